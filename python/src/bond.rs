@@ -1,4 +1,4 @@
-//! A bond law of Python: sampled once, by polynomials from there on.
+//! Bond laws in Python: sampled once, then evaluated as polynomials.
 
 use crate::error::value;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
@@ -7,13 +7,13 @@ use pyo3::prelude::*;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// Panels below and above rest, which is the end of one.
+/// Number of panels below and above rest, which is the end of one.
 const PANELS: usize = 128;
 
 /// Degree of the polynomial of a panel.
 const DEGREE: usize = 10;
 
-/// t(l)/kθ on panels, each by its values at the points of Chebyshev–Lobatto.
+/// Tension t(l)/kθ on panels, each by its values at the Chebyshev–Lobatto points.
 pub struct Sampled {
     /// Ends of the panels, l.
     ends: Vec<f64>,
@@ -22,7 +22,7 @@ pub struct Sampled {
     stress_free: bool,
 }
 
-/// Points of a panel from −1 to 1.
+/// Points of a panel, from −1 to 1.
 fn nodes() -> [f64; DEGREE + 1] {
     std::array::from_fn(|k| -(PI * k as f64 / DEGREE as f64).cos())
 }
@@ -38,8 +38,8 @@ fn node(ends: &[f64], panel: usize, at: f64) -> f64 {
     0.5 * ((1.0 - at) * ends[panel] + (1.0 + at) * ends[panel + 1])
 }
 
-/// D of Lobatto's points: the derivative of the polynomial at the points from its values (Trefethen 2000, Spectral Methods in
-/// MATLAB, chapter 6).
+/// Differentiation matrix D of the Lobatto points: the derivative of the polynomial at the points from its
+/// values (Trefethen 2000, Spectral Methods in MATLAB, chapter 6).
 fn differentiation() -> [[f64; DEGREE + 1]; DEGREE + 1] {
     let x = nodes();
     let c = |k: usize| {
@@ -57,8 +57,8 @@ fn differentiation() -> [[f64; DEGREE + 1]; DEGREE + 1] {
     d
 }
 
-/// The polynomial through values at the points, by the barycentric formula (Berrut and Trefethen 2004,
-/// doi:10.1137/S0036144502417715).
+/// Evaluates the polynomial through values at the points, by the barycentric formula (Berrut and Trefethen
+/// 2004, doi:10.1137/S0036144502417715).
 fn interpolate(values: &[f64; DEGREE + 1], at: f64) -> f64 {
     let (mut above, mut below) = (0.0, 0.0);
     for (k, (x, value)) in nodes().into_iter().zip(values).enumerate() {
@@ -88,7 +88,7 @@ impl Sampled {
         let stiff = points[PANELS][1][0].abs();
         let mut law = Self { ends, points, stress_free: rest.abs() <= 1e-12 * stiff };
         if law.stress_free {
-            // what is left at rest is rounding
+            // the remainder at rest is rounding
             law.points[PANELS][0][0] = 0.0;
             law.points[PANELS - 1][0][DEGREE] = 0.0;
         }
@@ -96,7 +96,8 @@ impl Sampled {
         law
     }
 
-    /// The energies at the points, from 0 at rest outwards: Gauss' rule of six points between neighbours is exact.
+    /// Integrates the energies at the points, from 0 at rest outwards: Gauss' rule of six points between
+    /// neighbours is exact.
     fn integrate(&mut self) {
         const GAUSS: [[f64; 2]; 6] = [
             [-0.932_469_514_203_152, 0.171_324_492_379_170_36],
@@ -134,13 +135,14 @@ impl Sampled {
         }
     }
 
-    /// Tension (0), its derivative (1) or the energy (2) at a stretch; beyond the samples along the tangent at their end.
-    fn at(&self, what: usize, stretch: f64) -> f64 {
+    /// Returns tension (0), its derivative (1) or the energy (2) at a stretch; beyond the samples along the
+    /// tangent at their end.
+    fn value(&self, what: usize, stretch: f64) -> f64 {
         let (low, high) = (self.ends[0], self.ends[2 * PANELS]);
         let inside = stretch.clamp(low, high);
         let panel = self.ends.partition_point(|end| *end <= inside).saturating_sub(1).min(2 * PANELS - 1);
         let (a, b) = (self.ends[panel], self.ends[panel + 1]);
-        // both differences: digits beside both ends, one of which may be rest
+        // both differences keep digits beside both ends, one of which may be rest
         let at = ((inside - a) - (b - inside)) / (b - a);
         let value = |what: usize| interpolate(&self.points[panel][what], at);
         let beyond = stretch - inside;
@@ -155,32 +157,32 @@ impl Sampled {
 
 impl BondPotential for Sampled {
     fn tension(&self, stretch: f64) -> f64 {
-        self.at(0, stretch)
+        self.value(0, stretch)
     }
     fn tension_derivative(&self, stretch: f64) -> f64 {
-        self.at(1, stretch)
+        self.value(1, stretch)
     }
     fn energy(&self, stretch: f64) -> f64 {
-        self.at(2, stretch)
+        self.value(2, stretch)
     }
     fn is_stress_free(&self) -> bool {
         self.stress_free
     }
 }
 
-/// A bond law from samples of t/kθ.
+/// Bond law from samples of t/kθ.
 #[pyclass(frozen, module = "polymech._polymech")]
 pub struct BondLaw {
     low: f64,
     high: f64,
     tension: Vec<f64>,
-    /// The law.
+    /// Creates the law for the solver.
     pub law: Arc<Sampled>,
 }
 
 #[pymethods]
 impl BondLaw {
-    /// Of the tensions at [`Self::stretches`].
+    /// Creates a law from the tensions at [`Self::stretches`].
     #[new]
     fn new(low: f64, high: f64, tension: PyReadonlyArray1<'_, f64>) -> PyResult<Self> {
         let stretches = stretches(low, high)?;
@@ -213,14 +215,14 @@ impl BondLaw {
         Ok(stretches(low, high)?.into_pyarray(py))
     }
 
-    /// Tension, its derivative and energy at stretches.
+    /// Computes tension, its derivative and energy at stretches.
     fn evaluate<'py>(
         &self,
         py: Python<'py>,
         stretch: PyReadonlyArray1<'py, f64>,
     ) -> PyResult<[Bound<'py, PyArray1<f64>>; 3]> {
         let stretch = stretch.as_slice()?;
-        let each = |what: usize| stretch.iter().map(|&l| self.law.at(what, l)).collect::<Vec<f64>>();
+        let each = |what: usize| stretch.iter().map(|&l| self.law.value(what, l)).collect::<Vec<f64>>();
         Ok([0, 1, 2].map(|what| each(what).into_pyarray(py)))
     }
 }

@@ -1,4 +1,4 @@
-//! Errors as exceptions.
+//! Exceptions from errors.
 
 use harness::case::Fault;
 use harness::scene::Failure;
@@ -10,7 +10,8 @@ pyo3::create_exception!(
     polymech,
     SceneError,
     PyValueError,
-    "A fault in a scene. The text has the lines of the scene with a caret; `key` is the path of the key, `line` its line."
+    "A fault in a scene. The text has the lines of the scene with a caret; `key` is the path of the key, \
+     `line` its line."
 );
 pyo3::create_exception!(
     polymech,
@@ -22,22 +23,22 @@ pyo3::create_exception!(
     polymech,
     Interrupted,
     RunError,
-    "A run that was stopped. Its checkpoint is in the folder `output`, from which `resume` continues."
+    "A run that was stopped. Its checkpoint is in the folder `output`; `resume` continues it."
 );
 
-/// The exception of a run that ended with a failure; `output` is its folder.
+/// Creates the exception of a run that failed; `output` is its folder.
 pub fn failure<E: Fault>(py: Python<'_>, failure: Failure<E>, output: &Path) -> PyErr {
     match failure {
         Failure::Scene(error) => {
             let plain = error.plain();
-            // the message stands before the picture already
+            // the message above the source excerpt
             let picture = plain.find("╭─").and_then(|at| plain[..at].rfind('\n')).map(|at| &plain[at + 1..]);
             let raised = SceneError::new_err(match picture {
                 Some(picture) => format!("{}\n{picture}", error.message()),
                 None => plain,
             });
             let value = raised.value(py);
-            // an exception takes attributes
+            // an exception can have attributes
             let _ = value.setattr("key", error.key()).and_then(|()| value.setattr("line", error.line()));
             raised
         }
@@ -53,7 +54,7 @@ pub fn failure<E: Fault>(py: Python<'_>, failure: Failure<E>, output: &Path) -> 
     }
 }
 
-/// The exception of an error of one of the crates: `ValueError` for bad input.
+/// Converts an error of one of the crates: `ValueError` for bad input.
 pub fn fault<E: Fault>(error: &E) -> PyErr {
     match error.exit_code() {
         2 => PyValueError::new_err(error.to_string()),
@@ -61,12 +62,13 @@ pub fn fault<E: Fault>(error: &E) -> PyErr {
     }
 }
 
-/// A `ValueError`: of laws, fits and parameters.
+/// Creates a `ValueError`, for laws, fits and parameters.
 pub fn value(error: impl ToString) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-/// The exception of a file that cannot be read: `OSError` where the system refuses it, else `ValueError`.
+/// Creates the exception of a file that cannot be read: `OSError` if the system refuses it, else
+/// `ValueError`.
 pub fn file(error: &polycore::Error) -> PyErr {
     match error {
         polycore::Error::Io { .. } => PyOSError::new_err(error.to_string()),

@@ -7,8 +7,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
 
-/// What a file holds: `times`, `points` (a number), `arrays` and `cell_arrays` (names and components), and of a mesh
-/// `connectivity`, `ends`, `types`.
+/// Content of a file: `times`, `points` (a number), `arrays` and `cell_arrays` (names and components), and
+/// for a mesh `connectivity`, `ends`, `types`.
 #[pyfunction]
 pub fn layout(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
     let series = vtkhdf::read(&path).map_err(|error| file(&error))?;
@@ -26,8 +26,8 @@ pub fn layout(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
     Ok(found)
 }
 
-/// An array at some steps, (steps, places, components), or (steps, places) of scalars: of `point`s, of `cell`s, or the
-/// `position`s.
+/// Reads an array at some steps, (steps, places, components), or (steps, places) for scalars: of `point`s, of
+/// `cell`s, or the `position`s.
 #[pyfunction]
 pub fn field<'py>(
     py: Python<'py>,

@@ -5,7 +5,7 @@ use crate::pool;
 use crate::watch::stoppable;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use polycore::constitutive::Error;
-use polycore::constitutive::hyperelastic::data::{Mode, State, Table};
+use polycore::constitutive::hyperelastic::data::{Mode, TestData, TestState};
 use polycore::constitutive::hyperelastic::{
     self, Compressible, Coupling, Hyperelastic, MODELS, Volumetric, fit, homogeneous,
 };
@@ -16,13 +16,13 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 use std::sync::atomic::Ordering;
 
-/// From so many numbers on they are shared out to threads.
-const MANY: usize = 1 << 14;
+/// Least number of values that are distributed to threads.
+const PARALLEL_FROM: usize = 1 << 14;
 
-/// Numbers that a thread takes at once.
+/// Number of values that a thread computes at once.
 const CHUNK: usize = 1 << 12;
 
-/// A function of Langevin statistics at each number; `method` is the inverse.
+/// Evaluates a function of Langevin statistics at each number; `method` is the inverse.
 #[pyfunction]
 pub fn langevin<'py>(
     py: Python<'py>,
@@ -36,43 +36,43 @@ pub fn langevin<'py>(
     })?;
     let x = x.as_slice()?;
     let work = || match function {
-        "langevin" => Some(each(x, chain::langevin)),
-        "derivative" => Some(each(x, chain::derivative)),
-        "free_energy" => Some(each(x, chain::free_energy)),
-        "inverse" => Some(each(x, |x| known.value(x))),
-        "inverse_derivative" => Some(each(x, |x| known.derivative(x))),
+        "langevin" => Some(evaluate(x, chain::langevin)),
+        "derivative" => Some(evaluate(x, chain::derivative)),
+        "free_energy" => Some(evaluate(x, chain::free_energy)),
+        "inverse" => Some(evaluate(x, |x| known.value(x))),
+        "inverse_derivative" => Some(evaluate(x, |x| known.derivative(x))),
         _ => None,
     };
-    let found = py.detach(|| pool::here(work))?;
+    let found = py.detach(|| pool::in_pool(work))?;
     found.map(|found| found.into_pyarray(py)).ok_or_else(|| value(format!("no function {function}")))
 }
 
-fn each(x: &[f64], function: impl Fn(f64) -> f64 + Sync) -> Vec<f64> {
-    if x.len() < MANY {
+fn evaluate(x: &[f64], function: impl Fn(f64) -> f64 + Sync) -> Vec<f64> {
+    if x.len() < PARALLEL_FROM {
         return x.iter().map(|&x| function(x)).collect();
     }
     x.par_iter().with_min_len(CHUNK).map(|&x| function(x)).collect()
 }
 
-/// Name, source and published error, in per cent, of each inverse.
+/// Lists name, source and published error, in per cent, of each inverse.
 #[pyfunction]
 pub fn langevin_methods() -> Vec<(&'static str, &'static str, Option<&'static str>)> {
     Inverse::ALL.iter().map(|one| (one.name(), one.source(), one.published_error())).collect()
 }
 
 /// Name, unit and example value.
-type Parameter = (&'static str, &'static str, f64);
+type ParameterRow = (&'static str, &'static str, f64);
 
-/// Name of each law, and name, unit and example value of each of its parameters.
+/// Lists each law, with name, unit and example value of each of its parameters.
 #[pyfunction]
-pub fn models() -> Vec<(&'static str, Vec<Parameter>)> {
+pub fn models() -> Vec<(&'static str, Vec<ParameterRow>)> {
     let parameters = |model: &hyperelastic::ModelDescriptor| {
         model.parameters.iter().zip(model.example).map(|(p, &example)| (p.name, p.unit, example)).collect()
     };
     MODELS.iter().map(|model| (model.key, parameters(model))).collect()
 }
 
-/// A hyperelastic law of Chapter 1.
+/// Hyperelastic law of Chapter 1.
 #[pyclass(frozen, module = "polymech._polymech")]
 pub struct Law {
     key: String,
@@ -134,7 +134,7 @@ impl Law {
         self.law.shear_modulus()
     }
 
-    /// Nominal stresses P₁, P₂, (N, 2), of an incompressible sheet stretched to λ₁, λ₂.
+    /// Computes nominal stresses P₁, P₂, (N, 2), of an incompressible sheet stretched to λ₁, λ₂.
     fn biaxial<'py>(
         &self,
         py: Python<'py>,
@@ -149,8 +149,8 @@ impl Law {
         found.into_iter().flatten().collect::<Vec<_>>().into_pyarray(py).reshape([count, 2])
     }
 
-    /// W, (N, 1), P, σ or S, (N, 9), at each F, (N, 9).
-    fn of_gradient<'py>(
+    /// Computes W, (N, 1), P, σ or S, (N, 9), at each F, (N, 9).
+    fn at_gradient<'py>(
         &self,
         py: Python<'py>,
         what: &str,
@@ -189,7 +189,7 @@ impl Law {
     }
 }
 
-/// Evaluates a function at `count` points, on all threads where there are many; returns the first error.
+/// Evaluates a function at `count` points, on all threads if there are many; returns the first error.
 fn points<T: Send>(
     py: Python<'_>,
     count: usize,
@@ -206,7 +206,7 @@ fn points<T: Send>(
     found.map_err(value)
 }
 
-/// The best fit of a law to nominal stresses: P₁ at λ₁ of a `mode`, or (P₁, P₂) at (λ₁, λ₂) of `biaxial` rows.
+/// Fits a law to nominal stresses: P₁ at λ₁ of a `mode`, or (P₁, P₂) at (λ₁, λ₂) of `biaxial` rows.
 #[pyfunction]
 pub fn fit_law<'py>(
     py: Python<'py>,
@@ -222,9 +222,9 @@ pub fn fit_law<'py>(
         for row in rows.as_array().rows() {
             let state = match (mode, row.as_slice()) {
                 (Mode::Biaxial, Some(&[first, second, p, q])) => {
-                    State { mode, stretches: [first, second], nominal: [p, q] }
+                    TestState { mode, stretches: [first, second], nominal: [p, q] }
                 }
-                (_, Some(&[stretch, nominal])) if mode != Mode::Biaxial => State {
+                (_, Some(&[stretch, nominal])) if mode != Mode::Biaxial => TestState {
                     mode,
                     stretches: [stretch, mode.second_stretch(stretch)],
                     nominal: [nominal, 0.0],
@@ -240,7 +240,7 @@ pub fn fit_law<'py>(
             states.push(state);
         }
     }
-    let table = Table { source: String::new(), states };
+    let table = TestData { source: String::new(), states };
     let model = hyperelastic::model(key).map_err(value)?;
     let found = stoppable(py, |stop| fit::fit_until(model, &table, &|| stop.load(Ordering::Relaxed)))?;
     let found = found.map_err(value)?;

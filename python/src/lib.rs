@@ -1,9 +1,10 @@
 //! `polymech._polymech`: the crates of this workspace as a Python module, in plain arrays and texts.
 //!
-//! The package `polymech` in `python/package` is what users see: shapes of arrays, names, pictures and docstrings are there. Here
-//! is what needs Rust: scenes run as the command lines run them ([`scenes`]), fields of VTKHDF files ([`fields`]), laws at many
-//! points ([`laws`], [`surrogates`], by [`predict`]), models of `peri` ([`model`], [`bond`]) and the material of `crystfem` at a
-//! point ([`point`]). Work is done without the interpreter's lock; [`watch`] lets signals and Python's functions in.
+//! Users see the package `polymech` in `python/package`: shapes of arrays, names, pictures and docstrings are
+//! there. This module contains the parts that need Rust: runs of scenes ([`scenes`]), fields of VTKHDF files
+//! ([`fields`]), laws at many points ([`laws`], [`surrogates`], by [`predict`]), models of `peri` ([`model`],
+//! [`bond`]) and the material of `crystfem` at a point ([`point`]). Work releases the interpreter's lock;
+//! [`watch`] handles signals and calls Python's functions.
 
 use pyo3::prelude::*;
 
@@ -32,7 +33,7 @@ mod _polymech {
         model::Simulation,
         point::{course, fit_kinetics},
         scenes::{check, resume, run, schema, sweep, view},
-        surrogates::Surrogate,
+        surrogates::LearntLaw,
     };
 
     #[pymodule_init]

@@ -1,9 +1,9 @@
-//! Models of `peri` in a few lines of Python.
+//! Models of `peri`, described in a few lines of Python.
 
 use crate::bond::BondLaw;
 use crate::error::{fault, value};
 use crate::pool;
-use crate::watch::{Line, Watchers, watched};
+use crate::watch::{RunLink, Watchers, watched};
 use harness::case::{Fault, Step, StepField};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray1};
 use peri::Error;
@@ -14,24 +14,25 @@ use peri::geometry::{Cut, Shape};
 use peri::material::BondMaterial;
 use peri::model::{self, Body, Model, Rubber};
 use peri::potential::Law;
-use peri::solver::{DynamicRelaxation, Lbfgs, Record, State, Status, Support, VelocityVerlet};
-use peri::stress::{self, Measure, Tensor};
+use peri::solver::{DynamicRelaxation, Lbfgs, State, Status, StepRecord, Support, VelocityVerlet};
+use peri::stress::{self, StressMethod, StressTensor};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::HashMap;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
-/// A function of all positions, (N, D); displacement and body force of the points that it takes.
-type Load = (Py<PyAny>, Vec<Option<f64>>, Vec<f64>);
+/// Prescribed region: a function that selects positions, (N, D); displacement and body force of the selected
+/// points.
+type PrescribedRegion = (Py<PyAny>, Vec<Option<f64>>, Vec<f64>);
 
-/// A model as Python describes it; lengths in m.
+/// Model as described in Python; lengths in m.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct Spec {
-    /// `add` or `cut`, the kind, its numbers.
+pub struct SimulationSpec {
+    /// `add` or `cut`, the shape, its numbers.
     shapes: Vec<(String, String, Vec<f64>)>,
-    /// Two ends in a plane; in space a corner and two edges.
+    /// Two ends of a crack in a plane; in space a corner and two edges.
     cracks: Vec<Vec<f64>>,
     spacing: f64,
     horizon: f64,
@@ -46,48 +47,49 @@ pub struct Spec {
     critical_stretch: Option<f64>,
     fracture_energy: Option<f64>,
     convention: String,
-    regions: Vec<Load>,
+    regions: Vec<PrescribedRegion>,
     steps: usize,
     contact: Option<f64>,
 }
 
-/// Method and settings.
+/// Solution method with its settings.
 #[derive(Clone, Copy)]
-enum Solver {
+enum SolutionMethod {
     Lbfgs(Lbfgs),
     Relaxation(DynamicRelaxation),
     Verlet(VelocityVerlet),
 }
 
-/// A body in the plane or in space.
+/// Body in the plane or in space.
 trait AnyBody: Send + Sync {
     fn dimension(&self) -> usize;
-    fn solve(&mut self, method: Solver, line: &Line<'_>) -> Result<(), Error>;
+    fn solve(&mut self, method: SolutionMethod, line: &RunLink<'_>) -> Result<(), Error>;
     fn positions(&self) -> Vec<f64>;
     fn displacements(&self) -> Vec<f64>;
     fn set_velocity(&mut self, velocity: &[f64]);
     fn history(&self) -> Vec<(&'static str, &'static str, Vec<f64>)>;
-    fn stress(&self, which: &str, measure: Measure) -> Result<Vec<f64>, Error>;
+    fn stress(&self, which: &str, measure: StressMethod) -> Result<Vec<f64>, Error>;
     fn intact(&self) -> Vec<u32>;
     fn fragments(&self) -> usize;
     fn extend(&mut self, factors: Vec<f64>);
 }
 
-type Built<const D: usize> = model::Simulation<D, BondMaterial<'static>>;
+type BondSimulation<const D: usize> = model::Simulation<D, BondMaterial<'static>>;
 
-fn stopped() -> Error {
+fn interruption() -> Error {
     Error::Shared(polycore::Error::Interrupted { program: "peri", output: Default::default() })
 }
 
-impl<const D: usize> AnyBody for Built<D> {
+impl<const D: usize> AnyBody for BondSimulation<D> {
     fn dimension(&self) -> usize {
         D
     }
 
-    fn solve(&mut self, method: Solver, line: &Line<'_>) -> Result<(), Error> {
+    fn solve(&mut self, method: SolutionMethod, line: &RunLink<'_>) -> Result<(), Error> {
         let sites: Vec<usize> = self.bonds.particles().iter().map(|&site| site as usize).collect();
         let positions = line.wants_steps().then(|| self.positions());
-        let watch = |_: &Status| if line.stop().load(Ordering::Relaxed) { Err(stopped()) } else { Ok(()) };
+        let watch =
+            |_: &Status| if line.stop().load(Ordering::Relaxed) { Err(interruption()) } else { Ok(()) };
         let finished = |state: &State<D>| {
             let (Some(positions), Some(record)) = (&positions, state.history.last()) else { return Ok(()) };
             if state.control.round > 0 {
@@ -96,24 +98,24 @@ impl<const D: usize> AnyBody for Built<D> {
             let field = |name, data| StepField { name, unit: "m", components: D, data };
             let displacement = sites.iter().flat_map(|&site| state.displacement.get(site)).collect();
             let step = Step {
-                values: Record::SCALARS.map(|(name, unit, get)| (name, unit, get(record))).to_vec(),
+                values: StepRecord::SCALARS.map(|(name, unit, get)| (name, unit, get(record))).to_vec(),
                 fields: vec![field("position", positions.clone()), field("displacement", displacement)],
             };
-            if line.step(step) { Ok(()) } else { Err(stopped()) }
+            if line.step(step) { Ok(()) } else { Err(interruption()) }
         };
         match method {
-            Solver::Lbfgs(method) => self.solve_watched(method, watch, finished),
-            Solver::Relaxation(method) => self.solve_watched(method, watch, finished),
-            Solver::Verlet(method) => self.solve_watched(method, watch, finished),
+            SolutionMethod::Lbfgs(method) => self.solve_watched(method, watch, finished),
+            SolutionMethod::Relaxation(method) => self.solve_watched(method, watch, finished),
+            SolutionMethod::Verlet(method) => self.solve_watched(method, watch, finished),
         }
     }
 
     fn positions(&self) -> Vec<f64> {
-        Built::displacements(self).flat_map(|(position, _)| position).collect()
+        BondSimulation::displacements(self).flat_map(|(position, _)| position).collect()
     }
 
     fn displacements(&self) -> Vec<f64> {
-        Built::displacements(self).flat_map(|(_, displacement)| displacement).collect()
+        BondSimulation::displacements(self).flat_map(|(_, displacement)| displacement).collect()
     }
 
     fn set_velocity(&mut self, velocity: &[f64]) {
@@ -124,12 +126,12 @@ impl<const D: usize> AnyBody for Built<D> {
     }
 
     fn history(&self) -> Vec<(&'static str, &'static str, Vec<f64>)> {
-        let rows = Built::history(self);
-        Record::SCALARS.map(|(name, unit, get)| (name, unit, rows.iter().map(get).collect())).to_vec()
+        let rows = BondSimulation::history(self);
+        StepRecord::SCALARS.map(|(name, unit, get)| (name, unit, rows.iter().map(get).collect())).to_vec()
     }
 
-    fn stress(&self, which: &str, measure: Measure) -> Result<Vec<f64>, Error> {
-        let flat = |tensors: Vec<Tensor<D>>| tensors.into_iter().flatten().flatten().collect();
+    fn stress(&self, which: &str, measure: StressMethod) -> Result<Vec<f64>, Error> {
+        let flat = |tensors: Vec<StressTensor<D>>| tensors.into_iter().flatten().flatten().collect();
         Ok(match which {
             "piola" => flat(self.piola(measure)?),
             "deformation" => flat(stress::deformation_gradients(&self.bonds, &self.state.displacement)),
@@ -147,7 +149,7 @@ impl<const D: usize> AnyBody for Built<D> {
     }
 
     fn fragments(&self) -> usize {
-        Built::fragments(self)
+        BondSimulation::fragments(self)
     }
 
     fn extend(&mut self, factors: Vec<f64>) {
@@ -155,7 +157,7 @@ impl<const D: usize> AnyBody for Built<D> {
     }
 }
 
-/// A model that is built: particles, bonds and state.
+/// Model with particles, bonds and state.
 #[pyclass(module = "polymech._polymech")]
 pub struct Simulation {
     body: Box<dyn AnyBody>,
@@ -165,13 +167,13 @@ pub struct Simulation {
 #[pymethods]
 impl Simulation {
     #[new]
-    fn new(py: Python<'_>, spec: Spec) -> PyResult<Self> {
+    fn new(py: Python<'_>, spec: SimulationSpec) -> PyResult<Self> {
         let sampled = match spec.law.bind(py).cast::<BondLaw>() {
             Ok(law) => Some(law.get().law.clone()),
             Err(_) => None,
         };
         let named = if sampled.is_none() { Some(spec.law.extract::<String>(py)?) } else { None };
-        // what a region of Python raised
+        // an exception of a region's function
         let raised = Arc::new(Mutex::new(None));
         let built = py.detach(|| match spec.space.as_str() {
             "solid" => build::<3>(spec, sampled, named, &raised),
@@ -184,7 +186,7 @@ impl Simulation {
         Ok(Self { whole: body.intact(), body })
     }
 
-    /// Solves what is left of the load steps; `False` where `on_step` stopped it.
+    /// Solves the remaining load steps; returns `False` if `on_step` stopped it.
     #[pyo3(signature = (method, settings, threads, on_step))]
     fn solve(
         &mut self,
@@ -194,7 +196,7 @@ impl Simulation {
         threads: Option<usize>,
         on_step: Option<Py<PyAny>>,
     ) -> PyResult<bool> {
-        let method = solver(method, settings)?;
+        let method = parse_method(method, settings)?;
         let watchers = Watchers { progress: None, on_step };
         let body = &mut self.body;
         match watched(py, &watchers, threads, |line| body.solve(method, &line))? {
@@ -227,7 +229,7 @@ impl Simulation {
         self.vectors(py, self.body.displacements())
     }
 
-    /// Name and unit of each column, and its values, a row for each step.
+    /// Returns name and unit of each column, and its values, a row for each step.
     fn history<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let columns = PyDict::new(py);
         for (name, unit, values) in self.body.history() {
@@ -236,25 +238,25 @@ impl Simulation {
         Ok(columns)
     }
 
-    /// `cauchy` or `piola` stress, Pa, or the `deformation` gradient, (N, D, D).
+    /// Computes `cauchy` or `piola` stress, Pa, or the `deformation` gradient, (N, D, D).
     fn tensors<'py>(
         &self,
         py: Python<'py>,
         which: &str,
         measure: &str,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let known = Measure::ALL.into_iter().find(|one| one.name() == measure).ok_or_else(|| {
-            let names: Vec<&str> = Measure::ALL.iter().map(|one| one.name()).collect();
+        let known = StressMethod::ALL.into_iter().find(|one| one.name() == measure).ok_or_else(|| {
+            let names: Vec<&str> = StressMethod::ALL.iter().map(|one| one.name()).collect();
             value(format!("measure: found {measure:?}; allowed: {}", names.join(", ")))
         })?;
         let found =
-            py.detach(|| pool::here(|| self.body.stress(which, known)))?.map_err(|error| fault(&error))?;
+            py.detach(|| pool::in_pool(|| self.body.stress(which, known)))?.map_err(|error| fault(&error))?;
         let d = self.body.dimension();
         let count = found.len() / (d * d);
         found.into_pyarray(py).reshape(vec![count, d, d])
     }
 
-    /// The part of its bonds that each particle has lost.
+    /// Share of its bonds that each particle has lost.
     fn damage<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let now = self.body.intact();
         let lost =
@@ -275,7 +277,7 @@ impl Simulation {
     }
 }
 
-/// A shape of a kind and numbers.
+/// Creates a shape from its name and numbers.
 fn shape<const D: usize>(kind: &str, numbers: &[f64]) -> PyResult<Shape<D>> {
     let vector = |from: usize| -> [f64; D] { std::array::from_fn(|d| numbers[from + d]) };
     match (kind, numbers.len()) {
@@ -294,13 +296,13 @@ fn shape<const D: usize>(kind: &str, numbers: &[f64]) -> PyResult<Shape<D>> {
 }
 
 fn build<const D: usize>(
-    spec: Spec,
+    spec: SimulationSpec,
     sampled: Option<Arc<crate::bond::Sampled>>,
     named: Option<String>,
     raised: &Arc<Mutex<Option<PyErr>>>,
 ) -> PyResult<Box<dyn AnyBody>>
 where
-    Body<D>: Placed,
+    Body<D>: InSpace,
 {
     let mut shapes = spec.shapes.iter();
     let Some((_, kind, numbers)) = shapes.next() else { return Err(value("a body needs a shape")) };
@@ -315,10 +317,10 @@ where
     if spec.partial_volumes {
         body = body.volume_correction(VolumeCorrection::Linear);
     }
-    let body = body.placed(&spec.space, spec.thickness)?;
+    let body = body.in_space(&spec.space, spec.thickness)?;
     let calibration = if spec.lattice_calibration { Calibration::Lattice } else { Calibration::Continuum };
     let rubber = match (sampled, named) {
-        (Some(law), _) => Rubber::of_law(law, spec.youngs_modulus),
+        (Some(law), _) => Rubber::with_law(law, spec.youngs_modulus),
         (None, name) => {
             let name = name.unwrap_or_default();
             let law = Law::ALL.into_iter().find(|law| law.name() == name).ok_or_else(|| {
@@ -356,7 +358,7 @@ where
         };
         let raised = raised.clone();
         let inside = move |points: &[[f64; D]]| {
-            asked(&region, points).map_err(|error| {
+            select_points(&region, points).map_err(|error| {
                 if let Ok(mut raised) = raised.lock() {
                     raised.get_or_insert(error);
                 }
@@ -368,8 +370,8 @@ where
     model.build().map(|built| Box::new(built) as Box<dyn AnyBody>).map_err(|error| fault(&error))
 }
 
-/// Which points a function of Python takes.
-fn asked<const D: usize>(region: &Py<PyAny>, points: &[[f64; D]]) -> PyResult<Vec<bool>> {
+/// Selects the points for which a function of Python returns true.
+fn select_points<const D: usize>(region: &Py<PyAny>, points: &[[f64; D]]) -> PyResult<Vec<bool>> {
     Python::attach(|py| {
         let flat: Vec<f64> = points.iter().flatten().copied().collect();
         let points = flat.into_pyarray(py).reshape([points.len(), D])?;
@@ -383,7 +385,7 @@ fn cut<const D: usize>(numbers: &[f64]) -> PyResult<Cut<D>> {
         return Err(value(format!("crack: found {} numbers; allowed: {}", numbers.len(), D * D)));
     }
     let vector = |from: usize| -> [f64; D] { std::array::from_fn(|d| numbers[from + d]) };
-    // in a plane its other end, in space its edges
+    // the other end in a plane, the edges in space
     let edge = |k: usize| match D {
         2 if k == 0 => std::array::from_fn(|d| numbers[2 + d] - numbers[d]),
         2 => [0.0; D],
@@ -393,13 +395,13 @@ fn cut<const D: usize>(numbers: &[f64]) -> PyResult<Cut<D>> {
     Ok(Cut { corner: vector(0), edges: std::array::from_fn(edge) })
 }
 
-/// The space of a body.
-trait Placed: Sized {
-    fn placed(self, space: &str, thickness: f64) -> PyResult<Self>;
+/// Bodies of one dimension, placed in plane stress, plane strain or space.
+trait InSpace: Sized {
+    fn in_space(self, space: &str, thickness: f64) -> PyResult<Self>;
 }
 
-impl Placed for Body<2> {
-    fn placed(self, space: &str, thickness: f64) -> PyResult<Self> {
+impl InSpace for Body<2> {
+    fn in_space(self, space: &str, thickness: f64) -> PyResult<Self> {
         match space {
             "plane-stress" => Ok(self.plane_stress(thickness)),
             "plane-strain" => Ok(self.plane_strain(thickness)),
@@ -408,19 +410,19 @@ impl Placed for Body<2> {
     }
 }
 
-impl Placed for Body<3> {
-    fn placed(self, _: &str, _: f64) -> PyResult<Self> {
+impl InSpace for Body<3> {
+    fn in_space(self, _: &str, _: f64) -> PyResult<Self> {
         Ok(self)
     }
 }
 
-/// A method by its name, with some of its settings.
-fn solver(name: &str, mut settings: HashMap<String, f64>) -> PyResult<Solver> {
+/// Creates a method from its name and some of its settings.
+fn parse_method(name: &str, mut settings: HashMap<String, f64>) -> PyResult<SolutionMethod> {
     let mut take = |name: &str, default: f64| settings.remove(name).unwrap_or(default);
     let method = match name {
         "lbfgs" => {
             let own = Lbfgs::default();
-            Solver::Lbfgs(Lbfgs {
+            SolutionMethod::Lbfgs(Lbfgs {
                 tolerance: take("tolerance", 1e-4),
                 max_iterations: take("max_iterations", own.max_iterations as f64) as u64,
                 accept: take("accept", own.accept),
@@ -429,7 +431,7 @@ fn solver(name: &str, mut settings: HashMap<String, f64>) -> PyResult<Solver> {
         }
         "relaxation" => {
             let own = DynamicRelaxation::default();
-            Solver::Relaxation(DynamicRelaxation {
+            SolutionMethod::Relaxation(DynamicRelaxation {
                 tolerance: take("tolerance", own.tolerance),
                 max_iterations: take("max_iterations", own.max_iterations as f64) as u64,
                 accept: take("accept", own.accept),
@@ -438,7 +440,7 @@ fn solver(name: &str, mut settings: HashMap<String, f64>) -> PyResult<Solver> {
         }
         "verlet" => {
             let step = take("time_step", 0.0);
-            Solver::Verlet(VelocityVerlet {
+            SolutionMethod::Verlet(VelocityVerlet {
                 density: take("density", 1000.0),
                 time_step: (step > 0.0).then_some(step),
                 safety: take("safety", 0.8),
@@ -452,6 +454,6 @@ fn solver(name: &str, mut settings: HashMap<String, f64>) -> PyResult<Solver> {
     };
     match settings.keys().next() {
         None => Ok(method),
-        Some(other) => Err(value(format!("setting: found {other:?}, which `{name}` has not"))),
+        Some(other) => Err(value(format!("unexpected setting {other:?}: `{name}` has no such setting"))),
     }
 }

@@ -1,23 +1,23 @@
-//! The material of a print at a point, and its kinetics fitted.
+//! Material of a print at a point, and fits of its kinetics.
 
 use crate::error::fault;
 use crate::watch::left_alone;
-use crystfem::fit::{Fit, Known, Run, nakamura};
-use crystfem::history::History;
-use crystfem::kinetics::{Constants, Kinetics};
-use crystfem::material::{Polymer, Property, Semicrystalline, ThermalMaterial};
+use crystfem::fit::{FixedConstants, KineticFit, Run, nakamura};
+use crystfem::history::TemperatureHistory;
+use crystfem::kinetics::{KineticConstants, Kinetics};
+use crystfem::material::{Polymer, Semicrystalline, ThermalMaterial, ThermalProperty};
 use crystfem::melting::Melting;
-use crystfem::point::{Course, Drive, Stepping};
+use crystfem::point::{Drive, PointProcess, Stepping};
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// A polymer as Python describes it, SI.
+/// Polymer as described in Python, SI.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct Spec {
+pub struct MaterialPointSpec {
     density: f64,
-    /// Temperatures, K, none of a constant, and values.
+    /// Temperatures, K (none for a constant), and values.
     conductivity: (Vec<f64>, Vec<f64>),
     specific_heat: (Vec<f64>, Vec<f64>),
     /// K₀, K_G, U, T₀, T∞, n.
@@ -29,15 +29,15 @@ pub struct Spec {
     seed: f64,
 }
 
-impl Spec {
+impl MaterialPointSpec {
     fn polymer(self) -> Result<Semicrystalline, crystfem::Error> {
         let property = |name: &'static str, (temperatures, values): (Vec<f64>, Vec<f64>)| match values[..] {
-            [value] if temperatures.is_empty() => Property::constant(name, value),
-            _ => Property::table(name, temperatures, values),
+            [value] if temperatures.is_empty() => ThermalProperty::constant(name, value),
+            _ => ThermalProperty::table(name, temperatures, values),
         };
         let [growth_rate, nucleation, activation_energy, equilibrium_melting, frozen, avrami_exponent] =
             self.kinetics;
-        let constants = Constants {
+        let constants = KineticConstants {
             growth_rate,
             nucleation,
             activation_energy,
@@ -59,11 +59,12 @@ impl Spec {
     }
 }
 
-/// The material under a temperature history (s, K): columns `time`, `temperature`, `energy`, `rate` and its fields.
+/// Computes the material under a temperature history (s, K): columns `time`, `temperature`, `energy`, `rate`
+/// and its fields.
 #[pyfunction]
 pub fn course<'py>(
     py: Python<'py>,
-    material: Spec,
+    material: MaterialPointSpec,
     time: Vec<f64>,
     temperature: Vec<f64>,
     degree: f64,
@@ -71,9 +72,9 @@ pub fn course<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let solved = left_alone(py, move || {
         let material = material.polymer()?;
-        let drive = Drive::Prescribed(History::new(time, temperature)?);
+        let drive = Drive::Prescribed(TemperatureHistory::new(time, temperature)?);
         let stepping = Stepping::Adaptive { degree, kelvin };
-        let curves = Course { material: &material, drive, stepping }.run()?;
+        let curves = PointProcess { material: &material, drive, stepping }.run()?;
         Ok((curves, material.field_names()))
     })?;
     let (curves, names) = solved.map_err(|error: crystfem::Error| fault(&error))?;
@@ -89,7 +90,8 @@ pub fn course<'py>(
     Ok(columns)
 }
 
-/// Fits K₀, K_G and n to α along temperature histories (s, K) that begin in the melt, after a first row in it.
+/// Fits K₀, K_G and n to α along temperature histories (s, K) that begin in the melt, after a first row in
+/// it.
 #[pyfunction]
 pub fn fit_kinetics<'py>(
     py: Python<'py>,
@@ -97,7 +99,7 @@ pub fn fit_kinetics<'py>(
     known: [f64; 3],
 ) -> PyResult<Bound<'py, PyDict>> {
     let [equilibrium_melting, frozen, activation_energy] = known;
-    let known = Known { equilibrium_melting, frozen, activation_energy };
+    let known = FixedConstants { equilibrium_melting, frozen, activation_energy };
     let run = |[times, temperatures, degrees]: &[PyReadonlyArray1<'py, f64>; 3]| Run {
         times: times.as_array().to_vec(),
         temperatures: temperatures.as_array().to_vec(),
@@ -105,7 +107,7 @@ pub fn fit_kinetics<'py>(
         history: Vec::new(),
     };
     let runs: Vec<Run> = runs.iter().map(run).collect();
-    let Fit { estimates, draws, rms, measurements, evaluations, model } =
+    let KineticFit { estimates, draws, rms, measurements, evaluations, model } =
         left_alone(py, move || nakamura(&runs, &known))?.map_err(|error| fault(&error))?;
     let answer = PyDict::new(py);
     let rows: Vec<_> =

@@ -1,24 +1,24 @@
-//! Threads of this process: a process forked from one that has computed has none of its parent's.
+//! Threads of this process: a forked process inherits none from its parent.
 
 use pyo3::PyResult;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The process that loaded the module; rayon's own threads belong to it.
+/// Process that loaded the module; rayon's own threads belong to it.
 static LOADED_IN: AtomicU32 = AtomicU32::new(0);
 
-/// The threads of a forked process, with its number.
+/// Threads of a forked process, with its process id.
 static FORKED: Mutex<Option<(u32, Arc<rayon::ThreadPool>)>> = Mutex::new(None);
 
-/// Marks this process as that which loaded the module.
+/// Marks this process as the one that loaded the module.
 pub fn loaded() {
     LOADED_IN.store(std::process::id(), Ordering::Relaxed);
 }
 
-/// Threads of its own in a process that was forked: none of rayon's would ever answer there.
+/// Creates threads in a forked process: rayon's own would never answer there.
 ///
 /// # Errors
-/// `ValueError` where the system gives no threads.
+/// `ValueError` if the system provides no threads.
 pub fn forked() -> PyResult<Option<Arc<rayon::ThreadPool>>> {
     let own = std::process::id();
     if own == LOADED_IN.load(Ordering::Relaxed) {
@@ -36,16 +36,16 @@ pub fn forked() -> PyResult<Option<Arc<rayon::ThreadPool>>> {
         ))
     })?;
     let pool = Arc::new(pool);
-    // that of a parent has no threads that could end
+    // the pool of the parent has no threads that could end
     std::mem::forget(kept.replace((own, pool.clone())));
     Ok(Some(pool))
 }
 
-/// Computes on threads that this process has.
+/// Runs work on threads of this process.
 ///
 /// # Errors
 /// As [`forked`].
-pub fn here<T: Send>(work: impl FnOnce() -> T + Send) -> PyResult<T> {
+pub fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> PyResult<T> {
     Ok(match forked()? {
         Some(pool) => pool.install(work),
         None => work(),

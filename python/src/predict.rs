@@ -1,4 +1,4 @@
-//! A law at many points: flat arrays in, flat arrays out, on all threads and without the interpreter's lock.
+//! Laws at many points: flat arrays in, flat arrays out, on all threads and without the interpreter's lock.
 
 use crate::watch::stoppable;
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray2};
@@ -10,56 +10,57 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Points that a thread takes at once.
+/// Number of points that a thread computes at once.
 const CHUNK: usize = 256;
 
-/// Places of the six components among the nine of a tensor, rows first.
+/// Indices of the six components among the nine of a tensor, row by row.
 const UPPER: [usize; 6] = [0, 4, 8, 1, 2, 5];
 
-/// And those of their mirror images.
+/// Indices of their mirror images.
 const LOWER: [usize; 6] = [0, 4, 8, 3, 6, 7];
 
-/// What is asked of a law at rows of `width` numbers.
+/// Options of a prediction at rows of `width` numbers.
 #[derive(Clone, Copy)]
-struct How {
+struct PredictOptions {
     width: usize,
     tangent: bool,
     uncertainty: bool,
-    /// Two entries of C may differ by this part of its largest.
+    /// Allowed asymmetry of C, relative to its largest entry.
     rounding: f64,
 }
 
-/// What a law predicts at N points.
+/// Predictions at N points.
 #[derive(Default)]
-struct Found {
+struct Predicted {
     stress: Vec<f64>,
     tangent: Vec<f64>,
     energy: Vec<f64>,
     spread: Vec<f64>,
     deviation: Vec<f64>,
-    /// 8 for each point: six components outside, far, spread.
+    /// Eight flags per point: six components outside, far, spread.
     flags: Vec<bool>,
     unseen: Vec<bool>,
 }
 
-/// What a thread fills.
-struct Part<'a> {
+/// Share of the output that a thread fills.
+struct OutputChunk<'a> {
     c: &'a [f64],
     stress: &'a mut [f64],
     tangent: Option<&'a mut [f64]>,
     energy: &'a mut [f64],
-    uncertainty: Option<Uncertainty<'a>>,
+    uncertainty: Option<UncertaintyChunk<'a>>,
 }
 
-struct Uncertainty<'a> {
+struct UncertaintyChunk<'a> {
     spread: &'a mut [f64],
     deviation: &'a mut [f64],
     flags: &'a mut [bool],
     unseen: &'a mut [bool],
 }
 
-/// `stress` (N, 6) in Pa, `tangent` (N, 6, 6) in Pa if asked for, `energy` (N) in J/m³ (NaN of a law without), and of a learnt law
-/// `spread` (N), `deviation` (N, 6), `outside` and `unseen` (N, 6), `far`, `disagree` (N), at the rows of C, (N, 6) or (N, 9). A C of nine is taken for symmetric where it is within
+/// Predicts `stress` (N, 6) in Pa, `tangent` (N, 6, 6) in Pa if requested, `energy` (N) in J/m³ (NaN for a
+/// law without), and for a learnt law `spread` (N), `deviation` (N, 6), `outside` and `unseen` (N, 6), `far`,
+/// `disagree` (N), at the rows of C, (N, 6) or (N, 9). A C of nine components counts as symmetric within
 /// `rounding` of its largest entry.
 pub fn predict<'py>(
     py: Python<'py>,
@@ -76,7 +77,7 @@ pub fn predict<'py>(
     let rows =
         c.as_slice().map_err(|_| PyValueError::new_err("C: found strides; allowed: contiguous rows"))?;
     let (count, width) = shape;
-    let how = How { width, tangent, uncertainty, rounding };
+    let how = PredictOptions { width, tangent, uncertainty, rounding };
     let found = match count <= CHUNK {
         true => py.detach(|| evaluate(law, rows, how, &AtomicBool::new(false))),
         false => stoppable(py, |stop| evaluate(law, rows, how, stop))?,
@@ -100,11 +101,12 @@ pub fn predict<'py>(
 fn evaluate(
     law: &dyn Law,
     rows: &[f64],
-    How { width, tangent, uncertainty, rounding }: How,
+    PredictOptions { width, tangent, uncertainty, rounding }: PredictOptions,
     stop: &AtomicBool,
-) -> Result<Found, String> {
+) -> Result<Predicted, String> {
     let count = rows.len() / width;
-    let mut found = Found { stress: vec![0.0; 6 * count], energy: vec![0.0; count], ..Found::default() };
+    let mut found =
+        Predicted { stress: vec![0.0; 6 * count], energy: vec![0.0; count], ..Predicted::default() };
     if tangent {
         found.tangent = vec![0.0; 36 * count];
     }
@@ -114,7 +116,7 @@ fn evaluate(
         found.flags = vec![false; 8 * count];
         found.unseen = vec![false; 6 * count];
     }
-    let mut parts: Vec<Part<'_>> = Vec::with_capacity(count.div_ceil(CHUNK));
+    let mut parts: Vec<OutputChunk<'_>> = Vec::with_capacity(count.div_ceil(CHUNK));
     let mut tangents = found.tangent.chunks_mut(36 * CHUNK);
     let mut spreads = found.spread.chunks_mut(CHUNK);
     let mut deviations = found.deviation.chunks_mut(6 * CHUNK);
@@ -124,14 +126,14 @@ fn evaluate(
     for ((c, stress), energy) in whole.zip(found.energy.chunks_mut(CHUNK)) {
         let uncertainty = match (spreads.next(), deviations.next(), flags.next(), unseen.next()) {
             (Some(spread), Some(deviation), Some(flags), Some(unseen)) => {
-                Some(Uncertainty { spread, deviation, flags, unseen })
+                Some(UncertaintyChunk { spread, deviation, flags, unseen })
             }
             _ => None,
         };
-        parts.push(Part { c, stress, tangent: tangents.next(), energy, uncertainty });
+        parts.push(OutputChunk { c, stress, tangent: tangents.next(), energy, uncertainty });
     }
     let fill = |memory: &mut (Workspace, Vec<Voigt>, Vec<Prediction>),
-                (number, part): (usize, &mut Part<'_>)| {
+                (number, part): (usize, &mut OutputChunk<'_>)| {
         if stop.load(Ordering::Relaxed) {
             return Err((number * CHUNK, "stopped".to_owned()));
         }
@@ -152,8 +154,8 @@ fn evaluate(
     }
 }
 
-impl Part<'_> {
-    /// Evaluates the points; the first that the law refuses, and why.
+impl OutputChunk<'_> {
+    /// Evaluates the points; returns the first error and its point.
     fn fill(
         &mut self,
         law: &dyn Law,
@@ -186,7 +188,7 @@ impl Part<'_> {
                 *prediction = law.tangent(c, memory).map_err(|error| told(point, error))?;
             }
         } else if law.stresses(points, memory, predictions).is_err() {
-            // one by one: which of them it is
+            // one by one, to find the point of the error
             for (point, (c, prediction)) in points.iter().zip(predictions.iter_mut()).enumerate() {
                 *prediction = law.stress(c, memory).map_err(|error| told(point, error))?;
             }

@@ -1,7 +1,7 @@
-//! Scenes, run as the command lines run them.
+//! Runs of scenes, as on the command lines.
 
 use crate::error::failure;
-use crate::watch::{Line, Watchers, left_alone, watched};
+use crate::watch::{RunLink, Watchers, left_alone, watched};
 use crystfem::program::run::Crystfem;
 use harness::case::{self, Case, Fault, Finished, Options, Part, Step, SweepOptions, Vary};
 use harness::checkpoint::Header;
@@ -21,15 +21,16 @@ macro_rules! of_program {
         match $program {
             "peri" => $function::<Peri>($($argument),*),
             "crystfem" => $function::<Crystfem>($($argument),*),
-            other => Err(PyValueError::new_err(format!("program: found {other:?}; allowed: \"peri\", \"crystfem\""))),
+            other => Err(PyValueError::new_err(format!("program: found {other:?}; allowed: \"peri\", \
+                \"crystfem\""))),
         }
     };
 }
 
-/// How a run behaves.
+/// Options of a run.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct Behaviour {
+pub struct RunOptions {
     output: PathBuf,
     quick: bool,
     checkpoint_every: f64,
@@ -39,7 +40,7 @@ pub struct Behaviour {
     on_step: Option<Py<PyAny>>,
 }
 
-impl Behaviour {
+impl RunOptions {
     fn watchers(&mut self) -> Watchers {
         Watchers { progress: self.progress.take(), on_step: self.on_step.take() }
     }
@@ -49,63 +50,63 @@ impl Behaviour {
     }
 }
 
-/// Runs a scene into a folder: the text of `report.json` and what the command line prints of it.
+/// Runs a scene into a folder; returns the text of `report.json` and the terminal output.
 #[pyfunction]
 pub fn run(
     py: Python<'_>,
     program: &str,
     text: String,
     path: PathBuf,
-    how: Behaviour,
+    how: RunOptions,
 ) -> PyResult<(String, String)> {
     of_program!(program, run_of(py, Source::new(path, text), how, false))
 }
 
-/// Continues a run that was stopped; of a finished one its report.
+/// Resumes a stopped run; for a finished run, returns its report.
 #[pyfunction]
-pub fn resume(py: Python<'_>, program: &str, how: Behaviour) -> PyResult<(String, String)> {
+pub fn resume(py: Python<'_>, program: &str, how: RunOptions) -> PyResult<(String, String)> {
     of_program!(program, resume_of(py, how))
 }
 
-fn resume_of<C: Case>(py: Python<'_>, how: Behaviour) -> PyResult<(String, String)> {
+fn resume_of<C: Case>(py: Python<'_>, how: RunOptions) -> PyResult<(String, String)> {
     let output = &how.output;
     let there = |name: &str| output.join(name).is_file();
     if !there(harness::checkpoint::FILE_NAME) && there(harness::report::FILE_NAME) {
         let report =
             Report::read(output.join(harness::report::FILE_NAME)).map_err(|e| crate::error::file(&e))?;
-        return told(&report.clone().into());
+        return describe(&report.clone().into());
     }
     let header = Header::read(output, C::PROGRAM.magic)
         .and_then(|header| header.check(output).map(|()| header))
         .map_err(|error| crate::error::fault(&error))?;
     let source = Source::new(header.scene_path, header.scene).with_inputs(header.stamp.inputs);
-    let how = Behaviour { quick: header.quick, ..how };
+    let how = RunOptions { quick: header.quick, ..how };
     run_of::<C>(py, source, how, true)
 }
 
 fn run_of<C: Case>(
     py: Python<'_>,
     source: Source,
-    mut how: Behaviour,
+    mut how: RunOptions,
     resume: bool,
 ) -> PyResult<(String, String)> {
     let (watchers, every) = (how.watchers(), how.every()?);
-    let Behaviour { output, quick, threads, inputs, .. } = &how;
+    let RunOptions { output, quick, threads, inputs, .. } = &how;
     let finished = watched(py, &watchers, *threads, |line| {
         let source = match resume {
             true => source,
             false => case::attached::<C::Error>(source, output, *quick, inputs, false)?,
         };
-        go::<C>(&source, output, (*quick, resume, every), line)
+        run_with::<C>(&source, output, (*quick, resume, every), line)
     })?;
-    told(&finished.map_err(|error| failure(py, error, output))?)
+    describe(&finished.map_err(|error| failure(py, error, output))?)
 }
 
-fn go<C: Case>(
+fn run_with<C: Case>(
     source: &Source,
     output: &Path,
     (quick, resume, checkpoint_every): (bool, bool, Duration),
-    mut line: Line<'_>,
+    mut line: RunLink<'_>,
 ) -> Result<Finished, Failure<C::Error>> {
     let stop = line.stop();
     let steps = line.steps();
@@ -123,7 +124,7 @@ fn go<C: Case>(
     case::run::<C>(source, options)
 }
 
-fn told(finished: &Finished) -> PyResult<(String, String)> {
+fn describe(finished: &Finished) -> PyResult<(String, String)> {
     let report = serde_json::to_string(&finished.report).map_err(crate::error::value)?;
     Ok((report, finished.text.clone()))
 }
@@ -135,13 +136,13 @@ pub fn check(
     program: &str,
     text: String,
     path: PathBuf,
-    how: Behaviour,
+    how: RunOptions,
 ) -> PyResult<Vec<String>> {
     of_program!(program, check_of(py, Source::new(path, text), how))
 }
 
-fn check_of<C: Case>(py: Python<'_>, source: Source, how: Behaviour) -> PyResult<Vec<String>> {
-    let Behaviour { output, quick, inputs, .. } = how;
+fn check_of<C: Case>(py: Python<'_>, source: Source, how: RunOptions) -> PyResult<Vec<String>> {
+    let RunOptions { output, quick, inputs, .. } = how;
     let place = output.clone();
     // a check writes nothing
     let lines = left_alone(py, move || {
@@ -160,7 +161,7 @@ pub fn sweep(
     path: PathBuf,
     vary: Vec<(String, Vec<String>)>,
     columns: Vec<String>,
-    how: Behaviour,
+    how: RunOptions,
 ) -> PyResult<(String, String)> {
     let vary: Vec<Vary> = vary.into_iter().map(|(key, values)| Vary { key, values, drawn: false }).collect();
     of_program!(program, sweep_of(py, Source::new(path, text), vary, columns, how))
@@ -171,11 +172,11 @@ fn sweep_of<C: Case>(
     source: Source,
     vary: Vec<Vary>,
     columns: Vec<String>,
-    mut how: Behaviour,
+    mut how: RunOptions,
 ) -> PyResult<(String, String)> {
     let (watchers, checkpoint_every) = (how.watchers(), how.every()?);
-    let Behaviour { output, quick, threads, inputs, .. } = &how;
-    let finished = watched(py, &watchers, *threads, |mut line: Line<'_>| {
+    let RunOptions { output, quick, threads, inputs, .. } = &how;
+    let finished = watched(py, &watchers, *threads, |mut line: RunLink<'_>| {
         let source = case::attached::<C::Error>(source, output, *quick, inputs, false)?;
         let stop = line.stop();
         let interrupted = &|| stop.load(Ordering::Relaxed);
@@ -195,22 +196,22 @@ fn sweep_of<C: Case>(
         };
         case::sweep::<C>(&source, &vary, &mut options)
     })?;
-    told(&finished.map_err(|error| failure(py, error, output))?)
+    describe(&finished.map_err(|error| failure(py, error, output))?)
 }
 
-/// The JSON Schema of a program's scenes.
+/// Returns the JSON Schema of a program's scenes.
 #[pyfunction]
 pub fn schema(program: &str) -> PyResult<String> {
-    fn of<C: Case>() -> PyResult<String>
+    fn schema_of<C: Case>() -> PyResult<String>
     where
         C::Error: Fault,
     {
         Ok(C::schema().to_string())
     }
-    of_program!(program, of())
+    of_program!(program, schema_of())
 }
 
-/// The page of a run in a folder, as HTML.
+/// Creates the page of a run in a folder, as HTML.
 #[pyfunction]
 pub fn view(py: Python<'_>, folder: PathBuf) -> PyResult<String> {
     py.detach(|| harness::view::view(folder)).map_err(|error| crate::error::file(&error))

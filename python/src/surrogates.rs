@@ -1,4 +1,4 @@
-//! Laws learnt from data.
+//! Learnt laws.
 
 use crate::error::{file, value};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
@@ -8,18 +8,18 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
 
-/// A law C → S, or W, as `mdsurrogate` writes it.
-#[pyclass(frozen, module = "polymech._polymech")]
-pub struct Surrogate {
+/// Law C → S, or W, as `mdsurrogate` writes it.
+#[pyclass(frozen, name = "Surrogate", module = "polymech._polymech")]
+pub struct LearntLaw {
     law: surrogate::Surrogate,
 }
 
 /// W and b of each layer.
-type Layers<'py> = Vec<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)>;
+type MemberWeights<'py> = Vec<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)>;
 
 #[pymethods]
-impl Surrogate {
-    /// From the bytes of a file.
+impl LearntLaw {
+    /// Reads a model from the bytes of a file.
     #[new]
     fn new(bytes: &[u8]) -> PyResult<Self> {
         surrogate::Surrogate::from_bytes(bytes).map(|law| Self { law }).map_err(value)
@@ -30,8 +30,8 @@ impl Surrogate {
         py.detach(|| surrogate::Surrogate::read(path)).map(|law| Self { law }).map_err(|error| file(&error))
     }
 
-    /// From a header in JSON (its `architecture` and `members` follow from the weights) and W, (outputs, inputs), and b of each layer
-    /// of each member.
+    /// Builds a model from a header in JSON (its `architecture` and `members` follow from the weights) and W,
+    /// (outputs, inputs), and b of each layer of each member.
     #[staticmethod]
     fn build(
         header: &str,
@@ -52,13 +52,13 @@ impl Surrogate {
         Ok((PyBytes::new(py, &self.law.to_bytes().map_err(value)?),))
     }
 
-    /// All but the weights, as JSON.
+    /// Returns everything but the weights, as JSON.
     fn header(&self) -> PyResult<String> {
         serde_json::to_string(self.law.header()).map_err(value)
     }
 
-    /// W and b of each layer of each member.
-    fn weights<'py>(&self, py: Python<'py>) -> PyResult<Vec<Layers<'py>>> {
+    /// Returns W and b of each layer of each member.
+    fn weights<'py>(&self, py: Python<'py>) -> PyResult<Vec<MemberWeights<'py>>> {
         let of_layer = |layer: &Layer<f64>| {
             let outputs = layer.bias.len();
             let weights = layer.weights.clone().into_pyarray(py);

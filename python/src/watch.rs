@@ -1,4 +1,4 @@
-//! Long work on a thread of its own, while the caller's thread hears signals and calls Python's functions.
+//! Long work on a separate thread, while the caller's thread handles signals and calls Python's functions.
 
 use harness::case::{Step, StepField};
 use numpy::{IntoPyArray, PyArrayMethods};
@@ -10,13 +10,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
 use std::time::{Duration, Instant};
 
-/// How often signals are looked for.
+/// Interval between checks for signals.
 const EVERY: Duration = Duration::from_millis(50);
 
-/// Time between two calls of a function that sees progress.
+/// Least time between two calls of a progress function.
 const SHOWN_EVERY: Duration = Duration::from_millis(100);
 
-/// Functions of Python that see a run.
+/// Functions of Python that observe a run.
 pub struct Watchers {
     /// `progress(part, line)`.
     pub progress: Option<Py<PyAny>>,
@@ -24,14 +24,14 @@ pub struct Watchers {
     pub on_step: Option<Py<PyAny>>,
 }
 
-/// What the working thread says.
+/// Message of the working thread.
 enum Message {
     Progress(f64, String),
     Step(Step, SyncSender<bool>),
 }
 
-/// The working thread's end.
-pub struct Line<'a> {
+/// Sending end of the working thread.
+pub struct RunLink<'a> {
     stop: &'a AtomicBool,
     sender: Sender<Message>,
     wants_progress: bool,
@@ -39,18 +39,18 @@ pub struct Line<'a> {
     shown: Option<Instant>,
 }
 
-impl<'a> Line<'a> {
-    /// Whether the user asked to stop.
+impl<'a> RunLink<'a> {
+    /// Flag that is true once the user asks to stop.
     pub fn stop(&self) -> &'a AtomicBool {
         self.stop
     }
 
-    /// Whether a function of Python sees steps.
+    /// Returns true if a function of Python receives the steps.
     pub fn wants_steps(&self) -> bool {
         self.wants_steps
     }
 
-    /// Shows the part done, now and then.
+    /// Reports the progress from time to time.
     pub fn progress(&mut self, part: f64, line: &dyn Fn() -> String) {
         if self.wants_progress && self.shown.is_none_or(|shown| shown.elapsed() > SHOWN_EVERY) {
             self.shown = Some(Instant::now());
@@ -58,12 +58,12 @@ impl<'a> Line<'a> {
         }
     }
 
-    /// The end of a line that shows steps alone.
-    pub fn steps(&self) -> Line<'a> {
-        Line { sender: self.sender.clone(), wants_progress: false, shown: None, ..*self }
+    /// Creates a link that reports steps alone.
+    pub fn steps(&self) -> RunLink<'a> {
+        RunLink { sender: self.sender.clone(), wants_progress: false, shown: None, ..*self }
     }
 
-    /// Shows a step; whether to go on.
+    /// Reports a step; returns false if the run must stop.
     pub fn step(&self, step: Step) -> bool {
         if self.stop.load(Ordering::Relaxed) {
             return false;
@@ -74,13 +74,13 @@ impl<'a> Line<'a> {
     }
 }
 
-/// Runs `work` on a thread of its own, on `threads` threads where given. A signal (`KeyboardInterrupt`) and what a function of
-/// Python raises ask it to stop, and are raised when it has.
+/// Runs `work` on a separate thread, with `threads` threads if given. A signal (`KeyboardInterrupt`) or an
+/// exception of a function of Python asks it to stop, and is raised when it has.
 pub fn watched<T: Send>(
     py: Python<'_>,
     watchers: &Watchers,
     threads: Option<usize>,
-    work: impl FnOnce(Line<'_>) -> T + Send,
+    work: impl FnOnce(RunLink<'_>) -> T + Send,
 ) -> PyResult<T> {
     let stop = AtomicBool::new(false);
     let pool = match threads {
@@ -92,7 +92,7 @@ pub fn watched<T: Send>(
     };
     let (sender, receiver) = channel();
     let (wants_progress, wants_steps) = (watchers.progress.is_some(), watchers.on_step.is_some());
-    let line = Line { stop: &stop, sender, wants_progress, wants_steps, shown: None };
+    let line = RunLink { stop: &stop, sender, wants_progress, wants_steps, shown: None };
     let stop = &stop;
     py.detach(move || {
         std::thread::scope(|scope| {
@@ -107,13 +107,13 @@ pub fn watched<T: Send>(
     })
 }
 
-/// Runs `work` on a thread of its own, with a flag that a signal sets; no function of Python sees it.
+/// Runs `work` on a separate thread, with a flag that a signal sets, without functions of Python.
 pub fn stoppable<T: Send>(py: Python<'_>, work: impl FnOnce(&AtomicBool) -> T + Send) -> PyResult<T> {
     watched(py, &Watchers { progress: None, on_step: None }, None, |line| work(line.stop()))
 }
 
-/// Runs `work` that nothing can stop on a thread of its own, which a signal leaves to itself: it ends when it is done, and
-/// what it finds is dropped.
+/// Runs `work` that cannot be stopped on a separate thread. A signal abandons it: it runs to its end, and its
+/// result is dropped.
 pub fn left_alone<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce() -> T + Send + 'static,
@@ -140,7 +140,7 @@ pub fn left_alone<T: Send + 'static>(
     })
 }
 
-/// Serves the working thread until it ends; what was raised first.
+/// Serves the working thread until it ends; returns the first exception.
 fn hear(watchers: &Watchers, receiver: Receiver<Message>, stop: &AtomicBool) -> Option<PyErr> {
     let mut raised = None;
     loop {
@@ -183,7 +183,7 @@ fn serve(py: Python<'_>, watchers: &Watchers, message: Message) -> PyResult<()> 
                     _ => fields.set_item(name, flat.reshape([flat.len()? / components, components])?)?,
                 }
             }
-            // an error leaves the answer out, which stops the run
+            // an error drops the sender, which stops the run
             let more = on_step.call1(py, (values, units, fields))?;
             let stop = more.bind(py).is(pyo3::types::PyBool::new(py, false));
             let _ = answer.send(!stop);

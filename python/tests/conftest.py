@@ -1,4 +1,4 @@
-"""What the tests share."""
+"""Fixtures of the tests."""
 
 import os
 from pathlib import Path
@@ -35,13 +35,13 @@ def sheet():
 
 @pytest.fixture
 def root():
-    """The root of the repository."""
+    """Root of the repository."""
     return ROOT
 
 
 @pytest.fixture
 def programs():
-    """The folder of the command lines, where the tests were told one."""
+    """Folder of the command lines, if one is given."""
     folder = os.environ.get("POLYMECH_PROGRAMS")
     if not folder:
         pytest.skip("needs the command lines (POLYMECH_PROGRAMS)")

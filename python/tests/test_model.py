@@ -140,7 +140,7 @@ def test_refusals():
         peri.Body.rectangle((0, 0, 0), (1, 1), 0.1)
     with pytest.raises(ValueError, match="a load: found 3 components; allowed: 2"):
         peri.Model(body, youngs_modulus=1e6).displace(lambda x, y: x > 0, (0, 0, 0)).build()
-    with pytest.raises(ValueError, match="setting: found .tolerence."):
+    with pytest.raises(ValueError, match="unexpected setting .tolerence."):
         pulled(body).solve(tolerence=1)
     with pytest.raises(ValueError, match="method: found .newton.; allowed: lbfgs"):
         pulled(body).solve("newton")

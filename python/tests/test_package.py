@@ -1,4 +1,4 @@
-"""Types, docstrings, notebooks, and what the guide shows."""
+"""Types, docstrings, notebooks, and code of the guide."""
 
 import doctest
 import json

@@ -64,7 +64,7 @@ def test_xarray(torn):
     fields = torn.fields.first
     assert fields.displacement.attrs["units"] == "m" and fields.displacement.dims == ("step", "particle", "i")
     assert torn.history.to_xarray()["load"].attrs["units"] == "N"
-    with pytest.raises(KeyError, match="there are"):
+    with pytest.raises(KeyError, match="available"):
         torn.fields["nobody"]
 
 

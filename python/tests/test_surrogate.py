@@ -85,7 +85,7 @@ def test_flags():
     assert found.unseen[2].tolist() == [False, False, False, True, False, False]
     bare = law().predict(c, uncertainty=False)
     assert bare.spread is None and (bare.stress == found.stress).all()
-    with pytest.raises(ValueError, match="without flags"):
+    with pytest.raises(ValueError, match="no flags"):
         _ = bare.flagged
 
 

@@ -1,9 +1,9 @@
-//! The memory that a piece of work takes on its own thread.
+//! Measurement of the memory that work allocates on its own thread.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-/// The system's allocator, counting the bytes that each thread holds.
+/// System allocator that counts the bytes of each thread.
 struct Counting;
 
 thread_local! {
@@ -17,7 +17,8 @@ fn count(bytes: i64) {
     MOST.set(MOST.get().max(held));
 }
 
-// SAFETY: every call is passed on to the system's allocator as it is; the counters need no allocation and no destructor.
+// SAFETY: every call is passed on to the system's allocator unchanged; the counters need no allocation and no
+// destructor.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count(layout.size() as i64);
@@ -40,7 +41,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// What the work gives, and the most bytes that this thread held at once beyond those it held before.
+/// Returns the result of the work, and the peak of bytes that this thread held beyond those it held before.
 pub fn most<T>(work: impl FnOnce() -> T) -> (T, u64) {
     let before = HELD.get();
     MOST.set(before);

@@ -1,7 +1,8 @@
 //! Malformed and absurd input: exit code 2, the message that helps, nothing written, no panic.
 //!
-//! Each scene is a patch of a valid one, with its fault and its message: `tests/bad/peri.txt` and `crystfem.txt`, whose heads tell how they
-//! are read; the valid scenes are in `tests/bad/peri/` and `crystfem/`.
+//! Each scene is a patch of a valid one, with its fault and its message: `tests/bad/peri.txt` and
+//! `crystfem.txt`, whose heads describe the format; the valid scenes are in `tests/bad/peri/` and
+//! `crystfem/`.
 
 use crate::program::{Ended, command, executable, finish, peri, workspace};
 use crate::scenes;
@@ -12,7 +13,7 @@ const MARK: &str = "# <- here";
 
 #[test]
 fn every_bad_scene_gets_its_message() {
-    judge_all("peri", 275);
+    judge_all("peri", 279);
 }
 
 #[test]
@@ -20,7 +21,7 @@ fn every_bad_scene_of_a_part_gets_its_message() {
     judge_all("crystfem", 118);
 }
 
-/// A scene with one fault.
+/// Scene with one fault.
 pub struct BadScene {
     pub name: String,
     pub text: String,
@@ -28,7 +29,7 @@ pub struct BadScene {
     expected: Vec<String>,
 }
 
-/// Reads the patches of a program and writes their scenes, and the files that they name, to a folder.
+/// Reads the patches of a program and writes their scenes and files to a folder.
 pub fn write_bad_scenes(program: &str, folder: &Path) -> Vec<BadScene> {
     let bad = workspace().join("tests/bad");
     for files in ["clouds", "inputs"] {
@@ -57,7 +58,7 @@ pub fn write_bad_scenes(program: &str, folder: &Path) -> Vec<BadScene> {
     entries.collect()
 }
 
-/// Applies a patch; its error is the line that is not in the base.
+/// Applies a patch; the error is the line that is missing in the base.
 fn patched(base: &str, patch: &[&str]) -> Result<String, String> {
     let mut rest = base.lines();
     let mut scene: Vec<&str> = Vec::new();
@@ -131,7 +132,7 @@ fn judge(program: &str, folder: &Path, scene: &BadScene) -> Result<(), String> {
     Ok(())
 }
 
-/// Checks and runs a scene with the given bytes; returns what `check` told.
+/// Checks and runs a scene with the given bytes; returns the output of `check`.
 fn refused(bytes: &[u8], arguments: &str) -> Ended {
     let directory = tempfile::tempdir().unwrap();
     fs::write(directory.path().join("scene.toml"), bytes).unwrap();
@@ -146,7 +147,7 @@ fn refused(bytes: &[u8], arguments: &str) -> Ended {
 #[test]
 fn files_that_are_no_text() {
     refused(b"version = 1\n\xff\xfe", "").tells("scene.toml: is not UTF-8 text (byte 12, line 2)");
-    refused(b"version = 1\n", "").tells("`program` is missing");
+    refused(b"version = 1\n", "").tells("missing `program`");
     refused(b"version = 1\n\0\x01\x02", "").tells("not valid TOML");
     refused(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "").tells("is not UTF-8 text (byte 0, line 1)");
     refused(&b"# padding\n".repeat(2_000_000), "").tells("is larger than 16 MiB");
@@ -160,10 +161,11 @@ fn nesting_without_end() {
     refused(deep("a = ", "{ b = ", "").as_bytes(), "").tells("not valid TOML");
     // a line longer than the 65535 columns of the pictures
     refused(deep("[a", ".a", "]\n").as_bytes(), "").tells("scene.toml:2");
-    refused(deep("title = \"", "long", "\"\n").as_bytes(), "").tells("`program` is missing");
+    refused(deep("title = \"", "long", "\"\n").as_bytes(), "").tells("missing `program`");
 }
 
-/// A valid scene cut anywhere is refused, or is itself valid (where only a trailing part is gone); it never panics.
+/// A valid scene cut anywhere is refused, or is itself valid (if only a trailing part is missing); it never
+/// panics.
 #[test]
 fn cut_anywhere() {
     let scene = scenes::plate("\"100 mm\"", "1e-3");
@@ -197,7 +199,7 @@ fn what_is_not_a_file() {
             .tells("there is no directory nowhere either");
         if cfg!(unix) {
             peri(&format!("{verb} /dev/zero"), here).with_code(2).tells("is larger than 16 MiB");
-            peri(&format!("{verb} /dev/null"), here).with_code(2).tells("`version` is missing");
+            peri(&format!("{verb} /dev/null"), here).with_code(2).tells("missing `version`");
         }
     }
     assert!(!here.join("out").exists());

@@ -1,4 +1,4 @@
-//! The results are the same bits on any number of threads.
+//! Results have the same bits on any number of threads.
 
 use crate::program::peri;
 use crate::results::{assert_same, report, scalar};
@@ -6,7 +6,7 @@ use crate::scenes;
 use std::fs;
 use std::path::Path;
 
-/// Runs the scene in `here` on 1, 2 and 3 threads; everything but times must be equal, byte for byte.
+/// Runs the scene in `here` on 1, 2 and 3 threads; everything but times must be equal, byte by byte.
 fn on_any_number_of_threads(here: &Path) {
     for threads in 1..=3 {
         peri(&format!("run scene.toml --output out{threads} --threads {threads}"), here).with_code(0);
@@ -39,7 +39,7 @@ fn cracked_bar_in_three_dimensions() {
     assert_eq!((&work["particles"], &work["steps"]), (&320.into(), &3.into()));
 }
 
-/// Variants, several at a time where there are several threads.
+/// Variants, several at once if there are several threads.
 #[test]
 fn variants() {
     let directory = tempfile::tempdir().unwrap();
@@ -49,7 +49,7 @@ fn variants() {
     on_any_number_of_threads(here);
 }
 
-/// A sheet torn apart, its bonds looked at in equilibrium or in every iteration, with contact or without.
+/// A torn sheet, its bonds checked in equilibrium or in every iteration, with and without contact.
 #[test]
 fn fracture() {
     for solver in ["", "breaking = \"each-iteration\"\n[contact]", "method = \"lbfgs\""] {
@@ -61,7 +61,7 @@ fn fracture() {
         assert_eq!(scalar(&report, "fragments"), 2.0);
         let [peak, last] = ["peak_load", "last_load"].map(|name| scalar(&report, name));
         assert!(peak > 50.0 && last.abs() < 0.02 * peak, "{peak} N, {last} N");
-        // what the loads did is stored, was released by breaking, or was damped
+        // the work of the loads is stored, released by breaking, or damped
         let [work, stored, released, damped] =
             ["work_of_loads", "stored_energy", "released_energy", "damped_energy"]
                 .map(|name| scalar(&report, name));
@@ -73,7 +73,7 @@ fn fracture() {
     }
 }
 
-/// A sheet that cracks in explicit dynamics, in both precisions: the same to what single precision leaves.
+/// A sheet that cracks in explicit dynamics, in both precisions: equal up to single precision.
 #[test]
 fn explicit_dynamics() {
     let [double, mixed] = ["double", "mixed"].map(|precision| {
@@ -102,7 +102,7 @@ fn strip_of_scattered_points() {
     on_any_number_of_threads(here);
 }
 
-/// Whether the same scene is run twice, or the directory held other results before, makes no difference.
+/// Results do not depend on an earlier run or other results in the same directory.
 #[test]
 fn a_second_run_into_the_same_directory() {
     let directory = tempfile::tempdir().unwrap();

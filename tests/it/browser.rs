@@ -1,4 +1,4 @@
-//! A headless Chromium, driven by chromedriver: <https://www.w3.org/TR/webdriver2/>.
+//! Headless Chromium, driven by chromedriver: <https://www.w3.org/TR/webdriver2/>.
 
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
@@ -7,10 +7,10 @@ use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Longer than anything on a page takes on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(120);
+/// Time limit of any action on a page, on a busy machine.
+const TIME_LIMIT: Duration = Duration::from_secs(120);
 
-/// A browser with one page.
+/// Browser with one page.
 pub struct Browser {
     driver: Child,
     port: u16,
@@ -20,7 +20,7 @@ pub struct Browser {
 }
 
 impl Browser {
-    /// Opens a file in a window of a size; none, said by name, where there is no chromedriver.
+    /// Opens a file in a window of the given size; `None`, with a message, without chromedriver.
     pub fn open(page: &Path, [width, height]: [u32; 2]) -> Option<Self> {
         let started =
             Command::new("chromedriver").arg("--port=0").stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
@@ -45,8 +45,14 @@ impl Browser {
             "--enable-unsafe-swiftshader",
             &size,
         ];
+        let mut options = json!({ "args": arguments });
+        if width < 500 {
+            // no window is so narrow
+            let screen = json!({ "width": width, "height": height, "pixelRatio": 1, "touch": true });
+            options["mobileEmulation"] = json!({ "deviceMetrics": screen });
+        }
         let asked = json!({ "capabilities": { "alwaysMatch": {
-            "goog:chromeOptions": { "args": arguments },
+            "goog:chromeOptions": options,
             "goog:loggingPrefs": { "browser": "ALL", "performance": "ALL" },
         } } });
         let session = browser.ask("POST", "", &asked);
@@ -55,14 +61,15 @@ impl Browser {
         Some(browser)
     }
 
-    /// A command of the protocol, and its value.
+    /// Sends a command of the protocol; returns its value.
     #[track_caller]
     fn ask(&self, method: &str, path: &str, body: &Value) -> Value {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
-        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        stream.set_read_timeout(Some(TIME_LIMIT)).unwrap();
         let body = if method == "POST" { body.to_string() } else { String::new() };
         let head = format!(
-            "{method} /session{}{path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Length: {}\r\n\r\n",
+            "{method} /session{}{path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Length: \
+             {}\r\n\r\n",
             self.session,
             body.len()
         );
@@ -85,7 +92,7 @@ impl Browser {
         value
     }
 
-    /// The value of an expression in the page.
+    /// Evaluates an expression in the page.
     #[track_caller]
     pub fn value(&self, expression: &str) -> Value {
         self.ask("POST", "/execute/sync", &json!({ "script": format!("return {expression}"), "args": [] }))
@@ -96,9 +103,17 @@ impl Browser {
     pub fn wait(&self, expression: &str) {
         let begun = Instant::now();
         while self.value(&format!("Boolean({expression})")) != true {
-            assert!(begun.elapsed() < PATIENCE, "{expression} never holds: {:#?}", self.complaints());
+            assert!(begun.elapsed() < TIME_LIMIT, "{expression} never holds: {:#?}", self.complaints());
             std::thread::sleep(Duration::from_millis(50));
         }
+    }
+
+    /// Faults of the layout: texts that overlap, are cut off or stand outside of the window, and controls
+    /// without a name.
+    #[track_caller]
+    pub fn layout_faults(&self) -> Vec<Value> {
+        let script = json!({ "script": include_str!("layout.js"), "args": [] });
+        self.ask("POST", "/execute/sync", &script).as_array().unwrap().clone()
     }
 
     #[track_caller]
@@ -121,22 +136,28 @@ impl Browser {
         self.ask("POST", &format!("/element/{element}/value"), &json!({ "text": keys }));
     }
 
-    /// Drags fingers across the window, or the mouse with its button down, which pauses on the way; each from one place to another.
+    /// Drags fingers across the window, or the mouse with its button down, with a pause on the way; each from
+    /// one place to another.
     #[track_caller]
     pub fn drag(&self, kind: &str, ways: &[[[f64; 2]; 2]]) {
-        let step = |[x, y]: [f64; 2], duration: u32| json!({ "type": "pointerMove", "duration": duration, "x": x.round() as i64, "y": y.round() as i64 });
+        let step = |[x, y]: [f64; 2], duration: u32| {
+            let [x, y] = [x.round() as i64, y.round() as i64];
+            json!({ "type": "pointerMove", "duration": duration, "x": x, "y": y })
+        };
         let pointer = |(k, &[from, to]): (usize, &[[f64; 2]; 2])| {
             let half = [0, 1].map(|d| 0.5 * (from[d] + to[d]));
-            json!({ "type": "pointer", "id": format!("{kind}{k}"), "parameters": { "pointerType": kind }, "actions": [
-                step(from, 0), { "type": "pause", "duration": 400 }, { "type": "pointerDown", "button": 0 }, step(half, 80), step(to, 80),
-                { "type": "pointerUp", "button": 0 },
-            ] })
+            let actions = json!([
+                step(from, 0), { "type": "pause", "duration": 400 }, { "type": "pointerDown", "button": 0 },
+                step(half, 80), step(to, 80), { "type": "pointerUp", "button": 0 },
+            ]);
+            let id = format!("{kind}{k}");
+            json!({ "type": "pointer", "id": id, "parameters": { "pointerType": kind }, "actions": actions })
         };
         let actions: Vec<Value> = ways.iter().enumerate().map(pointer).collect();
         self.ask("POST", "/actions", &json!({ "actions": actions }));
     }
 
-    /// A picture of the window, where `VIEW_PICTURES` names a folder for them.
+    /// Takes a screenshot if `VIEW_PICTURES` names a folder.
     pub fn picture(&self, name: &str) {
         if let Some(folder) = std::env::var_os("VIEW_PICTURES") {
             let taken = self.ask("GET", "/screenshot", &json!({}));
@@ -153,7 +174,7 @@ impl Browser {
         self.log("browser").into_iter().filter(|entry| entry["level"] == "SEVERE").collect()
     }
 
-    /// Addresses that the page asked for, besides itself and what it holds.
+    /// Addresses that the page requested, besides itself and its content.
     pub fn requests(&self) -> Vec<String> {
         let told = |entry: &Value| -> Option<String> {
             let message: Value = serde_json::from_str(entry["message"].as_str()?).ok()?;

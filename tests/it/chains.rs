@@ -1,4 +1,5 @@
-//! Scenes that read results of other scenes: what is missing or stale is told and computed, a changed file is noticed.
+//! Scenes that read results of other scenes: missing or stale results are reported and computed, changed
+//! files are noticed.
 
 use crate::program::{Ended, command, finish, peri};
 use crate::results::{assert_same, report, scalar};
@@ -44,7 +45,7 @@ every = "100 s"
 pictures = false
 "#;
 
-/// A strip whose stiffness follows it.
+/// A strip whose stiffness follows the crystallinity.
 const STRIP: &str = r#"version = 1
 program = "peri"
 
@@ -153,7 +154,7 @@ fn staleness_is_handed_on() {
     stale.tells("its input `print` is stale: the file air.csv has changed");
     run("--with-inputs").with_code(0);
     run("").with_code(0);
-    // computed again by itself, with other results: what was read from it is stale
+    // computed separately, with other results: what was read from it is stale
     fs::write(here.join("print/air.csv"), "time [s],value [degC]\n0,25\n300,32\n").unwrap();
     crystfem("run print/case.toml", here).with_code(0);
     let stale = run("").with_code(2);
@@ -181,7 +182,7 @@ fn chains_that_cannot_be() {
     failed.tells("its results in out/print are missing");
 }
 
-/// Whatever is wrong with the fields is told with the key that names them.
+/// Faults in the fields are reported with the key that names them.
 #[test]
 fn fields_that_cannot_be_used() {
     let directory = tempfile::tempdir().unwrap();
@@ -251,7 +252,8 @@ fn fields_that_cannot_be_used() {
     refused("none.vtkhdf");
 }
 
-/// The stress of a print, 1 MPa along its second axis, is there while a strip is held at its ends: it pulls them with stress × section.
+/// The stress of a print, 1 MPa along its second axis, acts in a strip that is held at its ends: it pulls
+/// them with stress × section.
 #[test]
 fn a_stress_is_handed_over() {
     let directory = tempfile::tempdir().unwrap();
@@ -278,7 +280,7 @@ fn a_stress_is_handed_over() {
         .replace("max = [\"8 mm\", \"4 mm\"]", "max = [\"4 mm\", \"2 mm\"]");
     write(here, &[("strip", &held)]);
     let ended = strip(here, "").with_code(2);
-    ended.tells("found a table of a tensor");
+    ended.tells("unexpected `material.fields[0].table`: the strain of a stress tensor");
     let table = "table = [[0, \"0.9 GPa\"], [0.25, \"1.6 GPa\"]]";
     let turned = held
         .replace(table, "placement = { axes = [\"-y\", \"x\"], origin = [\"0 mm\", \"4 mm\", \"0 mm\"] }");
@@ -301,7 +303,8 @@ fn a_stress_is_handed_over() {
     strip(here, "").with_code(2).tells("`material.fields[0].from.field`");
 }
 
-/// A law that another scene learns: neo-Hooke's stresses S = μ(1 − C⁻¹) + ½λ(J² − 1)C⁻¹ of μ = 0.4 and λ = 1 MPa; the sheet has about its force.
+/// A law learnt by another scene: neo-Hookean stresses S = μ(1 − C⁻¹) + ½λ(J² − 1)C⁻¹ with μ = 0.4 and λ = 1
+/// MPa; the sheet has about that force.
 #[test]
 fn a_law_of_an_input() {
     let directory = tempfile::tempdir().unwrap();
@@ -318,8 +321,10 @@ fn a_law_of_an_input() {
             rows += &format!("p{path},{},{},{},0,0,0,{},{},{},0,0,0\n", c[0], c[1], c[2], s[0], s[1], s[2]);
         }
     }
-    let law = "version = 1\nprogram = \"mdsurrogate\"\n[data]\nfiles = [\"rows.csv\"]\n[training]\nepochs = 60\nlearning_rate = 1e-2\n\
-        [[model]]\nname = \"law\"\nkind = \"energy\"\nsymmetry = \"isotropic\"\npolyconvex = true\nhidden = [[8, \"softplus\"]]\n";
+    let law = "version = 1\nprogram = \"mdsurrogate\"\n[data]\nfiles = [\"rows.csv\"]\n[training]\nepochs = \
+               60\nlearning_rate = 1e-2\n\
+        [[model]]\nname = \"law\"\nkind = \"energy\"\nsymmetry = \"isotropic\"\npolyconvex = true\nhidden = \
+                            [[8, \"softplus\"]]\n";
     let block = STRIP.find("[material]").unwrap()..STRIP.find("[[boundary]]").unwrap();
     let solid = |law: &str| {
         let own = format!("[material.solid]\nlaw = \"correspondence\"\nconstitutive = {law}\n\n");
@@ -331,7 +336,8 @@ fn a_law_of_an_input() {
     strip(here, "--with-inputs").with_code(0);
     let force = |folder: &str| scalar(&report(&here.join(folder)), "reaction_x");
     let found = force("out/strip");
-    let bulk = "{ model = \"neo-hookean\", parameters = { shear_modulus = \"0.4 MPa\" }, bulk_modulus = \"1.2666667 MPa\" }";
+    let bulk = "{ model = \"neo-hookean\", parameters = { shear_modulus = \"0.4 MPa\" }, \
+                bulk_modulus = \"1.2666667 MPa\" }";
     write(here, &[("strip", &solid(bulk))]);
     strip(here, "--output out/exact").with_code(0);
     near(
@@ -365,7 +371,7 @@ fn a_killed_input_is_resumed() {
     let _ = child.kill();
     assert_eq!(finish(child).code, None, "it had ended");
     strip(here, "").with_code(2).tells("its results in out/print are not finished");
-    // of another scene it is not resumed, but run again
+    // a run of another scene is not resumed, but repeated
     let copy = here.join("copy");
     fs::create_dir(&copy).unwrap();
     fs::copy(here.join("out/print/checkpoint.bin"), copy.join("checkpoint.bin")).unwrap();
@@ -377,7 +383,7 @@ fn a_killed_input_is_resumed() {
     assert!(scalar(&report(&here.join("out/strip")), "youngs_modulus_field_mean") > 0.0);
 }
 
-/// A run does not go on with another input or another table than it began with.
+/// A run does not continue with another input or another table than it began with.
 #[test]
 fn what_changes_before_a_resume_is_noticed() {
     let directory = tempfile::tempdir().unwrap();
@@ -416,7 +422,7 @@ fn what_changes_before_a_resume_is_noticed() {
     assert_same(&here.join("out/undisturbed"), &here.join("out/strip"));
 }
 
-/// So it is for the tables of a part, and for all programs: the harness sees to it.
+/// Reports describe how tables were read, for a part and in all programs.
 #[test]
 fn a_report_tells_what_was_read() {
     let directory = tempfile::tempdir().unwrap();

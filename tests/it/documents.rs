@@ -1,4 +1,4 @@
-//! The commands and links of README and docs: those that are cheap are run, the others must at least be understood.
+//! Commands and links of README and docs: cheap commands are run, the others must at least be accepted.
 
 use crate::program::{command, finish, workspace};
 use std::fs;
@@ -9,10 +9,11 @@ const PROGRAMS: [&str; 4] = ["crystfem", "mdsurrogate", "peri", "polycore"];
 
 /// A command line in a document.
 #[derive(Debug)]
-struct Shown {
+pub struct Shown {
     file: PathBuf,
     line: usize,
-    words: Vec<String>,
+    /// Program and arguments.
+    pub words: Vec<String>,
 }
 
 /// README and everything below docs.
@@ -35,8 +36,9 @@ fn documents() -> Vec<PathBuf> {
     found
 }
 
-/// Commands in fences marked as shell, a backslash joining lines; output, comments and other languages are left out.
-fn commands_of(file: &Path) -> Vec<Shown> {
+/// Collects commands in fences marked as shell; a backslash joins lines; output, comments and other languages
+/// are left out.
+pub fn commands_of(file: &Path) -> Vec<Shown> {
     let text = fs::read_to_string(file).unwrap();
     let (mut shown, mut shell, mut inside) = (Vec::new(), false, false);
     let mut joined = String::new();
@@ -63,7 +65,7 @@ fn commands_of(file: &Path) -> Vec<Shown> {
     shown
 }
 
-/// The words of the commands in a shell line, without comments, redirections and assignments.
+/// Splits a shell line into the words of its commands, without comments, redirections and assignments.
 fn parts(line: &str) -> Vec<Vec<String>> {
     let mut parts = vec![Vec::new()];
     let (mut word, mut quote, mut quoted) = (String::new(), None, false);
@@ -99,8 +101,8 @@ fn parts(line: &str) -> Vec<Vec<String>> {
     parts
 }
 
-/// Which of our programs a command runs, and its arguments.
-fn ours(words: &[String]) -> Option<(&str, Vec<&str>)> {
+/// Returns which of our programs a command runs, and its arguments.
+pub fn ours(words: &[String]) -> Option<(&str, Vec<&str>)> {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     match words[..] {
         ["cargo", "xtask", ..] => Some(("xtask", words[2..].to_vec())),
@@ -122,7 +124,7 @@ fn ours(words: &[String]) -> Option<(&str, Vec<&str>)> {
     }
 }
 
-/// A directory in which documents' relative paths hold and results harm nobody.
+/// Creates a directory in which documents' relative paths are valid and results do no harm.
 fn playground() -> tempfile::TempDir {
     let directory = tempfile::tempdir().unwrap();
     for entry in fs::read_dir(workspace()).unwrap() {
@@ -156,7 +158,7 @@ fn commands_shown_are_understood() {
             _ => false,
         };
         for argument in arguments.iter().filter(|argument| argument.ends_with(".toml")) {
-            // a scene that the document lets its reader write
+            // a scene that the document asks its reader to write
             let is_example = !argument.contains('/');
             if !is_example && !playground.path().join(argument).is_file() {
                 faults.push(format!("{place}: there is no {argument}"));
@@ -164,7 +166,7 @@ fn commands_shown_are_understood() {
         }
         let missing_example = arguments.iter().any(|a| a.ends_with(".toml") && !a.contains('/'));
         let mut run = command(program, "", playground.path());
-        // arguments are parsed from left to right, and help ends the parsing before anything is run
+        // arguments are parsed from left to right, and help ends the parsing before a run
         let end = arguments.iter().position(|argument| *argument == "--").unwrap_or(arguments.len());
         run.args(&arguments[..end]);
         if !cheap || missing_example {
@@ -180,7 +182,7 @@ fn commands_shown_are_understood() {
     assert!(known >= 10, "only {known} commands were found");
 }
 
-/// Links and pictures of documents that do not lead to the web lead to files.
+/// Links and pictures of documents that do not lead to the web lead to existing files.
 #[test]
 fn links_lead_to_files() {
     let mut faults = Vec::new();
@@ -203,8 +205,8 @@ fn links_lead_to_files() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// Examples of the libraries are doctests of the crates, in the head of a `lib.rs`, or programs in their `examples`
-/// ([`crate::examples`] runs them).
+/// Examples of the libraries are doctests of the crates, in the head of a `lib.rs`, or programs in their
+/// `examples` ([`crate::examples`] runs them), which the page repeats.
 #[test]
 fn rust_examples_are_doctests_or_programs() {
     let heads: Vec<String> = ["peri", "mdsurrogate"]
@@ -216,24 +218,25 @@ fn rust_examples_are_doctests_or_programs() {
             lines.filter(|line| !line.starts_with("# ")).collect::<Vec<_>>().join("\n")
         })
         .into();
-    let path = workspace().join("docs/guide/src/how-to/library.md");
-    let page = fs::read_to_string(&path).unwrap();
-    let fences: Vec<&str> =
-        page.split("```rust\n").skip(1).filter_map(|rest| rest.split("\n```").next()).collect();
+    let page = fs::read_to_string(workspace().join("docs/guide/src/how-to/library.md")).unwrap();
     let mut programs = 0;
-    for fence in &fences {
-        if let Some(file) = fence.strip_prefix("{{#include ").and_then(|rest| rest.strip_suffix("}}")) {
-            assert!(file.contains("/examples/") && path.with_file_name(file).is_file(), "{file}");
+    let parts: Vec<&str> = page.split("```rust\n").collect();
+    for (before, after) in parts.iter().zip(&parts[1..]) {
+        let fence = after.split("\n```").next().unwrap();
+        let marker = before.trim_end().lines().next_back().and_then(|line| line.strip_prefix("<!-- file: "));
+        if let Some(file) = marker.and_then(|rest| rest.strip_suffix(" -->")) {
+            let text = fs::read_to_string(workspace().join(file)).unwrap();
+            assert!(file.contains("/examples/") && text.trim_end() == fence, "{file}");
             programs += 1;
             continue;
         }
         let there = |head: &String| head.contains(&format!("```\n{fence}\n```"));
         assert!(heads.iter().any(there), "no doctest is\n{fence}");
     }
-    assert!(programs >= 4 && fences.len() > programs, "{programs} of {}", fences.len());
+    assert!(programs >= 4 && parts.len() > programs + 1, "{programs} of {}", parts.len());
 }
 
-/// What mdBook would leave out: pages that SUMMARY.md does not name.
+/// Pages that SUMMARY.md does not name are missing from the book.
 #[test]
 fn every_page_is_in_the_summary() {
     let guide = workspace().join("docs/guide/src");

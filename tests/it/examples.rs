@@ -1,4 +1,4 @@
-//! The small programs that show how the libraries are used: each runs to its end.
+//! Example programs of the libraries: each runs to its end.
 
 use crate::program::{command, finish, workspace};
 use std::fs;

@@ -1,8 +1,9 @@
-//! What users hand in, damaged at random: scenes, meshes, tool paths, tables, clouds, HDF5, laws, checkpoints. No panic,
-//! no hang, no memory beyond what the file justifies, and an error that names the place.
+//! Robustness against input files damaged at random: scenes, meshes, tool paths, tables, clouds, HDF5, laws,
+//! checkpoints. No panic, no hang, no memory beyond what the file justifies, and an error that names the
+//! place.
 //!
-//! 2000 mutations of each kind, the same ones every time; `FRONT_DOOR=100000 cargo test --release -p tests front_door`
-//! takes that many, new ones every time. What it finds is kept in tests/proptest-regressions and tried first.
+//! 2000 mutations of each kind, always the same; `FRONT_DOOR=100000 cargo test --release -p tests front_door`
+//! takes that many new ones. Failures are kept in tests/proptest-regressions and tried first.
 
 use crate::allocations;
 use crate::bad::write_bad_scenes;
@@ -20,15 +21,15 @@ mod points;
 mod scenes;
 
 /// Mutations of each kind, unless `FRONT_DOOR` says otherwise.
-const FEW: u32 = 2000;
-/// Longer than any of these may take, on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(5);
-/// Memory that opening a file may take: so much, and so many times its length.
+const MUTATIONS: u32 = 2000;
+/// Time limit of each mutation, on a busy machine.
+const TIME_LIMIT: Duration = Duration::from_secs(5);
+/// Memory that opening a file may take: a constant, and a multiple of its length.
 const MEMORY: [u64; 2] = [32 << 20, 256];
-/// Of a larger file only so much is taken.
+/// Bytes taken of a larger file.
 const LARGEST: usize = 64 << 10;
 
-/// What is put in: numbers at the edges, brackets, words of the formats.
+/// Tokens to insert: extreme numbers, brackets, words of the formats.
 const TOKENS: [&str; 48] = [
     "0",
     "-1",
@@ -80,7 +81,7 @@ const TOKENS: [&str; 48] = [
     "true",
 ];
 
-/// One change of a file; places and lengths are shares of its length.
+/// Change of a file; places and lengths are shares of its length.
 #[derive(Clone, Debug)]
 enum Change {
     Flip(u16, u8),
@@ -136,12 +137,12 @@ fn apply(bytes: &mut Vec<u8>, change: &Change) {
     }
 }
 
-/// Damages files of a kind and opens them; an error must hold `name`, the place that a user has to look at.
+/// Damages files of a kind and opens them; an error must contain `name`, the place of the fault.
 fn attack(kind: &str, files: &[PathBuf], name: &str, open: impl Fn(&[u8]) -> Result<(), String>) {
     attack_some(1, kind, files, name, open);
 }
 
-/// One of `share` mutations.
+/// Applies one of `share` mutations.
 fn attack_some(
     share: u32,
     kind: &str,
@@ -160,7 +161,7 @@ fn attack_some(
     assert!(!corpus.is_empty(), "{kind}");
     let asked = std::env::var("FRONT_DOOR").ok().map(|count| count.parse().expect("FRONT_DOOR, a count"));
     let config = Config {
-        cases: asked.unwrap_or(FEW).div_ceil(share),
+        cases: asked.unwrap_or(MUTATIONS).div_ceil(share),
         source_file: Some(file!()),
         ..Config::default()
     };
@@ -174,7 +175,7 @@ fn attack_some(
         changes.iter().for_each(|change| apply(&mut bytes, change));
         let begun = Instant::now();
         let (opened, memory) = allocations::most(|| open(&bytes));
-        prop_assert!(begun.elapsed() < PATIENCE, "{:?}", begun.elapsed());
+        prop_assert!(begun.elapsed() < TIME_LIMIT, "{:?}", begun.elapsed());
         let allowed = MEMORY[0] + MEMORY[1] * bytes.len() as u64;
         prop_assert!(memory <= allowed, "{memory} bytes of memory, {allowed} allowed");
         match opened {
@@ -189,7 +190,7 @@ fn attack_some(
     }
 }
 
-/// Files below a folder of the workspace whose names end so.
+/// Lists files below a folder of the workspace whose names have the given ending.
 fn below(folder: &str, ending: &str) -> Vec<PathBuf> {
     let (mut found, mut folders) = (Vec::new(), vec![workspace().join(folder)]);
     while let Some(folder) = folders.pop() {
@@ -214,7 +215,7 @@ fn cases(program: &str) -> Vec<PathBuf> {
     files
 }
 
-/// Opens scenes given as a text by `open`.
+/// Opens scenes given as text by `open`.
 fn attack_scenes(files: &[PathBuf], open: impl Fn(&Source) -> Result<(), harness::scene::SceneError>) {
     attack("scene", files, "scene.toml", |bytes| {
         let source = Source::new("scene.toml", String::from_utf8_lossy(bytes).into_owned());
@@ -248,11 +249,11 @@ fn scenes_of_peri() {
 
 #[test]
 fn scenes_of_crystfem() {
-    use crystfem::program::scene::{FitScene, Kind, PartScene, PointScene, kind};
+    use crystfem::program::scene::{FitScene, PartScene, PointScene, SceneKind, kind};
     attack_scenes(&cases("crystfem"), |source| match kind(source)? {
-        Kind::Part => source.parse::<PartScene>()?.check(source),
-        Kind::Point => source.parse::<PointScene>().map(|_| ()),
-        Kind::Fit => source.parse::<FitScene>().map(|_| ()),
+        SceneKind::Part => source.parse::<PartScene>()?.check(source),
+        SceneKind::Point => source.parse::<PointScene>().map(|_| ()),
+        SceneKind::Fit => source.parse::<FitScene>().map(|_| ()),
     });
 }
 
@@ -311,11 +312,11 @@ fn tables() {
         harness::output::csv::read(path).map(|_| ()).map_err(|error| error.to_string())
     });
     attack_files("history", &below("cases/ch4", ".csv"), "history.csv", |path| {
-        crystfem::history::History::read(path).map(|_| ()).map_err(|error| error.to_string())
+        crystfem::history::TemperatureHistory::read(path).map(|_| ()).map_err(|error| error.to_string())
     });
     let rubber = below("cases/ch1", ".csv");
     attack_files("rubber data", &rubber, "rubber.csv", |path| {
-        polycore::constitutive::hyperelastic::data::Table::read(path)
+        polycore::constitutive::hyperelastic::data::TestData::read(path)
             .map(|_| ())
             .map_err(|error| error.to_string())
     });
@@ -384,7 +385,7 @@ fn checkpoints() {
     harness::checkpoint::write(&path, MAGIC, &value).unwrap();
     attack_files("checkpoint", &[path], "checkpoint.bin", |path| {
         match harness::checkpoint::read::<Vec<(String, Vec<f64>)>>(path, MAGIC) {
-            // its checksum lets nothing through
+            // its checksum rejects every change
             Ok(read) if read != value => Err("a damaged checkpoint was read".to_owned()),
             Ok(_) => Ok(()),
             Err(error) => Err(error.to_string()),

@@ -1,4 +1,4 @@
-//! What all programs have from the harness: the same commands, and sweeps.
+//! Functions that all programs have from the harness: the same commands, and sweeps.
 
 use crate::program::{command, finish, peri, workspace};
 use crate::scenes;
@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 
 const PROGRAMS: [&str; 4] = ["crystfem", "mdsurrogate", "peri", "polycore"];
 
-/// The commands on scenes and their flags are the same in every program.
+/// Commands on scenes and their flags are the same in every program.
 #[test]
 fn all_programs_have_the_same_commands() {
     let here = workspace();
@@ -46,14 +46,15 @@ fn every_program_sweeps() {
     ] {
         let output = directory.path().join(program);
         let line = format!("sweep {arguments} --quick -o {}", output.display());
-        // what a case expects need not hold for other values: the table says so
+        // expectations of a case need not hold for other values: the table says so
         finish(command(program, &line, workspace()).spawn().unwrap()).with_code(0);
         let table = fs::read_to_string(output.join("sweep.csv")).unwrap();
         assert!(table.lines().count() == 3 && table.lines().next().unwrap().contains(heads), "{table}");
     }
 }
 
-/// A sweep over draws gives the band of a value, one for each value of another key; wrong samples are named.
+/// A sweep over draws gives the band of a value, one for each value of another key; wrong samples are
+/// refused.
 #[test]
 fn a_sample_makes_a_band() {
     let directory = tempfile::tempdir().unwrap();
@@ -87,7 +88,7 @@ fn a_sample_makes_a_band() {
     }
 }
 
-/// A quick run is not taken for a whole one, and the table of a sweep takes no other keys.
+/// A quick run does not replace a full one, and the table of a sweep accepts no other keys.
 #[test]
 fn a_quick_sweep_is_another_sweep() {
     let directory = tempfile::tempdir().unwrap();
@@ -107,7 +108,8 @@ fn a_quick_sweep_is_another_sweep() {
     peri("check bad.toml", here).with_code(2).tells("did you mean `set`?");
 }
 
-/// Parts of a sweep at the same time, as the job script starts them, and a table of all: that of one sweep, to the byte.
+/// Parts of a sweep at the same time, as the job script starts them, and a table of all: equal to that of one
+/// sweep, to the byte.
 #[test]
 fn a_sweep_in_parts() {
     let directory = tempfile::tempdir().unwrap();
@@ -128,7 +130,7 @@ fn a_sweep_in_parts() {
     parts.into_iter().for_each(|part| drop(finish(part).with_code(0)));
     merge().with_code(2).tells("found run 2 of 8");
     assert!(!here.join("it's/sweep.csv").exists());
-    // part 2, stopped in its middle and submitted again
+    // part 2, stopped half way and submitted again
     let run = here.join("it's/youngs_modulus-1MPa_steps-2/report.json");
     finish(start(2)).with_code(0);
     fs::remove_file(&run).unwrap();

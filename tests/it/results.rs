@@ -1,10 +1,10 @@
-//! What a run must reproduce to the bit, and what it may not: times and provenance.
+//! Parts of a result that must be reproduced to the bit, and those that may differ: times and provenance.
 
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// `report.json` of an output directory.
+/// Reads `report.json` of an output directory.
 #[track_caller]
 pub fn report(directory: &Path) -> Value {
     let path = directory.join("report.json");
@@ -12,7 +12,7 @@ pub fn report(directory: &Path) -> Value {
     serde_json::from_str(&text).unwrap()
 }
 
-/// A scalar of a report.
+/// Returns a scalar of a report.
 #[track_caller]
 pub fn scalar(report: &Value, name: &str) -> f64 {
     report["values"][name]["value"]
@@ -20,10 +20,10 @@ pub fn scalar(report: &Value, name: &str) -> f64 {
         .unwrap_or_else(|| panic!("no `{name}` in {:#}", report["values"]))
 }
 
-/// Everything that a run leaves, file by file and folder by folder, without times: equal for equal runs.
+/// Reads all results of a run, file by file and folder by folder, without times: equal for equal runs.
 ///
-/// Numbers keep all digits of the JSON text (shortest representation that reads back to the same bits), so equal
-/// text is equal bits.
+/// Numbers keep all digits of the JSON text (shortest representation that reads back to the same bits), so
+/// equal text is equal bits.
 pub fn timeless(directory: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     for entry in std::fs::read_dir(directory).unwrap() {
@@ -73,7 +73,7 @@ fn without_times(mut report: Value) -> String {
     format!("{report:#}")
 }
 
-/// The table without its column `run_time [s]`.
+/// Removes the column `run_time [s]` from a table.
 fn without_run_time(table: &str) -> String {
     let times = table.lines().next().unwrap().split(',').position(|head| head.ends_with("[s]")).unwrap();
     let kept = |line: &str| {
@@ -83,7 +83,7 @@ fn without_run_time(table: &str) -> String {
     table.lines().map(kept).collect::<Vec<_>>().join("\n")
 }
 
-/// Asserts that two output directories hold the same files with the same bytes, times aside.
+/// Asserts that two output directories contain the same files with the same bytes, except for times.
 #[track_caller]
 pub fn assert_same(a: &Path, b: &Path) {
     let (a, b) = (timeless(a), timeless(b));

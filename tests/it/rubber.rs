@@ -1,4 +1,5 @@
-//! From tests of rubber to a simulated specimen: the block that `polycore` fits is a material of `peri`.
+//! Workflow from rubber tests to a simulated specimen: the block that `polycore` fits is a material of
+//! `peri`.
 
 use crate::program::{command, finish, peri, workspace};
 use crate::results::{report, scalar};
@@ -34,7 +35,8 @@ section = [{ name = "middle", point = ["12 mm", "6 mm"], normal = [1, 0] }]
 
 "#;
 
-/// Treloar's bar at a stretch of 3.06 carries 0.866 MPa (1944); the law fitted to all of his tests 0.904 MPa, and so do particles.
+/// Treloar's bar at a stretch of 3.06 carries 0.866 MPa (1944); the law fitted to all of his tests gives
+/// 0.904 MPa, and so do particles.
 #[test]
 fn a_fitted_law_is_a_material() {
     let folder = tempfile::tempdir().unwrap();

@@ -55,7 +55,8 @@ program = "peri"
 space = "solid"
 spacing = "10 mm"
 shapes = [{ add = "box", min = ["0 mm", "0 mm", "0 mm"], max = ["200 mm", "40 mm", "40 mm"] }]
-cracks = [{ from = ["100 mm", "0 mm", "0 mm"], to = ["100 mm", "20 mm", "0 mm"], and = ["100 mm", "0 mm", "40 mm"] }]
+cracks = [{ from = ["100 mm", "0 mm", "0 mm"], to = ["100 mm", "20 mm", "0 mm"],
+    and = ["100 mm", "0 mm", "40 mm"] }]
 
 [material]
 youngs_modulus = "1 MPa"
@@ -209,11 +210,11 @@ load_at = ["20 mm"]
     )
 }
 
-/// A small generator of numbers in [0, 1) (Knuth's MMIX constants), the same in every run.
+/// Small random generator in [0, 1) (Knuth's MMIX constants), the same in every run.
 pub struct Random(pub u64);
 
 impl Random {
-    /// The next number.
+    /// Returns the next number.
     pub fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64

@@ -1,4 +1,4 @@
-//! `PROGRAM schema`: every case is valid by it, keys are documented, and slips of the pen are found.
+//! `PROGRAM schema`: it accepts every case, describes keys, and finds mistakes.
 
 use crate::program::{command, finish, workspace};
 use serde_json::{Value, json};
@@ -8,13 +8,13 @@ use std::path::PathBuf;
 
 const PROGRAMS: [&str; 4] = ["crystfem", "mdsurrogate", "peri", "polycore"];
 
-/// The schema that a program prints.
+/// Returns the schema that a program prints.
 fn schema(program: &str) -> Value {
     let ended = finish(command(program, "schema", workspace()).spawn().unwrap()).with_code(0);
     serde_json::from_str(&ended.stdout).unwrap()
 }
 
-/// The cases of a program.
+/// Lists the cases of a program.
 fn cases(program: &str) -> Vec<(PathBuf, Value)> {
     let folders = |path: PathBuf| fs::read_dir(path).into_iter().flatten().map(|entry| entry.unwrap().path());
     let files = folders(workspace().join("cases")).flat_map(folders).map(|folder| folder.join("case.toml"));
@@ -27,7 +27,8 @@ fn cases(program: &str) -> Vec<(PathBuf, Value)> {
         .collect()
 }
 
-/// What of draft 7 the schemas use, patterns aside. The schemas were also checked with Python's `jsonschema`.
+/// Checks a value against the part of draft 7 that the schemas use, patterns aside. The schemas were also
+/// checked with Python's `jsonschema`.
 fn faults(root: &Value, schema: &Value, value: &Value, place: &str, faults: &mut Vec<String>) {
     let known = [
         "$ref",
@@ -183,7 +184,7 @@ fn slips_are_found() {
     assert!(check(&schema, &scene).iter().any(|fault| fault.contains("material")));
 }
 
-/// What editors show beside a key.
+/// Descriptions that editors show beside a key.
 #[test]
 fn keys_are_documented() {
     for program in PROGRAMS {
@@ -204,7 +205,7 @@ fn keys_are_documented() {
     }
 }
 
-/// Keys, choices and names that a schema knows, choices in quotes.
+/// Collects keys, choices and names of a schema, choices in quotes.
 fn words(schema: &Value, found: &mut BTreeSet<String>) {
     match schema {
         Value::Object(keys) => {
@@ -222,7 +223,8 @@ fn words(schema: &Value, found: &mut BTreeSet<String>) {
     }
 }
 
-/// The reference pages of `crystfem` leave out no key and no choice: each stands there in backticks, alone or in a line of TOML.
+/// The reference pages of `crystfem` contain every key and every choice, in backticks, alone or in a line of
+/// TOML.
 #[test]
 fn keys_are_in_the_reference() {
     let pages = ["part.md", "material.md"]
@@ -236,7 +238,7 @@ fn keys_are_in_the_reference() {
     }
     let mut known = BTreeSet::new();
     let mut schema = schema("crystfem");
-    // values of reports have a page of their own
+    // values of reports have their own page
     schema["definitions"]["Expect"]["properties"]["quantity"].take();
     words(&schema, &mut known);
     assert!(known.len() > 90 && known.contains("\"tr-bdf2\"") && known.contains("growth_rate"), "{known:?}");
@@ -244,7 +246,7 @@ fn keys_are_in_the_reference() {
     assert!(missing.is_empty(), "not in the reference: {missing:?}");
 }
 
-/// What the schema says of the scalars of reports, as a table: name, unit, description.
+/// Formats the scalars of reports in a schema as a table: name, unit, description.
 fn values(program: &str) -> String {
     let schema = schema(program);
     let choices = schema["definitions"]["Expect"]["properties"]["quantity"]["anyOf"].as_array().unwrap();
@@ -262,7 +264,7 @@ fn values(program: &str) -> String {
     table
 }
 
-/// The page of all values is made of the programs' declarations: `UPDATE_REFERENCE=1` writes it.
+/// The page of all values is generated from the programs' declarations: `UPDATE_REFERENCE=1` writes it.
 #[test]
 fn values_are_in_the_reference() {
     let path = workspace().join("docs/guide/src/reference/values.md");

@@ -1,4 +1,4 @@
-//! The page that `view` writes: what it holds, and that a browser shows it, without a network.
+//! The page that `view` writes: its content, and that a browser shows it without a network.
 
 use crate::browser::Browser;
 use crate::parts::BAR;
@@ -46,25 +46,25 @@ every = 2
 pictures = false
 "#;
 
-/// Longer pages load slowly and cannot be mailed.
-const MOST: usize = 5_000_000;
+/// Largest size of a page, bytes: longer ones load slowly and cannot be mailed.
+const LARGEST_PAGE: usize = 5_000_000;
 
 fn run(program: &str, arguments: &str, here: &Path) -> Ended {
     finish(command(program, arguments, here).spawn().unwrap())
 }
 
-/// What a page tells of its run.
-fn told(page: &str) -> Value {
+/// Returns the data of a page.
+fn page_data(page: &str) -> Value {
     let (_, rest) = page.split_once("<script type=\"application/json\" id=\"run\">").unwrap();
     serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
 }
 
-/// The values of data that the page keeps of what it shows.
-fn shown(browser: &Browser, name: &str) -> String {
+/// Values of the data that the page shows.
+fn shown_values(browser: &Browser, name: &str) -> String {
     browser.value(&format!("document.body.dataset.{name} ?? ''")).as_str().unwrap().to_owned()
 }
 
-/// Chooses an entry of a list by its beginning, as a user does.
+/// Selects an entry of a list by its beginning, as a user does.
 fn choose(browser: &Browser, id: &str, entry: &str) {
     let set = format!(
         "(() => {{ const list = document.getElementById('{id}'); \
@@ -74,7 +74,8 @@ fn choose(browser: &Browser, id: &str, entry: &str) {
     assert!(browser.value(&set).as_i64().unwrap() >= 0, "no {entry} in {id}");
 }
 
-/// The page of a run that tears: rendered, turned, cut, stepped by slider, key, click and play, by mouse and by fingers.
+/// The page of a run that tears: rendered, rotated, cut, stepped by slider, key, click and play, by mouse and
+/// by fingers.
 #[test]
 fn a_sheet_that_tears() {
     let directory = tempfile::tempdir().unwrap();
@@ -84,8 +85,8 @@ fn a_sheet_that_tears() {
     let ended = peri("view out", here).with_code(0);
     ended.shows("view.html: open it in a browser");
     let page = fs::read_to_string(here.join("out/view.html")).unwrap();
-    assert!(page.len() < MOST, "{} characters", page.len());
-    let told = told(&page);
+    assert!(page.len() < LARGEST_PAGE, "{} characters", page.len());
+    let told = page_data(&page);
     let body = &told["bodies"][0];
     let frames = body["frames"].as_array().unwrap();
     assert!(frames.len() >= 15 && body["cells"][0]["kind"] == 9, "{body:#}");
@@ -97,73 +98,77 @@ fn a_sheet_that_tears() {
 
     let Some(browser) = Browser::open(&here.join("out/view.html"), [1400, 1000]) else { return };
     browser.wait("document.body.dataset.ready");
-    assert_eq!(shown(&browser, "step"), (frames.len() - 1).to_string(), "it begins at the end");
-    assert_eq!(shown(&browser, "triangles"), (2 * cells).to_string());
+    assert_eq!(shown_values(&browser, "step"), (frames.len() - 1).to_string(), "it begins at the end");
+    assert_eq!(shown_values(&browser, "triangles"), (2 * cells).to_string());
     browser.picture("sheet-end.txt");
-    // the first step by key, and the marker on the curve goes along
-    let last = shown(&browser, "mark");
+    // the first step by key; the marker on the curve follows
+    let last = shown_values(&browser, "mark");
     browser.press("#step", "\u{e011}");
     browser.wait("document.body.dataset.step === '0'");
-    assert_ne!(shown(&browser, "mark"), last);
+    assert_ne!(shown_values(&browser, "mark"), last);
     browser.press("#step", "\u{e014}\u{e014}");
     browser.wait("document.body.dataset.step === '2'");
     let moment = browser.value("document.getElementById('moment').textContent");
     assert!(moment.as_str().unwrap().contains("displacement"), "{moment}");
     // the marker lies on the row of its step: the displacement of the frame
-    let mark: Value = serde_json::from_str(&shown(&browser, "mark")).unwrap();
-    let displacement = frames[2]["displacement"].as_f64().unwrap();
-    assert!((mark[0][0].as_f64().unwrap() - displacement).abs() < 1e-5, "{mark} {displacement}");
+    let mark: Value = serde_json::from_str(&shown_values(&browser, "mark")).unwrap();
+    let displacement = 1e3 * frames[2]["displacement"].as_f64().unwrap();
+    assert!((mark[0][0].as_f64().unwrap() - displacement).abs() < 1e-2, "{mark} {displacement} mm");
     // a click on the peak of the curve
     let place = |browser: &Browser, row: usize| -> [f64; 2] {
         let at = browser.value(&format!(
-            "(() => {{ const chart = document.getElementById('chart'), {{ xaxis, yaxis }} = chart._fullLayout, \
-             box = chart.getBoundingClientRect(), line = chart.data[0]; \
-             return [box.left + xaxis._offset + xaxis.d2p(line.x[{row}]), box.top + yaxis._offset + yaxis.d2p(line.y[{row}])]; }})()"
+            "(() => {{ chart.element.scrollIntoView({{ block: 'center' }}); \
+             const box = chart.element.getBoundingClientRect(), line = chart.lines[0]; \
+             return [box.left + chart.place.x(line.x[{row}]), box.top + chart.place.y(line.y[{row}])]; }})()"
         ));
         [0, 1].map(|k| at[k].as_f64().unwrap())
     };
     let there = place(&browser, 19);
     browser.drag("mouse", &[[there, there]]);
     browser.wait("document.body.dataset.step !== '2'");
-    let step: usize = shown(&browser, "step").parse().unwrap();
+    let step: usize = shown_values(&browser, "step").parse().unwrap();
     assert!((frames[step]["time"].as_f64().unwrap() - 20.0).abs() <= 1.0, "step {step}");
     // colours
-    let ends = |browser: &Browser| [shown(browser, "low"), shown(browser, "high")];
+    let ends = |browser: &Browser| [shown_values(browser, "low"), shown_values(browser, "high")];
     let damage = ends(&browser);
     choose(&browser, "fields", "cauchy_hardy 22");
     browser.wait(&format!("document.body.dataset.high !== '{}'", damage[1]));
     let whole = ends(&browser);
+    browser.click("#more summary");
     browser.click("#own-range");
     browser.wait(&format!("document.body.dataset.high !== '{}'", whole[1]));
-    // a turn by the mouse and one by a finger, and two fingers for nearer
-    let eye = "JSON.stringify(document.getElementById('stage')._fullLayout.scene._scene.getCamera().eye)";
-    let size = "document.getElementById('stage')._fullLayout.scene.aspectratio.y";
+    // moved by the mouse and by a finger, and two fingers for nearer: a plane body stays in its plane
+    let eye = "JSON.stringify(stage.centre)";
+    let size = "stage.zoom";
     let before = browser.value(eye);
     let middle = browser.value(
-        "(() => { const box = document.getElementById('stage').getBoundingClientRect(); \
+        "(() => { stage.element.scrollIntoView({ block: 'center' }); const box = \
+         stage.element.getBoundingClientRect(); \
          return [box.left + box.width / 2, box.top + box.height / 2]; })()",
     );
     let [x, y] = [0, 1].map(|k| middle[k].as_f64().unwrap());
     browser.drag("mouse", &[[[x, y], [x + 120.0, y + 60.0]]]);
     browser.wait(&format!("{eye} !== '{}'", before.as_str().unwrap()));
-    browser.picture("sheet-turned.txt");
-    let turned = browser.value(eye);
+    browser.picture("sheet-moved.txt");
+    let moved = browser.value(eye);
     browser.drag("touch", &[[[x, y], [x - 90.0, y - 80.0]]]);
-    browser.wait(&format!("{eye} !== '{}'", turned.as_str().unwrap()));
+    browser.wait(&format!("{eye} !== '{}'", moved.as_str().unwrap()));
     let near = browser.value(size).as_f64().unwrap();
     browser.drag("touch", &[[[x - 20.0, y], [x - 140.0, y]], [[x + 20.0, y], [x + 140.0, y]]]);
     browser.wait(&format!("{size} > {}", 1.5 * near));
-    // play to the end, and its button shows that it rests
+    // play to the end; its button shows that it stopped
     browser.press("#step", "\u{e011}");
     browser.wait("document.body.dataset.step === '0'");
     browser.click("#play");
     browser.wait(&format!("document.body.dataset.step === '{}'", frames.len() - 1));
     browser.wait("document.getElementById('play').textContent === '▶'");
+    assert_eq!(browser.layout_faults(), Vec::<Value>::new());
     assert_eq!(browser.complaints(), Vec::<Value>::new());
     assert_eq!(browser.requests(), Vec::<String>::new());
 }
 
-/// The page of a print on a telephone: layers come, the cut shows the inside, probes over time choose the step.
+/// The page of a print on a telephone: layers appear, the cut shows the inside, probes over time select the
+/// step.
 #[test]
 fn a_print_on_a_small_screen() {
     let directory = tempfile::tempdir().unwrap();
@@ -172,11 +177,16 @@ fn a_print_on_a_small_screen() {
     run("crystfem", "run bar.toml --output out", here).with_code(0);
     run("crystfem", "view out --html page.html", here).with_code(0).shows("page.html");
     let page = fs::read_to_string(here.join("page.html")).unwrap();
-    assert!(page.len() < MOST && !here.join("out/view.html").exists(), "{}", page.len());
-    let Some(browser) = Browser::open(&here.join("page.html"), [420, 860]) else { return };
+    assert!(page.len() < LARGEST_PAGE && !here.join("out/view.html").exists(), "{}", page.len());
+    let Some(browser) = Browser::open(&here.join("page.html"), [390, 800]) else { return };
     browser.wait("document.body.dataset.ready");
     browser.picture("print-end.txt");
-    let triangles = |browser: &Browser| shown(browser, "triangles").parse::<usize>().unwrap();
+    assert_eq!(browser.layout_faults(), Vec::<Value>::new());
+    let azimuth = browser.value("stage.azimuth").as_f64().unwrap();
+    browser.press("#stage", "\u{e014}");
+    browser.wait(&format!("stage.azimuth !== {azimuth}"));
+    browser.click("#more summary");
+    let triangles = |browser: &Browser| shown_values(browser, "triangles").parse::<usize>().unwrap();
     let whole = triangles(&browser);
     browser.press("#step", "\u{e011}");
     browser.wait("document.body.dataset.step === '0'");
@@ -188,17 +198,19 @@ fn a_print_on_a_small_screen() {
     choose(&browser, "fields", "crystallinity");
     choose(&browser, "axis", "y");
     browser.wait(&format!("document.body.dataset.triangles !== '{whole}'"));
-    let grey = "document.getElementById('stage').data[1].i.length";
-    assert!(browser.value(grey).as_u64().unwrap() > 0, "glass has no crystallinity");
+    assert_ne!(shown_values(&browser, "grey"), "0", "glass has no crystallinity");
     browser.picture("print-cut.txt");
     browser.press("#cut", "\u{e010}");
     browser.wait("document.body.dataset.triangles === '0'");
     browser.click("#other-side");
     browser.wait(&format!("document.body.dataset.triangles === '{whole}'"));
     // probes
-    let traces = browser.value("document.getElementById('chart').data.length").as_u64().unwrap();
-    assert!(traces >= 2, "a probe and the marker");
-    assert!(shown(&browser, "mark").contains("120"), "the marker is at the end: {}", shown(&browser, "mark"));
+    assert!(browser.value("chart.lines.length").as_u64().unwrap() >= 1, "a probe");
+    assert!(
+        shown_values(&browser, "mark").contains("120"),
+        "the marker is at the end: {}",
+        shown_values(&browser, "mark")
+    );
     assert_eq!(browser.complaints(), Vec::<Value>::new());
     assert_eq!(browser.requests(), Vec::<String>::new());
 }
@@ -221,8 +233,11 @@ fn what_there_is_is_shown_or_named() {
     fs::write(here.join("curves/point_a&b.csv"), "time [s],alpha </script>\n0,0\n1,\n2,NaN\n3,1\n").unwrap();
     run("polycore", "view curves", here).with_code(0);
     let page = fs::read_to_string(here.join("curves/view.html")).unwrap();
-    assert_eq!(told(&page)["tables"][0]["columns"][1]["data"], serde_json::json!([0.0, null, null, 1.0]));
-    // a run under way, and one with nothing yet
+    assert_eq!(
+        page_data(&page)["tables"][0]["columns"][1]["data"],
+        serde_json::json!([0.0, null, null, 1.0])
+    );
+    // a run in progress, and one without any file
     fs::write(here.join("sheet.toml"), SHEET.replace("steps = 30", "steps = 3000")).unwrap();
     let mut child = command("peri", "run sheet.toml --output half", here).spawn().unwrap();
     let written = || {
@@ -241,16 +256,16 @@ fn what_there_is_is_shown_or_named() {
     child.wait().unwrap();
     peri("view half", here).with_code(0);
     let page = fs::read_to_string(here.join("half/view.html")).unwrap();
-    let half = told(&page);
-    assert!(half["unfinished"] == true && half["bodies"][0]["frames"].as_array().unwrap().len() >= 3);
+    let half = page_data(&page);
+    assert!(half["verdict"]["state"] == "bad" && half["bodies"][0]["frames"].as_array().unwrap().len() >= 3);
     fs::create_dir(here.join("begun")).unwrap();
     fs::write(here.join("begun/checkpoint.bin"), "x").unwrap();
     peri("view begun", here).with_code(0);
 
     let Some(browser) = Browser::open(&here.join("half/view.html"), [1000, 800]) else { return };
     browser.wait("document.body.dataset.ready === 'yes'");
-    let about = "document.getElementById('about').textContent";
-    assert!(browser.value(about).as_str().unwrap().contains("the run has not ended"));
+    let verdict = "document.getElementById('verdict').textContent";
+    assert!(browser.value(verdict).as_str().unwrap().contains("The run has not ended"));
     assert_eq!(browser.complaints(), Vec::<Value>::new());
     let Some(browser) = Browser::open(&here.join("begun/view.html"), [1000, 800]) else { return };
     browser.wait("document.body.dataset.ready === 'nothing'");

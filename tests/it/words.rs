@@ -1,7 +1,8 @@
-//! What `crystfem` says of slips that would pass in silence, and how much it says.
+//! Messages of `crystfem` for mistakes that would pass in silence, and their number.
 
+use crate::browser::Browser;
 use crate::parts::BAR;
-use crate::program::{Ended, command, finish};
+use crate::program::{Ended, command, finish, peri, workspace};
 use std::fs;
 use std::path::Path;
 
@@ -15,7 +16,8 @@ fn slips_are_reported() {
     let here = directory.path();
     let write = |name: &str, text: &str| fs::write(here.join(name), text).unwrap();
     // a quantity that no run reports
-    let expect = "\n[[expect]]\nquantity = \"layer-1.min_crystallinity\"\nat_least = 0.2\nkind = \"bound\"\nsource = \"none\"\n";
+    let expect = "\n[[expect]]\nquantity = \"layer-1.min_crystallinity\"\nat_least = 0.2\nkind = \
+                  \"bound\"\nsource = \"none\"\n";
     write("expect.toml", &(BAR.to_owned() + expect));
     for verb in ["check", "run"] {
         let ended = crystfem(&format!("{verb} expect.toml"), here).with_code(2);
@@ -30,17 +32,20 @@ fn slips_are_reported() {
     write("cold.toml", &BAR.replace("ambient = \"100 degC\"", "ambient = \"60 K\""));
     let told = crystfem("check cold.toml", here).with_code(0);
     told.shows("note       `boundary[1].ambient` is 60 K, which is -213.15 °C: is `degC` meant?");
-    told.shows("builds     a mesh that reaches from (-12, -6, -2) mm to (12, 6, 1.5) mm");
-    // a leg that is a jump
+    told.shows("builds     a mesh from (-12, -6, -2) mm to (12, 6, 1.5) mm");
+    // a segment that is a jump
     write(
         "point.toml",
-        "version = 1\nprogram = \"crystfem\"\n[material]\nlaw = \"semicrystalline\"\ndensity = \"1010 kg/m^3\"\n\
-         conductivity = \"0.25 W/(m K)\"\nspecific_heat = \"2200 J/(kg K)\"\nkinetics = \"table-4.1-column-1\"\n\
-         crystallinity = 0.25\n[[point]]\nname = \"p\"\nstart = \"200 degC\"\nlegs = [{ to = \"120 degC\" }]\n",
+        "version = 1\nprogram = \"crystfem\"\n[material]\nlaw = \"semicrystalline\"\ndensity = \"1010 \
+         kg/m^3\"\n\
+         conductivity = \"0.25 W/(m K)\"\nspecific_heat = \"2200 J/(kg K)\"\nkinetics = \
+                          \"table-4.1-column-1\"\n\
+         crystallinity = 0.25\n[[point]]\nname = \"p\"\nstart = \"200 degC\"\nlegs = \
+             [{ to = \"120 degC\" }]\n",
     );
     crystfem("check point.toml", here)
         .with_code(0)
-        .shows("1 segments, 0 s, 1 of them jumps (neither `rate` nor `duration`)");
+        .shows("1 segments, 0 s, 1 of them jumps (without `rate` and `duration`)");
     // a key of a sweep without its block
     write("bar.toml", BAR);
     let ended = crystfem("sweep bar.toml --vary layer_time=5s", here).with_code(2);
@@ -54,7 +59,8 @@ fn slips_are_reported() {
 fn a_mesh_without_its_unit() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
-    let mesh = "*NODE\n1, 0, 0, 0\n2, 60, 0, 0\n3, 60, 10, 0\n4, 0, 10, 0\n5, 0, 0, 6\n6, 60, 0, 6\n7, 60, 10, 6\n\
+    let mesh = "*NODE\n1, 0, 0, 0\n2, 60, 0, 0\n3, 60, 10, 0\n4, 0, 10, 0\n5, 0, 0, 6\n6, 60, 0, 6\n7, 60, \
+                10, 6\n\
                 8, 0, 10, 6\n*ELEMENT, TYPE=C3D8, ELSET=part\n1, 1, 2, 3, 4, 5, 6, 7, 8\n";
     fs::write(here.join("part.inp"), mesh).unwrap();
     let scene = |unit: &str, height: &str| {
@@ -70,29 +76,75 @@ fn a_mesh_without_its_unit() {
     };
     scene("", "0.5 mm");
     let ended = crystfem("check part.toml", here).with_code(2);
-    ended.tells("`mesh.unit`: found nothing, and with the file's unit as 1 m the part is 60 × 10 × 6 m");
+    ended.tells("missing `mesh.unit`: in metres the part is 60 × 10 × 6 m");
     scene("unit = \"1 mm\"", "6 mm");
-    crystfem("check part.toml", here).with_code(0).shows("reaches from (0, 0, 0) mm to (60, 10, 6) mm");
+    crystfem("check part.toml", here).with_code(0).shows("a mesh from (0, 0, 0) mm to (60, 10, 6) mm");
 }
 
-/// A screen holds what is said of a run; the file has all.
+/// The terminal shows a screenful of messages of a run; the file has all.
 #[test]
 fn few_lines() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
     let bar = BAR.replace("tolerance = \"1 K\"", "tolerance = \"3 K\"").replace("layers = 3", "layers = 12");
     fs::write(here.join("bar.toml"), bar.replace("layer_time = \"10 s\"", "layer_time = \"5 s\"")).unwrap();
-    let ended = crystfem("run bar.toml --output out", here).with_code(0);
+    let short = crystfem("run bar.toml --output out", here).with_code(0);
+    assert!(short.stdout.lines().count() <= 25, "{}", short.stdout);
+    assert!(short.stdout.lines().all(|line| line.chars().count() <= 100), "{}", short.stdout);
+    assert!(!short.stdout.contains('\u{1b}'), "a file has no colours");
+    short.shows("results in out: report.json");
+    short.shows("view out");
+    let ended = crystfem("run bar.toml --output out --verbose", here).with_code(0);
     assert!(ended.stdout.lines().count() < 40, "{}", ended.stdout);
     ended.shows(" more values in report.json");
 }
 
-/// Values of layers and what is expected of each run in the table of a sweep, which a shorter sweep does not lose.
+/// The first command of the README, at its coarse spacings: a screen of text, a handful of files.
+#[test]
+fn the_first_command_fits_a_screen() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let case = workspace().join("cases/ch2/plate-with-hole/case.toml");
+    let line = format!("run {} --quick --output out", case.display());
+    let ended = peri(&line, here).with_code(0);
+    let lines: Vec<&str> = ended.stdout.lines().collect();
+    assert!(lines.len() <= 25 && lines.iter().all(|line| line.chars().count() <= 100), "{}", ended.stdout);
+    assert_eq!(lines[0], "Plate with a hole");
+    for shown in [
+        "variant ",
+        "hardy_first",
+        "dx=4mm m=3.015",
+        " expectations met (",
+        "results in out: report.json",
+        "view out",
+    ] {
+        ended.shows(shown);
+    }
+    let files: Vec<u64> =
+        fs::read_dir(here.join("out")).unwrap().map(|file| file.unwrap().metadata().unwrap().len()).collect();
+    assert!(files.len() <= 12 && files.iter().sum::<u64>() < 20_000_000, "{files:?}");
+    peri("view out", here).with_code(0);
+    for size in [[1400, 1000], [390, 800]] {
+        let Some(browser) = Browser::open(&here.join("out/view.html"), size) else { return };
+        browser.wait("document.body.dataset.ready");
+        browser.picture(&format!("plate-{}.txt", size[0]));
+        assert_eq!(browser.layout_faults(), Vec::<serde_json::Value>::new(), "{size:?}");
+        assert_eq!(browser.value("chart.lines.length"), 3, "the curves that the scene lists");
+        browser.click("#theme");
+        browser.press("#find-value", "force_imb");
+        browser.wait("document.querySelectorAll('#scalars tbody tr').length < 5");
+        assert_eq!(browser.layout_faults(), Vec::<serde_json::Value>::new(), "{size:?}, dark");
+        assert_eq!(browser.complaints(), Vec::<serde_json::Value>::new());
+    }
+}
+
+/// Values of layers and the expectations of each run in the table of a sweep, which a shorter sweep keeps.
 #[test]
 fn columns_of_a_sweep() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
-    let expect = "\n[[expect]]\nquantity = \"layer-3.least_crystallinity\"\nat_least = 0.2\nkind = \"bound\"\nsource = \"none\"\n";
+    let expect = "\n[[expect]]\nquantity = \"layer-3.least_crystallinity\"\nat_least = 0.2\nkind = \
+                  \"bound\"\nsource = \"none\"\n";
     let bar = BAR
         .replace("tolerance = \"1 K\"", "tolerance = \"3 K\"")
         .replace("end = \"120 s\"", "end = \"30 s\"");
@@ -124,7 +176,8 @@ fn columns_of_a_sweep() {
     assert_eq!(sweep("12s").lines().count(), 2);
 }
 
-/// Bisection by runs: the answer meets what is expected, a hundredth of the interval less does not, and all is in the table.
+/// Bisection by runs: the answer meets the expectations, a hundredth of the interval less does not, and all
+/// runs are in the table.
 #[test]
 fn the_least_value_that_passes() {
     let directory = tempfile::tempdir().unwrap();

@@ -9,9 +9,9 @@ use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use polycore::file::atomic_write;
 use serde::{Deserialize, Serialize};
 
-use crate::stamp::{Stamp, sources};
-use crate::table::{Table, print};
-use crate::workspace::Workspace;
+use crate::stamp::{SourceStamp, sources};
+use crate::table::{TextTable, print};
+use crate::workspace::Repository;
 
 mod brick;
 mod calculix;
@@ -24,12 +24,12 @@ mod peri_solvers;
 mod scikit_fem;
 mod surrogate;
 
-/// What to measure.
+/// Options of `bench`.
 #[derive(clap::Args)]
 pub struct Options {
-    /// `langevin`, `peri-laws`, `peri-peers` (beside LAMMPS), `peri-solvers [-- MM,MM…]`, `crystfem [-- PART… N,N…]`
-    /// (its brick beside CalculiX and scikit-fem), `mdsurrogate` (its training and answers beside PyTorch and onnxruntime), or a crate with a
-    /// `benches/measure.rs`.
+    /// Bench: `langevin`, `peri-laws`, `peri-peers` (compared with LAMMPS), `peri-solvers [-- MM,MM…]`,
+    /// `crystfem [-- PART… N,N…]` (its brick compared with CalculiX and scikit-fem), `mdsurrogate` (training
+    /// and inference compared with PyTorch and onnxruntime), or a crate with a `benches/measure.rs`.
     name: String,
     /// Print the rows as JSON.
     #[arg(long)]
@@ -42,20 +42,20 @@ pub struct Options {
 /// target/bench/NAME.json.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Bench {
-    /// When, where and from which sources.
-    pub stamp: Stamp,
-    /// What was measured.
+    /// Provenance: date, machine and hash of the sources.
+    pub stamp: SourceStamp,
+    /// Measured rows.
     pub rows: Vec<Row>,
 }
 
-/// What a bench has left; none where it has not run.
-pub fn read(workspace: &Workspace, name: &str) -> Option<Bench> {
+/// Reads the result of a bench; `None` if it has not run.
+pub fn read(workspace: &Repository, name: &str) -> Option<Bench> {
     let text = std::fs::read_to_string(workspace.target().join(format!("bench/{name}.json"))).ok()?;
     serde_json::from_str(&text).ok()
 }
 
-/// Measures, prints and writes.
-pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
+/// Measures, prints and writes the rows.
+pub fn run(workspace: &Repository, options: &Options) -> Result<bool> {
     let folder = workspace.results("bench")?;
     let (rows, table, passed) = match options.name.as_str() {
         "langevin" | "peri-laws" | "peri-peers" if !options.arguments.is_empty() => {
@@ -96,7 +96,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
             (rows, table, true)
         }
     };
-    // a part with options of its own is not what the report shows
+    // a part with other options is not what the report shows
     if options.name == "crystfem" {
         print(&if options.json {
             serde_json::to_string_pretty(&rows).into_diagnostic()? + "\n"
@@ -114,7 +114,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     Ok(passed)
 }
 
-/// Runs the measurements of a crate ([`Workspace::bench`]), which print rows as a JSON list.
+/// Runs the measurements of a crate ([`Repository::bench`]), which print rows as a JSON list.
 fn external(program: &Path, arguments: &[String]) -> Result<Vec<Row>> {
     let output = Command::new(program)
         .args(arguments)
@@ -133,7 +133,7 @@ fn external(program: &Path, arguments: &[String]) -> Result<Vec<Row>> {
 }
 
 fn text(rows: &[Row]) -> String {
-    let mut table = Table::new(["what", "size", "threads", "value", "unit"]);
+    let mut table = TextTable::new(["what", "size", "threads", "value", "unit"]);
     for row in rows {
         let value = row.value.map_or_else(|| "-".to_owned(), |value| format!("{value:.4e}"));
         table.push([
@@ -147,14 +147,15 @@ fn text(rows: &[Row]) -> String {
     table.text()
 }
 
-/// To target/bench/NAME.json, with what tells whether the rows still hold.
-fn write(workspace: &Workspace, name: &str, rows: &[Row]) -> Result<PathBuf> {
+/// Writes target/bench/NAME.json, with the provenance of the rows.
+fn write(workspace: &Repository, name: &str, rows: &[Row]) -> Result<PathBuf> {
     let path = workspace.results("bench")?.join(format!("{name}.json"));
     let of = name.split('-').next().unwrap_or(name);
     let crates = workspace.programs();
-    // `langevin` is of no program: the numerics of `polycore`
+    // `langevin` belongs to no program: the numerics of `polycore`
     let measured: Vec<&str> = crates.iter().map(String::as_str).filter(|program| *program == of).collect();
-    let stamp = Stamp::new(workspace.root(), &sources(workspace.root(), &measured, &["src", "benches"]))?;
+    let stamp =
+        SourceStamp::new(workspace.root(), &sources(workspace.root(), &measured, &["src", "benches"]))?;
     let bench = Bench { stamp, rows: rows.to_vec() };
     atomic_write(&path, |file| {
         serde_json::to_writer_pretty(&mut *file, &bench)?;

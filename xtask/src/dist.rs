@@ -11,11 +11,11 @@ use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
 use crate::licences;
 use crate::table::print;
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
-/// What an archive contains of the tree.
+/// Files of the tree that an archive contains.
 const FILES: [&str; 5] = ["README.md", "CHANGELOG.md", "CITATION.cff", "LICENSE-APACHE", "LICENSE-MIT"];
-/// Shells and what their completions are called.
+/// Shells and the names of their completions.
 const SHELLS: [(&str, &str, &str); 5] = [
     ("bash", "", ""),
     ("zsh", "_", ""),
@@ -38,14 +38,14 @@ pub struct Options {
     target: Option<String>,
 }
 
-/// Writes `polymer-mechanics-VERSION-TRIPLE.tar.gz` and says where it is.
-pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
+/// Writes `polymer-mechanics-VERSION-TRIPLE.tar.gz` and prints its path.
+pub fn run(workspace: &Repository, options: &Options) -> Result<bool> {
     let programs = workspace.programs();
     let mut executables = Vec::new();
     for program in &programs {
         executables.push(match &options.from {
             Some(folder) => folder.join(program).with_extension(std::env::consts::EXE_EXTENSION),
-            None => workspace.release(program)?,
+            None => workspace.build_program(program)?,
         });
     }
     let triple = options.target.clone().map_or_else(host, Ok)?;
@@ -69,12 +69,12 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
             .into_diagnostic()
             .wrap_err_with(|| executable.display().to_string())?;
         for (shell, before, after) in SHELLS {
-            let script = said(executable, &["completions", shell])?;
+            let script = run_program(executable, &["completions", shell])?;
             file(&format!("completions/{shell}/{before}{program}{after}"), &script)?;
         }
         let pages = root.join("man/man1");
         fs::create_dir_all(&pages).into_diagnostic()?;
-        said(executable, &["man", &pages.display().to_string()])?;
+        run_program(executable, &["man", &pages.display().to_string()])?;
     }
     for name in FILES {
         let path = workspace.root().join(name);
@@ -87,8 +87,8 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     Ok(true)
 }
 
-/// What a program prints.
-fn said(executable: &Path, arguments: &[&str]) -> Result<Vec<u8>> {
+/// Returns the output of a program.
+fn run_program(executable: &Path, arguments: &[&str]) -> Result<Vec<u8>> {
     let output = Command::new(executable)
         .args(arguments)
         .output()
@@ -114,7 +114,7 @@ fn pack(root: &Path, name: &str, archive: &Path) -> Result<()> {
     write().into_diagnostic().wrap_err_with(|| archive.display().to_string())
 }
 
-/// The system of this compiler, as `rustc -vV` names it.
+/// Target triple of this compiler, from `rustc -vV`.
 fn host() -> Result<String> {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let output = Command::new(rustc).arg("-vV").output().into_diagnostic().wrap_err("cannot start rustc")?;

@@ -1,4 +1,5 @@
-//! The licences of what our programs contain, for archives of binaries: each dependency with its terms and their text.
+//! Licences of the dependencies of our programs, for archives of binaries: each dependency with its terms and
+//! their text.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -8,9 +9,9 @@ use std::process::Command;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use serde::Deserialize;
 
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
-/// What names of files with terms begin with.
+/// Prefixes of the names of licence files.
 const TERMS: [&str; 5] = ["LICENSE", "LICENCE", "COPYING", "NOTICE", "UNLICENSE"];
 
 #[derive(Deserialize)]
@@ -28,18 +29,18 @@ struct Package {
     source: Option<String>,
 }
 
-/// A dependency, its terms and their texts.
-struct Part {
+/// Dependency, its terms and their texts.
+struct LinkedPackage {
     what: String,
     terms: String,
     texts: Vec<String>,
 }
 
-/// The text of `THIRD-PARTY.md`: crates that the programs are linked with, and the licences that they come with.
+/// Generates `THIRD-PARTY.md`: crates linked into the programs, and their licences.
 ///
 /// # Errors
 /// Cargo fails; a crate without terms.
-pub fn text(workspace: &Workspace, programs: &[String]) -> Result<String> {
+pub fn text(workspace: &Repository, programs: &[String]) -> Result<String> {
     let linked = linked(workspace, programs)?;
     let metadata = cargo(workspace, &["metadata", "--format-version", "1", "--locked"])?;
     let metadata: Metadata = serde_json::from_str(&metadata).into_diagnostic()?;
@@ -49,17 +50,17 @@ pub fn text(workspace: &Workspace, programs: &[String]) -> Result<String> {
     for package in metadata.packages.iter().filter(|package| package.source.is_some()) {
         let what = format!("{} {}", package.name, package.version);
         if linked.contains(&what) {
-            parts.push(part(package, what, &mit, &apache)?);
+            parts.push(read_package(package, what, &mit, &apache)?);
         }
     }
     if parts.len() < linked.len() / 2 {
         return Err(miette!("terms of {} of {} crates were found", parts.len(), linked.len()));
     }
-    Ok(written(&mut parts))
+    Ok(format_list(&mut parts))
 }
 
-/// Name and version of all crates that the programs are linked with on this machine.
-fn linked(workspace: &Workspace, programs: &[String]) -> Result<BTreeSet<String>> {
+/// Lists name and version of all crates linked into the programs on this machine.
+fn linked(workspace: &Repository, programs: &[String]) -> Result<BTreeSet<String>> {
     let mut arguments = vec!["tree", "--locked", "--edges", "normal", "--prefix", "none", "--format", "{p}"];
     let packages: Vec<String> = programs.iter().filter_map(|program| workspace.package(program)).collect();
     packages.iter().for_each(|package| arguments.extend(["--package", package]));
@@ -71,7 +72,7 @@ fn linked(workspace: &Workspace, programs: &[String]) -> Result<BTreeSet<String>
     Ok(tree.lines().filter_map(of).collect())
 }
 
-fn cargo(workspace: &Workspace, arguments: &[&str]) -> Result<String> {
+fn cargo(workspace: &Repository, arguments: &[&str]) -> Result<String> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let output = Command::new(cargo)
         .args(arguments)
@@ -85,7 +86,7 @@ fn cargo(workspace: &Workspace, arguments: &[&str]) -> Result<String> {
     String::from_utf8(output.stdout).into_diagnostic()
 }
 
-fn part(package: &Package, what: String, mit: &str, apache: &str) -> Result<Part> {
+fn read_package(package: &Package, what: String, mit: &str, apache: &str) -> Result<LinkedPackage> {
     let folder = Path::new(&package.manifest_path).parent().unwrap_or(Path::new("."));
     let mut texts = Vec::new();
     let entries = fs::read_dir(folder).into_diagnostic().wrap_err_with(|| folder.display().to_string())?;
@@ -115,15 +116,14 @@ fn part(package: &Package, what: String, mit: &str, apache: &str) -> Result<Part
             _ => return Err(miette!("{what} comes without the text of its licence, {terms}")),
         });
     }
-    Ok(Part { what, terms, texts })
+    Ok(LinkedPackage { what, terms, texts })
 }
 
-/// The list of crates, then every licence text once, with the names of the crates that have it.
-fn written(parts: &mut [Part]) -> String {
+/// Formats the list of crates, then every licence text once, with the names of its crates.
+fn format_list(parts: &mut [LinkedPackage]) -> String {
     parts.sort_by(|a, b| a.what.cmp(&b.what));
     let mut text = String::from(
-        "# Third-party software\n\nThe programs contain these crates. `plotly` contains plotly.js (MIT, Copyright 2012-2025, \
-         Plotly, Inc.), which the pages of the command `view` contain too.\n\n| crate | licence |\n|---|---|\n",
+        "# Third-party software\n\nThe programs contain these crates.\n\n| crate | licence |\n|---|---|\n",
     );
     let mut texts: BTreeMap<String, (Vec<&str>, &str)> = BTreeMap::new();
     for part in parts.iter() {
@@ -146,13 +146,13 @@ mod tests {
     use super::*;
     use std::path::PathBuf;
 
-    /// What is linked is listed, each with terms; tests and what other systems need are not.
+    /// Every linked crate is listed with its terms; dev-dependencies and those of other systems are not.
     #[test]
     fn every_linked_crate_has_terms() {
-        let workspace = Workspace::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."));
+        let workspace = Repository::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."));
         let text = text(&workspace, &workspace.programs()).expect("terms of all crates");
         let (list, _) = text.split_once("\n## ").expect("texts");
-        for name in ["nalgebra", "burn", "plotly", "rust-hdf5", "faer"] {
+        for name in ["nalgebra", "burn", "kuva", "rust-hdf5", "faer"] {
             assert!(list.contains(&format!("\n| {name} ")), "{name}");
         }
         for name in ["proptest", "criterion", "evidence", "windows-sys"] {

@@ -1,4 +1,5 @@
-//! Project tasks, as `cargo xtask TASK`. They run the released command lines: what users run is what is judged and timed.
+//! Project tasks, as `cargo xtask TASK`. They run the released command lines: what users run is judged and
+//! timed.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -9,6 +10,8 @@ mod bench;
 mod dist;
 mod licences;
 mod outcome;
+mod pictures;
+mod prose;
 mod report;
 mod stamp;
 mod summary;
@@ -18,7 +21,7 @@ mod tidy;
 mod validate;
 mod workspace;
 
-use workspace::Workspace;
+use workspace::Repository;
 
 /// Tasks of the polymer-mechanics workspace.
 #[derive(Parser)]
@@ -32,7 +35,7 @@ struct Cli {
 enum Task {
     /// Run all tests: the command of the README; lists skipped tests at the end.
     Test {
-        /// Passed on to `cargo test`, for example a test's name.
+        /// Arguments passed on to `cargo test`, for example a test's name.
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
@@ -40,19 +43,23 @@ enum Task {
     Validate(validate::Options),
     /// Measure: `langevin`, `peri-peers`, or a crate that has a `benches/measure.rs` (`peri`).
     Bench(bench::Options),
-    /// Make the archive of a release for this system: programs, completions, man pages, licences of dependencies.
+    /// Make the archive of a release for this system: programs, completions, man pages, licences of
+    /// dependencies.
     Dist(dist::Options),
-    /// Check the tree: lengths of source files, sizes of files in git.
+    /// Draw the pictures and tables of README and guide from cases; those that are up to date are kept.
+    Pictures(pictures::Options),
+    /// Check the tree: wording, lengths of source files, sizes of files in git.
     Tidy,
 }
 
 fn main() -> ExitCode {
-    let workspace = Workspace::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."));
+    let workspace = Repository::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."));
     let passed = match Cli::parse().task {
         Task::Test { arguments } => test::run(&workspace, &arguments),
         Task::Validate(options) => validate::run(&workspace, &options),
         Task::Bench(options) => bench::run(&workspace, &options),
         Task::Dist(options) => dist::run(&workspace, &options),
+        Task::Pictures(options) => pictures::run(&workspace, &options),
         Task::Tidy => tidy::run(&workspace),
     };
     match passed {

@@ -1,45 +1,45 @@
-//! What became of a case.
+//! Outcome of a case.
 
 use std::path::{Path, PathBuf};
 
 use harness::report::{Judgement, Report, Value};
 
-/// What became of a case.
+/// Outcome of a case.
 #[derive(Default)]
-pub struct Outcome {
-    /// `ch2/plate-with-hole`.
+pub struct CaseOutcome {
+    /// Name: `ch2/plate-with-hole`.
     pub case: String,
-    /// The case file, relative to the root where it lies below it.
+    /// Case file, relative to the root if it lies below.
     pub file: String,
     /// Link to the case file from target/validation.
     pub href: String,
-    /// The title in the case file.
+    /// Title in the case file.
     pub title: String,
-    /// The command line that ran it.
+    /// Command line that ran it.
     pub program: String,
-    /// What a user types to run it.
+    /// Command with which a user runs it.
     pub command: String,
-    /// The folder of its results.
+    /// Folder of its results.
     pub output: PathBuf,
-    /// What it printed.
+    /// Output of the program.
     pub log: PathBuf,
-    /// Wall time of the whole program.
+    /// Wall time of the program, s.
     pub seconds: f64,
-    /// Not run again: the results of an earlier run hold.
+    /// True if the results of an earlier run are still valid.
     pub kept: bool,
-    /// Why it failed other than by its expectations: a crash, no report.
+    /// Failure other than an unmet expectation: a crash, no report.
     pub failure: Option<String>,
-    /// What it wrote.
+    /// Report of the run.
     pub report: Option<Report>,
 }
 
-impl Outcome {
-    /// Of a case that has not run yet.
+impl CaseOutcome {
+    /// Creates the outcome of a case that has not run yet.
     pub fn new(case: &str) -> Self {
         Self { case: case.to_owned(), ..Self::default() }
     }
 
-    /// Takes over a report; `status` is how the program failed, if it did.
+    /// Adds a report; `status` is how the program failed, if it did.
     pub fn judge(&mut self, report: Report, status: Option<String>, quick: bool) {
         let missed = report.expect.iter().any(|judgement| !judgement.pass);
         self.failure = match status {
@@ -55,12 +55,12 @@ impl Outcome {
         self.report = Some(report);
     }
 
-    /// The judged expectations.
+    /// Judged expectations.
     pub fn expect(&self) -> &[Judgement] {
         self.report.as_ref().map_or(&[], |report| &report.expect)
     }
 
-    /// The unit of a scalar, as its report has it.
+    /// Unit of a scalar in its report.
     pub fn unit(&self, quantity: &str) -> &str {
         match self.report.as_ref().and_then(|report| report.values.get(quantity)) {
             Some(Value::Scalar { unit, .. }) => unit,
@@ -68,21 +68,22 @@ impl Outcome {
         }
     }
 
-    /// A scalar of the report with its unit, for a reader.
+    /// Formats a scalar of the report with its unit.
     pub fn scalar(&self, quantity: &str) -> Option<String> {
         match self.report.as_ref()?.values.get(quantity)? {
-            Value::Scalar { value, unit } if unit.is_empty() => Some(shown(*value)),
-            Value::Scalar { value, unit } => Some(format!("{} {unit}", shown(*value))),
+            Value::Scalar { value, unit } if unit.is_empty() => Some(format_number(*value)),
+            Value::Scalar { value, unit } => Some(format!("{} {unit}", format_number(*value))),
             Value::Curve { .. } => None,
         }
     }
 
-    /// It ran to its end and met every expectation.
+    /// Returns true if the run ended and met every expectation.
     pub fn passed(&self) -> bool {
         self.failure.is_none() && self.expect().iter().all(|judgement| judgement.pass)
     }
 
-    /// Verdict, quantity, value, requirement, kind, source of every expectation, and the failure if there is one.
+    /// Formats verdict, quantity, value, requirement, kind, source of every expectation, and the failure if
+    /// there is one.
     pub fn rows(&self) -> impl Iterator<Item = [String; 6]> {
         let failure = self.failure.as_ref().map(|failure| {
             let [verdict, run, empty] = ["FAIL", "(run)", ""].map(str::to_owned);
@@ -95,7 +96,7 @@ impl Outcome {
         self.expect().iter().map(row).chain(failure)
     }
 
-    /// What failed, by how much, and where to look; empty if nothing did.
+    /// Lists failures, their amounts, and where to look; empty if there are none.
     pub fn complaint(&self, short: impl Fn(&Path) -> String) -> String {
         let missed = self.expect().iter().filter(|judgement| !judgement.pass);
         let mut lines: Vec<String> = missed
@@ -113,8 +114,8 @@ impl Outcome {
     }
 }
 
-/// Four significant digits.
-fn shown(value: f64) -> String {
+/// Formats four significant digits.
+fn format_number(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 || !(1e-3..1e6).contains(&size) {
         return format!("{value:.3e}");
@@ -123,7 +124,7 @@ fn shown(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
-/// How far a value lies outside what was requested.
+/// Returns the amount by which a value lies outside its tolerance.
 fn beyond(judgement: &Judgement) -> Option<String> {
     use harness::report::Bound;
     let value = judgement.value.filter(|value| value.is_finite())?;
@@ -142,18 +143,19 @@ pub mod tests {
     use super::*;
     use harness::report::Named;
 
-    /// The text of a report with one expectation: kt = 3 ± 1 %.
+    /// Text of a report with one expectation: kt = 3 ± 1 %.
     pub fn report(value: f64) -> String {
         let mut report = Report::new("peri", "0", "");
         report.value(Named::new("kt", ""), value);
-        let expect = r#"{"quantity": "kt", "reference": 3.0, "tolerance": "1 %", "kind": "closed-form", "source": "a | b"}"#;
+        let expect = r#"{"quantity": "kt", "reference": 3.0, "tolerance": "1 %",
+            "kind": "closed-form", "source": "a | b"}"#;
         report.judge(&[serde_json::from_str(expect).expect("an expectation")], false);
         serde_json::to_string(&report).expect("JSON")
     }
 
-    /// Its outcome.
-    pub fn outcome(report: &str, status: Option<&str>) -> Outcome {
-        let mut outcome = Outcome::new("ch2/plate");
+    /// Builds an outcome from a report.
+    pub fn outcome(report: &str, status: Option<&str>) -> CaseOutcome {
+        let mut outcome = CaseOutcome::new("ch2/plate");
         outcome.judge(serde_json::from_str(report).expect("a report"), status.map(str::to_owned), false);
         outcome
     }

@@ -1,5 +1,5 @@
-//! The report of `cargo xtask validate`: target/validation/{report.html, report.json, validation.md}, and, of a whole
-//! full run, docs/validation.md.
+//! Report of `cargo xtask validate`: target/validation/{report.html, report.json, validation.md}, and after a
+//! complete full run docs/validation.md.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -10,10 +10,10 @@ use miette::{IntoDiagnostic, Result, miette};
 use polycore::file::atomic_write;
 use serde::Serialize;
 
-use crate::outcome::Outcome;
+use crate::outcome::CaseOutcome;
 use crate::summary;
 use crate::test::{self, Records};
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
 mod baseline;
 mod cross;
@@ -28,25 +28,25 @@ mod stability;
 mod thesis;
 mod timing;
 
-use baseline::{Baseline, Difference};
-use pictures::{Gallery, Picture};
+use baseline::{EarlierReport, ReportDifference};
+use pictures::{Gallery, ReportPicture};
 
-/// Pictures shown of each case in the list of cases.
+/// Number of pictures of each case in the list of cases.
 const PICTURES: usize = 6;
 
-/// What the report is made from besides the outcomes.
+/// Sources of the report besides the outcomes.
 pub struct Sources {
-    map: thesis::Map,
+    map: thesis::ThesisMap,
     errata: Vec<errata::Erratum>,
-    /// What the last run of the tests measured.
+    /// Measurements of the last run of the tests.
     records: Records,
-    baseline: Option<Baseline>,
+    baseline: Option<EarlierReport>,
 }
 
 impl Sources {
     /// Reads cases/thesis.toml, docs/errata.md and an earlier report.
-    pub fn read(workspace: &Workspace, baseline: Option<&Path>) -> Result<Self> {
-        let map = thesis::Map::read(workspace)?;
+    pub fn read(workspace: &Repository, baseline: Option<&Path>) -> Result<Self> {
+        let map = thesis::ThesisMap::read(workspace)?;
         let errata = errata::Erratum::read(workspace)?;
         let mut faults = map.faults(workspace);
         faults.extend(errata::faults(workspace, &errata, &map.erratum));
@@ -54,24 +54,24 @@ impl Sources {
             return Err(miette!("cases/thesis.toml:\n{}", faults.join("\n")));
         }
         let records = test::read(workspace);
-        Ok(Self { map, errata, records, baseline: baseline.map(Baseline::read).transpose()? })
+        Ok(Self { map, errata, records, baseline: baseline.map(EarlierReport::read).transpose()? })
     }
 }
 
-/// How much was run.
+/// Amount of work of a validation.
 #[derive(Clone, Copy)]
 pub struct Tier {
-    /// Without what cases mark `quick = false`.
+    /// Cases without `quick = false`.
     pub quick: bool,
     /// All cases below cases/.
     pub everything: bool,
 }
 
-/// Everything on the page.
+/// Content of the page.
 #[derive(Serialize)]
 struct Page {
     passed: bool,
-    /// All cases of the repository, not a choice of them.
+    /// True for all cases of the repository, false for a selection.
     everything: bool,
     tier: &'static str,
     sums: String,
@@ -83,18 +83,18 @@ struct Page {
     seconds: f64,
     counts: Vec<(String, usize)>,
     kinds: Vec<(String, usize)>,
-    thesis: Vec<thesis::Judged>,
-    links: Vec<thesis::Judged>,
-    others: Vec<others::Other>,
-    timing: Vec<timing::Measured>,
-    stability: Vec<stability::Trial>,
-    errata: Vec<errata::Proven>,
-    cross: Vec<cross::Crossed>,
-    difference: Option<Difference>,
+    thesis: Vec<thesis::RowVerdict>,
+    links: Vec<thesis::RowVerdict>,
+    others: Vec<others::ExternalFigure>,
+    timing: Vec<timing::TimingSubject>,
+    stability: Vec<stability::StabilityTrial>,
+    errata: Vec<errata::ErratumVerdict>,
+    cross: Vec<cross::CrossCheck>,
+    difference: Option<ReportDifference>,
     cases: Vec<CaseView>,
 }
 
-/// A case on the page.
+/// Case on the page.
 #[derive(Serialize)]
 struct CaseView {
     case: String,
@@ -105,7 +105,7 @@ struct CaseView {
     href: String,
     command: String,
     results: String,
-    /// Link to the page that shows its bodies.
+    /// Link to the page with its bodies.
     page: Option<String>,
     log: String,
     seconds: f64,
@@ -114,11 +114,11 @@ struct CaseView {
     complaint: String,
     rows: Vec<[String; 6]>,
     missed: usize,
-    pictures: Vec<Picture>,
+    pictures: Vec<ReportPicture>,
     work: Vec<(String, String)>,
 }
 
-/// report.json.
+/// Content of report.json.
 #[derive(Serialize)]
 struct Json<'a> {
     version: u32,
@@ -128,17 +128,17 @@ struct Json<'a> {
     date: String,
     machine: String,
     versions: Vec<(String, String)>,
-    /// Expectations by what kind of evidence they are.
+    /// Number of expectations by kind of evidence.
     kinds: BTreeMap<String, usize>,
     cases: Vec<JsonCase<'a>>,
-    thesis: Vec<thesis::Judged>,
-    links: Vec<thesis::Judged>,
-    others: Vec<others::Other>,
-    timing: Vec<timing::Measured>,
-    stability: Vec<stability::Trial>,
-    errata: Vec<errata::Proven>,
-    cross_checks: Vec<cross::Crossed>,
-    difference: Option<Difference>,
+    thesis: Vec<thesis::RowVerdict>,
+    links: Vec<thesis::RowVerdict>,
+    others: Vec<others::ExternalFigure>,
+    timing: Vec<timing::TimingSubject>,
+    stability: Vec<stability::StabilityTrial>,
+    errata: Vec<errata::ErratumVerdict>,
+    cross_checks: Vec<cross::CrossCheck>,
+    difference: Option<ReportDifference>,
 }
 
 #[derive(Serialize)]
@@ -155,7 +155,7 @@ struct JsonCase<'a> {
 }
 
 impl<'a> JsonCase<'a> {
-    fn of(outcome: &'a Outcome) -> Self {
+    fn new(outcome: &'a CaseOutcome) -> Self {
         let work = outcome.report.iter().flat_map(|report| &report.work);
         Self {
             case: &outcome.case,
@@ -171,11 +171,11 @@ impl<'a> JsonCase<'a> {
     }
 }
 
-/// Writes the report; the paths of what was written.
+/// Writes the report; returns the paths of its files.
 pub fn write(
-    workspace: &Workspace,
+    workspace: &Repository,
     sources: &Sources,
-    outcomes: &[Outcome],
+    outcomes: &[CaseOutcome],
     tier: Tier,
 ) -> Result<Vec<PathBuf>> {
     let folder = workspace.results("validation")?;
@@ -204,14 +204,14 @@ fn put(path: &Path, bytes: &[u8]) -> Result<()> {
 }
 
 fn page(
-    workspace: &Workspace,
+    workspace: &Repository,
     folder: &Path,
     sources: &Sources,
-    outcomes: &[Outcome],
+    outcomes: &[CaseOutcome],
     tier: Tier,
 ) -> Result<Page> {
     let mut gallery = Gallery::default();
-    let found = evidence::Found { outcomes, records: &sources.records, root: workspace.root() };
+    let found = evidence::MeasuredNumbers { outcomes, records: &sources.records, root: workspace.root() };
     let [thesis, links] = sources.map.judge(&found, &mut gallery);
     let provenance: Vec<&Provenance> =
         outcomes.iter().filter_map(|outcome| Some(&outcome.report.as_ref()?.provenance)).collect();
@@ -228,7 +228,7 @@ fn page(
         }
     }
     Ok(Page {
-        passed: outcomes.iter().all(Outcome::passed),
+        passed: outcomes.iter().all(CaseOutcome::passed),
         everything: tier.everything,
         tier: if tier.quick { "quick" } else { "full" },
         sums: summary::sums(outcomes),
@@ -256,7 +256,7 @@ fn page(
     })
 }
 
-fn view(workspace: &Workspace, outcome: &Outcome, gallery: &mut Gallery) -> CaseView {
+fn view(workspace: &Repository, outcome: &CaseOutcome, gallery: &mut Gallery) -> CaseView {
     let short = |path: &Path| workspace.short(path).to_string();
     let work = outcome.report.iter().flat_map(|report| &report.work);
     CaseView {
@@ -281,8 +281,8 @@ fn view(workspace: &Workspace, outcome: &Outcome, gallery: &mut Gallery) -> Case
     }
 }
 
-/// The page without its pictures, and the cases with their judgements.
-fn json(page: Page, outcomes: &[Outcome]) -> Json<'_> {
+/// Report without pictures, and the cases with their judgements.
+fn json(page: Page, outcomes: &[CaseOutcome]) -> Json<'_> {
     Json {
         version: 1,
         passed: page.passed,
@@ -292,11 +292,11 @@ fn json(page: Page, outcomes: &[Outcome]) -> Json<'_> {
         machine: page.machine,
         versions: page.versions,
         kinds: page.kinds.into_iter().collect(),
-        cases: outcomes.iter().map(JsonCase::of).collect(),
+        cases: outcomes.iter().map(JsonCase::new).collect(),
         others: page.others,
-        thesis: page.thesis.into_iter().map(thesis::Judged::without_pictures).collect(),
-        links: page.links.into_iter().map(thesis::Judged::without_pictures).collect(),
-        timing: page.timing.into_iter().map(timing::Measured::without_picture).collect(),
+        thesis: page.thesis.into_iter().map(thesis::RowVerdict::without_pictures).collect(),
+        links: page.links.into_iter().map(thesis::RowVerdict::without_pictures).collect(),
+        timing: page.timing.into_iter().map(timing::TimingSubject::without_picture).collect(),
         stability: page.stability,
         errata: page.errata,
         cross_checks: page.cross,
@@ -304,7 +304,7 @@ fn json(page: Page, outcomes: &[Outcome]) -> Json<'_> {
     }
 }
 
-/// The page as HTML.
+/// Renders the page as HTML.
 fn render(page: &Page) -> Result<String> {
     let mut environment = minijinja::Environment::new();
     environment.add_template("report.html", include_str!("report/template.html")).into_diagnostic()?;
@@ -312,14 +312,14 @@ fn render(page: &Page) -> Result<String> {
     template.render(minijinja::value::Serde(page)).into_diagnostic()
 }
 
-/// `Fig. 2.7` → `fig-2-7`.
+/// Converts `Fig. 2.7` to `fig-2-7`.
 fn anchor(name: &str) -> String {
     let parts = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|part| !part.is_empty());
     parts.collect::<Vec<_>>().join("-").to_lowercase()
 }
 
-/// From target/validation to a file.
-pub fn link(workspace: &Workspace, file: &Path) -> String {
+/// Path of a file relative to target/validation.
+pub fn link(workspace: &Repository, file: &Path) -> String {
     match (workspace.target().strip_prefix(workspace.root()), file.strip_prefix(workspace.root())) {
         (Ok(target), Ok(below)) => {
             let up = "../".repeat(target.components().count() + 1);

@@ -1,4 +1,4 @@
-//! When, where and from which sources something was measured: what tells whether it still holds.
+//! Provenance of a measurement; detects stale records.
 
 use std::fmt;
 use std::fs;
@@ -8,10 +8,10 @@ use harness::report::Report;
 use miette::{IntoDiagnostic, Result, WrapErr};
 use serde::{Deserialize, Serialize};
 
-/// Of a bench's rows, or of a number that a test measured.
+/// Provenance of a bench's rows, or of a number that a test measured.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Stamp {
-    /// The commit that was checked out.
+pub struct SourceStamp {
+    /// Commit that was checked out.
     commit: String,
     /// UTC, ISO 8601.
     date: String,
@@ -22,8 +22,8 @@ pub struct Stamp {
     hash: String,
 }
 
-impl Stamp {
-    /// Of now, for what was measured from `sources`.
+impl SourceStamp {
+    /// Creates the provenance of a measurement made now from `sources`.
     pub fn new(root: &Path, sources: &[String]) -> Result<Self> {
         let provenance = Report::new("xtask", env!("CARGO_PKG_VERSION"), "").provenance;
         let hash = hash(root, sources).into_diagnostic().wrap_err_with(|| sources.join(", "))?;
@@ -36,24 +36,25 @@ impl Stamp {
         })
     }
 
-    /// The sources are what they were.
+    /// Returns true if the sources have not changed.
     pub fn fresh(&self, root: &Path) -> bool {
         hash(root, &self.sources).is_ok_and(|now| now == self.hash)
     }
 }
 
-/// `2026-11-22, commit 0123456789, AMD EPYC`.
-impl fmt::Display for Stamp {
+/// Format: `2026-11-22, commit 0123456789, AMD EPYC`.
+impl fmt::Display for SourceStamp {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let day = self.date.split('T').next().unwrap_or(&self.date);
         write!(f, "{day}, commit {:.10}, {}", self.commit, self.machine)
     }
 }
 
-/// The numerics of `polycore`, on which the other crates rest.
+/// Numerics of `polycore` on which the other crates depend.
 const NUMERICS: [&str; 4] = ["constitutive", "langevin", "random", "tensor"];
 
-/// What the numbers of crates depend on: `parts` of their folders (`src`, `tests`), and the numerics of `polycore`.
+/// Lists the sources that numbers of crates depend on: `parts` of their folders (`src`, `tests`), and the
+/// numerics of `polycore`.
 pub fn sources(root: &Path, crates: &[&str], parts: &[&str]) -> Vec<String> {
     let folders =
         crates.iter().flat_map(|name| parts.iter().map(move |part| format!("crates/{name}/{part}")));
@@ -62,7 +63,8 @@ pub fn sources(root: &Path, crates: &[&str], parts: &[&str]) -> Vec<String> {
     folders.chain(below).filter(|source| root.join(source).exists()).collect()
 }
 
-/// Of the names and contents of all files, in the order of their names: FNV-1a, the same on every machine.
+/// Hashes names and contents of all files, sorted by name, by FNV-1a: the same on every machine. Lines of
+/// Rust that are blank or comments do not count.
 fn hash(root: &Path, sources: &[String]) -> std::io::Result<String> {
     let mut files = Vec::new();
     for source in sources {
@@ -78,10 +80,21 @@ fn hash(root: &Path, sources: &[String]) -> std::io::Result<String> {
     for file in files {
         take(file.strip_prefix(root).unwrap_or(&file).to_string_lossy().as_bytes());
         take(&[0]);
-        take(&fs::read(&file)?);
+        take(&content(&file)?);
         take(&[0]);
     }
     Ok(format!("{hash:016x}"))
+}
+
+/// Content of a file as far as it matters.
+fn content(file: &Path) -> std::io::Result<Vec<u8>> {
+    let bytes = fs::read(file)?;
+    if file.extension().is_none_or(|extension| extension != "rs") {
+        return Ok(bytes);
+    }
+    let is_code = |line: &&str| !line.is_empty() && !line.starts_with("//");
+    let text = String::from_utf8_lossy(&bytes);
+    Ok(text.lines().map(str::trim).filter(is_code).collect::<Vec<_>>().join("\n").into_bytes())
 }
 
 fn collect(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
@@ -111,7 +124,7 @@ mod tests {
         write("crates/polycore/src/tensor.rs", "");
         let sources = sources(root.path(), &["peri"], &["src", "tests"]);
         assert_eq!(sources, ["crates/peri/src", "crates/polycore/src/tensor.rs"]);
-        let stamp = Stamp::new(root.path(), &sources).expect("a stamp");
+        let stamp = SourceStamp::new(root.path(), &sources).expect("a stamp");
         write("crates/crystfem/src/lib.rs", "");
         assert!(stamp.fresh(root.path()));
         write("crates/peri/src/a/b.rs", "fn b() { }");
@@ -120,6 +133,6 @@ mod tests {
         assert!(stamp.fresh(root.path()));
         write("crates/peri/src/a/c.rs", "");
         assert!(!stamp.fresh(root.path()), "a new file");
-        assert!(Stamp::new(root.path(), &["crates/none".to_owned()]).is_err());
+        assert!(SourceStamp::new(root.path(), &["crates/none".to_owned()]).is_err());
     }
 }

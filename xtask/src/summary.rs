@@ -1,16 +1,16 @@
-//! What the suite found, as tables for the terminal.
+//! Results of the validation, as tables for the terminal.
 
 use std::fmt::Write as _;
 
 use harness::report::Kind;
 
-use crate::outcome::Outcome;
-use crate::table::Table;
+use crate::outcome::CaseOutcome;
+use crate::table::TextTable;
 
-/// Every expectation of every case, seconds by case, and a last line of sums.
-pub fn text(outcomes: &[Outcome]) -> String {
-    let mut table = Table::new(["case", "quantity", "value", "expected", "kind", "verdict"]);
-    let mut times = Table::new(["case", "program", "seconds", "expectations", "not satisfied"]);
+/// Formats every expectation of every case, seconds by case, and a last line with totals.
+pub fn text(outcomes: &[CaseOutcome]) -> String {
+    let mut table = TextTable::new(["case", "quantity", "value", "expected", "kind", "verdict"]);
+    let mut times = TextTable::new(["case", "program", "seconds", "expectations", "not satisfied"]);
     for outcome in outcomes {
         for [verdict, quantity, value, asked, kind, _] in outcome.rows() {
             table.push([outcome.case.clone(), quantity, value, asked, kind, verdict]);
@@ -33,10 +33,10 @@ pub fn text(outcomes: &[Outcome]) -> String {
     text
 }
 
-/// `22 cases, 0 failed; 282 expectations, 0 not satisfied: 120 closed-form, 40 published; 25 regression (no evidence)`.
-pub fn sums(outcomes: &[Outcome]) -> String {
+/// Last line of the summary: `22 cases, 0 failed; 282 expectations, 0 not satisfied: 120 closed-form, …`.
+pub fn sums(outcomes: &[CaseOutcome]) -> String {
     let failed = outcomes.iter().filter(|outcome| !outcome.passed()).count();
-    let judged = || outcomes.iter().flat_map(Outcome::expect);
+    let judged = || outcomes.iter().flat_map(CaseOutcome::expect);
     let missed = judged().filter(|judgement| !judgement.pass).count();
     let plural = if outcomes.len() == 1 { "" } else { "s" };
     let [cases, expectations] = [outcomes.len(), judged().count()];
@@ -56,10 +56,10 @@ pub fn sums(outcomes: &[Outcome]) -> String {
     text
 }
 
-/// How many expectations there are of each kind that there is.
-pub fn kinds(outcomes: &[Outcome]) -> Vec<(Kind, usize)> {
+/// Counts the expectations of each kind.
+pub fn kinds(outcomes: &[CaseOutcome]) -> Vec<(Kind, usize)> {
     let count = |kind: Kind| {
-        let judged = outcomes.iter().flat_map(Outcome::expect);
+        let judged = outcomes.iter().flat_map(CaseOutcome::expect);
         (kind, judged.filter(|judgement| judgement.expect.kind == kind).count())
     };
     Kind::ALL.map(count).into_iter().filter(|(_, count)| *count > 0).collect()

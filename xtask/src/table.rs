@@ -4,19 +4,19 @@ use std::io::Write as _;
 
 use harness::report::aligned;
 
-/// To standard output; a closed pipe is no reason to fail.
+/// Writes to standard output; ignores a closed pipe.
 pub fn print(text: &str) {
     let _ = std::io::stdout().write_all(text.as_bytes());
 }
 
-/// A heading and rows of as many cells.
-pub struct Table<const N: usize> {
+/// Heading and rows with as many cells.
+pub struct TextTable<const N: usize> {
     heading: [&'static str; N],
     rows: Vec<[String; N]>,
 }
 
-impl<const N: usize> Table<N> {
-    /// Without rows.
+impl<const N: usize> TextTable<N> {
+    /// Creates a table without rows.
     pub fn new(heading: [&'static str; N]) -> Self {
         Self { heading, rows: Vec::new() }
     }
@@ -26,18 +26,18 @@ impl<const N: usize> Table<N> {
         self.rows.push(row);
     }
 
-    /// Whether there is a row.
+    /// Returns true if there is no row.
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
-    /// Columns padded to their widest cell.
+    /// Formats columns padded to their widest cell.
     pub fn text(&self) -> String {
         let heading = self.heading.map(str::to_owned);
         aligned(&std::iter::once(&heading).chain(&self.rows).collect::<Vec<_>>())
     }
 
-    /// A table of GitHub's Markdown.
+    /// Formats a table of GitHub's Markdown.
     pub fn markdown(&self) -> String {
         let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
         let escape = |cell: &String| cell.replace('|', "\\|").replace('\n', " ");
@@ -56,7 +56,7 @@ mod tests {
 
     #[test]
     fn text_is_aligned_and_markdown_escaped() {
-        let mut table = Table::new(["λ", "name"]);
+        let mut table = TextTable::new(["λ", "name"]);
         table.push(["12".into(), "a|b".into()]);
         assert_eq!(table.text(), "λ   name\n12  a|b\n");
         assert_eq!(table.markdown(), "| λ | name |\n|---|---|\n| 12 | a\\|b |\n");

@@ -1,5 +1,5 @@
-//! `cargo xtask test`: all tests; the numbers that they measure go to target/evidence.json, and what they could not test
-//! here is listed at the end.
+//! `cargo xtask test`: runs all tests; the numbers that they measure go to target/evidence.json, and skipped
+//! tests are listed at the end.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -11,17 +11,17 @@ use polycore::file::atomic_write;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::stamp::{Stamp, sources};
+use crate::stamp::{SourceStamp, sources};
 use crate::table::print;
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
-/// As crate `evidence` names it.
+/// Environment variable that crate `evidence` reads.
 const FOLDER: &str = "EVIDENCE_FOLDER";
 
-/// A number as a test measured it, the file of crate `evidence` in words of Rust.
+/// Number measured by a test, as crate `evidence` writes it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Record {
-    /// What cases/thesis.toml refers to.
+pub struct TestRecord {
+    /// Name, as cases/thesis.toml refers to it.
     pub name: String,
     /// A number, or `NaN`, `inf`.
     value: serde_json::Value,
@@ -33,17 +33,17 @@ pub struct Record {
     at_least: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     at_most: Option<f64>,
-    /// As asserted.
+    /// True if the assertion held.
     pub met: bool,
-    /// `calibrate::tests::single_point_integrals`.
+    /// Test: `calibrate::tests::single_point_integrals`.
     pub test: String,
-    /// `crates/peri/src/calibrate.rs`.
+    /// Source file: `crates/peri/src/calibrate.rs`.
     pub file: String,
-    /// Of the run of the tests; none in a file that a test has just left.
-    pub stamp: Option<Stamp>,
+    /// Provenance of the test run; `None` in a file that a test has just written.
+    pub stamp: Option<SourceStamp>,
 }
 
-/// What a test could not find.
+/// Requirement that a test could not find.
 #[derive(Debug, Deserialize)]
 struct Skip {
     skipped: String,
@@ -52,16 +52,16 @@ struct Skip {
 
 #[derive(Deserialize)]
 #[serde(untagged)]
-enum Left {
+enum StoredRecord {
     Skip(Skip),
-    Record(Box<Record>),
+    Record(Box<TestRecord>),
 }
 
 /// All records by name.
-pub type Records = BTreeMap<String, Record>;
+pub type Records = BTreeMap<String, TestRecord>;
 
-impl Record {
-    /// The value and what was requested, for a reader.
+impl TestRecord {
+    /// Formats the value and the requirement.
     pub fn cells(&self) -> [String; 2] {
         let mut expect = json!({ "quantity": self.name, "kind": "bound", "source": "a test" });
         let asked = [
@@ -89,14 +89,14 @@ impl Record {
 }
 
 /// Runs the tests; `arguments` go to `cargo test`.
-pub fn run(workspace: &Workspace, arguments: &[String]) -> Result<bool> {
+pub fn run(workspace: &Repository, arguments: &[String]) -> Result<bool> {
     let folder = workspace.results("evidence")?;
     fs::remove_dir_all(&folder).into_diagnostic()?;
     fs::create_dir_all(&folder).into_diagnostic()?;
     let command = ["test", "--release", "--workspace"];
     let passed = workspace.cargo(&command, arguments, &[(FOLDER, &folder)])?;
     let (new, skips) = collect(&folder)?;
-    // a choice of tests leaves the numbers of the others
+    // a selection of tests keeps the numbers of the others
     let before = if arguments.is_empty() { Records::new() } else { read(workspace) };
     let records = stamped(workspace, before, new)?;
     atomic_write(workspace.target().join("evidence.json"), |file| {
@@ -107,18 +107,18 @@ pub fn run(workspace: &Workspace, arguments: &[String]) -> Result<bool> {
     Ok(passed)
 }
 
-/// Earlier records, and new ones with stamps of their crates' sources.
-fn stamped(workspace: &Workspace, mut records: Records, new: Vec<Record>) -> Result<Records> {
-    let mut stamps = BTreeMap::<String, Stamp>::new();
+/// Merges earlier records and new ones, with stamps of their crates' sources.
+fn stamped(workspace: &Repository, mut records: Records, new: Vec<TestRecord>) -> Result<Records> {
+    let mut stamps = BTreeMap::<String, SourceStamp>::new();
     for mut record in new {
         let of = record.file.strip_prefix("crates/").and_then(|rest| rest.split('/').next());
         let key = of.unwrap_or_default().to_owned();
         if !stamps.contains_key(&key) {
-            // tests of whole programs are of all crates
+            // tests of whole programs depend on all crates
             let crates = of.map_or_else(|| workspace.programs(), |name| vec![name.to_owned()]);
             let crates: Vec<&str> = crates.iter().map(String::as_str).collect();
             let sources = sources(workspace.root(), &crates, &["src", "tests"]);
-            stamps.insert(key.clone(), Stamp::new(workspace.root(), &sources)?);
+            stamps.insert(key.clone(), SourceStamp::new(workspace.root(), &sources)?);
         }
         record.stamp = stamps.get(&key).cloned();
         records.insert(record.name.clone(), record);
@@ -126,15 +126,15 @@ fn stamped(workspace: &Workspace, mut records: Records, new: Vec<Record>) -> Res
     Ok(records)
 }
 
-/// The records of the last runs; none where there was no run.
-pub fn read(workspace: &Workspace) -> Records {
+/// Reads the records of the last runs; empty if there was no run.
+pub fn read(workspace: &Repository) -> Records {
     let text = fs::read_to_string(workspace.target().join("evidence.json")).unwrap_or_default();
-    let records: Vec<Record> = serde_json::from_str(&text).unwrap_or_default();
+    let records: Vec<TestRecord> = serde_json::from_str(&text).unwrap_or_default();
     records.into_iter().map(|record| (record.name.clone(), record)).collect()
 }
 
-/// What tests have left in the folder.
-fn collect(folder: &Path) -> Result<(Vec<Record>, Vec<Skip>)> {
+/// Reads the records that tests have left in the folder.
+fn collect(folder: &Path) -> Result<(Vec<TestRecord>, Vec<Skip>)> {
     let (mut records, mut skips) = (Vec::new(), Vec::new());
     for entry in fs::read_dir(folder).into_diagnostic()? {
         let path = entry.into_diagnostic()?.path();
@@ -144,15 +144,15 @@ fn collect(folder: &Path) -> Result<(Vec<Record>, Vec<Skip>)> {
         let text =
             fs::read_to_string(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
         match serde_json::from_str(&text).map_err(|error| miette!("{}: {error}", path.display()))? {
-            Left::Skip(skip) => skips.push(skip),
-            Left::Record(record) => records.push(*record),
+            StoredRecord::Skip(skip) => skips.push(skip),
+            StoredRecord::Record(record) => records.push(*record),
         }
     }
     skips.sort_by(|a, b| a.skipped.cmp(&b.skipped));
     Ok((records, skips))
 }
 
-/// What was not tested; empty if everything was.
+/// Lists the skipped tests; empty if there are none.
 fn untested(skips: &[Skip]) -> String {
     let lines = skips.iter().map(|skip| format!("  {}: needs {}\n", skip.skipped, skip.needs));
     let lines: String = lines.collect();
@@ -163,7 +163,8 @@ fn untested(skips: &[Skip]) -> String {
 mod tests {
     use super::*;
 
-    /// New records replace those of the same name; each is stale when its own crate changes, and only then.
+    /// New records replace those of the same name; each becomes stale when its own crate changes, and only
+    /// then.
     #[test]
     fn records_have_the_stamp_of_their_crate() {
         let root = tempfile::tempdir().expect("a folder");
@@ -174,8 +175,8 @@ mod tests {
         };
         write("crates/peri/src/main.rs", "1");
         write("crates/crystfem/src/main.rs", "1");
-        let workspace = Workspace::new(root.path().to_path_buf());
-        let record = |name: &str, value: f64, file: &str| -> Record {
+        let workspace = Repository::new(root.path().to_path_buf());
+        let record = |name: &str, value: f64, file: &str| -> TestRecord {
             let text =
                 json!({ "name": name, "value": value, "at_most": 5, "met": true, "test": "t", "file": file });
             serde_json::from_value(text).expect("a record")
@@ -200,11 +201,13 @@ mod tests {
         write("1.json", r#"{"skipped": "export::fortran", "needs": "gfortran"}"#);
         write(
             "2.json",
-            r#"{"name": "n", "value": 1.5, "reference": 1.4, "tolerance": 0.2, "met": true, "test": "t", "file": "crates/peri/src/a.rs"}"#,
+            r#"{"name": "n", "value": 1.5, "reference": 1.4, "tolerance": 0.2, "met": true,
+                "test": "t", "file": "crates/peri/src/a.rs"}"#,
         );
         write(
             "3.json",
-            r#"{"name": "m", "value": "NaN", "at_most": 1e-12, "met": false, "test": "t", "file": "crates/peri/src/a.rs"}"#,
+            r#"{"name": "m", "value": "NaN", "at_most": 1e-12, "met": false,
+                "test": "t", "file": "crates/peri/src/a.rs"}"#,
         );
         write("4.17.part", "{");
         let (mut records, skips) = collect(folder.path()).expect("records");

@@ -7,18 +7,21 @@ use std::process::Command;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
 use crate::table::print;
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
-/// Longer source files want to be two.
+mod words;
+
+/// Largest number of lines of a source file.
 const MOST_LINES: usize = 500;
 
-/// Larger files do not belong into git.
+/// Largest size of a file in git.
 const MOST_BYTES: u64 = 1_000_000;
 
-/// Prints every finding; passes if there is none.
-pub fn run(workspace: &Workspace) -> Result<bool> {
+/// Prints every finding; returns true if there is none.
+pub fn run(workspace: &Repository) -> Result<bool> {
     let files = tracked(workspace.root())?;
     let mut findings = Vec::new();
+    let mut words = words::WordCounts::default();
     for file in &files {
         let path = workspace.root().join(file);
         // a file deleted but not yet committed is still listed
@@ -30,23 +33,29 @@ pub fn run(workspace: &Workspace) -> Result<bool> {
                 metadata.len()
             ));
         }
-        if is_source(file) {
-            let lines = fs::read_to_string(&path).map(|text| text.lines().count()).into_diagnostic()?;
-            if lines > MOST_LINES {
+        if file.extension().is_some_and(|extension| extension == "rs") {
+            let text = fs::read_to_string(&path).into_diagnostic()?;
+            words.add(&file.display().to_string(), &text);
+            let lines = text.lines().count();
+            if is_source(file) && lines > MOST_LINES {
                 findings.push(format!("{}: {lines} lines, at most {MOST_LINES} are allowed", file.display()));
             }
         }
     }
-    findings.extend(unused(workspace.root(), &files)?);
+    findings.extend(unused_dependencies(workspace.root(), &files)?);
+    findings.extend(words.findings());
+    findings.extend(crate::pictures::findings(workspace.root(), &files)?);
+    findings.extend(crate::prose::findings(workspace.root(), &files));
     for finding in &findings {
         print(&format!("{finding}\n"));
     }
+    print(&words.summary());
     print(&format!("tidy: {} files in git, {} findings\n", files.len(), findings.len()));
     Ok(findings.is_empty())
 }
 
-/// Dependencies that the root manifest declares and no member takes.
-fn unused(root: &Path, files: &[PathBuf]) -> Result<Vec<String>> {
+/// Finds dependencies that the root manifest declares and no member uses.
+fn unused_dependencies(root: &Path, files: &[PathBuf]) -> Result<Vec<String>> {
     let manifest = |path: &Path| -> Result<toml::Table> {
         let text = fs::read_to_string(root.join(path)).into_diagnostic()?;
         toml::from_str(&text).into_diagnostic().wrap_err_with(|| path.display().to_string())
@@ -65,19 +74,19 @@ fn unused(root: &Path, files: &[PathBuf]) -> Result<Vec<String>> {
             }
         }
     }
-    let finding = |name: &String| format!("Cargo.toml: `{name}` is declared and used by no crate");
+    let finding = |name: &String| format!("Cargo.toml: `{name}` is declared but no crate uses it");
     Ok(declared.keys().map(finding).collect())
 }
 
-/// Rust files under crates/*/src and xtask/src.
+/// Returns true for Rust files under crates/*/src and xtask/src.
 fn is_source(file: &Path) -> bool {
     let parts: Vec<_> = file.iter().filter_map(|part| part.to_str()).collect();
     let in_src = matches!(parts.as_slice(), ["crates", _, "src", ..] | ["xtask", "src", ..]);
     in_src && file.extension().is_some_and(|extension| extension == "rs")
 }
 
-/// What git knows, and what it would take in with `git add`.
-fn tracked(root: &Path) -> Result<Vec<PathBuf>> {
+/// Lists the files that git tracks or would add with `git add`.
+pub fn tracked(root: &Path) -> Result<Vec<PathBuf>> {
     let output = Command::new("git")
         .args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"])
         .current_dir(root)
@@ -106,12 +115,12 @@ mod tests {
             "[dependencies]\na.workspace = true\n[dev-dependencies]\nc = { workspace = true }\n",
         );
         let files = ["Cargo.toml", "m/Cargo.toml"].map(PathBuf::from);
-        let found = unused(folder.path(), &files).expect("manifests");
-        assert_eq!(found, ["Cargo.toml: `b` is declared and used by no crate"]);
-        // and ours
+        let found = unused_dependencies(folder.path(), &files).expect("manifests");
+        assert_eq!(found, ["Cargo.toml: `b` is declared but no crate uses it"]);
+        // and those of this repository
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         let files = tracked(&root).expect("files");
-        assert_eq!(unused(&root, &files).expect("manifests"), [""; 0]);
+        assert_eq!(unused_dependencies(&root, &files).expect("manifests"), [""; 0]);
     }
 
     #[test]

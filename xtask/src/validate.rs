@@ -1,4 +1,4 @@
-//! Runs the cases with the released command lines and judges everything that they expect.
+//! Runs the cases with the released command lines and judges all their expectations.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,39 +8,39 @@ use harness::case::Shard;
 use harness::scene::Source;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
-use crate::outcome::Outcome;
+use crate::outcome::CaseOutcome;
 use crate::report;
 use crate::summary;
 use crate::table::print;
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
 mod execute;
 
 use execute::{Settings, run_case};
 
-/// Lines of a failed case's output that are shown.
-const TAIL: usize = 30;
+/// Number of lines of a failed case's output that are shown.
+const SHOWN_LINES: usize = 30;
 
-/// What to run.
+/// Options of `validate`.
 #[derive(clap::Args)]
 pub struct Options {
     /// Only cases in this folder of cases/, for example `ch2`; may be repeated.
     #[arg(long, value_name = "CHAPTER")]
     only: Vec<String>,
-    /// Leave out what the cases mark `quick = false`.
+    /// Leave out everything marked `quick = false`.
     #[arg(long)]
     quick: bool,
     /// Only this case: its folder or file, also one outside cases/; may be repeated.
     #[arg(long, value_name = "PATH")]
     case: Vec<PathBuf>,
-    /// Keep the results of cases that were run before and have not changed, and go on with one that was interrupted.
+    /// Keep the results of cases that have not changed since they ran, and continue an interrupted one.
     #[arg(long)]
     resume: bool,
-    /// Run only part I of N of the cases, one that reads results of others in the part of those, and write no report: then
-    /// `--resume` puts together what all parts left in target/validation.
+    /// Run only part I of N of the cases (a case that reads results of others belongs to their part), and
+    /// write no report: `--resume` then combines the results of all parts in target/validation.
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
-    /// Compare with the report.json of an earlier run: what moved, and by how much.
+    /// Compare with the report.json of an earlier run: changed numbers, and their amounts.
     #[arg(long, value_name = "OLD.json")]
     baseline: Option<PathBuf>,
     /// Seconds after which a case is killed and counts as failed.
@@ -48,16 +48,16 @@ pub struct Options {
     timeout: f64,
 }
 
-/// A case file and its name, the folder below cases/.
-pub struct Case {
+/// Case file and its name, the folder below cases/.
+pub struct CaseFile {
     name: String,
     file: PathBuf,
-    /// The folder of all cases.
+    /// Folder of all cases.
     root: PathBuf,
 }
 
-impl Case {
-    /// Names and files of the scenes whose results it reads; what is wrong with them its program says.
+impl CaseFile {
+    /// Returns names and files of the scenes whose results it reads; its program reports errors in them.
     fn named_inputs(&self) -> Vec<(String, PathBuf)> {
         let Ok(source) = Source::read(&self.file) else { return Vec::new() };
         let inputs = source.inputs().unwrap_or_default().into_iter();
@@ -69,21 +69,21 @@ impl Case {
         self.named_inputs().into_iter().map(|(_, file)| file).collect()
     }
 
-    /// The name of another case.
+    /// Resolves the name of another case.
     fn name_of(&self, file: &Path) -> String {
         name(&self.root, file)
     }
 }
 
-/// Puts cases behind those whose results they read; otherwise they keep their order. Those in a cycle come last: their program
-/// names it.
-fn in_order(cases: Vec<Case>) -> Vec<Case> {
+/// Sorts cases after those whose results they read; otherwise keeps their order. Cases in a cycle come last:
+/// their program reports it.
+fn sort_by_inputs(cases: Vec<CaseFile>) -> Vec<CaseFile> {
     let mut waiting = cases;
-    let mut ordered: Vec<Case> = Vec::new();
+    let mut ordered: Vec<CaseFile> = Vec::new();
     loop {
         let files: Vec<PathBuf> = waiting.iter().map(|case| case.file.clone()).collect();
-        let is_ready = |case: &Case| case.inputs().iter().all(|input| !files.contains(input));
-        let (ready, rest): (Vec<Case>, Vec<Case>) = waiting.into_iter().partition(is_ready);
+        let is_ready = |case: &CaseFile| case.inputs().iter().all(|input| !files.contains(input));
+        let (ready, rest): (Vec<CaseFile>, Vec<CaseFile>) = waiting.into_iter().partition(is_ready);
         if ready.is_empty() {
             ordered.extend(rest);
             return ordered;
@@ -93,8 +93,8 @@ fn in_order(cases: Vec<Case>) -> Vec<Case> {
     }
 }
 
-/// A number of each case, counted from 0, that cases have in common that read results of each other.
-fn chains(cases: &[Case]) -> Vec<usize> {
+/// Numbers the cases, from 0, so that cases that read results of each other have the same number.
+fn chains(cases: &[CaseFile]) -> Vec<usize> {
     let mut of: Vec<usize> = (0..cases.len()).collect();
     for (index, case) in cases.iter().enumerate() {
         for input in case.inputs() {
@@ -109,15 +109,15 @@ fn chains(cases: &[Case]) -> Vec<usize> {
     of.iter().map(|chain| known.partition_point(|other| other < chain)).collect()
 }
 
-/// Runs, prints, writes target/validation/{report.html, report.json}; passes if every case did.
-pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
+/// Runs, prints, writes target/validation/{report.html, report.json}; returns true if every case passed.
+pub fn run(workspace: &Repository, options: &Options) -> Result<bool> {
     let mut cases = find(workspace, options)?;
     if let Some(shard) = options.shard {
         let chains = chains(&cases);
         let mut chains = chains.iter();
-        cases.retain(|_| chains.next().is_some_and(|&chain| shard.has(chain)));
+        cases.retain(|_| chains.next().is_some_and(|&chain| shard.contains(chain)));
     }
-    // read before anything is run for an hour
+    // read before the long run begins
     let map = report::Sources::read(workspace, options.baseline.as_deref())?;
     let settings = Settings {
         folder: workspace.results("validate")?,
@@ -127,7 +127,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     };
     let mut built = BTreeMap::new();
     let mut release = |program: &str| {
-        let build = || workspace.release(program).map_err(|error| error.to_string());
+        let build = || workspace.build_program(program).map_err(|error| error.to_string());
         let executable = built.entry(program.to_owned()).or_insert_with(build).clone();
         executable.map_err(|reason| miette!("{reason}"))
     };
@@ -149,24 +149,24 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     }
     print(&format!("{}\n", summary::text(&outcomes)));
     if options.shard.is_some() {
-        return Ok(outcomes.iter().all(Outcome::passed));
+        return Ok(outcomes.iter().all(CaseOutcome::passed));
     }
     let everything = options.only.is_empty() && options.case.is_empty();
     let tier = report::Tier { quick: options.quick, everything };
     for path in report::write(workspace, &map, &outcomes, tier)? {
         print(&format!("written: {}\n", workspace.short(&path)));
     }
-    Ok(outcomes.iter().all(Outcome::passed))
+    Ok(outcomes.iter().all(CaseOutcome::passed))
 }
 
-/// What a user types to run a case.
-fn command(outcome: &Outcome, quick: bool) -> String {
+/// Command with which a user runs a case.
+fn command(outcome: &CaseOutcome, quick: bool) -> String {
     let quick = if quick { " --quick" } else { "" };
     format!("cargo run --release -p {} -- run {}{quick}", outcome.program, outcome.file)
 }
 
-/// The cases requested, in alphabetical order, each behind those whose results it reads.
-fn find(workspace: &Workspace, options: &Options) -> Result<Vec<Case>> {
+/// Finds the requested cases, in alphabetical order, each after those whose results it reads.
+fn find(workspace: &Repository, options: &Options) -> Result<Vec<CaseFile>> {
     let all = workspace.root().join("cases");
     let mut files = Vec::new();
     for path in &options.case {
@@ -187,8 +187,8 @@ fn find(workspace: &Workspace, options: &Options) -> Result<Vec<Case>> {
     if files.is_empty() {
         return Err(miette!("no case.toml found; cases live in {}", workspace.short(&all)));
     }
-    let case = |file: PathBuf| Case { name: name(&all, &file), file, root: all.clone() };
-    Ok(in_order(files.into_iter().map(case).collect()))
+    let case = |file: PathBuf| CaseFile { name: name(&all, &file), file, root: all.clone() };
+    Ok(sort_by_inputs(files.into_iter().map(case).collect()))
 }
 
 fn walk(folder: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
@@ -203,7 +203,7 @@ fn walk(folder: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// cases/ch2/plate/case.toml → ch2/plate; elsewhere the folder's name.
+/// Name of a case: cases/ch2/plate/case.toml → ch2/plate; elsewhere the name of the folder.
 fn name(cases: &Path, file: &Path) -> String {
     let folder = file.parent().unwrap_or(file);
     let below = folder.strip_prefix(cases).ok().or_else(|| folder.file_name().map(Path::new));
@@ -213,7 +213,7 @@ fn name(cases: &Path, file: &Path) -> String {
 fn show_tail(log: &Path) {
     let text = fs::read_to_string(log).unwrap_or_default();
     let lines: Vec<&str> = text.lines().collect();
-    for line in &lines[lines.len().saturating_sub(TAIL)..] {
+    for line in &lines[lines.len().saturating_sub(SHOWN_LINES)..] {
         eprintln!("    {line}");
     }
 }
@@ -239,7 +239,7 @@ mod tests {
             let file = folder.join("case.toml");
             let text = input.map_or(String::new(), |input| format!("[inputs]\na = '../{input}/case.toml'"));
             fs::write(&file, text).expect("a scene");
-            Case { name: name.to_owned(), file, root: root.clone() }
+            CaseFile { name: name.to_owned(), file, root: root.clone() }
         };
         let cases = vec![
             case("a", Some("c")),
@@ -250,7 +250,7 @@ mod tests {
         ];
         // a → c → d, b and e
         assert_eq!(chains(&cases), [1, 0, 1, 1, 2]);
-        let names: Vec<String> = in_order(cases).into_iter().map(|case| case.name).collect();
+        let names: Vec<String> = sort_by_inputs(cases).into_iter().map(|case| case.name).collect();
         assert_eq!(names, ["b", "d", "c", "a", "e"]);
     }
 }

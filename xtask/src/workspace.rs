@@ -1,4 +1,4 @@
-//! Where things are, and how cargo is called.
+//! Paths of the repository, and calls of cargo.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -6,14 +6,14 @@ use std::process::{Command, Stdio};
 
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
-/// The workspace that this xtask was built in.
-pub struct Workspace {
+/// Workspace in which this xtask was built.
+pub struct Repository {
     root: PathBuf,
     target: PathBuf,
 }
 
-impl Workspace {
-    /// With build products where cargo puts them.
+impl Repository {
+    /// Creates the paths, with build products where cargo puts them.
     pub fn new(root: PathBuf) -> Self {
         let root = root.canonicalize().unwrap_or(root);
         let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
@@ -21,17 +21,17 @@ impl Workspace {
         Self { root, target }
     }
 
-    /// The folder of the workspace's Cargo.toml.
+    /// Folder of the workspace's Cargo.toml.
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// Where cargo puts build products.
+    /// Folder of cargo's build products.
     pub fn target(&self) -> &Path {
         &self.target
     }
 
-    /// A folder for results under target/, created if needed.
+    /// Creates a folder for results under target/, if needed.
     pub fn results(&self, name: &str) -> Result<PathBuf> {
         let folder = self.target.join(name);
         std::fs::create_dir_all(&folder)
@@ -40,12 +40,12 @@ impl Workspace {
         Ok(folder)
     }
 
-    /// Relative to the root where possible: for messages.
+    /// Path relative to the root if possible, for messages.
     pub fn short<'a>(&self, path: &'a Path) -> std::path::Display<'a> {
         path.strip_prefix(&self.root).unwrap_or(path).display()
     }
 
-    /// Runs cargo with these variables, and tells whether it succeeded.
+    /// Runs cargo with these variables; returns true if it succeeded.
     pub fn cargo(&self, arguments: &[&str], more: &[String], variables: &[(&str, &Path)]) -> Result<bool> {
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| OsString::from("cargo"));
         let status = Command::new(cargo)
@@ -59,13 +59,13 @@ impl Workspace {
         Ok(status.success())
     }
 
-    /// Builds one of our programs and gives the path of its executable.
-    pub fn release(&self, program: &str) -> Result<PathBuf> {
+    /// Builds one of our programs; returns the path of its executable.
+    pub fn build_program(&self, program: &str) -> Result<PathBuf> {
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         let package = self.package(program).filter(|_| !program.is_empty() && program.chars().all(plain));
         let Some(package) = package else {
             let known = self.programs().join(", ");
-            return Err(miette!("there is no program `{program}` in crates/ (there are: {known})"));
+            return Err(miette!("unknown program `{program}`; programs: {known}"));
         };
         if !self.cargo(&["build", "--release", "--quiet", "--package", &package], &[], &[])? {
             return Err(miette!("`cargo build --release --package {package}` failed"));
@@ -73,11 +73,11 @@ impl Workspace {
         Ok(self.target.join("release").join(program).with_extension(std::env::consts::EXE_EXTENSION))
     }
 
-    /// Builds the measurements of a crate, `benches/measure.rs`, and gives the path of the executable.
+    /// Builds the measurements of a crate, `benches/measure.rs`; returns the path of the executable.
     pub fn bench(&self, package: &str) -> Result<PathBuf> {
         let known: Vec<String> = self.programs().into_iter().filter(|name| self.measures(name)).collect();
         if !known.iter().any(|name| name == package) {
-            return Err(miette!("there is no bench `{package}` (there are: {})", known.join(", ")));
+            return Err(miette!("unknown bench `{package}`; benches: {}", known.join(", ")));
         }
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| OsString::from("cargo"));
         let output = Command::new(cargo)
@@ -101,13 +101,13 @@ impl Workspace {
         self.root.join("crates").join(name).join("benches/measure.rs").is_file()
     }
 
-    /// The package of a program: its own name, or `NAME-cli` where that is the name of a library alone.
+    /// Finds the package of a program: its own name, or `NAME-cli` if that is the name of a library.
     pub fn package(&self, program: &str) -> Option<String> {
         let has_main = |name: &String| self.root.join("crates").join(name).join("src/main.rs").is_file();
         [program.to_owned(), format!("{program}-cli")].into_iter().find(has_main)
     }
 
-    /// The programs, by name.
+    /// Lists the programs by name.
     pub fn programs(&self) -> Vec<String> {
         let entries = std::fs::read_dir(self.root.join("crates")).into_iter().flatten().flatten();
         let names = entries.filter_map(|entry| entry.file_name().into_string().ok());

@@ -1,11 +1,12 @@
-//! A brick with film and radiation: seconds per step, iterations, memory. Other programs solve it too.
+//! Benchmark of a brick with film and radiation: seconds per step, iterations, memory. Other programs solve
+//! it too.
 //!
-//! 20 mm cube of PA12 at 220 °C; the bottom held at 80 °C, on the five other sides h = 15 W/m²K and ε = 0.9 against
-//! 80 °C; backward Euler.
+//! 20 mm cube of PA12 at 220 °C; bottom fixed at 80 °C, other sides with h = 15 W/m²K and ε = 0.9 against 80
+//! °C; backward Euler.
 
 use crate::Failure;
-use crystfem::boundary::{Condition, Field, Schedule, Where};
-use crystfem::material::{Conductor, Property};
+use crystfem::boundary::{Condition, FaceSelection, Field, Schedule};
+use crystfem::material::{Conductor, ThermalProperty};
 use crystfem::mesh::{Grid, abaqus};
 use crystfem::problem::{Capacity, Problem};
 use crystfem::simulation::{LinearSolver, Settings, Simulation};
@@ -20,38 +21,39 @@ const EDGE: f64 = 0.02;
 const COLD: f64 = 353.15;
 const HOT: f64 = 493.15;
 
-/// Of the brick.
+/// Solve a brick with film and radiation.
 #[derive(clap::Args)]
 pub struct Options {
     /// Elements along an edge.
     #[arg(long, default_value_t = 26, value_parser = crate::elements)]
     elements: usize,
-    /// Steps.
+    /// Number of steps.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
     /// Length of a step, s.
     #[arg(long, default_value_t = 0.5)]
     step: f64,
-    /// Lumped capacity instead of consistent.
+    /// Use lumped instead of consistent capacity.
     #[arg(long)]
     lumped: bool,
-    /// Move inner nodes by up to this part of an edge, smoothly, so that no two elements are equal.
+    /// Distort the mesh: inner nodes move smoothly by up to this fraction of an edge, so that all elements
+    /// differ.
     #[arg(long, default_value_t = 0.0, value_parser = amplitude)]
     distorted: f64,
-    /// How linear systems are solved, as in a scene: `auto`, `conjugate-gradients`, `multigrid` or `direct`.
+    /// Linear solver, as in a scene: `auto`, `conjugate-gradients`, `multigrid` or `direct`.
     #[arg(long, default_value = "auto", value_parser = solver)]
     solver: LinearSolver,
-    /// Write the mesh here, as CalculiX reads it (`.inp`).
+    /// Write the mesh as a CalculiX file (`.inp`).
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
-    /// Write the nodes and their temperatures at the end here (CSV).
+    /// Write the nodes with their final temperatures (CSV).
     #[arg(long, value_name = "FILE")]
     temperatures: Option<PathBuf>,
 }
 
 fn amplitude(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number"))?;
-    if (0.0..=0.2).contains(&value) { Ok(value) } else { Err(format!("{value} is not within 0 to 0.2")) }
+    if (0.0..=0.2).contains(&value) { Ok(value) } else { Err(format!("{value} is outside 0 to 0.2")) }
 }
 
 fn solver(text: &str) -> Result<LinearSolver, String> {
@@ -59,7 +61,7 @@ fn solver(text: &str) -> Result<LinearSolver, String> {
     serde_json::from_value(name).map_err(|error| error.to_string())
 }
 
-/// Rows of one run.
+/// Returns the measurements of one run.
 pub fn measure(options: &Options) -> Result<Vec<Measurement>, Failure> {
     let before = peak_memory();
     let since = Instant::now();
@@ -110,9 +112,9 @@ pub fn measure(options: &Options) -> Result<Vec<Measurement>, Failure> {
 fn problem(options: &Options) -> Result<Problem, crystfem::Error> {
     let mesh = Grid::uniform([0.0; 3], [EDGE; 3], [options.elements; 3])?.mesh("brick")?;
     let mesh = if options.distorted > 0.0 { mesh.distorted(options.distorted)? } else { mesh };
-    let property = Property::constant;
+    let property = ThermalProperty::constant;
     let material = Arc::new(Conductor::new(1010.0, property("k", 0.25)?, property("c", 2200.0)?)?);
-    let surface = || Where::Outer { except: mesh.surfaces["bottom"].clone() };
+    let surface = || FaceSelection::Outer { except: mesh.surfaces["bottom"].clone() };
     let ambient = || Schedule::constant(COLD);
     let conditions = vec![
         Condition::Temperature { nodes: mesh.node_sets["bottom"].clone(), value: Field::constant(COLD) },
@@ -123,7 +125,7 @@ fn problem(options: &Options) -> Result<Problem, crystfem::Error> {
     Ok(Problem { conditions, capacity, ..Problem::new(mesh, material, HOT) })
 }
 
-/// The most memory that this process has had, bytes; `None` where the system does not tell.
+/// Returns the peak memory of this process, bytes; `None` if the system does not report it.
 pub fn peak_memory() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -1,26 +1,26 @@
-//! Error against run time of the time integrators.
+//! Benchmark of the time integrators: error against run time.
 
 use crate::Failure;
 use crate::median;
-use crystfem::exact::cube::{Cube, END, Start};
+use crystfem::exact::cube::{Cube, CubeStart, END};
 use crystfem::simulation::{LinearSolver, Settings, Simulation};
 use crystfem::time::{Scheme, Steps};
 use evidence::measurement::Measurement;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-/// Numbers of equal steps; tolerances of adaptive ones, K.
+/// Numbers of fixed steps, and tolerances of adaptive steps, K.
 const STEPS: [u32; 8] = [4, 8, 16, 32, 64, 128, 256, 512];
 const TOLERANCES: [f64; 7] = [10.0, 3.0, 1.0, 0.3, 0.1, 0.03, 0.01];
-/// Timings, of which the median counts.
+/// Number of timings; the median is reported.
 const REPEATS: usize = 3;
-/// What linear solves may leave, K: well below the errors of the steps.
-const SOLVES: f64 = 1e-6;
+/// Tolerance of linear solves, K, well below the errors of the steps.
+const SOLVER_TOLERANCE: f64 = 1e-6;
 
-/// Rows `SCHEME-MODE LENGTH: QUANTITY, PROBLEM`.
+/// Returns rows `SCHEME-MODE LENGTH: QUANTITY, PROBLEM`.
 pub fn measure(elements: usize) -> Result<Vec<Measurement>, Failure> {
     let mut rows = Vec::new();
-    for (problem, start) in [("smooth", Start::Smooth), ("quenched", Start::Quenched)] {
+    for (problem, start) in [("smooth", CubeStart::Smooth), ("quenched", CubeStart::Quenched)] {
         let cube = Cube::new(elements, start);
         for (name, scheme) in [("backward-euler", Scheme::BackwardEuler), ("tr-bdf2", Scheme::TrBdf2)] {
             let fixed = STEPS.map(|count| {
@@ -34,8 +34,13 @@ pub fn measure(elements: usize) -> Result<Vec<Measurement>, Failure> {
             });
             for (name, steps) in fixed.into_iter().chain(adaptive) {
                 let solver = LinearSolver::ConjugateGradients;
-                let of = [name.as_str(), problem];
-                run(&cube, of, Settings { scheme, steps, tolerance: SOLVES, solver }, &mut rows)?;
+                let labels = [name.as_str(), problem];
+                run(
+                    &cube,
+                    labels,
+                    Settings { scheme, steps, tolerance: SOLVER_TOLERANCE, solver },
+                    &mut rows,
+                )?;
             }
         }
     }
@@ -57,7 +62,7 @@ fn run(
         seconds.push(since.elapsed().as_secs_f64());
         work = simulation.state().work;
     }
-    // once more, with a look at each step
+    // another run measures the error after each step
     let mut squares = 0.0;
     let mut simulation = Simulation::new(cube.problem()?, settings)?;
     let _ = simulation.advance(END, &mut |simulation, step| {

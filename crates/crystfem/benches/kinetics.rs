@@ -1,28 +1,30 @@
-//! Error in α against nanoseconds a step of the ways to integrate the kinetics; a material's whole response.
+//! Benchmark of the kinetics integrators: error in α against time per step, and the response of a material.
 //!
-//! Rows `SCHEME KELVIN: QUANTITY`: the largest error in α over the curve, the time for all of it, and for a step of KELVIN.
+//! Rows `SCHEME KELVIN: QUANTITY`: largest error in α over the curve, time of the whole curve, and time per
+//! step of KELVIN.
 
 use crate::Failure;
 use crate::{REPEATS, median, point};
-use crystfem::kinetics::{Constants, Kinetics, Scheme, cooling_curve};
+use crystfem::kinetics::{KineticConstants, KineticScheme, Kinetics, cooling_curve};
 use crystfem::material::ThermalMaterial;
 use evidence::measurement::Measurement;
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Steps that a timing covers.
+/// Number of steps per timing.
 const STEPS: usize = 200_000;
 
-/// Column 1 of Table 4.1, 200 → 120 °C from a seed of 1e-3 (from which Euler's method can start at all).
+/// Measures column 1 of Table 4.1 from 200 to 120 °C, with a seed of 1e-3 (Euler's method cannot start from
+/// 0).
 pub fn measure(rate: f64) -> Result<Vec<Measurement>, Failure> {
     if !(rate > 0.0 && rate.is_finite()) {
         return Err(format!("--rate: found {rate} K/min; allowed: above 0").into());
     }
-    let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1)?;
+    let kinetics = Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1)?;
     let rate = rate / 60.0;
     let exact = cooling_curve(&kinetics, rate, 473.15, 393.15, 1e-3, 2);
     let mut rows = Vec::new();
-    for scheme in Scheme::ALL {
+    for scheme in KineticScheme::ALL {
         for kelvin in [0.001, 0.01, 0.1, 0.5, 1.0, 2.0, 5.0, 10.0] {
             let steps = (80.0_f64 / kelvin).round() as usize;
             let mut push = |what: &str, value: f64, unit: &str| {
@@ -30,7 +32,7 @@ pub fn measure(rate: f64) -> Result<Vec<Measurement>, Failure> {
                 rows.push(Measurement::new(what, steps, 1, value, unit));
             };
             let error = error(&kinetics, scheme, rate, kelvin, steps, &exact);
-            // JSON knows no NaN: a scheme that leaves [0, 1] for good has no row of errors
+            // JSON has no NaN: a scheme that leaves [0, 1] has no error row
             if error.is_finite() {
                 push("error", error, "");
             }
@@ -50,7 +52,7 @@ pub fn measure(rate: f64) -> Result<Vec<Measurement>, Failure> {
     Ok(rows)
 }
 
-/// Nanoseconds of a material's response, tangent and all.
+/// Measures the response of a material with its tangent, ns.
 fn response(latent_heat: Option<f64>, start: f64, increment: f64) -> Result<f64, Failure> {
     let polymer = point::polymer(latent_heat)?;
     let mut old = [0.0];
@@ -69,7 +71,7 @@ fn response(latent_heat: Option<f64>, start: f64, increment: f64) -> Result<f64,
 
 fn error(
     kinetics: &Kinetics,
-    scheme: Scheme,
+    scheme: KineticScheme,
     rate: f64,
     kelvin: f64,
     steps: usize,
@@ -89,8 +91,8 @@ fn error(
     worst
 }
 
-/// The curve again and again, α at the end of each step included.
-fn nanoseconds(kinetics: &Kinetics, scheme: Scheme, rate: f64, kelvin: f64, steps: usize) -> f64 {
+/// Measures the time per step, including α at the end of each step, ns.
+fn nanoseconds(kinetics: &Kinetics, scheme: KineticScheme, rate: f64, kelvin: f64, steps: usize) -> f64 {
     let repeats = (STEPS / steps).max(1);
     let times: Vec<f64> = (0..REPEATS)
         .map(|_| {

@@ -1,4 +1,5 @@
-//! `cargo bench -p crystfem`: a material's response with its tangent, as `cargo xtask bench crystfem -- kinetics` measures it.
+//! `cargo bench -p crystfem`: response of a material with its tangent, as in `cargo xtask bench crystfem --
+//! kinetics`.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use crystfem::material::ThermalMaterial;

@@ -11,12 +11,12 @@ mod point;
 mod print;
 mod solvers;
 
-/// Timings, of which the median counts.
+/// Number of timings; the median is reported.
 const REPEATS: usize = 7;
 
 type Failure = Box<dyn std::error::Error>;
 
-/// What to measure.
+/// Measures solvers, integrators and materials.
 #[derive(Parser)]
 struct Bench {
     #[command(subcommand)]
@@ -26,42 +26,43 @@ struct Bench {
     json: bool,
     #[command(flatten)]
     threads: Threads,
-    /// What `cargo bench` adds.
+    /// Argument that `cargo bench` adds.
     #[arg(long, global = true, hide = true)]
     bench: bool,
 }
 
 #[derive(Subcommand)]
 enum What {
-    /// Error in alpha against nanoseconds per step of the ways to integrate the kinetics, and the whole response of a
+    /// Measure the kinetics integrators, error in alpha against nanoseconds per step, and the response of a
     /// material.
     Kinetics {
         /// Cooling rate, K/min.
         #[arg(long, default_value_t = 10.0)]
         rate: f64,
     },
-    /// Error against time of the time integrators, with fixed and with adaptive steps: a cube that cools from a smooth
-    /// temperature, and one that is quenched.
+    /// Measure the time integrators, error against time, with fixed and adaptive steps, for a smooth and a
+    /// quenched cube.
     Integrators {
         /// Elements along an edge.
         #[arg(long, default_value_t = 16, value_parser = elements)]
         elements: usize,
     },
-    /// Error against time of the linear solvers in short and long steps of the quenched cube.
+    /// Measure the linear solvers, error against time, in short and long steps of the quenched cube.
     Solvers {
         /// Elements along an edge.
         #[arg(long, default_value_t = 26, value_parser = elements)]
         elements: usize,
     },
-    /// Seconds per step, iterations and memory of a brick with film and radiation, 20 steps of 0.5 s.
+    /// Measure seconds per step, iterations and memory of a brick with film and radiation, 20 steps of 0.5 s.
     Brick(brick::Options),
-    /// Seconds of a birth with its step, iterations and memory of a block that is printed in short pieces of line.
+    /// Measure seconds per birth with its step, iterations and memory of a block printed in short line
+    /// segments.
     Print(print::Options),
 }
 
 fn elements(text: &str) -> Result<usize, String> {
     let value: usize = text.parse().map_err(|_| format!("`{text}` is not a whole number"))?;
-    if (1..=400).contains(&value) { Ok(value) } else { Err(format!("{value} is not within 1 to 400")) }
+    if (1..=400).contains(&value) { Ok(value) } else { Err(format!("{value} is outside 1 to 400")) }
 }
 
 fn main() -> Result<(), Failure> {

@@ -1,13 +1,15 @@
-//! A block printed in short pieces of line: seconds of a birth with its step, iterations, bytes for each equation.
+//! Benchmark of a block printed in short line segments: seconds per birth with its step, iterations, bytes
+//! per equation.
 //!
-//! Layers of one element's height, lines of alternating direction, cut into pieces; each piece is a birth. All but the last are there at
-//! the start, as warm as their age lets them be; each of the last ones is followed by a step.
+//! Layers have the height of one element; their lines alternate in direction and are cut into segments, one
+//! birth each. All but the last segments exist from the start, colder with age; each of the last ones is
+//! followed by a step.
 
 use crate::Failure;
 use crate::brick::peak_memory;
-use crystfem::boundary::{Condition, Schedule, Where};
-use crystfem::kinetics::{Constants, Kinetics};
-use crystfem::material::{Filled, Polymer, Property, Semicrystalline, ThermalMaterial};
+use crystfem::boundary::{Condition, FaceSelection, Schedule};
+use crystfem::kinetics::{KineticConstants, Kinetics};
+use crystfem::material::{Filled, Polymer, Semicrystalline, ThermalMaterial, ThermalProperty};
 use crystfem::melting::Melting;
 use crystfem::mesh::Grid;
 use crystfem::problem::{Birth, Problem};
@@ -19,42 +21,43 @@ use std::time::Instant;
 const EDGE: f64 = 0.5e-3;
 const HOT: f64 = 493.15;
 
-/// Of the block.
+/// Print a block in short line segments.
 #[derive(clap::Args)]
 pub struct Options {
     /// Elements along x and y.
     #[arg(long, default_value_t = 68, value_parser = crate::elements)]
     elements: usize,
-    /// Layers, each an element high.
+    /// Number of layers, each one element high.
     #[arg(long, default_value_t = 22, value_parser = crate::elements)]
     layers: usize,
     /// Elements across a line.
     #[arg(long, default_value_t = 2, value_parser = crate::elements)]
     width: usize,
-    /// Elements along a piece.
+    /// Elements along a segment.
     #[arg(long, default_value_t = 40, value_parser = crate::elements)]
     piece: usize,
-    /// Births that are followed by a step.
+    /// Number of births followed by a step.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
     births: u32,
-    /// Time from birth to birth, s: one step of backward Euler.
+    /// Time between births, s: one step of backward Euler.
     #[arg(long, default_value_t = 0.5)]
     step: f64,
-    /// Temperature around it, °C.
+    /// Chamber temperature, °C.
     #[arg(long, default_value_t = 80.0)]
     chamber: f64,
-    /// Adaptive steps to this error in place of one, K.
+    /// Use adaptive steps with this tolerance, K.
     #[arg(long)]
     tolerance: Option<f64>,
-    /// Crystals release latent heat.
+    /// Include latent heat.
     #[arg(long)]
     latent: bool,
-    /// Parts to which cells are filled, in no order, as along G-code: with several most rows are unequal.
+    /// Number of different filled fractions, in random order as in G-code; with several, most rows are
+    /// unequal.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
     fills: u16,
 }
 
-/// Rows of one run.
+/// Returns the measurements of one run.
 pub fn measure(options: &Options) -> Result<Vec<Measurement>, Failure> {
     let before = peak_memory();
     let problem = problem(options)?;
@@ -71,7 +74,7 @@ pub fn measure(options: &Options) -> Result<Vec<Measurement>, Failure> {
     let since = Instant::now();
     let mut simulation = Simulation::new(problem, settings)?;
     let built = since.elapsed().as_secs_f64();
-    // all at once at the start takes more than birth by birth
+    // building everything at the start needs more memory than adding birth by birth
     let at_start = peak_memory().zip(before).map(|(after, before)| after - before);
     let _ = std::fs::write("/proc/self/clear_refs", "5");
     let start = simulation.state().work;
@@ -115,9 +118,9 @@ fn problem(options: &Options) -> Result<Problem, crystfem::Error> {
         Grid::uniform([0.0; 3], [side, side, EDGE * layers as f64], [count, count, layers])?.mesh("block")?;
     let whole: Arc<dyn ThermalMaterial> = Arc::new(Semicrystalline::new(Polymer {
         density: 1010.0,
-        conductivity: Property::constant("k", 0.25)?,
-        specific_heat: Property::constant("c", 2200.0)?,
-        kinetics: Kinetics::new(Constants::TABLE_4_1_COLUMN_1)?,
+        conductivity: ThermalProperty::constant("k", 0.25)?,
+        specific_heat: ThermalProperty::constant("c", 2200.0)?,
+        kinetics: Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1)?,
         melting: Some(Melting::PA12),
         ultimate_crystallinity: 0.25,
         latent_heat: options.latent.then_some(209e3),
@@ -126,10 +129,10 @@ fn problem(options: &Options) -> Result<Problem, crystfem::Error> {
     let filled = |part: f64| -> Result<Arc<dyn ThermalMaterial>, crystfem::Error> {
         Ok(Arc::new(Filled::new(whole.clone(), part)?))
     };
-    // from half to whole
+    // filled fractions from 0.5 to 1
     let parts = (1..=options.fills).map(|k| 0.5 + 0.5 * f64::from(k) / f64::from(options.fills));
     let materials = parts.map(filled).collect::<Result<Vec<_>, _>>()?;
-    let of = |element: usize| ((element as u64 * 2_654_435_761) >> 16) as u16 % options.fills;
+    let fill_index = |element: usize| ((element as u64 * 2_654_435_761) >> 16) as u16 % options.fills;
     let mut births = Vec::new();
     for layer in 0..layers {
         for line in (0..count).step_by(options.width) {
@@ -157,8 +160,8 @@ fn problem(options: &Options) -> Result<Problem, crystfem::Error> {
         ambient: Schedule::constant(cold),
     };
     let bottom = mesh.surfaces["bottom"].clone();
-    let outer = Where::Outer { except: bottom.clone() };
-    let conditions = vec![film(Where::Faces(bottom), 300.0), film(outer, 15.0)];
-    let material_of = (0..mesh.element_count()).map(of).collect();
+    let outer = FaceSelection::Outer { except: bottom.clone() };
+    let conditions = vec![film(FaceSelection::Faces(bottom), 300.0), film(outer, 15.0)];
+    let material_of = (0..mesh.element_count()).map(fill_index).collect();
     Ok(Problem { conditions, births, materials, material_of, ..Problem::new(mesh, whole, cold) })
 }

@@ -1,20 +1,20 @@
-//! Error against run time of the linear solvers, in short and long steps.
+//! Benchmark of the linear solvers: error against run time, in short and long steps.
 
 use crate::Failure;
-use crystfem::exact::cube::{Cube, Start};
+use crystfem::exact::cube::{Cube, CubeStart};
 use crystfem::simulation::{LinearSolver, Settings, Simulation};
 use evidence::measurement::Measurement;
 use std::time::Instant;
 
-/// Lengths of steps, s; steps taken.
+/// Lengths of steps, s, and number of steps.
 const LENGTHS: [f64; 3] = [0.5, 5.0, 50.0];
 const STEPS: i32 = 6;
-/// Rms errors requested of conjugate gradients, K.
+/// Rms tolerances of conjugate gradients, K.
 const TOLERANCES: [f64; 5] = [1e-1, 1e-3, 1e-5, 1e-7, 1e-9];
 
-/// Rows `SOLVER TOLERANCE: QUANTITY, LENGTH`; factors have the tolerance 0.
+/// Returns rows `SOLVER TOLERANCE: QUANTITY, LENGTH`; direct solves have the tolerance 0.
 pub fn measure(elements: usize) -> Result<Vec<Measurement>, Failure> {
-    let cube = Cube::new(elements, Start::Quenched);
+    let cube = Cube::new(elements, CubeStart::Quenched);
     let mut rows = Vec::new();
     for dt in LENGTHS {
         for tolerance in TOLERANCES {
@@ -41,7 +41,7 @@ fn run(
         simulation.run_until(f64::from(until) * dt)?;
         Ok(since.elapsed().as_secs_f64())
     };
-    // the first step makes what serves all of them
+    // the first step includes the set-up for all steps
     let first = advance(1)?;
     let step = advance(STEPS)? / f64::from(STEPS - 1);
     let error = cube.mean_square(&simulation, |lambda| (1.0 + dt * lambda).powi(-STEPS)).sqrt();

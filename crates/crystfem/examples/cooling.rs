@@ -1,10 +1,10 @@
-//! PA12 cooled at three rates: where half of it has crystallized, and what survives heating again.
+//! PA12 cooled at three rates: temperature of half crystallization, and crystals that survive heating.
 
-use crystfem::kinetics::{Constants, Kinetics, cooling_curve};
+use crystfem::kinetics::{KineticConstants, Kinetics, cooling_curve};
 use crystfem::melting::Melting;
 
 fn main() -> Result<(), crystfem::Error> {
-    let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1)?;
+    let kinetics = Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1)?;
     for rate in [1.0, 2.0, 10.0] {
         let curve = cooling_curve(&kinetics, rate / 60.0, 473.15, 373.15, 0.0, 2);
         let half = curve.temperature_at(0.5).map_or(f64::NAN, |kelvin| kelvin - 273.15);

@@ -1,7 +1,7 @@
-//! A hot block of PA12 in still air: temperatures in its middle and on a corner, and where the heat went.
+//! Hot block of PA12 in still air: temperatures in its middle and at a corner, and energy balance.
 
-use crystfem::boundary::{Condition, Schedule, Where};
-use crystfem::material::{Conductor, Property};
+use crystfem::boundary::{Condition, FaceSelection, Schedule};
+use crystfem::material::{Conductor, ThermalProperty};
 use crystfem::mesh::Grid;
 use crystfem::problem::Problem;
 use crystfem::simulation::{Settings, Simulation};
@@ -9,11 +9,14 @@ use std::sync::Arc;
 
 fn main() -> Result<(), crystfem::Error> {
     let (density, conductivity, specific_heat) = (1010.0, 0.25, 2200.0);
-    let material =
-        Conductor::new(density, Property::Constant(conductivity), Property::Constant(specific_heat))?;
+    let material = Conductor::new(
+        density,
+        ThermalProperty::Constant(conductivity),
+        ThermalProperty::Constant(specific_heat),
+    )?;
     let mesh = Grid::uniform([0.0; 3], [0.01, 0.02, 0.03], [8, 16, 24])?.mesh("block")?;
     let film = Condition::Film {
-        surface: Where::outer(),
+        surface: FaceSelection::outer(),
         coefficient: Schedule::constant(15.0),
         ambient: Schedule::constant(293.15),
     };
@@ -27,7 +30,7 @@ fn main() -> Result<(), crystfem::Error> {
     }
     let ledger = &simulation.state().ledger;
     println!(
-        "{:.1} J gone through the surface, {:.1e} of it unaccounted for",
+        "{:.1} J lost through the surface, relative balance error {:.1e}",
         -ledger.exchange.total(),
         ledger.worst
     );

@@ -1,15 +1,15 @@
-//! Kinetics of Hoffman and Lauritzen fitted to cooling runs, which are computed here with known constants.
+//! Hoffman–Lauritzen kinetics fitted to cooling runs that are computed with known constants.
 
-use crystfem::fit::{Fit, Known, Run, nakamura};
-use crystfem::kinetics::{Constants, Kinetics, cooling_curve};
+use crystfem::fit::{FixedConstants, KineticFit, Run, nakamura};
+use crystfem::kinetics::{KineticConstants, Kinetics, cooling_curve};
 
-/// Constants that made the runs.
-pub const TRUTH: Constants = Constants::TABLE_4_1_COLUMN_1;
+/// Constants of the computed runs.
+pub const TRUTH: KineticConstants = KineticConstants::TABLE_4_1_COLUMN_1;
 
-/// Runs at 1, 5 and 20 K/min with a value every hundredth of α, fitted.
-pub fn fitted() -> Result<Fit, crystfem::Error> {
-    let Constants { equilibrium_melting, frozen, activation_energy, .. } = TRUTH;
-    let known = Known { equilibrium_melting, frozen, activation_energy };
+/// Fits runs at 1, 5 and 20 K/min with a value every hundredth of α.
+pub fn fitted() -> Result<KineticFit, crystfem::Error> {
+    let KineticConstants { equilibrium_melting, frozen, activation_energy, .. } = TRUTH;
+    let known = FixedConstants { equilibrium_melting, frozen, activation_energy };
     let kinetics = Kinetics::new(TRUTH)?;
     let mut runs = Vec::new();
     for rate in [1.0 / 60.0, 5.0 / 60.0, 20.0 / 60.0] {
@@ -28,6 +28,6 @@ fn main() -> Result<(), crystfem::Error> {
     for constant in &fit.estimates {
         println!("{:16} {:.6e} {}", constant.name, constant.value, constant.unit);
     }
-    println!("rms error of α {:.1e}; made with {TRUTH:?}", fit.rms);
+    println!("rms error of α {:.1e}; true constants {TRUTH:?}", fit.rms);
     Ok(())
 }

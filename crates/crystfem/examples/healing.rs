@@ -1,4 +1,4 @@
-//! Healing between layers of PA12: the longer a layer waits for the next one, the colder it is, and the less their interface heals.
+//! Healing between layers of PA12: with longer layer times, layers are colder and interfaces heal less.
 
 use crystfem::coupling::{HealingCoupling, HealingSettings};
 use crystfem::healing::Healing;
@@ -8,14 +8,14 @@ use crystfem::printed::PrintedPart;
 use crystfem::simulation::{Settings, Simulation};
 use std::sync::Arc;
 
-/// Least and mean degree of healing of a bar with a layer every `interval`, s.
+/// Returns the least and mean degree of healing of a bar with a layer every `interval`, s.
 pub fn healed(interval: f64) -> Result<Option<[f64; 2]>, crystfem::Error> {
     let part = PrintedPart::bar(&Bar::new([10e-3, 5e-3], 4, 0.5e-3), Semicrystalline::pa12()?)?;
     let part = part.layer_every(interval).hold("bottom", 353.15).convection(15.0, 353.15);
     let problem = Arc::new(part.problem()?);
     let mut simulation = Simulation::new(problem.clone(), Settings::adaptive(1e-3))?;
 
-    // chains relax in 2 s at 180 °C, activation energy 60 kJ/mol (assumed)
+    // relaxation time 2 s at 180 °C, activation energy 60 kJ/mol (assumed)
     let law = Healing::new(2.0, 453.15, 60e3)?;
     let settings = HealingSettings::new(&problem.mesh, &problem.material_of, &problem.births, 0, law)?;
     let mut healing = HealingCoupling::new(settings);

@@ -1,12 +1,12 @@
-//! A block printed by G-code: the cells that its beads fill appear along its moves; temperature and crystallinity near its top.
+//! A block printed from G-code: cells are added along its moves; temperature and crystallinity near the top.
 
 use crystfem::material::Semicrystalline;
-use crystfem::mesh::path::{Cells, parse};
+use crystfem::mesh::path::{CellSettings, parse};
 use crystfem::printed::PrintedPart;
 use crystfem::simulation::{Settings, Simulation};
 use std::path::Path;
 
-/// Four layers of twelve lines, 10 mm × 6 mm × 1 mm; `read_gcode` reads a file.
+/// Returns four layers of twelve lines, 10 mm × 6 mm × 1 mm; `read_gcode` reads a file instead.
 fn gcode() -> String {
     let mut lines = String::from("M104 S220\nM83\nG1 X0 Y0 Z0.25 F1800\n");
     for (layer, line) in (1..=4).flat_map(|layer| (0..12).map(move |line| (layer, line))) {
@@ -17,12 +17,12 @@ fn gcode() -> String {
     lines
 }
 
-/// The block so many seconds after its print.
+/// Simulates the block until `later` seconds after the print.
 pub fn printed(later: f64) -> Result<Simulation, crystfem::Error> {
     let path = parse(Path::new("block.gcode"), gcode().as_bytes())?;
     let end = path.duration();
-    let cells = Cells::new([1e-3, 1e-3, 0.25e-3]);
-    let part = PrintedPart::along(path, &cells, Semicrystalline::pa12()?)?;
+    let cells = CellSettings::new([1e-3, 1e-3, 0.25e-3]);
+    let part = PrintedPart::along_path(path, &cells, Semicrystalline::pa12()?)?;
     let mut simulation =
         part.hold("bottom", 373.15).convection(15.0, 353.15).simulate(Settings::adaptive(1e-3))?;
     simulation.run_until(end + later)?;

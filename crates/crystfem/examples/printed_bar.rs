@@ -1,13 +1,14 @@
-//! A bar of PA12, printed in eight layers onto glass: temperature and crystallinity in the first and in the last layer.
+//! A bar of PA12 printed in eight layers on glass: temperature and crystallinity in the first and the last
+//! layer.
 
-use crystfem::material::{Conductor, Property, Semicrystalline};
+use crystfem::material::{Conductor, Semicrystalline, ThermalProperty};
 use crystfem::mesh::{Bar, Substrate};
 use crystfem::printed::PrintedPart;
 use crystfem::simulation::Settings;
 
 fn main() -> Result<(), crystfem::Error> {
     let (plate, air) = (353.15, 353.15);
-    let glass = Conductor::new(2500.0, Property::Constant(1.0), Property::Constant(800.0))?;
+    let glass = Conductor::new(2500.0, ThermalProperty::Constant(1.0), ThermalProperty::Constant(800.0))?;
     let substrate = Substrate { size: [30e-3, 20e-3], thickness: 4e-3, growth: 1.6 };
     let bar = Bar { substrate: Some(substrate), ..Bar::new([20e-3, 10e-3], 8, 0.5e-3) };
 

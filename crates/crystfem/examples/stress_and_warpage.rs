@@ -1,4 +1,4 @@
-//! Stress and warpage of a printed bar of PA12, on the bed and taken off it.
+//! Stress and warpage of a printed bar of PA12, on the bed and released.
 
 use crystfem::coupling::{StressCoupling, StressSettings};
 use crystfem::material::Semicrystalline;
@@ -8,7 +8,7 @@ use crystfem::printed::PrintedPart;
 use crystfem::simulation::{Settings, Simulation};
 use std::sync::Arc;
 
-/// Largest Mises stress on the bed and after the release, Pa, and warpage, m.
+/// Returns the largest Mises stress on the bed and after the release, Pa, and the warpage, m.
 pub fn bar() -> Result<[f64; 3], crystfem::Error> {
     let part = PrintedPart::bar(&Bar::new([20e-3, 5e-3], 4, 0.5e-3), Semicrystalline::pa12()?)?;
     let problem = Arc::new(part.layer_every(20.0).hold("bottom", 353.15).convection(15.0, 353.15).problem()?);
@@ -27,7 +27,7 @@ pub fn bar() -> Result<[f64; 3], crystfem::Error> {
 #[allow(dead_code, reason = "the tests include this file and call what it shows")]
 fn main() -> Result<(), crystfem::Error> {
     let [on_bed, released, warpage] = bar()?;
-    println!("largest Mises stress {:.2} MPa on the bed, {:.2} MPa off it", on_bed / 1e6, released / 1e6);
+    println!("largest Mises stress {:.2} MPa on the bed, {:.2} MPa released", on_bed / 1e6, released / 1e6);
     println!("warpage of the bed side {:.1} µm", warpage * 1e6);
     Ok(())
 }

@@ -1,34 +1,35 @@
-//! Births: elements that appear with a temperature, and conserve energy.
+//! Births: elements appear with a given temperature, and energy is conserved.
 //!
-//! A node of new elements only takes their temperature. A node that old and new elements share takes the temperature
-//! T* at which the energy counted at it is the sum of what both had:
-//! Σ_old m [U(T*) − U(T_old)] + Σ_new m [U(T*) − U(T_birth)] = 0, with the material's own energy and what its state does
-//! in a jump of no duration (Δt = 0). Nothing is lost, however thin the layer; with linear materials it is the mixture
-//! by heat capacity. A prescribed temperature stays, and its support takes the difference.
+//! A node of new elements only takes their temperature. A node shared by old and new elements takes the
+//! temperature T* at which its energy is the sum of both contributions:
+//! Σ_old m [U(T*) − U(T_old)] + Σ_new m [U(T*) − U(T_birth)] = 0.
+//! U is the energy of the material, with the change of its state in a jump of no duration (Δt = 0). So the
+//! balance closes for layers of any thickness; for linear materials T* is the mean weighted by heat capacity.
+//! A prescribed temperature stays, and its support exchanges the difference.
 
-use crate::element::{self, Geometry, MOST, WIDE, WIDE_POINTS};
+use crate::element::{self, FIRST_ORDER_NODES, Geometry, MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS};
 use crate::error::Error;
-use crate::material::Point;
+use crate::material::PointInput;
 use crate::simulation::{Simulation, State};
-use crate::system::{Added, Memory, Moves, NONE, Points, System};
+use crate::system::{Added, NONE, PointMemory, PointMoves, PointStates, ThermalSystem};
 use crate::time::Steps;
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
-/// Iterations for a temperature of mixture at most; bisection alone needs about 60.
-const MOST_ITERATIONS: usize = 200;
+/// Limit on iterations for a mixing temperature; bisection alone needs about 60.
+const MAX_ITERATIONS: usize = 200;
 
 /// Material at a node that may change its temperature.
-struct Part {
+struct NodeMaterial {
     material: u16,
     /// ρV, kg.
     mass: f64,
     /// Temperature, K.
     temperature: f64,
-    /// U there, J/kg.
+    /// U at this temperature, J/kg.
     energy: f64,
     state: Vec<f64>,
-    /// Where its state and energy are kept.
+    /// Kind of the points: `true` for points of general materials, `false` for nodal ones.
     general: bool,
     point: usize,
     old: bool,
@@ -36,7 +37,7 @@ struct Part {
 
 /// Linear material at a node.
 #[derive(Clone, Copy, Default)]
-struct Sum {
+struct LinearSum {
     /// ΣρcV of new elements, J/K.
     capacity: f64,
     /// Σ ρcV T_birth, J.
@@ -46,7 +47,7 @@ struct Sum {
 }
 
 impl Simulation {
-    /// Lets appear what is due.
+    /// Activates the elements due now.
     pub(crate) fn give_birth(&mut self) -> Result<(), Error> {
         let first = self.state.births;
         while let Some(birth) = self.problem.births.get(self.state.births)
@@ -76,7 +77,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// After a jump: no slope, no rate, the first step's length.
+    /// Resets the rates and the step length after a jump.
     fn restart(&mut self) {
         self.state.slope.clear();
         self.state.rate.clear();
@@ -87,12 +88,12 @@ impl Simulation {
         self.forget();
     }
 
-    /// Points of what exists at the start, at its temperature.
+    /// Initializes the points of the elements that exist at the start, at their temperature.
     pub(crate) fn fresh_points(&mut self) -> Result<(), Error> {
         let (problem, system) = (&self.problem, &self.system);
-        let mut memory = Memory::empty(system);
+        let mut memory = PointMemory::empty(system);
         for node in 0..system.size() {
-            for point in system.nodal.of(node) {
+            for point in system.nodal.points_of(node) {
                 let material = usize::from(system.nodal.material[point]);
                 memory.nodal.fresh(
                     problem,
@@ -108,7 +109,7 @@ impl Simulation {
             let first = general.starts[index] as usize;
             let equations = general.equations_of(index);
             let nodes = equations.len();
-            let shapes = element::shapes::<WIDE, WIDE_POINTS>(nodes);
+            let shapes = element::shapes::<MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS>(nodes);
             let corner = |a: usize| self.state.temperature[equations[a] as usize];
             for g in 0..general.starts[index + 1] as usize - first {
                 let temperature = match system.consistent {
@@ -123,22 +124,22 @@ impl Simulation {
         Ok(())
     }
 
-    /// Linear material of the elements born since `first`, at their nodes.
-    fn linear_sums(&self, first: usize) -> Result<HashMap<u32, Sum>, Error> {
-        let mut sums: HashMap<u32, Sum> = HashMap::new();
+    /// Sums linear material of the elements born since `first`, by node.
+    fn linear_sums(&self, first: usize) -> Result<HashMap<u32, LinearSum>, Error> {
+        let mut sums: HashMap<u32, LinearSum> = HashMap::new();
         for birth in &self.problem.births[first..self.state.births] {
             for &number in &birth.elements {
                 let material = usize::from(self.problem.material_of[number as usize]);
-                let (corners, nodes) = self.problem.mesh.positions::<MOST>(number);
+                let (corners, nodes) = self.problem.mesh.positions::<FIRST_ORDER_NODES>(number);
                 let volumes = match <Geometry>::new(&corners[..nodes]) {
                     Some(geometry) => geometry.corner_volumes,
                     None => return Err(Error::Mesh(format!("element {number}: inverted"))),
                 };
                 for (&node, volume) in self.problem.mesh.nodes(number).iter().zip(volumes) {
-                    let sum = sums.entry(self.system.equation[node as usize]).or_insert(Sum {
+                    let sum = sums.entry(self.system.equation[node as usize]).or_insert(LinearSum {
                         coldest: f64::INFINITY,
                         hottest: f64::NEG_INFINITY,
-                        ..Sum::default()
+                        ..LinearSum::default()
                     });
                     let capacity = self.behaviours[material].capacity.unwrap_or(0.0) * volume;
                     sum.capacity += capacity;
@@ -151,10 +152,15 @@ impl Simulation {
         Ok(sums)
     }
 
-    /// Makes room for what is new in temperatures and points, and mixes at the nodes in `sums`.
-    fn migrate(&mut self, state: &mut State, added: &Added, sums: &HashMap<u32, Sum>) -> Result<(), Error> {
+    /// Extends temperatures and points by those of new elements, and mixes at the nodes in `sums`.
+    fn migrate(
+        &mut self,
+        state: &mut State,
+        added: &Added,
+        sums: &HashMap<u32, LinearSum>,
+    ) -> Result<(), Error> {
         let (problem, system) = (&self.problem, &self.system);
-        let Memory { nodal, general } = &mut state.memory;
+        let PointMemory { nodal, general } = &mut state.memory;
         let birth_of = |birth: u32| problem.births[birth as usize - 1].temperature;
         nodal.rearrange(&added.nodal, system.nodal.stride, system.nodal.energies, |nodal, point| {
             let (birth, material) = (system.nodal.birth[point], system.nodal.material[point]);
@@ -171,7 +177,7 @@ impl Simulation {
         let mut prescribed = vec![0.0; if system.fixed.is_empty() { 0 } else { system.size() }];
         system.prescribe(problem, state.time, &mut prescribed);
         for &(equation, before) in &added.before {
-            // with consistent capacity all are touched
+            // with consistent capacity all nodes change
             let Some(sum) = sums.get(&equation) else { continue };
             let (k, existed) = (equation as usize, before.is_some());
             let old = state.temperature[k];
@@ -180,7 +186,7 @@ impl Simulation {
             let fixed = fixed.ok().map(|_| prescribed[k]);
             let capacity = before.unwrap_or(0.0);
             let mixture = Mixture { capacity, temperature: old, existed, sum };
-            let reached = mixture.settle(self, fixed, &mut list)?;
+            let reached = mixture.solve_temperature(self, fixed, &mut list)?;
             let old_heat = if existed { capacity * old } else { 0.0 };
             let mut change = (capacity + sum.capacity) * reached - old_heat;
             let mut new_heat = sum.heat;
@@ -188,7 +194,7 @@ impl Simulation {
                 let points = if part.general { &mut state.memory.general } else { &mut state.memory.nodal };
                 let stride = part.state.len();
                 points.state[part.point * stride..(part.point + 1) * stride].copy_from_slice(&part.state);
-                // that of others is in `sum`
+                // linear materials are in `sum`
                 if part.mass > 0.0 {
                     let before = std::mem::replace(&mut points.energy[part.point], part.energy);
                     change += part.mass * if part.old { part.energy - before } else { part.energy };
@@ -204,12 +210,12 @@ impl Simulation {
         Ok(())
     }
 
-    /// What is at a node, old and new.
-    fn parts(&self, state: &State, added: &Added, equation: u32) -> Vec<Part> {
+    /// Returns the materials at a node, old and new.
+    fn parts(&self, state: &State, added: &Added, equation: u32) -> Vec<NodeMaterial> {
         let (problem, system) = (&self.problem, &self.system);
         let old = state.temperature[equation as usize];
         let mut parts = Vec::new();
-        let part = |points: &Points, stride: usize, moves: &Moves, point: usize| Part {
+        let part = |points: &PointStates, stride: usize, moves: &PointMoves, point: usize| NodeMaterial {
             material: 0,
             mass: 0.0,
             temperature: old,
@@ -221,41 +227,50 @@ impl Simulation {
         };
         let birth_of = |birth: u32| problem.births[birth as usize - 1].temperature;
         let nodal = &system.nodal;
-        for point in nodal.of(equation as usize) {
+        for point in nodal.points_of(equation as usize) {
             let (birth, material) = (nodal.birth[point], nodal.material[point]);
             let mass = if nodal.follows(material) { 0.0 } else { nodal.mass[point] };
-            let part =
-                Part { material, mass, ..part(&state.memory.nodal, nodal.stride, &added.nodal, point) };
-            parts.push(Part { temperature: if part.old { old } else { birth_of(birth) }, ..part });
+            let part = NodeMaterial {
+                material,
+                mass,
+                ..part(&state.memory.nodal, nodal.stride, &added.nodal, point)
+            };
+            parts.push(NodeMaterial { temperature: if part.old { old } else { birth_of(birth) }, ..part });
         }
         for (number, g) in system.around(equation, &state.born) {
             let Ok(index) = system.general.elements.binary_search(&number) else { continue };
             let material = problem.material_of[number as usize];
-            let (corners, nodes) = problem.mesh.positions::<MOST>(number);
-            let volumes = <Geometry>::new(&corners[..nodes]).map_or([0.0; MOST], |g| g.corner_volumes);
+            let (corners, nodes) = problem.mesh.positions::<FIRST_ORDER_NODES>(number);
+            let volumes =
+                <Geometry>::new(&corners[..nodes]).map_or([0.0; FIRST_ORDER_NODES], |g| g.corner_volumes);
             let mass = problem.materials[usize::from(material)].density() * volumes[g];
             let point = system.general.starts[index] as usize + g;
             let part = part(&state.memory.general, system.general.stride, &added.general, point);
             let temperature = if part.old { old } else { birth_of(state.born[number as usize]) };
-            parts.push(Part { material, mass, temperature, general: true, ..part });
+            parts.push(NodeMaterial { material, mass, temperature, general: true, ..part });
         }
         parts
     }
 }
 
-/// Materials that meet at a node.
+/// Old and new material at one node.
 struct Mixture<'a> {
     /// ΣρcV of old linear material, J/K.
     capacity: f64,
     /// Temperature, K.
     temperature: f64,
     existed: bool,
-    sum: &'a Sum,
+    sum: &'a LinearSum,
 }
 
 impl Mixture<'_> {
-    /// The common temperature; `parts` take their state and energy there.
-    fn settle(&self, simulation: &Simulation, fixed: Option<f64>, parts: &mut [Part]) -> Result<f64, Error> {
+    /// Solves for the common temperature, and updates state and energy of `parts`.
+    fn solve_temperature(
+        &self,
+        simulation: &Simulation,
+        fixed: Option<f64>,
+        parts: &mut [NodeMaterial],
+    ) -> Result<f64, Error> {
         let (mut low, mut high) = (self.sum.coldest, self.sum.hottest);
         if self.existed {
             (low, high) = (low.min(self.temperature), high.max(self.temperature));
@@ -270,10 +285,10 @@ impl Mixture<'_> {
             None => {
                 // a monotone function: Newton within a bracket, else bisection
                 let mut guess = 0.5 * (low + high);
-                for _ in 0..MOST_ITERATIONS {
+                for _ in 0..MAX_ITERATIONS {
                     let (mut surplus, mut slope) = (linear * guess - heat, linear);
                     for part in parts.iter() {
-                        let (energy, capacity, _) = part.at(simulation, guess)?;
+                        let (energy, capacity, _) = part.after_jump(simulation, guess)?;
                         surplus += part.mass * (energy - part.energy);
                         slope += part.mass * capacity;
                     }
@@ -296,30 +311,30 @@ impl Mixture<'_> {
             }
         };
         for part in parts {
-            let (energy, _, state) = part.at(simulation, reached)?;
+            let (energy, _, state) = part.after_jump(simulation, reached)?;
             (part.energy, part.state) = (energy, state);
         }
         Ok(reached)
     }
 }
 
-impl Part {
-    /// U, ∂U/∂T and the state after a jump to a temperature.
-    fn at(&self, simulation: &Simulation, temperature: f64) -> Result<(f64, f64, Vec<f64>), Error> {
+impl NodeMaterial {
+    /// Returns U, ∂U/∂T and the state after a jump to a temperature.
+    fn after_jump(&self, simulation: &Simulation, temperature: f64) -> Result<(f64, f64, Vec<f64>), Error> {
         let material = &simulation.problem.materials[usize::from(self.material)];
         let count = material.state_names().len();
         let increment = temperature - self.temperature;
-        let at = Point { temperature: self.temperature, increment, gradient: Vector3::zeros(), dt: 0.0 };
+        let at = PointInput { temperature: self.temperature, increment, gradient: Vector3::zeros(), dt: 0.0 };
         let mut state = self.state.clone();
         let response = material.respond(&at, &self.state[..count], &mut state[..count])?;
         Ok((response.energy, response.d_energy_d_temperature, state))
     }
 }
 
-impl Memory {
-    /// Room for the points of a system.
-    pub(crate) fn empty(system: &System) -> Self {
-        let room = |points: usize, stride: usize, energies: usize| Points {
+impl PointMemory {
+    /// Allocates the points of a system.
+    pub(crate) fn empty(system: &ThermalSystem) -> Self {
+        let room = |points: usize, stride: usize, energies: usize| PointStates {
             state: vec![0.0; points * stride],
             energy: vec![0.0; energies],
         };
@@ -332,8 +347,8 @@ impl Memory {
     }
 }
 
-impl Points {
-    /// Fresh material at a temperature.
+impl PointStates {
+    /// Returns fresh material at a temperature.
     fn fresh(
         &mut self,
         problem: &crate::problem::Problem,
@@ -350,8 +365,14 @@ impl Points {
         }
     }
 
-    /// Moves points, with their energies or without; `fresh` makes the new ones.
-    fn rearrange(&mut self, moves: &Moves, stride: usize, energies: bool, fresh: impl Fn(&mut Self, usize)) {
+    /// Moves points, with or without their energies; `fresh` initializes new ones.
+    fn rearrange(
+        &mut self,
+        moves: &PointMoves,
+        stride: usize,
+        energies: bool,
+        fresh: impl Fn(&mut Self, usize),
+    ) {
         let state = self.state.split_off(moves.first * stride);
         let energy = if energies { self.energy.split_off(moves.first) } else { Vec::new() };
         for (point, &from) in (moves.first..).zip(&moves.from) {

@@ -1,4 +1,4 @@
-//! What acts on a body: prescribed temperatures, flux, film, radiation, heat sources. Temperatures in K.
+//! Boundary conditions and heat sources: prescribed temperature, flux, film, radiation. Temperatures in K.
 
 use crate::error::Error;
 use crate::mesh::Face;
@@ -7,27 +7,27 @@ use std::sync::Arc;
 /// Stefan–Boltzmann constant, W/(m² K⁴) (CODATA 2018).
 pub const STEFAN_BOLTZMANN: f64 = 5.670_374_419e-8;
 
-/// A value over time: linear between given times and constant outside of them, or swinging.
+/// A value over time: piecewise linear and constant outside its times, or a sine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
     times: Vec<f64>,
-    /// At the times; of a swing its two ends.
+    /// Values at the times; for a sine its lowest and highest value.
     values: Vec<f64>,
-    /// Of a swing, s.
+    /// Period of a sine, s; `None` if piecewise linear.
     period: Option<f64>,
 }
 
 impl Schedule {
-    /// The same value always.
+    /// Returns a constant.
     pub fn constant(value: f64) -> Self {
         Self { times: vec![0.0], values: vec![value], period: None }
     }
 
-    /// A sine between two values that passes their middle upwards at t = 0.
+    /// Returns a sine between two values with its mean, rising, at t = 0.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for values that are not finite, a high one below the low one, and a period that is not above
-    /// 0 and finite.
+    /// [`Error::Parameter`] for values that are not finite, `high` below `low`, and a period that is not
+    /// above 0 and finite.
     pub fn swing(low: f64, high: f64, period: f64) -> Result<Self, Error> {
         let wrong = |name, found, allowed: String| Err(Error::Parameter { name, found, allowed });
         if !low.is_finite() {
@@ -42,15 +42,15 @@ impl Schedule {
         Ok(Self { times: Vec::new(), values: vec![low, high], period: Some(period) })
     }
 
-    /// Of a swing, s.
+    /// Period of a sine, s.
     pub fn period(&self) -> Option<f64> {
         self.period
     }
 
-    /// Through (time, value) pairs. Steps land on their times.
+    /// Interpolates (time, value) pairs. Time steps end at their times.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where there is none, where times do not ascend, and for values that are not finite.
+    /// [`Error::Parameter`] for no pairs, times that do not ascend, and values that are not finite.
     pub fn linear(pairs: &[(f64, f64)]) -> Result<Self, Error> {
         let wrong = |name, found, allowed: &str| Error::Parameter { name, found, allowed: allowed.into() };
         if pairs.is_empty() {
@@ -74,15 +74,15 @@ impl Schedule {
         })
     }
 
-    /// The lowest value.
+    /// Lowest value.
     pub fn lowest(&self) -> f64 {
         self.values.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// Value at a time, s.
-    pub fn at(&self, time: f64) -> f64 {
+    /// Returns the value at a time, s.
+    pub fn value_at(&self, time: f64) -> f64 {
         if let (Some(period), [low, high]) = (self.period, &self.values[..]) {
-            // whole periods first: the sine of a large argument loses digits
+            // remove whole periods first: the sine of a large argument loses digits
             let turn = (time / period).fract() * std::f64::consts::TAU;
             return 0.5 * (low + high) + 0.5 * (high - low) * turn.sin();
         }
@@ -97,7 +97,7 @@ impl Schedule {
         self.values[next - 1] + part * (self.values[next] - self.values[next - 1])
     }
 
-    /// Times where the slope changes; none of a constant.
+    /// Times at which the slope changes; empty for a constant.
     pub fn breaks(&self) -> &[f64] {
         if self.times.len() > 1 { &self.times } else { &[] }
     }
@@ -108,37 +108,37 @@ impl Schedule {
 }
 
 /// A function of position (m) and time (s).
-pub type Function = Arc<dyn Fn([f64; 3], f64) -> f64 + Send + Sync>;
+pub type FieldFunction = Arc<dyn Fn([f64; 3], f64) -> f64 + Send + Sync>;
 
 /// A value over space and time.
 #[derive(Clone)]
 pub enum Field {
-    /// The same everywhere.
+    /// Uniform in space.
     Uniform(Schedule),
     /// A function of position and time; it should be smooth in time.
-    Function(Function),
+    Function(FieldFunction),
 }
 
 impl Field {
-    /// The same value everywhere and always.
+    /// Returns a value constant in space and time.
     pub fn constant(value: f64) -> Self {
         Self::Uniform(Schedule::constant(value))
     }
 
-    /// A function of position, m, and time, s.
+    /// Wraps a function of position, m, and time, s.
     pub fn function(function: impl Fn([f64; 3], f64) -> f64 + Send + Sync + 'static) -> Self {
         Self::Function(Arc::new(function))
     }
 
-    /// Value at a place and time.
-    pub fn at(&self, place: [f64; 3], time: f64) -> f64 {
+    /// Returns the value at a position, m, and time, s.
+    pub fn value_at(&self, place: [f64; 3], time: f64) -> f64 {
         match self {
-            Self::Uniform(schedule) => schedule.at(time),
+            Self::Uniform(schedule) => schedule.value_at(time),
             Self::Function(function) => function(place, time),
         }
     }
 
-    /// Times where the slope changes.
+    /// Times at which the slope changes.
     pub fn breaks(&self) -> &[f64] {
         match self {
             Self::Uniform(schedule) => schedule.breaks(),
@@ -146,7 +146,7 @@ impl Field {
         }
     }
 
-    /// Period of a swing, s.
+    /// Period of a sine, s.
     pub fn period(&self) -> Option<f64> {
         match self {
             Self::Uniform(schedule) => schedule.period(),
@@ -174,30 +174,30 @@ impl std::fmt::Debug for Field {
     }
 }
 
-/// Which faces a condition acts on. A face counts only while it is on the
-/// current outer surface: one element beside it exists and no other covers it.
+/// Faces on which a condition acts. A face counts only while it is on the current outer surface: exactly one
+/// of its elements exists.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Where {
-    /// These faces, given from either side.
+pub enum FaceSelection {
+    /// Listed faces, in either orientation.
     Faces(Vec<Face>),
-    /// The current outer surface, except these faces.
+    /// Current outer surface, except some faces.
     Outer {
-        /// Faces left out.
+        /// Excluded faces.
         except: Vec<Face>,
     },
 }
 
-impl Where {
-    /// The whole current outer surface.
+impl FaceSelection {
+    /// Returns the whole current outer surface.
     pub fn outer() -> Self {
         Self::Outer { except: Vec::new() }
     }
 }
 
-/// A boundary condition. Several may act on one face; their heat adds up.
+/// A boundary condition. Heat of several conditions on one face adds up.
 #[derive(Clone, Debug)]
 pub enum Condition {
-    /// Prescribed temperature, K, of nodes. Where two name one node, the later one holds.
+    /// Prescribed temperature, K, of nodes. The last condition on a node wins.
     Temperature {
         /// Nodes of the mesh.
         nodes: Vec<u32>,
@@ -206,15 +206,15 @@ pub enum Condition {
     },
     /// Heat flux into the body, W/m².
     Flux {
-        /// Where.
-        surface: Where,
+        /// Faces.
+        surface: FaceSelection,
         /// Heat into the body, W/m².
         inward: Field,
     },
     /// Heat loss h (T − T_a), W/m².
     Film {
-        /// Where.
-        surface: Where,
+        /// Faces.
+        surface: FaceSelection,
         /// h, W/(m² K).
         coefficient: Schedule,
         /// T_a, K.
@@ -222,8 +222,8 @@ pub enum Condition {
     },
     /// Heat loss ε σ (T⁴ − T_a⁴), W/m².
     Radiation {
-        /// Where.
-        surface: Where,
+        /// Faces.
+        surface: FaceSelection,
         /// ε, 0 to 1.
         emissivity: f64,
         /// T_a, K.
@@ -232,8 +232,8 @@ pub enum Condition {
 }
 
 impl Condition {
-    /// The surface it acts on; `None` for prescribed temperatures.
-    pub fn surface(&self) -> Option<&Where> {
+    /// Faces of the condition; `None` for prescribed temperatures.
+    pub fn surface(&self) -> Option<&FaceSelection> {
         match self {
             Self::Temperature { .. } => None,
             Self::Flux { surface, .. } | Self::Film { surface, .. } | Self::Radiation { surface, .. } => {
@@ -242,7 +242,7 @@ impl Condition {
         }
     }
 
-    /// Times where a schedule's slope changes.
+    /// Times at which the slope of a schedule changes.
     pub fn breaks(&self) -> Vec<f64> {
         match self {
             Self::Temperature { value, .. } => value.breaks().to_vec(),
@@ -252,7 +252,7 @@ impl Condition {
         }
     }
 
-    /// Shortest period of its swings, s.
+    /// Shortest period of its sines, s.
     pub fn period(&self) -> Option<f64> {
         let periods = match self {
             Self::Temperature { value, .. } => [value.period(), None],
@@ -263,6 +263,8 @@ impl Condition {
         periods.into_iter().flatten().min_by(f64::total_cmp)
     }
 
+    /// Checks the values.
+    ///
     /// # Errors
     /// [`Error::Parameter`] for values out of their domain.
     pub(crate) fn check(&self) -> Result<(), Error> {
@@ -280,7 +282,7 @@ impl Condition {
             },
             Self::Flux { inward, .. } => inward.check("flux"),
             Self::Film { coefficient, ambient, .. } => {
-                // k/h is less than an atom there: no film, but a surface that is held
+                // at a higher h, k/h is below the size of an atom: the surface is held, not cooled
                 let bad = |h: &&f64| !(0.0..=1e12).contains(*h);
                 if let Some(&found) = coefficient.values.iter().find(bad) {
                     let allowed = "0 to 1e12 W/(m² K); beyond it, prescribe its `temperature`";
@@ -298,16 +300,18 @@ impl Condition {
     }
 }
 
-/// Heat released in a volume.
+/// A heat source in a volume.
 #[derive(Clone, Debug)]
-pub struct Source {
+pub struct HeatSource {
     /// Elements.
     pub elements: Vec<u32>,
     /// Heat per volume, W/m³.
     pub power: Field,
 }
 
-impl Source {
+impl HeatSource {
+    /// Checks the power.
+    ///
     /// # Errors
     /// [`Error::Parameter`] for a power that is not finite.
     pub(crate) fn check(&self) -> Result<(), Error> {
@@ -325,7 +329,7 @@ mod tests {
         for (time, value) in
             [(-1.0, 300.0), (0.0, 300.0), (5.0, 350.0), (10.0, 400.0), (15.0, 375.0), (99.0, 350.0)]
         {
-            assert_eq!(ramp.at(time), value);
+            assert_eq!(ramp.value_at(time), value);
         }
         assert_eq!(ramp.breaks(), [0.0, 10.0, 20.0]);
         assert!(Schedule::constant(3.0).breaks().is_empty());
@@ -344,7 +348,7 @@ mod tests {
             (60.0, 200.0),
             (8e15, 300.0),
         ] {
-            assert!((swing.at(time) - value).abs() < 1e-12, "{time}: {}", swing.at(time));
+            assert!((swing.value_at(time) - value).abs() < 1e-12, "{time}: {}", swing.value_at(time));
         }
         assert!(swing.breaks().is_empty() && swing.period() == Some(80.0));
         for (low, high, period) in
@@ -352,7 +356,7 @@ mod tests {
         {
             assert!(Schedule::swing(low, high, period).is_err());
         }
-        // whichever end is out of the domain is named
+        // the error names the end that is out of range
         let cold = Condition::Temperature {
             nodes: vec![0],
             value: Field::Uniform(Schedule::swing(-1.0, 9.0, 1.0).unwrap()),
@@ -361,8 +365,8 @@ mod tests {
     }
 
     #[test]
-    fn values_out_of_their_domain_are_named() {
-        let surface = || Where::Outer { except: Vec::new() };
+    fn invalid_values_are_refused() {
+        let surface = || FaceSelection::Outer { except: Vec::new() };
         let film = |coefficient, ambient| Condition::Film {
             surface: surface(),
             coefficient: Schedule::constant(coefficient),
@@ -376,6 +380,6 @@ mod tests {
         assert!(radiation.check().unwrap_err().to_string().contains("0 to 1"));
         let flux = Condition::Flux { surface: surface(), inward: Field::constant(f64::NAN) };
         assert!(flux.check().is_err());
-        assert!(Source { elements: vec![0], power: Field::constant(f64::INFINITY) }.check().is_err());
+        assert!(HeatSource { elements: vec![0], power: Field::constant(f64::INFINITY) }.check().is_err());
     }
 }

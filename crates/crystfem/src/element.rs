@@ -1,38 +1,38 @@
-//! Hexahedra (2 × 2 × 2 Gauss points), tetrahedra (4 points) and wedges (6 points) of first order, and those of second
-//! order ([`natural`]): shapes, gradients, volumes, faces.
+//! First-order hexahedra (2 × 2 × 2 Gauss points), tetrahedra (4 points) and wedges (6 points), and
+//! second-order elements ([`natural`]): shape functions, gradients, volumes, faces.
 //!
-//! In first-order elements integration point g lies nearest to corner g. With lumped capacity, energy is counted at the
-//! corner and conduction at the Gauss point beside it, so each pair is one material point with one state.
+//! In first-order elements integration point g is nearest to corner g. Lumped capacity counts energy at the
+//! corner and conduction at the Gauss point beside it: each pair is one material point with one state.
 
 mod face;
 pub mod natural;
 
-use crate::shape::Shape;
+use crate::shape::ElementShape;
 pub use face::FaceGeometry;
 use nalgebra::Matrix3;
-use natural::Rule;
+use natural::QuadratureRule;
 use polycore::numerics::hexahedron;
 pub use polycore::numerics::hexahedron::CORNERS;
 
-/// Nodes of a first-order element at most, and its integration points.
-pub const MOST: usize = 8;
-/// Nodes of any element at most.
-pub const WIDE: usize = 20;
-/// Integration points of any element at most.
-pub const WIDE_POINTS: usize = 27;
+/// Maximum number of nodes, and of integration points, of a first-order element.
+pub const FIRST_ORDER_NODES: usize = 8;
+/// Maximum number of nodes of any element.
+pub const MAX_ELEMENT_NODES: usize = 20;
+/// Maximum number of integration points of any element.
+pub const MAX_ELEMENT_POINTS: usize = 27;
 
 /// 1/√3: the abscissa of the two-point Gauss rule.
 const GAUSS: f64 = 0.577_350_269_189_625_8;
-/// The four-point rule of a tetrahedron, exact to degree 2: one barycentric coordinate is NEAR, three are FAR.
+/// Four-point rule of a tetrahedron, exact to degree 2: one barycentric coordinate is NEAR, three are FAR.
 const NEAR: f64 = 0.585_410_196_624_968_5;
 const FAR: f64 = 0.138_196_601_125_010_5;
 
 /// An element at its integration points.
 #[derive(Clone, Debug)]
-pub struct Geometry<const N: usize = MOST, const P: usize = MOST> {
+pub struct Geometry<const N: usize = FIRST_ORDER_NODES, const P: usize = FIRST_ORDER_NODES> {
     /// Number of nodes.
     pub nodes: usize,
-    /// Number of integration points: as many as nodes in first-order elements.
+    /// Number of integration points; equals the number of nodes in first-order elements.
     pub points: usize,
     /// Gauss weight times the Jacobian of each point, m³.
     pub weights: [f64; P],
@@ -42,16 +42,16 @@ pub struct Geometry<const N: usize = MOST, const P: usize = MOST> {
     pub corner_volumes: [f64; N],
 }
 
-/// Number of integration points of an element of so many nodes.
+/// Number of integration points of an element with `nodes` nodes.
 pub fn points(nodes: usize) -> usize {
     rule(nodes).map_or(nodes, |rule| rule.points)
 }
 
-/// The rule of an element that is neither an 8-node hexahedron nor a 4-node tetrahedron.
-fn rule(nodes: usize) -> Option<&'static Rule> {
+/// Integration rule of wedges and second-order elements; `None` for 8-node hexahedra and 4-node tetrahedra.
+fn rule(nodes: usize) -> Option<&'static QuadratureRule> {
     match nodes {
         8 | 4 => None,
-        _ => Shape::of(nodes).map(Rule::of),
+        _ => ElementShape::with_nodes(nodes).map(QuadratureRule::for_shape),
     }
 }
 
@@ -76,7 +76,8 @@ pub fn shapes<const N: usize, const P: usize>(nodes: usize) -> [[f64; N]; P] {
 }
 
 impl<const N: usize, const P: usize> Geometry<N, P> {
-    /// Of the element with these nodes, at most `N`; `None` where a Jacobian is not positive (inverted, flat, folded).
+    /// Computes the geometry of an element from its nodes, at most `N`; `None` if a Jacobian is not positive
+    /// (inverted, flat, folded).
     pub fn new(corners: &[[f64; 3]]) -> Option<Self> {
         let nodes = corners.len();
         let mut geometry = Self {
@@ -141,7 +142,7 @@ impl<const N: usize, const P: usize> Geometry<N, P> {
         matrix
     }
 
-    /// Adds one integration point's part of [`Self::conduction`], for a symmetric conductivity.
+    /// Adds the contribution of one integration point to [`Self::conduction`], for a symmetric conductivity.
     pub fn add_conduction(&self, point: usize, conductivity: &Matrix3<f64>, matrix: &mut [[f64; N]; N]) {
         let gradients = &self.gradients[point];
         for b in 0..self.nodes {
@@ -151,7 +152,7 @@ impl<const N: usize, const P: usize> Geometry<N, P> {
                     image[d] += self.weights[point] * conductivity[(d, n)] * gradients[b][n];
                 }
             }
-            // both triangles get the same bits: heat that leaves one node for another arrives there
+            // both triangles get the same bits: the heat that leaves one node arrives at the other
             for a in 0..=b {
                 let value = (0..3).map(|d| gradients[a][d] * image[d]).sum::<f64>();
                 matrix[a][b] += value;
@@ -162,7 +163,7 @@ impl<const N: usize, const P: usize> Geometry<N, P> {
         }
     }
 
-    /// The same with a factor on each column: the result is not symmetric.
+    /// Adds [`Self::add_conduction`] with a factor on each column; the result is not symmetric.
     pub fn add_scaled_conduction(
         &self,
         point: usize,
@@ -297,10 +298,10 @@ mod tests {
         assert!(<Geometry>::new(&[[f64::NAN; 3]; 4]).is_none());
     }
 
-    /// The sides of a second-order element close it, and a curved one has the volume that the divergence theorem gives.
+    /// Sides of a second-order element close it, and a curved one has the volume of the divergence theorem.
     #[test]
     fn second_order_sides_close_the_element() {
-        for shape in Shape::ALL {
+        for shape in ElementShape::ALL {
             let corners: Vec<[f64; 3]> = (0..shape.corners()).map(|k| natural::corner(shape, k)).collect();
             let middle = |&[p, q]: &[usize; 2]| [0, 1, 2].map(|d| 0.5 * (corners[p][d] + corners[q][d]));
             let all = corners.iter().copied().chain(shape.edges().iter().map(middle));
@@ -310,7 +311,7 @@ mod tests {
                 false => [x + 0.3 * y, y + 0.1 * z, z],
             };
             let places: Vec<[f64; 3]> = all.take(shape.nodes()).map(curve).collect();
-            let geometry = Geometry::<WIDE, WIDE_POINTS>::new(&places).unwrap();
+            let geometry = Geometry::<MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS>::new(&places).unwrap();
             assert_eq!(geometry.points, points(shape.nodes()));
             let mass = geometry.mass();
             let volume = geometry.volume();
@@ -325,7 +326,7 @@ mod tests {
                         _ => vec![(1.0 - r) * (1.0 - s), r * (1.0 - s), r * s, (1.0 - r) * s],
                     };
                     let place = |d: usize| ring.iter().zip(&weights).map(|(&k, w)| w * corners[k][d]).sum();
-                    let natural = natural::Natural::at(shape, [place(0), place(1), place(2)]);
+                    let natural = natural::Natural::new(shape, [place(0), place(1), place(2)]);
                     nalgebra::Vector3::from(
                         [0, 1, 2].map(|d| {
                             (0..shape.nodes()).map(|a| natural.shapes[a] * places[a][d]).sum::<f64>()

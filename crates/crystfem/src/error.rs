@@ -1,102 +1,103 @@
-//! What can go wrong in this crate.
+//! Errors of this crate.
 
 use std::path::PathBuf;
 
-/// Errors of the heat and crystallization crate.
+/// Error of heat conduction and crystallization.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A mesh cannot be used.
     #[error("mesh: {0}")]
     Mesh(String),
-    /// A parameter is out of its domain.
+    /// A parameter out of its domain.
     #[error("{name}: found {found}; allowed: {allowed}")]
     Parameter {
-        /// What.
+        /// Name of the parameter.
         name: &'static str,
-        /// The value found.
+        /// Value found.
         found: f64,
-        /// What is allowed.
+        /// Allowed values.
         allowed: String,
     },
-    /// A name that is none of those known.
+    /// An unknown name.
     #[error("no {what} `{name}`; allowed: {}", known.join(", "))]
     Unknown {
-        /// What it would name.
+        /// Kind of thing named.
         what: &'static str,
-        /// The name found.
+        /// Name found.
         name: String,
-        /// Names that there are.
+        /// Known names.
         known: Vec<String>,
     },
-    /// A line of a data or mesh file cannot be used.
+    /// A line of a data or mesh file that cannot be used.
     #[error("{}:{line}: {what}: found {found:?}; allowed: {allowed}", path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Line, from 1.
         line: usize,
         /// Column, key or section.
         what: String,
-        /// What is there.
+        /// Text found.
         found: String,
-        /// What may be there.
+        /// Allowed text.
         allowed: String,
     },
-    /// Measurements from which nothing can be concluded.
+    /// Measurements that do not suffice.
     #[error("{what}: {reason}")]
     Data {
-        /// What was asked of them.
+        /// Purpose of the measurements.
         what: String,
-        /// What is wrong with them, and what is allowed.
+        /// Defect, with the allowed values.
         reason: String,
     },
-    /// A result is not finite.
+    /// A result that is not finite.
     #[error("{quantity} is not finite at {place}, t = {time} s")]
     NotFinite {
-        /// The quantity.
+        /// Quantity.
         quantity: &'static str,
         /// Node or integration point, with its position.
         place: String,
         /// Time, s.
         time: f64,
     },
-    /// A result that the scene says leaves the finite numbers does not.
-    #[error("{place}: all its values are finite; allowed: some that are not, as `non_finite` says")]
+    /// A result that is finite although the scene expects values that are not.
+    #[error("{place}: expected a non-finite value (`non_finite = true`), found only finite ones")]
     Finite {
-        /// The point of the scene.
+        /// Point of the scene.
         place: String,
     },
-    /// An iteration did not end.
+    /// An iteration that did not converge.
     #[error(
-        "{method} did not converge at t = {time} s: error {error} K after {iterations} iterations, wanted {wanted} K"
+        "{method} did not converge at t = {time} s: error {error} K after {iterations} iterations, wanted \
+         {wanted} K"
     )]
     NotConverged {
-        /// The iteration.
+        /// Name of the method.
         method: &'static str,
         /// Time at the end of the increment, s.
         time: f64,
-        /// Iterations spent.
+        /// Number of iterations.
         iterations: usize,
-        /// Error at the end, K.
+        /// Remaining error, K.
         error: f64,
         /// Tolerance, K.
         wanted: f64,
     },
-    /// A step was stopped on request; what was before it stays.
+    /// A step stopped on request; earlier steps are kept.
     #[error("stopped on request at t = {time} s")]
     Stopped {
         /// Time before the step, s.
         time: f64,
     },
-    /// One of several studies failed.
+    /// A failed study.
     #[error("study {name}: {error}")]
     Study {
-        /// Its name.
+        /// Name of the study.
         name: String,
-        /// What went wrong in it.
+        /// Error of the study.
         error: Box<Error>,
     },
-    /// Files, output, scenes.
+    /// An error of files, output or scenes.
     #[error(transparent)]
     Shared(#[from] polycore::Error),
 }

@@ -1,25 +1,25 @@
-//! States of materials as fields over nodes.
+//! Material states as fields over nodes and elements.
 
-use crate::element::{self, MOST, WIDE, WIDE_POINTS};
+use crate::element::{self, FIRST_ORDER_NODES, MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS};
 use crate::error::Error;
 use crate::simulation::Simulation;
-use crate::system::{NONE, Points};
+use crate::system::{NONE, PointStates};
 
-/// Statistics of a field over nodes, weighted by their volumes; all not finite where a value is not.
+/// Volume-weighted statistics of a field over nodes; not finite if a value is not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Statistics {
-    /// Mean by volume.
+    /// Volume-weighted mean.
     pub mean: f64,
     /// Smallest value.
     pub least: f64,
     /// Largest value.
     pub largest: f64,
-    /// Standard deviation by volume.
+    /// Volume-weighted standard deviation.
     pub deviation: f64,
 }
 
 impl Statistics {
-    /// Of the nodes that have a value and a volume; `None` without any.
+    /// Computes the statistics over nodes that have a value and a volume; `None` if there are none.
     pub fn new(values: &[Option<f64>], volumes: &[f64]) -> Option<Self> {
         let (mut sum, mut volume) = (0.0, 0.0);
         let (mut least, mut largest) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -43,13 +43,20 @@ impl Statistics {
 }
 
 impl Simulation {
-    /// Names of the quantities that materials show, each once, in the order of the materials.
+    /// Names of the output quantities of all materials, without duplicates, in the order of the materials.
     pub fn field_names(&self) -> Vec<&'static str> {
         self.problem.field_names()
     }
 
-    /// A quantity of a material at one of its points; `None` where the material does not have it.
-    fn value(&self, name: &str, points: &Points, stride: usize, point: usize, material: u16) -> Option<f64> {
+    /// Returns a quantity of a material at one of its points; `None` if the material lacks it.
+    fn value(
+        &self,
+        name: &str,
+        points: &PointStates,
+        stride: usize,
+        point: usize,
+        material: u16,
+    ) -> Option<f64> {
         let law = &self.problem.materials[usize::from(material)];
         let (states, names) = (law.state_names().len(), law.field_names());
         let place = names.iter().position(|other| *other == name)?;
@@ -59,11 +66,11 @@ impl Simulation {
         Some(values[place])
     }
 
-    /// Σ m f and Σ m over the points at a node.
+    /// Returns Σ m f and Σ m over the points at a node.
     fn at_node(&self, name: &str, equation: usize) -> [f64; 2] {
         let (nodal, points) = (&self.system.nodal, &self.state.memory.nodal);
         let mut sums = [0.0; 2];
-        for point in nodal.of(equation) {
+        for point in nodal.points_of(equation) {
             if let Some(value) = self.value(name, points, nodal.stride, point, nodal.material[point]) {
                 let mass = self.system.mass(&self.problem, &self.state.born, equation, point);
                 sums[0] += mass * value;
@@ -73,14 +80,14 @@ impl Simulation {
         sums
     }
 
-    /// [`Self::field`] at a node where all points are at nodes.
+    /// [`Self::field`] at a node if all points are at nodes.
     fn mean_at(&self, name: &str, node: u32) -> Option<f64> {
         let equation = self.system.equation.get(node as usize).filter(|equation| **equation != NONE)?;
         let [sum, mass] = self.at_node(name, *equation as usize);
         (mass > 0.0).then(|| sum / mass)
     }
 
-    /// [`Self::field`] at some nodes; looks at no others where all points are at nodes.
+    /// [`Self::field`] at some nodes; computes no others if all points are at nodes.
     pub fn field_of(&self, name: &str, nodes: &[u32]) -> Vec<Option<f64>> {
         if !self.system.general.is_empty() {
             let field = self.field(name);
@@ -89,8 +96,8 @@ impl Simulation {
         nodes.iter().map(|&node| self.mean_at(name, node)).collect()
     }
 
-    /// A quantity of the materials at all nodes of the mesh: the mean of the points there, weighted by mass; `None` where no
-    /// material has it or nothing exists.
+    /// Returns a quantity at all nodes of the mesh: the mass-weighted mean of the points at each; `None` at
+    /// nodes without material that has it.
     pub fn field(&self, name: &str) -> Vec<Option<f64>> {
         let (problem, system) = (&self.problem, &self.system);
         let nodes = problem.mesh.points.len();
@@ -119,10 +126,10 @@ impl Simulation {
                     mass[node as usize] += weight;
                 }
             };
-            if nodes.len() > MOST {
-                // all points of a second-order element, by the square of the shape function there
+            if nodes.len() > FIRST_ORDER_NODES {
+                // all points of a second-order element, weighted by the squared shape function
                 let Some(geometry) = problem.mesh.geometry(number) else { continue };
-                let shapes = element::shapes::<WIDE, WIDE_POINTS>(nodes.len());
+                let shapes = element::shapes::<MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS>(nodes.len());
                 for (g, shapes) in shapes.iter().enumerate().take(geometry.points) {
                     for (&node, shape) in nodes.iter().zip(shapes) {
                         add(node, density * geometry.weights[g] * shape * shape, first + g);
@@ -130,7 +137,7 @@ impl Simulation {
                 }
                 continue;
             }
-            let volumes = problem.mesh.node_volumes(number).unwrap_or([0.0; WIDE]);
+            let volumes = problem.mesh.node_volumes(number).unwrap_or([0.0; MAX_ELEMENT_NODES]);
             for (g, &node) in nodes.iter().enumerate() {
                 add(node, density * volumes[g], first + g);
             }
@@ -138,8 +145,8 @@ impl Simulation {
         sum.iter().zip(&mass).map(|(sum, mass)| (*mass > 0.0).then(|| sum / mass)).collect()
     }
 
-    /// A quantity of the materials in each element: the mean of its own points, those of its material and birth; `None` where its material does not
-    /// have it or it does not exist.
+    /// Returns a quantity in each element: the mean over the element's points; `None` if the element does not
+    /// exist or its material lacks it.
     pub fn element_means(&self, name: &str) -> Vec<Option<f64>> {
         let (problem, system) = (&self.problem, &self.system);
         let mean = |sum: f64, count: usize| (count > 0).then(|| sum / count as f64);
@@ -148,7 +155,7 @@ impl Simulation {
             means.iter_mut().enumerate().filter(|(element, _)| self.is_born(*element as u32))
         {
             let (material, birth) = (problem.material_of[element], self.state.born[element]);
-            // general materials have no points at nodes, alike or not
+            // general materials have no points at nodes, uniform or not
             let like = system.nodal.like[usize::from(material)];
             let (mut sum, mut count) = (0.0, 0);
             for &node in problem.mesh.nodes(element as u32) {
@@ -156,7 +163,7 @@ impl Simulation {
                 let own = |point: &usize| {
                     system.nodal.material[*point] == like && system.nodal.birth[*point] == birth
                 };
-                let found = system.nodal.of(equation as usize).find(own);
+                let found = system.nodal.points_of(equation as usize).find(own);
                 let (points, stride) = (&self.state.memory.nodal, system.nodal.stride);
                 let found = found.and_then(|point| self.value(name, points, stride, point, material));
                 if let Some(found) = found {
@@ -175,17 +182,18 @@ impl Simulation {
         means
     }
 
-    /// A quantity of the materials at a place, as [`Self::field`] at its nodes; `None` where no material there has it.
+    /// Returns a quantity at a position, interpolated from [`Self::field`]; `None` without a material that
+    /// has it.
     pub fn field_at(&self, name: &str, place: [f64; 3]) -> Option<f64> {
         let field = self.field(name);
         self.problem.mesh.locate(place)?.value(|node| field[node as usize])
     }
 
-    /// The first temperature, energy or state variable that is not finite, with its node and the time.
+    /// Checks that temperatures, energies and state variables are finite.
     ///
     /// # Errors
-    /// [`Error::NotFinite`].
-    pub fn finite(&self) -> Result<(), Error> {
+    /// [`Error::NotFinite`] with the first that is not, its node and the time.
+    pub fn check_finite(&self) -> Result<(), Error> {
         let (problem, system, state) = (&self.problem, &self.system, &self.state);
         let fail = |quantity: &'static str, node: u32| {
             let [x, y, z] = problem.mesh.points[node as usize].map(|x| (1e9 * x).round() / 1e6);
@@ -195,7 +203,7 @@ impl Simulation {
         if let Some(wrong) = state.temperature.iter().position(|t| !t.is_finite()) {
             return fail("temperature", system.nodes()[wrong]);
         }
-        let wrong = |points: &Points, stride: usize| -> Option<(usize, Option<usize>)> {
+        let wrong = |points: &PointStates, stride: usize| -> Option<(usize, Option<usize>)> {
             let in_state = points.state.iter().position(|x| !x.is_finite());
             let in_energy = || points.energy.iter().position(|x| !x.is_finite()).map(|point| (point, None));
             in_state.map(|at| (at / stride, Some(at % stride))).or_else(in_energy)
@@ -221,11 +229,11 @@ impl Simulation {
         Ok(())
     }
 
-    /// Volume that each node has of the elements named that exist, m³: the weights of means over them.
+    /// Volume of each node within the existing elements among `elements`, m³: weights of means over them.
     pub fn volumes(&self, elements: &[u32]) -> Vec<f64> {
         let mut volumes = vec![0.0; self.problem.mesh.points.len()];
         for &number in elements.iter().filter(|&&element| self.is_born(element)) {
-            let own = self.problem.mesh.node_volumes(number).unwrap_or([0.0; WIDE]);
+            let own = self.problem.mesh.node_volumes(number).unwrap_or([0.0; MAX_ELEMENT_NODES]);
             for (&node, own) in self.problem.mesh.nodes(number).iter().zip(own) {
                 volumes[node as usize] += own;
             }

@@ -1,16 +1,16 @@
-//! Reading of files: their bytes, and errors at their lines.
+//! Reading of files, and errors with their line.
 
 use crate::error::Error;
 use std::path::Path;
 
-/// Reads the bytes of a file.
+/// Reads a file.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>, Error> {
     std::fs::read(path).map_err(|source| {
         Error::Shared(polycore::Error::Io { operation: "read", path: path.to_owned(), source })
     })
 }
 
-/// Error at a line of a file; long findings are cut.
+/// Builds an error at a line of a file; long text is cut.
 pub fn line_error(
     path: &Path,
     line: usize,

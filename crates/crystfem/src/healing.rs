@@ -1,14 +1,16 @@
-//! Healing of interfaces between what was printed at different times.
+//! Healing of interfaces between regions printed at different times.
 
 use crate::error::Error;
 use crate::kinetics::GAS_CONSTANT;
 
-/// Degree of healing D_h = min(1, ∫ w dt/τ_r(T))^¼ of chains that cross an interface from contact on (Yang and Pitchumani 2002), with the melt's
-/// share w = 1 − α of the colder side: crystals stop it, remelting lets it go on. Strength is D_h times, fracture energy D_h² times that of
-/// the material (de Gennes, Wool).
+/// Degree of healing D_h = min(1, ∫ w dt/τ_r(T))^¼ of chains that cross an interface after contact (Yang and
+/// Pitchumani 2002), with the melt fraction w = 1 − α of the colder side: crystals stop healing, and
+/// remelting resumes it. Strength is D_h times and fracture energy D_h² times that of the material (de
+/// Gennes, Wool).
 ///
-/// The relaxation time is τ₀ at T₀. It follows Arrhenius in the melt, τ_r ∝ exp(H/(RT)), and, with a [`Glass`], the equation of Williams, Landel
-/// and Ferry from there down to the glass transition, at and below which nothing heals.
+/// The relaxation time is τ₀ at T₀. It follows Arrhenius in the melt, τ_r ∝ exp(H/(RT)), and, with a
+/// [`Glass`], the Williams–Landel–Ferry equation from there down to the glass transition; no healing at or
+/// below the transition.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Healing {
     time: f64,
@@ -17,7 +19,8 @@ pub struct Healing {
     glass: Option<Glass>,
 }
 
-/// The glass transition: log₁₀ a_T = −C₁(T − T_g)/(C₂ + T − T_g) (Williams, Landel and Ferry 1955).
+/// Glass transition with the WLF equation log₁₀ a_T = −C₁(T − T_g)/(C₂ + T − T_g) (Williams, Landel and Ferry
+/// 1955).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Glass {
     /// T_g, K.
@@ -28,11 +31,11 @@ pub struct Glass {
     pub width: f64,
 }
 
-/// Above T_g + 100 K free volume no longer rules the mobility of chains (Ferry 1980).
+/// Range above T_g, K, in which free volume controls the mobility of chains (Ferry 1980).
 const FREE_VOLUME: f64 = 100.0;
 
 impl Glass {
-    /// C₁ = 17.44 and C₂ = 51.6 K, which fit most polymers; T_g in K.
+    /// Returns the universal constants C₁ = 17.44 and C₂ = 51.6 K, which fit most polymers; T_g in K.
     pub fn universal(transition: f64) -> Self {
         Self { transition, steepness: 17.44, width: 51.6 }
     }
@@ -43,7 +46,8 @@ impl Glass {
         -std::f64::consts::LN_10 * self.steepness * above / (self.width + above)
     }
 
-    /// Temperature at which the apparent activation energy R T² ln 10 C₁C₂/(C₂ + T − T_g)² falls to `energy`, J/mol, but T_g + 100 K at most.
+    /// Temperature at which the apparent activation energy R T² ln 10 C₁C₂/(C₂ + T − T_g)² falls to `energy`,
+    /// J/mol; at most T_g + 100 K.
     fn border(&self, energy: f64) -> f64 {
         let Self { transition, steepness, width } = *self;
         // √H (C₂ + T − T_g) = √(R ln 10 C₁C₂) T
@@ -59,10 +63,11 @@ impl Glass {
 }
 
 impl Healing {
-    /// τ₀, s, at T₀, K, and H, J/mol: Arrhenius at any temperature.
+    /// Returns Arrhenius healing at any temperature, from τ₀, s, at T₀, K, and H, J/mol.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a time or a temperature that is not above 0, an energy below 0, and what is not finite.
+    /// [`Error::Parameter`] for a time or a temperature that is not above 0, an energy below 0, and values
+    /// that are not finite.
     pub fn new(time: f64, temperature: f64, energy: f64) -> Result<Self, Error> {
         positive(&[("relaxation time of healing, s", time), ("temperature of healing, K", temperature)])?;
         if !(energy >= 0.0 && energy.is_finite()) {
@@ -72,10 +77,11 @@ impl Healing {
         Ok(Self { time, temperature, energy, glass: None })
     }
 
-    /// The same towards a glass transition.
+    /// Adds a glass transition.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a T_g that is not above 0 or reaches T₀, and constants that are not above 0.
+    /// [`Error::Parameter`] for a T_g that is not above 0 or not below T₀, and constants that are not above
+    /// 0.
     pub fn with_glass(self, glass: Glass) -> Result<Self, Error> {
         let Glass { transition, steepness, width } = glass;
         let named = [("glass transition, K", transition), ("C1 of WLF", steepness), ("C2 of WLF, K", width)];
@@ -95,7 +101,7 @@ impl Healing {
         (self.logarithm(self.temperature) - self.logarithm(temperature)).exp() / self.time
     }
 
-    /// Says which equation holds where.
+    /// Describes the equations and their ranges.
     pub fn explain(&self) -> String {
         match self.glass {
             Some(glass) => format!(
@@ -107,7 +113,7 @@ impl Healing {
         }
     }
 
-    /// ln τ_r but for a constant.
+    /// ln τ_r up to a constant.
     fn logarithm(&self, temperature: f64) -> f64 {
         let arrhenius = |temperature: f64| self.energy / (GAS_CONSTANT * temperature);
         match self.glass {
@@ -120,7 +126,8 @@ impl Healing {
         }
     }
 
-    /// ∫ w dt/τ_r over a step of temperatures, K, and melt's shares that are linear in time, by two points of Gauss: fourth order in the step.
+    /// Integrates ∫ w dt/τ_r over a step with temperatures, K, and melt fractions linear in time, by two
+    /// Gauss points: fourth order in the step.
     pub fn progress(&self, temperatures: [f64; 2], melt: [f64; 2], duration: f64) -> f64 {
         let reach = 0.5 / 3.0_f64.sqrt();
         let at = |[from, to]: [f64; 2], share: f64| from + share * (to - from);
@@ -128,7 +135,7 @@ impl Healing {
         0.5 * duration * (own(0.5 - reach) + own(0.5 + reach))
     }
 
-    /// D_h of an integral.
+    /// Degree of healing D_h from the integral.
     pub fn degree(integral: f64) -> f64 {
         integral.clamp(0.0, 1.0).powf(0.25)
     }
@@ -145,7 +152,7 @@ fn positive(named: &[(&'static str, f64)]) -> Result<(), Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kinetics::{Constants, Kinetics};
+    use crate::kinetics::{KineticConstants, Kinetics};
     use evidence::near;
 
     /// 190 to 130 °C at 40 K/s, 2 s at 180 °C, 60 kJ/mol, no crystals.
@@ -166,10 +173,10 @@ mod tests {
         near("healing: order of its steps", (error(2) / error(4)).log2(), 4.0, 0.1);
     }
 
-    /// A hold at 165 °C while it crystallizes: ∫(1 − α)dt/τ = Γ(1 + 1/n)/(Kτ).
+    /// Hold at 165 °C during crystallization: ∫(1 − α)dt/τ = Γ(1 + 1/n)/(Kτ).
     #[test]
-    fn crystals_end_it() {
-        let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap();
+    fn crystals_stop_healing() {
+        let kinetics = Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1).unwrap();
         let healing = Healing::new(1000.0, 438.15, 60e3).unwrap();
         let (rate, steps) = (kinetics.rate(438.15), 4000);
         let dt = 4.0 / rate / steps as f64;
@@ -179,23 +186,23 @@ mod tests {
         near("healing: its degree, ended by crystals", Healing::degree(sum), 0.816185, 1e-6);
     }
 
-    /// From T_g + 100 K down to T_g + 20 K the WLF equation slows healing by 10^6.63, Arrhenius at 60 kJ/mol by 10^1.8.
+    /// WLF slows healing by 10^6.63 from T_g + 100 K to T_g + 20 K, Arrhenius at 60 kJ/mol by 10^1.8.
     #[test]
-    fn the_glass_stops_it() {
+    fn glass_transition_stops_healing() {
         let arrhenius = Healing::new(2.0, 453.15, 60e3).unwrap();
         let healing = arrhenius.with_glass(Glass::universal(318.15)).unwrap();
         let factor = |law: Healing| (law.rate(418.15) / law.rate(338.15)).log10();
         let wlf = 17.44 * (100.0 / 151.6 - 20.0 / 71.6);
         near("healing: WLF from T_g + 100 to T_g + 20 K", factor(healing), wlf, 1e-12);
         near("healing: Arrhenius from T_g + 100 to T_g + 20 K", factor(arrhenius), 1.78, 0.02);
-        // the same in the melt, and at T₀
+        // equal in the melt and at T₀
         for temperature in [418.15, 440.0, 453.15, 500.0] {
             assert!((healing.rate(temperature) / arrhenius.rate(temperature) - 1.0).abs() < 1e-12);
         }
         assert_eq!([300.0, 318.15].map(|temperature| healing.rate(temperature)), [0.0; 2]);
         let rates: Vec<f64> = (319..500).map(|t| healing.rate(f64::from(t))).collect();
         assert!(rates.windows(2).all(|pair| pair[0] < pair[1]));
-        // an energy above that of WLF at T_g + 100 K: both agree in value and slope where they meet
+        // an energy above that of WLF at T_g + 100 K: value and slope are continuous at the border
         let stiff = Healing::new(2.0, 453.15, 200e3).unwrap().with_glass(Glass::universal(318.15)).unwrap();
         let border = Glass::universal(318.15).border(200e3);
         assert!(border > 318.15 && border < 418.15, "{border}");

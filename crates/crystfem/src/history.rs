@@ -2,51 +2,51 @@
 
 use crate::error::Error;
 
-/// A temperature that runs linearly from point to point.
+/// A piecewise linear temperature history.
 #[derive(Clone, Debug, PartialEq)]
-pub struct History {
-    /// Times, s; equal neighbours are a jump.
+pub struct TemperatureHistory {
+    /// Times, s; equal neighbours mark a jump.
     times: Vec<f64>,
     /// Temperatures, K.
     temperatures: Vec<f64>,
 }
 
-/// A part of a history.
+/// A leg of a history.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Leg {
-    /// To a temperature, K, at a rate, K/s.
+    /// Ramp to a temperature, K, at a rate, K/s.
     Rate {
-        /// K.
+        /// Final temperature, K.
         to: f64,
-        /// K/s, above 0 for heating and cooling alike.
+        /// Rate, K/s, above 0 for heating and cooling alike.
         rate: f64,
     },
-    /// To a temperature, K, in a time, s; 0: a jump.
+    /// Ramp to a temperature, K, in a time, s; 0 is a jump.
     Time {
-        /// K.
+        /// Final temperature, K.
         to: f64,
-        /// s.
+        /// Duration, s.
         duration: f64,
     },
-    /// The same temperature for a time, s.
+    /// Hold at the same temperature, s.
     Hold {
-        /// s.
+        /// Duration, s.
         duration: f64,
     },
 }
 
-/// From here to there.
+/// A linear segment of a history.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Segment {
+pub struct HistorySegment {
     /// Times, s.
     pub times: [f64; 2],
     /// Temperatures, K.
     pub temperatures: [f64; 2],
 }
 
-impl Segment {
-    /// The temperature at a time within, K.
-    pub fn at(&self, time: f64) -> f64 {
+impl HistorySegment {
+    /// Interpolates the temperature at a time within the segment, K.
+    pub fn temperature_at(&self, time: f64) -> f64 {
         let [from, to] = self.temperatures;
         let duration = self.times[1] - self.times[0];
         if time >= self.times[1] || duration == 0.0 {
@@ -56,12 +56,12 @@ impl Segment {
     }
 }
 
-impl History {
-    /// From points.
+impl TemperatureHistory {
+    /// Returns a history through points.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for no points, unequal columns, times that decrease, temperatures below 0 K, and what is not
-    /// finite.
+    /// [`Error::Parameter`] for no points, columns of different lengths, times that decrease, temperatures
+    /// below 0 K, and values that are not finite.
     pub fn new(times: Vec<f64>, temperatures: Vec<f64>) -> Result<Self, Error> {
         let refuse = |name, found, allowed: String| Err(Error::Parameter { name, found, allowed });
         if times.is_empty() || times.len() != temperatures.len() {
@@ -80,10 +80,11 @@ impl History {
         Ok(Self { times, temperatures })
     }
 
-    /// From time 0 and a temperature, K, by legs.
+    /// Builds a history of legs from time 0 and a temperature, K.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for rates that are not above 0, durations below 0, and as [`History::new`].
+    /// [`Error::Parameter`] for rates that are not above 0, durations below 0, and as for
+    /// [`TemperatureHistory::new`].
     pub fn from_legs(start: f64, legs: &[Leg]) -> Result<Self, Error> {
         let (mut times, mut temperatures) = (vec![0.0], vec![start]);
         let (mut time, mut temperature) = (0.0, start);
@@ -113,13 +114,15 @@ impl History {
     /// Reads a CSV file with the columns `time [unit]` and `temperature [unit]`.
     ///
     /// # Errors
-    /// [`Error::File`] as `table::read`, and where times decrease.
+    /// [`Error::File`] as for `table::read`, and for times that decrease.
     pub fn read(path: &std::path::Path) -> Result<Self, Error> {
-        use crate::table::{Column, read_with_lines};
+        use crate::table::{TableColumn, read_with_lines};
         use polycore::units::dimension::{TemperatureDimension, TimeDimension};
 
-        let columns =
-            [Column::of::<TimeDimension>("time"), Column::of::<TemperatureDimension>("temperature")];
+        let columns = [
+            TableColumn::new::<TimeDimension>("time"),
+            TableColumn::new::<TemperatureDimension>("temperature"),
+        ];
         let ([times, temperatures], lines) = read_with_lines(path, columns)?;
         if let Some(row) = (1..times.len()).find(|&row| times[row] < times[row - 1]) {
             return Err(Error::File {
@@ -133,7 +136,7 @@ impl History {
         Self::new(times, temperatures)
     }
 
-    /// The first temperature, K.
+    /// Initial temperature, K.
     pub fn start(&self) -> f64 {
         self.temperatures[0]
     }
@@ -143,9 +146,9 @@ impl History {
         [self.times[0], self.times[self.times.len() - 1]]
     }
 
-    /// Its segments, jumps included.
-    pub fn segments(&self) -> impl Iterator<Item = Segment> + '_ {
-        (1..self.times.len()).map(|i| Segment {
+    /// Segments, jumps included.
+    pub fn segments(&self) -> impl Iterator<Item = HistorySegment> + '_ {
+        (1..self.times.len()).map(|i| HistorySegment {
             times: [self.times[i - 1], self.times[i]],
             temperatures: [self.temperatures[i - 1], self.temperatures[i]],
         })
@@ -164,33 +167,40 @@ mod tests {
             Leg::Time { to: 450.0, duration: 0.0 },
             Leg::Time { to: 400.0, duration: 100.0 },
         ];
-        let history = History::from_legs(470.0, &legs).unwrap();
+        let history = TemperatureHistory::from_legs(470.0, &legs).unwrap();
         assert_eq!((history.start(), history.span()), (470.0, [0.0, 320.0]));
-        let segments: Vec<Segment> = history.segments().collect();
-        assert_eq!(segments[0].at(80.0), 430.0);
+        let segments: Vec<HistorySegment> = history.segments().collect();
+        assert_eq!(segments[0].temperature_at(80.0), 430.0);
         assert_eq!(
-            (segments[2].at(220.0), segments[3].at(320.0), segments[3].at(400.0)),
+            (
+                segments[2].temperature_at(220.0),
+                segments[3].temperature_at(320.0),
+                segments[3].temperature_at(400.0)
+            ),
             (450.0, 400.0, 400.0)
         );
     }
 
     #[test]
     fn refusals() {
-        let message = |legs: &[Leg]| History::from_legs(400.0, legs).unwrap_err().to_string();
+        let message = |legs: &[Leg]| TemperatureHistory::from_legs(400.0, legs).unwrap_err().to_string();
         assert!(message(&[Leg::Rate { to: 300.0, rate: -1.0 }]).contains("found -1; allowed: above 0"));
         assert!(message(&[Leg::Rate { to: 300.0, rate: 1e-320 }]).contains("found inf"));
         assert!(message(&[Leg::Hold { duration: f64::NAN }]).contains("found NaN"));
         assert!(message(&[Leg::Time { to: -1.0, duration: 1.0 }]).contains("found -1; allowed: 0 or above"));
-        assert!(History::new(vec![], vec![]).is_err());
+        assert!(TemperatureHistory::new(vec![], vec![]).is_err());
         assert!(
-            History::new(vec![1.0, 0.0], vec![300.0, 300.0]).unwrap_err().to_string().contains("1 or later")
+            TemperatureHistory::new(vec![1.0, 0.0], vec![300.0, 300.0])
+                .unwrap_err()
+                .to_string()
+                .contains("1 or later")
         );
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("h.csv");
         std::fs::write(&path, "time [s],temperature [degC]\n0,20\n10,30\n5,40\n").unwrap();
-        let error = History::read(&path).unwrap_err().to_string();
+        let error = TemperatureHistory::read(&path).unwrap_err().to_string();
         assert!(error.contains("h.csv:4: time: found \"5 s\"; allowed: 10 s or later"), "{error}");
         std::fs::write(&path, "time [min],temperature [degC]\n0,20\n10,30\n").unwrap();
-        assert_eq!(History::read(&path).unwrap().span(), [0.0, 600.0]);
+        assert_eq!(TemperatureHistory::read(&path).unwrap().span(), [0.0, 600.0]);
     }
 }

@@ -1,71 +1,72 @@
-//! The balance of energy, Eq. (4.14): stored = in − out, for each step and since the start.
+//! Energy balance, Eq. (4.14): stored = in − out, for each step and since the start.
 
 pub use crate::system::Exchange;
 
-/// Shift of temperature, K. A step that moves less heat than by which its balance would change if all temperatures
-/// shifted by this has its balance measured against that: temperatures of 500 K are known to 6e-14 K only.
-pub const NOTHING: f64 = 1e-2;
+/// Shift of temperature, K, that sets the smallest reference of a relative balance: a step that moves less
+/// heat than a uniform shift by this is measured against the latter. Temperatures of 500 K are known to 6e-14
+/// K only.
+pub const REFERENCE_SHIFT: f64 = 1e-2;
 
-/// Energy since the start, J. Heat into the body counts positive.
+/// Energies since the start, J. Heat into the body is positive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Ledger {
-    /// Change of the energy of what exists.
+    /// Change of the energy of existing elements.
     pub stored: f64,
     /// Heat through surfaces and from sources.
     pub exchange: Exchange,
-    /// Heat that holds prescribed temperatures.
+    /// Heat supplied by prescribed temperatures.
     pub reaction: f64,
-    /// Energy that births brought in, from the reference of the material's energy.
+    /// Energy brought in by births, from the reference of the material's energy.
     pub birth: f64,
-    /// Sum of the magnitudes of what is missing in the balances of steps and births.
+    /// Sum of the magnitudes of the imbalances of steps and births.
     pub missing: f64,
-    /// The largest share that is missing of a step or a birth, see [`Record::relative`].
+    /// Largest relative imbalance of a step or a birth, see [`StepBalance::relative`].
     pub worst: f64,
 }
 
-/// One accepted step, and its balance of energy in J.
+/// Energy balance of an accepted step, J.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Record {
-    /// Time at its end, s.
+pub struct StepBalance {
+    /// Time at the end, s.
     pub time: f64,
-    /// Its length, s.
+    /// Length, s.
     pub dt: f64,
-    /// Change of the energy of what exists.
+    /// Change of the energy of existing elements.
     pub stored: f64,
-    /// Σ|ΔE_i| over the nodes: heat moved within the body counts, too.
+    /// Σ|ΔE_i| over the nodes, which includes heat moved within the body.
     pub moved: f64,
-    /// Change of the balance with a uniform shift of the free temperatures, J/K: capacity, and over the step what
-    /// goes through surfaces and to prescribed nodes.
+    /// Change of the balance per uniform shift of the free temperatures, J/K: capacity, and the exchange over
+    /// the step through surfaces and with prescribed nodes.
     pub sensitivity: f64,
     /// Heat through surfaces and from sources.
     pub exchange: Exchange,
-    /// Heat that holds prescribed temperatures.
+    /// Heat supplied by prescribed temperatures.
     pub reaction: f64,
-    /// The same with the magnitude of each node's: what goes in at one end and out at the other counts.
+    /// Sum of the magnitudes of this heat over nodes.
     pub held: f64,
-    /// Largest temporal error of a node, K, where steps are adaptive.
+    /// Largest temporal error of a node, K; `None` for fixed steps.
     pub error: Option<f64>,
-    /// The smallest wish of a material for the next step over this one.
+    /// Smallest ratio of next to present step requested by a material.
     pub step_ratio: Option<f64>,
 }
 
-impl Record {
-    /// stored − in + out, J.
+impl StepBalance {
+    /// Imbalance stored − in + out, J.
     pub fn missing(&self) -> f64 {
         self.stored - self.exchange.total() - self.reaction
     }
 
-    /// |[`Self::missing`]| over all heat moved, stored and exchanged, or over that of [`NOTHING`], 10 mK, where
-    /// that is more.
+    /// Relative imbalance: |[`Self::missing`]| over all heat moved, stored and exchanged, or over that of a
+    /// shift by [`REFERENCE_SHIFT`], 10 mK, if larger.
     pub fn relative(&self) -> f64 {
-        let scale = (self.moved + self.exchange.gross() + self.held).max(NOTHING * self.sensitivity);
+        let scale = (self.moved + self.exchange.gross() + self.held).max(REFERENCE_SHIFT * self.sensitivity);
         if scale > 0.0 { self.missing().abs() / scale } else { 0.0 }
     }
 }
 
 impl Ledger {
     /// Adds a step.
-    pub fn add(&mut self, step: &Record) {
+    pub fn add(&mut self, step: &StepBalance) {
         self.stored += step.stored;
         self.exchange.add(1.0, &step.exchange);
         self.reaction += step.reaction;

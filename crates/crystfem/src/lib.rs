@@ -1,6 +1,7 @@
 //! Heat conduction and crystallization of semicrystalline polymers printed layer by layer.
 //!
-//! The `crystfem` command line solves problems written as scenes (`scene`, feature `case`); the same from Rust:
+//! The `crystfem` command line solves problems written as scenes (`scene`, feature `case`); the same from
+//! Rust:
 //!
 //! ```
 //! use crystfem::material::Semicrystalline;
@@ -27,8 +28,8 @@
 //! # }
 //! ```
 //!
-//! The modules below are the parts of [`printed`]. Use them directly for meshes from files, tool paths, other conditions
-//! and materials of your own.
+//! The modules below are the parts of [`printed`]. Use them directly for meshes from files, tool paths, other
+//! conditions and materials of your own.
 
 mod births;
 pub mod boundary;

@@ -1,10 +1,10 @@
-//! Melting: the degree of melting X_m(T) of Richards' curve, and the survival of crystals on heating.
+//! Melting: degree of melting X_m(T) by Richards' curve, and survival of crystals on heating.
 
 use crate::error::Error;
 use crate::simd_math::{exp, expm1_near, ln, ln_1p};
 
-/// Richards' curve, the distribution of melting temperatures. Eq. (4.8) integrates in closed form to
-/// X_m = (1 + (d−1) e^{−k_m(T−T_p)})^{1/(1−d)}.
+/// Richards' curve, the distribution of melting temperatures. Eq. (4.8) integrates in closed form to X_m = (1
+/// + (d−1) e^{−k_m(T−T_p)})^{1/(1−d)}.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Melting {
     /// Sharpness k_m, 1/K.
@@ -19,10 +19,10 @@ impl Melting {
     /// PA12: k_m = 0.965 /K, d = 8.584, T_p = 450 K (§4.2, after its reference \[23\]).
     pub const PA12: Self = Self { sharpness: 0.965, shape: 8.584, peak: 450.0 };
 
-    /// From sharpness k_m, 1/K, shape d and peak T_p, K.
+    /// Returns the curve of sharpness k_m, 1/K, shape d and peak T_p, K.
     ///
     /// # Errors
-    /// [`Error::Parameter`] unless k_m > 0, d ≥ 1.001 (Richards' curve has its limit, Gompertz', at 1) and T_p > 0 are
+    /// [`Error::Parameter`] unless k_m > 0, d ≥ 1.001 (the limit d = 1 is Gompertz' curve) and T_p > 0 are
     /// finite.
     pub fn new(sharpness: f64, shape: f64, peak: f64) -> Result<Self, Error> {
         let check = |name, found: f64, good: bool, allowed: &str| {
@@ -38,12 +38,12 @@ impl Melting {
         Ok(Self { sharpness, shape, peak })
     }
 
-    /// k_m, d and T_p.
+    /// Constants k_m, d and T_p.
     pub fn constants(&self) -> [f64; 3] {
         [self.sharpness, self.shape, self.peak]
     }
 
-    /// X_m(T), 0 for solid, 1 for melt.
+    /// Degree of melting X_m(T): 0 for solid, 1 for melt.
     pub fn molten(&self, temperature: f64) -> f64 {
         (-self.depth(temperature)[0]).exp()
     }
@@ -54,10 +54,10 @@ impl Melting {
         -slope * (-depth).exp()
     }
 
-    /// ln(1 − X_m) and its derivative in T, 1/K: exact at both ends, where X_m or 1 − X_m underflows.
+    /// ln(1 − X_m) and its derivative in T, 1/K: accurate at both ends, where X_m or 1 − X_m underflows.
     pub fn survival(&self, temperature: f64) -> [f64; 2] {
         let exponent = self.sharpness * (temperature - self.peak);
-        // beyond, 1 − X_m = e^{−k_m(T−T_p)} to the last bit
+        // above, 1 − X_m = e^{−k_m(T−T_p)} to the last bit
         if exponent > 600.0 {
             return [-exponent, -self.sharpness];
         }
@@ -67,7 +67,7 @@ impl Melting {
         [logarithm, slope * (-depth).exp() / survivors]
     }
 
-    /// [`Self::survival`] without branches and slope, for loops of vectors.
+    /// [`Self::survival`] without branches and slope, for vectorized loops.
     #[inline(always)]
     pub(crate) fn survival_of_all(&self, temperature: f64) -> f64 {
         let power = self.shape - 1.0;
@@ -112,7 +112,7 @@ mod tests {
         assert!((pa12.molten_slope(450.0) - 0.08467).abs() < 5e-6);
     }
 
-    /// Eq. (4.8) as printed.
+    /// The slope is Eq. (4.8) as printed.
     #[test]
     fn the_slope_is_the_printed_one() {
         let pa12 = Melting::PA12;
@@ -128,7 +128,7 @@ mod tests {
         }
     }
 
-    /// From absolute zero to 1e6 K: finite, falling, and asymptotically −k_m(T − T_p).
+    /// The curve is finite, falling, and asymptotically −k_m(T − T_p), from absolute zero to 1e6 K.
     #[test]
     fn ends_of_the_curve() {
         let pa12 = Melting::PA12;
@@ -145,7 +145,7 @@ mod tests {
         }
         let [log, slope] = pa12.survival(1e6);
         assert_eq!([log, slope], [-0.965 * (1e6 - 450.0), -0.965]);
-        // both branches meet
+        // both branches agree at their border
         let border = 450.0 + 600.0 / 0.965;
         let ([below, _], [above, _]) = (pa12.survival(border - 1e-9), pa12.survival(border + 1e-9));
         assert!((below - above).abs() < 1e-8);

@@ -1,9 +1,9 @@
-//! The material alone, at one point: under a given temperature history, or as a lumped body that exchanges heat with its
-//! surroundings or none.
+//! A material at one point: under a given temperature history, or as a lumped body that cools or is
+//! adiabatic.
 
 use crate::error::Error;
-use crate::history::{History, Segment};
-use crate::material::{Point, ThermalMaterial};
+use crate::history::{HistorySegment, TemperatureHistory};
+use crate::material::{PointInput, ThermalMaterial};
 use nalgebra::Vector3;
 use root::root;
 
@@ -12,35 +12,36 @@ mod root;
 
 pub use material_point::MaterialPoint;
 
-/// What drives the temperature.
+/// Source of the temperature.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Drive {
-    /// It is given.
-    Prescribed(History),
-    /// Newton's cooling: dU/dt = −c (T − T_a)/τ, c the heat capacity at the start; adiabatic without exchange.
+    /// Given history.
+    Prescribed(TemperatureHistory),
+    /// Newton's cooling, dU/dt = −c (T − T_a)/τ, with the initial heat capacity c; adiabatic without
+    /// exchange.
     Lumped {
-        /// Temperature at the start, K.
+        /// Initial temperature, K.
         start: f64,
         /// Temperature of the surroundings T_a, K, and time constant τ, s.
         exchange: Option<[f64; 2]>,
-        /// How long, s.
+        /// Duration, s.
         duration: f64,
     },
 }
 
-/// How time is divided.
+/// Division of time into steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stepping {
-    /// By the material: no step changes α by more than `degree`, or T by more than `kelvin`.
+    /// Adaptive steps: none changes α by more than `degree`, or T by more than `kelvin`.
     Adaptive {
         /// Largest change of α in a step.
         degree: f64,
         /// Largest change of temperature in a step, K.
         kelvin: f64,
     },
-    /// Steps of the same change of temperature, K; a hold is one step.
+    /// Steps of equal change of temperature, K; a hold is one step.
     Kelvin(f64),
-    /// Steps of the same time, s.
+    /// Steps of equal time, s.
     Seconds(f64),
 }
 
@@ -50,20 +51,20 @@ impl Default for Stepping {
     }
 }
 
-/// Steps that a curve may have.
-pub const MOST_STEPS: usize = 1_000_000;
+/// Limit on the steps of a curve.
+pub const MAX_STEPS: usize = 1_000_000;
 
-/// A material and what happens to it.
-pub struct Course<'a> {
+/// A material with its thermal process.
+pub struct PointProcess<'a> {
     /// The material.
     pub material: &'a dyn ThermalMaterial,
-    /// What drives its temperature.
+    /// Source of the temperature.
     pub drive: Drive,
-    /// How time is divided.
+    /// Division of time into steps.
     pub stepping: Stepping,
 }
 
-/// Rows of equal length: the start and the end of each step.
+/// Columns of equal length, with a row for the start and for the end of each step.
 #[derive(Clone, Debug, Default)]
 pub struct Curves {
     /// Time, s.
@@ -74,19 +75,19 @@ pub struct Curves {
     pub energy: Vec<f64>,
     /// dα/dt of growth, 1/s.
     pub rate: Vec<f64>,
-    /// States, a vector for each row.
+    /// States, a vector per row.
     pub states: Vec<Vec<f64>>,
-    /// Fields of the material, a vector for each row.
+    /// Fields of the material, a vector per row.
     pub fields: Vec<Vec<f64>>,
-    /// The segment of the history that ends each row's step.
-    segments: Vec<Option<Segment>>,
-    /// Steps rejected as too large.
+    /// Segment of the history on which each row's step ends.
+    segments: Vec<Option<HistorySegment>>,
+    /// Number of rejected steps.
     pub rejected: usize,
 }
 
-/// When and where something happens.
+/// Time and temperature of an event.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Event {
+pub struct CurveEvent {
     /// Time, s.
     pub time: f64,
     /// Temperature, K.
@@ -95,19 +96,20 @@ pub struct Event {
     pub rate: f64,
 }
 
-/// The end of a step.
-struct End {
+/// Values at the end of a step.
+struct StepEnd {
     temperature: f64,
     energy: f64,
     state: Vec<f64>,
     step_ratio: Option<f64>,
 }
 
-impl Course<'_> {
-    /// The curves.
+impl PointProcess<'_> {
+    /// Computes the curves.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for steps that are not above 0 or more than [`MOST_STEPS`]; what the material refuses.
+    /// [`Error::Parameter`] for steps that are not above 0 or more than [`MAX_STEPS`]; errors of the
+    /// material.
     pub fn run(&self) -> Result<Curves, Error> {
         self.check()?;
         let mut state = vec![0.0; self.material.state_names().len()];
@@ -122,7 +124,7 @@ impl Course<'_> {
         };
         let mut curves = Curves::default();
         let energy = self.material.energy(start, &state);
-        self.record(&mut curves, time, None, End { temperature: start, energy, state, step_ratio: None });
+        self.record(&mut curves, time, None, StepEnd { temperature: start, energy, state, step_ratio: None });
         for segment in segments {
             self.follow(&mut curves, segment)?;
         }
@@ -157,8 +159,8 @@ impl Course<'_> {
             ),
             _ => (0.0, 0.0),
         };
-        if steps > MOST_STEPS as f64 {
-            let allowed = format!("one that makes at most {MOST_STEPS} steps");
+        if steps > MAX_STEPS as f64 {
+            let allowed = format!("one that makes at most {MAX_STEPS} steps");
             return Err(Error::Parameter { name: "step (s or K)", found: step, allowed });
         }
         match self.stepping {
@@ -171,11 +173,11 @@ impl Course<'_> {
         }
     }
 
-    /// Steps through a segment, or through the whole time of a lumped body.
-    fn follow(&self, curves: &mut Curves, segment: Option<Segment>) -> Result<(), Error> {
+    /// Steps through a segment, or through the whole duration of a lumped body.
+    fn follow(&self, curves: &mut Curves, segment: Option<HistorySegment>) -> Result<(), Error> {
         let (begin, end, slope) = match (&self.drive, &segment) {
             (Drive::Lumped { duration, .. }, _) => (0.0, *duration, 0.0),
-            (_, Some(Segment { times: [a, b], temperatures: [from, to] })) => {
+            (_, Some(HistorySegment { times: [a, b], temperatures: [from, to] })) => {
                 (*a, *b, if b > a { (to - from) / (b - a) } else { 0.0 })
             }
             _ => return Ok(()),
@@ -204,7 +206,7 @@ impl Course<'_> {
         }
         loop {
             let left = duration - done;
-            // no sliver at the end
+            // avoid a tiny last step
             let dt = if wish >= left * (1.0 - 1e-9) { left } else { wish.min(widest) };
             let row = curves.time.len() - 1;
             let last = dt == left;
@@ -220,8 +222,8 @@ impl Course<'_> {
             if last {
                 return Ok(());
             }
-            if curves.time.len() > MOST_STEPS {
-                let allowed = format!("steps that make at most {MOST_STEPS}");
+            if curves.time.len() > MAX_STEPS {
+                let allowed = format!("steps that make at most {MAX_STEPS}");
                 return Err(Error::Parameter { name: "time step, s", found: dt, allowed });
             }
             done = after;
@@ -232,8 +234,8 @@ impl Course<'_> {
         }
     }
 
-    /// Allowed over actual change of a step.
-    fn ratio(&self, curves: &Curves, row: usize, found: &End) -> f64 {
+    /// Ratio of allowed to actual change of a step.
+    fn ratio(&self, curves: &Curves, row: usize, found: &StepEnd) -> f64 {
         let Stepping::Adaptive { degree, kelvin } = self.stepping else { return 1.0 };
         let mut ratio = f64::INFINITY;
         if let (Some(_), Some(index)) = (found.step_ratio, self.degree_index()) {
@@ -241,27 +243,28 @@ impl Course<'_> {
             self.material.fields(&found.state, &mut fields);
             ratio = degree / (fields[index] - curves.fields[row][index]).abs();
         }
-        // prescribed temperatures are limited beforehand
+        // steps along prescribed temperatures are limited in advance
         if matches!(self.drive, Drive::Lumped { .. }) {
             ratio = ratio.min(kelvin / (found.temperature - curves.temperature[row]).abs());
         }
         if ratio.is_nan() { 1.0 } else { ratio }
     }
 
-    /// From a row to a later time.
+    /// Steps from a row to a later time.
     fn step(
         &self,
         curves: &Curves,
         row: usize,
-        segment: Option<&Segment>,
+        segment: Option<&HistorySegment>,
         from: f64,
         to: f64,
         dt: f64,
-    ) -> Result<End, Error> {
+    ) -> Result<StepEnd, Error> {
         let start = curves.temperature[row];
         let mut state = vec![0.0; self.material.state_names().len()];
         let mut respond = |end: f64| {
-            let at = Point { temperature: start, increment: end - start, gradient: Vector3::zeros(), dt };
+            let at =
+                PointInput { temperature: start, increment: end - start, gradient: Vector3::zeros(), dt };
             self.material.respond(&at, &curves.states[row], &mut state)
         };
         let temperature = match (&self.drive, segment) {
@@ -278,15 +281,15 @@ impl Course<'_> {
                     Ok([response.energy - before + lost, response.d_energy_d_temperature + slope])
                 })?
             }
-            (Drive::Prescribed(_), Some(segment)) if from < to => segment.at(to),
+            (Drive::Prescribed(_), Some(segment)) if from < to => segment.temperature_at(to),
             (Drive::Prescribed(_), Some(segment)) => segment.temperatures[1],
             (Drive::Prescribed(_), None) => start,
         };
         let response = respond(temperature)?;
-        Ok(End { temperature, energy: response.energy, state, step_ratio: response.step_ratio })
+        Ok(StepEnd { temperature, energy: response.energy, state, step_ratio: response.step_ratio })
     }
 
-    /// Heat capacity at rest, J/(kg K).
+    /// Heat capacity at constant state, J/(kg K).
     fn capacity(&self, temperature: f64) -> f64 {
         let mut state = vec![0.0; self.material.state_names().len()];
         self.material.initial_state(temperature, &mut state);
@@ -294,7 +297,7 @@ impl Course<'_> {
         above - below
     }
 
-    fn record(&self, curves: &mut Curves, time: f64, segment: Option<Segment>, end: End) {
+    fn record(&self, curves: &mut Curves, time: f64, segment: Option<HistorySegment>, end: StepEnd) {
         let mut fields = vec![0.0; self.material.field_names().len()];
         self.material.fields(&end.state, &mut fields);
         curves.time.push(time);
@@ -306,16 +309,16 @@ impl Course<'_> {
         curves.segments.push(segment);
     }
 
-    /// Where α stands among the fields.
+    /// Index of α among the fields.
     pub fn degree_index(&self) -> Option<usize> {
         self.material.field_names().iter().position(|name| *name == "alpha")
     }
 
-    /// When α first reaches a degree from below: found by repeating the step in which it does, to rounding.
+    /// Locates the first upward crossing of α through a degree, by repeating its step, to rounding.
     ///
     /// # Errors
-    /// As [`Course::run`].
-    pub fn reaching(&self, curves: &Curves, degree: f64) -> Result<Option<Event>, Error> {
+    /// Errors of [`PointProcess::run`].
+    pub fn reaching(&self, curves: &Curves, degree: f64) -> Result<Option<CurveEvent>, Error> {
         let Some(index) = self.degree_index() else { return Ok(None) };
         let alpha = |row: usize| curves.fields[row][index];
         let Some(row) = (1..curves.time.len()).find(|&row| alpha(row - 1) < degree && alpha(row) >= degree)
@@ -333,18 +336,21 @@ impl Course<'_> {
         self.event(curves, row, high).map(Some)
     }
 
-    /// When dα/dt of growth is greatest: by golden section about the greatest row.
+    /// Locates the maximum of dα/dt, by golden section around the largest row.
     ///
     /// # Errors
-    /// As [`Course::run`].
-    pub fn peak(&self, curves: &Curves) -> Result<Option<Event>, Error> {
+    /// Errors of [`PointProcess::run`].
+    pub fn peak(&self, curves: &Curves) -> Result<Option<CurveEvent>, Error> {
         let rows = curves.time.len();
         let finite = (0..rows).filter(|&row| curves.rate[row] > 0.0 && curves.rate[row].is_finite());
         let Some(top) = finite.max_by(|&a, &b| curves.rate[a].total_cmp(&curves.rate[b])) else {
             return Ok(None);
         };
-        let mut best =
-            Event { time: curves.time[top], temperature: curves.temperature[top], rate: curves.rate[top] };
+        let mut best = CurveEvent {
+            time: curves.time[top],
+            temperature: curves.temperature[top],
+            rate: curves.rate[top],
+        };
         for row in [top, top + 1].into_iter().filter(|&row| row > 0 && row < rows) {
             let (mut low, mut high) = (0.0, 1.0);
             let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
@@ -361,23 +367,23 @@ impl Course<'_> {
         Ok(Some(best))
     }
 
-    fn event(&self, curves: &Curves, row: usize, share: f64) -> Result<Event, Error> {
+    fn event(&self, curves: &Curves, row: usize, share: f64) -> Result<CurveEvent, Error> {
         let end = self.within(curves, row, share)?;
         let time = curves.time[row - 1] + share * (curves.time[row] - curves.time[row - 1]);
         let rate = self.material.crystallization_rate(end.temperature, &end.state);
-        Ok(Event { time, temperature: end.temperature, rate })
+        Ok(CurveEvent { time, temperature: end.temperature, rate })
     }
 
-    /// A share of the step that ended at a row.
-    fn within(&self, curves: &Curves, row: usize, share: f64) -> Result<End, Error> {
+    /// Repeats a fraction of the step that ended at a row.
+    fn within(&self, curves: &Curves, row: usize, share: f64) -> Result<StepEnd, Error> {
         let [from, to] = [curves.time[row - 1], curves.time[row]];
         let dt = share * (to - from);
         if to > from {
             return self.step(curves, row - 1, curves.segments[row].as_ref(), from, from + dt, dt);
         }
-        // a share of a jump
+        // a fraction of a jump
         let [a, b] = [curves.temperature[row - 1], curves.temperature[row]];
-        let jump = Segment { times: [from, from], temperatures: [a, a + share * (b - a)] };
+        let jump = HistorySegment { times: [from, from], temperatures: [a, a + share * (b - a)] };
         self.step(curves, row - 1, Some(&jump), from, from, 0.0)
     }
 }

@@ -1,4 +1,4 @@
-//! Which elements appear when, and how hot: layer by layer, or along a tool path.
+//! Print plan: time and temperature at which elements appear, layer by layer or along a tool path.
 
 use crate::boundary::Schedule;
 use crate::error::Error;
@@ -7,24 +7,25 @@ use crate::mesh::path::{Setting, ToolPath};
 use crate::problem::Birth;
 use std::collections::BTreeMap;
 
-/// Parameter of the error where a path sets no temperature of the nozzle before a birth.
+/// Name in the error for births before the path sets a nozzle temperature.
 pub const NOZZLE: &str = "birth before any temperature of the nozzle, s";
 
-/// The print of a part.
+/// Order of a print.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PrintPlan {
     /// Births, in the order of time.
     pub births: Vec<Birth>,
     /// Elements that are never printed, ascending.
     pub absent: Vec<u32>,
-    /// Elements of each layer, where it goes by layers.
+    /// Elements of each layer, for a print by layers.
     pub layers: Vec<Vec<u32>>,
-    /// End, s: an interval after the last layer; where the path ends, and a window after the last birth.
+    /// End time, s: one interval after the last layer, or the end of the path plus a window after the last
+    /// birth.
     pub end: f64,
 }
 
 impl PrintPlan {
-    /// Layer k (from 0) appears at `start` + k · `interval`, s, with the `temperature`, K, of that time.
+    /// Plans layer k (from 0) at `start` + k · `interval`, s, at the `temperature`, K, of that time.
     pub fn in_layers(
         layers: Vec<Vec<u32>>,
         start: f64,
@@ -40,12 +41,13 @@ impl PrintPlan {
         Self { births, absent: Vec::new(), layers, end }
     }
 
-    /// Each element appears at its time along a path, s after `start`, those of one `window` together (default: a hundredth of
-    /// the path's duration), at a given temperature or that of the nozzle when the element is laid down.
+    /// Plans each element at its time along a path, s after `start`; elements of one `window` appear together
+    /// (default: a hundredth of the path's duration). The temperature is given, or that of the nozzle at
+    /// deposition.
     ///
     /// # Errors
-    /// Those of [`groups`]; [`Error::Parameter`] named [`NOZZLE`].
-    pub fn along(
+    /// Errors of [`groups`]; [`Error::Parameter`] named [`NOZZLE`].
+    pub fn along_path(
         path: &ToolPath,
         times: &[f64],
         start: f64,
@@ -58,10 +60,10 @@ impl PrintPlan {
         for (time, elements) in groups(times, window)? {
             let time = start + time;
             if let Some(schedule) = temperature {
-                births.push(Birth { time, elements, temperature: schedule.at(time) });
+                births.push(Birth { time, elements, temperature: schedule.value_at(time) });
                 continue;
             }
-            // each as it is laid down, not when all appear: tools differ
+            // the temperature at deposition, not at birth: tools differ
             let mut by_temperature: BTreeMap<u64, Vec<u32>> = BTreeMap::new();
             for element in elements {
                 let laid = times.get(element as usize).copied().unwrap_or(time - start);

@@ -1,10 +1,10 @@
-//! Printed parts in a few lines: a mesh with layers or a tool path, a material, what surrounds it.
+//! Printed parts in a few lines: a mesh with layers or a tool path, a material, boundary conditions.
 
-use crate::boundary::{Condition, Field, Schedule, Where};
+use crate::boundary::{Condition, FaceSelection, Field, Schedule};
 use crate::error::Error;
 use crate::material::{ThermalMaterial, fill_elements};
 use crate::mesh::layers::Layers;
-use crate::mesh::path::{Cells, ToolPath};
+use crate::mesh::path::{CellSettings, ToolPath};
 use crate::mesh::{Bar, Face, Mesh};
 use crate::print_plan::PrintPlan;
 use crate::problem::Problem;
@@ -14,13 +14,14 @@ use std::sync::Arc;
 /// Order of a print.
 enum Order {
     Layers(Layers),
-    /// A path, the time of each element on it, s, filled parts, and which of them each element has.
+    /// Path, time of each element on it, s, fill fractions, and index of each element's fraction.
     Path(Box<ToolPath>, Vec<f64>, (Vec<f64>, Vec<usize>)),
 }
 
 /// A part that is printed layer by layer or along a tool path.
 ///
-/// By default layers come every 20 s at 220 °C, a path has the temperatures of its nozzle, and no heat crosses the surface.
+/// By default layers appear every 20 s at 220 °C, a path has the temperatures of its nozzle, and the surface
+/// is adiabatic.
 pub struct PrintedPart {
     mesh: Mesh,
     order: Order,
@@ -29,23 +30,23 @@ pub struct PrintedPart {
     interval: f64,
     temperature: Option<f64>,
     held: Vec<(String, f64)>,
-    /// Conditions on the outer surface but the held ones, by their place.
-    outer: Vec<Box<dyn Fn(Where) -> Condition>>,
+    /// Conditions on the outer surface without the held faces, as functions of it.
+    outer: Vec<Box<dyn Fn(FaceSelection) -> Condition>>,
 }
 
 impl PrintedPart {
-    /// Layers of a mesh, of one material.
+    /// Returns a part of layers of a mesh, of one material.
     pub fn new(mesh: Mesh, layers: Layers, material: impl ThermalMaterial + 'static) -> Self {
         Self::ordered(mesh, Order::Layers(layers), material)
     }
 
-    /// Cells that the beads of a path fill, printed in the order of its moves.
+    /// Returns a part of cells filled by the beads of a path, printed in the order of its moves.
     ///
     /// # Errors
-    /// Those of [`ToolPath::deposit`].
-    pub fn along(
+    /// Errors of [`ToolPath::deposit`].
+    pub fn along_path(
         path: ToolPath,
-        cells: &Cells,
+        cells: &CellSettings,
         material: impl ThermalMaterial + 'static,
     ) -> Result<Self, Error> {
         let deposit = path.deposit(cells)?;
@@ -66,29 +67,29 @@ impl PrintedPart {
         }
     }
 
-    /// A bar, Fig. 4.2.
+    /// Returns a bar, Fig. 4.2.
     ///
     /// # Errors
-    /// As [`Bar::mesh`].
+    /// Errors of [`Bar::mesh`].
     pub fn bar(bar: &Bar, material: impl ThermalMaterial + 'static) -> Result<Self, Error> {
         let mesh = bar.mesh()?;
         let layers = Layers::from_sets(&mesh, "layer-")?;
         Ok(Self::new(mesh, layers, material))
     }
 
-    /// What the mesh has beside the layers, and its temperature at the start, K.
+    /// Sets material and initial temperature, K, of elements outside all layers.
     pub fn substrate(mut self, material: impl ThermalMaterial + 'static, temperature: f64) -> Self {
         self.substrate = Some((Arc::new(material), temperature));
         self
     }
 
-    /// Time from layer to layer, s; the first is there at the start.
+    /// Sets the time between layers, s; the first layer exists at the start.
     pub fn layer_every(mut self, seconds: f64) -> Self {
         self.interval = seconds;
         self
     }
 
-    /// Temperature of new material, K.
+    /// Sets the deposition temperature, K.
     pub fn deposited_at(mut self, kelvin: f64) -> Self {
         self.temperature = Some(kelvin);
         self
@@ -100,7 +101,7 @@ impl PrintedPart {
         self
     }
 
-    /// Heat loss h (T − T_a) of the present outer surface, but where it is held: h in W/(m² K), T_a in K.
+    /// Adds heat loss h (T − T_a) on the current outer surface, except held faces: h in W/(m² K), T_a in K.
     pub fn convection(mut self, coefficient: f64, ambient: f64) -> Self {
         self.outer.push(Box::new(move |surface| Condition::Film {
             surface,
@@ -110,7 +111,8 @@ impl PrintedPart {
         self
     }
 
-    /// Heat loss ε σ (T⁴ − T_a⁴) of the present outer surface, but where it is held: ε from 0 to 1, T_a in K.
+    /// Adds heat loss ε σ (T⁴ − T_a⁴) on the current outer surface, except held faces: ε from 0 to 1, T_a in
+    /// K.
     pub fn radiation(mut self, emissivity: f64, ambient: f64) -> Self {
         self.outer.push(Box::new(move |surface| Condition::Radiation {
             surface,
@@ -120,11 +122,12 @@ impl PrintedPart {
         self
     }
 
-    /// The problem, to which conditions and sources may be added.
+    /// Returns the problem, to which conditions and sources may be added.
     ///
     /// # Errors
-    /// [`Error::Mesh`] for a surface that the mesh lacks, and for elements in no layer where there is no substrate;
-    /// [`Error::Parameter`] for a time between layers that is not positive. [`Simulation::new`] checks the rest.
+    /// [`Error::Mesh`] for an unknown surface, and for elements outside all layers without a substrate;
+    /// [`Error::Parameter`] for a time between layers that is not positive. [`Simulation::new`] checks the
+    /// rest.
     pub fn problem(self) -> Result<Problem, Error> {
         let Self { mesh, order, material, substrate, interval, temperature, held, outer } = self;
         if !(interval > 0.0 && interval.is_finite()) {
@@ -138,7 +141,7 @@ impl PrintedPart {
             }
             Order::Path(path, times, fill) => {
                 let given = temperature.map(Schedule::constant);
-                (PrintPlan::along(&path, &times, 0.0, None, given.as_ref())?, Some(fill))
+                (PrintPlan::along_path(&path, &times, 0.0, None, given.as_ref())?, Some(fill))
             }
         };
         let births = plan.births;
@@ -154,7 +157,7 @@ impl PrintedPart {
                 start = temperature;
             }
             None if beside > 0 => {
-                return Err(Error::Mesh(format!("{beside} elements are in no layer; allowed: a substrate")));
+                return Err(Error::Mesh(format!("{beside} elements are in no layer: they need a substrate")));
             }
             None => {}
         }
@@ -169,7 +172,8 @@ impl PrintedPart {
             let nodes = mesh.nodes_of(faces);
             conditions.push(Condition::Temperature { nodes, value: Field::constant(kelvin) });
         }
-        conditions.extend(outer.iter().map(|condition| condition(Where::Outer { except: except.clone() })));
+        conditions
+            .extend(outer.iter().map(|condition| condition(FaceSelection::Outer { except: except.clone() })));
         let whole = Problem::new(mesh, materials[0].clone(), start);
         if let Some((parts, part_of)) = &fill {
             fill_elements(&mut materials, &mut material_of, parts, part_of)?;
@@ -177,10 +181,10 @@ impl PrintedPart {
         Ok(Problem { materials, material_of, conditions, births, ..whole })
     }
 
-    /// The part at the start of its print.
+    /// Returns the simulation at the start of the print.
     ///
     /// # Errors
-    /// As [`Self::problem`] and [`Simulation::new`].
+    /// Errors of [`Self::problem`] and [`Simulation::new`].
     pub fn simulate(self, settings: Settings) -> Result<Simulation, Error> {
         Simulation::new(self.problem()?, settings)
     }

@@ -1,61 +1,61 @@
-//! What is solved: a mesh with materials, what acts on it, and when its elements appear.
+//! Problem definition: mesh, materials, conditions, and times at which elements appear.
 
-use crate::boundary::{Condition, Field, Source, Where};
+use crate::boundary::{Condition, FaceSelection, Field, HeatSource};
 use crate::error::Error;
 use crate::material::ThermalMaterial;
 use crate::mesh::{Face, Mesh};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-/// How heat capacity is represented.
+/// Representation of the heat capacity.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Capacity {
-    /// At the nodes; so are film, radiation and the state of materials with constant conductivity. Temperatures do
-    /// not overshoot where a layer is born.
+    /// Lumped at the nodes, as are film, radiation and the state of materials with constant conductivity.
+    /// Temperatures do not overshoot at births.
     #[default]
     Lumped,
-    /// By the shape functions, everything at Gauss points.
+    /// Consistent with the shape functions; everything at Gauss points.
     Consistent,
 }
 
-/// Elements that appear at a time.
+/// Elements that appear at the same time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Birth {
     /// Time, s.
     pub time: f64,
-    /// Elements; one in no birth exists from the start, unless it is absent.
+    /// Elements. An element without birth exists from the start, unless it is absent.
     pub elements: Vec<u32>,
-    /// Their temperature when they appear, K.
+    /// Temperature at birth, K.
     pub temperature: f64,
 }
 
-/// A problem of heat conduction, Eq. (4.14)–(4.17).
+/// A problem of heat conduction, Eqs (4.14)–(4.17).
 #[derive(Clone)]
 pub struct Problem {
-    /// The mesh, with all elements that ever exist.
+    /// Mesh with all elements that ever exist.
     pub mesh: Mesh,
     /// Materials.
     pub materials: Vec<Arc<dyn ThermalMaterial>>,
     /// Material of each element, as an index into `materials`.
     pub material_of: Vec<u16>,
-    /// Temperature at t = 0 of what exists then, K.
+    /// Initial temperature of the existing elements, K.
     pub initial: Field,
-    /// What acts on nodes and faces.
+    /// Conditions on nodes and faces.
     pub conditions: Vec<Condition>,
-    /// Heat released in elements.
-    pub sources: Vec<Source>,
-    /// Elements that appear later, in the order of time.
+    /// Heat sources in elements.
+    pub sources: Vec<HeatSource>,
+    /// Births, in the order of time.
     pub births: Vec<Birth>,
     /// Elements that never appear.
     pub absent: Vec<u32>,
-    /// Lumped or consistent.
+    /// Lumped or consistent capacity.
     pub capacity: Capacity,
 }
 
 impl Problem {
-    /// Names of the quantities that materials show, each once, in the order of the materials.
+    /// Names of the output quantities of all materials, without duplicates, in the order of the materials.
     pub fn field_names(&self) -> Vec<&'static str> {
         let mut names = Vec::new();
         for name in self.materials.iter().flat_map(|material| material.field_names()) {
@@ -66,7 +66,7 @@ impl Problem {
         names
     }
 
-    /// One material everywhere, one initial temperature, nothing acting on it.
+    /// Returns a problem of one material and one initial temperature, without conditions.
     pub fn new(mesh: Mesh, material: Arc<dyn ThermalMaterial>, temperature: f64) -> Self {
         let elements = mesh.element_count();
         Self {
@@ -82,7 +82,7 @@ impl Problem {
         }
     }
 
-    /// Times where something changes its slope or appears, sorted.
+    /// Times of births and of changes of slope, sorted.
     pub(crate) fn breaks(&self) -> Vec<f64> {
         let mut times: Vec<f64> = self.conditions.iter().flat_map(Condition::breaks).collect();
         times.extend(self.sources.iter().flat_map(|s| s.power.breaks().iter().copied()));
@@ -92,13 +92,13 @@ impl Problem {
         times
     }
 
-    /// Shortest period of what swings, s: steps must be shorter.
+    /// Shortest period of the conditions, s; steps must be shorter.
     pub fn shortest_period(&self) -> Option<f64> {
         let conditions = self.conditions.iter().filter_map(Condition::period);
         conditions.chain(self.sources.iter().filter_map(|s| s.power.period())).min_by(f64::total_cmp)
     }
 
-    /// Checks everything that can be checked before a run.
+    /// Checks the problem, as far as possible before a run.
     ///
     /// # Errors
     /// [`Error::Mesh`] for elements, nodes, faces or materials that do not exist and for inverted elements;
@@ -141,8 +141,8 @@ impl Problem {
         }
         if self.mesh.is_second_order() && (self.capacity == Capacity::Lumped || !self.births.is_empty()) {
             return mesh_error(
-                "found second-order elements with lumped capacity or births; allowed: `consistent` capacity and no births \
-                 (their row sums are negative at corners); print first-order elements"
+                "found second-order elements with lumped capacity or births; allowed: `consistent` capacity \
+                 and no births (their row sums are negative at corners); print first-order elements"
                     .into(),
             );
         }
@@ -171,8 +171,8 @@ impl Problem {
                 )));
             }
             let faces: &[Face] = match condition.surface() {
-                Some(Where::Faces(faces)) => faces,
-                Some(Where::Outer { except }) => except,
+                Some(FaceSelection::Faces(faces)) => faces,
+                Some(FaceSelection::Outer { except }) => except,
                 None => &[],
             };
             if let Some(face) = faces.iter().find(|&&face| self.mesh.face_nodes(face).is_empty()) {
@@ -253,14 +253,14 @@ impl Problem {
     }
 }
 
-/// Temperature at the nodes, K, from that of each element: of the last element at a node that is not among those `later`
-/// printed.
+/// Temperature at the nodes, K, from that of each element; a node takes that of its last element that is not
+/// among those printed `later`.
 pub fn initial_temperatures(mesh: &Mesh, temperature_of: &[f64], later: &HashSet<u32>) -> Field {
     let first = temperature_of.first().copied().unwrap_or(0.0);
     if temperature_of.iter().all(|&temperature| temperature == first) {
         return Field::constant(first);
     }
-    // by place, as the problem asks; places of nodes are exact
+    // by position, as a problem takes a field; node positions are exact keys
     let mut at = HashMap::new();
     for (element, &temperature) in temperature_of.iter().enumerate() {
         if later.contains(&(element as u32)) {

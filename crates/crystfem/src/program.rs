@@ -1,4 +1,5 @@
-//! The program `crystfem`: scenes in TOML, their runs, the command line. The only room of this crate that knows of them.
+//! The program `crystfem`: TOML scenes, their runs and the command line. No other module of this crate uses
+//! them.
 
 pub mod command;
 pub mod observe;

@@ -1,6 +1,7 @@
-//! Element types: their corners, edges and sides, and the order of their nodes here and in other programs.
+//! Element types: corners, edges and sides, and their node order here and in other programs.
 
-/// Sides of a wedge: triangles 0 and 1, quadrilaterals 2 to 4, numbered as in Abaqus, anticlockwise seen from outside.
+/// Sides of a wedge: triangles 0 and 1, quadrilaterals 2 to 4, numbered as in Abaqus, anticlockwise seen from
+/// outside.
 const WEDGE_SIDES: [&[usize]; 5] = [&[0, 2, 1], &[3, 4, 5], &[0, 1, 4, 3], &[1, 2, 5, 4], &[2, 0, 3, 5]];
 /// Local nodes of the sides S1 … S6 of a hexahedron, anticlockwise seen from outside.
 pub const HEXAHEDRON_SIDES: [[usize; 4]; 6] =
@@ -12,10 +13,10 @@ const HEXAHEDRON_EDGES: [[usize; 2]; 12] =
 const TETRAHEDRON_EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]];
 const WEDGE_EDGES: [[usize; 2]; 9] = [[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]];
 
-/// An element type. Nodes are in the order of Abaqus (C3D8, C3D4, C3D6, C3D20, C3D10, C3D15): corners, then the node on the
-/// middle of each edge in the order of [`Shape::edges`].
+/// An element type. Nodes are in the order of Abaqus (C3D8, C3D4, C3D6, C3D20, C3D10, C3D15): corners, then
+/// the node on the middle of each edge in the order of [`ElementShape::edges`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Shape {
+pub enum ElementShape {
     /// 8 nodes.
     Hexahedron,
     /// 4 nodes.
@@ -30,8 +31,8 @@ pub enum Shape {
     Wedge15,
 }
 
-impl Shape {
-    /// All of them.
+impl ElementShape {
+    /// All types.
     pub const ALL: [Self; 6] = [
         Self::Hexahedron,
         Self::Tetrahedron,
@@ -53,12 +54,12 @@ impl Shape {
         }
     }
 
-    /// The shape of so many nodes.
-    pub fn of(nodes: usize) -> Option<Self> {
+    /// Returns the type with this number of nodes.
+    pub fn with_nodes(nodes: usize) -> Option<Self> {
         Self::ALL.into_iter().find(|shape| shape.nodes() == nodes)
     }
 
-    /// The same with a node on the middle of each edge.
+    /// Returns the type with mid-edge nodes added.
     pub const fn second_order(self) -> Self {
         match self {
             Self::Hexahedron | Self::Hexahedron20 => Self::Hexahedron20,
@@ -67,7 +68,7 @@ impl Shape {
         }
     }
 
-    /// Returns whether shape functions are of second order.
+    /// Returns true for second-order shape functions.
     pub const fn is_second_order(self) -> bool {
         self.nodes() > 8
     }
@@ -99,7 +100,7 @@ impl Shape {
         }
     }
 
-    /// Corners of a side, anticlockwise seen from outside; empty where there is no such side.
+    /// Corners of a side, anticlockwise seen from outside; empty if there is no such side.
     pub fn side(self, side: u8) -> &'static [usize] {
         let side = usize::from(side);
         match self.corners() {
@@ -109,7 +110,7 @@ impl Shape {
         }
     }
 
-    /// The node on the middle of the edge between two corners; `None` of a first-order element or no edge.
+    /// Mid-edge node between two corners; `None` for a first-order element or without such an edge.
     pub fn middle(self, a: usize, b: usize) -> Option<usize> {
         if !self.is_second_order() {
             return None;
@@ -139,8 +140,9 @@ impl Shape {
         }
     }
 
-    /// Number in VTK, and the position here of each node in VTK's order: VTK counts the first triangle of a 6-node wedge
-    /// the other way round (vtkWedge: its normal points away from the second), and all others as Abaqus.
+    /// Number in VTK, and the position here of each node in VTK's order. VTK numbers the first triangle of a
+    /// 6-node wedge in the opposite sense (vtkWedge: its normal points away from the second), and all others
+    /// like Abaqus.
     pub const fn vtk(self) -> (u8, Option<[usize; 6]>) {
         match self {
             Self::Hexahedron => (12, None),
@@ -152,7 +154,7 @@ impl Shape {
         }
     }
 
-    /// Position in Gmsh's order of each node here: Gmsh counts the edges of second-order elements in its own order
+    /// Position in Gmsh's order of each node here. Gmsh has its own order of edges in second-order elements
     /// (<https://gmsh.info/doc/texinfo/gmsh.html#Node-ordering>).
     pub const fn gmsh(self) -> &'static [usize] {
         const FIRST: [usize; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
@@ -168,18 +170,18 @@ impl Shape {
     }
 }
 
-/// An element that is neither an 8-node hexahedron nor a 4-node tetrahedron.
+/// A wedge or a second-order element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cell {
     /// Type.
-    pub shape: Shape,
+    pub shape: ElementShape,
     nodes: [u32; 20],
 }
 
 impl Cell {
-    /// Of as many nodes as some shape has; `None` otherwise.
+    /// Returns an element with these nodes; `None` if no type has as many.
     pub fn new(nodes: &[u32]) -> Option<Self> {
-        let mut cell = Self { shape: Shape::of(nodes.len())?, nodes: [u32::MAX; 20] };
+        let mut cell = Self { shape: ElementShape::with_nodes(nodes.len())?, nodes: [u32::MAX; 20] };
         cell.nodes[..nodes.len()].copy_from_slice(nodes);
         Some(cell)
     }
@@ -189,7 +191,7 @@ impl Cell {
         &self.nodes[..self.shape.nodes()]
     }
 
-    /// Nodes.
+    /// Nodes, for changes.
     pub fn nodes_mut(&mut self) -> &mut [u32] {
         &mut self.nodes[..self.shape.nodes()]
     }

@@ -1,14 +1,14 @@
-//! exp and ln without branches or tables, so that loops over them become vectors of the processor. Inline them into functions that
-//! `pulp` dispatches. Errors are a few 2⁻⁵³ of the result.
+//! exp and ln without branches or tables, so that loops over them are vectorized. Inline them into functions
+//! that `pulp` dispatches. Relative errors are a few 2⁻⁵³.
 
-/// 1.5·2⁵²: what is added to it is rounded to a whole number.
+/// 1.5·2⁵²; adding it rounds to a whole number.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
-/// ln 2, its first 32 bits and the rest.
+/// ln 2, split into its first 32 bits and the remainder.
 const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
-/// Most of |x| of [`expm1_small`].
-pub const SMALL: f64 = 0.1;
-/// Below, eˣ is taken for 0.
-const LEAST: f64 = -708.0;
+/// Largest |x| for [`expm1_small`].
+pub const MAX_SMALL_ARGUMENT: f64 = 0.1;
+/// Smallest x with a nonzero result.
+const MIN_EXPONENT: f64 = -708.0;
 
 /// 1/k!, k = 13, 12 … 2.
 const FACTORIALS: [f64; 12] = [
@@ -29,7 +29,7 @@ const FACTORIALS: [f64; 12] = [
 /// eˣ for x ≤ 709; 0 below −708.
 #[inline(always)]
 pub fn exp(x: f64) -> f64 {
-    let held = x.max(LEAST);
+    let held = x.max(MIN_EXPONENT);
     let rounded = held.mul_add(std::f64::consts::LOG2_E, ROUNDER);
     let whole = rounded - ROUNDER;
     let rest = whole.mul_add(-LN_2[1], whole.mul_add(-LN_2[0], held));
@@ -39,7 +39,7 @@ pub fn exp(x: f64) -> f64 {
     }
     let sum = (sum * rest).mul_add(rest, rest) + 1.0;
     let scale = f64::from_bits((rounded.to_bits() << 52).wrapping_add(1.0_f64.to_bits()));
-    if x < LEAST { 0.0 } else { sum * scale }
+    if x < MIN_EXPONENT { 0.0 } else { sum * scale }
 }
 
 /// ln x of a positive normal x.
@@ -55,7 +55,7 @@ pub fn ln(x: f64) -> f64 {
     exponent.mul_add(LN_2[0], small + 2.0 * s)
 }
 
-/// 2⁵²: a whole number in its last bits is added to it.
+/// 2⁵²; a whole number in the last bits is added to it.
 const TWO_52: f64 = 4_503_599_627_370_496.0;
 
 /// ln(1 + x) for −½ ≤ x ≤ 1.
@@ -65,7 +65,7 @@ pub fn ln_1p(x: f64) -> f64 {
     (2.0 * s).mul_add(series::<17>(s * s), 2.0 * s)
 }
 
-/// eˣ − 1 for |x| ≤ [`SMALL`].
+/// eˣ − 1 for |x| ≤ [`MAX_SMALL_ARGUMENT`].
 #[inline(always)]
 pub fn expm1_small(x: f64) -> f64 {
     let mut sum = FACTORIALS[2];
@@ -78,7 +78,7 @@ pub fn expm1_small(x: f64) -> f64 {
 /// eˣ − 1 for −0.7 ≤ x ≤ 0.
 #[inline(always)]
 pub fn expm1_near(x: f64) -> f64 {
-    // the square of a root: e²ʸ − 1 = (eʸ − 1)(eʸ + 1)
+    // square of a root: e²ʸ − 1 = (eʸ − 1)(eʸ + 1)
     let mut sum = expm1_small(0.125 * x);
     for _ in 0..3 {
         sum *= sum + 2.0;
@@ -86,7 +86,7 @@ pub fn expm1_near(x: f64) -> f64 {
     sum
 }
 
-/// Σ sᵏ/(2k+1), k = 1 … `TERMS`, of s = t²: artanh t = t (1 + Σ).
+/// Series Σ sᵏ/(2k+1), k = 1 … `TERMS`, for s = t²: artanh t = t (1 + Σ).
 #[inline(always)]
 fn series<const TERMS: usize>(s: f64) -> f64 {
     let mut sum = 0.0;
@@ -96,7 +96,7 @@ fn series<const TERMS: usize>(s: f64) -> f64 {
     sum
 }
 
-/// 1/3, 1/5 …
+/// Odd reciprocals 1/3, 1/5 …
 const ODD: [f64; 17] = {
     let mut odd = [0.0; 17];
     let mut k = 0;
@@ -111,9 +111,9 @@ const ODD: [f64; 17] = {
 mod tests {
     use super::*;
 
-    /// Against the library over all of their ranges, to 4 of 2⁻⁵².
+    /// Results agree with the standard library over their ranges, to four times 2⁻⁵².
     #[test]
-    fn they_are_those_of_the_library() {
+    fn results_agree_with_the_standard_library() {
         let near = |found: f64, exact: f64, of: f64| {
             assert!((found - exact).abs() <= 4.0 * f64::EPSILON * exact.abs(), "{of}: {found:e} {exact:e}");
         };

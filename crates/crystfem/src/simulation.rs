@@ -1,42 +1,42 @@
-//! A problem in time: [`Simulation::advance`] goes from one time to the next, through births, in steps that land on
-//! every given time.
+//! Time integration of a problem: [`Simulation::advance`] runs from one time to the next, through births, in
+//! steps that end at every given time.
 
 mod step;
 
 use crate::error::Error;
 pub use crate::fields::Statistics;
-use crate::ledger::{Ledger, Record};
+use crate::ledger::{Ledger, StepBalance};
 use crate::problem::Problem;
-use crate::solver::Task;
-pub use crate::solver::{Choice, LinearSolver, Method};
-use crate::system::{Behaviour, Exchange, NONE, System};
-pub use crate::system::{Memory, Points};
-use crate::time::{Scheme, Start, Stepper, Steps, Work};
+use crate::solver::LinearTask;
+pub use crate::solver::{LinearMethod, LinearSolver, SolverChoice};
+use crate::system::{Exchange, MaterialBehaviour, NONE, ThermalSystem};
+pub use crate::system::{PointMemory, PointStates};
+use crate::time::{Scheme, StepStart, Stepper, Steps, Work};
 use polycore::numerics::bounds;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// How a problem is solved.
+/// Settings of the time integration.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Settings {
     /// Time integrator.
     pub scheme: Scheme,
-    /// Lengths of steps.
+    /// Step lengths.
     pub steps: Steps,
-    /// Rms error of temperature that linear solves and Newton's iteration may leave, K.
+    /// Rms error of temperature, K, allowed in linear solves and Newton's iteration.
     pub tolerance: f64,
-    /// How linear systems are solved.
+    /// Linear solver.
     pub solver: LinearSolver,
 }
 
 impl Settings {
-    /// TR-BDF2 with a temporal error of 0.1 K per step at most.
+    /// Returns TR-BDF2 with a temporal error of at most 0.1 K per step.
     pub fn adaptive(first: f64) -> Self {
         let steps = Steps::Adaptive { tolerance: 0.1, first, smallest: 1e-6 * first, largest: f64::INFINITY };
         Self { scheme: Scheme::TrBdf2, steps, tolerance: 1e-7, solver: LinearSolver::Auto }
     }
 
-    /// Backward Euler with fixed steps.
+    /// Returns backward Euler with fixed steps.
     pub fn backward_euler(dt: f64) -> Self {
         Self {
             scheme: Scheme::BackwardEuler,
@@ -71,7 +71,7 @@ impl Settings {
     }
 }
 
-/// Everything a run needs to continue, bit by bit.
+/// State of a simulation: everything needed to continue with the same bits.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct State {
     /// Time, s.
@@ -80,60 +80,60 @@ pub struct State {
     pub temperature: Vec<f64>,
     /// Rate of change over the last step, K/s; empty after a jump.
     pub slope: Vec<f64>,
-    /// Q of each equation, W; empty if not known.
+    /// Q of each equation, W; empty if unknown.
     pub rate: Vec<f64>,
-    /// Heat going in at this time, W.
+    /// Heat supplied at this time, W.
     pub exchange: Exchange,
     /// Material points.
-    pub memory: Memory,
-    /// Birth of each element, from 1; 0 from the start, [`u32::MAX`] not yet.
+    pub memory: PointMemory,
+    /// Birth of each element, from 1; 0 for elements from the start, [`u32::MAX`] for unborn ones.
     pub born: Vec<u32>,
-    /// Births that have happened.
+    /// Number of past births.
     pub births: usize,
-    /// Length of the next step that the error control wants, s.
+    /// Length of the next step by error control, s.
     pub next_dt: f64,
-    /// Whether the last thing was a jump.
+    /// True right after a jump.
     pub jump: bool,
-    /// How linear systems are solved since the last jump.
-    pub method: Method,
-    /// Iterations since the last choice, in steps whose solves took many.
+    /// Method for linear systems since the last jump.
+    pub method: LinearMethod,
+    /// Iterations since the last choice of method, in steps whose solves took many.
     pub excess: f64,
-    /// Energy since the start.
+    /// Energies since the start.
     pub ledger: Ledger,
     /// Work since the start.
     pub work: Work,
 }
 
 impl State {
-    /// What a step begins with.
-    pub(crate) fn start(&self) -> Start<'_> {
+    /// Initial values of a step.
+    pub(crate) fn start(&self) -> StepStart<'_> {
         let Self { time, temperature, slope, rate, exchange, memory, .. } = self;
-        Start { time: *time, temperature, slope, rate, exchange, memory }
+        StepStart { time: *time, temperature, slope, rate, exchange, memory }
     }
 }
 
-/// A problem being solved.
+/// A problem during its time integration.
 pub struct Simulation {
     pub(crate) problem: Arc<Problem>,
     pub(crate) settings: Settings,
-    pub(crate) behaviours: Vec<Behaviour>,
-    pub(crate) system: System,
+    pub(crate) behaviours: Vec<MaterialBehaviour>,
+    pub(crate) system: ThermalSystem,
     pub(crate) state: State,
     stepper: Stepper,
     breaks: Vec<f64>,
 }
 
 impl Simulation {
-    /// Counts material points and distinct rows of the matrix, and bytes of all stored rows.
+    /// Number of material points, number of distinct matrix rows, and bytes of all stored rows.
     pub fn storage(&self) -> [usize; 3] {
         let rows = &self.system.rows;
         [self.system.nodal.material.len(), rows.stored()[0], rows.bytes()]
     }
 
-    /// At time 0, with what exists then. A problem that others use too is shared by an [`Arc`].
+    /// Starts at time 0 with the elements that exist then. Share a problem by an [`Arc`] if others use it.
     ///
     /// # Errors
-    /// Those of [`Problem::check`] and of the materials.
+    /// Errors of [`Problem::check`] and of the materials.
     pub fn new(problem: impl Into<Arc<Problem>>, settings: Settings) -> Result<Self, Error> {
         let problem = problem.into();
         let (behaviours, breaks) = Self::prepare(&problem, &settings)?;
@@ -145,12 +145,12 @@ impl Simulation {
         if let Steps::Adaptive { first, .. } = settings.steps {
             state.next_dt = first;
         }
-        let system = System::build(&problem, &behaviours, &state.born, 0)?;
+        let system = ThermalSystem::build(&problem, &behaviours, &state.born, 0)?;
         (state.work.builds, state.work.visited) = (1, system.elements as u64);
         state.temperature = system
             .nodes()
             .iter()
-            .map(|&n| problem.initial.at(problem.mesh.points[n as usize], 0.0))
+            .map(|&n| problem.initial.value_at(problem.mesh.points[n as usize], 0.0))
             .collect();
         if let Some(found) = state.temperature.iter().copied().find(|t| !(*t >= 0.0 && t.is_finite())) {
             let allowed = "an absolute temperature, 0 K or above".into();
@@ -158,17 +158,17 @@ impl Simulation {
         }
         let mut simulation =
             Self { problem, settings, behaviours, system, state, stepper: Stepper::default(), breaks };
-        // what is prescribed at the start is part of the initial state
+        // temperatures prescribed at the start are part of the initial state
         simulation.system.prescribe(&simulation.problem, 0.0, &mut simulation.state.temperature);
         simulation.fresh_points()?;
         simulation.give_birth()?;
         Ok(simulation)
     }
 
-    /// Goes on from a state of the same problem.
+    /// Continues from a state of the same problem.
     ///
     /// # Errors
-    /// As [`Self::new`]; [`Error::Mesh`] where the state does not belong to the problem.
+    /// Errors of [`Self::new`]; [`Error::Mesh`] if the state does not belong to the problem.
     pub fn resume(problem: impl Into<Arc<Problem>>, settings: Settings, state: State) -> Result<Self, Error> {
         let problem = problem.into();
         let (behaviours, breaks) = Self::prepare(&problem, &settings)?;
@@ -179,7 +179,7 @@ impl Simulation {
                 problem.material_of.len()
             )));
         }
-        let system = System::build(&problem, &behaviours, &state.born, state.births)?;
+        let system = ThermalSystem::build(&problem, &behaviours, &state.born, state.births)?;
         let size = system.size();
         let fits = |list: &[f64]| list.is_empty() || list.len() == size;
         let memory = &state.memory;
@@ -193,7 +193,8 @@ impl Simulation {
             || memory.general.state.len() != system.general.points() * system.general.stride
         {
             return Err(Error::Mesh(format!(
-                "state: found {} temperatures and {} + {} points; allowed: {size} and {} + {} of this problem",
+                "state: found {} temperatures and {} + {} points; allowed: {size} and {} + {} of this \
+                 problem",
                 state.temperature.len(),
                 memory.nodal.state.len() / system.nodal.stride.max(1),
                 memory.general.energy.len(),
@@ -204,13 +205,13 @@ impl Simulation {
         Ok(Self { problem, settings, behaviours, system, state, stepper: Stepper::default(), breaks })
     }
 
-    fn prepare(problem: &Problem, settings: &Settings) -> Result<(Vec<Behaviour>, Vec<f64>), Error> {
+    fn prepare(problem: &Problem, settings: &Settings) -> Result<(Vec<MaterialBehaviour>, Vec<f64>), Error> {
         settings.check()?;
         problem.check()?;
         let behaviours = problem
             .materials
             .iter()
-            .map(|material| Behaviour::of(&**material, problem.capacity))
+            .map(|material| MaterialBehaviour::from_material(&**material, problem.capacity))
             .collect::<Result<_, _>>()?;
         Ok((behaviours, problem.breaks()))
     }
@@ -220,7 +221,7 @@ impl Simulation {
         &self.problem
     }
 
-    /// Returns the state; serialise it to continue later with the same bits.
+    /// Returns the state, which can be serialized to continue later with the same bits.
     pub fn state(&self) -> &State {
         &self.state
     }
@@ -230,55 +231,56 @@ impl Simulation {
         self.state.time
     }
 
-    /// Returns whether a node of the mesh exists.
+    /// Returns true if a node of the mesh exists.
     pub fn exists(&self, node: u32) -> bool {
         self.system.equation.get(node as usize).is_some_and(|&equation| equation != NONE)
     }
 
-    /// Returns whether an element exists.
+    /// Returns true if an element exists.
     pub fn is_born(&self, element: u32) -> bool {
         self.state.born.get(element as usize).is_some_and(|&birth| birth != NONE)
     }
 
-    /// Temperature of a node, K; `None` where it does not exist.
+    /// Temperature of a node, K; `None` if it does not exist.
     pub fn temperature(&self, node: u32) -> Option<f64> {
         let equation = *self.system.equation.get(node as usize)?;
         self.state.temperature.get(equation as usize).copied()
     }
 
-    /// Temperatures of all nodes of the mesh, K; `missing` for those that do not exist.
+    /// Temperatures of all nodes of the mesh, K; `missing` for nodes that do not exist.
     pub fn temperatures(&self, missing: f64) -> Vec<f64> {
         (0..self.problem.mesh.points.len() as u32).map(|n| self.temperature(n).unwrap_or(missing)).collect()
     }
 
-    /// Temperature at a place, K; `None` where nothing exists.
+    /// Interpolates the temperature at a position, K; `None` outside existing elements.
     pub fn temperature_at(&self, place: [f64; 3]) -> Option<f64> {
         self.problem.mesh.locate(place)?.value(|node| self.temperature(node))
     }
 
-    /// Goes to a time. `observe` sees every accepted step, and may stop there. Births at `until` itself are left to
-    /// the next call, so that outputs at that time show what was before them.
+    /// Runs to a time. `observe` is called after every accepted step, and may stop the run. Births at `until`
+    /// itself are left to the next call, so that outputs at that time show the state before them.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a time that has passed; those of the materials; [`Error::NotConverged`] where a
-    /// step as short as allowed has no solution.
+    /// [`Error::Parameter`] for a past time; errors of the materials; [`Error::NotConverged`] if a step of
+    /// the smallest length has no solution.
     pub fn advance(
         &mut self,
         until: f64,
-        observe: &mut (dyn FnMut(&Self, &Record) -> ControlFlow<()> + Send),
+        observe: &mut (dyn FnMut(&Self, &StepBalance) -> ControlFlow<()> + Send),
     ) -> Result<ControlFlow<()>, Error> {
         self.advance_unless(&|| false, until, observe)
     }
 
-    /// [`Self::advance`], which also stops within a step once `stop` is true, and stays so: as if that step had not begun.
+    /// Runs like [`Self::advance`], but also stops within a step once `stop` returns true (and keeps
+    /// returning it); the step is then discarded.
     ///
     /// # Errors
-    /// As [`Self::advance`].
+    /// Errors of [`Self::advance`].
     pub fn advance_unless(
         &mut self,
         stop: &(dyn Fn() -> bool + Sync),
         until: f64,
-        observe: &mut (dyn FnMut(&Self, &Record) -> ControlFlow<()> + Send),
+        observe: &mut (dyn FnMut(&Self, &StepBalance) -> ControlFlow<()> + Send),
     ) -> Result<ControlFlow<()>, Error> {
         if !(until >= self.state.time && until.is_finite()) {
             let allowed = format!("{} s (now) or later, finite", self.state.time);
@@ -304,18 +306,17 @@ impl Simulation {
         })
     }
 
-    /// [`Self::advance`] without looking at its steps.
+    /// Runs to a time without an observer.
     ///
     /// # Errors
-    /// As [`Self::advance`].
+    /// Errors of [`Self::advance`].
     pub fn run_until(&mut self, until: f64) -> Result<(), Error> {
         self.advance(until, &mut |_, _| ControlFlow::Continue(())).map(|_| ())
     }
 
-    /// [`Self::advance`] with a look at each accepted step, which ends at its first error.
-    ///
+    /// Runs to a time with a callback after each accepted step; its first error ends the run.
     /// # Errors
-    /// As [`Self::advance`], and those of `after_step`.
+    /// Errors of [`Self::advance`] and of `after_step`.
     pub fn observe(
         &mut self,
         until: f64,
@@ -329,18 +330,18 @@ impl Simulation {
         result
     }
 
-    /// How linear systems would be solved from now to a time, and why.
-    pub fn choose(&self, until: f64) -> Choice {
+    /// Returns the linear solver for a run to a time, with the reason.
+    pub fn choose(&self, until: f64) -> SolverChoice {
         self.task(until).choose()
     }
 
-    /// Entries of the factors that a run to a time makes, about; 0 where it makes none.
+    /// Estimates the entries of the matrix factors in a run to a time; 0 without factors.
     pub fn factors(&self, until: f64) -> f64 {
         let task = self.task(until);
-        if task.choose().method == Method::Factors { task.factor_entries() } else { 0.0 }
+        if task.choose().method == LinearMethod::Factors { task.factor_entries() } else { 0.0 }
     }
 
-    pub(crate) fn task(&self, until: f64) -> Task {
+    pub(crate) fn task(&self, until: f64) -> LinearTask {
         let (equal_steps, dt) = match self.settings.steps {
             Steps::Fixed { dt } => (true, dt),
             Steps::Adaptive { first, .. } => (false, first),
@@ -359,7 +360,7 @@ impl Simulation {
             true => 1.0 + dt * conduction / capacity(k),
             false => 1.0,
         });
-        Task {
+        LinearTask {
             size,
             length: longest / spacing,
             entries: self.system.rows.stored()[2],
@@ -373,7 +374,7 @@ impl Simulation {
         }
     }
 
-    /// What is solved and what is left out, for a run to a time: one sentence a line.
+    /// Describes the computation of a run to a time and what is left out: one sentence a line.
     pub fn explain(&self, until: f64) -> Vec<String> {
         let system = &self.system;
         let [rows, segments, entries] = system.rows.stored();
@@ -402,7 +403,7 @@ impl Simulation {
         lines
     }
 
-    /// Forgets what was made for other equations.
+    /// Invalidates everything prepared for earlier equations.
     pub(crate) fn forget(&mut self) {
         self.stepper.reset();
     }

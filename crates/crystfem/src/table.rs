@@ -1,11 +1,11 @@
-//! Columns of tables of measured numbers, read by [`polycore::table`], and the names under which calorimeters write them.
+//! Columns of measured data, read by [`polycore::table`], and the headings that calorimeters use.
 
 use crate::error::Error;
 use polycore::table::{self, Table};
 use polycore::units::Dimension;
 use std::path::Path;
 
-/// Other names of a column, the likeliest first.
+/// Alternative names of a column, the likeliest first.
 const NAMES: [(&str, &[&str]); 4] = [
     ("time", &["time", "t", "elapsed time", "test time", "zeit"]),
     (
@@ -43,12 +43,12 @@ fn names(name: &'static str) -> Vec<&'static str> {
     NAMES.iter().find(|(first, _)| *first == name).map_or(vec![name], |(_, all)| all.to_vec())
 }
 
-/// Reads a column in SI; the unit is that of headings without one.
+/// Reads a column in SI; the unit applies to headings without one.
 type Read = fn(&Table, usize, Option<&str>) -> Result<Vec<f64>, table::Error>;
 
-/// A column that is requested.
+/// A requested column.
 #[derive(Clone, Copy)]
-pub struct Column {
+pub struct TableColumn {
     name: &'static str,
     read: Read,
     example: &'static str,
@@ -57,42 +57,43 @@ pub struct Column {
     most: f64,
 }
 
-impl Column {
-    /// A column of quantities of dimension `D`.
-    pub fn of<D: Dimension>(name: &'static str) -> Self {
+impl TableColumn {
+    /// Returns a column of quantities of dimension `D`.
+    pub fn new<D: Dimension>(name: &'static str) -> Self {
         let (least, most) = (f64::NEG_INFINITY, f64::INFINITY);
         Self { name, read: Table::column::<D>, example: D::EXAMPLE, unit: None, least, most }
     }
 
-    /// Takes a heading without a unit in this one.
+    /// Accepts a heading without a unit, with this default unit.
     pub fn or_unit(mut self, unit: &'static str) -> Self {
         self.unit = Some(unit);
         self
     }
 
-    /// Refuses numbers, in SI, outside a range.
+    /// Limits the range of values, in SI.
     pub fn within(mut self, least: f64, most: f64) -> Self {
         (self.least, self.most) = (least, most);
         self
     }
 }
 
-/// Reads columns, in SI units, whatever their order and units in the file; others are passed over.
+/// Reads columns in SI units, in any order and units in the file; other columns are ignored.
 ///
 /// # Errors
-/// [`Error::File`] with line and column for a file that cannot be read, a missing or repeated column, a row of another
-/// length, what is no finite number or not of the column's dimension, a number out of its range, and no row at all.
-pub fn read<const N: usize>(path: &Path, columns: [Column; N]) -> Result<[Vec<f64>; N], Error> {
+/// [`Error::File`] with line and column for a file that cannot be read, a missing or repeated column, a row
+/// of another length, a cell that is not a finite number of the column's dimension, a number out of range,
+/// and a table without rows.
+pub fn read<const N: usize>(path: &Path, columns: [TableColumn; N]) -> Result<[Vec<f64>; N], Error> {
     read_with_lines(path, columns).map(|(data, _)| data)
 }
 
-/// As [`read`], with the line of each row, from 1.
+/// Reads like [`read`], and returns the line of each row, from 1.
 ///
 /// # Errors
-/// As [`read`].
+/// Errors of [`read`].
 pub fn read_with_lines<const N: usize>(
     path: &Path,
-    columns: [Column; N],
+    columns: [TableColumn; N],
 ) -> Result<([Vec<f64>; N], Vec<usize>), Error> {
     let table = open(path)?;
     let mut data = [(); N].map(|()| Vec::new());
@@ -121,12 +122,12 @@ pub fn read_with_lines<const N: usize>(
     Ok((data, (0..table.rows()).map(|row| table.line(row)).collect()))
 }
 
-/// One line: how a table of a calorimeter is understood; nothing of what is none.
-pub fn understood(path: &Path) -> Option<String> {
+/// Describes how a calorimeter table is interpreted, in one line; `None` for other files.
+pub fn describe_format(path: &Path) -> Option<String> {
     let table = Table::read(path).ok()?;
     let used: Vec<usize> = NAMES.iter().flat_map(|(_, names)| table.matching(names)).collect();
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    (!used.is_empty()).then(|| format!("data {name}: {}", table.understood(&used)))
+    (!used.is_empty()).then(|| format!("data {name}: {}", table.describe(&used)))
 }
 
 impl From<table::Error> for Error {
@@ -136,7 +137,7 @@ impl From<table::Error> for Error {
     }
 }
 
-/// A table, whose faults are those of a line of a file.
+/// Opens a table; errors point to lines of the file.
 fn open(path: &Path) -> Result<Table, Error> {
     Table::read(path).map_err(|error| match error {
         polycore::Error::Table(error) => error.into(),
@@ -156,9 +157,9 @@ mod tests {
         let path = folder.path().join("t.csv");
         std::fs::write(&path, text).unwrap();
         let columns = [
-            Column::of::<TimeDimension>("time"),
-            Column::of::<TemperatureDimension>("temperature"),
-            Column::of::<RatioDimension>("alpha").within(0.0, 1.0),
+            TableColumn::new::<TimeDimension>("time"),
+            TableColumn::new::<TemperatureDimension>("temperature"),
+            TableColumn::new::<RatioDimension>("alpha").within(0.0, 1.0),
         ];
         read(&path, columns).map_err(|error| error.to_string())
     }
@@ -191,7 +192,7 @@ mod tests {
             let error = of(text).unwrap_err();
             assert!(parts.iter().all(|part| error.contains(part)), "{error}");
         }
-        let columns = [Column::of::<TimeDimension>("time")];
+        let columns = [TableColumn::new::<TimeDimension>("time")];
         assert!(
             read(Path::new("/no/such.csv"), columns)
                 .unwrap_err()
@@ -200,8 +201,8 @@ mod tests {
         );
     }
 
-    /// Exports of calorimeters: the same three rows of Netzsch (Latin-1), TA Instruments (UTF-16), Mettler, PerkinElmer
-    /// and of a spreadsheet.
+    /// Exports of calorimeters: the same three rows from Netzsch (Latin-1), TA Instruments (UTF-16), Mettler,
+    /// PerkinElmer and a spreadsheet.
     #[test]
     fn exports_of_calorimeters() {
         let netzsch = "#EXO:1\r\n#DECIMAL:COMMA\r\n##Temp./°C;Time/min;DSC/(mW/mg)\r\n200,5;0,0;0,05\r\n\
@@ -211,10 +212,12 @@ mod tests {
                   0.0\t200.5\t0.05\r\n0.1\t199.5\t0.25\r\n";
         let wide: Vec<u8> =
             "\u{feff}".chars().chain(ta.chars()).map(|c| c as u16).flat_map(u16::to_le_bytes).collect();
-        let mettler = "Curve Values:\n  Index      t       Ts       Value\n             [s]     [°C]     [W/g]\n\
-                       \x20     0      0    200.5        0.05\n      1      6    199.5        0.25\n";
-        let elmer = "PerkinElmer\nTime\tHeat Flow\tSample Temperature\nminutes\tmW/mg\tºC\n0\t0.05\t200.5\n0.1\t0.25\t199.5\n";
-        let sheet = "\u{feff}\"time [s]\";\"temperature [K]\";\"heat_flow [W/kg]\"\n\"0\";\"473,65\";\"50\"\n6;472,65;250\n";
+        let mettler = "Curve Values:\n  Index      t       Ts       Value\n             [s]     [°C]     \
+            [W/g]\n\x20     0      0    200.5        0.05\n      1      6    199.5        0.25\n";
+        let elmer = "PerkinElmer\nTime\tHeat Flow\tSample Temperature\nminutes\tmW/mg\tºC\n0\t0.05\t200.5\n\
+            0.1\t0.25\t199.5\n";
+        let sheet = "\u{feff}\"time [s]\";\"temperature [K]\";\"heat_flow \
+            [W/kg]\"\n\"0\";\"473,65\";\"50\"\n6;472,65;250\n";
         for (name, bytes) in [
             ("netzsch", latin),
             ("ta", wide),
@@ -226,16 +229,16 @@ mod tests {
             let path = folder.path().join("t.csv");
             std::fs::write(&path, bytes).unwrap();
             let columns = [
-                Column::of::<TimeDimension>("time"),
-                Column::of::<TemperatureDimension>("temperature"),
-                Column::of::<SpecificPowerDimension>("heat_flow"),
+                TableColumn::new::<TimeDimension>("time"),
+                TableColumn::new::<TemperatureDimension>("temperature"),
+                TableColumn::new::<SpecificPowerDimension>("heat_flow"),
             ];
             let [time, temperature, flow] =
                 read(&path, columns).unwrap_or_else(|error| panic!("{name}: {error}"));
             assert_eq!(time, [0.0, 6.0], "{name}");
             assert_eq!(temperature, [473.65, 472.65], "{name}");
             assert_eq!(flow, [50.0, 250.0], "{name}");
-            assert!(understood(&path).unwrap().starts_with("data t.csv: separat"), "{name}");
+            assert!(describe_format(&path).unwrap().starts_with("data t.csv: separat"), "{name}");
         }
     }
 }

@@ -1,13 +1,13 @@
-//! Programs of others that tests call: compilers, and CalculiX linked with a material.
+//! External programs of tests: compilers, and CalculiX linked with a material.
 
 use super::skipped;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Whether a program is there; says that the test is skipped if not.
+/// Returns true if a program is installed; otherwise records that the test is skipped.
 #[track_caller]
-pub fn there(program: &str) -> bool {
+pub fn has_program(program: &str) -> bool {
     let found = Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success());
     if !found {
         skipped(program);
@@ -15,10 +15,10 @@ pub fn there(program: &str) -> bool {
     found
 }
 
-/// Standard output of a command.
+/// Returns the standard output of a command.
 ///
 /// # Panics
-/// Where it cannot be started or ends with another status than 0.
+/// If it cannot be started or fails.
 #[track_caller]
 pub fn run(command: &mut Command) -> String {
     let output = command.output().unwrap_or_else(|error| panic!("{command:?}: {error}"));
@@ -28,15 +28,16 @@ pub fn run(command: &mut Command) -> String {
     out
 }
 
-/// `libPACKAGE.a` of a package of this workspace: cargo builds it and tells where it is.
+/// Builds `libPACKAGE.a` of a package of this workspace and returns its path.
 ///
 /// # Panics
-/// Where it does not compile.
+/// If it does not compile.
 pub fn static_library(package: &str) -> PathBuf {
     let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
     let mut build = Command::new(cargo);
     build.args(["build", "--release", "--quiet", "--message-format=json-render-diagnostics"]);
-    // both in one build: their libraries have names without a hash, and the examples of one need the other as it was built with it
+    // both in one build: their libraries have names without a hash, and the examples of one need the other as
+    // it was built with it
     build.args(["--package=umatht", "--package=umat"]);
     let text = run(build.current_dir(env!("CARGO_MANIFEST_DIR")));
     let messages = text.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
@@ -46,8 +47,8 @@ pub fn static_library(package: &str) -> PathBuf {
     names.rfind(|file| file.ends_with(&library)).unwrap_or_else(|| panic!("no {library}"))
 }
 
-/// The folder of a CalculiX 2.20 that was built from source, with its archive: the environment variable `CALCULIX_SOURCE`. Says that the test
-/// is skipped where there is none.
+/// Returns the folder of a CalculiX 2.20 built from source, with its archive, from the environment variable
+/// `CALCULIX_SOURCE`; without it, records that the test is skipped.
 #[track_caller]
 pub fn calculix() -> Option<PathBuf> {
     let folder = std::env::var_os("CALCULIX_SOURCE").map(PathBuf::from);
@@ -56,13 +57,14 @@ pub fn calculix() -> Option<PathBuf> {
         skipped("CalculiX built from source (CALCULIX_SOURCE names the folder of ccx_2.20.a)");
         return None;
     }
-    if there("gfortran") { found } else { None }
+    if has_program("gfortran") { found } else { None }
 }
 
-/// Links CalculiX with a material, which stands before the archive: its empty routines stay unless `symbols` are asked for.
+/// Links CalculiX with a material, which stands before the archive: its empty routines stay unless `symbols`
+/// are asked for.
 ///
 /// # Panics
-/// Where it cannot be linked.
+/// If it cannot be linked.
 pub fn link_calculix(source: &Path, materials: &[&Path], symbols: &[&str], program: &Path) {
     let mut link = Command::new("gfortran");
     link.args(["-O2", "-fopenmp", "-o"]).arg(program).arg(source.join("ccx_2.20.o"));
@@ -73,10 +75,10 @@ pub fn link_calculix(source: &Path, materials: &[&Path], symbols: &[&str], progr
     run(link.args(["-lspooles", "-lpthread", "-larpack", "-llapack", "-lblas", "-lm", "-ldl"]));
 }
 
-/// Runs a deck in CalculiX in a folder: its `.dat`.
+/// Runs an input file in CalculiX in a folder; returns its `.dat`.
 ///
 /// # Panics
-/// Where it fails.
+/// If it fails.
 pub fn run_calculix(program: &Path, folder: &Path, deck: &str) -> (String, String) {
     std::fs::write(folder.join("deck.inp"), deck).expect("a folder to write to");
     let told = run(Command::new(program).arg("deck").current_dir(folder));

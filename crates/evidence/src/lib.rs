@@ -1,8 +1,8 @@
-//! Numbers that tests measure, kept for the report of `cargo xtask validate`.
+//! Measurements of tests, kept for the report of `cargo xtask validate`.
 //!
-//! A test says [`near`], [`at_most`] or [`within`] where it would say `assert!`, with a name that cases/thesis.toml
-//! refers to. The test fails as with `assert!`; and under `cargo xtask test`, which names a folder in [`FOLDER`], the
-//! number found is left there, met or not. [`skipped`] leaves there what a test could not find on this machine.
+//! A test calls [`near`], [`at_most`] or [`within`] instead of `assert!`, with a name that cases/thesis.toml
+//! refers to. The test fails as with `assert!`. Under `cargo xtask test`, which names a folder in [`FOLDER`],
+//! the number is also recorded there, met or not. [`skipped`] records a missing requirement of this machine.
 
 pub mod hosts;
 pub mod measurement;
@@ -14,7 +14,7 @@ use std::path::Path;
 
 use serde_json::{Map, Value, json};
 
-/// The environment variable that names the folder.
+/// Environment variable with the folder of the records.
 pub const FOLDER: &str = "EVIDENCE_FOLDER";
 
 /// Asserts that |`value` − `reference`| ≤ `tolerance`.
@@ -45,7 +45,7 @@ pub fn within(name: &str, value: f64, low: f64, high: f64) {
     judge(name, value, json!({ "at_least": low, "at_most": high }), (low..=high).contains(&value));
 }
 
-/// Says that the running test needs what this machine lacks; the test then returns.
+/// Records that the running test lacks a requirement on this machine; the test then returns.
 #[track_caller]
 pub fn skipped(needs: &str) {
     let test = test();
@@ -70,7 +70,7 @@ fn judge(name: &str, value: f64, asked: Value, met: bool) {
     assert!(met, "{name}: {value}, asked for {text}");
 }
 
-/// The test harness names its threads by their tests.
+/// Name of the running test: the test harness names its threads by their tests.
 fn test() -> String {
     std::thread::current().name().unwrap_or("a test").to_owned()
 }
@@ -80,7 +80,7 @@ fn leave(key: &str, record: Value) {
     leave_in(Path::new(&folder), key, &record);
 }
 
-/// Written beside and renamed: tests of many processes write at once.
+/// Writes a file by rename: tests of many processes write at once.
 fn leave_in(folder: &Path, key: &str, record: &Value) {
     let mut hasher = DefaultHasher::new();
     key.hash(&mut hasher);

@@ -1,17 +1,17 @@
-//! Rows of benches: what `benches/measure.rs` of a crate prints and `cargo xtask bench` reads.
+//! Rows of benches: printed by `benches/measure.rs` of a crate, read by `cargo xtask bench`.
 
 use serde::{Deserialize, Serialize};
 
-/// One measured number.
+/// Measured number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {
-    /// What was measured.
+    /// Quantity that was measured.
     pub what: String,
     /// Size of the problem: particles, equations, steps, points.
     pub size: u64,
     /// Threads used.
     pub threads: usize,
-    /// The number; absent where there is none.
+    /// Value; `None` if there is none.
     pub value: Option<f64>,
     /// Unit, empty for a ratio.
     pub unit: String,

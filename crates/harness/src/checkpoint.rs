@@ -1,4 +1,4 @@
-//! What a killed run needs to go on: one file, whole or not at all, with a checksum.
+//! Checkpoint of a run: one file with a checksum, written whole or not at all.
 
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ pub const FILE_NAME: &str = "checkpoint.bin";
 /// First bytes of a file: program and version of what it holds.
 pub type Magic = [u8; 8];
 
-/// How the magics of the command lines begin, before a hyphen, and the programs.
+/// Beginning of the magic of each program, up to a hyphen, and the program.
 pub const PROGRAMS: [(&str, &str); 4] =
     [("mdsg", "mdsurrogate"), ("part", "crystfem"), ("peri", "peri"), ("poly", "polycore")];
 
@@ -27,14 +27,14 @@ pub struct Header {
     pub scene: String,
     /// The scene's path, for relative paths and messages.
     pub scene_path: PathBuf,
-    /// Whether this is a `--quick` run.
+    /// True for a `--quick` run.
     pub quick: bool,
-    /// What else the run is computed from.
+    /// Hashes of all that the run is computed from.
     pub stamp: Stamp,
 }
 
 impl Header {
-    /// Of a scene.
+    /// Creates the header of a run of a scene.
     pub fn new(source: &Source, quick: bool) -> Self {
         // files that a scene names lie beside it, from wherever the run is resumed
         let scene_path = std::path::absolute(&source.path).unwrap_or_else(|_| source.path.clone());
@@ -109,7 +109,7 @@ pub fn read<T: DeserializeOwned>(path: &Path, magic: &Magic) -> Result<T, Error>
         Err(error) if [ErrorKind::NotFound, ErrorKind::NotADirectory].contains(&error.kind()) => {
             return Err(refused(path, "there is none; start a run with `run`"));
         }
-        Err(error) => return Err(Error::io("read", path)(error)),
+        Err(error) => return Err(Error::from_io("read", path)(error)),
     };
     let Some((sum, rest)) = bytes.strip_prefix(magic).and_then(|rest| rest.split_first_chunk()) else {
         return Err(refused(path, foreign(&bytes, magic)));
@@ -121,17 +121,17 @@ pub fn read<T: DeserializeOwned>(path: &Path, magic: &Magic) -> Result<T, Error>
     decode(path, rest)
 }
 
-/// The bytes of a value in the checkpoint at `path`.
+/// Returns the bytes of a value in the checkpoint at `path`.
 pub(crate) fn encode(path: &Path, value: &impl Serialize) -> Result<Vec<u8>, Error> {
     postcard::to_stdvec(value).map_err(|error| refused(path, error))
 }
 
-/// A value of [`encode`].
+/// Decodes a value of [`encode`].
 pub(crate) fn decode<T: DeserializeOwned>(path: &Path, bytes: &[u8]) -> Result<T, Error> {
     postcard::take_from_bytes(bytes).map(|(value, _)| value).map_err(|error| refused(path, error))
 }
 
-/// What a file without the right magic is.
+/// Describes a file with another magic.
 fn foreign(bytes: &[u8], magic: &Magic) -> String {
     let name = |magic: &[u8]| magic.split(|&byte| byte == b'-').next().map(<[u8]>::to_vec);
     let found = bytes.get(..magic.len()).and_then(name);

@@ -1,5 +1,6 @@
-//! Observers of a run: probes, lines, sections, fields, couplings, pictures. Each declares the scalars and fields that it
-//! provides, sees every accepted step, and writes its results at the end; the checkpoint keeps what it has seen.
+//! Observers of a run: probes, lines, sections, fields, couplings, pictures. Each declares the scalars and
+//! fields that it provides, sees every accepted step, and writes its results at the end; the checkpoint keeps
+//! what it has seen.
 
 use crate::report::Named;
 use polycore::Error;
@@ -9,8 +10,8 @@ use std::path::Path;
 
 /// Watches a run whose state is an `S`; `E` is the error of the program.
 ///
-/// `[[expect]]`, `check` and the field file know an observer by what [`scalars`](Self::scalars) and [`fields`](Self::fields)
-/// name, so a scalar or a field is written down once.
+/// `[[expect]]`, `check` and the field file know an observer by what [`scalars`](Self::scalars) and
+/// [`fields`](Self::fields) name, so a scalar or a field is written down once.
 pub trait Observer<S: ?Sized, E> {
     /// Names its scalars and how each follows from the final state.
     fn scalars(&self, _to: &mut Scalars<S>) {}
@@ -65,7 +66,7 @@ pub trait Observer<S: ?Sized, E> {
         Ok(())
     }
 
-    /// What it has seen, for the checkpoint.
+    /// Returns the state of the observer, for the checkpoint.
     fn save(&self) -> Vec<u8> {
         Vec::new()
     }
@@ -94,7 +95,7 @@ pub fn encode<T: Serialize>(seen: &T) -> Vec<u8> {
     postcard::to_stdvec(seen).unwrap_or_default()
 }
 
-/// What [`encode`] made bytes of.
+/// Decodes bytes of [`encode`].
 ///
 /// # Errors
 /// [`Error::Format`] for bytes of another version.
@@ -106,12 +107,12 @@ pub fn decode<T: DeserializeOwned>(saved: &[u8]) -> Result<T, Error> {
     })
 }
 
-/// Where the files of observers go.
+/// Destination of the files of observers.
 #[derive(Clone, Copy, Debug)]
 pub struct Outputs<'a> {
     /// Output folder of the run.
     pub folder: &'a Path,
-    /// Whether the scene asks for pictures.
+    /// True if the scene asks for pictures.
     pub pictures: bool,
 }
 
@@ -172,7 +173,7 @@ pub struct Field {
     pub name: String,
     /// Components at each place: 1, 3, 6 or 9.
     pub components: usize,
-    /// Where.
+    /// Place of the values.
     pub place: Place,
     /// Values; NaN where the field does not exist. Empty where names alone are asked for.
     pub values: Vec<f64>,
@@ -181,7 +182,7 @@ pub struct Field {
 /// Fields of observers: their names before a run, their values at a state.
 pub struct Fields<'a, S: ?Sized> {
     state: Option<&'a S>,
-    /// In the order of the observers.
+    /// Fields in the order of the observers.
     pub each: Vec<Field>,
 }
 
@@ -208,7 +209,7 @@ impl<'a, S: ?Sized> Fields<'a, S> {
 pub struct Observers<'a, S: ?Sized, E>(pub Vec<Box<dyn Observer<S, E> + Send + 'a>>);
 
 impl<S: ?Sized, E> Observers<'_, S, E> {
-    /// Names of all scalars.
+    /// Returns names of all scalars.
     pub fn names(&self) -> Vec<Named> {
         let mut names = Vec::new();
         let take = &mut |named, _| names.push(named);
@@ -265,7 +266,7 @@ impl<S: ?Sized, E> Observers<'_, S, E> {
         self.0.iter().flat_map(|observer| observer.work(state)).collect()
     }
 
-    /// What all have seen, for the checkpoint.
+    /// Returns the state of all observers, for the checkpoint.
     pub fn save(&self) -> Vec<Vec<u8>> {
         self.0.iter().map(|observer| observer.save()).collect()
     }

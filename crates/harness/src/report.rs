@@ -1,7 +1,8 @@
-//! What a run gives back: values and curves, judged expectations, work done, seconds by phase, provenance.
+//! Report of a run: values and curves, judged expectations, work, seconds by phase, provenance.
 //!
-//! [`Report::write`] puts it all into `report.json`, whole or not at all. JSON has no NaN; a non-finite number is
-//! written as the string `"NaN"`, `"inf"` or `"-inf"`, listed under `non_finite`, and fails the report.
+//! [`Report::write`] puts it all into `report.json`, whole or not at all. JSON has no NaN; a non-finite
+//! number is written as the string `"NaN"`, `"inf"` or `"-inf"`, listed under `non_finite`, and fails the
+//! report.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -17,10 +18,12 @@ mod expect;
 mod number;
 mod provenance;
 mod quantity;
+mod units;
 
 pub use expect::{Bound, Expect, Judgement, Kind, Tolerance};
 pub use provenance::{Git, Host, Provenance};
 pub use quantity::{Named, Quantity};
+pub use units::SceneUnits;
 
 /// The name of the file that [`Report::write`] leaves in the output directory.
 pub const FILE_NAME: &str = "report.json";
@@ -28,7 +31,7 @@ pub const FILE_NAME: &str = "report.json";
 /// A run's result.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Report {
-    /// All expectations met and all numbers finite.
+    /// True if all expectations are met and all numbers finite.
     pub passed: bool,
     /// Named scalars and curves.
     pub values: BTreeMap<String, Value>,
@@ -44,7 +47,7 @@ pub struct Report {
     /// Seconds by phase.
     #[serde(with = "number::map")]
     pub seconds: BTreeMap<String, f64>,
-    /// Which program ran which scene where.
+    /// Program, scene and machine.
     pub provenance: Provenance,
 }
 
@@ -52,17 +55,17 @@ pub struct Report {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Value {
-    /// One number.
+    /// A number.
     Scalar {
-        /// In `unit`.
+        /// Number, in `unit`.
         #[serde(with = "number")]
         value: f64,
-        /// As text, empty if dimensionless.
+        /// Unit, empty if dimensionless.
         unit: String,
     },
     /// Columns of equal length.
     Curve {
-        /// In the order given.
+        /// Columns in the order given.
         columns: Vec<Column>,
     },
 }
@@ -70,11 +73,11 @@ pub enum Value {
 /// A column of a curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Column {
-    /// Its heading.
+    /// Heading.
     pub name: String,
-    /// As text, empty if dimensionless.
+    /// Unit, empty if dimensionless.
     pub unit: String,
-    /// The numbers.
+    /// Numbers.
     #[serde(with = "number::list")]
     pub data: Vec<f64>,
 }
@@ -82,7 +85,7 @@ pub struct Column {
 /// A run of a stability suite.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Trial {
-    /// Its name.
+    /// Name.
     pub what: String,
     /// Expected behaviour, as the scene has it.
     pub description: String,
@@ -90,12 +93,13 @@ pub struct Trial {
     pub observed: String,
     /// Iterations or steps, where they are counted.
     pub iterations: Option<u64>,
-    /// It met its expectations.
+    /// True if the run met its expectations.
     pub passed: bool,
 }
 
 impl Report {
-    /// An empty report; `scene_text` is the scene as it was run (with its defaults resolved, where known).
+    /// Returns an empty report; `scene_text` is the scene as it was run (with its defaults resolved, where
+    /// known).
     pub fn new(program: &str, version: &str, scene_text: &str) -> Self {
         Self {
             passed: true,
@@ -151,7 +155,7 @@ impl Report {
         self
     }
 
-    /// A scalar by name.
+    /// Returns a scalar by name.
     pub fn scalar(&self, name: &str) -> Option<f64> {
         match self.values.get(name)? {
             Value::Scalar { value, .. } => Some(*value),
@@ -159,15 +163,23 @@ impl Report {
         }
     }
 
-    /// Judges expectations against the values so far, replacing earlier judgements; with `quick`, those marked
-    /// `quick = false` are left out.
+    /// Returns a scalar with six digits, and its unit; empty if there is none of that name.
+    pub fn shown(&self, name: &str) -> (String, String) {
+        match self.values.get(name) {
+            Some(Value::Scalar { value, unit }) => (number::short(*value), unit.clone()),
+            _ => Default::default(),
+        }
+    }
+
+    /// Judges expectations against the values so far, replacing earlier judgements; with `quick`, those
+    /// marked `quick = false` are left out.
     pub fn judge(&mut self, expectations: &[Expect], quick: bool) -> &mut Self {
         let asked = expectations.iter().filter(|expect| expect.quick || !quick);
         self.expect = asked.map(|expect| expect.judge(&self.values)).collect();
         self.refresh()
     }
 
-    /// Takes note that a run ended in an error before its end: it has not passed.
+    /// Records that a run ended with an error: it has not passed.
     pub fn ended(&mut self, what: &str, error: &str) -> &mut Self {
         self.trials.push(Trial {
             what: what.to_owned(),
@@ -180,7 +192,7 @@ impl Report {
         self
     }
 
-    /// Everything expected is satisfied, every trial passed, and every number is finite.
+    /// Returns whether all expectations are met, all trials passed and all numbers are finite.
     pub fn passed(&self) -> bool {
         self.passed
     }
@@ -204,7 +216,7 @@ impl Report {
     /// [`Error::Io`], or [`Error::Format`] if it is not a report.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(Error::io("read", path))?;
+        let text = std::fs::read_to_string(path).map_err(Error::from_io("read", path))?;
         serde_json::from_str(&text).map_err(|error| Error::Format {
             path: path.to_path_buf(),
             format: "report",
@@ -212,12 +224,13 @@ impl Report {
         })
     }
 
-    /// The scalars, work, times and judged expectations as text.
+    /// Returns the scalars, work, times and judged expectations as text.
     pub fn table(&self) -> String {
         self.table_of(|_| true)
     }
 
-    /// [`Report::table`] with those values alone that are requested by name; the number of the others is reported.
+    /// [`Report::table`] with those values alone that are requested by name; the number of the others is
+    /// reported.
     pub fn table_of(&self, shown: impl Fn(&str) -> bool) -> String {
         let mut text = String::new();
         let mut rows = Vec::new();
@@ -244,14 +257,14 @@ impl Report {
         text + &self.verdict()
     }
 
-    /// Of the expectations of some quantities: how many hold, and what the others missed.
+    /// Returns how many expectations of some quantities are met, and the rows of those that are not.
     pub fn verdict_on(&self, quantities: impl Fn(&str) -> bool) -> (usize, Vec<String>) {
         let of_it = || self.expect.iter().filter(|j| quantities(&j.expect.quantity));
         let missed = of_it().filter(|j| !j.pass).map(|j| j.row()[..].join(" ")).collect();
         (of_it().filter(|j| j.pass).count(), missed)
     }
 
-    /// The judged expectations and what is not finite, as text.
+    /// Returns the judged expectations and what is not finite, as text.
     pub fn verdict(&self) -> String {
         let mut text = String::new();
         text += &aligned(&self.expect.iter().map(Judgement::row).collect::<Vec<_>>());
@@ -331,13 +344,14 @@ impl Phases {
         }
     }
 
-    /// The ended phases in order of first appearance.
+    /// Returns the ended phases in order of first appearance.
     pub fn seconds(&self) -> impl Iterator<Item = (&str, f64)> {
         self.done.iter().map(|(phase, seconds)| (phase.as_str(), *seconds))
     }
 }
 
-/// Aligns cells in columns that are two blanks apart; rows of another length than the first do not widen them.
+/// Aligns cells in columns that are two blanks apart; rows of another length than the first do not widen
+/// them.
 pub fn aligned<R: AsRef<[String]>>(rows: &[R]) -> String {
     let columns = rows.first().map_or(0, |row| row.as_ref().len());
     let mut widths = vec![0; columns];

@@ -14,14 +14,16 @@
 //! assert!(error.message().contains("did you mean `spacing`?"));
 //! ```
 //!
-//! Every scene begins with `version = 1`; [`Source::parse`] checks and removes that key, and `[inputs]`, so scene types do not
-//! declare them. Alternatives are best written as a struct of options that is checked afterwards: serde buffers untagged
-//! enums, after which it knows neither the place nor what would have been allowed. Cross-field checks are the program's: it reports them with [`Source::error`].
+//! Every scene begins with `version = 1`; [`Source::parse`] checks and removes that key, and `[inputs]`, so
+//! scene types do not declare them. Alternatives are best written as a struct of options that is checked
+//! afterwards: serde buffers untagged enums, after which it knows neither the place nor what would have been
+//! allowed. Cross-field checks are the program's: it reports them with [`Source::error`].
 
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use serde::Deserialize as _;
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
@@ -56,6 +58,9 @@ pub const SWEEP: &str = "sweep";
 /// The table of a scene that names the scenes whose results it reads; the harness reads it, programs do not.
 pub const INPUTS: &str = "inputs";
 
+/// The table of a scene that names the values to show first; the harness reads it, programs do not.
+pub const REPORT: &str = "report";
+
 /// A larger file is not a scene; numbers in bulk belong into CSV files beside it.
 pub const LARGEST_FILE: u64 = 16 << 20;
 
@@ -64,9 +69,9 @@ pub const LARGEST_FILE: u64 = 16 << 20;
 pub struct Source {
     /// The file, as given by the user.
     pub path: PathBuf,
-    /// Its content.
+    /// Content of the file.
     pub text: String,
-    /// What stands in for other parts, see [`Source::with_replaced`].
+    /// Replacements of parts of the scene, see [`Source::with_replaced`].
     overlays: Vec<overlay::Overlay>,
     /// Files that have been read for it.
     files: files::Notes,
@@ -75,7 +80,7 @@ pub struct Source {
 }
 
 impl Source {
-    /// A scene that does not lie in a file; `path` only names it in messages.
+    /// Returns a scene that does not lie in a file; `path` only names it in messages.
     pub fn new(path: impl Into<PathBuf>, text: impl Into<String>) -> Self {
         Self {
             path: path.into(),
@@ -131,7 +136,8 @@ impl Source {
         root.get_mut().remove("version");
         self.overlay(root.get_mut())?;
         root.get_mut().remove(INPUTS);
-        T::deserialize(Deserializer::from(root)).map_err(|error| {
+        let report = root.get_mut().remove(REPORT).map_or(Ok(()), check_report);
+        report.and_then(|()| T::deserialize(Deserializer::from(root))).map_err(|error| {
             // the first tree went into the deserializer; errors are rare, so parse once more
             match DeTable::parse(&self.text) {
                 Ok(root) => {
@@ -143,29 +149,47 @@ impl Source {
         })
     }
 
-    /// An error about the value at a dotted key path, for rules that span several keys.
+    /// Reports the value at a dotted key path, for rules that span several keys.
     ///
-    /// `source.error("body.parts[1].radius", "0.6 m, larger than the plate", "less than 0.5 m")`. A path that does
-    /// not exist points at its nearest existing parent.
+    /// `source.error("body.parts[1].radius", "0.6 m, larger than the plate", "less than 0.5 m")`. A path that
+    /// does not exist points at its nearest existing parent.
     pub fn error(&self, key: &str, found: impl ToString, allowed: impl ToString) -> SceneError {
         let (key, span) = self.place(key);
         SceneError::value(self, &key, span, &found.to_string(), &allowed.to_string())
     }
 
-    /// As [`Source::error`], of what already tells what was found and what is allowed: a file that cannot be used.
+    /// Reports a key that must be written: "missing `key`: needed for …".
+    pub fn missing(&self, key: &str, why: impl ToString) -> SceneError {
+        let (key, span) = self.place(key);
+        SceneError::missing(self, key, span, &why.to_string())
+    }
+
+    /// Reports a key that has no meaning here: "unexpected `key`: …".
+    pub fn unexpected(&self, key: &str, why: impl ToString) -> SceneError {
+        let (key, span) = self.place(key);
+        SceneError::unexpected(self, key, span, &why.to_string())
+    }
+
+    /// Reports a key that excludes another one: "`key` conflicts with `other`: …".
+    pub fn conflict(&self, key: &str, other: &str, why: impl ToString) -> SceneError {
+        let (key, span) = self.place(key);
+        SceneError::conflict(self, key, span, other, &why.to_string())
+    }
+
+    /// Reports an error at a key in its own words, such as a file that cannot be used.
     pub fn refused(&self, key: &str, error: impl ToString) -> SceneError {
         let (key, span) = self.place(key);
         SceneError::refused(self, key, span, &error.to_string())
     }
 
-    /// As [`Source::error`], of a name that is none of the known ones; a similar one is proposed, and of many the
+    /// Reports a name that is not known; a similar one is proposed, and of many the
     /// most similar ones are shown.
     pub fn unknown(&self, key: &str, name: &str, known: &[&str]) -> SceneError {
         let (key, span) = self.place(key);
         SceneError::unknown(self, key, span, name, known)
     }
 
-    /// Where the value at a dotted key path is written: its path in the text and its span.
+    /// Returns the path in the text and the span of the value at a dotted key path.
     fn place(&self, key: &str) -> (String, std::ops::Range<usize>) {
         let root = DeTable::parse(&self.text).ok();
         let origin = root.as_ref().and_then(|root| self.origin(root.get_ref(), key));
@@ -194,7 +218,20 @@ impl Source {
     }
 }
 
-/// The fault of the key `program` alone: where the scene is another program's, all other keys are, too.
+/// The table `[report]`.
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ReportSpec {
+    #[serde(rename = "values")]
+    _values: Vec<String>,
+}
+
+fn check_report(table: Spanned<DeValue<'_>>) -> Result<(), toml::de::Error> {
+    ReportSpec::deserialize(toml::de::ValueDeserializer::from(table)).map(drop)
+}
+
+/// Returns the fault of the key `program` alone: where the scene is another program's, all other keys are,
+/// too.
 fn wrong_program<T: DeserializeOwned>(root: &Spanned<DeTable<'_>>) -> Option<toml::de::Error> {
     let (key, value) = root.get_ref().get_key_value("program")?;
     let mut alone = DeTable::new();

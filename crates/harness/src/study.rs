@@ -1,5 +1,5 @@
-//! Studies of a scene: a `[[study]]` replaces parts of the scene, sets single keys, and lists values of keys; every
-//! combination of the values is a variant, a scene of its own.
+//! Studies of a scene: a `[[study]]` replaces parts of the scene, sets single keys, and lists values of keys;
+//! every combination of the values is a variant, a scene of its own.
 
 mod compare;
 mod convergence;
@@ -27,7 +27,8 @@ crate::quantities! {
     pub OF_STUDIES:
     LIMIT = "{convergence}.limit", "*", "value that three studies tend to, after Richardson";
     ORDER = "{convergence}.order", "", "observed order of these studies";
-    ERROR_OF = "{curve}.error_of_{study}", "", "root mean square of the errors of a study, in the unit of its quantities, in an error-against-time curve";
+    ERROR_OF = "{curve}.error_of_{study}", "", "rms error of a study in an error-against-time curve, in its \
+        unit";
 }
 
 /// A `T` of the scene that a study gives: read where it stands in for the scene's own.
@@ -64,8 +65,9 @@ impl<T: JsonSchema> JsonSchema for Instead<T> {
     }
 }
 
-/// Declares the `[[study]]` of a program: `replaces` are blocks of the scene with their types, `lists` keys whose values may
-/// be listed; both name the key of the scene. A key before the one that holds it: the first holds.
+/// Declares the `[[study]]` of a program: `replaces` are blocks of the scene with their types, `lists` keys
+/// whose values may be listed; both name the key of the scene. A key before the one that holds it: the first
+/// holds.
 #[macro_export]
 macro_rules! study {
     ($(#[$about:meta])* pub struct $name:ident;
@@ -75,7 +77,7 @@ macro_rules! study {
         #[derive(Clone, Debug, Default, serde::Deserialize, schemars::JsonSchema)]
         #[serde(deny_unknown_fields, default)]
         pub struct $name {
-            /// Its name, a part of the names of values and files.
+            /// Name, a part of the names of values and files.
             pub name: Option<String>,
             /// Expected behaviour, for the table of a suite.
             pub description: Option<String>,
@@ -94,7 +96,7 @@ macro_rules! study {
         }
 
         impl $name {
-            /// The study as the harness resolves it.
+            /// Returns the study as the harness resolves it.
             pub fn study(&self) -> $crate::study::Study {
                 let Self { name, description, expect_error, quick, set, vary, .. } = self.clone();
                 let replaced = [$(($key, stringify!($block), self.$block.is_some()),)*];
@@ -117,7 +119,7 @@ macro_rules! study {
 /// A `[[study]]`, whatever the program.
 #[derive(Clone, Debug, Default)]
 pub struct Study {
-    /// Its name.
+    /// Name.
     pub name: Option<String>,
     /// Expected behaviour.
     pub description: Option<String>,
@@ -125,7 +127,7 @@ pub struct Study {
     pub expect_error: Option<String>,
     /// Part of `--quick` runs.
     pub quick: bool,
-    /// Whether it has a `set`.
+    /// True if it has a `set`.
     pub sets: bool,
     /// Keys of the scene and the keys of the study that replace them.
     pub replaced: Vec<[&'static str; 2]>,
@@ -153,7 +155,7 @@ impl Naming {
         }
     }
 
-    /// Whether a quantity is a value of a variant.
+    /// Returns whether a quantity is a value of a variant.
     pub fn is_of(self, variant: &str, quantity: &str) -> bool {
         match self {
             Self::Brackets => quantity.ends_with(&format!("[{variant}]")),
@@ -164,7 +166,9 @@ impl Naming {
     fn check(self, source: &Source, key: &str, name: Option<&str>) -> Result<(), SceneError> {
         let stops = |c: char| c.is_control() || "/\\[]".contains(c);
         match (self, name) {
-            (Self::Folders, None) => Err(source.error(key, "nothing", "a name: values and a folder have it")),
+            (Self::Folders, None) => {
+                Err(source.missing(key, "the values and the folder of a study have its name"))
+            }
             (Self::Folders, Some(name)) => check_name(source, key, name),
             (Self::Brackets, Some(name)) if name.contains(stops) => {
                 let allowed = "a name without `/`, `\\`, `[`, `]`: files and values have it";
@@ -178,7 +182,7 @@ impl Naming {
 /// A variant of a scene.
 #[derive(Clone, Debug)]
 pub struct Variant {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// The index of its study; none of a scene without studies.
     pub study: Option<usize>,
@@ -190,12 +194,13 @@ pub struct Variant {
     pub expect_error: Option<String>,
 }
 
-/// Lists the variants of a scene: the scene itself where it has no studies; `quick` leaves out those of studies with
-/// `quick = false`. `name` names a variant by its scene and its study's name; of equal variants the first is taken.
+/// Lists the variants of a scene: the scene itself where it has no studies; `quick` leaves out those of
+/// studies with `quick = false`. `name` names a variant by its scene and its study's name; of equal variants
+/// the first is taken.
 ///
 /// # Errors
-/// Names of studies that cannot be names of files, equal names of different variants, a quick run of nothing, and what `name`
-/// finds.
+/// Names of studies that cannot be names of files, equal names of different variants, a quick run of nothing,
+/// and what `name` finds.
 pub fn variants(
     source: &Source,
     studies: &[Study],
@@ -222,7 +227,8 @@ pub fn variants(
             .map(|(key, values)| (key.as_str(), format!("vary.{key}"), values.len(), Some(values)));
         let lists: Vec<_> = lists.chain(vary).collect();
         for places in grid(&lists.iter().map(|list| list.2).collect::<Vec<_>>()) {
-            // of what concerns a key the first holds: listed values before single keys, and these before blocks
+            // of what concerns a key the first holds: listed values before single keys, and these before
+            // blocks
             let (mut own, mut label) = (source.clone(), study.name.clone());
             for ((key, list, _, values), place) in lists.iter().zip(places) {
                 own = own.with_replaced(key, &format!("study[{index}].{list}[{place}]"));
@@ -287,10 +293,10 @@ pub fn grid(lengths: &[usize]) -> impl Iterator<Item = Vec<usize>> {
 
 /// A solved variant, as comparisons see it.
 pub trait Solved {
-    /// Its name.
+    /// Name.
     fn name(&self) -> &str;
 
-    /// A scalar and its unit.
+    /// Returns a scalar and its unit.
     fn scalar(&self, quantity: &str) -> Option<(f64, &str)>;
 
     /// Seconds of its solution; none if it has failed.
@@ -332,7 +338,7 @@ impl Comparisons<'_> {
         self.curves.iter().enumerate().try_for_each(|(index, spec)| spec.check(source, index, variants))
     }
 
-    /// Names of the scalars that they add to a report.
+    /// Returns names of the scalars that they add to a report.
     pub fn names(&self) -> impl Iterator<Item = Named> {
         let tables = self.convergence.iter().flat_map(|spec| [LIMIT, ORDER].map(|q| q.of(&[&spec.name])));
         let curves = self.curves.iter().flat_map(|spec| spec.studies.iter().map(|study| (&spec.name, study)));

@@ -18,7 +18,8 @@ fn expected(step: usize) -> Value {
     let stress: Vec<[f64; 6]> =
         (0..POINTS).map(|i| std::array::from_fn(|c| 1e6 * wave(i, c as f64))).collect();
     let damage: Vec<[f64; 1]> = (0..POINTS).map(|i| [wave(i, 0.3).abs()]).collect();
-    json!({ "points": points, "arrays": { "displacement": displacement, "stress": stress, "damage": damage } })
+    let arrays = json!({ "displacement": displacement, "stress": stress, "damage": damage });
+    json!({ "points": points, "arrays": arrays })
 }
 
 fn floats(values: &Value) -> Vec<f64> {

@@ -1,4 +1,5 @@
-//! `cargo xtask bench mdsurrogate`: nanoseconds a point of stress, of tangent and of batches, of the thesis' network and of energies.
+//! `cargo xtask bench mdsurrogate`: nanoseconds per point for stress, tangent and batches of the thesis'
+//! network and of energies.
 
 use clap::Parser;
 use evidence::measurement::{Measurement, print};
@@ -13,21 +14,21 @@ use std::time::Instant;
 mod points;
 mod training;
 
-/// Repetitions, of which the median counts.
+/// Number of repetitions; the median is reported.
 const REPEATS: usize = 15;
 
-/// What to measure.
+/// Measures the speed of laws or of their training.
 #[derive(Parser)]
 struct Bench {
     /// Print JSON rows {what, size, threads, value, unit}.
     #[arg(long)]
     json: bool,
-    /// Measure training: an epoch of the thesis' network on rows of the thesis' number.
+    /// Measure training: one epoch of the thesis' network with as many rows.
     #[arg(long, conflicts_with = "law")]
     training: bool,
-    /// A law to measure instead of the built-in ones with random weights.
+    /// Law to measure instead of the built-in ones with random weights.
     law: Option<std::path::PathBuf>,
-    /// What `cargo bench` adds.
+    /// Argument that `cargo bench` adds.
     #[arg(long, hide = true)]
     bench: bool,
 }
@@ -86,7 +87,7 @@ fn measure<T: Real + Scalar>(
     Ok(())
 }
 
-/// Nanoseconds a point.
+/// Returns the median time in nanoseconds per point.
 fn median_time(mut run: impl FnMut() -> Result<(), Error>) -> Result<f64, Error> {
     let mut times = [0.0; REPEATS];
     for time in &mut times {

@@ -1,5 +1,5 @@
-//! `cargo bench -p mdsurrogate`: a stress, a stress with its tangent and lists of stresses, as `cargo xtask bench mdsurrogate` measures
-//! them, for a list of 512 points.
+//! `cargo bench -p mdsurrogate`: stress, stress with tangent, and batches of stresses for 512 points, as in
+//! `cargo xtask bench mdsurrogate`.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use mdsurrogate::surrogate::{Prediction, Workspace};

@@ -1,14 +1,14 @@
-//! The laws and strains that answers are measured on; `cargo bench` takes them, too.
+//! Laws and strains of the benchmarks.
 
 use mdsurrogate::Error;
 use mdsurrogate::network::{Activation::Softplus, Architecture, Real};
 use mdsurrogate::surrogate::{Header, Kind, Surrogate, Symmetry};
 use nalgebra::{SVector, Scalar};
 
-/// Points of one repetition.
+/// Points per repetition.
 pub const POINTS: usize = 512;
 
-/// The thesis' network and an energy, with random weights.
+/// Returns the thesis' network and an energy, with random weights.
 pub fn laws() -> Result<Vec<(String, Surrogate<f64>)>, Error> {
     let mut ann = Header::new(Kind::Ann, &[], 1);
     ann.architecture = Architecture::thesis(4)?;
@@ -18,7 +18,7 @@ pub fn laws() -> Result<Vec<(String, Surrogate<f64>)>, Error> {
     named.into_iter().map(|(name, header)| Ok((name.to_owned(), Surrogate::random(header, 1)?))).collect()
 }
 
-/// C with stretches of some per cent and a little shear.
+/// Returns C with stretches of 0.9 to 1.3 and a little shear.
 pub fn points<T: Real + Scalar>() -> Vec<SVector<T, 6>> {
     let [low, high] = [0.9, 1.3];
     let point = |k: usize| {

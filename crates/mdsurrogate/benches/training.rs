@@ -1,22 +1,22 @@
-//! `cargo xtask bench mdsurrogate -- --training`: seconds of an epoch of the thesis' network.
+//! `cargo xtask bench mdsurrogate -- --training`: seconds per epoch of the thesis' network.
 
 use evidence::measurement::Measurement;
 use mdsurrogate::Error;
-use mdsurrogate::dataset::Row;
-use mdsurrogate::kinematics::cauchy_of_material;
+use mdsurrogate::dataset::DataRow;
+use mdsurrogate::kinematics::cauchy_from_material;
 use mdsurrogate::network::Architecture;
 use mdsurrogate::random::SplitMix64;
 use mdsurrogate::surrogate::Kind;
 use mdsurrogate::train::{Settings, Training};
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 
-/// Training rows of the thesis: 80 % of 72,720.
+/// Number of training rows in the thesis: 80 % of 72,720.
 const ROWS: usize = 58_176;
 const BATCHES: [usize; 2] = [32, 256];
-/// Epochs, of which the median counts.
+/// Number of epochs; the median is reported.
 const EPOCHS: u32 = 5;
 
-/// Seconds of an epoch of ANN-4 by batch, on one thread.
+/// Returns the seconds per epoch of ANN-4 for each batch size, on one thread.
 pub fn measure() -> Result<Vec<Measurement>, Error> {
     let mut random = SplitMix64::new(1);
     let mut rows = Vec::with_capacity(ROWS);
@@ -25,9 +25,9 @@ pub fn measure() -> Result<Vec<Measurement>, Error> {
         let f = Tensor::from_diagonal(&[stretch(), stretch(), stretch()].into());
         let f = DeformationGradient::new(f)?;
         let s = Voigt::from_fn(|a, _| 1e9 * ((a + 1) as f64 * f.matrix()[(a % 3, a % 3)]).sin());
-        rows.push(Row::new(sample as u64, f64::NAN, f, cauchy_of_material(&f, &s)));
+        rows.push(DataRow::new(sample as u64, f64::NAN, f, cauchy_from_material(&f, &s)));
     }
-    let rows: Vec<&Row> = rows.iter().collect();
+    let rows: Vec<&DataRow> = rows.iter().collect();
     let header = mdsurrogate::fitted::header(Kind::Ann, Architecture::thesis(4)?, 1, &rows, true)?;
     let mut measured = Vec::new();
     for batch in BATCHES {

@@ -1,4 +1,5 @@
-//! Asks a model for stress, tangent and uncertainty: `cargo run --release --example predict [law.safetensors]`.
+//! Predicts stress, tangent and uncertainty with a model: `cargo run --release --example predict
+//! [law.safetensors]`.
 
 use polycore::constitutive::network::Activation::Softplus;
 use polycore::constitutive::surrogate::{Header, Kind, Prediction, Surrogate, Symmetry, Workspace};
@@ -8,7 +9,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = tempfile::tempdir()?;
     let path = std::env::args().nth(1).map_or(folder.path().join("law.safetensors"), Into::into);
     if !path.exists() {
-        // random weights instead of a training: an orthotropic energy, an ensemble of two
+        // without a file: random weights in an ensemble of two orthotropic energies
         let header = Header::new(Kind::energy(Symmetry::Orthotropic), &[(32, Softplus), (32, Softplus)], 2);
         Surrogate::random(header, 1)?.write(&path)?;
     }
@@ -18,9 +19,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let found = model.predict(&Voigt::new(1.1, 1.0, 1.0, 0.1, 0.0, 0.0))?;
     println!("S11 = {:.4} MPa, spread {:.4} MPa", found.stress[0] / 1e6, found.spread / 1e6);
     println!("C1111 = {:.4} MPa", found.tangent.unwrap_or_default()[(0, 0)] / 1e6);
-    println!("outside of the training data: {:?}, never seen: {:?}", found.flags.outside, found.flags.unseen);
+    println!("outside the training data: {:?}, never varied: {:?}", found.flags.outside, found.flags.unseen);
 
-    // many points: the same bits at half the cost, without an allocation in the calls that follow
+    // many points: bit-identical at half the cost, without allocations after the first call
     let points: Vec<Voigt> =
         (0..1000).map(|k| Voigt::new(1.0 + 1e-4 * f64::from(k), 1.0, 1.0, 0.0, 0.0, 0.0)).collect();
     let (mut predictions, mut memory) = (vec![Prediction::default(); points.len()], Workspace::default());

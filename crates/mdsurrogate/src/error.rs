@@ -1,109 +1,109 @@
-//! What can go wrong in this crate: where, what was found, what is allowed.
+//! Errors of this crate: place, value found, allowed values.
 
 use std::path::{Path, PathBuf};
 
-/// Errors of the surrogate crate.
+/// Errors of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A result is not finite.
     #[error("{quantity} is not finite at {place}")]
     NotFinite {
-        /// What.
+        /// Name of the quantity.
         quantity: &'static str,
-        /// The row, or where else.
+        /// Row, or other place.
         place: String,
     },
-    /// One cell of a table.
+    /// Invalid cell of a table.
     #[error("{}:{line}: column `{column}`: found {found}; allowed: {allowed}", path.display())]
     Cell {
-        /// The file.
+        /// File.
         path: PathBuf,
-        /// Its line, from 1 (of the unpacked text).
+        /// Line, from 1 (in the unpacked text).
         line: u64,
-        /// The heading.
+        /// Heading of the column.
         column: String,
-        /// What stands there.
+        /// Content of the cell.
         found: String,
-        /// What may stand there.
+        /// Allowed content.
         allowed: String,
     },
-    /// A column that a table needs and does not have.
+    /// Missing column of a table.
     #[error("{}:1: column `{column}` is missing{}", path.display(), hint(similar))]
     MissingColumn {
-        /// The file.
+        /// File.
         path: PathBuf,
-        /// The heading looked for.
+        /// Heading of the missing column.
         column: String,
-        /// The nearest heading that is there.
+        /// Most similar heading of the file.
         similar: Option<String>,
     },
-    /// A file whose content is not what it should be.
+    /// File with invalid content.
     #[error("{}: found {found}; allowed: {allowed}", path.display())]
     File {
-        /// The file.
+        /// File.
         path: PathBuf,
-        /// What is wrong.
+        /// Content found.
         found: String,
-        /// What it should be.
+        /// Allowed content.
         allowed: String,
     },
-    /// Numbers that are no deformation or stress in the units stated.
+    /// Implausible deformation or stress, probably in a wrong unit.
     #[error("{place}: {quantity} = {found}, but {allowed}; is a unit wrong?")]
     Implausible {
         /// File and line, or the whole set.
         place: String,
-        /// What.
+        /// Name of the quantity.
         quantity: String,
-        /// The offending value with its unit.
+        /// Value found, with its unit.
         found: String,
-        /// The plausible range and its reason.
+        /// Plausible range, with its reason.
         allowed: &'static str,
     },
-    /// Too few or repeated data for what was asked.
+    /// Insufficient or repeated data.
     #[error("{what}: found {found}; allowed: {allowed}")]
     Data {
-        /// The operation.
+        /// Operation.
         what: &'static str,
-        /// What was found.
+        /// Data found.
         found: String,
-        /// What it needs.
+        /// Data needed.
         allowed: String,
     },
-    /// A parameter out of its domain.
+    /// Parameter out of its domain.
     #[error("{name}: found {found}; allowed: {allowed}")]
     Parameter {
-        /// What.
+        /// Name of the parameter.
         name: &'static str,
-        /// The value found.
+        /// Value found.
         found: String,
-        /// What is allowed.
+        /// Allowed values.
         allowed: String,
     },
-    /// A training whose numbers left the range of f32.
+    /// Training that diverged: its numbers exceed f32.
     #[error(
         "training diverged in epoch {epoch}, batch {batch}: loss {loss} at learning rate {learning_rate:e}; \
-         allowed: finite numbers (a smaller learning rate); the epochs before are kept"
+         use a smaller learning rate (earlier epochs are kept)"
     )]
     Diverged {
-        /// From 1.
+        /// Epoch, from 1.
         epoch: u32,
-        /// From 1.
+        /// Batch, from 1.
         batch: usize,
-        /// What was found.
+        /// Loss of this batch.
         loss: f64,
-        /// Adam's step.
+        /// Learning rate of Adam.
         learning_rate: f64,
     },
-    /// Files, output, scenes, tensors.
+    /// Error of files, output, scenes or tensors.
     #[error(transparent)]
     Shared(#[from] polycore::Error),
 }
 
 impl Error {
-    /// For `map_err` on file operations.
-    pub fn io(operation: &'static str, path: impl AsRef<Path>) -> impl FnOnce(std::io::Error) -> Self {
-        let error = polycore::Error::io(operation, path);
+    /// Returns a function for `map_err` on file operations.
+    pub fn from_io(operation: &'static str, path: impl AsRef<Path>) -> impl FnOnce(std::io::Error) -> Self {
+        let error = polycore::Error::from_io(operation, path);
         move |source| Self::Shared(error(source))
     }
 
@@ -122,7 +122,7 @@ impl From<polycore::tensor::Error> for Error {
     }
 }
 
-/// What a model refuses is reported as this crate's own errors.
+/// Converts errors of models to errors of this crate.
 impl From<polycore::constitutive::Error> for Error {
     fn from(error: polycore::constitutive::Error) -> Self {
         use polycore::constitutive::Error as Law;
@@ -134,7 +134,7 @@ impl From<polycore::constitutive::Error> for Error {
     }
 }
 
-/// The nearest of some names, if one is near enough to be meant.
+/// Returns the most similar name, if it is similar enough.
 pub(crate) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Option<String> {
     let first = |text: &str| text.chars().next();
     let scored =

@@ -1,52 +1,54 @@
-//! The header of a model that is to be trained: its inputs and outputs scaled by the training rows.
+//! Header of a model before training: scales of inputs and outputs from the training rows.
 
 use crate::Error;
-use crate::dataset::Row;
+use crate::dataset::DataRow;
 use crate::network::{Architecture, LANES};
-use crate::surrogate::{Features, Header, Kind, Support, Surrogate, UNSEEN};
+use crate::surrogate::{CONSTANT_TOLERANCE, Features, Header, Kind, Support, Surrogate};
 use nalgebra::Vector3;
 use polycore::numerics::range;
 use polycore::tensor::{Tensor, Voigt, voigt};
 
-/// Representatives of the training strains in a law ([`Support`]).
+/// Number of representatives of the training strains in a law ([`Support`]).
 const REPRESENTATIVES: usize = 256;
 
-/// Least deviation of an energy's input, over that which it would have if the components of C varied as they do but
-/// independently of each other. An invariant that varies less, as det C of rubber, is scaled by that: standardised by its own
-/// deviation it would be noise, and W of that noise a stress larger by one over it. It stays an input, since its slope is a
-/// stress also where it is constant: the pressure. A tenth is ten times below any input that tells something by itself.
+/// Smallest deviation of an input of an energy, relative to the deviation for independent variations of the
+/// components of C. An invariant that varies less, e.g. det C of rubber, is scaled by this value:
+/// standardised by its own deviation it would be noise, amplified in the stress by one over that deviation.
+/// It stays an input, because its slope is a stress even if it is constant: the pressure. The value of 0.1 is
+/// ten times below inputs with information of their own.
 const LEAST_DEVIATION: f64 = 0.1;
 
-/// Names of an energy's invariants that hardly vary in these rows, those of its training, although C does: scaled by
-/// what they could vary ([`header`]), and unknown where they do vary.
-pub fn constrained(model: &Surrogate, rows: &[&Row]) -> Vec<&'static str> {
+/// Returns the names of invariants of an energy that hardly vary in its training rows although C does; they
+/// are scaled by their possible variation ([`header`]), and predictions at other values are extrapolations.
+pub fn constrained(model: &Surrogate, rows: &[&DataRow]) -> Vec<&'static str> {
     let Some(invariants) = model.header().kind.invariants() else { return Vec::new() };
     let values: Vec<[f64; LANES]> = rows.iter().map(|row| model.features(&row.c).values).collect();
     let constrained = |k: &usize| {
         let column: Vec<f64> = values.iter().map(|value| value[*k]).collect();
-        // standardised: 1, or less where the least deviation was taken
-        model.coefficients().inverse[*k] > 0.0 && moments("inputs", &column).is_ok_and(|[_, own]| own < 0.5)
+        // standardised deviation: 1, or less if the smallest deviation was used
+        model.coefficients().inverse[*k] > 0.0
+            && moments("inputs", &column).is_ok_and(|[_, deviation]| deviation < 0.5)
     };
     (0..invariants.count()).filter(constrained).map(|k| invariants.name(k)).collect()
 }
 
-/// The header of a model of these hidden layers whose inputs are standardised by `rows` (3.8) and whose outputs are
-/// scaled by them: the stress of an `ann` component by component if `standardised`, else in MPa (as in the thesis); an energy by the
-/// largest product of deviations of S and C. Training box and representatives are those of the rows and of what the symmetry makes
-/// the same: sheared one way, an orthotropic law knows the other.
+/// Creates the header of a model: `rows` standardise the inputs (3.8) and scale the outputs, i.e. the stress
+/// of an `ann` component by component if `standardised`, otherwise in MPa (as in the thesis), and an energy
+/// by the largest product of deviations of S and C. Training box and representatives cover the rows and their
+/// symmetric equivalents: after shear in one direction, an orthotropic law also knows the other direction.
 ///
 /// # Errors
-/// [`Error::Data`] for no row; [`Error::Parameter`] for numbers that are not finite or no network.
+/// Returns [`Error::Data`] for no rows; [`Error::Parameter`] for non-finite numbers and invalid networks.
 pub fn header(
     kind: Kind,
     architecture: Architecture,
     members: usize,
-    rows: &[&Row],
+    rows: &[&DataRow],
     standardised: bool,
 ) -> Result<Header, Error> {
     let mut header = Header::new(kind, &[], members);
     let inputs = header.kind.inputs();
-    // features of a law without hidden layers are those of any
+    // features do not depend on the hidden layers
     let raw = Surrogate::<f64>::random(header.clone(), 0)?;
     header.architecture = architecture;
     header.check()?;
@@ -56,32 +58,32 @@ pub fn header(
         [header.input_mean[k], header.input_deviation[k]] = moments("inputs", &column)?;
     }
     let known = equivalents(&header.kind, rows);
-    let (mut of_stress, mut of_strain) = ([[0.0; 2]; 6], [0.0; 6]);
+    let (mut stress_moments, mut strain_deviation) = ([[0.0; 2]; 6], [0.0; 6]);
     let mut largest = 0.0f64;
     for a in 0..6 {
         let stress: Vec<f64> = rows.iter().map(|row| row.s[a]).collect();
         let strain: Vec<f64> = rows.iter().map(|row| row.c[a]).collect();
         let known = known.iter().map(|c| c[a]);
-        of_stress[a] = moments("S", &stress)?;
-        [_, of_strain[a]] = moments("C", &strain)?;
-        largest = largest.max(of_stress[a][1] * of_strain[a]);
+        stress_moments[a] = moments("S", &stress)?;
+        [_, strain_deviation[a]] = moments("C", &strain)?;
+        largest = largest.max(stress_moments[a][1] * strain_deviation[a]);
         header.training_box[a] = range(known);
     }
     if header.kind != Kind::Ann {
         for (k, deviation) in header.input_deviation.iter_mut().enumerate() {
             let independent = |features: &Features| -> f64 {
-                (0..6).map(|a| (features.slopes[k][a] * of_strain[a]).powi(2)).sum()
+                (0..6).map(|a| (features.slopes[k][a] * strain_deviation[a]).powi(2)).sum()
             };
             let square = features.iter().map(independent).sum::<f64>() / rows.len() as f64;
             *deviation = deviation.max(LEAST_DEVIATION * square.sqrt());
         }
     }
-    header.support = Some(Support::of(&known, REPRESENTATIVES)?);
+    header.support = Some(Support::from_rows(&known, REPRESENTATIVES)?);
     match header.kind {
         Kind::Ann if standardised => {
-            for (a, [mean, deviation]) in of_stress.into_iter().enumerate() {
+            for (a, [mean, deviation]) in stress_moments.into_iter().enumerate() {
                 header.output_mean[a] = mean;
-                // a stress that never changes is its mean
+                // a constant stress is predicted by its mean
                 header.output_deviation[a] = deviation;
             }
         }
@@ -93,8 +95,9 @@ pub fn header(
     Ok(header)
 }
 
-/// The strains of rows, and those that a symmetry makes the same: turned half about its axes, where that changes any.
-fn equivalents(kind: &Kind, rows: &[&Row]) -> Vec<Voigt> {
+/// Returns the strains of rows and their symmetric equivalents: half turns about the axes, if these change
+/// any row.
+fn equivalents(kind: &Kind, rows: &[&DataRow]) -> Vec<Voigt> {
     let own: Vec<Voigt> = rows.iter().map(|row| row.c).collect();
     let mut all = own.clone();
     if let Kind::Energy { symmetry, axes, .. } = kind {
@@ -102,7 +105,7 @@ fn equivalents(kind: &Kind, rows: &[&Row]) -> Vec<Voigt> {
             let axis = Vector3::from(axes[axis]);
             let turn = 2.0 * axis * axis.transpose() - Tensor::identity();
             let turned = |c: &Voigt| voigt::from_stress(&(turn * voigt::to_stress(c) * turn.transpose()));
-            if own.iter().any(|c| (turned(c) - c).norm() > UNSEEN) {
+            if own.iter().any(|c| (turned(c) - c).norm() > CONSTANT_TOLERANCE) {
                 all.extend(own.iter().map(turned));
             }
         }
@@ -110,15 +113,15 @@ fn equivalents(kind: &Kind, rows: &[&Row]) -> Vec<Voigt> {
     all
 }
 
-/// Mean and standard deviation (divisor n); a deviation that rounding leaves of a constant is 0.
+/// Computes mean and standard deviation (divisor n); a deviation due to rounding becomes 0.
 fn moments(what: &'static str, values: &[f64]) -> Result<[f64; 2], Error> {
     if values.is_empty() {
-        let (found, allowed) = ("no row".into(), "at least one row to learn from".into());
+        let (found, allowed) = ("no row".into(), "at least one training row".into());
         return Err(Error::Data { what: "training", found, allowed });
     }
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
-    // a second pass about the mean does not cancel
+    // the second pass about the mean avoids cancellation
     let deviation = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt();
     if !deviation.is_finite() {
         return Err(Error::parameter(what, format!("mean {mean}, deviation {deviation}"), "finite numbers"));
@@ -136,7 +139,7 @@ mod tests {
     #[test]
     fn inputs_have_no_mean_and_unit_deviation() {
         let rows = rows_of_a_law();
-        let rows: Vec<&Row> = rows.iter().collect();
+        let rows: Vec<&DataRow> = rows.iter().collect();
         for kind in [Kind::Ann, Kind::energy(Symmetry::Orthotropic), Kind::energy(Symmetry::Isotropic)] {
             let architecture = Architecture::new(kind.inputs(), &[(4, Tanh)], kind.outputs());
             let header = super::header(kind, architecture, 1, &rows, true).unwrap();
@@ -152,17 +155,18 @@ mod tests {
         }
     }
 
-    /// Sheared to one side only: the other side is known to an orthotropic energy in its axes, not to an `ann`.
+    /// After shear to one side, an orthotropic energy knows the other side in its axes, but an `ann` does
+    /// not.
     #[test]
     fn symmetry_extends_what_is_known() {
         let row = |sample: u64| {
             let shear = 0.01 * sample as f64;
             let f = Tensor::new(1.0, 0.0, shear, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0 + shear);
             let f = polycore::tensor::DeformationGradient::new(f).unwrap();
-            Row::new(sample, f64::NAN, f, Voigt::new(1e6, 0.0, 2e6 + shear, 0.0, shear, 0.0))
+            DataRow::new(sample, f64::NAN, f, Voigt::new(1e6, 0.0, 2e6 + shear, 0.0, shear, 0.0))
         };
-        let rows: Vec<Row> = (0..20).map(row).collect();
-        let rows: Vec<&Row> = rows.iter().collect();
+        let rows: Vec<DataRow> = (0..20).map(row).collect();
+        let rows: Vec<&DataRow> = rows.iter().collect();
         let law = |kind: Kind| {
             let architecture = Architecture::new(kind.inputs(), &[(4, Tanh)], kind.outputs());
             Surrogate::<f64>::random(header(kind, architecture, 1, &rows, true).unwrap(), 1).unwrap()
@@ -182,11 +186,11 @@ mod tests {
         assert!(law(Kind::energy(Symmetry::Orthotropic)).flags(&c).unseen[3]);
     }
 
-    /// Rubber: det C = 1 but for the last digit that a table has. Its W is that of the other invariants; where the volume of
-    /// the rows varies by itself, nothing changes.
+    /// Rubber: det C = 1 except for the last digit in a table, so W depends on the other invariants. If the
+    /// volume varies by itself, nothing changes.
     #[test]
     fn an_invariant_without_variance_of_its_own() {
-        let rows = |digits: i32, volume: f64| -> Vec<Row> {
+        let rows = |digits: i32, volume: f64| -> Vec<DataRow> {
             let mut random = crate::random::SplitMix64::new(2);
             let row = |sample: u64| {
                 let noise = polycore::tensor::Tensor::from_fn(|_, _| 0.4 * (random.uniform() - 0.5));
@@ -195,7 +199,7 @@ mod tests {
                 let unit = 10f64.powi(digits);
                 let f = (f * scale).map(|value| (value * unit).round() / unit);
                 let f = polycore::tensor::DeformationGradient::new(f).unwrap();
-                Row::new(sample, f64::NAN, f, Voigt::new(1e6, 0.0, 0.0, 0.0, 0.0, 0.0))
+                DataRow::new(sample, f64::NAN, f, Voigt::new(1e6, 0.0, 0.0, 0.0, 0.0, 0.0))
             };
             (0..200).map(row).collect()
         };
@@ -206,13 +210,13 @@ mod tests {
         ] {
             for (digits, volume) in [(4, 0.0), (8, 0.0), (15, 0.0), (8, 0.02)] {
                 let rows = rows(digits, volume);
-                let rows: Vec<&Row> = rows.iter().collect();
+                let rows: Vec<&DataRow> = rows.iter().collect();
                 let architecture = Architecture::new(kind.inputs(), &[], 1);
                 let header = super::header(kind.clone(), architecture, 1, &rows, true).unwrap();
                 let law = Surrogate::<f64>::random(header, 1).unwrap();
                 assert_eq!(constrained(&law, &rows), [name], "{kind:?} {digits} {volume}");
                 let k = (0..kind.inputs()).find(|&k| kind.invariants().unwrap().name(k) == name).unwrap();
-                // 1/deviation of the others: one percent of strain is no more than a tenth of a unit
+                // 1/deviation of the others: one percent of strain is at most a tenth of a unit
                 let others = (0..kind.inputs()).filter(|&other| other != k);
                 let greatest = others.map(|other| law.coefficients().inverse[other]).fold(0.0, f64::max);
                 assert!(
@@ -222,7 +226,7 @@ mod tests {
                 );
             }
             let free = rows(8, 0.6);
-            let free: Vec<&Row> = free.iter().collect();
+            let free: Vec<&DataRow> = free.iter().collect();
             let header =
                 super::header(kind.clone(), Architecture::new(kind.inputs(), &[], 1), 1, &free, true)
                     .unwrap();
@@ -230,7 +234,7 @@ mod tests {
         }
     }
 
-    /// By central differences, also in turned material axes.
+    /// Central differences, also in rotated material axes.
     #[test]
     fn slopes_are_derivatives_of_the_inputs() {
         let (s, c) = 0.4f64.sin_cos();
@@ -246,7 +250,7 @@ mod tests {
                 let step = Voigt::from_fn(|b, _| if a == b { 1e-5 } else { 0.0 });
                 let (up, down) = (law.features(&(at + step)).values, law.features(&(at - step)).values);
                 for k in 0..law.header().kind.inputs() {
-                    // rounding 1e-16/1e-5; cubic at most
+                    // rounding 1e-16/1e-5; at most cubic
                     assert!(
                         ((up[k] - down[k]) / 2e-5 - slopes[k][a] * law.coefficients().inverse[k]).abs()
                             < 1e-9,

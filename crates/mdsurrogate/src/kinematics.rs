@@ -1,47 +1,47 @@
-//! From what molecular dynamics measures, box and virial stress, to (C, S) and back.
+//! Conversion of measurements in molecular dynamics, box and virial stress, to (C, S) and back.
 //!
-//! Voigt order (3.2)–(3.3): [11, 22, 33, 12, 13, 23], which is also LAMMPS' order xx, yy, zz, xy, xz, yz of its
-//! pressure vector. Stress is positive in tension: σ = −P.
+//! Voigt order (3.2)–(3.3): [11, 22, 33, 12, 13, 23], as in the pressure vector of LAMMPS (xx, yy, zz, xy,
+//! xz, yz). Stress is positive in tension: σ = −P.
 
 use crate::Error;
 use polycore::tensor::{DeformationGradient, StressMeasure, Tensor, Voigt, voigt};
 
-pub use polycore::tensor::voigt::{NAMES, cauchy_of_material, jaumann_tangent};
+pub use polycore::tensor::voigt::{NAMES, cauchy_from_material, jaumann_tangent};
 
-/// One standard atmosphere, Pa (exact by definition; LAMMPS' `units real` measure pressure in it).
+/// One standard atmosphere, Pa (exact; the pressure unit of LAMMPS' `units real`).
 pub const ATMOSPHERE: f64 = 101_325.0;
 
 /// One ångström, m.
 pub const ANGSTROM: f64 = 1e-10;
 
-/// Edges and tilts of a periodic box as LAMMPS writes them; lengths in one common unit.
+/// Edges and tilts of a periodic box as in LAMMPS, in one common unit.
 ///
-/// Its edge vectors are the columns of [[lx, xy, xz], [0, ly, yz], [0, 0, lz]].
+/// The edge vectors are the columns of [[lx, xy, xz], [0, ly, yz], [0, 0, lz]].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PeriodicBox {
-    /// lx, ly, lz.
+    /// Lengths lx, ly, lz.
     pub lengths: [f64; 3],
-    /// xy, xz, yz; zero for an orthogonal box.
+    /// Tilts xy, xz, yz; zero for an orthogonal box.
     pub tilts: [f64; 3],
 }
 
 impl PeriodicBox {
-    /// A box without tilt.
+    /// Creates a box without tilts.
     pub fn orthogonal(lengths: [f64; 3]) -> Self {
         Self { lengths, tilts: [0.0; 3] }
     }
 
-    /// The edge vectors as columns.
+    /// Returns the edge vectors as columns.
     pub fn edges(&self) -> Tensor {
         let ([x, y, z], [xy, xz, yz]) = (self.lengths, self.tilts);
         Tensor::new(x, xy, xz, 0.0, y, yz, 0.0, 0.0, z)
     }
 
-    /// F = H H₀⁻¹, which maps the edges of `reference` to those of this box (diagonal for two orthogonal boxes:
+    /// Computes F = H H₀⁻¹, which maps the edges of `reference` to those of this box (for orthogonal boxes
     /// F_ii = l_i/L_i).
     ///
     /// # Errors
-    /// A length that is not positive and finite, a tilt that is not finite.
+    /// Returns an error for lengths that are not positive and finite, and for non-finite tilts.
     pub fn deformation_from(&self, reference: &Self) -> Result<DeformationGradient, Error> {
         for lengths in [self.lengths, reference.lengths] {
             if let Some(index) = lengths.iter().position(|l| !(l.is_finite() && *l > 0.0)) {
@@ -50,7 +50,7 @@ impl PeriodicBox {
             }
         }
         let ([x, y, z], [xy, xz, yz]) = (reference.lengths, reference.tilts);
-        // the inverse of an upper triangle, written out so that F of orthogonal boxes is exactly l/L
+        // explicit inverse of an upper triangle, so that F of orthogonal boxes is exactly l/L
         let inverse = Tensor::new(
             1.0 / x,
             -xy / (x * y),
@@ -70,30 +70,30 @@ impl PeriodicBox {
     }
 }
 
-/// σ = −P in Pa from LAMMPS' pressure vector [xx, yy, zz, xy, xz, yz] in atm.
-pub fn cauchy_of_pressure(atmospheres: &Voigt) -> Voigt {
+/// Computes σ = −P, Pa, from the pressure vector of LAMMPS [xx, yy, zz, xy, xz, yz] in atm.
+pub fn cauchy_from_pressure(atmospheres: &Voigt) -> Voigt {
     -ATMOSPHERE * atmospheres
 }
 
-/// C = FᵀF (3.5) and S = J F⁻¹ σ F⁻ᵀ (3.6), in the unit of σ.
+/// Computes C = FᵀF (3.5) and S = J F⁻¹ σ F⁻ᵀ (3.6), in the unit of σ.
 pub fn material_pair(deformation: &DeformationGradient, cauchy: &Voigt) -> (Voigt, Voigt) {
     use StressMeasure::{Cauchy, SecondPiolaKirchhoff};
     let s = deformation.convert_stress(&voigt::to_stress(cauchy), Cauchy, SecondPiolaKirchhoff);
     (voigt::from_stress(&deformation.right_cauchy_green()), voigt::from_stress(&s))
 }
 
-/// The rotation-free F = U = √C of a right Cauchy–Green vector (3.2).
+/// Computes F = U = √C without rotation from C in Voigt order (3.2).
 ///
 /// # Errors
-/// A component that is not finite, or C that is not positive definite.
-pub fn stretch_of(c: &Voigt) -> Result<DeformationGradient, Error> {
+/// Returns an error for non-finite components, and for a C that is not positive definite.
+pub fn stretch_from_c(c: &Voigt) -> Result<DeformationGradient, Error> {
     let bad = |found: String| Error::parameter("C", found, "a positive definite tensor of finite components");
     if let Some(index) = c.iter().position(|value| !value.is_finite()) {
         return Err(bad(format!("component {} = {}", NAMES[index], c[index])));
     }
     let eigen = voigt::to_stress(c).symmetric_eigen();
     let least = eigen.eigenvalues.min();
-    // what rounding makes of a singular C is no deformation either
+    // a singular C stays singular with rounding
     if least <= 1e-14 * eigen.eigenvalues.max() {
         return Err(bad(format!("the eigenvalue {least:e}")));
     }
@@ -105,7 +105,7 @@ pub fn stretch_of(c: &Voigt) -> Result<DeformationGradient, Error> {
 mod tests {
     use super::*;
 
-    /// The first averaged row of run uz_4 of the shipped data, by hand: F₃₃ = 33.128024/33.1027, J = F₁₁F₂₂F₃₃,
+    /// First averaged row of run uz_4 of the shipped data, by hand: F₃₃ = 33.128024/33.1027, J = F₁₁F₂₂F₃₃,
     /// S₃₃ = Jσ₃₃/F₃₃² (diagonal F).
     #[test]
     fn a_row_by_hand() {
@@ -125,15 +125,15 @@ mod tests {
         assert!((s[4] / (j * cauchy[4] / (stretch[0] * stretch[2])) - 1.0).abs() < 4e-15);
     }
 
-    /// PROVENANCE.md of the data: σ = −P[atm] × 0.101325 MPa, tension positive.
+    /// PROVENANCE.md of the data: σ = −P[atm] × 0.101325 MPa, positive in tension.
     #[test]
     fn pressure_in_atmospheres_becomes_tension_in_pascal() {
-        let stress = cauchy_of_pressure(&Voigt::new(-1000.0, 0.0, 0.0, 0.0, 0.0, 10.0));
+        let stress = cauchy_from_pressure(&Voigt::new(-1000.0, 0.0, 0.0, 0.0, 0.0, 10.0));
         assert_eq!(stress[0], 101.325e6);
         assert_eq!(stress[5], -1.01325e6);
     }
 
-    /// A sheared box: the tilt xy over ly is the amount of simple shear γ, C₁₂ = γ and C₂₂ = 1 + γ².
+    /// A sheared box: the tilt xy over ly is the simple shear γ, C₁₂ = γ and C₂₂ = 1 + γ².
     #[test]
     fn tilt_is_simple_shear() {
         let reference = PeriodicBox::orthogonal([2.0, 4.0, 5.0]);
@@ -141,7 +141,7 @@ mod tests {
         let f = sheared.deformation_from(&reference).unwrap();
         let (c, _) = material_pair(&f, &Voigt::zeros());
         assert!((c - Voigt::new(1.0, 1.01, 1.0, 0.1, 0.0, 0.0)).amax() < 1e-15);
-        // a tilted reference: the deformation back is the inverse
+        // with a tilted reference, the deformation back is the inverse
         let back = reference.deformation_from(&sheared).unwrap();
         assert!((back.matrix() * f.matrix() - Tensor::identity()).amax() < 1e-15);
     }
@@ -152,14 +152,14 @@ mod tests {
         let cauchy = Voigt::new(3.0, 2.0, -4.0, -1.0, 0.5, 0.7);
         let (c, s) = material_pair(&f, &cauchy);
         // three products with a matrix of condition 3
-        assert!((cauchy_of_material(&f, &s) - cauchy).amax() < 2e-14);
-        let u = stretch_of(&c).unwrap();
+        assert!((cauchy_from_material(&f, &s) - cauchy).amax() < 2e-14);
+        let u = stretch_from_c(&c).unwrap();
         assert!((voigt::from_stress(&u.right_cauchy_green()) - c).amax() < 1e-14);
         assert!((u.matrix() - u.matrix().transpose()).amax() < 1e-15);
     }
 
     #[test]
-    fn what_is_no_deformation() {
+    fn invalid_deformations_are_refused() {
         let reference = PeriodicBox::orthogonal([1.0; 3]);
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             let error = PeriodicBox::orthogonal([1.0, bad, 1.0]).deformation_from(&reference).unwrap_err();
@@ -169,7 +169,7 @@ mod tests {
             (Voigt::new(1.0, 1.0, 1.0, 1.0, 0.0, 0.0), "eigenvalue"),
             (Voigt::new(1.0, 1.0, f64::NAN, 0.0, 0.0, 0.0), "33"),
         ] {
-            assert!(stretch_of(&c).unwrap_err().to_string().contains(part));
+            assert!(stretch_from_c(&c).unwrap_err().to_string().contains(part));
         }
     }
 }

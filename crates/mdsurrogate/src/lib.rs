@@ -1,11 +1,12 @@
-//! From molecular dynamics to a constitutive law: data sets of (C, S), training and search of models, their judgement, export.
+//! Constitutive laws from molecular dynamics: data sets of (C, S), training and search of models, evaluation
+//! and export.
 //!
 //! ```
 //! use mdsurrogate::network::Activation::Softplus;
 //! use mdsurrogate::surrogate::{Header, Kind, Prediction, Surrogate, Symmetry, Workspace};
 //! use polycore::tensor::Voigt;
 //!
-//! // random weights in place of a training: an orthotropic energy, an ensemble of two
+//! // random weights instead of training: an orthotropic energy, an ensemble of two
 //! let header = Header::new(Kind::energy(Symmetry::Orthotropic), &[(32, Softplus), (32, Softplus)], 2);
 //! # let directory = tempfile::tempdir()?;
 //! # let file = directory.path().join("law.safetensors");
@@ -17,16 +18,17 @@
 //! assert!(found.stress[0] != 0.0 && found.tangent.is_some() && found.spread > 0.0);
 //! assert!(found.flags.unseen[3], "no training data had shear");
 //!
-//! // many points: the same bits at half the cost, and no allocation in calls with the same memory
+//! // many points: bit-identical at half the cost, without allocation in calls with the same memory
 //! let points = vec![Voigt::new(1.1, 1.0, 1.0, 0.0, 0.0, 0.0); 100];
 //! let (mut memory, mut predictions) = (Workspace::default(), vec![Prediction::default(); 100]);
 //! model.stresses(&points, &mut memory, &mut predictions)?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Models are evaluated by [`polycore::constitutive`], without a training framework, and are laws as any other there
-//! ([`polycore::constitutive::Law`]); [`surrogate`] and [`network`] are its modules. What is added here: [`mod@dataset`], [`fitted`],
-//! `train` and `search` (feature `train`), [`eval`], [`export`], and molecular dynamics in [`md`].
+//! [`polycore::constitutive`] evaluates the models without a training framework; they are laws like all
+//! others there ([`polycore::constitutive::Law`]), and [`surrogate`] and [`network`] are its modules. This
+//! crate adds [`mod@dataset`], [`fitted`], `train` and `search` (feature `train`), [`eval`], [`export`], and
+//! molecular dynamics in [`md`].
 //!
 //! Data sets are tables of runs:
 //!
@@ -42,14 +44,14 @@
 //! let set = read(&file, &ReadOptions::default())?;
 //! assert_eq!((set.paths.len(), set.len()), (2, 6));
 //!
-//! // one run to learn from, one to judge by
+//! // one run for training, one for the test
 //! let halves = Fractions { train: 0.5, validation: 0.0, test: 0.5 };
 //! let sets = split(&set, Method::Path, halves, 1)?;
 //! assert_eq!((sets.train.len(), sets.test.len()), (3, 3));
 //!
-//! // C12, C13 and C23 never change: (3.8) would divide by zero
+//! // C12, C13 and C23 are constant: (3.8) would divide by zero
 //! let c: Vec<_> = set.rows().map(|row| row.c).collect();
-//! assert_eq!(Standardisation::of(c.iter())?.constant(), ["22", "12", "13", "23"]);
+//! assert_eq!(Standardisation::from_rows(c.iter())?.constant(), ["22", "12", "13", "23"]);
 //!
 //! // a second difference of 6 MPa in one of two paths: √(6²/2/6) MPa
 //! let noise = noise(&set, |row| row.s).unwrap();
@@ -70,7 +72,7 @@ pub mod search;
 #[cfg(feature = "train")]
 pub mod train;
 
-// `cargo bench` compiles a file of `program`, in which this crate has its name
+// `cargo bench` compiles a file of `program`, which uses the name of this crate
 #[cfg(feature = "case")]
 extern crate self as mdsurrogate;
 

@@ -1,4 +1,4 @@
-//! The `mdsurrogate` command line.
+//! Command line of `mdsurrogate`.
 
 fn main() -> std::process::ExitCode {
     mdsurrogate::program::command::main()

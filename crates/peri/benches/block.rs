@@ -1,8 +1,10 @@
-//! An elastic block in motion: the problem that other peridynamics codes are timed on (`cargo xtask bench peri-peers`).
+//! Elastic block in motion: the problem on which other peridynamics codes are timed (`cargo xtask bench
+//! peri-peers`).
 //!
-//! A cube of the prototype microelastic material (18K/(πδ⁴) times the strain of a bond, Silling & Askari 2005,
-//! doi:10.1016/j.compstruc.2004.11.026), free on all sides, released at rest from a smooth displacement. The constants
-//! are those of LAMMPS' example `peri`, Parks et al. 2008, doi:10.1016/j.cpc.2008.06.011.
+//! A cube of the prototype microelastic material (18K/(πδ⁴) times the strain of a bond, Silling & Askari
+//! 2005, doi:10.1016/j.compstruc.2004.11.026), free on all sides, released at rest from a smooth
+//! displacement. The constants are those of LAMMPS' example `peri`, Parks et al. 2008,
+//! doi:10.1016/j.cpc.2008.06.011.
 
 use crate::Failure;
 use crate::kernel::RATIO;
@@ -29,7 +31,7 @@ const TIME_STEP: f64 = 2e-8;
 /// A of the displacement.
 const AFFINE: [[f64; 3]; 3] = [[0.5, 0.2, 0.0], [0.0, -0.3, 0.1], [0.1, 0.0, 0.4]];
 
-/// The block.
+/// Size and settings of the block.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Elastic block")]
 pub struct Options {
@@ -39,7 +41,7 @@ pub struct Options {
     /// Time steps; with 0, forces of the initial displacement.
     #[arg(long, requires = "block", default_value_t = 20)]
     steps: u32,
-    /// Size of the initial displacement's gradient, 1e-6 to 0.24.
+    /// Gradient of the initial displacement, 1e-6 to 0.24.
     #[arg(long, requires = "block", default_value_t = 0.01, value_parser = strain)]
     strain: f64,
     /// Partial volumes of particles that the horizon cuts.
@@ -74,10 +76,10 @@ pub fn within(text: &str, least: f64, most: f64) -> Result<f64, String> {
     }
 }
 
-/// Builds the block, moves it, and gives its rates.
+/// Builds the block, moves it, and returns its rates.
 ///
 /// # Errors
-/// The momentum of the free body is not zero; those of the kernel and of files.
+/// A momentum of the free body other than zero; errors of the kernel and of files.
 pub fn measure(cells: u16, options: &Options) -> Result<Vec<Measurement>, Failure> {
     let mut block = Block::new(cells.into(), options)?;
     let start = Instant::now();
@@ -144,7 +146,7 @@ impl Block {
         Ok(block)
     }
 
-    /// Velocity Verlet: v ← v + ½Δt f/ρ, u ← u + Δt v, new f, v ← v + ½Δt f/ρ.
+    /// Advances by velocity Verlet: v ← v + ½Δt f/ρ, u ← u + Δt v, new f, v ← v + ½Δt f/ρ.
     fn step(&mut self) {
         let (sites, kick) = (self.bonds.sites(), 0.5 * TIME_STEP / DENSITY);
         let forces = self.force.components();
@@ -169,7 +171,7 @@ impl Block {
         });
     }
 
-    /// Forces between particles keep the momentum of a free body at rest, but for the rounding of its sum.
+    /// Checks that the momentum of a free body stays zero up to rounding.
     fn check_momentum(&self) -> Result<(), Failure> {
         let particles = self.bonds.particles();
         for v in self.velocity.components() {
@@ -202,7 +204,7 @@ impl Block {
     }
 }
 
-/// u_i = ε(A_ij X_j + L/4π sin(2π (X_i + X_{i+1})/L)).
+/// Returns u_i = ε(A_ij X_j + L/4π sin(2π (X_i + X_{i+1})/L)).
 fn initial_displacement(position: [f64; 3], strain: f64, side: f64) -> [f64; 3] {
     let mut displacement = [0.0; 3];
     for (i, u) in displacement.iter_mut().enumerate() {

@@ -1,11 +1,12 @@
-//! An elastic block in motion, on a device and by the host's kernel: bonds, steps, seconds, directed bonds a second, and how far
-//! forces are apart. `cargo bench -p peri --no-default-features --features gpu --bench gpu -- 60 100`: 60³ particles, 100 steps.
+//! An elastic block in motion, on a device and by the host's kernel: bonds, steps, seconds, directed bonds a
+//! second, and how far forces are apart. `cargo bench -p peri --no-default-features --features gpu --bench
+//! gpu -- 60 100`: 60³ particles, 100 steps.
 
 use peri::bonds::{BodyGeometry, BondDamage, BondForces, LatticeBonds, force};
 use peri::calibrate::{Space, modulus};
 use peri::field::Field;
 use peri::geometry::Shape;
-use peri::gpu::{Device, DeviceBody, Precision, Start};
+use peri::gpu::{Device, DeviceBody, DeviceStep, MOST_STEPS, Precision, StepSums};
 use peri::model::Body;
 use peri::potential::{KernelFit, Law};
 use std::time::Instant;
@@ -39,12 +40,10 @@ fn measure<const D: usize>(cells: u32, steps: u64) -> Result<(), Box<dyn std::er
     let (seconds, threads) = (begin.elapsed().as_secs_f64(), std::thread::available_parallelism()?);
     let rate = (count * evaluations) as f64 / seconds;
     println!(
-        "  host, {threads} threads, Double: {count} bonds, {evaluations} forces, {seconds:.3} s, {rate:.3e} directed bonds/s"
+        "  host, {threads} threads, Double: {count} bonds, {evaluations} forces, {seconds:.3} s, {rate:.3e} \
+         directed bonds/s"
     );
 
-    let largest = |field: &Field<D>| {
-        field.components().into_iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()))
-    };
     for precision in [Precision::Single, Precision::Double] {
         let device = match Device::portable()?.with_precision(precision) {
             Ok(device) => device,
@@ -55,30 +54,57 @@ fn measure<const D: usize>(cells: u32, steps: u64) -> Result<(), Box<dyn std::er
         };
         // well below 2/ω_max
         let time_step = 0.1 * SPACING / (STIFFNESS / DENSITY).sqrt();
-        let (displacement, velocity) = (displacement.clone(), Field::zeros(bonds.sites()));
-        let start = Start { displacement, velocity, held: Vec::new(), density: DENSITY, time_step };
-        // ANCHOR: device
-        // bonds break beyond a stretch of 1.5: they are looked at in every step, and none does
-        let mut body = DeviceBody::new(&device, &bonds, &fit, modulus, Some(1.5))?;
-        let found = body.force(&start.displacement)?;
-        body.start(&start)?;
-        // the first step compiles the kernels
-        body.advance(1)?;
-        let begin = Instant::now();
-        body.advance(steps)?;
-        let seconds = begin.elapsed().as_secs_f64();
-        let motion = body.state()?;
-        // ANCHOR_END: device
-        let pairs = found.components().into_iter().flatten().zip(expected.components().into_iter().flatten());
-        let apart = pairs.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
-        let (name, rate) = (device.name(), (count * steps) as f64 / seconds);
-        let [error, moved] = [apart / largest(&expected), largest(&motion.displacement) / SPACING];
-        println!(
-            "  {name}, {precision:?}: {count} bonds, {steps} steps, {seconds:.3} s, {rate:.3e} directed bonds/s, forces off by \
-             {error:.1e} of the largest; displacements up to {moved:.3} spacings"
-        );
+        let step = DeviceStep { time_step, density: DENSITY, damping: 0.0, factors: [1.0; 2], rate: 0.0 };
+        let zero = Field::zeros(bonds.sites());
+        let mut body = DeviceBody::new(&device, &bonds, &fit, modulus)?;
+        let found = body.force(&bonds, &displacement)?;
+        body.set_state(&bonds, [&displacement, &zero, &found], time_step)?;
+        let (name, error) = (device.name().to_owned(), largest_apart(&found, &expected));
+        println!("  {name}, {precision:?}: forces off by {error:.1e} of the largest");
+        for (what, pulls, looks) in
+            [("forces", true, false), ("forces that look", true, true), ("steps", false, false)]
+        {
+            let take = |body: &mut DeviceBody<D>, steps: usize| -> Result<StepSums, peri::Error> {
+                let mut last = StepSums::default();
+                for taken in 0..steps {
+                    let slot = taken % MOST_STEPS;
+                    if !pulls {
+                        body.leap(&step);
+                    }
+                    body.pull(1.0, looks);
+                    if !pulls {
+                        body.kick(&step);
+                        body.keep_sums(slot);
+                    }
+                    if slot + 1 == MOST_STEPS || taken + 1 == steps {
+                        last = body.sums(&vec![step; slot + 1])?[slot];
+                    }
+                }
+                Ok(last)
+            };
+            // the first ones compile the kernels
+            take(&mut body, 3)?;
+            let begin = Instant::now();
+            let last = take(&mut body, steps as usize)?;
+            let seconds = begin.elapsed().as_secs_f64();
+            let rate = (count * steps) as f64 / seconds;
+            println!(
+                "    {what}: {count} bonds, {steps} of them, {seconds:.4} s, {rate:.3e} directed bonds/s, \
+                 {:.3} ms each; kinetic \
+                 energy {:.3e} J",
+                1e3 * seconds / steps as f64,
+                last.kinetic
+            );
+        }
     }
     Ok(())
+}
+
+/// Largest difference of two fields over the largest of the second.
+fn largest_apart<const D: usize>(found: &Field<D>, expected: &Field<D>) -> f64 {
+    let pairs = || found.components().into_iter().flatten().zip(expected.components().into_iter().flatten());
+    let apart = pairs().fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+    apart / pairs().fold(0.0_f64, |most, (_, b)| most.max(b.abs()))
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

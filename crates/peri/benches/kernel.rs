@@ -1,11 +1,11 @@
-//! What force kernels are measured on; `cargo bench` takes it, too.
+//! Bodies and materials on which force kernels are measured.
 
 use peri::Error;
 use peri::bonds::{Bonds, Lattice, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::field::{CHUNK, Field};
 use peri::geometry::{Operation, Shape, lattice};
-use peri::material::{Correspondence, EightChain, Material, NonlocalSolid, Response};
+use peri::material::{Correspondence, EightChainSolid, Material, NonlocalSolid, SolverMaterial};
 use peri::potential::{KernelFit, Law};
 use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric};
 use polycore::constitutive::network::Activation::Softplus;
@@ -15,19 +15,19 @@ use rayon::prelude::*;
 /// Horizon over spacing of every measurement.
 pub const RATIO: f64 = 3.015;
 
-/// A square or cube of about so many particles.
+/// Builds a square or cube of about `particles` particles.
 pub fn block<const D: usize>(particles: f64) -> Result<Lattice<D>, Error> {
     let side = particles.powf(1.0 / D as f64).round();
     let body = [Operation::Add(Shape::Box { min: [0.0; D], max: [side; D] })];
     lattice(&body, 1.0, 1.0)
 }
 
-/// Its bonds.
+/// Returns the bonds of a box.
 pub fn bonds<const D: usize>(lattice: Lattice<D>) -> Result<LatticeBonds<D>, Error> {
     LatticeBonds::new(lattice, RATIO, VolumeCorrection::None, &[])
 }
 
-/// Gives bonds a law, fitted for these stretches, and a displacement for them to act on.
+/// Returns a law fitted for these stretches, and a displacement.
 pub fn loaded<const D: usize>(
     bonds: &mut dyn Bonds<D>,
     law: Law,
@@ -45,11 +45,11 @@ pub fn loaded<const D: usize>(
     Ok((fit, displacement))
 }
 
-/// A material at work, and its name.
-pub type Named<const D: usize> = (&'static str, Box<dyn Response<D>>);
+/// Response of a material, and its name.
+pub type Named<const D: usize> = (&'static str, Box<dyn SolverMaterial<D>>);
 
-/// Solids with two passes, by name: chains of 25 links, and by correspondence neo-Hookean rubber, K/μ = 100, and a learnt law, a
-/// network of 209 weights that are random: its speed does not depend on them.
+/// Returns solids with two passes: chains of 25 links, and by correspondence neo-Hookean rubber, K/μ = 100,
+/// and a learnt law, a network of 209 random weights.
 pub fn solids<const D: usize>(bonds: &dyn Bonds<D>) -> Result<[Named<D>; 3], Error> {
     let space = if D == 2 { Space::PlaneStrain } else { Space::Solid };
     let law =
@@ -58,7 +58,7 @@ pub fn solids<const D: usize>(bonds: &dyn Bonds<D>) -> Result<[Named<D>; 3], Err
     let kind = Kind::polyconvex_energy(Symmetry::Isotropic);
     let learnt = Surrogate::random(Header::new(kind, &[(16, Softplus), (8, Softplus)], 1), 1);
     let learnt = learnt.map_err(|error| Error::geometry(error.to_string()))?;
-    let chains = NonlocalSolid(EightChain::new(space, 1.0, 25.0, 100.0)?).respond(bonds);
+    let chains = NonlocalSolid(EightChainSolid::new(space, 1.0, 25.0, 100.0)?).respond(bonds);
     let neo_hookean = NonlocalSolid(Correspondence::new(law, space)?).respond(bonds);
     let learnt = NonlocalSolid(Correspondence::new(learnt, space)?).respond(bonds);
     Ok([
@@ -68,9 +68,9 @@ pub fn solids<const D: usize>(bonds: &dyn Bonds<D>) -> Result<[Named<D>; 3], Err
     ])
 }
 
-/// States of all particles, and their forces.
+/// Computes the states and forces of all particles.
 pub fn both_passes<const D: usize>(
-    solid: &mut dyn Response<D>,
+    solid: &mut dyn SolverMaterial<D>,
     bonds: &dyn Bonds<D>,
     displacement: &Field<D>,
     out: &mut Field<D>,

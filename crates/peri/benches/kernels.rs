@@ -4,11 +4,11 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use peri::bonds::{BodyGeometry, BondDamage, CloudBonds, VolumeCorrection, force};
 use peri::field::Field;
 use peri::potential::{KernelFit, Law};
-use peri::stress::{BallVolume, Loaded, Measure, Missing, piola_in_cloud};
+use peri::stress::{BallVolume, StressInput, StressMethod, SurfaceCompensation, piola_in_cloud};
 
 mod kernel;
 
-/// Particles: what the caches hold.
+/// Numbers of particles that fit into the caches.
 const SIZE: f64 = 1e4;
 
 fn dimension<const D: usize>(criterion: &mut Criterion) -> Result<(), peri::Error> {
@@ -63,8 +63,13 @@ fn stress(criterion: &mut Criterion) {
     let fit = KernelFit::new(&*law, [0.5, 2.0], 1e-7);
     let fit = fit.unwrap_or_else(|error| panic!("{error}"));
     let mut group = criterion.benchmark_group("stress of a cloud");
-    for measure in [Measure::Hardy, Measure::Gaussian] {
-        let state = Loaded { displacement: &displacement, fit: &fit, modulus: 1.0, missing: Missing::Bonds };
+    for measure in [StressMethod::Hardy, StressMethod::Gaussian] {
+        let state = StressInput {
+            displacement: &displacement,
+            fit: &fit,
+            modulus: 1.0,
+            missing: SurfaceCompensation::Bonds,
+        };
         group.bench_function(measure.name(), |bencher| {
             bencher.iter(|| piola_in_cloud(&bonds, &state, measure, BallVolume::Particles));
         });

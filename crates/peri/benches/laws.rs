@@ -1,8 +1,8 @@
 //! Ways to evaluate a bond law: error against time (`cargo xtask bench peri-laws`).
 //!
-//! Law `chain-offset`, n̄ = 720, D̂ = 1200, bond stretches l uniform in [0.5, 2.9442], the critical one of the thesis' DENT
-//! specimen. As in the kernels, what comes in is e = l² − 1 and what goes out q = t/l: tables need a square root. Error:
-//! the largest of q over its root mean square, against the law itself.
+//! Law `chain-offset`, n̄ = 720, D̂ = 1200, bond stretches l uniform in [0.5, 2.9442], the critical one of
+//! the thesis' DENT specimen. As in the kernels, the input is e = l² − 1 and the output q = t/l, so that
+//! tables need a square root. Error: the largest error of q over its root mean square.
 
 use evidence::measurement::Measurement;
 use peri::Error;
@@ -11,16 +11,16 @@ use std::hint::black_box;
 use std::time::Instant;
 
 const RANGE: [f64; 2] = [0.5, 2.9442];
-/// A row that stays in the first-level cache.
+/// Length of a row in the first-level cache.
 const ROW: usize = 1024;
 /// Rows per repeat.
 const ROWS: usize = 100;
-/// Nodes of tables; the thesis gives no number.
+/// Numbers of nodes of tables; the thesis gives none.
 const NODES: [usize; 4] = [50, 200, 1000, 4000];
 /// Bounds of fits, the second that of the solvers.
 const BOUNDS: [f64; 4] = [1e-4, 1e-6, 1e-9, 1e-11];
 
-/// Every way with every setting.
+/// Measures every way with every setting.
 pub fn measure() -> Result<Vec<Measurement>, Error> {
     let law = Law::ChainOffset.build(720.0, 1200.0, false)?;
     let strains: Vec<f64> = stretches().iter().map(|l| l * l - 1.0).collect();
@@ -56,14 +56,14 @@ pub fn measure() -> Result<Vec<Measurement>, Error> {
     Ok(rows)
 }
 
-/// Uniform in the range and in no order: multiples of the golden section modulo 1.
+/// Returns unordered uniform numbers: multiples of the golden section modulo 1.
 fn stretches() -> Vec<f64> {
     const GOLDEN: f64 = 0.618_033_988_749_894_8;
     let [low, high] = RANGE;
     (1..=ROW).map(|k| low + (high - low) * (GOLDEN * k as f64).fract()).collect()
 }
 
-/// q = e·N(e)/D(e), eight bonds at once as the kernels have them.
+/// Evaluates q = e·N(e)/D(e) for eight bonds at once, as the kernels do.
 fn evaluate(fit: &KernelFit, strains: &[f64], found: &mut [f64]) {
     const LANES: usize = 8;
     let (strains, found) = (strains.as_chunks::<LANES>().0, found.as_chunks_mut::<LANES>().0);
@@ -119,14 +119,14 @@ impl Table {
         Self { per_width: 1.0 / width, nodes }
     }
 
-    /// The nodes on both sides, and how far from the first to the second.
+    /// Returns the nodes on both sides, and the fraction between them.
     fn between(&self, stretch: f64) -> ([f64; 2], [f64; 2], f64) {
         let place = (stretch - RANGE[0]) * self.per_width;
         let k = (place as usize).min(self.nodes.len() - 2);
         (self.nodes[k], self.nodes[k + 1], place - k as f64)
     }
 
-    /// As the thesis has it (§2.4).
+    /// Interpolation of the thesis (§2.4).
     fn linear(&self, strains: &[f64], found: &mut [f64]) {
         for (e, q) in strains.iter().zip(found) {
             let l = (1.0 + e).sqrt();

@@ -1,4 +1,5 @@
-//! `cargo xtask bench peri`: bond evaluations per second, bytes per particle, and the machine's bandwidth beside them.
+//! `cargo xtask bench peri`: bond evaluations per second, bytes per particle, and the bandwidth of the
+//! machine.
 
 use clap::Parser;
 use evidence::measurement::{Measurement, print};
@@ -16,15 +17,15 @@ mod kernel;
 mod laws;
 mod solvers;
 
-/// Stretches of a bond law that times are compared with.
+/// Range of stretches of the bond law for comparison.
 const WIDE: [f64; 2] = [0.5, 3.0];
 
-/// Repetitions, of which the median counts.
+/// Number of repetitions; the median counts.
 const REPEATS: usize = 7;
 
 type Failure = Box<dyn std::error::Error>;
 
-/// What to measure.
+/// Settings of the measurement.
 #[derive(Parser)]
 struct Bench {
     /// Print JSON rows {what, size, threads, value, unit}.
@@ -40,12 +41,12 @@ struct Bench {
     block: block::Options,
     #[command(flatten)]
     solvers: solvers::Options,
-    /// Time this instead: ways to evaluate the bond law, each with its error.
+    /// Measure ways to evaluate the bond law instead, each with its error.
     #[arg(long, conflicts_with_all = ["block", "solvers"])]
     laws: bool,
     #[command(flatten)]
     threads: Threads,
-    /// What `cargo bench` adds.
+    /// Ignored argument of `cargo bench`.
     #[arg(long, hide = true)]
     bench: bool,
 }
@@ -86,7 +87,7 @@ impl Bench {
     }
 }
 
-/// a ← b + s·c over arrays larger than any cache; bytes moved per second, best of five as STREAM has it.
+/// Measures a ← b + s·c over arrays larger than any cache: bytes moved per second, best of five as in STREAM.
 fn triad() -> f64 {
     use rayon::prelude::*;
     let n = 1 << 25;
@@ -137,7 +138,7 @@ fn measure_dimension<const D: usize>(
         measure_bonds(&mut cloud, "list", Law::ChainOffset, [0.95, 1.05], threads, rows)?;
         let seconds = measure_bonds(&mut cloud, "list", Law::ChainOffset, WIDE, threads, rows)?;
         measure_solids(&mut cloud, "list", seconds, threads, rows)?;
-        // that of scenes, which takes as long where it is zero
+        // stretches of scenes; softening takes as long if it is zero
         let start = Instant::now();
         let theta = relief(&cloud).unwrap_or_else(|| Field::zeros(cloud.sites()));
         cloud.set_relief(theta);
@@ -149,7 +150,7 @@ fn measure_dimension<const D: usize>(
     Ok(())
 }
 
-/// Both passes of solids with any Poisson ratio, and their time over that of a bond law.
+/// Measures both passes of solids with any Poisson ratio, and their time over that of a bond law.
 fn measure_solids<const D: usize>(
     bonds: &mut dyn Bonds<D>,
     path: &str,
@@ -173,7 +174,7 @@ fn measure_solids<const D: usize>(
     Ok(())
 }
 
-/// Median of the seconds that something takes, after a first time.
+/// Returns the median of the seconds of a function, after a first call.
 fn median(mut run: impl FnMut()) -> f64 {
     run();
     // at least 20 ms a measurement

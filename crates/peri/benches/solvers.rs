@@ -1,7 +1,9 @@
-//! Quasi-static methods on one problem: error against work and run time (`cargo xtask bench peri-solvers`).
+//! Quasi-static methods compared on one problem: error against work and run time (`cargo xtask bench
+//! peri-solvers`).
 //!
-//! The plate with a hole of `cases/ch2/plate-with-hole`, from rest to equilibrium in one load step. Error: the largest
-//! difference of displacements from the same lattice's equilibrium at a residual of 1e-11, over the root mean square.
+//! The plate with a hole of `cases/ch2/plate-with-hole`, from rest to equilibrium in one load step. Error:
+//! the largest difference of displacements from the equilibrium of the lattice at a residual of 1e-11, over
+//! the root mean square.
 
 use crate::RATIO;
 use evidence::measurement::Measurement;
@@ -17,21 +19,21 @@ use peri::solver::{
 };
 use std::time::Instant;
 
-/// Half a side of the plate, its thickness, and the hole's radius, m.
+/// Half a side of the plate, its thickness, and the radius of the hole, m.
 const HALF: f64 = 0.5;
 const THICKNESS: f64 = 10e-3;
 const RADIUS: f64 = 60e-3;
-/// Residuals requested.
+/// Requested residuals.
 const TOLERANCES: [f64; 5] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
-/// Residual of what errors are measured against.
+/// Residual of the reference solution.
 const REFERENCE: f64 = 1e-11;
 const METHODS: [&str; 2] = ["adr", "lbfgs"];
 
-/// What to compare on.
+/// Settings of the comparison.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Quasi-static methods")]
 pub struct Options {
-    /// Time this instead: every method on the plate with a hole, particles MM mm apart.
+    /// Time every method on the plate with a hole instead, at a spacing of MM mm.
     #[arg(long, value_name = "MM", value_delimiter = ',', conflicts_with = "block", value_parser = spacing)]
     pub solvers: Vec<f64>,
 }
@@ -40,7 +42,7 @@ fn spacing(text: &str) -> Result<f64, String> {
     crate::block::within(text, 0.5, 20.0)
 }
 
-/// Every method at every tolerance.
+/// Runs every method at every tolerance.
 pub fn measure(spacings: &[f64]) -> Result<Vec<Measurement>, Error> {
     let mut rows = Vec::new();
     for spacing in spacings {
@@ -106,7 +108,7 @@ impl Plate {
         Ok(state)
     }
 
-    /// Largest difference of two displacements over the root mean square of the second.
+    /// Returns the largest difference of two displacements over the root mean square of the second.
     fn apart(&self, state: &State<2>, exact: &State<2>) -> f64 {
         let (mut largest, mut sum) = (0.0_f64, 0.0);
         let particles = self.bonds.particles();

@@ -1,4 +1,4 @@
-//! The bond laws side by side: tension, tangent at rest, and the stretch at which a chain carries most.
+//! Bond laws side by side: tension, tangent at rest, and the stretch of the largest force of a chain.
 
 use peri::potential::{Chain, Law};
 

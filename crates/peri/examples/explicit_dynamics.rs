@@ -1,4 +1,4 @@
-//! A wave in a bar of rubber whose end moves: where its front is, and how fast it runs.
+//! Wave in a bar of rubber with a moving end: position and speed of its front.
 
 use peri::bonds::BodyGeometry;
 use peri::calibrate::Calibration;

@@ -1,4 +1,4 @@
-//! A material of your own: the linear solid of ordinary state-based peridynamics, whose Poisson ratio is free.
+//! Your own material: the linear solid of ordinary state-based peridynamics, with any Poisson ratio.
 //! Silling et al. 2007, doi:10.1007/s10659-007-9125-1, in D dimensions (2: plane strain).
 //!
 //! ```sh
@@ -12,8 +12,8 @@ use peri::material::{Bond, Family, Material, Property};
 use peri::solver::{Lbfgs, Loads, Method, State, Support, System};
 
 // ANCHOR: material
-/// W = ½K θ² + ½α Σ_J (e − θ|ξ|/D)² V_J with the bonds' extensions e = |ζ| − |ξ|, the weighted volume m = Σ_J |ξ|² V_J of the
-/// whole family, the dilatation θ = (D/m) Σ_J |ξ| e V_J and α = D(D + 2)μ/m.
+/// W = ½K θ² + ½α Σ_J (e − θ|ξ|/D)² V_J with the bonds' extensions e = |ζ| − |ξ|, the weighted volume m = Σ_J
+/// |ξ|² V_J of the whole family, the dilatation θ = (D/m) Σ_J |ξ| e V_J and α = D(D + 2)μ/m.
 #[derive(Clone)]
 pub struct LinearSolid {
     /// Bulk modulus K, Pa; in plane strain K₃ + μ/3. A number for all particles, or a field.
@@ -22,7 +22,7 @@ pub struct LinearSolid {
     pub shear: Property,
 }
 
-/// What a particle knows of its family. W = ½α Σ e² V_J + ½b θ², since the mixed terms are sums over e.
+/// State of a particle, from its family. W = ½α Σ e² V_J + ½b θ², because the mixed terms are sums over e.
 #[derive(Clone, Default)]
 pub struct Point {
     alpha: f64,
@@ -38,15 +38,15 @@ pub struct Point {
 impl<const D: usize> Material<D> for LinearSolid {
     type Point = Point;
 
-    /// The whole family gives m.
+    /// Computes m from the complete family.
     fn begin(&self, family: &Family<D>) -> Point {
         let dimension = D as f64;
         let weighted = family.sum(|bond| bond.length * bond.length * bond.volume).max(f64::MIN_POSITIVE);
-        let alpha = dimension * (dimension + 2.0) * self.shear.at(family.site()) / weighted;
+        let alpha = dimension * (dimension + 2.0) * self.shear.value_at(family.site()) / weighted;
         Point { alpha, share: dimension / weighted, ..Point::default() }
     }
 
-    /// The intact bonds give θ and b.
+    /// Computes θ and b from the intact bonds.
     fn prepare(&self, family: &Family<D>, point: &mut Point) {
         let (mut weighted, mut extension, mut spread) = (0.0, 0.0, 0.0);
         family.each(|bond| {
@@ -56,12 +56,12 @@ impl<const D: usize> Material<D> for LinearSolid {
         });
         let dimension = D as f64;
         let both = 2.0 * dimension / point.share - weighted;
-        point.balance = self.bulk.at(family.site()) - point.alpha * both / (dimension * dimension);
+        point.balance = self.bulk.value_at(family.site()) - point.alpha * both / (dimension * dimension);
         point.dilatation = point.share * extension;
         point.spread = point.share * spread;
     }
 
-    /// Both ends pull along the bond: τ = (αe + bθ D|ξ|/m) ζ/|ζ|.
+    /// Returns the force along the bond from both ends: τ = (αe + bθ D|ξ|/m) ζ/|ζ|.
     fn force(&self, bond: &Bond<D>, own: &Point, other: &Point) -> [f64; D] {
         let pull = |end: &Point| {
             bond.length * (end.alpha * bond.strain() + end.balance * end.dilatation * end.share)
@@ -75,7 +75,8 @@ impl<const D: usize> Material<D> for LinearSolid {
         0.5 * point.alpha * squares + 0.5 * point.balance * point.dilatation.powi(2)
     }
 
-    /// Springs αe and the bond's turn, both ends; then b(∂θ/∂u)² and bθ ∂²θ/∂u², where both are positive.
+    /// Bounds the stiffness: springs αe and rotation of the bond at both ends; then b(∂θ/∂u)² and bθ ∂²θ/∂u²
+    /// where positive.
     fn stiffness(&self, family: &Family<D>, points: &[Point]) -> f64 {
         let own = &points[family.site()];
         let dilatation = own.balance.max(0.0) * own.spread * own.spread;
@@ -90,14 +91,15 @@ impl<const D: usize> Material<D> for LinearSolid {
             })
     }
 
-    /// Of Young's modulus E ≈ 3μ.
+    /// Returns kθ for Young's modulus E ≈ 3μ.
     fn micromodulus(&self, bonds: &dyn BodyGeometry<D>) -> f64 {
         modulus_in(bonds, 3.0 * self.shear.least())
     }
 }
 // ANCHOR_END: material
 
-/// A strip of 60 × 16 particles in plane strain, pulled by 1 % with its sides free: −ε₂₂/ε₁₁ in the middle, from rows 6 apart.
+/// Pulls a strip of 60 × 16 particles in plane strain by 1 % with free sides; returns −ε₂₂/ε₁₁ in the middle,
+/// from rows 6 apart.
 pub fn poisson_ratio(solid: LinearSolid) -> Result<f64, peri::Error> {
     let body = [Operation::Add(Shape::Box { min: [0.0; 2], max: [60.0, 16.0] })];
     let mut bonds = LatticeBonds::new(lattice(&body, 1.0, 1.0)?, 3.015, VolumeCorrection::None, &[])?;

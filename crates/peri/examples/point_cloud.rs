@@ -1,4 +1,4 @@
-//! A strip of points that form no lattice, pulled by hand: points, bonds, material, loads, solution.
+//! Pulls a strip of points without a lattice, step by step: points, bonds, material, loads, solution.
 
 use peri::bonds::{BodyGeometry, CloudBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};

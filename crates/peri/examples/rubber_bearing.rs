@@ -1,19 +1,21 @@
-//! A rubber strip between two rigid plates, which bond laws cannot describe: it is stiff because its volume cannot change.
-//! Plane strain, eight-chain network; apparent modulus against Gent & Lindley's for thin bonded strips (1959, doi:10.1243/PIME_PROC_1959_173_022_02).
+//! Rubber strip between two rigid plates, which bond laws cannot describe: it is stiff because its volume
+//! cannot change. Plane strain, eight-chain network; apparent modulus, compared with Gent & Lindley for thin
+//! bonded strips (1959, doi:10.1243/PIME_PROC_1959_173_022_02).
 
 use peri::calibrate::Space;
 use peri::geometry::Shape;
-use peri::material::{EightChain, NonlocalSolid};
+use peri::material::{EightChainSolid, NonlocalSolid};
 use peri::model::{Body, Model};
 use peri::solver::Lbfgs;
 
-/// Apparent modulus P/(w ε), Pa, of a strip of width w and height h between plates that approach by 1 %.
+/// Returns the apparent modulus P/(w ε), Pa, of a strip of width w and height h between plates that approach
+/// by 1 %.
 pub fn apparent_modulus(width: f64, height: f64, spacing: f64, bulk: f64) -> Result<f64, peri::Error> {
     // the plates are two horizons thick, as materials with two passes need
     let plate = 6.0 * spacing;
     let strip = Shape::rectangle([0.0, -plate], [width, height + plate]);
     let body = Body::lattice(strip, spacing).plane_strain(1e-3);
-    let rubber = NonlocalSolid(EightChain::new(Space::PlaneStrain, 0.4e6, 25.0, bulk)?);
+    let rubber = NonlocalSolid(EightChainSolid::new(Space::PlaneStrain, 0.4e6, 25.0, bulk)?);
     let model = Model::new(body, rubber)
         .clamp(|[_, y]| y < 0.0)
         .displace(move |[_, y]| y > height, [0.0, -0.01 * height]);

@@ -1,4 +1,4 @@
-//! A scene from a program: run as the command line does, values by their names.
+//! Runs a scene from a program, as the command line does, and reads values by name.
 
 use harness::case::{self, Options};
 use harness::scene::Source;

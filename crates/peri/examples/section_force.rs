@@ -1,4 +1,4 @@
-//! Force and moment that a bent beam transmits across its sections.
+//! Force and moment across sections of a bent beam.
 
 use peri::geometry::Shape;
 use peri::model::{Body, Model, Rubber};

@@ -1,4 +1,4 @@
-//! A sheet with a slot, pulled until it tears: load against displacement, bond by bond.
+//! Pulls a sheet with a slot until it tears: load against displacement.
 
 use peri::geometry::Shape;
 use peri::model::{Body, Model, Rubber};

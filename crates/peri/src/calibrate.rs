@@ -1,26 +1,27 @@
-//! The bond modulus kθ from Young's modulus, and what a lattice makes of it.
+//! Bond modulus kθ from Young's modulus, and the moduli of a lattice.
 //!
-//! The dual force f = 2t enters the equation of motion (2.6). With t ≈ 3kθ(l − 1), (2.76) and (2.80) equal the standard
-//! constants of the prototype microelastic material; Poisson's ratio is 1/4 (3D, plane strain) or 1/3 (plane stress).
+//! The dual force f = 2t enters the equation of motion (2.6). With t ≈ 3kθ(l − 1), (2.76) and (2.80) equal
+//! the standard constants of the prototype microelastic material; Poisson's ratio is 1/4 (3D, plane strain)
+//! or 1/3 (plane stress).
 
 use crate::bonds::{BodyGeometry, LatticeBonds, Stencil, VolumeCorrection};
 use serde::Deserialize;
 use std::f64::consts::PI;
 
-/// The space a body lives in.
+/// Dimension and plane state of a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Space {
     /// Thin sheet, bonds in its plane.
     PlaneStress,
-    /// Thick slab, bonds in its cross-section (a disk, not a ball).
+    /// Thick slab, bonds in its cross-section (a disk, not a sphere).
     PlaneStrain,
     /// Three dimensions.
     Solid,
 }
 
-/// Where kθ comes from.
+/// Source of kθ.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -28,11 +29,11 @@ pub enum Calibration {
     /// The continuum's integrals, (2.76) and (2.80).
     #[default]
     Continuum,
-    /// The lattice's own sums: a homogeneous dilatation stores the exact energy.
+    /// Sums over the lattice: a homogeneous dilatation stores the exact energy.
     Lattice,
 }
 
-/// Poisson's ratio that bond forces along the bonds allow.
+/// Poisson's ratio of bond forces along the bonds.
 pub fn poisson_ratio(space: Space) -> f64 {
     if space == Space::PlaneStress { 1.0 / 3.0 } else { 0.25 }
 }
@@ -47,7 +48,7 @@ pub fn stiffness_1111(space: Space, youngs_modulus: f64) -> f64 {
     }
 }
 
-/// kθ from Young's modulus (Pa), horizon and thickness (m).
+/// Computes kθ from Young's modulus (Pa), horizon and thickness (m).
 ///
 /// Solid: 2E/(πδ⁴), Eq. (2.76). Plane stress: 3E/(2πtδ³), Eq. (2.80). Plane strain on a disk: 8E/(5πtδ³).
 pub fn modulus(space: Space, youngs_modulus: f64, horizon: f64, thickness: f64) -> f64 {
@@ -58,7 +59,7 @@ pub fn modulus(space: Space, youngs_modulus: f64, horizon: f64, thickness: f64) 
     }
 }
 
-/// kθ of bonds in a solid or, in two dimensions, in a sheet of the thickness that its particles have.
+/// Computes kθ of bonds in a solid or, in two dimensions, in a sheet of the thickness of its particles.
 pub fn modulus_in<const D: usize>(bonds: &dyn BodyGeometry<D>, youngs_modulus: f64) -> f64 {
     let volume = bonds.particles().first().map_or(0.0, |&site| bonds.volume(site as usize));
     let thickness = volume / bonds.spacing().powi(D as i32);
@@ -66,7 +67,7 @@ pub fn modulus_in<const D: usize>(bonds: &dyn BodyGeometry<D>, youngs_modulus: f
     modulus(space, youngs_modulus, bonds.horizon(), thickness)
 }
 
-/// The factor on kθ for a calibration.
+/// Factor of a calibration on kθ.
 pub fn lattice_factor<const D: usize>(calibration: Calibration, bonds: &LatticeBonds<D>) -> f64 {
     match calibration {
         Calibration::Continuum => 1.0,
@@ -77,7 +78,7 @@ pub fn lattice_factor<const D: usize>(calibration: Calibration, bonds: &LatticeB
     }
 }
 
-/// Small-strain moduli of a regular lattice, each over its exact value (C₁₁₁₁, C₁₁₂₂, E over E) or plain (ν, A).
+/// Small-strain moduli of a regular lattice, over their exact value (C₁₁₁₁, C₁₁₂₂, E over E) or plain (ν, A).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LatticeModuli {
     /// C₁₁₁₁ over the isotropic one.
@@ -97,7 +98,8 @@ pub struct LatticeModuli {
 }
 
 impl LatticeModuli {
-    /// Moduli of the lattice with horizon `ratio` spacings: C_ijkl = 3kθ Σ w V ξ_i ξ_j ξ_k ξ_l/|ξ|³, E = Δx = 1.
+    /// Computes the moduli of a lattice with a horizon of `ratio` spacings: C_ijkl = 3kθ Σ w V ξ_i ξ_j ξ_k
+    /// ξ_l/|ξ|³, E = Δx = 1.
     pub fn new<const D: usize>(ratio: f64, correction: VolumeCorrection) -> Self {
         let space = if D == 2 { Space::PlaneStress } else { Space::Solid };
         let modulus = modulus(space, 1.0, ratio, 1.0);
@@ -142,8 +144,9 @@ impl LatticeModuli {
 mod tests {
     use super::*;
 
-    /// formulation.md, table of lattice moduli at m = 3.015, to its printed digits. Its 3D rows are shifted by one column
-    /// (ΣV/Ω stands under C₁₁₁₁, and so on; `reference/ch2/lattice_moduli.csv` has the columns' names): taken from there.
+    /// Compares with formulation.md, table of lattice moduli at m = 3.015, to its printed digits. Its 3D rows
+    /// are shifted by one column (ΣV/Ω stands under C₁₁₁₁, and so on) and taken from
+    /// `reference/ch2/lattice_moduli.csv`, which names the columns.
     #[test]
     fn lattice_moduli_table() {
         let check = |found: LatticeModuli, expected: [f64; 6], name: &str| {
@@ -173,7 +176,7 @@ mod tests {
         );
     }
 
-    /// Silling & Askari's c = 18K/(πδ⁴), and 9E/(πtδ³) in plane stress (Ha & Bobaru 2010,
+    /// Compares with Silling & Askari's c = 18K/(πδ⁴), and 9E/(πtδ³) in plane stress (Ha & Bobaru 2010,
     /// doi:10.1007/s10704-010-9442-4): force density c(l − 1) = 2t with t = 3kθ(l − 1).
     #[test]
     fn equals_the_constants_of_the_linear_bond() {
@@ -197,8 +200,9 @@ mod tests {
         }
     }
 
-    /// The traces of the printed double integrals (A.18), (A.38): 128π/45 on the unit disk and 64π²/35 in the unit ball,
-    /// against the distribution of distances between two points, p(r) of a disk and of a ball.
+    /// Compares the traces of the printed double integrals (A.18), (A.38), 128π/45 on the unit disk and
+    /// 64π²/35 in the unit ball, with the distribution of distances between two points, p(r) of a disk and of
+    /// a ball.
     #[test]
     fn double_integrals_of_the_appendix() {
         let n = 20_000;
@@ -219,8 +223,8 @@ mod tests {
         assert!((found - 64.0 * PI * PI / 35.0).abs() < 1e-5, "{found}");
     }
 
-    /// `reference/ch2/lattice_moduli.csv`, rows of other horizons: C₁₁₁₁, C₁₁₂₂, E along \[100\], ν, E along \[110\], Zener's
-    /// ratio and the isotropic mean.
+    /// Compares with `reference/ch2/lattice_moduli.csv`, rows of other horizons: C₁₁₁₁, C₁₁₂₂, E along
+    /// \[100\], ν, E along \[110\], Zener's ratio and the isotropic mean.
     #[test]
     #[rustfmt::skip]
     fn lattice_moduli_at_other_horizons() {
@@ -234,27 +238,44 @@ mod tests {
             );
         };
         let rows = [
-            (3.015, None, [1.03713356, 0.99019733, 1.04860210, 0.31824809, 1.00165972, 0.93361849, 1.02539950]),
-            (3.015, Linear, [0.86076051, 0.86664499, 0.85928436, 0.33561212, 0.86516885, 1.01028973, 0.86223163]),
-            (6.015, None, [0.98313429, 1.01630059, 0.97470286, 0.34457842, 1.00787147, 1.05147110, 0.99142587]),
-            (8.015, Linear, [0.92282413, 0.94124460, 0.91817305, 0.33998699, 0.93659398, 1.03024331, 0.92742925]),
+            (3.015, None, [
+                1.03713356, 0.99019733, 1.04860210, 0.31824809, 1.00165972, 0.93361849, 1.02539950,
+            ]),
+            (3.015, Linear, [
+                0.86076051, 0.86664499, 0.85928436, 0.33561212, 0.86516885, 1.01028973, 0.86223163,
+            ]),
+            (6.015, None, [
+                0.98313429, 1.01630059, 0.97470286, 0.34457842, 1.00787147, 1.05147110, 0.99142587,
+            ]),
+            (8.015, Linear, [
+                0.92282413, 0.94124460, 0.91817305, 0.33998699, 0.93659398, 1.03024331, 0.92742925,
+            ]),
         ];
         for (ratio, correction, expected) in rows {
             near(LatticeModuli::new::<2>(ratio, correction), expected);
         }
         let rows = [
-            (3.015, None, [1.03554537, 1.19345703, 0.97766676, 0.27754213, 1.11960848, 1.24761663, 1.09871003]),
-            (3.015, Linear, [0.85400927, 0.94294951, 0.82186459, 0.26903156, 0.90292221, 1.16479791, 0.88958537]),
-            (6.015, None, [0.99836783, 1.05133156, 0.97951856, 0.25981674, 1.02847399, 1.08174375, 1.01955332]),
-            (8.015, Linear, [0.92156207, 0.93127787, 0.91815004, 0.25197157, 0.92723336, 1.01589794, 0.92544839]),
+            (3.015, None, [
+                1.03554537, 1.19345703, 0.97766676, 0.27754213, 1.11960848, 1.24761663, 1.09871003,
+            ]),
+            (3.015, Linear, [
+                0.85400927, 0.94294951, 0.82186459, 0.26903156, 0.90292221, 1.16479791, 0.88958537,
+            ]),
+            (6.015, None, [
+                0.99836783, 1.05133156, 0.97951856, 0.25981674, 1.02847399, 1.08174375, 1.01955332,
+            ]),
+            (8.015, Linear, [
+                0.92156207, 0.93127787, 0.91815004, 0.25197157, 0.92723336, 1.01589794, 0.92544839,
+            ]),
         ];
         for (ratio, correction, expected) in rows {
             near(LatticeModuli::new::<3>(ratio, correction), expected);
         }
     }
 
-    /// What (A.18) and (A.38) print are 2Ω times the single-point integrals of (2.77) and (2.73): ∫ ξξξξ/|ξ|³ dV has the
-    /// coefficients tπR³/12 and πR⁴/15 that the calibration needs, by quadrature of its components.
+    /// Checks that (A.18) and (A.38) print 2Ω times the single-point integrals of (2.77) and (2.73): ∫
+    /// ξξξξ/|ξ|³ dV has the coefficients tπR³/12 and πR⁴/15 that the calibration needs, by quadrature of its
+    /// components.
     #[test]
     fn single_point_integrals() {
         let n = 2000;

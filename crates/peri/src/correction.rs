@@ -1,13 +1,14 @@
-//! The energy surface correction: bonds near a free surface are stiffened until a homogeneous strain stores the
-//! energy that the continuum stores. Madenci & Oterkus, Peridynamic Theory and Its Applications (2014), §4.2.
+//! The energy surface correction: bonds near a free surface are stiffened until a homogeneous strain stores
+//! the energy that the continuum stores. Madenci & Oterkus, Peridynamic Theory and Its Applications (2014),
+//! §4.2.
 
 use crate::bonds::{BodyGeometry, Property};
 use crate::field::Field;
 use rayon::prelude::*;
 
-/// Per-particle factors g_d = W_exact/W_d for a uniaxial strain ε in each direction d, with W_exact = ½ C₁₁₁₁ ε² and
-/// the bonds' W_d = ¼ Σ_J 6kθ V_J |ξ| n_d⁴ ε² (dual force f = 2t, linear bond t = 3kθ(λ − 1)).
-/// A particle without bonds along d gets 1.
+/// Computes per-particle factors g_d = W_exact/W_d for a uniaxial strain ε in each direction d, with
+/// W_exact = ½ C₁₁₁₁ ε² and the bonds' W_d = ¼ Σ_J 6kθ V_J |ξ| n_d⁴ ε² (dual force f = 2t, linear bond t =
+/// 3kθ(λ − 1)). A particle without bonds along d gets 1.
 pub fn surface_factors<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     modulus: f64,
@@ -34,8 +35,9 @@ pub fn surface_factors<const D: usize>(
     factors
 }
 
-/// The factors of bonds, see [`crate::bonds::BondForces::set_factors`], from surface correction and from a micromodulus over that of the law:
-/// a bond has the mean of its two ends. `None` where all are 1.
+/// Computes the factors of bonds, see [`crate::bonds::BondForces::set_factors`], from surface correction and
+/// from the ratio of the micromodulus to that of the law: a bond has the mean of its two ends. `None` if all
+/// are 1.
 pub fn bond_factors<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     surface: Option<Field<D>>,
@@ -47,7 +49,7 @@ pub fn bond_factors<const D: usize>(
     let mut factors = Field::zeros(bonds.sites());
     for site in bonds.particles().iter().map(|&site| site as usize) {
         let surface = surface.as_ref().map_or([1.0; D], |surface| surface.get(site));
-        factors.set(site, surface.map(|g| g * micromodulus.at(site)));
+        factors.set(site, surface.map(|g| g * micromodulus.value_at(site)));
     }
     Some(factors)
 }

@@ -17,27 +17,30 @@ use polycore::units::{EnergyPerArea, Stress};
 use serde::Deserialize;
 use std::f64::consts::PI;
 
-/// As written in a scene: one of `percent_over_contour` (with `interpretation`), `stretch`, `fracture_energy`.
+/// Critical stretch of a scene: one of `percent_over_contour` (with `interpretation`), `stretch`,
+/// `fracture_energy`.
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Critical {
     /// Factor f on the contour stretch √n̄, e.g. 1.2.
     pub percent_over_contour: Option<f64>,
-    /// What f√n̄ is the stretch of.
+    /// Stretch that f√n̄ refers to.
     pub interpretation: Option<Interpretation>,
-    /// The critical bond stretch itself.
+    /// Critical bond stretch.
     pub stretch: Option<f64>,
-    /// Fracture energy G, from which the stretch follows: the mesh-objective choice.
+    /// Fracture energy G, from which the stretch follows: independent of the mesh.
     pub fracture_energy: Option<EnergyPerArea>,
-    /// What the fracture energy of a bond law is the energy of; default: `tearing`, of an inclusion that of the rest.
+    /// Energy that the fracture energy of a bond law refers to; default: `tearing`; of an inclusion, that of
+    /// the base material.
     pub convention: Option<Convention>,
-    /// Uniaxial tensile strength of a solid, force over the undeformed section, beside its fracture energy: bonds soften.
+    /// Uniaxial tensile strength of a solid, force over the undeformed section, in addition to its fracture
+    /// energy: bonds soften.
     pub strength: Option<Stress>,
 }
 
-/// Interpretations of f√n̄, R1 to R4 in the documents, (formulation.md, Critical stretch). (2.38) is the trace of an isochoric deformation: the bond stretch
-/// belongs on its right, the chain stretch g on its left.
+/// Interpretations of f√n̄, R1 to R4 in the documents (formulation.md, Critical stretch). (2.38) is the trace
+/// of an isochoric deformation: the bond stretch belongs on its right, the chain stretch g on its left.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -46,15 +49,15 @@ pub enum Interpretation {
     BondFull,
     /// R2: l = f√(n̄/8).
     BondEighth,
-    /// R3: (2.38) solved the other way round: l = g(f√n̄).
+    /// R3: (2.38) solved in reverse: l = g(f√n̄).
     ChainFull,
-    /// R4: l = g(f√(n̄/8)): the literal text, the only physical one.
+    /// R4: l = g(f√(n̄/8)): the literal text, the only physical interpretation.
     #[default]
     ChainEighth,
 }
 
 impl Interpretation {
-    /// All of them.
+    /// All interpretations.
     pub const ALL: [Self; 4] = [Self::BondFull, Self::BondEighth, Self::ChainFull, Self::ChainEighth];
 
     /// Name in scenes.
@@ -67,7 +70,7 @@ impl Interpretation {
         }
     }
 
-    /// The critical bond stretch for a factor and a number of links.
+    /// Computes the critical bond stretch for a factor and a number of links.
     pub fn stretch(self, factor: f64, links: f64) -> f64 {
         let (contour, eighth) = (factor * links.sqrt(), factor * (links / 8.0).sqrt());
         match self {
@@ -79,11 +82,11 @@ impl Interpretation {
     }
 }
 
-/// What a critical stretch depends on besides its own numbers.
+/// Body and law data that a critical stretch depends on.
 pub struct Context<'a> {
     /// The bond law.
     pub law: &'a dyn BondPotential,
-    /// Links per bond, where the law has chains.
+    /// Links per bond, if the law has chains.
     pub links: Option<f64>,
     /// The space.
     pub space: Space,
@@ -95,13 +98,14 @@ pub struct Context<'a> {
     pub thickness: f64,
     /// Bonds across a cut through the body.
     pub crossing: Crossing,
-    /// What a fracture energy is the energy of, where nothing else is said.
+    /// Default convention of a fracture energy.
     pub convention: Convention,
 }
 
-/// Energy density Y_c, J/m³, beyond which bonds of a solid break that has the fracture energy G, J/m²: G/(c Σ ŵ|ξ₁|), with the sum over
-/// the largest family of the body. c = 1.13 + 0.98/m, m the horizon over the spacing, makes the crack of a pure-shear strip run at G
-/// (cases/ch5/rubber-tearing): bonds ahead of a tip release less than the mean of those that a crack cuts.
+/// Computes the energy density Y_c, J/m³, beyond which bonds of a solid with the fracture energy G, J/m²,
+/// break: G/(c Σ ŵ|ξ₁|), with the sum over the largest family of the body. c = 1.13 + 0.98/m, m the horizon
+/// over the spacing, makes the crack of a pure-shear strip run at G (cases/ch5/rubber-tearing): bonds ahead
+/// of a tip release less than the mean of those that a crack cuts.
 pub fn energy_limit<const D: usize>(bonds: &dyn BodyGeometry<D>, fracture_energy: f64) -> f64 {
     let (reach, calibration) = share_of_crack(bonds);
     fracture_energy / (calibration * reach)
@@ -109,7 +113,7 @@ pub fn energy_limit<const D: usize>(bonds: &dyn BodyGeometry<D>, fracture_energy
 
 /// Σ ŵ|ξ₁| of the largest family, m, and c of bonds that break at once.
 fn share_of_crack<const D: usize>(bonds: &dyn BodyGeometry<D>) -> (f64, f64) {
-    // the axis along which the family reaches farthest, in bodies thinner than it
+    // the axis along which the family reaches farthest, for bodies thinner than the family
     let mut most = [0.0_f64; 2];
     for &site in bonds.particles() {
         let (mut whole, mut reach) = (0.0, [0.0; D]);
@@ -124,16 +128,16 @@ fn share_of_crack<const D: usize>(bonds: &dyn BodyGeometry<D>) -> (f64, f64) {
     (most[1] / most[0], 1.13 + 0.98 * bonds.spacing() / bonds.horizon())
 }
 
-/// c of bonds of ductility 1, 2, 4, and 8 or more, over that of bonds that break at once: softening spreads the load over what is ahead
-/// of the tip. Between them it is linear in log₂ e_f. From pure-shear strips of rubber and of small strains: theory/fracture.md of the guide.
+/// c of bonds of ductility 1, 2, 4, and 8 or more, over that of bonds that break at once: softening spreads
+/// the load over the bonds ahead of the tip. Linear in log₂ e_f in between. From pure-shear strips of rubber
+/// and of small strains: theory/fracture.md of the guide.
 const CALIBRATION: [f64; 4] = [1.0, 0.85, 0.73, 0.62];
 
-/// Bonds with the strength whose uniform state has the energy density Y₀ = `onset`, J/m³, and the fracture energy G, J/m²: Y_c =
-/// G/(c(Y_c/Y₀) Σ ŵ|ξ₁|), see [`energy_limit`]. The limit Y_c of bonds that break at once where it is below Y₀, which such bonds reach
-/// before their strength.
+/// Softening law of bonds with the strength whose uniform state has the energy density Y₀ = `onset`, J/m³,
+/// and the fracture energy G, J/m²: Y_c = G/(c(Y_c/Y₀) Σ ŵ|ξ₁|), see [`energy_limit`].
 ///
 /// # Errors
-/// That limit.
+/// The limit Y_c of bonds that break at once, if it is below Y₀: such bonds break before their strength.
 pub fn bilinear<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     fracture_energy: f64,
@@ -155,12 +159,12 @@ pub fn bilinear<const D: usize>(
     Ok(Bilinear { onset, limit: high * onset })
 }
 
-/// What [`Critical`] must be given.
+/// Alternatives of [`Critical`].
 pub const ONE_OF: &str = "exactly one of `percent_over_contour`, `stretch`, `fracture_energy`";
 
 impl Critical {
-    /// Names of the alternatives that are given.
-    pub fn given(&self) -> Vec<&'static str> {
+    /// Names of the alternatives given.
+    pub fn alternatives(&self) -> Vec<&'static str> {
         let all = [
             ("percent_over_contour", self.percent_over_contour.is_some()),
             ("stretch", self.stretch.is_some()),
@@ -169,11 +173,13 @@ impl Critical {
         all.into_iter().filter(|(_, given)| *given).map(|(name, _)| name).collect()
     }
 
-    /// When bonds of a solid break: at a stretch, at an energy, or softened at an energy beyond a strength.
+    /// Criterion for breaking bonds of a solid: a stretch, an energy, or an energy of softening beyond a
+    /// strength.
     ///
     /// # Errors
-    /// [`Error::Parameter`]: a strength that the law does not reach, or too large for the fracture energy.
-    pub fn of_solid<const D: usize>(
+    /// [`Error::Parameter`] for a strength that the law does not reach or that is too large for the fracture
+    /// energy.
+    pub fn solid_criterion<const D: usize>(
         &self,
         law: &dyn PointLaw<D>,
         bonds: &dyn BodyGeometry<D>,
@@ -189,8 +195,8 @@ impl Critical {
                     .ok_or_else(|| fault("a stress that the law reaches in uniaxial tension".to_owned()))?;
                 let softening = bilinear(bonds, energy, onset).map_err(|limit| {
                     fault(format!(
-                        "less, or a finer spacing: at it W = {onset:.4e} J/m³, and bonds of this fracture energy break at \
-                         {limit:.4e} J/m³"
+                        "less, or a finer spacing: at it W = {onset:.4e} J/m³, and bonds of this fracture \
+                         energy break at {limit:.4e} J/m³"
                     ))
                 })?;
                 Ok(Criterion::Softening(softening))
@@ -198,10 +204,11 @@ impl Critical {
         }
     }
 
-    /// The critical bond stretch.
+    /// Computes the critical bond stretch.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where none or several of the alternatives are given, or a value is out of its domain.
+    /// [`Error::Parameter`] if none or several of the alternatives are given, or a value is out of its
+    /// domain.
     pub fn resolve(&self, context: &Context) -> Result<f64, Error> {
         let fault =
             |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.to_owned() });
@@ -209,13 +216,13 @@ impl Critical {
             return fault(
                 "critical.strength",
                 strength.si(),
-                "nothing: bond laws have none, `[material.solid]` has",
+                "only with `[material.solid]`: bond laws have no strength",
             );
         }
         match (self.percent_over_contour, self.stretch, self.fracture_energy) {
             (Some(factor), None, None) => match context.links {
                 Some(links) => {
-                    // below the contour of which (2.38) makes 1, its left branch compresses
+                    // below the contour that (2.38) maps to 1, its left branch compresses
                     let contour = match self.interpretation.unwrap_or_default() {
                         Interpretation::BondFull | Interpretation::ChainFull => factor * links.sqrt(),
                         Interpretation::BondEighth | Interpretation::ChainEighth => {
@@ -239,14 +246,15 @@ impl Critical {
             (None, None, Some(energy)) => {
                 stretch_of_energy(context, self.convention.unwrap_or(context.convention), energy.si())
             }
-            _ => fault("critical (number of alternatives)", self.given().len() as f64, ONE_OF),
+            _ => fault("critical (number of alternatives)", self.alternatives().len() as f64, ONE_OF),
         }
     }
 }
 
-/// Fracture energy G, J/m², of a critical stretch, with Φ = ∫₁^{λc} t dλ/kθ. [`Convention::Tearing`]: κkθΦ Σ_J w V_J |ξ_e||ξ| of a
-/// [`Crossing`]; [`Convention::Bonds`]: tδ⁴kθΦ in a sheet, (2π/5)δ⁵kθΦ in a solid; [`Convention::Softening`]: kθΦ Σ_J w V_J |ξ_e||ξ| of bonds
-/// that soften and bear nothing at this stretch.
+/// Computes the fracture energy G, J/m², of a critical stretch, with Φ = ∫₁^{λc} t dλ/kθ.
+/// [`Convention::Tearing`]: κkθΦ Σ_J w V_J |ξ_e||ξ| of a [`Crossing`]; [`Convention::Bonds`]: tδ⁴kθΦ in a
+/// sheet, (2π/5)δ⁵kθΦ in a solid; [`Convention::Softening`]: kθΦ Σ_J w V_J |ξ_e||ξ| of bonds that soften to
+/// zero load at this stretch.
 pub fn fracture_energy(context: &Context, convention: Convention, stretch: f64) -> f64 {
     let energy = match convention {
         Convention::Softening => softened_energy(context.law, stretch, stretch),
@@ -263,7 +271,7 @@ pub fn fracture_energy(context: &Context, convention: Convention, stretch: f64) 
 /// Fracture energies of a bond law in a body.
 #[derive(Clone, Copy, Debug)]
 pub struct Toughness {
-    /// What the scene's fracture energy is the energy of; `None` where it gives a stretch.
+    /// Convention of the scene's fracture energy; `None` if it gives a stretch.
     pub convention: Option<Convention>,
     /// Critical stretch λ_c.
     pub stretch: f64,
@@ -276,7 +284,7 @@ pub struct Toughness {
 }
 
 impl Toughness {
-    /// Of a critical stretch that follows from `critical`.
+    /// Computes the fracture energies of a critical stretch that follows from `critical`.
     pub fn new(critical: &Critical, context: &Context, stretch: f64) -> Self {
         let given = critical.fracture_energy.map(|_| critical.convention.unwrap_or(context.convention));
         let soft = given == Some(Convention::Softening);
@@ -290,7 +298,8 @@ impl Toughness {
     }
 }
 
-/// The stretch at which bonds have stored their shares of G, by bisection: energy grows with stretch in tension.
+/// Finds the stretch at which bonds have stored their shares of G, by bisection: energy grows with stretch in
+/// tension.
 fn stretch_of_energy(context: &Context, convention: Convention, energy: f64) -> Result<f64, Error> {
     let fault = |allowed: &str| {
         Err(Error::Parameter { name: "critical.fracture_energy", found: energy, allowed: allowed.to_owned() })
@@ -328,7 +337,7 @@ mod tests {
         Context { law, links: None, space, modulus, horizon, thickness, crossing, convention }
     }
 
-    /// formulation.md, table of the four examples, to its printed digits.
+    /// Compares with formulation.md, table of the four examples, to its printed digits.
     #[test]
     fn interpretations_of_the_four_examples() {
         let table = [
@@ -372,7 +381,8 @@ mod tests {
         }
     }
 
-    /// For the linear bond: G = (2π/5)δ⁵kθ·(3/2)s² = (6/5)·E·s²δ... against Silling & Askari's G = 9Ks²δ/5 ... in 3D.
+    /// Compares G = (2π/5)δ⁵kθ·(3/2)s² = (6/5)·E·s²δ of the linear bond with Silling & Askari's G = 9Ks²δ/5
+    /// in 3D.
     #[test]
     fn linear_bond_has_the_textbook_fracture_energy() {
         let (e, horizon, s) = (1e7, 0.03, 0.02);
@@ -385,8 +395,8 @@ mod tests {
         assert!((found / exact - 1.0).abs() < 1e-12);
     }
 
-    /// `reference/ch2/s8_G.py`: G = 2.67 N/mm, E = 0.6 N/mm², δ = 6.03 mm give Φ = 2πG/(3Eδ), and a linear bond breaks at
-    /// 1 + √(2Φ/3).
+    /// Compares with `reference/ch2/s8_G.py`: G = 2.67 N/mm, E = 0.6 N/mm², δ = 6.03 mm give Φ = 2πG/(3Eδ),
+    /// and a linear bond breaks at 1 + √(2Φ/3).
     #[test]
     fn critical_stretch_of_a_fracture_energy() {
         let (e, horizon, thickness) = (0.6e6, 6.03e-3, 3e-3);

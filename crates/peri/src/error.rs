@@ -1,7 +1,8 @@
-//! What can go wrong in this crate.
+//! Errors of this crate.
 
 /// Errors of the peridynamics crate.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// The body cannot be built.
     #[error("{0}")]
@@ -9,32 +10,34 @@ pub enum Error {
     /// A material parameter or a law is out of its domain.
     #[error("{name}: found {found}; allowed: {allowed}")]
     Parameter {
-        /// What.
+        /// Name of the parameter.
         name: &'static str,
-        /// The value found.
+        /// Value found.
         found: f64,
-        /// What is allowed.
+        /// Allowed values.
         allowed: String,
     },
     /// A result is not finite.
     #[error(
-        "{quantity} is not finite at particle {particle} (X = {position:?} m), step {step}, iteration {iteration}"
+        "{quantity} is not finite at particle {particle} (X = {position:?} m), step {step}, \
+        iteration {iteration}"
     )]
     NotFinite {
-        /// The quantity.
+        /// Name of the quantity.
         quantity: &'static str,
-        /// The particle's index.
+        /// Index of the particle.
         particle: usize,
-        /// Its reference position.
+        /// Reference position, m.
         position: Vec<f64>,
         /// Load step.
         step: usize,
         /// Iteration within the step.
         iteration: u64,
     },
-    /// The solver used all its iterations.
+    /// The solver reached its limit of iterations.
     #[error(
-        "not converged after {iterations} iterations of step {step}: residual {residual:.3e}, needed {needed:.3e}"
+        "not converged after {iterations} iterations of step {step}: residual {residual:.3e}, \
+        needed {needed:.3e}"
     )]
     NotConverged {
         /// Load step.
@@ -46,12 +49,18 @@ pub enum Error {
         /// Relative residual requested.
         needed: f64,
     },
-    /// Loads that nothing can balance: a part of the body bears a force and hangs on nothing, from the start or once the body is torn.
+    /// Loads without equilibrium: a force acts on a part of the body that nothing holds, from the start or
+    /// after the body is torn.
     #[error(
         "no equilibrium {}: {why}; {}",
-        if *torn { format!("after {step} steps, torn at load factor {factor:.4}") } else { format!("at load factor {factor:.4}") },
         if *torn {
-            "the last equilibrium is kept; prescribe a displacement instead of the force to follow the body beyond its peak load"
+            format!("after {step} steps, torn at load factor {factor:.4}")
+        } else {
+            format!("at load factor {factor:.4}")
+        },
+        if *torn {
+            "the last equilibrium is kept; prescribe a displacement instead of the force to follow \
+            the body beyond its peak load"
         } else {
             "hold it by a `displacement` along that axis, balance the forces, or use explicit dynamics"
         }
@@ -61,23 +70,24 @@ pub enum Error {
         step: usize,
         /// Load factor of the next.
         factor: f64,
-        /// Whether bonds have broken.
+        /// True if bonds have broken.
         torn: bool,
-        /// What bears which force, or how far it has moved.
+        /// Part and force without support, or its displacement.
         why: String,
     },
     /// The time step of explicit dynamics is beyond the critical one.
     #[error("time step: found {found:.4e} s; allowed: up to the critical {critical:.4e} s")]
     TimeStep {
-        /// The time step requested, s.
+        /// Time step requested, s.
         found: f64,
-        /// The critical one 2/ω_max, s.
+        /// Critical time step 2/ω_max, s.
         critical: f64,
     },
-    /// Energy grows from nothing in explicit dynamics.
+    /// Kinetic energy exceeds the available energy in explicit dynamics.
     #[error(
-        "unstable at t = {time:.4e} s (time step {step}): kinetic energy {kinetic:.3e} J where {available:.3e} J are \
-         available; its time step is {time_step:.4e} s, the critical one for the observed stretches {critical:.4e} s"
+        "unstable at t = {time:.4e} s (time step {step}): kinetic energy {kinetic:.3e} J where \
+         {available:.3e} J are available; its time step is {time_step:.4e} s, the critical one for the \
+         observed stretches {critical:.4e} s"
     )]
     Unstable {
         /// Time, s.
@@ -86,16 +96,17 @@ pub enum Error {
         step: u64,
         /// Kinetic energy, J.
         kinetic: f64,
-        /// Energy that the loads have brought and that has not gone, J.
+        /// Work of the loads less dissipation, J.
         available: f64,
         /// The time step, s.
         time_step: f64,
-        /// Estimate of the critical one for all stretches observed, s.
+        /// Estimated critical time step for all stretches observed, s.
         critical: f64,
     },
     /// Loads press a body through a plane, or particles through each other.
     #[error(
-        "{what} overlap by {overlap:.3e} m at step {step}, time {time:.4e} s; allowed: {allowed:.3e} m; raise `contact.stiffness`, \
+        "{what} overlap by {overlap:.3e} m at step {step}, time {time:.4e} s; allowed: \
+        {allowed:.3e} m; raise `contact.stiffness`, \
          take more or shorter steps, or a smaller load"
     )]
     Penetration {
@@ -110,25 +121,25 @@ pub enum Error {
         /// Overlap allowed, m.
         allowed: f64,
     },
-    /// A device lacks what is asked of it, or fails; see [`crate::gpu`].
+    /// A device does not support a feature or fails; see [`crate::gpu`].
     #[cfg(feature = "gpu")]
     #[error("device: {0}")]
     Device(String),
-    /// One of several variants.
+    /// An error of one of several variants.
     #[error("{variant}: {error}")]
     Within {
-        /// Its name.
+        /// Name of the variant.
         variant: String,
-        /// What went wrong.
+        /// Error of the variant.
         error: Box<Self>,
     },
-    /// Files, output, scenes.
+    /// Errors of files, output and scenes.
     #[error(transparent)]
     Shared(#[from] polycore::Error),
 }
 
 impl Error {
-    /// A geometry error.
+    /// Creates a geometry error.
     pub fn geometry(what: String) -> Self {
         Self::Geometry(what)
     }

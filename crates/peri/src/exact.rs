@@ -1,9 +1,9 @@
-//! Closed-form solutions and homogeneous responses: what results are compared with.
+//! Closed-form solutions and homogeneous responses, for comparison with results.
 
 mod hole;
 mod plate;
 
-pub use hole::{HoleComparison, Region};
+pub use hole::{HoleComparison, HoleRegion};
 pub use plate::Plate;
 
 use crate::bonds::Stencil;
@@ -11,8 +11,8 @@ use crate::potential::BondPotential;
 use crate::quadrature::mean;
 use polycore::numerics::bisected;
 
-/// Kirsch's stresses [σ_xx, σ_yy, σ_xy] at (x, y) around a hole of `radius` at the origin of an infinite plate under
-/// remote tension `remote` along x, Eqs (2.81)–(2.83); continued as printed inside the hole.
+/// Kirsch's stresses [σ_xx, σ_yy, σ_xy] at (x, y) around a hole of `radius` at the origin of an infinite
+/// plate under remote tension `remote` along x, Eqs (2.81)–(2.83); continued as printed inside the hole.
 pub fn kirsch(x: f64, y: f64, radius: f64, remote: f64) -> [f64; 3] {
     let q = radius * radius / (x * x + y * y);
     let angle = y.atan2(x);
@@ -26,7 +26,8 @@ pub fn kirsch(x: f64, y: f64, radius: f64, remote: f64) -> [f64; 3] {
 }
 
 /// Stress concentration over the remote (gross) stress of a central hole in a plate of finite width, with
-/// `ratio` = diameter/width: (2 + (1 − ratio)³)/(1 − ratio), Heywood (1952), within 1 % of Howland (1930) to 0.6.
+/// `ratio` = diameter/width: (2 + (1 − ratio)³)/(1 − ratio), Heywood (1952), within 1 % of Howland (1930) to
+/// 0.6.
 pub fn heywood_gross(ratio: f64) -> f64 {
     (2.0 + (1.0 - ratio).powi(3)) / (1.0 - ratio)
 }
@@ -41,8 +42,8 @@ pub fn observed_order(spacing: &[f64], error: &[f64]) -> f64 {
     top / bottom
 }
 
-/// Nominal stress P of a homogeneously deformed plane lattice under a bond law, over kθ, with F = diag(stretches):
-/// P_dd = Σ t n_d ξ_d V (one-point sum), spacing 1, thickness 1.
+/// Nominal stress P of a homogeneously deformed plane lattice under a bond law, over kθ, with F =
+/// diag(stretches): P_dd = Σ t n_d ξ_d V (one-point sum), spacing 1, thickness 1.
 pub fn lattice_nominal_stress(law: &dyn BondPotential, ratio: f64, stretches: [f64; 2]) -> [f64; 2] {
     let stencil = Stencil::<2>::new(ratio);
     let mut stress = [0.0; 2];
@@ -58,14 +59,16 @@ pub fn lattice_nominal_stress(law: &dyn BondPotential, ratio: f64, stretches: [f
     stress
 }
 
-/// Uniaxial response of the plane lattice: lateral stretch at which the lateral stress vanishes, and the nominal
-/// stress over kθ along the pull. Both NaN where no lateral stretch between 0.02 and 3 is free of stress.
+/// Uniaxial response of the plane lattice: lateral stretch at which the lateral stress vanishes, and the
+/// nominal stress over kθ along the pull. Both NaN if no lateral stretch between 0.02 and 3 is free of
+/// stress.
 pub fn lattice_uniaxial(law: &dyn BondPotential, ratio: f64, stretch: f64) -> (f64, f64) {
     uniaxial(stretch, |lateral| lattice_nominal_stress(law, ratio, [stretch, lateral]))
 }
 
-/// Nominal stress [along, across] over kθ of the continuum of `D` dimensions (2: sheet of thickness 1, 3: solid) with a
-/// horizon of 1, F = diag(pull, lateral, …): P = ∫ t n ⊗ ξ dV over directions, r integrated in closed form.
+/// Nominal stress [along, across] over kθ of the continuum of `D` dimensions (2: sheet of thickness 1, 3:
+/// solid) with a horizon of 1, F = diag(pull, lateral, …): P = ∫ t n ⊗ ξ dV over directions, r integrated in
+/// closed form.
 pub fn continuum_nominal_stress<const D: usize>(law: &dyn BondPotential, stretches: [f64; 2]) -> [f64; 2] {
     let [pull, lateral] = stretches;
     // (F n)·e n·e/|F n| of a bond at an angle of cosine c to the pull
@@ -99,8 +102,9 @@ pub fn continuum_uniaxial<const D: usize>(law: &dyn BondPotential, stretch: f64)
     uniaxial(stretch, |lateral| continuum_nominal_stress::<D>(law, [stretch, lateral]))
 }
 
-/// Directions in a half plane; pieces of the cosine in a half space, of eight directions each. What they must resolve is
-/// the turn of bonds into the pull, over an angle of lateral/pull stretch: below 1e-9 as long as that exceeds 0.01.
+/// Directions in a half plane; pieces of the cosine in a half space, of eight directions each. They must
+/// resolve the rotation of bonds into the pull, over an angle of lateral/pull stretch: the error is below
+/// 1e-9 while that angle exceeds 0.01.
 const ANGLES: usize = 1024;
 const PIECES: usize = 128;
 
@@ -166,7 +170,7 @@ mod tests {
         assert!((observed_order(&h, &error) - 0.45).abs() < 1e-14);
     }
 
-    /// formulation.md: lattice uniaxial, n̄ = 720, unscaled, P11/E.
+    /// Compares with formulation.md: lattice uniaxial, n̄ = 720, unscaled, P11/E.
     #[test]
     fn lattice_uniaxial_response() {
         let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
@@ -176,8 +180,9 @@ mod tests {
             assert!((found / expected - 1.0).abs() < 1e-4, "{stretch}: {found} against {expected}");
         }
     }
-    /// `reference/ch2/uniaxial.csv`: P11/E and lateral stretch of the continuum with K rescaled to 3, n̄ = 720, D̂ = 1200
-    /// (25 where said), sheet then solid. Its tables and quadratures are good to about 1e-5.
+    /// Compares with `reference/ch2/uniaxial.csv`: P11/E and lateral stretch of the continuum with K rescaled
+    /// to 3, n̄ = 720, D̂ = 1200 (25 where noted), sheet then solid. Its tables and quadratures are accurate
+    /// to about 1e-5.
     #[test]
     fn continuum_uniaxial_response() {
         let table = [
@@ -208,7 +213,8 @@ mod tests {
         }
     }
 
-    /// The continuum's small-strain response is E and ν of the calibration; a lattice of long horizon tends to it.
+    /// Checks that the continuum's small-strain response is E and ν of the calibration, and that a lattice of
+    /// long horizon converges to it.
     #[test]
     fn small_strain_and_long_horizon() {
         let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
@@ -229,7 +235,7 @@ mod tests {
         assert!((far / exact - 1.0).abs() < 0.01, "{far} {exact}");
     }
 
-    /// Beyond l ≈ 8 the reference finds no lateral stretch free of stress; at rest nothing moves.
+    /// The reference finds no stress-free lateral stretch beyond l ≈ 8; a stretch of 1 has no stress.
     #[test]
     fn limits_of_the_uniaxial_response() {
         let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();

@@ -1,9 +1,9 @@
-//! Vector fields stored component by component (structure of arrays), and their fixed division into work items.
+//! Vector fields stored component by component (structure of arrays), divided into fixed work items.
 
 use std::ops::Range;
 
-/// Sites per work item. Fixed by the data, never by the number of threads: sums taken item by item give the same
-/// bits on any number of threads. A multiple of [`crate::bonds::TILE`].
+/// Sites per work item. Fixed by the data, never by the number of threads: sums taken item by item have the
+/// same bits on any number of threads. A multiple of [`crate::bonds::TILE`].
 pub const CHUNK: usize = 4096;
 
 /// A vector field of dimension `D` on `sites` storage sites.
@@ -29,42 +29,42 @@ impl<const D: usize> Field<D> {
         std::array::from_fn(|d| self.components[d].as_slice())
     }
 
-    /// The components to write to.
+    /// Mutable components.
     pub fn components_mut(&mut self) -> [&mut [f64]; D] {
         self.components.each_mut().map(Vec::as_mut_slice)
     }
 
-    /// The vector in one site.
+    /// Vector at a site.
     pub fn get(&self, site: usize) -> [f64; D] {
         std::array::from_fn(|d| self.components[d][site])
     }
 
-    /// Replaces the vector in one site.
+    /// Replaces the vector at a site.
     pub fn set(&mut self, site: usize, value: [f64; D]) {
         for d in 0..D {
             self.components[d][site] = value[d];
         }
     }
 
-    /// The field cut into its work items, in order.
+    /// Splits the field into its work items, in order.
     pub fn chunks_mut(&mut self) -> Vec<[&mut [f64]; D]> {
         let mut iterators = self.components.each_mut().map(|c| c.chunks_mut(CHUNK));
         let count = iterators[0].len();
         (0..count).map(|_| iterators.each_mut().map(|i| i.next().unwrap_or_default())).collect()
     }
 
-    /// First component (and site) that is not finite, if any.
+    /// Finds the first component (and site) that is not finite.
     pub fn non_finite(&self) -> Option<(usize, usize)> {
         (0..D).find_map(|d| self.components[d].iter().position(|x| !x.is_finite()).map(|site| (site, d)))
     }
 }
 
-/// The sites of work item `index` in a storage of `sites`.
+/// Range of sites of work item `index` in a storage of `sites`.
 pub fn chunk_range(index: usize, sites: usize) -> Range<usize> {
     index * CHUNK..((index + 1) * CHUNK).min(sites)
 }
 
-/// Serde for arrays of any length, which serde itself offers only up to 32 and not generically.
+/// Serialises arrays of any length, which serde itself supports only up to 32 and not generically.
 mod components {
     use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 

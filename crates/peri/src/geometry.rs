@@ -1,4 +1,5 @@
-//! Bodies from shapes: boxes, disks, balls, cylinders, added and cut in order; cracks of zero width; point clouds.
+//! Bodies from shapes: boxes, disks, balls, cylinders, added and cut in order; cracks of zero width; point
+//! clouds.
 
 mod cuts;
 mod gaps;
@@ -10,16 +11,16 @@ pub use gaps::Gaps;
 use crate::error::Error;
 use polycore::memory::{available, gib};
 
-/// Where particles sit: a box of cells, some of them occupied.
+/// A box of cells, some of them occupied by particles.
 #[derive(Clone, Debug)]
 pub struct Lattice<const D: usize> {
-    /// Edge of a cell = distance of neighbouring particles, m.
+    /// Edge of a cell, the distance of neighbouring particles, m.
     pub spacing: f64,
     /// Centre of the first cell, m.
     pub origin: [f64; D],
     /// Cells along each axis.
     pub cells: [usize; D],
-    /// Which cells hold a particle; first axis fastest.
+    /// True for cells that hold a particle; first axis fastest.
     pub occupied: Vec<bool>,
     /// Volume of each particle, m³ (in 2D with the thickness).
     pub volume: f64,
@@ -80,7 +81,7 @@ impl Shape<3> {
 }
 
 impl<const D: usize> Shape<D> {
-    /// Whether the open interior contains a point. Points on a box's face belong to the box.
+    /// Returns true if the open interior contains a point. Points on a box's face belong to the box.
     pub fn contains(&self, point: [f64; D]) -> bool {
         match self {
             Self::Box { min, max } => (0..D).all(|d| min[d] <= point[d] && point[d] <= max[d]),
@@ -94,7 +95,7 @@ impl<const D: usize> Shape<D> {
         }
     }
 
-    /// Smallest box around it, as (lower corner, upper corner).
+    /// Bounding box as (lower corner, upper corner).
     pub fn bounds(&self) -> ([f64; D], [f64; D]) {
         match self {
             Self::Box { min, max } => (*min, *max),
@@ -107,7 +108,7 @@ impl<const D: usize> Shape<D> {
     }
 }
 
-/// A shape put on or taken away.
+/// An operation that adds or removes a shape.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Operation<const D: usize> {
     /// Union with the shape.
@@ -116,7 +117,7 @@ pub enum Operation<const D: usize> {
     Cut(Shape<D>),
 }
 
-/// Whether a point belongs to the body that a list of operations builds.
+/// Returns true if a point belongs to the body built by a list of operations.
 pub fn inside<const D: usize>(operations: &[Operation<D>], point: [f64; D]) -> bool {
     operations.iter().fold(false, |inside, operation| match operation {
         Operation::Add(shape) => inside || shape.contains(point),
@@ -124,7 +125,7 @@ pub fn inside<const D: usize>(operations: &[Operation<D>], point: [f64; D]) -> b
     })
 }
 
-/// Smallest box around all added shapes; `None` where nothing is added.
+/// Bounding box of all added shapes; `None` if nothing is added.
 pub fn bounds<const D: usize>(operations: &[Operation<D>]) -> Option<([f64; D], [f64; D])> {
     operations
         .iter()
@@ -137,17 +138,17 @@ pub fn bounds<const D: usize>(operations: &[Operation<D>]) -> Option<([f64; D], 
         })
 }
 
-/// Cells along each axis of a lattice of `spacing` over a box, as real numbers: they may be too many to count.
+/// Cells along each axis of a lattice of `spacing` over a box, as real numbers: they may exceed integers.
 pub fn cell_counts<const D: usize>(low: [f64; D], high: [f64; D], spacing: f64) -> [f64; D] {
     std::array::from_fn(|d| ((high[d] - low[d]) / spacing).round().max(1.0))
 }
 
-/// The lattice of cells whose centres lie inside the body. Cells are centred: the first centre lies half a spacing
-/// inside the lower corner of the bounding box.
+/// Builds the lattice of cells whose centres lie inside the body. Cells are centred: the first centre lies
+/// half a spacing inside the lower corner of the bounding box.
 ///
 /// # Errors
-/// [`Error::Geometry`] where the spacing is not positive, nothing is added, no centre is inside, or the cells are more than 2·10⁹ or than
-/// the memory that is left, of which then nothing is asked for.
+/// [`Error::Geometry`] if the spacing is not positive, nothing is added, no centre is inside, or the cells
+/// exceed 2·10⁹ or the available memory, before any is allocated.
 pub fn lattice<const D: usize>(
     operations: &[Operation<D>],
     spacing: f64,
@@ -161,7 +162,7 @@ pub fn lattice<const D: usize>(
     let count: f64 = counts.iter().product();
     refuse_too_large(spacing, [count, MOST_CELLS], count)?;
     let cells = counts.map(|c| c as usize);
-    // the box keeps its centre where its edges are no multiple of the spacing
+    // the box keeps its centre if its edges are no multiples of the spacing
     let origin: [f64; D] =
         std::array::from_fn(|d| 0.5 * (low[d] + high[d]) - 0.5 * spacing * (cells[d] - 1) as f64);
     let total: usize = cells.iter().product();
@@ -184,10 +185,10 @@ pub fn lattice<const D: usize>(
     Ok(Lattice { spacing, origin, cells, occupied, volume: spacing.powi(D as i32) * thickness })
 }
 
-/// Cells a body may have at most, whatever memory there is: sites are counted in 32 bits.
+/// Largest number of cells of a body, whatever the memory: sites are counted in 32 bits.
 pub const MOST_CELLS: f64 = 2e9;
 
-/// Refuses a body before anything of it is allocated.
+/// Refuses a body before any of it is allocated.
 ///
 /// # Errors
 /// [`Error::Geometry`] with the number of cells and the bytes that they need.
@@ -197,17 +198,19 @@ pub(crate) fn refuse_too_large(spacing: f64, [cells, most]: [f64; 2], bytes: f64
         return Ok(());
     }
     Err(Error::geometry(format!(
-        "spacing: found {spacing} m, with which the body has {cells:.3e} cells that need at least {}; allowed: at most {most:.0e} \
+        "spacing: found {spacing} m, with which the body has {cells:.3e} cells that need at least {}; \
+        allowed: at most {most:.0e} \
          cells and {} (the available memory)",
         gib(bytes),
         gib(available)
     )))
 }
 
-/// The regular lattice that points of one volume lie on; `None` where they lie on none.
+/// Recognises the regular lattice of points of one volume; `None` if there is none.
 ///
-/// The spacing is the edge of a particle's cube (plane bodies: square). Every coordinate must be within 1e-9 spacings of
-/// the lattice, no cell may hold two points, and along every axis at least half of the points have a next neighbour.
+/// The spacing is the edge of a particle's cube (square in plane bodies). Every coordinate must be within
+/// 1e-9 spacings of the lattice, no cell may hold two points, and along every axis at least half of the
+/// points must have a next neighbour.
 pub fn recognise<const D: usize>(points: &[[f64; D]], volumes: &[f64], thickness: f64) -> Option<Lattice<D>> {
     let volume = *volumes.first()?;
     if volumes.iter().any(|&v| v != volume) {
@@ -216,7 +219,7 @@ pub fn recognise<const D: usize>(points: &[[f64; D]], volumes: &[f64], thickness
     let spacing = (volume / thickness).powf(1.0 / D as f64);
     let [low, high] = polycore::numerics::bounds(points.iter().copied());
     let extent: [f64; D] = std::array::from_fn(|d| ((high[d] - low[d]) / spacing).round() + 1.0);
-    // a sparse box would waste more than a neighbour list; of a spacing of 0 the extent is not a number
+    // a sparse box would waste more than a neighbour list; a spacing of 0 makes the extent NaN
     let sparse = extent.iter().product::<f64>() > 8.0 * points.len() as f64;
     if sparse || !extent.iter().all(|e| e.is_finite()) {
         return None;

@@ -1,9 +1,9 @@
-//! The integrals over the horizon of Appendix A, by quadrature from their integrands.
+//! Integrals over the horizon of Appendix A, by quadrature of their integrands.
 //!
-//! Unit disk and unit ball, of unit thickness. Single-point: ∫ ξ⊗ξ⊗ξ⊗ξ/|ξ|³ dV over the horizon of a point, which is a
-//! coefficient times δδ + δδ + δδ: (A.19) has tπR³/12, (A.39) πR⁴/15. Double: the same between two points of the
-//! horizon, ∬ ξ⊗ξ⊗ξ⊗ξ/|ξ|³ dV dV, of which (A.18) prints t²R⁵π²/6 and (A.38) 8R⁷π²/45 for the coefficient. Its trace,
-//! ∬ |ξ| dV dV, is the mean distance of two points times the square of the measure.
+//! Unit disk and unit ball, of unit thickness. Single-point: ∫ ξ⊗ξ⊗ξ⊗ξ/|ξ|³ dV over the horizon of a point,
+//! which is a coefficient times δδ + δδ + δδ: (A.19) has tπR³/12, (A.39) πR⁴/15. Double: the same between two
+//! points of the horizon, ∬ ξ⊗ξ⊗ξ⊗ξ/|ξ|³ dV dV, of which (A.18) prints t²R⁵π²/6 and (A.38) 8R⁷π²/45 for the
+//! coefficient. Its trace, ∬ |ξ| dV dV, is the mean distance of two points times the square of the measure.
 
 use crate::quadrature::mean;
 use std::f64::consts::PI;
@@ -24,8 +24,8 @@ fn around(f: impl Fn(f64) -> f64) -> f64 {
     (0..ANGLES).map(|k| f((k as f64 + 0.5) * step)).sum::<f64>() * step
 }
 
-/// ∫ ξᵢξⱼξₖξₗ/|ξ|³ dV of (1111) and (1122) over the disk and the ball, ∬ |ξ| dV dV over both, and the trace of what is published
-/// over them.
+/// Computes ∫ ξᵢξⱼξₖξₗ/|ξ|³ dV of (1111) and (1122) over the disk and the ball, ∬ |ξ| dV dV over both, and
+/// the trace of the published values.
 pub fn all() -> [f64; 8] {
     // ξᵢξⱼξₖξₗ/|ξ|³ of (1111) and (1122), ξ = r(c, s)
     let disk = |power: [i32; 2]| {
@@ -41,8 +41,8 @@ pub fn all() -> [f64; 8] {
             integral(0.0, 1.0, |r| r.powi(4) / r.powi(3) * r * r) * lateral * circle
         })
     };
-    // from a point at the radius a, the boundary is at the distance −a c + √(1 − a²s²) in the direction (c, s); with
-    // a = sin t the root has no singular end
+    // from a point at the radius a, the boundary is at the distance −a c + √(1 − a²s²) in the direction (c,
+    // s); with a = sin t the root has no singular end
     let edge = |a: f64, c: f64| (1.0 - a * a * (1.0 - c * c)).max(0.0).sqrt() - a * c;
     let disk_trace = integral(0.0, 0.5 * PI, |t| {
         let (a, da) = t.sin_cos();
@@ -71,8 +71,8 @@ pub fn all() -> [f64; 8] {
 mod tests {
     use super::*;
 
-    /// Closed forms: δδ + δδ + δδ is 3 for (1111) and 1 for (1122); 128/45π is the mean distance of two points in a unit
-    /// disk, 36/35 in a unit ball (Santaló 1976).
+    /// Compares with closed forms: δδ + δδ + δδ is 3 for (1111) and 1 for (1122); 128/45π is the mean
+    /// distance of two points in a unit disk, 36/35 in a unit ball (Santaló 1976).
     #[test]
     fn closed_forms() {
         let expected = [

@@ -1,4 +1,4 @@
-//! The `peri` command line.
+//! The program `peri`.
 
 fn main() -> std::process::ExitCode {
     peri::program::command::main()

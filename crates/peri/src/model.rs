@@ -1,4 +1,5 @@
-//! Models in a few lines: a [`Body`], a material and loads make a [`Simulation`], which any [`Method`] solves.
+//! Models in a few lines: a [`Body`], a material and loads make a [`Simulation`], which any [`Method`]
+//! solves.
 
 mod body;
 mod rubber;
@@ -7,23 +8,23 @@ pub use body::Body;
 pub use rubber::Rubber;
 
 use crate::bonds::{BodyGeometry, LatticeBonds, Property, covered_stretches, fragments};
-use crate::contact::{Contact, Plane};
+use crate::contact::{Contact, RigidPlane};
 use crate::error::Error;
 use crate::material::{BondMaterial, Material, NonlocalSolid, PointLaw};
 use crate::potential::KernelFit;
 use crate::probe::StressEvaluator;
 use crate::solver::{
-    Breaking, Loads, Method, Policy, Record, Rotation, State, Status, Support, System, Turned,
+    Breaking, Loads, Method, Policy, RotatingRegion, Rotation, State, Status, StepRecord, Support, System,
 };
-use crate::stress::{self, BallVolume, Loaded, Measure, Missing, Tensor};
+use crate::stress::{self, BallVolume, StressInput, StressMethod, StressTensor, SurfaceCompensation};
 use std::sync::Arc;
 
-/// What a body can be made of: a [`Material`], or a description that becomes one in a body, such as [`Rubber`].
+/// A material of a body: a [`Material`], or a description that becomes one in a body, such as [`Rubber`].
 pub trait IntoMaterial<const D: usize> {
-    /// The material.
+    /// Resulting material.
     type Material: Material<D> + Clone;
 
-    /// The material in a body, and the critical stretch of its bonds where they break.
+    /// Builds the material in a body, and the critical stretch of its bonds if they break.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a parameter out of its domain.
@@ -42,26 +43,27 @@ impl<const D: usize, M: Material<D> + Clone> IntoMaterial<D> for M {
     }
 }
 
-/// Which of some points X, m, belong to a region.
-type Region<const D: usize> = Box<dyn Fn(&[[f64; D]]) -> Result<Vec<bool>, Error>>;
+/// Selects the points X, m, that belong to a region.
+type RegionTest<const D: usize> = Box<dyn Fn(&[[f64; D]]) -> Result<Vec<bool>, Error>>;
 
 /// A body, its material and its loads, before anything is built.
 ///
-/// A region is a function of the reference position: `|[x, _]| x < 3e-3` holds every particle with X₁ below 3 mm.
+/// A region is a function of the reference position: `|[x, _]| x < 3e-3` contains every particle with X₁
+/// below 3 mm.
 pub struct Model<const D: usize, M> {
     body: Body<D>,
     material: M,
-    regions: Vec<(Region<D>, Support<D>)>,
-    /// Regions that turn, by their numbers.
+    regions: Vec<(RegionTest<D>, Support<D>)>,
+    /// Rotating regions, by their numbers.
     rotations: Vec<(usize, Rotation<D>)>,
     factors: Vec<f64>,
     critical_stretch: Option<Property>,
     contact: Option<f64>,
-    planes: Vec<Plane<D>>,
+    planes: Vec<RigidPlane<D>>,
 }
 
 impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
-    /// A body without loads: one load step, bonds that break only where the material says so, no contact.
+    /// Creates a body without loads: one load step, no breaking unless the material defines it, no contact.
     pub fn new(body: Body<D>, material: M) -> Self {
         let (regions, rotations, factors) = (Vec::new(), Vec::new(), vec![1.0]);
         let planes = Vec::new();
@@ -73,13 +75,13 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
         self.displace(region, [0.0; D])
     }
 
-    /// Moves a region by a displacement, m, at load factor 1. Where regions overlap the last one counts.
+    /// Moves a region by a displacement, m, at load factor 1. If regions overlap, the last one counts.
     pub fn displace(self, region: impl Fn([f64; D]) -> bool + 'static, displacement: [f64; D]) -> Self {
         self.support(region, Support { displacement: displacement.map(Some), body_force: [0.0; D] })
     }
 
-    /// Turns a region about an axis, along the arc: by the whole angle at load factor 1. Of turned regions that others overlap,
-    /// nothing else may be prescribed.
+    /// Rotates a region about an axis, along the arc: by the whole angle at load factor 1. No other region
+    /// with prescribed displacement may overlap a rotating one.
     pub fn rotate(mut self, region: impl Fn([f64; D]) -> bool + 'static, rotation: Rotation<D>) -> Self {
         self.rotations.push((self.regions.len(), rotation));
         self.displace(region, [0.0; D])
@@ -95,8 +97,8 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
         self.support_where(move |points| Ok(points.iter().map(|&point| region(point)).collect()), support)
     }
 
-    /// As [`Self::support`], of a region that sees all particles at once, in the order of [`Simulation::displacements`]: gives
-    /// for each whether it belongs to it.
+    /// Prescribes a support as [`Self::support`], for a region that sees all particles at once, in the order
+    /// of [`Simulation::displacements`], and returns a mark for each.
     pub fn support_where(
         mut self,
         region: impl Fn(&[[f64; D]]) -> Result<Vec<bool>, Error> + 'static,
@@ -112,22 +114,22 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
         self
     }
 
-    /// Breaks bonds at a stretch, a number or a field over the particles, whatever the material says.
+    /// Breaks bonds at a stretch, a number or a field over the particles, whatever the material defines.
     pub fn critical_stretch(mut self, stretch: impl Into<Property>) -> Self {
         self.critical_stretch = Some(stretch.into());
         self
     }
 
-    /// Particles without a bond repel each other with the stiffness s of [`Contact::new`];
-    /// [`PAIR_STIFFNESS`](crate::contact::PAIR_STIFFNESS) suits.
+    /// Makes particles without a bond repel each other with the stiffness s of [`Contact::new`]; a good value
+    /// is [`PAIR_STIFFNESS`](crate::contact::PAIR_STIFFNESS).
     pub fn contact(mut self, stiffness: f64) -> Self {
         self.contact = Some(stiffness);
         self
     }
 
-    /// A rigid plane that the body cannot pass, or to which it is tied. Explicit dynamics take larger steps with a
-    /// [`Plane::stiffness`] of 2.
-    pub fn plane(mut self, plane: Plane<D>) -> Self {
+    /// Adds a rigid plane that the body cannot pass, or to which it is tied. Explicit dynamics takes larger
+    /// steps with a [`RigidPlane::stiffness`] of 2.
+    pub fn plane(mut self, plane: RigidPlane<D>) -> Self {
         self.planes.push(plane);
         self
     }
@@ -135,8 +137,8 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
     /// Builds particles, bonds, material and loads.
     ///
     /// # Errors
-    /// [`Error::Geometry`] for a body without particles or a region without any; [`Error::Parameter`] for a parameter of the
-    /// material or of contact out of its domain.
+    /// [`Error::Geometry`] for a body or a region without particles; [`Error::Parameter`] for a parameter of
+    /// the material or of contact out of its domain.
     pub fn build(self) -> Result<Simulation<D, M::Material>, Error> {
         let bonds = self.body.build()?;
         let (material, critical) = self.material.into_material(&self.body, &bonds)?;
@@ -149,7 +151,8 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
             if inside.len() != points.len() {
                 let (found, allowed) = (inside.len(), points.len());
                 return Err(Error::geometry(format!(
-                    "region {} of the loads: found {found} answers; allowed: {allowed}, one for each particle",
+                    "region {} of the loads: found {found} answers; allowed: {allowed}, one for each \
+                    particle",
                     number + 1
                 )));
             }
@@ -166,7 +169,7 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
         for (number, rotation) in self.rotations {
             let region = regions[..number].iter().filter(|(_, support)| holds(support)).count();
             let (shift, components, sites) = ([0.0; D], (1 << D) - 1, regions[number].0.clone());
-            loads.turn(&bonds, Turned { rotation, shift, components, region, sites });
+            loads.turn(&bonds, RotatingRegion { rotation, shift, components, region, sites });
         }
         let modulus = material.longitudinal_modulus(&bonds);
         let contact = match (self.contact, self.planes.is_empty()) {
@@ -189,13 +192,14 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
 pub struct Simulation<const D: usize, M> {
     /// Particles and intact bonds.
     pub bonds: LatticeBonds<D>,
-    /// The state that is reached. Its velocity may be set before a dynamic solution.
+    /// Present state. Its velocity may be set before a dynamic solution.
     pub state: State<D>,
-    /// Load factor at the end of each step; more may be added, for the next call of [`Self::solve`]. Not used in dynamics.
+    /// Load factor at the end of each step; more may be added for the next call of [`Self::solve`]. Not used
+    /// in dynamics.
     pub factors: Vec<f64>,
     material: M,
     loads: Loads<D>,
-    /// Sites of the regions that loads act on.
+    /// True for sites with loads.
     loaded: Vec<bool>,
     breaking: Option<Breaking>,
     contact: Option<Contact<D>>,
@@ -205,16 +209,16 @@ impl<const D: usize, M: Material<D> + Clone> Simulation<D, M> {
     /// Solves the remaining load steps, or continues to the end time of a dynamic method.
     ///
     /// # Errors
-    /// As the method: [`Error::NotConverged`], [`Error::NotFinite`], [`Error::Unstable`] and others.
+    /// Errors of the method: [`Error::NotConverged`], [`Error::NotFinite`], [`Error::Unstable`] and others.
     pub fn solve(&mut self, method: impl Method<D>) -> Result<(), Error> {
         self.solve_with(method, |_| Ok(()))
     }
 
-    /// [`Self::solve`]; `finished` sees the state after every load step, equilibrium in which bonds broke or row of a dynamic
-    /// history, and may stop the solution by an error.
+    /// Solves as [`Self::solve`] does; `finished` receives the state after every load step, equilibrium in
+    /// which bonds broke or row of a dynamic history, and may stop the solution by an error.
     ///
     /// # Errors
-    /// As [`Self::solve`], and those of `finished`.
+    /// Errors of [`Self::solve`] and of `finished`.
     pub fn solve_with(
         &mut self,
         method: impl Method<D>,
@@ -223,10 +227,11 @@ impl<const D: usize, M: Material<D> + Clone> Simulation<D, M> {
         self.solve_watched(method, |_| Ok(()), finished)
     }
 
-    /// [`Self::solve_with`]; `watch` sees every iteration and may stop the solution by an error, too.
+    /// Solves as [`Self::solve_with`] does; `watch` receives every iteration and may also stop the solution
+    /// by an error.
     ///
     /// # Errors
-    /// As [`Self::solve_with`], and those of `watch`.
+    /// Errors of [`Self::solve_with`] and of `watch`.
     pub fn solve_watched(
         &mut self,
         method: impl Method<D>,
@@ -242,8 +247,8 @@ impl<const D: usize, M: Material<D> + Clone> Simulation<D, M> {
         solved
     }
 
-    /// The finished load steps, or the rows of a dynamic history.
-    pub fn history(&self) -> &[Record] {
+    /// Finished load steps, or the rows of a dynamic history.
+    pub fn history(&self) -> &[StepRecord] {
         &self.state.history
     }
 
@@ -253,23 +258,24 @@ impl<const D: usize, M: Material<D> + Clone> Simulation<D, M> {
         particles.map(|site| (self.bonds.position(site), self.state.displacement.get(site)))
     }
 
-    /// Pieces that the body has broken into.
+    /// Number of pieces that the body has broken into.
     pub fn fragments(&self) -> usize {
         fragments(&self.bonds).len()
     }
 }
 
 impl<const D: usize> Simulation<D, BondMaterial<'static>> {
-    /// Evaluates forces of bonds, see [`crate::probe`].
+    /// Creates an evaluator of bond forces, see [`crate::probe`].
     pub fn evaluator(&self) -> StressEvaluator<D> {
-        StressEvaluator::of_bonds(self.material.clone(), 1e-9, self.breaking.is_some())
+        StressEvaluator::for_bonds(self.material.clone(), 1e-9, self.breaking.is_some())
     }
 }
 
 impl<const D: usize, L: PointLaw<D> + Clone + 'static> Simulation<D, NonlocalSolid<L>> {
-    /// Evaluates forces, stresses and energy-momentum, see [`crate::probe`]; to be made before bonds break.
+    /// Creates an evaluator of forces, stresses and energy-momentum, see [`crate::probe`]; create it before
+    /// bonds break.
     pub fn evaluator(&self) -> StressEvaluator<D> {
-        StressEvaluator::of_solid(Arc::new(self.material.0.clone()), false, &self.bonds)
+        StressEvaluator::for_solid(Arc::new(self.material.0.clone()), false, &self.bonds)
     }
 }
 
@@ -278,11 +284,11 @@ impl<const D: usize> Simulation<D, BondMaterial<'_>> {
     ///
     /// # Errors
     /// As [`KernelFit::new`].
-    pub fn piola(&self, measure: Measure) -> Result<Vec<Tensor<D>>, Error> {
+    pub fn piola(&self, measure: StressMethod) -> Result<Vec<StressTensor<D>>, Error> {
         let displacement = &self.state.displacement;
         let fit = KernelFit::new(self.material.law(), covered_stretches(&self.bonds, displacement), 1e-9)?;
-        let (modulus, missing) = (self.material.modulus(), Missing::WindowAt(&self.loaded));
-        let loaded = Loaded { displacement, fit: &fit, modulus, missing };
+        let (modulus, missing) = (self.material.modulus(), SurfaceCompensation::WindowAt(&self.loaded));
+        let loaded = StressInput { displacement, fit: &fit, modulus, missing };
         Ok(stress::piola(&self.bonds, &loaded, measure, BallVolume::default()))
     }
 
@@ -290,7 +296,7 @@ impl<const D: usize> Simulation<D, BondMaterial<'_>> {
     ///
     /// # Errors
     /// As [`Self::piola`].
-    pub fn cauchy(&self, measure: Measure) -> Result<Vec<Tensor<D>>, Error> {
+    pub fn cauchy(&self, measure: StressMethod) -> Result<Vec<StressTensor<D>>, Error> {
         let gradients = stress::deformation_gradients(&self.bonds, &self.state.displacement);
         Ok(stress::cauchy(&self.piola(measure)?, &gradients))
     }

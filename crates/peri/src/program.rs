@@ -1,4 +1,4 @@
-//! The program `peri`: scenes in TOML, their runs, the command line. The only room of this crate that knows of them.
+//! The program `peri`: scenes in TOML, runs, the command line. The library does not depend on it.
 
 pub mod bridge;
 pub mod command;

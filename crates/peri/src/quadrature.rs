@@ -8,7 +8,7 @@ const RULE: [(f64, f64); 4] = [
     (0.960_289_856_497_536_3, 0.101_228_536_290_376_26),
 ];
 
-/// The mean of a function over [a, b], a = b included; exact for polynomials of degree 15.
+/// Mean of a function over [a, b], including a = b; exact for polynomials of degree 15.
 pub(crate) fn mean(a: f64, b: f64, function: impl Fn(f64) -> f64) -> f64 {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
     RULE.iter()

@@ -1,4 +1,4 @@
-//! Surface of a body as face points, about one for each particle on it: where rigid planes touch.
+//! Surface of a body as face points, about one for each particle on it: rigid planes act there.
 
 use crate::bonds::{BodyGeometry, LatticeBonds};
 use crate::geometry::{Operation, Shape, bounds, cell_counts, inside, length};
@@ -10,12 +10,12 @@ const SIDE: f64 = 0.01;
 
 /// A point of the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Face<const D: usize> {
-    /// Reference place, m.
+pub struct SurfaceFace<const D: usize> {
+    /// Reference position, m.
     pub place: [f64; D],
     /// Outward unit normal.
     pub normal: [f64; D],
-    /// Number of its patch.
+    /// Number of the face's patch.
     pub patch: u32,
 }
 
@@ -24,7 +24,8 @@ pub struct Face<const D: usize> {
 enum Patch<const D: usize> {
     /// Faces with normals along an axis.
     Flat { axis: usize, outward: f64 },
-    /// Part of a circle, a sphere, or a circular cylinder along `axis`; `outward` is −1 for the wall of a hole.
+    /// Part of a circle, a sphere, or a circular cylinder along `axis`; `outward` is −1 for the wall of a
+    /// hole.
     Round { centre: [f64; D], radius: f64, axis: Option<usize>, outward: f64 },
 }
 
@@ -34,8 +35,9 @@ impl<const D: usize> Patch<D> {
         std::array::from_fn(|d| if Some(d) == axis { 0.0 } else { point[d] - centre[d] })
     }
 
-    /// Distance along the surface between a face and the point of the surface above a particle, and depth of the particle, m.
-    fn reach(&self, face: &Face<D>, point: [f64; D]) -> (f64, f64) {
+    /// Distance along the surface between a face and the point of the surface above a particle, and depth of
+    /// the particle, m.
+    fn reach(&self, face: &SurfaceFace<D>, point: [f64; D]) -> (f64, f64) {
         match *self {
             Self::Flat { axis, outward } => {
                 let aside: f64 =
@@ -58,23 +60,24 @@ impl<const D: usize> Patch<D> {
     }
 }
 
-/// Face points and the patches that they belong to.
+/// Face points and their patches.
 #[derive(Clone, Debug, Default)]
-pub struct Surface<const D: usize> {
-    faces: Vec<Face<D>>,
+pub struct BodySurface<const D: usize> {
+    faces: Vec<SurfaceFace<D>>,
     patches: Vec<Patch<D>>,
-    /// Faces that only bound what lies below the others: the last ones.
+    /// Number of faces, at the end of the list, that only bound the region below the others.
     bounds: usize,
 }
 
-impl<const D: usize> Surface<D> {
-    /// Samples the boundary of shapes: flat sides above the columns of the lattice, round ones at equal arcs of about `spacing`, m.
+impl<const D: usize> BodySurface<D> {
+    /// Samples the boundary of shapes: flat sides above the columns of the lattice, round ones at equal arcs
+    /// of about `spacing`, m.
     pub fn of_shapes(operations: &[Operation<D>], spacing: f64) -> Self {
         let mut surface = Self { faces: Vec::new(), patches: Vec::new(), bounds: 0 };
         let Some((low, high)) = bounds(operations) else { return surface };
         let counts = cell_counts(low, high, spacing);
         let origin = std::array::from_fn(|d| 0.5 * (low[d] + high[d]) - 0.5 * spacing * (counts[d] - 1.0));
-        let columns = Columns { origin, counts: counts.map(|count| count as usize), spacing };
+        let columns = CellColumns { origin, counts: counts.map(|count| count as usize), spacing };
         for operation in operations {
             let (shape, outward) = match operation {
                 Operation::Add(shape) => (shape, 1.0),
@@ -82,13 +85,13 @@ impl<const D: usize> Surface<D> {
             };
             surface.sample(shape, outward, &columns);
         }
-        let side = |face: &Face<D>, sign: f64| {
+        let side = |face: &SurfaceFace<D>, sign: f64| {
             let place = std::array::from_fn(|d| face.place[d] + sign * SIDE * spacing * face.normal[d]);
             inside(operations, place)
         };
         // sides of two shapes may lie in one plane
         let mut known = HashSet::new();
-        let mut is_new = |face: &Face<D>| known.insert((face.patch, face.place.map(f64::to_bits)));
+        let mut is_new = |face: &SurfaceFace<D>| known.insert((face.patch, face.place.map(f64::to_bits)));
         surface.faces.retain(|face| side(face, -1.0) && !side(face, 1.0) && is_new(face));
         surface
     }
@@ -110,28 +113,30 @@ impl<const D: usize> Surface<D> {
                 let mut place = lattice.position(site as usize);
                 place[axis] += 0.5 * outward * lattice.spacing();
                 let normal = std::array::from_fn(|d| if d == axis { outward } else { 0.0 });
-                faces.push(Face { place, normal, patch: patch as u32 });
+                faces.push(SurfaceFace { place, normal, patch: patch as u32 });
             }
         }
         Self { faces, patches, bounds: 0 }
     }
 
-    /// Takes flat sides whose patches are those of [`Self::of_lattice`]: 2d and 2d + 1 for the normals along −d and d.
-    pub(crate) fn of_sides(faces: Vec<Face<D>>) -> Self {
+    /// Collects flat sides whose patches are those of [`Self::of_lattice`]: 2d and 2d + 1 for the normals
+    /// along −d and d.
+    pub(crate) fn of_sides(faces: Vec<SurfaceFace<D>>) -> Self {
         Self { faces, patches: Self::axes(), bounds: 0 }
     }
 
-    /// With the faces of another surface of the same body on the other side of what lies below these.
+    /// Adds the faces of another surface of the same body, on the other side of the region below these.
     pub fn bounded_by(mut self, other: &Self) -> Self {
         let shift = self.patches.len() as u32;
         self.patches.extend(&other.patches);
         let own = other.faces.len() - other.bounds;
-        self.faces.extend(other.faces[..own].iter().map(|face| Face { patch: face.patch + shift, ..*face }));
+        self.faces
+            .extend(other.faces[..own].iter().map(|face| SurfaceFace { patch: face.patch + shift, ..*face }));
         self.bounds += own;
         self
     }
 
-    /// Returns true for a face, by its number, that only bounds what lies below the others.
+    /// Returns true for a face, by its number, that only bounds the region below the others.
     pub fn is_bound(&self, face: usize) -> bool {
         face + self.bounds >= self.faces.len()
     }
@@ -141,12 +146,13 @@ impl<const D: usize> Surface<D> {
     }
 
     /// The face points.
-    pub fn faces(&self) -> &[Face<D>] {
+    pub fn faces(&self) -> &[SurfaceFace<D>] {
         &self.faces
     }
 
-    /// Distance along the surface between a face and the point of the surface above a particle, and depth of the particle, m.
-    pub fn reach(&self, face: &Face<D>, point: [f64; D]) -> (f64, f64) {
+    /// Distance along the surface between a face and the point of the surface above a particle, and depth of
+    /// the particle, m.
+    pub fn reach(&self, face: &SurfaceFace<D>, point: [f64; D]) -> (f64, f64) {
         self.patches[face.patch as usize].reach(face, point)
     }
 
@@ -160,7 +166,7 @@ impl<const D: usize> Surface<D> {
     }
 
     /// Adds face points on all sides of a shape.
-    fn sample(&mut self, shape: &Shape<D>, outward: f64, columns: &Columns<D>) {
+    fn sample(&mut self, shape: &Shape<D>, outward: f64, columns: &CellColumns<D>) {
         match *shape {
             Shape::Box { min, max } => {
                 for axis in 0..D {
@@ -185,7 +191,7 @@ impl<const D: usize> Surface<D> {
                 self.flat(shape, axis, ends, outward, columns);
                 let patch = self.patch(Patch::Round { centre, radius, axis: Some(axis), outward });
                 let count = around(TAU * radius, columns.spacing);
-                for layer in (0..columns.counts[axis]).map(|k| columns.at(axis, k)) {
+                for layer in (0..columns.counts[axis]).map(|k| columns.coordinate(axis, k)) {
                     if layer <= ends.0 || layer >= ends.1 {
                         continue;
                     }
@@ -201,7 +207,7 @@ impl<const D: usize> Surface<D> {
         }
     }
 
-    /// Adds `count` points of a ring, given as normal and place of each direction.
+    /// Adds `count` points of a ring, given by normal and position of each direction.
     fn ring(
         &mut self,
         patch: u32,
@@ -212,12 +218,19 @@ impl<const D: usize> Surface<D> {
         for k in 0..count {
             let (sin, cos) = (TAU * (k as f64 + 0.5) / count as f64).sin_cos();
             let (normal, place) = at(cos, sin);
-            self.faces.push(Face { place, normal: normal.map(|n| outward * n), patch });
+            self.faces.push(SurfaceFace { place, normal: normal.map(|n| outward * n), patch });
         }
     }
 
-    /// Adds the points of both sides of a shape that are flat across an axis, above the columns of the lattice.
-    fn flat(&mut self, shape: &Shape<D>, axis: usize, ends: (f64, f64), outward: f64, columns: &Columns<D>) {
+    /// Adds the points of both flat sides of a shape across an axis, above the columns of the lattice.
+    fn flat(
+        &mut self,
+        shape: &Shape<D>,
+        axis: usize,
+        ends: (f64, f64),
+        outward: f64,
+        columns: &CellColumns<D>,
+    ) {
         let middle = 0.5 * (ends.0 + ends.1);
         for (end, sign) in [(ends.0, -outward), (ends.1, outward)] {
             let patch = self.patch(Patch::Flat { axis, outward: sign });
@@ -230,12 +243,12 @@ impl<const D: usize> Surface<D> {
                     }
                     let cell = rest % columns.counts[d];
                     rest /= columns.counts[d];
-                    columns.at(d, cell)
+                    columns.coordinate(d, cell)
                 });
                 if shape.contains(place) {
                     place[axis] = end;
                     let normal = std::array::from_fn(|d| if d == axis { sign } else { 0.0 });
-                    self.faces.push(Face { place, normal, patch });
+                    self.faces.push(SurfaceFace { place, normal, patch });
                 }
             }
         }
@@ -243,14 +256,14 @@ impl<const D: usize> Surface<D> {
 }
 
 /// Columns of the lattice that fills a body.
-struct Columns<const D: usize> {
+struct CellColumns<const D: usize> {
     origin: [f64; D],
     counts: [usize; D],
     spacing: f64,
 }
 
-impl<const D: usize> Columns<D> {
-    fn at(&self, axis: usize, cell: usize) -> f64 {
+impl<const D: usize> CellColumns<D> {
+    fn coordinate(&self, axis: usize, cell: usize) -> f64 {
         self.origin[axis] + self.spacing * cell as f64
     }
 }

@@ -1,6 +1,6 @@
 //! The `polycore` command line: fits hyperelastic laws to the data that a case names, and tabulates laws.
 
-// harness::say! prints without a panic where nobody reads any more
+// harness::say! prints without a panic if the output is closed
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 use std::process::ExitCode;
@@ -10,7 +10,7 @@ use harness::scene::{Failure, Source};
 use polycore::Error;
 
 mod cli {
-    /// Everything printed and written is in MPa.
+    /// Unit of all output, Pa: MPa.
     pub const MPA: f64 = 1e6;
 
     pub mod card;
@@ -20,13 +20,13 @@ mod cli {
     pub mod material;
     pub mod quantities;
     pub mod scene;
-    pub mod set;
+    pub mod table_fits;
     pub mod trials;
 }
 
 use cli::{exact, fits, scene};
 
-/// Fits of hyperelastic laws.
+/// Program that fits hyperelastic laws.
 struct Fits;
 
 impl case::Case for Fits {
@@ -43,11 +43,11 @@ impl case::Case for Fits {
     type Error = Error;
 
     fn explain(source: &Source, _quick: bool) -> Result<Vec<String>, Failure<Error>> {
-        Ok(scene::Case::parse(source)?.plan().lines().map(str::to_owned).collect())
+        Ok(scene::FitCase::parse(source)?.plan().lines().map(str::to_owned).collect())
     }
 
     fn solve(source: &Source, run: &mut Run) -> Result<Finished, Failure<Error>> {
-        Ok(fits::run(&scene::Case::parse(source)?, run)?)
+        Ok(fits::run(&scene::FitCase::parse(source)?, run)?)
     }
 
     fn schema() -> serde_json::Value {

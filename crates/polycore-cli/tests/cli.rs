@@ -1,4 +1,4 @@
-//! The contract of the `polycore` command line: what it prints, writes and returns.
+//! Output, files and exit codes of the `polycore` command line.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -30,7 +30,7 @@ fn polycore(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_polycore")).args(arguments).output().unwrap()
 }
 
-/// A folder with a scene and its table; the scene's path.
+/// Creates a folder with a scene and its table; returns the scene's path.
 fn folder(scene: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("bar.csv"), BAR).unwrap();
@@ -40,7 +40,7 @@ fn folder(scene: &str) -> (tempfile::TempDir, PathBuf) {
 }
 
 fn run(scene: &Path, output: &Path) -> Output {
-    polycore(&["run", scene.to_str().unwrap(), "--output", output.to_str().unwrap(), "--quick"])
+    polycore(&["run", scene.to_str().unwrap(), "--output", output.to_str().unwrap(), "--quick", "--verbose"])
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -114,7 +114,7 @@ fn bad_scenes_exit_with_2_and_write_nothing() {
     assert_eq!(polycore(&["run", "no/such/case.toml"]).status.code(), Some(2));
 }
 
-/// Two scenes of one folder have results of their own, the parameters are printed, and so is what `peri` takes.
+/// Two scenes of one folder have separate results; the parameters and the block for `peri` are printed.
 #[test]
 fn what_a_newcomer_sees() {
     let (folder, scene) = folder(SCENE);
@@ -124,7 +124,12 @@ fn what_a_newcomer_sees() {
     let mut texts = Vec::new();
     for name in [scene.file_name(), other.file_name()] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_polycore"));
-        let result = command.current_dir(folder.path()).arg("run").arg(name.unwrap()).arg("--quick").output();
+        let result = command
+            .current_dir(folder.path())
+            .arg("run")
+            .arg(name.unwrap())
+            .args(["--quick", "--verbose"])
+            .output();
         texts.push(text(&result.unwrap().stdout));
     }
     assert!(folder.path().join("out/chains/report.json").exists());
@@ -187,7 +192,7 @@ fn trials_pass_and_fail() {
     assert_eq!(run(&scene, &out).status.code(), Some(0));
     let report = Report::read(out.join("report.json")).unwrap();
     assert_eq!(report.trials.len(), 3);
-    // a law that answers where it must refuse, one that refuses in other words, and a wrong figure
+    // a law that answers instead of refusing, one that refuses in other words, and a wrong figure
     for (from, to) in
         [("5.0625]", "6.0]"), ("locking value", "overflow"), ("reference = 1.875", "reference = 2.0")]
     {
@@ -205,9 +210,11 @@ fn trials_pass_and_fail() {
         ("[\"1 MPa\", 5.0625]", "[\"1 MPa\"]", "shear_modulus, J_m"),
         ("[\"1 MPa\", 5.0625]", "[1.0, 5.0625]", "without a unit"),
         ("[\"1 MPa\", 5.0625]", "[\"1 MPa\", \"5 MPa\"]", "with a unit"),
-        ("stretch = 2.0\nrefused", "refused", "no `stretch`"),
+        ("stretch = 2.0\nrefused", "refused", "missing `trial[0].stretch`"),
         ("name = \"strip\"", "name = \"locked\"", "a second time"),
-        ("data = [[2.0, \"1.75 MPa\"]]", "", "neither"),
+        ("data = [[2.0, \"1.75 MPa\"]]", "", "missing `trial[2].parameters`"),
+        ("data = [[", "parameters = [\"1 MPa\"]\ndata = [[", "`trial[2].data` conflicts with `parameters`"),
+        ("data = [[", "stretch = 2.0\ndata = [[", "unexpected `trial[2].stretch`"),
         ("mode = \"pure-shear\"", "mode = \"shear\"", "allowed: `uniaxial`, `equibiaxial`, `pure-shear`"),
         ("\"strip.nominal\"", "\"strip.stress\"", "found `strip.stress`; allowed: "),
     ] {
@@ -237,7 +244,7 @@ fn exact_tables_read_back_as_data() {
     let result = polycore(&arguments);
     assert_eq!(result.status.code(), Some(0), "{}", text(&result.stderr));
     let table =
-        polycore::constitutive::hyperelastic::data::Table::parse("exact", &text(&result.stdout)).unwrap();
+        polycore::constitutive::hyperelastic::data::TestData::parse("exact", &text(&result.stdout)).unwrap();
     assert_eq!(table.measurements(), 2);
     assert!((table.states[0].nominal[0] - 0.875e6).abs() < 1e-6);
     for bad in [
@@ -263,7 +270,7 @@ fn completions() {
     }
 }
 
-/// A scene of one table, all laws, `keys` in its entry.
+/// Scene of one table, all laws, `keys` in its entry.
 fn fitted(table: &str, keys: &str) -> (tempfile::TempDir, Output) {
     let scene = format!(
         "version = 1\nprogram = \"polycore\"\n[fit]\n[[fit.data]]\nname = \"t\"\nfile = \"bar.csv\"\n{keys}\n"
@@ -280,7 +287,7 @@ fn neo_hookean(unit: &str, modulus: f64, stretches: impl IntoIterator<Item = f64
     format!("stretch,nominal_{unit}\n{}", stretches.into_iter().map(row).collect::<String>())
 }
 
-/// Compression, one-term data, gels: every law is fitted or named, and what is written has its digits.
+/// Compression, one-term data, gels: every law is fitted or reported, and written numbers have all digits.
 #[test]
 fn ordinary_tables_give_every_law() {
     let laws = 10;
@@ -304,7 +311,7 @@ fn ordinary_tables_give_every_law() {
         let materials = std::fs::read_to_string(folder.path().join("out/materials.toml")).unwrap();
         assert!(materials.contains(written), "{materials}");
         assert!(
-            materials.contains("# mooney-rivlin, rms") && materials.contains("take `neo-hookean`"),
+            materials.contains("# mooney-rivlin, rms") && materials.contains("use `neo-hookean`"),
             "{materials}"
         );
         let fits = std::fs::read_to_string(folder.path().join("out/fits.csv")).unwrap();
@@ -314,7 +321,7 @@ fn ordinary_tables_give_every_law() {
     }
 }
 
-/// Few data: laws of more parameters are named as failed, the others are kept.
+/// Few data: laws with more parameters are reported as failed, the others are kept.
 #[test]
 fn a_law_that_fails_is_named() {
     let (folder, result) = fitted("stretch,nominal_MPa\n1.5,0.4\n2,0.7\n3,1.1\n", "");
@@ -329,17 +336,19 @@ fn a_law_that_fails_is_named() {
     assert!(report.scalar("t.gent.rms").is_some() && report.scalar("t.ogden-2.rms").is_none());
 }
 
-/// What a table leaves open is settled by a key, and what it cannot be is said.
+/// Keys resolve ambiguous tables, and tables that cannot be read are refused.
 #[test]
 fn tables_of_laboratories() {
     let laboratory = "Test;Specimen;Strain (%);Stress (MPa)\nuniaxial;1;0,0;0\nuniaxial;1;50,0;0,527778\n\
-                      uniaxial;1;100,0;0,875\nequibiaxial;1;50,0;0,684156\nplanar;1;50,0;0,601852\nplanar;1;60,0;0,7\n";
+                      uniaxial;1;100,0;0,875\nequibiaxial;1;50,0;0,684156\nplanar;1;50,0;0,601852\n\
+                      planar;1;60,0;0,7\n";
     let (_folder, result) = fitted(laboratory, "");
     let shown = text(&result.stdout);
     assert_eq!(result.status.code(), Some(0), "{shown}{}", text(&result.stderr));
     for part in [
-        "separator `;`, decimal comma, UTF-8, headings in line 1, columns `Test`, `Strain (%)`, `Stress (MPa)`",
-        "engineering strain and nominal stress (the headings do not say which; keys `strain` and `stress`)",
+        "separator `;`, decimal comma, UTF-8, headings in line 1, columns `Test`, `Strain (%)`, `Stress \
+         (MPa)`",
+        "engineering strain and nominal stress (assumed; the keys `strain` and `stress` set them)",
         "stretches 1.0000 to 2.0000",
     ] {
         assert!(shown.contains(part), "{shown}");
@@ -357,7 +366,7 @@ fn tables_of_laboratories() {
         (strains, "", &["bar.csv", "line 2: column 1, `stretch`", "is this a strain?"][..]),
         ("eps;sigma\n0.5;0.79\n", "", &["unit of column 2, `sigma`", "stress_unit"]),
         ("eps;sigma/MPa\n0.5;0,79\n", "", &["line 2", "decimal"]),
-        ("Force (N),Extension (mm)\n1,2\n", "", &["divided by the undeformed area"]),
+        ("Force (N),Extension (mm)\n1,2\n", "", &["divide forces by the undeformed area"]),
     ] {
         let (_folder, result) = fitted(table, keys);
         let error = text(&result.stderr).replace(['\n', '│'], " ");
@@ -365,16 +374,18 @@ fn tables_of_laboratories() {
         assert_eq!(result.status.code(), Some(2), "{error}");
         assert!(parts.iter().all(|part| error.contains(part)), "{error}");
     }
-    // strains that are named as such by the key
+    // strains whose measure the key names
     let (_folder, result) = fitted(strains, "strain = \"engineering\"");
     assert_eq!(result.status.code(), Some(0), "{}", text(&result.stderr));
 }
 
-/// `cross` says where a law may be used: Ogden's term of α < 0, which fits bars, is far off in equibiaxial tension.
+/// `cross` reports where a law is safe: Ogden's term of α < 0, which fits bars, is far off in equibiaxial
+/// tension.
 #[test]
 fn cross_ends_in_a_verdict() {
     let case = concat!(env!("CARGO_MANIFEST_DIR"), "/../../cases/external/treloar-fits/treloar1944_20C.csv");
-    let scene = "version = 1\nprogram = \"polycore\"\n[fit]\ncross = true\nlaws = [\"ogden-1\", \"eight-chain-root-i2\"]\n\
+    let scene = "version = 1\nprogram = \"polycore\"\n[fit]\ncross = true\nlaws = [\"ogden-1\", \
+                 \"eight-chain-root-i2\"]\n\
                  [[fit.data]]\nname = \"bar\"\nfile = \"t.csv\"\nmode = \"uniaxial\"\n\
                  [[fit.data]]\nname = \"sheet\"\nfile = \"t.csv\"\nmode = \"equibiaxial\"\n";
     let (folder, scene) = folder(scene);
@@ -393,11 +404,11 @@ fn cross_ends_in_a_verdict() {
     assert!(fits.contains("bar,ogden-1,r2.sheet,-"), "{fits}");
 }
 
-/// Names of other programs lead to the law that they are here.
+/// Names used by other programs lead to the law of this one.
 #[test]
 fn laws_of_other_names_get_advice() {
     for (name, advice) in [
-        ("arruda-boyce", "`eight-chain`: that is Arruda and Boyce's law"),
+        ("arruda-boyce", "`eight-chain`, the law of Arruda and Boyce"),
         ("reduced-polynomial", "`yeoh`"),
         ("prony", "rates and relaxation are not modelled"),
         ("poisson_ratio", "incompressible"),

@@ -1,12 +1,12 @@
 //! Fits laws of rubber elasticity to a tension test: `cargo run --release --example fit_rubber [table.csv]`.
 
-use polycore::constitutive::hyperelastic::data::Table;
+use polycore::constitutive::hyperelastic::data::TestData;
 use polycore::constitutive::hyperelastic::{fit, homogeneous, model};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let treloar =
         concat!(env!("CARGO_MANIFEST_DIR"), "/../../cases/ch1/rubber-fits/treloar1944_uniaxial.csv");
-    let table = Table::read(std::env::args().nth(1).unwrap_or(treloar.into()))?;
+    let table = TestData::read(std::env::args().nth(1).unwrap_or(treloar.into()))?;
     println!("{} stresses: {}", table.measurements(), table.source);
     for key in ["neo-hookean", "gent", "eight-chain"] {
         let fit = fit::fit(model(key)?, &table)?;

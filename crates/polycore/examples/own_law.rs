@@ -21,7 +21,7 @@ impl Law for SaintVenantKirchhoff {
 
     fn tangent(&self, c: &Voigt, _: &mut Workspace) -> Result<Prediction, Error> {
         // E with its shear doubled, so that S = ℂ E and W = ½ S·E
-        let strain = voigt::strain_of_right_cauchy_green(c);
+        let strain = voigt::strain_from_right_cauchy_green(c);
         let tangent = Voigt6x6::from_fn(|a, b| {
             let isotropic = if a == b { if a < 3 { 2.0 * self.shear } else { self.shear } } else { 0.0 };
             isotropic + if a < 3 && b < 3 { self.lame } else { 0.0 }
@@ -36,7 +36,7 @@ fn main() -> Result<(), Error> {
     let law = SaintVenantKirchhoff { lame: 2e9, shear: 1e9 };
     let moduli = law.moduli(&mut Workspace::default())?;
     println!("{}: K = {:.4e} Pa, μ = {:.4e} Pa", law.name(), moduli.bulk, moduli.shear);
-    let found = Deviations::of(&law, &deformations())?;
+    let found = Deviations::measure(&law, &deformations())?;
     println!("{found:#?}");
     let passes = found.stress.is_some_and(|error| error < 2e-8) && found.tangent < 2e-8 && found.bits == 0.0;
     assert!(passes && found.stress_at_rest == 0.0 && found.objectivity < 1e-12);

@@ -2,7 +2,8 @@
 //!
 //! - [`hyperelastic`]: the isotropic laws of Chapter 1 in closed form, and their fits to tests of rubber;
 //! - [`surrogate`]: models learnt from data (feature `surrogate`): networks, without a training framework;
-//! - your own: implement [`Law`], or [`hyperelastic::Hyperelastic`] for an isotropic law of the principal stretches.
+//! - your own: implement [`Law`], or [`hyperelastic::Hyperelastic`] for an isotropic law of the principal
+//!   stretches.
 //!
 //! [`verify`] measures how well any of them keeps what every law must keep.
 //!

@@ -10,12 +10,12 @@ pub const EXIT_BAD_INPUT: u8 = 2;
 /// Exit code of a run that the user stopped.
 pub const EXIT_INTERRUPTED: u8 = 130;
 
-/// What can go wrong outside reading a scene (`scene::SceneError` is for that).
+/// Error outside reading a scene (for which there is `scene::SceneError`).
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// The operating system refused an operation on a file.
-    #[error("cannot {operation} {}: {}{source}", path.display(), plainly(source))]
+    #[error("cannot {operation} {}: {}{source}", path.display(), explanation(source))]
     Io {
         /// A verb: `create`, `rename`, …
         operation: &'static str,
@@ -24,7 +24,7 @@ pub enum Error {
         /// The reason given by the operating system.
         source: io::Error,
     },
-    /// The output directory cannot be used; found before any computation.
+    /// The output directory cannot be used; detected before any computation.
     #[error("the output directory {} cannot be used: {reason}", path.display())]
     OutputDirectory {
         /// The directory.
@@ -32,14 +32,14 @@ pub enum Error {
         /// Why.
         reason: String,
     },
-    /// A file exists but its content is not what it should be.
+    /// A file with invalid content.
     #[error("{} is not a valid {format}: {reason}", path.display())]
     Format {
         /// The file.
         path: PathBuf,
         /// `VTKHDF file`, `report`, …
         format: &'static str,
-        /// What is wrong with it.
+        /// Defect of the content.
         reason: String,
     },
     /// Data that cannot be written or drawn.
@@ -47,7 +47,7 @@ pub enum Error {
     Data {
         /// The array, curve or picture.
         what: String,
-        /// What is wrong with it.
+        /// Defect of the data.
         reason: String,
     },
     /// A checkpoint cannot be used.
@@ -63,7 +63,7 @@ pub enum Error {
     Option {
         /// The option, as it was written.
         option: String,
-        /// What is wrong with it, and what is allowed.
+        /// Defect of the option, and allowed values.
         reason: String,
     },
     /// A run was asked to stop; its checkpoint is written.
@@ -74,7 +74,7 @@ pub enum Error {
         /// The output directory of the run.
         output: PathBuf,
     },
-    /// A sweep was asked to stop; what its runs have done is kept.
+    /// A sweep was asked to stop; finished runs are kept.
     #[error("interrupted; the same command continues with the results in {}", .0.display())]
     SweepInterrupted(PathBuf),
     /// A number outside the range on which an operation is defined.
@@ -97,20 +97,20 @@ pub enum Error {
         /// The last residual.
         residual: f64,
     },
-    /// A matrix that is no deformation gradient.
+    /// Invalid deformation gradient.
     #[error(transparent)]
     Tensor(#[from] crate::tensor::Error),
-    /// A constitutive law, its fit, table or file.
+    /// Error of a constitutive law, its fit, table or file.
     #[error(transparent)]
     Constitutive(#[from] constitutive::Error),
-    /// A table of numbers that cannot be read.
+    /// Table of numbers that cannot be read.
     #[cfg(feature = "tables")]
     #[error(transparent)]
     Table(#[from] crate::table::Error),
 }
 
-/// What a user can do something about, before the system's own words.
-fn plainly(error: &io::Error) -> &'static str {
+/// Returns a plain explanation of an error that the user can act on, to precede the system's text.
+fn explanation(error: &io::Error) -> &'static str {
     match error.kind() {
         io::ErrorKind::StorageFull => "the disk is full: ",
         io::ErrorKind::QuotaExceeded => "the disk quota is exhausted: ",
@@ -119,20 +119,20 @@ fn plainly(error: &io::Error) -> &'static str {
     }
 }
 
-/// Whether a file could not be written because there is no more room for it, which is no fault of the input.
+/// Returns true if a file could not be written for lack of space, which is no fault of the input.
 #[cfg(feature = "files")]
 pub(crate) fn no_room(error: &io::Error) -> bool {
-    !plainly(error).is_empty()
+    !explanation(error).is_empty()
 }
 
 impl Error {
-    /// For `map_err`: `fs::rename(a, b).map_err(Error::io("rename", b))`.
-    pub fn io(operation: &'static str, path: impl AsRef<Path>) -> impl FnOnce(io::Error) -> Self {
+    /// Returns a closure for `map_err`: `fs::rename(a, b).map_err(Error::from_io("rename", b))`.
+    pub fn from_io(operation: &'static str, path: impl AsRef<Path>) -> impl FnOnce(io::Error) -> Self {
         let path = path.as_ref().to_path_buf();
         move |source| Self::Io { operation, path, source }
     }
 
-    /// Exit code of the command lines: 2 for bad input (what cannot be read, an unusable output directory or
+    /// Exit code of the command lines: 2 for bad input (an unreadable file, an unusable output directory or
     /// checkpoint), 130 for an interrupted run, 1 for a failed one.
     pub fn exit_code(&self) -> u8 {
         match self {
@@ -160,9 +160,9 @@ mod tests {
 
     #[test]
     fn a_full_disk_in_plain_words() {
-        let full = Error::io("write", "a.csv")(io::ErrorKind::StorageFull.into());
+        let full = Error::from_io("write", "a.csv")(io::ErrorKind::StorageFull.into());
         assert!(full.to_string().starts_with("cannot write a.csv: the disk is full: "), "{full}");
         assert_eq!(full.exit_code(), 1);
-        assert_eq!(Error::io("read", "a.csv")(io::ErrorKind::NotFound.into()).exit_code(), 2);
+        assert_eq!(Error::from_io("read", "a.csv")(io::ErrorKind::NotFound.into()).exit_code(), 2);
     }
 }

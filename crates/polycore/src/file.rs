@@ -1,4 +1,4 @@
-//! Whole files on disk, never half-written ones.
+//! Atomic writing of files.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
@@ -23,12 +23,12 @@ pub fn atomic_write(
         .suffix(".part")
         .permissions_of_a_new_file()
         .tempfile_in(directory)
-        .map_err(Error::io("create a file in", directory))?;
+        .map_err(Error::from_io("create a file in", directory))?;
     let mut buffer = BufWriter::new(temporary.as_file_mut());
-    write(&mut buffer).and_then(|()| buffer.flush()).map_err(Error::io("write", path))?;
+    write(&mut buffer).and_then(|()| buffer.flush()).map_err(Error::from_io("write", path))?;
     drop(buffer);
-    temporary.as_file().sync_all().map_err(Error::io("synchronise", path))?;
-    temporary.persist(path).map_err(|error| Error::io("write", path)(error.error))?;
+    temporary.as_file().sync_all().map_err(Error::from_io("synchronise", path))?;
+    temporary.persist(path).map_err(|error| Error::from_io("write", path)(error.error))?;
     sync_directory(directory);
     Ok(())
 }
@@ -36,7 +36,8 @@ pub fn atomic_write(
 /// Makes sure, before any computation, that results can be written into `directory`; creates it if needed.
 ///
 /// # Errors
-/// [`Error::OutputDirectory`] (exit code 2) if it cannot be created or written to; [`Error::Io`] (1) if the disk is full.
+/// [`Error::OutputDirectory`] (exit code 2) if it cannot be created or written to; [`Error::Io`] (1) if the
+/// disk is full.
 pub fn prepare_directory(directory: impl AsRef<Path>) -> Result<(), Error> {
     let directory = directory.as_ref();
     let fail = |reason: String| Error::OutputDirectory { path: directory.to_path_buf(), reason };
@@ -51,24 +52,24 @@ pub fn prepare_directory(directory: impl AsRef<Path>) -> Result<(), Error> {
     // permissions do not tell everything (read-only mounts, quotas): try
     let probe = tempfile::tempfile_in(directory).and_then(|mut probe| probe.write_all(b"probe"));
     probe.map_err(|error| match crate::error::no_room(&error) {
-        true => Error::io("write into", directory)(error),
+        true => Error::from_io("write into", directory)(error),
         false => fail(error.to_string()),
     })
 }
 
-/// Makes a rename last; best effort, since not every system can synchronise a directory.
+/// Synchronises a directory so that a rename is durable; best effort, since not every system can.
 pub fn sync_directory(directory: &Path) {
     if let Ok(handle) = File::open(directory) {
         let _ = handle.sync_all();
     }
 }
 
-/// A file's name without its folder.
+/// File name without its folder.
 pub fn name_of(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Directory of a file: `.` where its path names none.
+/// Directory of a file, or `.` if its path names none.
 pub fn parent(path: &Path) -> &Path {
     path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

@@ -1,5 +1,5 @@
-//! Datasets of HDF5 files that others hand in: none is read before its size is believable. Files that are written, and what
-//! their errors say.
+//! HDF5 files: datasets are checked for a plausible size before they are read; errors of the library become
+//! plain ones.
 
 use crate::Error;
 use rust_hdf5::{H5Dataset, H5File, Hdf5Error};
@@ -7,14 +7,16 @@ use std::mem::ManuallyDrop;
 use std::ops::Deref;
 use std::path::Path;
 
-/// Deflate packs at best 1032 bytes into one (Deutsch 1996, RFC 1951: 258 bytes in two bits).
-const BEST_PACKING: f64 = 1032.0;
-/// Bytes that a dataset or a chunk may always have: a chunk is as large as it is when only a corner of it is used.
-const ALWAYS: f64 = (4 << 20) as f64;
+/// Largest ratio of deflate compression (Deutsch 1996, RFC 1951: 258 bytes in two bits).
+const BEST_COMPRESSION: f64 = 1032.0;
+/// Size that a dataset or a chunk may always have, bytes: a chunk keeps its size when only a corner of it is
+/// used.
+const ALWAYS_ALLOWED: f64 = (4 << 20) as f64;
 
-/// Opens a dataset of a file of `file_bytes`, if the file can hold what the dataset says that it has.
+/// Opens a dataset of a file of `file_bytes`, if the file can hold the size that the dataset claims.
 ///
-/// A damaged or malicious header can name any size; HDF5 gives fill values for what was never written.
+/// A damaged or malicious header can name any size; HDF5 returns fill values for content that was never
+/// written.
 ///
 /// # Errors
 /// No such dataset; more bytes, of the whole or of a chunk, than deflate can pack into the file.
@@ -23,7 +25,7 @@ pub fn dataset(file: &H5File, name: &str, file_bytes: u64) -> Result<H5Dataset, 
     let bytes = |sizes: &[usize]| {
         sizes.iter().map(|&size| size as f64).product::<f64>() * dataset.element_size() as f64
     };
-    let most = BEST_PACKING * file_bytes as f64 + ALWAYS;
+    let most = BEST_COMPRESSION * file_bytes as f64 + ALWAYS_ALLOWED;
     let chunk = dataset.chunk_dims().unwrap_or_default();
     let needed = bytes(&dataset.shape()).max(bytes(&chunk));
     if needed > most {
@@ -36,12 +38,12 @@ pub fn dataset(file: &H5File, name: &str, file_bytes: u64) -> Result<H5Dataset, 
     Ok(dataset)
 }
 
-/// A file that is being written. One that is dropped before it is closed, since a write failed, is left as it is: the library
-/// would try to finish it, and complain on standard error beside the error that is returned.
+/// File that is being written. If it is dropped before it is closed, since a write failed, it is left as it
+/// is: the library would try to finish it, and print errors beside the one that is returned.
 pub struct Created(ManuallyDrop<H5File>);
 
 impl Created {
-    /// A new file.
+    /// Creates a file.
     ///
     /// # Errors
     /// Those of the library.
@@ -66,7 +68,7 @@ impl Deref for Created {
     }
 }
 
-/// A file that could not be written; the library wraps what the system said, sometimes as text alone.
+/// Converts an error of writing; the library wraps the system's message, sometimes as text alone.
 pub fn write_error(path: &Path, error: Hdf5Error) -> Error {
     let told = match error {
         Hdf5Error::Io(error) => error,
@@ -79,7 +81,7 @@ pub fn write_error(path: &Path, error: Hdf5Error) -> Error {
             }
         }
     };
-    Error::io("write", path)(told)
+    Error::from_io("write", path)(told)
 }
 
 #[cfg(test)]
@@ -109,7 +111,7 @@ mod tests {
         assert!(dataset(&file, "neither", bytes).is_err());
     }
 
-    /// A disk without room is no fault of a file's format.
+    /// A full disk is not a defect of a file's format.
     #[test]
     #[cfg(target_os = "linux")]
     fn no_room_for_a_file() {

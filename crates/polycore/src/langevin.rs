@@ -1,13 +1,14 @@
-//! The Langevin function 𝓛(β) = coth β − 1/β of chain statistics, its inverse, and what they give to energies.
+//! The Langevin function 𝓛(β) = coth β − 1/β of chain statistics, its inverse, and the energies that follow.
 //!
 //! A chain of n rigid links at relative extension x = r/(n b) ∈ (−1, 1) carries the dimensionless force
-//! β = 𝓛⁻¹(x) (thesis (2.36); Kuhn and Grün 1942, doi:10.1007/BF01793684). Everything here is in dimensionless numbers.
+//! β = 𝓛⁻¹(x) (thesis (2.36); Kuhn and Grün 1942, doi:10.1007/BF01793684). Everything here is in
+//! dimensionless numbers.
 //!
 //! Near the locking point x = 1 the digits are in the complement c = 1 − |x|, not in x: a caller who knows c
 //! should use [`inverse_from_complement`].
 //!
-//! Accuracy, measured on 320 000 random arguments against mpmath (`tools/langevin.py`; a thousand of the values are
-//! kept in `tests/langevin_reference.csv`), in units in the last place of the exact result:
+//! Accuracy, measured on 320 000 random arguments against mpmath (`tools/langevin.py`; a thousand of the
+//! values are kept in `tests/langevin_reference.csv`), in units in the last place of the exact result:
 //!
 //! | function | max error | function | max error |
 //! |---|---|---|---|
@@ -26,7 +27,8 @@ pub use inverse::{inverse, inverse_derivative, inverse_derivative_from_complemen
 /// Below this |β| the functions are ratios of power series with positive terms; above, exponentials.
 const SERIES_BELOW: f64 = 3.0;
 
-/// Terms of every series and polynomial. The series need 13 of them at `SERIES_BELOW`; four chains of four are fast.
+/// Terms of every series and polynomial. The series need 13 of them at `SERIES_BELOW`; four chains of four
+/// are fast.
 const TERMS: usize = 16;
 
 /// (sinh β − β)/β³ = Σ β²ᵏ/(2k+3)!
@@ -90,7 +92,8 @@ pub fn derivative(beta: f64) -> f64 {
     }
 }
 
-/// ln(β/sinh β) (thesis Eqs. (1.27), (2.39)); even, −β²/6 for small β, ln 2|β| − |β| for large β, no overflow anywhere.
+/// ln(β/sinh β) (thesis Eqs. (1.27), (2.39)); even, −β²/6 for small β, ln 2|β| − |β| for large β, no overflow
+/// anywhere.
 pub fn ln_beta_over_sinh(beta: f64) -> f64 {
     let magnitude = beta.abs();
     if magnitude < SERIES_BELOW {
@@ -103,9 +106,11 @@ pub fn ln_beta_over_sinh(beta: f64) -> f64 {
     }
 }
 
-/// Free energy of a chain per link and kθ, ψ = β𝓛(β) + ln(β/sinh β) (thesis Eq. (1.27)), with dψ/dx = β at x = 𝓛(β).
+/// Free energy of a chain per link and kθ, ψ = β𝓛(β) + ln(β/sinh β) (thesis Eq. (1.27)), with dψ/dx = β at x
+/// = 𝓛(β).
 ///
-/// β²/6 for small β. For large β the two terms are ±β while ψ grows as ln 2β − 1 only; they are combined beforehand.
+/// β²/6 for small β. For large β the two terms are ±β while ψ grows as ln 2β − 1 only; they are combined
+/// beforehand.
 pub fn free_energy(beta: f64) -> f64 {
     let magnitude = beta.abs();
     // where the two ways lose equally little

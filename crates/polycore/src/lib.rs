@@ -1,5 +1,5 @@
-//! Mathematics of the polymer-mechanics toolkit: tensors, Langevin statistics, constitutive laws and their fits, units,
-//! transfer of fields.
+//! Mathematics of the polymer-mechanics toolkit: tensors, Langevin statistics, constitutive laws and their
+//! fits, units, transfer of fields.
 //!
 //! ```
 //! use polycore::constitutive::hyperelastic::{EightChain, homogeneous::uniaxial};

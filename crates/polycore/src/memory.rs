@@ -1,21 +1,21 @@
-//! Memory: what a program may still take, and how an amount is told.
+//! Available memory; formatting of byte counts.
 //!
-//! A program states what a scene needs before it takes it: `check` and `--explain` print a line of [`needs`], and a scene
-//! that needs more than [`available`] is refused.
+//! A program states the memory of a scene before it allocates any: `check` and `--explain` print a line of
+//! [`needs`], and a scene that needs more than [`available`] is refused.
 
 use std::path::Path;
 
 /// Bytes of a GiB.
 pub const GIB: f64 = (1_u64 << 30) as f64;
 
-/// Bytes that this program may still take: the least of what the machine has left (`MemAvailable` of Linux), what the
-/// limits of the process leave (`ulimit -v` and `ulimit -d`), and what each control group around it leaves (versions 1
-/// and 2); 16 GiB where nothing of these is told.
+/// Bytes that this program may still allocate: the least of the machine's free memory (`MemAvailable` of
+/// Linux), the limits of the process (`ulimit -v` and `ulimit -d`), and those of each control group around it
+/// (versions 1 and 2); 16 GiB if no limit is known.
 pub fn available() -> f64 {
     available_in(Path::new("/"))
 }
 
-/// [`available`], with `/proc` and `/sys` below `root`.
+/// Computes [`available`] with `/proc` and `/sys` below `root`.
 fn available_in(root: &Path) -> f64 {
     let read = |path: &str| std::fs::read_to_string(root.join(path)).unwrap_or_default();
     let machine = entry(&read("proc/meminfo"), "MemAvailable:").map(|kib| kib * 1024.0);
@@ -45,12 +45,12 @@ fn available_in(root: &Path) -> f64 {
         .unwrap_or(16.0 * GIB)
 }
 
-/// Files of a control group: its limit, what it has taken, and the entry of `memory.stat` that can be given back.
+/// Files of a control group: its limit, its usage, and the entry of `memory.stat` that can be reclaimed.
 const VERSION_1: [&str; 3] = ["memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"];
 const VERSION_2: [&str; 3] = ["memory.max", "memory.current", "inactive_file"];
 
-/// What a control group and those above it leave, bytes; `None` where none has a limit. Where the path is that of another
-/// name space, as in a container, the groups that are there count.
+/// Free memory within the limits of a control group and its ancestors, bytes; `None` without a limit. If the
+/// path belongs to another name space, as in a container, the groups that exist count.
 fn in_group(mount: &Path, path: &str, [limit, taken, cache]: &[&str; 3]) -> Option<f64> {
     let folder = mount.join(path.trim_start_matches('/'));
     let above = folder.ancestors().take_while(|folder| folder.starts_with(mount));
@@ -64,7 +64,7 @@ fn in_group(mount: &Path, path: &str, [limit, taken, cache]: &[&str; 3]) -> Opti
     left.reduce(f64::min)
 }
 
-/// The first number after a name that begins a line.
+/// First number after a name at the start of a line.
 fn entry(text: &str, name: &str) -> Option<f64> {
     let rest = text
         .lines()
@@ -72,12 +72,12 @@ fn entry(text: &str, name: &str) -> Option<f64> {
     rest.split_whitespace().next()?.parse().ok()
 }
 
-/// The line that states an estimate in bytes: `at most about 120 MB of memory`.
+/// Line that states an estimate in bytes: `at most about 120 MB of memory`.
 pub fn needs(bytes: f64) -> String {
     format!("at most about {:.0} MB of memory", bytes / 1e6)
 }
 
-/// An amount in a message: `1.5 GiB`.
+/// Formats an amount for a message: `1.5 GiB`.
 pub fn gib(bytes: f64) -> String {
     format!("{:.1} GiB", bytes / GIB)
 }
@@ -94,7 +94,7 @@ mod tests {
         assert!(available() > 1e6 && available().is_finite());
     }
 
-    /// A root folder with files of these texts.
+    /// Root folder with files of these texts.
     fn root(files: &[(&str, &str)]) -> tempfile::TempDir {
         let root = tempfile::tempdir().unwrap();
         for (name, text) in files {
@@ -139,7 +139,7 @@ mod tests {
             ("sys/fs/cgroup/user/memory.current", "2000000\n"),
         ];
         assert_eq!(of(&inner), 3_000_000.0);
-        // what is cached of files is given back
+        // cached file pages can be reclaimed
         let cached = ("sys/fs/cgroup/user/memory.stat", "anon 1\ninactive_file 500000\nactive_file 7\n");
         assert_eq!(of(&[&inner[..], &[cached]].concat()), 3_500_000.0);
         let own = [("sys/fs/cgroup/user/job/memory.max", "300000\n")];

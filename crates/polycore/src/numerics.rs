@@ -16,9 +16,9 @@ pub use bounds::{bounds, range};
 #[cfg(feature = "solvers")]
 pub use conjugate_gradients::conjugate_gradients;
 pub use groups::Groups;
-pub use sets::Sets;
+pub use sets::DisjointSets;
 
-/// Sum of the values of work items in their order, whatever thread computes them.
+/// Sums the values of work items in their order, whichever thread computes them.
 #[cfg(feature = "solvers")]
 pub fn ordered_sum(items: impl rayon::iter::IndexedParallelIterator<Item = f64>) -> f64 {
     items.collect::<Vec<_>>().iter().sum()

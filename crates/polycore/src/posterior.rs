@@ -1,18 +1,19 @@
-//! The uncertainty of a least-squares fit as a sample of its parameters.
+//! Posterior of a least-squares fit, as a sample of its parameters.
 
 use crate::random::SplitMix64;
 use nalgebra::DMatrix;
 
-/// Draws that fits write.
+/// Number of draws that fits write.
 pub const DRAWS: usize = 1000;
 
-/// Degrees of freedom beyond which Student's distribution is taken as the normal one.
+/// Degrees of freedom beyond which Student's distribution is replaced by the normal one.
 const NORMAL: usize = 1000;
 
-/// Draws of the parameters of a fit: Student's multivariate t about the minimum, with the covariance s²(JᵀJ)⁻¹ as its scale and the
-/// degrees of freedom of the residuals. It is the posterior of a linear model with errors of one unknown size and no prior
-/// knowledge of either (Box & Tiao, *Bayesian Inference in Statistical Analysis*, 1973, section 2.7), and Laplace's approximation of any other. The same seed gives the same
-/// draws. `None` if the covariance is not positive definite.
+/// Draws parameters of a fit from Student's multivariate t about the minimum, with the covariance s²(JᵀJ)⁻¹
+/// as its scale and the degrees of freedom of the residuals. It is the posterior of a linear
+/// model with errors of one unknown size and no prior knowledge of either (Box & Tiao, *Bayesian Inference in
+/// Statistical Analysis*, 1973, section 2.7), and Laplace's approximation of any other. The same seed gives
+/// the same draws. `None` if the covariance is not positive definite.
 pub fn draws(
     at: &[f64],
     covariance: &DMatrix<f64>,
@@ -40,7 +41,8 @@ pub fn draws(
 mod tests {
     use super::*;
 
-    /// Mean, covariance ν/(ν − 2) Σ, and the 97.5 % quantile of Student's t of 10 degrees of freedom, 2.228 (tables).
+    /// Mean, covariance ν/(ν − 2) Σ, and the 97.5 % quantile of Student's t of 10 degrees of freedom, 2.228
+    /// (tables).
     #[test]
     fn draws_have_the_moments_of_students_t() {
         let covariance = DMatrix::from_row_slice(2, 2, &[4.0, -1.2, -1.2, 1.0]);

@@ -1,5 +1,5 @@
-//! A generator of pseudo-random numbers whose sequence never changes between versions: splits and shuffles are named
-//! by their seed.
+//! Pseudo-random numbers whose sequence never changes between versions: splits and shuffles are reproduced
+//! from their seed.
 
 /// SplitMix64 (Steele, Lea & Flood 2014, <https://doi.org/10.1145/2660193.2660195>).
 #[derive(Debug, Clone)]
@@ -8,12 +8,12 @@ pub struct SplitMix64 {
 }
 
 impl SplitMix64 {
-    /// Any seed will do.
+    /// Creates a generator; any seed will do.
     pub fn new(seed: u64) -> Self {
         Self { state: seed }
     }
 
-    /// 64 bits.
+    /// Next 64 bits.
     pub fn next_u64(&mut self) -> u64 {
         self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.state;
@@ -27,12 +27,14 @@ impl SplitMix64 {
         (self.next_u64() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Uniform among 0 … bound − 1 (bound > 0) by multiplication; the bias, below bound·2⁻⁶⁴, is beyond measuring.
+    /// Uniform among 0 … bound − 1 (bound > 0) by multiplication; the bias, below bound·2⁻⁶⁴, is beyond
+    /// measuring.
     pub fn below(&mut self, bound: usize) -> usize {
         ((u128::from(self.next_u64()) * bound as u128) >> 64) as usize
     }
 
-    /// Of the standard normal distribution, by the polar method of Marsaglia & Bray 1964, <https://doi.org/10.1137/1006063>.
+    /// Draws from the standard normal distribution, by the polar method of Marsaglia & Bray 1964,
+    /// <https://doi.org/10.1137/1006063>.
     pub fn normal(&mut self) -> f64 {
         loop {
             let (a, b) = (2.0 * self.uniform() - 1.0, 2.0 * self.uniform() - 1.0);
@@ -43,7 +45,7 @@ impl SplitMix64 {
         }
     }
 
-    /// Fisher–Yates.
+    /// Shuffles by Fisher–Yates.
     pub fn shuffle<T>(&mut self, items: &mut [T]) {
         for last in (1..items.len()).rev() {
             items.swap(last, self.below(last + 1));

@@ -1,9 +1,9 @@
 //! Tables of measured numbers, as programs and laboratories write them.
 //!
-//! [`Table::read`] finds out by itself how a file is written: its encoding (UTF-8, UTF-16, Latin-1), separator (tab, `;`,
-//! `,`, blanks), decimal sign, the line of headings below any lines of metadata, and a row of units. Headings are
-//! `name [unit]`, `name (unit)`, `name/unit` or `name` over a unit. What was found is said in one line
-//! ([`Table::understood`]), and stands in every error.
+//! [`Table::read`] detects the layout of a file: its encoding (UTF-8, UTF-16, Latin-1), separator (tab, `;`,
+//! `,`, blanks), decimal sign, the line of headings below any lines of metadata, and a row of units. Headings
+//! are `name [unit]`, `name (unit)`, `name/unit` or `name` over a unit. [`Table::describe`] states the layout
+//! in one line, and so does every error.
 //!
 //! ```
 //! use polycore::table::Table;
@@ -11,11 +11,11 @@
 //!
 //! let text = "Operator;Smith\nTime (min);Stress\n;MPa\n0,5;1,25\n1,0;2,5\n";
 //! let table = Table::parse("tests.csv", text.as_bytes().to_vec())?;
-//! let [time, stress] = [table.one(&["time"])?, table.one(&["stress"])?];
+//! let [time, stress] = [table.require_column(&["time"])?, table.require_column(&["stress"])?];
 //! assert_eq!(table.column::<TimeDimension>(time, None)?, [30.0, 60.0]);
 //! assert_eq!(table.column::<StressDimension>(stress, None)?, [1.25e6, 2.5e6]);
 //! let how = "separator `;`, decimal comma, UTF-8, headings in line 2, units in line 3";
-//! assert_eq!(table.understood(&[time, stress]), format!("{how}, columns `Time (min)`, `Stress`"));
+//! assert_eq!(table.describe(&[time, stress]), format!("{how}, columns `Time (min)`, `Stress`"));
 //! # Ok::<(), polycore::table::Error>(())
 //! ```
 
@@ -29,23 +29,23 @@ use std::path::{Path, PathBuf};
 pub use heading::{Heading, plain_unit, plainly};
 pub use layout::{Decimal, Layout, Separator};
 
-/// Why a table cannot be read.
+/// Error of reading a table.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{}{}: {what}: found {found:?}; allowed: {allowed}", path.display(), place(*line))]
+#[error("{}{}: {what}: found {found:?}; allowed: {allowed}", path.display(), location(*line))]
 pub struct Error {
     /// The file.
     pub path: PathBuf,
-    /// Line, from 1; 0 where it is the file as a whole.
+    /// Line, from 1; 0 for the file as a whole.
     pub line: usize,
     /// Column, row, headings or file.
     pub what: String,
-    /// What is there.
+    /// Content found.
     pub found: String,
-    /// What may be there, and how the table was understood.
+    /// Allowed content, and the layout of the table.
     pub allowed: String,
 }
 
-fn place(line: usize) -> String {
+fn location(line: usize) -> String {
     if line == 0 { String::new() } else { format!(":{line}") }
 }
 
@@ -56,7 +56,7 @@ pub struct Table {
     /// The columns.
     pub headings: Vec<Heading>,
     layout: Layout,
-    /// Lines above the headings, and comments among the rows, as they stand there.
+    /// Lines above the headings, and comments among the rows.
     pub remarks: Vec<String>,
     /// The text of all cells, where each ends, the first of each row and one more, and the line of each row.
     cells: String,
@@ -72,14 +72,15 @@ impl Table {
     /// [`crate::Error::Io`] and what [`Table::parse`] refuses.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, crate::Error> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(crate::Error::io("read", path))?;
+        let bytes = std::fs::read(path).map_err(crate::Error::from_io("read", path))?;
         Ok(Self::parse(path, bytes)?)
     }
 
-    /// Reads what a file holds.
+    /// Parses the bytes of a file.
     ///
     /// # Errors
-    /// What is no text, a table without headings, and a row that has another number of cells than the headings.
+    /// Bytes that are no text, a table without headings, a row with another number of cells than the
+    /// headings.
     pub fn parse(path: impl AsRef<Path>, bytes: Vec<u8>) -> Result<Self, Error> {
         let path = path.as_ref();
         let refuse = |line, what: &str, found: String, allowed: String| Error {
@@ -92,7 +93,7 @@ impl Table {
         let (text, encoding) = text::decode(bytes)
             .map_err(|[found, allowed]| refuse(0, "file", found.to_owned(), allowed.to_owned()))?;
         let lines = text::lines(&text);
-        let (mut layout, heads) = match Layout::of(&lines) {
+        let (mut layout, heads) = match Layout::detect(&lines) {
             Ok(found) => found,
             Err((line, found)) => {
                 let allowed = "a line of headings above the numbers, such as `time [s],temperature [degC]`";
@@ -146,13 +147,13 @@ impl Table {
         &self.path
     }
 
-    /// How the file is written.
+    /// Layout of the file.
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
 
-    /// One line: how the file is written and which columns are used.
-    pub fn understood(&self, used: &[usize]) -> String {
+    /// Describes the layout and the columns used, in one line.
+    pub fn describe(&self, used: &[usize]) -> String {
         let names: Vec<String> = used.iter().map(|&i| format!("`{}`", self.headings[i].text)).collect();
         let plural = if names.len() == 1 { "" } else { "s" };
         format!("{}, column{plural} {}", self.layout, names.join(", "))
@@ -168,13 +169,13 @@ impl Table {
         self.lines[row]
     }
 
-    /// The column of exactly this name, the first of several.
+    /// First column of exactly this name.
     pub fn find(&self, name: &str) -> Option<usize> {
         self.headings.iter().position(|heading| heading.name == name)
     }
 
-    /// The columns of the first of some names that there is: exactly or, if none is, apart from capitals, dots and dashes;
-    /// single letters (t is a time, T a temperature) only exactly.
+    /// Columns of the first of some names that exists: an exact match or, if there is none, a match without
+    /// regard to capitals, dots and dashes; single letters (t is a time, T a temperature) match only exactly.
     pub fn matching(&self, names: &[&str]) -> Vec<usize> {
         let all = |test: &dyn Fn(&Heading) -> bool| -> Vec<usize> {
             (0..self.headings.len()).filter(|&i| test(&self.headings[i])).collect()
@@ -185,11 +186,11 @@ impl Table {
         exact.chain(plain).find(|found| !found.is_empty()).unwrap_or_default()
     }
 
-    /// The one column of some names, the first of which is for errors.
+    /// Finds the only column with one of some names, the first of which appears in errors.
     ///
     /// # Errors
-    /// None or several of them.
-    pub fn one(&self, names: &[&str]) -> Result<usize, Error> {
+    /// No such column, or several.
+    pub fn require_column(&self, names: &[&str]) -> Result<usize, Error> {
         let found = self.matching(names);
         match found[..] {
             [column] => Ok(column),
@@ -197,26 +198,26 @@ impl Table {
         }
     }
 
-    /// An error about the headings, all of which it names.
+    /// Creates an error about the headings, with all of them.
     pub fn refuse_headings(&self, allowed: impl Into<String>) -> Error {
         let texts: Vec<&str> = self.headings.iter().map(|heading| heading.text.as_str()).collect();
         let (line, found) = (self.layout.heading_line, texts.join(","));
         self.refuse(line, "headings", found, &allowed.into())
     }
 
-    /// An error, with how the table was understood.
+    /// Creates an error, with the layout of the table.
     pub fn refuse(&self, line: usize, what: &str, found: String, allowed: &str) -> Error {
         let allowed = format!("{allowed} ({})", self.layout);
         Error { path: self.path.clone(), line, what: what.to_owned(), found, allowed }
     }
 
-    /// An error about a cell.
+    /// Creates an error about a cell.
     pub fn refuse_cell(&self, row: usize, column: usize, allowed: &str) -> Error {
         let what = format!("column {}, `{}`", column + 1, self.headings[column].text);
         self.refuse(self.lines[row], &what, self.text(row, column).to_owned(), allowed)
     }
 
-    /// A cell, without the blanks around it.
+    /// Text of a cell, without the blanks around it.
     pub fn text(&self, row: usize, column: usize) -> &str {
         let cell = self.firsts[row] + column;
         if cell >= self.firsts[row + 1] {
@@ -226,17 +227,17 @@ impl Table {
         &self.cells[start..self.ends[cell]]
     }
 
-    /// A finite number, in the unit of its column.
+    /// Finite number of a cell, in the unit of its column.
     ///
     /// # Errors
-    /// The cell is blank or anything else.
+    /// A cell that is blank or not a finite number.
     pub fn number(&self, row: usize, column: usize) -> Result<f64, Error> {
         let text = self.text(row, column);
         let number = self.layout.decimal.number(text).filter(|number| number.is_finite());
         number.ok_or_else(|| self.refuse_cell(row, column, &self.why_no_number(text)))
     }
 
-    /// As [`Table::number`], nothing of a cell that is blank or says that there is no number (`n/a`, `-`).
+    /// Reads a number, or `None` from a cell that is blank or states that there is no number (`n/a`, `-`).
     ///
     /// # Errors
     /// A cell that is neither blank nor a finite number.
@@ -246,10 +247,10 @@ impl Table {
         if blank { Ok(None) } else { self.number(row, column).map(Some) }
     }
 
-    /// The unit of a column: that of its heading, or the one given for headings without.
+    /// Unit of a column: that of its heading, or `default` for headings without.
     ///
     /// # Errors
-    /// A unit of another dimension than `D`, none where one is needed.
+    /// A unit of another dimension than `D`, no unit if one is needed.
     pub fn unit<D: Dimension>(&self, column: usize, default: Option<&str>) -> Result<Unit<D>, Error> {
         let heading = &self.headings[column];
         let unit = heading.unit.as_deref().or(default).unwrap_or_default();
@@ -268,13 +269,13 @@ impl Table {
         let unit = self.unit::<D>(column, default)?;
         let value = |row| {
             let number = self.number(row, column)?;
-            let quantity = unit.of(number);
+            let quantity = unit.quantity(number);
             quantity.map(|q| q.si()).map_err(|error| self.refuse_cell(row, column, &format!("{error}")))
         };
         (0..self.rows()).map(value).collect()
     }
 
-    /// What a remark says behind a mark such as `# source:`, of the first that has it.
+    /// Text after a mark such as `# source:`, from the first remark that has it.
     pub fn remark(&self, mark: &str) -> Option<&str> {
         self.remarks.iter().find_map(|line| line.trim().strip_prefix(mark)).map(str::trim)
     }

@@ -2,12 +2,12 @@
 //!
 //! [`DeformationGradient`] is a 3×3 matrix that was checked: every component is finite and det F > 0.
 //! Everything else follows from it without further errors: Cauchy–Green tensors, invariants, principal
-//! stretches, and the conversions between the four [`StressMeasure`]s. Voigt vectors and 6×6 tangents, with their
-//! factor-2 rules, are in [`voigt`].
+//! stretches, and the conversions between the four [`StressMeasure`]s. Voigt vectors and 6×6 tangents, with
+//! their factor-2 rules, are in [`voigt`].
 //!
-//! Accuracy. The determinant is summed in doubled precision and the cofactors with fused multiply–add, so that
-//! neither loses digits to cancellation; the principal stretches come from a one-sided Jacobi decomposition of F
-//! itself (never of C, whose eigenvalues carry the square of the condition number).
+//! Accuracy. The determinant is summed in doubled precision and the cofactors with fused multiply–add, so
+//! that neither loses digits to cancellation; the principal stretches come from a one-sided Jacobi
+//! decomposition of F itself (never of C, whose eigenvalues carry the square of the condition number).
 //! Repeated stretches need no special case.
 
 pub mod deformation;
@@ -26,7 +26,7 @@ pub type Tensor = nalgebra::Matrix3<f64>;
 /// A second-order tensor in two dimensions.
 pub type Tensor2 = nalgebra::Matrix2<f64>;
 
-/// Why a matrix is no deformation gradient.
+/// Error of a matrix that is no deformation gradient.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -37,10 +37,10 @@ pub enum Error {
         row: usize,
         /// Column, from 1.
         column: usize,
-        /// What stands there.
+        /// Value of the component.
         value: f64,
     },
-    /// det F ≤ 0: the material is turned inside out or squeezed to nothing.
+    /// det F ≤ 0: the material is inverted or has no volume.
     #[error("the deformation gradient has determinant {determinant:e}; it must be positive")]
     Inverted {
         /// det F.
@@ -49,13 +49,13 @@ pub enum Error {
     /// det F is beyond the range of `f64`.
     #[error("the determinant of the deformation gradient leaves the range of f64 ({determinant})")]
     OutOfRange {
-        /// What det F came to.
+        /// Value of det F.
         determinant: f64,
     },
     /// A stretch is not a positive finite number.
     #[error("stretch {index} is {value}; a stretch must be positive and finite")]
     Stretch {
-        /// Which one, from 1.
+        /// Index of the stretch, from 1.
         index: usize,
         /// The value given.
         value: f64,

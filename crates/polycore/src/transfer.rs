@@ -1,27 +1,29 @@
-//! Fields of one discretisation on another: from the hexahedra of a mesh to the particles of a body, and back, by the volume
-//! that cells and particles have in common.
+//! Transfer of fields between discretisations: from the hexahedra of a mesh to the particles of a body, and
+//! back, weighted by the common volume of cells and particles.
 //!
-//! A particle is an axis-parallel box. Each part that a cell and a box have in common has a volume V and a place, the natural
-//! coordinates of its middle in the cell. Then
+//! A particle is an axis-parallel box. Each part that a cell and a box have in common has a volume V and a
+//! place, the natural coordinates of its middle in the cell. Then
 //! - a field over cells gives a box Σ V v / Σ V,
-//! - a field over nodes gives it Σ V Σ_a N_a(place) v_a / Σ V, with the trilinear shape functions N_a of the cell,
+//! - a field over nodes gives it Σ V Σ_a N_a(place) v_a / Σ V, with the trilinear shape functions N_a of the
+//!   cell,
 //!
-//! and both keep the integral over everything covered. Cells that are axis-parallel boxes themselves are cut exactly: a product of
-//! linear functions has its mean over a box in the middle of that box, so that the second line is the mean of the
-//! interpolated field, and the value in the middle of the box where the field is linear and the box is covered. Any other hexahedron
-//! is replaced by Gauss points, two along each axis of each of its n³ equal pieces in natural coordinates, with pieces of at most
-//! half a box: their weights integrate a trilinear field over the cell exactly, and each point belongs to one box, so that
-//! integrals are kept, but which share a box has of a cell is as coarse as the points.
+//! and both keep the integral over everything covered. Cells that are axis-parallel boxes themselves are cut
+//! exactly: a product of linear functions has its mean over a box in the middle of that box, so that the
+//! second line is the mean of the interpolated field, and the value in the middle of the box where the field
+//! is linear and the box is covered. Any other hexahedron is replaced by Gauss points, two along each axis of
+//! each of its n³ equal pieces in natural coordinates, with pieces of at most half a box: their weights
+//! integrate a trilinear field over the cell exactly, and each point belongs to one box, so that integrals
+//! are kept, but which share a box has of a cell is as coarse as the points.
 
 use crate::Error;
 use crate::numerics::hexahedron::{CORNERS, shapes};
 use crate::numerics::{Groups, bounds};
 
-/// Corners this far from those of a box, over its edges, still make one.
+/// Distance of corners from those of a box, over its edges, up to which a cell counts as a box.
 const ALIGNED: f64 = 1e-9;
-/// Boxes that overlap by less than this of an edge touch: rounding.
+/// Overlap, over an edge, below which boxes only touch: rounding.
 const TOUCHING: f64 = 1e-11;
-/// Pieces of a general hexahedron along an axis, at most.
+/// Largest number of pieces of a general hexahedron along an axis.
 const MOST_PIECES: f64 = 16.0;
 
 /// An axis-parallel box.
@@ -34,34 +36,34 @@ pub struct Cuboid {
 }
 
 impl Cuboid {
-    /// Its volume, m³.
+    /// Volume, m³.
     pub fn volume(&self) -> f64 {
         (0..3).map(|d| self.max[d] - self.min[d]).product()
     }
 
-    /// The box around points.
-    pub fn around(points: &[[f64; 3]]) -> Self {
+    /// Bounding box of points.
+    pub fn bounding(points: &[[f64; 3]]) -> Self {
         let [min, max] = bounds(points.iter().copied());
         Self { min, max }
     }
 }
 
-/// What a cell and a box have in common.
+/// Intersection of a cell and a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Part {
+struct OverlapPart {
     cell: u32,
     volume: f64,
-    /// Natural coordinates of its middle in the cell.
+    /// Natural coordinates of its centre in the cell.
     place: [f64; 3],
 }
 
-/// The parts of a mesh in boxes.
+/// Intersections of the cells of a mesh with boxes.
 #[derive(Clone, Debug)]
 pub struct Overlap {
     cells: Vec<[u32; 8]>,
     nodes: usize,
-    /// The parts of each box.
-    parts: Groups<Part>,
+    /// Intersections of each box.
+    parts: Groups<OverlapPart>,
 }
 
 impl Overlap {
@@ -77,7 +79,7 @@ impl Overlap {
             return fail(format!("box {index} of a transfer, {:?}", boxes[index]), "without volume");
         }
         let bins = Bins::new(boxes);
-        let mut found: Vec<(u32, Part)> = Vec::new();
+        let mut found: Vec<(u32, OverlapPart)> = Vec::new();
         for (index, cell) in cells.iter().enumerate() {
             if cell
                 .iter()
@@ -89,7 +91,7 @@ impl Overlap {
                 );
             }
             let corners = cell.map(|node| points[node as usize]);
-            let bounds = Cuboid::around(&corners);
+            let bounds = Cuboid::bounding(&corners);
             let number = index as u32;
             let before = found.len();
             if is_box(&corners, &bounds) {
@@ -130,21 +132,21 @@ impl Overlap {
     }
 
     /// Volume of the mesh in a box, m³.
-    pub fn covered(&self, index: usize) -> f64 {
-        self.parts.of(index).iter().map(|part| part.volume).sum()
+    pub fn covered_volume(&self, index: usize) -> f64 {
+        self.parts.group(index).iter().map(|part| part.volume).sum()
     }
 
-    /// Nodes of the cells that have a part in a box.
+    /// Nodes of the cells that intersect a box.
     pub fn nodes_of(&self, index: usize) -> impl Iterator<Item = u32> + '_ {
-        self.parts.of(index).iter().flat_map(|part| self.cells[part.cell as usize])
+        self.parts.group(index).iter().flat_map(|part| self.cells[part.cell as usize])
     }
 
-    /// Cells that have a part in a box.
+    /// Cells that intersect a box.
     pub fn cells_of(&self, index: usize) -> impl Iterator<Item = u32> + '_ {
-        self.parts.of(index).iter().map(|part| part.cell)
+        self.parts.group(index).iter().map(|part| part.cell)
     }
 
-    /// Means over the boxes of a field over cells; `None` where the mesh does not reach.
+    /// Computes means over the boxes of a field over cells; `None` outside the mesh.
     ///
     /// # Errors
     /// [`Error::Data`]: another number of values than cells.
@@ -153,7 +155,7 @@ impl Overlap {
         Ok(self.means(|part| values[part.cell as usize]))
     }
 
-    /// Means over the boxes of a field over nodes, trilinear in each cell; `None` where the mesh does not reach.
+    /// Computes means over the boxes of a field over nodes, trilinear in each cell; `None` outside the mesh.
     ///
     /// # Errors
     /// [`Error::Data`]: another number of values than nodes.
@@ -165,7 +167,7 @@ impl Overlap {
         }))
     }
 
-    /// Means over the cells of a field over boxes; `None` where no box reaches.
+    /// Computes means over the cells of a field over boxes; `None` outside the boxes.
     ///
     /// # Errors
     /// [`Error::Data`]: another number of values than boxes.
@@ -173,7 +175,7 @@ impl Overlap {
         fits("boxes", self.boxes(), values)?;
         let mut sums = vec![(0.0, 0.0); self.cells.len()];
         for (index, value) in values.iter().enumerate() {
-            for part in self.parts.of(index) {
+            for part in self.parts.group(index) {
                 let (volume, sum) = &mut sums[part.cell as usize];
                 *volume += part.volume;
                 *sum += part.volume * value;
@@ -182,8 +184,8 @@ impl Overlap {
         Ok(sums.into_iter().map(mean).collect())
     }
 
-    /// Values of nodes from a field over boxes: Σ V N_a v / Σ V N_a over the parts of all boxes, the lumped projection, which keeps
-    /// the integral Σ_a v_a ∫N_a dV; `None` where no box reaches.
+    /// Computes nodal values from a field over boxes: Σ V N_a v / Σ V N_a over all intersections, the lumped
+    /// projection, which keeps the integral Σ_a v_a ∫N_a dV; `None` outside the boxes.
     ///
     /// # Errors
     /// [`Error::Data`]: another number of values than boxes.
@@ -191,7 +193,7 @@ impl Overlap {
         fits("boxes", self.boxes(), values)?;
         let mut sums = vec![(0.0, 0.0); self.nodes];
         for (index, value) in values.iter().enumerate() {
-            for part in self.parts.of(index) {
+            for part in self.parts.group(index) {
                 let (nodes, shape) = (self.cells[part.cell as usize], shapes(part.place));
                 for a in 0..8 {
                     let (volume, sum) = &mut sums[nodes[a] as usize];
@@ -203,10 +205,10 @@ impl Overlap {
         Ok(sums.into_iter().map(mean).collect())
     }
 
-    fn means(&self, value: impl Fn(&Part) -> f64) -> Vec<Option<f64>> {
+    fn means(&self, value: impl Fn(&OverlapPart) -> f64) -> Vec<Option<f64>> {
         let of_box =
             |index| {
-                let parts = self.parts.of(index).iter();
+                let parts = self.parts.group(index).iter();
                 mean(parts.fold((0.0, 0.0), |(all, sum), part| {
                     (all + part.volume, sum + part.volume * value(part))
                 }))
@@ -227,8 +229,8 @@ fn fits(what: &str, count: usize, values: &[f64]) -> Result<(), Error> {
     Err(Error::Data { what: "a field to transfer".to_owned(), reason })
 }
 
-/// Volume of hexahedra and the integral of a field over their nodes, by two Gauss points along each axis; exact for the
-/// trilinear field.
+/// Volume of hexahedra and the integral of a field over their nodes, by two Gauss points along each axis;
+/// exact for the trilinear field.
 ///
 /// # Errors
 /// As [`Overlap::new`]; another number of values than nodes.
@@ -251,7 +253,7 @@ pub fn integral(points: &[[f64; 3]], cells: &[[u32; 8]], values: &[f64]) -> Resu
 }
 
 impl Cuboid {
-    /// Of a point from the middle, over half the edge: at most 1 inside.
+    /// Distance of a point from the middle, over half the edge: at most 1 inside.
     fn distance(&self, point: [f64; 3]) -> f64 {
         let along =
             |d: usize| (2.0 * point[d] - self.min[d] - self.max[d]).abs() / (self.max[d] - self.min[d]);
@@ -268,8 +270,8 @@ fn is_box(corners: &[[f64; 3]; 8], bounds: &Cuboid) -> bool {
     })
 }
 
-/// What two boxes have in common.
-fn cut(cell: &Cuboid, other: &Cuboid, number: u32) -> Option<Part> {
+/// Returns the intersection of two boxes.
+fn cut(cell: &Cuboid, other: &Cuboid, number: u32) -> Option<OverlapPart> {
     let (mut volume, mut place) = (1.0, [0.0; 3]);
     for d in 0..3 {
         let (low, high) = (cell.min[d].max(other.min[d]), cell.max[d].min(other.max[d]));
@@ -280,11 +282,11 @@ fn cut(cell: &Cuboid, other: &Cuboid, number: u32) -> Option<Part> {
         volume *= high - low;
         place[d] = (low + high - cell.min[d] - cell.max[d]) / (cell.max[d] - cell.min[d]);
     }
-    Some(Part { cell: number, volume, place })
+    Some(OverlapPart { cell: number, volume, place })
 }
 
 /// Gauss points of a hexahedron in n³ pieces: volume and natural coordinates, and the point itself.
-fn gauss_points(corners: &[[f64; 3]; 8], number: u32, n: usize) -> Vec<(Part, [f64; 3])> {
+fn gauss_points(corners: &[[f64; 3]; 8], number: u32, n: usize) -> Vec<(OverlapPart, [f64; 3])> {
     let step = 2.0 / n as f64;
     let at = |k: usize| {
         let sign = if k.is_multiple_of(2) { -1.0 } else { 1.0 };
@@ -308,12 +310,12 @@ fn gauss_points(corners: &[[f64; 3]; 8], number: u32, n: usize) -> Vec<(Part, [f
         let [a, b, c] = jacobian;
         let determinant = a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
             + a[2] * (b[0] * c[1] - b[1] * c[0]);
-        points.push((Part { cell: number, volume: determinant * (0.5 * step).powi(3), place }, point));
+        points.push((OverlapPart { cell: number, volume: determinant * (0.5 * step).powi(3), place }, point));
     }
     points
 }
 
-/// Boxes by the place of their middles, in bins as large as the largest box.
+/// Boxes sorted by their centres into bins as large as the largest box.
 struct Bins {
     origin: [f64; 3],
     edge: [f64; 3],
@@ -326,7 +328,7 @@ impl Bins {
     fn new(boxes: &[Cuboid]) -> Self {
         let middles: Vec<[f64; 3]> =
             boxes.iter().map(|b| std::array::from_fn(|d| 0.5 * (b.min[d] + b.max[d]))).collect();
-        let bounds = Cuboid::around(&middles);
+        let bounds = Cuboid::bounding(&middles);
         let size = |d: usize| boxes.iter().map(move |b| b.max[d] - b.min[d]);
         let least = std::array::from_fn(|d| size(d).fold(f64::INFINITY, f64::min));
         let mut edge: [f64; 3] = std::array::from_fn(|d| size(d).fold(0.0, f64::max));
@@ -357,23 +359,23 @@ impl Bins {
         a + self.counts[0] * (b + self.counts[1] * c)
     }
 
-    /// Visits boxes that may reach into `bounds`, each once.
+    /// Visits boxes that may intersect `bounds`, each once.
     fn within(&self, bounds: &Cuboid, visit: &mut dyn FnMut(usize)) {
         if self.boxes.items().is_empty() {
             return;
         }
-        // middles of boxes that reach in lie at most half an edge outside
+        // centres of intersecting boxes lie at most half an edge outside
         let low = self.bin(std::array::from_fn(|d| bounds.min[d] - 0.51 * self.edge[d]));
         let high = self.bin(std::array::from_fn(|d| bounds.max[d] + 0.51 * self.edge[d]));
         for c in low[2]..=high[2] {
             for b in low[1]..=high[1] {
                 let (first, last) = (self.index([low[0], b, c]), self.index([high[0], b, c]));
-                self.boxes.between(first, last).iter().for_each(|&index| visit(index));
+                self.boxes.groups(first, last).iter().for_each(|&index| visit(index));
             }
         }
     }
 
-    /// Pieces along an axis of a cell: at most half a box each.
+    /// Number of pieces of a cell along each axis: at most half a box each.
     fn pieces(&self, bounds: &Cuboid) -> usize {
         let ratio = |d: usize| 2.0 * (bounds.max[d] - bounds.min[d]) / self.least[d];
         (0..3).map(ratio).fold(1.0, f64::max).ceil().min(MOST_PIECES) as usize

@@ -3,8 +3,9 @@
 //! A scene type declares `spacing: Length`; reading `"2 kg"` there fails with a message that names what was
 //! found and what is needed. Inside the solvers there are no units: [`Quantity::si`] gives the plain `f64`.
 //!
-//! Symbols, factors and dimensions come from [`uom`]; the grammar on top allows products (`N*mm`, `N·mm`, `N mm`),
-//! quotients (`J/(kg K)`), powers (`mm^2`, `mm²`, `s^-1`) and `u` for `µ`. `J/kg K` is ambiguous and refused.
+//! Symbols, factors and dimensions come from [`uom`]; the grammar on top allows products (`N*mm`, `N·mm`,
+//! `N mm`), quotients (`J/(kg K)`), powers (`mm^2`, `mm²`, `s^-1`) and `u` for `µ`. `J/kg K` is ambiguous and
+//! refused.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -23,11 +24,11 @@ pub use error::UnitError;
 /// (which SI counts as dimensionless; kept apart so that a strain cannot be read as an angle).
 pub type Exponents = [i8; 8];
 
-/// What distinguishes one kind of quantity from another.
+/// Kind of quantity, by its dimension.
 pub trait Dimension {
     /// The powers of the base dimensions.
     const EXPONENTS: Exponents;
-    /// With its article, as error messages use it: `a length`.
+    /// Name with its article, as error messages use it: `a length`.
     const NAME: &'static str;
     /// A valid input, as error messages show it.
     const EXAMPLE: &'static str;
@@ -48,12 +49,12 @@ impl<D: Dimension> Quantity<D> {
     /// Symbol of the SI unit of this quantity.
     pub const UNIT: &'static str = D::UNIT;
 
-    /// From a value already in SI units; used for defaults.
+    /// Creates a quantity from a value in SI units.
     pub const fn from_si(si: f64) -> Self {
         Self { si, dimension: PhantomData }
     }
 
-    /// The value in coherent SI units.
+    /// Value in coherent SI units.
     pub const fn si(self) -> f64 {
         self.si
     }
@@ -65,18 +66,18 @@ impl<D: Dimension> FromStr for Quantity<D> {
     /// Reads `NUMBER UNIT`.
     ///
     /// # Errors
-    /// Every departure from the grammar, an unknown unit, another dimension than `D`, and numbers that are not
-    /// finite or that over- or underflow in SI units.
+    /// Every departure from the grammar, an unknown unit, another dimension than `D`, and numbers that are
+    /// not finite or that over- or underflow in SI units.
     fn from_str(text: &str) -> Result<Self, UnitError> {
         let (number, unit) = grammar::split_number(text)?;
         if !number.is_finite() {
             return Err(UnitError::Range { text: text.trim().into(), problem: "is not a finite number" });
         }
-        Unit::<D>::within(unit, text)?.of(number)
+        Unit::<D>::within(unit, text)?.quantity(number)
     }
 }
 
-/// A unit of a dimension `D`, read once and then used for many numbers: those of a column of a table.
+/// Unit of a dimension `D`, read once and then used for many numbers, e.g. a column of a table.
 #[derive(Clone, Debug)]
 pub struct Unit<D> {
     text: String,
@@ -87,15 +88,15 @@ pub struct Unit<D> {
 }
 
 impl<D: Dimension> Unit<D> {
-    /// Reads a unit; the empty text is that of dimensionless numbers.
+    /// Reads a unit; the empty text is the unit of dimensionless numbers.
     ///
     /// # Errors
-    /// An unknown unit, another dimension than `D`, no unit where one is needed.
+    /// An unknown unit, another dimension than `D`, no unit if one is needed.
     pub fn parse(unit: &str) -> Result<Self, UnitError> {
         Self::within(unit.trim(), unit)
     }
 
-    /// The unit at the end of a text, for whose errors the whole of it is given.
+    /// Reads the unit at the end of a text; errors show the whole text.
     fn within(unit: &str, whole: &str) -> Result<Self, UnitError> {
         let new = |numerator, denominator, zero| Self {
             text: unit.to_owned(),
@@ -120,11 +121,11 @@ impl<D: Dimension> Unit<D> {
         }
     }
 
-    /// The quantity of that many units.
+    /// Creates the quantity of `number` units.
     ///
     /// # Errors
     /// Numbers that over- or underflow in SI units, and temperatures below absolute zero.
-    pub fn of(&self, number: f64) -> Result<Quantity<D>, UnitError> {
+    pub fn quantity(&self, number: f64) -> Result<Quantity<D>, UnitError> {
         // −0 stays −0
         let from_zero = if self.zero == 0.0 { number } else { number + self.zero };
         let si = from_zero * self.numerator / self.denominator;
@@ -141,7 +142,7 @@ impl<D: Dimension> Unit<D> {
     }
 }
 
-/// Whether a text is a unit of any dimension.
+/// Returns true if a text is a unit of any dimension.
 pub fn is_unit(text: &str) -> bool {
     !text.is_empty() && (table::affine(text).is_some() || grammar::unit(text, text).is_ok())
 }
@@ -165,7 +166,7 @@ impl<'de, D: Dimension> Deserialize<'de> for Quantity<D> {
     }
 }
 
-/// A text `NUMBER UNIT`; a bare number too where there is no unit.
+/// Text `NUMBER UNIT`; also a bare number if the quantity has no unit.
 #[cfg(feature = "schemars")]
 impl<D: Dimension> schemars::JsonSchema for Quantity<D> {
     fn schema_name() -> std::borrow::Cow<'static, str> {
@@ -232,7 +233,8 @@ impl<D: Dimension> Visitor<'_> for QuantityVisitor<D> {
 }
 
 macro_rules! dimensions {
-    ($($(#[$doc:meta])* $alias:ident, $marker:ident: $exponents:expr, $name:literal, $unit:literal, $example:literal
+    ($($(#[$doc:meta])* $alias:ident, $marker:ident: $exponents:expr, $name:literal, $unit:literal,
+        $example:literal
         $(, $absolute:literal)?;)+) => {
         /// The marker types behind the aliases, one for each kind of quantity.
         pub mod dimension {
@@ -258,13 +260,13 @@ macro_rules! dimensions {
             pub type $alias = Quantity<dimension::$marker>;
         )+
 
-        /// Exponents and names, in the order of declaration: the first that fits names what was found.
+        /// Exponents and names in the order of declaration; the first match names a quantity.
         const NAMES: &[(Exponents, &str)] = &[$(($exponents, $name)),+];
     };
 }
 
 /// Exponents of a `uom` quantity.
-macro_rules! of {
+macro_rules! exponents {
     ($quantity:ident) => {{
         use uom::si::Dimension as D;
         use uom::typenum::Integer as I;
@@ -281,67 +283,79 @@ macro_rules! of {
         ]
     }};
 }
-pub(crate) use of;
+pub(crate) use exponents;
 
 dimensions! {
     /// A number without a dimension; `"1 %"`, `"0.01"` and the bare `0.01` are all accepted.
-    Ratio, RatioDimension: of!(ratio), "a dimensionless number", "", "0.01";
+    Ratio, RatioDimension: exponents!(ratio), "a dimensionless number", "", "0.01";
     /// A length.
-    Length, LengthDimension: of!(length), "a length", "m", "2 mm";
+    Length, LengthDimension: exponents!(length), "a length", "m", "2 mm";
     /// An area.
-    Area, AreaDimension: of!(area), "an area", "m^2", "5 mm^2";
+    Area, AreaDimension: exponents!(area), "an area", "m^2", "5 mm^2";
     /// A volume.
-    Volume, VolumeDimension: of!(volume), "a volume", "m^3", "1 mm^3";
+    Volume, VolumeDimension: exponents!(volume), "a volume", "m^3", "1 mm^3";
     /// A time or duration.
-    Time, TimeDimension: of!(time), "a time", "s", "30 s";
+    Time, TimeDimension: exponents!(time), "a time", "s", "30 s";
     /// A mass.
-    Mass, MassDimension: of!(mass), "a mass", "kg", "2 kg";
+    Mass, MassDimension: exponents!(mass), "a mass", "kg", "2 kg";
     /// A force.
-    Force, ForceDimension: of!(force), "a force", "N", "10 N";
+    Force, ForceDimension: exponents!(force), "a force", "N", "10 N";
     /// A stress, pressure or elastic modulus.
-    Stress, StressDimension: of!(pressure), "a stress", "Pa", "0.6 N/mm^2";
+    Stress, StressDimension: exponents!(pressure), "a stress", "Pa", "0.6 N/mm^2";
     /// A mass density.
-    Density, DensityDimension: of!(mass_density), "a mass density", "kg/m^3", "1010 kg/m^3";
+    Density, DensityDimension: exponents!(mass_density), "a mass density", "kg/m^3", "1010 kg/m^3";
     /// A speed.
-    Speed, SpeedDimension: of!(velocity), "a speed", "m/s", "5 mm/s";
+    Speed, SpeedDimension: exponents!(velocity), "a speed", "m/s", "5 mm/s";
     /// An acceleration.
-    Acceleration, AccelerationDimension: of!(acceleration), "an acceleration", "m/s^2", "9.81 m/s^2";
+    Acceleration, AccelerationDimension: exponents!(acceleration), "an acceleration", "m/s^2", "9.81 m/s^2";
     /// A rate or frequency.
-    Rate, RateDimension: of!(frequency), "a rate", "1/s", "5e-5 /s";
+    Rate, RateDimension: exponents!(frequency), "a rate", "1/s", "5e-5 /s";
     /// An absolute temperature; the only quantity that may be given in `degC`.
-    Temperature, TemperatureDimension: of!(thermodynamic_temperature), "a temperature", "K", "220 degC", true;
+    Temperature, TemperatureDimension: exponents!(thermodynamic_temperature),
+        "a temperature", "K", "220 degC", true;
     /// A difference of temperatures, in kelvin.
-    TemperatureDifference, TemperatureDifferenceDimension: of!(temperature_interval), "a temperature difference", "K", "5 K";
+    TemperatureDifference, TemperatureDifferenceDimension: exponents!(temperature_interval), "a temperature \
+        difference", "K", "5 K";
     /// A heating or cooling rate.
-    TemperatureRate, TemperatureRateDimension: [0, 0, -1, 0, 1, 0, 0, 0], "a temperature rate", "K/s", "10 K/min";
+    TemperatureRate, TemperatureRateDimension: [0, 0, -1, 0, 1, 0, 0, 0], "a temperature \
+        rate", "K/s", "10 K/min";
     /// A square of temperatures, as nucleation constants are.
-    SquaredTemperature, SquaredTemperatureDimension: [0, 0, 0, 0, 2, 0, 0, 0], "a squared temperature", "K^2", "136235 K^2";
+    SquaredTemperature, SquaredTemperatureDimension: [0, 0, 0, 0, 2, 0, 0, 0],
+        "a squared temperature", "K^2", "136235 K^2";
     /// A change per temperature.
-    PerTemperature, PerTemperatureDimension: [0, 0, 0, 0, -1, 0, 0, 0], "a number per temperature", "1/K", "0.965 1/K";
+    PerTemperature, PerTemperatureDimension: [0, 0, 0, 0, -1, 0, 0, 0], "a number per \
+        temperature", "1/K", "0.965 1/K";
     /// An energy per amount of substance.
-    MolarEnergy, MolarEnergyDimension: of!(molar_energy), "a molar energy", "J/mol", "6270 J/mol";
+    MolarEnergy, MolarEnergyDimension: exponents!(molar_energy), "a molar energy", "J/mol", "6270 J/mol";
     /// An energy (a torque has the same dimension).
-    Energy, EnergyDimension: of!(energy), "an energy", "J", "1 J";
+    Energy, EnergyDimension: exponents!(energy), "an energy", "J", "1 J";
     /// A power.
-    Power, PowerDimension: of!(power), "a power", "W", "21 W";
+    Power, PowerDimension: exponents!(power), "a power", "W", "21 W";
     /// A power per mass, as calorimeters measure it.
     SpecificPower, SpecificPowerDimension: [2, 0, -3, 0, 0, 0, 0, 0], "a power per mass", "W/kg", "1.5 W/g";
     /// An energy per area or force per length: fracture energy, surface tension; `N/mm` = 1000 J/m².
-    EnergyPerArea, EnergyPerAreaDimension: of!(surface_tension), "an energy per area", "J/m^2", "2.67 N/mm";
+    EnergyPerArea, EnergyPerAreaDimension: exponents!(surface_tension), "an energy per \
+        area", "J/m^2", "2.67 N/mm";
     /// A specific energy or latent heat.
-    SpecificEnergy, SpecificEnergyDimension: of!(available_energy), "an energy per mass", "J/kg", "104.5 J/g";
+    SpecificEnergy, SpecificEnergyDimension: exponents!(available_energy), "an energy per \
+        mass", "J/kg", "104.5 J/g";
     /// A specific heat capacity.
-    SpecificHeat, SpecificHeatDimension: of!(specific_heat_capacity), "a specific heat capacity", "J/(kg K)", "2200 J/(kg K)";
+    SpecificHeat, SpecificHeatDimension: exponents!(specific_heat_capacity), "a specific heat \
+        capacity", "J/(kg K)", "2200 J/(kg K)";
     /// A thermal conductivity.
-    Conductivity, ConductivityDimension: of!(thermal_conductivity), "a thermal conductivity", "W/(m K)", "0.25 W/(m K)";
+    Conductivity, ConductivityDimension: exponents!(thermal_conductivity),
+        "a thermal conductivity", "W/(m K)", "0.25 W/(m K)";
     /// A film coefficient of heat transfer.
-    HeatTransfer, HeatTransferDimension: of!(heat_transfer), "a heat transfer coefficient", "W/(m^2 K)", "50 W/(m^2 K)";
+    HeatTransfer, HeatTransferDimension: exponents!(heat_transfer), "a heat transfer \
+        coefficient", "W/(m^2 K)", "50 W/(m^2 K)";
     /// A heat flux.
-    HeatFlux, HeatFluxDimension: of!(heat_flux_density), "a heat flux", "W/m^2", "500 W/m^2";
+    HeatFlux, HeatFluxDimension: exponents!(heat_flux_density), "a heat flux", "W/m^2", "500 W/m^2";
     /// Heat released per volume and time.
-    PowerDensity, PowerDensityDimension: [-1, 1, -3, 0, 0, 0, 0, 0], "a power per volume", "W/m^3", "1 W/mm^3";
+    PowerDensity, PowerDensityDimension: [-1, 1, -3, 0, 0, 0, 0, 0], "a power per \
+        volume", "W/m^3", "1 W/mm^3";
     /// A thermal diffusivity or kinematic viscosity.
-    Diffusivity, DiffusivityDimension: of!(diffusion_coefficient), "a diffusivity", "m^2/s", "0.11 mm^2/s";
+    Diffusivity, DiffusivityDimension: exponents!(diffusion_coefficient),
+        "a diffusivity", "m^2/s", "0.11 mm^2/s";
     /// A plane angle; needs its unit.
     Angle, AngleDimension: [0, 0, 0, 0, 0, 0, 0, 1], "an angle", "rad", "90 deg";
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use polycore::langevin;
 
-type Function = fn(f64) -> f64;
+type ScalarFunction = fn(f64) -> f64;
 
 /// Difference in units of the last place of the reference.
 fn ulps(value: f64, reference: f64) -> f64 {
@@ -14,8 +14,9 @@ fn ulps(value: f64, reference: f64) -> f64 {
 
 #[test]
 fn every_function_within_its_documented_error() {
-    // in ulp: the table in the documentation of `polycore::langevin`; the tabulated reference is itself rounded (1/2)
-    let functions: [(&str, Function, f64); 8] = [
+    // in ulp: the table in the documentation of `polycore::langevin`; the tabulated reference is itself
+    // rounded (1/2)
+    let functions: [(&str, ScalarFunction, f64); 8] = [
         ("langevin", langevin::langevin, 4.0),
         ("derivative", langevin::derivative, 4.0),
         ("complement", langevin::complement, 2.0),

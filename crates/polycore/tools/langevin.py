@@ -106,8 +106,10 @@ def table():
     ]
     for low, high in zip(EDGES, EDGES[1:]):
         middle = (low + high) / 2
-        row = ", ".join(repr(float(v)) for v in interpolant(near_one, low, high, middle))
-        out.append(f"    ({float(middle)!r}, [{row}]),")
+        row = [repr(float(v)) for v in interpolant(near_one, low, high, middle)]
+        out.append(f"    ({float(middle)!r}, [")
+        out += [f"        {', '.join(row[i : i + 4])}," for i in range(0, len(row), 4)]
+        out.append("    ]),")
     out.append("];")
     return "\n".join(out)
 

@@ -1,4 +1,4 @@
-//! The symbols that hosts call. `umatht_` of [`umatht`] comes along.
+//! Symbols that hosts call. `umatht_` of [`umatht`] is included.
 
 use crate::{Error, Material, Print};
 use polycore::tensor::voigt::{self, Voigt, Voigt6x6};
@@ -7,24 +7,24 @@ use std::ffi::{c_char, c_int};
 
 /// Length of a name in Fortran.
 const NAME: usize = 80;
-/// What a host may cut its increment to where there is no stress.
+/// Ratio to which a host may cut its increment if there is no stress.
 const CUT: f64 = 0.25;
 
-/// A material with its name and constants.
-type Known = (Vec<u8>, Vec<f64>, Material);
+/// Material with its name and constants.
+type CachedMaterial = (Vec<u8>, Vec<f64>, Material);
 
 thread_local! {
-    /// The last material on this thread: hosts call once an integration point and iteration.
-    static LAST: RefCell<Option<Known>> = const { RefCell::new(None) };
+    /// Last material on this thread: hosts call once per integration point and iteration.
+    static LAST: RefCell<Option<CachedMaterial>> = const { RefCell::new(None) };
 }
 
-fn with<R>(name: &[u8], constants: &[f64], work: impl FnOnce(&Material) -> R) -> R {
+fn with_material<R>(name: &[u8], constants: &[f64], work: impl FnOnce(&Material) -> R) -> R {
     LAST.with_borrow_mut(|last| {
         let (.., material) = match last.take() {
             Some(kept) if kept.0 == name && kept.1 == constants => last.insert(kept),
             _ => {
                 let made = Material::new(&String::from_utf8_lossy(name), constants);
-                let made = made.unwrap_or_else(|error| end(&error));
+                let made = made.unwrap_or_else(|error| abort(&error));
                 last.insert((name.to_vec(), constants.to_vec(), made))
             }
         };
@@ -32,26 +32,28 @@ fn with<R>(name: &[u8], constants: &[f64], work: impl FnOnce(&Material) -> R) ->
     })
 }
 
-/// A host cannot go on, and no Fortran routine returns an error.
-fn end(message: &Error) -> ! {
+/// Ends the process: a host cannot continue, and no Fortran routine returns an error.
+fn abort(message: &Error) -> ! {
     eprintln!("{message}");
     std::process::exit(2)
 }
 
 fn states(found: usize) {
     if found < Print::STATES {
-        end(&Error::new("state variables (*DEPVAR)", found, Print::STATES));
+        abort(&Error::new("state variables (*DEPVAR)", found, Print::STATES));
     }
 }
 
-/// UMAT as Abaqus declares it (*Abaqus User Subroutines Guide*, 1.1.44): three normal and three shear stresses. Rubbers take F from `DFGRD1`, prints
-/// the strains `STRAN` + `DSTRAN`. Where a law has no stress, `PNEWDT` asks for a quarter of the increment.
+/// UMAT as Abaqus declares it (*Abaqus User Subroutines Guide*, 1.1.44): three normal and three shear
+/// stresses. Rubbers use F from `DFGRD1`, prints the strains `STRAN` + `DSTRAN`. If a law has no stress,
+/// `PNEWDT` requests a quarter of the increment.
 ///
-/// Energies are those of a unit of the deformed volume, in the host's unit of stress: `SSE` is W/J of a rubber; of a print the elastic energy,
-/// beside what crystals took as they grew and melted (`SPD`) and what relaxed (`SCD`).
+/// Energies are per deformed volume, in the host's unit of stress: `SSE` is W/J of a rubber or the elastic
+/// energy of a print, `SPD` the energy dissipated by growing and melting crystals, `SCD` that of relaxation.
 ///
 /// # Safety
-/// As in Fortran: every pointer is valid for the length that `NTENS`, `NSTATV` and `NPROPS` tell, and nothing else refers to what is written.
+/// As in Fortran: every pointer is valid for the length that `NTENS`, `NSTATV` and `NPROPS` tell, and nothing
+/// else refers to what is written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn umat_(
     stress: *mut f64,
@@ -91,7 +93,7 @@ pub unsafe extern "C" fn umat_(
     let (normal, all) = unsafe { (*ndi, *ntens) };
     if (normal, all) != (3, 6) {
         let allowed = "3 and 3: solids; no plane stress, no plane strain";
-        end(&Error::new("normal and shear stresses", format!("{normal} and {}", all - normal), allowed));
+        abort(&Error::new("normal and shear stresses", format!("{normal} and {}", all - normal), allowed));
     }
     // SAFETY: the caller's promise; `NTENS` is 6, lengths below 0 are 0
     let (name, constants, state, change) = unsafe {
@@ -102,7 +104,7 @@ pub unsafe extern "C" fn umat_(
             [stran, dstran].map(|six| Voigt::from_column_slice(std::slice::from_raw_parts(six, 6))),
         )
     };
-    let answer: Result<_, Error> = with(name, constants, |material| match material {
+    let answer: Result<_, Error> = with_material(name, constants, |material| match material {
         // SAFETY: the caller's promise
         Material::Rubber(rubber) => {
             let (stress, tangent, energy) = rubber.stored(unsafe { &*dfgrd1 })?;
@@ -116,7 +118,7 @@ pub unsafe extern "C" fn umat_(
             let (turn, time, temperature) = unsafe { (&*drot, *dtime, *temp + *dtemp) };
             let mut old = state.to_vec();
             turned(&mut old, turn);
-            // the host has turned its own strain
+            // the host has rotated its own strain
             old[3..9].copy_from_slice(change[0].as_slice());
             let (stress, tangent, energies) =
                 print.advance(&old, state, temperature, time, |before| before + change[1])?;
@@ -145,7 +147,7 @@ pub unsafe extern "C" fn umat_(
     }
 }
 
-/// The elastic strains of a state in axes turned by `DROT`.
+/// Rotates the elastic strains of a state by `DROT`.
 fn turned(state: &mut [f64], turn: &[f64; 9]) {
     if *turn == [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0] {
         return;
@@ -157,10 +159,12 @@ fn turned(state: &mut [f64], turn: &[f64; 9]) {
     }
 }
 
-/// UMAT_USER of CalculiX 2.20, materials whose name begins with `USER`: Green's strain (tensor shears) in, S and dS/dE out; no `*ORIENTATION`.
+/// UMAT_USER of CalculiX 2.20, materials whose name begins with `USER`: Green's strain (tensor shears) in, S
+/// and dS/dE out; no `*ORIENTATION`.
 ///
 /// # Safety
-/// As in Fortran: every pointer is valid for what CalculiX declares, and nothing else refers to what is written.
+/// As in Fortran: every pointer is valid for what CalculiX declares, and nothing else refers to what is
+/// written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn umat_user_(
     amat: *const c_char,
@@ -197,7 +201,7 @@ pub unsafe extern "C" fn umat_user_(
     // SAFETY: the caller's promise
     let (orientation, kode) = unsafe { (*iorien, *kode) };
     if orientation != 0 {
-        end(&Error::new("*ORIENTATION", orientation, "none: these materials are isotropic"));
+        abort(&Error::new("*ORIENTATION", orientation, "none: these materials are isotropic"));
     }
     // SAFETY: the caller's promise: xstate(nstate, mi(1), elements), numbers from 1
     let (name, constants, strain, old, new) = unsafe {
@@ -205,7 +209,7 @@ pub unsafe extern "C" fn umat_user_(
         let place = states * (length(*iint - 1) + length(*mi) * length(*iel - 1));
         (
             std::slice::from_raw_parts(amat.cast::<u8>(), NAME),
-            // CalculiX tells the number of constants so
+            // CalculiX encodes the number of constants like this
             std::slice::from_raw_parts(elconloc, length(-kode - 100)),
             Voigt::from_column_slice(&*emec),
             std::slice::from_raw_parts(xstateini.wrapping_add(place), states),
@@ -214,7 +218,7 @@ pub unsafe extern "C" fn umat_user_(
     };
     // shears doubled
     let doubled = Voigt::from_fn(|k, _| strain[k] * if k < 3 { 1.0 } else { 2.0 });
-    let answer = with(name, constants, |material| match material {
+    let answer = with_material(name, constants, |material| match material {
         Material::Rubber(rubber) => {
             let c = Voigt::from_fn(|k, _| 2.0 * strain[k] + if k < 3 { 1.0 } else { 0.0 });
             rubber.material(&c)
@@ -229,7 +233,7 @@ pub unsafe extern "C" fn umat_user_(
         }
     });
     match answer {
-        // SAFETY: the caller's promise; `stiff` is asked for unless ICMD is 3
+        // SAFETY: the caller's promise; `stiff` is written unless ICMD is 3
         Ok((stress, tangent)) => unsafe {
             *stre = (stress - Voigt::from(*beta)).into();
             if *icmd != 3 {
@@ -241,7 +245,7 @@ pub unsafe extern "C" fn umat_user_(
     }
 }
 
-/// The upper triangle, column by column.
+/// Upper triangle, column by column.
 fn upper(tangent: &Voigt6x6) -> [f64; 21] {
     let places: Vec<(usize, usize)> = (0..6).flat_map(|b| (0..=b).map(move |a| (a, b))).collect();
     std::array::from_fn(|k| {

@@ -1,12 +1,13 @@
-//! Materials of this workspace as UMAT: `umat_`, as Abaqus calls it, and `umat_user_`, CalculiX' own, in `libumat`.
+//! Materials of this workspace as UMAT: `umat_` for Abaqus and `umat_user_` for CalculiX, in `libumat`.
 //!
-//! The name of the material in the input of the host chooses: a hyperelastic law of [`polycore`] (`EIGHT_CHAIN`, `NEO_HOOKEAN`, …, [`Rubber`])
-//! or the solidifying body of prints (`PRINTED_PA12`, [`Print`]); CalculiX wants `USER_` before it. `umatht_` is in the library, too.
+//! The name of the material in the input of the host selects a hyperelastic law of [`polycore`]
+//! (`EIGHT_CHAIN`, `NEO_HOOKEAN`, …, [`RubberMaterial`]) or the solidifying body of prints (`PRINTED_PA12`,
+//! [`Print`]); CalculiX needs `USER_` before it. The library also contains `umatht_`.
 //!
 //! ```
-//! use umat::Rubber;
+//! use umat::RubberMaterial;
 //! // K, then C_R and N of the eight-chain law, in the host's unit of stress
-//! let rubber = Rubber::new("eight-chain", &[100.0, 0.3, 25.0])?;
+//! let rubber = RubberMaterial::new("eight-chain", &[100.0, 0.3, 25.0])?;
 //! let twice = [2.0, 0.0, 0.0, 0.0, 0.8, 0.0, 0.0, 0.0, 0.7];
 //! let (stress, _) = rubber.cauchy(&twice)?;
 //! assert!(stress[0] > stress[1] && stress[3] == 0.0);
@@ -20,17 +21,17 @@ mod rubber;
 mod tests;
 
 pub use print::{Dissipation, Print};
-pub use rubber::Rubber;
+pub use rubber::RubberMaterial;
 
-/// Why a material cannot be made, or has no stress.
+/// Error of a material's constants or state.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("umat: {what}: found {found}; allowed: {allowed}")]
 pub struct Error {
-    /// What.
+    /// Name of the quantity.
     pub what: String,
-    /// What was found.
+    /// Value found.
     pub found: String,
-    /// What it may be.
+    /// Allowed values.
     pub allowed: String,
 }
 
@@ -40,22 +41,23 @@ impl Error {
     }
 }
 
-/// A material of a host's input.
+/// Material of a host's input.
 pub enum Material {
     /// Hyperelastic: no state.
-    Rubber(Rubber),
+    Rubber(RubberMaterial),
     /// Solidifying: [`Print::STATES`] state variables.
     Print(Box<Print>),
 }
 
 impl Material {
-    /// The material of a name: that of a law, in capitals or not, with `_` or `-`, perhaps `USER_` before it and `_…` behind it.
+    /// Creates the material of a name: that of a law, in any case, with `_` or `-`, optionally with `USER_`
+    /// before and `_…` behind it.
     ///
     /// # Errors
-    /// A name that begins with no material's; constants out of range, too few or too many.
+    /// An unknown name; constants out of range, too few or too many.
     pub fn new(name: &str, constants: &[f64]) -> Result<Self, Error> {
         let lower = name.trim().to_lowercase().replace('_', "-");
-        // CalculiX cuts its `USER` off
+        // CalculiX removes its `USER`
         let lower = lower.strip_prefix("user").unwrap_or(&lower).trim_start_matches('-');
         let is =
             |key: &str| lower.strip_prefix(key).is_some_and(|rest| rest.is_empty() || rest.starts_with('-'));
@@ -65,7 +67,7 @@ impl Material {
         let keys = rubber::names();
         // the longest: `eight-chain` begins `eight-chain-root-i2`
         match keys.iter().filter(|key| is(key)).max_by_key(|key| key.len()) {
-            Some(key) => Ok(Self::Rubber(Rubber::new(key, constants)?)),
+            Some(key) => Ok(Self::Rubber(RubberMaterial::new(key, constants)?)),
             None => {
                 let allowed =
                     format!("{}, {}", keys.join(", "), Print::NAME).to_uppercase().replace('-', "_");

@@ -1,45 +1,47 @@
-//! The solidifying body of prints under the strains and temperatures that hosts hand over.
+//! Solidifying body of prints under the strains and temperatures of a host.
 
 use crate::Error;
 use crystfem::mechanics::SolidifyingMaxwell;
 use polycore::tensor::voigt::{Voigt, Voigt6x6};
-use umatht::{Increment, State, respond};
+use umatht::{HeatIncrement, State, respond};
 
-/// PA12 that crystallizes, shrinks and relaxes ([`SolidifyingMaxwell::pa12`]): α by its own integration of the temperature that the host
-/// gives. Strains are small.
+/// PA12 that crystallizes, shrinks and relaxes ([`SolidifyingMaxwell::pa12`]); it integrates α from the
+/// temperatures of the host. Strains are small.
 pub struct Print {
     body: SolidifyingMaxwell,
     /// Constants of [`umatht::respond`].
     thermal: [f64; 5],
-    /// Temperature of birth, in the host's degrees.
+    /// Temperature at birth, in the host's degrees.
     birth: f64,
-    /// Pa in a unit of stress of the host.
+    /// Value in Pa of the host's unit of stress.
     unit: f64,
 }
 
-/// What an increment did with its work, in the host's unit of stress; the three together are the work of the stress on the
-/// strain without the free strain.
+/// Work of an increment by destination, in the host's unit of stress; the three together are the work of the
+/// stress on the strain without the free strain.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Dissipation {
     /// Increase of the elastic energy.
     pub stored: f64,
-    /// Taken by growing and melting crystals, and by softening.
+    /// Dissipated by growing and melting crystals, and by softening.
     pub crystals: f64,
-    /// Dissipated by relaxation, that of the melt included.
+    /// Dissipated by relaxation, including that of the melt.
     pub viscous: f64,
 }
 
-/// The strains of a branch.
-const SIX: usize = 6;
+/// Number of strain components of a branch.
+const COMPONENTS: usize = 6;
 
 impl Print {
-    /// In the input of a host, without `USER_`.
+    /// Name in the input of a host, without `USER_`.
     pub const NAME: &'static str = "printed-pa12";
-    /// z, α, T (K), the total strain at the end (6), and the elastic strains of the branches (6 × 6); all 0 at birth.
-    pub const STATES: usize = 9 + 6 * SIX;
+    /// Number of state variables: z, α, T (K), the total strain at the end (6), and the elastic strains of
+    /// the branches (6 × 6); all 0 at birth.
+    pub const STATES: usize = 9 + 6 * COMPONENTS;
 
-    /// Constants: column of Table 4.1 (1 or 2), absolute zero (0 in kelvin, 273.15 in °C), temperature of birth in the host's degrees (where
-    /// strains begin), crystallinity X∞ at α = 1, and Pa in the host's unit of stress (1e6 for MPa).
+    /// Creates the body from its constants: column of Table 4.1 (1 or 2), absolute zero (0 in kelvin, 273.15
+    /// in °C), temperature at birth in the host's degrees (zero strain), crystallinity X∞ at α = 1, and the
+    /// value in Pa of the host's unit of stress (1e6 for MPa).
     ///
     /// # Errors
     /// Constants out of range, too few or too many.
@@ -62,13 +64,14 @@ impl Print {
     }
 
     fn degree(&self, state: &State, from: f64, to: f64, time: f64) -> Result<State, Error> {
-        let at = Increment { temperature: from, change: to - from, time, gradient: [0.0; 3] };
+        let at = HeatIncrement { temperature: from, change: to - from, time, gradient: [0.0; 3] };
         let answer = respond(&self.thermal, &at, state);
         Ok(answer.map_err(|error| Error::new(error.name, error.found, error.allowed))?.state)
     }
 
-    /// Stress, the tangent and energies after an increment to a temperature, in a time, s; `strain` gives the total strain at the end from that at the
-    /// start, shears doubled. Reads `state`, writes `new`, both of [`Self::STATES`] numbers.
+    /// Computes stress, tangent and energies after an increment to a temperature, in a time, s; `strain`
+    /// gives the total strain at its start and end, shears doubled. Reads `state`, writes `new`, both of
+    /// [`Self::STATES`] numbers.
     ///
     /// # Errors
     /// Temperatures below absolute zero.
@@ -89,19 +92,19 @@ impl Print {
         let before = Voigt::from_column_slice(&state[3..9]);
         let after = strain(&before);
         // tensor components, without the free strain
-        let mechanical: [f64; SIX] = std::array::from_fn(|k| {
+        let mechanical: [f64; COMPONENTS] = std::array::from_fn(|k| {
             let change = after[k] - before[k];
             if k < 3 { change - step.free_strain } else { 0.5 * change }
         });
-        let mut branches = [[0.0; SIX]; 6];
+        let mut branches = [[0.0; COMPONENTS]; 6];
         let count = self.body.branches();
-        for (branch, kept) in branches.iter_mut().zip(state[9..].chunks_exact(SIX)) {
+        for (branch, kept) in branches.iter_mut().zip(state[9..].chunks_exact(COMPONENTS)) {
             branch.copy_from_slice(kept);
         }
         let nu = self.body.poisson;
         // Ĉ of modulus 1
         let (lame, shear) = (nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), 0.5 / (1.0 + nu));
-        let product = |a: &[f64; SIX], b: &[f64; SIX]| {
+        let product = |a: &[f64; COMPONENTS], b: &[f64; COMPONENTS]| {
             let sum = |range: std::ops::Range<usize>| range.map(|k| a[k] * b[k]).sum::<f64>();
             let traces = (a[0] + a[1] + a[2]) * (b[0] + b[1] + b[2]);
             lame * traces + 2.0 * shear * (sum(0..3) + 2.0 * sum(3..6))
@@ -115,10 +118,10 @@ impl Print {
         };
         step.advance(&mut branches[..count], &mechanical);
         let elastic = step.stress(&branches[..count]);
-        let sum: [f64; SIX] = std::array::from_fn(|k| elastic[k] + step.floor * mechanical[k]);
+        let sum: [f64; COMPONENTS] = std::array::from_fn(|k| elastic[k] + step.floor * mechanical[k]);
         new[..3].copy_from_slice(&[end.z, end.degree, end.temperature]);
         new[3..9].copy_from_slice(after.as_slice());
-        for (branch, kept) in branches.iter().zip(new[9..].chunks_exact_mut(SIX)) {
+        for (branch, kept) in branches.iter().zip(new[9..].chunks_exact_mut(COMPONENTS)) {
             kept.copy_from_slice(branch);
         }
         let volume = lame * (sum[0] + sum[1] + sum[2]);
@@ -137,7 +140,8 @@ mod tests {
     use super::*;
     use crystfem::exact::Wall;
 
-    /// Advances a point of a plate: its strain in the plane is given, σ₃₃ = 0. Gives the stress in the plane and its slope.
+    /// Advances a point of a plate with given strain in its plane and σ₃₃ = 0; returns the stress in the
+    /// plane and its slope.
     fn point(print: &Print, state: &[f64], new: &mut [f64], t: f64, dt: f64, plane: f64) -> (f64, f64) {
         let mut advance = |third: f64| {
             print.advance(state, new, t, dt, |_| Voigt::new(plane, plane, third, 0.0, 0.0, 0.0)).unwrap()
@@ -149,13 +153,14 @@ mod tests {
         (stress[0], tangent[(0, 0)] + tangent[(0, 1)] - coupled)
     }
 
-    /// A plate of 4 mm, 220 °C to 25 °C, Bi = 1 on both faces, after 600 s: `docs/reference/print/plate.py`, MPa.
+    /// A plate of 4 mm, 220 °C to 25 °C, Bi = 1 on both faces, after 600 s: `docs/reference/print/plate.py`,
+    /// MPa.
     #[test]
     fn a_plate_cools() {
         let print = Print::new(&[1.0, 273.15, 220.0, 0.25, 1e6]).unwrap();
         let (wall, cells) = (Wall { biot: 1.0 }, 40);
         for (held, expected) in [(true, [27.5719, 27.0687]), (false, [5.5791, -14.4911])] {
-            // centres of cells, with the centre and the surface of the plate, which bear nothing
+            // centres of cells, with the centre and the surface of the plate, which have no weight
             let mut places: Vec<f64> = (0..cells).map(|k| (f64::from(k) + 0.5) / f64::from(cells)).collect();
             places.extend([0.0, 1.0]);
             let mut states = vec![vec![0.0; Print::STATES]; places.len()];

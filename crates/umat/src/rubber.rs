@@ -1,4 +1,4 @@
-//! Hyperelastic laws under the deformations that hosts hand over.
+//! Hyperelastic laws under the deformations of a host.
 
 use crate::Error;
 use polycore::constitutive::hyperelastic::{Compressible, Hyperelastic, MODELS, Volumetric, model};
@@ -6,8 +6,8 @@ use polycore::constitutive::{Law, Workspace};
 use polycore::tensor::voigt::{self, Voigt, Voigt6x6};
 use polycore::tensor::{DeformationGradient, Tensor};
 
-/// W₀(λ₁, λ₂, λ₃) − g ln J + ¼λ(J² − 1 − 2 ln J): a law of chapter 1 with a bulk modulus.
-pub struct Rubber {
+/// Law of Chapter 1 with a bulk modulus: W₀(λ₁, λ₂, λ₃) − g ln J + ¼λ(J² − 1 − 2 ln J).
+pub struct RubberMaterial {
     law: Compressible<Box<dyn Hyperelastic>>,
 }
 
@@ -16,11 +16,13 @@ pub(crate) fn names() -> Vec<&'static str> {
     MODELS.iter().map(|model| model.key).collect()
 }
 
-impl Rubber {
-    /// A law by its key; constants are the bulk modulus K of small strains, then the parameters of the law, stresses in the host's unit.
+impl RubberMaterial {
+    /// Creates a law by its key; constants are the bulk modulus K at small strains, then the parameters of
+    /// the law, stresses in the host's unit.
     ///
     /// # Errors
-    /// An unknown key; constants out of range, too few or too many; K below that of the law without a volumetric term.
+    /// An unknown key; constants out of range, too few or too many; K below that of the law without a
+    /// volumetric term.
     pub fn new(key: &str, constants: &[f64]) -> Result<Self, Error> {
         let wrong = |error: polycore::constitutive::Error| Error::new(key, format!("{constants:?}"), error);
         let descriptor = model(key).map_err(wrong)?;
@@ -41,16 +43,17 @@ impl Rubber {
         Ok(Self { law })
     }
 
-    /// S and ℂ = 2 ∂S/∂C at C, in the order 11, 22, 33, 12, 13, 23.
+    /// Computes S and ℂ = 2 ∂S/∂C at C, in the order 11, 22, 33, 12, 13, 23.
     ///
     /// # Errors
-    /// A C that is not positive definite, chains beyond their length.
+    /// A C that is not positive definite, chains beyond their limit.
     pub fn material(&self, c: &Voigt) -> Result<(Voigt, Voigt6x6), Error> {
         let prediction = self.law.tangent(c, &mut Workspace::default()).map_err(stretched)?;
         Ok((prediction.stress, prediction.tangent.unwrap_or_default()))
     }
 
-    /// Cauchy stress and the tangent of its Jaumann rate ([`voigt::jaumann_tangent`]) at F, nine numbers column by column.
+    /// Computes the Cauchy stress and the tangent of its Jaumann rate ([`voigt::jaumann_tangent`]) at F, nine
+    /// numbers column by column.
     ///
     /// # Errors
     /// As [`Self::material`]; det F ≤ 0.
@@ -58,7 +61,8 @@ impl Rubber {
         self.stored(f).map(|(stress, tangent, _)| (stress, tangent))
     }
 
-    /// As [`Self::cauchy`], with the stored energy W/J of a unit of the deformed volume, in the host's unit of stress.
+    /// Computes the Cauchy stress and tangent as [`Self::cauchy`], and the stored energy W/J per deformed
+    /// volume, in the host's unit of stress.
     ///
     /// # Errors
     /// As [`Self::cauchy`].
@@ -68,7 +72,7 @@ impl Rubber {
         let found = self.law.tangent(&c, &mut Workspace::default()).map_err(stretched)?;
         let (s, tangent) = (found.stress, found.tangent.unwrap_or_default());
         let energy = found.energy.unwrap_or_default() / f.jacobian();
-        Ok((voigt::cauchy_of_material(&f, &s), voigt::jaumann_tangent(&f, &s, &tangent), energy))
+        Ok((voigt::cauchy_from_material(&f, &s), voigt::jaumann_tangent(&f, &s, &tangent), energy))
     }
 }
 

@@ -1,4 +1,4 @@
-//! `umat_` as Abaqus calls it, and what materials refuse.
+//! Calls of `umat_` in Abaqus' form, and errors of materials.
 
 use crate::host::umat_;
 use crate::{Material, Print};
@@ -7,8 +7,8 @@ use polycore::constitutive::hyperelastic::model;
 use polycore::tensor::Tensor;
 use polycore::tensor::voigt::{self, PAIRS, Voigt, Voigt6x6};
 
-/// What changes from one call to the next.
-struct Call<'a> {
+/// Arguments that change from one call to the next.
+struct UmatCall<'a> {
     name: &'a str,
     constants: &'a [f64],
     deformation: Tensor,
@@ -18,13 +18,13 @@ struct Call<'a> {
     turn: Tensor,
 }
 
-impl Call<'_> {
-    /// σ, DDSDDE and PNEWDT.
+impl UmatCall<'_> {
+    /// Returns σ, DDSDDE and PNEWDT.
     fn umat(&self, state: &mut [f64]) -> (Voigt, Voigt6x6, f64) {
         self.with_energies(state, &mut [0.0; 3])
     }
 
-    /// The same, with SSE, SPD and SCD brought up to date.
+    /// Calls it as above, and updates SSE, SPD and SCD.
     fn with_energies(&self, state: &mut [f64], energies: &mut [f64; 3]) -> (Voigt, Voigt6x6, f64) {
         let [sse, spd, scd] = energies;
         let (mut stress, mut tangent, mut cut) = ([0.0; 6], [0.0; 36], 1.0);
@@ -35,7 +35,7 @@ impl Call<'_> {
         let square = |tensor: &Tensor| -> [f64; 9] { std::array::from_fn(|k| tensor.as_slice()[k]) };
         let (f, turn) = (square(&self.deformation), square(&self.turn));
         let [start, change] = [self.temperature[0], self.temperature[1] - self.temperature[0]];
-        // SAFETY: every array has the length that the call tells; what is not read has nine numbers
+        // SAFETY: every array has the length that the call states; what is not read has nine numbers
         unsafe {
             umat_(
                 stress.as_mut_ptr(),
@@ -75,9 +75,17 @@ impl Call<'_> {
     }
 }
 
-fn call<'a>(name: &'a str, constants: &'a [f64], deformation: Tensor) -> Call<'a> {
+fn call<'a>(name: &'a str, constants: &'a [f64], deformation: Tensor) -> UmatCall<'a> {
     let turn = Tensor::identity();
-    Call { name, constants, deformation, strain: [Voigt::zeros(); 2], temperature: [0.0; 2], time: 1.0, turn }
+    UmatCall {
+        name,
+        constants,
+        deformation,
+        strain: [Voigt::zeros(); 2],
+        temperature: [0.0; 2],
+        time: 1.0,
+        turn,
+    }
 }
 
 /// Nearly incompressible under uniaxial stress: σ₁₁ of the incompressible law, to μ/K.
@@ -147,7 +155,8 @@ fn stored_energy_is_work() {
     }
 }
 
-/// Once its crystals are grown, the work on a print at one temperature is stored or relaxed: no strain is free, and none is lost.
+/// Work on a print with grown crystals at constant temperature is stored or relaxed: there is no free strain,
+/// and no energy is lost.
 #[test]
 fn energies_of_a_print_close() {
     let constants = [1.0, 273.15, 180.0, 0.25, 1e6];
@@ -159,7 +168,7 @@ fn energies_of_a_print_close() {
     for _ in 0..300 {
         before = one.with_energies(&mut state, &mut energies).0;
     }
-    // held while it shrinks: crystals take what they are born without
+    // held while it shrinks: crystals dissipate the energy of their birth
     assert!(state[1] > 0.999 && energies[0] > 0.0 && energies[1] > 0.0, "{energies:?} {}", state[1]);
     let (grown, mut work, steps) = (energies, 0.0, 2000);
     for step in 0..steps {
@@ -176,7 +185,7 @@ fn energies_of_a_print_close() {
     assert!(((stored + crystals + viscous) / work - 1.0).abs() < 2e-3, "{stored} {viscous} {work}");
 }
 
-/// A held print cools; turned by 90° with its strains, its stresses turn.
+/// A held print cools; rotated by 90° with its strains, its stresses rotate.
 #[test]
 fn a_print_turns() {
     let constants = [1.0, 273.15, 180.0, 0.25, 1e6];
@@ -222,7 +231,7 @@ fn wrong_input_is_named() {
         let error = Material::new(name, constants).err().unwrap().to_string();
         assert!(error.contains(says), "{name}: {error}");
     }
-    // chains beyond their length: the host cuts its increment
+    // chains beyond their limit: the host cuts its increment
     let f = Tensor::from_diagonal(&[9.0, 0.3, 0.3].into());
     let (_, tangent, cut) = call("EIGHT_CHAIN", &[100.0, 0.3, 4.0], f).umat(&mut []);
     assert!(cut == 0.25 && tangent.iter().all(|entry| *entry == 0.0));

@@ -1,4 +1,4 @@
-//! The materials in CalculiX 2.20, where `CALCULIX_SOURCE` names its source build.
+//! Tests of the materials in CalculiX 2.20, if `CALCULIX_SOURCE` names its source build.
 
 use evidence::hosts::{self, run};
 use polycore::constitutive::hyperelastic::{homogeneous::uniaxial, model};
@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// CalculiX with the library. `WITHOUT_TANGENT` in its environment: the tangent of the material at rest instead of the true one.
+/// Links CalculiX with the library. With `WITHOUT_TANGENT` in its environment it uses the tangent of the
+/// material at rest.
 fn program() -> Option<&'static Path> {
     static BUILT: OnceLock<Option<(tempfile::TempDir, PathBuf)>> = OnceLock::new();
     let built = BUILT.get_or_init(|| {
@@ -27,34 +28,44 @@ fn program() -> Option<&'static Path> {
     built.as_ref().map(|(folder, name)| PATH.get_or_init(|| folder.path().join(name)).as_path())
 }
 
-/// What the linker calls instead of the material.
-const WRAP: &str = "subroutine wrap(amat, iel, iint, kode, elconloc, emec, emec0, beta, xokl, voj, xkl, vj, ithermal, t1l, dtime, &
-    time, ttime, icmd, ielas, mi, nstate_, xstateini, xstate, stre, stiff, iorien, pgauss, orab, pnewdt, ipkon) bind(c, name='__wrap_umat_user_')
+/// Subroutine that the linker calls instead of the material.
+const WRAP: &str = "subroutine wrap(amat, iel, iint, kode, elconloc, emec, emec0, beta, xokl, voj, xkl, vj, \
+                    ithermal, t1l, dtime, &
+    time, ttime, icmd, ielas, mi, nstate_, xstateini, xstate, stre, stiff, iorien, pgauss, &
+    orab, pnewdt, ipkon) bind(c, name='__wrap_umat_user_')
     implicit none
     character(len=1) :: amat(80)
     integer :: iel, iint, kode, ithermal(*), icmd, ielas, mi(*), nstate_, iorien, ipkon(*), length
-    double precision :: elconloc(*), emec(6), emec0(6), beta(6), xokl(3, 3), voj, xkl(3, 3), vj, t1l, dtime, time, ttime, &
+    double precision :: elconloc(*), emec(6), emec0(6), beta(6), xokl(3, 3), voj, xkl(3, 3), &
+        vj, t1l, dtime, time, ttime, &
         xstateini(*), xstate(*), stre(6), stiff(21), pgauss(3), orab(7, *), pnewdt, none(6), rest(6)
     interface
-        subroutine real_umat(amat, iel, iint, kode, elconloc, emec, emec0, beta, xokl, voj, xkl, vj, ithermal, t1l, dtime, &
-            time, ttime, icmd, ielas, mi, nstate_, xstateini, xstate, stre, stiff, iorien, pgauss, orab, pnewdt, ipkon) &
+        subroutine real_umat(amat, iel, iint, kode, elconloc, emec, emec0, beta, xokl, voj, xkl, vj, &
+            ithermal, t1l, dtime, &
+            time, ttime, icmd, ielas, mi, nstate_, xstateini, xstate, stre, stiff, iorien, pgauss, &
+            orab, pnewdt, ipkon) &
             bind(c, name='__real_umat_user_')
             character(len=1) :: amat(80)
             integer :: iel, iint, kode, ithermal(*), icmd, ielas, mi(*), nstate_, iorien, ipkon(*)
-            double precision :: elconloc(*), emec(6), emec0(6), beta(6), xokl(3, 3), voj, xkl(3, 3), vj, t1l, dtime, time, &
+            double precision :: elconloc(*), emec(6), emec0(6), beta(6), xokl(3, 3), voj, xkl(3, 3), &
+            vj, t1l, dtime, time, &
                 ttime, xstateini(*), xstate(*), stre(6), stiff(21), pgauss(3), orab(7, *), pnewdt
         end subroutine real_umat
     end interface
     none = 0
     call get_environment_variable('WITHOUT_TANGENT', length=length)
-    if (length > 0) call real_umat(amat, iel, iint, kode, elconloc, none, emec0, beta, xokl, voj, xkl, vj, ithermal, t1l, dtime, &
-        time, ttime, icmd, ielas, mi, nstate_, xstateini, xstate, rest, stiff, iorien, pgauss, orab, pnewdt, ipkon)
-    call real_umat(amat, iel, iint, kode, elconloc, emec, emec0, beta, xokl, voj, xkl, vj, ithermal, t1l, dtime, &
-        time, ttime, merge(3, icmd, length > 0), ielas, mi, nstate_, xstateini, xstate, stre, stiff, iorien, pgauss, orab, pnewdt, ipkon)
+    if (length > 0) call real_umat(amat, iel, iint, kode, elconloc, none, emec0, beta, xokl, voj, xkl, vj, &
+            ithermal, t1l, dtime, &
+        time, ttime, icmd, ielas, mi, nstate_, xstateini, xstate, rest, stiff, iorien, &
+        pgauss, orab, pnewdt, ipkon)
+    call real_umat(amat, iel, iint, kode, elconloc, emec, emec0, beta, xokl, voj, xkl, vj, &
+            ithermal, t1l, dtime, &
+        time, ttime, merge(3, icmd, length > 0), ielas, mi, nstate_, xstateini, xstate, &
+        stre, stiff, iorien, pgauss, orab, pnewdt, ipkon)
 end subroutine wrap
 ";
 
-/// `examples/cube.inp`, which the guide shows: the force of the incompressible law, to μ/K.
+/// Tests `examples/cube.inp`, which the guide shows: the force of the incompressible law, to μ/K.
 #[test]
 fn the_example() {
     let Some(program) = program() else { return };
@@ -65,8 +76,8 @@ fn the_example() {
     evidence::near("a cube of eight chains in CalculiX", force.unwrap() / expected, 1.0, 1e-3);
 }
 
-/// A quarter of a sheet of 40 × 80 × 2 mm with notches of 10 mm at both edges, stretched by 20 % of its length: one element through half of the
-/// thickness, the notched edge free.
+/// A quarter of a sheet of 40 × 80 × 2 mm with notches of 10 mm at both edges, stretched by 20 % of its
+/// length: one element through half of the thickness, the notched edge free.
 fn notched_sheet(material: &str) -> String {
     let (columns, rows) = (16, 32);
     let node = |i: usize, j: usize, k: usize| 1 + i + (columns + 1) * (j + (rows + 1) * k);
@@ -94,7 +105,8 @@ fn notched_sheet(material: &str) -> String {
     set(&mut deck, "GRIP", &|_, j, _| j == rows);
     writeln!(
         deck,
-        "{material}*SOLID SECTION, ELSET=SHEET, MATERIAL=USER_RUBBER_LAW\n*STEP, NLGEOM, INC=1000\n*STATIC\n0.1, 1.0, 1e-6\n*BOUNDARY\nMIDDLE,1,1\n\
+        "{material}*SOLID SECTION, ELSET=SHEET, MATERIAL=USER_RUBBER_LAW\n*STEP, NLGEOM, \
+         INC=1000\n*STATIC\n0.1, 1.0, 1e-6\n*BOUNDARY\nMIDDLE,1,1\n\
          LIGAMENT,2,2\nFACE,3,3\nGRIP,1,1\nGRIP,2,2,8.0\n*NODE PRINT, NSET=GRIP, TOTALS=ONLY\nRF\n*END STEP\n"
     )
     .unwrap();
@@ -105,7 +117,7 @@ fn all(planes: usize, rows: usize, columns: usize) -> impl Iterator<Item = (usiz
     (0..planes).flat_map(move |k| (0..rows).flat_map(move |j| (0..columns).map(move |i| (k, j, i))))
 }
 
-/// Load along y at the end, N, none where CalculiX gave up, and all iterations.
+/// Returns the load along y at the end, N (`None` if CalculiX failed), and all iterations.
 fn solved(program: &Path, deck: &str, tangent: bool) -> (Option<f64>, usize) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("deck.inp"), deck).unwrap();
@@ -123,7 +135,8 @@ fn solved(program: &Path, deck: &str, tangent: bool) -> (Option<f64>, usize) {
     (numbers.get(1).copied().filter(|_| ended.status.success()), iterations)
 }
 
-/// The same sheet of our neo-Hookean law and of CalculiX' own, nearly incompressible; iterations with our tangent and with that at rest.
+/// Compares the sheet with our neo-Hookean law and with CalculiX' own, nearly incompressible; iterations with
+/// our tangent and with that at rest.
 #[test]
 fn a_notched_sheet() {
     let Some(program) = program() else { return };
@@ -161,8 +174,9 @@ fn a_notched_sheet() {
     assert!(with * 2 < without, "{with} {without}");
 }
 
-/// A plate of PA12, 4 mm thick, 220 °C to 25 °C with Bi = 1 on both faces, half of it in CalculiX, free to shrink in its plane or held:
-/// stresses in the plane at its centre and its surface after 600 s (`docs/reference/print/plate.py`).
+/// A plate of PA12, 4 mm thick, 220 °C to 25 °C with Bi = 1 on both faces, half of it in CalculiX, free to
+/// shrink in its plane or held: stresses in the plane at its centre and its surface after 600 s
+/// (`docs/reference/print/plate.py`).
 #[test]
 fn a_plate_cools() {
     let Some(program) = program() else { return };
@@ -195,7 +209,8 @@ fn a_plate_cools() {
                 }
             }
         }
-        // mm, N, s, K; temperatures in closed form: CalculiX' coupled steps would take the heat capacity of the shrunken body
+        // mm, N, s, K; temperatures in closed form: CalculiX' coupled steps would take the heat capacity of
+        // the shrunken body
         let phases = [(0.1, 20.0, 0.0), (0.5, 80.0, 20.0), (2.0, 500.0, 100.0)];
         for k in 0..=cells {
             writeln!(deck, "*AMPLITUDE, NAME=A{k}, TIME=TOTAL TIME\n0., 493.15").unwrap();
@@ -210,8 +225,10 @@ fn a_plate_cools() {
         }
         write!(
             deck,
-            "*MATERIAL, NAME=USER_PRINTED_PA12\n*USER MATERIAL, CONSTANTS=5\n1., 0., 493.15, 0.25, 1e6\n*DEPVAR\n45\n\
-             *SOLID SECTION, ELSET=PLATE, MATERIAL=USER_PRINTED_PA12\n*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 493.15\n\
+            "*MATERIAL, NAME=USER_PRINTED_PA12\n*USER MATERIAL, CONSTANTS=5\n1., 0., 493.15, 0.25, \
+             1e6\n*DEPVAR\n45\n\
+             *SOLID SECTION, ELSET=PLATE, MATERIAL=USER_PRINTED_PA12\n\
+             *INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 493.15\n\
              *BOUNDARY\n{supports}"
         )
         .unwrap();
@@ -235,7 +252,8 @@ fn a_plate_cools() {
             }
         }
         assert_eq!(points.len(), 2 * cells);
-        // means of elements (CalculiX takes the change of volume from an element's mean), carried on linearly to the faces
+        // means of elements (CalculiX takes the change of volume from an element's mean), extrapolated
+        // linearly to the faces
         let mean = |element: usize| 0.5 * (points[2 * element].1 + points[2 * element + 1].1);
         let out = |near: usize, far: usize| mean(near) + 0.5 * (mean(near) - mean(far));
         let found = [out(0, 1), out(cells - 1, cells - 2)];

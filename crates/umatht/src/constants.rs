@@ -1,11 +1,11 @@
-//! Constants of the material as hosts list them.
+//! Constants of the material in the order of hosts.
 
 use crystfem::kinetics::{self, Kinetics};
-use crystfem::material::{CONSTANT_NAMES, Polymer, Property, Semicrystalline};
+use crystfem::material::{CONSTANT_NAMES, Polymer, Semicrystalline, ThermalProperty};
 use crystfem::melting::Melting;
 use std::cell::RefCell;
 
-/// Names of the constants, in their order.
+/// Names of the constants, in order.
 pub const NAMES: [&str; 15] = [
     "conductivity",
     "specific_heat",
@@ -23,18 +23,18 @@ pub const NAMES: [&str; 15] = [
     CONSTANT_NAMES[7],
     CONSTANT_NAMES[8],
 ];
-/// How many a host lists before those of its own kinetics.
-pub const HEAD: usize = 6;
+/// Number of constants before those of the user's own kinetics.
+pub const COMMON_COUNT: usize = 6;
 
-/// A number that the material cannot have.
+/// Invalid constant of the material.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("umatht: {name}: found {found}; allowed: {allowed}")]
 pub struct Error {
-    /// What.
+    /// Name of the constant.
     pub name: &'static str,
-    /// The number.
+    /// Value found.
     pub found: f64,
-    /// What it may be.
+    /// Allowed values.
     pub allowed: String,
 }
 
@@ -47,16 +47,16 @@ impl From<crystfem::Error> for Error {
     }
 }
 
-/// The material of a list of constants.
-pub struct Constants {
+/// Material with the host's conventions.
+pub struct HostMaterial {
     pub material: Semicrystalline,
-    /// 0 of the host's temperature, K.
+    /// Absolute temperature at 0 of the host's scale, K.
     pub absolute_zero: f64,
-    /// Whether the host is CalculiX.
+    /// True if the host is CalculiX.
     pub calculix: bool,
 }
 
-impl Constants {
+impl HostMaterial {
     fn new(list: &[f64]) -> Result<Self, Error> {
         let wrong = |place: usize, found: f64, allowed: &str| Error {
             name: NAMES[place],
@@ -84,8 +84,8 @@ impl Constants {
         };
         let pa12 = Some(Melting::PA12);
         let (kinetics, melting) = match (column, rest) {
-            (1.0, _) => (kinetics::Constants::TABLE_4_1_COLUMN_1, pa12),
-            (2.0, _) => (kinetics::Constants::TABLE_4_1_COLUMN_2, pa12),
+            (1.0, _) => (kinetics::KineticConstants::TABLE_4_1_COLUMN_1, pa12),
+            (2.0, _) => (kinetics::KineticConstants::TABLE_4_1_COLUMN_2, pa12),
             (
                 0.0,
                 &[
@@ -102,7 +102,7 @@ impl Constants {
                     peak,
                 ],
             ) => {
-                let own = kinetics::Constants {
+                let own = kinetics::KineticConstants {
                     growth_rate,
                     nucleation,
                     activation_energy,
@@ -114,11 +114,13 @@ impl Constants {
                 (own, melts.then(|| Melting::new(sharpness, shape, peak)).transpose()?)
             }
             (0.0, &[_, _, _, _, _, _, _, _]) => {
-                let allowed = "15 with `kinetics` 0: k_m in 1/K, d and T_p in K of melting are constants 13 to 15, or 0, 0, 0 for crystals that never melt";
+                let allowed = "15 with `kinetics` 0: k_m in 1/K, d and T_p in K of melting are constants 13 \
+                               to 15, or 0, 0, 0 for crystals that never melt";
                 return Err(Error { name: "constants", found: 12.0, allowed: allowed.into() });
             }
             _ => {
-                let allowed = "1 or 2, a column of Table 4.1 (PA12); 0 with constants 7 to 15; 3 with these in a file (from a host only)";
+                let allowed = "1 or 2, a column of Table 4.1 (PA12); 0 with constants 7 to 15; 3 with these \
+                               in a file (from a host only)";
                 return Err(wrong(3, column, allowed));
             }
         };
@@ -128,11 +130,11 @@ impl Constants {
         let material = Semicrystalline::new(Polymer {
             // the host has its own
             density: 1.0,
-            conductivity: Property::Constant(conductivity),
-            specific_heat: Property::Constant(specific_heat),
+            conductivity: ThermalProperty::Constant(conductivity),
+            specific_heat: ThermalProperty::Constant(specific_heat),
             kinetics: Kinetics::new(kinetics)?,
             melting,
-            // of α alone: the host gives ΔH·X∞
+            // α alone: the host gives ΔH·X∞
             ultimate_crystallinity: 1.0,
             latent_heat: (latent > 0.0).then_some(latent),
             seed: 0.0,
@@ -142,19 +144,19 @@ impl Constants {
 }
 
 thread_local! {
-    /// The constants of the last call on this thread: hosts call once an integration point and iteration.
-    static LAST: RefCell<Option<(Vec<f64>, Constants)>> = const { RefCell::new(None) };
+    /// Constants of the last call on this thread: hosts call once per integration point and iteration.
+    static LAST: RefCell<Option<(Vec<f64>, HostMaterial)>> = const { RefCell::new(None) };
 }
 
-/// Works with the material of a list of constants.
+/// Calls `work` with the material of a list of constants.
 ///
 /// # Errors
 /// A constant out of range.
-pub fn with<R>(list: &[f64], work: impl FnOnce(&Constants) -> R) -> Result<R, Error> {
+pub fn with_material<R>(list: &[f64], work: impl FnOnce(&HostMaterial) -> R) -> Result<R, Error> {
     LAST.with_borrow_mut(|last| {
         let (_, constants) = match last.take() {
             Some(kept) if kept.0 == list => last.insert(kept),
-            _ => last.insert((list.to_vec(), Constants::new(list)?)),
+            _ => last.insert((list.to_vec(), HostMaterial::new(list)?)),
         };
         Ok(work(constants))
     })

@@ -1,28 +1,28 @@
-//! Constants that a host does not pass: CalculiX takes six of a thermal material.
+//! Constants in a file, for hosts that do not pass all: CalculiX takes six of a thermal material.
 
-use crate::constants::{HEAD, NAMES};
+use crate::constants::{COMMON_COUNT, NAMES};
 use std::cell::RefCell;
 use std::path::Path;
 use std::rc::Rc;
 
-/// Value of constant `kinetics` that asks for the file.
+/// Value of constant `kinetics` that selects the file.
 const IN_FILE: f64 = 3.0;
 
-/// A name, the constants that the host gives, and the whole list.
-type Known = (String, Vec<f64>, Rc<[f64]>);
+/// Name, constants of the host, and the whole list.
+type CachedList = (String, Vec<f64>, Rc<[f64]>);
 
 thread_local! {
-    /// Those of the last call on this thread.
-    static LAST: RefCell<Option<Known>> = const { RefCell::new(None) };
+    /// Constants of the last call on this thread.
+    static LAST: RefCell<Option<CachedList>> = const { RefCell::new(None) };
 }
 
-/// Whether constants 7 to 15 of a list are in a file.
+/// Returns true if constants 7 to 15 of a list are in a file.
 pub fn is_asked(list: &[f64]) -> bool {
     list.get(3) == Some(&IN_FILE)
 }
 
-/// The whole list of constants of a material: 7 to 15 from `name.umatht` in a folder, the host's name of the material in small letters, a
-/// line `growth_rate = 37869.0` (TOML) for each.
+/// Completes the constants of a material: 7 to 15 from `name.umatht` in a folder, named after the material in
+/// lower case, with a line `growth_rate = 37869.0` (TOML) for each.
 ///
 /// # Errors
 /// A file that cannot be read, a missing or unknown name, a value that is no number.
@@ -39,8 +39,8 @@ pub fn complete(folder: &Path, name: &str, list: &[f64]) -> Result<Rc<[f64]>, St
         let text = std::fs::read_to_string(&path).map_err(|error| {
             format!("umatht: {}, asked for by constant `kinetics` 3: {error}", path.display())
         })?;
-        let mut whole = list[..list.len().min(HEAD)].to_vec();
-        whole.resize(HEAD, 0.0);
+        let mut whole = list[..list.len().min(COMMON_COUNT)].to_vec();
+        whole.resize(COMMON_COUNT, 0.0);
         whole[3] = 0.0;
         whole.extend(parse(&text).map_err(|error| format!("umatht: {}: {error}", path.display()))?);
         let whole = Rc::from(whole);
@@ -49,10 +49,10 @@ pub fn complete(folder: &Path, name: &str, list: &[f64]) -> Result<Rc<[f64]>, St
     })
 }
 
-/// Constants 7 to 15, in their order.
+/// Parses constants 7 to 15, in order.
 fn parse(text: &str) -> Result<Vec<f64>, String> {
     let table: toml::Table = text.parse().map_err(|error: toml::de::Error| error.to_string())?;
-    let names = &NAMES[HEAD..];
+    let names = &NAMES[COMMON_COUNT..];
     if let Some(other) = table.keys().find(|key| !names.contains(&key.as_str())) {
         return Err(format!("found `{other}`; allowed: {}", names.join(", ")));
     }
@@ -70,8 +70,10 @@ mod tests {
 
     #[test]
     fn a_file_has_the_rest() {
-        let text = "growth_rate = 37869\nnucleation = 136235.0\nactivation_energy = 6270.0\nequilibrium_melting = 466.35\n\
-                    frozen = 294.15\navrami_exponent = 2.678\nmelting_sharpness = 0.965\nmelting_shape = 8.584 # d\nmelting_peak = 450\n";
+        let text = "growth_rate = 37869\nnucleation = 136235.0\nactivation_energy = \
+                    6270.0\nequilibrium_melting = 466.35\n\
+                    frozen = 294.15\navrami_exponent = 2.678\nmelting_sharpness = 0.965\n\
+                    melting_shape = 8.584 # d\nmelting_peak = 450\n";
         assert_eq!(
             parse(text).unwrap(),
             [37869.0, 136_235.0, 6270.0, 466.35, 294.15, 2.678, 0.965, 8.584, 450.0]

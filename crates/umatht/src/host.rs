@@ -1,19 +1,18 @@
-//! The symbols that hosts call.
+//! Symbols that hosts call.
 
-use crate::{Answer, Increment, NAMES, State, file, respond};
+use crate::{HeatIncrement, HeatResponse, NAMES, State, file, respond};
 use std::ffi::{CStr, c_char, c_int};
 use std::path::Path;
 
 /// Length of a name in Fortran.
 const NAME: usize = 80;
 
-/// UMATHT as Abaqus declares it; CalculiX appends arguments, which are left alone. `STATEV` are the first three of
-/// [`State`], and, where there is a fourth, the latent heat that crystals release per mass and time; `PROPS` are the constants of
-/// [`NAMES`]. Wrong numbers end the program with a line that names them.
-///
+/// UMATHT as Abaqus declares it; CalculiX appends arguments, which are ignored. `STATEV` holds the three of
+/// [`State`] and, if there is a fourth, the latent heat that crystals release per mass and time; `PROPS` are
+/// the constants of [`NAMES`]. Invalid numbers end the program with a message that names them.
 /// # Safety
-/// As in Fortran: every pointer is valid for the length that `NTGRD`, `NSTATV` and `NPROPS` tell, and nothing else refers
-/// to what is written.
+/// As in Fortran: every pointer is valid for the length that `NTGRD`, `NSTATV` and `NPROPS` tell, and nothing
+/// else refers to what is written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn umatht_(
     u: *mut f64,
@@ -58,22 +57,22 @@ pub unsafe extern "C" fn umatht_(
     // SAFETY: the caller's promise
     let (temperature, change, time) = unsafe { (*temp, *dtemp, *dtime) };
     if states.len() < 3 {
-        end(&format!("umatht: NSTATV: found {}; allowed: 3 or more (*DEPVAR)", states.len()));
+        abort(&format!("umatht: NSTATV: found {}; allowed: 3 or more (*DEPVAR)", states.len()));
     }
     let directions = gradient.len();
-    let mut at = Increment { temperature, change, time, gradient: [0.0; 3] };
+    let mut at = HeatIncrement { temperature, change, time, gradient: [0.0; 3] };
     at.gradient[..directions].copy_from_slice(gradient);
     let state = State { z: states[0], degree: states[1], temperature: states[2] };
     let whole;
     let constants = if file::is_asked(constants) {
         // SAFETY: the caller's promise: 80 characters
         let name = String::from_utf8_lossy(unsafe { std::slice::from_raw_parts(cmname.cast::<u8>(), NAME) });
-        whole = file::complete(Path::new(""), &name, constants).unwrap_or_else(|error| end(&error));
+        whole = file::complete(Path::new(""), &name, constants).unwrap_or_else(|error| abort(&error));
         &whole
     } else {
         constants
     };
-    let answer = respond(constants, &at, &state).unwrap_or_else(|error| end(&error.to_string()));
+    let answer = respond(constants, &at, &state).unwrap_or_else(|error| abort(&error.to_string()));
     states[..3].copy_from_slice(&[answer.state.z, answer.state.degree, answer.state.temperature]);
     if let Some(heat) = states.get_mut(3) {
         // the source that CalculiX' DFLUX adds (include/dflux.f)
@@ -100,14 +99,14 @@ pub unsafe extern "C" fn umatht_(
     }
 }
 
-/// A host cannot go on, and no Fortran routine returns an error.
-fn end(message: &str) -> ! {
+/// Ends the process: a host cannot continue, and no Fortran routine returns an error.
+fn abort(message: &str) -> ! {
     eprintln!("{message}");
     std::process::exit(2)
 }
 
-/// `int crystfem_respond(constants, count, increment, state, answer)`: 0, or 1 where a number is out of range, which is then
-/// printed.
+/// `int crystfem_respond(constants, count, increment, state, answer)`: returns 0, or 1 if a number is out of
+/// range, with a message.
 ///
 /// # Safety
 /// `constants` points to `count` numbers, the others to what `include/crystfem.h` declares.
@@ -117,12 +116,12 @@ pub unsafe extern "C" fn crystfem_respond(
     count: usize,
     at: *const [f64; 6],
     state: *const State,
-    answer: *mut Answer,
+    answer: *mut HeatResponse,
 ) -> c_int {
     // SAFETY: the caller's promise
     let (constants, [temperature, change, time, gradient @ ..], state) =
         unsafe { (std::slice::from_raw_parts(constants, count), *at, &*state) };
-    match respond(constants, &Increment { temperature, change, time, gradient }, state) {
+    match respond(constants, &HeatIncrement { temperature, change, time, gradient }, state) {
         Ok(found) => {
             // SAFETY: the caller's promise
             unsafe { answer.write(found) };
@@ -135,8 +134,7 @@ pub unsafe extern "C" fn crystfem_respond(
     }
 }
 
-/// `int crystfem_constant(name)`: the place of a constant by its name, counted from 0; −1 for another name.
-///
+/// `int crystfem_constant(name)`: returns the index of a constant, from 0; −1 for an unknown name.
 /// # Safety
 /// `name` points to a text that ends with 0.
 #[unsafe(no_mangle)]

@@ -1,15 +1,16 @@
-//! The semicrystalline material of [`crystfem`] in other programs: `umatht_`, as Abaqus and CalculiX call it, and
-//! `crystfem_respond` for C (`include/crystfem.h`).
+//! The semicrystalline material of [`crystfem`] in other programs: `umatht_`, as Abaqus and CalculiX call it,
+//! and `crystfem_respond` for C (`include/crystfem.h`).
 //!
-//! [`respond`] is the material: a pure function of constants, an increment and the state at its start. The host keeps the
-//! state; whatever increment it repeats or cuts back gets the same answer.
+//! [`respond`] is the material: a pure function of constants, an increment and the state at its start. The
+//! host keeps the state; an increment that it repeats or cuts back gets the same response.
 //!
 //! ```
-//! use umatht::{Increment, NAMES, State, respond};
+//! use umatht::{HeatIncrement, NAMES, State, respond};
 //!
 //! // k, c, ΔH·X∞, column of Table 4.1; 1 s of cooling from 150 °C at 10 K/min
 //! let constants = [0.25, 2200.0, 0.0, 1.0];
-//! let at = Increment { temperature: 423.15, change: -10.0 / 60.0, time: 1.0, gradient: [100.0, 0.0, 0.0] };
+//! let (change, gradient) = (-10.0 / 60.0, [100.0, 0.0, 0.0]);
+//! let at = HeatIncrement { temperature: 423.15, change, time: 1.0, gradient };
 //! let answer = respond(&constants, &at, &State::default())?;
 //! assert!(answer.state.degree > 0.0 && answer.flux[0] == -25.0);
 //! assert_eq!(NAMES[3], "kinetics");
@@ -22,16 +23,16 @@ mod host;
 
 pub use constants::{Error, NAMES};
 
-use constants::Constants;
-use crystfem::material::{Point, ThermalMaterial};
+use constants::HostMaterial;
+use crystfem::material::{PointInput, ThermalMaterial};
 use nalgebra::Vector3;
 
-/// An increment at an integration point, in the units of the host: time in s, temperature from its own zero.
+/// Increment at an integration point, in the units of the host: time in s, temperature from its own zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Increment {
+pub struct HeatIncrement {
     /// Temperature at the start.
     pub temperature: f64,
-    /// Its change.
+    /// Change over the increment.
     pub change: f64,
     /// Time increment, s.
     pub time: f64,
@@ -45,17 +46,17 @@ pub struct Increment {
 pub struct State {
     /// z = \[−ln(1 − α)\]^{1/n}.
     pub z: f64,
-    /// Relative crystallinity α, to be plotted.
+    /// Relative crystallinity α, for plots.
     pub degree: f64,
     /// Absolute temperature at the end, K.
     pub temperature: f64,
 }
 
-/// What the material answers, at the end of an increment.
+/// Response of the material at the end of an increment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
-pub struct Answer {
-    /// The state there.
+pub struct HeatResponse {
+    /// State at the end.
     pub state: State,
     /// Change of internal energy per mass over the increment.
     pub energy: f64,
@@ -65,22 +66,22 @@ pub struct Answer {
     pub flux: [f64; 3],
     /// ∂f/∂∇T row by row, with the sign that the host expects.
     pub conductivity: [f64; 9],
-    /// Suggested next increment over this one; 1 without a wish.
+    /// Suggested ratio of the next increment to this one; 1 without a suggestion.
     pub step_ratio: f64,
 }
 
-/// The response to an increment.
+/// Computes the response to an increment.
 ///
 /// # Errors
 /// [`Error`]: a constant out of range, a temperature that is not finite or below 0 K.
-pub fn respond(constants: &[f64], at: &Increment, state: &State) -> Result<Answer, Error> {
-    constants::with(constants, |constants| answer(constants, at, state))?
+pub fn respond(constants: &[f64], at: &HeatIncrement, state: &State) -> Result<HeatResponse, Error> {
+    constants::with_material(constants, |constants| answer(constants, at, state))?
 }
 
-fn answer(constants: &Constants, at: &Increment, state: &State) -> Result<Answer, Error> {
-    let Constants { material, absolute_zero, calculix } = constants;
+fn answer(constants: &HostMaterial, at: &HeatIncrement, state: &State) -> Result<HeatResponse, Error> {
+    let HostMaterial { material, absolute_zero, calculix } = constants;
     let end = at.temperature + at.change + absolute_zero;
-    // CalculiX hands over the last iterate for the temperature at the start
+    // CalculiX passes the last iterate for the temperature at the start
     let known = *calculix && state.temperature > 0.0;
     let start = if known { state.temperature } else { at.temperature + absolute_zero };
     for kelvin in [start, end] {
@@ -89,7 +90,7 @@ fn answer(constants: &Constants, at: &Increment, state: &State) -> Result<Answer
         }
     }
     let point =
-        Point { temperature: start, increment: end - start, gradient: at.gradient.into(), dt: at.time };
+        PointInput { temperature: start, increment: end - start, gradient: at.gradient.into(), dt: at.time };
     let (old, mut new) = ([state.z], [0.0]);
     let response = material.respond(&point, &old, &mut new)?;
     let mut fields = [0.0; 2];
@@ -100,7 +101,7 @@ fn answer(constants: &Constants, at: &Increment, state: &State) -> Result<Answer
         conductivity[k] = sign * entry;
     }
     let flux: Vector3<f64> = response.flux;
-    Ok(Answer {
+    Ok(HeatResponse {
         state: State { z: new[0], degree: fields[0], temperature: end },
         energy: response.energy - material.energy(start, &old),
         slope: response.d_energy_d_temperature,
@@ -114,11 +115,11 @@ fn answer(constants: &Constants, at: &Increment, state: &State) -> Result<Answer
 mod tests {
     use super::*;
 
-    fn at(temperature: f64, change: f64) -> Increment {
-        Increment { temperature, change, time: 1.0, gradient: [1.0, 2.0, 3.0] }
+    fn at(temperature: f64, change: f64) -> HeatIncrement {
+        HeatIncrement { temperature, change, time: 1.0, gradient: [1.0, 2.0, 3.0] }
     }
 
-    /// Own kinetics, those of column 1, with a melting point of 500 K.
+    /// Constants with own kinetics: those of column 1, with a melting point of 500 K.
     const OWN: [f64; 15] = [
         0.25,
         2200.0,
@@ -137,10 +138,11 @@ mod tests {
         500.0,
     ];
 
-    /// Crystals melt where their own constants say: at 460 K those of PA12 are gone, others are there, or never melt.
+    /// Crystals melt at the temperature of their own constants: at 460 K those of PA12 are gone, others
+    /// remain, or never melt.
     #[test]
     fn melting_belongs_to_the_constants() {
-        let hot = Increment { gradient: [0.0; 3], ..at(440.0, 20.0) };
+        let hot = HeatIncrement { gradient: [0.0; 3], ..at(440.0, 20.0) };
         let state = State { z: 2.0, ..State::default() };
         let degree = |constants: &[f64]| respond(constants, &hot, &state).unwrap().state.degree;
         let pa12 = degree(&[0.25, 2200.0, 0.0, 1.0]);
@@ -154,7 +156,8 @@ mod tests {
         assert_eq!(degree(&as_pa12), pa12);
     }
 
-    /// The start is that of CalculiX's state, the sign of k that of its conductivity, the zero that of the host.
+    /// CalculiX' conventions: start from the state, sign of k in its conductivity, zero of the host's
+    /// temperature.
     #[test]
     fn hosts_differ() {
         let celsius = [0.25, 2200.0, 52e3, 1.0, 273.15, 0.0];
@@ -171,7 +174,7 @@ mod tests {
         assert_eq!(abaqus.flux, [-0.25, -0.5, -0.75]);
     }
 
-    /// ∂U/∂T by central differences, with latent heat; the energy of a way there and back at once is 0.
+    /// ∂U/∂T by central differences, with latent heat; an instantaneous round trip has no energy.
     #[test]
     fn slope_is_the_derivative() {
         let constants = [0.25, 2200.0, 52e3, 2.0];
@@ -179,7 +182,7 @@ mod tests {
         let energy = |change: f64| respond(&constants, &at(430.0, change), &state).unwrap();
         let slope = (energy(-9.99).energy - energy(-10.01).energy) / 0.02;
         assert!((slope / energy(-10.0).slope - 1.0).abs() < 1e-5, "{slope}");
-        let still = respond(&constants, &Increment { time: 0.0, ..at(430.0, 0.0) }, &state).unwrap();
+        let still = respond(&constants, &HeatIncrement { time: 0.0, ..at(430.0, 0.0) }, &state).unwrap();
         assert_eq!((still.energy, still.state.z), (0.0, 0.5));
     }
 

@@ -1,9 +1,9 @@
 //! The library called as hosts call it: from C, from Fortran in the order of Abaqus, and in CalculiX.
 //!
-//! Temperatures at which α reaches 0.01, 0.5, 0.99 on cooling are those of `shared/formulation.md`, which an independent
-//! program computed.
+//! Temperatures at which α reaches 0.01, 0.5, 0.99 on cooling are those of `shared/formulation.md`, which an
+//! independent program computed.
 
-use evidence::hosts::{self, run, there};
+use evidence::hosts::{self, has_program, run};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
@@ -18,7 +18,7 @@ fn library() -> &'static Path {
     BUILT.get_or_init(|| hosts::static_library("umatht"))
 }
 
-/// A program of the files, linked with the library.
+/// Builds a program from the files, linked with the library.
 fn link(compiler: &str, files: &[&Path], folder: &Path) -> PathBuf {
     let program = folder.join("host");
     let mut build = Command::new(compiler);
@@ -28,10 +28,10 @@ fn link(compiler: &str, files: &[&Path], folder: &Path) -> PathBuf {
     program
 }
 
-/// From C, by names; the same bits as from Rust.
+/// Calls by names from C give the same bits as from Rust.
 #[test]
 fn answers_in_c() {
-    if !there("gcc") {
+    if !has_program("gcc") {
         return;
     }
     let directory = tempfile::tempdir().unwrap();
@@ -39,7 +39,7 @@ fn answers_in_c() {
     std::fs::write(&file, C).unwrap();
     let text = run(&mut Command::new(link("gcc", &[&file], directory.path())));
     let mut numbers = text.split_whitespace().map(|word| word.parse::<f64>().unwrap());
-    let at = umatht::Increment { temperature: 150.0, change: -2.0, time: 3.0, gradient: [1.0, 2.0, 3.0] };
+    let at = umatht::HeatIncrement { temperature: 150.0, change: -2.0, time: 3.0, gradient: [1.0, 2.0, 3.0] };
     let state = umatht::State { z: 0.2, ..Default::default() };
     let own = umatht::respond(&[0.25, 2200.0, 52e3, 1.0, 273.15], &at, &state).unwrap();
     for expected in
@@ -62,7 +62,8 @@ int main(void) {
     constants[crystfem_constant(\"kinetics\")] = 1;
     constants[crystfem_constant(\"absolute_zero\")] = 273.15;
     if (crystfem_respond(constants, 5, at, &state, &answer)) return 1;
-    printf(\"%.17g %.17g %.17g %.17g %.17g %.17g\", answer.state.z, answer.state.degree, answer.energy, answer.slope,
+    printf(\"%.17g %.17g %.17g %.17g %.17g %.17g\", answer.state.z, answer.state.degree, answer.energy, \
+             answer.slope,
            answer.flux[2], answer.conductivity[8]);
     constants[0] = -1;
     wrong = crystfem_respond(constants, 5, at, &state, &answer);
@@ -71,11 +72,11 @@ int main(void) {
 }
 ";
 
-/// In Abaqus' order: U and the state from the start of the increment in every iteration, increments that are cut back and
-/// tried again; prescribed cooling, and a lumped body with latent heat.
+/// Calls in Abaqus' order: U and the state from the start of the increment in every iteration, increments
+/// that are cut back and tried again; prescribed cooling, and a lumped body with latent heat.
 #[test]
 fn follows_the_order_of_abaqus() {
-    if !there("gfortran") {
+    if !has_program("gfortran") {
         return;
     }
     let directory = tempfile::tempdir().unwrap();
@@ -101,7 +102,8 @@ fn follows_the_order_of_abaqus() {
 const FORTRAN: &str = "program main
     implicit none
     integer, parameter :: dp = kind(1d0)
-    real(dp) :: u, dudt, dudg(3), flux(3), dfdt(3), dfdg(3, 3), statev(3), temp, dtemp, dtime, props(4), pnewdt, rate
+    real(dp) :: u, dudt, dudg(3), flux(3), dfdt(3), dfdg(3, 3), statev(3)
+    real(dp) :: temp, dtemp, dtime, props(4), pnewdt, rate
     real(dp) :: u0, old(3), residual, time(2), none(3), levels(3) = [0.01_dp, 0.5_dp, 0.99_dp]
     character(len=32) :: word
     integer :: increment, iteration, level
@@ -151,13 +153,14 @@ contains
         statev = old
         u = u0
         pnewdt = 1
-        call umatht(u, dudt, dudg, flux, dfdt, dfdg, statev, temp, dtemp, none, time, step, none, none, repeat('x', 80), 3, 3, &
+        call umatht(u, dudt, dudg, flux, dfdt, dfdg, statev, temp, dtemp, none, time, step, none, none, &
+            repeat('x', 80), 3, 3, &
             props, 4, none, pnewdt, 1, 1, 1, 1, 1, increment)
     end subroutine material
 end program main
 ";
 
-/// A block that cools at 10 K/min in CalculiX 2.20: temperatures at which it crystallizes.
+/// Cools a block at 10 K/min in CalculiX 2.20: temperatures at which it crystallizes.
 #[test]
 fn crystallizes_in_calculix() {
     let Some(source) = hosts::calculix() else { return };
@@ -175,11 +178,16 @@ fn crystallizes_in_calculix() {
         let nodes: Vec<String> = (1..=8).map(|j| (4 * k + j).to_string()).collect();
         deck += &format!("{},{}\n", k + 1, nodes.join(","));
     }
-    // one end from 200 °C to 120 °C at 10 K/min in steps of 0.1 K; the others 40 µm away at most follow within 1 mK
-    deck += "*MATERIAL, NAME=PA12\n*USER MATERIAL, TYPE=THERMAL, CONSTANTS=6\n0.25, 2200., 0., 1., 0., 1.\n*SPECIFIC HEAT\n2200.\n*DENSITY\n1010.\n\
-             *DEPVAR\n3\n*SOLID SECTION, ELSET=BLOCK, MATERIAL=PA12\n*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 473.15\n\
-             *AMPLITUDE, NAME=COOL\n0., 473.15, 480., 393.15\n*STEP, INC=2000\n*HEAT TRANSFER, DIRECT\n0.6, 480.\n\
-             *BOUNDARY, AMPLITUDE=COOL\n1, 11, 11, 1.\n2, 11, 11, 1.\n3, 11, 11, 1.\n4, 11, 11, 1.\n*NODE PRINT, NSET=ALL, FREQUENCY=1\nNT\n*EL PRINT, ELSET=BLOCK, FREQUENCY=1\nSDV\n*END STEP\n";
+    // one end from 200 °C to 120 °C at 10 K/min in steps of 0.1 K; the others 40 µm away at most follow
+    // within 1 mK
+    deck += "*MATERIAL, NAME=PA12\n*USER MATERIAL, TYPE=THERMAL, CONSTANTS=6\n0.25, 2200., 0., 1., 0., \
+             1.\n*SPECIFIC HEAT\n2200.\n*DENSITY\n1010.\n\
+             *DEPVAR\n3\n*SOLID SECTION, ELSET=BLOCK, MATERIAL=PA12\n*INITIAL CONDITIONS, TYPE=TEMPERATURE\n\
+             ALL, 473.15\n\
+             *AMPLITUDE, NAME=COOL\n0., 473.15, 480., 393.15\n*STEP, INC=2000\n*HEAT TRANSFER, DIRECT\n\
+             0.6, 480.\n\
+             *BOUNDARY, AMPLITUDE=COOL\n1, 11, 11, 1.\n2, 11, 11, 1.\n3, 11, 11, 1.\n4, 11, 11, 1.\n\
+             *NODE PRINT, NSET=ALL, FREQUENCY=1\nNT\n*EL PRINT, ELSET=BLOCK, FREQUENCY=1\nSDV\n*END STEP\n";
     let (_, results) = hosts::run_calculix(&program, directory.path(), &deck);
     let (mut before, mut found) = ((473.15, 0.0), Vec::new());
     for block in results.split("internal state variables").skip(1) {

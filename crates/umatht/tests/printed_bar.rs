@@ -1,7 +1,7 @@
 //! A bar printed layer by layer in CalculiX with the material of this crate, and in `crystfem`: node by node.
 
-use crystfem::kinetics::{Constants, Kinetics};
-use crystfem::material::{Polymer, Property, Semicrystalline};
+use crystfem::kinetics::{KineticConstants, Kinetics};
+use crystfem::material::{Polymer, Semicrystalline, ThermalProperty};
 use crystfem::melting::Melting;
 use crystfem::mesh::{Bar, HEXAHEDRON_SIDES, Mesh};
 use crystfem::printed::PrintedPart;
@@ -15,7 +15,8 @@ const HEIGHT: f64 = 0.5e-3;
 const INTERVAL: f64 = 10.0;
 /// ΔH·X∞, J/kg.
 const LATENT: f64 = 52_250.0;
-/// A layer lies on a film so thin that it neither insulates nor conducts along it: so its nodes are its own, and a birth keeps its energy.
+/// Thickness of the film under each layer, so small that it neither insulates nor conducts along it: each
+/// layer has its own nodes, and a birth conserves its energy.
 const FILM: f64 = 1e-7;
 const HALF: [f64; 2] = [2e-3, 1e-3];
 
@@ -25,13 +26,13 @@ fn bar() -> Bar {
     Bar { elements_per_layer: 4, element_size: 0.5e-3, ..Bar::new([x, y], LAYERS, HEIGHT) }
 }
 
-/// Temperatures of all nodes that exist, K, at the end of each layer.
+/// Temperatures of all existing nodes, K, at the end of each layer.
 fn ours(latent: bool) -> Vec<Vec<Option<f64>>> {
     let material = Semicrystalline::new(Polymer {
         density: 1010.0,
-        conductivity: Property::Constant(0.25),
-        specific_heat: Property::Constant(2200.0),
-        kinetics: Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap(),
+        conductivity: ThermalProperty::Constant(0.25),
+        specific_heat: ThermalProperty::Constant(2200.0),
+        kinetics: Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1).unwrap(),
         melting: Some(Melting::PA12),
         ultimate_crystallinity: 0.25,
         latent_heat: latent.then_some(LATENT / 0.25),
@@ -49,7 +50,8 @@ fn ours(latent: bool) -> Vec<Vec<Option<f64>>> {
         .collect()
 }
 
-/// The layer of an element, from 0, and the numbers of its nodes in CalculiX: a node between two layers is two.
+/// Returns the layer of an element, from 0, and the numbers of its nodes in CalculiX: a node between two
+/// layers exists twice.
 fn element(mesh: &Mesh, nodes: &[u32; 8]) -> (usize, [usize; 8]) {
     let middle = nodes.iter().map(|&node| mesh.points[node as usize][2]).sum::<f64>() / 8.0;
     let layer = (middle / HEIGHT) as usize;
@@ -103,7 +105,7 @@ fn deck(mesh: &Mesh, latent: bool) -> String {
                     next += 1;
                     let under = corners.map(|c| number(mesh, nodes[c], layer - 1));
                     let over = corners.map(|c| numbers[c]);
-                    // seen from above anticlockwise
+                    // anticlockwise as seen from above
                     let turned = |face: [usize; 4]| [face[0], face[3], face[2], face[1]];
                     writeln!(films, "{next},{}", list(&[turned(under), turned(over)].concat())).unwrap();
                 }
@@ -115,10 +117,14 @@ fn deck(mesh: &Mesh, latent: bool) -> String {
     };
     writeln!(
         text,
-        "{films}*ELSET, ELSET=BAR\n{}*ELSET, ELSET=FILMS\n{}*MATERIAL, NAME=PA12\n*USER MATERIAL, TYPE=THERMAL, CONSTANTS=6\n\
-         0.25, 2200., {LATENT}, 1., 0., 1.\n*SPECIFIC HEAT\n2200.\n*DENSITY\n1010.\n*DEPVAR\n4\n*SOLID SECTION, ELSET=BAR, MATERIAL=PA12\n\
-         *MATERIAL, NAME=FILM\n*CONDUCTIVITY\n1.\n*SPECIFIC HEAT\n1.\n*DENSITY\n1.\n*SOLID SECTION, ELSET=FILMS, MATERIAL=FILM\n\
-         *INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 493.15\n*AMPLITUDE, NAME=ONE\n0., 1., 1e6, 1.\n*NSET, NSET=BOTTOM",
+        "{films}*ELSET, ELSET=BAR\n{}*ELSET, ELSET=FILMS\n{}*MATERIAL, NAME=PA12\n*USER MATERIAL, \
+         TYPE=THERMAL, CONSTANTS=6\n\
+         0.25, 2200., {LATENT}, 1., 0., 1.\n*SPECIFIC HEAT\n2200.\n*DENSITY\n1010.\n*DEPVAR\n4\n\
+         *SOLID SECTION, ELSET=BAR, MATERIAL=PA12\n\
+         *MATERIAL, NAME=FILM\n*CONDUCTIVITY\n1.\n*SPECIFIC HEAT\n1.\n*DENSITY\n1.\n\
+         *SOLID SECTION, ELSET=FILMS, MATERIAL=FILM\n\
+         *INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 493.15\n*AMPLITUDE, NAME=ONE\n0., 1., 1e6, 1.\n\
+         *NSET, NSET=BOTTOM",
         sets("L", 0),
         sets("F", 1)
     )
@@ -129,7 +135,13 @@ fn deck(mesh: &Mesh, latent: bool) -> String {
     for layer in 0..LAYERS {
         for (phase, (step, duration)) in [(0.005, 0.5), (0.025, INTERVAL - 0.5)].into_iter().enumerate() {
             let count = (duration / step).round() as usize;
-            writeln!(text, "*STEP, INC={}\n*HEAT TRANSFER, DIRECT\n{step}, {duration}\n*CONTROLS, PARAMETERS=FIELD\n1e-6, 1e-4, , , 1e-6", count + 1).unwrap();
+            writeln!(
+                text,
+                "*STEP, INC={}\n*HEAT TRANSFER, DIRECT\n{step}, {duration}\n*CONTROLS, \
+                            PARAMETERS=FIELD\n1e-6, 1e-4, , , 1e-6",
+                count + 1
+            )
+            .unwrap();
             if (layer, phase) == (0, 0) {
                 writeln!(text, "*MODEL CHANGE, TYPE=ELEMENT, REMOVE\n{}{}", sets("L", 1), sets("F", 1))
                     .unwrap();
@@ -176,7 +188,7 @@ fn node_by_node() {
                 let numbers: Vec<f64> =
                     line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
                 let [number, kelvin] = numbers[..] else { continue };
-                // upper nodes of films are not ours
+                // upper nodes of films do not exist here
                 if let Some(Some(own)) = own.get(number as usize - 1) {
                     off = off.max((own - kelvin).abs());
                     compared += 1;
@@ -190,7 +202,8 @@ fn node_by_node() {
     let change = pairs().fold(0.0_f64, |most, (without, with)| most.max(with - without));
     pairs().for_each(|(_, with)| warmest = warmest.max(with - 353.15));
     eprintln!("latent heat changes {change} K of {warmest} K; CalculiX is off by {off} K");
-    // with steps twice as long 0.16 K, which is first order; at its end the last layer is 29 K above the chamber
+    // with steps twice as long 0.16 K, which is first order; at its end the last layer is 29 K above the
+    // chamber
     evidence::at_most("printed bar in CalculiX, K", off, 0.15);
     evidence::at_most("printed bar in CalculiX, of what latent heat changes", off / change, 0.03);
 }

@@ -1,7 +1,7 @@
 """Polymer mechanics across scales.
 
 >>> import polymech
->>> result = polymech.peri.run("sheet.toml")            # a scene: results in names, arrays and pictures
+>>> result = polymech.peri.run("sheet.toml")            # results of a scene: values, arrays and pictures
 >>> result.history["load"], result.report["peak_load"]  # doctest: +SKIP
 
 `peri` (fracture of elastomers) and `crystfem` (heat and crystallization of prints) run scenes, as their command lines do.

@@ -21,13 +21,13 @@ _SUFFIXES = {"degC": "°C", "Pa": "Pa", "m": "m", "K": "K", "s": "s", "N": "N"}
 
 
 def unit_of(name: str) -> str:
-    """The unit of an array."""
+    """Returns the unit of an array."""
     stem, _, last = name.rpartition("_")
     return _SUFFIXES.get(last, "") if stem and last in _SUFFIXES else _UNITS.get(name.split("_")[0], "")
 
 
 class Series:
-    """A VTKHDF file; arrays are read when they are asked for."""
+    """A VTKHDF file; arrays are read on demand."""
 
     def __init__(self, path: Path) -> None:
         self.path = str(path)
@@ -42,11 +42,11 @@ class Series:
 
     @property
     def moves(self) -> bool:
-        """Particles, not a mesh."""
+        """True for particles, false for a mesh."""
         return not self.layout["cells"]
 
     def read(self, kind: str, name: str, steps: list[int] | None = None) -> NDArray[np.float64]:
-        """An array of `point`s or `cell`s, or the `position`s, (steps, places[, components])."""
+        """Reads an array of `point`s or `cell`s, or the `position`s, (steps, places[, components])."""
         chosen = list(range(len(self.times))) if steps is None else [k % len(self.times) for k in steps]
         if self._kept is not None:
             return self._kept[kind, name][chosen]
@@ -59,13 +59,13 @@ class Series:
         yield "position", "position"
 
     def load(self) -> Series:
-        """All arrays in memory."""
+        """Reads all arrays into memory."""
         if self._kept is None:
             self._kept = {(kind, name): self.read(kind, name) for kind, name in self.names()}
         return self
 
     def dataset(self) -> xarray.Dataset:
-        """All arrays over `step` and `particle`, or `node` and `element`; coordinate `time`."""
+        """Returns all arrays over `step` and `particle`, or `node` and `element`; coordinate `time`."""
         import xarray as xr
 
         place = "particle" if self.moves else "node"
@@ -88,7 +88,7 @@ class Series:
         return xr.Dataset(variables, coords={"time": time})
 
     def mesh(self, step: int = -1) -> pyvista.DataSet:
-        """A step as PyVista sees it."""
+        """Returns a step for PyVista."""
         import pyvista as pv
 
         points = self.read("position", "position", [step])[0]
@@ -108,32 +108,32 @@ class Series:
 
 
 class Fields(Mapping[str, "xarray.Dataset"]):
-    """Datasets by the name of the variant or study; each is read when it is asked for."""
+    """Datasets by the name of the variant or study; each is read on demand."""
 
     def __init__(self, series: dict[str, Series]) -> None:
         self.series = series
-        """The files themselves, for single arrays and steps: ``fields.series[name].read("point", "displacement", [-1])``."""
+        """Files, for single arrays and steps: ``fields.series[name].read("point", "displacement", [-1])``."""
 
     @classmethod
-    def of(cls, output: Path | None) -> Fields:
-        """All VTKHDF files below a folder."""
+    def find(cls, output: Path | None) -> Fields:
+        """Finds all VTKHDF files below a folder."""
         if output is None:
             return cls({})
         files = sorted(output.rglob("*.vtkhdf"))
         return cls({str(file.relative_to(output).with_suffix("")): Series(file) for file in files})
 
     def loaded(self) -> Fields:
-        """The same, in memory."""
+        """Returns the same fields, in memory."""
         return Fields({name: one.load() for name, one in self.series.items()})
 
     def pick(self, name: str | None = None) -> Series:
-        """The file of a variant, the first if none is named."""
+        """Returns the file of a variant, by default the first."""
         if not self.series:
-            raise KeyError("no fields: the scene has `output.fields = false`, or the run writes none")
+            raise KeyError("no fields: the scene has `output.fields = false`, or the run writes no fields")
         if name is None:
             return next(iter(self.series.values()))
         if name not in self.series:
-            raise KeyError(f"no fields of {name!r}; there are {', '.join(map(repr, self.series))}")
+            raise KeyError(f"no fields of {name!r}; available: {', '.join(map(repr, self.series))}")
         return self.series[name]
 
     def __getitem__(self, name: str) -> xarray.Dataset:
@@ -147,9 +147,9 @@ class Fields(Mapping[str, "xarray.Dataset"]):
 
     @property
     def first(self) -> xarray.Dataset:
-        """Of the first variant, often the only one."""
+        """Dataset of the first variant, often the only one."""
         return self.pick().dataset()
 
     def mesh(self, name: str | None = None, step: int = -1) -> pyvista.DataSet:
-        """A step of a variant as PyVista sees it."""
+        """Returns a step of a variant for PyVista."""
         return self.pick(name).mesh(step)

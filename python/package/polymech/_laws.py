@@ -16,13 +16,13 @@ Array = NDArray[np.float64]
 
 
 def flat(x: ArrayLike) -> tuple[Array, tuple[int, ...]]:
-    """Numbers in a row, and their shape; no copy where they are in a row already."""
+    """Flattens an array, without a copy if possible, and returns its shape."""
     array = np.asarray(x, dtype=np.float64)
     return np.ascontiguousarray(array).reshape(-1), array.shape
 
 
 class Langevin:
-    """The Langevin function 𝓛(β) = coth β − 1/β of chain statistics, and what belongs to it, at every element of an array."""
+    """The Langevin function 𝓛(β) = coth β − 1/β of chain statistics, its derivative, energy and inverse, for arrays."""
 
     @staticmethod
     def value(beta: ArrayLike) -> Array:
@@ -36,7 +36,7 @@ class Langevin:
 
     @staticmethod
     def free_energy(beta: ArrayLike) -> Array:
-        """ψ = β𝓛(β) + ln(β/sinh β), the free energy of a chain for each link and kθ."""
+        """ψ = β𝓛(β) + ln(β/sinh β), the free energy of a chain per link and kθ."""
         return Langevin._at("free_energy", beta)
 
     @staticmethod
@@ -46,12 +46,12 @@ class Langevin:
 
     @staticmethod
     def inverse_derivative(x: ArrayLike, method: str = "exact") -> Array:
-        """d𝓛⁻¹/dx, of an approximant its own derivative."""
+        """d𝓛⁻¹/dx, for an approximant its own derivative."""
         return Langevin._at("inverse_derivative", x, method)
 
     @staticmethod
     def methods() -> dict[str, str]:
-        """Names of the inverses, and where each was published."""
+        """Returns the names of the inverses and their publications."""
         return {name: source for name, source, _ in _polymech.langevin_methods()}
 
     @staticmethod
@@ -62,32 +62,32 @@ class Langevin:
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a law predicts at each C, in the shape that C has: (…, 6) in the order 11, 22, 33, 12, 13, 23, or (…, 3, 3)."""
+    """Predictions of a law at each C, in the shape of C: (…, 6) in the order 11, 22, 33, 12, 13, 23, or (…, 3, 3)."""
 
     stress: Array
     """S, second Piola–Kirchhoff, Pa, in the shape of C."""
     tangent: Array | None
     """ℂ = 2 ∂S/∂C, (…, 6, 6), Pa: dS = ℂ dE with doubled shear strains."""
     energy: Array
-    """W, (…), J/m³; NaN of a law that has none."""
+    """W, (…), J/m³; NaN for a law without an energy."""
     spread: Array | None = None
-    """Of an ensemble: root mean square distance of its members from their mean, (…), Pa. This and what follows is of learnt laws."""
+    """Root mean square distance of the members of an ensemble from their mean, (…), Pa; this and the following: learnt laws only."""
     deviation: Array | None = None
     """Standard deviation of each component over the members, (…, 6), Pa."""
     outside: NDArray[np.bool_] | None = None
-    """Components of C outside of the box of the training data, (…, 6)."""
+    """Components of C outside the box of the training data, (…, 6)."""
     unseen: NDArray[np.bool_] | None = None
-    """Of those, the ones that never changed in the training data, (…, 6)."""
+    """Components outside the box that never changed in the training data, (…, 6)."""
     far: NDArray[np.bool_] | None = None
-    """In a gap of the training data, (…)."""
+    """True in a gap of the training data, (…)."""
     disagree: NDArray[np.bool_] | None = None
-    """The members disagree by more than at any training strain, (…)."""
+    """True if the members disagree by more than at any training strain, (…)."""
 
     @property
     def flagged(self) -> NDArray[np.bool_]:
-        """Whether there is any reason for doubt, (…): where a learnt law leaves its data."""
+        """True if any flag is set, (…): a learnt law outside its data."""
         if self.outside is None or self.far is None or self.disagree is None:
-            raise ValueError("flagged: found a prediction without flags; allowed: of a learnt law, with uncertainty=True")
+            raise ValueError("flagged: this prediction has no flags; use a learnt law with uncertainty=True")
         doubt: NDArray[np.bool_] = self.outside.any(axis=-1) | self.far | self.disagree
         return doubt
 
@@ -96,9 +96,9 @@ _PAIRS = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])
 
 
 def predicted(evaluate: Callable[[Array, float], dict[str, Any]], c: ArrayLike) -> Prediction:
-    """Calls a law of the module at C of any shape; tensors may be symmetric to rounding of their type."""
+    """Evaluates a law of the module at C of any shape; tensors may be symmetric up to rounding of their type."""
     given = np.asarray(c)
-    # a product of three matrices of a type is right to some tens of its roundings
+    # a product of three matrices is accurate to some tens of roundings of its type
     rounding = 64 * float(np.finfo(given.dtype if given.dtype.kind == "f" else np.float64).eps)
     array = np.asarray(given, dtype=np.float64)
     tensors = array.ndim >= 2 and array.shape[-2:] == (3, 3)
@@ -129,7 +129,7 @@ def predicted(evaluate: Callable[[Array, float], dict[str, Any]], c: ArrayLike) 
 
 
 class Law:
-    """A hyperelastic law of rubber: ``Law("eight-chain", modulus=0.27e6, links=25)``, parameters in SI by their names or in order.
+    """A hyperelastic law of rubber: ``Law("eight-chain", modulus=0.27e6, links=25)``, parameters in SI, by name or in order.
 
     Laws are incompressible unless `volumetric` names an energy U(J) and its Lamé constant λ in Pa: ``("ciarlet", 10e6)``,
     ``"quadratic"``, ``"logarithmic"``. `Law.models()` lists the laws and their parameters.
@@ -155,7 +155,7 @@ class Law:
 
     @staticmethod
     def models() -> dict[str, dict[str, Value]]:
-        """Each law, and its parameters with example values."""
+        """Returns each law and its parameters with example values."""
         return {name: {p: Value(x, unit) for p, unit, x in parameters} for name, parameters in _polymech.models()}
 
     @property
@@ -191,11 +191,11 @@ class Law:
         return self.biaxial(stretch, 1.0)
 
     def energy(self, deformation: ArrayLike) -> Array:
-        """W(F), J/m³, (…) of F (…, 3, 3)."""
+        """W(F), J/m³, (…) for F (…, 3, 3)."""
         return self._of("energy", deformation)[..., 0]
 
     def first_piola_kirchhoff(self, deformation: ArrayLike) -> Array:
-        """P = ∂W/∂F, Pa, (…, 3, 3); of an incompressible law the part that W determines."""
+        """P = ∂W/∂F, Pa, (…, 3, 3); for an incompressible law the part that W determines."""
         return self._of("piola", deformation)
 
     def cauchy(self, deformation: ArrayLike) -> Array:
@@ -206,11 +206,11 @@ class Law:
         array = np.asarray(deformation, dtype=np.float64)
         if array.shape[-2:] != (3, 3):
             raise ValueError(f"F: found the shape {array.shape}; allowed: (…, 3, 3)")
-        found = self._law.of_gradient(what, np.ascontiguousarray(array).reshape(-1, 9))
+        found = self._law.at_gradient(what, np.ascontiguousarray(array).reshape(-1, 9))
         return found.reshape(*array.shape[:-2], 1) if what == "energy" else found.reshape(array.shape)
 
     def predict(self, c: ArrayLike, tangent: bool = False) -> Prediction:
-        """S, W and, if asked for, ℂ at C = FᵀF of shape (…, 6) or (…, 3, 3)."""
+        """Computes S, W and, if requested, ℂ at C = FᵀF of shape (…, 6) or (…, 3, 3)."""
         return predicted(lambda rows, rounding: self._law.predict(rows, tangent, rounding), c)
 
 
@@ -221,21 +221,21 @@ class Fit:
     law: Law
     """The law."""
     parameters: dict[str, Value]
-    """Its parameters."""
+    """Parameters of the law."""
     standard_errors: dict[str, float | None]
-    """Of each; none where the data do not determine it."""
+    """Standard error of each parameter; `None` if the data do not determine it."""
     rms: float
     """Root mean square of the residuals of the nominal stress, Pa."""
     measurements: int
-    """Stresses that were measured."""
+    """Number of measured stresses."""
     draws: Array
     """Draws of the parameters from their posterior, (draws, parameters)."""
 
 
 def fit(model: str, tests: Mapping[str, tuple[ArrayLike, ...]]) -> Fit:
-    """The best fit of a law to tests: ``fit("ogden-2", {"uniaxial": (stretch, stress), "equibiaxial": …, "pure-shear": …})``.
+    """Fits a law to tests: ``fit("ogden-2", {"uniaxial": (stretch, stress), "equibiaxial": …, "pure-shear": …})``.
 
-    Nominal stresses in Pa, (N,), at stretches (N,); of ``"biaxial"`` tests four columns: λ₁, λ₂, P₁, P₂. A stress of exactly 0 is a
+    Nominal stresses in Pa, (N,), at stretches (N,); for ``"biaxial"`` tests four columns: λ₁, λ₂, P₁, P₂. A stress of exactly 0 is a
     condition, not a measurement. Least squares of the stresses by Levenberg–Marquardt from several starts.
     """
     rows = [(name, np.column_stack([np.asarray(c, dtype=np.float64) for c in columns])) for name, columns in tests.items()]

@@ -1,4 +1,4 @@
-"""Models of peridynamics in a few lines."""
+"""Peridynamic models in a few lines."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def _numbers(values: Sequence[float], length: int, what: str) -> list[float]:
 
 
 class Body:
-    """Shapes filled with particles on a regular lattice; lengths in m. Methods give a new body and leave this one.
+    """Shapes filled with particles on a regular lattice; lengths in m. Methods return a new body and do not change this one.
 
     Bodies of two dimensions are sheets in plane stress, unless `space` is ``"plane-strain"``.
     """
@@ -58,29 +58,29 @@ class Body:
 
     @classmethod
     def rectangle(cls, low: Sequence[float], high: Sequence[float], spacing: float, **options: Any) -> Body:
-        """A sheet between two corners. Options: `horizon` δ in spacings, `thickness` in m, `space`, `partial_volumes`."""
+        """Creates a sheet between two corners. Options: `horizon` δ in spacings, `thickness` in m, `space`, `partial_volumes`."""
         return cls(2, ("box", _numbers(low, 2, "corner") + _numbers(high, 2, "corner")), spacing, **options)
 
     @classmethod
     def disk(cls, centre: Sequence[float], radius: float, spacing: float, **options: Any) -> Body:
-        """A round sheet."""
+        """Creates a round sheet."""
         return cls(2, ("ball", [*_numbers(centre, 2, "centre"), float(radius)]), spacing, **options)
 
     @classmethod
     def box(cls, low: Sequence[float], high: Sequence[float], spacing: float, **options: Any) -> Body:
-        """A cuboid between two corners. Options: `horizon` δ in spacings, `partial_volumes`."""
+        """Creates a cuboid between two corners. Options: `horizon` δ in spacings, `partial_volumes`."""
         return cls(3, ("box", _numbers(low, 3, "corner") + _numbers(high, 3, "corner")), spacing, **options)
 
     @classmethod
     def ball(cls, centre: Sequence[float], radius: float, spacing: float, **options: Any) -> Body:
-        """A ball."""
+        """Creates a sphere."""
         return cls(3, ("ball", [*_numbers(centre, 3, "centre"), float(radius)]), spacing, **options)
 
     @classmethod
     def cylinder(
         cls, centre: Sequence[float], radius: float, length: float, axis: int, spacing: float, **options: Any
     ) -> Body:
-        """A cylinder along the axis 0, 1 or 2."""
+        """Creates a cylinder along the axis 0, 1 or 2."""
         numbers = [*_numbers(centre, 3, "centre"), float(radius), float(length), float(axis)]
         return cls(3, ("cylinder", numbers), spacing, **options)
 
@@ -90,20 +90,20 @@ class Body:
         return body
 
     def join(self, other: Body) -> Body:
-        """Joins the shape of another body to what has been added so far."""
+        """Adds the shape of another body."""
         return self._with(shapes=("add", *other._spec["shapes"][0][1:]))
 
     def cut(self, low: Sequence[float], high: Sequence[float]) -> Body:
-        """Cuts out a box."""
+        """Removes a box."""
         d = self.dimension
         return self._with(shapes=("cut", "box", _numbers(low, d, "corner") + _numbers(high, d, "corner")))
 
     def cut_ball(self, centre: Sequence[float], radius: float) -> Body:
-        """Cuts out a disk or ball."""
+        """Removes a disk or sphere."""
         return self._with(shapes=("cut", "ball", [*_numbers(centre, self.dimension, "centre"), float(radius)]))
 
     def crack(self, start: Sequence[float], *edges: Sequence[float]) -> Body:
-        """A crack of zero width: in a plane from a point to another, in space from a corner along two edges."""
+        """Adds a crack of zero width: in a plane between two points, in space from a corner along two edges."""
         d = self.dimension
         if len(edges) != d - 1:
             raise ValueError(f"crack: found {len(edges)} further points; allowed: {d - 1} in {d} dimensions")
@@ -113,9 +113,9 @@ class Body:
 class BondLaw:
     """A bond law of your own: the tension t of a bond over its stretch l = |ζ|/|ξ|, a function of an array of stretches.
 
-    It is sampled once, at the construction, between two stretches; beyond them it goes on along its tangent. Between the samples it is
-    a polynomial of degree 10 on 256 panels, so a smooth function is kept to about 1e-12. The scale of t is free: it is made to have the
-    small-strain modulus of the model.
+    The function is sampled once, on construction, between two stretches; beyond them it continues along its tangent. Between the
+    samples it is a polynomial of degree 10 on 256 panels, accurate to about 1e-12 for a smooth function. The scale of t is arbitrary:
+    it is chosen so that the small-strain modulus is that of the model.
     """
 
     def __init__(self, tension: Callable[[Array], ArrayLike], stretches: tuple[float, float] = (0.05, 6.0)) -> None:
@@ -124,7 +124,7 @@ class BondLaw:
         self._law = _polymech.BondLaw(low, high, np.ascontiguousarray(sampled))
 
     def tension(self, stretch: ArrayLike) -> Array:
-        """t(l), as kernels are fitted to it."""
+        """t(l), to which the kernels are fitted."""
         return self._evaluate(stretch, 0)
 
     def derivative(self, stretch: ArrayLike) -> Array:
@@ -132,7 +132,7 @@ class BondLaw:
         return self._evaluate(stretch, 1)
 
     def energy(self, stretch: ArrayLike) -> Array:
-        """∫t dl from rest."""
+        """Integral of t over l from rest."""
         return self._evaluate(stretch, 2)
 
     def _evaluate(self, stretch: ArrayLike, what: int) -> Array:
@@ -141,14 +141,14 @@ class BondLaw:
 
 
 class Model:
-    """A body, its material and its loads, before anything is built. Methods change the model and give it back.
+    """A body, its material and its loads, not yet built. Methods change the model and return it.
 
     `law` is the name of a bond law (``chain-offset``, ``chain-shifted``, ``chain-affine``, ``linear``, ``as-published``), a
     `BondLaw`, or a function of stretches. `youngs_modulus` in Pa. Chains have `links` of a `dissociation` energy, in kθ. Bonds break at
-    a `critical_stretch`, or at that which follows from a `fracture_energy` in J/m²: by the `convention` ``tearing`` the energy at which a
-    crack runs, by ``bonds`` that of the bonds across it, by ``softening`` that of tearing of bonds that soften before they break.
+    a `critical_stretch`, or at the one that follows from a `fracture_energy` in J/m². The `convention` says which energy it is:
+    ``tearing``, at which a crack runs; ``bonds``, of the bonds across it; ``softening``, of tearing with bonds that soften before they break.
 
-    A region is a function of the coordinates, arrays in m, such as ``lambda x, y: y < 6e-3``, or a box: two corners.
+    A region is a function of coordinate arrays in m, such as ``lambda x, y: y < 6e-3``, or two corners of a box.
     """
 
     def __init__(
@@ -167,7 +167,7 @@ class Model:
         if calibration not in ("continuum", "lattice"):
             raise ValueError(f"calibration: found {calibration!r}; allowed: continuum, lattice")
         if critical_stretch is not None and fracture_energy is not None:
-            raise ValueError("found critical_stretch and fracture_energy; allowed: one of them")
+            raise ValueError("critical_stretch conflicts with fracture_energy: give one of them")
         if convention not in ("tearing", "bonds", "softening"):
             raise ValueError(f"convention: found {convention!r}; allowed: tearing, bonds, softening")
         if not isinstance(law, (str, BondLaw)):
@@ -193,7 +193,7 @@ class Model:
         return self.displace(region, [0.0] * self.body.dimension)
 
     def displace(self, region: Region, displacement: Sequence[float | None]) -> Model:
-        """Moves a region by a displacement, m, at the end of the steps; components that are `None` stay free. The last one counts."""
+        """Displaces a region, m, at the end of the steps; components that are `None` stay free. Later calls replace earlier ones."""
         moved = [None if u is None else float(u) for u in displacement]
         return self._load(region, moved, [0.0] * self.body.dimension)
 
@@ -223,12 +223,12 @@ class Model:
         return self
 
     def contact(self, stiffness: float) -> Model:
-        """Particles without a bond repel each other: 2/`stiffness` layers of confined material are as compliant as a contact; 2 suits."""
+        """Makes particles without a bond repel each other: a contact is as compliant as 2/`stiffness` layers of confined material; 2 is usual."""
         self._spec["contact"] = float(stiffness)
         return self
 
     def build(self) -> Simulation:
-        """Builds particles, bonds and loads. Raises `ValueError` for what cannot be, and what a region raises."""
+        """Builds particles, bonds and loads. Raises `ValueError` for an invalid model, and any exception of a region."""
         return Simulation(_polymech.Simulation(self._spec))
 
     def solve(self, method: str = "lbfgs", **settings: Any) -> Simulation:
@@ -237,12 +237,12 @@ class Model:
 
 
 class Simulation:
-    """A model that is built, and its state. Arrays are in the order of `positions`."""
+    """A built model and its state. Arrays are in the order of `positions`."""
 
     def __init__(self, simulation: _polymech.Simulation) -> None:
         self._simulation = simulation
         self.finished = False
-        """Whether the last `solve` came to its end."""
+        """True if the last `solve` completed."""
 
     def solve(
         self,
@@ -252,11 +252,11 @@ class Simulation:
         on_step: OnStep | None = None,
         **settings: float,
     ) -> Simulation:
-        """Solves what is left of the load steps, by ``lbfgs``, dynamic ``relaxation``, or explicit dynamics, ``verlet``.
+        """Solves the remaining load steps by ``lbfgs``, dynamic ``relaxation``, or explicit dynamics, ``verlet``.
 
-        Settings: `tolerance`, `max_iterations`, `accept`; of ``verlet`` `density` (kg/m³), `end_time`, `ramp`, `time_step` (s), `damping`
-        (1/s), `records`. `on_step` sees every finished step; where it returns `False`, and after Ctrl-C, the state is that reached, and
-        another call goes on. Raises `RunError` where no equilibrium is found.
+        Settings: `tolerance`, `max_iterations`, `accept`; for ``verlet`` `density` (kg/m³), `end_time`, `ramp`, `time_step` (s), `damping`
+        (1/s), `records`. `on_step` is called after every step. If it returns `False`, or after Ctrl-C, the state is kept, and another
+        call continues. Raises `RunError` if no equilibrium is found.
         """
         numbers = {name: float(value) for name, value in settings.items()}
         self.finished = self._simulation.solve(method, numbers, threads, stepper(on_step))
@@ -268,7 +268,7 @@ class Simulation:
         return self
 
     def set_velocity(self, velocity: ArrayLike) -> Simulation:
-        """The velocity at the start of explicit dynamics, (N, D), m/s."""
+        """Sets the initial velocity of explicit dynamics, (N, D), m/s."""
         self._simulation.set_velocity(np.ascontiguousarray(velocity, dtype=np.float64).reshape(-1))
         return self
 
@@ -284,13 +284,13 @@ class Simulation:
 
     @property
     def history(self) -> Table:
-        """A row for each finished load step, or of a dynamic history."""
+        """Table with a row for each finished load step, or each record of a dynamic history."""
         columns = self._simulation.history()
         return Table({n: data for n, (_, data) in columns.items()}, {n: unit for n, (unit, _) in columns.items()}, "history")
 
     @property
     def load(self) -> Value:
-        """The load of the last step, N."""
+        """Load of the last step, N."""
         loads = self.history["load"]
         return Value(loads[-1] if len(loads) else 0.0, "N")
 
@@ -308,16 +308,16 @@ class Simulation:
 
     @property
     def damage(self) -> Array:
-        """The part of its bonds that each particle has lost, (N,)."""
+        """Share of its bonds that each particle has lost, (N,)."""
         return self._simulation.damage()
 
     @property
     def fragments(self) -> int:
-        """Pieces that the body has broken into."""
+        """Number of pieces of the body."""
         return self._simulation.fragments()
 
     def mesh(self) -> pyvista.PolyData:
-        """The particles at their deformed positions as PyVista sees them."""
+        """Particles at their deformed positions, for PyVista."""
         import pyvista as pv
 
         u, x = self.displacements, self.positions
@@ -328,7 +328,7 @@ class Simulation:
         return points
 
     def plot(self, values: ArrayLike | None = None, label: str = "") -> Figure:
-        """A picture on matplotlib: the deformed body in colours of `values`, (N,), or of its displacement, beside the history."""
+        """Plots the deformed body, coloured by `values`, (N,), or by its displacement, beside the history."""
         import matplotlib.pyplot as plt
 
         from . import _plot

@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 
 def plot(result: Result, field: str | None, variant: str | None, step: int) -> Figure:
-    """The body beside the history, whichever there is."""
+    """Plots the body and the history, if they exist."""
     import matplotlib.pyplot as plt
 
     series = result.fields.pick(variant) if result.fields else None
     histories = result.histories
     wanted = int(series is not None) + int(bool(histories))
     if wanted == 0:
-        raise ValueError("plot: found neither fields nor a history; allowed: a run with one of them")
+        raise ValueError("plot: this run has neither fields nor a history")
     figure, axes = plt.subplots(1, wanted, figsize=(5.5 * wanted, 4.2), layout="constrained", squeeze=False)
     if series is not None:
         body(axes[0, 0], series, field, step)
@@ -34,7 +34,7 @@ def plot(result: Result, field: str | None, variant: str | None, step: int) -> F
 
 
 def body(axes: Axes, series: Series, field: str | None, step: int) -> None:
-    """Particles, or nodes of the upper side, in colours of a field."""
+    """Draws particles, or nodes of the upper side, coloured by a field."""
     names = {name: kind for kind, name in series.names() if kind != "position"}
     name = field or next((n for n in ("damage", "temperature_degC", "displacement") if n in names), next(iter(names)))
     if name not in names or names[name] == "cell":
@@ -46,7 +46,7 @@ def body(axes: Axes, series: Series, field: str | None, step: int) -> None:
 
 
 def scalar(values: NDArray[np.float64], name: str) -> tuple[NDArray[np.float64], str]:
-    """One number for each place: the length of a vector, the first component of a tensor."""
+    """Reduces values to one number per place: the length of a vector, the first component of a tensor."""
     unit = unit_of(name)
     label = f"{name} [{unit}]" if unit else name
     if values.ndim == 1:
@@ -57,7 +57,7 @@ def scalar(values: NDArray[np.float64], name: str) -> tuple[NDArray[np.float64],
 
 
 def draw(axes: Axes, points: NDArray[np.float64], values: NDArray[np.float64], label: str) -> Any:
-    """Points of a plane, or of a solid seen along its shortest edge, nearest last."""
+    """Draws points of a plane, or of a solid seen along its shortest edge, nearest last."""
     points = np.asarray(points)
     if points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
@@ -79,7 +79,7 @@ def draw(axes: Axes, points: NDArray[np.float64], values: NDArray[np.float64], l
 
 
 def history(axes: Axes, histories: dict[str, Table]) -> None:
-    """Load over displacement, or temperature over time."""
+    """Plots load over displacement, or temperature over time."""
     for name, table in histories.items():
         x, y = ("displacement", "load") if "load" in table else ("time", next((n for n in table if n.startswith("temp")), list(table)[-1]))
         scale, unit = (1e3, "mm") if table.units.get(x) == "m" else (1.0, table.units.get(x, ""))

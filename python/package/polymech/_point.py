@@ -1,4 +1,4 @@
-"""The material of a print at a point, and constants of its kinetics from measurements."""
+"""Material of a print at a point, and fits of its kinetics to measurements."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Material:
 
 
 def table(function: Callable[[Array], ArrayLike], low: float, high: float, unit: str, step: float = 1.0) -> dict[str, list[str]]:
-    """A property of a scene's material from a function of temperature in °C, sampled once from `low` to `high`.
+    """Samples a function of temperature in °C, from `low` to `high`, as a property of a scene's material.
 
     For example ``{"specific_heat": crystfem.table(lambda t: 1500 + 6 * t, 20, 220, "J/(kg K)")}``.
     """
@@ -96,9 +96,9 @@ def point(
     degree: float = 0.01,
     kelvin: float = 0.5,
 ) -> Table:
-    """The material under a temperature history: `time` in s, `temperature` in K, linear between, both (N,).
+    """Computes the material under a temperature history: `time` in s, `temperature` in K, linear between, both (N,).
 
-    Gives `time`, `temperature`, relative crystallinity `alpha`, `crystallinity`, `energy` (J/kg) and `rate` dα/dt (1/s). No step
+    Returns `time`, `temperature`, relative crystallinity `alpha`, `crystallinity`, `energy` (J/kg) and `rate` dα/dt (1/s). No step
     changes α by more than `degree`, or the temperature by more than `kelvin`.
     """
     seconds, kelvins = (np.asarray(x, dtype=float).ravel().tolist() for x in (time, temperature))
@@ -111,16 +111,16 @@ def point(
 
 @dataclass(frozen=True)
 class Fit:
-    """Constants of the kinetics, fitted."""
+    """Fitted constants of the kinetics."""
 
     parameters: dict[str, Value]
     """`growth_rate`, `nucleation`, `avrami_exponent`."""
     standard_errors: dict[str, float]
-    """Of each."""
+    """Standard error of each parameter."""
     intervals: dict[str, tuple[float, float]]
     """95 % confidence intervals."""
     rms: float
-    """Root mean square of model less measurement, in α."""
+    """Root mean square of model minus measurement, in α."""
     draws: Array
     """Draws of the parameters from their posterior, (draws, parameters)."""
     model: Array

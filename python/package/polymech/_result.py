@@ -1,4 +1,4 @@
-"""What a run gives back."""
+"""Results of a run."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ class Table(Mapping[str, Array]):
         self.units = dict(units)
         self.name = name
         self.result: Result | None = None
-        """Of a sweep: its report and folder."""
+        """Report and folder of a sweep."""
 
     @classmethod
     def read(cls, path: str | Path) -> Table:
-        """A CSV file with a header ``name [unit],…``; columns that hold no numbers are texts."""
+        """Reads a CSV file with a header ``name [unit],…``; columns without numbers are texts."""
         path = Path(path)
         with path.open(encoding="utf-8", newline="") as file:
             header, *rows = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
@@ -87,7 +87,7 @@ class Table(Mapping[str, Array]):
 
     @property
     def rows(self) -> int:
-        """Rows."""
+        """Number of rows."""
         return len(next(iter(self._columns.values()), ()))
 
     def __repr__(self) -> str:
@@ -95,7 +95,7 @@ class Table(Mapping[str, Array]):
         return f"Table {self.name!r} of {self.rows} rows: {heads}"
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A pandas DataFrame; `attrs["units"]` has the units."""
+        """Converts to a pandas DataFrame; `attrs["units"]` has the units."""
         import pandas as pd
 
         frame = pd.DataFrame(self._columns)
@@ -103,7 +103,7 @@ class Table(Mapping[str, Array]):
         return frame
 
     def to_xarray(self) -> xarray.Dataset:
-        """An xarray Dataset over `row`; the variables have `units` as attributes."""
+        """Converts to an xarray Dataset over `row`; the variables have `units` as attributes."""
         import xarray as xr
 
         columns = {name: ("row", data, {"units": self.units.get(name, "")}) for name, data in self._columns.items()}
@@ -121,12 +121,12 @@ class Table(Mapping[str, Array]):
 
 
 class Report(Mapping[str, Value]):
-    """Values by name, with units: ``report["peak_load"].unit``. Of several variants a name carries the variant in brackets."""
+    """Values by name, with units: ``report["peak_load"].unit``. With several variants a name has the variant in brackets."""
 
     def __init__(self, report: dict[str, Any], text: str) -> None:
         self._report = report
         self.text = text
-        """What the command line prints."""
+        """Output of the command line."""
         scalars = {name: value for name, value in report["values"].items() if "columns" not in value}
         self._values = {name: Value(float(value["value"]), value["unit"]) for name, value in scalars.items()}
 
@@ -143,12 +143,12 @@ class Report(Mapping[str, Value]):
 
     @property
     def passed(self) -> bool:
-        """All expectations are met, and all numbers are finite."""
+        """True if all expectations are met and all numbers are finite."""
         return bool(self._report["passed"])
 
     @property
     def expect(self) -> list[dict[str, Any]]:
-        """The expectations of the scene with the values found."""
+        """Expectations of the scene with the values found."""
         found: list[dict[str, Any]] = self._report["expect"]
         return found
 
@@ -163,7 +163,7 @@ class Report(Mapping[str, Value]):
 
     @property
     def work(self) -> dict[str, int]:
-        """Steps, iterations, evaluations done."""
+        """Numbers of steps, iterations, evaluations."""
         return dict(self._report["work"])
 
     @property
@@ -177,7 +177,7 @@ class Report(Mapping[str, Value]):
         return dict(self._report["provenance"])
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A row for each value, with its unit."""
+        """Converts to a row for each value, with its unit."""
         import pandas as pd
 
         rows = {"value": [float(v) for v in self._values.values()], "unit": [v.unit for v in self._values.values()]}
@@ -189,17 +189,17 @@ class Report(Mapping[str, Value]):
 
 def _unknown(name: str, known: Mapping[str, Any]) -> str:
     near = difflib.get_close_matches(name, known, n=3, cutoff=0.4) or list(known)[:8]
-    return f"no {name!r}; there are {', '.join(map(repr, near))}" + (" and others" if len(known) > len(near) else "")
+    return f"no {name!r}; available: {', '.join(map(repr, near))}" + (" and others" if len(known) > len(near) else "")
 
 
 class Page:
-    """A page that needs no network; notebooks show it."""
+    """A self-contained page; notebooks show it."""
 
     def __init__(self, html: str) -> None:
         self.html = html
 
     def write(self, path: str | Path) -> None:
-        """Writes the page, whole or not at all."""
+        """Writes the page; an error leaves no partial file."""
         path = Path(path)
         part = path.with_name(f".{path.name}.part")
         part.write_text(self.html, encoding="utf-8")
@@ -212,8 +212,8 @@ class Page:
 class Result:
     """A finished run: `report`, `history`, `tables`, `fields`, `mesh()`, `plot()`, `view()`, and the folder `output` of its files.
 
-    Results without a folder of the user's lie in a temporary one, which goes with this object. A pickled result takes all of its
-    numbers along, but no folder.
+    Without `output` the results are in a temporary folder, which is deleted with this object. A pickled result contains all numbers, but
+    no folder.
     """
 
     def __init__(self, report: dict[str, Any], text: str, output: Path | None, *, temporary: bool = False) -> None:
@@ -224,7 +224,7 @@ class Result:
 
     @cached_property
     def tables(self) -> dict[str, Table]:
-        """Every CSV file of the run by its name without ending, of studies with their folder: `history_dx-1mm_m-3.015`."""
+        """Every CSV file of the run by its name without ending, for studies with their folder: `history_dx-1mm_m-3.015`."""
         if self.output is None:
             return {}
         files = sorted(self.output.rglob("*.csv"))
@@ -232,7 +232,7 @@ class Result:
 
     @property
     def histories(self) -> dict[str, Table]:
-        """The tables over load steps or time: of each variant (`peri`), of each probe or point (`crystfem`)."""
+        """Tables over load steps or time: one for each variant (`peri`), or probe or point (`crystfem`)."""
         found = {}
         for name, table in self.tables.items():
             folder, _, last = name.rpartition("/")
@@ -245,7 +245,7 @@ class Result:
 
     @property
     def history(self) -> Table:
-        """The history of the first variant or probe; `histories` has all."""
+        """History of the first variant or probe; `histories` has all."""
         histories = self.histories
         if not histories:
             raise KeyError("no history: a run of one load step, or without probes")
@@ -254,22 +254,22 @@ class Result:
     @cached_property
     def fields(self) -> Fields:
         """Fields by variant or study, as xarray Datasets: ``result.fields["dx=1mm"]``, or ``result.fields.first``."""
-        return Fields.of(self.output)
+        return Fields.find(self.output)
 
     def mesh(self, variant: str | None = None, step: int = -1) -> pyvista.DataSet:
-        """A step as a PyVista mesh: particles at their deformed positions, or the elements of a part that exist."""
+        """Returns a step as a PyVista mesh: particles at their deformed positions, or the existing elements of a part."""
         return self.fields.mesh(variant, step)
 
     def plot(self, field: str | None = None, variant: str | None = None, step: int = -1) -> matplotlib.figure.Figure:
-        """A picture on matplotlib: the body in colours of a field, beside its history."""
+        """Plots the body, coloured by a field, beside its history."""
         from ._plot import plot
 
         return plot(self, field, variant, step)
 
     def view(self) -> Page:
-        """One HTML page: the body to turn and cut, in colours of its fields, beside its curves. A notebook shows it."""
+        """Creates an HTML page with the body, coloured by its fields, and its curves. A notebook shows it."""
         if self.output is None:
-            raise ValueError("view: found a result without a folder; allowed: one of a run")
+            raise ValueError("view: this result has no folder; use the result of a run")
         return Page(_polymech.view(str(self.output)))
 
     def __getstate__(self) -> dict[str, Any]:

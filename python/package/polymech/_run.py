@@ -22,14 +22,14 @@ from ._scene import Scene, literal, read
 
 @dataclass(frozen=True)
 class Step:
-    """A finished step of a run, as a function `on_step` sees it."""
+    """A finished step of a run, the argument of `on_step`."""
 
     values: dict[str, Value]
     """Numbers with units: `load`, `displacement`, `broken_bonds`, `time`, …"""
     fields: dict[str, NDArray[np.float64]]
     """Arrays at particles or nodes, (N, 3) or (N,): `position` and `displacement` in m; `temperature_degC`, `alpha`, …"""
     units: dict[str, str]
-    """Unit of each of both."""
+    """Unit of each value and field."""
 
 
 OnStep: TypeAlias = Callable[[Step], Any]
@@ -37,7 +37,7 @@ Progress: TypeAlias = "bool | Callable[[float, str], Any]"
 
 
 def stepper(on_step: OnStep | None) -> Callable[..., Any] | None:
-    """A function of Python as the module calls it."""
+    """Wraps a Python function for the module."""
     if on_step is None:
         return None
 
@@ -48,7 +48,7 @@ def stepper(on_step: OnStep | None) -> Callable[..., Any] | None:
 
 
 def _bar(part: float, line: str) -> None:
-    """One line that is written over: on terminals and in notebooks."""
+    """Draws a progress bar in one line, on terminals and in notebooks."""
     done = round(30 * min(max(part, 0.0), 1.0))
     sys.stderr.write(f"\r[{'█' * done}{'·' * (30 - done)}] {100 * part:3.0f} %  {line[:80]:<80}")
     sys.stderr.flush()
@@ -63,7 +63,7 @@ def _how(
     progress: Progress = False,
     on_step: OnStep | None = None,
 ) -> tuple[dict[str, Any], bool]:
-    """What the module is told, and whether the folder is ours to remove."""
+    """Returns the options for the module, and whether the folder is temporary."""
     ours = output is None
     folder = tempfile.mkdtemp(prefix="polymech-") if output is None else os.fspath(output)
     how = {
@@ -85,7 +85,7 @@ def _done(how: dict[str, Any], ours: bool, told: tuple[str, str]) -> Result:
 
 
 def _begin(how: dict[str, Any], ours: bool, call: Callable[[], Any]) -> Any:
-    """Calls; where a run stopped on its way, its folder stays and is told."""
+    """Calls a run; if it is stopped, its folder is kept and named in the exception."""
     try:
         return call()
     except BaseException as error:
@@ -100,7 +100,7 @@ def _begin(how: dict[str, Any], ours: bool, call: Callable[[], Any]) -> Any:
 
 
 class Program:
-    """The commands of a program, of which `peri` and `crystfem` are made."""
+    """Commands of a program, for `peri` and `crystfem`."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -120,15 +120,15 @@ class Program:
     ) -> Result:
         """Runs a scene to its end.
 
-        `scene` is the path of a TOML file, its text, or a dictionary; `overrides` replace keys of it, with ``__`` for a dot:
+        `scene` is the path of a TOML file, its text, or a dictionary; `overrides` replace its keys, with ``__`` for a dot:
         ``material__youngs_modulus="2 MPa"``, or ``**{"a.b[0].c": 1}``.
 
-        `output` is the folder of the results; without it they lie in a temporary folder that goes with the `Result`. `threads` may be
-        any number: results are the same to the bit. `progress=True` shows a bar, a function is called as ``progress(part, line)``.
-        `on_step` sees every finished step (`Step`: values, fields); where it returns `False` the run stops with `Interrupted`.
-        Ctrl-C raises `KeyboardInterrupt`. In both cases the checkpoint stays, and `resume` continues to the same bits.
+        `output` is the folder of the results; the default is a temporary folder that is deleted with the `Result`. `threads` may be
+        any number: results have the same bits. `progress=True` shows a bar, a function is called as ``progress(part, line)``.
+        `on_step` is called with every finished step (`Step`: values, fields); if it returns `False` the run stops with `Interrupted`.
+        Ctrl-C raises `KeyboardInterrupt`. In both cases the checkpoint is kept, and `resume` continues to the same bits.
 
-        Raises `SceneError` (a `ValueError`) for a fault of the scene, `RunError` for a run that fails.
+        Raises `SceneError` (a `ValueError`) for an invalid scene, `RunError` for a failed run.
         """
         text, path = read(scene, self._name, overrides)
         how, ours = _how(output, quick, threads, checkpoint_every, inputs, progress, on_step)
@@ -143,12 +143,12 @@ class Program:
         progress: Progress = False,
         on_step: OnStep | None = None,
     ) -> Result:
-        """Continues the run that was stopped or killed in a folder; of a finished one its results."""
+        """Continues a run that was stopped or killed in a folder; a finished run returns its results."""
         how, _ = _how(output, threads=threads, checkpoint_every=checkpoint_every, progress=progress, on_step=on_step)
         return _done(how, False, _begin(how, False, lambda: _polymech.resume(self._name, how)))
 
     def check(self, scene: Scene, *, quick: bool = False, **overrides: Any) -> list[str]:
-        """Describes in lines what a scene builds and what it omits; raises `SceneError` for a fault in it."""
+        """Describes in lines what a scene builds and what it omits; raises `SceneError` if it is invalid."""
         text, path = read(scene, self._name, overrides)
         how, _ = _how(Path("out") / "check", quick=quick)
         return _polymech.check(self._name, text, path, how)
@@ -167,12 +167,12 @@ class Program:
     ) -> Table:
         """Runs a scene for every combination of values, in parallel: ``{"print.layer_time": ["10 s", "20 s"]}``.
 
-        Gives a row for each run: its settings, and values of its report, of which `columns` names more (``*`` stands for any text).
-        The same call into the same folder continues and extends a sweep.
+        Returns a row for each run with its settings and values of its report; `columns` adds values (``*`` matches any text).
+        The same call with the same folder continues and extends a sweep.
         """
         text, path = read(scene, self._name, {})
         how, ours = _how(output, quick=quick, threads=threads, progress=progress)
-        # what the runs have in common is a key of one value
+        # overrides are keys with one value
         common = {name.replace("__", "."): [value] for name, value in overrides.items()}
         each = {**common, **vary}.items()
         values = [(name, [value if isinstance(value, str) else literal(value) for value in column]) for name, column in each]
@@ -183,6 +183,6 @@ class Program:
         return table
 
     def schema(self) -> dict[str, Any]:
-        """The JSON Schema of scenes."""
+        """Returns the JSON Schema of scenes."""
         found: dict[str, Any] = json.loads(_polymech.schema(self._name))
         return found

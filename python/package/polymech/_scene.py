@@ -13,7 +13,7 @@ Scene: TypeAlias = "str | os.PathLike[str] | Mapping[str, Any]"
 
 
 def number(value: float) -> str:
-    """A number as TOML writes it."""
+    """Formats a number for TOML."""
     if math.isnan(value):
         return "nan"
     if math.isinf(value):
@@ -22,9 +22,9 @@ def number(value: float) -> str:
 
 
 def literal(value: Any) -> str:
-    """A value as TOML writes it in one line."""
+    """Formats a value for TOML, in one line."""
     if isinstance(value, str):
-        # TOML's strings take what JSON's take; DEL is the one character that JSON leaves as it is
+        # TOML's strings are those of JSON, except for DEL, which JSON does not escape
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if hasattr(value, "tolist"):
         value = value.tolist()
@@ -44,13 +44,13 @@ def literal(value: Any) -> str:
 
 
 def key(name: str) -> str:
-    """A key as TOML writes it."""
+    """Formats a key for TOML."""
     plain = name.replace("_", "").replace("-", "")
     return name if plain.isascii() and plain.isalnum() else literal(str(name))
 
 
 def dumps(scene: Mapping[str, Any]) -> str:
-    """A dictionary as a TOML text: tables under headings, what is in them in single lines."""
+    """Formats a dictionary as TOML: tables under headings, their values in single lines."""
     lines = [f"{key(k)} = {literal(v)}" for k, v in scene.items() if not _heads(v)]
     for name, value in scene.items():
         if not _heads(value):
@@ -62,14 +62,14 @@ def dumps(scene: Mapping[str, Any]) -> str:
 
 
 def _heads(value: Any) -> bool:
-    """Whether a value gets a heading of its own."""
+    """Returns true for a value with a heading of its own."""
     if isinstance(value, Mapping):
         return True
     return isinstance(value, (list, tuple)) and bool(value) and all(isinstance(item, Mapping) for item in value)
 
 
 def read(scene: Scene, program: str, overrides: Mapping[str, Any]) -> tuple[str, str]:
-    """Text and path of a scene. Overrides stand behind it and hold over all else, as a sweep sets them."""
+    """Returns text and path of a scene. Overrides are appended and take precedence, as those of a sweep."""
     if isinstance(scene, Mapping):
         text, path = dumps({"version": 1, "program": program, **scene}), "scene.toml"
     elif isinstance(scene, str) and "\n" in scene:
@@ -80,7 +80,7 @@ def read(scene: Scene, program: str, overrides: Mapping[str, Any]) -> tuple[str,
         if Path(path).is_file():
             text = Path(path).read_text(encoding="utf-8")
         else:
-            raise FileNotFoundError(f"{path}: there is no such scene; a text of a scene has more than one line")
+            raise FileNotFoundError(f"{path}: no such scene; the text of a scene has more than one line")
     if overrides:
         # `material__youngs_modulus` is `material.youngs_modulus`
         set_ = {name.replace("__", "."): value for name, value in overrides.items()}

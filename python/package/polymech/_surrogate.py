@@ -1,4 +1,4 @@
-"""Laws learnt from data."""
+"""Learnt laws."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Layers = Sequence[tuple[ArrayLike, ArrayLike]]
 class Surrogate:
     """A law C → S learnt from data, a file of `mdsurrogate`: ``Surrogate("law.safetensors")``.
 
-    Predictions have tangents, and flags where they leave the training data.
+    Predictions have tangents, and flags outside the training data.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -46,11 +46,11 @@ class Surrogate:
         output_deviation: ArrayLike | None = None,
         provenance: Sequence[str] = (),
     ) -> Surrogate:
-        """A network of your own, from any framework, as a law with tangents, flags and exports.
+        """Creates a law with tangents, flags and exports from your own network of any framework.
 
         `members` is a list of (W, b), W of shape (outputs, inputs) as in PyTorch, the layers from input to output, or a list of such
         lists, an ensemble; `transposed`: W of shape (inputs, outputs), as in JAX and Keras. `activations` has a name for each layer: ``linear``, ``relu``, ``softplus``, ``tanh``, ``sigmoid``, ``silu``,
-        ``elu``; the last is usually ``linear``. `strains`, (N, 6), are the C of your training data: predictions outside of their box
+        ``elu``; the last is usually ``linear``. `strains`, (N, 6), are the C of your training data: predictions outside their box
         are flagged.
 
         An ``ann`` maps six standardised components of C to six of S: S = output_mean + output_deviation · N((C − input_mean) /
@@ -95,7 +95,7 @@ class Surrogate:
 
     @property
     def header(self) -> dict[str, Any]:
-        """All but the weights: kind, architecture, scaling, training box, provenance."""
+        """Everything but the weights: kind, architecture, scaling, training box, provenance."""
         found: dict[str, Any] = json.loads(self._law.header())
         return found
 
@@ -109,10 +109,10 @@ class Surrogate:
         self._law.write(os.fspath(path))
 
     def predict(self, c: ArrayLike, tangent: bool = False, uncertainty: bool = True) -> Prediction:
-        """S and, if asked for, ℂ at C = FᵀF of shape (…, 6) or (…, 3, 3), on all threads and without the interpreter's lock.
+        """Computes S and, if requested, ℂ at C = FᵀF of shape (…, 6) or (…, 3, 3), on all threads and without the interpreter's lock.
 
-        Contiguous arrays of float64 are read where they are. `uncertainty=False` leaves spread, deviation and flags out.
-        Raises `ValueError` for a C that is not positive definite, and tells which.
+        Contiguous arrays of float64 are not copied. `uncertainty=False` leaves spread, deviation and flags out.
+        Raises `ValueError` with the index of a C that is not positive definite.
         """
         return predicted(lambda rows, rounding: self._law.predict(rows, tangent, uncertainty, rounding), c)
 
@@ -123,12 +123,12 @@ class Surrogate:
 
 
 def _is_layer(item: Any) -> bool:
-    """Whether this is (W, b), not a list of layers."""
+    """Returns true for (W, b), false for a list of layers."""
     return len(item) == 2 and _rank(item[0]) == 2 and _rank(item[1]) == 1
 
 
 def _rank(item: Any) -> int | None:
-    """Dimensions of an array; none of what is no array, such as a layer (W, b)."""
+    """Number of dimensions of an array; `None` for other objects, such as a layer (W, b)."""
     if isinstance(item, (list, tuple)) and len({np.shape(part) if isinstance(part, np.ndarray) else None for part in item}) > 1:
         return None
     try:

@@ -1,4 +1,4 @@
-"""Heat and crystallization of parts printed layer by layer: scenes, the material alone, and its constants fitted.
+"""Heat and crystallization of parts printed layer by layer: scenes, the material alone, and fits of its constants.
 
 >>> from polymech import crystfem
 >>> result = crystfem.run("cases/ch4/printed-bar/case.toml")   # doctest: +SKIP

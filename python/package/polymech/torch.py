@@ -1,4 +1,4 @@
-"""Laws learnt from data as PyTorch modules, and networks of PyTorch or JAX as laws.
+"""Learnt laws as PyTorch modules, and networks of PyTorch or JAX as laws.
 
 >>> from polymech import torch as bridge
 >>> module = bridge.Module(surrogate)             # doctest: +SKIP
@@ -26,7 +26,7 @@ _MODULES = {"relu": nn.ReLU, "softplus": nn.Softplus, "tanh": nn.Tanh, "sigmoid"
 
 
 class Module(nn.Module):  # type: ignore[misc, unused-ignore]
-    """An ``ann`` law as a module: C (…, 6) → S (…, 6) in Pa, the mean of its members, whose weights can be trained on."""
+    """An ``ann`` law as a module: C (…, 6) → S (…, 6) in Pa, the mean of its members, whose training can be continued."""
 
     def __init__(self, surrogate: Surrogate) -> None:
         super().__init__()
@@ -47,7 +47,7 @@ class Module(nn.Module):  # type: ignore[misc, unused-ignore]
         return self.output_mean + self.output_deviation * y
 
     def to_surrogate(self) -> Surrogate:
-        """The module as a law again, with the box of its training data."""
+        """Converts the module back to a law, with the box of its training data."""
         low, high = np.asarray(self.header["training_box"]).T
         weights = [layers_of(member) for member in self.members]
         return Surrogate.from_weights(
@@ -58,7 +58,7 @@ class Module(nn.Module):  # type: ignore[misc, unused-ignore]
             input_deviation=self.header["input_deviation"],
             output_mean=self.header["output_mean"],
             output_deviation=self.header["output_deviation"],
-            provenance=[*self.header["provenance"], "trained on in PyTorch"],
+            provenance=[*self.header["provenance"], "training continued in PyTorch"],
         )
 
 
@@ -76,7 +76,7 @@ def _sequential(layers: Sequence[tuple[Any, Any]], activations: Sequence[str]) -
 
 
 def layers_of(sequential: Any) -> tuple[list[tuple[Any, Any]], list[str]]:
-    """(W, b) of each linear layer of a `Sequential`, and the names of the activations after them."""
+    """Returns (W, b) of each linear layer of a `Sequential`, and the names of the activations after them."""
     layers: list[tuple[Any, Any]] = []
     activations: list[str] = []
     names = {module: name for name, module in _MODULES.items()}
@@ -97,6 +97,6 @@ def layers_of(sequential: Any) -> tuple[list[tuple[Any, Any]], list[str]]:
 
 
 def from_sequential(sequential: Any, *, strains: ArrayLike, **options: Any) -> Surrogate:
-    """A `torch.nn.Sequential` of linear layers and activations as a law: options as `Surrogate.from_weights`."""
+    """Converts a `torch.nn.Sequential` of linear layers and activations to a law; options of `Surrogate.from_weights`."""
     layers, activations = layers_of(sequential)
     return Surrogate.from_weights(layers, activations, strains=strains, **options)

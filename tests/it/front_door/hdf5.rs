@@ -2,7 +2,7 @@
 
 use super::{attack_files, fs};
 use harness::output::vtkhdf::{self, Cells, MeshSeries, ParticleSeries};
-use mdsurrogate::dataset::{Fractions, Method, ReadOptions, Standardisation, hdf5, read, split};
+use mdsurrogate::dataset::{Fractions, ReadOptions, SplitMethod, Standardisation, hdf5, read, split};
 use rust_hdf5::{H5File, LibverBound};
 use std::path::{Path, PathBuf};
 
@@ -16,14 +16,15 @@ fn table(rows: usize) -> String {
     text
 }
 
-/// Files as this project writes them, with and without a split, and as others might: C and S alone, in the format of
-/// HDF5 1.8 and in that of 1.6, whole and in packed chunks.
+/// Files as this project writes them, with and without a split, and of other origin: C and S alone, in the
+/// formats of HDF5 1.8 and 1.6, contiguous and in compressed chunks.
 fn data_sets(folder: &Path) -> Vec<PathBuf> {
     let csv = folder.join("a.csv");
     fs::write(&csv, table(6)).unwrap();
     let set = read(&csv, &ReadOptions::default()).unwrap();
-    let parts = split(&set, Method::Path, Fractions::default(), 1).unwrap();
-    let standardisation = Standardisation::of(set.rows().map(|row| &row.c).collect::<Vec<_>>().into_iter());
+    let parts = split(&set, SplitMethod::Path, Fractions::default(), 1).unwrap();
+    let standardisation =
+        Standardisation::from_rows(set.rows().map(|row| &row.c).collect::<Vec<_>>().into_iter());
     let files = ["plain.h5", "split.h5", "old.h5", "new.h5"].map(|name| folder.join(name));
     hdf5::write(&files[0], &set, None).unwrap();
     hdf5::write(&files[1], &set, Some((&parts, &standardisation.unwrap()))).unwrap();

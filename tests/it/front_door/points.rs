@@ -1,11 +1,11 @@
-//! Clouds of points, with the bodies that are built of them.
+//! Point clouds, with the bodies built from them.
 
 use super::{attack, below, fs};
 use crate::scenes;
 use harness::scene::Source;
 use peri::program::scene::{Scene, body_of, check};
 
-/// Every fortieth of the points of the strip, and a lattice of 12 × 4: their scenes build in no time.
+/// Every fortieth of the points of the strip, and a lattice of 12 × 4: scenes that are built quickly.
 #[test]
 fn clouds() {
     let folder = tempfile::tempdir().unwrap();
@@ -30,7 +30,7 @@ fn clouds() {
         fs::write(&path, bytes).unwrap();
         match body_of::<2>(&source, &scene, &variant) {
             Ok(_) => Ok(()),
-            // these points and that horizon do not go together: both are named
+            // these points are incompatible with that horizon: the message names both
             Err(error) if error.to_string().contains("body.horizon") => Ok(()),
             Err(error) => Err(error.render()),
         }

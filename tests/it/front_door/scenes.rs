@@ -5,16 +5,16 @@ use crate::{parts, scenes};
 use harness::scene::{Failure, Source};
 use std::path::{Path, PathBuf};
 
-/// Larger bodies and meshes are judged, not built.
+/// Size above which bodies and meshes are checked, not built.
 const LARGEST: f64 = 4e6;
 const MOST_ELEMENTS: f64 = 4e3;
-/// Building takes milliseconds: one of so many mutations is tried.
+/// Share of mutations that are built, which takes milliseconds.
 const SHARE: u32 = 20;
 
-fn told<E: std::error::Error>(failure: Failure<E>) -> String {
+fn message<E: std::error::Error>(failure: Failure<E>) -> String {
     match failure {
         Failure::Scene(error) => error.render(),
-        // faults of what is solved name themselves
+        // errors of a solution name themselves
         Failure::Run(error) => format!("scene.toml: {error}"),
     }
 }
@@ -26,7 +26,7 @@ fn attack(kind: &str, folder: &Path, files: &[PathBuf], open: impl Fn(&Source) -
     });
 }
 
-fn written(folder: &Path, texts: &[String]) -> Vec<PathBuf> {
+fn write_files(folder: &Path, texts: &[String]) -> Vec<PathBuf> {
     let write = |(number, text): (usize, &String)| {
         let path = folder.join(format!("{number}.toml"));
         fs::write(&path, text).unwrap();
@@ -40,7 +40,7 @@ fn bodies_of_peri() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("points.csv"), scenes::points()).unwrap();
     let texts = [scenes::plate("\"100 mm\"", "1e-3"), scenes::bar().to_owned(), scenes::fracture("8 mm", "")];
-    let files = written(folder.path(), &texts);
+    let files = write_files(folder.path(), &texts);
     attack("body", folder.path(), &files, |source| {
         use peri::calibrate::Space;
         use peri::program::scene::{Scene, check, least_memory};
@@ -55,7 +55,7 @@ fn bodies_of_peri() {
                 return Ok(());
             }
         }
-        peri::program::run::explanation(source, &scene, false).map(|_| ()).map_err(told)
+        peri::program::run::explanation(source, &scene, false).map(|_| ()).map_err(message)
     });
 }
 
@@ -71,30 +71,30 @@ fn parts_of_crystfem() {
     let layers = parts::BAR
         .replace("[print]", "[print]\nelements = \"bar\"\nlayer_height = \"0.5 mm\"")
         .replace("emissivity = 0.9", "");
-    let files = written(folder.path(), &[along, table, layers, parts::BAR.to_owned()]);
+    let files = write_files(folder.path(), &[along, table, layers, parts::BAR.to_owned()]);
     attack("part", folder.path(), &files, |source| {
         let scene = source.parse::<crystfem::program::scene::PartScene>().map_err(|error| error.render())?;
         let elements = scene.mesh.elements(source).map_err(|error| error.render())?;
         if elements.iter().product::<f64>() > MOST_ELEMENTS || scene.mesh.file.is_some() {
             return Ok(());
         }
-        crystfem::program::run::explain(source, false).map(|_| ()).map_err(told)
+        crystfem::program::run::explain(source, false).map(|_| ()).map_err(message)
     });
 }
 
-/// Kinetics and fits, with the tables beside them.
+/// Kinetics and fits, with their tables.
 #[test]
 fn points_and_fits_of_crystfem() {
-    use crystfem::program::scene::{Kind, kind};
+    use crystfem::program::scene::{SceneKind, kind};
     for file in cases("crystfem") {
         let source = Source::read(&file).unwrap();
-        if kind(&source).unwrap() == Kind::Part {
+        if kind(&source).unwrap() == SceneKind::Part {
             continue;
         }
         let folder = file.parent().unwrap().to_owned();
         attack("points", &folder, &[file], |source| match kind(source).map_err(|error| error.render())? {
-            Kind::Part => Ok(()),
-            _ => crystfem::program::run::explain(source, false).map(|_| ()).map_err(told),
+            SceneKind::Part => Ok(()),
+            _ => crystfem::program::run::explain(source, false).map(|_| ()).map_err(message),
         });
     }
 }

@@ -1,4 +1,4 @@
-"""The brick of `crates/crystfem/benches/brick.rs` by scikit-fem, on the same nodes and elements.
+"""Solves the brick of `crates/crystfem/benches/brick.rs` in scikit-fem, on the same nodes and elements.
 
 brick.py MESH.inp STEPS TEMPERATURES.csv [STEP NEWTON SOLVES]: prints one line of JSON, writes the temperature of each
 node. STEP: length of a step, s; NEWTON, SOLVES: tolerances.

@@ -1,4 +1,4 @@
-//! The brick of `crates/crystfem/benches/brick.rs`, and beside it, on the same mesh, CalculiX and scikit-fem.
+//! The brick of `crates/crystfem/benches/brick.rs`, compared on the same mesh with CalculiX and scikit-fem.
 
 use std::path::{Path, PathBuf};
 
@@ -9,45 +9,48 @@ use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use super::calculix::{self, Calculix};
 use super::scikit_fem::ScikitFem;
 use super::{Row, external};
-use crate::table::Table;
-use crate::workspace::Workspace;
+use crate::table::TextTable;
+use crate::workspace::Repository;
 
-/// Steps of a whole run.
+/// Number of steps of a run.
 pub const STEPS: u32 = 20;
-/// Elements along an edge of the largest brick that other programs solve, and of the largest that takes them seconds.
+/// Elements along an edge of the largest brick that other programs solve, and of the largest that takes them
+/// seconds.
 const LARGEST: usize = 45;
 const SHORT: usize = 26;
-/// Turns, of which medians count; more of what is short.
+/// Number of rounds, whose medians count; more for short runs.
 const ROUNDS: usize = 3;
 const SHORT_ROUNDS: usize = 5;
-/// How far inner nodes of the distorted brick are moved, over its edge.
+/// Displacement of inner nodes of the distorted brick, over its edge.
 const DISTORTION: &str = "0.1";
 
-/// scikit-fem's mean temperature at 20 000 nodes after 20 steps, K (formulation.md; printed to 8 digits after the point).
+/// scikit-fem's mean temperature at 20 000 nodes after 20 steps, K (formulation.md; printed to 8 digits after
+/// the point).
 const MEAN: (usize, f64) = (26, 476.763_119_07);
 const SAME_MEAN: f64 = 1e-7;
-/// Nodes agree up to here, K: what Newton's iterations leave, and half of the last digit that CalculiX prints.
+/// Tolerance of nodal temperatures, K: the error of Newton's iterations, and half of the last digit that
+/// CalculiX prints.
 const SAME_SCIKIT_FEM: f64 = 1e-5;
 const SAME_CALCULIX: f64 = 1e-4;
 
-/// What was measured.
+/// Result of the brick bench.
 pub struct Brick {
     pub rows: Vec<Row>,
     pub text: String,
-    /// Whether all temperatures agree.
+    /// True if all temperatures agree.
     pub passed: bool,
 }
 
-/// One program on one brick.
-struct Line {
+/// Run of one program on one brick.
+struct BrickRun {
     program: &'static str,
     edge: usize,
-    /// Seconds a step, and before the first one.
+    /// Seconds per step, and before the first one.
     step: f64,
     set_up: Option<f64>,
     iterations: Option<f64>,
     memory: Option<f64>,
-    /// Largest difference to ours at a node, K, and what is allowed.
+    /// Largest difference from our temperature at a node, K, and its limit.
     difference: Option<(f64, f64)>,
     mean: f64,
 }
@@ -55,7 +58,7 @@ struct Line {
 /// Runs all edges.
 pub fn run(
     program: &Path,
-    workspace: &Workspace,
+    workspace: &Repository,
     folder: &Path,
     distorted: bool,
     edges: &[usize],
@@ -65,7 +68,7 @@ pub fn run(
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot create {}", folder.display()))?;
     let mut runs =
-        Runs { program: program.to_owned(), folder, distorted, lines: Vec::new(), rows: Vec::new() };
+        BrickBench { program: program.to_owned(), folder, distorted, lines: Vec::new(), rows: Vec::new() };
     let (calculix, scikit_fem) = (Calculix::find(), ScikitFem::find(workspace)?);
     let mut notes = String::new();
     for (name, found) in [("CalculiX", calculix.as_ref().err()), ("scikit-fem", scikit_fem.as_ref().err())] {
@@ -79,7 +82,7 @@ pub fn run(
         let rounds = if edge <= SHORT { SHORT_ROUNDS } else { ROUNDS };
         let lumped = (0..rounds).map(|_| Ok(vec![runs.ours(edge, true)?])).collect::<Result<_>>()?;
         runs.medians(lumped);
-        let mut all: Vec<Vec<Line>> = Vec::new();
+        let mut all: Vec<Vec<BrickRun>> = Vec::new();
         for _ in 0..rounds {
             let mut turn = vec![runs.ours(edge, false)?];
             if let (Ok(calculix), true) = (&calculix, beside) {
@@ -102,24 +105,25 @@ pub fn run(
     let table = runs.table();
     let passed = runs.passed(&mut notes);
     let text = format!(
-        "Brick of 20 mm{}, film and radiation, {STEPS} steps of 0.5 s by backward Euler, one thread; programs in turns, \
+        "Brick of 20 mm{}, film and radiation, {STEPS} steps of 0.5 s by backward Euler, one thread; \
+         programs in turns, \
          medians of {ROUNDS}, up to {SHORT}³ elements of {SHORT_ROUNDS}\n{table}{notes}",
         if distorted { ", inner nodes moved by up to 2 mm: no two elements equal" } else { "" }
     );
     Ok(Brick { rows: runs.rows, text, passed })
 }
 
-struct Runs {
+struct BrickBench {
     program: PathBuf,
     folder: PathBuf,
     distorted: bool,
-    lines: Vec<Line>,
+    lines: Vec<BrickRun>,
     rows: Vec<Row>,
 }
 
-impl Runs {
-    /// A run of ours with lumped capacity, or with consistent one, which the others take too.
-    fn ours(&self, edge: usize, lumped: bool) -> Result<Line> {
+impl BrickBench {
+    /// Runs our program with lumped capacity, or with consistent capacity as the others have it.
+    fn ours(&self, edge: usize, lumped: bool) -> Result<BrickRun> {
         let words = format!("brick --threads 1 --elements {edge} --steps {STEPS}");
         let mut arguments: Vec<String> = words.split(' ').map(str::to_owned).collect();
         if self.distorted {
@@ -136,7 +140,7 @@ impl Runs {
         let (Some(step), Some(mean)) = (of("step"), of("mean temperature")) else {
             return Err(miette!("the brick printed no time of a step"));
         };
-        Ok(Line {
+        Ok(BrickRun {
             program: if lumped { "crystfem, lumped" } else { "crystfem" },
             edge,
             step,
@@ -148,14 +152,14 @@ impl Runs {
         })
     }
 
-    fn calculix(&self, calculix: &Calculix, edge: usize) -> Result<Line> {
+    fn calculix(&self, calculix: &Calculix, edge: usize) -> Result<BrickRun> {
         let mesh = self.read_mesh(edge)?;
-        // two lengths of runs: what a step takes, without reading the deck
+        // two lengths of runs give the time per step, without reading the input
         let short = calculix.run(&self.folder, &mesh, 2, "ITERATIVE SCALING")?;
         let long = calculix.run(&self.folder, &mesh, STEPS, "ITERATIVE SCALING")?;
         let step = (long.seconds - short.seconds) / f64::from(STEPS - 2);
         let difference = (self.difference(edge, &long.temperatures)?, SAME_CALCULIX);
-        Ok(Line {
+        Ok(BrickRun {
             program: "CalculiX, iterative scaling",
             edge,
             step,
@@ -167,14 +171,14 @@ impl Runs {
         })
     }
 
-    /// Its direct solver, three steps of which are enough.
+    /// Times the direct solver of CalculiX; three steps are enough.
     fn spooles(&mut self, calculix: &Calculix, edge: usize, rounds: usize) -> Result<()> {
         let mesh = self.read_mesh(edge)?;
-        let turn = || -> Result<Vec<Line>> {
+        let turn = || -> Result<Vec<BrickRun>> {
             let [one, three] = [1, 3].map(|steps| calculix.run(&self.folder, &mesh, steps, "SPOOLES"));
             let (one, three) = (one?, three?);
             let step = 0.5 * (three.seconds - one.seconds);
-            Ok(vec![Line {
+            Ok(vec![BrickRun {
                 program: "CalculiX, SPOOLES",
                 edge,
                 step,
@@ -190,10 +194,10 @@ impl Runs {
         Ok(())
     }
 
-    fn scikit_fem(&self, scikit_fem: &ScikitFem, edge: usize) -> Result<Line> {
+    fn scikit_fem(&self, scikit_fem: &ScikitFem, edge: usize) -> Result<BrickRun> {
         let run = scikit_fem.run(&self.folder, &self.file(edge, "inp"), STEPS)?;
         let temperatures = column(&self.folder.join("scikit-fem.csv"), "temperature")?;
-        Ok(Line {
+        Ok(BrickRun {
             program: "scikit-fem, CG",
             edge,
             step: run.looped / f64::from(STEPS),
@@ -205,13 +209,13 @@ impl Runs {
         })
     }
 
-    /// Takes turns over as lines and rows.
-    fn medians(&mut self, turns: Vec<Vec<Line>>) {
+    /// Adds the medians of the rounds to lines and rows.
+    fn medians(&mut self, turns: Vec<Vec<BrickRun>>) {
         let mut turns = turns.into_iter();
         let Some(mut lines) = turns.next() else { return };
-        let others: Vec<Vec<Line>> = turns.collect();
+        let others: Vec<Vec<BrickRun>> = turns.collect();
         for (k, line) in lines.iter_mut().enumerate() {
-            let all = |of: &dyn Fn(&Line) -> f64| {
+            let all = |of: &dyn Fn(&BrickRun) -> f64| {
                 let mut values = vec![of(line)];
                 values.extend(others.iter().map(|turn| of(&turn[k])));
                 values.sort_by(f64::total_cmp);
@@ -240,7 +244,7 @@ impl Runs {
     }
 
     fn table(&self) -> String {
-        let mut table = Table::new([
+        let mut table = TextTable::new([
             "program",
             "nodes",
             "s/step",
@@ -271,7 +275,7 @@ impl Runs {
         table.text()
     }
 
-    /// Whether temperatures agree; `notes` names those that do not.
+    /// Returns true if the temperatures agree; `notes` names those that do not.
     fn passed(&self, notes: &mut String) -> bool {
         let before = notes.len();
         // NaN is no agreement
@@ -320,22 +324,22 @@ impl Runs {
         self.folder.join(format!("brick-{edge}.{ending}"))
     }
 
-    fn read_mesh(&self, edge: usize) -> Result<calculix::Mesh> {
+    fn read_mesh(&self, edge: usize) -> Result<calculix::CalculixMesh> {
         let path = self.file(edge, "inp");
         let text = std::fs::read_to_string(&path)
             .into_diagnostic()
             .wrap_err_with(|| format!("cannot read {}", path.display()))?;
-        Ok(calculix::Mesh::new(&format!("brick-{edge}.inp"), &text, nodes(edge)))
+        Ok(calculix::CalculixMesh::new(&format!("brick-{edge}.inp"), &text, nodes(edge)))
     }
 
-    /// Largest difference to ours at a node, K.
+    /// Largest difference from our temperature at a node, K.
     fn difference(&self, edge: usize, temperatures: &[f64]) -> Result<f64> {
         let ours = column(&self.file(edge, "csv"), "temperature")?;
         if ours.len() != temperatures.len() {
             return Err(miette!("{} temperatures, not {}", temperatures.len(), ours.len()));
         }
         let apart = |(a, b): (&f64, &f64)| (a - b).abs();
-        // NaN is the largest
+        // NaN counts as the largest
         Ok(ours.iter().zip(temperatures).map(apart).max_by(f64::total_cmp).unwrap_or(f64::NAN))
     }
 
@@ -352,7 +356,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// A column of a CSV.
+/// Reads a column of a CSV file.
 fn column(path: &Path, name: &str) -> Result<Vec<f64>> {
     let columns = csv::read(path).into_diagnostic()?;
     let found = columns.into_iter().find(|(heading, _)| heading.split_whitespace().next() == Some(name));

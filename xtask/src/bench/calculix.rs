@@ -1,4 +1,4 @@
-//! CalculiX as a separate program: its decks, and what it prints.
+//! CalculiX as a separate program: its input and output.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -7,32 +7,32 @@ use std::time::Instant;
 
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
-/// Names another program than `ccx`.
+/// Environment variable with another program than `ccx`.
 const VARIABLE: &str = "CCX";
 
-/// Where it is.
+/// Installation of CalculiX.
 pub struct Calculix {
     program: PathBuf,
 }
 
-/// A mesh in a file that a deck includes.
-pub struct Mesh {
+/// Mesh in a file that the input includes.
+pub struct CalculixMesh {
     file: String,
     nodes: u64,
     /// Element and side, from 1, of all sides but the bottom.
     sides: Vec<(u64, u8)>,
 }
 
-/// One run.
-pub struct Run {
-    /// From start to end of the program.
+/// Result of a run.
+pub struct CalculixRun {
+    /// Wall time of the program, s.
     pub seconds: f64,
-    /// Of all nodes after the last step, K.
+    /// Temperatures of all nodes after the last step, K.
     pub temperatures: Vec<f64>,
 }
 
-impl Mesh {
-    /// From a file as `crates/crystfem/benches/brick.rs` writes it.
+impl CalculixMesh {
+    /// Creates the input from a file as `crates/crystfem/benches/brick.rs` writes it.
     pub fn new(file: &str, text: &str, nodes: u64) -> Self {
         let (mut sides, mut inside) = (Vec::new(), false);
         for line in text.lines() {
@@ -48,7 +48,7 @@ impl Mesh {
         Self { file: file.to_owned(), nodes, sides }
     }
 
-    /// The whole deck: temperatures of all nodes are printed after the last step.
+    /// Formats the input: temperatures of all nodes are printed after the last step.
     fn deck(&self, steps: u32, solver: &str) -> String {
         let each = |line: &dyn Fn(u64, u8) -> String| -> String {
             self.sides.iter().map(|&(element, side)| line(element, side) + "\n").collect()
@@ -59,10 +59,12 @@ impl Mesh {
             format!("*INCLUDE,INPUT={}\n*NSET,NSET=NALL,GENERATE\n1,{},1\n", self.file, self.nodes);
         deck += "*MATERIAL,NAME=PA12\n*CONDUCTIVITY\n0.25\n*DENSITY\n1010\n*SPECIFIC HEAT\n2200\n\
                  *PHYSICAL CONSTANTS,ABSOLUTE ZERO=0,STEFAN BOLTZMANN=5.670374419e-8\n\
-                 *SOLID SECTION,ELSET=brick,MATERIAL=PA12\n*INITIAL CONDITIONS,TYPE=TEMPERATURE\nNALL,493.15\n";
+                 *SOLID SECTION,ELSET=brick,MATERIAL=PA12\n*INITIAL CONDITIONS,TYPE=TEMPERATURE\n\
+                 NALL,493.15\n";
         let _ = write!(
             deck,
-            "*STEP,INC=100000\n*HEAT TRANSFER,DIRECT,SOLVER={solver}\n0.5,{}\n*BOUNDARY\nbottom,11,11,353.15\n\
+            "*STEP,INC=100000\n*HEAT \
+             TRANSFER,DIRECT,SOLVER={solver}\n0.5,{}\n*BOUNDARY\nbottom,11,11,353.15\n\
              *FILM\n{film}*RADIATE\n{radiation}*NODE PRINT,NSET=NALL,FREQUENCY={steps}\nNT\n*END STEP\n",
             0.5 * f64::from(steps)
         );
@@ -71,7 +73,7 @@ impl Mesh {
 }
 
 impl Calculix {
-    /// Looks for it; else how to get it.
+    /// Finds the program; the error says how to install it.
     pub fn find() -> Result<Self, String> {
         let program = std::env::var_os(VARIABLE).map_or_else(|| PathBuf::from("ccx"), PathBuf::from);
         match Command::new(&program).arg("-v").stdin(Stdio::null()).output() {
@@ -83,8 +85,8 @@ impl Calculix {
         }
     }
 
-    /// Runs a deck in `folder`, where the mesh lies, on one thread.
-    pub fn run(&self, folder: &Path, mesh: &Mesh, steps: u32, solver: &str) -> Result<Run> {
+    /// Runs an input in `folder`, which contains the mesh, on one thread.
+    pub fn run(&self, folder: &Path, mesh: &CalculixMesh, steps: u32, solver: &str) -> Result<CalculixRun> {
         std::fs::write(folder.join("calculix.inp"), mesh.deck(steps, solver)).into_diagnostic()?;
         let since = Instant::now();
         let output = Command::new(&self.program)
@@ -113,11 +115,11 @@ impl Calculix {
                 mesh.nodes
             ));
         }
-        Ok(Run { seconds, temperatures })
+        Ok(CalculixRun { seconds, temperatures })
     }
 }
 
-/// Lines `NODE VALUE` of one table, in the order of nodes.
+/// Parses lines `NODE VALUE` of one table, in the order of nodes.
 fn temperatures(printed: &str) -> Vec<f64> {
     let pair = |line: &str| {
         let mut words = line.split_whitespace();
@@ -135,8 +137,9 @@ mod tests {
 
     #[test]
     fn decks_and_tables() {
-        let text = "*NODE\n1,0,0,0\n*SURFACE,NAME=bottom,TYPE=ELEMENT\n1,S1\n*SURFACE,NAME=top,TYPE=ELEMENT\n1,S2\n7,S2\n";
-        let mesh = Mesh::new("brick.inp", text, 8);
+        let text = "*NODE\n1,0,0,0\n*SURFACE,NAME=bottom,TYPE=ELEMENT\n1,S1\n\
+                    *SURFACE,NAME=top,TYPE=ELEMENT\n1,S2\n7,S2\n";
+        let mesh = CalculixMesh::new("brick.inp", text, 8);
         let deck = mesh.deck(20, "SPOOLES");
         assert!(
             deck.contains("*FILM\n1,F2,353.15,15\n7,F2,353.15,15\n*RADIATE\n1,R2,353.15,0.9\n"),

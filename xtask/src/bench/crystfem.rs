@@ -1,5 +1,5 @@
-//! `crystfem`: error against run time of its kinetics, time integrators and linear solvers; then the [`brick`], on equal elements and on
-//! a distorted mesh.
+//! `crystfem`: error against run time of its kinetics, time integrators and linear solvers; then the
+//! [`brick`], with equal elements and on a distorted mesh.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,22 +8,23 @@ use harness::output::picture::{LinePlot, Series};
 use miette::{IntoDiagnostic, Result, miette};
 
 use super::{Row, brick, external, write};
-use crate::table::Table;
-use crate::workspace::Workspace;
+use crate::table::TextTable;
+use crate::workspace::Repository;
 
-/// Elements along an edge of the brick unless the user gives others: 20 000, 100 000, 300 000, 1 000 000 nodes.
+/// Default numbers of elements along an edge of the brick: 20 000, 100 000, 300 000, 1 000 000 nodes.
 const EDGES: &str = "26,45,66,99";
 
-/// The parts with other programs: the brick, and the same with inner nodes moved, so that no two elements are equal.
+/// Parts that run other programs: the brick, and the same with displaced inner nodes, so that no two elements
+/// are equal.
 const BRICK: &str = "brick";
 const DISTORTED: &str = "distorted";
 
-/// One curve: its name, and at each length of steps or tolerance what was measured.
-type Curve = (String, Vec<(String, BTreeMap<String, f64>)>);
+/// Curve: its name, and the measurements at each step length or tolerance.
+type BenchCurve = (String, Vec<(String, BTreeMap<String, f64>)>);
 
-/// Rows, tables, and whether other programs agree on the brick. `arguments` are names of parts (default: all) and edges
-/// of the brick. Rows and pictures of each part go to `folder`.
-pub fn run(workspace: &Workspace, folder: &Path, arguments: &[String]) -> Result<(Vec<Row>, String, bool)> {
+/// Returns rows, tables, and whether other programs agree on the brick. `arguments` are names of parts
+/// (default: all) and edges of the brick. Rows and pictures of each part go to `folder`.
+pub fn run(workspace: &Repository, folder: &Path, arguments: &[String]) -> Result<(Vec<Row>, String, bool)> {
     let known = || PARTS.iter().map(|part| part.name).chain([BRICK, DISTORTED]);
     let (mut names, mut edges) = (Vec::new(), EDGES.to_owned());
     for argument in arguments {
@@ -38,7 +39,7 @@ pub fn run(workspace: &Workspace, folder: &Path, arguments: &[String]) -> Result
             let allowed = known().collect::<Vec<_>>().join(", ");
             edge.trim()
                 .parse()
-                .map_err(|_| miette!("`{edge}` is not a number of elements, and none of {allowed}"))
+                .map_err(|_| miette!("found `{edge}`; allowed: a number of elements, or {allowed}"))
         })
         .collect::<Result<_>>()?;
     let wanted = |name: &str| names.is_empty() || names.contains(&name);
@@ -64,22 +65,22 @@ pub fn run(workspace: &Workspace, folder: &Path, arguments: &[String]) -> Result
     Ok((all, text, passed))
 }
 
-/// One of the measurements of `crates/crystfem/benches/measure.rs`.
-struct Part {
+/// Measurement of `crates/crystfem/benches/measure.rs`.
+struct BenchTable {
     name: &'static str,
     title: &'static str,
-    /// Of a table.
+    /// Heading of the table.
     heading: [&'static str; 6],
-    /// Other quantities than error and time that are shown.
+    /// Quantities shown besides error and time.
     more: [&'static str; 2],
     error: &'static str,
     time: &'static str,
-    /// First words of the curves of a picture each; one empty word for all curves.
+    /// First words of the curves of each picture; an empty word selects all curves.
     pictures: &'static [&'static str],
 }
 
-const PARTS: &[Part] = &[
-    Part {
+const PARTS: &[BenchTable] = &[
+    BenchTable {
         name: "kinetics",
         title: "Kinetics, 200 → 120 °C at 10 K/min",
         heading: ["scheme", "K a step", "largest error in α", "s", "ns a step", ""],
@@ -88,16 +89,17 @@ const PARTS: &[Part] = &[
         time: "time of the curve / s",
         pictures: &[""],
     },
-    Part {
+    BenchTable {
         name: "integrators",
-        title: "Time integrators, cube of 17³ nodes that cools from a smooth temperature, and one that is quenched",
+        title: "Time integrators, cube of 17³ nodes that cools from a smooth temperature, and one that is \
+                quenched",
         heading: ["integrator", "steps / tolerance, K", "rms error, K", "s", "steps taken", "CG iterations"],
         more: ["steps", "cg iterations"],
         error: "rms error / K",
         time: "time / s",
         pictures: &["smooth", "quenched"],
     },
-    Part {
+    BenchTable {
         name: "solvers",
         title: "Linear solvers, steps of 0.5, 5 and 50 s of the quenched cube of 27³ nodes",
         heading: ["solver", "tolerance, K", "rms error, K", "s a step", "set-up, s", "CG iterations a step"],
@@ -108,8 +110,8 @@ const PARTS: &[Part] = &[
     },
 ];
 
-impl Part {
-    fn draw(&self, folder: &Path, curves: &[Curve]) -> Result<()> {
+impl BenchTable {
+    fn draw(&self, folder: &Path, curves: &[BenchCurve]) -> Result<()> {
         for first in self.pictures {
             let title = [self.title.split(',').next().unwrap_or_default(), first].join(": ");
             let mut plot =
@@ -129,10 +131,10 @@ impl Part {
     }
 }
 
-/// Rows `CURVE PLACE: QUANTITY` and `CURVE PLACE: QUANTITY, PROBLEM`, collected in the order of their first appearance;
-/// other rows are of no curve.
-fn curves(rows: &[Row]) -> Vec<Curve> {
-    let mut curves: Vec<Curve> = Vec::new();
+/// Collects rows `CURVE PLACE: QUANTITY` and `CURVE PLACE: QUANTITY, PROBLEM` in the order of their first
+/// appearance; other rows belong to no curve.
+fn curves(rows: &[Row]) -> Vec<BenchCurve> {
+    let mut curves: Vec<BenchCurve> = Vec::new();
     for row in rows {
         let Some((words, quantity)) = row.what.split_once(": ") else { continue };
         let (Some((name, place)), Some(value)) = (words.rsplit_once(' '), row.value) else { continue };
@@ -154,8 +156,8 @@ fn curves(rows: &[Row]) -> Vec<Curve> {
     curves
 }
 
-fn table(part: &Part, curves: &[Curve]) -> String {
-    let mut table = Table::new(part.heading);
+fn table(part: &BenchTable, curves: &[BenchCurve]) -> String {
+    let mut table = TextTable::new(part.heading);
     for (name, points) in curves {
         for (place, at) in points {
             let shown = |quantity: &str, digits: usize| {

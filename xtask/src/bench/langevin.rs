@@ -1,8 +1,9 @@
 //! Error against time of every inverse Langevin function.
 //!
-//! Error: the largest relative one on a grid of (0, 1) graded to both ends. That of the exact inverse is taken against
-//! the mpmath values of polycore's tests; the others are compared with the exact inverse, whose error is 2e-16.
-//! Time: the median over repeats of a row of shuffled uniform arguments, divided by its length; one core.
+//! Error: the largest relative one on a grid of (0, 1) graded to both ends. That of the exact inverse is
+//! taken against the mpmath values of polycore's tests; the others are compared with the exact inverse, whose
+//! error is 2e-16. Time: the median over repeats of a row of shuffled uniform arguments, divided by its
+//! length; one core.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -13,7 +14,7 @@ use miette::{IntoDiagnostic, Result, miette};
 use polycore::langevin::{Inverse, inverse_from_complement};
 
 use super::Row;
-use crate::table::Table;
+use crate::table::TextTable;
 
 #[path = "../../../crates/polycore/benches/langevin/arguments.rs"]
 mod arguments;
@@ -23,17 +24,17 @@ use arguments::{ROW, arguments};
 /// Values of 𝓛⁻¹ to 20 digits: `function,argument,value`.
 const REFERENCE: &str = include_str!("../../../crates/polycore/tests/langevin_reference.csv");
 
-/// Rows per repeat, and repeats.
+/// Number of rows per repeat, and of repeats.
 const ROWS: usize = 200;
 const REPEATS: usize = 41;
 
-/// The rows, and a table of them; the picture goes to `folder`/langevin.{png,svg}.
+/// Returns the rows and their table; the picture goes to `folder`/langevin.{png,svg}.
 pub fn run(folder: &Path) -> Result<(Vec<Row>, String)> {
     let grid = grid();
     let arguments = arguments();
     let mut rows = Vec::new();
     let mut points = Vec::new();
-    let mut table = Table::new(["inverse", "largest relative error", "published", "ns/call", "source"]);
+    let mut table = TextTable::new(["inverse", "largest relative error", "published", "ns/call", "source"]);
     for choice in Inverse::ALL {
         let (error, count) = match choice {
             Inverse::Exact => error_of_exact()?,

@@ -1,45 +1,45 @@
-//! `peri` beside LAMMPS' `peri/pmb`: the same elastic block, the same particles, horizon and steps, alternating runs in
-//! one go; and the forces of both, particle by particle.
+//! `peri` compared with LAMMPS' `peri/pmb`: the same elastic block, particles, horizon and steps, alternating
+//! runs in one session; and the forces of both, particle by particle.
 
 use std::path::{Path, PathBuf};
 
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
-use super::forces::{Difference, Snapshot, compare, contact};
+use super::forces::{ForceDifference, Snapshot, compare, contact};
 use super::lammps::{Lammps, read_forces, write_particles};
 use super::{Row, external};
-use crate::table::Table;
-use crate::workspace::Workspace;
+use crate::table::TextTable;
+use crate::workspace::Repository;
 
-/// Distance of particles (m), horizon over it, bulk modulus (Pa): those of `crates/peri/benches/block.rs`.
+/// Spacing of particles (m), horizon over it, bulk modulus (Pa): those of `crates/peri/benches/block.rs`.
 const SPACING: f64 = 5e-4;
 const RATIO: f64 = 3.015;
 const BULK_MODULUS: f64 = 14.9e9;
 
-/// Particles along an edge, and steps of a run: seconds of LAMMPS.
+/// Particles along an edge, and steps of a run that takes LAMMPS seconds.
 const SIZES: [(u16, u32); 2] = [(22, 100), (46, 20)];
 const THREADS: [usize; 2] = [1, 2];
-/// Alternating pairs of runs, of which medians count.
+/// Number of alternating pairs of runs, whose medians count.
 const ROUNDS: usize = 5;
 
-/// Gradients of the displacement: bonds within 2 %, and compressed so far that particles touch.
+/// Gradients of the displacement: bonds within 2 %, and a compression in which particles touch.
 const SMALL: f64 = 0.01;
 const LARGE: f64 = 0.2;
 
-/// The forces are the same problem's up to here, in units of their root mean square: bonds are fitted to 1e-9 of their
-/// force (the solver's bound), which together are about ten times what is left of them.
-const SAME: f64 = 1e-8;
+/// Difference of forces that counts as agreement, in units of their root mean square: bonds are fitted to
+/// 1e-9 of their force (the solver's bound), and their sum is about ten times as large as the net force.
+const SAME_FORCES: f64 = 1e-8;
 
-/// Rows, tables, and whether both programs solved the same problem.
-pub fn run(workspace: &Workspace, folder: &Path) -> Result<(Vec<Row>, String, bool)> {
+/// Returns rows, tables, and whether both programs solved the same problem.
+pub fn run(workspace: &Repository, folder: &Path) -> Result<(Vec<Row>, String, bool)> {
     let mut peers = Peers {
         lammps: Lammps::find(workspace)?,
         peri: workspace.bench("peri")?,
         folder: folder.join("peri-peers"),
         rows: Vec::new(),
         same: true,
-        forces: Table::new(["forces", "particles", "max |Δf|/rms f", "at cell", "differing", "why"]),
-        rates: Table::new([
+        forces: TextTable::new(["forces", "particles", "max |Δf|/rms f", "at cell", "differing", "why"]),
+        rates: TextTable::new([
             "particles",
             "threads",
             "steps",
@@ -66,7 +66,8 @@ pub fn run(workspace: &Workspace, folder: &Path) -> Result<(Vec<Row>, String, bo
     let after = load();
     let shown = |load: Option<f64>| load.map_or_else(|| "?".to_owned(), |load| load.to_string());
     let text = format!(
-        "LAMMPS ({version}) peri/pmb, 1 MPI process a thread; medians of {ROUNDS} alternating runs; bonds are directed\n\
+        "LAMMPS ({version}) peri/pmb, 1 MPI process a thread; medians of {ROUNDS} alternating runs; bonds \
+         are directed\n\
          load average of the machine: {} before, {} after\n\n{}\n{}",
         shown(before),
         shown(after),
@@ -85,20 +86,20 @@ struct Peers {
     folder: PathBuf,
     rows: Vec<Row>,
     same: bool,
-    forces: Table<6>,
-    rates: Table<8>,
+    forces: TextTable<6>,
+    rates: TextTable<8>,
 }
 
-/// What is known of two sets of forces.
-enum Claim {
-    /// Nothing but rounding and the fitted law is between them.
+/// Expected relation of two sets of forces.
+enum Expectation {
+    /// Equal up to rounding and the fitted law.
     Same,
-    /// They differ, and this is why.
+    /// Different, for this reason.
     Differ(&'static str),
 }
 
 impl Peers {
-    /// Forces of one displacement in both programs, and what makes them differ.
+    /// Compares forces of one displacement in both programs, and explains their differences.
     fn one_step(&mut self, cells: u16) -> Result<()> {
         let run = |peers: &Self| -> Result<Vec<[f64; 3]>> {
             peers.lammps.run(&peers.folder, SPACING, 0, 1)?;
@@ -106,25 +107,25 @@ impl Peers {
         };
         let partial = self.start(cells, SMALL)?;
         let lammps = run(self)?;
-        self.judge("partial volumes", &partial, &lammps, Claim::Same)?;
+        self.judge("partial volumes", &partial, &lammps, Expectation::Same)?;
         let flags = format!("{cells} --steps 0 --strain {SMALL}");
         let sharp = self.snapshot(&format!("{flags} --partial-volumes --fit-bound 1e-13"))?;
-        self.judge("partial volumes, law fitted to 1e-13", &sharp, &lammps, Claim::Same)?;
+        self.judge("partial volumes, law fitted to 1e-13", &sharp, &lammps, Expectation::Same)?;
         let full = self.snapshot(&flags)?;
         let why = "LAMMPS always scales volumes within Δx/2 of the horizon: 0.69 V at 2√2 Δx, 0.52 V at 3 Δx";
-        self.judge("full volumes (our default)", &full, &lammps, Claim::Differ(why))?;
+        self.judge("full volumes (our default)", &full, &lammps, Expectation::Differ(why))?;
         let mut touching = self.start(cells, LARGE)?;
         let lammps = run(self)?;
         let why = "LAMMPS' contact force, never off: pairs nearer than min(0.9 |ξ|, 1.35 Δx)";
-        self.judge("partial volumes, strain 0.2", &touching, &lammps, Claim::Differ(why))?;
+        self.judge("partial volumes, strain 0.2", &touching, &lammps, Expectation::Differ(why))?;
         let push = contact(&touching, SPACING, RATIO * SPACING, BULK_MODULUS);
         for (force, push) in touching.forces.iter_mut().zip(push) {
             *force = [force[0] + push[0], force[1] + push[1], force[2] + push[2]];
         }
-        self.judge("the same plus contact forces", &touching, &lammps, Claim::Same)
+        self.judge("the same plus contact forces", &touching, &lammps, Expectation::Same)
     }
 
-    /// Alternating runs; gives LAMMPS' version and leaves its last forces for [`Self::after_steps`].
+    /// Alternates runs; returns LAMMPS' version and keeps its last forces for [`Self::after_steps`].
     fn alternate(&mut self, cells: u16, steps: u32, threads: usize) -> Result<String> {
         let (count, words) = (u64::from(cells).pow(3), [cells.to_string(), steps.to_string()]);
         let number = threads.to_string();
@@ -170,21 +171,21 @@ impl Peers {
         Ok(version)
     }
 
-    /// Forces at the end of the timed runs.
+    /// Compares forces at the end of the timed runs.
     fn after_steps(&mut self, cells: u16, steps: u32) -> Result<()> {
         let ours = self.snapshot(&format!("{cells} --steps {steps} --strain {SMALL} --partial-volumes"))?;
         let lammps = read_forces(&self.folder)?;
-        self.judge(&format!("partial volumes, after {steps} steps"), &ours, &lammps, Claim::Same)
+        self.judge(&format!("partial volumes, after {steps} steps"), &ours, &lammps, Expectation::Same)
     }
 
-    /// The initial displacement with its forces, also given to LAMMPS.
+    /// Computes the initial displacement with its forces, also as input of LAMMPS.
     fn start(&self, cells: u16, strain: f64) -> Result<Snapshot> {
         let start = self.snapshot(&format!("{cells} --steps 0 --strain {strain} --partial-volumes"))?;
         write_particles(&self.folder, &start, SPACING)?;
         Ok(start)
     }
 
-    /// What `measure --block` ends with; `flags` begin with the cells.
+    /// Reads the snapshot that `measure --block` writes last; `flags` begin with the cells.
     fn snapshot(&self, flags: &str) -> Result<Snapshot> {
         let path = self.folder.join("state.csv");
         let words = format!("--block {flags}");
@@ -194,18 +195,18 @@ impl Peers {
         Snapshot::read(&path)
     }
 
-    /// Compares the forces of `state` with LAMMPS'; a row of their table.
-    fn judge(&mut self, what: &str, state: &Snapshot, lammps: &[[f64; 3]], claim: Claim) -> Result<()> {
-        let Some(Difference { largest, at, differing }) = compare(&state.forces, lammps) else {
+    /// Compares the forces of `state` with LAMMPS'; adds a row to their table.
+    fn judge(&mut self, what: &str, state: &Snapshot, lammps: &[[f64; 3]], claim: Expectation) -> Result<()> {
+        let Some(ForceDifference { largest, at, differing }) = compare(&state.forces, lammps) else {
             return Err(miette!("{what}: {} and {} forces, or all zero", state.forces.len(), lammps.len()));
         };
-        let same = largest <= SAME;
+        let same = largest <= SAME_FORCES;
         let why = match claim {
-            Claim::Same if same => "rounding and the fitted law".to_owned(),
-            Claim::Same => format!("UNKNOWN: at most {SAME:e} was expected"),
-            Claim::Differ(why) => why.to_owned(),
+            Expectation::Same if same => "rounding and the fitted law".to_owned(),
+            Expectation::Same => format!("UNKNOWN: at most {SAME_FORCES:e} was expected"),
+            Expectation::Differ(why) => why.to_owned(),
         };
-        self.same &= same || matches!(claim, Claim::Differ(_));
+        self.same &= same || matches!(claim, Expectation::Differ(_));
         let count = lammps.len();
         self.forces.push([
             what.to_owned(),
@@ -224,13 +225,13 @@ impl Peers {
     }
 }
 
-/// Of an odd number of values, which are sorted.
+/// Median of an odd number of values; sorts them.
 fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     values[values.len() / 2]
 }
 
-/// Load average of the last minute, where the system tells it.
+/// Load average of the last minute, if the system provides it.
 fn load() -> Option<f64> {
     std::fs::read_to_string("/proc/loadavg").ok()?.split_whitespace().next()?.parse().ok()
 }

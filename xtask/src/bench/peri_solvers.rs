@@ -7,15 +7,15 @@ use harness::output::picture::{LinePlot, Series};
 use miette::{IntoDiagnostic, Result, miette};
 
 use super::{Row, external};
-use crate::table::Table;
-use crate::workspace::Workspace;
+use crate::table::TextTable;
+use crate::workspace::Repository;
 
-/// Distances of particles, mm, unless the user gives others.
+/// Default spacings of particles, mm.
 const SPACINGS: &str = "10,5,2";
 
-/// One method at one tolerance, on one lattice.
+/// Run of one method at one tolerance, on one lattice.
 #[derive(Default)]
-struct Point {
+struct SolverRun {
     tolerance: String,
     error: f64,
     forces: f64,
@@ -23,12 +23,12 @@ struct Point {
     seconds: f64,
 }
 
-/// The rows, and a table of them; pictures go to `folder`/peri-solvers-{time,work}.png.
-pub fn run(workspace: &Workspace, folder: &Path, arguments: &[String]) -> Result<(Vec<Row>, String)> {
+/// Returns the rows and their table; pictures go to `folder`/peri-solvers-{time,work}.png.
+pub fn run(workspace: &Repository, folder: &Path, arguments: &[String]) -> Result<(Vec<Row>, String)> {
     let spacings = arguments.first().map_or(SPACINGS, String::as_str);
     let rows = external(&workspace.bench("peri")?, &["--solvers".to_owned(), spacings.to_owned()])?;
     let curves = curves(&rows)?;
-    let mut table = Table::new([
+    let mut table = TextTable::new([
         "particles",
         "method",
         "residual",
@@ -55,11 +55,11 @@ pub fn run(workspace: &Workspace, folder: &Path, arguments: &[String]) -> Result
     Ok((rows, table.text()))
 }
 
-type Curves = BTreeMap<(u64, String), Vec<Point>>;
+type SolverCurves = BTreeMap<(u64, String), Vec<SolverRun>>;
 
-/// Rows `METHOD TOLERANCE: QUANTITY`, collected.
-fn curves(rows: &[Row]) -> Result<Curves> {
-    let mut curves = Curves::new();
+/// Collects rows `METHOD TOLERANCE: QUANTITY`.
+fn curves(rows: &[Row]) -> Result<SolverCurves> {
+    let mut curves = SolverCurves::new();
     for row in rows {
         let unknown = || miette!("--solvers printed a row `{}`", row.what);
         let (method, rest) = row.what.split_once(' ').ok_or_else(unknown)?;
@@ -67,7 +67,7 @@ fn curves(rows: &[Row]) -> Result<Curves> {
         let value = row.value.ok_or_else(unknown)?;
         let points = curves.entry((row.size, method.to_owned())).or_default();
         if points.last().is_none_or(|point| point.tolerance != tolerance) {
-            points.push(Point { tolerance: tolerance.to_owned(), ..Point::default() });
+            points.push(SolverRun { tolerance: tolerance.to_owned(), ..SolverRun::default() });
         }
         let point = points.last_mut().ok_or_else(unknown)?;
         match quantity {
@@ -81,7 +81,13 @@ fn curves(rows: &[Row]) -> Result<Curves> {
     Ok(curves)
 }
 
-fn draw(folder: &Path, name: &str, label: &str, curves: &Curves, x: impl Fn(&Point) -> f64) -> Result<()> {
+fn draw(
+    folder: &Path,
+    name: &str,
+    label: &str,
+    curves: &SolverCurves,
+    x: impl Fn(&SolverRun) -> f64,
+) -> Result<()> {
     let mut plot = LinePlot::new("Plate with a hole: error of displacements")
         .axes(label, "largest error / rms displacement")
         .log_x()

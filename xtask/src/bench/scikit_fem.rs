@@ -6,36 +6,36 @@ use std::process::{Command, Stdio};
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use serde::Deserialize;
 
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
-/// Names another virtual environment than target/venv-scikit-fem.
+/// Environment variable with another virtual environment than target/venv-scikit-fem.
 const VARIABLE: &str = "SCIKIT_FEM_VENV";
 
-/// Where it is.
+/// Installation of scikit-fem.
 pub struct ScikitFem {
     python: PathBuf,
 }
 
-/// What brick.py prints; temperatures are in scikit-fem.csv.
+/// Numbers that brick.py prints; temperatures are in scikit-fem.csv.
 #[derive(Deserialize)]
-pub struct Figures {
+pub struct BrickFigures {
     /// Seconds for the constant matrices.
     pub set_up: f64,
     /// Seconds for all steps.
     #[serde(rename = "loop")]
     pub looped: f64,
-    /// Most memory of the process, bytes.
+    /// Peak memory of the process, bytes.
     pub memory: f64,
     /// Iterations of conjugate gradients in all steps.
     pub iterations: f64,
 }
 
 impl ScikitFem {
-    /// Looks for it; else (inside) the command that installs it.
+    /// Finds the installation; the inner error is the command that installs it.
     ///
     /// # Errors
-    /// Where a folder cannot be looked into.
-    pub fn find(workspace: &Workspace) -> Result<Result<Self, String>> {
+    /// A folder that cannot be read.
+    pub fn find(workspace: &Repository) -> Result<Result<Self, String>> {
         let folder = std::env::var_os(VARIABLE)
             .map_or_else(|| workspace.target().join("venv-scikit-fem"), PathBuf::from);
         let python = folder.join("bin/python");
@@ -50,16 +50,16 @@ impl ScikitFem {
         }
         let folder = folder.display();
         Ok(Err(format!(
-            "none in {folder} (python3 -m venv {folder} && {folder}/bin/pip install scikit-fem scipy; {VARIABLE} \
-             names another virtual environment)"
+            "none in {folder} (python3 -m venv {folder} && {folder}/bin/pip install scikit-fem scipy; \
+             {VARIABLE} names another virtual environment)"
         )))
     }
 
     /// Runs on one thread.
     ///
     /// # Errors
-    /// Where it fails.
-    pub fn run(&self, folder: &Path, mesh: &Path, steps: u32) -> Result<Figures> {
+    /// If it fails.
+    pub fn run(&self, folder: &Path, mesh: &Path, steps: u32) -> Result<BrickFigures> {
         std::fs::write(folder.join("brick.py"), include_str!("brick.py")).into_diagnostic()?;
         let mut command = Command::new(&self.python);
         command.arg("brick.py").arg(mesh).arg(steps.to_string()).arg("scikit-fem.csv").current_dir(folder);

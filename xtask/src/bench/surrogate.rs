@@ -1,5 +1,5 @@
-//! `mdsurrogate`: its own measurements; beside them, in the same run, an epoch of the thesis' network in PyTorch, and the
-//! answers of a trained law in PyTorch and in onnxruntime.
+//! `mdsurrogate`: its own measurements, and in the same session an epoch of the thesis' network in PyTorch,
+//! and the predictions of a trained law in PyTorch and in onnxruntime.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -9,20 +9,20 @@ use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use polycore::file::atomic_write;
 
 use super::{Row, external};
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
 const TRAINING: &str = include_str!("torch_training.py");
 const ANSWERS: &str = include_str!("surrogate_peers.py");
 
-/// The case whose ANN-4 is asked, as its quick tier trains it.
+/// Case whose ANN-4 is evaluated, as its quick tier trains it.
 const CASE: &str = "cases/ch3/train-default/case.toml";
 
-/// Strains at which it is asked.
+/// Number of strains.
 const POINTS: usize = 512;
 
-/// Rows; what a peer cannot measure here is named in a row without a value.
-pub fn run(workspace: &Workspace, folder: &Path) -> Result<Vec<Row>> {
-    let program = workspace.release("mdsurrogate")?;
+/// Returns the rows; a peer that cannot be measured here has a row without a value.
+pub fn run(workspace: &Repository, folder: &Path) -> Result<Vec<Row>> {
+    let program = workspace.build_program("mdsurrogate")?;
     let bench = workspace.bench("mdsurrogate")?;
     let mut rows = external(&bench, &[])?;
     rows.extend(external(&bench, &["--training".to_owned()])?);
@@ -60,7 +60,7 @@ pub fn run(workspace: &Workspace, folder: &Path) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// Strains of the training data's kind, stretches of up to 0.9 to 1.3, and some shear beyond it.
+/// Strains like those of the training data, stretches of up to 0.9 to 1.3, with some shear beyond them.
 fn points() -> String {
     let mut table = "C11,C22,C33,C12,C13,C23\n".to_owned();
     for k in 0..POINTS {
@@ -81,7 +81,7 @@ fn points() -> String {
     table
 }
 
-/// Runs the program; what it prints is shown only if it fails.
+/// Runs the program; its output is shown only if it fails.
 fn mdsurrogate(program: &Path, arguments: &[&str]) -> Result<()> {
     let output = Command::new(program)
         .args(arguments)
@@ -89,7 +89,7 @@ fn mdsurrogate(program: &Path, arguments: &[&str]) -> Result<()> {
         .output()
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot start {}", program.display()))?;
-    // 1: an expectation of the case was not met, which is not the question here
+    // 1: an expectation of the case was not met, which does not matter here
     match output.status.code() {
         Some(0 | 1) => Ok(()),
         _ => Err(miette!("mdsurrogate {}: {}", arguments.join(" "), String::from_utf8_lossy(&output.stderr))),

@@ -1,4 +1,4 @@
-//! What moved since an earlier report.json, and by how much.
+//! Differences from an earlier report.json.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -7,14 +7,14 @@ use std::path::Path;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use serde::{Deserialize, Serialize};
 
-use crate::outcome::Outcome;
+use crate::outcome::CaseOutcome;
 
-/// Relative changes below this are rounding of another machine or instruction set.
-const STILL: f64 = 1e-6;
+/// Relative changes below which a difference is rounding of another machine or instruction set.
+const ROUNDING: f64 = 1e-6;
 
-/// The part of an earlier report.json that is compared.
+/// Part of an earlier report.json that is compared.
 #[derive(Deserialize)]
-pub struct Baseline {
+pub struct EarlierReport {
     commit: Option<String>,
     date: Option<String>,
     cases: Vec<OldCase>,
@@ -36,19 +36,19 @@ struct OldJudgement {
     pass: bool,
 }
 
-/// The difference between two reports.
+/// Difference between two reports.
 #[derive(Serialize)]
-pub struct Difference {
+pub struct ReportDifference {
     commit: String,
     date: String,
-    moved: Vec<Move>,
-    /// Quantities that were compared.
+    moved: Vec<QuantityChange>,
+    /// Number of compared quantities.
     compared: usize,
 }
 
-/// A number that has changed.
+/// Changed number.
 #[derive(Serialize)]
-pub struct Move {
+pub struct QuantityChange {
     case: String,
     what: String,
     before: String,
@@ -57,7 +57,7 @@ pub struct Move {
     tone: &'static str,
 }
 
-impl Baseline {
+impl EarlierReport {
     /// Reads a report.json of `cargo xtask validate`.
     pub fn read(path: &Path) -> Result<Self> {
         let text = fs::read_to_string(path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
@@ -66,12 +66,12 @@ impl Baseline {
         })
     }
 
-    /// Compares everything that both have; seconds only where they have doubled or halved.
-    pub fn compare(&self, outcomes: &[Outcome]) -> Difference {
+    /// Compares everything that both reports have; seconds only if they have doubled or halved.
+    pub fn compare(&self, outcomes: &[CaseOutcome]) -> ReportDifference {
         let (mut moved, mut compared) = (Vec::new(), 0);
         for outcome in outcomes {
             let mut push = |what: &str, before: String, now: String, change: String, tone| {
-                moved.push(Move {
+                moved.push(QuantityChange {
                     case: outcome.case.clone(),
                     what: what.to_owned(),
                     before,
@@ -95,7 +95,7 @@ impl Baseline {
                 compared += 1;
                 let Some(value) = before.value.as_ref().and_then(serde_json::Value::as_f64) else { continue };
                 let change = (now - value).abs() / value.abs().max(now.abs()).max(f64::MIN_POSITIVE);
-                if change > STILL || now.is_nan() || before.pass != judgement.pass {
+                if change > ROUNDING || now.is_nan() || before.pass != judgement.pass {
                     let tone = match (before.pass, judgement.pass) {
                         (true, false) => "bad",
                         (false, true) => "good",
@@ -126,7 +126,7 @@ impl Baseline {
             }
         }
         let text = |text: &Option<String>| text.clone().unwrap_or_else(|| "unknown".to_owned());
-        Difference { commit: text(&self.commit), date: text(&self.date), moved, compared }
+        ReportDifference { commit: text(&self.commit), date: text(&self.date), moved, compared }
     }
 }
 
@@ -141,9 +141,10 @@ mod tests {
 
     #[test]
     fn what_moved() {
-        let old = |value: f64, pass: bool| -> Baseline {
+        let old = |value: f64, pass: bool| -> EarlierReport {
             serde_json::from_str(&format!(
-                r#"{{"commit": "abc", "cases": [{{"case": "ch2/plate", "passed": {pass}, "seconds": 0, "work": {{}},
+                r#"{{"commit": "abc", "cases": [{{"case": "ch2/plate", "passed": {pass}, "seconds": 0,
+                "work": {{}},
                     "expect": [{{"quantity": "kt", "value": {value}, "pass": {pass}}}]}}]}}"#
             ))
             .expect("a baseline")

@@ -1,4 +1,4 @@
-//! Comparisons with programs that nobody here wrote. One that was not made is named, with what makes it.
+//! Comparisons with other programs. A missing comparison is listed with the command that makes it.
 
 use std::fs;
 
@@ -6,49 +6,49 @@ use miette::{IntoDiagnostic, Result, WrapErr};
 use serde::{Deserialize, Serialize};
 
 use crate::bench::{self, Bench, Row};
-use crate::test::{self, Record};
-use crate::workspace::Workspace;
+use crate::test::{self, TestRecord};
+use crate::workspace::Repository;
 
-/// The comparisons.
+/// File of the comparisons.
 const FILE: &str = "cases/peers.toml";
 
 #[derive(Deserialize)]
 struct Checks {
-    bench: Vec<Check>,
-    test: Vec<Tested>,
+    bench: Vec<BenchCheck>,
+    test: Vec<TestCheck>,
 }
 
-/// A comparison by a bench.
+/// Comparison by a bench.
 #[derive(Deserialize)]
-struct Check {
+struct BenchCheck {
     title: String,
     /// Rows of target/bench/NAME.json …
     bench: String,
-    /// … of which one holds all of these words.
+    /// … one of which contains all of these words.
     words: Vec<String>,
-    /// The largest number that counts as agreement; none where the difference has a stated cause.
+    /// Largest number that counts as agreement; `None` if the difference has a stated cause.
     agree: f64,
     command: String,
     needs: String,
 }
 
-/// A comparison by a test that runs the other program.
+/// Comparison by a test that runs the other program.
 #[derive(Deserialize)]
-struct Tested {
+struct TestCheck {
     title: String,
-    /// The name of its number, as the test gives it by crate `evidence`.
+    /// Name of its number in crate `evidence`.
     record: String,
     needs: String,
 }
 
-/// A comparison as made, or why it was not.
+/// Comparison, or the reason for which it is missing.
 #[derive(Serialize)]
-pub struct Crossed {
+pub struct CrossCheck {
     title: String,
     what: String,
     value: String,
     asked: String,
-    /// When, where and from which commit.
+    /// Date, machine and commit of the measurement.
     measured: String,
     verdict: &'static str,
     tone: &'static str,
@@ -56,36 +56,36 @@ pub struct Crossed {
     needs: String,
 }
 
-impl Crossed {
-    /// For docs/validation.md.
+impl CrossCheck {
+    /// Cells of the row in docs/validation.md.
     pub fn cells(&self) -> [String; 5] {
         [&self.title, &self.value, &self.asked, self.verdict, &self.measured].map(str::to_owned)
     }
 }
 
-/// All comparisons, from the rows that benches and the numbers that tests have left.
-pub fn checked(workspace: &Workspace) -> Result<Vec<Crossed>> {
+/// Collects all comparisons, from rows of benches and numbers of tests.
+pub fn checked(workspace: &Repository) -> Result<Vec<CrossCheck>> {
     let checks = read(workspace)?;
-    let made = |check: &Check| {
+    let made = |check: &BenchCheck| {
         let bench = bench::read(workspace, &check.bench);
         let fresh = bench.as_ref().is_some_and(|bench| bench.stamp.fresh(workspace.root()));
-        check.made(bench.as_ref(), fresh)
+        check.judge(bench.as_ref(), fresh)
     };
     let records = test::read(workspace);
-    let tested = |tested: &Tested| {
+    let tested = |tested: &TestCheck| {
         let record = records.get(&tested.record);
         let stamp = record.and_then(|record| record.stamp.as_ref());
-        tested.made(record, stamp.is_some_and(|stamp| stamp.fresh(workspace.root())))
+        tested.judge(record, stamp.is_some_and(|stamp| stamp.fresh(workspace.root())))
     };
     Ok(checks.bench.iter().map(made).chain(checks.test.iter().map(tested)).collect())
 }
 
-fn read(workspace: &Workspace) -> Result<Checks> {
+fn read(workspace: &Repository) -> Result<Checks> {
     let text = fs::read_to_string(workspace.root().join(FILE)).into_diagnostic().wrap_err(FILE)?;
     toml::from_str(&text).into_diagnostic().wrap_err(FILE)
 }
 
-/// Verdict and tone.
+/// Returns verdict and tone.
 fn judged(agrees: bool, fresh: bool) -> (&'static str, &'static str) {
     match (agrees, fresh) {
         (false, _) => ("disagrees", "bad"),
@@ -94,12 +94,12 @@ fn judged(agrees: bool, fresh: bool) -> (&'static str, &'static str) {
     }
 }
 
-impl Tested {
-    fn made(&self, record: Option<&Record>, fresh: bool) -> Crossed {
-        let [value, asked] = record.map(Record::cells).unwrap_or_default();
+impl TestCheck {
+    fn judge(&self, record: Option<&TestRecord>, fresh: bool) -> CrossCheck {
+        let [value, asked] = record.map(TestRecord::cells).unwrap_or_default();
         let (verdict, tone) = record.map_or(("skipped", "open"), |record| judged(record.met, fresh));
         let stamp = record.and_then(|record| record.stamp.as_ref());
-        Crossed {
+        CrossCheck {
             title: self.title.clone(),
             what: record.map(|record| record.test.clone()).unwrap_or_default(),
             value,
@@ -113,9 +113,9 @@ impl Tested {
     }
 }
 
-impl Check {
-    /// `fresh`: the sources that the bench measured have not changed.
-    fn made(&self, bench: Option<&Bench>, fresh: bool) -> Crossed {
+impl BenchCheck {
+    /// Judges the comparison; `fresh`: the sources that the bench measured have not changed.
+    fn judge(&self, bench: Option<&Bench>, fresh: bool) -> CrossCheck {
         let is_it = |row: &&Row| {
             let what = row.what.to_lowercase();
             self.words.iter().all(|word| what.contains(&word.to_lowercase()))
@@ -124,7 +124,7 @@ impl Check {
             .iter()
             .flat_map(|bench| &bench.rows)
             .filter(is_it)
-            // what JSON has no number for is no agreement
+            // a number that JSON cannot represent is no agreement
             .map(|row| (row, row.value.unwrap_or(f64::NAN)))
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let (what, value, verdict, tone) = match worst {
@@ -134,7 +134,7 @@ impl Check {
             }
             None => (String::new(), String::new(), "skipped", "open"),
         };
-        Crossed {
+        CrossCheck {
             title: self.title.clone(),
             what,
             value: value.trim_end().to_owned(),
@@ -151,24 +151,24 @@ impl Check {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stamp::Stamp;
+    use crate::stamp::SourceStamp;
 
     #[test]
     fn made_skipped_disagreeing_and_stale() {
-        let workspace = Workspace::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..").into());
+        let workspace = Repository::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..").into());
         let check = &read(&workspace).expect(FILE).bench[0];
-        assert_eq!(check.made(None, false).verdict, "skipped");
+        assert_eq!(check.judge(None, false).verdict, "skipped");
         let root = tempfile::tempdir().expect("a folder");
         let bench = |value: f64| {
             let what = "forces, partial volumes: max |Δf|/rms f".to_owned();
             let row = Row { what, size: 1, threads: 1, value: Some(value), unit: String::new() };
-            Bench { stamp: Stamp::new(root.path(), &[]).expect("a stamp"), rows: vec![row] }
+            Bench { stamp: SourceStamp::new(root.path(), &[]).expect("a stamp"), rows: vec![row] }
         };
-        let verdict = |value, fresh| check.made(Some(&bench(value)), fresh).verdict;
+        let verdict = |value, fresh| check.judge(Some(&bench(value)), fresh).verdict;
         assert_eq!(verdict(3.4e-10, true), "agrees");
         assert_eq!(verdict(1e-3, true), "disagrees");
         assert_eq!(verdict(f64::NAN, true), "disagrees");
         assert_eq!(verdict(3.4e-10, false), "stale");
-        assert!(check.made(Some(&bench(1.0)), true).measured.contains(", commit "));
+        assert!(check.judge(Some(&bench(1.0)), true).measured.contains(", commit "));
     }
 }

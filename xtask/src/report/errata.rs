@@ -1,61 +1,61 @@
-//! The rows of docs/errata.md, each with the number that proves it (cases/thesis.toml).
+//! Rows of docs/errata.md, each with the number that proves it (cases/thesis.toml).
 
 use std::fs;
 
 use miette::{IntoDiagnostic, Result, WrapErr};
 use serde::{Deserialize, Serialize};
 
-use super::evidence::{Finding, Found, Measured, Number, check, verdict};
-use crate::workspace::Workspace;
+use super::evidence::{CaseNumber, MeasuredNumbers, NumberRow, TestNumber, check, verdict};
+use crate::workspace::Repository;
 
-/// What proves an erratum.
+/// Proof of an erratum.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Proof {
     /// Words of the row's first two cells that no other row has.
     pub says: String,
-    /// The case of the numbers.
+    /// Case of the numbers.
     pub case: Option<String>,
     /// Quantities that a case expects.
     #[serde(default)]
-    pub numbers: Vec<Number>,
+    pub numbers: Vec<CaseNumber>,
     /// Numbers that tests measure.
     #[serde(default)]
-    pub tests: Vec<Measured>,
+    pub tests: Vec<TestNumber>,
 }
 
-/// A row of docs/errata.md.
+/// Row of docs/errata.md.
 pub struct Erratum {
     chapter: String,
     cells: [String; 4],
 }
 
-/// A row with its numbers.
+/// Row with its numbers.
 #[derive(Serialize)]
-pub struct Proven {
+pub struct ErratumVerdict {
     chapter: String,
     place: String,
     wrong: String,
     ours: String,
     test: String,
-    findings: Vec<Finding>,
+    findings: Vec<NumberRow>,
     verdict: &'static str,
     tone: &'static str,
 }
 
 impl Erratum {
-    /// All rows of docs/errata.md.
-    pub fn read(workspace: &Workspace) -> Result<Vec<Self>> {
+    /// Reads all rows of docs/errata.md.
+    pub fn read(workspace: &Repository) -> Result<Vec<Self>> {
         let text = fs::read_to_string(workspace.root().join("docs/errata.md"));
         Ok(parse(&text.into_diagnostic().wrap_err("docs/errata.md")?))
     }
 
-    fn is(&self, proof: &Proof) -> bool {
+    fn matches(&self, proof: &Proof) -> bool {
         format!("{} {}", self.cells[0], self.cells[1]).contains(&proof.says)
     }
 }
 
-/// Tables of four columns, below headings `## Chapter N: …`.
+/// Parses tables of four columns, below headings `## Chapter N: …`.
 fn parse(text: &str) -> Vec<Erratum> {
     let (mut rows, mut chapter, mut inside) = (Vec::new(), String::new(), false);
     for line in text.lines() {
@@ -75,7 +75,7 @@ fn parse(text: &str) -> Vec<Erratum> {
     rows
 }
 
-/// Cells of a row of Markdown; `\|` is no border, and other escapes are undone.
+/// Splits a row of Markdown into cells; `\|` is no separator, and other escapes are removed.
 fn cells(line: &str) -> Vec<String> {
     let (mut cells, mut cell, mut escaped) = (Vec::new(), String::new(), false);
     for letter in line.trim().trim_start_matches('|').chars() {
@@ -91,18 +91,18 @@ fn cells(line: &str) -> Vec<String> {
     cells
 }
 
-/// What is wrong between docs/errata.md and the proofs.
-pub fn faults(workspace: &Workspace, rows: &[Erratum], proofs: &[Proof]) -> Vec<String> {
+/// Checks docs/errata.md against the proofs.
+pub fn faults(workspace: &Repository, rows: &[Erratum], proofs: &[Proof]) -> Vec<String> {
     let mut faults = Vec::new();
     for row in rows {
-        let count = proofs.iter().filter(|proof| row.is(proof)).count();
+        let count = proofs.iter().filter(|proof| row.matches(proof)).count();
         if count != 1 {
             faults.push(format!("docs/errata.md, {} {}: {count} proofs", row.chapter, row.cells[0]));
         }
     }
     for proof in proofs {
         let mut fault = |text: String| faults.push(format!("erratum `{}`: {text}", proof.says));
-        if rows.iter().filter(|row| row.is(proof)).count() != 1 {
+        if rows.iter().filter(|row| row.matches(proof)).count() != 1 {
             fault("is not exactly one row of docs/errata.md".to_owned());
         }
         if proof.numbers.is_empty() && proof.tests.is_empty() {
@@ -113,17 +113,17 @@ pub fn faults(workspace: &Workspace, rows: &[Erratum], proofs: &[Proof]) -> Vec<
     faults
 }
 
-/// Looks the numbers up.
-pub fn judge(rows: &[Erratum], proofs: &[Proof], found: &Found) -> Vec<Proven> {
+/// Evaluates the numbers of the rows.
+pub fn judge(rows: &[Erratum], proofs: &[Proof], found: &MeasuredNumbers) -> Vec<ErratumVerdict> {
     let judged = |row: &Erratum| {
-        let proof = proofs.iter().find(|proof| row.is(proof));
+        let proof = proofs.iter().find(|proof| row.matches(proof));
         let findings = proof.map_or_else(Vec::new, |proof| {
             found.findings(proof.case.as_deref(), &proof.numbers, &proof.tests)
         });
         let (verdict, tone) = verdict(&findings).unwrap_or(("proven", "good"));
         let [place, wrong, ours, test] =
             row.cells.clone().map(|cell| cell.replace('`', "").replace("**", ""));
-        Proven { chapter: row.chapter.clone(), place, wrong, ours, test, findings, verdict, tone }
+        ErratumVerdict { chapter: row.chapter.clone(), place, wrong, ours, test, findings, verdict, tone }
     };
     rows.iter().map(judged).collect()
 }
@@ -134,7 +134,8 @@ mod tests {
 
     #[test]
     fn rows_of_markdown() {
-        let text = "## Chapter 4: x\n\n| a | b | c | d |\n|---|---|---|---|\n| (4.1) | \\|DTEMP\\| | z = \\[1\\] | t |\nno\n| a |";
+        let text = "## Chapter 4: x\n\n| a | b | c | d |\n|---|---|---|---|\n| (4.1) | \\|DTEMP\\| | z = \
+                    \\[1\\] | t |\nno\n| a |";
         let rows = parse(text);
         assert_eq!(rows.len(), 1);
         assert_eq!(rows[0].chapter, "Chapter 4");

@@ -1,4 +1,4 @@
-//! What a verdict rests on: quantities that cases are judged by, or numbers that tests have measured.
+//! Evidence of a verdict: quantities by which cases are judged, or numbers that tests have measured.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,96 +8,97 @@ use harness::report::{Expect, Kind};
 use miette::{Result, miette};
 use serde::{Deserialize, Serialize};
 
-use crate::outcome::Outcome;
+use crate::outcome::CaseOutcome;
 use crate::test::Records;
-use crate::workspace::Workspace;
+use crate::workspace::Repository;
 
-/// A quantity of a case, as named in cases/thesis.toml.
+/// Quantity of a case, as named in cases/thesis.toml.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Number {
-    /// One that the case has an `[[expect]]` of, unless `judged` is false.
+pub struct CaseNumber {
+    /// Quantity with an `[[expect]]` in its case, unless `judged` is false.
     pub quantity: String,
-    /// False for a number that is only shown: a loading of which the thesis prints no figure.
-    #[serde(default = "yes")]
+    /// False for a number that is only shown: a loading for which the thesis prints no figure.
+    #[serde(default = "default_true")]
     pub judged: bool,
-    /// In words, with its unit.
+    /// Description with the unit.
     pub what: String,
-    /// Another case than that of the row.
+    /// Case, if it is not that of the row.
     pub case: Option<String>,
-    /// The thesis' own figure, where it prints one.
+    /// Figure of the thesis, if it prints one.
     pub thesis: Option<String>,
 }
 
-fn yes() -> bool {
+fn default_true() -> bool {
     true
 }
 
-/// A number that a test measures, as named in cases/thesis.toml.
+/// Number that a test measures, as named in cases/thesis.toml.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Measured {
-    /// The name that the test gives it by crate `evidence`.
+pub struct TestNumber {
+    /// Name in crate `evidence`.
     pub record: String,
-    /// In words, with its unit.
+    /// Description with the unit.
     pub what: String,
-    /// The thesis' own figure, where it prints one.
+    /// Figure of the thesis, if it prints one.
     pub thesis: Option<String>,
 }
 
-/// A row of numbers: what it is, what was found, what was expected, the verdict.
+/// Row of a number: description, value, requirement, state.
 #[derive(Clone, Debug, Serialize)]
-pub struct Finding {
-    /// In words.
+pub struct NumberRow {
+    /// Description.
     pub what: String,
-    /// As found.
+    /// Value found.
     pub value: String,
-    /// What the case asks for.
+    /// Value that the case requires.
     pub asked: String,
-    /// The thesis' figure, if any.
+    /// Figure of the thesis, if any.
     pub thesis: String,
-    /// Where from: a case's quantity, or a test.
+    /// Source: a case's quantity, or a test.
     pub from: String,
-    /// How it ended.
-    pub state: State,
+    /// State of the number.
+    pub state: NumberState,
 }
 
-/// How a number was found.
+/// State of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum State {
+pub enum NumberState {
     /// Within its tolerance.
     Met,
     /// Within the tolerance of our own earlier figure, which is no evidence.
     Regression,
-    /// By this run; nothing is asked of it.
+    /// Measured by this run, without a requirement.
     Found,
     /// Outside its tolerance; or the case failed.
     Missed,
-    /// By a test whose sources have changed since.
+    /// Measured by a test whose sources have changed since.
     Stale,
     /// Not in this run.
     NotRun,
 }
 
-/// A verdict on findings, with a tone for the page: what is missed fails, what was met backs, the rest does not.
-pub fn verdict(findings: &[Finding]) -> Option<(&'static str, &'static str)> {
+/// Returns a verdict on numbers, with a tone for the page: a missed one fails, a met one supports, the others
+/// do not.
+pub fn verdict(findings: &[NumberRow]) -> Option<(&'static str, &'static str)> {
     let has = |state| findings.iter().any(|finding| finding.state == state);
     match () {
-        () if has(State::Missed) => Some(("failed", "bad")),
-        () if has(State::Met) => None,
-        () if has(State::Stale) => Some(("stale", "open")),
-        () if has(State::Regression) => Some(("no evidence", "bad")),
+        () if has(NumberState::Missed) => Some(("failed", "bad")),
+        () if has(NumberState::Met) => None,
+        () if has(NumberState::Stale) => Some(("stale", "open")),
+        () if has(NumberState::Regression) => Some(("no evidence", "bad")),
         () => Some(("not in this run", "open")),
     }
 }
 
-impl Number {
-    /// Looks it up in what was run.
-    pub fn find(&self, row: Option<&str>, outcomes: &[Outcome]) -> Finding {
+impl CaseNumber {
+    /// Evaluates the number in this run.
+    pub fn find(&self, row: Option<&str>, outcomes: &[CaseOutcome]) -> NumberRow {
         let case = self.case.as_deref().or(row).unwrap_or_default();
         let from = format!("{case}: {}", self.quantity);
-        let empty = |state, value: &str| Finding {
+        let empty = |state, value: &str| NumberRow {
             what: self.what.clone(),
             value: value.to_owned(),
             asked: String::new(),
@@ -106,19 +107,19 @@ impl Number {
             state,
         };
         let Some(outcome) = outcomes.iter().find(|outcome| outcome.case == case) else {
-            return empty(State::NotRun, "not in this run");
+            return empty(NumberState::NotRun, "not in this run");
         };
         if !self.judged {
             return match outcome.scalar(&self.quantity) {
-                Some(value) => empty(State::Found, &value),
-                None => empty(State::NotRun, "not in this tier"),
+                Some(value) => empty(NumberState::Found, &value),
+                None => empty(NumberState::NotRun, "not in this tier"),
             };
         }
         let judged: Vec<_> = outcome.expect().iter().filter(|j| j.expect.quantity == self.quantity).collect();
         let Some(last) = judged.last() else {
             return match &outcome.failure {
-                Some(failure) => empty(State::Missed, failure),
-                None => empty(State::NotRun, "not in this tier"),
+                Some(failure) => empty(NumberState::Missed, failure),
+                None => empty(NumberState::NotRun, "not in this tier"),
             };
         };
         let [_, _, value, _, _] = last.row();
@@ -128,18 +129,18 @@ impl Number {
         let value = if unit.is_empty() { value } else { format!("{value} {unit}") };
         let evidence = judged.iter().any(|judgement| judgement.expect.kind.is_evidence());
         let state = match (met, evidence) {
-            (true, true) => State::Met,
-            (true, false) => State::Regression,
-            (false, _) => State::Missed,
+            (true, true) => NumberState::Met,
+            (true, false) => NumberState::Regression,
+            (false, _) => NumberState::Missed,
         };
-        Finding { asked: asked.join(", "), ..empty(state, &value) }
+        NumberRow { asked: asked.join(", "), ..empty(state, &value) }
     }
 }
 
-impl Measured {
-    /// Looks it up in what tests have left.
-    pub fn find(&self, records: &Records, root: &Path) -> Finding {
-        let empty = |state, from: String| Finding {
+impl TestNumber {
+    /// Evaluates the number in the records of the tests.
+    pub fn find(&self, records: &Records, root: &Path) -> NumberRow {
+        let empty = |state, from: String| NumberRow {
             what: self.what.clone(),
             value: "not in this run".to_owned(),
             asked: String::new(),
@@ -148,45 +149,50 @@ impl Measured {
             state,
         };
         let Some(record) = records.get(&self.record) else {
-            return empty(State::NotRun, "cargo xtask test".to_owned());
+            return empty(NumberState::NotRun, "cargo xtask test".to_owned());
         };
         let fresh = record.stamp.as_ref().is_some_and(|stamp| stamp.fresh(root));
         let state = match (record.met, fresh) {
-            (false, _) => State::Missed,
-            (true, true) => State::Met,
-            (true, false) => State::Stale,
+            (false, _) => NumberState::Missed,
+            (true, true) => NumberState::Met,
+            (true, false) => NumberState::Stale,
         };
         let when = record.stamp.as_ref().map(ToString::to_string).unwrap_or_default();
         let from = format!("test {} in {}, {when}", record.test, record.file);
         let [value, asked] = record.cells();
-        Finding { value, asked, ..empty(state, from) }
+        NumberRow { value, asked, ..empty(state, from) }
     }
 }
 
-/// What was found: by this run's cases, and by the last run of the tests.
-pub struct Found<'a> {
-    /// Of the cases.
-    pub outcomes: &'a [Outcome],
-    /// Of the tests.
+/// Numbers of this run's cases and of the last run of the tests.
+pub struct MeasuredNumbers<'a> {
+    /// Outcomes of the cases.
+    pub outcomes: &'a [CaseOutcome],
+    /// Records of the tests.
     pub records: &'a Records,
-    /// Of the workspace.
+    /// Root of the repository.
     pub root: &'a Path,
 }
 
-impl Found<'_> {
-    /// Looks numbers up.
-    pub fn findings(&self, case: Option<&str>, numbers: &[Number], tests: &[Measured]) -> Vec<Finding> {
+impl MeasuredNumbers<'_> {
+    /// Evaluates numbers.
+    pub fn findings(
+        &self,
+        case: Option<&str>,
+        numbers: &[CaseNumber],
+        tests: &[TestNumber],
+    ) -> Vec<NumberRow> {
         let found = numbers.iter().map(|number| number.find(case, self.outcomes));
         found.chain(tests.iter().map(|test| test.find(self.records, self.root))).collect()
     }
 }
 
-/// Adds what is wrong with numbers and tests.
+/// Adds defects of numbers and tests to `faults`.
 pub fn check(
-    workspace: &Workspace,
+    workspace: &Repository,
     case: Option<&str>,
-    numbers: &[Number],
-    tests: &[Measured],
+    numbers: &[CaseNumber],
+    tests: &[TestNumber],
     fault: &mut dyn FnMut(String),
 ) {
     let (mut evidence, mut regressions) = (tests.len(), 0);
@@ -209,14 +215,14 @@ pub fn check(
         fault("rests only on our own earlier figures (kind = \"regression\")".to_owned());
     }
     for test in tests {
-        if !named(workspace, &test.record) {
+        if !has_source(workspace, &test.record) {
             fault(format!("no test in crates/ measures \"{}\"", test.record));
         }
     }
 }
 
-/// The quantities that a case expects, and of what kinds.
-fn expected(workspace: &Workspace, case: &str) -> Result<BTreeMap<String, Vec<Kind>>> {
+/// Lists the quantities that a case expects, and their kinds.
+fn expected(workspace: &Repository, case: &str) -> Result<BTreeMap<String, Vec<Kind>>> {
     let path = workspace.root().join("cases").join(case).join("case.toml");
     let text = fs::read_to_string(&path).map_err(|error| miette!("cases/{case}/case.toml: {error}"))?;
     let table: toml::Table = toml::from_str(&text).map_err(|error| miette!("{case}: {error}"))?;
@@ -228,8 +234,8 @@ fn expected(workspace: &Workspace, case: &str) -> Result<BTreeMap<String, Vec<Ki
     Ok(kinds)
 }
 
-/// Whether a file below crates/ or tests/ gives a number that name: a link, not a proof.
-fn named(workspace: &Workspace, record: &str) -> bool {
+/// Returns true if a file below crates/ or tests/ names the record: a link, not a proof.
+fn has_source(workspace: &Repository, record: &str) -> bool {
     let name = format!("\"{record}\"");
     let mut folders = vec![workspace.root().join("crates"), workspace.root().join("tests")];
     while let Some(folder) = folders.pop() {
@@ -249,41 +255,42 @@ fn named(workspace: &Workspace, record: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stamp::Stamp;
+    use crate::stamp::SourceStamp;
 
     #[test]
     fn records_of_tests() {
         let root = tempfile::tempdir().expect("a folder");
         std::fs::write(root.path().join("source"), "1").expect("a source");
-        let text = r#"{"name": "n", "value": 0.5, "at_most": 1, "met": true, "test": "t", "file": "f", "stamp": null}"#;
-        let mut record: crate::test::Record = serde_json::from_str(text).expect("a record");
-        record.stamp = Some(Stamp::new(root.path(), &["source".to_owned()]).expect("a stamp"));
-        let row = Measured { record: "n".to_owned(), what: "w".to_owned(), thesis: None };
-        let state = |record: &crate::test::Record| {
+        let text = r#"{"name": "n", "value": 0.5, "at_most": 1, "met": true, "test": "t",
+            "file": "f", "stamp": null}"#;
+        let mut record: crate::test::TestRecord = serde_json::from_str(text).expect("a record");
+        record.stamp = Some(SourceStamp::new(root.path(), &["source".to_owned()]).expect("a stamp"));
+        let row = TestNumber { record: "n".to_owned(), what: "w".to_owned(), thesis: None };
+        let state = |record: &crate::test::TestRecord| {
             let records = Records::from([("n".to_owned(), record.clone())]);
             row.find(&records, root.path()).state
         };
-        assert_eq!(state(&record), State::Met);
-        assert_eq!(row.find(&Records::new(), root.path()).state, State::NotRun);
+        assert_eq!(state(&record), NumberState::Met);
+        assert_eq!(row.find(&Records::new(), root.path()).state, NumberState::NotRun);
         std::fs::write(root.path().join("source"), "2").expect("a source");
-        assert_eq!(state(&record), State::Stale);
+        assert_eq!(state(&record), NumberState::Stale);
         record.met = false;
-        assert_eq!(state(&record), State::Missed);
+        assert_eq!(state(&record), NumberState::Missed);
     }
 
     #[test]
     fn verdicts() {
-        let of = |states: &[State]| {
+        let of = |states: &[NumberState]| {
             let [what, value, asked, thesis, from] = [""; 5].map(str::to_owned);
-            let finding = Finding { what, value, asked, thesis, from, state: State::Met };
-            let findings: Vec<Finding> =
-                states.iter().map(|&state| Finding { state, ..finding.clone() }).collect();
+            let finding = NumberRow { what, value, asked, thesis, from, state: NumberState::Met };
+            let findings: Vec<NumberRow> =
+                states.iter().map(|&state| NumberRow { state, ..finding.clone() }).collect();
             verdict(&findings).map(|(verdict, _)| verdict)
         };
-        assert_eq!(of(&[State::Met, State::Stale, State::Regression]), None);
-        assert_eq!(of(&[State::Met, State::Missed]), Some("failed"));
-        assert_eq!(of(&[State::Regression, State::Found]), Some("no evidence"));
-        assert_eq!(of(&[State::Regression, State::Stale]), Some("stale"));
-        assert_eq!(of(&[State::Found, State::NotRun]), Some("not in this run"));
+        assert_eq!(of(&[NumberState::Met, NumberState::Stale, NumberState::Regression]), None);
+        assert_eq!(of(&[NumberState::Met, NumberState::Missed]), Some("failed"));
+        assert_eq!(of(&[NumberState::Regression, NumberState::Found]), Some("no evidence"));
+        assert_eq!(of(&[NumberState::Regression, NumberState::Stale]), Some("stale"));
+        assert_eq!(of(&[NumberState::Found, NumberState::NotRun]), Some("not in this run"));
     }
 }

@@ -1,46 +1,50 @@
-//! docs/validation.md: what stays the same from day to day, without seconds; dates and machines are those of benches.
+//! Writes docs/validation.md: the results that do not change from day to day, without seconds; dates and
+//! machines are those of benches.
 
 use harness::report::Kind;
 
 use super::Page;
-use crate::outcome::Outcome;
+use crate::outcome::CaseOutcome;
 use crate::summary;
-use crate::table::Table;
+use crate::table::TextTable;
 
-/// Sums, thesis map, links between scales, cases, fronts, cross-checks.
-pub fn text(page: &Page, outcomes: &[Outcome]) -> String {
+/// Formats totals, thesis map, links between scales, cases, fronts, cross-checks.
+pub fn text(page: &Page, outcomes: &[CaseOutcome]) -> String {
     let mut text = format!(
-        "# Validation\n\nWritten by `cargo xtask validate`: {}.\nThe same with pictures, every number and its source is \
+        "# Validation\n\nWritten by `cargo xtask validate`: {}.\nThe same with pictures, every number and \
+         its source is \
          `target/validation/report.html`.\n",
         page.sums
     );
-    let failed: Vec<&Outcome> = outcomes.iter().filter(|outcome| !outcome.passed()).collect();
+    let failed: Vec<&CaseOutcome> = outcomes.iter().filter(|outcome| !outcome.passed()).collect();
     for outcome in failed {
         let complaint = outcome.complaint(|path| path.display().to_string());
         text += &format!("\n**{} failed**:\n\n```text\n{complaint}\n```\n", outcome.case);
     }
     text += "\n## Kinds of evidence\n\n";
-    let mut table = Table::new(["kind", "expectations", "what it is"]);
+    let mut table = TextTable::new(["kind", "expectations", "meaning"]);
     for (kind, count) in summary::kinds(outcomes) {
         table.push([kind.to_string(), count.to_string(), meaning(kind).to_owned()]);
     }
     text += &table.markdown();
     text += "\n## Thesis map\n\n";
-    let mut table = Table::new(["thesis", "what", "numbers", "verdict"]);
+    let mut table = TextTable::new(["thesis", "what", "numbers", "verdict"]);
     page.thesis.iter().for_each(|judged| table.push(judged.cells()));
     text += &table.markdown();
     text += "\n## Across scales\n\n";
-    let mut table = Table::new(["link", "what", "numbers", "verdict"]);
+    let mut table = TextTable::new(["link", "what", "numbers", "verdict"]);
     page.links.iter().for_each(|judged| table.push(judged.cells()));
     text += &table.markdown();
     if !page.others.is_empty() {
-        text += "\n## Others' figures\n\nFigures of other authors beside ours (cases below `cases/external`).\n\n";
-        let mut table = Table::new(["case", "what", "source", "figure", "ours", "verdict"]);
+        text += "\n## Others' figures\n\nFigures of other authors beside ours (cases below \
+                 `cases/external`).\n\n";
+        let mut table = TextTable::new(["case", "what", "source", "figure", "ours", "verdict"]);
         page.others.iter().for_each(|other| table.push(other.cells()));
         text += &table.markdown();
     }
     text += "\n## Cases\n\n";
-    let mut table = Table::new(["case", "program", "expectations", "of them regressions", "not satisfied"]);
+    let mut table =
+        TextTable::new(["case", "program", "expectations", "of them regressions", "not satisfied"]);
     for outcome in outcomes {
         let missed = outcome.expect().iter().filter(|judgement| !judgement.pass).count();
         let ours = outcome.expect().iter().filter(|judgement| !judgement.expect.kind.is_evidence()).count();
@@ -48,13 +52,14 @@ pub fn text(page: &Page, outcomes: &[Outcome]) -> String {
         table.push([outcome.case.clone(), outcome.program.clone(), all, ours, missed]);
     }
     text += &table.markdown();
-    text += "\n## Error against run time\n\nMethods that no other measured method beats in both error and time.\n\n";
-    let mut table = Table::new(["what", "front", "default", "measured"]);
+    text += "\n## Error against run time\n\nMethods that no other measured method beats in both error and \
+             time.\n\n";
+    let mut table = TextTable::new(["what", "front", "default", "measured"]);
     let mut absent = Vec::new();
     for measured in &page.timing {
         match measured.cells() {
             Some(cells) => table.push(cells),
-            None => absent.push(measured.absent()),
+            None => absent.push(measured.missing_row()),
         }
     }
     if !table.is_empty() {
@@ -64,7 +69,7 @@ pub fn text(page: &Page, outcomes: &[Outcome]) -> String {
         text += &format!("\n{title}: not measured, run `{command}`.\n");
     }
     text += "\n## Cross-checks\n\n";
-    let mut table = Table::new(["engine", "largest difference", "expected", "verdict", "measured"]);
+    let mut table = TextTable::new(["engine", "largest difference", "expected", "verdict", "measured"]);
     page.cross.iter().for_each(|crossed| table.push(crossed.cells()));
     text + &table.markdown()
 }

@@ -1,16 +1,16 @@
-//! Figures that no one here wrote, and ours beside them: the cases below cases/external.
+//! Comparison with external figures: the cases below cases/external.
 
 use harness::report::Kind;
 use serde::Serialize;
 
-use crate::outcome::Outcome;
+use crate::outcome::CaseOutcome;
 
-/// The folder of cases/.
+/// Folder of cases/.
 const FOLDER: &str = "external/";
 
-/// A figure and ours.
+/// External figure and ours.
 #[derive(Serialize)]
-pub struct Other {
+pub struct ExternalFigure {
     case: String,
     anchor: String,
     title: String,
@@ -23,16 +23,17 @@ pub struct Other {
     tone: &'static str,
 }
 
-impl Other {
-    /// For docs/validation.md: case, what, source, figure with its tolerance, ours, verdict.
+impl ExternalFigure {
+    /// Cells of the row in docs/validation.md: case, quantity, source, figure with its tolerance, ours,
+    /// verdict.
     pub fn cells(&self) -> [String; 6] {
         [&self.case, &self.quantity, &self.source, &self.figure, &self.ours, self.verdict].map(str::to_owned)
     }
 }
 
-/// What closed forms, publications and other programs say, of all cases in the folder. A regression there holds our own
-/// distance from another's figure: that figure is missed.
-pub fn figures(outcomes: &[Outcome]) -> Vec<Other> {
+/// Comparisons of all cases in the folder with closed forms, publications and other programs. A regression
+/// among them keeps our own distance from a foreign figure, which is therefore missed.
+pub fn figures(outcomes: &[CaseOutcome]) -> Vec<ExternalFigure> {
     let of_others = |kind| {
         matches!(kind, Kind::ClosedForm | Kind::Published | Kind::IndependentProgram | Kind::Regression)
     };
@@ -47,7 +48,7 @@ pub fn figures(outcomes: &[Outcome]) -> Vec<Other> {
                 (true, None) if judgement.expect.kind.is_evidence() => ("met", "good"),
                 _ => ("missed", "bad"),
             };
-            Other {
+            ExternalFigure {
                 case: name.to_owned(),
                 anchor: super::anchor(&outcome.case),
                 title: outcome.title.clone(),
@@ -76,7 +77,7 @@ mod tests {
         for (outcome, case) in outcomes.iter_mut().zip(["external/a", "external/b", "ch2/c"]) {
             outcome.case = case.to_owned();
         }
-        let cells: Vec<[String; 6]> = figures(&outcomes).iter().map(Other::cells).collect();
+        let cells: Vec<[String; 6]> = figures(&outcomes).iter().map(ExternalFigure::cells).collect();
         assert_eq!(cells[0], ["a", "kt", "a | b", "3 ± 1 %", "3", "met"]);
         assert_eq!(cells[1], ["b", "kt", "a | b", "3 ± 1 %", "4", "missed"]);
         assert_eq!(cells.len(), 2);

@@ -1,15 +1,15 @@
-//! Pages of runs, for cases whose bodies are worth turning: those that tear, and those that are printed.
+//! Result pages of cases whose bodies are worth rotating: those that tear, and those that are printed.
 
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use harness::view;
 
-use crate::outcome::Outcome;
+use crate::outcome::CaseOutcome;
 
-/// Writes the page of a case that wrote fields of a fracture or a print, where its results are newer, and gives its path.
-/// None where there is nothing to turn.
-pub fn page(outcome: &Outcome) -> Option<PathBuf> {
+/// Writes the page of a case with fields of a fracture or a print, if its results are newer, and returns its
+/// path; `None` if there is no body.
+pub fn page(outcome: &CaseOutcome) -> Option<PathBuf> {
     let report = outcome.report.as_ref()?;
     let of_it =
         |key: &str| ["broken_bonds", "birth_energy"].iter().any(|name| key.split('[').next() == Some(name));
@@ -38,7 +38,7 @@ mod tests {
     #[test]
     fn only_what_tears_or_is_printed_has_a_page() {
         let folder = tempfile::tempdir().expect("a folder");
-        let mut outcome = Outcome::new("ch9/it");
+        let mut outcome = CaseOutcome::new("ch9/it");
         outcome.output = folder.path().join("ch9/it");
         std::fs::create_dir_all(&outcome.output).expect("a folder");
         let points: Vec<[f64; 3]> = (0..9).map(|k| [f64::from(k % 3), f64::from(k / 3), 0.0]).collect();

@@ -1,4 +1,4 @@
-//! Pictures of cases, made small enough to stand in one page.
+//! Pictures of cases, reduced so that all fit in one page.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -9,41 +9,41 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 
-use crate::outcome::Outcome;
+use crate::outcome::CaseOutcome;
 
-/// Pixels across of the widest picture; pages are about 900 wide, and pictures of finer screens gain little.
+/// Width of the widest picture, pixels; pages are about 900 wide, and finer pictures gain little.
 const WIDTH: u32 = 1100;
 
-/// A picture with what leads to it.
+/// Picture with its links.
 #[derive(Clone, Serialize)]
-pub struct Picture {
+pub struct ReportPicture {
     /// `data:image/png;base64,…`.
     pub data: String,
-    /// The file's name in words.
+    /// Name of the file in words.
     pub caption: String,
     /// `ch2/dent`.
     pub case: String,
     /// Link to the case file.
     pub href: String,
-    /// The case file, from the root.
+    /// Case file, relative to the root.
     pub file: String,
-    /// What makes it.
+    /// Command that draws it.
     pub command: String,
 }
 
-/// Reads pictures, each of them into one place of the page only.
+/// Reader of pictures; each appears in one place of the page only.
 #[derive(Default)]
 pub struct Gallery {
     shown: BTreeSet<PathBuf>,
 }
 
 impl Gallery {
-    /// The picture `name` among an outcome's results; none where there is no such file.
-    pub fn picture(&mut self, outcome: &Outcome, name: &str) -> Option<Picture> {
+    /// Returns the picture `name` among an outcome's results; `None` if there is no such file.
+    pub fn picture(&mut self, outcome: &CaseOutcome, name: &str) -> Option<ReportPicture> {
         let path = outcome.output.join(name);
         let data = embed(&path)?;
         self.shown.insert(path);
-        Some(Picture {
+        Some(ReportPicture {
             data,
             caption: words(name),
             case: outcome.case.clone(),
@@ -53,15 +53,15 @@ impl Gallery {
         })
     }
 
-    /// Up to `most` pictures among an outcome's results that stand nowhere yet.
-    pub fn rest(&mut self, outcome: &Outcome, most: usize) -> Vec<Picture> {
+    /// Returns up to `most` pictures among an outcome's results that are not shown yet.
+    pub fn rest(&mut self, outcome: &CaseOutcome, most: usize) -> Vec<ReportPicture> {
         let mut names = names(&outcome.output);
         names.retain(|name| !self.shown.contains(&outcome.output.join(name)));
         names.iter().take(most).filter_map(|name| self.picture(outcome, name)).collect()
     }
 }
 
-/// PNG files of a folder, in alphabetical order.
+/// Lists the PNG files of a folder, in alphabetical order.
 pub fn names(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut names: Vec<String> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
@@ -70,13 +70,13 @@ pub fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// stages_dx-2mm_m-3.015_r-20mm.png → stages dx=2mm m=3.015 r=20mm.
+/// Converts a file name to words: stages_dx-2mm_m-3.015_r-20mm.png → stages dx=2mm m=3.015 r=20mm.
 fn words(name: &str) -> String {
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     stem.replace('_', " ")
 }
 
-/// A file as a data URI, PNG files scaled down to [`WIDTH`].
+/// Encodes a file as a data URI; PNG files are scaled down to [`WIDTH`].
 pub fn embed(path: &Path) -> Option<String> {
     let bytes = fs::read(path).ok()?;
     if path.extension().is_some_and(|extension| extension == "svg") {
@@ -86,7 +86,7 @@ pub fn embed(path: &Path) -> Option<String> {
     Some(format!("data:image/png;base64,{}", STANDARD.encode(bytes)))
 }
 
-/// The picture scaled down and with a palette's worth of compression; none where the file does as it is.
+/// Scales a picture down and compresses it with a palette; `None` if the file is small enough.
 fn smaller(path: &Path) -> Option<Vec<u8>> {
     let mut decoder = png::Decoder::new(BufReader::new(File::open(path).ok()?));
     decoder.set_transformations(png::Transformations::normalize_to_color8());
@@ -109,7 +109,8 @@ fn smaller(path: &Path) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// Each pixel of `target` is the mean of the pixels of `source` that it covers, partly covered ones in proportion.
+/// Averages pixels: each pixel of `target` is the mean of the pixels of `source` that it covers, weighted by
+/// their covered part.
 fn average(pixels: &[u8], source: (usize, usize), target: (usize, usize), channels: usize) -> Vec<u8> {
     let columns = spans(source.0, target.0);
     let rows = spans(source.1, target.1);
@@ -132,7 +133,7 @@ fn average(pixels: &[u8], source: (usize, usize), target: (usize, usize), channe
     scaled
 }
 
-/// Which of `from` pixels, and how much of each, every one of `to` covers.
+/// Computes which of `from` pixels, and how much of each, every one of `to` pixels covers.
 fn spans(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
     let ratio = from as f64 / to as f64;
     let span = |k: usize| {

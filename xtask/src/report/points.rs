@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use harness::report::Value;
 
 use crate::bench::Row;
-use crate::outcome::Outcome;
+use crate::outcome::CaseOutcome;
 
-/// Rows of errors with the rows of times of the same point, of the largest size that has both: name, time, error.
+/// Pairs rows of errors with the rows of times of the same point, for the largest size that has both: name,
+/// time, error.
 pub fn pairs(rows: &[Row], error: &str, time: &str) -> Vec<(String, f64, f64)> {
     let key = |row: &Row, marker: &str| {
         let at = row.what.find(marker)?;
@@ -21,7 +22,7 @@ pub fn pairs(rows: &[Row], error: &str, time: &str) -> Vec<(String, f64, f64)> {
     for row in rows {
         let Some(name) = key(row, error) else { continue };
         let same = |other: &&Row| key(other, time).as_ref() == Some(&name);
-        // where a size is that of the problem, partners have the same
+        // if a size is that of the problem, both rows have the same
         let partner = rows.iter().filter(same).find(|other| other.size == row.size);
         let partner = partner.or_else(|| rows.iter().find(same));
         if let (Some(error), Some(time)) = (row.value, partner.and_then(|row| row.value)) {
@@ -38,8 +39,8 @@ pub fn pairs(rows: &[Row], error: &str, time: &str) -> Vec<(String, f64, f64)> {
     points.into_iter().map(|(_, name, time, error)| (name, time, error)).collect()
 }
 
-/// Rows `NAME,…` with numbers in two columns.
-pub fn of_table(text: &str, error: usize, time: usize, scale: f64) -> Vec<(String, f64, f64)> {
+/// Reads rows `NAME,…` with numbers in two columns.
+pub fn read_table_points(text: &str, error: usize, time: usize, scale: f64) -> Vec<(String, f64, f64)> {
     let point = |line: &str| {
         let cells: Vec<&str> = line.split(',').collect();
         let number = |k: usize| cells.get(k)?.trim().parse::<f64>().ok();
@@ -48,8 +49,8 @@ pub fn of_table(text: &str, error: usize, time: usize, scale: f64) -> Vec<(Strin
     text.lines().skip(1).filter_map(point).collect()
 }
 
-/// Every point of every curve whose name begins so.
-pub fn of_curves(outcome: &Outcome, prefix: &str) -> Vec<(String, f64, f64)> {
+/// Reads every point of every curve whose name begins with `prefix`.
+pub fn read_curve_points(outcome: &CaseOutcome, prefix: &str) -> Vec<(String, f64, f64)> {
     let values = outcome.report.iter().flat_map(|report| &report.values);
     let mut points = Vec::new();
     for (name, value) in values {
@@ -92,9 +93,9 @@ mod tests {
     fn rows_of_a_table() {
         let text = "law,error,training [s],one stress [s]\nenergy,2.5,30,1e-6\nANN-4,3,nothing,2e-6\n";
         assert_eq!(
-            of_table(text, 1, 3, 1e6),
+            read_table_points(text, 1, 3, 1e6),
             [("energy".to_owned(), 1.0, 2.5), ("ANN-4".to_owned(), 2.0, 3.0)]
         );
-        assert_eq!(of_table(text, 1, 2, 1.0), [("energy".to_owned(), 30.0, 2.5)]);
+        assert_eq!(read_table_points(text, 1, 2, 1.0), [("energy".to_owned(), 30.0, 2.5)]);
     }
 }

@@ -7,14 +7,14 @@ use std::path::Path;
 use harness::report::Judgement;
 use serde::{Deserialize, Serialize};
 
-use crate::outcome::Outcome;
+use crate::outcome::CaseOutcome;
 
-/// Words in the names of cases whose every run is such a thing, though their scenes have no `description`.
+/// Words in the names of cases that consist of such runs, though their scenes have no `description`.
 const WORDS: [&str; 2] = ["stability", "extremes"];
 
-/// A run.
+/// Result of a run.
 #[derive(Serialize)]
-pub struct Trial {
+pub struct StabilityTrial {
     case: String,
     what: String,
     description: String,
@@ -23,13 +23,13 @@ pub struct Trial {
     passed: bool,
 }
 
-/// The trials that reports list; of cases without a list, a trial for each group of expectations.
-pub fn trials(outcomes: &[Outcome]) -> Vec<Trial> {
+/// Collects the trials of reports; for cases without trials, one for each group of expectations.
+pub fn trials(outcomes: &[CaseOutcome]) -> Vec<StabilityTrial> {
     let mut trials = Vec::new();
     for outcome in outcomes {
         let Some(report) = &outcome.report else { continue };
         let case = outcome.case.clone();
-        trials.extend(report.trials.iter().map(|trial| Trial {
+        trials.extend(report.trials.iter().map(|trial| StabilityTrial {
             case: case.clone(),
             what: trial.what.clone(),
             description: trial.description.clone(),
@@ -38,7 +38,7 @@ pub fn trials(outcomes: &[Outcome]) -> Vec<Trial> {
             passed: trial.passed,
         }));
         let name = case.rsplit('/').next().unwrap_or(&case);
-        let listed = of_suite(&case, &outcome.output);
+        let listed = suite_trials(&case, &outcome.output);
         if !listed.is_empty() {
             trials.extend(listed);
         } else if report.trials.is_empty() && WORDS.iter().any(|word| name.contains(word)) {
@@ -49,9 +49,9 @@ pub fn trials(outcomes: &[Outcome]) -> Vec<Trial> {
     trials
 }
 
-/// A row of suite.json, which some programs write beside their report.
+/// Row of suite.json, which some programs write beside their report.
 #[derive(Deserialize)]
-struct Row {
+struct StabilityRow {
     case: String,
     description: String,
     observed: String,
@@ -59,10 +59,10 @@ struct Row {
     steps: Option<u64>,
 }
 
-fn of_suite(case: &str, output: &Path) -> Vec<Trial> {
+fn suite_trials(case: &str, output: &Path) -> Vec<StabilityTrial> {
     let text = fs::read_to_string(output.join("suite.json")).unwrap_or_default();
-    let rows: Vec<Row> = serde_json::from_str(&text).unwrap_or_default();
-    let trial = |row: Row| Trial {
+    let rows: Vec<StabilityRow> = serde_json::from_str(&text).unwrap_or_default();
+    let trial = |row: StabilityRow| StabilityTrial {
         case: case.to_owned(),
         what: row.case,
         description: row.description,
@@ -73,7 +73,7 @@ fn of_suite(case: &str, output: &Path) -> Vec<Trial> {
     rows.into_iter().map(trial).collect()
 }
 
-/// `run.quantity` and `quantity[run]` by their runs.
+/// Groups `run.quantity` and `quantity[run]` by their runs.
 fn groups(expect: &[Judgement]) -> BTreeMap<&str, Vec<&Judgement>> {
     let mut groups = BTreeMap::<&str, Vec<&Judgement>>::new();
     for judgement in expect {
@@ -82,7 +82,7 @@ fn groups(expect: &[Judgement]) -> BTreeMap<&str, Vec<&Judgement>> {
     groups
 }
 
-/// The run and what of it.
+/// Splits a quantity into the run and its own name.
 fn parts(quantity: &str) -> (&str, &str) {
     match quantity.split_once('[').and_then(|(name, rest)| Some((rest.strip_suffix(']')?, name))) {
         Some(parts) => parts,
@@ -90,7 +90,7 @@ fn parts(quantity: &str) -> (&str, &str) {
     }
 }
 
-fn trial(case: &str, what: &str, judged: &[&Judgement]) -> Trial {
+fn trial(case: &str, what: &str, judged: &[&Judgement]) -> StabilityTrial {
     let (mut description, mut observed) = (Vec::new(), Vec::new());
     for judgement in judged {
         let [_, quantity, value, asked, _] = judgement.row();
@@ -98,7 +98,7 @@ fn trial(case: &str, what: &str, judged: &[&Judgement]) -> Trial {
         description.push(format!("{name} {asked}"));
         observed.push(format!("{name} {value}"));
     }
-    Trial {
+    StabilityTrial {
         case: case.to_owned(),
         what: what.to_owned(),
         description: description.join(", "),
@@ -115,10 +115,11 @@ mod tests {
     #[test]
     fn rows_of_a_suite() {
         let folder = tempfile::tempdir().expect("a folder");
-        assert!(of_suite("ch4/x", folder.path()).is_empty());
-        let rows = r#"[{"case": "a", "description": "end", "observed": "ended", "pass": true, "steps": 7, "seconds": 0.1}]"#;
+        assert!(suite_trials("ch4/x", folder.path()).is_empty());
+        let rows = r#"[{"case": "a", "description": "end", "observed": "ended", "pass": true,
+            "steps": 7, "seconds": 0.1}]"#;
         fs::write(folder.path().join("suite.json"), rows).expect("a suite");
-        let trials = of_suite("ch4/x", folder.path());
+        let trials = suite_trials("ch4/x", folder.path());
         assert_eq!(
             (trials[0].what.as_str(), trials[0].iterations.as_str(), trials[0].passed),
             ("a", "7", true)

@@ -1,4 +1,4 @@
-//! The thesis map: every numbered figure and table that holds a result, and what became of it here (cases/thesis.toml).
+//! Thesis map: every numbered figure and table with a result, and our result (cases/thesis.toml).
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -6,11 +6,11 @@ use std::fs;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use serde::{Deserialize, Serialize};
 
-use super::evidence::{Finding, Found, Measured, Number, check, verdict};
-use super::pictures::{Gallery, Picture};
-use crate::workspace::Workspace;
+use super::evidence::{CaseNumber, MeasuredNumbers, NumberRow, TestNumber, check, verdict};
+use super::pictures::{Gallery, ReportPicture};
+use crate::workspace::Repository;
 
-/// What must have a row (issue 6): figures and tables with a result, and the appendices.
+/// Items that must have a row (issue 6): figures and tables with a result, and the appendices.
 pub const NUMBERED: &[&str] = &[
     "Fig. 2.6",
     "Fig. 2.7",
@@ -47,113 +47,113 @@ pub const NUMBERED: &[&str] = &[
     "Appendix B",
 ];
 
-/// The file.
+/// Content of cases/thesis.toml.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Map {
-    /// In the order of the thesis.
-    pub row: Vec<Row>,
-    /// What one program hands to another.
+pub struct ThesisMap {
+    /// Rows in the order of the thesis.
+    pub row: Vec<ThesisRow>,
+    /// Transfers from one program to another.
     #[serde(default)]
-    pub link: Vec<Row>,
+    pub link: Vec<ThesisRow>,
     /// Numbers that prove the rows of docs/errata.md.
     pub erratum: Vec<super::errata::Proof>,
 }
 
-/// A figure or table, or a link between scales.
+/// Figure or table, or a link between scales.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Row {
+pub struct ThesisRow {
     /// `Fig. 2.7`, `Print to stress`.
     pub number: String,
-    /// What it is.
+    /// Title of the row.
     pub title: String,
-    /// What the thesis shows, or a link does.
+    /// Result shown by the thesis, or transferred by a link.
     pub shows: String,
-    /// What we get.
+    /// Our result.
     pub ours: String,
-    /// Claimed; holds only if its numbers do.
+    /// Claimed verdict; valid only if its numbers are met.
     pub verdict: Verdict,
-    /// The difference, or why it cannot be reproduced.
+    /// Difference, or the reason for which it cannot be reproduced.
     pub because: Option<String>,
-    /// The case, `ch2/dent`.
+    /// Case: `ch2/dent`.
     pub case: Option<String>,
     /// Quantities that the case expects.
     #[serde(default)]
-    pub numbers: Vec<Number>,
+    pub numbers: Vec<CaseNumber>,
     /// Numbers that tests measure.
     #[serde(default)]
-    pub tests: Vec<Measured>,
+    pub tests: Vec<TestNumber>,
     /// Pictures among the case's results; of each group the first that exists is shown.
     #[serde(default)]
     pub pictures: Vec<Vec<String>>,
 }
 
-/// What is claimed of a row.
+/// Claim of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// As the thesis shows it.
+    /// Agrees with the thesis.
     Reproduced,
-    /// Of a link: held against something that is not ours.
+    /// Verified against an external result (for a link).
     Verified,
-    /// With a difference that `because` states.
+    /// Differs, for the reason in `because`.
     Differs,
-    /// The text does not say enough; `because` says what is missing.
+    /// Not reproducible from the text of the thesis; `because` says what is missing.
     NotFromTheText,
     /// Not done yet; `because` says what is missing.
     Open,
 }
 
-/// A row with what was found.
+/// Row with its results.
 #[derive(Serialize)]
-pub struct Judged {
+pub struct RowVerdict {
     number: String,
     title: String,
     shows: String,
     ours: String,
     because: Option<String>,
-    /// For a reader: `reproduced`.
+    /// Text for readers: `reproduced`.
     verdict: &'static str,
-    /// For the page: `good`, `fair`, `bad`, `open`.
+    /// Class on the page: `good`, `fair`, `bad`, `open`.
     tone: &'static str,
-    findings: Vec<Finding>,
+    findings: Vec<NumberRow>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pictures: Vec<Picture>,
+    pictures: Vec<ReportPicture>,
     case: Option<String>,
     anchor: String,
 }
 
-impl Judged {
-    /// For the table in docs/validation.md.
+impl RowVerdict {
+    /// Cells of the row in docs/validation.md.
     pub fn cells(&self) -> [String; 4] {
         let numbers: Vec<String> = self.findings.iter().map(|f| format!("{}: {}", f.what, f.value)).collect();
         let because = self.because.as_ref().map(|text| format!(": {text}")).unwrap_or_default();
         [self.number.clone(), self.title.clone(), numbers.join("; "), format!("{}{because}", self.verdict)]
     }
 
-    /// For a reader: `reproduced`.
+    /// Text for readers: `reproduced`.
     pub fn verdict(&self) -> &'static str {
         self.verdict
     }
 
-    /// Pictures are for the page only.
+    /// Removes the pictures, which are for the page only.
     pub fn without_pictures(mut self) -> Self {
         self.pictures.clear();
         self
     }
 }
 
-impl Map {
+impl ThesisMap {
     /// Reads cases/thesis.toml.
-    pub fn read(workspace: &Workspace) -> Result<Self> {
+    pub fn read(workspace: &Repository) -> Result<Self> {
         let path = workspace.root().join("cases/thesis.toml");
         let text = fs::read_to_string(&path).into_diagnostic().wrap_err("cases/thesis.toml")?;
         toml::from_str(&text).map_err(|error| miette!("cases/thesis.toml: {error}"))
     }
 
-    /// Every row is there once and rests on something that exists; the list of what is wrong.
-    pub fn faults(&self, workspace: &Workspace) -> Vec<String> {
+    /// Checks that every row appears once and refers to something that exists; returns the defects.
+    pub fn faults(&self, workspace: &Repository) -> Vec<String> {
         let mut faults = Vec::new();
         let mut seen = BTreeSet::new();
         for row in self.row.iter().chain(&self.link) {
@@ -181,14 +181,14 @@ impl Map {
         faults
     }
 
-    /// Looks everything up: figures and tables, and links.
-    pub fn judge(&self, found: &Found, gallery: &mut Gallery) -> [Vec<Judged>; 2] {
+    /// Evaluates all rows: figures and tables, and links.
+    pub fn judge(&self, found: &MeasuredNumbers, gallery: &mut Gallery) -> [Vec<RowVerdict>; 2] {
         [&self.row, &self.link].map(|rows| rows.iter().map(|row| row.judge(found, gallery)).collect())
     }
 }
 
-impl Row {
-    fn judge(&self, found: &Found, gallery: &mut Gallery) -> Judged {
+impl ThesisRow {
+    fn judge(&self, found: &MeasuredNumbers, gallery: &mut Gallery) -> RowVerdict {
         let findings = found.findings(self.case.as_deref(), &self.numbers, &self.tests);
         let (verdict, tone) = match (self.verdict, verdict(&findings)) {
             (_, Some(failed @ ("failed", _))) => failed,
@@ -204,7 +204,7 @@ impl Row {
             let outcome = outcome?;
             group.iter().find_map(|name| gallery.picture(outcome, name))
         };
-        Judged {
+        RowVerdict {
             pictures: self.pictures.iter().filter_map(shown).collect(),
             number: self.number.clone(),
             title: self.title.clone(),
@@ -224,14 +224,15 @@ impl Row {
 mod tests {
     use super::*;
 
-    fn workspace() -> Workspace {
-        Workspace::new(std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."))
+    fn workspace() -> Repository {
+        Repository::new(std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."))
     }
 
-    /// Every figure and table has a row, and every row a quantity that a case expects or a test that says so.
+    /// Every figure and table has a row, and every row a quantity that a case expects or a test that measures
+    /// it.
     #[test]
     fn the_map_is_whole() {
-        let map = Map::read(&workspace()).expect("cases/thesis.toml");
+        let map = ThesisMap::read(&workspace()).expect("cases/thesis.toml");
         let faults = map.faults(&workspace());
         assert!(faults.is_empty(), "{}", faults.join("\n"));
         let errata = super::super::errata::Erratum::read(&workspace()).expect("docs/errata.md");
@@ -244,7 +245,7 @@ mod tests {
     fn faults_are_found() {
         let row = |text: &str| {
             let head = "erratum = []\n[[row]]\nnumber = 'Fig. 2.7'\ntitle = 't'\nshows = 's'\nours = 'o'\n";
-            let map: Map = toml::from_str(&format!("{head}{text}")).expect("a map");
+            let map: ThesisMap = toml::from_str(&format!("{head}{text}")).expect("a map");
             map.faults(&workspace())
                 .into_iter()
                 .filter(|fault| fault.starts_with("Fig. 2.7:"))
@@ -258,11 +259,11 @@ mod tests {
         assert_eq!(row(test), ["Fig. 2.7: no test in crates/ measures \"no such\""]);
     }
 
-    /// A row that rests on our own earlier figures only is refused.
+    /// A row that relies on our own earlier figures alone is refused.
     #[test]
     fn regressions_are_no_evidence() {
         let root = tempfile::tempdir().expect("a folder");
-        let workspace = Workspace::new(root.path().to_path_buf());
+        let workspace = Repository::new(root.path().to_path_buf());
         fs::create_dir_all(root.path().join("cases/c")).expect("a folder");
         let faults = |kinds: &[&str]| {
             let expect = |kind: &&str| {
@@ -270,7 +271,7 @@ mod tests {
             };
             let text: String = kinds.iter().map(expect).collect();
             fs::write(root.path().join("cases/c/case.toml"), text).expect("a case");
-            let number: Number = toml::from_str("quantity = 'q'\nwhat = 'w'").expect("a number");
+            let number: CaseNumber = toml::from_str("quantity = 'q'\nwhat = 'w'").expect("a number");
             let mut faults = Vec::new();
             check(&workspace, Some("c"), &[number], &[], &mut |text| faults.push(text));
             faults

@@ -1,4 +1,4 @@
-//! Error against run time, from what `cargo xtask bench` has measured and from cases that time themselves.
+//! Error against run time, from measurements of `cargo xtask bench` and from cases that time themselves.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -9,22 +9,24 @@ use miette::{IntoDiagnostic, Result, WrapErr};
 use serde::{Deserialize, Serialize};
 
 use super::pictures;
-use super::points::{of_curves, of_table, pairs};
+use super::points::{pairs, read_curve_points, read_table_points};
 use crate::bench;
-use crate::outcome::Outcome;
-use crate::stamp::Stamp;
-use crate::workspace::Workspace;
+use crate::outcome::CaseOutcome;
+use crate::stamp::SourceStamp;
+use crate::workspace::Repository;
 
-/// The alternatives, cases/timing.toml.
+/// File of the alternatives: cases/timing.toml.
 const FILE: &str = "cases/timing.toml";
 
-/// Where the points of a subject are.
+/// Source of the points of a subject.
 #[derive(Deserialize)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
-enum Source {
-    /// Rows of target/bench/NAME.json: what distinguishes those of errors and those of times, the rest being a point.
+enum PointSource {
+    /// Rows of target/bench/NAME.json: words that distinguish rows of errors and of times; the rest of a name
+    /// is the point.
     Bench { name: String, error: String, time: String },
-    /// A table among a case's results: a method a row, its name in the first column; these columns, the times multiplied.
+    /// Table among a case's results: one method per row, its name in the first column; columns of error and
+    /// time, and a factor of the times.
     Table { case: String, file: String, error: usize, time: usize, scale: f64 },
     /// Curves of a case's report: columns `seconds` and, last, errors.
     Case { name: String, curves: String },
@@ -35,71 +37,72 @@ struct Subjects {
     subject: Vec<Subject>,
 }
 
-/// Alternatives for one thing.
+/// Alternatives for one task.
 #[derive(Deserialize)]
 struct Subject {
     title: String,
     #[serde(flatten)]
-    source: Source,
-    /// What separates the name of a method from its setting in a point's name.
+    source: PointSource,
+    /// Separator of method and setting in a point's name.
     #[serde(default = "line_break")]
     split: String,
-    /// The method that is taken where a scene names none.
+    /// Method by default.
     default: String,
     axes: [String; 2],
-    /// What measures it.
+    /// Command that measures it.
     command: String,
     #[serde(default)]
     note: String,
 }
 
-/// Splits no name.
+/// Separator that occurs in no name.
 fn line_break() -> String {
     "\n".to_owned()
 }
 
-/// A subject as measured.
+/// Measured subject.
 #[derive(Serialize)]
-pub struct Measured {
+pub struct TimingSubject {
     title: String,
     axes: [String; 2],
     default: String,
     command: String,
     note: String,
-    points: Vec<Point>,
-    /// Whether a point of the default is on the front.
+    points: Vec<TimingPoint>,
+    /// True if a point of the default is on the front.
     default_on_front: bool,
-    /// When, where and from what a bench measured it; none of what this run's cases measured.
+    /// Provenance of a bench's measurement; `None` for measurements of this run's cases.
     #[serde(skip_serializing_if = "Option::is_none")]
     measured: Option<String>,
-    /// The sources that the bench measured have changed.
+    /// True if the sources that the bench measured have changed.
     stale: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     picture: Option<String>,
 }
 
-/// A method with one setting.
+/// Method with one setting.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Point {
+pub struct TimingPoint {
     method: String,
     name: String,
     time: f64,
     error: f64,
-    /// Nothing measured is both faster and more exact.
+    /// True if no measured point is both faster and more accurate.
     front: bool,
     default: bool,
-    /// For a reader.
+    /// Values formatted for readers.
     shown: [String; 2],
 }
 
-impl Measured {
-    /// Pictures are for the page only.
+impl TimingSubject {
+    /// Removes the picture, which is for the page only.
     pub fn without_picture(mut self) -> Self {
         self.picture = None;
         self
     }
 
-    /// The subject, the methods on its front, where the default is, and by what it was measured; for docs/validation.md.
+    /// Cells for docs/validation.md: the subject, the methods on its front, the place of the default, and the
+    /// measurement.
     pub fn cells(&self) -> Option<[String; 4]> {
         let mut front: Vec<&str> =
             self.points.iter().filter(|p| p.front).map(|p| p.method.as_str()).collect();
@@ -117,14 +120,18 @@ impl Measured {
         (!self.points.is_empty()).then_some(cells)
     }
 
-    /// What was not measured, and by what it is.
-    pub fn absent(&self) -> [&str; 2] {
+    /// Names what was not measured, and the command that measures it.
+    pub fn missing_row(&self) -> [&str; 2] {
         [&self.title, &self.command]
     }
 }
 
-/// Everything that was measured, and by what command the rest is; pictures go to `folder`.
-pub fn measured(workspace: &Workspace, folder: &Path, outcomes: &[Outcome]) -> Result<Vec<Measured>> {
+/// Collects all measurements, and the commands for missing ones; writes pictures to `folder`.
+pub fn measured(
+    workspace: &Repository,
+    folder: &Path,
+    outcomes: &[CaseOutcome],
+) -> Result<Vec<TimingSubject>> {
     let path = workspace.root().join(FILE);
     let text = fs::read_to_string(&path).into_diagnostic().wrap_err(FILE)?;
     let subjects: Subjects = toml::from_str(&text).into_diagnostic().wrap_err(FILE)?;
@@ -132,39 +139,44 @@ pub fn measured(workspace: &Workspace, folder: &Path, outcomes: &[Outcome]) -> R
 }
 
 impl Subject {
-    fn measured(self, workspace: &Workspace, folder: &Path, outcomes: &[Outcome]) -> Result<Measured> {
-        let mut stamp: Option<Stamp> = None;
+    fn measured(
+        self,
+        workspace: &Repository,
+        folder: &Path,
+        outcomes: &[CaseOutcome],
+    ) -> Result<TimingSubject> {
+        let mut stamp: Option<SourceStamp> = None;
         let points = match &self.source {
-            Source::Bench { name, error, time } => {
+            PointSource::Bench { name, error, time } => {
                 let bench = bench::read(workspace, name);
                 stamp = bench.as_ref().map(|bench| bench.stamp.clone());
                 pairs(bench.as_ref().map_or(&[], |bench| &bench.rows), error, time)
             }
-            Source::Table { case, file, error, time, scale } => {
+            PointSource::Table { case, file, error, time, scale } => {
                 let outcome = outcomes.iter().find(|outcome| outcome.case == *case);
                 let path = outcome.map(|outcome| outcome.output.join(file));
                 let text = path.and_then(|path| fs::read_to_string(path).ok()).unwrap_or_default();
-                of_table(&text, *error, *time, *scale)
+                read_table_points(&text, *error, *time, *scale)
             }
-            Source::Case { name, curves } => outcomes
+            PointSource::Case { name, curves } => outcomes
                 .iter()
                 .find(|outcome| outcome.case == *name)
-                .map_or_else(Vec::new, |outcome| of_curves(outcome, curves)),
+                .map_or_else(Vec::new, |outcome| read_curve_points(outcome, curves)),
         };
-        let mut points: Vec<Point> = points
+        let mut points: Vec<TimingPoint> = points
             .into_iter()
             .filter(|(_, time, error)| time.is_finite() && error.is_finite() && *time > 0.0)
             .map(|(name, time, error)| {
                 let method = name.split(&self.split).next().unwrap_or(&name).to_owned();
                 let default = method == self.default;
                 let shown = [time, error].map(|number| format!("{number:.2e}"));
-                Point { method, name, time, error, front: false, default, shown }
+                TimingPoint { method, name, time, error, front: false, default, shown }
             })
             .collect();
         front(&mut points);
         let picture = if points.is_empty() { None } else { Some(self.draw(&points, folder)?) };
         let default_on_front = points.iter().any(|point| point.front && point.default);
-        Ok(Measured {
+        Ok(TimingSubject {
             title: self.title,
             axes: self.axes,
             default: self.default,
@@ -173,17 +185,17 @@ impl Subject {
             points,
             default_on_front,
             stale: stamp.as_ref().is_some_and(|stamp| !stamp.fresh(workspace.root())),
-            measured: stamp.as_ref().map(Stamp::to_string),
+            measured: stamp.as_ref().map(SourceStamp::to_string),
             picture,
         })
     }
 
-    fn draw(&self, points: &[Point], folder: &Path) -> Result<String> {
+    fn draw(&self, points: &[TimingPoint], folder: &Path) -> Result<String> {
         // an error of 0 has no place on a logarithmic axis
-        let y = |point: &Point| point.error.max(1e-17);
+        let y = |point: &TimingPoint| point.error.max(1e-17);
         let mut plot =
             LinePlot::new(&self.title).axes(&self.axes[0], &self.axes[1]).log_x().log_y().size(900.0, 520.0);
-        let mut methods: BTreeMap<&str, Vec<&Point>> = BTreeMap::new();
+        let mut methods: BTreeMap<&str, Vec<&TimingPoint>> = BTreeMap::new();
         for point in points {
             methods.entry(&point.method).or_default().push(point);
         }
@@ -194,7 +206,7 @@ impl Subject {
             let name = if method == self.default { format!("{method} (default)") } else { method.to_owned() };
             plot = plot.series(Series::markers(&name, &xs, &ys));
         }
-        let mut on: Vec<&Point> = points.iter().filter(|point| point.front).collect();
+        let mut on: Vec<&TimingPoint> = points.iter().filter(|point| point.front).collect();
         on.sort_by(|a, b| a.time.total_cmp(&b.time));
         let xs: Vec<f64> = on.iter().map(|point| point.time).collect();
         let ys: Vec<f64> = on.iter().map(|point| y(point)).collect();
@@ -206,8 +218,8 @@ impl Subject {
     }
 }
 
-/// Marks what nothing measured beats in both.
-fn front(points: &mut [Point]) {
+/// Marks the points that no other point beats in both.
+fn front(points: &mut [TimingPoint]) {
     let all: Vec<(f64, f64)> = points.iter().map(|point| (point.time, point.error)).collect();
     for point in points {
         let beaten = |&(time, error): &(f64, f64)| {
@@ -223,7 +235,7 @@ mod tests {
 
     #[test]
     fn the_front_is_what_nothing_beats() {
-        let point = |time, error| Point {
+        let point = |time, error| TimingPoint {
             method: String::new(),
             name: String::new(),
             time,

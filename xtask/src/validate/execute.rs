@@ -1,4 +1,4 @@
-//! One case, run by the released command line. Whatever goes wrong is the outcome of this case and of no other.
+//! Runs one case with the released command line. An error is the outcome of this case and of no other.
 
 use std::fs::{self, File};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -12,14 +12,14 @@ use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use polycore::file::atomic_write;
 use serde::{Deserialize, Serialize};
 
-use super::Case;
-use crate::outcome::Outcome;
+use super::CaseFile;
+use crate::outcome::CaseOutcome;
 
-/// How cases are run.
+/// Settings for running cases.
 pub struct Settings {
-    /// Where results go.
+    /// Folder of the results.
     pub folder: PathBuf,
-    /// Leave out what the cases mark `quick = false`.
+    /// Leave out parts marked `quick = false`.
     pub quick: bool,
     /// Keep the results of cases that have not changed.
     pub resume: bool,
@@ -28,34 +28,35 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Where the results of an input of a case are: as far from those of the case as the scenes are apart.
-    fn results(&self, case: &Case, input: &Path) -> PathBuf {
+    /// Folder of the results of a case's input: in the same relation to the results of the case as the
+    /// scenes.
+    fn results(&self, case: &CaseFile, input: &Path) -> PathBuf {
         self.folder.join(case.name_of(input))
     }
 }
 
-/// What a case was run from, beside its results: FOLDER.run.json.
+/// Provenance of a case's results, stored beside them: FOLDER.run.json.
 #[derive(Serialize, Deserialize)]
-struct RunStamp {
-    /// Of the case's folder, the executable and the tier.
+struct CaseStamp {
+    /// Hash of the case's folder, the executable and the tier.
     fingerprint: String,
-    /// How long it took and how it failed; absent while it runs.
-    ended: Option<Ended>,
+    /// Duration and failure; `None` while the case runs.
+    ended: Option<RunEnd>,
 }
 
 #[derive(Clone, Serialize, Deserialize)]
-struct Ended {
+struct RunEnd {
     seconds: f64,
     failure: Option<String>,
 }
 
-/// Never an error: whatever goes wrong is the outcome of this case.
+/// Runs the case. Never fails: an error is the outcome of this case.
 pub fn run_case(
     settings: &Settings,
-    case: &Case,
+    case: &CaseFile,
     release: &mut dyn FnMut(&str) -> Result<PathBuf>,
-) -> Outcome {
-    let mut outcome = Outcome::new(&case.name);
+) -> CaseOutcome {
+    let mut outcome = CaseOutcome::new(&case.name);
     outcome.output = settings.folder.join(&case.name);
     outcome.log = settings.folder.join(format!("{}.log", case.name));
     if let Err(error) = attempt(settings, case, release, &mut outcome) {
@@ -66,9 +67,9 @@ pub fn run_case(
 
 fn attempt(
     settings: &Settings,
-    case: &Case,
+    case: &CaseFile,
     release: &mut dyn FnMut(&str) -> Result<PathBuf>,
-    outcome: &mut Outcome,
+    outcome: &mut CaseOutcome,
 ) -> Result<()> {
     (outcome.program, outcome.title) = heading(&case.file)?;
     let executable = release(&outcome.program)?;
@@ -77,11 +78,12 @@ fn attempt(
     }
     let path = settings.folder.join(format!("{}.run.json", case.name));
     let fingerprint = fingerprint(settings, case, &executable).into_diagnostic()?;
-    let before = fs::read_to_string(&path).ok().and_then(|text| serde_json::from_str::<RunStamp>(&text).ok());
+    let before =
+        fs::read_to_string(&path).ok().and_then(|text| serde_json::from_str::<CaseStamp>(&text).ok());
     let before = before.filter(|stamp| settings.resume && stamp.fingerprint == fingerprint);
     let (ended, unfinished) = match before {
-        Some(RunStamp { ended: Some(ended), .. }) => (Some(ended), false),
-        Some(RunStamp { ended: None, .. }) => (None, outcome.output.join("checkpoint.bin").is_file()),
+        Some(CaseStamp { ended: Some(ended), .. }) => (Some(ended), false),
+        Some(CaseStamp { ended: None, .. }) => (None, outcome.output.join("checkpoint.bin").is_file()),
         None => (None, false),
     };
     outcome.kept = ended.is_some();
@@ -92,13 +94,13 @@ fn attempt(
                 // an old report must not be judged
                 clear(&outcome.output)?;
             }
-            write(&path, &RunStamp { fingerprint: fingerprint.clone(), ended: None })?;
+            write(&path, &CaseStamp { fingerprint: fingerprint.clone(), ended: None })?;
             let since = Instant::now();
             let failure = start(&executable, case, settings, outcome, unfinished)?;
-            let ended = Ended { seconds: since.elapsed().as_secs_f64(), failure };
-            // a case that was cut off is not kept
+            let ended = RunEnd { seconds: since.elapsed().as_secs_f64(), failure };
+            // an aborted case is not kept
             let keep = outcome.output.join(FILE_NAME).is_file();
-            write(&path, &RunStamp { fingerprint, ended: keep.then(|| ended.clone()) })?;
+            write(&path, &CaseStamp { fingerprint, ended: keep.then(|| ended.clone()) })?;
             ended
         }
     };
@@ -111,7 +113,7 @@ fn attempt(
     Ok(())
 }
 
-/// The keys that every case has: `program = "peri"`, `title = "…"`.
+/// Reads the keys that every case has: `program = "peri"`, `title = "…"`.
 fn heading(file: &Path) -> Result<(String, String)> {
     let text = fs::read_to_string(file).into_diagnostic()?;
     let table: toml::Table = toml::from_str(&text).map_err(|error| miette!("{}", error.message()))?;
@@ -120,8 +122,8 @@ fn heading(file: &Path) -> Result<(String, String)> {
     Ok((program, word("title").unwrap_or_default()))
 }
 
-/// Of the case file's text, the files beside it, the executable, the tier, and the results of its inputs.
-fn fingerprint(settings: &Settings, case: &Case, executable: &Path) -> std::io::Result<String> {
+/// Hashes the case file, the files beside it, the executable, the tier, and the results of its inputs.
+fn fingerprint(settings: &Settings, case: &CaseFile, executable: &Path) -> std::io::Result<String> {
     let mut hasher = DefaultHasher::new();
     (fs::read(&case.file)?, settings.quick).hash(&mut hasher);
     for input in case.inputs() {
@@ -142,7 +144,7 @@ fn fingerprint(settings: &Settings, case: &Case, executable: &Path) -> std::io::
     Ok(format!("{:016x}", hasher.finish()))
 }
 
-fn write(path: &Path, stamp: &RunStamp) -> Result<()> {
+fn write(path: &Path, stamp: &CaseStamp) -> Result<()> {
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder).into_diagnostic()?;
     }
@@ -156,12 +158,13 @@ fn clear(folder: &Path) -> Result<()> {
     fs::create_dir_all(folder).into_diagnostic()
 }
 
-/// `PROGRAM run CASE --output FOLDER [--quick]` or `PROGRAM resume FOLDER`, its output in FOLDER.log; how it failed.
+/// Runs `PROGRAM run CASE --output FOLDER [--quick]` or `PROGRAM resume FOLDER`, its output in FOLDER.log;
+/// returns how it failed.
 fn start(
     executable: &Path,
-    case: &Case,
+    case: &CaseFile,
     settings: &Settings,
-    outcome: &Outcome,
+    outcome: &CaseOutcome,
     resume: bool,
 ) -> Result<Option<String>> {
     let log = File::create(&outcome.log).into_diagnostic()?;
@@ -192,7 +195,7 @@ fn start(
     }
 }
 
-/// The exit status, or none for a program that was killed because it took too long.
+/// Waits for a program; returns its exit status, or `None` if it was killed after the time limit.
 fn wait(mut child: Child, timeout: f64) -> std::io::Result<Option<ExitStatus>> {
     let since = Instant::now();
     let mut pause = Duration::from_millis(2);
@@ -225,10 +228,10 @@ fn describe(status: ExitStatus) -> Option<String> {
 mod tests {
     use super::*;
 
-    /// A case run by a shell script instead of a program.
+    /// Case run by a shell script instead of a program.
     struct Stage {
         folder: tempfile::TempDir,
-        case: Case,
+        case: CaseFile,
         settings: Settings,
     }
 
@@ -241,7 +244,7 @@ mod tests {
             let settings =
                 Settings { folder: folder.path().join("results"), quick: true, resume: false, timeout: 60.0 };
             let root = folder.path().to_path_buf();
-            Self { folder, case: Case { name: "ch9/it".to_owned(), file, root }, settings }
+            Self { folder, case: CaseFile { name: "ch9/it".to_owned(), file, root }, settings }
         }
 
         fn program(&self, script: &str) -> PathBuf {
@@ -252,7 +255,7 @@ mod tests {
             program
         }
 
-        fn run(&self, script: &str) -> Outcome {
+        fn run(&self, script: &str) -> CaseOutcome {
             let program = self.program(script);
             run_case(&self.settings, &self.case, &mut |_| Ok(program.clone()))
         }

@@ -1,14 +1,14 @@
-//! The side of a part that lies on the bed: its nodes, what holds it after the release, how warped it is.
+//! Side of a part that lies on the bed: its nodes, its supports after release, its warpage.
 
 use crate::error::Error;
-use crate::mechanics::Support;
+use crate::mechanics::FixedComponent;
 use crate::mesh::Mesh;
-use crate::mesh::surface::Surface;
+use crate::mesh::surface::OuterSurface;
 use nalgebra::{Matrix3, Matrix3xX, Vector3};
 use std::collections::{HashMap, HashSet};
 
-/// Nodes of the bearing elements, ascending, that lie on a named surface ([`Surface::region`]), or without a name those
-/// shared with other elements.
+/// Returns the bed nodes, ascending: nodes of bearing elements on a named surface ([`OuterSurface::region`]),
+/// or by default those shared with other elements.
 ///
 /// # Errors
 /// [`Error::Unknown`] for a name that the mesh lacks.
@@ -20,7 +20,7 @@ pub fn bed_nodes(mesh: &Mesh, bears: &[bool], surface: Option<&str>) -> Result<V
     let bearing = nodes_of(true);
     let mut bed: Vec<u32> = match surface {
         Some(name) => {
-            let surface = Surface::of_all(mesh)?;
+            let surface = OuterSurface::of_all(mesh)?;
             let faces = surface.all_in(&surface.region(mesh, name)?);
             let nodes = faces.iter().flat_map(|face| mesh.face_nodes(*face).to_vec());
             nodes.filter(|node| bearing.contains(node)).collect()
@@ -32,7 +32,7 @@ pub fn bed_nodes(mesh: &Mesh, bears: &[bool], surface: Option<&str>) -> Result<V
     Ok(bed)
 }
 
-/// Number of bearing elements without a way to a node of the bed through nodes they share.
+/// Counts the bearing elements that are not connected to the bed through shared nodes.
 pub fn loose_elements(mesh: &Mesh, bears: &[bool], bed: &[u32]) -> usize {
     let mut around: HashMap<u32, Vec<u32>> = HashMap::new();
     let bearing = || (0..bears.len() as u32).filter(|&element| bears[element as usize]);
@@ -55,8 +55,9 @@ fn place(mesh: &Mesh, node: u32) -> Vector3<f64> {
     Vector3::from(mesh.points[node as usize])
 }
 
-/// Holds 3, 2 and 1 components of three nodes of the bed, far from each other: no rigid motion is left and no force needed.
-pub(super) fn statically_determinate(mesh: &Mesh, bed: &[u32]) -> Vec<Support> {
+/// Supports 3, 2 and 1 components of three distant nodes of the bed: no rigid motion remains, and no reaction
+/// arises.
+pub(super) fn statically_determinate(mesh: &Mesh, bed: &[u32]) -> Vec<FixedComponent> {
     let place = |node: u32| place(mesh, node);
     let farthest = |of: &dyn Fn(u32) -> f64| {
         bed.iter().copied().max_by(|&a, &b| of(a).total_cmp(&of(b)).then(b.cmp(&a))).unwrap_or(0)
@@ -67,13 +68,13 @@ pub(super) fn statically_determinate(mesh: &Mesh, bed: &[u32]) -> Vec<Support> {
     let third = farthest(&|node| (place(node) - place(first)).cross(&along).norm());
     let normal = along.cross(&(place(third) - place(first)));
     let (axis, upright) = (along.iamax(), normal.iamax());
-    let mut supports: Vec<Support> = (0..3).map(|d| (first, d)).collect();
+    let mut supports: Vec<FixedComponent> = (0..3).map(|d| (first, d)).collect();
     supports.extend((0..3).filter(|&d| d != axis).map(|d| (second, d)));
     supports.push((third, upright));
     supports
 }
 
-/// Subtracts the small rigid motion t + ω × (x − x̄) that is nearest to the displacements of the bed, m.
+/// Subtracts the rigid motion t + ω × (x − x̄), by least squares over the displacements of the bed, m.
 pub(super) fn remove_rigid_motion(mesh: &Mesh, bed: &[u32], displacement: &mut [[f64; 3]]) {
     let centre = bed.iter().map(|&node| place(mesh, node)).sum::<Vector3<f64>>() / bed.len() as f64;
     let (mut matrix, mut turn, mut shift) = (Matrix3::zeros(), Vector3::zeros(), Vector3::zeros());
@@ -91,7 +92,7 @@ pub(super) fn remove_rigid_motion(mesh: &Mesh, bed: &[u32], displacement: &mut [
     }
 }
 
-/// Largest less smallest distance of places from their least-squares plane, m.
+/// Returns the range of distances of points from their least-squares plane, m.
 pub(super) fn out_of_flatness(places: &[[f64; 3]]) -> f64 {
     let count = places.len() as f64;
     let mean: [f64; 3] = std::array::from_fn(|d| places.iter().map(|p| p[d]).sum::<f64>() / count);

@@ -1,30 +1,31 @@
-//! Healing of the interfaces of a part on its way through the temperatures of a simulation.
+//! Healing of the interfaces of a part during a simulation.
 
 use crate::error::Error;
 use crate::healing::Healing;
 use crate::mesh::Mesh;
-use crate::mesh::surface::{Surface, area};
+use crate::mesh::surface::{OuterSurface, area};
 use crate::problem::Birth;
 use crate::simulation::Simulation;
 
 /// An interface between two elements.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Interface {
-    /// The newer and the older element.
+pub struct HealingInterface {
+    /// Newer and older element.
     pub sides: [u32; 2],
-    /// The corners that they share.
+    /// Shared corners.
     pub nodes: Vec<u32>,
-    /// m².
+    /// Area, m².
     pub area: f64,
 }
 
-impl Interface {
-    /// Returns the interfaces between printed elements of different births; `birth_of` gives the number of the birth of each element.
+impl HealingInterface {
+    /// Returns the interfaces between printed elements of different births; `birth_of` is the birth number of
+    /// each element.
     ///
     /// # Errors
-    /// Those of [`Surface::of_all`].
+    /// Errors of [`OuterSurface::of_all`].
     pub fn between_births(mesh: &Mesh, printed: &[bool], birth_of: &[u32]) -> Result<Vec<Self>, Error> {
-        let surface = Surface::of_all(mesh)?;
+        let surface = OuterSurface::of_all(mesh)?;
         let mut interfaces = Vec::new();
         for element in (0..mesh.element_count() as u32).filter(|&element| printed[element as usize]) {
             for face in mesh.faces_of(element) {
@@ -39,24 +40,24 @@ impl Interface {
     }
 }
 
-/// A part whose interfaces heal.
+/// Settings of a healing part.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HealingSettings {
-    /// Rate of healing.
+    /// Law of healing.
     pub law: Healing,
-    /// Tensile strength of the material, Pa, if known: that of an interface is D_h times it.
+    /// Tensile strength of the material, Pa, if known; that of an interface is D_h times it.
     pub strength: Option<f64>,
-    /// Interfaces, see [`Interface::between_births`].
-    pub interfaces: Vec<Interface>,
-    /// Whether each element is printed of the material that heals.
+    /// Interfaces, see [`HealingInterface::between_births`].
+    pub interfaces: Vec<HealingInterface>,
+    /// Elements printed of the healing material.
     pub printed: Vec<bool>,
 }
 
 impl HealingSettings {
-    /// All that is printed of one material, by its number among those of the elements, heals between births.
+    /// Returns settings for all elements of one material, given by its index, with interfaces between births.
     ///
     /// # Errors
-    /// Those of [`Interface::between_births`].
+    /// Errors of [`HealingInterface::between_births`].
     pub fn new(
         mesh: &Mesh,
         material_of: &[u16],
@@ -70,13 +71,13 @@ impl HealingSettings {
         }
         let births = birth_of.iter().zip(material_of);
         let printed: Vec<bool> = births.map(|(&birth, &of)| of == material && birth != u32::MAX).collect();
-        let interfaces = Interface::between_births(mesh, &printed, &birth_of)?;
+        let interfaces = HealingInterface::between_births(mesh, &printed, &birth_of)?;
         Ok(Self { law, strength: None, interfaces, printed })
     }
 }
 
-/// State of a coupling, for checkpoints: of each interface its integral and, once both sides exist, time, s, temperature, K, and the
-/// melt's share.
+/// State of a coupling, for checkpoints: for each interface its integral and, once both sides exist, time, s,
+/// temperature, K, and melt fraction.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct HealingState(Vec<(f64, Option<[f64; 3]>)>);
 
@@ -88,18 +89,18 @@ pub struct HealingCoupling {
 }
 
 impl HealingCoupling {
-    /// Begins with no interface healed.
+    /// Starts with unhealed interfaces.
     pub fn new(settings: HealingSettings) -> Self {
         let state = HealingState(vec![(0.0, None); settings.interfaces.len()]);
         Self { settings, state }
     }
 
-    /// Returns the state.
+    /// Returns the state for a checkpoint.
     pub fn save(&self) -> HealingState {
         self.state.clone()
     }
 
-    /// Continues from a state of the same part.
+    /// Restores a state of the same part.
     pub fn restore(&mut self, state: HealingState) {
         self.state = state;
     }
@@ -132,7 +133,8 @@ impl HealingCoupling {
         self.state.0.iter().map(|(integral, last)| last.map(|_| Healing::degree(*integral)))
     }
 
-    /// Least D_h of the interfaces of each element; 1 inside of a layer, NaN of elements that are not printed or do not exist yet.
+    /// Smallest D_h of the interfaces of each element; 1 for interior elements, NaN for elements that are not
+    /// printed or do not exist yet.
     pub fn element_degrees(&self, simulation: &Simulation) -> Vec<f64> {
         let within = |(element, &printed): (u32, &bool)| {
             if printed && simulation.is_born(element) { 1.0 } else { f64::NAN }
@@ -148,7 +150,8 @@ impl HealingCoupling {
         least
     }
 
-    /// Least D_h and mean by area, times a scale: 1, or a strength; `None` before the first interface.
+    /// Smallest and area-weighted mean D_h, times a scale (1, or a strength); `None` before the first
+    /// interface.
     pub fn least_and_mean(&self, scale: f64) -> Option<[f64; 2]> {
         let (mut least, mut sum, mut area) = (f64::INFINITY, 0.0, 0.0);
         for (interface, degree) in self.settings.interfaces.iter().zip(self.degrees()) {
@@ -160,7 +163,7 @@ impl HealingCoupling {
         (area > 0.0).then(|| [scale * least, scale * sum / area])
     }
 
-    /// Returns the settings.
+    /// Settings.
     pub fn settings(&self) -> &HealingSettings {
         &self.settings
     }

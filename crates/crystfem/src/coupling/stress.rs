@@ -1,40 +1,43 @@
-//! Stress and warpage of a part on its way through the temperatures of a simulation.
+//! Stress and warpage of a part during a simulation.
 
 use super::bed::{bed_nodes, loose_elements, out_of_flatness, remove_rigid_motion, statically_determinate};
 use crate::error::Error;
-use crate::mechanics::{Body, BodyState, EnergyBalance, MOST, SolidifyingMaxwell, Support, points, shares};
+use crate::mechanics::{
+    Body, BodyState, EnergyBalance, FixedComponent, MAX_NODES_PER_ELEMENT, SolidifyingMaxwell, points, shares,
+};
 use crate::mesh::Mesh;
 use crate::simulation::Simulation;
 use polycore::tensor::von_mises;
 
-/// Residual over the load at which a solution ends: its error is far below that of the model.
+/// Relative residual at which a solution ends: its error is far below that of the model.
 const TOLERANCE: f64 = 1e-8;
 
 /// Default of [`StressSettings::strain_step`].
 pub const STRAIN_STEP: f64 = 2e-4;
 
-/// A part that bears stress.
+/// Settings of a part that bears stress.
 #[derive(Clone, Debug)]
 pub struct StressSettings {
     /// Mechanical constants.
     pub law: SolidifyingMaxwell,
     /// Relative crystallinity α of fresh material; default 0.
     pub initial_alpha: f64,
-    /// Whether each element bears stress.
+    /// Elements that bear stress.
     pub bears: Vec<bool>,
-    /// Nodes on the bed, ascending, which are held during the print.
+    /// Bed nodes, ascending, held during the print.
     pub bed: Vec<u32>,
-    /// Largest change of the linear free strain in any element between two solutions; default [`STRAIN_STEP`].
+    /// Largest change of the linear free strain in any element between two solutions; default
+    /// [`STRAIN_STEP`].
     pub strain_step: f64,
-    /// Whether the part is taken off the bed at the end; default true.
+    /// Release of the part from the bed at the end; default true.
     pub release: bool,
 }
 
 impl StressSettings {
-    /// Settings of the bearing elements of a mesh, held at the nodes of [`bed_nodes`].
+    /// Returns settings for the bearing elements of a mesh, held at the nodes of [`bed_nodes`].
     ///
     /// # Errors
-    /// Those of [`bed_nodes`].
+    /// Errors of [`bed_nodes`].
     pub fn new(
         mesh: &Mesh,
         law: SolidifyingMaxwell,
@@ -48,13 +51,14 @@ impl StressSettings {
 
 /// State of an element at the last solution.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-struct Thermal {
-    /// Temperatures of the nodes, K, and their number.
-    nodes: [f64; MOST],
+struct ElementThermalState {
+    /// Temperatures of the nodes, K.
+    nodes: [f64; MAX_NODES_PER_ELEMENT],
+    /// Number of nodes.
     count: usize,
     /// α.
     degree: f64,
-    /// s.
+    /// Time, s.
     time: f64,
 }
 
@@ -62,13 +66,13 @@ struct Thermal {
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct StressState {
     body: BodyState,
-    last: Vec<Option<Thermal>>,
+    last: Vec<Option<ElementThermalState>>,
     solutions: u64,
     mises_on_bed: f64,
 }
 
-/// Quasi-static stress of a part whose free strain follows temperature and crystallization ([`SolidifyingMaxwell`]): no
-/// effect back on temperatures.
+/// Quasi-static stress of a part whose free strain follows temperature and crystallization
+/// ([`SolidifyingMaxwell`]), without effect on temperatures.
 pub struct StressCoupling<'a> {
     settings: StressSettings,
     mesh: &'a Mesh,
@@ -77,10 +81,11 @@ pub struct StressCoupling<'a> {
 }
 
 impl<'a> StressCoupling<'a> {
-    /// Begins with an empty part on the mesh of a simulation.
+    /// Starts with an empty part on the mesh of a simulation.
     ///
     /// # Errors
-    /// Those of [`Body::new`]; [`Error::Mesh`] for fewer than three nodes on the bed, and elements without a way to it.
+    /// Errors of [`Body::new`]; [`Error::Mesh`] for fewer than three nodes on the bed, and elements that are
+    /// not connected to it.
     pub fn new(mesh: &'a Mesh, settings: StressSettings) -> Result<Self, Error> {
         let mut body = Body::new(mesh, settings.law.poisson)?;
         body.tolerance = TOLERANCE;
@@ -98,31 +103,31 @@ impl<'a> StressCoupling<'a> {
         Ok(Self { settings, mesh, body, state })
     }
 
-    /// Returns the state.
+    /// Returns the state for a checkpoint.
     pub fn save(&self) -> StressState {
         StressState { body: self.body.state.clone(), ..self.state.clone() }
     }
 
-    /// Continues from a state of the same part.
+    /// Restores a state of the same part.
     pub fn restore(&mut self, mut state: StressState) {
         self.body.state = std::mem::take(&mut state.body);
         self.state = state;
     }
 
-    /// Updates after an accepted step, and before the first: activates new elements; solves if the free strain changed by
-    /// more than the strain step, or if elements appear next.
+    /// Updates after an accepted step, and before the first: activates new elements; solves if the free
+    /// strain changed by more than the strain step, or if elements appear next.
     ///
     /// # Errors
-    /// Those of [`Body::step`].
+    /// Errors of [`Body::step`].
     pub fn after_step(&mut self, simulation: &Simulation) -> Result<(), Error> {
         self.update(simulation, false)
     }
 
-    /// Solves at the end of a simulation, and takes the part off the bed where the settings say so: a step of no duration
-    /// with six supports.
+    /// Solves at the end of a simulation; then releases the part from the bed, if set, by a step of no
+    /// duration with six supports.
     ///
     /// # Errors
-    /// Those of [`Body::step`].
+    /// Errors of [`Body::step`].
     pub fn finish(&mut self, simulation: &Simulation) -> Result<(), Error> {
         self.update(simulation, true)?;
         self.state.mises_on_bed = self.largest_mises();
@@ -140,12 +145,17 @@ impl<'a> StressCoupling<'a> {
         let time = simulation.time();
         let degrees = simulation.element_means("alpha");
         let births = &simulation.problem().births;
-        let now = |element: usize| -> Option<Thermal> {
-            let (mut nodes, own) = ([0.0; MOST], self.mesh.nodes(element as u32));
+        let now = |element: usize| -> Option<ElementThermalState> {
+            let (mut nodes, own) = ([0.0; MAX_NODES_PER_ELEMENT], self.mesh.nodes(element as u32));
             for (value, &node) in nodes.iter_mut().zip(own) {
                 *value = simulation.temperature(node)?;
             }
-            Some(Thermal { nodes, count: own.len(), degree: degrees[element].unwrap_or(0.0), time })
+            Some(ElementThermalState {
+                nodes,
+                count: own.len(),
+                degree: degrees[element].unwrap_or(0.0),
+                time,
+            })
         };
         let StressSettings { law, bears, .. } = &self.settings;
         let mut present = vec![None; bears.len()];
@@ -156,11 +166,11 @@ impl<'a> StressCoupling<'a> {
             }
             present[element] = now(element);
             if self.state.last[element].is_none() {
-                // its own temperature at birth: what it shares with neighbours at once is a part of its strain
+                // birth temperature: the exchange with neighbours at birth is part of the strain
                 let birth = (simulation.state().born[element] as usize).checked_sub(1);
                 self.state.last[element] = match birth.and_then(|birth| births.get(birth)) {
-                    Some(birth) => Some(Thermal {
-                        nodes: [birth.temperature; MOST],
+                    Some(birth) => Some(ElementThermalState {
+                        nodes: [birth.temperature; MAX_NODES_PER_ELEMENT],
                         count: self.mesh.nodes(element as u32).len(),
                         degree: self.settings.initial_alpha,
                         time: birth.time,
@@ -176,20 +186,25 @@ impl<'a> StressCoupling<'a> {
                 change = pairs.map(|(from, to)| strain([from, to]).abs()).fold(change, f64::max);
             }
         }
-        self.body.born(born, law.branches());
-        // who is born now must not take part in what happened before
+        self.body.activate(born, law.branches());
+        // elements born now have no part in the past step
         let about = births.get(simulation.state().births).is_some_and(|birth| birth.time <= time);
         if must || about || change > self.settings.strain_step {
             let bed = self.settings.bed.iter();
-            let supports: Vec<Support> = bed.flat_map(|&node| (0..3).map(move |d| (node, d))).collect();
+            let supports: Vec<FixedComponent> =
+                bed.flat_map(|&node| (0..3).map(move |d| (node, d))).collect();
             self.solve(&present, &supports)?;
             self.state.last = present;
         }
         Ok(())
     }
 
-    /// One solution from the last states of elements to the present ones.
-    fn solve(&mut self, present: &[Option<Thermal>], supports: &[Support]) -> Result<(), Error> {
+    /// Solves for the step from the last states of elements to the present ones.
+    fn solve(
+        &mut self,
+        present: &[Option<ElementThermalState>],
+        supports: &[FixedComponent],
+    ) -> Result<(), Error> {
         let (law, last) = (&self.settings.law, &self.state.last);
         if last.iter().all(Option::is_none) {
             return Ok(());
@@ -206,7 +221,10 @@ impl<'a> StressCoupling<'a> {
             },
             |element, point, _| {
                 let Some((before, after)) = pair(element) else { return 0.0 };
-                law.volume.strain([before.at(point), before.degree], [after.at(point), after.degree])
+                law.volume.strain(
+                    [before.temperature_at(point), before.degree],
+                    [after.temperature_at(point), after.degree],
+                )
             },
             supports,
         )?;
@@ -214,7 +232,7 @@ impl<'a> StressCoupling<'a> {
         Ok(())
     }
 
-    /// Nodes of the bed that have a displacement.
+    /// Bed nodes that have a displacement.
     fn present_bed(&self, displacement: &[f64]) -> Vec<u32> {
         let present = |&node: &u32| !displacement[3 * node as usize].is_nan();
         self.settings.bed.iter().copied().filter(present).collect()
@@ -224,7 +242,7 @@ impl<'a> StressCoupling<'a> {
         self.state.last.get(element).is_some_and(Option::is_some)
     }
 
-    /// Displacements of the nodes, m, three a node; NaN where nothing bears stress.
+    /// Displacements of the nodes, m, three a node; NaN for nodes without bearing elements.
     pub fn displacement(&self) -> Vec<f64> {
         let mut all = vec![f64::NAN; 3 * self.mesh.points.len()];
         for element in (0..self.state.last.len()).filter(|&element| self.is_present(element)) {
@@ -243,7 +261,7 @@ impl<'a> StressCoupling<'a> {
         lengths.filter(|x| !x.is_nan()).fold(0.0, f64::max)
     }
 
-    /// Mises stress of each element, Pa: the largest of its Gauss points; NaN where nothing bears stress.
+    /// Mises stress of each element, Pa: maximum over its Gauss points; NaN for elements that bear no stress.
     pub fn mises(&self) -> Vec<f64> {
         let largest = |element: usize| {
             let points = 0..self.body.points(element);
@@ -253,8 +271,8 @@ impl<'a> StressCoupling<'a> {
         (0..self.mesh.element_count()).map(largest).collect()
     }
 
-    /// Mean stress of each element, Pa, six each in VTK's order of symmetric tensors, xx, yy, zz, xy, yz, zx; NaN where
-    /// nothing bears stress.
+    /// Mean stress of each element, Pa, in VTK's order of symmetric tensors, xx, yy, zz, xy, yz, zx; NaN for
+    /// elements that bear no stress.
     pub fn stresses(&self) -> Vec<f64> {
         let mean = |element: usize| match self.is_present(element) {
             true => self.body.mean_stress(element),
@@ -273,7 +291,7 @@ impl<'a> StressCoupling<'a> {
         self.state.mises_on_bed
     }
 
-    /// Deviation of the bed side from flat, m: largest less smallest distance from its least-squares plane.
+    /// Warpage, m: range of distances of the bed side from its least-squares plane.
     pub fn warpage(&self) -> f64 {
         let moved = self.displacement();
         let place = |&node: &u32| -> [f64; 3] {
@@ -283,40 +301,40 @@ impl<'a> StressCoupling<'a> {
         out_of_flatness(&places.collect::<Vec<_>>())
     }
 
-    /// Largest rotation of an element since it was melt, rad.
+    /// Largest rotation of an element since it solidified, rad.
     pub fn largest_rotation(&self) -> f64 {
         self.body.largest_rotation()
     }
 
-    /// Energies of all solutions.
+    /// Energy balance of all solutions.
     pub fn energy_balance(&self) -> &EnergyBalance {
         &self.body.state.balance
     }
 
-    /// Numbers of solutions and of iterations of conjugate gradients.
+    /// Numbers of solutions and of conjugate-gradient iterations.
     pub fn work(&self) -> [u64; 2] {
         [self.state.solutions, self.body.state.iterations]
     }
 
-    /// Returns the settings.
+    /// Settings.
     pub fn settings(&self) -> &StressSettings {
         &self.settings
     }
 }
 
-impl Thermal {
-    /// Mean T, K, and α.
+impl ElementThermalState {
+    /// Returns mean T, K, and α.
     fn mean(&self) -> [f64; 2] {
         // corners of first order have equal shares
         if self.count <= 8 {
             return [self.nodes[..self.count].iter().sum::<f64>() / self.count as f64, self.degree];
         }
         let points = points(self.count);
-        [(0..points).map(|point| self.at(point)).sum::<f64>() / points as f64, self.degree]
+        [(0..points).map(|point| self.temperature_at(point)).sum::<f64>() / points as f64, self.degree]
     }
 
-    /// T at a Gauss point, K.
-    fn at(&self, point: usize) -> f64 {
+    /// Returns T at a Gauss point, K.
+    fn temperature_at(&self, point: usize) -> f64 {
         let shares = shares(self.count, point);
         shares[..self.count].iter().zip(self.nodes).map(|(share, t)| share * t).sum()
     }

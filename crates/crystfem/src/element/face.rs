@@ -1,9 +1,9 @@
 //! Faces of elements at their integration points.
 
 use super::{GAUSS, natural};
-use crate::shape::Shape;
+use crate::shape::ElementShape;
 
-/// A face at its integration points: 2 × 2 Gauss points, or three on a triangle; 3 × 3 and six of second order.
+/// A face at its integration points: 2 × 2 Gauss points or three on a triangle; 3 × 3 or six in second order.
 #[derive(Clone, Debug)]
 pub struct FaceGeometry<const N: usize = 4, const P: usize = 4> {
     /// Number of nodes.
@@ -18,17 +18,17 @@ pub struct FaceGeometry<const N: usize = 4, const P: usize = 4> {
     pub corner_areas: [f64; N],
 }
 
-/// Corners of a quadrilateral in natural coordinates.
-const AROUND: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+/// Corners of a quadrilateral in natural coordinates, in order.
+const QUADRILATERAL_CORNERS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
 
-/// N and ∂N/∂ξ of a second-order triangle (r, s ≥ 0) or quadrilateral (−1 … 1): those of the first side of the solid with
-/// such sides.
+/// N and ∂N/∂ξ of a second-order triangle (r, s ≥ 0) or quadrilateral (−1 … 1), from the first side of a
+/// solid element with such sides.
 fn second_order_face(nodes: usize, [r, s]: [f64; 2]) -> [(f64, [f64; 2]); 8] {
     let (shape, at, order): (_, _, &[usize]) = match nodes {
-        8 => (Shape::Hexahedron20, [r, s, -1.0], &[0, 1, 2, 3, 8, 9, 10, 11]),
-        _ => (Shape::Wedge15, [r, s, -1.0], &[0, 1, 2, 6, 7, 8]),
+        8 => (ElementShape::Hexahedron20, [r, s, -1.0], &[0, 1, 2, 3, 8, 9, 10, 11]),
+        _ => (ElementShape::Wedge15, [r, s, -1.0], &[0, 1, 2, 6, 7, 8]),
     };
-    let natural = natural::Natural::at(shape, at);
+    let natural = natural::Natural::new(shape, at);
     let mut face = [(0.0, [0.0; 2]); 8];
     for (own, &node) in face.iter_mut().zip(order) {
         *own = (natural.shapes[node], [natural.gradients[node][0], natural.gradients[node][1]]);
@@ -37,7 +37,7 @@ fn second_order_face(nodes: usize, [r, s]: [f64; 2]) -> [(f64, [f64; 2]); 8] {
 }
 
 impl<const N: usize, const P: usize> FaceGeometry<N, P> {
-    /// Of a face with these nodes: corners in order around it, then the middles of its edges.
+    /// Computes the geometry of a face from its nodes: corners in order around it, then mid-edge nodes.
     pub fn new(corners: &[[f64; 3]]) -> Self {
         let nodes = corners.len().min(N);
         let mut rule: [([f64; 2], f64); 9] = [([0.0; 2], 0.0); 9];
@@ -67,9 +67,14 @@ impl<const N: usize, const P: usize> FaceGeometry<N, P> {
                     face.shapes[point][node] = second[node].0;
                     second[node].1
                 } else if nodes == 4 {
-                    let factor = |d: usize| 0.5 * (1.0 + GAUSS * AROUND[point][d] * AROUND[node][d]);
+                    let factor = |d: usize| {
+                        0.5 * (1.0 + GAUSS * QUADRILATERAL_CORNERS[point][d] * QUADRILATERAL_CORNERS[node][d])
+                    };
                     face.shapes[point][node] = factor(0) * factor(1);
-                    [0.5 * AROUND[node][0] * factor(1), 0.5 * AROUND[node][1] * factor(0)]
+                    [
+                        0.5 * QUADRILATERAL_CORNERS[node][0] * factor(1),
+                        0.5 * QUADRILATERAL_CORNERS[node][1] * factor(0),
+                    ]
                 } else {
                     face.shapes[point][node] = if point == node { 2.0 / 3.0 } else { 1.0 / 6.0 };
                     [[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]][node]

@@ -1,29 +1,30 @@
-//! Shape functions of wedges and of second-order elements, and their integration rules (Zienkiewicz & Taylor, vol. 1).
+//! Shape functions of wedges and of second-order elements, and their integration rules (Zienkiewicz & Taylor,
+//! vol. 1).
 //!
-//! Natural coordinates: −1 … 1 along each axis of a hexahedron; r, s ≥ 0, r + s ≤ 1 in the triangle of a wedge and −1 … 1
-//! along its third axis; r, s, t ≥ 0, r + s + t ≤ 1 in a tetrahedron.
+//! Natural coordinates: −1 … 1 along each axis of a hexahedron; r, s ≥ 0, r + s ≤ 1 in the triangle of a
+//! wedge and −1 … 1 along its third axis; r, s, t ≥ 0, r + s + t ≤ 1 in a tetrahedron.
 
-use super::{CORNERS, WIDE, WIDE_POINTS};
-use crate::shape::Shape;
+use super::{CORNERS, MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS};
+use crate::shape::ElementShape;
 use std::sync::OnceLock;
 
-/// N and ∂N/∂ξ of each node.
+/// N and ∂N/∂ξ of each node at one point.
 #[derive(Clone, Copy, Debug)]
 pub struct Natural {
     /// N.
-    pub shapes: [f64; WIDE],
+    pub shapes: [f64; MAX_ELEMENT_NODES],
     /// ∂N/∂ξ.
-    pub gradients: [[f64; 3]; WIDE],
+    pub gradients: [[f64; 3]; MAX_ELEMENT_NODES],
 }
 
 /// An element type at its integration points.
 #[derive(Debug)]
-pub struct Rule {
+pub struct QuadratureRule {
     /// Number of points.
     pub points: usize,
     /// Weights.
-    pub weights: [f64; WIDE_POINTS],
-    /// Shape functions there.
+    pub weights: [f64; MAX_ELEMENT_POINTS],
+    /// Shape functions at the points.
     pub at: Vec<Natural>,
 }
 
@@ -33,12 +34,13 @@ fn triangle(r: f64, s: f64) -> [(f64, [f64; 2]); 3] {
 }
 
 impl Natural {
-    /// At a place; of 8-node hexahedra and 4-node tetrahedra too.
-    pub fn at(shape: Shape, [r, s, t]: [f64; 3]) -> Self {
-        let mut natural = Self { shapes: [0.0; WIDE], gradients: [[0.0; 3]; WIDE] };
+    /// Evaluates the shape functions at natural coordinates; any shape, 8-node hexahedra and 4-node
+    /// tetrahedra included.
+    pub fn new(shape: ElementShape, [r, s, t]: [f64; 3]) -> Self {
+        let mut natural = Self { shapes: [0.0; MAX_ELEMENT_NODES], gradients: [[0.0; 3]; MAX_ELEMENT_NODES] };
         match shape {
-            Shape::Hexahedron | Shape::Hexahedron20 => natural.hexahedron(shape, [r, s, t]),
-            Shape::Tetrahedron | Shape::Tetrahedron10 => {
+            ElementShape::Hexahedron | ElementShape::Hexahedron20 => natural.hexahedron(shape, [r, s, t]),
+            ElementShape::Tetrahedron | ElementShape::Tetrahedron10 => {
                 let own = [
                     (1.0 - r - s - t, [-1.0; 3]),
                     (r, [1.0, 0.0, 0.0]),
@@ -57,7 +59,7 @@ impl Natural {
                     natural.set(a, 4.0 * l * m, [0, 1, 2].map(|d| 4.0 * (dl[d] * m + l * dm[d])));
                 }
             }
-            Shape::Wedge | Shape::Wedge15 => natural.wedge(shape, [r, s, t]),
+            ElementShape::Wedge | ElementShape::Wedge15 => natural.wedge(shape, [r, s, t]),
         }
         natural
     }
@@ -67,12 +69,12 @@ impl Natural {
         self.gradients[node] = gradient;
     }
 
-    fn hexahedron(&mut self, shape: Shape, at: [f64; 3]) {
+    fn hexahedron(&mut self, shape: ElementShape, at: [f64; 3]) {
         for (a, corner) in CORNERS.iter().enumerate() {
             let f = [0, 1, 2].map(|d| 1.0 + corner[d] * at[d]);
             let product = 0.125 * f[0] * f[1] * f[2];
             let slopes = [0, 1, 2].map(|d| 0.125 * corner[d] * f[(d + 1) % 3] * f[(d + 2) % 3]);
-            if shape == Shape::Hexahedron {
+            if shape == ElementShape::Hexahedron {
                 self.set(a, product, slopes);
             } else {
                 // ⅛ ∏(1 + ξ_d ξ) (Σ ξ_d ξ − 2)
@@ -96,12 +98,12 @@ impl Natural {
         }
     }
 
-    fn wedge(&mut self, shape: Shape, [r, s, t]: [f64; 3]) {
+    fn wedge(&mut self, shape: ElementShape, [r, s, t]: [f64; 3]) {
         let own = triangle(r, s);
         for (a, sign) in (0..6).map(|a| (a, if a < 3 { -1.0 } else { 1.0 })) {
             let (l, slope) = own[a % 3];
             let f = 1.0 + sign * t;
-            let (value, by_l, by_t) = if shape == Shape::Wedge {
+            let (value, by_l, by_t) = if shape == ElementShape::Wedge {
                 (0.5 * l * f, 0.5 * f, 0.5 * l * sign)
             } else {
                 // ½ L [(2L − 1)(1 ± t) − (1 − t²)]
@@ -128,7 +130,7 @@ impl Natural {
 }
 
 /// Natural coordinates of a corner.
-pub fn corner(shape: Shape, corner: usize) -> [f64; 3] {
+pub fn corner(shape: ElementShape, corner: usize) -> [f64; 3] {
     let simplex = |k: usize| [f64::from(u8::from(k == 1)), f64::from(u8::from(k == 2))];
     match shape.corners() {
         8 => CORNERS[corner],
@@ -137,8 +139,8 @@ pub fn corner(shape: Shape, corner: usize) -> [f64; 3] {
     }
 }
 
-/// Its middle.
-pub fn middle(shape: Shape) -> [f64; 3] {
+/// Natural coordinates of the centre.
+pub fn middle(shape: ElementShape) -> [f64; 3] {
     match shape.corners() {
         8 => [0.0; 3],
         4 => [0.25; 3],
@@ -150,7 +152,8 @@ pub fn middle(shape: Shape) -> [f64; 3] {
 pub const GAUSS_3: [(f64, f64); 3] =
     [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
 
-/// Dunavant's rule of degree 4 on a triangle: two orbits of three points (coordinate that two share, weight over ½).
+/// Dunavant's rule of degree 4 on a triangle: two orbits of three points, each (repeated coordinate, weight
+/// over ½).
 pub const DUNAVANT: [(f64, f64); 2] = [
     (0.445_948_490_915_964_9, 0.223_381_589_678_011_47),
     (0.091_576_213_509_770_74, 0.109_951_743_655_321_87),
@@ -164,21 +167,21 @@ pub fn dunavant() -> impl Iterator<Item = ([f64; 2], f64)> {
     })
 }
 
-/// Integration points and weights. All but the wedge's are exact for products of two shape functions of an element with
-/// straight edges; point g of a 6-node wedge lies nearest to its corner g.
-fn points(shape: Shape) -> Vec<([f64; 3], f64)> {
+/// Integration points and weights. All but the wedge's are exact for products of two shape functions of an
+/// element with straight edges; point g of a 6-node wedge lies nearest to its corner g.
+fn points(shape: ElementShape) -> Vec<([f64; 3], f64)> {
     match shape {
-        Shape::Wedge => {
+        ElementShape::Wedge => {
             let near = [[1.0 / 6.0, 1.0 / 6.0], [2.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 2.0 / 3.0]];
             let place = |t: f64| near.map(|[r, s]| ([r, s, t], 1.0 / 6.0));
             [place(-super::GAUSS), place(super::GAUSS)].concat()
         }
-        Shape::Wedge15 => {
+        ElementShape::Wedge15 => {
             let along = |(t, w): (f64, f64)| dunavant().map(move |([r, s], area)| ([r, s, t], w * area));
             GAUSS_3.into_iter().flat_map(along).collect()
         }
         // fourteen points of degree 5 (Walkington 2000): two orbits of four, one of six
-        Shape::Tetrahedron | Shape::Tetrahedron10 => {
+        ElementShape::Tetrahedron | ElementShape::Tetrahedron10 => {
             let mut points = Vec::with_capacity(14);
             for (a, weight) in [
                 (0.310_885_919_263_300_6, 0.112_687_925_718_015_85),
@@ -194,24 +197,24 @@ fn points(shape: Shape) -> Vec<([f64; 3], f64)> {
             points.extend(places.map(|at| (at, weight / 6.0)));
             points
         }
-        Shape::Hexahedron | Shape::Hexahedron20 => {
+        ElementShape::Hexahedron | ElementShape::Hexahedron20 => {
             let all = (0..27).map(|k| [GAUSS_3[k % 3], GAUSS_3[k / 3 % 3], GAUSS_3[k / 9]]);
             all.map(|g| (g.map(|(x, _)| x), g.iter().map(|(_, w)| w).product())).collect()
         }
     }
 }
 
-impl Rule {
-    /// Of a shape, made once.
-    pub fn of(shape: Shape) -> &'static Self {
-        static RULES: [OnceLock<Rule>; 6] = [const { OnceLock::new() }; 6];
+impl QuadratureRule {
+    /// Returns the rule of a shape, computed once.
+    pub fn for_shape(shape: ElementShape) -> &'static Self {
+        static RULES: [OnceLock<QuadratureRule>; 6] = [const { OnceLock::new() }; 6];
         RULES[shape as usize].get_or_init(|| {
             let points = points(shape);
-            let mut weights = [0.0; WIDE_POINTS];
+            let mut weights = [0.0; MAX_ELEMENT_POINTS];
             for (weight, (_, own)) in weights.iter_mut().zip(&points) {
                 *weight = *own;
             }
-            let at = points.iter().map(|(place, _)| Natural::at(shape, *place)).collect();
+            let at = points.iter().map(|(place, _)| Natural::new(shape, *place)).collect();
             Self { points: points.len(), weights, at }
         })
     }
@@ -221,29 +224,29 @@ impl Rule {
 mod tests {
     use super::*;
 
-    /// N is 1 at its own node and 0 at the others, all add up to 1, and gradients are those of finite differences.
+    /// N is 1 at its own node and 0 at the others, the sum is 1, and gradients agree with finite differences.
     #[test]
     fn shape_functions_belong_to_their_nodes() {
-        for shape in Shape::ALL {
+        for shape in ElementShape::ALL {
             let corners: Vec<[f64; 3]> = (0..shape.corners()).map(|k| corner(shape, k)).collect();
             let middles =
                 shape.edges().iter().map(|&[p, q]| [0, 1, 2].map(|d| 0.5 * (corners[p][d] + corners[q][d])));
             let places: Vec<[f64; 3]> = corners.iter().copied().chain(middles).take(shape.nodes()).collect();
             for (a, place) in places.iter().enumerate() {
-                let natural = Natural::at(shape, *place);
+                let natural = Natural::new(shape, *place);
                 for b in 0..shape.nodes() {
                     let exact = f64::from(u8::from(a == b));
                     assert!((natural.shapes[b] - exact).abs() < 1e-15, "{shape:?} {a} {b}");
                 }
             }
             let at = [0.21, 0.13, 0.37];
-            let natural = Natural::at(shape, at);
+            let natural = Natural::new(shape, at);
             assert!((natural.shapes.iter().sum::<f64>() - 1.0).abs() < 1e-15);
             for d in 0..3 {
                 let moved = |h: f64| {
                     let mut place = at;
                     place[d] += h;
-                    Natural::at(shape, place).shapes
+                    Natural::new(shape, place).shapes
                 };
                 let (low, high) = (moved(-1e-5), moved(1e-5));
                 for a in 0..shape.nodes() {
@@ -261,15 +264,20 @@ mod tests {
         // ∫₋₁¹ t^k
         let line = |k: u32| if k.is_multiple_of(2) { 2.0 / f64::from(k + 1) } else { 0.0 };
         let simplex = |i: u32, j: u32| factorial(i) * factorial(j) / factorial(i + j + 2);
-        for shape in [Shape::Wedge, Shape::Hexahedron20, Shape::Tetrahedron10, Shape::Wedge15] {
+        for shape in [
+            ElementShape::Wedge,
+            ElementShape::Hexahedron20,
+            ElementShape::Tetrahedron10,
+            ElementShape::Wedge15,
+        ] {
             for (i, j, k) in (0..216).map(|n| (n % 6, n / 6 % 6, n / 36)) {
                 let (exact, fits) = match shape {
-                    Shape::Tetrahedron10 => (
+                    ElementShape::Tetrahedron10 => (
                         factorial(i) * factorial(j) * factorial(k) / factorial(i + j + k + 3),
                         i + j + k <= 5,
                     ),
-                    Shape::Wedge => (simplex(i, j) * line(k), i + j <= 2 && k <= 3),
-                    Shape::Wedge15 => (simplex(i, j) * line(k), i + j <= 4),
+                    ElementShape::Wedge => (simplex(i, j) * line(k), i + j <= 2 && k <= 3),
+                    ElementShape::Wedge15 => (simplex(i, j) * line(k), i + j <= 4),
                     _ => (line(i) * line(j) * line(k), true),
                 };
                 let power = |[r, s, t]: [f64; 3]| r.powi(i as i32) * s.powi(j as i32) * t.powi(k as i32);

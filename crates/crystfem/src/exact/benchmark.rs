@@ -3,9 +3,9 @@
 use super::{Wall, root};
 use std::f64::consts::PI;
 
-/// Temperature, K, at the end of a rod that is held at `hot` at the other end and radiates to `ambient`: the root of
-/// k/L (T_h − T) = εσ (T⁴ − T_a⁴). `conductance` is k/L, `radiation` εσ. T2 of NAFEMS. NaN unless both are above 0 and
-/// T_h ≥ T_a ≥ 0.
+/// Temperature, K, at the free end of a rod held at `hot` at the other end and radiating to `ambient`: the
+/// root of k/L (T_h − T) = εσ (T⁴ − T_a⁴). `conductance` is k/L, `radiation` εσ. T2 of NAFEMS. NaN unless
+/// both are above 0 and T_h ≥ T_a ≥ 0.
 pub fn radiating_rod(hot: f64, ambient: f64, conductance: f64, radiation: f64) -> f64 {
     if !(conductance > 0.0 && radiation > 0.0 && ambient >= 0.0 && hot >= ambient) {
         return f64::NAN;
@@ -13,7 +13,7 @@ pub fn radiating_rod(hot: f64, ambient: f64, conductance: f64, radiation: f64) -
     root(ambient, hot, |t| conductance * (hot - t) - radiation * (t.powi(4) - ambient.powi(4)))
 }
 
-/// A slab from x = 0, held at 0, to x = L, held at A sin ωt from t = 0 on, at 0 before. T3 of NAFEMS.
+/// A slab held at 0 at x = 0 and at A sin ωt at x = L from t = 0, initially at 0. T3 of NAFEMS.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SwingingSlab {
     /// L, m.
@@ -25,8 +25,8 @@ pub struct SwingingSlab {
 }
 
 impl SwingingSlab {
-    /// T/A at x, m, and t > 0, s: Im[e^{iωt} sinh(qx)/sinh(qL)] with q = √(iω/a), and a series that decays
-    /// (Carslaw & Jaeger, 3.6), within 1e-12 for at/L² ≥ 1e-4. NaN for other times and places.
+    /// Returns T/A at x, m, and t > 0, s: Im[e^{iωt} sinh(qx)/sinh(qL)] with q = √(iω/a), and a decaying
+    /// series (Carslaw & Jaeger, 3.6), within 1e-12 for at/L² ≥ 1e-4. NaN outside.
     pub fn share(&self, x: f64, time: f64) -> f64 {
         let Self { thickness, diffusivity, angular_frequency } = *self;
         let fourier = diffusivity * time / thickness.powi(2);
@@ -59,8 +59,8 @@ impl SwingingSlab {
     }
 }
 
-/// A plate 0 ≤ x ≤ a, 0 ≤ y ≤ b, held at 1 on y = 0, insulated on x = 0, with a film to 0 on x = a and y = b. T4 of
-/// NAFEMS.
+/// A plate 0 ≤ x ≤ a, 0 ≤ y ≤ b, held at 1 on y = 0, insulated on x = 0, with a film to 0 on x = a and y = b.
+/// T4 of NAFEMS.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CooledPlate {
     /// a and b, m.
@@ -70,8 +70,9 @@ pub struct CooledPlate {
 }
 
 impl CooledPlate {
-    /// T at a place: Σ 4 sin ζ/(2ζ + sin 2ζ) cos βx Y(y)/Y(0) with ζ = βa, ζ tan ζ = Ha and
-    /// Y = β cosh β(b − y) + H sinh β(b − y), within 1e-12 for y ≥ a/50. NaN elsewhere.
+    /// Returns T at a point, within 1e-12 for y ≥ a/50, NaN outside:
+    /// Σ 4 sin ζ/(2ζ + sin 2ζ) cos βx Y(y)/Y(0) with ζ = βa, ζ tan ζ = Ha, Y = β cosh β(b − y) + H sinh β(b −
+    /// y).
     pub fn share(&self, [x, y]: [f64; 2]) -> f64 {
         let ([a, b], film) = (self.size, self.film);
         if !((0.0..=a).contains(&x) && (a / 50.0..=b).contains(&y) && film > 0.0) {

@@ -1,17 +1,17 @@
-//! Bodies of one temperature: small Biot numbers, and none at all.
+//! Bodies of uniform temperature: small Biot numbers, and adiabatic bodies.
 
 use super::root;
 
-/// T = T_a + (T_i − T_a) e^{−rate·t}, K: a body small enough to have one temperature, under a film;
-/// rate = hA/(ρcV), 1/s.
+/// Temperature of a body of uniform temperature under a film, K: T = T_a + (T_i − T_a) e^{−rate·t}, rate =
+/// hA/(ρcV), 1/s.
 pub fn lumped_film(initial: f64, ambient: f64, rate: f64, time: f64) -> f64 {
     ambient + (initial - ambient) * (-rate * time).exp()
 }
 
-/// T of a body of one temperature that radiates to surroundings at `ambient`, K: dT/dt = −rate (T⁴ − T_s⁴),
-/// rate = εσA/(ρcV), 1/(K³ s). It solves rate·t = F(T) − F(T_i) with
-/// F = [ln|(T + T_s)/(T − T_s)| + 2 atan(T/T_s)]/4T_s³, in forms of F that do not cancel, to rounding;
-/// towards 0 K, T = (T_i⁻³ + 3 rate t)^{−1/3}. Temperatures are absolute; NaN for negative ones.
+/// Temperature of a body of uniform temperature that radiates to surroundings at `ambient`, K: dT/dt = −rate
+/// (T⁴ − T_s⁴), rate = εσA/(ρcV), 1/(K³ s). It solves rate·t = F(T) − F(T_i) with F = [ln|(T + T_s)/(T −
+/// T_s)| + 2 atan(T/T_s)]/4T_s³, in forms of F that do not cancel, to rounding; towards 0 K, T = (T_i⁻³ + 3
+/// rate t)^{−1/3}. Temperatures are absolute; NaN for negative ones.
 pub fn lumped_radiation(initial: f64, ambient: f64, rate: f64, time: f64) -> f64 {
     let progress = rate * time;
     if !(initial >= 0.0 && ambient >= 0.0 && progress >= 0.0) {
@@ -26,8 +26,8 @@ pub fn lumped_radiation(initial: f64, ambient: f64, rate: f64, time: f64) -> f64
     if ambient == 0.0 {
         return (initial.powi(-3) + 3.0 * progress).powf(-1.0 / 3.0);
     }
-    // the unknown is w = ln|T − T_s|, in which nothing is lost near the end; the slope (T⁴ − T_s⁴)/(T − T_s) lies
-    // between its values at both ends
+    // the unknown w = ln|T − T_s| keeps digits near the end; the slope (T⁴ − T_s⁴)/(T − T_s) lies between its
+    // values at both ends
     let sign = if initial > ambient { 1.0 } else { -1.0 };
     let start = (initial - ambient).abs().ln();
     let slope = |t: f64| (t + ambient) * (t * t + ambient * ambient);
@@ -48,7 +48,7 @@ fn primitive(w: f64, ambient: f64, sign: f64) -> f64 {
         // (artanh s + atan s)/2T_s³, s = T/T_s
         return (near + ratio.atan()) / (2.0 * ambient.powi(3));
     }
-    // (artanh p − atan p)/2T_s³, p = T_s/T; by its series T⁻³ (1/3 + p⁴/7 + p⁸/11 + …) where the terms cancel
+    // (artanh p − atan p)/2T_s³, p = T_s/T; by its series T⁻³ (1/3 + p⁴/7 + p⁸/11 + …) if the terms cancel
     let p = ratio.recip();
     if p < 0.3 {
         let p4 = p.powi(4);
@@ -58,8 +58,8 @@ fn primitive(w: f64, ambient: f64, sign: f64) -> f64 {
     (near - p.atan()) / (2.0 * ambient.powi(3))
 }
 
-/// Rise of temperature when a body without exchange crystallizes: ΔT = ΔH X∞/c, K, with `enthalpy` ΔH of the crystal,
-/// J/kg, and `crystallinity` X∞ its share.
+/// Adiabatic temperature rise of a crystallizing body, K: ΔT = ΔH X∞/c, with `enthalpy` ΔH of the crystal,
+/// J/kg, and ultimate `crystallinity` X∞.
 pub fn adiabatic_rise(enthalpy: f64, crystallinity: f64, specific_heat: f64) -> f64 {
     enthalpy * crystallinity / specific_heat
 }
@@ -115,7 +115,7 @@ mod tests {
         assert_eq!(lumped_radiation(493.15, 353.15, CUBE, f64::INFINITY), 353.15);
         assert_eq!(lumped_radiation(493.15, 353.15, CUBE, 1e12), 353.15);
         assert_eq!(lumped_radiation(353.15, 353.15, CUBE, 10.0), 353.15);
-        // surroundings next to nothing are none
+        // near-zero ambient equals vacuum
         let vacuum = lumped_radiation(493.15, 0.0, CUBE, 600.0);
         for ambient in [1e-300, 1e-10, 1e-3] {
             assert!((lumped_radiation(493.15, ambient, CUBE, 600.0) - vacuum).abs() < 1e-11, "{ambient}");

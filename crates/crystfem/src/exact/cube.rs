@@ -1,60 +1,67 @@
-//! A cube whose finite elements have a closed form: three faces through the origin held, the others insulated.
+//! A cube with a closed-form finite-element solution: three faces through the origin held, the others
+//! insulated.
 //!
-//! On equal cubes of edge h the products of sin((m + ½)πj/N) are the eigenvectors of the conduction matrix and of the
-//! lumped capacity together, with c_d = cos((m_d + ½)π/N) and
-//! λ = (α/h²) Σ_d 2(1 − c_d) Π_{e≠d} (2 + c_e)/3. With them both the solution in continuous time (e^{−λt}) and that of a
-//! scheme (a product of its amplifications) are known to rounding: errors of time steps and of linear solvers have
-//! nothing of the error in space.
+//! On equal cubes of edge h the products of sin((m + ½)πj/N) are eigenvectors of both the conduction matrix
+//! and the lumped capacity, with c_d = cos((m_d + ½)π/N) and
+//! λ = (α/h²) Σ_d 2(1 − c_d) Π_{e≠d} (2 + c_e)/3.
+//! So the solution in continuous time (e^{−λt}) and that of a time scheme (a product of its amplification
+//! factors) are known to rounding, and errors of time steps and linear solvers are measured without the error
+//! in space.
 
 use crate::boundary::{Condition, Field};
-use crate::material::{Conductor, Property};
+use crate::material::{Conductor, ThermalProperty};
 use crate::mesh::Grid;
 use crate::problem::Problem;
 use crate::simulation::Simulation;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// Edge, m; k, ρ, c of PA12; held faces and the largest temperature at the start, K.
+/// Edge, m.
 const EDGE: f64 = 0.01;
+/// Conductivity of PA12, W/(m K).
 const CONDUCTIVITY: f64 = 0.25;
+/// Density of PA12, kg/m³.
 const DENSITY: f64 = 1010.0;
+/// Specific heat of PA12, J/(kg K).
 const SPECIFIC_HEAT: f64 = 2200.0;
+/// Temperature of the held faces, K.
 const COLD: f64 = 353.15;
+/// Largest initial temperature, K.
 const HOT: f64 = 493.15;
 
-/// When to end, s: Fo = 0.3.
+/// End time, s: Fo = 0.3.
 pub const END: f64 = 266.64;
 
-/// What the cube has at the start.
+/// Initial temperature of the cube.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Start {
-    /// The slowest eigenvector.
+pub enum CubeStart {
+    /// Slowest eigenvector.
     Smooth,
-    /// One temperature, and with it a jump at the held faces.
+    /// Uniform, with a jump at the held faces.
     Quenched,
 }
 
-/// The cube of N³ elements.
+/// A cube of N³ elements.
 pub struct Cube {
     elements: usize,
-    start: Start,
+    start: CubeStart,
 }
 
 impl Cube {
-    /// Of `elements` along an edge.
-    pub fn new(elements: usize, start: Start) -> Self {
+    /// Returns a cube with `elements` along an edge.
+    pub fn new(elements: usize, start: CubeStart) -> Self {
         Self { elements, start }
     }
 
-    /// Equations.
+    /// Number of equations.
     pub fn size(&self) -> usize {
         (self.elements + 1).pow(3)
     }
 
-    /// As finite elements.
+    /// Returns the finite-element problem.
     pub fn problem(&self) -> Result<Problem, crate::Error> {
         let mesh = Grid::uniform([0.0; 3], [EDGE; 3], [self.elements; 3])?.mesh("cube")?;
-        let property = Property::constant;
+        let property = ThermalProperty::constant;
         let (k, c) = (property("k", CONDUCTIVITY)?, property("c", SPECIFIC_HEAT)?);
         let mut nodes: Vec<u32> =
             ["left", "front", "bottom"].iter().flat_map(|side| mesh.node_sets[*side].clone()).collect();
@@ -64,21 +71,21 @@ impl Cube {
         let material = Arc::new(Conductor::new(DENSITY, k, c)?);
         let (start, sine) = (self.start, |x: f64| (0.5 * PI * x / EDGE).sin());
         let initial = Field::function(move |place, _| match start {
-            Start::Smooth => COLD + (HOT - COLD) * place.map(sine).iter().product::<f64>(),
-            Start::Quenched => HOT,
+            CubeStart::Smooth => COLD + (HOT - COLD) * place.map(sine).iter().product::<f64>(),
+            CubeStart::Quenched => HOT,
         });
         Ok(Problem { conditions, initial, ..Problem::new(mesh, material, HOT) })
     }
 
-    /// Temperatures of all nodes, x fastest, where each eigenvector has been multiplied by `factor` of its λ (1/s).
+    /// Temperatures of all nodes, K, x fastest, with each eigenvector multiplied by `factor` of its λ (1/s).
     pub fn exact(&self, factor: impl Fn(f64) -> f64) -> Vec<f64> {
         let count = self.elements;
         let angle = |mode: usize| (mode as f64 + 0.5) * PI / count as f64;
         let sine = |mode: usize, node: usize| (angle(mode) * node as f64).sin();
-        // of the temperature 1 at all nodes that are free; the last has half a cell
+        // expansion of the temperature 1 at all free nodes; the last has half a cell
         let coefficient = |mode: usize| match self.start {
-            Start::Smooth => f64::from(u8::from(mode == 0)),
-            Start::Quenched => {
+            CubeStart::Smooth => f64::from(u8::from(mode == 0)),
+            CubeStart::Quenched => {
                 let weight = |node: usize| if node == count { 0.5 } else { 1.0 };
                 2.0 / count as f64 * (1..=count).map(|node| weight(node) * sine(mode, node)).sum::<f64>()
             }
@@ -98,7 +105,7 @@ impl Cube {
             let amplitude: f64 = modes.iter().map(|&mode| coefficients[mode]).product();
             *value = amplitude * factor(2.0 * scale * sum);
         }
-        // modes to nodes along one axis after the other; each pass turns the axes by one
+        // transform modes to nodes along one axis after the other; each pass rotates the axes by one
         for _ in 0..3 {
             let lines = values.len() / count;
             let mut next = vec![0.0; lines * (count + 1)];
@@ -114,7 +121,7 @@ impl Cube {
         values.into_iter().map(|share| COLD + (HOT - COLD) * share).collect()
     }
 
-    /// Mean square of the difference to [`Self::exact`] at the nodes, K².
+    /// Returns the mean square difference to [`Self::exact`] at the nodes, K².
     pub fn mean_square(&self, simulation: &Simulation, factor: impl Fn(f64) -> f64) -> f64 {
         let exact = self.exact(factor);
         let found = simulation.temperatures(f64::NAN);
@@ -128,21 +135,22 @@ mod tests {
     use super::*;
     use crate::exact::Wall;
 
-    /// The start comes back, and on many elements the product of three walls with held faces (Carslaw & Jaeger).
+    /// The initial state is reproduced; many elements approach the product of three walls with held faces
+    /// (Carslaw & Jaeger).
     #[test]
-    fn the_closed_form() {
-        for start in [Start::Smooth, Start::Quenched] {
+    fn closed_form_of_start_and_decay() {
+        for start in [CubeStart::Smooth, CubeStart::Quenched] {
             let cube = Cube::new(5, start);
             let problem = cube.problem().unwrap();
             for (place, exact) in problem.mesh.points.iter().zip(cube.exact(|_| 1.0)) {
                 let held = place.contains(&0.0);
-                let expected = if held { COLD } else { problem.initial.at(*place, 0.0) };
+                let expected = if held { COLD } else { problem.initial.value_at(*place, 0.0) };
                 // rounding of sums of 5³ modes of 140 K
                 assert!((exact - expected).abs() < 1e-11, "{place:?}: {exact}, {expected}");
             }
         }
         let errors = [8, 16].map(|elements| {
-            let cube = Cube::new(elements, Start::Quenched);
+            let cube = Cube::new(elements, CubeStart::Quenched);
             let exact = cube.exact(|lambda| (-lambda * END).exp());
             let fourier = CONDUCTIVITY / (DENSITY * SPECIFIC_HEAT) * END / (EDGE * EDGE);
             let wall = Wall { biot: f64::INFINITY }.share(0.0, fourier);
@@ -152,10 +160,10 @@ mod tests {
         assert!(errors[1].abs() < 2e-3 && (errors[0] / errors[1] - 4.0).abs() < 0.2, "{errors:?}");
     }
 
-    /// The finite elements step as their eigenvectors do.
+    /// Finite elements step like their eigenvectors.
     #[test]
     fn backward_euler_is_a_product() {
-        let cube = Cube::new(4, Start::Quenched);
+        let cube = Cube::new(4, CubeStart::Quenched);
         let settings = crate::simulation::Settings {
             tolerance: 1e-9,
             ..crate::simulation::Settings::backward_euler(10.0)

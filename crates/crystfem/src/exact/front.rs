@@ -1,9 +1,9 @@
-//! Moving fronts: Stefan's problem and Neumann's.
+//! Moving fronts: solutions of Stefan and Neumann.
 
 use super::{erfcx, root};
 
-/// λ of the front x = 2λ√(αt) in Stefan's problem, λ e^{λ²} erf λ = Ste/√π, Ste = c (T_m − T_s)/L (Carslaw & Jaeger,
-/// 11.2); 0 at Ste = 0, NaN below.
+/// Root λ of the front x = 2λ√(αt) in Stefan's problem, λ e^{λ²} erf λ = Ste/√π, Ste = c (T_m − T_s)/L
+/// (Carslaw & Jaeger, 11.2); 0 at Ste = 0, NaN below.
 pub fn stefan_root(stefan: f64) -> f64 {
     if stefan.is_nan() || stefan < 0.0 {
         return f64::NAN;
@@ -14,8 +14,8 @@ pub fn stefan_root(stefan: f64) -> f64 {
     root(0.0, greatest, |root| sought - (root.ln() + root * root + libm::erf(root).ln()))
 }
 
-/// A half space of melt that freezes from its held surface on, with two conductors and a latent heat at one temperature
-/// (Neumann's solution, Carslaw & Jaeger, 11.2). The densities of both are one.
+/// A half space of melt that freezes from its cooled surface, with conductivities of solid and melt and a
+/// latent heat at one temperature (Neumann's solution, Carslaw & Jaeger, 11.2). Both have the same density.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Freezing {
     /// Conductivities of solid and melt, W/(m K).
@@ -35,9 +35,9 @@ pub struct Freezing {
 }
 
 impl Freezing {
-    /// λ of the front x = 2λ√(α_s t):
-    /// e^{−λ²}/erf λ − (k_l/k_s) ν (T_i − T_m)/(T_m − T_s) e^{−ν²λ²}/erfc(νλ) = λ L √π/(c (T_m − T_s)), ν = √(α_s/α_l).
-    /// NaN where temperatures are not in their order.
+    /// Root λ of the front x = 2λ√(α_s t), with ν = √(α_s/α_l):
+    /// e^{−λ²}/erf λ − (k_l/k_s) ν (T_i − T_m)/(T_m − T_s) e^{−ν²λ²}/erfc(νλ) = λ L √π/(c (T_m − T_s)).
+    /// NaN unless T_s < T_m ≤ T_i.
     pub fn root(&self) -> f64 {
         let fall = self.melting - self.surface;
         let ordered = fall > 0.0 && self.initial >= self.melting && self.latent_heat >= 0.0;
@@ -53,12 +53,12 @@ impl Freezing {
         })
     }
 
-    /// Place of the front, m.
+    /// Position of the front, m.
     pub fn front(&self, time: f64) -> f64 {
         2.0 * self.root() * (self.diffusivity[0] * time).sqrt()
     }
 
-    /// T at a depth, K. The initial temperature at t = 0 below the surface.
+    /// Returns T at a depth, K; the initial temperature at t = 0 below the surface.
     pub fn temperature(&self, depth: f64, time: f64) -> f64 {
         let root = self.root();
         let nu = (self.diffusivity[0] / self.diffusivity[1]).sqrt();

@@ -1,4 +1,4 @@
-//! Half spaces: a surface held, a surface with film, two in contact.
+//! Half spaces: with a held surface, with a film, two in contact.
 
 use super::erfcx;
 
@@ -19,23 +19,24 @@ impl HalfSpace {
         self.conductivity / self.diffusivity.sqrt()
     }
 
-    /// T = T_s + (T_i − T_s) erf(x/2√(αt)), K, with the surface held at `surface` from t = 0 on (Carslaw & Jaeger, 2.4).
-    /// `surface` at depth 0 and the initial temperature elsewhere at t = 0.
-    pub fn held(&self, surface: f64, depth: f64, time: f64) -> f64 {
+    /// Returns T, K, with the surface held at `surface` from t = 0: T_s + (T_i − T_s) erf(x/2√(αt)) (Carslaw
+    /// & Jaeger, 2.4). At t = 0 it is `surface` at depth 0 and the initial temperature elsewhere.
+    pub fn with_held_surface(&self, surface: f64, depth: f64, time: f64) -> f64 {
         surface + (self.initial - surface) * libm::erf(self.similarity(depth, time))
     }
 
-    /// Heat through the held surface out of the body, q = k (T_i − T_s)/√(παt), W/m²; infinite at t = 0.
-    pub fn held_flux(&self, surface: f64, time: f64) -> f64 {
+    /// Heat flux out through the held surface, q = k (T_i − T_s)/√(παt), W/m²; infinite at t = 0.
+    pub fn flux_with_held_surface(&self, surface: f64, time: f64) -> f64 {
         self.conductivity * (self.initial - surface) / (std::f64::consts::PI * self.diffusivity * time).sqrt()
     }
 
-    /// T under a film of coefficient `film`, W/(m² K), with `ambient` beyond it, K:
-    /// (T − T_i)/(T_a − T_i) = erfc η − e^{hx/k + h²αt/k²} erfc(η + h√(αt)/k), η = x/2√(αt) (Carslaw & Jaeger, 2.7).
-    /// The product is e^{−η²} erfcx(η + h√(αt)/k), which neither overflows nor cancels, for any h from 0 to infinity.
-    pub fn film(&self, film: f64, ambient: f64, depth: f64, time: f64) -> f64 {
+    /// Returns T, K, under a film of coefficient `film`, W/(m² K), to `ambient`, K (Carslaw & Jaeger, 2.7):
+    /// (T − T_i)/(T_a − T_i) = erfc η − e^{hx/k + h²αt/k²} erfc(η + h√(αt)/k), η = x/2√(αt).
+    /// The product is computed as e^{−η²} erfcx(η + h√(αt)/k), which neither overflows nor cancels for any h
+    /// from 0 to infinity.
+    pub fn with_film(&self, film: f64, ambient: f64, depth: f64, time: f64) -> f64 {
         if film.is_infinite() {
-            return self.held(ambient, depth, time);
+            return self.with_held_surface(ambient, depth, time);
         }
         self.initial
             + (ambient - self.initial)
@@ -51,7 +52,7 @@ impl HalfSpace {
     }
 }
 
-/// θ = erfc η − e^{−η²} erfcx(η + β) with β = h√(αt)/k: 0 untouched, 1 at ambient temperature.
+/// θ = erfc η − e^{−η²} erfcx(η + β) with β = h√(αt)/k: 0 at the initial, 1 at the ambient temperature.
 pub(super) fn film_share(similarity: f64, film: f64) -> f64 {
     if similarity.is_infinite() || film == 0.0 {
         return 0.0;
@@ -59,26 +60,27 @@ pub(super) fn film_share(similarity: f64, film: f64) -> f64 {
     (-similarity * similarity).exp() * (erfcx(similarity) - erfcx(similarity + film))
 }
 
-/// Two half spaces brought into perfect contact: a layer printed on glass, in its first moments.
+/// Two half spaces in perfect contact from t = 0: a layer just printed on glass.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Contact {
-    /// The body at negative places.
+pub struct HalfSpaceContact {
+    /// Body at x < 0.
     pub lower: HalfSpace,
-    /// The body at positive places.
+    /// Body at x > 0.
     pub upper: HalfSpace,
 }
 
-impl Contact {
-    /// Temperature of the contact, constant in time: (e₁T₁ + e₂T₂)/(e₁ + e₂), K (Carslaw & Jaeger, 2.15).
+impl HalfSpaceContact {
+    /// Contact temperature, constant in time: (e₁T₁ + e₂T₂)/(e₁ + e₂), K (Carslaw & Jaeger, 2.15).
     pub fn temperature_of_contact(&self) -> f64 {
         let [lower, upper] = [self.lower, self.upper].map(|body| body.effusivity());
         (lower * self.lower.initial + upper * self.upper.initial) / (lower + upper)
     }
 
-    /// T at `place` (m, negative in the lower body), K: each body is one with its surface held at the contact's.
+    /// Returns T at `place` (m, negative in the lower body), K: each body has its surface held at the contact
+    /// temperature.
     pub fn temperature(&self, place: f64, time: f64) -> f64 {
         let body = if place < 0.0 { self.lower } else { self.upper };
-        body.held(self.temperature_of_contact(), place.abs(), time)
+        body.with_held_surface(self.temperature_of_contact(), place.abs(), time)
     }
 }
 
@@ -89,46 +91,46 @@ mod tests {
     /// PA12 of `reference/ch4/analytic.py`.
     const PA12: HalfSpace = HalfSpace { conductivity: 0.25, diffusivity: 1.125_112_511e-7, initial: 493.15 };
 
-    // formulation.md, "Verification problems": x = 2 mm, t = 20 s, surface and ambient 353.15 K; its nine decimals follow
-    // from α given with ten digits
+    // formulation.md, "Verification problems": x = 2 mm, t = 20 s, surface and ambient 353.15 K; its nine
+    // decimals follow from α given with ten digits
     #[test]
     fn figures_of_the_formulation() {
-        assert!((PA12.held(353.15, 2e-3, 20.0) - 444.737_621_471).abs() < 5e-8);
-        assert!((PA12.film(50.0, 353.15, 2e-3, 20.0) - 483.955_142_637).abs() < 5e-8);
-        assert!((PA12.held_flux(353.15, 20.0) - 13_163.765_378).abs() < 1e-5);
+        assert!((PA12.with_held_surface(353.15, 2e-3, 20.0) - 444.737_621_471).abs() < 5e-8);
+        assert!((PA12.with_film(50.0, 353.15, 2e-3, 20.0) - 483.955_142_637).abs() < 5e-8);
+        assert!((PA12.flux_with_held_surface(353.15, 20.0) - 13_163.765_378).abs() < 1e-5);
         let glass = HalfSpace { conductivity: 1.0, diffusivity: 1.0 / (2500.0 * 800.0), initial: 353.15 };
-        let contact = Contact { lower: glass, upper: PA12 };
+        let contact = HalfSpaceContact { lower: glass, upper: PA12 };
         assert!((contact.temperature_of_contact() - 401.468_157_592).abs() < 1e-8);
         // continuous in temperature and in flux
         let [below, above] = [contact.temperature(-1e-9, 20.0), contact.temperature(1e-9, 20.0)];
         let contact_temperature = contact.temperature_of_contact();
         assert!((below - contact_temperature).abs() < 1e-4 && (above - contact_temperature).abs() < 1e-4);
-        let [out, into] = [PA12, glass].map(|body| body.held_flux(contact_temperature, 20.0));
+        let [out, into] = [PA12, glass].map(|body| body.flux_with_held_surface(contact_temperature, 20.0));
         assert!((out + into).abs() < 1e-10 * out);
     }
 
     #[test]
     fn limits() {
-        assert_eq!(PA12.held(353.15, 0.0, 0.0), 353.15);
-        assert_eq!(PA12.held(353.15, 1e-3, 0.0), 493.15);
-        assert_eq!(PA12.film(50.0, 353.15, 0.0, 0.0), 493.15);
-        assert_eq!(PA12.film(50.0, 353.15, 1e-3, 0.0), 493.15);
-        assert_eq!(PA12.film(0.0, 353.15, 1e-3, 10.0), 493.15);
-        assert_eq!(PA12.film(f64::INFINITY, 353.15, 0.0, 0.0), 353.15);
+        assert_eq!(PA12.with_held_surface(353.15, 0.0, 0.0), 353.15);
+        assert_eq!(PA12.with_held_surface(353.15, 1e-3, 0.0), 493.15);
+        assert_eq!(PA12.with_film(50.0, 353.15, 0.0, 0.0), 493.15);
+        assert_eq!(PA12.with_film(50.0, 353.15, 1e-3, 0.0), 493.15);
+        assert_eq!(PA12.with_film(0.0, 353.15, 1e-3, 10.0), 493.15);
+        assert_eq!(PA12.with_film(f64::INFINITY, 353.15, 0.0, 0.0), 353.15);
         // an infinite film holds the surface
         for film in [1e12, f64::INFINITY] {
-            let held = PA12.held(353.15, 2e-3, 20.0);
-            assert!((PA12.film(film, 353.15, 2e-3, 20.0) - held).abs() < 1e-6);
+            let held = PA12.with_held_surface(353.15, 2e-3, 20.0);
+            assert!((PA12.with_film(film, 353.15, 2e-3, 20.0) - held).abs() < 1e-6);
         }
         // long after, everything is at ambient temperature; e^{h²αt/k²} alone would overflow
-        assert!((PA12.film(50.0, 353.15, 2e-3, 1e12) - 353.15).abs() < 1e-1);
-        assert!(PA12.film(50.0, 353.15, 2e-3, -1.0).is_nan());
+        assert!((PA12.with_film(50.0, 353.15, 2e-3, 1e12) - 353.15).abs() < 1e-1);
+        assert!(PA12.with_film(50.0, 353.15, 2e-3, -1.0).is_nan());
     }
 
     #[test]
     fn the_film_solution_satisfies_its_surface_condition() {
         // −k ∂T/∂x = h (T_a − T) at the surface, by a one-sided difference of second order
-        let at = |x| PA12.film(50.0, 353.15, x, 20.0);
+        let at = |x| PA12.with_film(50.0, 353.15, x, 20.0);
         let step = 1e-6;
         let slope = (-3.0 * at(0.0) + 4.0 * at(step) - at(2.0 * step)) / (2.0 * step);
         assert!((-0.25 * slope / (50.0 * (353.15 - at(0.0))) - 1.0).abs() < 1e-5);

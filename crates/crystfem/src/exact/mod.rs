@@ -1,7 +1,7 @@
-//! Closed-form solutions of heat conduction: what results are compared with.
+//! Closed-form solutions of heat conduction, for verification.
 //!
-//! Arguments outside their domain (negative times or conductivities, what is not a number) give NaN or the limit named;
-//! nothing panics.
+//! Arguments outside their domain (negative times or conductivities, NaN) give NaN or the limit named,
+//! without a panic.
 
 mod benchmark;
 mod cooling;
@@ -14,21 +14,21 @@ mod wall;
 pub use benchmark::{CooledPlate, SwingingSlab, radiating_rod};
 pub use cooling::{adiabatic_rise, lumped_film, lumped_radiation};
 pub use front::{Freezing, stefan_root};
-pub use half_space::{Contact, HalfSpace};
+pub use half_space::{HalfSpace, HalfSpaceContact};
 pub use manufactured::Manufactured;
 pub use wall::{Wall, steady_wall};
 
-/// Complementary error function over the Gaussian: erfcx x = e^{x²} erfc x, within 5e-16 of its value for x > −26;
-/// below, e^{x²} is beyond the largest number and infinity comes back.
+/// Scaled complementary error function erfcx x = e^{x²} erfc x, within 5e-16 of its value for x > −26;
+/// infinity below, where e^{x²} overflows.
 ///
-/// Up to 25 both factors are taken as they are, with the rounding of x² carried along; beyond, the asymptotic series
-/// (Abramowitz & Stegun 7.1.23) of which the eighth term is below 1e-17.
+/// Up to 25 both factors are evaluated, with the rounding of x² compensated; beyond, the asymptotic series
+/// (Abramowitz & Stegun 7.1.23), whose eighth term is below 1e-17.
 pub fn erfcx(x: f64) -> f64 {
     if x < 25.0 {
         let square = x * x;
         let rounding = x.mul_add(x, -square);
         let gaussian = square.exp();
-        // infinity times its own rounding would be none
+        // infinity times its rounding error would be NaN
         let correction = if gaussian.is_finite() { gaussian * rounding } else { 0.0 };
         return (gaussian + correction) * libm::erfc(x);
     }
@@ -37,9 +37,9 @@ pub fn erfcx(x: f64) -> f64 {
     series / (x * std::f64::consts::PI.sqrt())
 }
 
-/// Where a function that is positive at `low` and negative at `high` changes sign, to the last bit.
+/// Finds the sign change of a function positive at `low` and negative at `high`, to the last bit.
 fn root(low: f64, high: f64, f: impl Fn(f64) -> f64) -> f64 {
-    // a number has 64 bits; halving from 1e308 to 1e-308 takes 2100 steps
+    // halving from 1e308 to 1e-308 takes 2100 steps
     polycore::numerics::bisected(low, high, 2200, |x| f(x) > 0.0)
 }
 

@@ -1,10 +1,10 @@
-//! A plane wall: cooled by films on both sides, or with conductivity that follows temperature.
+//! A plane wall: with films on both sides, or with temperature-dependent conductivity.
 
 use super::half_space::film_share;
 use super::root;
 
-/// A wall of half thickness L with films on both faces, or of thickness L with one face insulated; ξ = x/L is 0 in the
-/// middle (at the insulated face) and 1 at the film. θ = (T − T_a)/(T_i − T_a).
+/// A wall of half thickness L with films on both faces, or of thickness L with one face insulated; ξ = x/L is
+/// 0 at the middle (the insulated face) and 1 at the film. θ = (T − T_a)/(T_i − T_a).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wall {
     /// Bi = hL/k, from 0 (insulated) to infinity (held faces).
@@ -12,7 +12,7 @@ pub struct Wall {
 }
 
 impl Wall {
-    /// n-th root (from 0) of ζ tan ζ = Bi, as nπ and the rest: 0 ≤ ζ − nπ ≤ π/2.
+    /// n-th root (from 0) of ζ tan ζ = Bi, split into nπ and the remainder: 0 ≤ ζ − nπ ≤ π/2.
     pub fn root(&self, n: u32) -> (f64, f64) {
         let whole = f64::from(n) * std::f64::consts::PI;
         // (φ + nπ) tan φ = Bi as φ = atan(Bi/(φ + nπ)): the difference is monotone for any Bi
@@ -20,10 +20,11 @@ impl Wall {
         (whole, rest)
     }
 
-    /// θ at ξ after Fo = αt/L²: Σ 4 sin ζ/(2ζ + sin 2ζ) e^{−ζ²Fo} cos ζξ (Carslaw & Jaeger, 3.11), within 1e-13.
+    /// Returns θ at ξ after Fo = αt/L², within 1e-13: Σ 4 sin ζ/(2ζ + sin 2ζ) e^{−ζ²Fo} cos ζξ (Carslaw &
+    /// Jaeger, 3.11).
     ///
-    /// Below Fo = 0.02 the two faces are half spaces (the wave of one has fallen below 1e-21 at the other), above it
-    /// twenty terms are enough (e^{−ζ²Fo} < 1e-30 after them).
+    /// Below Fo = 0.02 the two faces are half spaces (the temperature wave of one is below 1e-21 at the
+    /// other); above, twenty terms suffice (e^{−ζ²Fo} < 1e-30 after them).
     pub fn share(&self, place: f64, fourier: f64) -> f64 {
         if fourier.is_nan() || fourier < 0.0 || self.biot.is_nan() || self.biot < 0.0 {
             return f64::NAN;
@@ -43,7 +44,7 @@ impl Wall {
         let term = |n: u32| {
             let (whole, rest) = self.root(n);
             let zeta = whole + rest;
-            // sin ζ = ± sin φ and sin 2ζ = sin 2φ: nothing is lost far out or near nπ
+            // sin ζ = ± sin φ and sin 2ζ = sin 2φ keep digits for large n and near nπ
             let sign = if n.is_multiple_of(2) { 1.0 } else { -1.0 };
             4.0 * sign * rest.sin() / (2.0 * zeta + (2.0 * rest).sin())
                 * (-zeta * zeta * fourier).exp()
@@ -53,8 +54,8 @@ impl Wall {
     }
 }
 
-/// T at ξ = x/L between two held faces, K, for k = k₀ (1 + b (T − T₀)): Kirchhoff's u = T − T₀ + b (T − T₀)²/2 is linear
-/// in x. `slope` is b, 1/K; `reference` T₀, K. NaN where k is not positive at both faces.
+/// Returns T at ξ = x/L between two held faces, K, for k = k₀ (1 + b (T − T₀)): Kirchhoff's u = T − T₀ + b (T
+/// − T₀)²/2 is linear in x. `slope` is b, 1/K; `reference` T₀, K. NaN unless k is positive at both faces.
 pub fn steady_wall(faces: [f64; 2], slope: f64, reference: f64, place: f64) -> f64 {
     let [a, b] = faces.map(|face| face - reference);
     if !(1.0 + slope * a > 0.0 && 1.0 + slope * b > 0.0) {
@@ -62,7 +63,7 @@ pub fn steady_wall(faces: [f64; 2], slope: f64, reference: f64, place: f64) -> f
     }
     let u = |t: f64| t + 0.5 * slope * t * t;
     let here = u(a) + (u(b) - u(a)) * place;
-    // the root of the quadratic with positive conductivity, without cancellation at small b
+    // root with positive conductivity, in the form without cancellation at small b
     reference + 2.0 * here / (1.0 + (1.0 + 2.0 * slope * here).sqrt())
 }
 
@@ -94,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn both_forms_meet() {
+    fn both_forms_agree_at_their_border() {
         for biot in [1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e6, f64::INFINITY] {
             for place in [0.0, 0.3, 0.9, 1.0] {
                 let wall = Wall { biot };
@@ -121,7 +122,7 @@ mod tests {
     #[test]
     fn kirchhoff() {
         assert_eq!(steady_wall([300.0, 400.0], 0.0, 300.0, 0.25), 325.0);
-        // the flux k ∂T/∂x is one everywhere
+        // the flux k ∂T/∂x is uniform
         let at = |place| steady_wall([300.0, 400.0], 0.01, 320.0, place);
         let flux =
             |place: f64| (1.0 + 0.01 * (at(place) - 320.0)) * (at(place + 1e-6) - at(place - 1e-6)) / 2e-6;

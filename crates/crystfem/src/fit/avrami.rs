@@ -1,19 +1,19 @@
 //! Avrami's law of isothermal crystallization.
 
 use super::least_squares::{STEP, minimize};
-use super::{Estimate, Fit, check, check_finite};
+use super::{Estimate, KineticFit, check, check_finite};
 use crate::error::Error;
 use crate::kinetics;
 use std::f64::consts::LN_2;
 
-/// Fits α = 1 − exp(−k tⁿ), Eq. (4.2), to times, s, from the begin of crystallization, and α.
+/// Fits α = 1 − exp(−k tⁿ), Eq. (4.2), to times, s, from the start of crystallization, and α.
 ///
 /// Estimates: `half_time` t_½ in s, `avrami_exponent` n, `rate_constant` k = ln 2/t_½ⁿ in s⁻ⁿ.
 ///
 /// # Errors
-/// [`Error::Data`] for columns of different lengths, times that are negative, α outside [`super::DEGREES`], NaN, too few
-/// measurements or constant ones, and data that do not determine both constants.
-pub fn avrami(times: &[f64], degrees: &[f64]) -> Result<Fit, Error> {
+/// [`Error::Data`] for columns of different lengths, negative times, α outside [`super::DEGREES`], NaN, too
+/// few or constant measurements, and data that do not determine both constants.
+pub fn avrami(times: &[f64], degrees: &[f64]) -> Result<KineticFit, Error> {
     let what = "fit of Avrami's law";
     if times.len() != degrees.len() {
         let reason = format!("{} times and {} values of alpha", times.len(), degrees.len());
@@ -41,13 +41,13 @@ pub fn avrami(times: &[f64], degrees: &[f64]) -> Result<Fit, Error> {
     };
     let starts: Vec<Vec<f64>> = [1.0, 2.5, 4.0].iter().map(|&n: &f64| vec![half(n), n.ln()]).collect();
     let minimum = minimize(what, &residuals, times.len(), &starts, STEP)?;
-    let [half, exponent] = [minimum.at[0], minimum.at[1]];
+    let [half, exponent] = [minimum.parameters[0], minimum.parameters[1]];
     let n = exponent.exp();
     // ln k = ln ln 2 − n ln t_½
     let estimate = |name, unit: &str, value: f64, gradient: [f64; 2]| {
         Estimate::of_logarithm(name, unit, value, minimum.error_of(&gradient), minimum.degrees)
     };
-    Ok(Fit {
+    Ok(KineticFit {
         estimates: vec![
             estimate("half_time", "s", half, [1.0, 0.0]),
             estimate("avrami_exponent", "", exponent, [0.0, 1.0]),
@@ -60,6 +60,6 @@ pub fn avrami(times: &[f64], degrees: &[f64]) -> Result<Fit, Error> {
         rms: minimum.rms(),
         measurements: times.len(),
         evaluations: minimum.evaluations,
-        model: model(&minimum.at),
+        model: model(&minimum.parameters),
     })
 }

@@ -4,55 +4,62 @@ use super::check_finite;
 use crate::error::Error;
 use serde::Deserialize;
 
-/// The heat flow without the transition, between the limits of integration.
+/// Baseline between the limits of integration: the heat flow without the transition.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Baseline {
-    /// Straight between the heat flows at the limits.
+    /// Straight line between the heat flows at the limits.
     #[default]
     Linear,
-    /// From the heat flow at the first limit to that at the second in proportion to α: a step of the heat capacity.
+    /// Heat flow from the value at the first limit to that at the second, in proportion to α: a step of the
+    /// heat capacity.
     Sigmoidal,
-    /// From the tangent before the first limit to the tangent after the second in proportion to α. The tangents are
-    /// least-squares lines through the measurements up to a tenth of the width away from the limits.
+    /// Heat flow from the tangent before the first limit to the tangent after the second, in proportion to α.
+    /// The tangents are least-squares lines through the measurements within a tenth of the peak width from
+    /// the limits.
     Tangential,
 }
 
-/// Measurements on a side that a tangent needs.
+/// Number of measurements per side that a tangent needs.
 const TANGENT_ROWS: usize = 3;
-/// Iterations of α, each of which moves a baseline.
+/// Limit on iterations of α and its baseline.
 const ITERATIONS: usize = 200;
-/// Largest change of α in the last iteration.
+/// Change of α at which the iteration ends.
 const CONVERGED: f64 = 1e-12;
-/// Least area of a peak over the integral of the heat flow's size: below is rounding.
-const LEAST_AREA: f64 = 1e-10;
+/// Smallest peak area over the integral of |q|; smaller ones are rounding errors.
+const MIN_AREA: f64 = 1e-10;
 
-/// A heat flow between two limits, and what follows from it.
+/// A peak of heat flow between two limits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Peak {
-    /// The limits and the times of measurements between them, s.
+    /// Limits and measurement times between them, s.
     pub times: Vec<f64>,
-    /// Heat that the sample gives off, q, W/kg.
+    /// Heat flow given off by the sample, q, W/kg.
     pub flows: Vec<f64>,
     /// Baseline B, W/kg.
     pub baseline: Vec<f64>,
-    /// α(t) = ∫(q − B) dt/ΔH from the first limit to t: 0 there, 1 at the second.
+    /// α(t) = ∫(q − B) dt/ΔH from the first limit to t: 0 at the first limit, 1 at the second.
     pub degrees: Vec<f64>,
     /// ΔH = ∫(q − B) dt between the limits, J/kg.
     pub enthalpy: f64,
 }
 
 impl Peak {
-    /// Integrates the heat given off, W/kg, at `times`, s, between `limits`, s, by the trapezoidal rule; the heat flow is
-    /// linear between measurements. B = (1 − α) B₁ + α B₂ with lines B₁ and B₂ through the limits is iterated with α; see
-    /// Höhne, Hemminger & Flammersheim, Differential Scanning Calorimetry (2003).
+    /// Integrates the heat flow given off, W/kg, at `times`, s, between `limits`, s, by the trapezoidal rule.
+    /// B = (1 − α) B₁ + α B₂ with lines B₁ and B₂ through the limits is iterated with α; see Höhne, Hemminger
+    /// & Flammersheim, Differential Scanning Calorimetry (2003).
     ///
     /// # Errors
-    /// [`Error::Data`] for columns of different lengths, numbers that are not finite, times that decrease, limits that are
-    /// not in order within the times, too few rows for a tangent, and a baseline that does not converge;
-    /// [`Error::Parameter`] for an enthalpy that is not above 0.
-    pub fn of(times: &[f64], flows: &[f64], limits: [f64; 2], baseline: Baseline) -> Result<Self, Error> {
+    /// [`Error::Data`] for columns of different lengths, numbers that are not finite, times that decrease,
+    /// limits that are not in order within the times, too few rows for a tangent, and a baseline that does
+    /// not converge; [`Error::Parameter`] for an enthalpy that is not above 0.
+    pub fn integrate(
+        times: &[f64],
+        flows: &[f64],
+        limits: [f64; 2],
+        baseline: Baseline,
+    ) -> Result<Self, Error> {
         let what = "integration of a heat flow";
         let refuse = |reason: String| Error::Data { what: what.to_owned(), reason };
         if times.len() != flows.len() || times.len() < 2 {
@@ -73,7 +80,7 @@ impl Peak {
         }
         let inside: Vec<usize> =
             (0..times.len()).filter(|&row| times[row] > from && times[row] < to).collect();
-        let [start, end] = limits.map(|limit| at(times, flows, limit));
+        let [start, end] = limits.map(|limit| interpolate(times, flows, limit));
         let cut = |start: f64, values: &[f64], end: f64| {
             let between = inside.iter().map(|&row| values[row]);
             std::iter::once(start).chain(between).chain(std::iter::once(end)).collect::<Vec<f64>>()
@@ -112,20 +119,20 @@ impl Peak {
         };
         peak.degrees = peak.times.iter().map(|time| (time - from) / (to - from)).collect();
         for _ in 0..ITERATIONS {
-            let change = peak.integrate(limits, lines)?;
-            // both lines are one: α does not move it
+            let change = peak.iterate(limits, lines)?;
+            // both lines coincide: B does not depend on α
             if baseline == Baseline::Linear || change < CONVERGED {
                 return Ok(peak);
             }
         }
         Err(refuse(format!(
-            "the baseline does not converge within {ITERATIONS} iterations; allowed: a step of the heat flow across the \
-             peak that is small against the peak"
+            "the baseline does not converge within {ITERATIONS} iterations; allowed: a step of the heat \
+             flow across the peak that is small against the peak"
         )))
     }
 
-    /// The baseline by the α so far, then α; the largest change of it.
-    fn integrate(&mut self, limits: [f64; 2], lines: [[f64; 2]; 2]) -> Result<f64, Error> {
+    /// Updates the baseline from α, then α; returns the largest change of α.
+    fn iterate(&mut self, limits: [f64; 2], lines: [[f64; 2]; 2]) -> Result<f64, Error> {
         let on = |side: usize, time: f64| lines[side][0] + lines[side][1] * (time - limits[side]);
         let rows = self.times.iter().zip(&self.degrees);
         self.baseline = rows.map(|(&t, degree)| (1.0 - degree) * on(0, t) + degree * on(1, t)).collect();
@@ -137,9 +144,9 @@ impl Peak {
             size += half * (self.flows[row - 1].abs() + self.flows[row].abs());
             sums.push(sum);
         }
-        if !(sum > LEAST_AREA * size && sum.is_finite()) {
-            let allowed = "above 0: a peak of heat given off over its baseline. Crystallization is exothermal; is \
-                           `exothermal` the wrong way round, or is the peak outside the limits?";
+        if !(sum > MIN_AREA * size && sum.is_finite()) {
+            let allowed = "above 0: a peak of heat given off over its baseline. Crystallization is \
+                exothermal; is `exothermal` the wrong way round, or is the peak outside the limits?";
             return Err(Error::Parameter { name: "enthalpy in J/kg", found: sum, allowed: allowed.into() });
         }
         let mut change = 0.0_f64;
@@ -152,15 +159,15 @@ impl Peak {
     }
 }
 
-/// A column at a time within sorted times, linear between rows.
-pub fn at(times: &[f64], values: &[f64], time: f64) -> f64 {
+/// Interpolates a column at a time within sorted times.
+pub fn interpolate(times: &[f64], values: &[f64], time: f64) -> f64 {
     let after = times.partition_point(|&t| t < time).clamp(1, times.len() - 1);
     let [a, b] = [times[after - 1], times[after]];
     let share = if b > a { (time - a) / (b - a) } else { 1.0 };
     values[after - 1] + share * (values[after] - values[after - 1])
 }
 
-/// Value at 0 and slope of the least-squares line.
+/// Fits a line; returns its value at 0 and its slope.
 fn tangent(rows: &[[f64; 2]]) -> Option<[f64; 2]> {
     let count = rows.len() as f64;
     let mean = |k: usize| rows.iter().map(|row| row[k]).sum::<f64>() / count;
@@ -190,14 +197,14 @@ mod tests {
         HEAT * slope * (-LN_2 * (t / HALF).powf(EXPONENT)).exp()
     }
 
-    /// Times from −30 to 240 s in so many steps, and heat flows over a baseline.
+    /// Returns times from −30 to 240 s in `steps` steps, and heat flows over a baseline.
     fn curve(steps: usize, baseline: impl Fn(f64) -> f64) -> (Vec<f64>, Vec<f64>) {
         let times: Vec<f64> = (0..=steps).map(|k| -30.0 + 270.0 * k as f64 / steps as f64).collect();
         let flows = times.iter().map(|&t| released(t) + baseline(t)).collect();
         (times, flows)
     }
 
-    /// Largest error of α and relative error of ΔH.
+    /// Returns the largest error of α and the relative error of ΔH.
     fn errors(peak: &Peak, degree: impl Fn(f64) -> f64, enthalpy: f64) -> [f64; 2] {
         let rows = peak.times.iter().zip(&peak.degrees);
         let worst = rows.map(|(&t, found)| (found - degree(t)).abs()).fold(0.0, f64::max);
@@ -208,12 +215,12 @@ mod tests {
         errors.windows(2).map(|pair| [0, 1].map(|k| (pair[0][k] / pair[1][k]).log2())).collect()
     }
 
-    /// Avrami's law on a sloped baseline, the whole peak: α and ΔH come back, α to second order.
+    /// Recovers α, to second order, and ΔH from Avrami's law on a sloped baseline over the whole peak.
     #[test]
     fn a_whole_peak_on_a_slope() {
         let of = |steps: usize| {
             let (times, flows) = curve(steps, |t| 700.0 + 3.0 * t);
-            errors(&Peak::of(&times, &flows, [-30.0, 240.0], Baseline::Linear).unwrap(), avrami, HEAT)
+            errors(&Peak::integrate(&times, &flows, [-30.0, 240.0], Baseline::Linear).unwrap(), avrami, HEAT)
         };
         let found = [of(216), of(432), of(864)];
         for order in orders(&found) {
@@ -222,7 +229,8 @@ mod tests {
         assert!(found[2][0] < 1e-5 && found[2][1] < 1e-6, "{found:?}");
     }
 
-    /// Limits in the flanks of the peak, between rows, and four times the rows: chords, α and ΔH have closed forms, both come back to second order.
+    /// Recovers closed forms of α and ΔH to second order with limits in the flanks of the peak, between rows,
+    /// under refinement by four.
     #[test]
     fn limits_in_the_flanks() {
         // a third of a step behind a row, at every refinement
@@ -234,7 +242,7 @@ mod tests {
         };
         let of = |steps: usize| {
             let (times, flows) = curve(steps, |t| -200.0 - 1.5 * t);
-            let peak = Peak::of(&times, &flows, [a, b], Baseline::Linear).unwrap();
+            let peak = Peak::integrate(&times, &flows, [a, b], Baseline::Linear).unwrap();
             assert_eq!((peak.degrees[0], *peak.degrees.last().unwrap()), (0.0, 1.0));
             errors(&peak, |t| area(t) / area(b), area(b))
         };
@@ -244,8 +252,8 @@ mod tests {
         }
     }
 
-    /// A step of the heat capacity, by levels and by lines: the truth is B = (1 − α) B₁ + α B₂, which a straight baseline
-    /// misses by several per cent.
+    /// Recovers a step of the heat capacity from levels and from tangents: B = (1 − α) B₁ + α B₂, which a
+    /// straight baseline misses by several per cent.
     #[test]
     fn a_step_of_the_heat_capacity() {
         for (baseline, slopes) in [(Baseline::Sigmoidal, [0.0, 0.0]), (Baseline::Tangential, [1.0, 0.4])] {
@@ -256,7 +264,7 @@ mod tests {
                 };
                 let (times, flows) = curve(steps, truth);
                 // tangents reach a tenth of the width beyond: −19 to 0 s and 190 to 209 s
-                errors(&Peak::of(&times, &flows, [0.0, 190.0], baseline).unwrap(), avrami, HEAT)
+                errors(&Peak::integrate(&times, &flows, [0.0, 190.0], baseline).unwrap(), avrami, HEAT)
             };
             let found = [of(270, baseline), of(540, baseline), of(1080, baseline)];
             for order in orders(&found) {
@@ -269,10 +277,10 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_integrated() {
+    fn invalid_integrations_are_refused() {
         let (times, flows) = curve(270, |t| 700.0 + 3.0 * t);
         let of = |times: &[f64], flows: &[f64], limits, baseline| {
-            Peak::of(times, flows, limits, baseline).unwrap_err().to_string()
+            Peak::integrate(times, flows, limits, baseline).unwrap_err().to_string()
         };
         use Baseline::{Linear, Sigmoidal, Tangential};
         let whole = [-30.0, 240.0];

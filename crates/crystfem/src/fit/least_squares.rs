@@ -1,35 +1,35 @@
-//! Levenberg–Marquardt from several starts, and the covariance at the minimum.
+//! Levenberg–Marquardt from several starting points, and the covariance at the minimum.
 
 use crate::error::Error;
 use nalgebra::{DMatrix, DVector};
-use polycore::numerics::least_squares::{Found, levenberg_marquardt};
+use polycore::numerics::least_squares::{Optimum, levenberg_marquardt};
 use polycore::posterior;
 use std::cell::Cell;
 
-/// Model less measurement at parameters; `None` outside the model's domain.
+/// Residuals, model minus measurement, at given parameters; `None` outside the model's domain.
 pub type Residuals<'a> = dyn Fn(&[f64]) -> Option<Vec<f64>> + 'a;
 
-/// A residual that no step is accepted with.
-const REJECTED: f64 = 1e100;
+/// Residual of rejected trial points: no step to them is accepted.
+const REJECTED_RESIDUAL: f64 = 1e100;
 
-/// Relative least eigenvalue of the normal matrix, its columns scaled to 1, below which the parameters are not
-/// determined: differences carry 1e-10, which it squares with the condition.
-const COLLINEAR: f64 = 1e-12;
+/// Smallest relative eigenvalue of the normal matrix, with its columns scaled to 1, at which the parameters
+/// count as determined: differences have errors of 1e-10, which the matrix squares with the condition.
+const MIN_EIGENVALUE: f64 = 1e-12;
 
-/// Step of differences of a residual that is exact to rounding: ∛ε, good to 1e-10.
+/// Relative difference step for residuals exact to rounding: ∛ε, good to 1e-10.
 pub const STEP: f64 = 6e-6;
 
-/// A minimum.
+/// A minimum of the sum of squares.
 pub struct Minimum {
     /// Parameters.
-    pub at: Vec<f64>,
-    /// Residuals there.
+    pub parameters: Vec<f64>,
+    /// Residuals at the minimum.
     pub residuals: Vec<f64>,
     /// Covariance of the parameters, s² (JᵀJ)⁻¹ with s² = Σr²/(m − k).
     pub covariance: DMatrix<f64>,
     /// Degrees of freedom m − k.
     pub degrees: usize,
-    /// Evaluations of all residuals, without those for derivatives.
+    /// Number of evaluations of all residuals, without those for derivatives.
     pub evaluations: usize,
 }
 
@@ -39,23 +39,24 @@ impl Minimum {
         (self.residuals.iter().map(|r| r * r).sum::<f64>() / self.residuals.len() as f64).sqrt()
     }
 
-    /// Draws of the parameters, and of each the constants that they make: [`polycore::posterior`].
+    /// Draws parameters from their posterior ([`polycore::posterior`]) and converts each draw to constants.
     pub fn draws(&self, constants: impl Fn(&[f64]) -> Vec<f64>) -> Vec<Vec<f64>> {
-        let drawn = posterior::draws(&self.at, &self.covariance, self.degrees, posterior::DRAWS, 0);
+        let drawn = posterior::draws(&self.parameters, &self.covariance, self.degrees, posterior::DRAWS, 0);
         drawn.unwrap_or_default().iter().map(|q| constants(q)).collect()
     }
 
-    /// Standard error of a function of the parameters, by its gradient.
+    /// Standard error of a function of the parameters, from its gradient.
     pub fn error_of(&self, gradient: &[f64]) -> f64 {
         let gradient = DVector::from_row_slice(gradient);
         (gradient.transpose() * &self.covariance * gradient)[(0, 0)].max(0.0).sqrt()
     }
 }
 
-/// The best minimum over all starts of `count` residuals, with derivatives by central differences of a relative `step`.
+/// Returns the best minimum over all starting points of `count` residuals, with central differences of
+/// relative size `step`.
 ///
 /// # Errors
-/// [`Error::Data`] if no start arrives anywhere, or if the data do not determine the parameters.
+/// [`Error::Data`] if no start converges, or if the data do not determine the parameters.
 pub fn minimize(
     what: &str,
     residuals: &Residuals,
@@ -69,13 +70,14 @@ pub fn minimize(
     let trial = |at: &DVector<f64>| {
         evaluations.set(evaluations.get() + 1);
         // a trial outside the domain must be rejected; `None` would end the search
-        Some(DVector::from_vec(residuals(at.as_slice()).unwrap_or_else(|| vec![REJECTED; count])))
+        Some(DVector::from_vec(residuals(at.as_slice()).unwrap_or_else(|| vec![REJECTED_RESIDUAL; count])))
     };
     for start in starts {
         let at = DVector::from_row_slice(start);
-        let Found { at, objective } = levenberg_marquardt(at, 200, trial, |at| jacobian(residuals, at, step));
+        let Optimum { at, objective } =
+            levenberg_marquardt(at, 200, trial, |at| jacobian(residuals, at, step));
         let better = best.as_ref().is_none_or(|(least, _)| objective < *least);
-        if objective < REJECTED && better && residuals(at.as_slice()).is_some() {
+        if objective < REJECTED_RESIDUAL && better && residuals(at.as_slice()).is_some() {
             best = Some((objective, at));
         }
     }
@@ -90,7 +92,7 @@ pub fn minimize(
     }
     let scaled = DMatrix::from_fn(count, at.len(), |row, column| jacobian[(row, column)] / norms[column]);
     let normal = scaled.tr_mul(&scaled);
-    if normal.clone().symmetric_eigenvalues().min() < COLLINEAR {
+    if normal.clone().symmetric_eigenvalues().min() < MIN_EIGENVALUE {
         return Err(refuse(undetermined));
     }
     let inverse = normal.cholesky().ok_or_else(|| refuse(undetermined))?.inverse();
@@ -98,11 +100,11 @@ pub fn minimize(
     let variance = found.iter().map(|r| r * r).sum::<f64>() / degrees as f64;
     let covariance =
         DMatrix::from_fn(at.len(), at.len(), |i, j| variance * inverse[(i, j)] / (norms[i] * norms[j]));
-    let at = at.as_slice().to_vec();
-    Ok(Minimum { at, residuals: found, covariance, degrees, evaluations: evaluations.get() })
+    let parameters = at.as_slice().to_vec();
+    Ok(Minimum { parameters, residuals: found, covariance, degrees, evaluations: evaluations.get() })
 }
 
-/// By central differences.
+/// Computes the Jacobian by central differences.
 fn jacobian(residuals: &Residuals, at: &DVector<f64>, step: f64) -> Option<DMatrix<f64>> {
     let mut columns = Vec::with_capacity(at.len());
     for i in 0..at.len() {

@@ -1,4 +1,4 @@
-//! Constants of the kinetics from measurements, by least squares in α, with 95 % confidence intervals.
+//! Fits of kinetic constants to measurements, by least squares in α, with 95 % confidence intervals.
 
 mod avrami;
 mod heat_flow;
@@ -10,10 +10,10 @@ mod student;
 mod thermogram;
 
 pub use avrami::avrami;
-pub use heat_flow::{Baseline, Peak, at};
-pub use nakamura::{Known, Run, nakamura};
+pub use heat_flow::{Baseline, Peak, interpolate};
+pub use nakamura::{FixedConstants, Run, nakamura};
 pub use ozawa::{Cooling, ozawa, rates_at};
-pub use part::part;
+pub use part::fit_in_part;
 pub use student::quantile;
 pub use thermogram::{MeasuredPeak, Thermogram};
 
@@ -21,46 +21,46 @@ use crate::error::Error;
 
 /// A fitted law.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fit {
-    /// Its constants.
+pub struct KineticFit {
+    /// Fitted constants.
     pub estimates: Vec<Estimate>,
     /// Draws of all constants from their posterior ([`polycore::posterior`]).
     pub draws: Vec<Vec<f64>>,
-    /// Root mean square of model less measurement, in α.
+    /// Root mean square of model minus measurement, in α.
     pub rms: f64,
-    /// Measurements.
+    /// Number of measurements.
     pub measurements: usize,
-    /// Evaluations of all residuals, without those for derivatives.
+    /// Number of evaluations of all residuals, without those for derivatives.
     pub evaluations: usize,
-    /// α of the model at the measurements, in their order.
+    /// α of the model at the measurements.
     pub model: Vec<f64>,
 }
 
-/// A constant with its uncertainty: independent errors of the same size in every α, of unknown size.
+/// A constant with its uncertainty, for independent errors of equal but unknown variance in α.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// Its SI unit.
+    /// SI unit.
     pub unit: String,
-    /// The estimate.
+    /// Best estimate.
     pub value: f64,
     /// Standard error.
     pub standard_error: f64,
-    /// Interval that holds the true value with a probability of 95 %, where the law is nearly linear within it.
+    /// Interval with the true value at a probability of 95 %, if the law is nearly linear within it.
     pub interval: [f64; 2],
 }
 
-impl Fit {
-    /// An estimate by name.
+impl KineticFit {
+    /// Returns an estimate by name.
     pub fn get(&self, name: &str) -> Option<&Estimate> {
         self.estimates.iter().find(|estimate| estimate.name == name)
     }
 }
 
 impl Estimate {
-    /// Of a positive constant whose logarithm has the estimate `logarithm` and a standard error; the interval is
-    /// symmetric in the logarithm.
+    /// Returns the estimate of a positive constant from its logarithm and the standard error of that; the
+    /// interval is symmetric in the logarithm.
     fn of_logarithm(name: &'static str, unit: &str, logarithm: f64, error: f64, degrees: usize) -> Self {
         let (value, reach) = (logarithm.exp(), quantile(degrees) * error);
         Self {
@@ -73,10 +73,10 @@ impl Estimate {
     }
 }
 
-/// Measured α that are accepted: noise carries some beyond 0 and 1, and to cut it off would bias the fit.
+/// Accepted range of measured α: noise exceeds 0 and 1, and clipping would bias the fit.
 pub const DEGREES: [f64; 2] = [-0.2, 1.2];
 
-/// Checks measured degrees of a fit of so many parameters.
+/// Checks the measured α for a fit of `parameters` parameters.
 fn check(what: &str, degrees: &[f64], parameters: usize) -> Result<(), Error> {
     let refuse = |reason: String| Err(Error::Data { what: what.to_owned(), reason });
     let [least, most] = DEGREES;
@@ -93,7 +93,8 @@ fn check(what: &str, degrees: &[f64], parameters: usize) -> Result<(), Error> {
     let within = degrees.iter().filter(|a| (0.01..=0.99).contains(*a)).count();
     if within < parameters {
         return refuse(format!(
-            "{within} measurements of alpha between 0.01 and 0.99; allowed: at least {parameters}, as many as parameters"
+            "{within} measurements of alpha between 0.01 and 0.99; allowed: at least {parameters}, as many \
+             as parameters"
         ));
     }
     let [low, high] = degrees.iter().fold([1.0_f64, 0.0_f64], |[low, high], &a| [low.min(a), high.max(a)]);
@@ -103,7 +104,7 @@ fn check(what: &str, degrees: &[f64], parameters: usize) -> Result<(), Error> {
     Ok(())
 }
 
-/// Checks a column of numbers.
+/// Checks that a column is finite and at least `least`.
 fn check_finite(what: &str, name: &str, values: &[f64], least: f64) -> Result<(), Error> {
     match values.iter().enumerate().find(|(_, x)| !(x.is_finite() && **x >= least)) {
         None => Ok(()),

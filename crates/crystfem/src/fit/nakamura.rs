@@ -1,17 +1,17 @@
-//! Nakamura's theory with the rate of Hoffman and Lauritzen, from any temperature histories.
+//! Nakamura's theory with the rate of Hoffman and Lauritzen, fitted to any temperature histories.
 
 use super::least_squares::{STEP, minimize};
-use super::{Estimate, Fit, check, check_finite};
+use super::{Estimate, KineticFit, check, check_finite};
 use crate::error::Error;
-use crate::kinetics::{Constants, GAS_CONSTANT, Kinetics};
+use crate::kinetics::{GAS_CONSTANT, KineticConstants, Kinetics};
 use std::f64::consts::LN_2;
 
-/// Steps of temperature, K, in which K is integrated: the error in α is below 1e-7.
-const PART: f64 = 1.0;
+/// Temperature step, K, for the integration of K: the error in α is below 1e-7.
+const INTEGRATION_STEP: f64 = 1.0;
 
-/// What is not fitted.
+/// Constants that are not fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Known {
+pub struct FixedConstants {
     /// Equilibrium melting temperature T₀, K.
     pub equilibrium_melting: f64,
     /// Temperature T∞ of frozen chains, K.
@@ -25,16 +25,16 @@ pub struct Known {
 pub struct Run {
     /// Times, s, increasing.
     pub times: Vec<f64>,
-    /// Temperatures, K; linear between.
+    /// Temperatures, K, linear in between.
     pub temperatures: Vec<f64>,
-    /// α there.
+    /// Measured α.
     pub degrees: Vec<f64>,
-    /// The history before the first measurement: times, s, increasing, and temperatures, K; linear between.
+    /// History before the first measurement: times, s, increasing, and temperatures, K, linear in between.
     pub history: Vec<[f64; 2]>,
 }
 
 impl Run {
-    /// At a constant cooling rate, K/s, from T₀ on.
+    /// Returns a measurement at a constant cooling rate, K/s, from T₀.
     ///
     /// # Errors
     /// [`Error::Data`] unless the rate is above 0 and the temperatures, K, fall from T₀ or below.
@@ -42,7 +42,7 @@ impl Run {
         rate: f64,
         temperatures: Vec<f64>,
         degrees: Vec<f64>,
-        known: &Known,
+        known: &FixedConstants,
     ) -> Result<Self, Error> {
         let refuse = |reason: String| Err(Error::Data { what: "cooling curve".to_owned(), reason });
         if !(rate > 0.0 && rate.is_finite()) {
@@ -69,7 +69,7 @@ impl Run {
         let mut z = 0.0;
         let mut found: Vec<f64> = if self.history.is_empty() { vec![z] } else { Vec::new() };
         let later = all.map(|[next, end]| {
-            let parts = ((end - temperature).abs() / PART).ceil().clamp(1.0, 1000.0);
+            let parts = ((end - temperature).abs() / INTEGRATION_STEP).ceil().clamp(1.0, 1000.0);
             for part in 0..parts as usize {
                 let [a, b] = [part, part + 1].map(|k| temperature + (end - temperature) * (k as f64 / parts));
                 z += kinetics.growth(a, b, (next - time) / parts).z;
@@ -116,9 +116,9 @@ impl Run {
 /// Estimates: `growth_rate` K₀ in 1/s, `nucleation` K_G in K², `avrami_exponent` n.
 ///
 /// # Errors
-/// [`Error::Data`] for what [`avrami`](super::avrami) refuses too, times that decrease, and data that do not determine
-/// all three (one isothermal run, say); [`Error::Parameter`] for known constants out of their domain.
-pub fn nakamura(runs: &[Run], known: &Known) -> Result<Fit, Error> {
+/// [`Error::Data`] as for [`avrami`](super::avrami), for times that decrease, and data that do not determine
+/// all three (one isothermal run, for example); [`Error::Parameter`] for known constants out of their domain.
+pub fn nakamura(runs: &[Run], known: &FixedConstants) -> Result<KineticFit, Error> {
     let what = "fit of Nakamura's and Hoffman–Lauritzen's constants";
     for run in runs {
         run.check(what)?;
@@ -126,7 +126,7 @@ pub fn nakamura(runs: &[Run], known: &Known) -> Result<Fit, Error> {
     let degrees: Vec<f64> = runs.iter().flat_map(|run| run.degrees.iter().copied()).collect();
     check(what, &degrees, 3)?;
     let of = |growth_rate: f64, nucleation: f64, avrami_exponent: f64| {
-        Kinetics::new(Constants {
+        Kinetics::new(KineticConstants {
             growth_rate,
             nucleation,
             activation_energy: known.activation_energy,
@@ -172,12 +172,12 @@ pub fn nakamura(runs: &[Run], known: &Known) -> Result<Fit, Error> {
         }
     }
     let minimum = minimize(what, &residuals, degrees.len(), &starts, STEP)?;
-    let q = &minimum.at;
+    let q = &minimum.parameters;
     let gradient = [1.0, q[1].exp() * barrier, LN_2.ln() / q[2].exp()];
     let estimate = |name, unit: &str, value: f64, gradient: [f64; 3]| {
         Estimate::of_logarithm(name, unit, value, minimum.error_of(&gradient), minimum.degrees)
     };
-    Ok(Fit {
+    Ok(KineticFit {
         estimates: vec![
             estimate("growth_rate", "1/s", logarithm(q), gradient),
             estimate("nucleation", "K^2", q[1], [0.0, 1.0, 0.0]),
@@ -191,8 +191,8 @@ pub fn nakamura(runs: &[Run], known: &Known) -> Result<Fit, Error> {
     })
 }
 
-/// The mean temperature of what is neither melt nor done.
-fn middle(runs: &[Run], known: &Known) -> Option<f64> {
+/// Returns the mean temperature of measurements with 0.01 ≤ α ≤ 0.99 between T∞ and T₀.
+fn middle(runs: &[Run], known: &FixedConstants) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0.0);
     for run in runs {
         for (&temperature, &degree) in run.temperatures.iter().zip(&run.degrees) {

@@ -1,7 +1,7 @@
 //! Ozawa's law of crystallization at constant cooling rates.
 
 use super::least_squares::{STEP, minimize};
-use super::{Estimate, Fit, check, check_finite};
+use super::{Estimate, KineticFit, check, check_finite};
 use crate::error::Error;
 
 /// α over temperature at a constant cooling rate.
@@ -11,13 +11,13 @@ pub struct Cooling {
     pub rate: f64,
     /// Temperatures, K, falling.
     pub temperatures: Vec<f64>,
-    /// α there.
+    /// Measured α.
     pub degrees: Vec<f64>,
 }
 
 impl Cooling {
-    /// α at a temperature, linear between measurements; `None` outside them.
-    fn at(&self, temperature: f64) -> Option<f64> {
+    /// Interpolates α at a temperature; `None` outside the measurements.
+    fn degree_at(&self, temperature: f64) -> Option<f64> {
         (1..self.temperatures.len()).find_map(|i| {
             let [above, below] = [self.temperatures[i - 1], self.temperatures[i]];
             let within = below <= temperature && temperature <= above;
@@ -27,10 +27,10 @@ impl Cooling {
     }
 }
 
-/// Rates, K/s, of the curves that have 0.01 ≤ α ≤ 0.99 at a temperature, and α there.
+/// Returns the rates, K/s, of the curves with 0.01 ≤ α ≤ 0.99 at a temperature, and α there.
 pub fn rates_at(coolings: &[Cooling], temperature: f64) -> (Vec<f64>, Vec<f64>) {
     let found = |cooling: &Cooling| {
-        let degree = cooling.at(temperature).filter(|a| (0.01..=0.99).contains(a))?;
+        let degree = cooling.degree_at(temperature).filter(|a| (0.01..=0.99).contains(a))?;
         Some((cooling.rate, degree))
     };
     coolings.iter().filter_map(found).unzip()
@@ -42,9 +42,9 @@ pub fn rates_at(coolings: &[Cooling], temperature: f64) -> (Vec<f64>, Vec<f64>) 
 /// Estimates: `ozawa_exponent` m, `cooling_function` χ in (K/s)ᵐ.
 ///
 /// # Errors
-/// [`Error::Data`] for rates that are not above 0, fewer than three rates with 0.01 ≤ α ≤ 0.99 at this temperature, and
-/// data that do not determine both constants.
-pub fn ozawa(coolings: &[Cooling], temperature: f64) -> Result<Fit, Error> {
+/// [`Error::Data`] for rates that are not above 0, fewer than three rates with 0.01 ≤ α ≤ 0.99 at this
+/// temperature, and data that do not determine both constants.
+pub fn ozawa(coolings: &[Cooling], temperature: f64) -> Result<KineticFit, Error> {
     let what = format!("fit of Ozawa's law at {temperature} K ({:.2} degC)", temperature - 273.15);
     let refuse = |reason: String| Error::Data { what: what.clone(), reason };
     for cooling in coolings {
@@ -66,7 +66,7 @@ pub fn ozawa(coolings: &[Cooling], temperature: f64) -> Result<Fit, Error> {
         )));
     }
     check(&what, &degrees, 2)?;
-    // parameters: m and ln χ − m ln q̄, with the mean q̄ of the logarithms, so that both are nearly uncorrelated
+    // parameters: m and ln χ − m ln q̄, with the geometric mean q̄, to be nearly uncorrelated
     let middle = rates.iter().map(|q| q.ln()).sum::<f64>() / rates.len() as f64;
     let model = |p: &[f64]| -> Vec<f64> {
         rates.iter().map(|q| -(-(p[1] - p[0] * (q.ln() - middle)).exp()).exp_m1()).collect()
@@ -75,7 +75,7 @@ pub fn ozawa(coolings: &[Cooling], temperature: f64) -> Result<Fit, Error> {
         let found: Vec<f64> = model(p).iter().zip(&degrees).map(|(model, data)| model - data).collect();
         found.iter().all(|r| r.is_finite()).then_some(found)
     };
-    // a straight line of ln(−ln(1−α)) over ln q
+    // initial values: a straight line of ln(−ln(1−α)) over ln q
     let points: Vec<[f64; 2]> =
         rates.iter().zip(&degrees).map(|(q, a)| [q.ln() - middle, (-(-a).ln_1p()).ln()]).collect();
     let squares: f64 = points.iter().map(|p| p[0] * p[0]).sum();
@@ -85,7 +85,7 @@ pub fn ozawa(coolings: &[Cooling], temperature: f64) -> Result<Fit, Error> {
     let slope = points.iter().map(|p| p[0] * p[1]).sum::<f64>() / squares;
     let mean = points.iter().map(|p| p[1]).sum::<f64>() / points.len() as f64;
     let minimum = minimize(&what, &residuals, rates.len(), &[vec![-slope, mean]], STEP)?;
-    let [exponent, level] = [minimum.at[0], minimum.at[1]];
+    let [exponent, level] = [minimum.parameters[0], minimum.parameters[1]];
     let error = minimum.error_of(&[1.0, 0.0]);
     let reach = super::quantile(minimum.degrees) * error;
     let estimates = vec![
@@ -104,12 +104,12 @@ pub fn ozawa(coolings: &[Cooling], temperature: f64) -> Result<Fit, Error> {
             minimum.degrees,
         ),
     ];
-    Ok(Fit {
+    Ok(KineticFit {
         estimates,
         draws: minimum.draws(|p| vec![p[0], (p[1] + p[0] * middle).exp()]),
         rms: minimum.rms(),
         measurements: rates.len(),
         evaluations: minimum.evaluations,
-        model: model(&minimum.at),
+        model: model(&minimum.parameters),
     })
 }

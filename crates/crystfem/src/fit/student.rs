@@ -1,12 +1,12 @@
-//! Student's distribution.
+//! Student's t distribution.
 
 use polycore::numerics::bisected;
 
-/// t with P(|x| ≤ t) = 0.95 for Student's distribution of so many degrees of freedom (at least 1); Abramowitz &
-/// Stegun 26.7.3 and 26.7.4, inverted by bisection.
+/// Returns t with P(|x| ≤ t) = 0.95 for Student's distribution with `degrees` degrees of freedom (at least
+/// 1); Abramowitz & Stegun 26.7.3 and 26.7.4, inverted by bisection.
 pub fn quantile(degrees: usize) -> f64 {
     if degrees > 2000 {
-        // 26.7.5: its next term is below 1e-9 there
+        // 26.7.5: its next term is below 1e-9 here
         let (z, n) = (1.959_963_984_540_054_f64, degrees as f64);
         let second = (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / (96.0 * n * n);
         return z + (z.powi(3) + z) / (4.0 * n) + second;
@@ -14,7 +14,7 @@ pub fn quantile(degrees: usize) -> f64 {
     bisected(0.0, 13.0, 60, |t| within(t, degrees.max(1)) < 0.95)
 }
 
-/// P(|x| ≤ t).
+/// Probability P(|x| ≤ t).
 fn within(t: f64, degrees: usize) -> f64 {
     let angle = (t / (degrees as f64).sqrt()).atan();
     let (sine, cosine) = angle.sin_cos();

@@ -1,11 +1,11 @@
 use super::*;
-use crate::kinetics::{Constants, Kinetics, cooling_curve};
+use crate::kinetics::{KineticConstants, Kinetics, cooling_curve};
 use harness::case::Fault;
 
-/// Normal numbers (splitmix64 and Box–Muller).
-struct Noise(u64);
+/// Normal random numbers (splitmix64 and Box–Muller).
+struct AlphaNoise(u64);
 
-impl Noise {
+impl AlphaNoise {
     fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut x = self.0;
@@ -20,10 +20,11 @@ impl Noise {
     }
 }
 
-const KNOWN: Known = Known { equilibrium_melting: 466.35, frozen: 294.15, activation_energy: 6270.0 };
+const KNOWN: FixedConstants =
+    FixedConstants { equilibrium_melting: 466.35, frozen: 294.15, activation_energy: 6270.0 };
 
 fn pa12() -> Kinetics {
-    Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap()
+    Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1).unwrap()
 }
 
 /// α at 1, 2 and 10 K/min by exact quadrature, every kelvin about the transition.
@@ -41,7 +42,7 @@ fn coolings(rates: &[f64]) -> Vec<Cooling> {
         .collect()
 }
 
-fn runs(noise: Option<(&mut Noise, f64)>) -> Vec<Run> {
+fn runs(noise: Option<(&mut AlphaNoise, f64)>) -> Vec<Run> {
     let mut runs: Vec<Run> = coolings(&[1.0, 2.0, 10.0])
         .into_iter()
         .map(|c| Run::cooling(c.rate, c.temperatures, c.degrees, &KNOWN).unwrap())
@@ -54,9 +55,10 @@ fn runs(noise: Option<(&mut Noise, f64)>) -> Vec<Run> {
     runs
 }
 
-/// Without noise the constants come back; Gauss' rule on steps of 0.75 K and from T₀ carries 1e-6.
+/// Recovers the constants from data without noise; Gauss' rule on steps of 0.75 K and from T₀ contributes
+/// 1e-6.
 #[test]
-fn nakamura_comes_back() {
+fn nakamura_constants_are_recovered() {
     let fit = nakamura(&runs(None), &KNOWN).unwrap();
     for (name, value) in [("growth_rate", 37_869.0), ("nucleation", 136_235.0), ("avrami_exponent", 2.678)] {
         let found = fit.get(name).unwrap();
@@ -67,7 +69,7 @@ fn nakamura_comes_back() {
 }
 
 #[test]
-fn avrami_comes_back() {
+fn avrami_constants_are_recovered() {
     let times: Vec<f64> = (0..40).map(|k| 10.0 * f64::from(k)).collect();
     for exponent in [0.6, 1.0, 2.678, 4.0] {
         let degrees: Vec<f64> = times.iter().map(|&t| crate::kinetics::avrami(t, 130.0, exponent)).collect();
@@ -79,9 +81,10 @@ fn avrami_comes_back() {
     }
 }
 
-/// By Nakamura's theory Ozawa's exponent is n and χ(T) = (∫K dT)ⁿ; linear interpolation between exact rows.
+/// Recovers Ozawa's exponent n and χ(T) = (∫K dT)ⁿ of Nakamura's theory from exact rows, interpolated
+/// linearly.
 #[test]
-fn ozawa_comes_back() {
+fn ozawa_exponent_is_recovered() {
     let mut coolings = coolings(&[5.0, 7.0, 10.0, 14.0]);
     let temperature = 426.0;
     for cooling in &mut coolings {
@@ -98,11 +101,11 @@ fn ozawa_comes_back() {
     assert!(error.contains("0 rates with alpha") && error.contains("at least 3"), "{error}");
 }
 
-/// How often the 95 % intervals hold the true values.
-fn coverage(count: u64, truth: &[(&str, f64)], fit: impl Fn(&mut Noise) -> Fit) -> Vec<f64> {
+/// Returns the frequency with which 95 % intervals contain the true values.
+fn coverage(count: u64, truth: &[(&str, f64)], fit: impl Fn(&mut AlphaNoise) -> KineticFit) -> Vec<f64> {
     let mut held = vec![0.0; truth.len()];
     for seed in 0..count {
-        let fit = fit(&mut Noise(seed.wrapping_mul(0x1234_5678_9abc_def1)));
+        let fit = fit(&mut AlphaNoise(seed.wrapping_mul(0x1234_5678_9abc_def1)));
         for (held, (name, value)) in held.iter_mut().zip(truth) {
             let [low, high] = fit.get(name).unwrap().interval;
             *held += f64::from(u8::from(low <= *value && *value <= high)) / count as f64;
@@ -113,7 +116,7 @@ fn coverage(count: u64, truth: &[(&str, f64)], fit: impl Fn(&mut Noise) -> Fit) 
 
 /// 95 % ± 3.5 standard deviations of the frequency, √(0.95 · 0.05/600) = 0.9 %.
 #[test]
-fn intervals_of_avrami_hold_the_true_value_as_often_as_they_say() {
+fn intervals_of_avrami_have_their_coverage() {
     let times: Vec<f64> = (1..=30).map(|k| 12.0 * f64::from(k)).collect();
     let rate = std::f64::consts::LN_2 / 150.0_f64.powf(2.5);
     let truth = [("half_time", 150.0), ("avrami_exponent", 2.5), ("rate_constant", rate)];
@@ -127,15 +130,16 @@ fn intervals_of_avrami_hold_the_true_value_as_often_as_they_say() {
 
 /// 95 % ± 3.5 standard deviations of the frequency, √(0.95 · 0.05/300) = 1.3 %.
 #[test]
-fn intervals_of_nakamura_hold_the_true_value_as_often_as_they_say() {
+fn intervals_of_nakamura_have_their_coverage() {
     let truth = [("growth_rate", 37_869.0), ("nucleation", 136_235.0), ("avrami_exponent", 2.678)];
     let held = coverage(300, &truth, |noise| nakamura(&runs(Some((noise, 0.02))), &KNOWN).unwrap());
     assert!(held.iter().all(|share| (share - 0.95).abs() < 0.045), "{held:?}");
 }
 
-/// As above; few rates make the quantile of Student's distribution matter (four degrees of freedom).
+/// 95 % intervals at few rates, where the quantile of Student's distribution matters (four degrees of
+/// freedom).
 #[test]
-fn intervals_of_ozawa_hold_the_true_value_as_often_as_they_say() {
+fn intervals_of_ozawa_have_their_coverage() {
     let truth = [("ozawa_exponent", 2.678)];
     let held = coverage(600, &truth, |noise| {
         let coolings: Vec<Cooling> = [5.0, 6.5, 8.0, 10.0, 12.0, 15.0]
@@ -173,7 +177,7 @@ fn degenerate_data_have_named_errors() {
         assert_eq!(error.exit_code(), 2);
         assert!(error.to_string().contains(part), "{error}");
     }
-    // one isothermal run tells K and n, not K₀ and K_G
+    // one isothermal run determines K and n, not K₀ and K_G
     let hold = Run {
         times: (0..30).map(|k| 10.0 * f64::from(k)).collect(),
         temperatures: vec![430.0; 30],
@@ -187,7 +191,7 @@ fn degenerate_data_have_named_errors() {
     let cold = Run { temperatures: vec![200.0; 30], ..hold };
     assert!(nakamura(&[cold], &KNOWN).unwrap_err().to_string().contains("no alpha between"));
     assert!(
-        nakamura(&runs(None), &Known { frozen: 500.0, ..KNOWN })
+        nakamura(&runs(None), &FixedConstants { frozen: 500.0, ..KNOWN })
             .unwrap_err()
             .to_string()
             .contains("above the temperature")
@@ -206,12 +210,12 @@ fn degenerate_data_have_named_errors() {
     assert!(ozawa(&same, 426.0).is_err());
 }
 
-/// What grew while the sample was held, before the first measurement, belongs to the history.
+/// Growth during a hold before the first measurement is part of the history.
 #[test]
 fn a_hold_before_the_measurements_counts() {
     let mut held = runs(None);
     for run in &mut held {
-        // a kelvin above the first measurement, until z is 0.3 larger
+        // a hold one kelvin above the first measurement, until z is 0.3 larger
         let temperature = run.temperatures[0] + 1.0;
         let reached =
             run.times[0] - (run.times[1] - run.times[0]) / (run.temperatures[0] - run.temperatures[1]);
@@ -222,14 +226,14 @@ fn a_hold_before_the_measurements_counts() {
         run.history.extend([[reached, temperature], [reached + hold, temperature]]);
     }
     let value = |runs: &[Run]| nakamura(runs, &KNOWN).unwrap().estimates[1].value;
-    let truth = Constants::TABLE_4_1_COLUMN_1.nucleation;
+    let truth = KineticConstants::TABLE_4_1_COLUMN_1.nucleation;
     assert!((value(&held) / truth - 1.0).abs() < 1e-5, "{}", value(&held));
     held.iter_mut().for_each(|run| run.history.truncate(1));
     assert!((value(&held) / truth - 1.0).abs() > 1e-3);
 }
 
 proptest::proptest! {
-    /// Whatever is given, a fit ends with finite estimates or with an error.
+    /// A fit ends with finite estimates or an error for any input.
     #[test]
     fn never_panics(times in proptest::collection::vec(proptest::num::f64::ANY, 0..12),
                     degrees in proptest::collection::vec(-0.3..1.3_f64, 0..12)) {
@@ -237,27 +241,29 @@ proptest::proptest! {
             proptest::prop_assert!(fit.rms.is_finite());
         }
         let temperatures: Vec<f64> = times.iter().map(|t| t.abs() % 700.0).collect();
-        let run = Run { times: (0..times.len()).map(|k| k as f64).collect(), temperatures, degrees, history: vec![[0.0, 480.0]] };
+        let times = (0..times.len()).map(|k| k as f64).collect();
+        let run = Run { times, temperatures, degrees, history: vec![[0.0, 480.0]] };
         if let Ok(fit) = nakamura(&[run], &KNOWN) {
             proptest::prop_assert!(fit.rms.is_finite());
         }
     }
 }
 
-/// What a fit predicts beyond its data, the temperature at α = ½ on cooling at 40 K/min, is as uncertain as its draws say: its spread over
-/// repeated measurements is that of the draws, and their 95 % bands hold the true value as often as they should.
+/// Draws predict the scatter of repeated measurements: for a prediction beyond the data, the temperature at α
+/// = ½ on cooling at 40 K/min, the spread over repeated measurements is that of the draws, and their 95 %
+/// bands contain the true value in 95 % of cases.
 #[test]
-fn draws_predict_what_repeated_measurements_give() {
+fn draws_predict_repeated_measurements() {
     let half = |kinetics: &Kinetics| {
         cooling_curve(kinetics, 40.0 / 60.0, 466.35, 380.0, 0.0, 2).temperature_at(0.5).unwrap()
     };
     let of = |constants: &[f64]| {
-        let known = Constants::TABLE_4_1_COLUMN_1;
+        let known = KineticConstants::TABLE_4_1_COLUMN_1;
         let [growth_rate, nucleation, avrami_exponent] = [constants[0], constants[1], constants[2]];
-        half(&Kinetics::new(Constants { growth_rate, nucleation, avrami_exponent, ..known }).unwrap())
+        half(&Kinetics::new(KineticConstants { growth_rate, nucleation, avrami_exponent, ..known }).unwrap())
     };
     let truth = half(&pa12());
-    let mut noise = Noise(5);
+    let mut noise = AlphaNoise(5);
     let (mut predicted, mut deviations, mut within) = (Vec::new(), Vec::new(), 0);
     let repeats = 80;
     let deviation = |all: &[f64]| {

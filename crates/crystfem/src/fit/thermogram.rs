@@ -1,33 +1,33 @@
-//! Heat flow of a calorimeter over time, as a measurement of a fit.
+//! Thermograms of a calorimeter, as measurements for a fit.
 
-use super::{Baseline, Peak, Run, at};
+use super::{Baseline, Peak, Run, interpolate};
 use crate::error::Error;
 
 /// A measured heat flow.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Thermogram {
-    /// s, ascending.
+    /// Times, s, ascending.
     pub times: Vec<f64>,
-    /// K; empty of an isothermal run.
+    /// Temperatures, K; empty for an isothermal run.
     pub temperatures: Vec<f64>,
-    /// Heat that the sample gives off, W/kg.
+    /// Heat flow given off by the sample, W/kg.
     pub flows: Vec<f64>,
 }
 
 /// A peak and the temperatures around it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeasuredPeak {
-    /// Between the limits.
+    /// Peak between the limits.
     pub peak: Peak,
-    /// Temperatures there, K; empty of an isothermal run.
+    /// Temperatures of the peak, K; empty for an isothermal run.
     pub temperatures: Vec<f64>,
-    /// Times, s, and temperatures, K, of the rows before it, from the last one at which nothing can crystallize.
+    /// Times, s, and temperatures, K, of earlier rows, from the last one above melting.
     pub history: Vec<[f64; 2]>,
 }
 
 impl Thermogram {
-    /// First time from `start` on at which a temperature, K, is passed on cooling, s.
-    pub fn passes(&self, temperature: f64, start: f64) -> Option<f64> {
+    /// Returns the first time from `start` on, s, at which cooling passes a temperature, K.
+    pub fn first_crossing(&self, temperature: f64, start: f64) -> Option<f64> {
         (1..self.temperatures.len()).find_map(|row| {
             let [above, below] = [self.temperatures[row - 1], self.temperatures[row]];
             let share = (above - temperature) / (above - below);
@@ -36,13 +36,14 @@ impl Thermogram {
         })
     }
 
-    /// Integrates the peak between two times, s, of a material that cannot crystallize at and above `melting`, K.
+    /// Integrates the peak between two times, s, of a material that cannot crystallize at or above `melting`,
+    /// K.
     ///
     /// # Errors
-    /// Those of [`Peak::of`].
+    /// Errors of [`Peak::integrate`].
     pub fn peak(&self, limits: [f64; 2], baseline: Baseline, melting: f64) -> Result<MeasuredPeak, Error> {
-        let peak = Peak::of(&self.times, &self.flows, limits, baseline)?;
-        let along = |time: &f64| at(&self.times, &self.temperatures, *time);
+        let peak = Peak::integrate(&self.times, &self.flows, limits, baseline)?;
+        let along = |time: &f64| interpolate(&self.times, &self.temperatures, *time);
         let temperatures = match self.temperatures.is_empty() {
             true => Vec::new(),
             false => peak.times.iter().map(along).collect(),
@@ -56,7 +57,7 @@ impl Thermogram {
 }
 
 impl MeasuredPeak {
-    /// The measurement of [`nakamura`](super::nakamura).
+    /// Returns the measurement for [`nakamura`](super::nakamura).
     pub fn run(&self) -> Run {
         Run {
             times: self.peak.times.clone(),

@@ -8,15 +8,15 @@ pub fn avrami(time: f64, half_time: f64, exponent: f64) -> f64 {
     -(-std::f64::consts::LN_2 * (time / half_time).powf(exponent)).exp_m1()
 }
 
-/// The curve at a constant cooling rate, z(T) = q⁻¹ ∫_T^{T_start} K dT, on equally spaced temperatures.
+/// z at a constant cooling rate, z(T) = q⁻¹ ∫_T^{T_start} K dT, on equally spaced temperatures.
 #[derive(Clone, Debug)]
 pub struct CoolingCurve {
     kinetics: Kinetics,
     /// Cooling rate q, K/s.
     rate: f64,
-    /// Falling temperatures, K.
+    /// Temperatures, K, falling.
     pub temperature: Vec<f64>,
-    /// z there.
+    /// z at the temperatures.
     pub z: Vec<f64>,
 }
 
@@ -29,8 +29,8 @@ const GAUSS_5: [[f64; 2]; 5] = [
     [0.906_179_845_938_664, 0.236_926_885_056_189_08],
 ];
 
-/// Cools from `start` to `end`, K, at `rate`, K/s, from a relative crystallinity. Gauss' rule of five points on at
-/// least `points − 1` intervals of at most 0.25 K: exact to rounding.
+/// Cools from `start` to `end`, K, at `rate`, K/s, from a relative crystallinity `seed`. Gauss' rule of five
+/// points on at least `points − 1` intervals of at most 0.25 K: exact to rounding.
 pub fn cooling_curve(
     kinetics: &Kinetics,
     rate: f64,
@@ -64,14 +64,14 @@ fn integral(kinetics: &Kinetics, low: f64, high: f64) -> f64 {
 }
 
 impl CoolingCurve {
-    /// z at a temperature of the range.
+    /// Interpolates z at a temperature within the range.
     pub fn z_at(&self, temperature: f64) -> f64 {
         let last = self.temperature.len() - 1;
         let index = self.temperature.partition_point(|&t| t >= temperature).clamp(1, last) - 1;
         self.z[index] + integral(&self.kinetics, temperature, self.temperature[index]) / self.rate
     }
 
-    /// The temperature at which α is reached, K; `None` if it is not.
+    /// Temperature at which α is reached, K; `None` if it is not.
     pub fn temperature_at(&self, degree: f64) -> Option<f64> {
         let z = self.kinetics.z_of_degree(degree);
         if self.z[self.z.len() - 1] < z || self.z[0] > z {
@@ -81,14 +81,14 @@ impl CoolingCurve {
         Some(bisected(self.temperature[index], self.temperature[index - 1], 80, |t| self.z_at(t) >= z))
     }
 
-    /// The temperature at which dα/dt is greatest, K.
+    /// Temperature of the largest dα/dt, K.
     pub fn peak(&self) -> f64 {
         let speed = |t: f64| self.kinetics.degree_slope(self.z_at(t)) * self.kinetics.rate(t);
         let speeds: Vec<f64> = self.temperature.iter().map(|&t| speed(t)).collect();
         let top = (0..speeds.len()).max_by(|&a, &b| speeds[a].total_cmp(&speeds[b])).unwrap_or(0);
         let (mut high, mut low) =
             (self.temperature[top.saturating_sub(1)], self.temperature[(top + 1).min(speeds.len() - 1)]);
-        // golden section: √ε of the width is all that a maximum determines
+        // golden section: a maximum is determined to √ε of the width only
         let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
         for _ in 0..60 {
             let (a, b) = (high - golden * (high - low), low + golden * (high - low));

@@ -1,15 +1,15 @@
-//! The increment Δz = ∫K(T(t)) dt of a temperature that runs linearly in time, with its derivative.
+//! Increment Δz = ∫K(T(t)) dt for a temperature linear in time, with its derivative.
 
-use super::{Constants, Kinetics, LARGEST_Z};
+use super::{KineticConstants, Kinetics, LARGEST_Z};
 use crate::simd_math::exp;
 
-/// Panels into which (T∞, T₀) is divided; an increment is integrated panel by panel. The error in α of one panel
-/// of PA12 (5.4 K) is about 1e-5 at worst, and of steps of 1 K 3e-8.
+/// Number of panels that divide (T∞, T₀); an increment is integrated panel by panel. The error in α for one
+/// panel of PA12 (5.4 K) is about 1e-5 at worst, for steps of 1 K 3e-8.
 pub const PANELS: usize = 32;
 
-/// Increments below this part of a panel are integrated in one piece even across a border: K is smooth there, and the
-/// error of the rule is below 1e-13.
-const WHOLE: f64 = 0.01;
+/// Largest increment, in panels, that is integrated in one piece across a border: K is smooth, and the error
+/// of the rule is below 1e-13.
+const MAX_SINGLE_PIECE: f64 = 0.01;
 
 /// Δz and ∂Δz/∂T at the end of the increment, at fixed Δt.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -21,7 +21,8 @@ pub struct Growth {
 }
 
 impl Kinetics {
-    /// Δz over an increment of temperature in the time `dt`, s: Gauss' rule of two points on each panel.
+    /// Computes Δz over an increment of temperature in the time `dt`, s: Gauss' rule of two points on each
+    /// panel.
     ///
     /// The borders of the panels are fixed temperatures, so that Δz is a continuous function of the end.
     pub fn growth(&self, start: f64, end: f64, dt: f64) -> Growth {
@@ -37,8 +38,8 @@ impl Kinetics {
         sum
     }
 
-    /// The part of a panel.
-    pub fn growth_over(&self, panel: &Panel, dt: f64) -> Growth {
+    /// Computes Δz over one panel.
+    pub fn growth_over(&self, panel: &TemperaturePanel, dt: f64) -> Growth {
         let half = 0.5 * panel.share * dt;
         if !panel.inside || half == 0.0 {
             return Growth::default();
@@ -56,9 +57,10 @@ impl Kinetics {
 }
 
 impl Kinetics {
-    /// Δz of increments that lie each within one of `count` panels; NaN for the others, and for what is not finite.
+    /// Computes Δz of many increments, each within one of `count` panels; NaN for increments that cross a
+    /// border or are not finite.
     ///
-    /// To inline into functions that `pulp` dispatches: the loop is one of vectors.
+    /// Inlined into functions that `pulp` dispatches, so that the loop is vectorized.
     #[inline(always)]
     pub(crate) fn growth_of_all(
         &self,
@@ -73,10 +75,10 @@ impl Kinetics {
         let (start, end) = (&start[..size], &end[..size]);
         for k in 0..size {
             let change = end[k] - start[k];
-            // on heating, or else
+            // on heating, or otherwise
             let count = if change > 0.0 { counts[1] } else { counts[0] };
             let width = (high - low) / count;
-            let whole = change.abs() <= WHOLE * width;
+            let whole = change.abs() <= MAX_SINGLE_PIECE * width;
             let single = whole || panel(start[k], low, width, count) == panel(end[k], low, width, count);
             let (middle, reach) = (0.5 * (start[k] + end[k]), 0.5 * change * NODE);
             let sum = self.rate_of_all(middle - reach) + self.rate_of_all(middle + reach);
@@ -86,7 +88,7 @@ impl Kinetics {
         }
     }
 
-    /// Δz in a second, of increments that each lie within one panel.
+    /// Computes Δz per second of increments that each lie within one panel.
     #[inline(always)]
     pub(crate) fn growth_of_pieces(&self, start: &[f64], end: &[f64], growth: &mut [f64]) {
         let size = growth.len();
@@ -100,7 +102,7 @@ impl Kinetics {
     /// [`Self::rate`] without branches.
     #[inline(always)]
     fn rate_of_all(&self, temperature: f64) -> f64 {
-        let Constants { nucleation, equilibrium_melting, frozen, .. } = self.constants;
+        let KineticConstants { nucleation, equilibrium_melting, frozen, .. } = self.constants;
         let (above, below) = (temperature - frozen, equilibrium_melting - temperature);
         let barrier = 2.0 * temperature * temperature * below;
         let exponent = nucleation * (temperature + equilibrium_melting) * above;
@@ -110,40 +112,40 @@ impl Kinetics {
     }
 }
 
-/// Number of the panel of a temperature; those below and above all are one each.
+/// Index of the panel of a temperature; the ranges below and above are one panel each.
 #[inline(always)]
 fn panel(temperature: f64, low: f64, width: f64, count: f64) -> f64 {
     ((temperature - low) / width).max(-1.0).min(count).floor()
 }
 
-/// 1/√3, the node of Gauss' rule of two points on \[−1, 1\].
+/// Node 1/√3 of Gauss' rule of two points on \[−1, 1\].
 const NODE: f64 = 0.577_350_269_189_625_8;
 
 /// A part of an increment within one panel, or outside (T∞, T₀).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Panel {
+pub struct TemperaturePanel {
     /// Temperature at its start, K.
     pub start: f64,
     /// Temperature at its end, K.
     pub end: f64,
-    /// Whether it ends where the increment does, so that its end moves with it.
+    /// True for the last panel of the increment, whose end moves with it.
     pub last: bool,
-    /// Whether it lies in (T∞, T₀).
+    /// True within (T∞, T₀).
     inside: bool,
-    /// Its part of the time.
+    /// Fraction of the time increment.
     share: f64,
     /// ∂share/∂T_end, 1/K.
     share_slope: f64,
 }
 
-impl Panel {
-    /// Its part of the time.
+impl TemperaturePanel {
+    /// Fraction of the time increment.
     pub(crate) fn share(&self) -> f64 {
         if self.inside { self.share } else { 0.0 }
     }
 }
 
-/// The panels of an increment, in the order in which they are passed.
+/// Iterator over the panels of an increment, in order.
 #[derive(Clone, Debug)]
 pub struct Panels {
     start: f64,
@@ -158,15 +160,15 @@ pub struct Panels {
 }
 
 impl Panels {
-    /// Of an increment; (T∞, T₀) is divided into `count` panels.
+    /// Returns the panels of an increment; `count` panels divide (T∞, T₀).
     pub fn new(kinetics: &Kinetics, start: f64, end: f64, count: usize) -> Self {
         let (low, high) = (kinetics.constants.frozen, kinetics.constants.equilibrium_melting);
         let width = (high - low) / count as f64;
-        let whole = (end - start).abs() <= WHOLE * width;
+        let whole = (end - start).abs() <= MAX_SINGLE_PIECE * width;
         Self { start, end, at: start, low, width, count: count as f64, whole, done: false }
     }
 
-    /// The next border beyond `at` on the way to the end, or the end.
+    /// Next border from `at` towards the end, or the end.
     fn border(&self) -> f64 {
         let place = (self.at - self.low) / self.width;
         if self.end > self.at {
@@ -182,16 +184,16 @@ impl Panels {
 }
 
 impl Iterator for Panels {
-    type Item = Panel;
+    type Item = TemperaturePanel;
 
-    fn next(&mut self) -> Option<Panel> {
+    fn next(&mut self) -> Option<TemperaturePanel> {
         if self.done {
             return None;
         }
         let start = self.at;
         let mut border = if self.whole { self.end } else { self.border() };
         if border == start && start != self.end {
-            // rounding has put `at` a little before a border: go on to the next
+            // rounding has put `at` just before a border: continue to the next
             self.at = if self.end > start { start.next_up() } else { start.next_down() };
             border = self.border();
         }
@@ -207,6 +209,6 @@ impl Iterator for Panels {
         };
         let middle = 0.5 * (start + border);
         let inside = self.whole || (middle > self.low && middle < self.low + self.width * self.count);
-        Some(Panel { start, end: border, last: self.done, inside, share, share_slope })
+        Some(TemperaturePanel { start, end: border, last: self.done, inside, share, share_slope })
     }
 }

@@ -1,8 +1,8 @@
-//! Crystallization from the melt: Nakamura's theory with the rate of Hoffman and Lauritzen, carried in z.
+//! Crystallization from the melt: Nakamura's theory with the rate of Hoffman and Lauritzen, integrated in z.
 //!
-//! With z = \[−ln(1−α)\]^{1/n} the rate equation (4.5) becomes dz/dt = K(T): a quadrature. It is stable for any step,
-//! α = 0 is no fixed point of it, and α = 1 − exp(−zⁿ) never leaves \[0, 1\]. z carries both ends without
-//! cancellation: α → 0 as zⁿ, 1 − α as exp(−zⁿ).
+//! With z = \[−ln(1−α)\]^{1/n} the rate equation (4.5) becomes dz/dt = K(T), a quadrature. It is stable for
+//! any step, α = 0 is not a fixed point, and α = 1 − exp(−zⁿ) stays within \[0, 1\]. z keeps the digits of
+//! both ends: α → 0 as zⁿ, 1 − α as exp(−zⁿ).
 
 mod exact;
 mod growth;
@@ -10,32 +10,32 @@ mod scheme;
 
 pub use exact::{CoolingCurve, avrami, cooling_curve};
 pub use growth::{Growth, PANELS, Panels};
-pub use scheme::Scheme;
+pub use scheme::KineticScheme;
 
 use crate::error::Error;
 use polycore::numerics::bisected;
 
-/// Universal gas constant R as the thesis rounds it, J/(mol K).
+/// Universal gas constant R as rounded in the thesis, J/(mol K).
 pub const GAS_CONSTANT: f64 = 8.314;
 
-/// The constants of Eqs (4.6) and (4.7), SI.
+/// Constants of Eqs (4.6) and (4.7), SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Constants {
+pub struct KineticConstants {
     /// Growth rate constant K₀, 1/s.
     pub growth_rate: f64,
     /// Nucleation constant K_G, K².
     pub nucleation: f64,
-    /// Activation energy of the jump of chain segments U, J/mol.
+    /// Activation energy for jumps of chain segments U, J/mol.
     pub activation_energy: f64,
-    /// Equilibrium melting temperature T₀, K: where the undercooling ends, and the T₀ of (T + T₀).
+    /// Equilibrium melting temperature T₀, K, at which the undercooling is zero; also the T₀ of (T + T₀).
     pub equilibrium_melting: f64,
-    /// Temperature T∞ at which the chains cease to move, about 30 K below the glass transition, K.
+    /// Temperature T∞ at which chain motion ceases, about 30 K below the glass transition, K.
     pub frozen: f64,
     /// Avrami exponent n.
     pub avrami_exponent: f64,
 }
 
-impl Constants {
+impl KineticConstants {
     /// Table 4.1, column 1: PA12 after its reference \[108\] (Zhao et al.).
     pub const TABLE_4_1_COLUMN_1: Self = Self {
         growth_rate: 37_869.0,
@@ -54,7 +54,7 @@ impl Constants {
         frozen: 21.0 + 273.15,
         avrami_exponent: 2.618,
     };
-    /// Appendix B, which rounds the temperatures of column 1 (and takes 0 °C for 273 K).
+    /// Appendix B, which rounds the temperatures of column 1 (with 0 °C = 273 K).
     pub const APPENDIX_B: Self = Self {
         growth_rate: 37_870.0,
         nucleation: 136_235.0,
@@ -68,10 +68,10 @@ impl Constants {
 /// Largest z: its n-th power stays finite, and 1 − α has long underflowed to 0.
 const LARGEST_Z: f64 = 1e30;
 
-/// The rate K(T) of a polymer, Eqs (4.6) and (4.7), and the relation of α and z.
+/// Rate K(T) of a polymer, Eqs (4.6) and (4.7), and the relation of α and z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kinetics {
-    constants: Constants,
+    constants: KineticConstants,
     /// K₀ (ln 2)^{1/n}.
     prefactor: f64,
     /// U/R.
@@ -79,13 +79,13 @@ pub struct Kinetics {
 }
 
 impl Kinetics {
-    /// From constants.
+    /// Builds the kinetics from constants.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for K₀ or K_G ≤ 0, U < 0, T∞ < 0 K, T₀ ≤ T∞, n outside \[1, 10\] (below 1 the rate dα/dt
-    /// would be infinite at α = 0), and for what is not finite.
-    pub fn new(constants: Constants) -> Result<Self, Error> {
-        let Constants {
+    /// [`Error::Parameter`] for K₀ or K_G ≤ 0, U < 0, T∞ < 0 K, T₀ ≤ T∞, n outside \[1, 10\] (below 1 the
+    /// rate dα/dt would be infinite at α = 0), and values that are not finite.
+    pub fn new(constants: KineticConstants) -> Result<Self, Error> {
+        let KineticConstants {
             growth_rate,
             nucleation,
             activation_energy,
@@ -120,16 +120,16 @@ impl Kinetics {
         })
     }
 
-    /// The constants.
-    pub fn constants(&self) -> &Constants {
+    /// Constants.
+    pub fn constants(&self) -> &KineticConstants {
         &self.constants
     }
 
-    /// K(T) = (ln 2)^{1/n} K₀ exp(−U/(R(T−T∞))) exp(−K_G(T+T₀)/(2T²(T₀−T))), 1/s, Eqs (4.6) and (4.7); 0 outside
-    /// (T∞, T₀), into which it runs smoothly.
+    /// Rate K(T), 1/s, Eqs (4.6) and (4.7); tends smoothly to 0 at T∞ and T₀ and is 0 outside:
+    /// K(T) = (ln 2)^{1/n} K₀ exp(−U/(R(T−T∞))) exp(−K_G(T+T₀)/(2T²(T₀−T))).
     #[inline]
     pub fn rate(&self, temperature: f64) -> f64 {
-        let Constants { nucleation, equilibrium_melting, frozen, .. } = self.constants;
+        let KineticConstants { nucleation, equilibrium_melting, frozen, .. } = self.constants;
         if !(temperature > frozen && temperature < equilibrium_melting) {
             return 0.0;
         }
@@ -149,7 +149,7 @@ impl Kinetics {
 
     /// d ln K/dT within (T∞, T₀).
     fn logarithmic_slope(&self, temperature: f64) -> f64 {
-        let Constants { nucleation, equilibrium_melting, frozen, .. } = self.constants;
+        let KineticConstants { nucleation, equilibrium_melting, frozen, .. } = self.constants;
         let (above, below) = (temperature - frozen, equilibrium_melting - temperature);
         let barrier =
             nucleation * (temperature + equilibrium_melting) / (2.0 * temperature * temperature * below);
@@ -157,15 +157,15 @@ impl Kinetics {
         self.activation / (above * above) - barrier * change
     }
 
-    /// Half time of an isothermal crystallization t_½ = (ln 2)^{1/n}/K, s, Eq. (4.6); infinite outside (T∞, T₀).
+    /// Half time of isothermal crystallization t_½ = (ln 2)^{1/n}/K, s, Eq. (4.6); infinite outside (T∞, T₀).
     pub fn half_time(&self, temperature: f64) -> f64 {
         std::f64::consts::LN_2.powf(self.constants.avrami_exponent.recip()) / self.rate(temperature)
     }
 
-    /// Where crystallization is fastest: T in K and K(T) in 1/s.
+    /// Temperature of fastest crystallization, K, and its K(T), 1/s.
     pub fn fastest(&self) -> [f64; 2] {
         let (low, high) = (self.constants.frozen, self.constants.equilibrium_melting);
-        // K grows without bound in proportion at T∞ and falls so at T₀
+        // d ln K/dT tends to +∞ at T∞ and to −∞ at T₀
         let temperature = bisected(low, high, 200, |t| self.logarithmic_slope(t) > 0.0);
         [temperature, self.rate(temperature)]
     }
@@ -180,12 +180,12 @@ impl Kinetics {
         (-self.power(z)).exp()
     }
 
-    /// z of a relative crystallinity α in \[0, 1\]; where α is near 1, [`Kinetics::z_of_remainder`] keeps digits.
+    /// z from a relative crystallinity α in \[0, 1\]; near α = 1, [`Kinetics::z_of_remainder`] keeps digits.
     pub fn z_of_degree(&self, degree: f64) -> f64 {
         self.root(-(-degree).ln_1p())
     }
 
-    /// z of 1 − α in \[0, 1\].
+    /// z from 1 − α in \[0, 1\].
     pub fn z_of_remainder(&self, remainder: f64) -> f64 {
         self.root(-remainder.ln())
     }
@@ -195,7 +195,7 @@ impl Kinetics {
         self.degree_and_slope(z)[1]
     }
 
-    /// α and dα/dz, for the cost of one power and one exponential.
+    /// α and dα/dz, at the cost of one power and one exponential.
     #[inline]
     pub fn degree_and_slope(&self, z: f64) -> [f64; 2] {
         let extent = self.extent(z);
@@ -224,13 +224,14 @@ impl Kinetics {
         self.constants.avrami_exponent * (extent.power / z) * (extent.remainder / extent.degree)
     }
 
-    /// z of zⁿ.
+    /// z from zⁿ.
     #[inline]
     pub(crate) fn z_of_power(&self, power: f64) -> f64 {
         self.root(power)
     }
 
-    /// dα/dt = n K (1−α) \[ln 1/(1−α)\]^{(n−1)/n}, 1/s, Eq. (4.5), as printed: not guarded, a NaN beyond α = 1.
+    /// dα/dt = n K (1−α) \[ln 1/(1−α)\]^{(n−1)/n}, 1/s, Eq. (4.5), as printed, without guard: NaN beyond α =
+    /// 1.
     pub fn degree_rate(&self, temperature: f64, degree: f64) -> f64 {
         let n = self.constants.avrami_exponent;
         n * self.rate(temperature) * (1.0 - degree) * (-(-degree).ln_1p()).powf((n - 1.0) / n)

@@ -1,14 +1,14 @@
-//! Ways to integrate the kinetics over a step, to be compared: error against work.
+//! Time schemes for the kinetics, for comparisons of error and work.
 
 use super::Kinetics;
 
-/// A one-step scheme. The first two advance α by Eq. (4.5), as the thesis does, and may leave \[0, 1\]; the others
-/// advance z.
+/// A one-step scheme. The first two advance α by Eq. (4.5), as the thesis does, and may leave \[0, 1\]; the
+/// others advance z.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scheme {
+pub enum KineticScheme {
     /// Euler's method in α, Eq. (4.10).
     Euler,
-    /// The classical Runge–Kutta method of four stages in α.
+    /// Classical Runge–Kutta method of four stages in α.
     RungeKutta4,
     /// Midpoint rule in z.
     Midpoint,
@@ -16,8 +16,8 @@ pub enum Scheme {
     Gauss2,
 }
 
-impl Scheme {
-    /// All.
+impl KineticScheme {
+    /// All schemes.
     pub const ALL: [Self; 4] = [Self::Euler, Self::RungeKutta4, Self::Midpoint, Self::Gauss2];
 
     /// Name in reports.
@@ -30,7 +30,7 @@ impl Scheme {
         }
     }
 
-    /// The state that this scheme carries: α, or z.
+    /// State variable of the scheme, α or z, from α.
     pub fn state(self, kinetics: &Kinetics, degree: f64) -> f64 {
         match self {
             Self::Euler | Self::RungeKutta4 => degree,
@@ -38,7 +38,7 @@ impl Scheme {
         }
     }
 
-    /// α of a state.
+    /// α from the state variable.
     pub fn degree(self, kinetics: &Kinetics, state: f64) -> f64 {
         match self {
             Self::Euler | Self::RungeKutta4 => state,
@@ -46,7 +46,7 @@ impl Scheme {
         }
     }
 
-    /// The state after a step `dt`, s, in which the temperature runs linearly from `start` to `end`, K.
+    /// Advances the state by a step `dt`, s, with the temperature linear from `start` to `end`, K.
     #[inline]
     pub fn advance(self, kinetics: &Kinetics, state: f64, start: f64, end: f64, dt: f64) -> f64 {
         let middle = 0.5 * (start + end);

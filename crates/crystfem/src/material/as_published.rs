@@ -1,22 +1,22 @@
 //! The subroutine of Appendix B as coded, for comparison: Algorithm 1 by Euler's method, from a seed of 1e-3.
 
-use super::{Conductor, Point, Response, ThermalMaterial};
+use super::{Conductor, PointInput, ThermalMaterial, ThermalResponse};
 use crate::error::Error;
 
-/// Which sign of the increment crystallizes.
+/// Sign of the temperature increment that crystallizes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sign {
     /// `DTEMP > 0`, as printed: heating crystallizes and cooling melts.
     AsPublished,
-    /// `DTEMP < 0`.
-    Mended,
+    /// `DTEMP < 0`, corrected.
+    Corrected,
 }
 
-/// Appendix B after its three missing parentheses are put in. The arithmetic is the printed one, in single precision
-/// where the variables are `REAL`; temperatures are those at the start of the increment. Whatever it does with α, infinite
-/// and NaN included, stands in the state; energy and flux do not depend on it.
+/// Appendix B with its three missing parentheses. The arithmetic is the printed one, in single precision for
+/// `REAL` variables; temperatures are those at the start of the increment. The state holds its α, infinite
+/// and NaN included; energy and flux do not depend on it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct AsPublished {
+pub struct PublishedSubroutine {
     conductor: Conductor,
     sign: Sign,
     guarded: bool,
@@ -27,13 +27,14 @@ const ALPHA_MAX: f32 = 0.25;
 const T0: f32 = 466.0;
 const T_INF: f32 = 294.0;
 
-impl AsPublished {
-    /// With `guarded`, K = 0 outside (T∞, T₀), without which the exponential overflows above T₀.
+impl PublishedSubroutine {
+    /// Returns the material; with `guarded`, K = 0 outside (T∞, T₀), otherwise the exponential overflows
+    /// above T₀.
     pub fn new(conductor: Conductor, sign: Sign, guarded: bool) -> Self {
         Self { conductor, sign, guarded }
     }
 
-    /// THALF, KT and DALPHADT.
+    /// Rate from THALF, KT and DALPHADT.
     fn rate(&self, old: f32, kelvin: f32) -> f32 {
         if self.guarded && !(kelvin > T_INF && kelvin < T0) {
             return 0.0;
@@ -49,12 +50,12 @@ impl AsPublished {
         (f64::from(n * rate) * left * (1.0 / left).ln().powf((exponent - 1.0) / exponent)) as f32
     }
 
-    /// α at the end of an increment from a temperature in K.
+    /// α at the end of an increment, from a temperature in K.
     fn alpha(&self, old: f32, temperature: f64, increment: f64, dt: f64) -> f32 {
         let kelvin = kelvin(temperature);
         let crystallizing = match self.sign {
             Sign::AsPublished => increment,
-            Sign::Mended => -increment,
+            Sign::Corrected => -increment,
         };
         if crystallizing > 0.0 {
             return (f64::from(old) + dt * f64::from(self.rate(old, kelvin))) as f32;
@@ -82,7 +83,7 @@ fn kelvin(temperature: f64) -> f32 {
     (temperature - 273.15 + 273.0) as f32
 }
 
-impl ThermalMaterial for AsPublished {
+impl ThermalMaterial for PublishedSubroutine {
     fn density(&self) -> f64 {
         self.conductor.density()
     }
@@ -119,7 +120,7 @@ impl ThermalMaterial for AsPublished {
         self.conductor.heat_potential(temperature)
     }
 
-    fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
+    fn respond(&self, at: &PointInput, old: &[f64], new: &mut [f64]) -> Result<ThermalResponse, Error> {
         let response = self.conductor.conduct(at)?;
         new[0] = f64::from(self.alpha(old[0] as f32, at.temperature, at.increment, at.dt));
         Ok(response)

@@ -1,25 +1,30 @@
 //! A plain conductor: Fourier's law, with constant or tabulated properties.
 
-use super::{Point, Property, Response, ThermalMaterial};
+use super::{PointInput, ThermalMaterial, ThermalProperty, ThermalResponse};
 use crate::error::Error;
 use nalgebra::{Matrix3, Vector3};
 
-/// A conductor without state: U = ∫c dT, f = −k(T) D ∇T, D diagonal: along beads a part conducts better than across.
+/// A conductor without state: U = ∫c dT, f = −k(T) D ∇T, with diagonal D: a part conducts better along its
+/// beads.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Conductor {
     density: f64,
-    conductivity: Property,
-    specific_heat: Property,
+    conductivity: ThermalProperty,
+    specific_heat: ThermalProperty,
     /// D, along x, y, z.
     directions: Vector3<f64>,
 }
 
 impl Conductor {
-    /// From density, kg/m³, conductivity, W/(m K), and specific heat, J/(kg K).
+    /// Returns a conductor of density, kg/m³, conductivity, W/(m K), and specific heat, J/(kg K).
     ///
     /// # Errors
     /// [`Error::Parameter`] unless the density is above 0 and finite.
-    pub fn new(density: f64, conductivity: Property, specific_heat: Property) -> Result<Self, Error> {
+    pub fn new(
+        density: f64,
+        conductivity: ThermalProperty,
+        specific_heat: ThermalProperty,
+    ) -> Result<Self, Error> {
         if density > 0.0 && density.is_finite() {
             return Ok(Self { density, conductivity, specific_heat, directions: Vector3::repeat(1.0) });
         }
@@ -27,7 +32,7 @@ impl Conductor {
         Err(Error::Parameter { name: "density, kg/m³", found: density, allowed })
     }
 
-    /// The same with factors on the conductivity along x, y and z.
+    /// Scales the conductivity along x, y and z.
     ///
     /// # Errors
     /// [`Error::Parameter`] unless each is above 0 and finite.
@@ -49,7 +54,7 @@ impl Conductor {
     /// [`ThermalMaterial::potential`].
     pub(super) fn heat_potential(&self, temperature: f64) -> Option<[f64; 2]> {
         let conductivity = &self.conductivity;
-        conductivity.jumps().then(|| [conductivity.integral(temperature), conductivity.at(temperature)])
+        conductivity.jumps().then(|| [conductivity.integral(temperature), conductivity.value_at(temperature)])
     }
 
     /// Returns whether both properties are constant.
@@ -57,14 +62,14 @@ impl Conductor {
         self.conductivity.is_constant() && self.specific_heat.is_constant()
     }
 
-    /// The response without any state.
-    pub(super) fn conduct(&self, at: &Point) -> Result<Response, Error> {
+    /// Computes the response.
+    pub(super) fn conduct(&self, at: &PointInput) -> Result<ThermalResponse, Error> {
         let temperature = at.check()?;
         let [conductivity, slope] = self.conductivity.with_slope(temperature);
         let gradient = self.directions.component_mul(&at.gradient);
-        Ok(Response {
+        Ok(ThermalResponse {
             energy: self.specific_heat.integral(temperature),
-            d_energy_d_temperature: self.specific_heat.at(temperature),
+            d_energy_d_temperature: self.specific_heat.value_at(temperature),
             flux: -conductivity * gradient,
             d_flux_d_temperature: -slope * gradient,
             d_flux_d_gradient: Matrix3::from_diagonal(&(-conductivity * self.directions)),
@@ -73,8 +78,8 @@ impl Conductor {
     }
 }
 
-impl Point {
-    /// The temperature at the end of the increment, K, where it is one.
+impl PointInput {
+    /// Returns the temperature at the end of the increment, K, if valid.
     ///
     /// # Errors
     /// [`Error::Parameter`] for temperatures that are not finite and a Δt that is not finite or below 0.
@@ -122,7 +127,7 @@ impl ThermalMaterial for Conductor {
         self.heat_potential(temperature)
     }
 
-    fn respond(&self, at: &Point, _old: &[f64], _new: &mut [f64]) -> Result<Response, Error> {
+    fn respond(&self, at: &PointInput, _old: &[f64], _new: &mut [f64]) -> Result<ThermalResponse, Error> {
         self.conduct(at)
     }
 }

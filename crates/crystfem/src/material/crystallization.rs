@@ -1,24 +1,23 @@
-//! Growth and melting of crystals over an increment, at one point.
+//! Growth and melting of crystals at a point, over an increment.
 
 use crate::kinetics::{Extent, Kinetics, PANELS, Panels};
 use crate::melting::Melting;
 
-/// Panels of (T∞, T₀) on heating, where growth and melting alternate; PA12: 1.35 K.
+/// Number of panels of (T∞, T₀) on heating, where growth and melting alternate; 1.35 K each for PA12.
 pub(super) const HEATING_PANELS: usize = 4 * PANELS;
 
-/// A melting below this part of the crystals is none.
-pub(super) const NOTHING: f64 = -1e-17;
+/// ln of the melted fraction's complement above which melting is negligible.
+pub(super) const NEGLIGIBLE_MELTING: f64 = -1e-17;
 
-/// Fewer crystals are none: quotients of smaller numbers overflow.
-pub(super) const FAINT: f64 = 1e-280;
+/// Smallest z that can melt: quotients of smaller numbers overflow.
+pub(super) const SMALLEST_MELTING_Z: f64 = 1e-280;
 
-/// Kinetics and melting together: dz/dt = K(T) at every temperature, and on heating α falls in proportion to
-/// 1 − X_m(T).
+/// Kinetics and melting: dz/dt = K(T) at every temperature; on heating α falls in proportion to 1 − X_m(T).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crystallization {
     /// Growth.
     pub kinetics: Kinetics,
-    /// Melting; without it crystals never melt.
+    /// Melting; `None` if crystals never melt.
     pub melting: Option<Melting>,
 }
 
@@ -32,16 +31,16 @@ pub struct Grown {
 }
 
 impl Crystallization {
-    /// From z at the start over an increment in which the temperature runs linearly from `start` to `end`, K, in the
-    /// time `dt`, s.
+    /// Advances z over an increment with the temperature linear from `start` to `end`, K, in the time `dt`,
+    /// s.
     ///
-    /// On cooling and at a hold z grows by ∫K dt. On heating each panel of temperature takes half of its growth, then
-    /// α ← α (1−X_m(T₂))/(1−X_m(T₁)), then the other half: z and α stay within their bounds whatever the
-    /// increment, and the end is a continuous function of its temperature.
+    /// On cooling and at a hold z grows by ∫K dt. On heating each panel of temperature takes half of its
+    /// growth, then α ← α (1−X_m(T₂))/(1−X_m(T₁)), then the other half: z and α stay within their bounds for
+    /// any increment, and the result is a continuous function of the end temperature.
     pub fn advance(&self, z: f64, start: f64, end: f64, dt: f64) -> Grown {
         let kinetics = &self.kinetics;
         let melting = match &self.melting {
-            Some(melting) if end > start && melting.survival(end)[0] < NOTHING => melting,
+            Some(melting) if end > start && melting.survival(end)[0] < NEGLIGIBLE_MELTING => melting,
             _ => {
                 let growth = kinetics.growth(start, end, dt);
                 return Grown { z: z + growth.z, slope: growth.slope };
@@ -52,7 +51,7 @@ impl Crystallization {
             return grown;
         }
         let [mut before, _] = melting.survival(start);
-        // in a jump nothing grows, and what melts is the product of all parts
+        // no growth in a jump, and the melting of all panels is their product
         let panels = if dt == 0.0 { 1 } else { HEATING_PANELS };
         for panel in Panels::new(kinetics, start, end, panels) {
             let growth = kinetics.growth_over(&panel, dt);
@@ -67,11 +66,11 @@ impl Crystallization {
         grown
     }
 
-    /// α ← α e^L. Near α = 1 through 1 − α, so that no digit is lost on the way there and back.
+    /// Melts α ← α e^L, near α = 1 through 1 − α, so that no digits are lost.
     pub(super) fn melt(&self, grown: Grown, logarithm: f64, slope: f64) -> Grown {
         let kinetics = &self.kinetics;
         let Grown { z, slope: z_slope } = grown;
-        if z == 0.0 || logarithm > NOTHING {
+        if z == 0.0 || logarithm > NEGLIGIBLE_MELTING {
             return grown;
         }
         let before = kinetics.extent(z);
@@ -80,7 +79,7 @@ impl Crystallization {
         let remainder = lost + survivors * before.remainder;
         let power = if degree < 0.5 { -(-degree).ln_1p() } else { -remainder.ln() };
         let z_after = kinetics.z_of_power(power);
-        if degree < FAINT {
+        if degree < SMALLEST_MELTING_Z {
             return Grown { z: 0.0, slope: 0.0 };
         }
         let after = Extent { power, degree, remainder };
@@ -93,12 +92,12 @@ impl Crystallization {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kinetics::Constants;
+    use crate::kinetics::KineticConstants;
 
-    /// A jump to a temperature passes all those before it.
+    /// A jump equals the sequence of smaller jumps.
     #[test]
     fn jumps_follow_each_other() {
-        let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap();
+        let kinetics = Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1).unwrap();
         let law = Crystallization { kinetics, melting: Some(Melting::PA12) };
         for z in [1e-6, 0.3, 1.2, 3.0] {
             let to = |z: f64, start: f64, end: f64| law.advance(z, start, end, 0.0).z;

@@ -1,38 +1,38 @@
-//! A material that fills a part of its elements.
+//! A material that fills a fraction of its elements.
 
-use super::{Crystallization, Point, Response, ThermalMaterial};
+use super::{Crystallization, PointInput, ThermalMaterial, ThermalResponse};
 use crate::error::Error;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// A material of which an element holds only a part, spread evenly over it: ρ and k are that part of the material's, and
-/// energies and states per mass are the material's own (rule of mixtures with air that neither stores nor conducts).
+/// A material that fills a fraction of its elements, spread evenly: ρ and k are scaled by the fraction;
+/// energies and states per mass are unchanged (rule of mixtures with air that neither stores nor conducts).
 #[derive(Clone)]
 pub struct Filled {
-    /// The material.
-    of: Arc<dyn ThermalMaterial>,
-    /// The part that is filled; above 1 where more was pressed in.
+    /// Filling material.
+    material: Arc<dyn ThermalMaterial>,
+    /// Filled fraction; above 1 for overfilled elements.
     fill: f64,
 }
 
 impl Filled {
-    /// A material and the part of the elements' volume that it fills.
+    /// Returns a material that fills a fraction of its elements.
     ///
     /// # Errors
-    /// A part that is not positive.
-    pub fn new(of: Arc<dyn ThermalMaterial>, fill: f64) -> Result<Self, Error> {
+    /// [`Error::Parameter`] for a fraction that is not above 0 and finite.
+    pub fn new(material: Arc<dyn ThermalMaterial>, fill: f64) -> Result<Self, Error> {
         if fill > 0.0 && fill.is_finite() {
-            return Ok(Self { of, fill });
+            return Ok(Self { material, fill });
         }
         Err(Error::Parameter { name: "filled part", found: fill, allowed: "above 0, finite".into() })
     }
 }
 
-/// Replaces materials by [`Filled`] ones, one for each material and filled part that elements have: `part_of` is the index
-/// of each element among `parts`.
+/// Replaces materials by [`Filled`] ones, one for each pair of material and fraction in use; `part_of` is the
+/// index of each element in the fractions `parts`.
 ///
 /// # Errors
-/// Those of [`Filled::new`]; more than 65536 of them.
+/// Errors of [`Filled::new`]; [`Error::Parameter`] for more than 65536 materials.
 pub fn fill_elements(
     materials: &mut Vec<Arc<dyn ThermalMaterial>>,
     material_of: &mut [u16],
@@ -63,56 +63,56 @@ pub fn fill_elements(
 
 impl ThermalMaterial for Filled {
     fn density(&self) -> f64 {
-        self.fill * self.of.density()
+        self.fill * self.material.density()
     }
 
     fn state_names(&self) -> &'static [&'static str] {
-        self.of.state_names()
+        self.material.state_names()
     }
 
     fn initial_state(&self, temperature: f64, state: &mut [f64]) {
-        self.of.initial_state(temperature, state);
+        self.material.initial_state(temperature, state);
     }
 
     fn field_names(&self) -> &'static [&'static str] {
-        self.of.field_names()
+        self.material.field_names()
     }
 
     fn fields(&self, state: &[f64], fields: &mut [f64]) {
-        self.of.fields(state, fields);
+        self.material.fields(state, fields);
     }
 
     fn crystallization_rate(&self, temperature: f64, state: &[f64]) -> f64 {
-        self.of.crystallization_rate(temperature, state)
+        self.material.crystallization_rate(temperature, state)
     }
 
     fn energy(&self, temperature: f64, state: &[f64]) -> f64 {
-        self.of.energy(temperature, state)
+        self.material.energy(temperature, state)
     }
 
     fn is_linear(&self) -> bool {
-        self.of.is_linear()
+        self.material.is_linear()
     }
 
     fn constant_conductivity(&self) -> bool {
-        self.of.constant_conductivity()
+        self.material.constant_conductivity()
     }
 
     fn potential(&self, temperature: f64) -> Option<[f64; 2]> {
-        self.of.potential(temperature).map(|pair| pair.map(|x| self.fill * x))
+        self.material.potential(temperature).map(|pair| pair.map(|x| self.fill * x))
     }
 
     fn crystals(&self) -> Option<&Crystallization> {
-        self.of.crystals()
+        self.material.crystals()
     }
 
     fn filling(&self) -> Option<&Arc<dyn ThermalMaterial>> {
-        Some(&self.of)
+        Some(&self.material)
     }
 
-    fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
-        let own = self.of.respond(at, old, new)?;
-        Ok(Response {
+    fn respond(&self, at: &PointInput, old: &[f64], new: &mut [f64]) -> Result<ThermalResponse, Error> {
+        let own = self.material.respond(at, old, new)?;
+        Ok(ThermalResponse {
             flux: self.fill * own.flux,
             d_flux_d_temperature: self.fill * own.d_flux_d_temperature,
             d_flux_d_gradient: self.fill * own.d_flux_d_gradient,

@@ -1,30 +1,33 @@
-//! A material that is a powder until it has been melt.
+//! A material that is powder until it first melts.
 
-use super::{Point, Response, ThermalMaterial};
+use super::{PointInput, ThermalMaterial, ThermalResponse};
 use crate::error::Error;
 
-/// Names of states and fields with that of the consolidated part.
+/// Names of states and fields, without and with those of a crystallizing solid.
 const ALONE: &[&str] = &["consolidated"];
 const STATES: &[&str] = &["z", "consolidated"];
 const FIELDS: &[&str] = &["alpha", "crystallinity", "consolidated"];
 
-/// Powder that consolidates once it is hot: the consolidated part p is the greatest that (T − `from`)/(`to` − `from`), between 0 and 1, has reached, and the
-/// conductivity is [φ + (1 − φ)p] times that of the solid. Density and specific heat are the material's: a bed that settles is not modelled.
+/// Powder that consolidates when heated: the consolidated fraction p is the largest value reached by (T −
+/// `from`)/(`to` − `from`), clamped to 0 … 1, and the conductivity is [φ + (1 − φ)p] times that of the solid.
+/// Density and specific heat are those of the solid: settling of the bed is not modelled.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Powder<M> {
-    of: M,
-    /// φ.
+    solid: M,
+    /// φ, conductivity of powder over that of the solid.
     share: f64,
-    /// Temperatures at which it begins and ends to consolidate, K.
+    /// Temperatures at which consolidation begins and ends, K.
     window: [f64; 2],
 }
 
 impl<M: ThermalMaterial> Powder<M> {
-    /// The solid, the conductivity of its powder over its own, and the temperatures, K, at which it begins and ends to consolidate.
+    /// Returns a powder of a solid, from the ratio of conductivities φ and the temperatures, K, at which
+    /// consolidation begins and ends.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a share that is not above 0, up to 1, and temperatures that are not above 0, increasing and finite.
-    pub fn new(of: M, share: f64, window: [f64; 2]) -> Result<Self, Error> {
+    /// [`Error::Parameter`] for φ outside (0, 1], and temperatures that are not above 0, increasing and
+    /// finite.
+    pub fn new(solid: M, share: f64, window: [f64; 2]) -> Result<Self, Error> {
         let refuse =
             |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.to_owned() });
         if !(share > 0.0 && share <= 1.0) {
@@ -44,25 +47,25 @@ impl<M: ThermalMaterial> Powder<M> {
                 "above that at which it begins",
             );
         }
-        Ok(Self { of, share, window })
+        Ok(Self { solid, share, window })
     }
 
-    /// p and its slope over T, where `before` has been reached.
+    /// Returns p and its slope over T, starting from `before`.
     fn consolidated(&self, temperature: f64, before: f64) -> [f64; 2] {
         let [from, to] = self.window;
         let now = ((temperature - from) / (to - from)).min(1.0);
         if now > before { [now, if now < 1.0 { 1.0 / (to - from) } else { 0.0 }] } else { [before, 0.0] }
     }
 
-    /// How many states the solid has.
+    /// Number of states of the solid.
     fn solid_states(&self) -> usize {
-        self.of.state_names().len()
+        self.solid.state_names().len()
     }
 }
 
 impl<M: ThermalMaterial> ThermalMaterial for Powder<M> {
     fn density(&self) -> f64 {
-        self.of.density()
+        self.solid.density()
     }
 
     fn state_names(&self) -> &'static [&'static str] {
@@ -71,7 +74,7 @@ impl<M: ThermalMaterial> ThermalMaterial for Powder<M> {
 
     fn initial_state(&self, temperature: f64, state: &mut [f64]) {
         let (own, last) = state.split_at_mut(self.solid_states());
-        self.of.initial_state(temperature, own);
+        self.solid.initial_state(temperature, own);
         last[0] = self.consolidated(temperature, 0.0)[0];
     }
 
@@ -82,16 +85,16 @@ impl<M: ThermalMaterial> ThermalMaterial for Powder<M> {
     fn fields(&self, state: &[f64], fields: &mut [f64]) {
         let (own, last) = state.split_at(self.solid_states());
         let count = fields.len() - 1;
-        self.of.fields(own, &mut fields[..count]);
+        self.solid.fields(own, &mut fields[..count]);
         fields[count] = last[0];
     }
 
     fn crystallization_rate(&self, temperature: f64, state: &[f64]) -> f64 {
-        self.of.crystallization_rate(temperature, &state[..self.solid_states()])
+        self.solid.crystallization_rate(temperature, &state[..self.solid_states()])
     }
 
     fn energy(&self, temperature: f64, state: &[f64]) -> f64 {
-        self.of.energy(temperature, &state[..self.solid_states()])
+        self.solid.energy(temperature, &state[..self.solid_states()])
     }
 
     fn is_linear(&self) -> bool {
@@ -102,13 +105,13 @@ impl<M: ThermalMaterial> ThermalMaterial for Powder<M> {
         false
     }
 
-    fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
+    fn respond(&self, at: &PointInput, old: &[f64], new: &mut [f64]) -> Result<ThermalResponse, Error> {
         let own = self.solid_states();
-        let response = self.of.respond(at, &old[..own], &mut new[..own])?;
+        let response = self.solid.respond(at, &old[..own], &mut new[..own])?;
         let [part, slope] = self.consolidated(at.temperature + at.increment, old[own]);
         new[own] = part;
         let factor = self.share + (1.0 - self.share) * part;
-        Ok(Response {
+        Ok(ThermalResponse {
             flux: factor * response.flux,
             d_flux_d_temperature: factor * response.d_flux_d_temperature
                 + (1.0 - self.share) * slope * response.flux,
@@ -121,16 +124,18 @@ impl<M: ThermalMaterial> ThermalMaterial for Powder<M> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::material::{Conductor, Property, Semicrystalline};
+    use crate::material::{Conductor, Semicrystalline, ThermalProperty};
     use nalgebra::Vector3;
 
     fn powder() -> Powder<Conductor> {
-        let solid = Conductor::new(1000.0, Property::Constant(0.25), Property::Constant(2000.0)).unwrap();
+        let solid =
+            Conductor::new(1000.0, ThermalProperty::Constant(0.25), ThermalProperty::Constant(2000.0))
+                .unwrap();
         Powder::new(solid, 0.4, [440.0, 450.0]).unwrap()
     }
 
-    fn flux(from: f64, to: f64, before: f64) -> (Response, f64) {
-        let at = Point {
+    fn flux(from: f64, to: f64, before: f64) -> (ThermalResponse, f64) {
+        let at = PointInput {
             temperature: from,
             increment: to - from,
             gradient: Vector3::new(8.0, 0.0, -4.0),
@@ -141,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn it_consolidates_once() {
+    fn powder_consolidates_once() {
         for (from, to, before, part) in [
             (300.0, 430.0, 0.0, 0.0),
             (430.0, 445.0, 0.0, 0.5),

@@ -2,36 +2,36 @@
 
 use crate::error::Error;
 
-/// Temperature at which energies are counted from, K: U(T_ref) = 0 for amorphous material.
+/// Reference temperature of energies, K: U(T_ref) = 0 for amorphous material.
 pub const REFERENCE_TEMPERATURE: f64 = 273.15;
 
-/// Relative change within 1 K above which a property jumps.
-const STEEPEST: f64 = 0.1;
+/// Relative change within 1 K above which a property counts as a jump.
+const JUMP_CHANGE: f64 = 0.1;
 
-/// A positive property of temperature.
+/// A positive, temperature-dependent property.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Property {
-    /// The same at every temperature.
+pub enum ThermalProperty {
+    /// A constant.
     Constant(f64),
-    /// Linear between given values, constant beyond the ends.
-    Table(Table),
+    /// Linear between given values, constant outside.
+    Table(PropertyTable),
 }
 
-/// Temperatures and values of a [`Property`].
+/// Temperatures and values of a [`ThermalProperty`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct Table {
+pub struct PropertyTable {
     temperatures: Vec<f64>,
     values: Vec<f64>,
-    /// ∫ from the first temperature to each.
+    /// Integrals from the first temperature to each.
     integrals: Vec<f64>,
-    /// ∫ from the first temperature to the reference.
+    /// Integral from the first temperature to the reference.
     offset: f64,
-    /// See [`Property::jumps`].
+    /// Steep change, see [`ThermalProperty::jumps`].
     jumps: bool,
 }
 
-impl Property {
-    /// A constant; `name` is for the error.
+impl ThermalProperty {
+    /// Returns a constant; `name` is for the error.
     ///
     /// # Errors
     /// [`Error::Parameter`] unless it is above 0 and finite.
@@ -40,11 +40,11 @@ impl Property {
         Ok(Self::Constant(value))
     }
 
-    /// A table of temperatures, K, and values.
+    /// Returns a table of temperatures, K, and values.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for no rows or unequal columns (with the number of rows), temperatures that do not increase,
-    /// and values that are not above 0 and finite.
+    /// [`Error::Parameter`] for no rows or columns of different lengths (with the number of rows),
+    /// temperatures that do not increase, and values that are not above 0 and finite.
     pub fn table(name: &'static str, temperatures: Vec<f64>, values: Vec<f64>) -> Result<Self, Error> {
         let refuse = |name, found, allowed: String| Err(Error::Parameter { name, found, allowed });
         if temperatures.is_empty() || temperatures.len() != values.len() {
@@ -69,20 +69,20 @@ impl Property {
         }
         let jumps = temperatures.windows(2).zip(values.windows(2)).any(|(t, v)| {
             let change = (v[1] - v[0]).abs() / v[0].min(v[1]);
-            change > STEEPEST * (t[1] - t[0])
+            change > JUMP_CHANGE * (t[1] - t[0])
         });
-        let mut table = Table { temperatures, values, integrals, offset: 0.0, jumps };
+        let mut table = PropertyTable { temperatures, values, integrals, offset: 0.0, jumps };
         table.offset = table.integral(REFERENCE_TEMPERATURE);
         Ok(Self::Table(table))
     }
 
-    /// The value at a temperature.
+    /// Returns the value at a temperature, K.
     #[inline]
-    pub fn at(&self, temperature: f64) -> f64 {
+    pub fn value_at(&self, temperature: f64) -> f64 {
         self.with_slope(temperature)[0]
     }
 
-    /// The value and its derivative (at a point of a table the one to the right).
+    /// Returns the value and its derivative (the right one at a table row).
     #[inline]
     pub fn with_slope(&self, temperature: f64) -> [f64; 2] {
         match self {
@@ -91,7 +91,7 @@ impl Property {
         }
     }
 
-    /// The integral from [`REFERENCE_TEMPERATURE`] to a temperature, exact for a table too.
+    /// Integrates from [`REFERENCE_TEMPERATURE`] to a temperature, exactly for a table too.
     #[inline]
     pub fn integral(&self, temperature: f64) -> f64 {
         match self {
@@ -100,12 +100,12 @@ impl Property {
         }
     }
 
-    /// Returns whether it changes by more than a tenth of itself within 1 K somewhere.
+    /// Returns true if it changes by more than a tenth within 1 K somewhere.
     pub fn jumps(&self) -> bool {
         matches!(self, Self::Table(table) if table.jumps)
     }
 
-    /// Returns whether it is the same everywhere.
+    /// Returns true for a constant.
     pub fn is_constant(&self) -> bool {
         match self {
             Self::Constant(_) => true,
@@ -114,13 +114,13 @@ impl Property {
     }
 }
 
-impl Table {
-    /// Temperatures, K, and values.
+impl PropertyTable {
+    /// Rows of temperature, K, and value.
     pub fn rows(&self) -> impl Iterator<Item = [f64; 2]> {
         self.temperatures.iter().zip(&self.values).map(|(&temperature, &value)| [temperature, value])
     }
 
-    /// The row at or before a temperature within the table.
+    /// Index of the row at or before a temperature within the table.
     fn row(&self, temperature: f64) -> usize {
         self.temperatures.partition_point(|&t| t <= temperature) - 1
     }
@@ -138,7 +138,7 @@ impl Table {
         [self.values[i] + slope * (temperature - self.temperatures[i]), slope]
     }
 
-    /// From the first temperature.
+    /// Integrates from the first temperature.
     fn integral(&self, temperature: f64) -> f64 {
         let last = self.values.len() - 1;
         if temperature < self.temperatures[0] {
@@ -162,11 +162,12 @@ fn positive(name: &'static str, value: f64) -> Result<(), Error> {
 mod tests {
     use super::*;
 
-    fn table(temperatures: &[f64], values: &[f64]) -> Result<Property, Error> {
-        Property::table("specific heat, J/(kg K)", temperatures.to_vec(), values.to_vec())
+    fn table(temperatures: &[f64], values: &[f64]) -> Result<ThermalProperty, Error> {
+        ThermalProperty::table("specific heat, J/(kg K)", temperatures.to_vec(), values.to_vec())
     }
 
-    /// A parabola is the integral of a straight line: 1000 + 2 (T − 300) between 300 and 400 K, constant outside.
+    /// A parabola is the integral of a straight line: 1000 + 2 (T − 300) between 300 and 400 K, constant
+    /// outside.
     #[test]
     fn integral_is_exact() {
         let heat = table(&[300.0, 350.0, 400.0], &[1000.0, 1100.0, 1200.0]).unwrap();
@@ -180,7 +181,7 @@ mod tests {
         assert_eq!((heat.with_slope(299.0), heat.with_slope(400.0)), ([1000.0, 0.0], [1200.0, 0.0]));
         assert!(!heat.is_constant());
         let single = table(&[300.0], &[7.0]).unwrap();
-        assert_eq!((single.at(0.0), single.at(300.0), single.at(1e4)), (7.0, 7.0, 7.0));
+        assert_eq!((single.value_at(0.0), single.value_at(300.0), single.value_at(1e4)), (7.0, 7.0, 7.0));
         assert!(single.is_constant() && (single.integral(373.15) - 700.0).abs() < 1e-10);
     }
 
@@ -191,7 +192,7 @@ mod tests {
         for step in 0..400 {
             let t = 200.5 + f64::from(step);
             let difference = (heat.integral(t + 1e-3) - heat.integral(t - 1e-3)) / 2e-3;
-            assert!((difference - heat.at(t)).abs() < 1e-5 * heat.at(t), "{t}");
+            assert!((difference - heat.value_at(t)).abs() < 1e-5 * heat.value_at(t), "{t}");
         }
     }
 
@@ -206,6 +207,6 @@ mod tests {
         );
         assert!(message(&[300.0, f64::NAN], &[1.0, 2.0]).contains("found NaN"));
         assert!(message(&[300.0, 400.0], &[1.0, 0.0]).contains("found 0; allowed: above 0"));
-        assert!(Property::constant("k", f64::INFINITY).is_err());
+        assert!(ThermalProperty::constant("k", f64::INFINITY).is_err());
     }
 }

@@ -1,22 +1,25 @@
 //! Growth and melting of crystals at many points of one law.
 //!
-//! Points at one node have one temperature history, whatever their z. What depends on that alone is computed once for each node: growth Δz, and
-//! on heating ln (1−X_m(T₂))/(1−X_m(T₁)), by which crystals become less. Both, and the melting of each point, are loops of vectors. Increments
-//! that cross borders of panels are cut there into pieces, which points pass one after another.
+//! Points at one node share one temperature history, for any z. Quantities that depend on the history alone
+//! are computed once a node: growth Δz, and on heating the fall ln (1−X_m(T₂))/(1−X_m(T₁)), by which crystals
+//! decrease. These, and the melting of each point, are vectorized loops. Increments that cross panel borders
+//! are cut there into pieces, which are passed one after another.
 
 use super::Crystallization;
-use super::crystallization::{FAINT, Grown, HEATING_PANELS, NOTHING};
-use super::semicrystalline::{LARGEST_CHANGE, LONGEST};
+use super::crystallization::{Grown, HEATING_PANELS, NEGLIGIBLE_MELTING, SMALLEST_MELTING_Z};
+use super::semicrystalline::{LARGEST_CHANGE, MAX_STEP_RATIO};
 use crate::kinetics::{PANELS, Panels};
-use crate::simd_math::{SMALL, exp, expm1_small, ln, ln_1p};
+use crate::simd_math::{MAX_SMALL_ARGUMENT, exp, expm1_small, ln, ln_1p};
 use pulp::{Arch, Simd, WithSimd};
 
-/// z at least for powers of it; zⁿ at most for its exponential, and the logarithm of that.
-const LEAST_Z: f64 = 1e-20;
-const MOST_POWER: f64 = 700.0;
-const MOST_LOGARITHM: f64 = 6.5;
+/// Smallest z for powers.
+const MIN_Z: f64 = 1e-20;
+/// Largest zⁿ for its exponential.
+const MAX_POWER: f64 = 700.0;
+/// Logarithm of [`MAX_POWER`].
+const MAX_LOGARITHM: f64 = 6.5;
 
-/// Increments of temperature of nodes, in one time.
+/// Increments of temperature at nodes, all over the same time.
 #[derive(Clone, Copy)]
 pub(crate) struct Increments<'a> {
     /// Temperatures at the start, K.
@@ -27,21 +30,21 @@ pub(crate) struct Increments<'a> {
     pub dt: f64,
 }
 
-/// Room for one work item.
+/// Buffers for one work item.
 #[derive(Default)]
 pub(crate) struct Scratch {
-    /// Δz of each node, NaN where it heats in pieces.
+    /// Δz of each node; NaN for nodes that heat in pieces.
     growth: Vec<f64>,
-    /// ln (1−X_m(T₂))/(1−X_m(T₁)) of each node; 0 for none.
+    /// ln (1−X_m(T₂))/(1−X_m(T₁)) of each node; 0 without melting.
     fall: Vec<f64>,
-    /// First and last piece of each node that has them; a node whose increment is not finite has none.
+    /// First and last piece of each node with pieces; none if the increment is not finite.
     pieces: Vec<[u32; 2]>,
-    /// Pieces: temperatures at their ends, part of the time, growth and fall.
+    /// Pieces: temperatures at their ends, fraction of the time, growth and fall.
     piece: Pieces,
-    queue: Queue,
-    /// Points in nodes that heat in pieces, and their z before.
+    queue: MeltQueue,
+    /// Points of nodes that heat in pieces, and their initial z.
     long: Vec<(u32, f64)>,
-    seen: Seen,
+    seen: ChangeScan,
 }
 
 #[derive(Default)]
@@ -54,8 +57,9 @@ struct Pieces {
 }
 
 impl Crystallization {
-    /// z of points over an increment, as [`Self::advance`] does; `node` is that of each point. Returns the wish for the next step over
-    /// this one: [`LARGEST_CHANGE`] over the largest change of α, if there is any. z becomes NaN where an increment is not finite.
+    /// Advances z of points over an increment, like [`Self::advance`]; `node` is the node of each point.
+    /// Returns the requested ratio of next to present step: [`LARGEST_CHANGE`] over the largest change of α,
+    /// if there is any. z becomes NaN if an increment is not finite.
     pub(crate) fn advance_all(
         &self,
         increments: Increments,
@@ -76,14 +80,14 @@ impl Crystallization {
                 continue;
             }
             let before = *own;
-            if let Some(after) = queue.offer(self, point, before, growth, fall) {
+            if let Some(after) = queue.advance_or_queue(self, point, before, growth, fall) {
                 *own = after;
-                seen.see(self, before, after);
+                seen.record(self, before, after);
             }
         }
-        queue.take(self, |point, after| {
+        queue.melt_all(self, |point, after| {
             let before = std::mem::replace(&mut z[point as usize], after);
-            seen.see(self, before, after);
+            seen.record(self, before, after);
         });
         let most = long.iter().map(|&(point, _)| pieces[node[point as usize] as usize]);
         let most = most.map(|[first, last]| last - first).max().unwrap_or(0);
@@ -93,18 +97,20 @@ impl Crystallization {
                 let own = &mut z[point as usize];
                 let at = (first + round) as usize;
                 if first + round < last {
-                    *own = queue.offer(self, point, *own, piece.growth[at], piece.fall[at]).unwrap_or(*own);
+                    *own = queue
+                        .advance_or_queue(self, point, *own, piece.growth[at], piece.fall[at])
+                        .unwrap_or(*own);
                 }
             }
-            queue.take(self, |point, after| z[point as usize] = after);
+            queue.melt_all(self, |point, after| z[point as usize] = after);
         }
         for &(point, before) in &*long {
-            seen.see(self, before, z[point as usize]);
+            seen.record(self, before, z[point as usize]);
         }
         seen.requested_ratio(self)
     }
 
-    /// Growth and fall of all nodes and pieces.
+    /// Computes growth and fall of all nodes and pieces.
     fn histories(&self, increments: Increments, scratch: &mut Scratch) {
         let Scratch { growth, fall, pieces, piece, .. } = scratch;
         let Increments { start, end, dt } = increments;
@@ -133,7 +139,7 @@ impl Crystallization {
         falls.resize(from.len(), 0.0);
         arch.dispatch(Histories { law: self, start: from, end: to, dt: None, growth: parts, fall: falls });
         parts.iter_mut().zip(share).for_each(|(growth, share)| *growth *= *share * dt);
-        // without melting pieces add up
+        // without melting the growth of pieces adds up
         for k in 0..size {
             let [first, last] = pieces[k];
             if first < last && !melts(k) {
@@ -144,24 +150,31 @@ impl Crystallization {
     }
 }
 
-/// Points in which crystals melt: point, z, Δz and fall of each.
+/// Queue of points whose crystals melt: point, z, Δz and fall of each.
 #[derive(Default)]
-struct Queue {
+struct MeltQueue {
     points: Vec<u32>,
     z: Vec<f64>,
     growth: Vec<f64>,
     fall: Vec<f64>,
 }
 
-impl Queue {
-    /// z after an increment within one panel, or `None`: it waits for [`Self::take`].
+impl MeltQueue {
+    /// Returns z after an increment within one panel, or `None` if queued until [`Self::melt_all`].
     #[inline]
-    fn offer(&mut self, law: &Crystallization, point: u32, z: f64, growth: f64, fall: f64) -> Option<f64> {
+    fn advance_or_queue(
+        &mut self,
+        law: &Crystallization,
+        point: u32,
+        z: f64,
+        growth: f64,
+        fall: f64,
+    ) -> Option<f64> {
         if fall == 0.0 {
             return Some(z + growth);
         }
         let grown = z + 0.5 * growth;
-        if grown < LEAST_Z {
+        if grown < MIN_Z {
             return Some(law.melt(Grown { z: grown, slope: 0.0 }, fall, 0.0).z + 0.5 * growth);
         }
         self.points.push(point);
@@ -171,8 +184,8 @@ impl Queue {
         None
     }
 
-    /// Hands out all z that wait.
-    fn take(&mut self, law: &Crystallization, mut to: impl FnMut(u32, f64)) {
+    /// Melts the queued points and hands out their z.
+    fn melt_all(&mut self, law: &Crystallization, mut to: impl FnMut(u32, f64)) {
         let Self { points, z, growth, fall } = self;
         let exponent = law.kinetics.constants().avrami_exponent;
         Arch::new().dispatch(Melt { exponent, z, growth, fall });
@@ -182,31 +195,31 @@ impl Queue {
     }
 }
 
-/// Changes of α.
+/// Changes of α, for the step suggestion.
 #[derive(Default)]
-struct Seen {
-    /// Some change that asks for no shorter step than the longest.
+struct ChangeScan {
+    /// True once a change is too small to limit the step.
     small: bool,
-    /// z before and after, where α changes much.
+    /// z before and after large changes of α.
     before: Vec<f64>,
     after: Vec<f64>,
 }
 
-impl Seen {
+impl ChangeScan {
     fn clear(&mut self) {
         self.small = false;
         self.before.clear();
         self.after.clear();
     }
 
-    /// |∂α/∂z| ≤ n: most changes need no look at α.
+    /// Records a change; |∂α/∂z| ≤ n bounds most without evaluating α.
     #[inline]
-    fn see(&mut self, law: &Crystallization, before: f64, after: f64) {
+    fn record(&mut self, law: &Crystallization, before: f64, after: f64) {
         if after == before {
             return;
         }
         let exponent = law.kinetics.constants().avrami_exponent;
-        if exponent * (after - before).abs() > LARGEST_CHANGE / LONGEST {
+        if exponent * (after - before).abs() > LARGEST_CHANGE / MAX_STEP_RATIO {
             self.before.push(before);
             self.after.push(after);
         } else if !self.small {
@@ -217,16 +230,17 @@ impl Seen {
     fn requested_ratio(&mut self, law: &Crystallization) -> Option<f64> {
         let Self { before, after, small } = self;
         let exponent = law.kinetics.constants().avrami_exponent;
-        Arch::new().dispatch(Changes { exponent, before, after });
+        Arch::new().dispatch(AlphaChanges { exponent, before, after });
         let most = before.iter().copied().fold(0.0, f64::max);
         match most > 0.0 {
-            true => Some((LARGEST_CHANGE / most).clamp(0.1, LONGEST)),
-            false => small.then_some(LONGEST),
+            true => Some((LARGEST_CHANGE / most).clamp(0.1, MAX_STEP_RATIO)),
+            false => small.then_some(MAX_STEP_RATIO),
         }
     }
 }
 
-/// Growth and fall over increments: of nodes, NaN where borders of panels are crossed, or of pieces, in a second.
+/// Computes growth and fall over increments: of nodes (NaN if panel borders are crossed), or of pieces, per
+/// second.
 struct Histories<'a> {
     law: &'a Crystallization,
     start: &'a [f64],
@@ -256,15 +270,15 @@ impl WithSimd for Histories<'_> {
         let (start, end) = (&start[..size], &end[..size]);
         for k in 0..size {
             let change = melting.survival_of_all(end[k]) - melting.survival_of_all(start[k]);
-            let none = end[k] <= start[k] || change > NOTHING;
+            let none = end[k] <= start[k] || change > NEGLIGIBLE_MELTING;
             fall[k] = if none { 0.0 } else { change };
         }
     }
 }
 
-/// Half of the growth, α ← α e^L, the other half; z with half of its growth at least [`LEAST_Z`].
+/// Half of the growth, α ← α e^L, the other half; z with half of its growth is at least [`MIN_Z`].
 ///
-/// With p = zⁿ and u = (1 − e^L)(eᵖ − 1), p becomes p − ln(1 + u), where that is near; else −ln(1 − α).
+/// With p = zⁿ and u = (1 − e^L)(eᵖ − 1), p becomes p − ln(1 + u) if close, otherwise −ln(1 − α).
 struct Melt<'a> {
     exponent: f64,
     z: &'a mut [f64],
@@ -283,11 +297,19 @@ impl WithSimd for Melt<'_> {
         for k in 0..size {
             let grown = z[k] + 0.5 * growth[k];
             let kept = exp(fall[k]);
-            let lost = if fall[k] > -SMALL { -expm1_small(fall[k].max(-SMALL)) } else { 1.0 - kept };
-            // exp(n ln z) is off by 1e-14: so is what is small beside 1, not z
-            let power = exp(exponent * ln(grown)).min(MOST_POWER);
+            let lost = if fall[k] > -MAX_SMALL_ARGUMENT {
+                -expm1_small(fall[k].max(-MAX_SMALL_ARGUMENT))
+            } else {
+                1.0 - kept
+            };
+            // exp(n ln z) has an error of 1e-14, and so have quantities small beside 1, but not z
+            let power = exp(exponent * ln(grown)).min(MAX_POWER);
             let whole = exp(power);
-            let above = if power < SMALL { expm1_small(power.min(SMALL)) } else { whole - 1.0 };
+            let above = if power < MAX_SMALL_ARGUMENT {
+                expm1_small(power.min(MAX_SMALL_ARGUMENT))
+            } else {
+                whole - 1.0
+            };
             let melted = lost * above;
             let part = ln_1p(melted.min(1.0)) / power;
             let near = melted <= 1.0 && part <= 0.5;
@@ -297,19 +319,19 @@ impl WithSimd for Melt<'_> {
             let far = ln(if degree < 0.5 { -logarithm } else { -ln(remainder) });
             let factor = exp(root * if near { logarithm } else { far });
             let after = if near { grown * factor } else { factor };
-            z[k] = if degree < FAINT { 0.0 } else { after } + 0.5 * growth[k];
+            z[k] = if degree < SMALLEST_MELTING_Z { 0.0 } else { after } + 0.5 * growth[k];
         }
     }
 }
 
-/// `before` becomes |α − α before|.
-struct Changes<'a> {
+/// Replaces `before` by |α − α before|.
+struct AlphaChanges<'a> {
     exponent: f64,
     before: &'a mut [f64],
     after: &'a [f64],
 }
 
-impl WithSimd for Changes<'_> {
+impl WithSimd for AlphaChanges<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
@@ -322,11 +344,11 @@ impl WithSimd for Changes<'_> {
     }
 }
 
-/// 1 − α.
+/// Returns 1 − α.
 #[inline(always)]
 fn remainder(exponent: f64, z: f64) -> f64 {
-    let held = z.clamp(LEAST_Z, MOST_POWER);
-    exp(-exp((exponent * ln(held)).min(MOST_LOGARITHM)))
+    let held = z.clamp(MIN_Z, MAX_POWER);
+    exp(-exp((exponent * ln(held)).min(MAX_LOGARITHM)))
 }
 
 #[cfg(test)]

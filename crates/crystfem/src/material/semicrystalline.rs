@@ -1,16 +1,16 @@
-//! A semicrystalline polymer: Fourier's law, crystallization and melting, latent heat where it is given.
+//! A semicrystalline polymer: Fourier's law, crystallization and melting, optional latent heat.
 
-use super::{Conductor, Crystallization, Point, Property, Response, ThermalMaterial};
+use super::{Conductor, Crystallization, PointInput, ThermalMaterial, ThermalProperty, ThermalResponse};
 use crate::error::Error;
-use crate::kinetics::{Constants, Kinetics};
+use crate::kinetics::{KineticConstants, Kinetics};
 use crate::melting::Melting;
 
-/// A change of α in one increment at which the suggested step is the one taken.
+/// Change of α per increment at which the suggested step equals the present one.
 pub const LARGEST_CHANGE: f64 = 0.1;
-/// The largest suggested step over the one taken.
-pub(super) const LONGEST: f64 = 10.0;
+/// Largest suggested ratio of next to present step.
+pub(super) const MAX_STEP_RATIO: f64 = 10.0;
 
-/// Names of the constants of growth and melting as other programs list them, in the order of [`Polymer::growth_and_melting`].
+/// Names of the constants of growth and melting in exports, in the order of [`Polymer::growth_and_melting`].
 pub const CONSTANT_NAMES: [&str; 9] = [
     "growth_rate",
     "nucleation",
@@ -23,29 +23,31 @@ pub const CONSTANT_NAMES: [&str; 9] = [
     "melting_peak",
 ];
 
-/// What makes up a [`Semicrystalline`] material, SI.
+/// Constants of a [`Semicrystalline`] material, SI.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polymer {
     /// Density ρ, kg/m³.
     pub density: f64,
     /// Conductivity k, W/(m K).
-    pub conductivity: Property,
+    pub conductivity: ThermalProperty,
     /// Specific heat c, J/(kg K).
-    pub specific_heat: Property,
+    pub specific_heat: ThermalProperty,
     /// Kinetics of crystallization.
     pub kinetics: Kinetics,
-    /// Melting on heating; without it crystals never melt.
+    /// Melting on heating; `None` if crystals never melt.
     pub melting: Option<Melting>,
     /// Ultimate crystallinity X∞: the mass fraction of crystals at α = 1.
     pub ultimate_crystallinity: f64,
-    /// Heat of fusion of crystal ΔH, J/kg; without it temperature and crystallinity are uncoupled, as in the thesis.
+    /// Heat of fusion of the crystal ΔH, J/kg; `None` uncouples temperature from crystallinity, as in the
+    /// thesis.
     pub latent_heat: Option<f64>,
     /// Relative crystallinity α of fresh material.
     pub seed: f64,
 }
 
 impl Polymer {
-    /// The constants of growth and melting, SI, by the names of [`CONSTANT_NAMES`]; 0, 0, 0 of crystals that never melt.
+    /// Constants of growth and melting, SI, in the order of [`CONSTANT_NAMES`]; 0, 0, 0 if crystals never
+    /// melt.
     pub fn growth_and_melting(&self) -> [f64; 9] {
         let of = self.kinetics.constants();
         let [sharpness, shape, peak] = self.melting.map_or([0.0; 3], |melting| melting.constants());
@@ -63,7 +65,7 @@ impl Polymer {
     }
 }
 
-/// The material. Its state is z = \[−ln(1−α)\]^{1/n}; with latent heat U = ∫c dT − ΔH X∞ α.
+/// A semicrystalline material. Its state is z = \[−ln(1−α)\]^{1/n}; with latent heat U = ∫c dT − ΔH X∞ α.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Semicrystalline {
     conductor: Conductor,
@@ -75,11 +77,11 @@ pub struct Semicrystalline {
 }
 
 impl Semicrystalline {
-    /// From its parts.
+    /// Builds the material from its constants.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a density ≤ 0, X∞ outside (0, 1], ΔH < 0, a seed outside \[0, 1), and for what is not
-    /// finite.
+    /// [`Error::Parameter`] for a density ≤ 0, X∞ outside (0, 1], ΔH < 0, a seed outside \[0, 1), and values
+    /// that are not finite.
     pub fn new(polymer: Polymer) -> Result<Self, Error> {
         let Polymer { ultimate_crystallinity, latent_heat, seed, kinetics, melting, .. } = polymer;
         let check = |name, found: f64, good: bool, allowed: &str| {
@@ -105,17 +107,17 @@ impl Semicrystalline {
         })
     }
 
-    /// PA12 of Chapter 4: k = 0.25 W/(m K), ρ = 1010 kg/m³, c = 2200 J/(kg K), kinetics of column 1 of Table 4.1, X∞ = 0.25,
-    /// 209 J/g of crystal.
+    /// PA12 of Chapter 4: k = 0.25 W/(m K), ρ = 1010 kg/m³, c = 2200 J/(kg K), kinetics of column 1 of Table
+    /// 4.1, X∞ = 0.25, 209 J/g of crystal.
     ///
     /// # Errors
-    /// None: as [`Self::new`] for other constants.
+    /// Errors of [`Self::new`]; none for these constants.
     pub fn pa12() -> Result<Self, Error> {
         Self::new(Polymer {
             density: 1010.0,
-            conductivity: Property::Constant(0.25),
-            specific_heat: Property::Constant(2200.0),
-            kinetics: Kinetics::new(Constants::TABLE_4_1_COLUMN_1)?,
+            conductivity: ThermalProperty::Constant(0.25),
+            specific_heat: ThermalProperty::Constant(2200.0),
+            kinetics: Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1)?,
             melting: Some(Melting::PA12),
             ultimate_crystallinity: 0.25,
             latent_heat: Some(209e3),
@@ -123,7 +125,7 @@ impl Semicrystalline {
         })
     }
 
-    /// The same with factors on the conductivity along x, y and z.
+    /// Scales the conductivity along x, y and z.
     ///
     /// # Errors
     /// [`Error::Parameter`] unless each is above 0 and finite.
@@ -131,12 +133,12 @@ impl Semicrystalline {
         Ok(Self { conductor: self.conductor.with_directions(factors)?, ..self })
     }
 
-    /// Growth and melting.
+    /// Growth and melting of crystals.
     pub fn crystallization(&self) -> &Crystallization {
         &self.crystallization
     }
 
-    /// Kinetics.
+    /// Kinetics of crystallization.
     pub fn kinetics(&self) -> &Kinetics {
         &self.crystallization.kinetics
     }
@@ -159,7 +161,7 @@ impl ThermalMaterial for Semicrystalline {
         &["alpha", "crystallinity"]
     }
 
-    /// α and X = X∞ α.
+    /// Returns α and X = X∞ α.
     fn fields(&self, state: &[f64], fields: &mut [f64]) {
         fields[0] = self.kinetics().degree(state[0]);
         fields[1] = self.ultimate_crystallinity * fields[0];
@@ -190,7 +192,7 @@ impl ThermalMaterial for Semicrystalline {
         Some(&self.crystallization)
     }
 
-    fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
+    fn respond(&self, at: &PointInput, old: &[f64], new: &mut [f64]) -> Result<ThermalResponse, Error> {
         let mut response = self.conductor.conduct(at)?;
         let grown =
             self.crystallization.advance(old[0], at.temperature, at.temperature + at.increment, at.dt);
@@ -199,18 +201,20 @@ impl ThermalMaterial for Semicrystalline {
         if grown.z == old[0] && self.latent.is_none() {
             return Ok(response);
         }
-        // |∂α/∂z| ≤ n: the wish is the longest step without looking at α
+        // |∂α/∂z| ≤ n: small growth suggests the longest step without evaluating α
         if self.latent.is_none()
             && grown.z < 1.0
-            && kinetics.constants().avrami_exponent * (grown.z - old[0]).abs() <= LARGEST_CHANGE / LONGEST
+            && kinetics.constants().avrami_exponent * (grown.z - old[0]).abs()
+                <= LARGEST_CHANGE / MAX_STEP_RATIO
         {
-            response.step_ratio = Some(LONGEST);
+            response.step_ratio = Some(MAX_STEP_RATIO);
             return Ok(response);
         }
         let [after, slope] = kinetics.degree_and_slope(grown.z);
         if grown.z != old[0] {
             let change = (after - kinetics.degree(old[0])).abs();
-            response.step_ratio = (change > 0.0).then(|| (LARGEST_CHANGE / change).clamp(0.1, LONGEST));
+            response.step_ratio =
+                (change > 0.0).then(|| (LARGEST_CHANGE / change).clamp(0.1, MAX_STEP_RATIO));
         }
         if let Some(latent) = self.latent {
             response.energy -= latent * after;

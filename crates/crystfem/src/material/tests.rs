@@ -1,17 +1,17 @@
 use super::*;
-use crate::kinetics::{Constants, Kinetics};
+use crate::kinetics::{KineticConstants, Kinetics};
 use crate::melting::Melting;
 
 /// PA12 of formulation.md: k = 0.25, ρ = 1010, c = 2200, X∞ = 0.25, ΔH = 209 J/g.
 fn pa12(latent_heat: Option<f64>) -> Semicrystalline {
-    pa12_of(Constants::TABLE_4_1_COLUMN_1, latent_heat)
+    pa12_of(KineticConstants::TABLE_4_1_COLUMN_1, latent_heat)
 }
 
-fn pa12_of(constants: Constants, latent_heat: Option<f64>) -> Semicrystalline {
+fn pa12_of(constants: KineticConstants, latent_heat: Option<f64>) -> Semicrystalline {
     Semicrystalline::new(Polymer {
         density: 1010.0,
-        conductivity: Property::constant("conductivity", 0.25).unwrap(),
-        specific_heat: Property::constant("specific heat", 2200.0).unwrap(),
+        conductivity: ThermalProperty::constant("conductivity", 0.25).unwrap(),
+        specific_heat: ThermalProperty::constant("specific heat", 2200.0).unwrap(),
         kinetics: Kinetics::new(constants).unwrap(),
         melting: Some(Melting::PA12),
         ultimate_crystallinity: 0.25,
@@ -22,13 +22,13 @@ fn pa12_of(constants: Constants, latent_heat: Option<f64>) -> Semicrystalline {
 }
 
 fn plain() -> Conductor {
-    let constant = |value| Property::constant("a property", value).unwrap();
+    let constant = |value| ThermalProperty::constant("a property", value).unwrap();
     Conductor::new(1010.0, constant(0.25), constant(2200.0)).unwrap()
 }
 
 fn tabulated() -> Conductor {
     let table = |values: [f64; 4]| {
-        Property::table("a property", vec![250.0, 320.0, 450.0, 600.0], values.to_vec()).unwrap()
+        ThermalProperty::table("a property", vec![250.0, 320.0, 450.0, 600.0], values.to_vec()).unwrap()
     };
     Conductor::new(2500.0, table([0.2, 0.3, 0.25, 0.4]), table([1400.0, 2200.0, 2600.0, 2500.0])).unwrap()
 }
@@ -39,18 +39,19 @@ fn all() -> Vec<Box<dyn ThermalMaterial>> {
         Box::new(tabulated()),
         Box::new(pa12(None)),
         Box::new(pa12(Some(209e3))),
-        Box::new(pa12_of(Constants::TABLE_4_1_COLUMN_2, Some(209e3))),
-        Box::new(AsPublished::new(plain(), Sign::AsPublished, false)),
-        Box::new(AsPublished::new(plain(), Sign::Mended, true)),
+        Box::new(pa12_of(KineticConstants::TABLE_4_1_COLUMN_2, Some(209e3))),
+        Box::new(PublishedSubroutine::new(plain(), Sign::AsPublished, false)),
+        Box::new(PublishedSubroutine::new(plain(), Sign::Corrected, true)),
         Box::new(tabulated().with_directions([1.0, 0.4, 1e-3]).unwrap()),
     ]
 }
 
-fn point(temperature: f64, increment: f64, dt: f64) -> Point {
-    Point { temperature, increment, gradient: Vector3::new(100.0, -20.0, 3.0), dt }
+fn point(temperature: f64, increment: f64, dt: f64) -> PointInput {
+    PointInput { temperature, increment, gradient: Vector3::new(100.0, -20.0, 3.0), dt }
 }
 
-/// Every law: tangents against finite differences, energy a function of temperature and state, the old state untouched.
+/// Tangents agree with finite differences, energy is a function of temperature and state, and the old state
+/// is unchanged.
 #[test]
 fn tangents() {
     for (law, material) in all().iter().enumerate() {
@@ -71,7 +72,7 @@ fn tangents() {
                     let h = 1e-4;
                     let near = |dt_end: f64| {
                         let mut new = vec![0.0; count];
-                        let at = Point { increment: increment + dt_end, ..at };
+                        let at = PointInput { increment: increment + dt_end, ..at };
                         material.respond(&at, &old, &mut new).unwrap()
                     };
                     let (up, down) = (near(h), near(-h));
@@ -88,7 +89,7 @@ fn tangents() {
     }
 }
 
-/// D k ∇T; factors that are none are named.
+/// The flux is −D k ∇T; invalid factors are named.
 #[test]
 fn conductivity_along_axes() {
     let material = pa12(None).with_directions([2.0, 1.0, 1e-6]).unwrap();
@@ -101,7 +102,7 @@ fn conductivity_along_axes() {
     }
 }
 
-/// z and α of a material after a path of (temperature, duration).
+/// Returns z of a material after a path of (temperature, duration).
 fn follow(material: &dyn ThermalMaterial, start: f64, state: f64, path: &[(f64, f64)], steps: usize) -> f64 {
     let (mut at, mut state) = (start, state);
     for &(end, duration) in path {
@@ -116,7 +117,8 @@ fn follow(material: &dyn ThermalMaterial, start: f64, state: f64, path: &[(f64, 
     state
 }
 
-/// Erratum 6: the survival α (1−X_m(T₂))/(1−X_m(T₁)) is exact in one step or in many, falls with T, and ends at 0.
+/// Erratum 6: the survival α (1−X_m(T₂))/(1−X_m(T₁)) is exact in one step or in many, falls with T, and ends
+/// at 0.
 #[test]
 fn melting_by_survival() {
     let material = pa12(None);
@@ -124,7 +126,7 @@ fn melting_by_survival() {
     let full = kinetics.z_of_remainder(1e-12);
     let mut before = 1.0;
     for end in [400.0, 420.0, 440.0, 450.0, 455.0, 459.9, 460.0, 500.0, 1273.15] {
-        // in no time nothing grows
+        // no growth in zero time
         let exact = (Melting::PA12.survival(end)[0] - Melting::PA12.survival(300.0)[0]).exp();
         let [once, many] =
             [1, 500].map(|steps| kinetics.degree(follow(&material, 300.0, full, &[(end, 0.0)], steps)));
@@ -139,7 +141,7 @@ fn melting_by_survival() {
     assert!(at(459.9) < 1e-4 && (at(459.9) - at(460.0)).abs() < 1e-5);
 }
 
-/// One heating through the range where growth and melting overlap: steps of any size agree, at second order.
+/// Heating through the range where growth and melting overlap converges at second order in the step.
 #[test]
 fn splitting_of_growth_and_melting_converges() {
     let material = pa12(None);
@@ -153,7 +155,7 @@ fn splitting_of_growth_and_melting_converges() {
     }
 }
 
-/// A thousand times molten and crystallized: every cycle ends where the first did, to the last digits.
+/// A thousand cycles of melting and crystallization end where the first did, to the last digits.
 #[test]
 fn a_thousand_cycles_do_not_drift() {
     let material = pa12(Some(209e3));
@@ -177,7 +179,7 @@ fn latent_heat_is_in_the_energy() {
     let rise = (material.energy(400.0, &[0.0]) - material.energy(400.0, &[full])) / 2200.0;
     assert!((rise - 23.75).abs() < 1e-9, "{rise}");
     assert!(!material.is_linear() && pa12(None).is_linear());
-    // without latent heat the energy knows nothing of α
+    // without latent heat the energy does not depend on α
     assert_eq!(pa12(None).energy(400.0, &[full]), pa12(None).energy(400.0, &[0.0]));
 }
 
@@ -193,7 +195,7 @@ fn step_ratio_is_that_of_the_change_of_alpha() {
         [1.0, 1.0 + material.kinetics().growth(420.0, 420.0, 2.0).z].map(|z| material.kinetics().degree(z));
     let found = ratio(1.0, 2.0).unwrap();
     assert!((found - LARGEST_CHANGE / (after - before)).abs() < 1e-12, "{found}");
-    // also where a bound on the change is enough
+    // also if a bound on the change suffices
     let mut bounded = 0;
     for dt in [1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0, 3.0] {
         let grown = material.kinetics().growth(420.0, 420.0, dt).z;
@@ -206,7 +208,7 @@ fn step_ratio_is_that_of_the_change_of_alpha() {
 }
 
 #[test]
-fn temperatures_that_are_none_are_refused() {
+fn invalid_temperatures_are_refused() {
     for material in all() {
         let state = vec![0.0; material.state_names().len()];
         let mut new = state.clone();
@@ -223,13 +225,13 @@ fn temperatures_that_are_none_are_refused() {
 }
 
 proptest::proptest! {
-    /// From any α, over any increment between −200 and 1000 °C in any time up to 1e9 s: finite, α in [0, 1].
+    /// α stays finite and in [0, 1] from any α, over any increment between −200 and 1000 °C in up to 1e9 s.
     #[test]
     fn bounded_and_finite(
         start in 73.15..1273.15_f64, end in 73.15..1273.15_f64, scale in 0..10_i32, dt in -9.0..9.0_f64,
         degree in 0.0..=1.0_f64, exponent in 0..16_i32, near_one in proptest::bool::ANY, column in 0..2_usize,
     ) {
-        let constants = [Constants::TABLE_4_1_COLUMN_1, Constants::TABLE_4_1_COLUMN_2][column];
+        let constants = [KineticConstants::TABLE_4_1_COLUMN_1, KineticConstants::TABLE_4_1_COLUMN_2][column];
         let material = pa12_of(constants, Some(209e3));
         let kinetics = material.kinetics();
         let small = degree * 10.0_f64.powi(-exponent);
@@ -247,10 +249,10 @@ proptest::proptest! {
         }
     }
 
-    /// Cooling at 1e-3 to 1e6 K/min in one step across the whole window: the α of exact quadrature.
+    /// A single step across the whole window at 1e-3 to 1e6 K/min gives α of exact quadrature.
     #[test]
     fn one_step_across_the_window(rate in -3.0..6.0_f64, column in 0..2_usize) {
-        let constants = [Constants::TABLE_4_1_COLUMN_1, Constants::TABLE_4_1_COLUMN_2][column];
+        let constants = [KineticConstants::TABLE_4_1_COLUMN_1, KineticConstants::TABLE_4_1_COLUMN_2][column];
         let material = pa12_of(constants, None);
         let rate = 10.0_f64.powf(rate) / 60.0;
         let mut new = [0.0];
@@ -264,9 +266,9 @@ proptest::proptest! {
 mod printed {
     use super::*;
 
-    /// α after each step of a ramp from 200 °C at 1 K per step, or another start.
+    /// Returns α after each step of a ramp.
     fn ramp(sign: Sign, guarded: bool, from: f64, to: f64, step: f64, dt: f64) -> Vec<f64> {
-        let material = AsPublished::new(plain(), sign, guarded);
+        let material = PublishedSubroutine::new(plain(), sign, guarded);
         let (mut state, mut alphas) = ([0.0], Vec::new());
         material.initial_state(0.0, &mut state);
         let count = ((to - from).abs() / step).round() as usize;
@@ -280,7 +282,8 @@ mod printed {
         alphas
     }
 
-    /// Erratum 2: `DTEMP > 0` crystallizes. Cooling 200 → 120 °C leaves α = 1e-3, heating 120 → 180 °C gives 1.
+    /// Erratum 2: `DTEMP > 0` crystallizes. Cooling 200 → 120 °C leaves α = 1e-3, heating 120 → 180 °C gives
+    /// 1.
     #[test]
     fn erratum_2_the_sign_is_inverted() {
         let cooled = ramp(Sign::AsPublished, false, 200.0, 120.0, 0.005, 0.03);
@@ -293,17 +296,17 @@ mod printed {
     #[test]
     fn erratum_3_the_exponential_overflows_above_melting() {
         // formulation.md: α = 4.7e17 on step 1; its Δt is 0.05 s
-        let alphas = ramp(Sign::Mended, false, 200.0, 120.0, 1.0, 0.05);
+        let alphas = ramp(Sign::Corrected, false, 200.0, 120.0, 1.0, 0.05);
         assert!((alphas[0] / 4.7e17 - 1.0).abs() < 0.01, "{:e}", alphas[0]);
         assert!(alphas[1].is_nan());
-        let guarded = ramp(Sign::Mended, true, 200.0, 120.0, 0.005, 0.03);
+        let guarded = ramp(Sign::Corrected, true, 200.0, 120.0, 0.005, 0.03);
         assert!(guarded.iter().take(1000).all(|&alpha| alpha == f64::from(1e-3_f32)));
     }
 
     /// Erratum 4: Algorithm 1 sets α = 0 above melting, a fixed point of (4.11); the code's seed hides it.
     #[test]
     fn erratum_4_zero_is_a_fixed_point() {
-        let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap();
+        let kinetics = Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1).unwrap();
         evidence::near("rate (4.11) at α = 0, 420 K", kinetics.degree_rate(420.0, 0.0), 0.0, 0.0);
         assert!(kinetics.growth(420.0, 420.0, 10.0).z > 0.0);
     }
@@ -311,7 +314,7 @@ mod printed {
     /// Erratum 6: α = 1 heated to 459.9 K leaves 0.754, then jumps to 1e-3 at 460 K.
     #[test]
     fn erratum_6_alpha_max_mixes_two_crystallinities() {
-        let material = AsPublished::new(plain(), Sign::Mended, true);
+        let material = PublishedSubroutine::new(plain(), Sign::Corrected, true);
         let mut alpha = 1.0;
         let mut last = (0.0, 0.0);
         // TEMPK = K − 0.15 in the code; steps of 1 mK
@@ -328,16 +331,17 @@ mod printed {
         assert_eq!(alpha, f64::from(1e-3_f32));
     }
 
-    /// Euler at 1 K steps and 10 K/min: NaN, as formulation.md's table has it, with the sign corrected and guarded.
+    /// Euler at 1 K steps and 10 K/min: NaN, as formulation.md's table has it, with the sign corrected and
+    /// guarded.
     #[test]
     fn euler_goes_nan_at_one_kelvin_per_step() {
-        let alphas = ramp(Sign::Mended, true, 200.0, 120.0, 1.0, 6.0);
+        let alphas = ramp(Sign::Corrected, true, 200.0, 120.0, 1.0, 6.0);
         assert!(alphas.iter().any(|alpha| alpha.is_nan()));
         assert!(alphas.iter().any(|&alpha| alpha > 1.0));
     }
 }
 
-/// Crystals that melt away to nothing on strong heating leave finite tangents, at any step.
+/// Tangents stay finite when crystals melt completely on strong heating, at any step.
 #[test]
 fn tangents_are_finite_on_strong_heating() {
     let material = pa12(Some(209e3));
@@ -348,7 +352,7 @@ fn tangents_are_finite_on_strong_heating() {
         {
             for increment in [-100.0, -1e-3, 0.0, 1e-9, 1e-3, 0.5, 10.0, 100.0, 900.0] {
                 for dt in [0.0, 1e-12, 1e-6, 1e-3, 1.0, 1e6] {
-                    let at = Point { temperature: start, increment, gradient: Default::default(), dt };
+                    let at = PointInput { temperature: start, increment, gradient: Default::default(), dt };
                     let mut new = [0.0];
                     let response = material.respond(&at, &[z], &mut new).unwrap();
                     let found = [new[0], response.energy, response.d_energy_d_temperature];

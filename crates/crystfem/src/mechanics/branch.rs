@@ -1,65 +1,66 @@
-//! One branch of a solidifying Maxwell body over a step, in closed form, with its energies.
+//! A branch of a solidifying Maxwell body over a step, in closed form, with its energies.
 
-/// State of what carries a branch over a step: s is the share of the network that exists (1 for the amorphous phase), b softens it.
+/// Input of a branch over a step: s is the fraction of the network that exists (1 for the amorphous phase), b
+/// its softening.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Change {
-    /// Reduced time over relaxation time, y = Δξ/τ ≥ 0; 0 is elastic.
+pub struct BranchInput {
+    /// Reduced time over relaxation time, y = Δξ/τ ≥ 0; 0 if elastic.
     pub relaxation: f64,
-    /// s at the beginning and the end, 0 to 1.
+    /// s at the start and the end, 0 to 1.
     pub share: [f64; 2],
-    /// b at the beginning and the end.
+    /// b at the start and the end.
     pub softening: [f64; 2],
 }
 
-/// What a step does to a branch of modulus 1.
+/// Step of a branch of modulus 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
+pub struct BranchStep {
     /// e₂ = `carried` e₁ + `gained` Δε for the elastic strain e and the mechanical strain increment Δε.
     pub carried: f64,
     /// See [`Self::carried`].
     pub gained: f64,
-    /// b₂ s₂ or its mean over a growing network: the stiffness of the step is this times h = (1 − e^{−y})/y, and the stress at the end
-    /// b₂ s₂ e₂.
+    /// b₂ s₂, or its mean over a growing network: the stiffness of the step is this times h = (1 − e^{−y})/y,
+    /// and the stress at the end b₂ s₂ e₂.
     pub stiffness: f64,
-    change: Change,
+    change: BranchInput,
     forms: Forms,
 }
 
-/// Energies of a step over the modulus, with e:Ĉ:e for squares: what was put in, what is left, and where the rest went.
+/// Energies of a step over the modulus, with e:Ĉ:e for squares.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Energies {
-    /// Work of the stress of this branch on Δε.
+pub struct BranchEnergies {
+    /// Work of the branch's stress on Δε.
     pub work: f64,
     /// Increase of the stored energy.
     pub stored: f64,
-    /// Dissipated by relaxation, ≥ 0.
+    /// Dissipation by relaxation, ≥ 0.
     pub viscous: f64,
-    /// Lost because new crystals are born without stress, ≥ 0.
+    /// Loss by growth of new crystals without stress, ≥ 0.
     pub growth: f64,
-    /// Lost with crystals that melt, ≥ 0.
+    /// Loss with melting crystals, ≥ 0.
     pub melting: f64,
-    /// Change of the stored energy by softening alone.
+    /// Change of the stored energy due to softening alone.
     pub softening: f64,
 }
 
-impl Energies {
-    /// work + softening − stored − viscous − growth − melting: 0 but for rounding.
+impl BranchEnergies {
+    /// Balance work + softening − stored − viscous − growth − melting: 0 to rounding.
     pub fn closure(&self) -> f64 {
         self.work + self.softening - self.stored - self.viscous - self.growth - self.melting
     }
 
-    /// Sum of the magnitudes of all parts.
+    /// Sum of all magnitudes.
     pub fn size(&self) -> f64 {
         let Self { work, stored, viscous, growth, melting, softening } = *self;
         [work, stored, viscous, growth, melting, softening].map(f64::abs).iter().sum()
     }
 
-    /// What is gone: relaxation, growth and melting, ≥ 0.
+    /// Energy lost by relaxation, growth and melting, ≥ 0.
     pub fn lost(&self) -> f64 {
         self.viscous + self.growth + self.melting
     }
 
-    /// Adds others times a factor.
+    /// Adds a multiple of other energies.
     pub fn add(&mut self, other: &Self, factor: f64) {
         self.work += factor * other.work;
         self.stored += factor * other.stored;
@@ -70,7 +71,7 @@ impl Energies {
     }
 }
 
-/// h, g of the work h e·Δε + g Δε² and A, B, C of the loss A e² + 2B e·Δε + C Δε².
+/// Coefficients h, g of the work h e·Δε + g Δε² and A, B, C of the loss A e² + 2B e·Δε + C Δε².
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Forms {
     h: f64,
@@ -83,7 +84,8 @@ impl Forms {
         let p = -(-y).exp_m1();
         let h = if y > 0.0 { p / y } else { 1.0 };
         let (a, b) = (-0.5 * (-2.0 * y).exp_m1(), 0.5 * p * h);
-        // closed forms cancel at small y: g = (1 − h)/y = Σ (−y)^k/(k + 2)!, C = Σ (−1)^{m+1} (2^{m−1} − 2) y^{m−2}/m!
+        // closed forms cancel at small y: g = (1 − h)/y = Σ (−y)^k/(k + 2)!, C = Σ (−1)^{m+1} (2^{m−1} − 2)
+        // y^{m−2}/m!
         let (g, c) = if y < 0.5 {
             let (mut g, mut c, mut power, mut factorial) = (0.0, 0.0, 1.0, 2.0);
             for m in 2..22_i32 {
@@ -101,11 +103,12 @@ impl Forms {
     }
 }
 
-impl Step {
-    /// Growth e ← (s₁ e^{−y} e + s̄ h Δε)/s₂, melting e ← e^{−y} e + h Δε, s̄ = ½(s₁ + s₂): new crystals are born without stress (Bažant's
-    /// solidification), those that melt take theirs along. Linear in Δε, unconditionally stable.
-    pub fn new(change: Change) -> Self {
-        let Change { relaxation, share: [before, after], softening } = change;
+impl BranchStep {
+    /// Computes the step: growth e ← (s₁ e^{−y} e + s̄ h Δε)/s₂, melting e ← e^{−y} e + h Δε, s̄ = ½(s₁ +
+    /// s₂). New crystals are born without stress (Bažant's solidification); melting ones lose theirs. Linear
+    /// in Δε, unconditionally stable.
+    pub fn new(change: BranchInput) -> Self {
+        let BranchInput { relaxation, share: [before, after], softening } = change;
         let forms = Forms::new(relaxation);
         let (decay, mean) = ((-relaxation).exp(), 0.5 * (before + after));
         let (carried, gained) = if after < before {
@@ -119,13 +122,13 @@ impl Step {
         Self { carried, gained, stiffness: softening[1] * share * forms.h, change, forms }
     }
 
-    /// Energies from e:Ĉ:e, e:Ĉ:Δε and Δε:Ĉ:Δε of the elastic strain e at the beginning: growth or melting to s̄, relaxation there, and the
-    /// rest of growth or melting (Strang's order).
-    pub fn energies(&self, ee: f64, ed: f64, dd: f64) -> Energies {
-        let Change { share: [before, after], softening: [soft, hard], .. } = self.change;
+    /// Computes the energies from e:Ĉ:e, e:Ĉ:Δε and Δε:Ĉ:Δε with the initial elastic strain e: growth or
+    /// melting to s̄, relaxation there, and the rest of growth or melting (Strang splitting).
+    pub fn energies(&self, ee: f64, ed: f64, dd: f64) -> BranchEnergies {
+        let BranchInput { share: [before, after], softening: [soft, hard], .. } = self.change;
         let (mean, growing) = (0.5 * (before + after), after >= before);
         let [a, b, c] = self.forms.loss;
-        // elastic strain of the first half: e times `first`
+        // elastic strain after the first half: e times `first`
         let first = match growing {
             true if mean > 0.0 => before / mean,
             true => 0.0,
@@ -143,7 +146,7 @@ impl Step {
         } else {
             (0.0, 0.5 * hard * ((before - mean) * ee + (mean - after) * after_relaxation))
         };
-        Energies {
+        BranchEnergies {
             work: hard * mean * (self.forms.h * fed + self.forms.g * dd),
             stored: 0.5 * hard * after * last - 0.5 * soft * before * ee,
             viscous: hard * mean * (a * fee + 2.0 * b * fed + c * dd),
@@ -160,11 +163,12 @@ mod tests {
     use evidence::{at_most, near};
     use polycore::random::SplitMix64;
 
-    fn step(relaxation: f64, share: [f64; 2]) -> Step {
-        Step::new(Change { relaxation, share, softening: [1.0; 2] })
+    fn step(relaxation: f64, share: [f64; 2]) -> BranchStep {
+        BranchStep::new(BranchInput { relaxation, share, softening: [1.0; 2] })
     }
 
-    /// `docs/reference/print/branch.py`: 20,000 random steps, each of which closes its energies; no loss is negative.
+    /// Energies close and losses are not negative in 20,000 random steps, as in
+    /// `docs/reference/print/branch.py`.
     #[test]
     fn energies_close_over_any_history() {
         let mut random = SplitMix64::new(1);
@@ -178,7 +182,11 @@ mod tests {
             let soft = 0.2 + 0.8 * random.uniform();
             let relaxation = 10.0_f64.powf(8.0 * random.uniform() - 6.0);
             let increment = 1e-2 * random.normal();
-            let step = Step::new(Change { relaxation, share: [share, next], softening: [softening, soft] });
+            let step = BranchStep::new(BranchInput {
+                relaxation,
+                share: [share, next],
+                softening: [softening, soft],
+            });
             let found = step.energies(strain * strain, strain * increment, increment * increment);
             worst = worst.max(found.closure().abs() / 1e-4);
             least = least.min(found.viscous).min(found.growth).min(found.melting);
@@ -189,7 +197,7 @@ mod tests {
         at_most("print_negative_loss", -least / 1e-4, 1e-15);
     }
 
-    /// One branch: e = 1e-3, Δε = 2e-3, y = 0.5.
+    /// Step of one branch: e = 1e-3, Δε = 2e-3, y = 0.5.
     #[test]
     fn one_step_of_a_branch() {
         let step = step(0.5, [1.0; 2]);
@@ -204,7 +212,8 @@ mod tests {
         assert!((below.g - above.g).abs() < 1e-11 && (below.loss[2] - above.loss[2]).abs() < 1e-11);
     }
 
-    /// Crystals that melt take their stress along, new ones carry none: 1 GPa at a strain of 1e-3, s 1 → ½ → 1 and 1 → 0 → 1.
+    /// Melting crystals lose their stress and new ones carry none: 1 GPa at a strain of 1e-3, s 1 → ½ → 1 and
+    /// 1 → 0 → 1.
     #[test]
     fn cycles_of_melting() {
         let after = |shares: &[f64]| {

@@ -1,7 +1,7 @@
-//! A coarse level of rigid motions: six for each group of about 4³ nodes.
+//! Coarse level of rigid motions: six for each group of about 4³ nodes.
 //!
-//! Conjugate gradients with 3 × 3 blocks alone need as many iterations as a part is slender; blocks plus P (Pᵀ K P)⁻¹ Pᵀ need about
-//! 45 whatever its shape (`docs/guide/src/theory/print-stress.md`).
+//! Conjugate gradients with 3 × 3 blocks alone need iterations in proportion to a part's slenderness; blocks
+//! plus P (Pᵀ K P)⁻¹ Pᵀ need about 45 for any shape (`docs/guide/src/theory/print-stress.md`).
 
 use super::product::{Elements, block};
 use nalgebra::{Matrix3x6, SMatrix, Vector3, Vector6};
@@ -9,21 +9,21 @@ use std::collections::BTreeMap;
 
 /// Nodes of a group along each axis.
 const SIDE: f64 = 4.0;
-/// A pivot below this part of its diagonal is a motion that nothing resists or that is there twice.
-const DEAD: f64 = 1e-10;
+/// Smallest pivot over its diagonal; below, the motion has no stiffness or is redundant.
+const MIN_PIVOT: f64 = 1e-10;
 const NONE: u32 = u32::MAX;
 
 /// Groups of nodes and the Cholesky factor of Pᵀ K P.
-pub struct Coarse {
+pub struct CoarseMotions {
     /// Group of each node, or [`NONE`].
     group: Vec<u32>,
-    /// Displacement at each node of the motions of its group, 0 where a component is held.
+    /// Displacement at each node by the motions of its group, 0 for fixed components.
     motions: Vec<Matrix3x6<f64>>,
     factor: Skyline,
 }
 
-impl Coarse {
-    /// Builds the space of elements on nodes at `points`.
+impl CoarseMotions {
+    /// Builds the coarse space of elements on nodes at `points`.
     pub fn new(elements: &Elements, points: &[[f64; 3]]) -> Self {
         let free = elements.free();
         let mut exists = vec![false; points.len()];
@@ -31,7 +31,8 @@ impl Coarse {
         for (nodes, ..) in elements.each() {
             nodes.iter().for_each(|&node| exists[node as usize] = true);
             let at = |k: usize| Vector3::from(points[nodes[k] as usize]);
-            // of an upright brick: its edges; of a tetrahedron the box around its corners, half of it with nodes on edges
+            // edges of an upright brick; for a tetrahedron the box around its corners, halved with mid-edge
+            // nodes
             edges += if nodes.len() == 8 {
                 (at(6) - at(0)).abs()
             } else {
@@ -46,7 +47,7 @@ impl Coarse {
         let low = there().fold([f64::INFINITY; 3], |low, (_, at)| std::array::from_fn(|d| low[d].min(at[d])));
         let high =
             there().fold([f64::NEG_INFINITY; 3], |high, (_, at)| std::array::from_fn(|d| high[d].max(at[d])));
-        // the longest axis last: the factor has the narrowest band
+        // longest axis last: the factor then has the smallest bandwidth
         let mut axes = [0, 1, 2];
         axes.sort_by(|&a, &b| ((high[b] - low[b]) / side[b]).total_cmp(&((high[a] - low[a]) / side[a])));
         let place = |at: &[f64; 3]| axes.map(|d| ((at[d] - low[d]) / side[d] + 1e-6).floor() as i64);
@@ -62,7 +63,7 @@ impl Coarse {
         for (node, at) in there() {
             let (number, sum, many) = numbers[&place(at)];
             group[node] = number;
-            // lengths of the size of a group: translations and rotations are of one size
+            // lengths are scaled by the size of a group, so that translations and rotations are comparable
             let arm = (Vector3::from(*at) - sum / many) / side.max();
             let turns = -arm.cross_matrix();
             for d in (0..3).filter(|&d| free[node][d]) {
@@ -82,7 +83,7 @@ impl Coarse {
         for (nodes, stiffness, modulus) in elements.each() {
             let groups: Vec<u32> = nodes.iter().map(|&node| group[node as usize]).collect();
             let held = nodes.iter().any(|&node| free[node as usize] != [true; 3]);
-            // rigid motions of one group do not strain an element inside of it
+            // rigid motions of one group do not strain an element inside it
             if !held && groups.iter().all(|other| *other == groups[0]) {
                 continue;
             }
@@ -119,10 +120,11 @@ impl Coarse {
     }
 }
 
-/// The lower triangle of a symmetric matrix of 6 × 6 blocks, row by row from the first entry that may not be 0.
+/// Lower triangle of a symmetric matrix of 6 × 6 blocks, row by row from the first entry that may be nonzero.
 struct Skyline {
-    /// Where each row begins in `values`, and its first column.
+    /// Start of each row in `values`.
     starts: Vec<usize>,
+    /// First column of each row.
     first: Vec<usize>,
     values: Vec<f64>,
 }
@@ -153,7 +155,7 @@ impl Skyline {
         }
     }
 
-    /// Cholesky in place; a pivot that vanishes leaves its unknown out.
+    /// Factors in place by Cholesky; unknowns with vanishing pivots are left out.
     fn factor(&mut self) {
         for row in 0..self.size() {
             let (above, own) = self.values.split_at_mut(self.starts[row]);
@@ -172,7 +174,7 @@ impl Skyline {
             }
             let square: f64 = own[..length].iter().map(|x| x * x).sum();
             let left = own[length] - square;
-            own[length] = if left > DEAD * own[length] { left.sqrt() } else { 0.0 };
+            own[length] = if left > MIN_PIVOT * own[length] { left.sqrt() } else { 0.0 };
         }
     }
 
@@ -197,7 +199,7 @@ impl Skyline {
 mod tests {
     use super::*;
 
-    /// Two blocks that are coupled, with a motion that nothing resists.
+    /// Solves with two coupled blocks and a motion without stiffness.
     #[test]
     fn factors_solve() {
         let mut matrix = Skyline::new(&[0, 0]);

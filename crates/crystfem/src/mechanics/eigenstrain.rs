@@ -1,26 +1,29 @@
 //! Free strain of a crystallizing polymer as a function of its state.
 
-/// Specific volume v = (1 − X) v_a + X v_c, X = X∞ α, of an amorphous phase with a glass transition and of crystals:
+/// Specific volume v = (1 − X) v_a + X v_c, X = X∞ α, of crystals and an amorphous phase with a glass
+/// transition:
 ///
 /// ln v_a = −ln ρ_a + γ_g (min(T, T_g) − T_r) + γ_l max(T − T_g, 0), ln v_c = −ln ρ_c + γ_c (T − T_r).
 ///
-/// Thermal expansion and the shrinkage of crystallization are one function of the state: nothing drifts over cycles.
+/// Thermal expansion and shrinkage by crystallization are one state function: nothing drifts over cycles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpecificVolume {
     /// Densities ρ_a and ρ_c at T_r, kg/m³.
     pub densities: [f64; 2],
     /// Glass transition T_g, K.
     pub glass_transition: f64,
-    /// T_r, K.
+    /// Reference temperature T_r, K.
     pub reference: f64,
-    /// Volumetric expansion γ_g and γ_l of the amorphous phase below and above T_g, and γ_c of the crystals, 1/K.
+    /// Volumetric expansion γ_g and γ_l of the amorphous phase below and above T_g, and γ_c of the crystals,
+    /// 1/K.
     pub expansions: [f64; 3],
     /// Mass fraction X∞ of crystals at α = 1.
     pub crystallinity: f64,
 }
 
 impl SpecificVolume {
-    /// Of PA12: ρ_c of the γ cell (Inoue and Hoshino 1973 gives 1034 kg/m³), ρ_a = 990 kg/m³ from the literature, expansions assumed.
+    /// PA12: ρ_c of the γ cell (Inoue and Hoshino 1973 gives 1034 kg/m³), ρ_a = 990 kg/m³ from the
+    /// literature, expansions assumed.
     pub const PA12: Self = Self {
         densities: [990.0, 1034.0],
         glass_transition: 324.0,
@@ -37,7 +40,7 @@ impl SpecificVolume {
         let log_amorphous = -amorphous.ln() + glass * below + melt * above;
         let log_crystal = -crystal.ln() + crystals * (temperature - self.reference);
         let share = self.crystallinity * degree;
-        // the difference is small: no digits are lost in strains
+        // the difference is small: strains keep their digits
         log_amorphous + (share * (log_crystal - log_amorphous).exp_m1()).ln_1p()
     }
 
@@ -52,7 +55,8 @@ mod tests {
     use super::*;
     use evidence::near;
 
-    /// `docs/reference/print/pa12.py`: expansion coefficients, crystallization at 160 °C, melt to room temperature.
+    /// PA12 agrees with `docs/reference/print/pa12.py`: expansion coefficients, crystallization at 160 °C,
+    /// melt to room temperature.
     #[test]
     fn pa12_shrinks_as_it_should() {
         let volume = SpecificVolume::PA12;
@@ -65,7 +69,7 @@ mod tests {
         near("print_expansion_60", expansion(60.0), 1.87e-4, 1e-6);
         near("print_crystallization_160", volume.strain([433.15, 0.0], [433.15, 1.0]), -7.274_398e-3, 1e-9);
         near("print_melt_to_room", volume.strain([453.15, 0.0], [298.15, 1.0]), -3.482_16e-2, 1e-7);
-        // a function of the state: a cycle leaves nothing
+        // a state function: a cycle leaves no strain
         let states = [[453.15, 0.0], [433.15, 0.4], [300.0, 0.9], [440.0, 1.0], [453.15, 0.0]];
         let sum: f64 = states.windows(2).map(|pair| volume.strain(pair[0], pair[1])).sum();
         assert!(sum.abs() < 1e-16, "{sum}");

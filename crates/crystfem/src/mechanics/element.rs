@@ -1,25 +1,25 @@
-//! Hexahedra with incompatible modes, of modulus 1: bending without locking, free strains at Gauss points.
+//! Hexahedra with incompatible modes, of modulus 1: no locking in bending, free strains at Gauss points.
 
 use nalgebra::{SMatrix, SVector};
 use polycore::numerics::hexahedron::{self, CORNERS, slopes};
 
-/// Strains and stresses, xx, yy, zz, xy, yz, zx, shear strains as angles.
-pub type Six = SVector<f64, 6>;
-/// Components of the nodes of an element, 0 beyond those that it has.
-pub type Wide = SVector<f64, 30>;
+/// Strain or stress, xx, yy, zz, xy, yz, zx, with engineering shear strains.
+pub type VoigtVector = SVector<f64, 6>;
+/// Components of an element's nodes, 0 beyond its number.
+pub type ElementVector = SVector<f64, 30>;
 /// Forces of the modes of a hexahedron.
-pub type Modal = SVector<f64, 9>;
-type Nodal = SVector<f64, 24>;
+pub type ModalVector = SVector<f64, 9>;
+type HexahedronVector = SVector<f64, 24>;
 
-/// Gauss points.
-pub const POINTS: usize = 8;
+/// Number of Gauss points.
+pub const GAUSS_POINTS: usize = 8;
 
 /// Local coordinates of a Gauss point.
 pub fn gauss(point: usize) -> [f64; 3] {
     CORNERS[point].map(|sign| sign / 3.0_f64.sqrt())
 }
 
-/// Ĉ: the stiffness of an isotropic body of Young's modulus 1.
+/// Stiffness Ĉ of an isotropic body of Young's modulus 1.
 pub fn stiffness(poisson: f64) -> SMatrix<f64, 6, 6> {
     let lame = poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson));
     let shear = 0.5 / (1.0 + poisson);
@@ -31,41 +31,44 @@ pub fn stiffness(poisson: f64) -> SMatrix<f64, 6, 6> {
     })
 }
 
-/// The strain of one function of gradient g times unit displacements along x, y, z.
+/// Strain of a shape function of gradient g times unit displacements along x, y, z.
 pub fn strain_of(gradient: [f64; 3]) -> SMatrix<f64, 6, 3> {
     let [x, y, z] = gradient;
     SMatrix::from_row_slice(&[x, 0.0, 0.0, 0.0, y, 0.0, 0.0, 0.0, z, y, x, 0.0, 0.0, z, y, z, 0.0, x])
 }
 
-/// An eight-node hexahedron with the modes 1 − ξ², 1 − η², 1 − ζ² in each displacement (Wilson and Taylor 1973), whose gradients are taken with
-/// the Jacobian of the centre (Taylor, Beresford and Wilson 1976, doi:10.1002/nme.1620100602), so that the patch test holds. The modes are condensed.
+/// Eight-node hexahedron with the modes 1 − ξ², 1 − η², 1 − ζ² in each displacement (Wilson and Taylor 1973).
+/// Gradients of the modes use the Jacobian at the centre (Taylor, Beresford and Wilson 1976,
+/// doi:10.1002/nme.1620100602), so that the patch test holds. The modes are condensed.
 #[derive(Clone, Debug)]
 pub struct Hexahedron {
     /// Volumes of the Gauss points, m³.
-    pub weights: [f64; POINTS],
-    /// Strain of nodal displacements, and of the modes.
-    nodes: [SMatrix<f64, 6, 24>; POINTS],
-    modes: [SMatrix<f64, 6, 9>; POINTS],
+    pub weights: [f64; GAUSS_POINTS],
+    /// Strains of nodal displacements.
+    nodes: [SMatrix<f64, 6, 24>; GAUSS_POINTS],
+    /// Strains of the modes.
+    modes: [SMatrix<f64, 6, 9>; GAUSS_POINTS],
     /// K̂ after condensation, over the modulus.
     pub condensed: SMatrix<f64, 24, 24>,
-    /// Coupling and the inverse of the modes' own block.
+    /// Coupling of nodes and modes.
     coupling: SMatrix<f64, 24, 9>,
+    /// Inverse of the modes' own block.
     inverse: SMatrix<f64, 9, 9>,
     elastic: SMatrix<f64, 6, 6>,
-    /// Gradients of the corners' functions in the middle, 1/m.
+    /// Gradients of the corner functions at the centre, 1/m.
     middle: [SVector<f64, 3>; 8],
 }
 
 impl Hexahedron {
-    /// Of eight corners, m; `None` where it is turned inside out.
+    /// Computes an element from eight corners, m; `None` if inverted.
     pub fn new(corners: &[[f64; 3]; 8], poisson: f64) -> Option<Self> {
         let elastic = stiffness(poisson);
         let centre = jacobian(corners, [0.0; 3]);
         let (centre_inverse, centre_volume) = (centre.try_inverse()?, centre.determinant());
-        let mut weights = [0.0; POINTS];
-        let mut nodes = [SMatrix::<f64, 6, 24>::zeros(); POINTS];
-        let mut modes = [SMatrix::<f64, 6, 9>::zeros(); POINTS];
-        for point in 0..POINTS {
+        let mut weights = [0.0; GAUSS_POINTS];
+        let mut nodes = [SMatrix::<f64, 6, 24>::zeros(); GAUSS_POINTS];
+        let mut modes = [SMatrix::<f64, 6, 9>::zeros(); GAUSS_POINTS];
+        for point in 0..GAUSS_POINTS {
             let at = gauss(point);
             let jacobian = jacobian(corners, at);
             let volume = jacobian.determinant();
@@ -88,7 +91,7 @@ impl Hexahedron {
         let mut full = SMatrix::<f64, 24, 24>::zeros();
         let mut coupling = SMatrix::<f64, 24, 9>::zeros();
         let mut own = SMatrix::<f64, 9, 9>::zeros();
-        for point in 0..POINTS {
+        for point in 0..GAUSS_POINTS {
             let weighed = elastic * weights[point];
             full += nodes[point].transpose() * weighed * nodes[point];
             coupling += nodes[point].transpose() * weighed * modes[point];
@@ -101,7 +104,7 @@ impl Hexahedron {
         Some(Self { weights, nodes, modes, condensed, coupling, inverse, elastic, middle })
     }
 
-    /// Elements of one shape have one key: their edges to 1e-12 of their size.
+    /// Key of a shape: the edges to 1e-12 of their size; equal for elements of the same shape.
     pub fn key(corners: &[[f64; 3]; 8]) -> Vec<i64> {
         let size = (0..3).map(|d| (corners[6][d] - corners[0][d]).abs()).fold(0.0, f64::max);
         let edges = corners
@@ -110,15 +113,16 @@ impl Hexahedron {
         edges.chain([(size * 1e15).round() as i64]).collect()
     }
 
-    /// σ over the modulus of an elastic strain.
-    pub fn stress(&self, strain: &Six) -> Six {
+    /// Stress over the modulus, from an elastic strain.
+    pub fn stress(&self, strain: &VoigtVector) -> VoigtVector {
         self.elastic * strain
     }
 
-    /// Nodal forces of stresses at the Gauss points, with the modes condensed, and the forces of the modes: [`Self::strains`] takes them.
-    pub fn forces(&self, stresses: &[Six; POINTS]) -> (Nodal, SVector<f64, 9>) {
-        let (mut nodal, mut modal) = (Nodal::zeros(), SVector::<f64, 9>::zeros());
-        for point in 0..POINTS {
+    /// Nodal forces of stresses at the Gauss points, with condensed modes, and the forces of the modes, an
+    /// input of [`Self::strains`].
+    pub fn forces(&self, stresses: &[VoigtVector; GAUSS_POINTS]) -> (HexahedronVector, SVector<f64, 9>) {
+        let (mut nodal, mut modal) = (HexahedronVector::zeros(), SVector::<f64, 9>::zeros());
+        for point in 0..GAUSS_POINTS {
             let weighed = stresses[point] * self.weights[point];
             nodal += self.nodes[point].transpose() * weighed;
             modal += self.modes[point].transpose() * weighed;
@@ -126,15 +130,20 @@ impl Hexahedron {
         (nodal - self.coupling * (self.inverse * modal), modal)
     }
 
-    /// Strain increments at the Gauss points of nodal displacements, where the modes balance the forces `modal` of the stresses at the start of the
-    /// step over a stiffness `modulus` Ĉ.
-    pub fn strains(&self, displacement: &Nodal, modal: &SVector<f64, 9>, modulus: f64) -> [Six; POINTS] {
+    /// Strain increments at the Gauss points from nodal displacements, with modes in equilibrium with the
+    /// forces `modal` of the initial stresses over a stiffness `modulus` Ĉ.
+    pub fn strains(
+        &self,
+        displacement: &HexahedronVector,
+        modal: &SVector<f64, 9>,
+        modulus: f64,
+    ) -> [VoigtVector; GAUSS_POINTS] {
         let modes = -(self.inverse * (modal / modulus + self.coupling.transpose() * displacement));
         std::array::from_fn(|point| self.nodes[point] * displacement + self.modes[point] * modes)
     }
 
-    /// Half the curl of nodal displacements in the middle, rad.
-    pub fn rotation(&self, displacement: &Nodal) -> [f64; 3] {
+    /// Rotation at the centre by nodal displacements, half their curl, rad.
+    pub fn rotation(&self, displacement: &HexahedronVector) -> [f64; 3] {
         let parts = self.middle.iter().enumerate();
         parts
             .fold(SVector::<f64, 3>::zeros(), |sum, (k, gradient)| {
@@ -143,13 +152,13 @@ impl Hexahedron {
             .into()
     }
 
-    /// Shares of the corners at a Gauss point.
+    /// Shape functions of the corners at a Gauss point.
     pub fn shapes(point: usize) -> [f64; 8] {
         hexahedron::shapes(gauss(point))
     }
 }
 
-/// ∂x/∂ξ.
+/// Jacobian ∂x/∂ξ.
 fn jacobian(corners: &[[f64; 3]; 8], at: [f64; 3]) -> SMatrix<f64, 3, 3> {
     let mut jacobian = SMatrix::zeros();
     for (corner, local) in corners.iter().zip(slopes(at)) {

@@ -1,37 +1,38 @@
-//! A solidifying Maxwell body: amorphous branches that are always there, and a network of crystals.
+//! Solidifying Maxwell body: permanent amorphous branches, and a network of crystals.
 
-use super::branch::{Change, Energies, Step};
+use super::branch::{BranchEnergies, BranchInput, BranchStep};
 use super::eigenstrain::SpecificVolume;
 
-/// What is softer than this part of its moduli flows rather than bears stress.
-const MELT: f64 = 0.01;
+/// Stiffness over the sum of all moduli below which material flows instead of bearing stress.
+const MELT_STIFFNESS: f64 = 0.01;
 
-/// A modulus that relaxes.
+/// A Maxwell branch: a modulus that relaxes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Branch {
     /// Modulus, Pa.
     pub modulus: f64,
-    /// Relaxation time at the reference of the shift, s; infinite: elastic.
+    /// Relaxation time at the reference of the shift, s; infinite if elastic.
     pub time: f64,
 }
 
-/// ln a_T of the relaxation times of a phase.
+/// Time-temperature shift ln a_T of the relaxation times of a phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shift {
-    /// 0 at all temperatures.
+    /// Zero at all temperatures.
     None,
-    /// −ln 10 · c₁(T − T_r)/(c₂ + T − T_r) above T_r (Williams, Landel and Ferry 1955), its slope there below, at most a = 1e12.
+    /// −ln 10 · c₁(T − T_r)/(c₂ + T − T_r) above T_r (Williams, Landel and Ferry 1955); below, linear with
+    /// the slope at T_r, up to a = 1e12.
     Wlf {
-        /// T_r, K.
+        /// Reference temperature T_r, K.
         reference: f64,
-        /// c₁ and c₂ (K).
+        /// Constants c₁ and c₂ (K).
         constants: [f64; 2],
     },
-    /// (H/R)(1/T − 1/T_r).
+    /// Arrhenius, (H/R)(1/T − 1/T_r).
     Arrhenius {
-        /// T_r, K.
+        /// Reference temperature T_r, K.
         reference: f64,
-        /// H, J/mol.
+        /// Activation energy H, J/mol.
         energy: f64,
     },
 }
@@ -56,7 +57,7 @@ impl Shift {
         }
     }
 
-    /// ∫dt/a_T of a linear temperature history, by two points of Gauss: fourth order in the step.
+    /// Reduced time ∫dt/a_T of a linear temperature history, by two Gauss points: fourth order in the step.
     pub fn reduced_time(&self, temperatures: [f64; 2], duration: f64) -> f64 {
         let middle = 0.5 * (temperatures[0] + temperatures[1]);
         let reach = 0.5 * (temperatures[1] - temperatures[0]) / 3.0_f64.sqrt();
@@ -64,44 +65,45 @@ impl Shift {
     }
 }
 
-/// σ = Ĉ(ν):[Σ_A E_i e_i + b(T) s(α) Σ_N E_i e_i], with the elastic strain e_i of each branch, the stiffness Ĉ of modulus 1, one Poisson ratio and
-/// s = α. New crystals are born without stress and melting ones take theirs along: no stress-free temperature is needed.
+/// Solidifying Maxwell body, σ = Ĉ(ν):[Σ_A E_i e_i + b(T) s(α) Σ_N E_i e_i], with the elastic strain e_i of
+/// each branch, the stiffness Ĉ of modulus 1, one Poisson's ratio and s = α. New crystals are born without
+/// stress and melting ones lose theirs: no stress-free temperature is needed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolidifyingMaxwell {
     /// Free strain.
     pub volume: SpecificVolume,
     /// Branches of the amorphous phase, and their shift.
     pub amorphous: (Vec<Branch>, Shift),
-    /// Branches of the network of crystals, and their shift.
+    /// Branches of the crystal network, and their shift.
     pub network: (Vec<Branch>, Shift),
-    /// b(T) falls linearly from 1 at the first temperature to 0 at the second, K; `None`: 1.
+    /// Temperatures, K, between which b(T) falls linearly from 1 to 0; `None` for b = 1.
     pub softening: Option<[f64; 2]>,
-    /// ν.
+    /// Poisson's ratio ν.
     pub poisson: f64,
-    /// Modulus of the melt over the sum of all others: bears Δε − Δε* within a step and forgets it.
+    /// Modulus of the melt over the sum of all others: acts on Δε − Δε* within a step and is then forgotten.
     pub floor: f64,
-    /// Tensile strength, Pa: stresses above it would flow, which is not computed.
+    /// Tensile strength, Pa; plastic flow above it is not modelled.
     pub strength: f64,
 }
 
-/// What a material point does over a step, linear in the strain increment.
+/// Response of a material point over a step, linear in the strain increment.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Increment {
+pub struct MaxwellIncrement {
     /// Linear free strain Δε*.
     pub free_strain: f64,
-    /// Stiffness of the step over Ĉ, Pa: Δσ = stiffness Ĉ:(Δε − Δε* 1) beside what relaxes, the floor included.
+    /// Stiffness of the step over Ĉ, Pa, floor included: Δσ = stiffness Ĉ:(Δε − Δε* 1) plus relaxation.
     pub stiffness: f64,
-    /// The part of the floor in it, whose stress is not kept, Pa.
+    /// Contribution of the floor, whose stress is not kept, Pa.
     pub floor: f64,
-    /// Whether its stiffness is less than 1 % of the sum of all moduli.
+    /// True for a stiffness below 1 % of the sum of all moduli.
     pub melt: bool,
-    /// For each branch: its step, and its modulus times b₂ s₂ at the end.
-    branches: Vec<(Step, f64, f64)>,
+    /// Step of each branch, and its modulus times b₂ s₂ at the end.
+    branches: Vec<(BranchStep, f64, f64)>,
 }
 
 impl SolidifyingMaxwell {
-    /// PA12: moduli whose sum at 23 °C is that of sheets of PA 2200 (EOS), their split and times assumed; T_g of chapter 4. Placeholders until
-    /// someone measures them.
+    /// PA12: moduli with a sum at 23 °C as in sheets of PA 2200 (EOS), with assumed spectrum and times; T_g
+    /// of chapter 4. Placeholders until measured.
     pub fn pa12() -> Self {
         let third = |time: f64| Branch { modulus: 300e6, time };
         let network = [(420e6, f64::INFINITY), (140e6, 10.0), (140e6, 1000.0)];
@@ -122,9 +124,10 @@ impl SolidifyingMaxwell {
         }
     }
 
-    /// An elastic body of modulus E, Pa, ν, linear thermal expansion, 1/K, and strength, Pa: one branch that does not relax.
+    /// Returns an elastic body of modulus E, Pa, ν, linear thermal expansion, 1/K, and strength, Pa: one
+    /// branch without relaxation.
     pub fn elastic(modulus: f64, poisson: f64, expansion: f64, strength: f64) -> Self {
-        // two phases of one density and expansion: ln v is linear in T
+        // two phases of equal density and expansion: ln v is linear in T
         let volume = SpecificVolume {
             densities: [1.0; 2],
             glass_transition: 0.0,
@@ -143,7 +146,8 @@ impl SolidifyingMaxwell {
         }
     }
 
-    /// With another crystallinity X∞ at α = 1: its share in the volume, and a network in proportion to it; without crystals there is none.
+    /// Changes the crystallinity X∞ at α = 1: its fraction in the volume, and the network in proportion;
+    /// without crystals there is no network.
     pub fn with_crystallinity(mut self, crystallinity: f64) -> Self {
         let factor = crystallinity / self.volume.crystallinity;
         self.network.0.iter_mut().for_each(|branch| branch.modulus *= factor);
@@ -152,25 +156,26 @@ impl SolidifyingMaxwell {
         self
     }
 
-    /// Branches of both phases: as many elastic strains has the state of a point, all 0 at birth.
+    /// Number of branches of both phases, and of elastic strains of a point, all 0 at birth.
     pub fn branches(&self) -> usize {
         self.amorphous.0.len() + self.network.0.len()
     }
 
-    /// b(T).
+    /// Softening b(T).
     pub fn softness(&self, temperature: f64) -> f64 {
         self.softening.map_or(1.0, |[hard, soft]| ((soft - temperature) / (soft - hard)).max(0.0))
     }
 
-    /// The step from one (T, α) to another in a time, s; 0 is elastic.
-    pub fn increment(&self, from: [f64; 2], to: [f64; 2], duration: f64) -> Increment {
+    /// Increment from one (T, α) to another in a time, s; 0 is elastic.
+    pub fn increment(&self, from: [f64; 2], to: [f64; 2], duration: f64) -> MaxwellIncrement {
         let temperatures = [from[0], to[0]];
         let mut branches = Vec::with_capacity(self.branches());
         let (mut stiffness, mut whole) = (0.0, 0.0);
         let mut add = |(list, shift): &(Vec<Branch>, Shift), share: [f64; 2], softening: [f64; 2]| {
             let reduced = shift.reduced_time(temperatures, duration);
             for branch in list {
-                let step = Step::new(Change { relaxation: reduced / branch.time, share, softening });
+                let step =
+                    BranchStep::new(BranchInput { relaxation: reduced / branch.time, share, softening });
                 stiffness += branch.modulus * step.stiffness;
                 whole += branch.modulus;
                 branches.push((step, branch.modulus, branch.modulus * softening[1] * share[1]));
@@ -180,11 +185,12 @@ impl SolidifyingMaxwell {
         add(&self.network, [from[1], to[1]], temperatures.map(|t| self.softness(t)));
         let free_strain = self.volume.strain(from, to);
         let floor = self.floor * whole;
-        let melt = stiffness < MELT * whole;
-        Increment { free_strain, stiffness: stiffness + floor, floor, melt, branches }
+        let melt = stiffness < MELT_STIFFNESS * whole;
+        MaxwellIncrement { free_strain, stiffness: stiffness + floor, floor, melt, branches }
     }
 
-    /// The stress over Ĉ after a hold: Σ E_i e_i, Pa, for a strain measure such as one component under a uniaxial stress.
+    /// Stress over Ĉ after a hold, Σ E_i e_i, Pa, per strain, for example of a component under uniaxial
+    /// stress.
     pub fn relaxation_modulus(&self, temperature: f64, degree: f64, time: f64) -> f64 {
         let sum = |(list, shift): &(Vec<Branch>, Shift)| -> f64 {
             let reduced = shift.reduced_time([temperature; 2], time);
@@ -194,8 +200,9 @@ impl SolidifyingMaxwell {
     }
 }
 
-impl Increment {
-    /// Elastic strains at the end, in place, of any components, for Δε of the same: mechanical is Δε − Δε* where a component has a free strain.
+impl MaxwellIncrement {
+    /// Updates the elastic strains, of any components, from Δε of the same; `mechanical` is Δε − Δε* for a
+    /// component with a free strain.
     pub fn advance<const N: usize>(&self, strains: &mut [[f64; N]], mechanical: &[f64; N]) {
         for ((step, _, _), strain) in self.branches.iter().zip(strains) {
             for (e, d) in strain.iter_mut().zip(mechanical) {
@@ -204,7 +211,7 @@ impl Increment {
         }
     }
 
-    /// Σ E b₂ s₂ e over the branches, Pa: the stress over Ĉ of elastic strains at the end of the step.
+    /// Σ E b₂ s₂ e over the branches, Pa: the stress over Ĉ, from elastic strains at the end of the step.
     pub fn stress<const N: usize>(&self, strains: &[[f64; N]]) -> [f64; N] {
         let mut sum = [0.0; N];
         for ((_, _, modulus), strain) in self.branches.iter().zip(strains) {
@@ -213,14 +220,14 @@ impl Increment {
         sum
     }
 
-    /// Energies of all branches, J/m³, with the product a:Ĉ:b; to be called before [`Self::advance`].
+    /// Energies of all branches, J/m³, with the product a:Ĉ:b; call before [`Self::advance`].
     pub fn energies<const N: usize>(
         &self,
         strains: &[[f64; N]],
         mechanical: &[f64; N],
         product: impl Fn(&[f64; N], &[f64; N]) -> f64,
-    ) -> Energies {
-        let mut sum = Energies::default();
+    ) -> BranchEnergies {
+        let mut sum = BranchEnergies::default();
         for ((step, modulus, _), strain) in self.branches.iter().zip(strains) {
             let one = step.energies(
                 product(strain, strain),
@@ -237,10 +244,11 @@ impl Increment {
 mod tests {
     use super::*;
     use crate::exact::Wall;
-    use crate::kinetics::{Constants, Kinetics};
+    use crate::kinetics::{KineticConstants, Kinetics};
     use evidence::near;
 
-    /// α 1e-4/K, E∞ 0.4 and E₁ 0.6 GPa, τ 30 s, −1 K/s for 100 s, held. Without crystals the amorphous phase of one density is linear in T.
+    /// Returns α 1e-4/K, E∞ 0.4 and E₁ 0.6 GPa, τ 30 s. Without crystals the amorphous phase of one density
+    /// is linear in T.
     fn held_bar(shift: Shift) -> SolidifyingMaxwell {
         let branch = |modulus, time| Branch { modulus, time };
         let volume = SpecificVolume {
@@ -261,7 +269,7 @@ mod tests {
         }
     }
 
-    /// Stress of a bar whose length is held, after a history of (T, α, duration) from (T, α).
+    /// Returns the stress of a bar of fixed length after a history of (T, α, duration) from (T, α).
     fn held(body: &SolidifyingMaxwell, start: [f64; 2], legs: &[([f64; 2], f64)]) -> f64 {
         let (mut strains, mut stress, mut at) = (vec![[0.0]; body.branches()], 0.0, start);
         for &(to, duration) in legs {
@@ -273,12 +281,13 @@ mod tests {
         stress
     }
 
-    /// Steps of one size down from 433.15 K.
+    /// Returns steps of equal size down from 433.15 K.
     fn cooling(step: f64) -> Vec<([f64; 2], f64)> {
         (1..=(100.0 / step).round() as usize).map(|k| ([433.15 - step * k as f64, 0.0], step)).collect()
     }
 
-    /// 4e5·10 Pa·s… of E∞, and E₁ α q τ(1 − e^{−t/τ}): exact at any step; then e^{−t/τ} at rest.
+    /// Stress of a bar cooled at fixed length is exact at any step, α q t E∞ plus E₁ α q τ(1 − e^{−t/τ});
+    /// then e^{−t/τ} at rest.
     #[test]
     fn a_held_bar_cools() {
         let body = held_bar(Shift::None);
@@ -295,7 +304,8 @@ mod tests {
         }
     }
 
-    /// A cube at 160 °C, α 0 → 1, held one way, network of 1 GPa: E(1 − ln(1 + c)/c)/3, c = X∞(v_c − v_a)/v_a.
+    /// Cube at 160 °C, α 0 → 1, held in one direction, network of 1 GPa: E(1 − ln(1 + c)/c)/3, c = X∞(v_c −
+    /// v_a)/v_a.
     #[test]
     fn a_held_cube_crystallizes() {
         let body = SolidifyingMaxwell {
@@ -314,7 +324,7 @@ mod tests {
         near("print_held_cube_order", (coarse / fine).log2(), 2.0, 0.02);
     }
 
-    /// E(1 s) of PA12 at 100, 140 and 160 °C and the sum at rest: pa12.py.
+    /// E(1 s) of PA12 at 100, 140 and 160 °C and the sum at rest agree with pa12.py.
     #[test]
     fn moduli_of_pa12() {
         let body = SolidifyingMaxwell::pa12();
@@ -329,8 +339,8 @@ mod tests {
         near("print_modulus_at_rest", body.relaxation_modulus(296.15, 1.0, 0.0), 1600e6, 1.0);
     }
 
-    /// Temperatures of the plate at times: at two points of Gauss in each of 24 cells, then in its centre and on its
-    /// surface.
+    /// Returns temperatures of the plate over time: at two Gauss points in each of 24 cells, then at its
+    /// centre and surface.
     fn cooled(times: impl Iterator<Item = f64>) -> Vec<(f64, Vec<f64>)> {
         let (wall, diffusivity, cells) = (Wall { biot: 1.0 }, 0.25 / 1010.0 / 2200.0, 24);
         let offset = 0.5 / 3.0_f64.sqrt();
@@ -342,10 +352,11 @@ mod tests {
         times.map(|time| (time, places.iter().map(|&place| at(time, place)).collect())).collect()
     }
 
-    /// Stress in the plane of a plate of 4 mm of PA12, 220 °C to 25 °C, Bi = 1 on both faces, without latent heat, after 600 s: centre and
-    /// surface, free or held at its edges. σ = Σ E e/(1 − ν) with one elastic strain in the plane for each branch.
+    /// Returns the in-plane stress of a plate of 4 mm of PA12, 220 °C to 25 °C, Bi = 1 on both faces, without
+    /// latent heat, after 600 s: at centre and surface, free or held at its edges. σ = Σ E e/(1 − ν) with one
+    /// in-plane elastic strain per branch.
     fn plate(body: &SolidifyingMaxwell, held: bool, history: &[(f64, Vec<f64>)]) -> [f64; 2] {
-        let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap();
+        let kinetics = Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1).unwrap();
         let count = history[0].1.len();
         let mut temperatures = vec![493.15; count];
         let mut grown = vec![0.0; count];
@@ -379,7 +390,7 @@ mod tests {
         [found[count - 2] / 1e6, found[count - 1] / 1e6]
     }
 
-    /// An elastic wall, Bi = 1, at Fo = 0.5: σ = Eα(mean T − T)/(1 − ν) (Boley and Weiner).
+    /// Elastic wall, Bi = 1, at Fo = 0.5: σ = Eα(mean T − T)/(1 − ν) (Boley and Weiner).
     #[test]
     fn an_elastic_wall_cools() {
         let wall = SolidifyingMaxwell::elastic(1e9, 0.3, 1e-4, f64::INFINITY);
@@ -390,7 +401,7 @@ mod tests {
         near("print_wall_centre", centre / unit, -0.091_421_818, 1e-6);
     }
 
-    /// `docs/reference/print/plate.py`, MPa: one network of 1 GPa, and all of PA12.
+    /// Residual stress agrees with `docs/reference/print/plate.py`, MPa: a network of 1 GPa, and PA12.
     #[test]
     fn a_plate_cools_with_residual_stress() {
         let elastic = SolidifyingMaxwell {

@@ -1,20 +1,21 @@
-//! Stress of printed parts: a solidifying Maxwell body at small strains, whose free strain is a function of temperature and degree of
-//! crystallization. The guide's page *Stress of prints* has the model; here it is at a material point.
+//! Stress of printed parts: a solidifying Maxwell body at small strains, with a free strain that is a
+//! function of temperature and degree of crystallization. The guide's page *Stress of prints* describes the
+//! model.
 
 mod body;
 mod branch;
 mod coarse;
 mod eigenstrain;
 mod element;
-mod kind;
+mod element_kind;
 mod maxwell;
 mod product;
 mod solve;
 mod tetrahedron;
 
-pub use body::{Body, BodyState, EnergyBalance, Support};
-pub use branch::{Change, Energies, Step};
+pub use body::{Body, BodyState, EnergyBalance, FixedComponent};
+pub use branch::{BranchEnergies, BranchInput, BranchStep};
 pub use eigenstrain::SpecificVolume;
-pub use element::{Hexahedron, POINTS, stiffness};
-pub use kind::{Element, MOST, is_known, key, points, shares};
+pub use element::{GAUSS_POINTS, Hexahedron, stiffness};
+pub use element_kind::{MAX_NODES_PER_ELEMENT, MechanicalElement, is_supported, key, points, shares};
 pub use maxwell::{Branch, Shift, SolidifyingMaxwell};

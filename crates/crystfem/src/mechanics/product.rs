@@ -1,42 +1,43 @@
-//! Products of element matrices with displacements: each element by vectors of the processor, then the sum at each node in the order of its
-//! elements, so that its bits do not depend on threads.
+//! Products of element matrices with displacements: vectorized element by element, then summed at each node
+//! in the order of its elements, so that the bits do not depend on threads.
 
-use super::element::Wide;
+use super::element::ElementVector;
 use crate::system::vector::sum;
 use nalgebra::{Matrix3, Vector3};
 use polycore::numerics::Groups;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-/// Elements and nodes of a work item.
+/// Number of elements or nodes of a work item.
 const ITEM: usize = 512;
-/// Components of an element.
+/// Number of components of a hexahedron.
 const COMPONENTS: usize = 24;
 
-/// Forces that add up to a load, node by node.
-pub(super) struct Load {
+/// Load of nodes, as a sum of forces.
+pub(super) struct NodalLoad {
     pub(super) sum: Vec<Vector3<f64>>,
-    /// Sum of the squares of the parts.
+    /// Sum of the squares of all contributions.
     pub(super) parts: f64,
 }
 
-/// Elements of so many nodes: those, K̂ column by column, and its modulus.
+/// An element of `N` nodes: its nodes, K̂ column by column, and its modulus.
 type Stiff<'a, const N: usize> = ([u32; N], &'a [f64], f64);
 
-/// Elements with what each node has of them: hexahedra, then tetrahedra of 4 and of 10 nodes.
+/// Elements with their matrices: hexahedra, then tetrahedra of 4 and of 10 nodes.
 pub struct Elements<'a> {
     hexahedra: Vec<Stiff<'a, 8>>,
     first: Vec<Stiff<'a, 4>>,
     second: Vec<Stiff<'a, 10>>,
-    /// Places in `forces` of each node.
+    /// Positions in `forces` of each node.
     corners: Groups<u32>,
     free: Vec<[bool; 3]>,
-    /// Forces on all nodes of all elements.
+    /// Nodal forces of all elements.
     forces: Vec<f64>,
 }
 
 impl<'a> Elements<'a> {
-    /// On nodes of which `free` components move; `number` is that of each node of the mesh among them.
+    /// Collects elements on nodes with `free` components; `number` is the index of each node of the mesh
+    /// among these.
     pub fn new(
         list: impl Iterator<Item = (&'a [u32], &'a [f64], f64)>,
         number: &[u32],
@@ -60,7 +61,7 @@ impl<'a> Elements<'a> {
         own
     }
 
-    /// Each element: its nodes, K̂ and its modulus.
+    /// Iterates over elements: nodes, K̂ and modulus.
     pub fn each(&self) -> impl Iterator<Item = (&[u32], &'a [f64], f64)> {
         fn plain<'b, 'a, const N: usize>(stiff: &'b Stiff<'a, N>) -> (&'b [u32], &'a [f64], f64) {
             (&stiff.0, stiff.1, stiff.2)
@@ -69,12 +70,12 @@ impl<'a> Elements<'a> {
         self.hexahedra.iter().map(plain).chain(tetrahedra)
     }
 
-    /// Components that move.
+    /// Free components.
     pub fn free(&self) -> &[[bool; 3]] {
         &self.free
     }
 
-    /// image = Σ E K̂ u on free components.
+    /// Computes image = Σ E K̂ u on free components.
     pub fn product(&mut self, u: &[Vector3<f64>], image: &mut [Vector3<f64>]) {
         let Self { hexahedra, first, second, corners, free, forces } = self;
         let arch = Arch::new();
@@ -83,14 +84,14 @@ impl<'a> Elements<'a> {
         let parts = of_hexahedra.par_chunks_mut(COMPONENTS * ITEM);
         parts.zip(hexahedra.par_chunks(ITEM)).for_each(|(forces, list)| {
             let (forces, _) = forces.as_chunks_mut();
-            arch.dispatch(Product { list, u, forces });
+            arch.dispatch(HexahedraProduct { list, u, forces });
         });
         plain_product(first, u, of_first);
         plain_product(second, u, of_second);
         image.par_chunks_mut(ITEM).enumerate().for_each(|(item, image)| {
             for (k, image) in (item * ITEM..).zip(image) {
                 let mut sum = [0.0; 3];
-                for &corner in corners.of(k) {
+                for &corner in corners.group(k) {
                     let force = &forces[3 * corner as usize..][..3];
                     (0..3).for_each(|d| sum[d] += force[d]);
                 }
@@ -100,12 +101,12 @@ impl<'a> Elements<'a> {
     }
 }
 
-/// The 3 × 3 block of two nodes of K̂.
+/// Returns the 3 × 3 block of two nodes of K̂.
 pub fn block(stiffness: &[f64], nodes: usize, row: usize, column: usize) -> Matrix3<f64> {
     Matrix3::from_fn(|i, j| stiffness[(3 * column + j) * 3 * nodes + 3 * row + i])
 }
 
-/// E K̂ u of tetrahedra, column by column.
+/// Computes E K̂ u of tetrahedra, column by column.
 fn plain_product<const N: usize>(list: &[Stiff<N>], u: &[Vector3<f64>], forces: &mut [f64]) {
     forces.par_chunks_mut(3 * N * ITEM).zip(list.par_chunks(ITEM)).for_each(|(forces, list)| {
         for ((nodes, stiffness, modulus), forces) in list.iter().zip(forces.chunks_exact_mut(3 * N)) {
@@ -121,13 +122,13 @@ fn plain_product<const N: usize>(list: &[Stiff<N>], u: &[Vector3<f64>], forces: 
     });
 }
 
-struct Product<'a, 'b> {
+struct HexahedraProduct<'a, 'b> {
     list: &'a [Stiff<'b, 8>],
     u: &'a [Vector3<f64>],
     forces: &'a mut [[f64; COMPONENTS]],
 }
 
-impl WithSimd for Product<'_, '_> {
+impl WithSimd for HexahedraProduct<'_, '_> {
     type Output = ();
 
     #[inline(always)]
@@ -142,7 +143,7 @@ impl WithSimd for Product<'_, '_> {
                     local[3 * k + d] = own[d];
                 }
             }
-            // even and odd columns apart: their sums do not wait for each other
+            // even and odd columns separately: their sums are independent
             let mut sums = [[simd.splat_f64s(0.0); COMPONENTS]; 2];
             for (pair, local) in condensed.chunks_exact(2 * COMPONENTS).zip(local.chunks_exact(2)) {
                 for half in 0..2 {
@@ -162,14 +163,14 @@ impl WithSimd for Product<'_, '_> {
     }
 }
 
-/// a·b, in work items.
+/// Computes a·b, in work items.
 pub fn dot(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
     sum(a.len(), |k| a[k].dot(&b[k]))
 }
 
-/// Displacements of an element's nodes.
-pub(super) fn gather(nodes: &[u32], u: &[Vector3<f64>]) -> Wide {
-    let mut local = Wide::zeros();
+/// Gathers the displacements of an element's nodes.
+pub(super) fn gather(nodes: &[u32], u: &[Vector3<f64>]) -> ElementVector {
+    let mut local = ElementVector::zeros();
     for (k, &node) in nodes.iter().enumerate() {
         local.fixed_rows_mut::<3>(3 * k).copy_from(&u[node as usize]);
     }
@@ -181,7 +182,8 @@ mod tests {
     use super::*;
     use nalgebra::{DMatrix, DVector};
 
-    /// Two hexahedra that share four nodes and tetrahedra on them, one component held, against plain matrices.
+    /// Product agrees with plain matrices for two hexahedra with four common nodes and tetrahedra on them,
+    /// one component held.
     #[test]
     fn a_product_is_that_of_the_matrices() {
         let matrix =

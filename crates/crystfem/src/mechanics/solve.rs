@@ -1,8 +1,8 @@
-//! One linear solution of a body: conjugate gradients without a matrix.
+//! Linear solution of a body by matrix-free conjugate gradients.
 
 use super::body::Body;
-use super::coarse::Coarse;
-use super::product::{Elements, Load, block, dot};
+use super::coarse::CoarseMotions;
+use super::product::{Elements, NodalLoad, block, dot};
 use crate::error::Error;
 use crate::system::vector::combine;
 use nalgebra::{Matrix3, Vector3};
@@ -10,25 +10,25 @@ use polycore::numerics::conjugate_gradients;
 
 const NONE: u32 = u32::MAX;
 
-/// Iterations at most, over the equations.
-const ITERATIONS: usize = 20;
+/// Limit on iterations, per equation.
+const MAX_ITERATIONS_PER_EQUATION: usize = 20;
 
-/// A load below this part of the forces that add up to it is their rounding.
-const ROUNDING: f64 = 1e-14;
+/// Relative size of a load, over its contributions, that is rounding.
+const ROUNDING_RATIO: f64 = 1e-14;
 
 impl Body<'_> {
-    /// Conjugate gradients with the inverse 3 × 3 blocks of the nodes and a coarse level of rigid motions, on the nodes that exist; adds
-    /// its iterations to the state.
+    /// Solves by conjugate gradients with the inverse 3 × 3 blocks of the nodes and a coarse level of rigid
+    /// motions, on the existing nodes; adds its iterations to the state.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where they do not converge.
+    /// [`Error::Parameter`] without convergence.
     pub(super) fn solve(
         &mut self,
         moduli: &[(usize, f64)],
         free: &[[bool; 3]],
-        load: Load,
+        load: NodalLoad,
     ) -> Result<Vec<Vector3<f64>>, Error> {
-        // number of each node among those that exist
+        // index of each node among the existing ones
         let mut number = vec![NONE; free.len()];
         for &node in moduli.iter().flat_map(|&(element, _)| self.nodes(element)) {
             number[node as usize] = 0;
@@ -62,16 +62,17 @@ impl Body<'_> {
         for (value, free) in residual.iter_mut().zip(free) {
             (0..3).filter(|&d| !free[d]).for_each(|d| value[d] = 0.0);
         }
-        let goal = (self.tolerance * dot(&residual, &residual).sqrt()).max(ROUNDING * load.parts.sqrt());
+        let goal =
+            (self.tolerance * dot(&residual, &residual).sqrt()).max(ROUNDING_RATIO * load.parts.sqrt());
         if dot(&residual, &residual).sqrt() <= goal {
             return Ok(vec![Vector3::zeros(); number.len()]);
         }
-        let coarse = Coarse::new(&elements, &points);
+        let coarse = CoarseMotions::new(&elements, &points);
         let precondition = |residual: &[Vector3<f64>], result: &mut [Vector3<f64>]| {
             combine(result, |k, _| blocks[k] * residual[k]);
             coarse.add(residual, result);
         };
-        let most = (ITERATIONS * 3 * residual.len()).max(100);
+        let most = (MAX_ITERATIONS_PER_EQUATION * 3 * residual.len()).max(100);
         let reached = |residual: &[Vector3<f64>]| dot(residual, residual).sqrt() <= goal;
         let product = |u: &[Vector3<f64>], image: &mut [Vector3<f64>]| elements.product(u, image);
         let (moved, iterations) =

@@ -3,16 +3,16 @@ use crate::mechanics::{Hexahedron, SolidifyingMaxwell};
 use evidence::{at_most, near};
 use nalgebra::SVector;
 
-/// An elastic body that does not expand by itself.
+/// Returns an elastic body without expansion.
 fn elastic(modulus: f64) -> SolidifyingMaxwell {
     SolidifyingMaxwell::elastic(modulus, 0.0, 0.0, f64::INFINITY)
 }
 
-fn hold(modulus: f64) -> Increment {
+fn hold(modulus: f64) -> MaxwellIncrement {
     elastic(modulus).increment([300.0, 0.0], [300.0, 0.0], 0.0)
 }
 
-/// A block of elements from the origin on, with its layers along z.
+/// Returns a block of elements from the origin on, with layers along z.
 fn block(count: [usize; 3], size: [f64; 3]) -> Mesh {
     let [nx, ny, nz] = count;
     let node = |i: usize, j: usize, k: usize| ((k * (ny + 1) + j) * (nx + 1) + i) as u32;
@@ -42,8 +42,9 @@ fn block(count: [usize; 3], size: [f64; 3]) -> Mesh {
     mesh
 }
 
-/// 3-2-1: the corner at the origin, two components of that along x, one of that along y.
-fn resting(mesh: &Mesh) -> Vec<Support> {
+/// Returns 3-2-1 supports: the corner at the origin, two components of the corner along x, one of that along
+/// y.
+fn resting(mesh: &Mesh) -> Vec<FixedComponent> {
     let far = |d: usize| {
         let most = mesh.points.iter().map(|p| p[d]).fold(0.0, f64::max);
         mesh.points.iter().position(|p| p[d] == most && (0..3).all(|e| e == d || p[e] == 0.0)).unwrap() as u32
@@ -51,7 +52,7 @@ fn resting(mesh: &Mesh) -> Vec<Support> {
     vec![(0, 0), (0, 1), (0, 2), (far(0), 1), (far(0), 2), (far(1), 2)]
 }
 
-/// Curvature of the lower edge by least squares over the middle quarter of the length.
+/// Returns the curvature of the lower edge by least squares over the middle quarter of the length.
 fn curvature(mesh: &Mesh, body: &Body) -> f64 {
     let length = mesh.points.iter().map(|p| p[0]).fold(0.0, f64::max);
     let edge: Vec<[f64; 2]> = (0..mesh.points.len())
@@ -64,7 +65,8 @@ fn curvature(mesh: &Mesh, body: &Body) -> f64 {
     2.0 * matrix.svd(true, true).solve(&right, 1e-14).unwrap()[2] / (length * length)
 }
 
-/// A block with one distorted element inside under displacements of a linear field: strains of every Gauss point are exact.
+/// Patch test: strains at every Gauss point are exact in a block with one distorted element inside, under
+/// displacements of a linear field.
 #[test]
 fn the_patch_test_holds() {
     let mut mesh = block([3, 3, 3], [3.0, 3.0, 3.0]);
@@ -79,31 +81,31 @@ fn the_patch_test_holds() {
         let linear = |p: [f64; 3]| [1e-3 * p[0] + 2e-3 * p[1], -1e-3 * p[2], 3e-3 * p[0] - 2e-3 * p[2]];
         let local = SVector::from_fn(|k, _| linear(corners[k / 3])[k % 3]);
         for strain in element.strains(&local, &SVector::zeros(), 1.0) {
-            let exact = Six::from_row_slice(&[1e-3, 0.0, -2e-3, 2e-3, -1e-3, 3e-3]);
+            let exact = VoigtVector::from_row_slice(&[1e-3, 0.0, -2e-3, 2e-3, -1e-3, 3e-3]);
             at_most("stress_patch_strain", (strain - exact).amax(), 1e-16);
         }
     }
 }
 
-/// A free cube whose free strain is linear in z bends without stress.
+/// A free cube with a free strain linear in z bends without stress.
 #[test]
 fn a_free_cube_has_no_stress() {
     let mesh = block([3, 3, 3], [3e-3; 3]);
     let mut body = Body::new(&mesh, 0.4).unwrap();
-    body.born(0..27, 1);
+    body.activate(0..27, 1);
     body.step(|_| hold(1e9), |_, _, place| 1e-2 * place[2] / 3e-3, &resting(&mesh)).unwrap();
-    let most = (0..27).flat_map(|e| (0..POINTS).map(move |p| (e, p)));
+    let most = (0..27).flat_map(|e| (0..GAUSS_POINTS).map(move |p| (e, p)));
     let most = most.flat_map(|(e, p)| body.stress(e, p)).fold(0.0_f64, |most, s| most.max(s.abs()));
     at_most("stress_free_cube", most / 1e7, 1e-10);
 }
 
-/// Timoshenko's bimetal, 1 mm of 3 GPa and 2 mm of 1.5 GPa, free strains of −1 and −2 %: κ = 4.864864865 /m; the element of
-/// `docs/reference/print/fem.py` gives 4.8644041.
+/// Timoshenko's bimetal, 1 mm of 3 GPa and 2 mm of 1.5 GPa, free strains of −1 and −2 %: κ = 4.864864865 /m;
+/// the element of `docs/reference/print/fem.py` gives 4.8644041.
 #[test]
 fn a_bimetal_bends() {
     let mesh = block([16, 1, 3], [0.04, 2e-3, 3e-3]);
     let mut body = Body::new(&mesh, 0.0).unwrap();
-    body.born(0..48, 1);
+    body.activate(0..48, 1);
     let low = |element: usize| element < 16;
     body.step(
         |e| hold(if low(e) { 3e9 } else { 1.5e9 }),
@@ -123,7 +125,7 @@ fn layers_in_sequence_bend() {
         let mesh = block([along, 1, layers], [length, 2e-3, 1e-3 * layers as f64]);
         let mut body = Body::new(&mesh, 0.0).unwrap();
         for layer in 0..layers {
-            body.born(layer * along..(layer + 1) * along, 1);
+            body.activate(layer * along..(layer + 1) * along, 1);
             let shrinks = |e: usize| if e / along == layer { -0.01 } else { 0.0 };
             body.step(|_| hold(1e9), |e, _, _| shrinks(e), &resting(&mesh)).unwrap();
         }
@@ -131,16 +133,17 @@ fn layers_in_sequence_bend() {
     }
 }
 
-/// The same on a substrate of 2 mm, 2 mm in all: κ = Σ 6εh(t + (i − 1)h)/(t + ih)³, towards 15 /m of infinitely many.
+/// Layers on a substrate of 2 mm, 2 mm in all: κ = Σ 6εh(t + (i − 1)h)/(t + ih)³, towards 15 /m for
+/// infinitely many.
 #[test]
 fn layers_bend_their_substrate() {
     for (layers, exact) in [(1, 3.75), (2, 7.256_944_444), (8, 12.447_044_67)] {
         let height = 2e-3 / layers as f64;
         let mesh = block([32, 1, 2 * layers], [0.064, 2e-3, 4e-3]);
         let mut body = Body::new(&mesh, 0.0).unwrap();
-        body.born(0..32 * layers, 1);
+        body.activate(0..32 * layers, 1);
         for layer in layers..2 * layers {
-            body.born(32 * layer..32 * (layer + 1), 1);
+            body.activate(32 * layer..32 * (layer + 1), 1);
             let shrinks = |e: usize| if e / 32 == layer { -0.01 } else { 0.0 };
             body.step(|_| hold(1e9), |e, _, _| shrinks(e), &resting(&mesh)).unwrap();
         }
@@ -157,41 +160,42 @@ fn layers_bend_their_substrate() {
     }
 }
 
-/// Eight layers on a bed, ε = 0.010 + 0.004(i − ½)/8, then released: beam 0.4921875 /m, `fem.py` 0.50156.
+/// Eight layers on a bed, ε = 0.010 + 0.004(i − ½)/8, are released: beam 0.4921875 /m, `fem.py` 0.50156.
 #[test]
 fn a_part_is_released_from_its_bed() {
     let mesh = block([32, 1, 8], [0.064, 2e-3, 8e-3]);
     let mut body = Body::new(&mesh, 0.0).unwrap();
-    let bed: Vec<Support> = (0..mesh.points.len() as u32)
+    let bed: Vec<FixedComponent> = (0..mesh.points.len() as u32)
         .filter(|&n| mesh.points[n as usize][2] == 0.0)
         .flat_map(|n| (0..3).map(move |d| (n, d)))
         .collect();
     for layer in 0..8 {
-        body.born(32 * layer..32 * (layer + 1), 1);
+        body.activate(32 * layer..32 * (layer + 1), 1);
         let strain = -(0.010 + 0.004 * (layer as f64 + 0.5) / 8.0);
         body.step(|_| hold(1e9), |e, _, _| if e / 32 == layer { strain } else { 0.0 }, &bed).unwrap();
     }
-    let middle = (0..POINTS).map(|p| body.stress(16, p)[0]).sum::<f64>() / 8.0;
+    let middle = (0..GAUSS_POINTS).map(|p| body.stress(16, p)[0]).sum::<f64>() / 8.0;
     near("stress_on_the_bed", middle / 1.022_749_135e7, 1.0, 1e-6);
     body.step(|_| hold(1e9), |_, _, _| 0.0, &resting(&mesh)).unwrap();
     near("stress_released", curvature(&mesh, &body).abs() / 0.501_560_187, 1.0, 1e-5);
 }
 
-/// The same release: its work is ½R·Δu of the reactions, what it stores balances that, and rotations are those of a circle.
+/// Work of a release is ½R·Δu of the reactions and balances the stored energy; rotations are those of a
+/// circle.
 #[test]
 fn a_release_does_the_work_of_its_reactions() {
     let mesh = block([32, 1, 4], [0.064, 2e-3, 4e-3]);
     let mut body = Body::new(&mesh, 0.3).unwrap();
-    let bed: Vec<Support> = (0..mesh.points.len() as u32)
+    let bed: Vec<FixedComponent> = (0..mesh.points.len() as u32)
         .filter(|&n| mesh.points[n as usize][2] == 0.0)
         .flat_map(|n| (0..3).map(move |d| (n, d)))
         .collect();
-    body.born(0..128, 1);
+    body.activate(0..128, 1);
     body.step(|_| hold(1e9), |e, _, _| -1e-3 * (e / 32) as f64, &bed).unwrap();
     let before = body.state.clone();
     let mut reaction = vec![Vector3::<f64>::zeros(); mesh.points.len()];
     for (element, nodes) in mesh.hexahedra.iter().enumerate() {
-        let stresses = std::array::from_fn(|point| Six::from(body.stress(element, point)));
+        let stresses = std::array::from_fn(|point| VoigtVector::from(body.stress(element, point)));
         let (forces, _) = body.shape_of(element).forces(&stresses);
         for (k, &node) in nodes.iter().enumerate() {
             reaction[node as usize] += Vector3::from(forces.fixed_rows::<3>(3 * k));
@@ -207,12 +211,13 @@ fn a_release_does_the_work_of_its_reactions() {
     near("stress_release_work", work / by_reactions, 1.0, 1e-9);
     assert!(work < 0.0);
     at_most("stress_release_closure", body.state.balance.worst, 1e-13);
-    // both ends rest: the middles of the last elements are 31 mm from the middle of the arc
+    // both ends rest: centres of the last elements are 31 mm from the middle of the arc
     let turned = body.largest_rotation();
     near("stress_release_rotation", turned / (curvature(&mesh, &body).abs() * 0.031), 1.0, 2e-3);
 }
 
-/// Work of the solver: `/work/shared/reference/print/pcg.csv` and `pcg_slender.csv`, to 1e-6 of the load, with a molten top layer.
+/// Iterations of the solver agree with `/work/shared/reference/print/pcg.csv` and `pcg_slender.csv`, to 1e-6
+/// of the load, with a molten top layer.
 #[test]
 fn iterations_do_not_follow_the_shape() {
     for (count, floor, published) in [
@@ -229,8 +234,8 @@ fn iterations_do_not_follow_the_shape() {
         let mesh = block(count, count.map(|n| n as f64));
         let mut body = Body::new(&mesh, 0.4).unwrap();
         body.tolerance = 1e-6;
-        body.born(0..mesh.hexahedra.len(), 1);
-        let bed: Vec<Support> = (0..mesh.points.len() as u32)
+        body.activate(0..mesh.hexahedra.len(), 1);
+        let bed: Vec<FixedComponent> = (0..mesh.points.len() as u32)
             .filter(|&n| mesh.points[n as usize][2] == 0.0)
             .flat_map(|n| (0..3).map(move |d| (n, d)))
             .collect();
@@ -247,7 +252,7 @@ fn iterations_do_not_follow_the_shape() {
 }
 
 #[test]
-fn what_has_no_stress_is_refused() {
+fn unsupported_elements_are_refused() {
     let mesh = block([1, 1, 1], [1.0; 3]);
     assert!(Body::new(&mesh, 0.5).is_err() && Body::new(&mesh, f64::NAN).is_err());
     let mut twisted = mesh.clone();

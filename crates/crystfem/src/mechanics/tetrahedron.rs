@@ -1,33 +1,34 @@
-//! Tetrahedra of first and second order, of modulus 1.
+//! First- and second-order tetrahedra, of modulus 1.
 
-use super::element::{POINTS, Six, Wide, stiffness, strain_of};
+use super::element::{ElementVector, GAUSS_POINTS, VoigtVector, stiffness, strain_of};
 use crate::element::natural::Natural;
-use crate::mesh::Shape;
+use crate::mesh::ElementShape;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
-/// The four-point rule, exact to degree 2: one barycentric coordinate, and the three others.
+/// Four-point rule, exact to degree 2: one barycentric coordinate is NEAR, three are FAR.
 const NEAR: f64 = 0.585_410_196_624_968_5;
 const FAR: f64 = 0.138_196_601_125_010_5;
 
-/// A tetrahedron of 4 nodes with one Gauss point, or of 10 with four. Free strains at four points are a linear function, which the
-/// strains of second order contain; the constant strain of first order takes the mean.
+/// A tetrahedron of 4 nodes with one Gauss point, or of 10 with four. Free strains at four points are a
+/// linear function, which second-order strains contain; the constant first-order strain takes the mean.
 #[derive(Clone, Debug)]
 pub struct Tetrahedron {
     nodes: usize,
     points: usize,
     /// Volumes of the Gauss points, m³.
     pub weights: [f64; 4],
-    /// Gradients of the nodes' functions at each Gauss point, 1/m, and in the middle.
+    /// Gradients of the shape functions at each Gauss point, 1/m.
     gradients: Vec<[f64; 3]>,
+    /// Gradients of the shape functions at the centre, 1/m.
     middle: Vec<[f64; 3]>,
-    /// K̂ over the modulus, column by column.
+    /// Stiffness K̂ over the modulus, column by column.
     pub stiffness: Vec<f64>,
     elastic: SMatrix<f64, 6, 6>,
 }
 
 /// Natural coordinates of a Gauss point.
 fn gauss(nodes: usize, point: usize) -> [f64; 3] {
-    // corner 0 has what the three others leave
+    // corner 0 has the remainder of the three others
     [1, 2, 3].map(|corner| match (nodes, corner == point) {
         (4, _) => 0.25,
         (_, true) => NEAR,
@@ -35,12 +36,12 @@ fn gauss(nodes: usize, point: usize) -> [f64; 3] {
     })
 }
 
-fn shape(nodes: usize) -> Shape {
-    if nodes == 4 { Shape::Tetrahedron } else { Shape::Tetrahedron10 }
+fn shape(nodes: usize) -> ElementShape {
+    if nodes == 4 { ElementShape::Tetrahedron } else { ElementShape::Tetrahedron10 }
 }
 
 impl Tetrahedron {
-    /// Builds the element of 4 or 10 nodes, m; `None` where it is turned inside out at a Gauss point.
+    /// Computes an element of 4 or 10 nodes, m; `None` if inverted at a Gauss point.
     pub fn new(places: &[[f64; 3]], poisson: f64) -> Option<Self> {
         let (nodes, points) = (places.len(), if places.len() == 4 { 1 } else { 4 });
         let elastic = stiffness(poisson);
@@ -69,14 +70,14 @@ impl Tetrahedron {
         Some(Self { nodes, points, weights, gradients, middle, stiffness, elastic })
     }
 
-    /// σ over the modulus of an elastic strain.
-    pub fn stress(&self, strain: &Six) -> Six {
+    /// Stress over the modulus, from an elastic strain.
+    pub fn stress(&self, strain: &VoigtVector) -> VoigtVector {
         self.elastic * strain
     }
 
     /// Nodal forces of stresses at the Gauss points.
-    pub fn forces(&self, stresses: &[Six; POINTS]) -> Wide {
-        let mut forces = Wide::zeros();
+    pub fn forces(&self, stresses: &[VoigtVector; GAUSS_POINTS]) -> ElementVector {
+        let mut forces = ElementVector::zeros();
         for (point, own) in self.gradients.chunks_exact(self.nodes).enumerate() {
             let weighed = stresses[point] * self.weights[point];
             for (node, gradient) in own.iter().enumerate() {
@@ -87,9 +88,9 @@ impl Tetrahedron {
         forces
     }
 
-    /// Strains at the Gauss points of nodal displacements, 0 beyond them.
-    pub fn strains(&self, displacement: &Wide) -> [Six; POINTS] {
-        let mut strains = [Six::zeros(); POINTS];
+    /// Strains at the Gauss points from nodal displacements, 0 beyond them.
+    pub fn strains(&self, displacement: &ElementVector) -> [VoigtVector; GAUSS_POINTS] {
+        let mut strains = [VoigtVector::zeros(); GAUSS_POINTS];
         for (strain, own) in strains.iter_mut().zip(self.gradients.chunks_exact(self.nodes)) {
             for (node, gradient) in own.iter().enumerate() {
                 *strain += strain_of(*gradient) * displacement.fixed_rows::<3>(3 * node);
@@ -98,8 +99,8 @@ impl Tetrahedron {
         strains
     }
 
-    /// Half the curl of nodal displacements in the middle, rad.
-    pub fn rotation(&self, displacement: &Wide) -> [f64; 3] {
+    /// Rotation at the centre by nodal displacements, half their curl, rad.
+    pub fn rotation(&self, displacement: &ElementVector) -> [f64; 3] {
         let parts = self.middle.iter().enumerate();
         let sum = parts.fold(Vector3::zeros(), |sum: Vector3<f64>, (node, gradient)| {
             sum + Vector3::from(*gradient).cross(&displacement.fixed_rows::<3>(3 * node)) * 0.5
@@ -113,15 +114,15 @@ impl Tetrahedron {
     }
 }
 
-/// Shares of the nodes at a Gauss point.
+/// Shape functions at a Gauss point.
 pub fn shares(nodes: usize, point: usize) -> [f64; 10] {
-    let all = Natural::at(shape(nodes), gauss(nodes, point)).shapes;
+    let all = Natural::new(shape(nodes), gauss(nodes, point)).shapes;
     std::array::from_fn(|node| all[node])
 }
 
-/// Gradients of the nodes' functions, 1/m, and det ∂x/∂ξ, m³; `None` where that is not positive.
+/// Gradients of the shape functions, 1/m, and det ∂x/∂ξ, m³; `None` unless that is positive.
 fn derivatives(places: &[[f64; 3]], at: [f64; 3]) -> Option<(Vec<[f64; 3]>, f64)> {
-    let natural = Natural::at(shape(places.len()), at);
+    let natural = Natural::new(shape(places.len()), at);
     let own = natural.gradients.iter().zip(places);
     let jacobian = own.fold(Matrix3::zeros(), |sum: Matrix3<f64>, (local, place)| {
         sum + Vector3::from(*place) * Vector3::from(*local).transpose()

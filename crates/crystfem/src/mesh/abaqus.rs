@@ -5,51 +5,57 @@ use std::path::Path;
 
 use crate::error::Error;
 use crate::file::line_error;
-use crate::mesh::Shape;
-use crate::mesh::file_mesh::{Content, Element, Kind, Node, ReadMesh};
+use crate::mesh::ElementShape;
+use crate::mesh::file_mesh::{ElementKind, FileContent, FileElement, FileNode, ReadMesh};
 
 mod cards;
 mod ignored;
-mod place;
+mod instance;
 mod sets;
 mod write;
 
 use cards::{Card, Cards};
 use ignored::Ignored;
-use place::Place;
-use sets::{Entry, Resolver, Set, SetKind};
+use instance::InstancePosition;
+use sets::{FileSet, Resolver, SetEntry, SetKind};
 pub use write::write;
 
-/// Reads a mesh, coordinates multiplied by `scale` (1e-3 for a file in mm).
+/// Reads a mesh, with coordinates multiplied by `scale` (1e-3 for a file in mm).
 ///
-/// Understood, in any case of letters: `*NODE` (`NSET`), `*ELEMENT` (`TYPE`, `ELSET`), `*NSET` and `*ELSET`
-/// (`GENERATE`, names of other sets, `*NSET, ELSET=`), `*SURFACE` (of elements, with or without `Sn`, or of nodes), one
-/// `*PART` with one `*INSTANCE` (moved and turned), `*INCLUDE`, continuation lines, comments. Triangles and quadrangles of shells and membranes
-/// name surfaces, lines nothing. Other keywords are passed over: the notes name them, with
-/// the key of a scene that means the same. A name keeps the letters of its
+/// Supported keywords, in upper or lower case: `*NODE` (`NSET`), `*ELEMENT` (`TYPE`, `ELSET`), `*NSET` and
+/// `*ELSET` (`GENERATE`, names of other sets, `*NSET, ELSET=`), `*SURFACE` (of elements, with or without
+/// `Sn`, or of nodes), one `*PART` with one `*INSTANCE` (translated and rotated), `*INCLUDE`, continuation
+/// lines, comments. Triangles and quadrangles of shells and membranes name surfaces; lines are ignored. Other
+/// keywords are skipped: notes name them, with the equivalent scene key. A name keeps the letter case of its
 /// first use.
 ///
 /// # Errors
-/// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line: other elements, numbers that do not
-/// fit, sets and nodes that do not exist, and what would change the mesh unseen (`*NGEN`, `*SYSTEM`, …);
-/// [`Error::Mesh`] from [`crate::mesh::quality::check`]. Memory follows the size of the file.
+/// [`Error::Shared`] if the file cannot be read; [`Error::File`] with the line for other elements, numbers
+/// that do not fit, sets and nodes that do not exist, and keywords that would change the mesh (`*NGEN`,
+/// `*SYSTEM`, …); [`Error::Mesh`] from [`crate::mesh::quality::check`]. Memory is bounded by the size of the
+/// file.
 pub fn read(path: &Path, scale: f64) -> Result<ReadMesh, Error> {
     let bytes = crate::file::read_bytes(path)?;
     parse(path, &bytes, scale)
 }
 
-/// [`read`], of bytes; `path` is for messages only.
+/// Reads a mesh from bytes; `path` is for messages only.
 ///
 /// # Errors
-/// See [`read`].
+/// Errors of [`read`].
 pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<ReadMesh, Error> {
     let mut cards = Cards::new(path, bytes);
     mesh(path, &mut cards, scale).map_err(|error| cards.placed(error))
 }
 
 fn mesh(path: &Path, cards: &mut Cards, scale: f64) -> Result<ReadMesh, Error> {
-    let mut reader =
-        Reader { path, content: Content::default(), sets: Vec::new(), single: BTreeMap::new(), place: None };
+    let mut reader = InputReader {
+        path,
+        content: FileContent::default(),
+        sets: Vec::new(),
+        single: BTreeMap::new(),
+        place: None,
+    };
     let mut ignored = Ignored::default();
     while let Some(card) = cards.next()? {
         match card.keyword.as_str() {
@@ -58,13 +64,13 @@ fn mesh(path: &Path, cards: &mut Cards, scale: f64) -> Result<ReadMesh, Error> {
             "NSET" => reader.set(card, SetKind::Nodes, "NSET", cards)?,
             "ELSET" => reader.set(card, SetKind::Elements, "ELSET", cards)?,
             "SURFACE" => reader.surface(card, cards)?,
-            "PART" => reader.once(&card)?,
+            "PART" => reader.check_single(&card)?,
             "INSTANCE" => {
-                reader.once(&card)?;
-                reader.place = Place::read(cards)?.or(reader.place);
+                reader.check_single(&card)?;
+                reader.place = InstancePosition::read(cards)?.or(reader.place);
             }
             "END PART" | "ASSEMBLY" | "END ASSEMBLY" | "END INSTANCE" | "HEADING" => {}
-            keyword if CHANGING.contains(&keyword) => {
+            keyword if MESH_CHANGING.contains(&keyword) => {
                 let allowed = "a file that contains all its nodes and elements itself";
                 return Err(line_error(path, card.line, "keyword", format!("*{keyword}"), allowed));
             }
@@ -74,9 +80,9 @@ fn mesh(path: &Path, cards: &mut Cards, scale: f64) -> Result<ReadMesh, Error> {
     if cards.included() > 0 {
         reader.content.notes.push(format!("{} files are included", cards.included()));
     }
-    ignored.tell(&mut reader.content.notes);
+    ignored.write_notes(&mut reader.content.notes);
     if let Some(place) = &reader.place {
-        reader.content.nodes.iter_mut().for_each(|node| node.point = place.of(node.point));
+        reader.content.nodes.iter_mut().for_each(|node| node.point = place.transform(node.point));
         reader.content.notes.push("the part is moved to the place of its instance".to_owned());
     }
     let [nodes, elements] = reader.content.labels(path)?;
@@ -86,8 +92,8 @@ fn mesh(path: &Path, cards: &mut Cards, scale: f64) -> Result<ReadMesh, Error> {
     reader.content.into_mesh(path, &nodes, scale)
 }
 
-/// Keywords that make or move nodes and elements: passing them over would leave another mesh.
-const CHANGING: [&str; 10] = [
+/// Keywords that make or move nodes and elements: skipping them would give another mesh.
+const MESH_CHANGING: [&str; 10] = [
     "NGEN",
     "NFILL",
     "NCOPY",
@@ -100,43 +106,46 @@ const CHANGING: [&str; 10] = [
     "MODEL CHANGE",
 ];
 
-/// Elements by the stems of their names.
-const STEMS: [(Kind, &[&str]); 13] = [
-    (Kind::Solid(Shape::Hexahedron), &["C3D8", "DC3D8", "DCC3D8"]),
-    (Kind::Solid(Shape::Tetrahedron), &["C3D4", "DC3D4"]),
-    (Kind::Solid(Shape::Wedge), &["C3D6", "DC3D6"]),
-    (Kind::Solid(Shape::Hexahedron20), &["C3D20", "DC3D20"]),
-    (Kind::Solid(Shape::Tetrahedron10), &["C3D10", "DC3D10"]),
-    (Kind::Solid(Shape::Wedge15), &["C3D15", "DC3D15"]),
-    (Kind::Quadrangle8, &["S8", "M3D8", "SFM3D8", "DS8", "CPS8", "CPE8", "CAX8", "DC2D8"]),
-    (Kind::Triangle6, &["STRI65", "M3D6", "SFM3D6", "DS6", "CPS6", "CPE6", "CAX6", "DC2D6"]),
-    (Kind::Line3, &["T3D3", "T2D3", "B32", "B22", "DC1D3"]),
-    (Kind::Quadrangle, &["S4", "M3D4", "SFM3D4", "R3D4", "DS4", "CPS4", "CPE4", "CAX4", "DC2D4"]),
-    (Kind::Triangle, &["S3", "STRI3", "M3D3", "SFM3D3", "R3D3", "DS3", "CPS3", "CPE3", "CAX3", "DC2D3"]),
-    (Kind::Line, &["T3D2", "T2D2", "B31", "B21", "DC1D2"]),
-    (Kind::Point, &["MASS", "HEATCAP"]),
+/// Element kinds by the stems of their names.
+const KIND_STEMS: [(ElementKind, &[&str]); 13] = [
+    (ElementKind::Solid(ElementShape::Hexahedron), &["C3D8", "DC3D8", "DCC3D8"]),
+    (ElementKind::Solid(ElementShape::Tetrahedron), &["C3D4", "DC3D4"]),
+    (ElementKind::Solid(ElementShape::Wedge), &["C3D6", "DC3D6"]),
+    (ElementKind::Solid(ElementShape::Hexahedron20), &["C3D20", "DC3D20"]),
+    (ElementKind::Solid(ElementShape::Tetrahedron10), &["C3D10", "DC3D10"]),
+    (ElementKind::Solid(ElementShape::Wedge15), &["C3D15", "DC3D15"]),
+    (ElementKind::Quadrangle8, &["S8", "M3D8", "SFM3D8", "DS8", "CPS8", "CPE8", "CAX8", "DC2D8"]),
+    (ElementKind::Triangle6, &["STRI65", "M3D6", "SFM3D6", "DS6", "CPS6", "CPE6", "CAX6", "DC2D6"]),
+    (ElementKind::Line3, &["T3D3", "T2D3", "B32", "B22", "DC1D3"]),
+    (ElementKind::Quadrangle, &["S4", "M3D4", "SFM3D4", "R3D4", "DS4", "CPS4", "CPE4", "CAX4", "DC2D4"]),
+    (
+        ElementKind::Triangle,
+        &["S3", "STRI3", "M3D3", "SFM3D3", "R3D3", "DS3", "CPS3", "CPE3", "CAX3", "DC2D3"],
+    ),
+    (ElementKind::Line, &["T3D2", "T2D2", "B31", "B21", "DC1D2"]),
+    (ElementKind::Point, &["MASS", "HEATCAP"]),
 ];
 
-/// Kind of an element by its name in upper case: letters after a stem (R, I, H, T, …) tell of integration and physics, not
-/// of nodes.
-fn kind_of(name: &str) -> Option<Kind> {
+/// Returns the kind of an element by its name in upper case: letters after a stem (R, I, H, T, …) denote
+/// integration and physics, not nodes.
+fn kind_of(name: &str) -> Option<ElementKind> {
     let is = |stem: &&str| {
         name.strip_prefix(stem).is_some_and(|rest| rest.bytes().all(|byte| byte.is_ascii_alphabetic()))
     };
-    STEMS.iter().find(|(_, stems)| stems.iter().any(&is)).map(|(kind, _)| *kind)
+    KIND_STEMS.iter().find(|(_, stems)| stems.iter().any(&is)).map(|(kind, _)| *kind)
 }
 
-struct Reader<'a> {
+struct InputReader<'a> {
     path: &'a Path,
-    content: Content,
-    sets: Vec<Set>,
-    /// First lines of keywords that may come once.
+    content: FileContent,
+    sets: Vec<FileSet>,
+    /// First lines of keywords allowed only once.
     single: BTreeMap<String, usize>,
-    /// Where the instance is.
-    place: Option<Place>,
+    /// Position of the instance.
+    place: Option<InstancePosition>,
 }
 
-impl Reader<'_> {
+impl InputReader<'_> {
     fn nodes(&mut self, card: &Card, cards: &mut Cards) -> Result<(), Error> {
         let first = self.content.nodes.len();
         while let Some(row) = cards.row() {
@@ -150,12 +159,12 @@ impl Reader<'_> {
             if words.len() < 2 {
                 return Err(row.error("node", row.text(), "number, x, y, z"));
             }
-            self.content.nodes.push(Node { label, line: row.line as u32, point });
+            self.content.nodes.push(FileNode { label, line: row.line as u32, point });
         }
         if let Some(name) = card.parameter("NSET") {
             let labels = self.content.nodes[first..].iter();
-            let entries = labels.map(|node| (node.line as usize, Entry::Label(node.label))).collect();
-            self.sets.push(Set { name: name.to_owned(), of: SetKind::Nodes, entries });
+            let entries = labels.map(|node| (node.line as usize, SetEntry::Label(node.label))).collect();
+            self.sets.push(FileSet { name: name.to_owned(), kind: SetKind::Nodes, entries });
         }
         Ok(())
     }
@@ -163,8 +172,8 @@ impl Reader<'_> {
     fn elements(&mut self, card: &Card, cards: &mut Cards) -> Result<(), Error> {
         let name = card.parameter("TYPE").unwrap_or("").to_uppercase();
         let Some(kind) = kind_of(&name) else {
-            let allowed = "C3D8, C3D4, C3D6, C3D20, C3D10, C3D15, with D before or letters after them or not (DC3D8, C3D20R, \
-                           …); shells, membranes and trusses only name surfaces";
+            let allowed = "C3D8, C3D4, C3D6, C3D20, C3D10, C3D15, with D before or letters after them or \
+                not (DC3D8, C3D20R, …); shells, membranes and trusses only name surfaces";
             return Err(line_error(self.path, card.line, "element type", name, allowed));
         };
         let count = kind.node_count();
@@ -198,27 +207,27 @@ impl Reader<'_> {
             }
             let first = self.content.element_nodes.len();
             self.content.element_nodes.extend_from_slice(&labels[1..=count]);
-            self.content.elements.push(Element { label: labels[0], line: line as u32, kind, first });
+            self.content.elements.push(FileElement { label: labels[0], line: line as u32, kind, first });
         }
         if let Some(name) = card.parameter("ELSET") {
             let labels = self.content.elements[first..].iter();
             let entries =
-                labels.map(|element| (element.line as usize, Entry::Label(element.label))).collect();
-            self.sets.push(Set { name: name.to_owned(), of: SetKind::Elements, entries });
+                labels.map(|element| (element.line as usize, SetEntry::Label(element.label))).collect();
+            self.sets.push(FileSet { name: name.to_owned(), kind: SetKind::Elements, entries });
         }
         Ok(())
     }
 
-    fn set(&mut self, card: Card, of: SetKind, key: &'static str, cards: &mut Cards) -> Result<(), Error> {
+    fn set(&mut self, card: Card, kind: SetKind, key: &'static str, cards: &mut Cards) -> Result<(), Error> {
         let Some(name) = card.parameter(key) else {
             let allowed = format!("*{key}, {key}=NAME");
             return Err(line_error(self.path, card.line, "name of a set", "", allowed));
         };
         let mut entries = Vec::new();
-        let mut of = of;
-        if let (SetKind::Nodes, Some(elements)) = (of, card.parameter("ELSET")) {
-            of = SetKind::NodesOfElements;
-            entries.push((card.line, Entry::Set(elements.to_owned())));
+        let mut kind = kind;
+        if let (SetKind::Nodes, Some(elements)) = (kind, card.parameter("ELSET")) {
+            kind = SetKind::NodesOfElements;
+            entries.push((card.line, SetEntry::Set(elements.to_owned())));
         }
         let generate = card.parameter("GENERATE").is_some();
         while let Some(row) = cards.row() {
@@ -234,12 +243,12 @@ impl Reader<'_> {
                 if range[2] == 0 || range[0] > range[1] {
                     return Err(row.error("range", row.text(), "first ≤ last, step 1 or more"));
                 }
-                entries.push((row.line, Entry::Range(range)));
+                entries.push((row.line, SetEntry::Range(range)));
             } else {
-                entries.extend(words.iter().map(|word| (row.line, Entry::parse(word))));
+                entries.extend(words.iter().map(|word| (row.line, SetEntry::parse(word))));
             }
         }
-        self.sets.push(Set { name: name.to_owned(), of, entries });
+        self.sets.push(FileSet { name: name.to_owned(), kind, entries });
         Ok(())
     }
 
@@ -259,7 +268,7 @@ impl Reader<'_> {
             let Some(first) = words.first() else { continue };
             if nodes {
                 // the second column is an area
-                entries.push((row.line, Entry::parse(first)));
+                entries.push((row.line, SetEntry::parse(first)));
                 continue;
             }
             let side = words.get(1).map_or("", |word| *word).to_uppercase();
@@ -274,15 +283,15 @@ impl Reader<'_> {
                     ));
                 }
             };
-            entries.push((row.line, Entry::Side(Box::new(Entry::parse(first)), side)));
+            entries.push((row.line, SetEntry::Side(Box::new(SetEntry::parse(first)), side)));
         }
-        let of = if nodes { SetKind::Nodes } else { SetKind::Faces };
-        self.sets.push(Set { name: name.to_owned(), of, entries });
+        let kind = if nodes { SetKind::Nodes } else { SetKind::Faces };
+        self.sets.push(FileSet { name: name.to_owned(), kind, entries });
         Ok(())
     }
 
-    /// One part and one instance of it: numbers are then unique.
-    fn once(&mut self, card: &Card) -> Result<(), Error> {
+    /// Checks that there is one part with one instance, so that numbers are unique.
+    fn check_single(&mut self, card: &Card) -> Result<(), Error> {
         let Some(line) = self.single.insert(card.keyword.clone(), card.line) else { return Ok(()) };
         let allowed = "one: write the deck without parts and assemblies (Abaqus/CAE: Model, Edit Attributes)";
         let found = format!("*{}, after that of line {line}", card.keyword);

@@ -1,10 +1,10 @@
-//! The printed bar on its substrate, Fig. 4.2 of the thesis.
+//! Printed bar on its substrate, Fig. 4.2 of the thesis.
 
 use crate::error::Error;
-use crate::mesh::structured::{MAX_NODES, count as fill, few_enough};
-use crate::mesh::{Block, Face, Grid, Mesh, Split, graded};
+use crate::mesh::structured::{MAX_NODES, check_node_count, count as fill};
+use crate::mesh::{Block, CellSplit, Face, Grid, Mesh, graded};
 
-/// A bar printed in layers, its lower face at z = 0, its middle at x = y = 0.
+/// A bar printed in layers, with its lower face at z = 0 and its centre at x = y = 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bar {
     /// Extents along x and y, m.
@@ -13,41 +13,41 @@ pub struct Bar {
     pub layers: usize,
     /// Height of a layer, m.
     pub layer_height: f64,
-    /// Elements through a layer.
+    /// Number of elements through a layer.
     pub elements_per_layer: usize,
-    /// Greatest element along x and y, m.
+    /// Largest element along x and y, m.
     pub element_size: f64,
-    /// What it is printed on; `None`: the bar alone.
+    /// Substrate; `None` for a bar alone.
     pub substrate: Option<Substrate>,
-    /// What fills the cells.
-    pub cells: Split,
+    /// Element type.
+    pub cells: CellSplit,
 }
 
-/// A plate below the bar, its upper face at z = 0.
+/// A plate below the bar, with its upper face at z = 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Substrate {
-    /// Extents along x and y, m: not below the bar's.
+    /// Extents along x and y, m; at least those of the bar.
     pub size: [f64; 2],
     /// Thickness, m.
     pub thickness: f64,
-    /// Length of each element over that of its neighbour nearer to the bar, sideways and down: 1 or more.
+    /// Ratio of lengths of neighbouring elements, growing away from the bar sideways and down: 1 or more.
     pub growth: f64,
 }
 
 impl Bar {
-    /// A bar alone, m: two elements through a layer, hexahedra about two layers' height long.
+    /// Returns a bar alone, m: two elements through a layer, hexahedra about two layer heights long.
     pub fn new(size: [f64; 2], layers: usize, layer_height: f64) -> Self {
-        let (elements_per_layer, element_size, cells) = (2, 2.0 * layer_height, Split::Hexahedra);
+        let (elements_per_layer, element_size, cells) = (2, 2.0 * layer_height, CellSplit::Hexahedra);
         Self { size, layers, layer_height, elements_per_layer, element_size, substrate: None, cells }
     }
 
-    /// Conforming elements: element sets `bar`, `layer-1` … `layer-N`, `substrate`; surfaces and node sets on the sides
-    /// of the box around all, [`crate::mesh::BOX_SIDES`] (`bottom` is the substrate's lower face), and `interface`,
-    /// the bar's lower face.
+    /// Meshes bar and substrate with conforming elements: element sets `bar`, `layer-1` … `layer-N`,
+    /// `substrate`; surfaces and node sets on the sides of the bounding box, [`crate::mesh::BOX_SIDES`]
+    /// (`bottom` is the substrate's lower face), and `interface`, the bar's lower face.
     ///
     /// # Errors
-    /// Sizes or counts that are not positive, a layer without thickness or elements, a substrate smaller than the bar,
-    /// more nodes than 2²⁸.
+    /// [`Error::Parameter`] for sizes or counts that are not positive, a layer without thickness or elements,
+    /// a substrate smaller than the bar, and more than 2²⁸ nodes.
     pub fn mesh(&self) -> Result<Mesh, Error> {
         let grid = self.grid()?;
         let [x, y] = self.size.map(|size| 0.5 * size);
@@ -74,10 +74,11 @@ impl Bar {
         Ok(mesh)
     }
 
-    /// Elements along each axis of the grid through bar and substrate, as real numbers: they may be too many to make.
+    /// Number of elements along each axis of the grid through bar and substrate, as real numbers: they may be
+    /// too many to build.
     ///
     /// # Errors
-    /// As [`Bar::mesh`].
+    /// Errors of [`Bar::mesh`].
     pub fn elements(&self) -> Result<[f64; 3], Error> {
         let count = |name, found: usize| match (1..MAX_NODES).contains(&found) {
             true => Ok(()),
@@ -119,11 +120,11 @@ impl Bar {
             let step = self.layer_height / self.elements_per_layer as f64;
             elements[2] += fill(substrate.thickness, step, substrate.growth)?;
         }
-        few_enough(elements)?;
+        check_node_count(elements)?;
         Ok(elements)
     }
 
-    /// The lines of bar and substrate.
+    /// Grid lines of bar and substrate.
     fn grid(&self) -> Result<Grid, Error> {
         self.elements()?;
         let mut lines = [const { Vec::new() }; 3];
@@ -136,7 +137,7 @@ impl Bar {
             if let Some(substrate) = &self.substrate {
                 let beside = 0.5 * (substrate.size[d] - self.size[d]);
                 if beside > 1e-9 * substrate.size[d] {
-                    let outside = away(half, graded(beside, lengths[0], substrate.growth)?);
+                    let outside = end_points(half, graded(beside, lengths[0], substrate.growth)?);
                     let left = outside.iter().rev().map(|x| -x);
                     line = left.chain(line).chain(outside.iter().copied()).collect();
                 }
@@ -146,9 +147,9 @@ impl Bar {
         let step = self.elements_per_layer as f64;
         if let Some(substrate) = &self.substrate {
             let below = graded(substrate.thickness, self.layer_height / step, substrate.growth)?;
-            lines[2].extend(away(0.0, below).into_iter().rev().map(|z| -z));
+            lines[2].extend(end_points(0.0, below).into_iter().rev().map(|z| -z));
         }
-        // layer faces are the products that the blocks of the layers are bounded by
+        // layer faces are computed like the bounds of the layers' blocks
         lines[2].extend((0..=self.layers * self.elements_per_layer).map(|k| {
             (k / self.elements_per_layer) as f64 * self.layer_height
                 + self.layer_height * ((k % self.elements_per_layer) as f64 / step)
@@ -158,7 +159,7 @@ impl Bar {
 }
 
 /// Ends of elements of the given lengths, from `start` on.
-fn away(start: f64, lengths: Vec<f64>) -> Vec<f64> {
+fn end_points(start: f64, lengths: Vec<f64>) -> Vec<f64> {
     let mut end = start;
     lengths
         .into_iter()
@@ -182,7 +183,7 @@ mod tests {
             elements_per_layer: 2,
             element_size: 5e-4,
             substrate: Some(Substrate { size: [0.04, 0.02], thickness: 4e-3, growth: 1.4 }),
-            cells: Split::Hexahedra,
+            cells: CellSplit::Hexahedra,
         }
     }
 
@@ -224,7 +225,7 @@ mod tests {
 
     #[test]
     fn a_bar_of_tetrahedra() {
-        let mesh = Bar { cells: Split::SixTetrahedra, ..bar() }.mesh().unwrap();
+        let mesh = Bar { cells: CellSplit::SixTetrahedra, ..bar() }.mesh().unwrap();
         let quality = quality::check(&mesh, None).unwrap();
         let exact = 0.02 * 0.004 * 8.0 * 2e-4 + 0.04 * 0.02 * 4e-3;
         assert!((quality.volume / exact - 1.0).abs() < 1e-12);
@@ -234,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_printed_is_named() {
+    fn invalid_bars_are_refused() {
         let refused = |bar: Bar, words: &str| {
             let text = bar.mesh().unwrap_err().to_string();
             assert!(text.contains(words), "{text}");

@@ -6,31 +6,31 @@ use std::path::Path;
 use crate::error::Error;
 use crate::file::line_error;
 use crate::mesh::quality::{self, Quality};
-use crate::mesh::{Cell, Face, Mesh, Shape};
+use crate::mesh::{Cell, ElementShape, Face, Mesh};
 
-/// A mesh as read from a file, checked.
+/// A checked mesh from a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReadMesh {
-    /// The mesh; nodes and elements in the order of the file, 8-node hexahedra before 4-node tetrahedra before others,
-    /// nodes of no element left out.
+    /// Mesh with nodes and elements in the order of the file, 8-node hexahedra before 4-node tetrahedra
+    /// before others, without unused nodes.
     pub mesh: Mesh,
-    /// The file's number of each node.
+    /// Label of each node in the file.
     pub node_labels: Vec<u64>,
-    /// The file's number of each element.
+    /// Label of each element in the file.
     pub element_labels: Vec<u64>,
     /// Result of [`quality::check`].
     pub quality: Quality,
-    /// Notes for the user: what was left out or should be looked at.
+    /// Notes for the user: omissions and doubtful input.
     pub notes: Vec<String>,
 }
 
-/// Kinds of elements in files: those computed on, and those that only name faces and nodes.
+/// Element kinds in files: solids, and kinds that only name faces and nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
-    Solid(Shape),
+pub(super) enum ElementKind {
+    Solid(ElementShape),
     Quadrangle,
     Triangle,
-    /// With nodes on the middles of its edges.
+    /// Quadrangle with mid-edge nodes.
     Quadrangle8,
     Triangle6,
     Line,
@@ -38,7 +38,7 @@ pub(super) enum Kind {
     Point,
 }
 
-impl Kind {
+impl ElementKind {
     pub fn node_count(self) -> usize {
         match self {
             Self::Solid(shape) => shape.nodes(),
@@ -51,12 +51,12 @@ impl Kind {
         }
     }
 
-    /// The shape of what is computed on.
-    pub fn solid(self) -> Option<Shape> {
+    /// Element type of a solid.
+    pub fn solid(self) -> Option<ElementShape> {
         if let Self::Solid(shape) = self { Some(shape) } else { None }
     }
 
-    /// Corners of a triangle or quadrangle.
+    /// Number of corners of a triangle or quadrangle.
     fn facet(self) -> Option<usize> {
         match self {
             Self::Quadrangle | Self::Quadrangle8 => Some(4),
@@ -68,44 +68,47 @@ impl Kind {
 
 /// An element of a file.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Element {
+pub(super) struct FileElement {
     pub label: u64,
     pub line: u32,
-    pub kind: Kind,
-    /// Where its nodes begin in [`Content::element_nodes`]; as many count as the kind has.
+    pub kind: ElementKind,
+    /// Index of its first node in [`FileContent::element_nodes`]; the kind gives their number.
     pub first: usize,
 }
 
 /// A node of a file.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Node {
+pub(super) struct FileNode {
     pub label: u64,
     pub line: u32,
     pub point: [f64; 3],
 }
 
-/// Content of a file. Names and members of sets: positions in `nodes` and `elements`.
+/// Content of a file. Members of sets are indices into `nodes` and `elements`.
 #[derive(Debug, Default)]
-pub(super) struct Content {
-    pub nodes: Vec<Node>,
-    pub elements: Vec<Element>,
-    /// Numbers of the nodes of all elements, in the order of [`Shape`] of each.
+pub(super) struct FileContent {
+    pub nodes: Vec<FileNode>,
+    pub elements: Vec<FileElement>,
+    /// Labels of the nodes of all elements, in the node order of [`ElementShape`].
     pub element_nodes: Vec<u64>,
     pub node_sets: BTreeMap<String, Vec<u32>>,
-    /// Hexahedra, tetrahedra and wedges become an element set, triangles and quadrangles a surface of the same name.
+    /// Element sets by name; their solids become an element set, their triangles and quadrangles a surface of
+    /// the same name.
     pub element_sets: BTreeMap<String, Vec<u32>>,
     pub surfaces: BTreeMap<String, Vec<Face>>,
     pub notes: Vec<String>,
 }
 
-/// Positions of numbers that a file gives.
+/// Indices of the labels of a file.
 pub(super) struct Labels {
     sorted: Vec<(u64, u32)>,
 }
 
 impl Labels {
+    /// Sorts labels.
+    ///
     /// # Errors
-    /// Two of one number: both positions.
+    /// Both indices of a duplicate.
     pub fn new(labels: impl Iterator<Item = u64>) -> Result<Self, [u32; 2]> {
         let mut sorted: Vec<(u64, u32)> = labels.zip(0u32..).collect();
         // most files are in order already
@@ -119,7 +122,7 @@ impl Labels {
     }
 
     pub fn get(&self, label: u64) -> Option<u32> {
-        // numbers without gaps are found at once
+        // labels without gaps are found at once
         let first = self.sorted.first()?.0;
         let guess = usize::try_from(label.checked_sub(first)?).ok()?;
         if let Some(entry) = self.sorted.get(guess)
@@ -130,7 +133,7 @@ impl Labels {
         self.sorted.binary_search_by_key(&label, |entry| entry.0).ok().map(|place| self.sorted[place].1)
     }
 
-    /// Numbers from `first` to `last` that exist, with their positions.
+    /// Existing labels from `first` to `last`, with their indices.
     pub fn range(&self, first: u64, last: u64) -> &[(u64, u32)] {
         let start = self.sorted.partition_point(|entry| entry.0 < first);
         let end = self.sorted.partition_point(|entry| entry.0 <= last);
@@ -138,16 +141,16 @@ impl Labels {
     }
 }
 
-impl Content {
-    /// Numbers of an element's nodes.
-    pub fn nodes_of(&self, element: &Element) -> &[u64] {
+impl FileContent {
+    /// Labels of an element's nodes.
+    pub fn nodes_of(&self, element: &FileElement) -> &[u64] {
         &self.element_nodes[element.first..element.first + element.kind.node_count()]
     }
 
-    /// Numbers of nodes and of elements.
+    /// Indices of the labels of nodes and of elements.
     ///
     /// # Errors
-    /// A number twice.
+    /// [`Error::File`] for a duplicate label.
     pub fn labels(&self, path: &Path) -> Result<[Labels; 2], Error> {
         let nodes = Labels::new(self.nodes.iter().map(|node| node.label)).map_err(|[a, b]| {
             let [a, b] = [a, b].map(|place| self.nodes[place as usize]);
@@ -162,10 +165,11 @@ impl Content {
         Ok([nodes, elements])
     }
 
-    /// The mesh, coordinates multiplied by `scale`; `nodes` as of [`Self::labels`].
+    /// Converts to a mesh, with coordinates multiplied by `scale`; `nodes` come from [`Self::labels`].
     ///
     /// # Errors
-    /// A scale that is not positive, a node that does not exist, and what [`quality::check`] refuses.
+    /// [`Error::Parameter`] for a scale that is not positive, [`Error::File`] for a missing node, and errors
+    /// of [`quality::check`].
     pub fn into_mesh(mut self, path: &Path, nodes: &Labels, scale: f64) -> Result<ReadMesh, Error> {
         if !(scale > 0.0 && scale.is_finite()) {
             let allowed = "positive and finite, m per unit of the file".into();
@@ -174,14 +178,14 @@ impl Content {
         let mut mesh = Mesh::default();
         mesh.points.extend(self.nodes.iter().map(|node| node.point.map(|x| scale * x)));
         mesh.node_sets = std::mem::take(&mut self.node_sets);
-        // of hexahedra, tetrahedra and others
+        // hexahedra, tetrahedra and others
         let mut labels = [const { Vec::new() }; 3];
-        // number in the mesh, of each of the three among themselves at first
+        // index in the mesh, first within each of the three
         let mut number = vec![u32::MAX; self.elements.len()];
         let mut facets: Vec<([u32; 4], u32)> = Vec::new();
         let list = |shape| match shape {
-            Shape::Hexahedron => 0,
-            Shape::Tetrahedron => 1,
+            ElementShape::Hexahedron => 0,
+            ElementShape::Tetrahedron => 1,
             _ => 2,
         };
         for (place, element) in self.elements.iter().enumerate() {
@@ -197,8 +201,8 @@ impl Content {
                 number[place] = labels.len() as u32;
                 labels.push(element.label);
                 match shape {
-                    Shape::Hexahedron => mesh.hexahedra.extend(own.first_chunk::<8>()),
-                    Shape::Tetrahedron => mesh.tetrahedra.extend(own.first_chunk::<4>()),
+                    ElementShape::Hexahedron => mesh.hexahedra.extend(own.first_chunk::<8>()),
+                    ElementShape::Tetrahedron => mesh.tetrahedra.extend(own.first_chunk::<4>()),
                     _ => mesh.others.extend(Cell::new(&own[..shape.nodes()])),
                 }
             } else if let Some(corners) = element.kind.facet() {
@@ -238,7 +242,7 @@ impl Content {
         Ok(ReadMesh { mesh, node_labels, element_labels, quality, notes: self.notes })
     }
 
-    /// The face of a solid element that each triangle and quadrangle is; the first of two.
+    /// Finds the face of a solid element for each triangle and quadrangle; the first of two.
     fn match_facets(&mut self, mesh: &Mesh, mut facets: Vec<([u32; 4], u32)>) -> BTreeMap<u32, Face> {
         facets.sort_unstable();
         let mut face_of = BTreeMap::new();
@@ -260,13 +264,14 @@ impl Content {
             let first = facets.iter().find(|facet| !face_of.contains_key(&facet.1));
             let label = first.map_or(0, |facet| self.elements[facet.1 as usize].label);
             self.notes.push(format!(
-                "{missed} triangles or quadrangles are not sides of a hexahedron, tetrahedron or wedge, element {label} first: left out"
+                "{missed} triangles or quadrangles are not sides of a hexahedron, tetrahedron or wedge, \
+                 element {label} first: left out"
             ));
         }
         face_of
     }
 
-    /// Element sets and surfaces in the mesh's numbers.
+    /// Converts element sets and surfaces to the mesh's indices.
     fn name_sets(&mut self, mesh: &mut Mesh, number: &[u32], face_of: &BTreeMap<u32, Face>) {
         mesh.surfaces = std::mem::take(&mut self.surfaces);
         for faces in mesh.surfaces.values_mut() {
@@ -278,7 +283,8 @@ impl Content {
             let faces: Vec<Face> = places.iter().filter_map(|place| face_of.get(place).copied()).collect();
             if set.is_empty() && faces.is_empty() {
                 self.notes.push(format!(
-                    "element set `{name}` contains no hexahedra, tetrahedra, wedges or sides of them: left out"
+                    "element set `{name}` contains no hexahedra, tetrahedra, wedges or sides of them: left \
+                     out"
                 ));
             }
             if !faces.is_empty() {

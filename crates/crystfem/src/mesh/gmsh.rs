@@ -1,42 +1,44 @@
 //! Reads Gmsh's MSH 2 and 4, ASCII and binary of either byte order
 //! (<https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format>).
 //!
-//! A reader of our own: `mshio` 0.4 does not read physical names and panics (`unimplemented!`, `expect`) on sizes and
-//! digits that it does not know.
+//! An own reader, because `mshio` 0.4 does not read physical names and panics (`unimplemented!`, `expect`) on
+//! unexpected sizes and digits.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::error::Error;
-use crate::mesh::Shape;
-use crate::mesh::file_mesh::{Content, Element, Kind, Labels, Node, ReadMesh};
+use crate::mesh::ElementShape;
+use crate::mesh::file_mesh::{ElementKind, FileContent, FileElement, FileNode, Labels, ReadMesh};
 
 mod numbers;
-mod two;
+mod version2;
 
 use numbers::{Numbers, Version};
 
-/// Reads a mesh, coordinates multiplied by `scale` (1e-3 for a file in mm). Physical groups of volumes become element
-/// sets, those of surfaces become surfaces and node sets, those of curves and points node sets; a group without a name
-/// is called `physical-TAG`. Hexahedra (8 or 20 nodes), tetrahedra (4 or 10) and prisms (6 or 15) are computed on; of 27 and 18
-/// nodes those in the middles of sides and of the element are left out.
+/// Reads a mesh, with coordinates multiplied by `scale` (1e-3 for a file in mm). Physical groups of volumes
+/// become element sets, those of surfaces become surfaces and node sets, those of curves and points node
+/// sets; a group without a name is called `physical-TAG`. Supported solids are hexahedra (8 or 20 nodes),
+/// tetrahedra (4 or 10) and prisms (6 or 15); for 27 and 18 nodes those at the centres of sides and elements
+/// are left out.
 ///
 /// # Errors
-/// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line (in binary files the section's line
-/// and the byte) for what is not MSH 2 or 4, other elements, and numbers that do not fit; [`Error::Mesh`] from
-/// [`crate::mesh::quality::check`]. Memory follows the size of the file, not the counts that it announces.
+/// [`Error::Shared`] if the file cannot be read; [`Error::File`] with the line (in binary files the section's
+/// line and the byte) for files that are not MSH 2 or 4, other elements, and numbers that do not fit;
+/// [`Error::Mesh`] from [`crate::mesh::quality::check`]. Memory is bounded by the size of the file, not by
+/// the counts that it announces.
 pub fn read(path: &Path, scale: f64) -> Result<ReadMesh, Error> {
     let bytes = crate::file::read_bytes(path)?;
     parse(path, &bytes, scale)
 }
 
-/// [`read`], of bytes; `path` is for messages only.
+/// Reads a mesh from bytes; `path` is for messages only.
 ///
 /// # Errors
-/// See [`read`].
+/// Errors of [`read`].
 pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<ReadMesh, Error> {
-    let mut reader = Reader {
-        content: Content::default(),
+    let mut reader = MshReader {
+        content: FileContent::default(),
         names: BTreeMap::new(),
         groups: BTreeMap::new(),
         members: bytes.len().saturating_mul(16),
@@ -49,8 +51,8 @@ pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<ReadMesh, Error> {
     while let Some(section) = numbers.section()? {
         match section.as_str() {
             "PhysicalNames" => reader.physical_names(&mut numbers)?,
-            "Nodes" if reader.version == Version::Two => reader.nodes_of_two(&mut numbers)?,
-            "Elements" if reader.version == Version::Two => reader.elements_of_two(&mut numbers)?,
+            "Nodes" if reader.version == Version::Two => reader.nodes_version2(&mut numbers)?,
+            "Elements" if reader.version == Version::Two => reader.elements_version2(&mut numbers)?,
             "Entities" => reader.entities(&mut numbers)?,
             "Nodes" => reader.nodes(&mut numbers)?,
             "Elements" => reader.elements(&mut numbers)?,
@@ -71,7 +73,8 @@ pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<ReadMesh, Error> {
     if reader.reduced > 0 {
         let count = reader.reduced;
         let note = format!(
-            "{count} elements of complete second order: nodes in the middles of sides and elements are left out"
+            "{count} elements of complete second order: nodes in the middles of sides and elements are left \
+             out"
         );
         reader.content.notes.push(note);
     }
@@ -80,45 +83,45 @@ pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<ReadMesh, Error> {
     reader.content.into_mesh(path, &nodes, scale)
 }
 
-struct Reader {
-    content: Content,
+struct MshReader {
+    content: FileContent,
     /// Name of a physical group by dimension and tag.
     names: BTreeMap<(i64, i64), String>,
     /// Physical groups of an entity by dimension and tag.
     groups: BTreeMap<(i64, i64), Vec<i64>>,
-    /// Members that groups may still have: sixteen a byte, so that memory follows the size of the file.
+    /// Limit on further members of groups: sixteen a byte, so that memory is bounded by the size of the file.
     members: usize,
     version: Version,
-    /// Elements of complete second order.
+    /// Number of elements of complete second order.
     reduced: usize,
 }
 
-/// Elements by their number in the format.
-const KINDS: [(i64, Kind); 16] = [
-    (1, Kind::Line),
-    (2, Kind::Triangle),
-    (3, Kind::Quadrangle),
-    (4, Kind::Solid(Shape::Tetrahedron)),
-    (5, Kind::Solid(Shape::Hexahedron)),
-    (6, Kind::Solid(Shape::Wedge)),
-    (8, Kind::Line3),
-    (9, Kind::Triangle6),
-    (11, Kind::Solid(Shape::Tetrahedron10)),
-    (15, Kind::Point),
-    (16, Kind::Quadrangle8),
-    (17, Kind::Solid(Shape::Hexahedron20)),
-    (18, Kind::Solid(Shape::Wedge15)),
+/// Element kinds by their number in the format.
+const KINDS: [(i64, ElementKind); 16] = [
+    (1, ElementKind::Line),
+    (2, ElementKind::Triangle),
+    (3, ElementKind::Quadrangle),
+    (4, ElementKind::Solid(ElementShape::Tetrahedron)),
+    (5, ElementKind::Solid(ElementShape::Hexahedron)),
+    (6, ElementKind::Solid(ElementShape::Wedge)),
+    (8, ElementKind::Line3),
+    (9, ElementKind::Triangle6),
+    (11, ElementKind::Solid(ElementShape::Tetrahedron10)),
+    (15, ElementKind::Point),
+    (16, ElementKind::Quadrangle8),
+    (17, ElementKind::Solid(ElementShape::Hexahedron20)),
+    (18, ElementKind::Solid(ElementShape::Wedge15)),
     // of complete second order
-    (10, Kind::Quadrangle8),
-    (12, Kind::Solid(Shape::Hexahedron20)),
-    (13, Kind::Solid(Shape::Wedge15)),
+    (10, ElementKind::Quadrangle8),
+    (12, ElementKind::Solid(ElementShape::Hexahedron20)),
+    (13, ElementKind::Solid(ElementShape::Wedge15)),
 ];
 
-/// Nodes that elements of complete second order have more: quadrangles, hexahedra, prisms.
-const MORE: [(i64, usize); 3] = [(10, 1), (12, 7), (13, 3)];
+/// Additional nodes of elements of complete second order: quadrangles, hexahedra, prisms.
+const EXTRA_NODES: [(i64, usize); 3] = [(10, 1), (12, 7), (13, 3)];
 
-impl Reader {
-    /// `count`, then lines of dimension, tag and "name"; text in binary files too.
+impl MshReader {
+    /// Reads `count`, then lines of dimension, tag and "name"; text in binary files too.
     fn physical_names(&mut self, numbers: &mut Numbers) -> Result<(), Error> {
         let line = numbers.text_line();
         let Ok(count) = line.trim().parse::<u64>() else {
@@ -140,7 +143,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Physical groups of each entity.
+    /// Reads the physical groups of each entity.
     fn entities(&mut self, numbers: &mut Numbers) -> Result<(), Error> {
         let mut counts = [0; 4];
         for count in &mut counts {
@@ -149,7 +152,7 @@ impl Reader {
         for (dimension, count) in (0..).zip(counts) {
             for _ in 0..count {
                 let tag = numbers.int("tag of an entity")?;
-                // a point has a place, all else a box; in 4.0 each has one
+                // a point has a position, other entities a box; in 4.0 each has a box
                 for _ in 0..if dimension == 0 && self.version == Version::FourOne { 3 } else { 6 } {
                     numbers.double("place of an entity")?;
                 }
@@ -190,17 +193,17 @@ impl Reader {
             let own = numbers.size("number of nodes")?;
             if self.version == Version::Four {
                 for _ in 0..own {
-                    let (label, point) = (whole(numbers, "number of a node")?, place(numbers)?);
+                    let (label, point) = (read_label(numbers, "number of a node")?, place(numbers)?);
                     for _ in 0..parameters {
                         numbers.double("parametric coordinate")?;
                     }
-                    self.content.nodes.push(Node { label, line: numbers.line(), point });
+                    self.content.nodes.push(FileNode { label, line: numbers.line(), point });
                 }
                 continue;
             }
             for _ in 0..own {
                 let label = numbers.size("number of a node")?;
-                self.content.nodes.push(Node { label, line: numbers.line(), point: [0.0; 3] });
+                self.content.nodes.push(FileNode { label, line: numbers.line(), point: [0.0; 3] });
             }
             for node in first..self.content.nodes.len() {
                 self.content.nodes[node].point = place(numbers)?;
@@ -226,8 +229,10 @@ impl Reader {
             let first = self.content.elements.len();
             for _ in 0..numbers.size("number of elements")? {
                 if self.version == Version::Four {
-                    let label = whole(numbers, "number of an element")?;
-                    self.element(numbers, label, code, kind, |numbers| whole(numbers, "node of an element"))?;
+                    let label = read_label(numbers, "number of an element")?;
+                    self.element(numbers, label, code, kind, |numbers| {
+                        read_label(numbers, "node of an element")
+                    })?;
                 } else {
                     let label = numbers.size("number of an element")?;
                     self.element(numbers, label, code, kind, |numbers| numbers.size("node of an element"))?;
@@ -246,7 +251,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Blocks and members of a section; 4.1 has the least and greatest tags, too.
+    /// Reads the number of blocks and of members of a section; 4.1 has the smallest and largest tags, too.
     fn counts(&self, numbers: &mut Numbers) -> Result<[u64; 2], Error> {
         if self.version == Version::FourOne {
             return numbers.four_sizes().map(|[blocks, count, _, _]| [blocks, count]);
@@ -254,7 +259,7 @@ impl Reader {
         Ok([numbers.size("number of blocks")?, numbers.size("number of all")?])
     }
 
-    /// Dimension and tag of an entity; 4.0 has the tag first.
+    /// Reads dimension and tag of an entity; 4.0 has the tag first.
     fn entity(&self, numbers: &mut Numbers) -> Result<[i64; 2], Error> {
         if self.version == Version::Four {
             let tag = numbers.int("tag of an entity")?;
@@ -263,20 +268,20 @@ impl Reader {
         Ok([numbers.int("dimension of an entity")?, numbers.int("tag of an entity")?])
     }
 
-    /// An element, after its number.
+    /// Reads an element after its label.
     fn element(
         &mut self,
         numbers: &mut Numbers,
         label: u64,
         code: i64,
-        kind: Kind,
+        kind: ElementKind,
         node: impl Fn(&mut Numbers) -> Result<u64, Error>,
     ) -> Result<(), Error> {
         let mut nodes = [0; 20];
         for own in &mut nodes[..kind.node_count()] {
             *own = node(numbers)?;
         }
-        let more = MORE.iter().find(|more| more.0 == code).map_or(0, |more| more.1);
+        let more = EXTRA_NODES.iter().find(|more| more.0 == code).map_or(0, |more| more.1);
         for _ in 0..more {
             node(numbers)?;
         }
@@ -287,11 +292,11 @@ impl Reader {
             Some(shape) => all.extend(shape.gmsh().iter().map(|&place| nodes[place])),
             None => all.extend(&nodes[..kind.node_count()]),
         }
-        self.content.elements.push(Element { label, line: numbers.line(), kind, first });
+        self.content.elements.push(FileElement { label, line: numbers.line(), kind, first });
         Ok(())
     }
 
-    /// Elements of a physical group.
+    /// Adds an element to a physical group.
     fn add_to(
         &mut self,
         numbers: &Numbers,
@@ -313,11 +318,11 @@ impl Reader {
         Ok(())
     }
 
-    /// Node sets of the groups of points, curves and surfaces.
+    /// Builds node sets of the groups of points, curves and surfaces.
     fn name_nodes(&mut self, nodes: &Labels) {
-        let Content { elements, element_nodes, element_sets, node_sets, .. } = &mut self.content;
+        let FileContent { elements, element_nodes, element_sets, node_sets, .. } = &mut self.content;
         element_sets.retain(|name, places| {
-            let low = |kind: Kind| kind.solid().is_none();
+            let low = |kind: ElementKind| kind.solid().is_none();
             let members = places.iter().map(|place| &elements[*place as usize]);
             let set: Vec<u32> = members
                 .clone()
@@ -328,25 +333,27 @@ impl Reader {
             if !set.is_empty() {
                 node_sets.entry(name.clone()).or_default().extend(set);
             }
-            // of curves and points nothing else remains
-            members.into_iter().any(|element| !matches!(element.kind, Kind::Line | Kind::Line3 | Kind::Point))
+            // nothing else remains of curves and points
+            members.into_iter().any(|element| {
+                !matches!(element.kind, ElementKind::Line | ElementKind::Line3 | ElementKind::Point)
+            })
         });
     }
 }
 
-/// The kind of a type of elements.
-fn kind_of(numbers: &Numbers, code: i64) -> Result<Kind, Error> {
+/// Returns the kind of an element type.
+fn kind_of(numbers: &Numbers, code: i64) -> Result<ElementKind, Error> {
     KINDS.iter().find(|kind| kind.0 == code).map(|kind| kind.1).ok_or_else(|| {
         let pyramids = if matches!(code, 7 | 14 | 19) { " (pyramids are none)" } else { "" };
         let allowed = format!(
-            "1, 8 (lines), 2, 9 (triangles), 3, 16, 10 (quadrangles), 4, 11 (tetrahedra), 5, 17, 12 (hexahedra), \
-             6, 18, 13 (prisms), 15 (point){pyramids}; in Gmsh: Mesh.ElementOrder = 1 or 2"
+            "1, 8 (lines), 2, 9 (triangles), 3, 16, 10 (quadrangles), 4, 11 (tetrahedra), 5, 17, 12 \
+             (hexahedra), 6, 18, 13 (prisms), 15 (point){pyramids}; in Gmsh: Mesh.ElementOrder = 1 or 2"
         );
         numbers.error("type of elements", code, allowed)
     })
 }
 
-/// A place, after the number of a node.
+/// Reads a position, after the label of a node.
 fn place(numbers: &mut Numbers) -> Result<[f64; 3], Error> {
     let mut point = [0.0; 3];
     for x in &mut point {
@@ -358,8 +365,8 @@ fn place(numbers: &mut Numbers) -> Result<[f64; 3], Error> {
     Ok(point)
 }
 
-/// A number of a node or an element where it has four bytes.
-fn whole(numbers: &mut Numbers, what: &str) -> Result<u64, Error> {
+/// Reads a label of a node or an element stored in four bytes.
+fn read_label(numbers: &mut Numbers, what: &str) -> Result<u64, Error> {
     let number = numbers.int(what)?;
     u64::try_from(number).map_err(|_| numbers.error(what, number, "0 or more"))
 }

@@ -1,23 +1,24 @@
-//! Layers of elements, and groups that appear together.
+//! Layers of elements, and groups of elements that appear together.
 
 use crate::error::Error;
 use crate::mesh::Mesh;
 use polycore::numerics::range;
 
-/// Elements by layers, in the order of printing.
+/// Elements by layer, in printing order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layers {
     /// Elements of each layer, ascending.
     pub elements: Vec<Vec<u32>>,
-    /// What should be looked at.
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
 impl Layers {
-    /// Layers from the element sets `PREFIX1`, `PREFIX2`, … (`layer-` in a [`crate::mesh::Bar`]).
+    /// Collects layers from the element sets `PREFIX1`, `PREFIX2`, … (`layer-` in a [`crate::mesh::Bar`]).
     ///
     /// # Errors
-    /// No `PREFIX1`, a gap in the numbers, an empty set, or an element in two layers.
+    /// [`Error::Mesh`] without `PREFIX1`, for a gap in the numbers, an empty set, or an element in two
+    /// layers.
     pub fn from_sets(mesh: &Mesh, prefix: &str) -> Result<Self, Error> {
         let numbers = mesh.element_sets.keys().filter_map(|name| name.strip_prefix(prefix));
         let count = numbers.filter_map(|number| number.parse::<usize>().ok()).max().unwrap_or(0);
@@ -62,11 +63,12 @@ impl Layers {
         Ok(Self { elements, notes: Vec::new() })
     }
 
-    /// Layers by height: an element belongs to the layer in which its centre lies. `faces` are the z of the lower face of
-    /// the first layer and of the upper face of each, m; `elements` those that are printed.
+    /// Collects layers by height: an element belongs to the layer of its centre. `faces` are the z of the
+    /// lower face of the first layer and of the upper face of each, m; `elements` the printed ones.
     ///
     /// # Errors
-    /// Faces that do not ascend (a layer without thickness), a layer without an element, an element outside of all.
+    /// [`Error::Mesh`] for faces that do not ascend (a layer without thickness), a layer without elements,
+    /// and an element outside all layers.
     pub fn from_heights(mesh: &Mesh, elements: &[u32], faces: &[f64]) -> Result<Self, Error> {
         let named =
             |layer: usize| format!("layer {layer}, z from {} m to {} m", faces[layer - 1], faces[layer]);
@@ -90,7 +92,8 @@ impl Layers {
             let above = faces.partition_point(|face| *face <= z);
             if above == 0 || above == faces.len() {
                 return Err(Error::Mesh(format!(
-                    "element {element} at ({x:.6e}, {y:.6e}, {z:.6e}) m is in no layer; allowed: z from {} m to {} m",
+                    "element {element} at ({x:.6e}, {y:.6e}, {z:.6e}) m is in no layer; allowed: z from {} \
+                     m to {} m",
                     faces[0],
                     faces[faces.len() - 1]
                 )));
@@ -99,7 +102,7 @@ impl Layers {
             let heights = nodes.iter().map(|node| mesh.points[*node as usize][2]);
             let (low, high) = heights.fold((z, z), |(low, high), z| (low.min(z), high.max(z)));
             highest = highest.max(high - low);
-            // a hundredth of the layer is a rounded height
+            // tolerance of a hundredth of the layer, for rounded heights
             let slack = 0.01 * (faces[above] - faces[above - 1]);
             across += usize::from(low < faces[above - 1] - slack || high > faces[above] + slack);
         }
@@ -116,17 +119,18 @@ impl Layers {
         let mut notes = Vec::new();
         if across > 0 {
             notes.push(format!(
-                "{across} elements reach into a second layer: they belong to that of their centre"
+                "{across} elements reach into a second layer: each belongs to the layer of its centre"
             ));
         }
         Ok(Self { elements: layers, notes })
     }
 
-    /// [`Self::from_heights`] with layers of one height, from the lowest node of the elements to the highest; the last
-    /// layer ends there.
+    /// Collects layers of equal height, from the lowest to the highest node of the elements, where the last
+    /// layer ends.
     ///
     /// # Errors
-    /// A height that is not positive or that makes more layers than elements, and what [`Self::from_heights`] refuses.
+    /// [`Error::Parameter`] for a height that is not positive or gives more layers than elements, and errors
+    /// of [`Self::from_heights`].
     pub fn from_height(mesh: &Mesh, elements: &[u32], height: f64) -> Result<Self, Error> {
         let nodes = elements.iter().flat_map(|element| mesh.nodes(*element));
         let heights = nodes.map(|node| mesh.points[*node as usize][2]);
@@ -143,12 +147,12 @@ impl Layers {
     }
 }
 
-/// Elements that appear together, by time: those due within a `window`, s, at its end, so that nothing appears before
-/// it is printed; windows begin at the first time. With no window each time is its own. Elements at −∞ exist already,
-/// those at +∞ never appear.
+/// Groups elements that appear together, by time: those due within a `window`, s, appear at its end, so that
+/// nothing appears before it is printed; windows begin at the first time. A window of 0 keeps each time
+/// separate. Elements at −∞ exist already; those at +∞ never appear.
 ///
 /// # Errors
-/// A time or window that is not a number, a negative window.
+/// [`Error::Parameter`] for a time or window that is NaN, or a negative window.
 pub fn groups(activation: &[f64], window: f64) -> Result<Vec<(f64, Vec<u32>)>, Error> {
     if !(window >= 0.0 && window.is_finite()) {
         let allowed = "0 s or more".into();
@@ -164,7 +168,7 @@ pub fn groups(activation: &[f64], window: f64) -> Result<Vec<(f64, Vec<u32>)>, E
     let Some(first) = due.first().map(|due| due.0) else { return Ok(Vec::new()) };
     let mut groups: Vec<(f64, Vec<u32>)> = Vec::new();
     for (time, element) in due {
-        // the first time has a window of its own, or everything would be late by one
+        // the first time has its own window, otherwise everything would be late by one
         let end = if window == 0.0 { time } else { first + ((time - first) / window).ceil() * window };
         match groups.last_mut().filter(|group| group.0 == end) {
             Some(group) => group.1.push(element),
@@ -180,7 +184,7 @@ pub fn groups(activation: &[f64], window: f64) -> Result<Vec<(f64, Vec<u32>)>, E
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{Bar, Block, Grid, Split, Substrate};
+    use crate::mesh::{Bar, Block, CellSplit, Grid, Substrate};
 
     fn bar() -> Mesh {
         let substrate = Substrate { size: [0.03, 0.01], thickness: 1e-3, growth: 1.5 };
@@ -191,7 +195,7 @@ mod tests {
             elements_per_layer: 2,
             element_size: 1e-3,
             substrate: Some(substrate),
-            cells: Split::Hexahedra,
+            cells: CellSplit::Hexahedra,
         };
         bar.mesh().unwrap()
     }
@@ -210,7 +214,7 @@ mod tests {
     fn elements_across_layers_are_noted() {
         let block = Block { name: "brick".into(), lower: [0.0; 3], upper: [1.0; 3] };
         let grid = Grid::uniform([0.0; 3], [1.0; 3], [2, 2, 5]).unwrap();
-        let mesh = grid.blocks(&[block], Split::SixTetrahedra).unwrap();
+        let mesh = grid.blocks(&[block], CellSplit::SixTetrahedra).unwrap();
         let all: Vec<u32> = (0..mesh.element_count() as u32).collect();
         let layers = Layers::from_height(&mesh, &all, 0.2).unwrap();
         assert_eq!((layers.elements.len(), layers.notes.len()), (5, 0));
@@ -220,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_layer_is_named() {
+    fn invalid_layers_are_refused() {
         let mut mesh = bar();
         let printed = mesh.element_sets["bar"].clone();
         let text = |result: Result<Layers, Error>| result.unwrap_err().to_string();

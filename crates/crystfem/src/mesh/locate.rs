@@ -1,81 +1,83 @@
-//! Location of places in a mesh, for values between nodes.
+//! Location of points in a mesh, for interpolation.
 
 use super::Mesh;
-use crate::element::WIDE;
+use crate::element::MAX_ELEMENT_NODES;
 use crate::element::natural::{self, Natural};
-use crate::mesh::Shape;
+use crate::mesh::ElementShape;
 use nalgebra::{Matrix3, Vector3};
 use polycore::numerics::hexahedron;
 
-/// Natural coordinates, and distances over an element's diagonal, that count as none: a place on a node has its value.
-const NEAR: f64 = 1e-9;
-/// What is added around an element's box, over its largest edge, where lines are cut: above rounding, and above `NEAR`.
-const BOX: f64 = 1e-6;
-/// Iterations for the natural coordinates in a hexahedron; a parallelepiped needs two.
-const MOST_ITERATIONS: usize = 50;
-/// Part of an element by which a place may lie outside of the mesh.
-const OUTSIDE: f64 = 0.5;
+/// Tolerance in natural coordinates, and in distances over an element's diagonal: a point on a node has its
+/// value.
+const LOCATION_TOLERANCE: f64 = 1e-9;
+/// Enlargement of an element's box for cutting lines, over its longest edge: above rounding, and above
+/// `LOCATION_TOLERANCE`.
+const BOX_MARGIN: f64 = 1e-6;
+/// Limit on iterations for natural coordinates in a hexahedron; a parallelepiped needs two.
+const MAX_ITERATIONS: usize = 50;
+/// Largest distance outside the mesh, over the element's extent.
+const MAX_OUTSIDE: f64 = 0.5;
 
-/// A place in a mesh.
+/// A point in a mesh.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Place {
-    /// Nodes and their shape functions there, those that are not 0.
+pub struct LocatedPoint {
+    /// Nodes with their shape functions, if not 0.
     weights: Vec<(u32, f64)>,
-    /// Elements that hold it: one, or those that meet there.
+    /// Elements that contain the point: one, or all that meet there.
     elements: Vec<u32>,
-    /// Distance from the requested place, m; 0 inside the mesh.
+    /// Distance from the requested point, m; 0 inside the mesh.
     distance: f64,
 }
 
-impl Place {
-    /// Elements that hold it: one, or those that meet there.
+impl LocatedPoint {
+    /// Elements that contain the point: one, or all that meet there.
     pub fn elements(&self) -> &[u32] {
         &self.elements
     }
 
-    /// Distance from the requested place, m; 0 inside the mesh.
+    /// Distance from the requested point, m; 0 inside the mesh.
     pub fn distance(&self) -> f64 {
         self.distance
     }
 
-    /// Nodes with a weight.
+    /// Nodes with nonzero shape functions.
     pub fn nodes(&self) -> impl Iterator<Item = u32> {
         self.weights.iter().map(|pair| pair.0)
     }
 
-    /// Σ N_a u_a of a field over nodes; `None` where a node has no value.
+    /// Interpolates a field over nodes, Σ N_a u_a; `None` if a node has no value.
     pub fn value(&self, field: impl Fn(u32) -> Option<f64>) -> Option<f64> {
         self.weights.iter().map(|&(node, weight)| Some(weight * field(node)?)).sum()
     }
 }
 
 impl Mesh {
-    /// Returns whether a place, m, lies in an element or on its faces.
-    pub fn holds(&self, element: u32, at: [f64; 3]) -> bool {
+    /// Returns true if a point, m, lies in an element or on its faces.
+    pub fn contains(&self, element: u32, at: [f64; 3]) -> bool {
         self.shapes_at(element, at).is_some()
     }
 
-    /// Shape functions of an element's nodes at a place, m, in it or on its faces; `None` outside.
-    pub fn shapes_at(&self, element: u32, at: [f64; 3]) -> Option<[f64; WIDE]> {
-        let (corners, nodes) = self.positions::<WIDE>(element);
+    /// Shape functions of an element's nodes at a point, m; `None` outside the element and its faces.
+    pub fn shapes_at(&self, element: u32, at: [f64; 3]) -> Option<[f64; MAX_ELEMENT_NODES]> {
+        let (corners, nodes) = self.positions::<MAX_ELEMENT_NODES>(element);
         let (weights, distance, rounding) = near(corners.get(..nodes).filter(|list| !list.is_empty())?, at)?;
         (distance <= rounding).then_some(weights)
     }
 
-    /// The elements around a place, m, and the shape functions there. A place outside, but no further than half an
-    /// element's extent along each axis, is moved into the nearest element; `None` beyond.
-    pub fn locate(&self, at: [f64; 3]) -> Option<Place> {
+    /// Locates a point, m. A point outside, by at most half an element's extent along each axis, is moved
+    /// into the nearest element; `None` beyond.
+    pub fn locate(&self, at: [f64; 3]) -> Option<LocatedPoint> {
         self.locate_in(0..self.element_count() as u32, at)
     }
 
-    /// Where points in order along the line from `a` to `b` lie; `None` outside of the mesh.
-    pub fn locate_along(&self, a: [f64; 3], b: [f64; 3], points: &[[f64; 3]]) -> Vec<Option<Place>> {
+    /// Locates points in order along the line from `a` to `b`; `None` for points outside the mesh.
+    pub fn locate_along(&self, a: [f64; 3], b: [f64; 3], points: &[[f64; 3]]) -> Vec<Option<LocatedPoint>> {
         let along = [0, 1, 2].map(|d| b[d] - a[d]);
         let square: f64 = along.iter().map(|x| x * x).sum();
-        // the part of the line in each element's box, a little larger
+        // interval of the line in each element's slightly enlarged box
         let part = |element: u32| {
             let [low, high] = self.bounds_of(&[element])?;
-            let around = BOX * (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
+            let around = BOX_MARGIN * (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
             let (mut first, mut last) = (f64::NEG_INFINITY, f64::INFINITY);
             for d in 0..3 {
                 let ends = [low[d] - around - a[d], high[d] + around - a[d]];
@@ -99,7 +101,7 @@ impl Mesh {
                 open.push(part);
             }
             open.retain(|part| part.1 >= here);
-            // in the order of all elements, as `locate` tries them
+            // in the order of all elements, like `locate`
             open.sort_unstable_by_key(|part| part.2);
             let place = self.locate_in(open.iter().map(|part| part.2), *at)?;
             (place.distance == 0.0).then_some(place)
@@ -107,10 +109,10 @@ impl Mesh {
         points.iter().map(locate).collect()
     }
 
-    fn locate_in(&self, elements: impl Iterator<Item = u32>, at: [f64; 3]) -> Option<Place> {
-        let mut found: Vec<(u32, [f64; WIDE], f64, f64)> = Vec::new();
+    fn locate_in(&self, elements: impl Iterator<Item = u32>, at: [f64; 3]) -> Option<LocatedPoint> {
+        let mut found: Vec<(u32, [f64; MAX_ELEMENT_NODES], f64, f64)> = Vec::new();
         for number in elements {
-            let (corners, nodes) = self.positions::<WIDE>(number);
+            let (corners, nodes) = self.positions::<MAX_ELEMENT_NODES>(number);
             let corners = &corners[..nodes];
             if let Some((weights, distance, rounding)) = near(corners, at) {
                 found.push((number, weights, distance, rounding));
@@ -118,7 +120,7 @@ impl Mesh {
         }
         let &(nearest, weights, distance, rounding) = found.iter().min_by(|a, b| a.2.total_cmp(&b.2))?;
         let meets = |(_, _, other, rounding): &&(u32, _, f64, f64)| *other <= distance + rounding;
-        Some(Place {
+        Some(LocatedPoint {
             weights: self
                 .nodes(nearest)
                 .iter()
@@ -132,46 +134,47 @@ impl Mesh {
     }
 }
 
-/// Shape functions at the nearest place in an element, how far that is, and what of it is rounding, m; `None` of a place
-/// further outside than half of its box.
-fn near(corners: &[[f64; 3]], at: [f64; 3]) -> Option<([f64; WIDE], f64, f64)> {
+/// Shape functions at the nearest point in an element, the distance to it and the rounding error of that, m;
+/// `None` for a point outside by more than half of the element's box.
+fn near(corners: &[[f64; 3]], at: [f64; 3]) -> Option<([f64; MAX_ELEMENT_NODES], f64, f64)> {
     let near = (0..3).all(|d| {
         let ends = corners.iter().map(|corner| corner[d]);
         let (low, high) = (ends.clone().fold(f64::MAX, f64::min), ends.fold(f64::MIN, f64::max));
-        let around = OUTSIDE * (high - low);
+        let around = MAX_OUTSIDE * (high - low);
         (low - around..=high + around).contains(&at[d])
     });
     if !near {
         return None;
     }
-    let weights = match (corners.len(), Shape::of(corners.len())) {
-        (8, _) => in_hexahedron(corners, at),
-        (4, _) => in_tetrahedron(corners, at),
-        (_, shape) => in_other(shape?, corners, at),
+    let weights = match (corners.len(), ElementShape::with_nodes(corners.len())) {
+        (8, _) => hexahedron_shapes(corners, at),
+        (4, _) => tetrahedron_shapes(corners, at),
+        (_, shape) => general_shapes(shape?, corners, at),
     };
     let origin = Vector3::from(corners[0]);
     let offset = |corner: &[f64; 3]| Vector3::from(*corner) - origin;
     let reached: Vector3<f64> = corners.iter().zip(weights).map(|(c, weight)| weight * offset(c)).sum();
     let diagonal = corners.iter().map(|corner| offset(corner).norm()).fold(0.0, f64::max);
-    Some((weights, (offset(&at) - reached).norm(), NEAR * diagonal))
+    Some((weights, (offset(&at) - reached).norm(), LOCATION_TOLERANCE * diagonal))
 }
 
-/// Shape functions at natural coordinates, which are taken to the nearest in the element.
-fn of_hexahedron(natural: Vector3<f64>) -> [f64; WIDE] {
-    // exact at the ends: a node has the weight 1, and those across a face have 0
-    let natural = natural.map(|x| if x.abs() > 1.0 - NEAR { x.signum() } else { x });
-    let mut weights = [0.0; WIDE];
+/// Shape functions of a hexahedron at natural coordinates, clamped to the element.
+fn trilinear_shapes(natural: Vector3<f64>) -> [f64; MAX_ELEMENT_NODES] {
+    // exact at the ends: a node has weight 1, and those across a face have 0
+    let natural = natural.map(|x| if x.abs() > 1.0 - LOCATION_TOLERANCE { x.signum() } else { x });
+    let mut weights = [0.0; MAX_ELEMENT_NODES];
     weights[..8].copy_from_slice(&hexahedron::shapes(natural.into()));
     weights
 }
 
-/// Of wedges and second-order elements, by Newton's method from the middle; natural coordinates are taken to the nearest in
-/// the element. Close to a curved face, the nearest place is that of the nearest natural coordinates.
-fn in_other(shape: Shape, corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
+/// Shape functions of wedges and second-order elements, by Newton's method from the centre, with natural
+/// coordinates clamped to the element. Near a curved face the nearest point is that of the nearest natural
+/// coordinates.
+fn general_shapes(shape: ElementShape, corners: &[[f64; 3]], at: [f64; 3]) -> [f64; MAX_ELEMENT_NODES] {
     let offset = |place: [f64; 3]| Vector3::from(place) - Vector3::from(corners[0]);
     let mut place = Vector3::from(natural::middle(shape));
-    for _ in 0..MOST_ITERATIONS {
-        let natural = Natural::at(shape, place.into());
+    for _ in 0..MAX_ITERATIONS {
+        let natural = Natural::new(shape, place.into());
         let (mut left, mut jacobian) = (offset(at), Matrix3::<f64>::zeros());
         for (a, corner) in corners.iter().enumerate() {
             left -= natural.shapes[a] * offset(*corner);
@@ -183,13 +186,13 @@ fn in_other(shape: Shape, corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
             break;
         }
     }
-    // exact at the ends, so that a node has the weight 1
-    let ends = |x: f64| if x.abs() > 1.0 - NEAR { x.signum() } else { x };
-    // so many barycentric coordinates, those below 0 taken to 0
+    // exact at the ends, so that a node has weight 1
+    let ends = |x: f64| if x.abs() > 1.0 - LOCATION_TOLERANCE { x.signum() } else { x };
+    // barycentric coordinates, clamped at 0
     let simplex = |count: usize, place: Vector3<f64>| {
         let mut own = [1.0 - place.iter().take(count).sum::<f64>(), place[0], place[1], place[2]];
         own[count + 1..].fill(0.0);
-        let own = own.map(|x| if x > NEAR { x } else { 0.0 });
+        let own = own.map(|x| if x > LOCATION_TOLERANCE { x } else { 0.0 });
         let sum: f64 = own.iter().sum();
         own.map(|x| x / sum)
     };
@@ -204,14 +207,14 @@ fn in_other(shape: Shape, corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
             Vector3::new(r, s, ends(place[2]))
         }
     };
-    Natural::at(shape, place.into()).shapes
+    Natural::new(shape, place.into()).shapes
 }
 
-/// By Newton's method from the middle: x(ξ) = Σ N_a(ξ) x_a.
-fn in_hexahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
+/// Inverts x(ξ) = Σ N_a(ξ) x_a by Newton's method from the centre.
+fn hexahedron_shapes(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; MAX_ELEMENT_NODES] {
     let offset = |place: [f64; 3]| Vector3::from(place) - Vector3::from(corners[0]);
     let mut natural = Vector3::<f64>::zeros();
-    for _ in 0..MOST_ITERATIONS {
+    for _ in 0..MAX_ITERATIONS {
         let (mut left, mut jacobian) = (offset(at), Matrix3::<f64>::zeros());
         let (shapes, slopes) = (hexahedron::shapes(natural.into()), hexahedron::slopes(natural.into()));
         for ((corner, shape), slope) in corners.iter().zip(shapes).zip(slopes) {
@@ -219,24 +222,24 @@ fn in_hexahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
             jacobian += offset(*corner) * Vector3::from(slope).transpose();
         }
         let Some(step) = jacobian.try_inverse().map(|inverse| inverse * left) else { break };
-        // far outside of a distorted element the map folds: no further than a neighbour's far side
+        // far outside a distorted element the map folds: stay within the far side of a neighbour
         natural = (natural + step).map(|x| x.clamp(-3.0, 3.0));
         if step.amax() <= 1e-14 {
             break;
         }
     }
-    of_hexahedron(natural)
+    trilinear_shapes(natural)
 }
 
-/// Barycentric coordinates, those below 0 taken to 0.
-fn in_tetrahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
+/// Barycentric coordinates, clamped at 0.
+fn tetrahedron_shapes(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; MAX_ELEMENT_NODES] {
     let offset = |place: [f64; 3]| Vector3::from(place) - Vector3::from(corners[0]);
     let edges = Matrix3::from_columns(&[offset(corners[1]), offset(corners[2]), offset(corners[3])]);
     let natural = edges.try_inverse().unwrap_or_default() * offset(at);
-    let mut weights = [0.0; WIDE];
+    let mut weights = [0.0; MAX_ELEMENT_NODES];
     weights[0] = 1.0 - natural.sum();
     weights[1..4].copy_from_slice(natural.as_slice());
-    let weights = weights.map(|weight| if weight > NEAR { weight } else { 0.0 });
+    let weights = weights.map(|weight| if weight > LOCATION_TOLERANCE { weight } else { 0.0 });
     let sum: f64 = weights.iter().sum();
     weights.map(|weight| weight / sum)
 }
@@ -244,7 +247,7 @@ fn in_tetrahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{Block, Grid, Split};
+    use crate::mesh::{Block, CellSplit, Grid};
 
     fn meshes() -> [Mesh; 7] {
         let grid = Grid::uniform([0.0; 3], [3.0, 2.0, 1.0], [5, 3, 2]).unwrap();
@@ -253,7 +256,7 @@ mod tests {
         let distorted = hexahedra.distorted(0.05).unwrap();
         let blocks = [block];
         let [tetrahedra, wedges] =
-            [Split::FiveTetrahedra, Split::Wedges].map(|split| grid.blocks(&blocks, split).unwrap());
+            [CellSplit::FiveTetrahedra, CellSplit::Wedges].map(|split| grid.blocks(&blocks, split).unwrap());
         let others = [hexahedra.clone(), tetrahedra.clone(), wedges.distorted(0.02).unwrap()];
         let [h20, t10, w15] = others.map(Mesh::second_order);
         [hexahedra, distorted, tetrahedra, wedges, h20, t10, w15]
@@ -263,7 +266,7 @@ mod tests {
         1.0 + 2.0 * x - 3.0 * y + 4.0 * z
     }
 
-    /// Linear fields come back anywhere, and at a node its value to the last bit, held by all elements there.
+    /// Linear fields are exact anywhere, at nodes to the last bit, with all elements there.
     #[test]
     fn linear_fields_are_exact() {
         for mesh in meshes() {
@@ -293,9 +296,10 @@ mod tests {
         }
     }
 
-    /// Along lines through nodes, in faces, oblique and past the mesh: the places of `locate`, elements included.
+    /// Points along lines through nodes, in faces, oblique and past the mesh agree with `locate`, elements
+    /// included.
     #[test]
-    fn lines_find_what_single_places_find() {
+    fn lines_agree_with_single_points() {
         for mesh in meshes() {
             for (a, b) in [
                 ([0.0; 3], [3.0, 2.0, 1.0]),

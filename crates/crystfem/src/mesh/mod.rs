@@ -1,4 +1,4 @@
-//! Meshes of hexahedra, tetrahedra and wedges: structured ones, files, quality, outer surfaces, layers.
+//! Meshes of hexahedra, tetrahedra and wedges: structured meshes, files, quality, outer surfaces, layers.
 
 pub mod abaqus;
 mod bar;
@@ -7,10 +7,10 @@ mod geometry;
 pub mod gmsh;
 pub mod layers;
 mod locate;
-mod order;
 pub mod path;
 pub mod quality;
 mod read;
+mod second_order;
 mod split;
 pub mod stl;
 mod structured;
@@ -24,29 +24,29 @@ use nalgebra::Vector3;
 
 use crate::error::Error;
 
-pub use crate::shape::{Cell, HEXAHEDRON_SIDES, Shape, TETRAHEDRON_SIDES};
+pub use crate::shape::{Cell, ElementShape, HEXAHEDRON_SIDES, TETRAHEDRON_SIDES};
 pub use bar::{Bar, Substrate};
 pub use file_mesh::ReadMesh;
 pub(crate) use geometry::box_around;
-pub use locate::Place;
+pub use locate::LocatedPoint;
 pub use read::read;
-pub use split::Split;
+pub use split::CellSplit;
 pub use structured::{Block, Grid, graded};
 pub use tube::Tube;
 pub use voxels::{RATIOS, Voxels};
 
-/// A face of an element: the element's number and the side, 0–5 of a hexahedron, 0–3 of a tetrahedron or 0–4 of a wedge,
-/// numbered as in Abaqus (S1 is side 0).
+/// A face of an element: the element's index and the side, 0–5 of a hexahedron, 0–3 of a tetrahedron or 0–4
+/// of a wedge, numbered as in Abaqus (S1 is side 0).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Face {
-    /// Element: 8-node hexahedra first, 4-node tetrahedra after them, then all others.
+    /// Element: 8-node hexahedra first, then 4-node tetrahedra, then all others.
     pub element: u32,
     /// Side.
     pub side: u8,
 }
 
-/// A mesh. Elements are numbered 8-node hexahedra first, then 4-node tetrahedra, then the others; nodes of an element are in
-/// the order of Abaqus ([`Shape`]).
+/// A mesh. Elements are numbered 8-node hexahedra first, then 4-node tetrahedra, then the others; nodes of an
+/// element are in the order of Abaqus ([`ElementShape`]).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Positions of the nodes, m.
@@ -65,10 +65,10 @@ pub struct Mesh {
     pub surfaces: BTreeMap<String, Vec<Face>>,
 }
 
-/// Sides of a box that bounds a mesh and the names of the surfaces on them: x−, x+, y−, y+, z−, z+.
+/// Sides of the bounding box of a mesh, as names of surfaces: x−, x+, y−, y+, z−, z+.
 pub const BOX_SIDES: [&str; 6] = ["left", "right", "front", "back", "bottom", "top"];
 
-/// Nodes of a face: three or four corners, anticlockwise seen from outside, then the nodes on the middles of the edges of a
+/// Nodes of a face: three or four corners, anticlockwise seen from outside, then the mid-edge nodes of a
 /// second-order element, each after its first corner. Dereferences to a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FaceNodes {
@@ -83,7 +83,7 @@ impl FaceNodes {
         &self.nodes[..usize::from(count)]
     }
 
-    /// Sorted corners, the rest [`u32::MAX`]: the same from either side.
+    /// Sorted corners, padded with [`u32::MAX`]: the same from either side.
     pub(crate) fn key(&self) -> [u32; 4] {
         let corners = self.corners();
         let mut key = [u32::MAX; 4];
@@ -101,7 +101,7 @@ impl std::ops::Deref for FaceNodes {
     }
 }
 
-/// Elements that are axis-parallel bricks, by their shape: elements of one shape share their matrices.
+/// Shapes of elements that are axis-parallel bricks; elements of the same shape share their matrices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bricks {
     /// Edge lengths along x, y, z of each shape, m, in order of first use.
@@ -116,26 +116,26 @@ impl Mesh {
         self.hexahedra.len() + self.tetrahedra.len() + self.others.len()
     }
 
-    /// An element that is neither an 8-node hexahedron nor a 4-node tetrahedron.
+    /// Returns a wedge or a second-order element.
     fn other(&self, element: usize) -> Option<&Cell> {
         self.others.get(element.checked_sub(self.hexahedra.len() + self.tetrahedra.len())?)
     }
 
-    /// The type of an element; that of a tetrahedron where there is no such element.
-    pub fn shape(&self, element: u32) -> Shape {
+    /// Type of an element; tetrahedron for an index out of range.
+    pub fn shape(&self, element: u32) -> ElementShape {
         let element = element as usize;
         match element < self.hexahedra.len() {
-            true => Shape::Hexahedron,
-            false => self.other(element).map_or(Shape::Tetrahedron, |cell| cell.shape),
+            true => ElementShape::Hexahedron,
+            false => self.other(element).map_or(ElementShape::Tetrahedron, |cell| cell.shape),
         }
     }
 
-    /// Returns whether some element is of second order.
+    /// Returns true if an element is of second order.
     pub fn is_second_order(&self) -> bool {
         self.others.iter().any(|cell| cell.shape.is_second_order())
     }
 
-    /// Nodes of an element; empty where there is no such element.
+    /// Nodes of an element; empty for an index out of range.
     pub fn nodes(&self, element: u32) -> &[u32] {
         let element = element as usize;
         match self.hexahedra.get(element) {
@@ -147,7 +147,7 @@ impl Mesh {
         }
     }
 
-    /// Corners of an element; empty where there is no such element.
+    /// Corners of an element; empty for an index out of range.
     pub fn corners(&self, element: u32) -> &[u32] {
         let nodes = self.nodes(element);
         if nodes.len() > 8 { &nodes[..self.shape(element).corners()] } else { nodes }
@@ -163,7 +163,7 @@ impl Mesh {
         (0..self.side_count(element)).map(move |side| Face { element, side })
     }
 
-    /// Nodes of a face, anticlockwise seen from outside; empty where there is no such face.
+    /// Nodes of a face, anticlockwise seen from outside; empty if there is no such face.
     pub fn face_nodes(&self, face: Face) -> FaceNodes {
         let (all, shape) = (self.nodes(face.element), self.shape(face.element));
         let ring = if all.is_empty() { &[] } else { shape.side(face.side) };
@@ -177,25 +177,25 @@ impl Mesh {
         FaceNodes { nodes, count }
     }
 
-    /// Mean of an element's nodes, m.
+    /// Mean position of an element's nodes, m.
     pub fn centre(&self, element: u32) -> [f64; 3] {
         let nodes = self.nodes(element);
         let sum = nodes.iter().fold(Vector3::zeros(), |sum, node| sum + self.point(*node));
         (sum / nodes.len() as f64).into()
     }
 
-    /// Corners of the smallest box around all nodes, m; `None` without nodes.
+    /// Corners of the bounding box of all nodes, m; `None` without nodes.
     pub fn bounds(&self) -> Option<[[f64; 3]; 2]> {
         box_around(self.points.iter().copied())
     }
 
-    /// Lower and upper corner of the box around some elements, m; `None` of none.
+    /// Corners of the bounding box of some elements, m; `None` without any.
     pub fn bounds_of(&self, elements: &[u32]) -> Option<[[f64; 3]; 2]> {
         let nodes = elements.iter().flat_map(|&element| self.nodes(element));
         box_around(nodes.map(|&node| self.points[node as usize]))
     }
 
-    /// Nodes on faces, sorted, each once.
+    /// Nodes on faces, sorted, without duplicates.
     pub fn nodes_of(&self, faces: &[Face]) -> Vec<u32> {
         let mut nodes: Vec<u32> = faces.iter().flat_map(|face| self.face_nodes(*face).to_vec()).collect();
         nodes.sort_unstable();
@@ -203,16 +203,16 @@ impl Mesh {
         nodes
     }
 
-    /// The shapes of the elements if all are axis-parallel bricks, numbered from the corner with the least coordinates;
-    /// `None` otherwise. Edges count as parallel, and shapes as one, within 1e-9 of the shortest edge: element matrices
-    /// then agree to that, far below a discretisation error.
+    /// Shapes of the elements if all are axis-parallel bricks, numbered from the corner with the smallest
+    /// coordinates; `None` otherwise. Edges count as parallel, and shapes as equal, within 1e-9 of the
+    /// shortest edge: element matrices then agree to that, far below a discretization error.
     pub fn bricks(&self) -> Option<Bricks> {
         if !(self.tetrahedra.is_empty() && self.others.is_empty()) {
             return None;
         }
         let mut sizes: Vec<[f64; 3]> = Vec::new();
         let mut shape = Vec::with_capacity(self.hexahedra.len());
-        // shapes by their size in units that differ by 1e-9 between neighbours: most elements repeat the last shape
+        // shapes by size in units of relative 1e-9: most elements repeat the previous shape
         let mut known: BTreeMap<[i64; 3], u32> = BTreeMap::new();
         let mut last = u32::MAX;
         for element in 0..self.hexahedra.len() as u32 {
@@ -248,11 +248,12 @@ impl Mesh {
         fits.then(|| size.into())
     }
 
-    /// The same mesh with its inner nodes moved, for patch tests: by `amplitude` times the box along x, −0.7 of that
-    /// along y and 0.5 along z, times ∏ sin(π ξ_d) with ξ from 0 to 1 through the box; the box keeps its shape.
+    /// Returns the mesh with inner nodes moved, for patch tests: by `amplitude` times the box along x, −0.7
+    /// of that along y and 0.5 along z, times ∏ sin(π ξ_d) with ξ from 0 to 1 through the box, which keeps
+    /// its shape.
     ///
     /// # Errors
-    /// An amplitude whose deformation could invert an element: above 0.2 in size.
+    /// [`Error::Parameter`] for an amplitude above 0.2, which could invert an element.
     pub fn distorted(&self, amplitude: f64) -> Result<Self, Error> {
         // det F = 1 + amplitude (1, −0.7, 0.5)·∇∏ in box units, |∇∏| ≤ π: positive below 0.24
         if amplitude.is_nan() || amplitude.abs() > 0.2 {
@@ -298,7 +299,7 @@ mod tests {
                 let corner = mesh.point(nodes[0]);
                 let normal = (mesh.point(nodes[1]) - corner).cross(&(mesh.point(nodes[2]) - corner));
                 assert!(normal.dot(&(corner - centre)) > 0.0, "side {side}");
-                // each node on an edge lies between the corner before it and the next
+                // each mid-edge node lies between the corner before it and the next
                 let corners = nodes.corners();
                 for (k, middle) in nodes[corners.len()..].iter().enumerate() {
                     let ends = mesh.point(corners[k]) + mesh.point(corners[(k + 1) % corners.len()]);
@@ -309,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_exist_has_no_nodes() {
+    fn missing_elements_have_no_nodes() {
         let mesh = Grid::uniform([0.0; 3], [1.0; 3], [1, 1, 1]).unwrap().mesh("brick").unwrap();
         assert!(mesh.nodes(1).is_empty());
         assert!(mesh.face_nodes(Face { element: 0, side: 6 }).is_empty());
@@ -318,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn bricks_are_told_by_shape() {
+    fn bricks_are_grouped_by_shape() {
         // lines at k/7 differ in their last bits; the second half along x is twice as long
         let mut grid = Grid::uniform([0.0; 3], [1.0; 3], [7, 7, 7]).unwrap();
         for x in &mut grid.lines[0] {

@@ -1,4 +1,4 @@
-//! Printing along a path: moves of a nozzle, and when each element is covered.
+//! Tool paths: moves of a nozzle, and the times at which elements are covered.
 
 use std::path::Path;
 
@@ -7,9 +7,10 @@ use std::collections::BTreeMap;
 use crate::error::Error;
 use crate::mesh::Mesh;
 
-/// Diameter of a filament unless a scene or a file says otherwise, m.
+/// Default filament diameter, m.
 pub const FILAMENT: f64 = 1.75e-3;
 
+mod comments;
 mod cover;
 mod csv;
 mod deposit;
@@ -19,15 +20,14 @@ mod gcode;
 mod height;
 mod limits;
 mod line;
-mod place;
-mod plan;
+mod motion_planning;
+mod placement;
 mod printer;
-mod remark;
 mod summary;
 
-pub use cover::{Activation, Bead};
+pub use cover::{ActivationTimes, Bead};
 pub use csv::read_csv;
-pub use deposit::{Cells, Deposit};
+pub use deposit::{CellSettings, Deposit};
 pub use feature::FAMILIES;
 pub use flow::stadium_width;
 pub use gcode::{parse, read_gcode};
@@ -35,41 +35,41 @@ pub use gcode::{parse, read_gcode};
 /// A straight move of the nozzle at constant velocity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Move {
-    /// Where it begins, m.
+    /// Start, m.
     pub from: [f64; 3],
-    /// Where it ends, m: z is the upper face of what is laid down.
+    /// End, m; z is the upper face of the bead.
     pub to: [f64; 3],
-    /// When it begins, s.
+    /// Start time, s.
     pub start: f64,
-    /// When it ends, s.
+    /// End time, s.
     pub end: f64,
-    /// Whether material is laid down.
+    /// True if material is deposited.
     pub prints: bool,
-    /// Length of filament that is fed along it, m; 0 where that is not known.
+    /// Length of filament fed, m; 0 if unknown.
     pub fed: f64,
-    /// Height of its bead, m; 0 where the file does not tell.
+    /// Height of the bead, m; 0 if the file does not state it.
     pub height: f64,
-    /// What it is part of: an index into [`ToolPath::features`].
+    /// Feature, an index into [`ToolPath::features`].
     pub feature: u16,
-    /// Which tool moves.
+    /// Tool.
     pub tool: u16,
     /// Line of the file.
     pub line: u32,
 }
 
-/// A straight motion of X, Y, Z and filament, m, at F.
+/// Straight motion of X, Y, Z and filament, m, at feed rate F.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Motion {
+struct MachineMotion {
     delta: [f64; 4],
     start: f64,
     end: f64,
-    /// An index into the limits of the file.
+    /// Index into the limits of the file.
     limits: u32,
-    /// Whether the machine stood before it.
+    /// True if the machine stopped before it.
     stop: bool,
 }
 
-impl Motion {
+impl MachineMotion {
     fn length(&self) -> f64 {
         let across = self.delta[..3].iter().map(|x| x * x).sum::<f64>().sqrt();
         if across > 0.0 { across } else { self.delta[3].abs() }
@@ -83,16 +83,16 @@ impl Move {
     }
 }
 
-/// What a file sets besides places.
+/// A setting of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Setting {
     /// Temperature of the nozzle of the selected tool, K.
     Nozzle,
     /// Temperature of the bed, K.
     Bed,
-    /// The bed is switched off.
+    /// Bed heater off.
     BedOff,
-    /// Speed of the fan, 0 to 1.
+    /// Fan speed, 0 to 1.
     Fan,
 }
 
@@ -101,48 +101,49 @@ pub enum Setting {
 pub struct Command {
     /// Time, s.
     pub time: f64,
-    /// What is set.
+    /// Setting.
     pub setting: Setting,
-    /// To what.
+    /// Value.
     pub value: f64,
 }
 
-/// Moves in the order of time.
+/// A tool path: moves in the order of time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ToolPath {
-    /// The moves.
+    /// Moves.
     pub moves: Vec<Move>,
     /// Temperatures and the fan, in the order of time.
     pub commands: Vec<Command>,
-    /// Waits and filament alone after the last move, s.
+    /// Dwells and feed-only motions after the last move, s.
     pub rest: f64,
-    /// What was passed over.
+    /// Notes on ignored input.
     pub notes: Vec<String>,
-    /// Names of features; that of what has no name is empty.
+    /// Names of features; empty for an unnamed one.
     pub features: Vec<String>,
-    /// Diameter of the filament that the file states, m.
+    /// Filament diameter stated in the file, m.
     pub filament: Option<f64>,
-    /// Whether E is a volume (M200), which this diameter makes a length.
+    /// True if E is a volume (M200), converted to a length by this diameter.
     pub volumetric: bool,
-    /// Layers that the file marks; 0 where it marks none.
+    /// Number of layers marked in the file; 0 without marks.
     pub layers: usize,
-    /// How long the slicer says that the print takes, s, from the move `first` on.
+    /// Print time estimated by the slicer from the move `first` on, s.
     pub estimate: Option<f64>,
     first: usize,
-    /// All motions, filament alone too.
-    motions: Vec<Motion>,
-    /// Limits, in the order of the file.
+    /// All motions, including feed-only ones.
+    motions: Vec<MachineMotion>,
+    /// Machine limits, in the order of the file.
     limits: Vec<limits::Limits>,
 }
 
 impl ToolPath {
-    /// A bar printed in lines along x, there and back: from `lower` to `upper` in x and y, lines of the bead's width (less
-    /// where they would not fill the bar evenly), `layers` of the bead's height upwards from z = 0, `velocity` while
-    /// printing and between lines, m/s; each layer begins `interval` s after the one before.
+    /// Generates a bar printed in alternating lines along x: from `lower` to `upper` in x and y, with lines
+    /// of the bead's width (reduced to fill the bar evenly), `layers` of the bead's height upwards from z =
+    /// 0, `velocity` while printing and between lines, m/s; each layer begins `interval` s after the one
+    /// before.
     ///
     /// # Errors
-    /// Extents, bead, velocity or number of layers that are not positive; an interval shorter than a layer takes; more
-    /// than 10⁸ lines.
+    /// [`Error::Parameter`] for extents, bead, velocity or number of layers that are not positive, an
+    /// interval shorter than a layer takes, and more than 10⁸ lines.
     pub fn raster(
         [lower, upper]: [[f64; 2]; 2],
         bead: Bead,
@@ -166,7 +167,7 @@ impl ToolPath {
                 return parameter(name, found, "positive and finite");
             }
         }
-        // lines that fit to a billionth fit
+        // tolerance of a billionth on the number of lines
         let lines = (extent[1] / bead.width - 1e-9).ceil().max(1.0);
         let count = lines * layers as f64;
         if count > 1e8 {
@@ -187,7 +188,7 @@ impl ToolPath {
             let z = (layer + 1) as f64 * bead.height;
             for row in 0..lines as usize {
                 let y = lower[1] + (row as f64 + 0.5) * spacing;
-                // the nozzle waits, if it must, on its way to the layer
+                // the nozzle waits, if necessary, on its way to the layer
                 let start = layer as f64 * interval + row as f64 * (line + step);
                 let ends = if row % 2 == 0 { [lower[0], upper[0]] } else { [upper[0], lower[0]] };
                 let [from, to] = ends.map(|x| [x, y, z]);
@@ -208,23 +209,28 @@ impl ToolPath {
         Ok(Self { moves, ..Self::default() })
     }
 
-    /// When everything ends, s: the last move and what comes after it.
+    /// End of the last move and of the dwells after it, s.
     pub fn duration(&self) -> f64 {
         self.moves.last().map_or(0.0, |last| last.end) + self.rest
     }
 
-    /// When each of the elements is covered by the bead, see [`Activation`].
+    /// Times at which the bead covers elements, see [`ActivationTimes`].
     ///
     /// # Errors
-    /// A bead without width or height, an element that does not exist, a path that prints nothing, places or times that
-    /// are not finite.
-    pub fn activation(&self, mesh: &Mesh, elements: &[u32], bead: Bead) -> Result<Activation, Error> {
+    /// [`Error::Parameter`] or [`Error::Mesh`] for a bead without width or height, an element out of range, a
+    /// path that prints nothing, and positions or times that are not finite.
+    pub fn activation_times(
+        &self,
+        mesh: &Mesh,
+        elements: &[u32],
+        bead: Bead,
+    ) -> Result<ActivationTimes, Error> {
         cover::activation(self, mesh, elements, bead)
     }
 }
 
-/// Names and how often they came, most often first, twenty at most.
-fn told(counts: &mut BTreeMap<String, usize>) -> String {
+/// Lists names with their counts, most frequent first, at most twenty.
+fn list_counts(counts: &mut BTreeMap<String, usize>) -> String {
     let mut all: Vec<(String, usize)> = std::mem::take(counts).into_iter().collect();
     all.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
     let more = all.len().saturating_sub(20);

@@ -1,52 +1,53 @@
-//! Checks of a mesh before anything is computed on it.
+//! Quality checks of a mesh.
 
 use nalgebra::Vector3;
-use polycore::numerics::Sets;
+use polycore::numerics::DisjointSets;
 use rayon::prelude::*;
 
-use crate::element::natural::{Natural, Rule, corner};
+use crate::element::natural::{Natural, QuadratureRule, corner};
 use crate::error::Error;
-use crate::mesh::surface::Surface;
+use crate::mesh::surface::OuterSurface;
 use crate::mesh::{Face, Mesh};
 
-/// Least scaled Jacobian: det of the three edges at a corner over the product of their lengths, 1 for a brick, 1/√2 for
-/// the corner of a regular tetrahedron. Gradients on an element grow with its inverse: below this bound they lose six of
-/// fifteen digits.
-pub const LEAST_SCALED_JACOBIAN: f64 = 1e-6;
+/// Smallest accepted scaled Jacobian: det of the three edges at a corner over the product of their lengths, 1
+/// for a brick, 1/√2 for the corner of a regular tetrahedron. Gradients on an element grow with its inverse:
+/// below this bound they lose six of fifteen digits.
+pub const MIN_SCALED_JACOBIAN: f64 = 1e-6;
 
-/// Below this a note is made: the angle between an edge and the plane of two others is under 3°.
+/// Scaled Jacobian below which a note is made: an angle between an edge and the plane of two others under 3°.
 pub const POOR_SCALED_JACOBIAN: f64 = 0.05;
 
-/// Greatest ratio of an element's longest to its shortest edge: conductances of an element go with its square, and
-/// (10⁷)² leaves two digits of the small one.
-pub const GREATEST_ASPECT: f64 = 1e7;
+/// Largest accepted ratio of an element's longest to its shortest edge: conductances of an element scale with
+/// its square, and (10⁷)² leaves two digits of the small one.
+pub const MAX_ASPECT: f64 = 1e7;
 
-/// Above this a note is made.
+/// Ratio of edges above which a note is made.
 pub const POOR_ASPECT: f64 = 1e3;
 
-/// A mesh that can be computed on.
+/// Quality of an accepted mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Quality {
-    /// Volume of all elements, m³.
+    /// Total volume, m³.
     pub volume: f64,
-    /// Least scaled Jacobian and its element.
+    /// Smallest scaled Jacobian and its element.
     pub scaled_jacobian: (f64, u32),
-    /// Greatest ratio of edges and its element.
+    /// Largest ratio of edges and its element.
     pub aspect: (f64, u32),
-    /// Parts that share no node.
+    /// Number of parts without shared nodes.
     pub parts: usize,
-    /// Findings that are allowed but should be looked at.
+    /// Notes on accepted but doubtful findings.
     pub notes: Vec<String>,
 }
 
-/// Checks a mesh. `labels` are the element numbers of the file it came from, for the messages; without them elements
-/// count from 0.
+/// Checks a mesh. `labels` are the element numbers in its file, for messages; by default elements count from
+/// 0.
 ///
 /// # Errors
-/// [`Error::Mesh`] with the element, its centre, the value found and what is allowed: no elements, a node number out of
-/// range or twice in an element, coordinates that are not finite, an inverted element or one without volume (Jacobian at
-/// a corner or at a Gauss point not positive), a scaled Jacobian below [`LEAST_SCALED_JACOBIAN`], edges over
-/// [`GREATEST_ASPECT`], an element twice, a face of three elements, a set that is empty or names what does not exist.
+/// [`Error::Mesh`] with the element, its centre, the value found and what is allowed: no elements, a node out
+/// of range or repeated in an element, coordinates that are not finite, an inverted element or one without
+/// volume (Jacobian at a corner or at a Gauss point not positive), a scaled Jacobian below
+/// [`MIN_SCALED_JACOBIAN`], a ratio of edges above [`MAX_ASPECT`], a duplicate element, a face of
+/// three elements, and a set that is empty or has members out of range.
 pub fn check(mesh: &Mesh, labels: Option<&[u64]>) -> Result<Quality, Error> {
     let elements = mesh.element_count();
     if elements == 0 {
@@ -54,26 +55,28 @@ pub fn check(mesh: &Mesh, labels: Option<&[u64]>) -> Result<Quality, Error> {
     }
     check_numbers(mesh, labels)?;
     // worst of each work item, then of all in order: the same on any number of threads
-    let items: Vec<Worst> = (0..elements.div_ceil(ITEM))
+    let items: Vec<WorstMeasures> = (0..elements.div_ceil(ITEM))
         .into_par_iter()
-        .map(|item| Worst::of(mesh, (item * ITEM) as u32..((item + 1) * ITEM).min(elements) as u32))
+        .map(|item| {
+            WorstMeasures::measure(mesh, (item * ITEM) as u32..((item + 1) * ITEM).min(elements) as u32)
+        })
         .collect();
-    let worst = items.into_iter().reduce(Worst::and).unwrap_or_default();
+    let worst = items.into_iter().reduce(WorstMeasures::merge).unwrap_or_default();
     let refuse = |(value, element): (f64, u32), what: &str, allowed: String| {
         Err(Error::Mesh(format!("{}: {what} {value:.3e}; allowed: {allowed}", place(mesh, labels, element))))
     };
     if worst.determinant.0.is_nan() || worst.determinant.0 <= 0.0 {
         return refuse(worst.determinant, "inverted or without volume, Jacobian", "above 0 m³".into());
     }
-    if worst.scaled.0.is_nan() || worst.scaled.0 < LEAST_SCALED_JACOBIAN {
-        return refuse(worst.scaled, "sliver, scaled Jacobian", format!("{LEAST_SCALED_JACOBIAN:e} or more"));
+    if worst.scaled.0.is_nan() || worst.scaled.0 < MIN_SCALED_JACOBIAN {
+        return refuse(worst.scaled, "sliver, scaled Jacobian", format!("{MIN_SCALED_JACOBIAN:e} or more"));
     }
-    if worst.aspect.0.is_nan() || worst.aspect.0 > GREATEST_ASPECT {
-        return refuse(worst.aspect, "longest over shortest edge", format!("at most {GREATEST_ASPECT:e}"));
+    if worst.aspect.0.is_nan() || worst.aspect.0 > MAX_ASPECT {
+        return refuse(worst.aspect, "longest over shortest edge", format!("at most {MAX_ASPECT:e}"));
     }
-    check_twice(mesh, labels)?;
+    check_duplicates(mesh, labels)?;
     check_sets(mesh)?;
-    let surface = Surface::of_all(mesh)?;
+    let surface = OuterSurface::of_all(mesh)?;
     let mut notes = Vec::new();
     if worst.scaled.0 < POOR_SCALED_JACOBIAN {
         let (value, element) = worst.scaled;
@@ -90,10 +93,11 @@ pub fn check(mesh: &Mesh, labels: Option<&[u64]>) -> Result<Quality, Error> {
     if unused > 0 {
         notes.push(format!("{unused} nodes belong to no element, node {first} first"));
     }
-    if let Some((count, [a, b])) = doubles(mesh, &surface) {
+    if let Some((count, [a, b])) = coincident_nodes(mesh, &surface) {
         let [x, y, z] = mesh.points[a as usize];
         notes.push(format!(
-            "{count} nodes lie on others, nodes {a} and {b} at ({x:.6e}, {y:.6e}, {z:.6e}) m first: not merged"
+            "{count} nodes lie on others, nodes {a} and {b} at ({x:.6e}, {y:.6e}, {z:.6e}) m first: not \
+             merged"
         ));
     }
     if let Some((hexahedron, tetrahedron)) = half_faces(mesh, &surface) {
@@ -103,7 +107,7 @@ pub fn check(mesh: &Mesh, labels: Option<&[u64]>) -> Result<Quality, Error> {
     Ok(Quality { volume: worst.volume, scaled_jacobian: worst.scaled, aspect: worst.aspect, parts, notes })
 }
 
-/// Removes nodes that belong to no element; returns the old numbers of those kept. Node sets lose them too.
+/// Removes unused nodes, also from node sets; returns the old indices of those kept.
 pub fn drop_unused_nodes(mesh: &mut Mesh) -> Vec<u32> {
     let mut number = vec![u32::MAX; mesh.points.len()];
     let others = mesh.others.iter().flat_map(|cell| cell.nodes());
@@ -128,29 +132,29 @@ pub fn drop_unused_nodes(mesh: &mut Mesh) -> Vec<u32> {
     kept
 }
 
-/// Elements in a work item.
+/// Number of elements of a work item.
 const ITEM: usize = 4096;
 
-/// The worst of some elements; the first of equals.
+/// Worst quality measures of some elements; the first element if equal.
 #[derive(Clone, Copy, Debug)]
-struct Worst {
+struct WorstMeasures {
     volume: f64,
     determinant: (f64, u32),
     scaled: (f64, u32),
     aspect: (f64, u32),
 }
 
-impl Default for Worst {
+impl Default for WorstMeasures {
     fn default() -> Self {
         Self { volume: 0.0, determinant: (f64::INFINITY, 0), scaled: (f64::INFINITY, 0), aspect: (0.0, 0) }
     }
 }
 
-impl Worst {
-    fn of(mesh: &Mesh, elements: std::ops::Range<u32>) -> Self {
+impl WorstMeasures {
+    fn measure(mesh: &Mesh, elements: std::ops::Range<u32>) -> Self {
         elements.fold(Self::default(), |worst, element| {
             let [volume, determinant, scaled, aspect] = measures(mesh, element);
-            worst.and(Self {
+            worst.merge(Self {
                 volume,
                 determinant: (determinant, element),
                 scaled: (scaled, element),
@@ -159,8 +163,8 @@ impl Worst {
         })
     }
 
-    fn and(self, next: Self) -> Self {
-        // what is not a number is the worst
+    fn merge(self, next: Self) -> Self {
+        // NaN counts as the worst
         let least = |a: (f64, u32), b: (f64, u32)| if a.0.is_nan() || a.0 <= b.0 { a } else { b };
         let most = |a: (f64, u32), b: (f64, u32)| if a.0.is_nan() || a.0 >= b.0 { a } else { b };
         Self {
@@ -172,7 +176,8 @@ impl Worst {
     }
 }
 
-/// Volume, least Jacobian determinant (of the map from the unit cube or corner), least scaled Jacobian, ratio of edges.
+/// Volume, smallest Jacobian determinant (of the map from the unit cube or corner), smallest scaled Jacobian,
+/// ratio of edges.
 fn measures(mesh: &Mesh, element: u32) -> [f64; 4] {
     let mut least = [f64::INFINITY; 2];
     let mut edges = [f64::INFINITY, 0.0];
@@ -180,7 +185,7 @@ fn measures(mesh: &Mesh, element: u32) -> [f64; 4] {
         let determinant = a.cross(&b).dot(&c);
         let lengths = [a.norm(), b.norm(), c.norm()];
         let scaled = determinant / (lengths[0] * lengths[1] * lengths[2]);
-        // `min` would forget what is not a number
+        // `min` would ignore NaN
         least[0] = if determinant.is_nan() { f64::NAN } else { least[0].min(determinant) };
         if corner {
             // 0/0 of coincident nodes: the determinant decides
@@ -211,14 +216,14 @@ fn measures(mesh: &Mesh, element: u32) -> [f64; 4] {
             }
             volume
         }
-        _ => return of_other(mesh, element),
+        _ => return measures_of_other(mesh, element),
     };
     [volume, least[0], least[1], edges[1] / edges[0]]
 }
 
-/// [`measures`] of a wedge or a second-order element: its Jacobian at corners and integration points, and between its corners
-/// the edges.
-fn of_other(mesh: &Mesh, element: u32) -> [f64; 4] {
+/// Measures of a wedge or a second-order element, as in [`measures`]: Jacobian at corners and integration
+/// points, and straight edges between corners.
+fn measures_of_other(mesh: &Mesh, element: u32) -> [f64; 4] {
     let shape = mesh.shape(element);
     let x: Vec<Vector3<f64>> = mesh.nodes(element).iter().map(|&node| mesh.point(node)).collect();
     let determinant = |natural: &Natural| {
@@ -230,12 +235,12 @@ fn of_other(mesh: &Mesh, element: u32) -> [f64; 4] {
         }
         columns[0].cross(&columns[1]).dot(&columns[2])
     };
-    let rule = Rule::of(shape);
+    let rule = QuadratureRule::for_shape(shape);
     let own: Vec<f64> = rule.at.iter().map(determinant).collect();
     let volume = own.iter().zip(&rule.weights).map(|(own, weight)| own * weight).sum();
     let mut least = [f64::INFINITY; 2];
     let mut edges = [f64::INFINITY, 0.0f64];
-    let corners = (0..shape.corners()).map(|k| determinant(&Natural::at(shape, corner(shape, k))));
+    let corners = (0..shape.corners()).map(|k| determinant(&Natural::new(shape, corner(shape, k))));
     for found in own.iter().copied().chain(corners) {
         least[0] = if found.is_nan() || least[0].is_nan() { f64::NAN } else { least[0].min(found) };
     }
@@ -244,7 +249,7 @@ fn of_other(mesh: &Mesh, element: u32) -> [f64; 4] {
         let at: Vec<Vector3<f64>> =
             shape.edges().iter().filter_map(to).map(|other| x[other] - x[k]).collect();
         let lengths = [at[0].norm(), at[1].norm(), at[2].norm()];
-        // the determinants have told its sign
+        // the determinants have determined its sign
         let scaled = at[0].cross(&at[1]).dot(&at[2]).abs() / (lengths[0] * lengths[1] * lengths[2]);
         least[1] = if scaled.is_nan() { 0.0 } else { least[1].min(scaled) };
         edges = lengths.iter().fold(edges, |[low, high], length| [low.min(*length), high.max(*length)]);
@@ -252,11 +257,11 @@ fn of_other(mesh: &Mesh, element: u32) -> [f64; 4] {
     [volume, least[0], least[1], edges[1] / edges[0]]
 }
 
-/// Nodes next to each corner of a hexahedron, along ξ, η, ζ turned so that their product is positive.
+/// Nodes adjacent to each corner of a hexahedron, ordered for a positive triple product.
 const CORNERS: [[usize; 3]; 8] =
     [[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]];
 
-/// ∂x/∂ξ, ∂x/∂η, ∂x/∂ζ of a hexahedron at a point of the unit cube.
+/// Gradients ∂x/∂ξ, ∂x/∂η, ∂x/∂ζ of a hexahedron at a point of the unit cube.
 fn gradient(x: &[Vector3<f64>; 8], [s, t, u]: [f64; 3]) -> [Vector3<f64>; 3] {
     let mix = |a: Vector3<f64>, b: Vector3<f64>, t: f64| a * (1.0 - t) + b * t;
     [
@@ -266,7 +271,7 @@ fn gradient(x: &[Vector3<f64>; 8], [s, t, u]: [f64; 3]) -> [Vector3<f64>; 3] {
     ]
 }
 
-/// An element for a message: its number and centre.
+/// Describes an element in a message: its label and centre.
 fn place(mesh: &Mesh, labels: Option<&[u64]>, element: u32) -> String {
     let [x, y, z] = mesh.centre(element);
     let kind = mesh.shape(element).name();
@@ -274,7 +279,7 @@ fn place(mesh: &Mesh, labels: Option<&[u64]>, element: u32) -> String {
     format!("{kind} {} at ({x:.6e}, {y:.6e}, {z:.6e}) m", number.unwrap_or(element.into()))
 }
 
-/// Node numbers and coordinates.
+/// Checks node numbers and coordinates.
 fn check_numbers(mesh: &Mesh, labels: Option<&[u64]>) -> Result<(), Error> {
     if let Some((node, point)) =
         mesh.points.iter().enumerate().find(|(_, p)| p.iter().any(|x| !x.is_finite()))
@@ -298,11 +303,11 @@ fn check_numbers(mesh: &Mesh, labels: Option<&[u64]>) -> Result<(), Error> {
     Ok(())
 }
 
-/// Elements of equal nodes.
-fn check_twice(mesh: &Mesh, labels: Option<&[u64]>) -> Result<(), Error> {
+/// Checks for duplicate elements.
+fn check_duplicates(mesh: &Mesh, labels: Option<&[u64]>) -> Result<(), Error> {
     let mut keys: Vec<([u32; 8], u32)> = (0..mesh.element_count() as u32)
         .map(|element| {
-            // corners tell elements apart
+            // corners distinguish elements
             let mut key = [u32::MAX; 8];
             let nodes = mesh.corners(element);
             key[..nodes.len()].copy_from_slice(nodes);
@@ -320,7 +325,7 @@ fn check_twice(mesh: &Mesh, labels: Option<&[u64]>) -> Result<(), Error> {
     }
 }
 
-/// Sets are not empty, sorted, and name what exists.
+/// Checks that sets are not empty, sorted, and in range.
 fn check_sets(mesh: &Mesh) -> Result<(), Error> {
     let check = |kind: &str, name: &str, set: &[u32], count: usize| {
         let found = match set.last() {
@@ -354,9 +359,9 @@ fn check_sets(mesh: &Mesh) -> Result<(), Error> {
     Ok(())
 }
 
-/// Parts that share no node, and nodes of no element: their number and the first.
+/// Counts parts without shared nodes and unused nodes; returns also the first unused node.
 fn parts(mesh: &Mesh) -> (usize, usize, usize) {
-    let mut sets = Sets::new(mesh.points.len());
+    let mut sets = DisjointSets::new(mesh.points.len());
     let mut used = vec![false; mesh.points.len()];
     for element in 0..mesh.element_count() as u32 {
         let nodes = mesh.nodes(element);
@@ -370,14 +375,14 @@ fn parts(mesh: &Mesh) -> (usize, usize, usize) {
     (parts, unused, used.iter().position(|used| !used).unwrap_or(0))
 }
 
-/// Nodes that lie on others, within 1e-9 of the box's diagonal: their number and the first pair. Only nodes of the outer
-/// surface are looked at: faces between doubled nodes are outer faces.
-fn doubles(mesh: &Mesh, surface: &Surface) -> Option<(usize, [u32; 2])> {
+/// Counts coincident nodes, within 1e-9 of the box's diagonal; returns also the first pair. Only nodes of the
+/// outer surface are compared: faces between duplicate nodes are outer faces.
+fn coincident_nodes(mesh: &Mesh, surface: &OuterSurface) -> Option<(usize, [u32; 2])> {
     let [lower, upper] = mesh.bounds()?;
     let near = 1e-9 * (Vector3::from(upper) - Vector3::from(lower)).norm();
     let faces: Vec<Face> = surface.faces().collect();
     let nodes = mesh.nodes_of(&faces);
-    // cells much larger than the distance: most points look into one cell only
+    // cells much larger than the distance: most points search one cell only
     let cell = |x: f64, d: usize| ((x - lower[d]) / (64.0 * near)).floor() as i64;
     let mut sorted: Vec<([i64; 3], u32)> =
         nodes.iter().map(|n| ([0, 1, 2].map(|d| cell(mesh.points[*n as usize][d], d)), *n)).collect();
@@ -402,8 +407,8 @@ fn doubles(mesh: &Mesh, surface: &Surface) -> Option<(usize, [u32; 2])> {
     Some((pairs.len(), *pairs.first()?))
 }
 
-/// A hexahedron and a tetrahedron that meet at half a side.
-fn half_faces(mesh: &Mesh, surface: &Surface) -> Option<(u32, u32)> {
+/// Finds a hexahedron and a tetrahedron that meet at half a side.
+fn half_faces(mesh: &Mesh, surface: &OuterSurface) -> Option<(u32, u32)> {
     let has = |corners: usize| mesh.others.iter().any(|cell| cell.shape.corners() == corners);
     let squares = !mesh.hexahedra.is_empty() || has(8) || has(6);
     let split = !mesh.tetrahedra.is_empty() || has(4) || has(6);

@@ -1,25 +1,25 @@
-//! Hexahedra of a structured mesh split into tetrahedra and wedges.
+//! Splitting of structured hexahedra into tetrahedra and wedges.
 
-use crate::mesh::{Cell, Face, HEXAHEDRON_SIDES, Mesh, Shape};
+use crate::mesh::{Cell, ElementShape, Face, HEXAHEDRON_SIDES, Mesh};
 
-/// What fills the cells of a grid.
+/// Element type in the cells of a grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
-pub enum Split {
-    /// One hexahedron.
+pub enum CellSplit {
+    /// A hexahedron.
     #[default]
     Hexahedra,
     /// Five tetrahedra, mirrored from cell to cell so that diagonals meet.
     FiveTetrahedra,
-    /// Six tetrahedra around the diagonal from the first corner to the opposite one (Kuhn's division).
+    /// Six tetrahedra around the diagonal from the first to the opposite corner (Kuhn's triangulation).
     SixTetrahedra,
-    /// Two wedges with triangles below and above.
+    /// Two wedges, with triangles below and above.
     Wedges,
 }
 
-impl Split {
-    /// Elements of a cell.
+impl CellSplit {
+    /// Number of elements of a cell.
     pub fn count(self) -> usize {
         match self {
             Self::Hexahedra => 1,
@@ -33,22 +33,22 @@ impl Split {
 const SIX: [[usize; 4]; 6] =
     [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]];
 const WEDGES: [[usize; 6]; 2] = [[0, 1, 2, 4, 5, 6], [0, 2, 3, 4, 6, 7]];
-/// One in the middle, four at corners; the second list is for cells of odd parity.
+/// Central and four corner tetrahedra; the second list is for cells of odd parity.
 const FIVE: [[[usize; 4]; 5]; 2] = [
     [[0, 1, 2, 5], [0, 2, 3, 7], [0, 5, 7, 4], [2, 7, 5, 6], [0, 2, 7, 5]],
     [[1, 2, 3, 6], [0, 1, 3, 4], [1, 6, 4, 5], [3, 4, 6, 7], [1, 3, 4, 6]],
 ];
 
-/// Splits each hexahedron; sets and surfaces follow. `odd` tells the parity of each cell.
-pub(super) fn split(mesh: Mesh, odd: &[bool], into: Split) -> Mesh {
-    if into == Split::Hexahedra {
+/// Splits each hexahedron, with sets and surfaces; `odd` is the parity of each cell.
+pub(super) fn split(mesh: Mesh, odd: &[bool], into: CellSplit) -> Mesh {
+    if into == CellSplit::Hexahedra {
         return mesh;
     }
     let count = into.count() as u32;
     let part = |element: usize, k: usize| -> &[usize] {
         match into {
-            Split::Wedges => &WEDGES[k],
-            Split::SixTetrahedra => &SIX[k],
+            CellSplit::Wedges => &WEDGES[k],
+            CellSplit::SixTetrahedra => &SIX[k],
             _ => &FIVE[usize::from(odd[element])][k],
         }
     };
@@ -61,7 +61,7 @@ pub(super) fn split(mesh: Mesh, odd: &[bool], into: Split) -> Mesh {
             }
         }
     }
-    let shape = if into == Split::Wedges { Shape::Wedge } else { Shape::Tetrahedron };
+    let shape = if into == CellSplit::Wedges { ElementShape::Wedge } else { ElementShape::Tetrahedron };
     let of_set = |set: &Vec<u32>| set.iter().flat_map(|e| e * count..(e + 1) * count).collect();
     let of_surface = |faces: &Vec<Face>| {
         let mut split: Vec<Face> = Vec::with_capacity(2 * faces.len());
@@ -91,19 +91,19 @@ pub(super) fn split(mesh: Mesh, odd: &[bool], into: Split) -> Mesh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::surface::Surface;
+    use crate::mesh::surface::OuterSurface;
     use crate::mesh::{Block, Grid, quality};
 
     #[test]
     fn wedges_fill_the_brick_and_meet() {
         let grid = Grid::uniform([0.0; 3], [3.0, 2.0, 2.0], [3, 2, 2]).unwrap();
         let blocks = [Block { name: "brick".into(), lower: [0.0; 3], upper: [3.0, 2.0, 2.0] }];
-        let mesh = grid.blocks(&blocks, Split::Wedges).unwrap();
+        let mesh = grid.blocks(&blocks, CellSplit::Wedges).unwrap();
         assert_eq!((mesh.others.len(), mesh.element_sets["brick"].len()), (24, 24));
         let quality = quality::check(&mesh, None).unwrap();
         assert!((quality.volume - 12.0).abs() < 1e-13 && quality.notes.is_empty(), "{:?}", quality.notes);
         // two triangles for each of six squares below and above, quadrilaterals around
-        let surface = Surface::of_all(&mesh).unwrap();
+        let surface = OuterSurface::of_all(&mesh).unwrap();
         assert_eq!(surface.faces().count(), 2 * 2 * 6 + 2 * (6 + 4));
         let mut named: Vec<Face> = mesh.surfaces.values().flatten().copied().collect();
         named.sort_unstable();
@@ -114,7 +114,7 @@ mod tests {
     fn tetrahedra_fill_the_brick_and_meet() {
         let grid = Grid::uniform([0.0; 3], [3.0, 2.0, 2.0], [3, 2, 2]).unwrap();
         let blocks = [Block { name: "brick".into(), lower: [0.0; 3], upper: [3.0, 2.0, 2.0] }];
-        for (into, count) in [(Split::FiveTetrahedra, 5), (Split::SixTetrahedra, 6)] {
+        for (into, count) in [(CellSplit::FiveTetrahedra, 5), (CellSplit::SixTetrahedra, 6)] {
             let mesh = grid.blocks(&blocks, into).unwrap();
             assert_eq!(mesh.tetrahedra.len(), 12 * count);
             assert_eq!(mesh.element_sets["brick"].len(), 12 * count);
@@ -122,8 +122,8 @@ mod tests {
             let quality = quality::check(&mesh, None).unwrap();
             assert!((quality.volume - 12.0).abs() < 1e-13);
             assert!(quality.notes.is_empty(), "{:?}", quality.notes);
-            // conforming: nothing but the box's sides is outside, two triangles a square
-            let surface = Surface::of_all(&mesh).unwrap();
+            // conforming: only the sides of the box are outer faces, two triangles a square
+            let surface = OuterSurface::of_all(&mesh).unwrap();
             assert_eq!(surface.faces().count(), 2 * 2 * (6 + 6 + 4));
             let mut named: Vec<Face> = mesh.surfaces.values().flatten().copied().collect();
             named.sort_unstable();

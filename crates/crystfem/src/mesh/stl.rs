@@ -1,7 +1,7 @@
 //! Closed surfaces of triangles (STL), and the cells inside them.
 //!
-//! A reader of our own: `stl_io` 0.11 tells text from bytes by their first word, which binary files of some programs share,
-//! and its errors name no line.
+//! An own reader, because `stl_io` 0.11 distinguishes text from binary files by their first word, which some
+//! binary files share, and its errors name no line.
 
 mod corners;
 mod shells;
@@ -10,44 +10,45 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use crate::error::Error;
-use crate::mesh::voxels::{Frame, Voxels};
+use crate::mesh::voxels::{VoxelGrid, Voxels};
 
-/// Columns of rays in a cell along each axis: filled parts are exact along z and to about 1/8² across.
+/// Number of rays per cell along each axis: fill fractions are exact along z and to about 1/8² across.
 const RAYS: usize = 8;
-/// By how much rays miss the middles of their part of a cell, in parts of it: edges lie on middles, seldom here.
-const ASIDE: [f64; 2] = [1.3e-4, 0.7e-4];
-/// Least part of the volume, overlapping or inside shells that face inwards, that is noted.
-const TOLD: f64 = 1e-6;
+/// Offset of rays from the centres of their squares, in squares: edges often pass through centres.
+const RAY_OFFSET: [f64; 2] = [1.3e-4, 0.7e-4];
+/// Smallest fraction of the volume, overlapping or inside inward-facing shells, that is reported.
+const MIN_REPORTED: f64 = 1e-6;
 
-/// Closed shells of triangles. What any of them surrounds is inside, as slicers take it: overlaps count once. A shell that faces
-/// inwards inside another one is a cavity.
+/// Closed shells of triangles. The inside is the union of all shells, as in slicers: overlaps count once. An
+/// inward-facing shell inside another one is a cavity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stl {
-    /// Corners, m, each once.
+    /// Corners, m, without duplicates.
     pub points: Vec<[f64; 3]>,
-    /// Their numbers, anticlockwise seen from outside.
+    /// Indices of the corners, anticlockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// Volume inside the shells, m³, cavities taken off: overlaps count in each shell.
+    /// Volume inside the shells, m³, less cavities; overlaps count in each shell.
     pub volume: f64,
-    /// What should be looked at.
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
-/// Reads an STL file, ASCII or binary, coordinates multiplied by `scale` (1e-3 for a file in mm: the format has no unit), makes
-/// corners one that are closer than 1e-6 of the largest extent, turns shells that are inside out, and checks that they are closed.
-/// Normals of the file are not used.
+/// Reads an STL file, ASCII or binary, with coordinates multiplied by `scale` (1e-3 for a file in mm: the
+/// format has no unit), merges corners closer than 1e-6 of the largest extent, flips inverted shells, and
+/// checks that they are closed. Normals in the file are ignored.
 ///
 /// # Errors
-/// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line of text, or the sizes in bytes, for what is no STL;
-/// [`Error::Mesh`] for edges that more triangles pass one way than the other, and no volume.
+/// [`Error::Shared`] if the file cannot be read; [`Error::File`] with the line of text, or the sizes in
+/// bytes, for an invalid file; [`Error::Mesh`] for edges that are not matched in opposite directions, and no
+/// volume.
 pub fn read(path: &Path, scale: f64) -> Result<Stl, Error> {
     parse(path, &crate::file::read_bytes(path)?, scale)
 }
 
-/// [`read`], of bytes; `path` is for messages only.
+/// Reads from bytes; `path` is for messages only.
 ///
 /// # Errors
-/// See [`read`].
+/// Errors of [`read`].
 pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<Stl, Error> {
     if !(scale > 0.0 && scale.is_finite()) {
         let allowed = "positive and finite, m per unit of the file".into();
@@ -78,7 +79,7 @@ pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<Stl, Error> {
     if welded > 0 {
         triangles.iter_mut().for_each(|triangle| *triangle = triangle.map(|n| first[n as usize]));
         triangles.retain(whole);
-        notes.push(format!("{welded} corners closer than 1e-6 of the size to another are one with it"));
+        notes.push(format!("{welded} corners closer than 1e-6 of the size to another are merged"));
     }
     if all > triangles.len() {
         let collapsed = all - thin - triangles.len();
@@ -95,39 +96,41 @@ pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<Stl, Error> {
 }
 
 impl Stl {
-    /// Box around it, m.
+    /// Bounding box, m.
     pub fn bounds(&self) -> [[f64; 3]; 2] {
         polycore::numerics::bounds(self.triangles.iter().flatten().map(|n| self.points[*n as usize]))
     }
 
-    /// Cells along each axis of the grid around it, before any of them is made.
+    /// Number of cells along each axis of the grid around it, before any is made.
     ///
     /// # Errors
-    /// See [`Self::voxels`].
+    /// Errors of [`Self::voxels`].
     pub fn cells(&self, size: [f64; 3]) -> Result<[f64; 3], Error> {
         let [low, high] = self.bounds();
-        Ok(Frame::around(low, high, size)?.counts().map(|count| count as f64))
+        Ok(VoxelGrid::around(low, high, size)?.counts().map(|count| count as f64))
     }
 
-    /// The cells inside, from multiples of `size` on: 8 × 8 rays in z through each column of cells are inside where they have entered
-    /// more shells than they have left. Cells filled to less than `least` are left out. Beside them what overlaps, for the user.
+    /// Builds the cells inside, at multiples of `size`. 8 × 8 rays in z through each column of cells are
+    /// inside where they have entered more shells than they have left. Cells filled to less than `least` are
+    /// left out. Returns also notes on overlaps.
     ///
     /// # Errors
-    /// A size that is not positive, more cells than can be numbered, a least part that no cell reaches.
+    /// [`Error::Parameter`] for a size that is not positive, too many cells, and a `least` that no cell
+    /// reaches.
     pub fn voxels(&self, size: [f64; 3], least: f64) -> Result<(Voxels, Vec<String>), Error> {
         let [low, high] = self.bounds();
-        let frame = Frame::around(low, high, size)?;
+        let frame = VoxelGrid::around(low, high, size)?;
         let [nx, ny, nz] = frame.counts();
         let rays = [nx * RAYS, ny * RAYS];
-        // crossings of each ray, in units of cells, and whether it comes out
+        // crossings of each ray, in units of cells, and their directions
         let mut crossings: Vec<Vec<(f32, i8)>> = vec![Vec::new(); rays[0] * rays[1]];
         let points: Vec<[f64; 3]> =
             self.points.iter().map(|point| [0, 1, 2].map(|d| frame.units(point[d], d))).collect();
-        let place = |k: usize, d: usize| (k as f64 + 0.5 + ASIDE[d]) / RAYS as f64;
+        let place = |k: usize, d: usize| (k as f64 + 0.5 + RAY_OFFSET[d]) / RAYS as f64;
         for triangle in &self.triangles {
             let corners = triangle.map(|n| points[n as usize]);
             let range = |d: usize| {
-                let ends = corners.map(|corner| corner[d] * RAYS as f64 - 0.5 - ASIDE[d]);
+                let ends = corners.map(|corner| corner[d] * RAYS as f64 - 0.5 - RAY_OFFSET[d]);
                 let low = ends.into_iter().fold(f64::INFINITY, f64::min).ceil().max(0.0) as usize;
                 let high = ends.into_iter().fold(f64::NEG_INFINITY, f64::max).floor();
                 low..((high + 1.0).max(0.0) as usize).min(rays[d])
@@ -141,11 +144,11 @@ impl Stl {
         let whole: f64 = size.iter().product();
         let part = whole / (RAYS * RAYS) as f64;
         let mut filled = vec![0.0; nx * ny * nz];
-        // what counts in more than one shell, and what faces inwards and lies in none
+        // lengths counted in more than one shell, and in inward-facing shells outside all others
         let (mut twice, mut negative) = (0.0, 0.0);
         for (ray, crossings) in crossings.iter_mut().enumerate() {
             let column = (ray % rays[0]) / RAYS + nx * (ray / rays[0] / RAYS);
-            // where shells touch, out before in
+            // at touching shells, out before in
             crossings.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
             let mut around = 0_i32;
             for pair in crossings.windows(2) {
@@ -163,24 +166,24 @@ impl Stl {
             }
         }
         let mut notes = Vec::new();
-        let told = |volume: f64| volume > TOLD * self.volume;
-        if told(twice) {
+        let is_reported = |volume: f64| volume > MIN_REPORTED * self.volume;
+        if is_reported(twice) {
             notes.push(format!("shells overlap: {:.4} mm³ that lie in several count once", 1e9 * twice));
         }
-        if told(negative) {
+        if is_reported(negative) {
             let mm3 = 1e9 * negative;
             notes.push(format!(
                 "{mm3:.4} mm³ inside shells that face inwards, and in no other, are left empty"
             ));
         }
-        // exact but for what the rays measured
+        // exact except for the ray measurements
         let volume = self.volume - twice + negative;
         Ok((frame.voxels(&filled, least, volume)?.0, notes))
     }
 }
 
-/// Where a triangle crosses a ray along z, and whether it faces upwards (1) or downwards (−1); `None` where it does not. An edge gives its
-/// two triangles the same sign, so that the ray crosses one of them.
+/// Finds the crossing of a triangle with a ray along z, facing upwards (1) or downwards (−1); `None` without
+/// a crossing. An edge gives its two triangles the same sign, so that the ray crosses one of them.
 fn crossing(triangle: &[u32; 3], points: &[[f64; 3]], at: [f64; 2]) -> Option<(f64, i32)> {
     let side = |p: u32, q: u32| {
         let [low, high] = [p.min(q), p.max(q)].map(|n| points[n as usize]);

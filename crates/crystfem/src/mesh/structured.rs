@@ -1,27 +1,28 @@
-//! Structured meshes: grid lines along the axes, and the boxes that are filled.
+//! Structured meshes: grid lines along the axes, and filled boxes.
 
 use crate::error::Error;
-use crate::mesh::split::{Split, split};
+use crate::mesh::split::{CellSplit, split};
 use crate::mesh::{BOX_SIDES, Face, Mesh};
 
-/// Coordinates within this fraction of the extent are one.
-const SAME: f64 = 1e-9;
+/// Coordinates within this fraction of the extent are equal.
+const COORDINATE_TOLERANCE: f64 = 1e-9;
 
-/// Nodes of the largest mesh: 2²⁸, 15 GB of mesh alone; a slip in a size ends with a message instead of the machine.
+/// Largest number of nodes of a mesh: 2²⁸, or 15 GB of mesh alone, so that a typing error in a size gives a
+/// message instead of exhausting memory.
 pub(crate) const MAX_NODES: usize = 1 << 28;
 
 /// A named box, filled with elements.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Block {
-    /// Name of its element set.
+    /// Name of the element set.
     pub name: String,
-    /// Least coordinates, m.
+    /// Smallest coordinates, m.
     pub lower: [f64; 3],
-    /// Greatest coordinates, m.
+    /// Largest coordinates, m.
     pub upper: [f64; 3],
 }
 
-/// Grid lines along x, y and z, m, ascending: conforming hexahedra lie between them.
+/// Grid lines along x, y and z, m, ascending, with conforming hexahedra between them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     /// Coordinates of the lines.
@@ -29,12 +30,13 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Equal elements through a box.
+    /// Divides a box into equal elements.
     ///
     /// # Errors
-    /// A box without volume, no elements, or more nodes than 2²⁸.
+    /// [`Error::Mesh`] or [`Error::Parameter`] for a box without volume, no elements, and more than 2²⁸
+    /// nodes.
     pub fn uniform(lower: [f64; 3], upper: [f64; 3], elements: [usize; 3]) -> Result<Self, Error> {
-        few_enough(elements.map(|count| count as f64))?;
+        check_node_count(elements.map(|count| count as f64))?;
         let mut lines = [const { Vec::new() }; 3];
         for d in 0..3 {
             let [low, high, count] = [lower[d], upper[d], elements[d] as f64];
@@ -57,10 +59,11 @@ impl Grid {
         Ok(grid)
     }
 
-    /// Lines through all faces of the blocks, and between them equal elements no longer than `size`.
+    /// Places lines at all faces of the blocks, and between them equal elements no longer than `size`.
     ///
     /// # Errors
-    /// No blocks, one without volume, a size that is not positive, or more nodes than 2²⁸.
+    /// [`Error::Mesh`] or [`Error::Parameter`] for no blocks, a block without volume, a size that is not
+    /// positive, and more than 2²⁸ nodes.
     pub fn through(blocks: &[Block], size: [f64; 3]) -> Result<Self, Error> {
         let mut lines = [const { Vec::new() }; 3];
         for (d, line) in lines.iter_mut().enumerate() {
@@ -82,34 +85,35 @@ impl Grid {
         Ok(grid)
     }
 
-    /// One block through the whole grid: hexahedra, an element set `name`, and surfaces and node sets on the sides of
-    /// the box, [`BOX_SIDES`].
+    /// Meshes the whole grid as one block: hexahedra, an element set `name`, and surfaces and node sets on
+    /// the sides of the box, [`BOX_SIDES`].
     ///
     /// # Errors
-    /// Lines that do not ascend, or more nodes than 2²⁸.
+    /// [`Error::Mesh`] or [`Error::Parameter`] for lines that do not ascend, and more than 2²⁸ nodes.
     pub fn mesh(&self, name: &str) -> Result<Mesh, Error> {
         self.check()?;
         let end = |line: &Vec<f64>, first: bool| if first { line[0] } else { line[line.len() - 1] };
         let [lower, upper] = [true, false].map(|first| self.lines.each_ref().map(|line| end(line, first)));
-        self.blocks(&[Block { name: name.to_owned(), lower, upper }], Split::Hexahedra)
+        self.blocks(&[Block { name: name.to_owned(), lower, upper }], CellSplit::Hexahedra)
     }
 
-    /// Elements between the lines inside any block, sets of the elements in each block (blocks may overlap: an element
-    /// is in the set of each), and surfaces and node sets on the sides of the box around all, [`BOX_SIDES`].
+    /// Meshes the cells inside any block, with element sets of the blocks (which may overlap: an element is
+    /// in the set of each), and surfaces and node sets on the sides of the bounding box, [`BOX_SIDES`].
     ///
     /// # Errors
-    /// Lines that do not ascend, a block without volume or without an element, or more nodes than 2²⁸.
-    pub fn blocks(&self, blocks: &[Block], cells: Split) -> Result<Mesh, Error> {
+    /// [`Error::Mesh`] or [`Error::Parameter`] for lines that do not ascend, a block without volume or
+    /// elements, and more than 2²⁸ nodes.
+    pub fn blocks(&self, blocks: &[Block], cells: CellSplit) -> Result<Mesh, Error> {
         self.check()?;
         let [nx, ny, nz] = self.lines.each_ref().map(|line| line.len() - 1);
         let mut ranges = Vec::with_capacity(blocks.len());
         for block in blocks {
             block.check()?;
-            // a cell is inside by its middle
+            // the centre of a cell decides
             let range: [_; 3] = std::array::from_fn(|d| {
                 let line = &self.lines[d];
                 let cells = &line[..line.len() - 1];
-                // middles ascend: of a thousand layers each is found in ten looks
+                // centres ascend: binary search takes ten comparisons for a thousand layers
                 let until = |end: f64| {
                     let (mut low, mut high) = (0, cells.len());
                     while low < high {
@@ -148,11 +152,13 @@ impl Grid {
         Ok(split(mesh, &odd, cells))
     }
 
-    /// A hexahedron in each filled cell, x fastest: element sets `name` and, of each layer of cells with an element,
-    /// `layer-1`, … upwards, surfaces and node sets on the sides of the box around all, [`BOX_SIDES`].
+    /// Meshes each filled cell by a hexahedron, x fastest: element sets `name` and, of each layer of cells
+    /// with an element, `layer-1`, … upwards, surfaces and node sets on the sides of the bounding box,
+    /// [`BOX_SIDES`].
     ///
     /// # Errors
-    /// Lines that do not ascend, more nodes than 2²⁸, another number of cells, or none that is filled.
+    /// [`Error::Mesh`] or [`Error::Parameter`] for lines that do not ascend, more than 2²⁸ nodes, another
+    /// number of cells, and no filled cell.
     pub(crate) fn cells(&self, name: &str, filled: &[bool]) -> Result<Mesh, Error> {
         self.check()?;
         let [nx, ny, nz] = self.lines.each_ref().map(|line| line.len() - 1);
@@ -174,7 +180,7 @@ impl Grid {
         Ok(mesh)
     }
 
-    /// Numbers filled cells and their nodes, x fastest; `odd` tells the parity of i + j + k of each element.
+    /// Numbers filled cells and their nodes, x fastest; `odd` is the parity of i + j + k of each element.
     fn number(&self, element_of: &mut [u32], mesh: &mut Mesh, odd: &mut Vec<bool>) {
         let [nx, ny, nz] = self.lines.each_ref().map(|line| line.len() - 1);
         // corners of two layers of nodes at a time: lower and upper
@@ -191,7 +197,7 @@ impl Grid {
             let [below, above] = &mut layers;
             above.fill(u32::MAX);
             for (j, i) in (0..=ny).flat_map(|j| (0..=nx).map(move |i| (j, i))) {
-                // node (i, j, k) is a corner of up to eight cells; wrapping makes −1 no cell
+                // node (i, j, k) is a corner of up to eight cells; wrapping excludes −1
                 let used = (0..8).any(|c| {
                     let [i, j, k] =
                         [i.wrapping_sub(c & 1), j.wrapping_sub(c >> 1 & 1), k.wrapping_sub(c >> 2)];
@@ -217,7 +223,7 @@ impl Grid {
         mesh.points.shrink_to_fit();
     }
 
-    /// Surfaces and node sets on the sides of the box around the filled cells.
+    /// Builds surfaces and node sets on the sides of the bounding box of the filled cells.
     fn sides(&self, element_of: &[u32], mesh: &mut Mesh) {
         let n = self.lines.each_ref().map(|line| line.len() - 1);
         let cell = |at: [usize; 3]| element_of[at[0] + n[0] * (at[1] + n[1] * at[2])];
@@ -250,7 +256,7 @@ impl Grid {
         }
     }
 
-    /// Lines ascend and the nodes can be numbered.
+    /// Checks that lines ascend and that the nodes can be numbered.
     fn check(&self) -> Result<(), Error> {
         for (line, axis) in self.lines.iter().zip(["x", "y", "z"]) {
             if line.len() < 2 {
@@ -265,12 +271,12 @@ impl Grid {
                 return Err(Error::Mesh(format!("grid lines along {axis} do not ascend: {a} m, then {b} m")));
             }
         }
-        few_enough(self.lines.each_ref().map(|line| line.len() as f64 - 1.0))
+        check_node_count(self.lines.each_ref().map(|line| line.len() as f64 - 1.0))
     }
 }
 
-/// Refuses elements along each axis whose nodes cannot be numbered.
-pub(crate) fn few_enough(elements: [f64; 3]) -> Result<(), Error> {
+/// Refuses numbers of elements along each axis whose nodes cannot be numbered.
+pub(crate) fn check_node_count(elements: [f64; 3]) -> Result<(), Error> {
     let nodes: f64 = elements.iter().map(|count| count + 1.0).product();
     if nodes <= MAX_NODES as f64 {
         return Ok(());
@@ -294,11 +300,12 @@ impl Block {
     }
 }
 
-/// Lengths of elements that fill `length`: the first is at most `first`, each `growth` times the one before.
+/// Lengths of elements that fill `length`: the first at most `first`, each `growth` times the one before.
 /// Their sum is `length` to rounding.
 ///
 /// # Errors
-/// A length or first element that is not positive, a growth below 1, or more than 2²⁸ elements.
+/// [`Error::Parameter`] for a length or first element that is not positive, a growth below 1, and more than
+/// 2²⁸ elements.
 pub fn graded(length: f64, first: f64, growth: f64) -> Result<Vec<f64>, Error> {
     let count = count(length, first, growth)?;
     let relative: Vec<f64> = (0..count as i32).map(|k| growth.powi(k)).collect();
@@ -306,7 +313,7 @@ pub fn graded(length: f64, first: f64, growth: f64) -> Result<Vec<f64>, Error> {
     Ok(relative.into_iter().map(|part| length * (part / sum)).collect())
 }
 
-/// How many elements [`graded`] makes.
+/// Number of elements of [`graded`].
 pub(crate) fn count(length: f64, first: f64, growth: f64) -> Result<f64, Error> {
     for (name, found) in [("length", length), ("element size", first)] {
         if !(found > 0.0 && found.is_finite()) {
@@ -321,7 +328,7 @@ pub(crate) fn count(length: f64, first: f64, growth: f64) -> Result<f64, Error> 
         });
     }
     // a last element of less than a billionth is rounding
-    let ratio = length / first * (1.0 - SAME);
+    let ratio = length / first * (1.0 - COORDINATE_TOLERANCE);
     let count = if growth == 1.0 { ratio } else { (1.0 + ratio * (growth - 1.0)).ln() / growth.ln() };
     if count.is_nan() || count.ceil() >= MAX_NODES as f64 {
         let allowed = format!("at most {}", MAX_NODES - 1);
@@ -330,11 +337,11 @@ pub(crate) fn count(length: f64, first: f64, growth: f64) -> Result<f64, Error> 
     Ok(count.ceil().max(1.0))
 }
 
-/// Ascending coordinates, those closer than [`SAME`] of the extent taken as one.
+/// Sorts coordinates; those closer than [`COORDINATE_TOLERANCE`] of the extent become one.
 fn unique(mut values: Vec<f64>) -> Vec<f64> {
     values.sort_unstable_by(f64::total_cmp);
     let extent = values.last().zip(values.first()).map_or(0.0, |(last, first)| last - first);
-    values.dedup_by(|next, kept| *next - *kept <= SAME * extent);
+    values.dedup_by(|next, kept| *next - *kept <= COORDINATE_TOLERANCE * extent);
     values
 }
 
@@ -370,7 +377,7 @@ mod tests {
         ];
         let grid = Grid::through(&blocks, [0.5, 1.0, 0.5]).unwrap();
         assert_eq!(grid.lines[0].len(), 7);
-        let mesh = grid.blocks(&blocks, Split::Hexahedra).unwrap();
+        let mesh = grid.blocks(&blocks, CellSplit::Hexahedra).unwrap();
         assert_eq!(mesh.hexahedra.len(), 12 + 8);
         assert_eq!(mesh.element_sets["leg"].len(), 12);
         assert!(mesh.element_sets["head"].iter().all(|e| mesh.element_sets["leg"].contains(e)));
@@ -382,7 +389,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_a_grid_is_named() {
+    fn invalid_grids_are_refused() {
         let text = |result: Result<Grid, Error>| result.unwrap_err().to_string();
         assert!(text(Grid::uniform([0.0; 3], [1.0, 0.0, 1.0], [1; 3])).contains("along y has no extent"));
         assert!(text(Grid::uniform([0.0; 3], [1.0; 3], [0, 1, 1])).contains("found 0; allowed: 1 …"));
@@ -392,7 +399,7 @@ mod tests {
         assert!(text(Grid::through(&[], [1.0; 3])).contains("grid lines"));
         let mut grid = Grid::uniform([0.0; 3], [1.0; 3], [2; 3]).unwrap();
         let far = Block { name: "far".into(), lower: [2.0; 3], upper: [3.0; 3] };
-        let error = grid.blocks(&[far], Split::Hexahedra).unwrap_err().to_string();
+        let error = grid.blocks(&[far], CellSplit::Hexahedra).unwrap_err().to_string();
         assert!(error.contains("`far` contains no element"));
         grid.lines[1].swap(0, 1);
         assert!(

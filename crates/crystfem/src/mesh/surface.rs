@@ -7,17 +7,18 @@ use crate::mesh::{BOX_SIDES, Face, Mesh};
 /// No neighbour.
 const NONE: u32 = u32::MAX;
 
-/// The outer surface of the active elements: faces with exactly one active element. Neighbours are found once; each
-/// activation touches only the faces of the new elements.
+/// Outer surface of the active elements: faces with exactly one active element. Neighbours are found once;
+/// each activation updates only the faces of the new elements.
 #[derive(Clone, Debug)]
-pub struct Surface {
-    /// Number of hexahedra and of elements.
+pub struct OuterSurface {
+    /// Number of hexahedra.
     hexahedra: usize,
+    /// Number of elements.
     elements: usize,
-    /// First face of each of the other elements, and where the last ends.
+    /// First face of each of the other elements, and the end of the last one's.
     firsts: Vec<u32>,
-    /// The face on the other side of each face, or [`NONE`]; faces numbered 6·element + side, then 4·… for tetrahedra, then
-    /// those of the others.
+    /// Opposite face of each face, or [`NONE`]; faces are numbered 6·element + side, then 4·… for tetrahedra,
+    /// then those of the others.
     opposite: Vec<u32>,
     active: Vec<bool>,
     outer: Vec<bool>,
@@ -25,26 +26,26 @@ pub struct Surface {
 
 /// Change of the outer surface by an activation; faces sorted.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Change {
-    /// Faces that are outer now.
+pub struct SurfaceChange {
+    /// Faces that became outer faces.
     pub appeared: Vec<Face>,
-    /// Faces that were outer before.
+    /// Faces that are no longer outer faces.
     pub vanished: Vec<Face>,
 }
 
-/// A part of space in which faces may become outer ones; see [`Surface::region`].
+/// A set of faces that may become outer faces; see [`OuterSurface::region`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct Region {
+pub struct FaceRegion {
     /// Face numbers, sorted.
     faces: Vec<u32>,
 }
 
-impl Surface {
-    /// Neighbours of a mesh; no element is active.
+impl OuterSurface {
+    /// Finds the neighbours in a mesh; no element is active.
     ///
     /// # Errors
-    /// A node that is none, a face of three elements (named), two elements with the corners of one face and different nodes on
-    /// its edges, or more than 2³² − 1 faces.
+    /// [`Error::Mesh`] for a node out of range, a face of three elements (named), and two elements with the
+    /// same corners of a face and different mid-edge nodes; [`Error::Parameter`] for more than 2³² − 1 faces.
     pub fn new(mesh: &Mesh) -> Result<Self, Error> {
         let (hexahedra, elements) = (mesh.hexahedra.len(), mesh.element_count());
         let mut count = 6 * hexahedra + 4 * mesh.tetrahedra.len();
@@ -69,10 +70,10 @@ impl Surface {
         Ok(surface)
     }
 
-    /// The outer surface of the whole mesh.
+    /// Returns the outer surface of the whole mesh.
     ///
     /// # Errors
-    /// See [`Self::new`].
+    /// Errors of [`Self::new`].
     pub fn of_all(mesh: &Mesh) -> Result<Self, Error> {
         let mut surface = Self::new(mesh)?;
         surface.active.fill(true);
@@ -82,11 +83,11 @@ impl Surface {
         Ok(surface)
     }
 
-    /// Activates elements; those active already are passed over.
+    /// Activates elements; active ones are skipped.
     ///
     /// # Errors
-    /// An element that is none; nothing is changed then.
-    pub fn activate(&mut self, elements: &[u32]) -> Result<Change, Error> {
+    /// [`Error::Parameter`] for an element out of range, without any change.
+    pub fn activate(&mut self, elements: &[u32]) -> Result<SurfaceChange, Error> {
         if let Some(element) = elements.iter().find(|element| **element as usize >= self.elements) {
             let allowed = format!("below {}", self.elements);
             return Err(Error::Parameter { name: "element", found: f64::from(*element), allowed });
@@ -98,7 +99,7 @@ impl Surface {
         for element in &fresh {
             self.active[*element as usize] = true;
         }
-        let mut change = Change::default();
+        let mut change = SurfaceChange::default();
         for element in fresh {
             for number in self.faces_of(element) {
                 let opposite = self.opposite[number];
@@ -121,29 +122,31 @@ impl Surface {
             .map(|number| self.face(number))
     }
 
-    /// Returns whether each element is active.
+    /// Active elements.
     pub fn active(&self) -> &[bool] {
         &self.active
     }
 
-    /// Returns whether a face belongs to the outer surface.
+    /// Returns true if a face belongs to the outer surface.
     pub fn is_outer(&self, face: Face) -> bool {
         self.number(face).is_some_and(|number| self.outer[number as usize])
     }
 
-    /// The same face seen from the other element that has it.
+    /// Returns the same face as a face of the other element.
     pub fn opposite(&self, face: Face) -> Option<Face> {
         let opposite = self.opposite[self.number(face)? as usize];
         (opposite != NONE).then(|| self.face(opposite))
     }
 
-    /// Where a boundary condition acts: `outer` (everywhere), a named surface (from whichever side its faces are
-    /// given), the part of the surface of a named element set, the faces whose nodes are all in a named node set, or a side of the box around the mesh
-    /// ([`BOX_SIDES`]: faces within 1e-9 of its diagonal). A name of the mesh comes before our own.
+    /// Finds the region of a boundary condition: `outer` (everywhere), a named surface (given from either
+    /// side), the surface of a named element set, the faces with all nodes in a named node set, or a side of
+    /// the bounding box ([`BOX_SIDES`]: faces within 1e-9 of its diagonal). Names of the mesh take
+    /// precedence.
     ///
     /// # Errors
-    /// A name that is none of them, or a named surface with a face that does not exist.
-    pub fn region(&self, mesh: &Mesh, name: &str) -> Result<Region, Error> {
+    /// [`Error::Unknown`] for another name, and [`Error::Mesh`] for a named surface with a face that does not
+    /// exist.
+    pub fn region(&self, mesh: &Mesh, name: &str) -> Result<FaceRegion, Error> {
         let mut faces = Vec::new();
         if let Some(named) = mesh.surfaces.get(name) {
             for face in named {
@@ -167,8 +170,8 @@ impl Surface {
             if faces.is_empty() {
                 let count = set.len();
                 return Err(Error::Mesh(format!(
-                    "node set `{name}` ({count} nodes) has all nodes of no face; allowed: one that has, or a temperature, \
-                     which acts on nodes"
+                    "node set `{name}` ({count} nodes) has all nodes of no face; allowed: one that has, or \
+                     a temperature, which acts on nodes"
                 )));
             }
         } else if name == "outer" {
@@ -196,17 +199,17 @@ impl Surface {
         }
         faces.sort_unstable();
         faces.dedup();
-        Ok(Region { faces })
+        Ok(FaceRegion { faces })
     }
 
-    /// The part of the outer surface in a region, ascending.
-    pub fn faces_in(&self, region: &Region) -> Vec<Face> {
+    /// Outer faces in a region, ascending.
+    pub fn faces_in(&self, region: &FaceRegion) -> Vec<Face> {
         let outer = |number: &&u32| self.outer.get(**number as usize) == Some(&true);
         region.faces.iter().filter(outer).map(|number| self.face(*number)).collect()
     }
 
     /// All faces of a region, outer or not, ascending.
-    pub fn all_in(&self, region: &Region) -> Vec<Face> {
+    pub fn all_in(&self, region: &FaceRegion) -> Vec<Face> {
         region.faces.iter().map(|number| self.face(*number)).collect()
     }
 
@@ -244,8 +247,8 @@ impl Surface {
         }
     }
 
-    /// Sorts faces into buckets by their least node and pairs those of equal nodes: linear in the mesh, and the same
-    /// whatever the order of anything else.
+    /// Sorts faces into buckets by their smallest node and pairs those with equal nodes: linear in the mesh,
+    /// and independent of any order.
     fn neighbours(&self, mesh: &Mesh) -> Result<Vec<u32>, Error> {
         let key = |number: u32| mesh.face_nodes(self.face(number)).key();
         let all = |number: u32| {
@@ -289,8 +292,8 @@ impl Surface {
                     [a, b] if !self.firsts.is_empty() && all(a.1) != all(b.1) => {
                         let [a, b] = [a.1, b.1].map(|number| self.face(number).element);
                         return Err(Error::Mesh(format!(
-                            "elements {a} and {b} have the corners of one face and different nodes on its edges; \
-                             allowed: elements of one order side by side, with the same nodes"
+                            "elements {a} and {b} have the corners of one face and different nodes on its \
+                             edges; allowed: elements of one order side by side, with the same nodes"
                         )));
                     }
                     [a, b] => {
@@ -343,7 +346,7 @@ pub fn area(mesh: &Mesh, face: Face) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{Bar, Block, Grid, Split, Substrate};
+    use crate::mesh::{Bar, Block, CellSplit, Grid, Substrate};
 
     fn total(mesh: &Mesh, faces: impl IntoIterator<Item = Face>) -> f64 {
         faces.into_iter().map(|face| area(mesh, face)).sum()
@@ -359,18 +362,18 @@ mod tests {
             elements_per_layer: 2,
             element_size: 1e-3,
             substrate: Some(substrate),
-            cells: Split::Hexahedra,
+            cells: CellSplit::Hexahedra,
         }
         .mesh()
         .unwrap();
-        let mut surface = Surface::new(&mesh).unwrap();
+        let mut surface = OuterSurface::new(&mesh).unwrap();
         assert_eq!(surface.faces().count(), 0);
         surface.activate(&mesh.element_sets["substrate"]).unwrap();
         let glass = 2.0 * (0.03 * 0.01 + 0.04 * 2e-3);
         assert!((total(&mesh, surface.faces()) / glass - 1.0).abs() < 1e-12);
         for layer in 1..=4 {
             let change = surface.activate(&mesh.element_sets[&format!("layer-{layer}")]).unwrap();
-            // the new layer covers as much as its own top shows; its sides are added
+            // the new layer covers as much as its own top exposes; its sides are added
             assert_eq!(change.vanished.len(), 20 * 4);
             assert_eq!(change.appeared.len(), 20 * 4 + 2 * 2 * (20 + 4));
             let exact = glass + 2.0 * 0.024 * 2e-4 * f64::from(layer);
@@ -378,28 +381,28 @@ mod tests {
             assert!(change.vanished.iter().all(|face| !surface.is_outer(*face)));
         }
         // one by one or at once: the same surface
-        let whole: Vec<Face> = Surface::of_all(&mesh).unwrap().faces().collect();
+        let whole: Vec<Face> = OuterSurface::of_all(&mesh).unwrap().faces().collect();
         assert_eq!(surface.faces().collect::<Vec<_>>(), whole);
-        let mut backwards = Surface::new(&mesh).unwrap();
+        let mut backwards = OuterSurface::new(&mesh).unwrap();
         for element in (0..mesh.element_count() as u32).rev() {
             backwards.activate(&[element, element]).unwrap();
         }
         assert_eq!(backwards.faces().collect::<Vec<_>>(), whole);
-        assert_eq!(backwards.activate(&[0]).unwrap(), Change::default());
+        assert_eq!(backwards.activate(&[0]).unwrap(), SurfaceChange::default());
         assert!(backwards.activate(&[u32::MAX]).is_err());
     }
 
     #[test]
-    fn regions_are_asked_by_name() {
+    fn regions_are_found_by_name() {
         let grid = Grid::uniform([0.0; 3], [1.0, 1.0, 2.0], [2, 2, 4]).unwrap();
         let block =
             |name: &str, z0, z1| Block { name: name.into(), lower: [0.0, 0.0, z0], upper: [1.0, 1.0, z1] };
         let mut mesh =
-            grid.blocks(&[block("lower", 0.0, 1.0), block("upper", 1.0, 2.0)], Split::Hexahedra).unwrap();
+            grid.blocks(&[block("lower", 0.0, 1.0), block("upper", 1.0, 2.0)], CellSplit::Hexahedra).unwrap();
         // the interface, given from above
         let above = mesh.element_sets["upper"][..4].iter().map(|element| Face { element: *element, side: 0 });
         mesh.surfaces.insert("interface".into(), above.collect());
-        let mut surface = Surface::new(&mesh).unwrap();
+        let mut surface = OuterSurface::new(&mesh).unwrap();
         surface.activate(&mesh.element_sets["lower"]).unwrap();
         let interface = surface.region(&mesh, "interface").unwrap();
         let faces = surface.faces_in(&interface);
@@ -411,7 +414,7 @@ mod tests {
         assert_eq!(surface.faces_in(&outer), surface.faces().collect::<Vec<_>>());
         let upper = surface.faces_in(&surface.region(&mesh, "upper").unwrap());
         assert!((total(&mesh, upper) - 5.0).abs() < 1e-14);
-        // by name and by place
+        // by name and by position
         let named = surface.faces_in(&surface.region(&mesh, "left").unwrap());
         let mut bare = mesh.clone();
         bare.surfaces.clear();
@@ -432,11 +435,11 @@ mod tests {
     fn three_elements_a_face_and_missing_nodes_are_refused() {
         let mut mesh = Mesh { points: vec![[0.0; 3]; 6], ..Mesh::default() };
         mesh.tetrahedra = vec![[0, 1, 2, 3], [0, 2, 1, 4], [0, 1, 2, 5]];
-        let error = Surface::new(&mesh).unwrap_err().to_string();
+        let error = OuterSurface::new(&mesh).unwrap_err().to_string();
         assert!(error.contains("elements 0, 1, 2 share one face"), "{error}");
         mesh.tetrahedra = vec![[6, 7, 8, 9]];
-        assert!(Surface::new(&mesh).unwrap_err().to_string().contains("node 6; allowed: below 6"));
-        assert_eq!(Surface::of_all(&Mesh::default()).unwrap().faces().count(), 0);
+        assert!(OuterSurface::new(&mesh).unwrap_err().to_string().contains("node 6; allowed: below 6"));
+        assert_eq!(OuterSurface::of_all(&Mesh::default()).unwrap().faces().count(), 0);
     }
 
     #[test]

@@ -3,17 +3,17 @@
 use crate::error::Error;
 use crate::mesh::{BOX_SIDES, Grid, Mesh};
 
-/// A sector of a hollow cylinder around the z axis, from the plane y = 0 (x > 0) on towards y, its lower end at z = 0.
-/// Faces are plane: a body of N elements around differs from the cylinder by (angle/N)².
+/// A sector of a hollow cylinder around the z axis, from the plane y = 0 (x > 0) towards positive y, with its
+/// lower end at z = 0. Faces are plane: a body of N elements around differs from the cylinder by (angle/N)².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tube {
-    /// Radii of the bore and of the outside, m.
+    /// Inner and outer radius, m.
     pub radii: [f64; 2],
     /// Angle of the sector, rad: above 0, below 2π.
     pub angle: f64,
     /// Length along z, m.
     pub length: f64,
-    /// Elements along the radius, around, and along z.
+    /// Number of elements along the radius, around, and along z.
     pub elements: [usize; 3],
 }
 
@@ -21,11 +21,12 @@ pub struct Tube {
 const SIDES: [&str; 6] = ["bore", "shell", "start", "end", "bottom", "top"];
 
 impl Tube {
-    /// Hexahedra: element set `tube`; surfaces and node sets `bore`, `shell`, `bottom`, `top`, and the cuts `start`
-    /// (y = 0) and `end`.
+    /// Meshes the sector with hexahedra: element set `tube`; surfaces and node sets `bore`, `shell`,
+    /// `bottom`, `top`, and the cuts `start` (y = 0) and `end`.
     ///
     /// # Errors
-    /// Radii, an angle or a length without extent, elements of a quarter turn or more, no elements, or more nodes than 2²⁸.
+    /// [`Error::Parameter`] for radii, an angle or a length without extent, elements of a quarter turn or
+    /// more, no elements, and more than 2²⁸ nodes.
     pub fn mesh(&self) -> Result<Mesh, Error> {
         let wrong =
             |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.into() });
@@ -71,7 +72,7 @@ mod tests {
     use crate::mesh::surface::area;
     use std::f64::consts::{FRAC_PI_2, PI};
 
-    /// Of a polygon of chords φ: volume sin φ/φ, bore and shell 2 sin(φ/2)/φ, cuts the whole.
+    /// Volume and areas of a polygon of chords φ: volume sin φ/φ, bore and shell 2 sin(φ/2)/φ, cuts exact.
     #[test]
     fn a_sector_has_its_volume_and_surfaces() {
         let tube = Tube { radii: [0.02, 0.1], angle: FRAC_PI_2, length: 0.14, elements: [8, 9, 7] };
@@ -97,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_tube_is_named() {
+    fn invalid_tubes_are_refused() {
         let tube = Tube { radii: [0.02, 0.1], angle: 1.0, length: 0.14, elements: [2, 1, 2] };
         let refused = |tube: Tube, words: &str| {
             let text = tube.mesh().unwrap_err().to_string();

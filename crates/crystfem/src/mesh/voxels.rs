@@ -1,72 +1,73 @@
-//! Bodies as cells of a grid, each with the part of it that is filled.
+//! Bodies as cells of a grid, each with its fill fraction.
 
 use crate::error::Error;
-use crate::mesh::structured::few_enough;
+use crate::mesh::structured::check_node_count;
 use crate::mesh::{Grid, Mesh};
 
 /// Accepted range of cell volume over body volume.
 pub const RATIOS: [f64; 2] = [0.9, 1.1];
 
-/// Fill fractions are rounded to this.
+/// Bin width of fill fractions.
 const BIN: f64 = 0.05;
 
-/// A body as cells.
+/// A body of cells.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Voxels {
-    /// Cells in which something is: element sets `part`, `layer-1`, … (layers of cells), and the sides of the box around them.
+    /// Mesh of the filled cells: element sets `part`, `layer-1`, … (layers of cells), and the sides of the
+    /// bounding box.
     pub mesh: Mesh,
-    /// Filled part of each element; above 1 where beads overlap. Their volumes add up to `volume`.
+    /// Fill fraction of each element; above 1 for overlapping beads. The filled volumes sum to `volume`.
     pub fill: Vec<f64>,
     /// Volume of the body, m³.
     pub volume: f64,
-    /// Volume of the elements over it.
+    /// Volume of the elements over that of the body.
     pub ratio: f64,
-    /// The part of the volume that was in cells that are left out.
+    /// Fraction of the volume that was in omitted cells.
     pub left_out: f64,
 }
 
-/// Cells around a box, from multiples of their size on.
-pub(super) struct Frame {
+/// Grid of cells around a box, at multiples of their size.
+pub(super) struct VoxelGrid {
     first: [f64; 3],
     count: [usize; 3],
     size: [f64; 3],
 }
 
-impl Frame {
-    /// Around a box; faces that fall on a line to a millionth of a cell lie on it.
+impl VoxelGrid {
+    /// Encloses a box; faces within a millionth of a cell of a line count as on it.
     pub fn around(low: [f64; 3], high: [f64; 3], size: [f64; 3]) -> Result<Self, Error> {
         if let Some(found) = size.into_iter().find(|size| !(*size > 0.0 && size.is_finite())) {
             let (name, allowed) = ("size of a cell", "positive and finite, m".into());
             return Err(Error::Parameter { name, found, allowed });
         }
         let ends = [0, 1, 2].map(|d| [(low[d] / size[d] + 1e-6).floor(), (high[d] / size[d] - 1e-6).ceil()]);
-        few_enough(ends.map(|[first, last]| last - first))?;
+        check_node_count(ends.map(|[first, last]| last - first))?;
         let count = ends.map(|[first, last]| ((last - first) as usize).max(1));
         Ok(Self { first: [0, 1, 2].map(|d| ends[d][0] * size[d]), count, size })
     }
 
-    /// Cells along each axis.
+    /// Number of cells along each axis.
     pub fn counts(&self) -> [usize; 3] {
         self.count
     }
 
-    /// A place in units of cells from the grid's corner.
+    /// Converts a coordinate to units of cells from the grid's corner.
     pub fn units(&self, at: f64, d: usize) -> f64 {
         (at - self.first[d]) / self.size[d]
     }
 
-    /// The cell at a place; rounding at the border stays inside.
+    /// Index of the cell at a position; rounding at the border stays inside.
     pub fn cell(&self, at: [f64; 3]) -> usize {
         let [i, j, k] =
             [0, 1, 2].map(|d| self.units(at[d], d).floor().clamp(0.0, (self.count[d] - 1) as f64) as usize);
         i + self.count[0] * (j + self.count[1] * k)
     }
 
-    /// Cells whose filled volume, m³, is at least `least` of the whole, of a body of `volume`; what is in others goes to
-    /// these in equal proportion. Beside them which cells they are.
+    /// Builds the cells with a filled volume, m³, of at least `least` of the whole, for a body of `volume`;
+    /// the content of other cells is distributed in proportion. Returns also which cells they are.
     ///
     /// # Errors
-    /// A least part that is not from 0 to 1, or that no cell reaches.
+    /// [`Error::Parameter`] for a `least` outside 0 to 1, or that no cell reaches.
     pub fn voxels(&self, filled: &[f64], least: f64, volume: f64) -> Result<(Voxels, Vec<bool>), Error> {
         let name = "least filled part of a cell";
         if !(0.0..=1.0).contains(&least) {
@@ -93,8 +94,8 @@ impl Frame {
 }
 
 impl Voxels {
-    /// Filled parts that differ by less than a twentieth made one, their mean, so that the volume stays: the values, and which
-    /// of them each element has.
+    /// Merges fill fractions that differ by less than a twentieth into their mean, which keeps the volume:
+    /// returns the values, and the index of each element's value.
     pub fn bins(&self) -> (Vec<f64>, Vec<usize>) {
         let key = |fill: f64| (fill / BIN).round() as u64;
         let mut sums = std::collections::BTreeMap::new();
@@ -108,8 +109,8 @@ impl Voxels {
         (sums.into_values().map(|(sum, count)| sum / count).collect(), of)
     }
 
-    /// Returns whether full cells may stand for the body.
-    pub fn may_be_full(&self) -> bool {
+    /// Returns true if full cells may represent the body.
+    pub fn can_be_full(&self) -> bool {
         (RATIOS[0]..=RATIOS[1]).contains(&self.ratio)
     }
 }

@@ -1,18 +1,18 @@
-//! A material along a temperature history that is linear between given times.
+//! A material along a piecewise linear temperature history.
 
 use crate::error::Error;
-use crate::material::{Point, ThermalMaterial};
+use crate::material::{PointInput, ThermalMaterial};
 use nalgebra::Vector3;
 
 /// Largest change of temperature in a step, K.
 const STEP: f64 = 0.25;
-/// Steps between two times at most.
-const MOST: f64 = 10_000.0;
+/// Limit on steps between two times.
+const MAX_STEPS: f64 = 10_000.0;
 
-/// A point of a material, and the temperatures at which its first field, α, reached `N` values.
+/// A material point, and the temperatures at which its first field, α, reached `N` values.
 #[derive(Clone, Debug)]
 pub struct MaterialPoint<const N: usize> {
-    /// K.
+    /// Temperature, K.
     pub temperature: f64,
     /// States of the material.
     pub state: Vec<f64>,
@@ -24,7 +24,7 @@ pub struct MaterialPoint<const N: usize> {
 }
 
 impl<const N: usize> MaterialPoint<N> {
-    /// Fresh material at a temperature, K.
+    /// Returns fresh material at a temperature, K.
     pub fn new(material: &dyn ThermalMaterial, temperature: f64, values: [f64; N]) -> Self {
         let mut state = vec![0.0; material.state_names().len()];
         material.initial_state(temperature, &mut state);
@@ -36,13 +36,13 @@ impl<const N: usize> MaterialPoint<N> {
     /// Integrates over a linear change of temperature to `to`, K, in `duration`, s.
     ///
     /// # Errors
-    /// Those of the material.
+    /// Errors of the material.
     pub fn advance(&mut self, material: &dyn ThermalMaterial, to: f64, duration: f64) -> Result<(), Error> {
         let change = to - self.temperature;
-        let steps = (change.abs() / STEP).ceil().clamp(1.0, MOST);
+        let steps = (change.abs() / STEP).ceil().clamp(1.0, MAX_STEPS);
         for _ in 0..steps as usize {
             let (increment, dt) = (change / steps, duration / steps);
-            let at = Point { temperature: self.temperature, increment, gradient: Vector3::zeros(), dt };
+            let at = PointInput { temperature: self.temperature, increment, gradient: Vector3::zeros(), dt };
             let (old, before) = (self.state.clone(), self.fields[0]);
             material.respond(&at, &old, &mut self.state)?;
             material.fields(&self.state, &mut self.fields);
@@ -58,7 +58,8 @@ impl<const N: usize> MaterialPoint<N> {
     }
 }
 
-/// Share of the way from one α to another at which a value lies: in ln(−ln(1 − α)), which Avrami's law makes linear in ln t.
+/// Fraction of the way between two α at which a value lies, by interpolation in ln(−ln(1 − α)), which
+/// Avrami's law makes linear in ln t.
 fn share(before: f64, after: f64, value: f64) -> f64 {
     let of = |alpha: f64| (-(-alpha).ln_1p()).ln();
     let share = (of(value) - of(before)) / (of(after) - of(before));

@@ -1,8 +1,8 @@
-//! The zero of a function whose derivative is known, but not its shape.
+//! Root of a function with known derivative and unknown shape.
 
 use crate::error::Error;
 
-/// The zero of a function that rises in the large, near `guess`: Newton's method within a bracket.
+/// Finds the root of a function that rises overall, near `guess`, by Newton's method with a bracket.
 pub(super) fn root(guess: f64, mut f: impl FnMut(f64) -> Result<[f64; 2], Error>) -> Result<f64, Error> {
     let [value, slope] = f(guess)?;
     if value == 0.0 {
@@ -18,7 +18,7 @@ pub(super) fn root(guess: f64, mut f: impl FnMut(f64) -> Result<[f64; 2], Error>
             low = at
         }
         let newton = at - value / slope;
-        // a step of Newton's that stays inside, else wider until there is a bracket, else half of it
+        // a Newton step that stays inside, otherwise wider until a bracket is found, otherwise bisection
         let next = if slope > 0.0 && newton > low && newton < high && (newton - at).abs() < 100.0 {
             newton
         } else if low.is_finite() && high.is_finite() {
@@ -44,7 +44,7 @@ pub(super) fn root(guess: f64, mut f: impl FnMut(f64) -> Result<[f64; 2], Error>
 mod tests {
     use super::*;
 
-    /// A cubic with a falling part, from every side of it; and what has no zero.
+    /// A cubic with a falling part is solved from every side; a function without a root is an error.
     #[test]
     fn zeros() {
         let cubic = |x: f64| Ok([x.powi(3) - 3.0 * x - 10.0, 3.0 * x * x - 3.0]);

@@ -1,6 +1,6 @@
-//! The `crystfem` command line. It is a part of the library, so that the solvers are compiled once for all commands.
+//! Command line of `crystfem`, inside the library so that the solvers are compiled once for all commands.
 
-// harness::say! prints without a panic where nobody reads any more
+// harness::say! does not panic when the reader of a pipe has gone
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 use crate::program::run::Crystfem;

@@ -1,24 +1,29 @@
-//! One accepted step: its length, its attempts, and what it leaves.
+//! An accepted step: its length, attempts and result.
 
-use super::{LinearSolver, Method, Points, Simulation, State};
+use super::{LinearMethod, LinearSolver, PointStates, Simulation, State};
 use crate::error::Error;
-use crate::ledger::Record;
+use crate::ledger::StepBalance;
 use crate::solver::LEVELS;
 use crate::system::StepInput;
 use crate::system::vector::{set, sum};
 use crate::time::{Attempt, Scheme, Stepper, Steps, Work};
 
-/// Part of the step that the temporal error would allow, and growth of a step at most.
+/// Safety factor on the step length of error control.
 const SAFETY: f64 = 0.9;
-const MOST_GROWTH: f64 = 4.0;
-/// Iterations of a solve that no other method undercuts.
-const FEWEST: f64 = 16.0;
-/// Solves with the matrix of equal steps.
-const MANY: f64 = 20.0;
+/// Largest growth of the step length.
+const MAX_GROWTH: f64 = 4.0;
+/// Iterations of a solve below which no other method is cheaper.
+const MIN_COSTLY_ITERATIONS: f64 = 16.0;
+/// Expected number of solves with the matrix of equal steps.
+const EQUAL_STEP_SOLVES: f64 = 20.0;
 
 impl Simulation {
-    /// One accepted step.
-    pub(super) fn step(&mut self, until: f64, stop: &(dyn Fn() -> bool + Sync)) -> Result<Record, Error> {
+    /// Makes one accepted step.
+    pub(super) fn step(
+        &mut self,
+        until: f64,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<StepBalance, Error> {
         let time = self.state.time;
         let next = self.breaks[self.breaks.partition_point(|&t| t <= time)..].first().copied();
         let target = next.map_or(until, |next| next.min(until));
@@ -40,8 +45,8 @@ impl Simulation {
             Steps::Adaptive { largest, .. } => self.state.next_dt.min(largest),
         };
         let before = self.state.work;
-        // a ladder of steps, so that factors serve many
-        if let (Method::Factors, Steps::Adaptive { first, .. }, true) =
+        // step lengths from a ladder, so that factors serve many steps
+        if let (LinearMethod::Factors, Steps::Adaptive { first, .. }, true) =
             (self.state.method, self.settings.steps, self.system.is_linear())
         {
             wanted = first * (wanted / first * (1.0 + 1e-9)).log2().floor().exp2();
@@ -56,18 +61,18 @@ impl Simulation {
             } else {
                 time + wanted
             };
-            // equal steps have one length to the last bit, and with it one matrix
+            // equal steps have the same length to the last bit, and so the same matrix
             let equal = (end - time - wanted).abs() <= 1e-9 * wanted;
             let dt = if equal { wanted } else { end - time };
             if end <= time {
                 let allowed = format!("steps that change the time {time} s");
                 return Err(Error::Parameter { name: "time step", found: wanted, allowed });
             }
-            // factors serve many steps; a single one of another length does without
+            // factors serve many steps; a single step of another length does without them
             let single = adaptive.is_none() && (!equal || scheme != self.settings.scheme);
             let single = single && self.settings.solver != LinearSolver::Direct;
             self.stepper.stages.method = match self.state.method {
-                Method::Factors if single => Method::Diagonal,
+                LinearMethod::Factors if single => LinearMethod::Diagonal,
                 method => method,
             };
             let accuracy = adaptive.map(|(tolerance, ..)| 0.05 * tolerance);
@@ -97,17 +102,17 @@ impl Simulation {
                 self.reconsider(&before, until);
                 return Ok(record);
             };
-            // the length as it was wished: in time, far from 0, it is rounded and may come out longer
+            // the length as requested: rounding at large times may lengthen the actual one
             let shortest = wanted.min(dt) <= smallest * (1.0 + 1e-9);
-            // a wish below this is not granted by a shorter next step only
-            const REFUSED: f64 = 0.5;
+            // a ratio below this repeats the step instead of shortening the next one
+            const MIN_ACCEPTED_RATIO: f64 = 0.5;
             let factor = match &attempt {
                 Ok(attempt) => {
                     let ratio = attempt.step_ratio.unwrap_or(f64::INFINITY);
                     let error = attempt.error.unwrap_or(0.0) / tolerance;
-                    let grow = (SAFETY * error.powf(-1.0 / f64::from(attempt.order))).clamp(0.1, MOST_GROWTH);
-                    if (error <= 1.0 && ratio >= REFUSED) || shortest {
-                        // a step cut short by a landing says little about the next
+                    let grow = (SAFETY * error.powf(-1.0 / f64::from(attempt.order))).clamp(0.1, MAX_GROWTH);
+                    if (error <= 1.0 && ratio >= MIN_ACCEPTED_RATIO) || shortest {
+                        // a step shortened to end at a given time says little about the next one
                         let grown = (dt * grow).max(if lands { wanted } else { 0.0 });
                         self.state.next_dt = grown.min(dt * ratio).clamp(smallest, largest);
                         let record = self.accept([dt, end], attempt);
@@ -126,14 +131,18 @@ impl Simulation {
         }
     }
 
-    /// Chooses the method anew once steps whose solves take more than [`FEWEST`] iterations have taken [`LEVELS`] of them, the cost of
-    /// preparing another method. Work is counted, not timed, so that a resumed run decides alike.
+    /// Chooses the method again once steps with more than [`MIN_COSTLY_ITERATIONS`] iterations a solve have
+    /// taken [`LEVELS`] in total, the cost of preparing another method. Work is counted, not timed, so that a
+    /// resumed run decides alike.
     fn reconsider(&mut self, before: &Work, until: f64) {
         let work = &self.state.work;
         let solves = (work.cg_solves - before.cg_solves) as f64;
         let iterations = (work.cg_iterations - before.cg_iterations) as f64;
-        let candidate = self.state.method == Method::Diagonal && self.system.is_symmetric();
-        if self.settings.solver != LinearSolver::Auto || !candidate || iterations <= FEWEST * solves {
+        let candidate = self.state.method == LinearMethod::Diagonal && self.system.is_symmetric();
+        if self.settings.solver != LinearSolver::Auto
+            || !candidate
+            || iterations <= MIN_COSTLY_ITERATIONS * solves
+        {
             return;
         }
         self.state.excess += iterations;
@@ -143,15 +152,15 @@ impl Simulation {
         // both stages of a step, and the filter of its error
         let one = match (self.system.is_linear(), self.settings.scheme, self.settings.steps) {
             (false, ..) => 1.0,
-            (_, _, Steps::Fixed { .. }) => MANY,
+            (_, _, Steps::Fixed { .. }) => EQUAL_STEP_SOLVES,
             (_, Scheme::BackwardEuler, _) => 2.0,
             (_, Scheme::TrBdf2, _) => 3.0,
         };
-        self.state.method = self.task(until).instead(iterations / solves, one);
+        self.state.method = self.task(until).method_after(iterations / solves, one);
         self.state.excess = 0.0;
     }
 
-    /// States of materials whose energy does not depend on them, at the end of an attempt.
+    /// Advances the states of materials whose energy does not depend on them, at the end of an attempt.
     fn follow(&mut self, dt: f64) -> Result<Option<f64>, Error> {
         let in_place = self.in_place();
         let State { temperature: start, memory, work, time, .. } = &mut self.state;
@@ -160,7 +169,7 @@ impl Simulation {
         let nodal = &self.system.nodal;
         let new = &mut stages.evaluation.memory.nodal;
         let points = if in_place {
-            *new = Points::default();
+            *new = PointStates::default();
             &mut memory.nodal
         } else {
             nodal.keep_followers(&memory.nodal, new);
@@ -171,16 +180,16 @@ impl Simulation {
         Ok(ratio)
     }
 
-    /// Whether points at nodes have one state, not an old and a new one: no attempt with steps of one length is rejected, and nothing but
-    /// the state itself depends on it.
+    /// Returns true if points at nodes store one state instead of an old and a new one: fixed steps are never
+    /// rejected, and nothing but the state itself depends on it.
     fn in_place(&self) -> bool {
         matches!(self.settings.steps, Steps::Fixed { .. }) && !self.system.nodal.coupled
     }
 
-    /// Takes the end of the attempt as the new state.
-    fn accept(&mut self, [dt, end]: [f64; 2], attempt: &Attempt) -> Record {
+    /// Makes the end of the attempt the new state.
+    fn accept(&mut self, [dt, end]: [f64; 2], attempt: &Attempt) -> StepBalance {
         let in_place = self.in_place();
-        // no step of one length by backward Euler asks for the rate before it
+        // fixed steps of backward Euler never use the previous rate
         let rated = self.settings.scheme != Scheme::BackwardEuler
             || matches!(self.settings.steps, Steps::Adaptive { .. });
         let Self { problem, state, stepper, system, .. } = self;
@@ -188,7 +197,7 @@ impl Simulation {
         let Stepper { temperature, stages, .. } = stepper;
         let residual = &stages.residual;
         let change = &stages.evaluation.change;
-        let record = Record {
+        let record = StepBalance {
             time: end,
             dt,
             stored: sum(size, |k| change[k]),
@@ -200,7 +209,7 @@ impl Simulation {
             error: attempt.error,
             step_ratio: attempt.step_ratio,
         };
-        // a birth that is due makes the next step one after a jump, which begins from where it is
+        // a due birth makes the next step one after a jump, which starts from the current temperatures
         if problem.births.get(state.births).is_some_and(|birth| birth.time <= end) {
             state.slope.clear();
         } else {

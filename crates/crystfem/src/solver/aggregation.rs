@@ -1,20 +1,22 @@
-//! Levels of a multigrid method by smoothed aggregation (Vaněk, Mandel and Brezina 1996, doi:10.1007/BF02238511).
+//! Multigrid levels by smoothed aggregation (Vaněk, Mandel and Brezina 1996, doi:10.1007/BF02238511).
 //!
-//! Only conduction is aggregated, so that the levels serve every length of a step and every capacity. Neighbours are near by place, not by
-//! their entry: in a cube of eight nodes two on an edge have none, and in a thin layer the near ones are above each other.
+//! Only conduction is aggregated, so that the levels serve every step length and capacity. Neighbours are
+//! selected by distance, not by matrix entry: in a cube of eight nodes those along an edge have no entry, and
+//! in a thin layer the near ones are above each other.
 
 use rayon::prelude::*;
 
-/// A neighbour is near at up to this many times the square of the least distance.
-const NEAR: f64 = 4.0;
-/// Unknowns that are not aggregated further.
-const FEW: usize = 60;
-/// Of each aggregation at least: unknowns before it over those after it.
-const LEAST: f64 = 1.5;
-/// 1/λ of the prolongation's smoothing: λ of D⁻¹K is below 2 in most meshes.
+/// Largest squared distance of near neighbours over the smallest one.
+const NEAR_RATIO: f64 = 4.0;
+/// Number of unknowns that are not aggregated further.
+const MAX_UNAGGREGATED: usize = 60;
+/// Smallest coarsening ratio that is worth a level.
+const MIN_COARSENING: f64 = 1.5;
+/// Smoothing factor 1/λ of the prolongation: λ of D⁻¹K is below 2 in most meshes.
 const SMOOTHING: f64 = 2.0 / 3.0;
-/// A diagonal without far neighbours is at least this part of the whole one.
-const PIVOT: f64 = 0.1;
+/// Smallest fraction of the diagonal that remains without far neighbours.
+const MIN_DIAGONAL: f64 = 0.1;
+/// No unknown.
 const NONE: u32 = u32::MAX;
 
 /// A sparse matrix, row by row.
@@ -26,7 +28,7 @@ pub struct Sparse {
 }
 
 impl Sparse {
-    /// Of rows in the order of work items.
+    /// Concatenates the rows of work items.
     fn gather(rows: Vec<Self>) -> Self {
         let mut all = Self { starts: vec![0], ..Self::default() };
         for rows in rows {
@@ -38,7 +40,8 @@ impl Sparse {
         all
     }
 
-    /// Rows made one by one, in work items; `fill` adds (column, value) pairs, of which those of one column are added up.
+    /// Builds rows one by one, in parallel work items; `fill` adds (column, value) pairs, and those of the
+    /// same column are summed.
     fn build(size: usize, columns: usize, fill: impl Fn(usize, &mut dyn FnMut(u32, f64)) + Sync) -> Self {
         let items: Vec<usize> = (0..size).step_by(ITEM).collect();
         let part = |place: &mut Vec<u32>, &first: &usize| {
@@ -90,7 +93,7 @@ impl Sparse {
         other
     }
 
-    /// Σ over a row of value times x.
+    /// Product of a row with x.
     pub fn dot(&self, row: usize, x: &[f64]) -> f64 {
         let range = self.starts[row] as usize..self.starts[row + 1] as usize;
         let (columns, left) = self.columns[range.clone()].as_chunks::<4>();
@@ -108,19 +111,20 @@ impl Sparse {
     }
 }
 
-/// Rows of a work item.
+/// Number of rows of a work item.
 const ITEM: usize = 4096;
 
-/// From one level to the next.
+/// Transfer from one level to the next coarser one.
 #[derive(Clone, Debug)]
 pub struct Transfer {
     pub prolongation: Sparse,
     pub restriction: Sparse,
-    /// Conduction on the next level.
+    /// Conduction on the coarser level.
     pub conduction: Sparse,
 }
 
-/// All levels below the finest. `neighbours` visits the entries of a row of the conduction matrix; what is not `free` has no unknown.
+/// Builds all levels below the finest. `entries` visits the entries of a row of the conduction matrix; only
+/// `free` equations are unknowns.
 pub fn levels(
     free: &[f64],
     place: impl Fn(usize) -> [f64; 3],
@@ -141,7 +145,7 @@ pub fn levels(
     let mut levels = Vec::new();
     loop {
         let exists = (0..conduction.rows()).filter(|&row| conduction.row(row).next().is_some()).count();
-        if exists <= FEW {
+        if exists <= MAX_UNAGGREGATED {
             return levels;
         }
         let near = |row: usize| {
@@ -157,18 +161,18 @@ pub fn levels(
                     .filter(move |&column| column as usize != row)
             };
             let least = others().map(square).fold(f64::INFINITY, f64::min);
-            others().filter(move |&column| square(column) <= NEAR * (1.0 + 1e-9) * least)
+            others().filter(move |&column| square(column) <= NEAR_RATIO * (1.0 + 1e-9) * least)
         };
         let (group, count) =
             aggregate(conduction.rows(), |row| near(row), |row| conduction.row(row).next().is_some());
-        if (exists as f64) < LEAST * f64::from(count) {
+        if (exists as f64) < MIN_COARSENING * f64::from(count) {
             return levels;
         }
         let prolongation = Sparse::build(conduction.rows(), count as usize, |row, add| {
             if group[row] == NONE {
                 return;
             }
-            // what is far is added to the diagonal, which keeps the row's sum
+            // add far entries to the diagonal, which keeps the sum of the row
             let mut list: Vec<u32> = near(row).collect();
             list.sort_unstable();
             let (mut whole, mut diagonal) = (0.0, 0.0);
@@ -180,7 +184,7 @@ pub fn levels(
                     diagonal += value;
                 }
             }
-            let factor = SMOOTHING / if diagonal > PIVOT * whole { diagonal } else { whole };
+            let factor = SMOOTHING / if diagonal > MIN_DIAGONAL * whole { diagonal } else { whole };
             add(group[row], 1.0 - factor * diagonal);
             for (column, value) in
                 conduction.row(row).filter(|(column, _)| list.binary_search(column).is_ok())
@@ -211,7 +215,8 @@ pub fn levels(
     }
 }
 
-/// The group of each unknown: a root and all that is near it, then those that are left by themselves.
+/// Assigns a group to each unknown: first a root with all its near neighbours, then groups of the remaining
+/// ones.
 fn aggregate<I: Iterator<Item = u32>>(
     size: usize,
     near: impl Fn(usize) -> I,
@@ -231,7 +236,7 @@ fn aggregate<I: Iterator<Item = u32>>(
         match near(row).map(|other| roots[other as usize]).find(|&other| other != NONE) {
             Some(other) => group[row] = other,
             None => {
-                // near others that are left as well
+                // near neighbours that also remain
                 if group[row] == NONE {
                     group[row] = count;
                     for other in near(row) {

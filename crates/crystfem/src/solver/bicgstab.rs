@@ -1,10 +1,10 @@
-//! Stabilized biconjugate gradients, for matrices that are not symmetric, with the diagonal as preconditioner on the right
-//! (van der Vorst 1992, doi:10.1137/0913035).
+//! Stabilized biconjugate gradients for matrices that are not symmetric, with the diagonal as right
+//! preconditioner (van der Vorst 1992, doi:10.1137/0913035).
 
-use super::{Ended, Goal, Operator, norm_squared};
+use super::{Operator, SolveOutcome, StoppingCriterion, norm_squared};
 use crate::system::vector::{set, sum};
 
-/// Biconjugate gradients with their work space.
+/// Work vectors of stabilized biconjugate gradients.
 #[derive(Clone, Debug, Default)]
 pub struct BiconjugateGradients {
     shadow: Vec<f64>,
@@ -15,16 +15,16 @@ pub struct BiconjugateGradients {
 }
 
 impl BiconjugateGradients {
-    /// Solves A x = r from x = 0; arguments as of [`super::ConjugateGradients::solve`]. It stops by the residual: at
-    /// √(Σ r²/diagonal / `capacity`) = `tolerance`.
+    /// Solves A x = r from x = 0; arguments as for [`super::ConjugateGradients::solve`]. Converged when the
+    /// residual √(Σ r²/diagonal / `capacity`) is below `tolerance`.
     pub fn solve(
         &mut self,
         operator: &Operator,
         inverse: &[f64],
         residual: &mut [f64],
         solution: &mut [f64],
-        &Goal { capacity, tolerance, floor, limit, stop }: &Goal,
-    ) -> Ended {
+        &StoppingCriterion { capacity, tolerance, floor, limit, stop }: &StoppingCriterion,
+    ) -> SolveOutcome {
         let size = residual.len();
         let Self { shadow, direction, scaled, image, second } = self;
         for vector in [&mut *direction, &mut *scaled, &mut *image, &mut *second] {
@@ -33,19 +33,19 @@ impl BiconjugateGradients {
         }
         solution.fill(0.0);
         let goal = (tolerance * tolerance * capacity).max(floor);
-        // 0 restarts: along the residual, with the residual as shadow
+        // 0 restarts along the residual, with the residual as shadow
         let (mut rho, mut alpha, mut omega) = (0.0, 0.0, 0.0);
         for iteration in 0..limit {
             if stop() {
-                return Ended { iterations: iteration, error: f64::NAN, converged: false };
+                return SolveOutcome { iterations: iteration, error: f64::NAN, converged: false };
             }
             let square = norm_squared(residual, inverse);
             let error = (square / capacity).sqrt();
             if !square.is_finite() {
-                return Ended { iterations: iteration, error: f64::NAN, converged: false };
+                return SolveOutcome { iterations: iteration, error: f64::NAN, converged: false };
             }
             if square <= goal {
-                return Ended { iterations: iteration, error, converged: true };
+                return SolveOutcome { iterations: iteration, error, converged: true };
             }
             let last = rho;
             rho = if last == 0.0 { 0.0 } else { sum(size, |k| inverse[k] * shadow[k] * residual[k]) };
@@ -80,21 +80,21 @@ impl BiconjugateGradients {
             }
         }
         let error = (norm_squared(residual, inverse) / capacity).sqrt();
-        Ended { iterations: limit, error, converged: false }
+        SolveOutcome { iterations: limit, error, converged: false }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::system::{FaceMatrices, Rows};
+    use crate::system::{ConductionRows, FaceMatrices};
 
-    /// A line of 300 whose columns are scaled by 1 or 10: x known.
+    /// Solves for a known x on a line of 300 whose columns are scaled by 1 or 10.
     #[test]
     fn a_matrix_with_scaled_columns() {
         let size = 300;
         let scale = |k: usize| if k < 120 { 1.0 } else { 10.0 };
-        let rows = Rows::build(size, false, |row, out| {
+        let rows = ConductionRows::build(size, false, |row, out| {
             out.begin(std::iter::empty());
             out.add(0, 2.0 * scale(row), 0.0);
             if row > 0 {
@@ -118,7 +118,8 @@ mod tests {
         operator.product(&exact, &mut residual);
         let mut solution = vec![0.0; size];
         let solve = |limit, solution: &mut [f64]| {
-            let goal = Goal { capacity: 3.0, tolerance: 1e-10, floor: 0.0, limit, stop: &|| false };
+            let goal =
+                StoppingCriterion { capacity: 3.0, tolerance: 1e-10, floor: 0.0, limit, stop: &|| false };
             let mut right = residual.clone();
             BiconjugateGradients::default().solve(&operator, &inverse, &mut right, solution, &goal)
         };

@@ -1,6 +1,6 @@
-//! Values that are made once for a matrix and used again.
+//! Values computed once for a matrix and reused.
 
-/// A value and what it was made for: the generation of the equations and the bits of the weight of Q.
+/// A value with its key: the generation of the equations and the bits of the weight of Q.
 #[derive(Clone, Debug, Default)]
 pub struct Cached<T> {
     key: Option<(u64, u64)>,
@@ -9,22 +9,23 @@ pub struct Cached<T> {
 }
 
 impl<T> Cached<T> {
-    /// Returns whether the value was made for this key.
-    pub fn is_for(&self, key: (u64, u64)) -> bool {
+    /// Returns true if the value was made for this key.
+    pub fn matches(&self, key: (u64, u64)) -> bool {
         self.key == Some(key)
     }
 
-    /// Returns whether the value was made for the same build of the equations, whose number is the upper half of the generation.
-    pub fn is_for_build(&self, build: u64) -> bool {
+    /// Returns true if the value was made for this build of the equations, whose number is the upper half of
+    /// the generation.
+    pub fn matches_build(&self, build: u64) -> bool {
         self.key.is_some_and(|(generation, _)| generation >> 32 == build)
     }
 
-    /// Notes what the value was made for.
-    pub fn made_for(&mut self, key: (u64, u64)) {
+    /// Sets the key.
+    pub fn set_key(&mut self, key: (u64, u64)) {
         self.key = Some(key);
     }
 
-    /// Forgets what the value was made for, but keeps its memory.
+    /// Clears the key, but keeps the value's memory.
     pub fn forget(&mut self) {
         self.key = None;
     }

@@ -1,123 +1,126 @@
-//! Conjugate gradients with the diagonal or a multigrid cycle as preconditioner, without a stored matrix where the mesh has equal rows.
+//! Conjugate gradients with the diagonal or a multigrid cycle as preconditioner, matrix-free if the mesh has
+//! equal rows.
 //!
-//! It stops by the error, not by the residual: eᵀAe after k steps is Σ_{j≥k} α_j (r_j·z_j) (Hestenes & Stiefel 1952,
-//! doi:10.6028/jres.049.044), continued here as a geometric series; and eᵀAe ≥ eᵀCe, C the capacity, so that the
-//! root of eᵀAe/ΣC bounds the capacity-weighted rms error of temperature.
+//! The error stops the iteration, not the residual: eᵀAe after k steps is Σ_{j≥k} α_j (r_j·z_j) (Hestenes &
+//! Stiefel 1952, doi:10.6028/jres.049.044), extrapolated here as a geometric series; and eᵀAe ≥ eᵀCe, C the
+//! capacity, so that √(eᵀAe/ΣC) bounds the capacity-weighted rms error of temperature.
 
 use super::Operator;
 use super::multigrid::Multigrid;
 use crate::solver::norm_squared;
 use crate::system::vector::{advance, blend, dot, turn};
 
-/// How an iteration ended.
+/// Outcome of an iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ended {
-    /// Iterations.
+pub struct SolveOutcome {
+    /// Number of iterations.
     pub iterations: usize,
     /// Estimated rms error, K.
     pub error: f64,
-    /// Whether the error is below the tolerance, or nothing but rounding is left.
+    /// True if the error is below the tolerance, or at rounding.
     pub converged: bool,
 }
 
-/// When an iteration ends.
+/// Stopping criterion of an iteration.
 #[derive(Clone, Copy)]
-pub struct Goal<'a> {
+pub struct StoppingCriterion<'a> {
     /// ΣC, J/K.
     pub capacity: f64,
-    /// Error at which it has converged, K.
+    /// Tolerance of the error, K.
     pub tolerance: f64,
-    /// A square of the residual's norm that is rounding.
+    /// Square of the residual norm that is due to rounding.
     pub floor: f64,
-    /// Iterations at most.
+    /// Limit on iterations.
     pub limit: usize,
-    /// Whether to give up.
+    /// Requests a stop.
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// Relative change of a solution by packed rows, in the norm of A: 2⁻²⁴ of the terms |a_ij| (x_i − x_j)²/2, which add up to at most about
-/// four times xᵀAx, as entries of both signs do.
-const PACKED: f64 = 4.0 / 16_777_216.0;
-/// Part of the error that is left, and of the tolerance, that it may be.
-const UNSEEN: f64 = 0.03;
-const UNSEEN_AT_END: f64 = 0.3;
+/// Relative change of a solution by packed rows, in the norm of A: 2⁻²⁴ of the terms |a_ij| (x_i − x_j)²/2,
+/// whose sum is at most about four times xᵀAx, since entries have both signs.
+const PACKED_CHANGE: f64 = 4.0 / 16_777_216.0;
+/// Fraction of the remaining error that packed rows may cause.
+const PACKED_ERROR: f64 = 0.03;
+/// Fraction of the tolerance that packed rows may cause.
+const PACKED_ERROR_AT_END: f64 = 0.3;
 
-/// The last four terms of eᵀAe, from which the sum of those that follow is estimated.
-struct Estimate {
+/// Error estimate: the last four terms of eᵀAe, from which the remaining sum is extrapolated.
+struct ErrorEstimate {
     terms: [f64; 4],
-    /// xᵀAx of what was added to the solution since its residual was computed with A itself.
+    /// xᵀAx of the changes of the solution since its residual was computed with A itself.
     since: f64,
 }
 
-/// What comes after an iteration.
-enum Next {
+/// Action after an iteration.
+enum NextAction {
     Iterate,
-    /// The residual of A itself first.
+    /// Recompute the residual with A itself first.
     Renew,
-    End(Ended),
+    End(SolveOutcome),
 }
 
-impl Estimate {
+impl ErrorEstimate {
     fn new() -> Self {
         Self { terms: [f64::INFINITY; 4], since: 0.0 }
     }
 
-    /// Adds a term.
-    fn next(&mut self, term: f64, iterations: usize, goal: &Goal, packed: bool) -> Next {
+    /// Adds a term, and returns the next action.
+    fn next(&mut self, term: f64, iterations: usize, goal: &StoppingCriterion, packed: bool) -> NextAction {
         self.since += term;
-        let Some(left) = self.left(term) else { return Next::Iterate };
+        let Some(left) = self.remaining(term) else { return NextAction::Iterate };
         let wanted = goal.tolerance * goal.tolerance * goal.capacity;
-        let rounded = if packed { PACKED * PACKED * self.since } else { 0.0 };
-        let most = (UNSEEN * UNSEEN * left).max(UNSEEN_AT_END * UNSEEN_AT_END * wanted);
+        let rounded = if packed { PACKED_CHANGE * PACKED_CHANGE * self.since } else { 0.0 };
+        let most =
+            (PACKED_ERROR * PACKED_ERROR * left).max(PACKED_ERROR_AT_END * PACKED_ERROR_AT_END * wanted);
         if rounded > most {
             self.since = left;
-            return Next::Renew;
+            return NextAction::Renew;
         }
         if left > wanted {
-            return Next::Iterate;
+            return NextAction::Iterate;
         }
         let error = (left / goal.capacity).sqrt();
-        Next::End(Ended { iterations, error, converged: true })
+        NextAction::End(SolveOutcome { iterations, error, converged: true })
     }
 
-    /// After all iterations.
-    fn given_up(&self, goal: &Goal) -> Ended {
+    /// Returns the outcome at the iteration limit.
+    fn at_limit(&self, goal: &StoppingCriterion) -> SolveOutcome {
         let error = (self.terms[3] / goal.capacity).sqrt();
-        Ended { iterations: goal.limit, error, converged: false }
+        SolveOutcome { iterations: goal.limit, error, converged: false }
     }
 
-    /// The sum of the terms after this one, K²·J/K; `None` where it is not known yet.
-    fn left(&mut self, term: f64) -> Option<f64> {
+    /// Estimates the sum of later terms, K²·J/K; `None` if unknown yet.
+    fn remaining(&mut self, term: f64) -> Option<f64> {
         let terms = &mut self.terms;
         let first = terms[3] == f64::INFINITY;
         terms.rotate_left(1);
         terms[3] = term;
-        // terms shrink by ρ each, over three iterations and over the last one
+        // terms decrease by ρ each, over three iterations and over the last one
         let ratio = |from: usize| if terms[from] < f64::INFINITY { terms[3] / terms[from] } else { 1.0 };
         let rho = if terms[0] < f64::INFINITY { ratio(0).cbrt().max(ratio(2)) } else { ratio(2) };
         (!first && rho < 0.9999).then(|| terms[3] * rho / (1.0 - rho))
     }
 }
 
-/// Conjugate gradients with their work space.
+/// Work vectors of conjugate gradients.
 #[derive(Clone, Debug, Default)]
 pub struct ConjugateGradients {
     direction: Vec<f64>,
     image: Vec<f64>,
     conditioned: Vec<f64>,
-    /// r at the start, where products are rounded.
+    /// Initial residual, kept if products are rounded.
     right: Vec<f64>,
 }
 
 impl ConjugateGradients {
-    /// See [`super::Iterative::lend`].
+    /// Swaps work vectors, see [`super::Iterative::swap_vectors`].
     pub fn swap_vectors(&mut self, direction: &mut Vec<f64>, image: &mut Vec<f64>) {
         std::mem::swap(&mut self.direction, direction);
         std::mem::swap(&mut self.image, image);
     }
 
-    /// Solves A x = r from x = 0, with a multigrid cycle or the diagonal as preconditioner. `inverse` is one over A's diagonal, 0 where x
-    /// stays 0; `residual` becomes r − A x.
+    /// Solves A x = r from x = 0, preconditioned by a multigrid cycle or the diagonal. `inverse` is the
+    /// reciprocal of A's diagonal, 0 where x stays 0; `residual` becomes r − A x.
     pub fn solve(
         &mut self,
         mut multigrid: Option<&mut Multigrid>,
@@ -125,22 +128,22 @@ impl ConjugateGradients {
         inverse: &[f64],
         residual: &mut [f64],
         solution: &mut [f64],
-        goal: &Goal,
-    ) -> Ended {
+        goal: &StoppingCriterion,
+    ) -> SolveOutcome {
         let size = residual.len();
         self.direction.resize(size, 0.0);
         self.image.resize(size, 0.0);
         self.conditioned.resize(if multigrid.is_some() { size } else { 0 }, 0.0);
         self.direction.fill(0.0);
         solution.fill(0.0);
-        self.keep(operator, residual);
+        self.save_residual(operator, residual);
         let Self { direction, image, conditioned, right } = self;
-        let mut estimate = Estimate::new();
+        let mut estimate = ErrorEstimate::new();
         let mut last = f64::INFINITY;
         let mut norm = norm_squared(residual, inverse);
         for iteration in 0..goal.limit {
             if norm <= goal.floor || norm == 0.0 {
-                return Ended { iterations: iteration, error: 0.0, converged: true };
+                return SolveOutcome { iterations: iteration, error: 0.0, converged: true };
             }
             let square = match &mut multigrid {
                 Some(multigrid) => {
@@ -158,23 +161,23 @@ impl ConjugateGradients {
             last = square;
             let curvature = operator.product(direction, image);
             if (goal.stop)() || !(curvature > 0.0 && curvature.is_finite() && square > 0.0) {
-                return Ended { iterations: iteration, error: f64::NAN, converged: false };
+                return SolveOutcome { iterations: iteration, error: f64::NAN, converged: false };
             }
             let length = square / curvature;
             norm = advance(length, solution, residual, direction, image, inverse);
             match estimate.next(length * square, iteration + 1, goal, operator.packed.is_some()) {
-                Next::End(ended) => return ended,
-                Next::Renew => {
+                NextAction::End(ended) => return ended,
+                NextAction::Renew => {
                     renew(operator, right, inverse, residual, solution);
                     norm = norm_squared(residual, inverse);
                 }
-                Next::Iterate => {}
+                NextAction::Iterate => {}
             }
         }
-        estimate.given_up(goal)
+        estimate.at_limit(goal)
     }
 
-    fn keep(&mut self, operator: &Operator, residual: &[f64]) {
+    fn save_residual(&mut self, operator: &Operator, residual: &[f64]) {
         self.right.clear();
         if operator.packed.is_some() {
             self.right.extend_from_slice(residual);
@@ -182,7 +185,8 @@ impl ConjugateGradients {
     }
 }
 
-/// r = right − A x, of A itself: the directions go on (van der Vorst & Ye 2000, doi:10.1137/S1064827599353865).
+/// Recomputes r = right − A x with A itself; the search directions are kept (van der Vorst & Ye 2000,
+/// doi:10.1137/S1064827599353865).
 fn renew(operator: &Operator, right: &[f64], inverse: &[f64], residual: &mut [f64], solution: &[f64]) {
     operator.exact().product(solution, residual);
     blend(residual, right, inverse, |image, right, inverse| if inverse == 0.0 { 0.0 } else { right - image });
@@ -191,13 +195,13 @@ fn renew(operator: &Operator, right: &[f64], inverse: &[f64], residual: &mut [f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::system::{FaceMatrices, Rows};
+    use crate::system::{ConductionRows, FaceMatrices};
 
-    /// A line of 500 with diagonal 2 + 1e-3: x known; the estimate bounds the true error.
+    /// Estimate bounds the true error for a known x on a line of 500 with diagonal 2 + 1e-3.
     #[test]
     fn the_error_is_below_the_tolerance() {
         let size = 500;
-        let rows = Rows::build(size, false, |row, out| {
+        let rows = ConductionRows::build(size, false, |row, out| {
             out.begin(std::iter::empty());
             out.add(0, 2.0, 0.0);
             if row > 0 {
@@ -228,7 +232,7 @@ mod tests {
                 &inverse,
                 &mut right,
                 &mut solution,
-                &Goal { capacity: 0.5, tolerance, floor: 0.0, limit: 1000, stop: &|| false },
+                &StoppingCriterion { capacity: 0.5, tolerance, floor: 0.0, limit: 1000, stop: &|| false },
             );
             let error = solution.iter().zip(&exact).map(|(s, e)| (s - e) * (s - e)).sum::<f64>();
             assert!(ended.converged, "{ended:?}");
@@ -237,8 +241,8 @@ mod tests {
     }
 
     #[test]
-    fn an_indefinite_matrix_and_a_short_limit_are_told() {
-        let rows = Rows::build(2, false, |_, out| {
+    fn an_indefinite_matrix_and_a_short_limit_are_reported() {
+        let rows = ConductionRows::build(2, false, |_, out| {
             out.begin(std::iter::empty());
             out.add(0, -1.0, 0.0);
         });
@@ -252,7 +256,8 @@ mod tests {
         let mut solution = [0.0; 2];
         let mut solve = |limit| {
             let (mut residual, mut cg) = ([1.0, 2.0], ConjugateGradients::default());
-            let goal = Goal { capacity: 1.0, tolerance: 1e-9, floor: 0.0, limit, stop: &|| false };
+            let goal =
+                StoppingCriterion { capacity: 1.0, tolerance: 1e-9, floor: 0.0, limit, stop: &|| false };
             cg.solve(None, &operator, &[1.0; 2], &mut residual, &mut solution, &goal)
         };
         assert!(!solve(10).converged);

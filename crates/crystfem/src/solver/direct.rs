@@ -1,13 +1,13 @@
-//! Cholesky factors in the order of nested dissection: for large steps with an unchanged matrix. The analysis is made once for a system,
-//! factors once for a matrix.
+//! Cholesky factors in the order of nested dissection, for large steps with an unchanged matrix. The analysis
+//! is made once per system, factors once per matrix.
 
 use super::{Operator, dissection};
 use polycore::numerics::cholesky::{Cholesky, Pattern};
 
-/// Not among the unknowns.
+/// No unknown.
 const NONE: u32 = u32::MAX;
 
-/// Factors of the free equations' matrix.
+/// Cholesky factors of the matrix of the free equations.
 pub struct Direct {
     /// Equation of each unknown, in the order of elimination.
     order: Vec<u32>,
@@ -19,7 +19,8 @@ pub struct Direct {
 }
 
 impl Direct {
-    /// Analyses the pattern of the equations with `free` ≠ 0 at these places; `None` where memory does not suffice.
+    /// Analyses the pattern of the equations with `free` ≠ 0, at given positions; `None` if memory does not
+    /// suffice.
     pub fn analyse(operator: &Operator, free: &[f64], place: impl Fn(u32) -> [f64; 3]) -> Option<Self> {
         let size = free.len();
         let equations: Vec<u32> = (0..size as u32).filter(|&e| free[e as usize] != 0.0).collect();
@@ -49,8 +50,8 @@ impl Direct {
         Some(Self { order, unknown, cholesky: Cholesky::analyse(pattern)?, values: Vec::new(), right })
     }
 
-    /// Factors a matrix of the analysed pattern. False where it is not positive definite to working precision, or
-    /// memory does not suffice.
+    /// Factors a matrix of the analysed pattern. Returns false if it is not positive definite to working
+    /// precision, or memory does not suffice.
     pub fn factor(&mut self, operator: &Operator) -> bool {
         let pattern = self.cholesky.pattern();
         let mut entries = vec![0.0; pattern.rows.len()];
@@ -81,7 +82,7 @@ impl Direct {
         self.cholesky.factor(&entries, &mut self.values)
     }
 
-    /// Solves A x = b with the factors; x is 0 where an equation is not among the unknowns.
+    /// Solves A x = b with the factors; x is 0 for equations that are not unknowns.
     pub fn solve(&mut self, right: &[f64], solution: &mut [f64]) {
         for (value, &equation) in self.right.iter_mut().zip(&self.order) {
             *value = right[equation as usize];
@@ -93,7 +94,7 @@ impl Direct {
         }
     }
 
-    /// Entries of the factors.
+    /// Number of entries of the factors.
     #[cfg(test)]
     pub fn entries(&self) -> usize {
         self.values.len()
@@ -103,14 +104,15 @@ impl Direct {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::system::{FaceMatrices, Rows};
+    use crate::system::{ConductionRows, FaceMatrices};
 
-    /// The five-point Laplacian of a grid plus a shift, one equation fixed: solves what its product gives.
+    /// Solves reproduce a known x for the five-point Laplacian of a grid plus a shift, with one equation
+    /// fixed.
     #[test]
-    fn it_solves_what_it_factors() {
+    fn solves_reproduce_a_known_vector() {
         let (width, height) = (23_usize, 17);
         let size = width * height;
-        let rows = Rows::build(size, false, |row, out| {
+        let rows = ConductionRows::build(size, false, |row, out| {
             out.begin(std::iter::empty());
             out.add(0, 4.0, 0.0);
             for (other, there) in [

@@ -1,20 +1,20 @@
-//! Nested dissection by coordinates: an order of elimination that keeps the factors of a mesh small (George 1973,
-//! doi:10.1137/0710032).
+//! Nested dissection by coordinates: an elimination order that keeps the factors of a mesh small (George
+//! 1973, doi:10.1137/0710032).
 
 use polycore::numerics::bounds;
 
-/// Equations of a part that is not cut further.
-const SMALLEST: usize = 64;
+/// Largest number of equations of a part that is not cut further.
+const MAX_UNCUT: usize = 64;
 
-/// Equations in their order of elimination. A part is cut across its longest side; what lies beyond the cut and
-/// touches the other half comes last. `neighbours` visits the equations coupled to one.
+/// Returns equations in elimination order. A part is cut across its longest side; equations beyond the cut
+/// that are coupled to the other half come last. `neighbours` visits the equations coupled to one.
 pub fn order(
     equations: Vec<u32>,
     size: usize,
     place: impl Fn(u32) -> [f64; 3],
     neighbours: impl Fn(u32, &mut dyn FnMut(u32)),
 ) -> Vec<u32> {
-    // side of each equation within the part that is being cut
+    // side of each equation within the part being cut
     let mut side = vec![0_u8; size];
     let mut reversed = Vec::with_capacity(equations.len());
     let mut parts = vec![equations];
@@ -29,7 +29,7 @@ pub fn order(
         // planes of nodes may differ by rounding
         let cut = cut - 1e-9 * (high[longest] - low[longest]);
         let (near, far): (Vec<u32>, Vec<u32>) = part.iter().partition(|&&e| place(e)[longest] < cut);
-        if part.len() <= SMALLEST || near.is_empty() {
+        if part.len() <= MAX_UNCUT || near.is_empty() {
             part.reverse();
             reversed.append(&mut part);
             continue;
@@ -48,7 +48,7 @@ pub fn order(
         }
         separator.reverse();
         reversed.append(&mut separator);
-        // taken from the end: first the far half, then the near one, both before the separator
+        // filled from the end: first the far half, then the near one, both before the separator
         parts.push(near);
         parts.push(rest);
     }
@@ -60,7 +60,7 @@ pub fn order(
 mod tests {
     use super::*;
 
-    /// A grid of 20 × 20: a permutation; the last equations separate it.
+    /// Order of a grid of 20 × 20 is a permutation; the last equations separate it.
     #[test]
     fn a_square_is_cut_in_the_middle() {
         let place = |e: u32| [f64::from(e % 20), f64::from(e / 20), 0.0];

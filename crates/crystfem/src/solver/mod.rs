@@ -1,4 +1,4 @@
-//! Linear systems of one stage of a step, A δ = r with A = D + M + a·(K + faces).
+//! Linear solvers for one stage of a step, A δ = r with A = D + M + a·(K + faces).
 
 mod aggregation;
 mod bicgstab;
@@ -11,39 +11,40 @@ mod multigrid;
 mod packed;
 
 pub use cached::Cached;
-pub use cg::{Ended, Goal};
-pub use choice::{Choice, LEVELS, LinearSolver, Method, Task};
+pub use cg::{SolveOutcome, StoppingCriterion};
+pub use choice::{LEVELS, LinearMethod, LinearSolver, LinearTask, SolverChoice};
 pub use direct::Direct;
 pub use multigrid::Multigrid;
-pub use packed::Packed;
+pub use packed::PackedRows;
 
 use crate::system::vector::{dot, weighted_square};
-use crate::system::{FaceMatrices, Rows};
+use crate::system::{ConductionRows, FaceMatrices};
 use bicgstab::BiconjugateGradients;
 use cg::ConjugateGradients;
 
-/// A = D + `weights[0]`·M + `weights[1]`·(K + faces).
+/// Matrix A = D + `weights[0]`·M + `weights[1]`·(K + faces).
 #[derive(Clone, Copy)]
 pub struct Operator<'a> {
-    /// M and K.
-    pub rows: &'a Rows,
-    /// D: lumped capacity and surfaces; `None` with consistent capacity.
+    /// Matrices M and K.
+    pub rows: &'a ConductionRows,
+    /// Diagonal D, lumped capacity and surfaces; `None` with consistent capacity.
     pub diagonal: Option<&'a [f64]>,
     /// Factors of M and K.
     pub weights: [f64; 2],
-    /// Surfaces with consistent capacity.
+    /// Surface matrices with consistent capacity.
     pub faces: &'a FaceMatrices,
-    /// M and K for the iterations, where rows are unequal: A with consistent capacity, K with lumped one. Rounded to single precision.
-    pub packed: Option<&'a Packed>,
+    /// Packed single-precision rows for the iterations, if rows are unequal: A with consistent capacity, K
+    /// with lumped capacity.
+    pub packed: Option<&'a PackedRows>,
 }
 
 impl Operator<'_> {
-    /// Without packed rows.
+    /// Returns the operator without packed rows.
     pub fn exact(&self) -> Self {
         Self { packed: None, ..*self }
     }
 
-    /// y = A x; returns x·y.
+    /// Computes y = A x; returns x·y.
     pub fn product(&self, x: &[f64], y: &mut [f64]) -> f64 {
         let product = match self.packed {
             Some(packed) => {
@@ -62,23 +63,24 @@ impl Operator<'_> {
     }
 }
 
-/// The iterative methods with their work space.
+/// Iterative methods with their work vectors.
 #[derive(Default)]
 pub struct Iterative {
     conjugate: ConjugateGradients,
     biconjugate: BiconjugateGradients,
-    /// The preconditioner of symmetric matrices, where it is not the diagonal.
+    /// Multigrid preconditioner of symmetric matrices, if used.
     pub multigrid: Cached<Option<Multigrid>>,
 }
 
 impl Iterative {
-    /// Swaps the work vectors of conjugate gradients, the direction and A times it, with two vectors that are free until the next call.
+    /// Swaps the work vectors of conjugate gradients, the direction and A times it, with two vectors that are
+    /// free until the next call.
     pub fn swap_vectors(&mut self, direction: &mut Vec<f64>, image: &mut Vec<f64>) {
         self.conjugate.swap_vectors(direction, image);
     }
 
-    /// Solves A x = r from x = 0 by the method that suits the matrix. `inverse` is one over A's diagonal, 0 where x stays 0;
-    /// `residual` becomes r − A x, as the iterations know it.
+    /// Solves A x = r from x = 0 by the method that suits the matrix. `inverse` is the reciprocal of A's
+    /// diagonal, 0 where x stays 0; `residual` becomes r − A x, as tracked by the iteration.
     pub fn solve(
         &mut self,
         operator: &Operator,
@@ -86,8 +88,8 @@ impl Iterative {
         inverse: &[f64],
         residual: &mut [f64],
         solution: &mut [f64],
-        goal: &Goal,
-    ) -> Ended {
+        goal: &StoppingCriterion,
+    ) -> SolveOutcome {
         let Self { conjugate, biconjugate, multigrid } = self;
         if symmetric {
             conjugate.solve(multigrid.value.as_mut(), operator, inverse, residual, solution, goal)
@@ -97,7 +99,7 @@ impl Iterative {
     }
 }
 
-/// Σ r²/D: the square of a residual's norm.
+/// Squared norm of a residual, Σ r²/D.
 pub fn norm_squared(residual: &[f64], inverse: &[f64]) -> f64 {
     weighted_square(residual, inverse)
 }

@@ -1,28 +1,30 @@
-//! A V-cycle of smoothed aggregation as preconditioner: iterations depend neither on the mesh nor on the step.
+//! V-cycle of smoothed aggregation as preconditioner: the number of iterations depends neither on the mesh
+//! nor on the step.
 //!
-//! On each level A = D + a K, with D lumped and restricted like a residual, so that another step or capacity makes no new levels.
+//! On each level A = D + a K, with D lumped and restricted like a residual, so that another step length or
+//! capacity needs no new levels.
 
 use super::Operator;
 use super::aggregation::{Sparse, Transfer, levels};
 use crate::system::vector::{blend, combine, set};
 
-/// Part of 1/diagonal that a smoothing step takes, for λ of D⁻¹A up to 2.
+/// Damping of the Jacobi smoother, for λ of D⁻¹A up to 2.
 const DAMPING: f64 = 2.0 / 3.0;
 
-/// Levels, and what belongs to the matrix of a stage.
+/// Multigrid levels for the matrix of a stage.
 pub struct Multigrid {
     transfers: Vec<Transfer>,
     levels: Vec<Level>,
-    /// Work space of the finest level.
+    /// Work vectors of the finest level.
     smoothed: Vec<f64>,
     left: Vec<f64>,
-    bottom: Bottom,
+    bottom: CoarsestLevel,
 }
 
 /// A level below the finest.
 #[derive(Default)]
 struct Level {
-    /// A, in the pattern of the level's conduction.
+    /// Matrix A, in the pattern of the level's conduction.
     values: Vec<f64>,
     lumped: Vec<f64>,
     /// Damped 1/diagonal.
@@ -34,21 +36,22 @@ struct Level {
 
 /// Dense Cholesky factors of the last level.
 #[derive(Default)]
-struct Bottom {
+struct CoarsestLevel {
     factor: Vec<f64>,
 }
 
 impl Multigrid {
-    /// Of the conduction matrix of an operator; `free` is 0 at equations that are prescribed.
+    /// Builds the levels for the conduction matrix of an operator; `free` is 0 at prescribed equations.
     pub fn new(operator: &Operator, free: &[f64], place: impl Fn(usize) -> [f64; 3]) -> Self {
         let transfers = levels(free, place, |row, visit: &mut dyn FnMut(usize, f64)| {
             operator.rows.row(row, [0.0, 1.0]).for_each(|(column, value)| visit(column, value));
         });
         let levels = transfers.iter().map(|_| Level::default()).collect();
-        Self { transfers, levels, smoothed: Vec::new(), left: Vec::new(), bottom: Bottom::default() }
+        Self { transfers, levels, smoothed: Vec::new(), left: Vec::new(), bottom: CoarsestLevel::default() }
     }
 
-    /// For another matrix: row sums of the capacity and surfaces `lumped`, and the factor of conduction.
+    /// Updates the matrices of all levels, from the row sums `lumped` of capacity and surfaces, and the
+    /// factor of conduction.
     pub fn set(&mut self, lumped: &[f64], weight: f64) {
         for level in 0..self.levels.len() {
             let (before, rest) = self.levels.split_at_mut(level);
@@ -72,11 +75,12 @@ impl Multigrid {
             }
         }
         if let (Some(last), Some(transfer)) = (self.levels.last(), self.transfers.last()) {
-            self.bottom = Bottom::new(&transfer.conduction, &last.values);
+            self.bottom = CoarsestLevel::new(&transfer.conduction, &last.values);
         }
     }
 
-    /// z = B r; `inverse` is one over the diagonal of the operator, 0 where it is not free.
+    /// Applies the preconditioner, z = B r; `inverse` is the reciprocal of the operator's diagonal, 0 if not
+    /// free.
     pub fn apply(&mut self, operator: &Operator, inverse: &[f64], residual: &[f64], z: &mut [f64]) {
         let size = residual.len();
         let (smoothed, left) = (&mut self.smoothed, &mut self.left);
@@ -98,8 +102,8 @@ impl Multigrid {
     }
 }
 
-/// From the right side of the first of these levels to its solution.
-fn cycle(transfers: &[Transfer], levels: &mut [Level], bottom: &Bottom) {
+/// Solves from the first of these levels down.
+fn cycle(transfers: &[Transfer], levels: &mut [Level], bottom: &CoarsestLevel) {
     let Some((own, below)) = levels.split_first_mut() else { return };
     let matrix = &transfers[0].conduction;
     if below.is_empty() {
@@ -122,8 +126,8 @@ fn cycle(transfers: &[Transfer], levels: &mut [Level], bottom: &Bottom) {
     combine(found, |row, own| own + inverse[row] * left[row]);
 }
 
-impl Bottom {
-    /// A pivot that vanishes leaves its unknown out: a body that nothing holds and that has no capacity.
+impl CoarsestLevel {
+    /// Factors the matrix; a vanishing pivot, of a body without support and capacity, is left out.
     fn new(pattern: &Sparse, values: &[f64]) -> Self {
         let size = pattern.rows();
         let mut factor = vec![0.0; size * size];

@@ -1,75 +1,77 @@
-//! A matrix for the iterations alone, where most rows are distinct: entries combined for one step, in single precision, eight rows side by side.
+//! Packed matrix for iterations on mostly distinct rows: entries combined for one step, in single precision,
+//! eight rows side by side.
 //!
-//! Iterations on unequal rows take as long as reading them from memory does. Entries beside the diagonal are rounded to f32, and the diagonal
-//! takes what that leaves, so that sums of rows stay those of f64. The energy xᵀAx is then that of A to about 2⁻²⁴ in long and short
-//! steps alike; conjugate gradients go on from the residual of A itself before that shows.
+//! Iterations on unequal rows are limited by memory bandwidth. Off-diagonal entries are rounded to f32, and
+//! the diagonal takes the rounding errors, so that row sums stay those of f64. The energy xᵀAx then agrees
+//! with that of A to about 2⁻²⁴ for long and short steps alike; conjugate gradients recompute the residual
+//! with A itself before the difference matters.
 
-use crate::system::Rows;
+use crate::system::ConductionRows;
 use crate::system::vector::CHUNK;
 use polycore::numerics::ordered_sum;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-/// Rows side by side.
+/// Number of rows side by side.
 const LANES: usize = 8;
-/// Entries of a block over those of its longest row at most, where its rows share a list of distances.
-const MOST_SPREAD: f64 = 1.3;
+/// Largest ratio of a block's entries to those of its longest row, for blocks whose rows share offsets.
+const MAX_SPREAD: f64 = 1.3;
 
-/// Rows of M and K for given factors, packed.
+/// Packed rows of a combination of M and K.
 #[derive(Default)]
-pub struct Packed {
-    items: Vec<Kept>,
-    /// For which rows and factors it was made.
+pub struct PackedRows {
+    items: Vec<CachedItem>,
+    /// Versions of rows, and factors, for which it was made.
     made_for: Option<([u64; 2], [u64; 2])>,
     any: bool,
 }
 
-/// A work item, and for what it was made: births change few of them.
+/// A work item with its versions: births change few items.
 #[derive(Default)]
-struct Kept {
-    /// `None` where rows are mostly equal.
+struct CachedItem {
+    /// `None` if rows are mostly equal.
     item: Option<Item>,
-    /// For which pattern.
+    /// Version of the pattern.
     shaped_for: Option<u64>,
-    /// For which values and factors.
+    /// Version of the values, and factors.
     filled_for: Option<(u64, [u64; 2])>,
 }
 
-/// Rows of one work item.
+/// Packed rows of one work item.
 #[derive(Default)]
 struct Item {
-    /// The diagonal and what rounding took from the other entries.
+    /// Diagonal plus the rounding errors of the other entries.
     core: Vec<f64>,
-    /// Beside the diagonal, block after block, entry after entry.
+    /// Off-diagonal entries, block by block.
     values: Vec<[f32; LANES]>,
-    blocks: Vec<Block>,
-    /// Distances from the diagonal, of blocks with few of them.
+    blocks: Vec<RowBlock>,
+    /// Distances from the diagonal, for banded blocks.
     offsets: Vec<i32>,
     /// Columns of the other blocks.
     columns: Vec<[u32; LANES]>,
 }
 
-/// Eight rows, or the last ones.
+/// A block of eight rows, or of the last ones.
 #[derive(Clone, Copy)]
-struct Block {
-    /// Its first entry in `offsets` or `columns`.
+struct RowBlock {
+    /// Index of its first entry in `offsets` or `columns`.
     first: u32,
     count: u16,
     banded: bool,
 }
 
-impl Packed {
-    /// Makes it of these rows, as far as it is not yet; false where no rows are packed.
-    pub fn update(&mut self, rows: &Rows, weights: [f64; 2]) -> bool {
+impl PackedRows {
+    /// Updates outdated work items; returns false if no rows are packed.
+    pub fn update(&mut self, rows: &ConductionRows, weights: [f64; 2]) -> bool {
         let factors = weights.map(f64::to_bits);
-        // few distinct rows stay in caches as they are
+        // few distinct rows stay in caches unpacked
         if rows.are_few() {
             *self = Self::default();
             return false;
         }
         let made_for = Some((rows.versions(), factors));
         if self.made_for != made_for {
-            self.items.resize_with(rows.items(), Kept::default);
+            self.items.resize_with(rows.items(), CachedItem::default);
             self.items.par_iter_mut().enumerate().for_each(|(index, kept)| {
                 let [shape, values] = rows.versions_of(index);
                 if kept.shaped_for != Some(shape) {
@@ -86,10 +88,10 @@ impl Packed {
         self.any
     }
 
-    /// y = (diagonal + `factor`·A) x; returns x·y. `weights` are `factor` times those of A.
+    /// Computes y = (diagonal + `factor`·A) x; returns x·y. `weights` are `factor` times those of A.
     pub fn product(
         &self,
-        rows: &Rows,
+        rows: &ConductionRows,
         diagonal: Option<&[f64]>,
         (factor, weights): (f64, [f64; 2]),
         x: &[f64],
@@ -100,17 +102,17 @@ impl Packed {
             Some(Some(item)) => {
                 let first = index * CHUNK;
                 let diagonal = diagonal.map(|diagonal| &diagonal[first..first + y.len()]);
-                arch.dispatch(Product { item, diagonal, factor, x, y, first })
+                arch.dispatch(PackedProduct { item, diagonal, factor, x, y, first })
             }
-            _ => rows.part::<false>(index, diagonal, weights, x, y),
+            _ => rows.multiply_item::<false>(index, diagonal, weights, x, y),
         };
         ordered_sum(y.par_chunks_mut(CHUNK).enumerate().map(part))
     }
 }
 
 impl Item {
-    /// The pattern of a work item.
-    fn new(rows: &Rows, index: usize) -> Self {
+    /// Builds the pattern of a work item.
+    fn new(rows: &ConductionRows, index: usize) -> Self {
         let mut item = Self::default();
         let (start, end) = (index * CHUNK, ((index + 1) * CHUNK).min(rows.size()));
         item.core.resize(end - start, 0.0);
@@ -136,7 +138,7 @@ impl Item {
                 to >= 0 && to as usize + LANES <= rows.size()
             };
             let banded = lanes.len() == LANES
-                && offsets.len() as f64 <= MOST_SPREAD * most as f64
+                && offsets.len() as f64 <= MAX_SPREAD * most as f64
                 && offsets.first().is_none_or(inside)
                 && offsets.last().is_none_or(inside);
             if banded {
@@ -149,7 +151,7 @@ impl Item {
                         (item.offsets.len() - offsets.len()) as u32
                     }
                 };
-                item.blocks.push(Block { first: begin, count: offsets.len() as u16, banded });
+                item.blocks.push(RowBlock { first: begin, count: offsets.len() as u16, banded });
                 item.values.resize(item.values.len() + offsets.len(), [0.0; LANES]);
             } else {
                 let begin = item.columns.len();
@@ -160,7 +162,7 @@ impl Item {
                         columns[lane] = column as u32;
                     }
                 }
-                item.blocks.push(Block { first: begin as u32, count: most as u16, banded });
+                item.blocks.push(RowBlock { first: begin as u32, count: most as u16, banded });
                 item.values.resize(item.values.len() + most, [0.0; LANES]);
             }
         }
@@ -170,8 +172,8 @@ impl Item {
         item
     }
 
-    /// The entries for these factors.
-    fn fill(&mut self, rows: &Rows, index: usize, weights: [f64; 2]) {
+    /// Fills in the entries for given factors.
+    fn fill(&mut self, rows: &ConductionRows, index: usize, weights: [f64; 2]) {
         self.values.fill([0.0; LANES]);
         let mut values = self.values.as_mut_slice();
         for (place, block) in self.blocks.iter().enumerate() {
@@ -201,14 +203,14 @@ impl Item {
     }
 }
 
-impl Block {
+impl RowBlock {
     fn range(self) -> std::ops::Range<usize> {
         self.first as usize..self.first as usize + usize::from(self.count)
     }
 }
 
-/// One work item of a product.
-struct Product<'a> {
+/// Product of one work item.
+struct PackedProduct<'a> {
     item: &'a Item,
     diagonal: Option<&'a [f64]>,
     factor: f64,
@@ -217,7 +219,7 @@ struct Product<'a> {
     first: usize,
 }
 
-impl WithSimd for Product<'_> {
+impl WithSimd for PackedProduct<'_> {
     type Output = f64;
 
     #[inline(always)]
@@ -274,7 +276,7 @@ impl WithSimd for Product<'_> {
     }
 }
 
-/// Adds an entry of eight rows times those of a vector.
+/// Adds an entry of eight rows times entries of a vector.
 #[inline(always)]
 fn add<S: Simd>(simd: S, entry: &[f32; LANES], x: &[f64], sums: &mut [S::f64s; LANES]) {
     let mut wide = [0.0; LANES];
@@ -290,10 +292,10 @@ fn add<S: Simd>(simd: S, entry: &[f32; LANES], x: &[f64], sums: &mut [S::f64s; L
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::system::Row;
+    use crate::system::RowBuilder;
 
-    /// A grid of 90 × 70 with unequal entries, of neighbours in order and of neighbours anywhere: products as with f64 to the rounding of
-    /// f32, and exactly so on uniform vectors.
+    /// Products on a grid of 90 × 70 with unequal entries, between ordered and between scattered neighbours,
+    /// agree with f64 to the rounding of f32, and exactly on uniform vectors.
     #[test]
     fn products_of_grids_and_of_unordered_rows() {
         let (width, height) = (90, 70);
@@ -307,7 +309,7 @@ mod tests {
             of.iter().enumerate().for_each(|(name, &k)| names[k] = name);
             let name = |k: usize| names[k];
             let entry = |a: usize, b: usize| -1.0 - 0.5 * ((a.min(b) + 3 * a.max(b)) as f64).sin();
-            let rows = Rows::build(size, true, |row, out| {
+            let rows = ConductionRows::build(size, true, |row, out| {
                 out.begin(std::iter::once(row as u32));
                 let k = of[row];
                 let mut sum = 0.0;
@@ -323,7 +325,7 @@ mod tests {
                 }
                 out.add(0, sum, 1.0);
             });
-            let mut packed = Packed::default();
+            let mut packed = PackedRows::default();
             let diagonal: Vec<f64> = (0..size).map(|k| 1e-3 * (k as f64).cos().abs()).collect();
             let x: Vec<f64> = (0..size).map(|k| (k as f64).sin()).collect();
             let one = vec![1.0; size];
@@ -345,11 +347,12 @@ mod tests {
         }
     }
 
-    /// Rows that change or come at the end have their work items packed anew, others not; the products are those of rows made at once.
+    /// Only work items with changed or appended rows are packed again; products equal those of rows made at
+    /// once.
     #[test]
-    fn what_has_not_changed_is_kept() {
+    fn unchanged_items_are_kept() {
         let fill = |scale: f64| {
-            move |row: usize, out: &mut Row| {
+            move |row: usize, out: &mut RowBuilder| {
                 out.begin(std::iter::once(row as u32));
                 let own = scale + 0.1 * (row as f64).sin();
                 out.add(0, 2.0 * own, 0.0);
@@ -359,10 +362,10 @@ mod tests {
         let (before, size) = (3 * CHUNK - 5, 4 * CHUNK + 17);
         let changed: Vec<u32> =
             (CHUNK as u32 + 3..CHUNK as u32 + 9).chain(before as u32..size as u32).collect();
-        let mut rows = Rows::build(before, false, fill(1.0));
-        let mut packed = Packed::default();
+        let mut rows = ConductionRows::build(before, false, fill(1.0));
+        let mut packed = PackedRows::default();
         assert!(packed.update(&rows, [0.0, 1.0]));
-        let made = |packed: &Packed| -> Vec<Option<u64>> {
+        let made = |packed: &PackedRows| -> Vec<Option<u64>> {
             packed.items.iter().map(|kept| kept.shaped_for).collect()
         };
         let first = made(&packed);
@@ -371,10 +374,10 @@ mod tests {
         let second = made(&packed);
         assert_eq!(second.iter().zip(&first).map(|(a, b)| a == b).collect::<Vec<_>>(), [true, false, false]);
         assert_eq!(second.len(), 5);
-        let whole = Rows::build(size, false, |row, out: &mut Row| {
+        let whole = ConductionRows::build(size, false, |row, out: &mut RowBuilder| {
             fill(if changed.binary_search(&(row as u32)).is_ok() { 2.0 } else { 1.0 })(row, out);
         });
-        let mut fresh = Packed::default();
+        let mut fresh = PackedRows::default();
         assert!(fresh.update(&whole, [0.0, 1.0]));
         let x: Vec<f64> = (0..size).map(|k| (k as f64).cos()).collect();
         let [mut kept, mut exact] = [vec![0.0; size], vec![0.0; size]];
@@ -383,11 +386,11 @@ mod tests {
         assert!(kept == exact && dots[0] == dots[1]);
     }
 
-    /// What is added to a row of its own, and taken back, is packed again with its work item.
+    /// Additions to a row with its own values are packed again with their work item.
     #[test]
     fn rows_of_their_own() {
         let fill = |own: bool| {
-            move |row: usize, out: &mut Row| {
+            move |row: usize, out: &mut RowBuilder| {
                 out.begin(std::iter::once(row as u32));
                 out.add(0, 2.0 + (row as f64).sin(), 0.0);
                 (0..row.min(2)).for_each(|k| out.add(-1 - k as i32, -0.3, 0.0));
@@ -396,33 +399,36 @@ mod tests {
         };
         let size = 2 * CHUNK;
         let x: Vec<f64> = (0..size).map(|k| (k as f64).cos()).collect();
-        let product = |packed: &mut Packed, rows: &Rows| {
+        let product = |packed: &mut PackedRows, rows: &ConductionRows| {
             assert!(packed.update(rows, [0.0, 1.0]));
             let mut y = vec![0.0; size];
             packed.product(rows, None, (1.0, [0.0, 1.0]), &x, &mut y);
             y
         };
-        let mut rows = Rows::build(size, false, fill(true));
+        let mut rows = ConductionRows::build(size, false, fill(true));
         rows.keep();
-        let mut packed = Packed::default();
+        let mut packed = PackedRows::default();
         let first = product(&mut packed, &rows);
-        assert_eq!(first, product(&mut Packed::default(), &Rows::build(size, false, fill(false))));
+        assert_eq!(
+            first,
+            product(&mut PackedRows::default(), &ConductionRows::build(size, false, fill(false)))
+        );
         rows.add(77, 76, 10.0, 0.0);
         let added = product(&mut packed, &rows);
-        assert_eq!(added, product(&mut Packed::default(), &rows));
+        assert_eq!(added, product(&mut PackedRows::default(), &rows));
         let differ: Vec<usize> = (0..size).filter(|&row| added[row] != first[row]).collect();
         assert_eq!(differ, [77]);
         rows.restore();
         assert_eq!(first, product(&mut packed, &rows));
     }
 
-    /// Where rows are equal nothing is packed.
+    /// Equal rows are not packed.
     #[test]
-    fn equal_rows_are_left() {
-        let rows = Rows::build(10_000, false, |_, out| {
+    fn equal_rows_are_not_packed() {
+        let rows = ConductionRows::build(10_000, false, |_, out| {
             out.begin(std::iter::empty());
             out.add(0, 2.0, 0.0);
         });
-        assert!(!Packed::default().update(&rows, [0.0, 1.0]));
+        assert!(!PackedRows::default().update(&rows, [0.0, 1.0]));
     }
 }

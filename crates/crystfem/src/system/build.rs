@@ -1,90 +1,92 @@
-//! Adding elements to the equations: all that exist at first, and those of a birth later.
+//! Assembly: all elements that exist at first, and those of a birth later.
 //!
-//! A birth costs what it adds. Equations are appended ([`super::numbering`]); rows, capacity, points and faces are made anew at the nodes of
-//! new elements only, and what stands behind the first of them in a list moves. The result is that of building all at once, bit by bit.
+//! The cost of a birth is proportional to what it adds. Equations are appended ([`super::numbering`]); rows,
+//! capacity, points and faces are rebuilt at the nodes of new elements only, and later entries of lists move.
+//! The result equals that of building everything at once, bit by bit.
 
-use super::around::Around;
-use super::classes::{Class, OWN, VARYING, classify, matrices};
-use super::general::General;
-use super::nodal::Nodal;
+use super::classes::{ElementClass, OWN, VARYING, classify, matrices};
+use super::general::ElementPoints;
+use super::nodal::NodalPoints;
+use super::node_elements::NodeElements;
 use super::numbering::Numbering;
-use super::rows::{Row, Rows};
-use super::surfaces::{Surfaces, Touched};
-use super::{Behaviour, NONE, System};
-use crate::boundary::{Condition, Where};
-use crate::element::{Geometry, MOST, WIDE, WIDE_POINTS};
+use super::rows::{ConductionRows, RowBuilder};
+use super::surfaces::{Surfaces, TouchedEquations};
+use super::{MaterialBehaviour, NONE, ThermalSystem};
+use crate::boundary::{Condition, FaceSelection};
+use crate::element::{FIRST_ORDER_NODES, Geometry, MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS};
 use crate::error::Error;
 use crate::mesh::{Face, Mesh};
 use crate::problem::{Capacity, Problem};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 
-/// Elements whose matrices are made before they are added.
+/// Number of elements whose matrices are computed before they are added.
 const BATCH: usize = 4096;
 
-/// Where points are that stand at a place or behind it.
+/// Moves of points from an index on.
 #[derive(Clone, Debug, Default)]
-pub struct Moves {
-    /// That place.
+pub struct PointMoves {
+    /// First index that may have moved.
     pub first: usize,
-    /// Where each was before, or [`NONE`].
+    /// Former index of each point from there on, or [`NONE`].
     pub from: Vec<u32>,
 }
 
-/// What elements did that were added.
+/// Changes of a system by added elements.
 #[derive(Clone, Debug, Default)]
 pub struct Added {
-    /// Equations of their nodes, ascending, with the capacity of linear materials before, J/K; `None` where nothing was.
+    /// Equations of their nodes, ascending, with the former capacity of linear materials, J/K; `None` for new
+    /// nodes.
     pub before: Vec<(u32, Option<f64>)>,
-    /// Points at nodes.
-    pub nodal: Moves,
-    /// Points in elements.
-    pub general: Moves,
-    /// Elements that were visited: the new ones and their neighbours.
+    /// Moves of points at nodes.
+    pub nodal: PointMoves,
+    /// Moves of points in elements.
+    pub general: PointMoves,
+    /// Number of visited elements: new ones and their neighbours.
     pub visited: u64,
 }
 
-/// What of a problem never changes, as building needs it.
-pub struct Plan {
+/// Constant data of a problem, for assembly.
+pub struct AssemblyPlan {
     pub(super) numbering: Numbering,
-    around: Around,
+    around: NodeElements,
     /// Class of each element.
     kinds: Vec<u16>,
-    classes: Vec<Class>,
-    /// By their corners, faces on which each condition acts, or does not.
+    classes: Vec<ElementClass>,
+    /// Faces on which each condition acts, or does not, by their corners.
     named: Vec<HashSet<[u32; 4]>>,
-    /// The last condition that prescribes a node's temperature.
+    /// Last condition that prescribes the temperature of a node.
     held: HashMap<u32, u32>,
     /// Elements of each source, ascending.
     heated: Vec<Vec<u32>>,
 }
 
-/// Matrices of an element of its own.
-enum Own {
+/// Geometry of an element outside all classes.
+enum ElementGeometry {
     Narrow(Box<Geometry>),
-    Wide(Box<Geometry<WIDE, WIDE_POINTS>>),
+    Wide(Box<Geometry<MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS>>),
 }
 
-impl Own {
+impl ElementGeometry {
     fn new(mesh: &Mesh, element: u32) -> Result<Self, Error> {
-        let geometry = if mesh.nodes(element).len() > MOST {
+        let geometry = if mesh.nodes(element).len() > FIRST_ORDER_NODES {
             mesh.geometry(element).map(|geometry| Self::Wide(Box::new(geometry)))
         } else {
-            let (corners, nodes) = mesh.positions::<MOST>(element);
+            let (corners, nodes) = mesh.positions::<FIRST_ORDER_NODES>(element);
             Geometry::new(&corners[..nodes]).map(|geometry| Self::Narrow(Box::new(geometry)))
         };
         geometry.ok_or_else(|| Error::Mesh(format!("element {element}: inverted")))
     }
 }
 
-impl Plan {
-    fn new(problem: &Problem, behaviours: &[Behaviour], born: &[u32]) -> Self {
+impl AssemblyPlan {
+    fn new(problem: &Problem, behaviours: &[MaterialBehaviour], born: &[u32]) -> Self {
         let mesh = &problem.mesh;
         let (kinds, classes) = classify(mesh, &problem.material_of, behaviours);
         let by_corners = |condition: &Condition| {
             let faces: &[Face] = match condition.surface() {
-                Some(Where::Faces(faces)) => faces,
-                Some(Where::Outer { except }) => except,
+                Some(FaceSelection::Faces(faces)) => faces,
+                Some(FaceSelection::Outer { except }) => except,
                 None => &[],
             };
             faces.iter().map(|&face| mesh.face_nodes(face).key()).collect()
@@ -102,7 +104,7 @@ impl Plan {
         };
         Self {
             numbering: Numbering::new(problem, born),
-            around: Around::new(mesh, &problem.absent),
+            around: NodeElements::new(mesh, &problem.absent),
             kinds,
             classes,
             named: problem.conditions.iter().map(by_corners).collect(),
@@ -111,12 +113,12 @@ impl Plan {
         }
     }
 
-    /// Whether a condition acts on a face.
+    /// Returns true if a condition acts on a face.
     fn acts(&self, problem: &Problem, condition: usize, face: Face) -> bool {
         let named = &self.named[condition];
         match problem.conditions[condition].surface() {
-            Some(Where::Faces(_)) => named.contains(&problem.mesh.face_nodes(face).key()),
-            Some(Where::Outer { .. }) => {
+            Some(FaceSelection::Faces(_)) => named.contains(&problem.mesh.face_nodes(face).key()),
+            Some(FaceSelection::Outer { .. }) => {
                 named.is_empty() || !named.contains(&problem.mesh.face_nodes(face).key())
             }
             None => false,
@@ -124,36 +126,36 @@ impl Plan {
     }
 }
 
-impl System {
-    /// Of the elements that are born, those whose entry in `born` is not [`NONE`], by so many births.
+impl ThermalSystem {
+    /// Assembles the elements that are born (entry in `born` not [`NONE`]) after `births` births.
     ///
     /// # Errors
     /// [`Error::Mesh`] for an inverted element.
     pub fn build(
         problem: &Problem,
-        behaviours: &[Behaviour],
+        behaviours: &[MaterialBehaviour],
         born: &[u32],
         births: usize,
     ) -> Result<Self, Error> {
         let consistent = problem.capacity == Capacity::Consistent;
-        let stride = |wanted: &dyn Fn(&Behaviour) -> bool| {
+        let stride = |wanted: &dyn Fn(&MaterialBehaviour) -> bool| {
             behaviours.iter().filter(|b| wanted(b)).map(|b| b.states).max().unwrap_or(0)
         };
-        let mut nodal = Nodal {
-            stride: stride(&Behaviour::nodal),
+        let mut nodal = NodalPoints {
+            stride: stride(&MaterialBehaviour::nodal),
             followers: behaviours.iter().map(|b| b.capacity.is_some()).collect(),
             energies: behaviours.iter().any(|b| b.nodal() && b.capacity.is_none()),
-            ..Nodal::laws_of(problem, behaviours)
+            ..NodalPoints::laws_of(problem, behaviours)
         };
-        let plan = Plan::new(problem, behaviours, born);
+        let plan = AssemblyPlan::new(problem, behaviours, born);
         nodal.weighed = nodal.energies || plan.kinds.contains(&OWN);
         let mut system = Self {
             elements: 0,
             equation: vec![NONE; problem.mesh.points.len()],
-            rows: Rows::new(consistent),
+            rows: ConductionRows::new(consistent),
             capacity: Vec::new(),
             nodal,
-            general: General::new(stride(&|b| b.conductivity.is_none())),
+            general: ElementPoints::new(stride(&|b| b.conductivity.is_none())),
             surfaces: Surfaces::new(problem),
             fixed: Vec::new(),
             free: Vec::new(),
@@ -168,14 +170,14 @@ impl System {
         Ok(system)
     }
 
-    /// Elements of an equation's node that are born, ascending, and its number in each.
+    /// Born elements of an equation's node, ascending, with the local number of the node.
     pub fn around(&self, equation: u32, born: &[u32]) -> impl Iterator<Item = (u32, usize)> {
-        self.plan.around.of(self.nodes()[equation as usize], born)
+        self.plan.around.elements_of(self.nodes()[equation as usize], born)
     }
 
-    /// ρV of a point at a node, kg.
+    /// Mass ρV of a point at a node, kg.
     pub fn mass(&self, problem: &Problem, born: &[u32], equation: usize, point: usize) -> f64 {
-        let Nodal { birth, material, mass, weighed, like, .. } = &self.nodal;
+        let NodalPoints { birth, material, mass, weighed, like, .. } = &self.nodal;
         if *weighed {
             return mass[point];
         }
@@ -191,14 +193,14 @@ impl System {
         sum
     }
 
-    /// Adds elements, ascending, that are born with the last of so many births.
+    /// Adds elements, ascending, that appear with the last of `births` births.
     ///
     /// # Errors
     /// [`Error::Mesh`] for an inverted element.
     pub fn add(
         &mut self,
         problem: &Problem,
-        behaviours: &[Behaviour],
+        behaviours: &[MaterialBehaviour],
         born: &[u32],
         births: usize,
         new: &[u32],
@@ -207,11 +209,11 @@ impl System {
         let size = self.plan.numbering.end(births);
         self.capacity.resize(size, 0.0);
         self.free.resize(size, 0.0);
-        let mut touched = Touched::new(size);
+        let mut touched = TouchedEquations::new(size);
         let mut fresh = Vec::new();
         for &node in new.iter().flat_map(|&element| mesh.nodes(element)) {
             if self.equation[node as usize] == NONE {
-                let around = self.plan.around.of(node, born);
+                let around = self.plan.around.elements_of(node, born);
                 let first = around.map(|(element, _)| born[element as usize]).min().unwrap_or(NONE);
                 let Some(equation) = self.plan.numbering.equation(node, first) else {
                     return Err(Error::Mesh(format!("node {node} of birth {first}: has no equation")));
@@ -224,7 +226,7 @@ impl System {
         }
         fresh.sort_unstable();
         let new_fresh = |equation: u32| fresh.binary_search(&equation).is_ok();
-        // consistent matrices of faces are in no order that new ones could be added to
+        // face matrices of consistent capacity have no order that allows additions
         if self.consistent && old > 0 {
             self.equation.iter().filter(|equation| **equation != NONE).for_each(|&e| touched.add(e));
         }
@@ -235,7 +237,7 @@ impl System {
         if old == 0 {
             ring.extend_from_slice(new);
         } else {
-            let around = |&e: &u32| self.plan.around.of(self.nodes()[e as usize], born);
+            let around = |&e: &u32| self.plan.around.elements_of(self.nodes()[e as usize], born);
             ring.extend(touched.list.iter().flat_map(around).map(|(element, _)| element));
             ring.sort_unstable();
             ring.dedup();
@@ -244,10 +246,10 @@ impl System {
         self.elements += new.len();
         self.connect(mesh, born, size, &touched);
         let Self { plan, nodal, .. } = self;
-        if behaviours.iter().any(Behaviour::nodal) {
+        if behaviours.iter().any(MaterialBehaviour::nodal) {
             let like = nodal.like.clone();
             added.nodal = nodal.replace(size, &touched.list, |equation, keys| {
-                for (element, _) in plan.around.of(plan.numbering.nodes[equation as usize], born) {
+                for (element, _) in plan.around.elements_of(plan.numbering.nodes[equation as usize], born) {
                     let material = usize::from(problem.material_of[element as usize]);
                     let key = (born[element as usize], like[material]);
                     if behaviours[material].nodal() && !keys.contains(&key) {
@@ -266,7 +268,7 @@ impl System {
         if !self.general.is_empty() {
             self.rows.keep();
         }
-        self.act(problem, born, &ring, &touched, &volumes);
+        self.update_surfaces(problem, born, &ring, &touched, &volumes);
         for &equation in &fresh {
             if let Some(&condition) = self.plan.held.get(&self.nodes()[equation as usize]) {
                 self.fixed.push((equation, condition));
@@ -280,13 +282,14 @@ impl System {
         Ok(added)
     }
 
-    /// Rows of the equations that are touched.
-    fn connect(&mut self, mesh: &Mesh, born: &[u32], size: usize, touched: &Touched) {
+    /// Assembles the rows of touched equations.
+    fn connect(&mut self, mesh: &Mesh, born: &[u32], size: usize, touched: &TouchedEquations) {
         let Self { rows, plan, equation, .. } = self;
-        let Plan { around, kinds, classes, numbering, .. } = plan;
-        rows.update(size, &touched.list, |index, row: &mut Row| {
-            let around = || around.of(numbering.nodes[index], born);
-            // corners, classes and relative nodes of the elements around say all, but for elements of no class
+        let AssemblyPlan { around, kinds, classes, numbering, .. } = plan;
+        rows.update(size, &touched.list, |index, row: &mut RowBuilder| {
+            let around = || around.elements_of(numbering.nodes[index], born);
+            // corners, classes and relative nodes of the surrounding elements determine a row, except for
+            // elements outside all classes
             let repeated = row.begin(around().flat_map(|(element, corner)| {
                 let here = [corner as u32, u32::from(kinds[element as usize])];
                 let others = mesh.nodes(element).iter();
@@ -309,27 +312,27 @@ impl System {
         });
     }
 
-    /// Adds, at equations that are touched, what elements of no class have of their own, and the capacity of all; returns
-    /// ∫ N dV of each first-order element with a source.
+    /// Adds, at touched equations, elements outside all classes, and the capacity of all; returns ∫ N dV of
+    /// each first-order element with a source.
     fn add_elements(
         &mut self,
         problem: &Problem,
-        behaviours: &[Behaviour],
+        behaviours: &[MaterialBehaviour],
         born: &[u32],
         elements: &[u32],
-        touched: &Touched,
-    ) -> Result<Vec<(u32, [f64; MOST])>, Error> {
+        touched: &TouchedEquations,
+    ) -> Result<Vec<(u32, [f64; FIRST_ORDER_NODES])>, Error> {
         let mesh = &problem.mesh;
         let mut volumes = Vec::new();
         for elements in elements.chunks(BATCH) {
-            let Plan { kinds, classes, .. } = &self.plan;
+            let AssemblyPlan { kinds, classes, .. } = &self.plan;
             // most elements have none
-            let own: Vec<Option<Own>> = elements
+            let own: Vec<Option<ElementGeometry>> = elements
                 .par_iter()
                 .with_min_len(64)
                 .map(|&element| match usize::from(kinds[element as usize]) < classes.len() {
                     true => Ok(None),
-                    false => Own::new(mesh, element).map(Some),
+                    false => ElementGeometry::new(mesh, element).map(Some),
                 })
                 .collect::<Result<_, _>>()?;
             for (&element, geometry) in elements.iter().zip(own) {
@@ -338,19 +341,21 @@ impl System {
                 let behaviour = &behaviours[usize::from(material)];
                 let nodes = mesh.nodes(element);
                 match geometry.as_ref().filter(|_| kind == OWN) {
-                    Some(Own::Narrow(geometry)) => {
+                    Some(ElementGeometry::Narrow(geometry)) => {
                         self.add_own(nodes, &matrices(geometry, behaviour), touched);
                     }
-                    Some(Own::Wide(geometry)) => self.add_own(nodes, &matrices(geometry, behaviour), touched),
+                    Some(ElementGeometry::Wide(geometry)) => {
+                        self.add_own(nodes, &matrices(geometry, behaviour), touched)
+                    }
                     None => {}
                 }
                 let corner_volumes = match geometry.as_ref() {
-                    Some(Own::Narrow(geometry)) => &geometry.corner_volumes[..],
-                    Some(Own::Wide(geometry)) => &geometry.corner_volumes[..],
+                    Some(ElementGeometry::Narrow(geometry)) => &geometry.corner_volumes[..],
+                    Some(ElementGeometry::Wide(geometry)) => &geometry.corner_volumes[..],
                     None => &self.plan.classes[usize::from(kind)].volumes[..],
                 };
-                if let Some(volume) = corner_volumes.first_chunk::<MOST>()
-                    && nodes.len() <= MOST
+                if let Some(volume) = corner_volumes.first_chunk::<FIRST_ORDER_NODES>()
+                    && nodes.len() <= FIRST_ORDER_NODES
                     && self.plan.heated.iter().any(|list| list.binary_search(&element).is_ok())
                 {
                     volumes.push((element, *volume));
@@ -366,7 +371,7 @@ impl System {
                     if behaviour.nodal() && self.nodal.weighed {
                         let key = (born[element as usize], self.nodal.like[usize::from(material)]);
                         let density = problem.materials[usize::from(material)].density();
-                        for point in self.nodal.of(node as usize) {
+                        for point in self.nodal.points_of(node as usize) {
                             if (self.nodal.birth[point], self.nodal.material[point]) == key {
                                 self.nodal.mass[point] += density * volume;
                             }
@@ -378,12 +383,12 @@ impl System {
         Ok(volumes)
     }
 
-    /// Conduction and capacity of one element, in rows that are touched.
+    /// Adds conduction and capacity of one element to touched rows.
     fn add_own<const N: usize>(
         &mut self,
         nodes: &[u32],
         (conduction, capacity): &([[f64; N]; N], [[f64; N]; N]),
-        touched: &Touched,
+        touched: &TouchedEquations,
     ) {
         for (a, &row) in nodes.iter().enumerate() {
             let row = self.equation[row as usize];
@@ -397,21 +402,21 @@ impl System {
         }
     }
 
-    /// Conditions on the outer surface and sources, at equations that are touched.
-    fn act(
+    /// Updates conditions on the outer surface, and sources, at touched equations.
+    fn update_surfaces(
         &mut self,
         problem: &Problem,
         born: &[u32],
         elements: &[u32],
-        touched: &Touched,
-        volumes: &[(u32, [f64; MOST])],
+        touched: &TouchedEquations,
+        volumes: &[(u32, [f64; FIRST_ORDER_NODES])],
     ) {
         let Self { plan, surfaces, equation, consistent, .. } = self;
         let mesh = &problem.mesh;
         if problem.conditions.iter().any(|condition| condition.surface().is_some()) {
             let wanted = |node: u32| touched.contains(equation[node as usize]);
             let exposed = plan.around.outer(mesh, born, elements, wanted);
-            surfaces.act(problem, &exposed, equation, *consistent, touched, |condition, face| {
+            surfaces.set_condition(problem, &exposed, equation, *consistent, touched, |condition, face| {
                 plan.acts(problem, condition, face)
             });
         }
@@ -421,7 +426,7 @@ impl System {
                 let first = heated.partition_point(|&element| element < number);
                 for _ in heated[first..].iter().take_while(|&&element| element == number) {
                     let nodes = mesh.nodes(number);
-                    if nodes.len() > MOST {
+                    if nodes.len() > FIRST_ORDER_NODES {
                         let Some(geometry) = mesh.geometry(number) else { continue };
                         let equation = |a: usize| equation[nodes[a] as usize];
                         let mass = geometry.mass();
@@ -435,7 +440,7 @@ impl System {
                     }
                 }
             }
-            surfaces.release(source, list, pairs, touched);
+            surfaces.set_source(source, list, pairs, touched);
         }
     }
 }

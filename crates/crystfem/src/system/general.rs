@@ -1,48 +1,51 @@
-//! Material points in elements, for materials whose conductivity depends on temperature or state, and for all
-//! materials that are not linear when capacity is consistent.
+//! Material points in elements, for materials whose conductivity depends on temperature or state, and with
+//! consistent capacity for all materials that are not linear.
 //!
-//! Point g has the temperature gradient of Gauss point g. With lumped capacity it has the temperature of corner g
-//! beside it, and its energy is counted there; with consistent capacity it has the temperature of the Gauss point.
-//! The matrix takes the symmetric part of −∂f/∂(∇T) and leaves ∂f/∂T out, so that it stays symmetric: Newton's
-//! iteration then converges linearly where k varies, with a rate of the relative change of k over the last iterate.
+//! Point g has the temperature gradient of Gauss point g. With lumped capacity it has the temperature of the
+//! adjacent corner g, and its energy is counted there; with consistent capacity it has the temperature of the
+//! Gauss point. The matrix contains the symmetric part of −∂f/∂(∇T) without ∂f/∂T, so that it stays
+//! symmetric: with varying k Newton's iteration then converges linearly, at a rate given by the relative
+//! change of k over the last iterate.
 //!
-//! Where k jumps, that iteration stalls, and k at points would make the flux of an element depend on which of its points
-//! the jump has passed. There the flux is −D ∇θ with Kirchhoff's θ = ∫k dT at the nodes (Carslaw & Jaeger, §1.6), exact at
-//! nodes of a line at rest; its tangent ∇N_a·D∇N_b k(T_b) is complete, and not symmetric.
+//! If k jumps, that iteration stalls, and with k at points the flux of an element would depend on which of
+//! its points the jump has passed. The flux is then −D ∇θ with Kirchhoff's θ = ∫k dT at the nodes (Carslaw &
+//! Jaeger, §1.6), exact at the nodes of a line at steady state; its tangent ∇N_a·D∇N_b k(T_b) is complete,
+//! and not symmetric.
 
-use super::rows::Rows;
-use super::{Evaluation, Moves, NONE, Points, StepInput};
-use crate::element::{self, Geometry, MOST, WIDE, WIDE_POINTS};
+use super::rows::ConductionRows;
+use super::{Evaluation, NONE, PointMoves, PointStates, StepInput};
+use crate::element::{self, FIRST_ORDER_NODES, Geometry, MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS};
 use crate::error::Error;
-use crate::material::Point;
+use crate::material::PointInput;
 use crate::mesh::Mesh;
 use crate::problem::Problem;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-/// Elements of a work item, and work items evaluated before their sums are added.
+/// Number of elements of a work item.
 const ITEM: usize = 256;
+/// Number of elements evaluated before their sums are added.
 const BATCH: usize = 64 * ITEM;
 
-/// Elements with points.
+/// Elements with material points.
 #[derive(Clone, Debug, Default)]
-pub struct General {
+pub struct ElementPoints {
     /// Elements of the mesh, ascending.
     pub elements: Vec<u32>,
     /// First point of each element, and the number of points.
     pub starts: Vec<u32>,
-    /// Equations of all elements' nodes.
+    /// Equations of all elements' nodes, element by element.
     pub equations: Vec<u32>,
-    /// Where those of each element end.
+    /// End of each element's equations.
     pub ends: Vec<u32>,
     /// State variables stored for each point.
     pub stride: usize,
-    /// Whether a flux follows Kirchhoff's potential: the tangent is then not symmetric.
+    /// True if a flux follows Kirchhoff's potential: the tangent is then not symmetric.
     pub potential: bool,
 }
 
-/// What an element adds.
-struct Part<const N: usize> {
+/// Contribution of an element.
+struct ElementContribution<const N: usize> {
     change: [f64; N],
     rate: [f64; N],
     capacity: [f64; N],
@@ -51,17 +54,17 @@ struct Part<const N: usize> {
     ratio: Option<f64>,
 }
 
-impl General {
-    /// None, with room for so many state variables at a point.
+impl ElementPoints {
+    /// Returns an empty set with `stride` state variables a point.
     pub fn new(stride: usize) -> Self {
         Self { starts: vec![0], stride, ..Self::default() }
     }
 
-    /// Adds elements, ascending. Returns where points were from the first that may have moved.
-    pub fn insert(&mut self, mesh: &Mesh, new: &[u32], equation: &[u32]) -> Moves {
+    /// Inserts elements, ascending; returns the moves of points.
+    pub fn insert(&mut self, mesh: &Mesh, new: &[u32], equation: &[u32]) -> PointMoves {
         let first =
             new.first().map_or(self.elements.len(), |least| self.elements.partition_point(|e| e < least));
-        let mut moves = Moves { first: self.starts[first] as usize, from: Vec::new() };
+        let mut moves = PointMoves { first: self.starts[first] as usize, from: Vec::new() };
         self.equations.truncate(first.checked_sub(1).map_or(0, |before| self.ends[before] as usize));
         let points = self.starts.split_off(first + 1);
         let kept = self.elements.split_off(first);
@@ -88,7 +91,7 @@ impl General {
         moves
     }
 
-    /// Whether there is none.
+    /// Returns true without points.
     pub fn is_empty(&self) -> bool {
         self.elements.is_empty()
     }
@@ -110,14 +113,16 @@ impl General {
         problem: &Problem,
         consistent: bool,
         at: &StepInput,
-        old: &Points,
-        rows: &mut Rows,
+        old: &PointStates,
+        rows: &mut ConductionRows,
         out: &mut Evaluation,
     ) -> Result<(), Error> {
         if problem.mesh.is_second_order() {
-            return self.evaluate_all::<WIDE, WIDE_POINTS>(problem, consistent, at, old, rows, out);
+            return self.evaluate_all::<MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS>(
+                problem, consistent, at, old, rows, out,
+            );
         }
-        self.evaluate_all::<MOST, MOST>(problem, consistent, at, old, rows, out)
+        self.evaluate_all::<FIRST_ORDER_NODES, FIRST_ORDER_NODES>(problem, consistent, at, old, rows, out)
     }
 
     fn evaluate_all<const N: usize, const P: usize>(
@@ -125,8 +130,8 @@ impl General {
         problem: &Problem,
         consistent: bool,
         at: &StepInput,
-        old: &Points,
-        rows: &mut Rows,
+        old: &PointStates,
+        rows: &mut ConductionRows,
         out: &mut Evaluation,
     ) -> Result<(), Error> {
         let mut memory = std::mem::take(&mut out.memory.general);
@@ -145,7 +150,7 @@ impl General {
                 work.push((start..end, here, energies));
                 (state, energy) = (rest, others);
             }
-            let parts: Vec<Vec<Part<N>>> = work
+            let parts: Vec<Vec<ElementContribution<N>>> = work
                 .into_par_iter()
                 .map(|(range, state, energy)| {
                     let offset = self.starts[range.start] as usize;
@@ -189,11 +194,11 @@ impl General {
         problem: &Problem,
         consistent: bool,
         at: &StepInput,
-        old: &Points,
+        old: &PointStates,
         index: usize,
         state: &mut [f64],
         energy: &mut [f64],
-    ) -> Result<Part<N>, Error> {
+    ) -> Result<ElementContribution<N>, Error> {
         let number = self.elements[index];
         let (corners, nodes) = problem.mesh.positions::<N>(number);
         let material = &*problem.materials[usize::from(problem.material_of[number as usize])];
@@ -208,14 +213,14 @@ impl General {
             let equation = equations[a] as usize;
             (start[a], end[a]) = (at.start[equation], at.temperature[equation]);
         }
-        let mut part = Part {
+        let mut part = ElementContribution {
             change: [0.0; N],
             rate: [0.0; N],
             capacity: [0.0; N],
             matrices: at.tangent.then(|| Box::new([[[0.0; N]; N]; 2])),
             ratio: None,
         };
-        // Kirchhoff's potential and k at the nodes, where the flux follows it
+        // Kirchhoff's potential and k at the nodes, if the flux follows it
         let mut potential = [[0.0; 2]; N];
         let mut kirchhoff = false;
         for a in 0..nodes {
@@ -243,7 +248,7 @@ impl General {
                 None => 1.0,
             };
             gradient /= own;
-            let place = Point { temperature: from, increment: to - from, gradient, dt: at.dt };
+            let place = PointInput { temperature: from, increment: to - from, gradient, dt: at.dt };
             let old_state = &old.state[(first + g) * self.stride..];
             let new_state = &mut state[g * self.stride..];
             let response = material.respond(&place, &old_state[..count], &mut new_state[..count])?;

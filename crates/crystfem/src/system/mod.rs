@@ -1,65 +1,69 @@
-//! The equations of the elements that exist: Eq. (4.16) in space, before any choice of a time integrator.
+//! Equations of the existing elements: Eq. (4.16) discretized in space, independent of the time integrator.
 //!
-//! dE_i/dt + Q_i = 0 at each node i, with the energy E_i = ∫ N_i ρU dV and the heat that leaves the node,
-//! Q_i = −∫ ∇N_i·f dV + ∮ N_i q dA − ∫ N_i r dV.
-//! A [`System`] grows when elements appear: nodes of elements that do not exist have no equation. It holds
-//! the pattern and constant coefficients; [`System::evaluate`] gives E, Q and their tangents at a temperature.
+//! At each node i, with the energy E_i and the heat Q_i that leaves the node,
 //!
-//! Three kinds of material: linear ones have no points at all; ones whose conductivity alone is constant are asked at
-//! nodes (one point for each node, material and birth); all others at the integration points of each element.
+//! dE_i/dt + Q_i = 0, E_i = ∫ N_i ρU dV, Q_i = −∫ ∇N_i·f dV + ∮ N_i q dA − ∫ N_i r dV.
+//!
+//! A [`ThermalSystem`] grows when elements appear; nodes without existing elements have no equation. It holds
+//! the pattern and constant coefficients; [`ThermalSystem::evaluate`] computes E, Q and their tangents at a
+//! temperature.
+//!
+//! There are three kinds of materials: linear ones have no points; those with only the conductivity constant
+//! are evaluated at nodes (one point per node, material and birth); all others at the integration points of
+//! each element.
 
-mod around;
 mod build;
 mod classes;
 mod general;
 mod nodal;
+mod node_elements;
 mod numbering;
 mod rows;
 mod surfaces;
 pub mod vector;
 
-pub use build::{Added, Moves};
-pub use general::General;
-pub use nodal::Nodal;
+pub use build::{Added, PointMoves};
+pub use general::ElementPoints;
+pub use nodal::NodalPoints;
 #[cfg(test)]
-pub use rows::Row;
-pub use rows::{Diagonal, Rows};
+pub use rows::RowBuilder;
+pub use rows::{ConductionRows, Diagonal};
 pub use surfaces::{Exchange, FaceMatrices, Surfaces};
 
 use crate::error::Error;
-use crate::material::{Point, ThermalMaterial};
+use crate::material::{PointInput, ThermalMaterial};
 use crate::problem::{Capacity, Problem};
 use nalgebra::{Matrix3, Vector3};
 
 /// No equation.
 pub const NONE: u32 = u32::MAX;
 
-/// What of a material is constant.
+/// Constant properties of a material.
 #[derive(Clone, Copy, Debug)]
-pub struct Behaviour {
-    /// k, W/(m K), where it is.
+pub struct MaterialBehaviour {
+    /// Conductivity k, W/(m K), if constant.
     pub conductivity: Option<Matrix3<f64>>,
-    /// ρc, J/(m³ K), where U is linear in T.
+    /// Heat capacity ρc, J/(m³ K), if U is linear in T.
     pub capacity: Option<f64>,
-    /// Length of the state.
+    /// Number of state variables.
     pub states: usize,
-    /// Whether its flux follows Kirchhoff's potential.
+    /// True if the flux follows Kirchhoff's potential.
     pub potential: bool,
 }
 
-impl Behaviour {
-    /// Returns whether it has points at nodes.
+impl MaterialBehaviour {
+    /// Returns true if the material has points at nodes.
     pub fn nodal(&self) -> bool {
         self.conductivity.is_some() && (self.capacity.is_none() || self.states > 0)
     }
 }
 
-impl Behaviour {
-    /// Asks the material once.
+impl MaterialBehaviour {
+    /// Evaluates the material once to find its constant properties.
     ///
     /// # Errors
-    /// Those of the material; [`Error::Parameter`] for a conductivity or a capacity that is not positive.
-    pub fn of(material: &dyn ThermalMaterial, capacity: Capacity) -> Result<Self, Error> {
+    /// Errors of the material; [`Error::Parameter`] for a conductivity or a capacity that is not positive.
+    pub fn from_material(material: &dyn ThermalMaterial, capacity: Capacity) -> Result<Self, Error> {
         let states = material.state_names().len();
         let linear = material.is_linear();
         let potential = material.potential(300.0).is_some();
@@ -67,7 +71,7 @@ impl Behaviour {
         if !linear && (capacity == Capacity::Consistent || !material.constant_conductivity()) {
             return Ok(behaviour);
         }
-        let at = Point { temperature: 300.0, increment: 0.0, gradient: Vector3::zeros(), dt: 1.0 };
+        let at = PointInput { temperature: 300.0, increment: 0.0, gradient: Vector3::zeros(), dt: 1.0 };
         let mut old = vec![0.0; states];
         material.initial_state(at.temperature, &mut old);
         let mut new = old.clone();
@@ -99,133 +103,133 @@ impl Behaviour {
 
 /// States and energies of material points.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Points {
-    /// State variables, point after point.
+pub struct PointStates {
+    /// State variables, point by point.
     pub state: Vec<f64>,
-    /// U, J/kg; at nodes empty where that of all materials is linear.
+    /// Energies U, J/kg; empty at nodes if all materials are linear.
     pub energy: Vec<f64>,
 }
 
-/// Material points of both kinds.
+/// Material points at nodes and in elements.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Memory {
-    /// At nodes.
-    pub nodal: Points,
-    /// In elements.
-    pub general: Points,
+pub struct PointMemory {
+    /// Points at nodes.
+    pub nodal: PointStates,
+    /// Points in elements.
+    pub general: PointStates,
 }
 
-/// Where and when a system is evaluated.
+/// Input of an evaluation.
 #[derive(Clone, Copy)]
 pub struct StepInput<'a> {
-    /// Temperatures of the nodes that exist, K.
+    /// Temperatures of the existing nodes, K.
     pub temperature: &'a [f64],
     /// Temperatures at the start of the increment, K.
     pub start: &'a [f64],
     /// Length of the increment, s.
     pub dt: f64,
-    /// Time at its end, s.
+    /// Time at the end, s.
     pub time: f64,
-    /// Whether tangents are wanted.
+    /// Requests tangents.
     pub tangent: bool,
 }
 
-/// E, Q and their tangents.
+/// Evaluated E, Q and tangents.
 #[derive(Clone, Debug, Default)]
 pub struct Evaluation {
     /// E_i − E_i(start), J.
     pub change: Vec<f64>,
     /// Q_i, W.
     pub rate: Vec<f64>,
-    /// ∂E_i/∂T_i, J/K; row sums with consistent capacity; empty where it is that of the system.
+    /// ∂E_i/∂T_i, J/K; row sums with consistent capacity; empty if equal to that of the system.
     pub capacity: Vec<f64>,
-    /// Equations with ∂Q_i/∂T_i of a surface, W/K, which add up; with consistent capacity see `faces`.
+    /// Equations with contributions of surfaces to ∂Q_i/∂T_i, W/K; with consistent capacity see `faces`.
     pub conductance: Vec<(u32, f64)>,
     /// ∂Q/∂T of surfaces with consistent capacity.
     pub faces: FaceMatrices,
-    /// Heat that goes through surfaces and sources, W.
+    /// Heat flow through surfaces and from sources, W.
     pub exchange: Exchange,
-    /// The smallest wish of a material for the next increment over this one.
+    /// Smallest ratio of next to present increment requested by a material.
     pub step_ratio: Option<f64>,
     /// Points at the end of the increment.
-    pub memory: Memory,
-    /// Calls of `respond`.
+    pub memory: PointMemory,
+    /// Number of calls of `respond`.
     pub responses: u64,
     scratch: Vec<f64>,
 }
 
 impl Evaluation {
     /// ∂E_i/∂T_i, J/K; row sums with consistent capacity.
-    pub fn capacity<'a>(&'a self, system: &'a System) -> &'a [f64] {
+    pub fn capacity<'a>(&'a self, system: &'a ThermalSystem) -> &'a [f64] {
         if self.capacity.is_empty() { &system.capacity } else { &self.capacity }
     }
 }
 
-/// The equations of what exists.
-pub struct System {
+/// Equations of the existing elements.
+pub struct ThermalSystem {
     /// Number of elements.
     pub elements: usize,
     /// Equation of each node of the mesh, or [`NONE`].
     pub equation: Vec<u32>,
-    /// K, and M where it is consistent.
-    pub rows: Rows,
+    /// Conduction K, and M with consistent capacity.
+    pub rows: ConductionRows,
     /// Capacity of linear materials, row sums, J/K.
     pub capacity: Vec<f64>,
     /// Points at nodes.
-    pub nodal: Nodal,
+    pub nodal: NodalPoints,
     /// Points in elements.
-    pub general: General,
-    /// Faces and sources.
+    pub general: ElementPoints,
+    /// Conditions on faces, and sources.
     pub surfaces: Surfaces,
     /// Equations with prescribed temperature and their conditions, ascending.
     pub fixed: Vec<(u32, u32)>,
-    /// 0 where the temperature is prescribed and out of use, 1 elsewhere.
+    /// 0 at equations that are prescribed or out of use, 1 elsewhere.
     pub free: Vec<f64>,
-    /// Whether capacity is consistent.
+    /// True for consistent capacity.
     pub consistent: bool,
     /// Number of this build.
     pub build: u64,
-    /// Counts rebuilt tangents: a matrix is unchanged while this is.
+    /// Number of tangents built: the matrix is unchanged while it is.
     pub generation: u64,
     /// Time of the last evaluation, s.
     evaluated_at: f64,
-    plan: build::Plan,
+    plan: build::AssemblyPlan,
 }
 
-impl System {
-    /// Number of equations, those out of use included.
+impl ThermalSystem {
+    /// Number of equations, including those out of use.
     pub fn size(&self) -> usize {
         self.capacity.len()
     }
 
-    /// Node of the mesh of each equation, also of those out of use, which are not free and have no capacity.
+    /// Mesh node of each equation, also of those out of use, which are not free and have no capacity.
     pub fn nodes(&self) -> &[u32] {
         &self.plan.numbering.nodes[..self.size()]
     }
 
-    /// Returns whether no Newton iteration is needed.
+    /// Returns true if no Newton iteration is needed.
     pub fn is_linear(&self) -> bool {
         !self.nodal.coupled && self.general.is_empty() && !self.surfaces.radiates()
     }
 
-    /// Returns whether the tangent is symmetric.
+    /// Returns true for a symmetric tangent.
     pub fn is_symmetric(&self) -> bool {
         !self.general.potential
     }
 
-    /// Sets prescribed temperatures for a time.
+    /// Sets the temperatures prescribed at a time.
     pub fn prescribe(&self, problem: &Problem, time: f64, temperature: &mut [f64]) {
         for &(equation, condition) in &self.fixed {
             if let crate::boundary::Condition::Temperature { value, .. } =
                 &problem.conditions[condition as usize]
             {
                 let node = self.nodes()[equation as usize];
-                temperature[equation as usize] = value.at(problem.mesh.points[node as usize], time);
+                temperature[equation as usize] = value.value_at(problem.mesh.points[node as usize], time);
             }
         }
     }
 
-    /// E, Q and, if wanted, their tangents; `old` are the points at the start of the increment.
+    /// Evaluates E, Q and, if requested, their tangents; `old` are the points at the start of the increment.
     ///
     /// # Errors
     /// [`Error::NotFinite`] of a material.
@@ -233,7 +237,7 @@ impl System {
         &mut self,
         problem: &Problem,
         at: &StepInput,
-        old: &Memory,
+        old: &PointMemory,
         out: &mut Evaluation,
     ) -> Result<(), Error> {
         let size = self.size();
@@ -257,7 +261,7 @@ impl System {
             out.capacity.extend_from_slice(&self.capacity);
         }
         out.conductance.clear();
-        // the others
+        // other materials
         self.nodal.evaluate(problem, at, &old.nodal, out)?;
         if !self.general.is_empty() {
             self.general.evaluate(problem, self.consistent, at, &old.general, &mut self.rows, out)?;

@@ -1,12 +1,12 @@
-//! Material points at nodes: one for each node, material and birth, for materials with constant conductivity.
+//! Material points at nodes, for materials with constant conductivity: one for each node, material and birth.
 //!
-//! All corners of elements of one material that were born together have one temperature history at a node, hence one
-//! state, whatever parts of these elements the material fills; a mesh of hexahedra needs an eighth of the calls that its Gauss points would need.
+//! At a node all elements of one material and birth share one temperature history, hence one state, for any
+//! fill fraction; a mesh of hexahedra needs an eighth of the calls that Gauss points would need.
 
 use super::vector::{CHUNK, items};
-use super::{Behaviour, Evaluation, Moves, NONE, Points, StepInput};
+use super::{Evaluation, MaterialBehaviour, NONE, PointMoves, PointStates, StepInput};
 use crate::error::Error;
-use crate::material::{Crystallization, Increments, Point, Scratch, ThermalMaterial};
+use crate::material::{Crystallization, Increments, PointInput, Scratch, ThermalMaterial};
 use crate::problem::Problem;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -15,34 +15,36 @@ use std::sync::Arc;
 
 /// Points at nodes, in the order of the nodes.
 #[derive(Clone, Debug, Default)]
-pub struct Nodal {
-    /// First point of each node, and the number of points.
+pub struct NodalPoints {
+    /// First point of each node, and at the end the number of points.
     pub starts: Vec<u32>,
     /// Material of each point, one of `like`.
     pub material: Vec<u16>,
     /// Birth of each point.
     pub birth: Vec<u32>,
-    /// ρV, kg; empty where energies are linear and all elements are of a class: see [`super::System::mass`].
+    /// Mass ρV, kg; empty if energies are linear and all elements belong to a class: see
+    /// [`super::ThermalSystem::mass`].
     pub mass: Vec<f64>,
-    /// Whether that is stored.
+    /// True if masses are stored.
     pub weighed: bool,
-    /// State variables stored for each point.
+    /// Number of state variables of a point.
     pub stride: usize,
-    /// Of each material: whether its energy is linear, so that its state only follows the temperature.
+    /// Followers: materials with linear energy, whose state follows the temperature without effect on it.
     pub followers: Vec<bool>,
-    /// Whether some material's energy is not, so that energies are stored.
+    /// True if energies are stored, for materials whose energy is not linear.
     pub energies: bool,
-    /// Whether one of these has a point.
+    /// True if a point has such a material.
     pub coupled: bool,
-    /// Laws of crystals of materials whose state follows, and of each material its law.
+    /// Laws of crystallization of followers.
     pub laws: Vec<Crystallization>,
-    /// See `laws`.
+    /// Index in `laws` of each material.
     pub law_of: Vec<Option<u16>>,
-    /// Of each material the first one that has the same states, whatever part of the elements it fills: they share points.
+    /// First material with the same states, for each material: materials that differ only in the fraction of
+    /// the elements they fill share points.
     pub like: Vec<u16>,
 }
 
-/// Room for one work item of [`Nodal::follow`].
+/// Buffers for one work item of [`NodalPoints::follow`].
 #[derive(Default)]
 struct PointScratch {
     /// Points of one law, and their nodes, both within the item.
@@ -53,11 +55,11 @@ struct PointScratch {
     before: Vec<f64>,
 }
 
-impl Nodal {
-    /// No points; the laws of the materials whose state follows.
-    pub fn laws_of(problem: &Problem, behaviours: &[Behaviour]) -> Self {
+impl NodalPoints {
+    /// Returns an empty set with the laws of the followers.
+    pub fn laws_of(problem: &Problem, behaviours: &[MaterialBehaviour]) -> Self {
         let mut laws: Vec<Crystallization> = Vec::new();
-        let mut law = |(material, behaviour): (&Arc<dyn ThermalMaterial>, &Behaviour)| {
+        let mut law = |(material, behaviour): (&Arc<dyn ThermalMaterial>, &MaterialBehaviour)| {
             let own =
                 material.crystals().filter(|_| behaviour.capacity.is_some() && behaviour.states == 1)?;
             let known = laws.iter().position(|law| law == own);
@@ -75,29 +77,29 @@ impl Nodal {
         Self { laws, law_of, like, ..Self::default() }
     }
 
-    /// Whether there is none.
+    /// Returns true without points.
     pub fn is_empty(&self) -> bool {
         self.material.is_empty()
     }
 
     /// Points of a node.
-    pub fn of(&self, node: usize) -> std::ops::Range<usize> {
+    pub fn points_of(&self, node: usize) -> std::ops::Range<usize> {
         if self.is_empty() { 0..0 } else { self.starts[node] as usize..self.starts[node + 1] as usize }
     }
 
-    /// Whether the state of a material only follows the temperature.
+    /// Returns true for a follower.
     pub fn follows(&self, material: u16) -> bool {
         self.followers.get(usize::from(material)).is_some_and(|&follows| follows)
     }
 
-    /// Makes the points of these equations anew, ascending, and of all others up to `size`; `keys` gives birth and material of those that a
-    /// node has. Those have no mass yet. Returns where points were from the first that may have moved.
+    /// Rebuilds the points of `changed` equations, ascending, and of all new ones up to `size`; `keys` lists
+    /// birth and material of the points of a node. New points have no mass yet. Returns the moves of points.
     pub fn replace(
         &mut self,
         size: usize,
         touched: &[u32],
         mut keys: impl FnMut(u32, &mut Vec<(u32, u16)>),
-    ) -> Moves {
+    ) -> PointMoves {
         if self.starts.is_empty() {
             self.starts.push(0);
         }
@@ -106,7 +108,7 @@ impl Nodal {
         let ends = self.starts.split_off(first + 1);
         let (birth, material) = (self.birth.split_off(start), self.material.split_off(start));
         let mass = if self.weighed { self.mass.split_off(start) } else { Vec::new() };
-        let mut moves = Moves { first: start, from: Vec::new() };
+        let mut moves = PointMoves { first: start, from: Vec::new() };
         let mut touched = touched.iter().peekable();
         let mut list = Vec::new();
         let mut begin = 0;
@@ -136,12 +138,12 @@ impl Nodal {
         moves
     }
 
-    /// Of materials whose energy is not linear: adds to `change`, `capacity`; sets the new points.
+    /// Evaluates materials whose energy is not linear: adds to `change` and `capacity`, sets the new points.
     pub fn evaluate(
         &self,
         problem: &Problem,
         at: &StepInput,
-        old: &Points,
+        old: &PointStates,
         out: &mut Evaluation,
     ) -> Result<(), Error> {
         if self.coupled {
@@ -151,9 +153,9 @@ impl Nodal {
         Ok(())
     }
 
-    /// Of the others: what they are, in the place of what they were to be.
-    pub fn keep_followers(&self, old: &Points, new: &mut Points) {
-        let Points { state, energy } = new;
+    /// Restores the states of followers in `new` from `old`.
+    pub fn keep_followers(&self, old: &PointStates, new: &mut PointStates) {
+        let PointStates { state, energy } = new;
         if !self.coupled {
             state.clone_from(&old.state);
             energy.clone_from(&old.energy);
@@ -166,8 +168,8 @@ impl Nodal {
         }
     }
 
-    /// Of the others: takes `states` to the end of the increment; returns their smallest wish for the next step over this one, and how many
-    /// there are.
+    /// Integrates the followers over the increment; returns the smallest requested ratio of next to present
+    /// step, and the number of points.
     pub fn follow(
         &self,
         problem: &Problem,
@@ -209,7 +211,7 @@ impl Nodal {
         let place = |node: usize| {
             let start = at.start[node];
             let increment = at.temperature[node] - start;
-            Point { temperature: start, increment, gradient: Vector3::zeros(), dt: at.dt }
+            PointInput { temperature: start, increment, gradient: Vector3::zeros(), dt: at.dt }
         };
         let PointScratch { points, nodes, z, scratch, before } = room;
         let (mut ratio, mut count): (Option<f64>, u64) = (None, 0);
@@ -218,7 +220,7 @@ impl Nodal {
             points.clear();
             nodes.clear();
             for (k, node) in (0..).zip(range.clone()) {
-                for point in self.of(node).filter(|&point| law_of(point) == Some(number)) {
+                for point in self.points_of(node).filter(|&point| law_of(point) == Some(number)) {
                     if nodes.last() != Some(&k) {
                         place(node).check()?;
                     }
@@ -244,7 +246,7 @@ impl Nodal {
             count += points.len() as u64;
         }
         for node in range {
-            for point in self.of(node) {
+            for point in self.points_of(node) {
                 let index = self.material[point];
                 if !self.follows(index) || law_of(point).is_some() {
                     continue;
@@ -265,7 +267,7 @@ impl Nodal {
         &self,
         problem: &Problem,
         at: &StepInput,
-        old: &Points,
+        old: &PointStates,
         out: &mut Evaluation,
     ) -> Result<Option<f64>, Error> {
         let Evaluation { change, capacity, memory, .. } = out;
@@ -300,7 +302,7 @@ impl Nodal {
         &self,
         problem: &Problem,
         at: &StepInput,
-        old: &Points,
+        old: &PointStates,
         first: usize,
         change: &mut [f64],
         capacity: &mut [f64],
@@ -311,13 +313,13 @@ impl Nodal {
         let offset = self.starts[first] as usize;
         for k in 0..change.len() {
             let start = at.start[first + k];
-            let place = Point {
+            let place = PointInput {
                 temperature: start,
                 increment: at.temperature[first + k] - start,
                 gradient: Vector3::zeros(),
                 dt: at.dt,
             };
-            for point in self.of(first + k) {
+            for point in self.points_of(first + k) {
                 if self.follows(self.material[point]) {
                     continue;
                 }

@@ -1,28 +1,29 @@
-//! Which equation each node gets: equations are appended when elements appear, and never renumbered.
+//! Numbering of equations: they are appended when elements appear, and never renumbered.
 //!
-//! Nodes are sorted by number within groups of births. Where births come layer by layer in a mesh that is numbered by layers, a group is a
-//! layer; else it has an eighth of what was there before. So lines of equal elements keep consecutive equations, and with them equal rows.
-//! A node of a group that does not exist yet has an equation that is out of use: an empty row that is not free.
+//! Nodes are sorted by number within groups of births. If births are layers of a mesh numbered by layers, a
+//! group is a layer; otherwise it has an eighth of the equations before it. So lines of equal elements keep
+//! consecutive equations, and with them equal rows. A node of a group that does not exist yet has an equation
+//! out of use: an empty row that is not free.
 
 use super::NONE;
 use crate::problem::Problem;
 
-/// Equations of a group at least, unless it ends where numbers of nodes do.
-const SMALLEST: usize = 256;
-/// A group has this part of the equations before it.
-const PART: usize = 8;
+/// Smallest number of equations of a group, unless node numbers separate it.
+const MIN_GROUP: usize = 256;
+/// Ratio of earlier equations to those of a group.
+const GROUP_RATIO: usize = 8;
 
-/// The order of all nodes that ever exist.
+/// Order of all nodes that ever exist.
 #[derive(Clone, Debug)]
 pub struct Numbering {
     /// Node of each equation.
     pub nodes: Vec<u32>,
-    /// Where the group of each birth begins and ends; birth 0 is what exists from the start.
+    /// Begin and end of the group of each birth; birth 0 is what exists from the start.
     groups: Vec<[u32; 2]>,
 }
 
 impl Numbering {
-    /// Of elements that are born, by `born`, or will be.
+    /// Numbers the nodes of elements that are born, by `born`, or will be.
     pub fn new(problem: &Problem, born: &[u32]) -> Self {
         let mut birth_of = born.to_vec();
         for (birth, number) in problem.births.iter().zip(1..) {
@@ -40,13 +41,13 @@ impl Numbering {
         }
         let last = birth_of.iter().filter(|&&birth| birth != NONE).max().map_or(0, |&birth| birth as usize);
         let births = last.max(problem.births.len()) + 1;
-        // number, lowest and highest of the nodes that come with each birth
+        // birth's number, and its lowest and highest new nodes
         let mut come = vec![(0, NONE, 0); births];
         for (node, &birth) in (0..).zip(&first).filter(|(_, birth)| **birth != NONE) {
             let (count, low, high) = &mut come[birth as usize];
             (*count, *low, *high) = (*count + 1, node.min(*low), node.max(*high));
         }
-        // lowest node that comes with any later birth
+        // lowest new node of any later birth
         let mut later = vec![NONE; births];
         for birth in (1..births).rev() {
             later[birth - 1] = later[birth].min(come[birth].1);
@@ -55,7 +56,7 @@ impl Numbering {
         let (mut start, mut end, mut top) = (0, 0, 0);
         for (birth, &(count, _, high)) in come.iter().enumerate() {
             (end, top) = (end + count, high.max(top));
-            if birth == 0 || later[birth] > top || end - start >= SMALLEST.max(start / PART) {
+            if birth == 0 || later[birth] > top || end - start >= MIN_GROUP.max(start / GROUP_RATIO) {
                 groups.resize(birth + 1, [start as u32, end as u32]);
                 start = end;
             }
@@ -78,12 +79,12 @@ impl Numbering {
         Self { nodes, groups }
     }
 
-    /// Number of equations when so many births have happened, those out of use included.
+    /// Number of equations after `births` births, including those out of use.
     pub fn end(&self, births: usize) -> usize {
         self.groups[births.min(self.groups.len() - 1)][1] as usize
     }
 
-    /// Equation of a node that comes with a birth.
+    /// Equation of a node that appears with a birth.
     pub fn equation(&self, node: u32, birth: u32) -> Option<u32> {
         let [start, end] = *self.groups.get(birth as usize)?;
         let group = &self.nodes[start as usize..end as usize];
@@ -94,15 +95,15 @@ impl Numbering {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::material::{Conductor, Property};
+    use crate::material::{Conductor, ThermalProperty};
     use crate::mesh::Grid;
     use crate::problem::Birth;
     use std::sync::Arc;
 
-    /// A block of 8 × 8 × 6 on which `births` are laid.
+    /// Returns a block of 8 × 8 × 6 on which `births` are laid.
     fn problem(births: Vec<Vec<u32>>) -> (Problem, Vec<u32>) {
         let mesh = Grid::uniform([0.0; 3], [1.0; 3], [8, 8, 6]).unwrap().mesh("block").unwrap();
-        let constant = |name| Property::constant(name, 1.0).unwrap();
+        let constant = |name| ThermalProperty::constant(name, 1.0).unwrap();
         let material = Arc::new(Conductor::new(1.0, constant("k"), constant("c")).unwrap());
         let mut born = vec![0; 384];
         births.iter().flatten().for_each(|&element| born[element as usize] = NONE);
@@ -123,7 +124,8 @@ mod tests {
         );
     }
 
-    /// Element by element, against the order: each node once; those of a birth have an equation before its end; few are out of use.
+    /// Element-by-element births against the mesh order: each node has one equation, before the end of its
+    /// birth, and few are out of use.
     #[test]
     fn a_path_is_numbered_in_groups() {
         let (problem, born) = problem((64..384).rev().map(|element| vec![element]).collect());
@@ -140,7 +142,7 @@ mod tests {
                 assert_eq!(found.nodes[equation as usize], *node);
                 assert!((equation as usize) < found.end(number as usize));
             }
-            assert!(found.end(number as usize) - seen.len() <= SMALLEST);
+            assert!(found.end(number as usize) - seen.len() <= MIN_GROUP);
         }
     }
 }

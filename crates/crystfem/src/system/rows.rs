@@ -1,46 +1,48 @@
-//! The conduction matrix (and the consistent capacity matrix) row by row, each distinct list of distances and of values stored once.
+//! Conduction matrix (and consistent capacity matrix) by rows, with each distinct list of offsets and of
+//! values stored once.
 //!
-//! A row is a list of distances, column − row, and a list of values. On a mesh with lines of equal elements most consecutive rows are equal;
-//! a run of them is one segment, y_i = Σ_k v_k x_{i+o_k}, a stencil without any indices to gather. Elsewhere this is
-//! plain compressed rows: cells that a path fills in part have few distinct lists, which caches hold. Each row is written once: no colouring and no sums between threads, so the bits do not
-//! depend on them; gathering costs nothing over scattering because a stencil has 27 products where the elements
-//! around a node have 64.
+//! A row is a list of offsets, column − row, and a list of values. On a mesh with lines of equal elements
+//! most consecutive rows are equal; a run of them is a stencil, y_i = Σ_k v_k x_{i+o_k}, without
+//! index gathers. Otherwise this is a compressed row format, and partly filled cells have few distinct lists,
+//! which stay in caches. Each row is written once, without colouring or sums across threads, so that the bits
+//! do not depend on threads; the cost equals that of scattering because a stencil has 27 products and the
+//! elements around a node have 64.
 
 mod product;
 mod stencils;
 
 use super::vector::{CHUNK, items};
 use polycore::numerics::ordered_sum;
-use product::{Both, Product};
+use product::{FlowAndCapacity, RowsProduct};
 use pulp::Arch;
 use rayon::prelude::*;
-use stencils::{Entries, Stencil, Stencils};
+use stencils::{Entries, RowStencil, Stencils};
 
-/// Consecutive equal rows of one work item; the first is counted within it.
+/// A run of equal rows of one work item; `start` counts within the item.
 #[derive(Clone, Copy, Debug)]
-struct Segment {
+struct RowRun {
     start: u16,
     length: u16,
-    stencil: Stencil,
+    stencil: RowStencil,
 }
 
-/// One row under construction.
+/// A row under construction.
 #[derive(Debug, Default)]
-pub struct Row {
+pub struct RowBuilder {
     entries: Vec<(i32, f64, f64)>,
-    /// The same, sorted, list by list.
+    /// The entries, sorted, list by list.
     offsets: Vec<i32>,
     values: [Vec<f64>; 2],
-    /// Whether the row has entries that are set later, so that it cannot be shared.
+    /// True if the row has entries that are set later, and so cannot be shared.
     pub own: bool,
     key: Vec<u32>,
     new_key: Vec<u32>,
     repeated: bool,
 }
 
-impl Row {
-    /// Begins a row by what determines it. True where that is the same as for the row before: nothing needs to be
-    /// added then.
+impl RowBuilder {
+    /// Begins a row with its determinants. Returns true if they equal those of the row before: then nothing
+    /// needs to be added.
     pub fn begin(&mut self, determinants: impl Iterator<Item = u32>) -> bool {
         self.new_key.clear();
         // iterated from within: chains of iterators are slow from outside
@@ -55,7 +57,7 @@ impl Row {
         self.repeated
     }
 
-    /// Sorts what was added.
+    /// Sorts the added entries.
     fn sorted(&mut self, consistent: bool) -> Entries<'_> {
         let Self { entries, offsets, values: [conduction, capacity], .. } = self;
         entries.sort_unstable_by_key(|entry| entry.0);
@@ -68,7 +70,7 @@ impl Row {
         Entries { offsets, conduction, capacity }
     }
 
-    /// Adds to the entry at a distance from the diagonal.
+    /// Adds to the entry at an offset from the diagonal.
     pub fn add(&mut self, offset: i32, conduction: f64, capacity: f64) {
         match self.entries.iter_mut().find(|entry| entry.0 == offset) {
             Some(entry) => {
@@ -80,25 +82,25 @@ impl Row {
     }
 }
 
-/// The matrices K and, with consistent capacity, M, over the nodes that exist.
+/// Matrices K and, with consistent capacity, M, over the existing nodes.
 #[derive(Clone, Debug)]
-pub struct Rows {
+pub struct ConductionRows {
     size: usize,
     consistent: bool,
-    /// Runs of equal rows of each work item, as long as they can be.
-    segments: Vec<Vec<Segment>>,
+    /// Longest runs of equal rows of each work item.
+    segments: Vec<Vec<RowRun>>,
     stencils: Stencils,
-    /// Stencil of each row that has values of its own; empty where no row has.
-    own: Vec<Stencil>,
-    /// Values without what is added in each evaluation.
+    /// Stencil of each row with its own values; empty without such rows.
+    own: Vec<RowStencil>,
+    /// Values without the contributions of each evaluation.
     base: Option<[Vec<f64>; 2]>,
-    /// Counts changes of the pattern, and of values.
+    /// Version of the pattern, and of the values.
     versions: [u64; 2],
-    /// The versions in which each work item last changed.
+    /// Versions in which each work item last changed.
     changed: Vec<[u64; 2]>,
 }
 
-/// The diagonal of rows, made anew where they or the factors of M and K have changed.
+/// Diagonal of the rows, recomputed when they or the factors of M and K have changed.
 #[derive(Default)]
 pub struct Diagonal {
     values: Vec<f64>,
@@ -106,8 +108,8 @@ pub struct Diagonal {
 }
 
 impl Diagonal {
-    /// That of `weights[0]`·M + `weights[1]`·K.
-    pub fn of(&mut self, rows: &Rows, weights: [f64; 2]) -> &[f64] {
+    /// Returns the diagonal of `weights[0]`·M + `weights[1]`·K.
+    pub fn update(&mut self, rows: &ConductionRows, weights: [f64; 2]) -> &[f64] {
         let made_for = Some((rows.versions, weights.map(f64::to_bits)));
         if self.made_for != made_for {
             self.values.clear();
@@ -119,23 +121,23 @@ impl Diagonal {
     }
 }
 
-/// Rows of a run on average where runs count as short.
-const MOST_ALONE: usize = 4;
-/// A list that has no name yet.
-const UNNAMED: u32 = u32::MAX;
-/// The part of the entries that may be of stencils that no row has.
-const MOST_DEAD: usize = 4;
-/// Rows for each distinct one at least where distinct ones count as few.
-const FEW: usize = 4;
+/// Largest mean length of runs that count as short.
+const MAX_SHORT_RUN: usize = 4;
+/// Marks a list that has no number yet.
+const UNNUMBERED: u32 = u32::MAX;
+/// Reciprocal of the fraction of entries that may belong to unused stencils.
+const MIN_USED_RATIO: usize = 4;
+/// Smallest ratio of rows to distinct ones that count as few.
+const MIN_REPEATED_ROWS: usize = 4;
 
-/// New rows of one work item: runs with stencils of their own numbering, and whether each is a row's own.
-struct Part {
-    runs: Vec<(Segment, bool)>,
+/// New rows of one work item: runs with locally numbered stencils, and true for rows with their own values.
+struct NewRows {
+    runs: Vec<(RowRun, bool)>,
     stencils: Stencils,
 }
 
-impl Rows {
-    /// None.
+impl ConductionRows {
+    /// Returns an empty matrix.
     pub fn new(consistent: bool) -> Self {
         Self {
             size: 0,
@@ -159,53 +161,54 @@ impl Rows {
         self.segments.len()
     }
 
-    /// What changes with the pattern, and what changes with the values.
+    /// Versions of the pattern and of the values.
     pub fn versions(&self) -> [u64; 2] {
         self.versions
     }
 
-    /// The same of the rows of one work item.
+    /// Versions of the rows of one work item.
     pub fn versions_of(&self, item: usize) -> [u64; 2] {
         self.changed[item]
     }
 
-    /// Whether most rows of a work item stand alone.
+    /// Returns true if most rows of a work item differ from their neighbours.
     pub fn is_unequal(&self, item: usize) -> bool {
         let rows = (self.size - item * CHUNK).min(CHUNK);
-        MOST_ALONE * self.segments[item].len() > rows
+        MAX_SHORT_RUN * self.segments[item].len() > rows
     }
 
-    /// Whether the distinct rows are so few that caches hold them, however they alternate.
+    /// Returns true if distinct rows are few enough for caches, however they alternate.
     pub fn are_few(&self) -> bool {
-        FEW * self.stencils.values.used <= self.size
+        MIN_REPEATED_ROWS * self.stencils.values.used <= self.size
     }
 
-    /// Of `size` rows; `fill` begins each row and says what is in it.
+    /// Builds `size` rows; `fill` begins each row and adds its entries.
     #[cfg(test)]
-    pub fn build(size: usize, consistent: bool, fill: impl Fn(usize, &mut Row) + Sync) -> Self {
+    pub fn build(size: usize, consistent: bool, fill: impl Fn(usize, &mut RowBuilder) + Sync) -> Self {
         let mut rows = Self::new(consistent);
         rows.update(size, &(0..size as u32).collect::<Vec<_>>(), fill);
         rows
     }
 
-    /// Makes these rows, ascending, and empty ones up to `size`; `fill` begins each row and says what is in it. Other rows stay. What it
-    /// leaves depends on the rows alone, not on how they came about, but for stencils that no row has any more.
-    pub fn update(&mut self, size: usize, changed: &[u32], fill: impl Fn(usize, &mut Row) + Sync) {
+    /// Rebuilds the `changed` rows, ascending, and adds empty ones up to `size`; `fill` begins each row and
+    /// adds its entries. Other rows stay. The result depends on the rows alone, not on their history, except
+    /// for unused stencils.
+    pub fn update(&mut self, size: usize, changed: &[u32], fill: impl Fn(usize, &mut RowBuilder) + Sync) {
         let Stencils { values, patterns, .. } = &self.stencils;
-        if values.dead + patterns.dead > (values.entries() / MOST_DEAD).max(self.size) {
+        if values.dead + patterns.dead > (values.entries() / MIN_USED_RATIO).max(self.size) {
             self.compact();
         }
         self.versions = self.versions.map(|version| version + 1);
         let groups: Vec<&[u32]> =
             changed.chunk_by(|a, b| *a as usize / CHUNK == *b as usize / CHUNK).collect();
-        let parts: Vec<Part> =
-            groups.par_iter().map(|changed| Part::new(changed, self.consistent, &fill)).collect();
+        let parts: Vec<NewRows> =
+            groups.par_iter().map(|changed| NewRows::new(changed, self.consistent, &fill)).collect();
         let before = self.size;
         self.size = size.max(before);
         self.segments.resize_with(items(self.size), Vec::new);
         self.changed.resize(self.segments.len(), self.versions);
         if !self.own.is_empty() || parts.iter().any(|part| part.runs.iter().any(|run| run.1)) {
-            self.own.resize(self.size, Stencil::NONE);
+            self.own.resize(self.size, RowStencil::NONE);
         }
         let mut of = Vec::with_capacity(CHUNK);
         let mut parts = groups.iter().map(|group| group[0] as usize / CHUNK).zip(parts).peekable();
@@ -218,26 +221,26 @@ impl Rows {
             }
             self.changed[item] = self.versions;
             of.clear();
-            of.resize(end - first, Stencil::NONE);
+            of.resize(end - first, RowStencil::NONE);
             for segment in &self.segments[item] {
                 of[segment.rows()].fill(segment.stencil);
-                self.stencils.patterns.release(segment.stencil.pattern, segment.length);
-                self.stencils.values.release(segment.stencil.values, segment.length);
+                self.stencils.patterns.remove_rows(segment.stencil.pattern, segment.length);
+                self.stencils.values.remove_rows(segment.stencil.values, segment.length);
             }
             if let Some(part) = part {
-                let mut patterns = vec![UNNAMED; part.stencils.patterns.count()];
-                let mut values = vec![UNNAMED; part.stencils.values.count()];
+                let mut patterns = vec![UNNUMBERED; part.stencils.patterns.count()];
+                let mut values = vec![UNNUMBERED; part.stencils.values.count()];
                 for (run, own) in &part.runs {
                     let entries = part.stencils.entries(run.stencil);
                     let pattern = &mut patterns[run.stencil.pattern as usize];
-                    if *pattern == UNNAMED {
+                    if *pattern == UNNUMBERED {
                         *pattern = self.stencils.pattern(entries.offsets);
                     }
                     let values = &mut values[run.stencil.values as usize];
-                    if *values == UNNAMED {
+                    if *values == UNNUMBERED {
                         *values = self.stencils.list(entries, *own);
                     }
-                    let stencil = Stencil { pattern: *pattern, values: *values };
+                    let stencil = RowStencil { pattern: *pattern, values: *values };
                     of[run.rows()].fill(stencil);
                     if let Some(place) = self.own.get_mut(first + usize::from(run.start))
                         && *own
@@ -247,18 +250,18 @@ impl Rows {
                 }
             }
             // rows out of use
-            if of.contains(&Stencil::NONE) {
+            if of.contains(&RowStencil::NONE) {
                 let none = Entries { offsets: &[], conduction: &[], capacity: &[] };
                 let empty = self.stencils.find_or_add(none, false);
                 of.iter_mut()
-                    .filter(|stencil| **stencil == Stencil::NONE)
+                    .filter(|stencil| **stencil == RowStencil::NONE)
                     .for_each(|stencil| *stencil = empty);
             }
             self.segments[item].clear();
             let mut start = 0;
             for run in of.chunk_by(|a, b| a == b) {
-                let segment = Segment { start, length: run.len() as u16, stencil: run[0] };
-                self.hold(segment);
+                let segment = RowRun { start, length: run.len() as u16, stencil: run[0] };
+                self.count_rows(segment);
                 self.segments[item].push(segment);
                 start += segment.length;
             }
@@ -266,30 +269,30 @@ impl Rows {
         }
     }
 
-    fn hold(&mut self, Segment { length, stencil, .. }: Segment) {
-        self.stencils.patterns.hold(stencil.pattern, length);
-        self.stencils.values.hold(stencil.values, length);
+    fn count_rows(&mut self, RowRun { length, stencil, .. }: RowRun) {
+        self.stencils.patterns.add_rows(stencil.pattern, length);
+        self.stencils.values.add_rows(stencil.values, length);
     }
 
-    /// Drops lists that no row has.
+    /// Drops unused lists.
     fn compact(&mut self) {
         let old = std::mem::take(&mut self.stencils);
         let base = self.base.take();
-        let mut patterns = vec![UNNAMED; old.patterns.count()];
-        let mut values = vec![UNNAMED; old.values.count()];
+        let mut patterns = vec![UNNUMBERED; old.patterns.count()];
+        let mut values = vec![UNNUMBERED; old.values.count()];
         let mut kept = base.as_ref().map(|_| [Vec::new(), Vec::new()]);
         for item in 0..self.segments.len() {
             for at in 0..self.segments[item].len() {
-                let Segment { start, stencil, .. } = self.segments[item][at];
+                let RowRun { start, stencil, .. } = self.segments[item][at];
                 let own = self.own.get_mut(item * CHUNK + usize::from(start));
-                let own = own.filter(|own| **own != Stencil::NONE);
+                let own = own.filter(|own| **own != RowStencil::NONE);
                 let entries = old.entries(stencil);
                 let pattern = &mut patterns[stencil.pattern as usize];
-                if *pattern == UNNAMED {
+                if *pattern == UNNUMBERED {
                     *pattern = self.stencils.pattern(entries.offsets);
                 }
                 let values = &mut values[stencil.values as usize];
-                if *values == UNNAMED {
+                if *values == UNNUMBERED {
                     *values = self.stencils.list(entries, own.is_some());
                     for (kept, base) in kept.iter_mut().flatten().zip(base.iter().flatten()) {
                         kept.extend_from_slice(
@@ -297,30 +300,30 @@ impl Rows {
                         );
                     }
                 }
-                let stencil = Stencil { pattern: *pattern, values: *values };
+                let stencil = RowStencil { pattern: *pattern, values: *values };
                 own.into_iter().for_each(|own| *own = stencil);
                 self.segments[item][at].stencil = stencil;
-                self.hold(self.segments[item][at]);
+                self.count_rows(self.segments[item][at]);
             }
         }
         self.base = kept;
     }
 
-    /// Lists of values that rows have, segments of equal rows, and entries of K in these lists: of the rows alone, not of how they came about.
+    /// Number of lists of values, of runs of equal rows, and of entries of K; independent of the history.
     pub fn stored(&self) -> [usize; 3] {
         let Stencils { values, .. } = &self.stencils;
         [values.used, self.segments.iter().map(Vec::len).sum(), values.entries() - values.dead]
     }
 
-    /// Bytes of what is stored.
+    /// Bytes of memory.
     pub fn bytes(&self) -> usize {
-        let segments: usize = self.segments.iter().map(Vec::len).sum();
-        segments * size_of::<Segment>() + self.own.len() * size_of::<Stencil>() + self.stencils.bytes()
+        let runs: usize = self.segments.iter().map(Vec::len).sum();
+        runs * size_of::<RowRun>() + self.own.len() * size_of::<RowStencil>() + self.stencils.bytes()
     }
 
-    /// Adds to an entry of a row of its own; without effect elsewhere.
+    /// Adds to an entry of a row with its own values; without effect on other rows.
     pub fn add(&mut self, row: usize, column: usize, conduction: f64, capacity: f64) {
-        let Some(&Stencil { pattern, values }) = self.own.get(row).filter(|own| **own != Stencil::NONE)
+        let Some(&RowStencil { pattern, values }) = self.own.get(row).filter(|own| **own != RowStencil::NONE)
         else {
             return;
         };
@@ -337,7 +340,7 @@ impl Rows {
         }
     }
 
-    /// Takes the values of rows that are new since the last call as those to which [`Self::restore`] sets them.
+    /// Saves the values of new rows, to which [`Self::restore`] returns them.
     pub fn keep(&mut self) {
         let base = self.base.get_or_insert_default();
         let Stencils { conduction, capacity, .. } = &self.stencils;
@@ -346,7 +349,7 @@ impl Rows {
         }
     }
 
-    /// Sets the values back to what they were.
+    /// Restores the saved values.
     pub fn restore(&mut self) {
         if let Some([conduction, capacity]) = &self.base {
             self.stencils.conduction.copy_from_slice(conduction);
@@ -366,9 +369,9 @@ impl Rows {
         });
     }
 
-    /// The largest of `of(row, K_ii)`.
+    /// Returns the largest of `of(row, K_ii)`.
     pub fn largest(&self, of: impl Fn(usize, f64) -> f64 + Sync) -> f64 {
-        let item = |(item, segments): (usize, &Vec<Segment>)| {
+        let item = |(item, segments): (usize, &Vec<RowRun>)| {
             let mut most = f64::NEG_INFINITY;
             for segment in segments {
                 let value = self.diagonal(segment, [0.0, 1.0]);
@@ -379,7 +382,7 @@ impl Rows {
         self.segments.par_iter().enumerate().map(item).reduce(|| f64::NEG_INFINITY, f64::max)
     }
 
-    fn diagonal(&self, segment: &Segment, weights: [f64; 2]) -> f64 {
+    fn diagonal(&self, segment: &RowRun, weights: [f64; 2]) -> f64 {
         self.stencils.diagonal(segment.stencil).map_or(0.0, |at| self.value(at, weights))
     }
 
@@ -388,7 +391,7 @@ impl Rows {
         self.row(row, [0.0; 2]).map(|(column, _)| column)
     }
 
-    /// Entries (column, value) of a row of `capacity`·M + `conduction`·K, columns ascending.
+    /// Entries (column, value) of a row of `weights[0]`·M + `weights[1]`·K, columns ascending.
     pub fn row(&self, row: usize, weights: [f64; 2]) -> impl Iterator<Item = (usize, f64)> + '_ {
         let stencil = self.segment(row).map(|segment| segment.stencil);
         let offsets = stencil.map_or(&[][..], |stencil| self.stencils.offsets(stencil.pattern));
@@ -398,8 +401,8 @@ impl Rows {
             .map(move |(at, &offset)| (row.wrapping_add_signed(offset as isize), self.value(at, weights)))
     }
 
-    /// The run that a row belongs to.
-    fn segment(&self, row: usize) -> Option<&Segment> {
+    /// Run of a row.
+    fn segment(&self, row: usize) -> Option<&RowRun> {
         let segments = self.segments.get(row / CHUNK)?;
         let next = segments.partition_point(|segment| usize::from(segment.start) <= row % CHUNK);
         segments.get(next.saturating_sub(1))
@@ -413,23 +416,24 @@ impl Rows {
         }
     }
 
-    /// y = diagonal·x + (`weights[0]`·M + `weights[1]`·K) x; returns x·y, summed in the order of the items.
+    /// Computes y = diagonal·x + (`weights[0]`·M + `weights[1]`·K) x; returns x·y, summed in the order of the
+    /// items.
     pub fn product(&self, diagonal: Option<&[f64]>, weights: [f64; 2], x: &[f64], y: &mut [f64]) -> f64 {
         self.multiply::<false>(diagonal, weights, x, y)
     }
 
-    /// y = K x as Σ_j K_ij (x_j − x_i): rows of K add up to nothing. Its rounding is that of the differences, so that
-    /// heat is conserved to rounding of what flows, not of what is stored.
+    /// Computes y = K x as Σ_j K_ij (x_j − x_i): rows of K sum to zero. Rounding is that of the differences,
+    /// so that heat is conserved relative to the heat flow, not to the stored heat.
     pub fn flow(&self, x: &[f64], y: &mut [f64]) {
         self.multiply::<true>(None, [0.0, 1.0], x, y);
     }
 
-    /// [`Self::flow`] of x, and M u of the consistent capacity.
+    /// Computes [`Self::flow`] of x, and M u of the consistent capacity.
     pub fn flow_and_capacity(&self, x: &[f64], u: &[f64], flow: &mut [f64], stored: &mut [f64]) {
         flow.par_chunks_mut(CHUNK).zip(stored.par_chunks_mut(CHUNK)).enumerate().for_each(
             |(item, (flow, stored))| {
                 let (segments, first) = (&self.segments[item], item * CHUNK);
-                Arch::new().dispatch(Both { rows: self, segments, x, u, flow, stored, first });
+                Arch::new().dispatch(FlowAndCapacity { rows: self, segments, x, u, flow, stored, first });
             },
         );
     }
@@ -441,12 +445,12 @@ impl Rows {
         x: &[f64],
         y: &mut [f64],
     ) -> f64 {
-        let part = |(item, y): (usize, &mut [f64])| self.part::<FLOW>(item, diagonal, weights, x, y);
+        let part = |(item, y): (usize, &mut [f64])| self.multiply_item::<FLOW>(item, diagonal, weights, x, y);
         ordered_sum(y.par_chunks_mut(CHUNK).enumerate().map(part))
     }
 
-    /// [`Self::product`], or the flow, of the rows of one work item, `y`.
-    pub fn part<const FLOW: bool>(
+    /// Multiplies the rows of one work item, by [`Self::product`] or as a flow.
+    pub fn multiply_item<const FLOW: bool>(
         &self,
         item: usize,
         diagonal: Option<&[f64]>,
@@ -455,12 +459,12 @@ impl Rows {
         y: &mut [f64],
     ) -> f64 {
         let (segments, first) = (&self.segments[item], item * CHUNK);
-        Arch::new().dispatch(Product::<FLOW> { rows: self, segments, weights, diagonal, x, y, first })
+        Arch::new().dispatch(RowsProduct::<FLOW> { rows: self, segments, weights, diagonal, x, y, first })
     }
 }
 
-impl Segment {
-    /// Its rows, within the work item.
+impl RowRun {
+    /// Rows, within the work item.
     #[inline(always)]
     fn rows(self) -> std::ops::Range<usize> {
         let start = self.start as usize;
@@ -468,11 +472,11 @@ impl Segment {
     }
 }
 
-impl Part {
-    /// Of rows of one work item, ascending.
-    fn new(changed: &[u32], consistent: bool, fill: &(impl Fn(usize, &mut Row) + Sync)) -> Self {
+impl NewRows {
+    /// Builds the rows of one work item, ascending.
+    fn new(changed: &[u32], consistent: bool, fill: &(impl Fn(usize, &mut RowBuilder) + Sync)) -> Self {
         let mut part = Self { runs: Vec::new(), stencils: Stencils::default() };
-        let mut row = Row::default();
+        let mut row = RowBuilder::default();
         for &index in changed {
             fill(index as usize, &mut row);
             let start = (index as usize % CHUNK) as u16;
@@ -485,7 +489,7 @@ impl Part {
                 Some((last, false)) if last.stencil == stencil && last.start + last.length == start => {
                     last.length += 1;
                 }
-                _ => part.runs.push((Segment { start, length: 1, stencil }, own)),
+                _ => part.runs.push((RowRun { start, length: 1, stencil }, own)),
             }
         }
         part

@@ -1,7 +1,7 @@
-//! Flux, film, radiation and sources on what exists.
+//! Flux, film, radiation and sources on existing elements.
 //!
-//! With lumped capacity they act at nodes, q(T_i) ∮ N_i dA, so that their tangent is diagonal and no cold neighbour
-//! can heat a node; with consistent capacity they act at the Gauss points of faces.
+//! With lumped capacity they act at nodes, q(T_i) ∮ N_i dA: the tangent is diagonal, and no cold neighbour
+//! can heat a node. With consistent capacity they act at the Gauss points of faces.
 
 use super::{Evaluation, StepInput};
 use crate::boundary::{Condition, STEFAN_BOLTZMANN};
@@ -9,31 +9,31 @@ use crate::element::FaceGeometry;
 use crate::mesh::Face;
 use crate::problem::Problem;
 
-/// Heat that goes into the body, by kind: W, or J when summed over time.
+/// Heat into the body, by kind: W, or J when integrated over time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Exchange {
-    /// Through prescribed flux.
+    /// Heat by prescribed flux.
     pub flux: f64,
-    /// Through films.
+    /// Heat by films.
     pub film: f64,
-    /// Through radiation.
+    /// Heat by radiation.
     pub radiation: f64,
-    /// From sources.
+    /// Heat of sources.
     pub source: f64,
 }
 
 impl Exchange {
-    /// The sum of all.
+    /// Sum of all kinds.
     pub fn total(&self) -> f64 {
         self.flux + self.film + self.radiation + self.source
     }
 
-    /// The sum of all magnitudes.
+    /// Sum of all magnitudes.
     pub fn gross(&self) -> f64 {
         self.flux.abs() + self.film.abs() + self.radiation.abs() + self.source.abs()
     }
 
-    /// Adds a multiple of another.
+    /// Adds a multiple of another exchange.
     pub fn add(&mut self, factor: f64, other: &Self) {
         self.flux += factor * other.flux;
         self.film += factor * other.film;
@@ -42,34 +42,34 @@ impl Exchange {
     }
 }
 
-/// ∂Q/∂T of faces, W/K, face after face.
+/// Tangents ∂Q/∂T of faces, W/K, face by face.
 #[derive(Clone, Debug, Default)]
 pub struct FaceMatrices {
-    /// Nodes of each face.
+    /// Number of nodes of each face.
     nodes: Vec<u8>,
     equations: Vec<u32>,
     values: Vec<f64>,
 }
 
-/// ∂Q/∂T of one face, W/K.
+/// Tangent ∂Q/∂T of one face, W/K.
 #[derive(Clone, Copy, Debug)]
 pub struct FaceMatrix<'a> {
-    /// Equations of its nodes.
+    /// Equations of the nodes.
     pub equations: &'a [u32],
-    /// Row after row.
+    /// Values, row by row.
     pub values: &'a [f64],
 }
 
 impl FaceMatrices {
-    /// None.
+    /// Empty list.
     pub const NONE: &'static Self = &Self { nodes: Vec::new(), equations: Vec::new(), values: Vec::new() };
 
-    /// Whether there is none.
+    /// Returns true if there are no faces.
     pub fn is_empty(&self) -> bool {
         self.nodes.is_empty()
     }
 
-    /// Each face.
+    /// Iterates over the faces.
     pub fn iter(&self) -> impl Iterator<Item = FaceMatrix<'_>> {
         let (mut equations, mut values) = (self.equations.as_slice(), self.values.as_slice());
         self.nodes.iter().map(move |&nodes| {
@@ -89,7 +89,7 @@ impl FaceMatrices {
 }
 
 impl FaceMatrix<'_> {
-    /// y += factor · matrix · x.
+    /// Adds factor · matrix · x to y.
     pub fn add_product(&self, factor: f64, x: &[f64], y: &mut [f64]) {
         let nodes = self.equations.len();
         for (a, &row) in self.equations.iter().enumerate() {
@@ -102,12 +102,12 @@ impl FaceMatrix<'_> {
 
 /// A face with its quadrature.
 #[derive(Clone, Debug)]
-struct Acting<const N: usize, const P: usize> {
+struct QuadratureFace<const N: usize, const P: usize> {
     equations: [u32; N],
     geometry: FaceGeometry<N, P>,
 }
 
-impl<const N: usize, const P: usize> Acting<N, P> {
+impl<const N: usize, const P: usize> QuadratureFace<N, P> {
     fn new(problem: &Problem, face: Face, equation: &[u32]) -> Self {
         let nodes = problem.mesh.face_nodes(face);
         let (mut corners, mut equations) = ([[0.0; 3]; N], [0; N]);
@@ -119,36 +119,36 @@ impl<const N: usize, const P: usize> Acting<N, P> {
     }
 }
 
-/// Equations that take heat, those at which it is known, and ∮ N N dA, m², or ∫ N N dV, m³.
+/// Equation that takes heat, equation whose temperature sets it, and ∮ N N dA, m², or ∫ N N dV, m³.
 type Pairs = Vec<(u32, u32, f64)>;
 
-/// One condition on what exists.
+/// A condition on existing faces.
 #[derive(Clone, Debug, Default)]
-struct Part {
+struct ConditionFaces {
     condition: usize,
     radiates: bool,
     /// Equations with ∮ N dA, m², ascending.
     nodes: Vec<(u32, f64)>,
-    /// Equations that take a flux, those at which it is known, and ∮ N N dA, m²: of second-order faces, whose ∮ N dA is
-    /// negative at corners.
+    /// Equation that takes a flux, equation whose temperature sets it, and ∮ N N dA, m², of second-order
+    /// faces, whose ∮ N dA is negative at corners.
     pairs: Pairs,
     /// Faces, for film and radiation with consistent capacity.
-    faces: Vec<Acting<4, 4>>,
-    /// Those of second order.
-    wide: Vec<Acting<8, 9>>,
+    faces: Vec<QuadratureFace<4, 4>>,
+    /// Second-order faces, likewise.
+    wide: Vec<QuadratureFace<8, 9>>,
 }
 
 /// Conditions on the current outer surface, and sources in existing elements.
 #[derive(Clone, Debug, Default)]
 pub struct Surfaces {
-    parts: Vec<Part>,
-    /// Source, and equations with ∫ N dV, m³, ascending.
+    parts: Vec<ConditionFaces>,
+    /// Source index, and equations with ∫ N dV, m³, ascending.
     sources: Vec<(usize, Vec<(u32, f64)>)>,
-    /// Source, equations that take its heat, those at which it is known, and ∫ N N dV, m³, of second-order elements.
+    /// Source index, and pairs of equations with ∫ N N dV, m³, of second-order elements.
     wide_sources: Vec<(usize, Pairs)>,
 }
 
-/// Sorts by equation and adds equal ones, in the order given.
+/// Sorts by equation and sums equal ones in the given order.
 fn gather(mut list: Vec<(u32, f64)>) -> Vec<(u32, f64)> {
     list.sort_by_key(|entry| entry.0);
     list.dedup_by(|next, kept| {
@@ -161,7 +161,7 @@ fn gather(mut list: Vec<(u32, f64)>) -> Vec<(u32, f64)> {
     list
 }
 
-/// The same of pairs.
+/// Sorts pairs and sums equal ones in the given order.
 fn gather_pairs(mut list: Pairs) -> Pairs {
     list.sort_by_key(|entry| (entry.0, entry.1));
     list.dedup_by(|next, kept| {
@@ -174,37 +174,37 @@ fn gather_pairs(mut list: Pairs) -> Pairs {
     list
 }
 
-/// Equations whose elements became more.
-pub struct Touched {
-    /// Ascending, each once.
+/// Set of equations that have gained elements.
+pub struct TouchedEquations {
+    /// Equations, without duplicates, ascending after [`Self::sort`].
     pub list: Vec<u32>,
     marks: Vec<bool>,
 }
 
-impl Touched {
-    /// None of so many.
+impl TouchedEquations {
+    /// Returns an empty set for `size` equations.
     pub fn new(size: usize) -> Self {
         Self { list: Vec::new(), marks: vec![false; size] }
     }
 
-    /// Adds one.
+    /// Adds an equation.
     pub fn add(&mut self, equation: u32) {
         if !std::mem::replace(&mut self.marks[equation as usize], true) {
             self.list.push(equation);
         }
     }
 
-    /// After all are added.
+    /// Sorts the list, once all are added.
     pub fn sort(&mut self) {
         self.list.sort_unstable();
     }
 
-    /// Whether an equation is one.
+    /// Returns true if an equation is in the set.
     pub fn contains(&self, equation: u32) -> bool {
         self.marks[equation as usize]
     }
 
-    /// Puts new entries in the place of those that are touched.
+    /// Replaces the entries of touched equations.
     fn replace(&self, list: &mut Vec<(u32, f64)>, new: Vec<(u32, f64)>) {
         let Some(&first) = self.list.first() else { return };
         let tail = list.split_off(list.partition_point(|entry| entry.0 < first));
@@ -220,26 +220,26 @@ impl Touched {
 }
 
 impl Surfaces {
-    /// Of what does not exist yet.
+    /// Returns all conditions and sources, without faces and elements yet.
     pub fn new(problem: &Problem) -> Self {
         let surfaces = (0..problem.conditions.len()).filter(|&k| problem.conditions[k].surface().is_some());
         let part = |condition: usize| {
             let radiates = matches!(problem.conditions[condition], Condition::Radiation { .. });
-            Part { condition, radiates, ..Part::default() }
+            ConditionFaces { condition, radiates, ..ConditionFaces::default() }
         };
         let sources = (0..problem.sources.len()).map(|source| (source, Vec::new())).collect();
         Self { parts: surfaces.map(part).collect(), sources, wide_sources: Vec::new() }
     }
 
-    /// Conditions at equations that are touched: on those of the faces there, which exist and are not covered, on which one `acts`. With
+    /// Updates conditions at touched equations, on those exposed `faces` there on which one `acts`. With
     /// consistent capacity all equations are touched.
-    pub fn act(
+    pub fn set_condition(
         &mut self,
         problem: &Problem,
         faces: &[Face],
         equation: &[u32],
         consistent: bool,
-        touched: &Touched,
+        touched: &TouchedEquations,
         acts: impl Fn(usize, Face) -> bool,
     ) {
         for part in &mut self.parts {
@@ -251,12 +251,12 @@ impl Surfaces {
             for &face in faces.iter().filter(|&&face| acts(part.condition, face)) {
                 let nodes = problem.mesh.face_nodes(face).len();
                 if nodes > 4 {
-                    let acting = Acting::<8, 9>::new(problem, face, equation);
+                    let acting = QuadratureFace::<8, 9>::new(problem, face, equation);
                     if !by_nodes {
                         part.wide.push(acting);
                         continue;
                     }
-                    let Acting { equations, geometry } = acting;
+                    let QuadratureFace { equations, geometry } = acting;
                     for (a, b) in (0..nodes).flat_map(|a| (0..nodes).map(move |b| (a, b))) {
                         let of =
                             |g: usize| geometry.weights[g] * geometry.shapes[g][a] * geometry.shapes[g][b];
@@ -264,9 +264,9 @@ impl Surfaces {
                     }
                     continue;
                 }
-                let acting = Acting::<4, 4>::new(problem, face, equation);
+                let acting = QuadratureFace::<4, 4>::new(problem, face, equation);
                 if by_nodes {
-                    let Acting { equations, geometry } = acting;
+                    let QuadratureFace { equations, geometry } = acting;
                     let areas = (0..nodes).map(|k| (equations[k], geometry.corner_areas[k]));
                     list.extend(areas.filter(|entry| touched.contains(entry.0)));
                 } else {
@@ -278,30 +278,39 @@ impl Surfaces {
         }
     }
 
-    /// A source at equations that are touched, with ∫ N dV of its first-order elements' nodes and ∫ N N dV of the others', which are never
-    /// born.
-    pub fn release(&mut self, source: usize, volumes: Vec<(u32, f64)>, pairs: Pairs, touched: &Touched) {
+    /// Updates a source at touched equations, from ∫ N dV at the nodes of its first-order elements, and ∫ N N
+    /// dV of second-order ones, which are never born later.
+    pub fn set_source(
+        &mut self,
+        source: usize,
+        volumes: Vec<(u32, f64)>,
+        pairs: Pairs,
+        touched: &TouchedEquations,
+    ) {
         touched.replace(&mut self.sources[source].1, volumes);
         if !pairs.is_empty() {
             self.wide_sources.push((source, gather_pairs(pairs)));
         }
     }
 
-    /// Whether something radiates.
+    /// Returns true if a condition radiates.
     pub fn radiates(&self) -> bool {
-        let acts = |part: &Part| !(part.nodes.is_empty() && part.faces.is_empty() && part.wide.is_empty());
+        let acts =
+            |part: &ConditionFaces| !(part.nodes.is_empty() && part.faces.is_empty() && part.wide.is_empty());
         self.parts.iter().any(|part| part.radiates && acts(part))
     }
 
-    /// Whether a film has another coefficient at one time than at another: the matrix is another too.
+    /// Returns true if a film coefficient differs between two times, and with it the matrix.
     pub fn varies(&self, problem: &Problem, between: [f64; 2]) -> bool {
         self.parts.iter().any(|part| match &problem.conditions[part.condition] {
-            Condition::Film { coefficient, .. } => coefficient.at(between[0]) != coefficient.at(between[1]),
+            Condition::Film { coefficient, .. } => {
+                coefficient.value_at(between[0]) != coefficient.value_at(between[1])
+            }
             _ => false,
         })
     }
 
-    /// Adds to `rate`, `conductance`, `faces`; sets `exchange`.
+    /// Adds to `rate`, `conductance` and `faces`; sets `exchange`.
     pub fn evaluate(&self, problem: &Problem, nodes: &[u32], at: &StepInput, out: &mut Evaluation) {
         let mut exchange = Exchange::default();
         out.faces.clear();
@@ -311,25 +320,25 @@ impl Surfaces {
                 Condition::Temperature { .. } => {}
                 Condition::Flux { inward, .. } => {
                     for &(equation, area) in &part.nodes {
-                        let heat = area * inward.at(place(equation), at.time);
+                        let heat = area * inward.value_at(place(equation), at.time);
                         out.rate[equation as usize] -= heat;
                         exchange.flux += heat;
                     }
                     for &(equation, at_equation, area) in &part.pairs {
-                        let heat = area * inward.at(place(at_equation), at.time);
+                        let heat = area * inward.value_at(place(at_equation), at.time);
                         out.rate[equation as usize] -= heat;
                         exchange.flux += heat;
                     }
                 }
                 Condition::Film { coefficient, ambient, .. } => {
-                    let (film, ambient) = (coefficient.at(at.time), ambient.at(at.time));
-                    exchange.film -= part.lose(at, out, |t| (film * (t - ambient), film));
+                    let (film, ambient) = (coefficient.value_at(at.time), ambient.value_at(at.time));
+                    exchange.film -= part.add_loss(at, out, |t| (film * (t - ambient), film));
                 }
                 Condition::Radiation { emissivity, ambient, .. } => {
-                    let ambient = ambient.at(at.time);
+                    let ambient = ambient.value_at(at.time);
                     let (factor, fourth) = (emissivity * STEFAN_BOLTZMANN, ambient.powi(4));
-                    // odd continuation below 0 K, which iterates may visit
-                    exchange.radiation -= part.lose(at, out, |t| {
+                    // odd continuation below 0 K, which iterates may reach
+                    exchange.radiation -= part.add_loss(at, out, |t| {
                         let cube = t.abs() * t * t;
                         (factor * (cube * t - fourth), 4.0 * factor * cube)
                     });
@@ -339,7 +348,7 @@ impl Surfaces {
         for (source, volumes) in &self.sources {
             let power = &problem.sources[*source].power;
             for &(equation, volume) in volumes {
-                let heat = volume * power.at(place(equation), at.time);
+                let heat = volume * power.value_at(place(equation), at.time);
                 out.rate[equation as usize] -= heat;
                 exchange.source += heat;
             }
@@ -347,7 +356,7 @@ impl Surfaces {
         for (source, pairs) in &self.wide_sources {
             let power = &problem.sources[*source].power;
             for &(equation, at_equation, volume) in pairs {
-                let heat = volume * power.at(place(at_equation), at.time);
+                let heat = volume * power.value_at(place(at_equation), at.time);
                 out.rate[equation as usize] -= heat;
                 exchange.source += heat;
             }
@@ -356,9 +365,9 @@ impl Surfaces {
     }
 }
 
-impl Part {
-    /// Adds a heat loss (q, ∂q/∂T) of temperature; returns its sum, W.
-    fn lose(&self, at: &StepInput, out: &mut Evaluation, loss: impl Fn(f64) -> (f64, f64)) -> f64 {
+impl ConditionFaces {
+    /// Adds a heat loss (q, ∂q/∂T) that depends on temperature; returns its sum, W.
+    fn add_loss(&self, at: &StepInput, out: &mut Evaluation, loss: impl Fn(f64) -> (f64, f64)) -> f64 {
         let mut total = 0.0;
         for &(equation, area) in &self.nodes {
             let (q, slope) = loss(at.temperature[equation as usize]);
@@ -366,14 +375,14 @@ impl Part {
             out.conductance.push((equation, area * slope));
             total += area * q;
         }
-        total = self.faces.iter().fold(total, |total, face| face.lose(at, out, &loss, total));
-        self.wide.iter().fold(total, |total, face| face.lose(at, out, &loss, total))
+        total = self.faces.iter().fold(total, |total, face| face.add_loss(at, out, &loss, total));
+        self.wide.iter().fold(total, |total, face| face.add_loss(at, out, &loss, total))
     }
 }
 
-impl<const N: usize, const P: usize> Acting<N, P> {
-    /// Adds to `rate` and `faces`; `total` with what it loses, W.
-    fn lose(
+impl<const N: usize, const P: usize> QuadratureFace<N, P> {
+    /// Adds to `rate` and `faces`, and the heat loss, W, to `total`.
+    fn add_loss(
         &self,
         at: &StepInput,
         out: &mut Evaluation,

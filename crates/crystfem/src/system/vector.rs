@@ -4,7 +4,7 @@ use polycore::numerics::ordered_sum;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-/// Entries of a work item.
+/// Number of entries of a work item.
 pub const CHUNK: usize = 4096;
 
 /// Number of work items of a vector.
@@ -12,7 +12,7 @@ pub fn items(size: usize) -> usize {
     size.div_ceil(CHUNK)
 }
 
-/// a·b within a work item, in four partial sums of vectors.
+/// Computes a·b within a work item, in four vectors of partial sums.
 #[inline(always)]
 pub fn dot_simd<S: Simd>(simd: S, a: &[f64], b: &[f64]) -> f64 {
     let length = a.len().min(b.len());
@@ -60,7 +60,7 @@ impl WithSimd for Square<'_> {
     }
 }
 
-/// Σ w v².
+/// Computes Σ w v².
 pub fn weighted_square(value: &[f64], weight: &[f64]) -> f64 {
     let arch = Arch::new();
     let items = value.par_chunks(CHUNK).zip(weight.par_chunks(CHUNK));
@@ -77,13 +77,13 @@ impl WithSimd for Dot<'_> {
     }
 }
 
-/// a·b.
+/// Computes a·b.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let arch = Arch::new();
     ordered_sum(a.par_chunks(CHUNK).zip(b.par_chunks(CHUNK)).map(|(a, b)| arch.dispatch(Dot(a, b))))
 }
 
-/// Σ f(k) over 0..size, in work items, each in partial sums that do not wait for each other.
+/// Computes Σ f(k) over 0..size, in work items, each with independent partial sums.
 pub fn sum(size: usize, term: impl Fn(usize) -> f64 + Sync) -> f64 {
     const LANES: usize = 8;
     let item = |item: usize| {
@@ -101,7 +101,7 @@ pub fn sum(size: usize, term: impl Fn(usize) -> f64 + Sync) -> f64 {
     ordered_sum((0..items(size)).into_par_iter().map(item))
 }
 
-/// The largest f(k) over 0..size; NaN where one is NaN.
+/// Returns the largest f(k) over 0..size; NaN if one is NaN.
 pub fn largest(size: usize, term: impl Fn(usize) -> f64 + Sync) -> f64 {
     let parts: Vec<f64> = (0..items(size))
         .into_par_iter()
@@ -122,7 +122,7 @@ pub fn largest(size: usize, term: impl Fn(usize) -> f64 + Sync) -> f64 {
     parts.into_iter().fold(f64::NEG_INFINITY, |a, b| if b > a || b.is_nan() { b } else { a })
 }
 
-/// out_k = f(k), in work items.
+/// Sets out_k = f(k), in work items.
 pub fn set(out: &mut [f64], value: impl Fn(usize) -> f64 + Sync) {
     out.par_chunks_mut(CHUNK).enumerate().for_each(|(item, out)| {
         for (k, out) in out.iter_mut().enumerate() {
@@ -131,7 +131,7 @@ pub fn set(out: &mut [f64], value: impl Fn(usize) -> f64 + Sync) {
     });
 }
 
-/// out_k = f(out_k, a_k, b_k), in work items.
+/// Sets out_k = f(out_k, a_k, b_k), in work items.
 pub fn blend(out: &mut [f64], a: &[f64], b: &[f64], value: impl Fn(f64, f64, f64) -> f64 + Sync) {
     out.par_chunks_mut(CHUNK).zip(a.par_chunks(CHUNK).zip(b.par_chunks(CHUNK))).for_each(|(out, (a, b))| {
         for (out, (a, b)) in out.iter_mut().zip(a.iter().zip(b)) {
@@ -140,7 +140,7 @@ pub fn blend(out: &mut [f64], a: &[f64], b: &[f64], value: impl Fn(f64, f64, f64
     });
 }
 
-/// out_k = f(k, out_k), in work items.
+/// Sets out_k = f(k, out_k), in work items.
 pub fn combine<T: Copy + Send>(out: &mut [T], value: impl Fn(usize, T) -> T + Sync) {
     out.par_chunks_mut(CHUNK).enumerate().for_each(|(item, out)| {
         for (k, out) in out.iter_mut().enumerate() {
@@ -149,7 +149,7 @@ pub fn combine<T: Copy + Send>(out: &mut [T], value: impl Fn(usize, T) -> T + Sy
     });
 }
 
-struct Advance<'a> {
+struct SolutionUpdate<'a> {
     length: f64,
     solution: &'a mut [f64],
     residual: &'a mut [f64],
@@ -158,7 +158,7 @@ struct Advance<'a> {
     inverse: &'a [f64],
 }
 
-impl WithSimd for Advance<'_> {
+impl WithSimd for SolutionUpdate<'_> {
     type Output = f64;
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> f64 {
@@ -188,7 +188,7 @@ impl WithSimd for Advance<'_> {
     }
 }
 
-/// x += α p, r −= α q; returns Σ r²/diagonal.
+/// Updates x += α p and r −= α q; returns Σ r²/diagonal.
 pub fn advance(
     length: f64,
     solution: &mut [f64],
@@ -204,18 +204,18 @@ pub fn advance(
         .zip(direction.par_chunks(CHUNK).zip(image.par_chunks(CHUNK)))
         .zip(inverse.par_chunks(CHUNK));
     ordered_sum(items.map(|(((solution, residual), (direction, image)), inverse)| {
-        arch.dispatch(Advance { length, solution, residual, direction, image, inverse })
+        arch.dispatch(SolutionUpdate { length, solution, residual, direction, image, inverse })
     }))
 }
 
-struct Turn<'a> {
+struct DirectionUpdate<'a> {
     factor: f64,
     direction: &'a mut [f64],
     residual: &'a [f64],
     inverse: &'a [f64],
 }
 
-impl WithSimd for Turn<'_> {
+impl WithSimd for DirectionUpdate<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
@@ -235,12 +235,12 @@ impl WithSimd for Turn<'_> {
     }
 }
 
-/// p = r/diagonal + β p.
+/// Updates p = r/diagonal + β p.
 pub fn turn(factor: f64, direction: &mut [f64], residual: &[f64], inverse: &[f64]) {
     let arch = Arch::new();
     direction.par_chunks_mut(CHUNK).zip(residual.par_chunks(CHUNK).zip(inverse.par_chunks(CHUNK))).for_each(
         |(direction, (residual, inverse))| {
-            arch.dispatch(Turn { factor, direction, residual, inverse });
+            arch.dispatch(DirectionUpdate { factor, direction, residual, inverse });
         },
     );
 }
@@ -249,7 +249,7 @@ pub fn turn(factor: f64, direction: &mut [f64], residual: &[f64], inverse: &[f64
 mod tests {
     use super::*;
 
-    /// Against plain loops on a length that is no multiple of anything.
+    /// Operations agree with plain loops, on a length that is not a multiple of the lanes.
     #[test]
     fn operations() {
         let size = 2 * CHUNK + 13;

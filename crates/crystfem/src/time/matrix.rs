@@ -1,50 +1,51 @@
-//! The matrix A = C + M + a (K + faces) of a stage: its diagonal, its sums, what rounding leaves of a residual.
+//! Matrix A = C + M + a (K + faces) of a stage: its diagonal, its sums, the rounding level of a residual.
 
 use crate::solver::{Cached, Operator};
 use crate::system::vector::{blend, combine, dot, set};
-use crate::system::{Diagonal, Evaluation, FaceMatrices, System};
+use crate::system::{Diagonal, Evaluation, FaceMatrices, ThermalSystem};
 
-/// Key of what depends on the matrix.
-pub fn key(system: &System, weight: f64) -> (u64, u64) {
+/// Cache key of values that depend on the matrix.
+pub fn key(system: &ThermalSystem, weight: f64) -> (u64, u64) {
     (system.generation, weight.to_bits())
 }
 
-/// Diagonal and row sums of A, and what follows from them.
+/// Diagonal and row sums of A, with derived values.
 #[derive(Default)]
 pub struct Matrix {
     /// Diagonal of C and of the surfaces, with lumped capacity.
     pub diagonal: Vec<f64>,
-    /// One over the diagonal of A; 0 at prescribed nodes.
+    /// Reciprocal of the diagonal of A; 0 at prescribed nodes.
     pub inverse: Vec<f64>,
-    /// A·1 over the free nodes with consistent capacity; else it follows from the diagonal and `free_sums`.
+    /// A·1 over the free nodes with consistent capacity; otherwise it follows from the diagonal and
+    /// `free_sums`.
     row_sums: Vec<f64>,
-    /// K·1 and M·1 over the free nodes; empty where it is nothing.
+    /// K·1 and M·1 over the free nodes; empty if zero.
     free_sums: Cached<[Vec<f64>; 2]>,
-    /// The diagonal of the rows, which Newton's iteration needs often.
+    /// Diagonal of the rows, reused in Newton's iteration.
     rows: Diagonal,
     /// ΣC over the free nodes, J/K.
     pub capacity: f64,
-    /// Square of the norm of a residual that is rounding.
+    /// Squared norm of a residual that is due to rounding.
     pub floor: f64,
     /// 1·A·1 over the free nodes, J/K.
     pub sensitivity: f64,
 }
 
 impl Matrix {
-    /// Forgets what was made for another system.
+    /// Invalidates everything made for another system.
     pub fn reset(&mut self) {
         self.free_sums.forget();
     }
 
-    /// Computes all from the tangents of an evaluation.
-    pub fn compute(&mut self, system: &System, evaluation: &Evaluation, weight: f64) {
+    /// Computes everything from the tangents of an evaluation.
+    pub fn compute(&mut self, system: &ThermalSystem, evaluation: &Evaluation, weight: f64) {
         let size = system.size();
         let Evaluation { conductance, faces, .. } = evaluation;
         let capacity = evaluation.capacity(system);
         let sums_for = (system.build, system.rows.versions()[1]);
-        if !self.free_sums.is_for(sums_for) {
+        if !self.free_sums.matches(sums_for) {
             let mut sums = [Vec::new(), Vec::new()];
-            // rows of K add up to nothing but at prescribed neighbours
+            // rows of K sum to zero except at prescribed neighbours
             if system.consistent || !system.fixed.is_empty() {
                 sums[0].resize(size, 0.0);
                 system.rows.product(None, [0.0, 1.0], &system.free, &mut sums[0]);
@@ -54,7 +55,7 @@ impl Matrix {
                 system.rows.product(None, [1.0, 0.0], &system.free, &mut sums[1]);
             }
             self.free_sums.value = sums;
-            self.free_sums.made_for(sums_for);
+            self.free_sums.set_key(sums_for);
         }
         // A's diagonal, until it is inverted
         self.inverse.resize(size, 0.0);
@@ -72,10 +73,10 @@ impl Matrix {
             whole.copy_from_slice(&self.diagonal);
         }
         if system.is_linear() || !system.general.is_empty() {
-            // of rows that every evaluation changes, too
+            // also for rows that change in every evaluation
             system.rows.add_diagonal(weights, whole);
         } else {
-            let own = self.rows.of(&system.rows, weights);
+            let own = self.rows.update(&system.rows, weights);
             combine(whole, |k, whole| whole + own[k]);
         }
         if system.consistent {
@@ -97,8 +98,8 @@ impl Matrix {
         self.sensitivity = self.column_sums(system, weight, &system.free);
     }
 
-    /// 1·A x over the free nodes, of x that is 0 at all others.
-    pub fn column_sums(&self, system: &System, weight: f64, x: &[f64]) -> f64 {
+    /// Sums A x over the free nodes, for x that is 0 at all others.
+    pub fn column_sums(&self, system: &ThermalSystem, weight: f64, x: &[f64]) -> f64 {
         if system.consistent {
             return dot(&self.row_sums, x);
         }
@@ -106,10 +107,10 @@ impl Matrix {
         dot(&self.diagonal, x) + if conduction.is_empty() { 0.0 } else { weight * dot(conduction, x) }
     }
 
-    /// A, without packed rows.
+    /// Returns A, without packed rows.
     pub fn operator<'a>(
         &'a self,
-        system: &'a System,
+        system: &'a ThermalSystem,
         weight: f64,
         evaluation: &'a Evaluation,
     ) -> Operator<'a> {

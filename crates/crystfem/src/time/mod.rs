@@ -1,23 +1,23 @@
-//! From one time to the next.
+//! Time integration.
 //!
-//! E' = −Q is integrated in terms of energy, so that every scheme conserves it: with stage rates Q_s and weights b_s,
-//! E(t+Δt) = E(t) − Δt Σ b_s Q_s. A stage solves E(T) − E(t) + a Q(T) + known = 0; a linear scene needs
-//! one linear solve for it, others Newton's iteration.
+//! E' = −Q is integrated in terms of energy, so that every scheme conserves it: with stage rates Q_s and
+//! weights b_s, E(t+Δt) = E(t) − Δt Σ b_s Q_s. A stage solves E(T) − E(t) + a Q(T) + known = 0, by one linear
+//! solve for linear problems and by Newton's iteration otherwise.
 //!
 //! - backward Euler: one stage, order 1, L-stable; temperatures with lumped capacity never overshoot.
 //! - TR-BDF2 (Bank et al. 1985, doi:10.1109/T-ED.1985.22232; Hosea & Shampine 1996,
-//!   doi:10.1016/0168-9274(95)00115-8): two implicit stages with one matrix, order 2, L-stable. The first step after
-//!   a jump (start, birth) is backward Euler, which does not need the rate on the other side of the jump.
+//!   doi:10.1016/0168-9274(95)00115-8): two implicit stages with one matrix, order 2, L-stable. The first
+//!   step after a jump (start, birth) is backward Euler, which does not use the rate before the jump.
 //!
-//! The temporal error is the difference to the embedded formula of the other order, filtered by the matrix of the
-//! stage (A e = Δt Σ(b_s − b̂_s) Q_s) so that stiff parts, which are damped at once, do not count.
+//! The temporal error is the difference to the embedded formula of the other order, filtered by the matrix of
+//! the stage (A e = Δt Σ(b_s − b̂_s) Q_s) to exclude stiff components, which are damped at once.
 
 mod matrix;
 mod stage;
 mod step;
 
-pub(crate) use stage::{Stage, Stages};
-pub(crate) use step::{Attempt, Start, Stepper};
+pub(crate) use stage::{StageEquation, Stages};
+pub(crate) use step::{Attempt, StepStart, Stepper};
 
 /// Time integrators.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -31,42 +31,42 @@ pub enum Scheme {
     TrBdf2,
 }
 
-/// Lengths of steps.
+/// Step lengths.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Steps {
-    /// Always the same, but shorter before a given time.
+    /// Fixed, but shortened to end at given times.
     Fixed {
         /// Δt, s.
         dt: f64,
     },
-    /// By the temporal error and by the material's wish.
+    /// Adapted to the temporal error and to the steps suggested by materials.
     Adaptive {
         /// Largest temporal error of a node in a step, K.
         tolerance: f64,
-        /// The first step, and the first after a birth, s.
+        /// First step, and first step after a birth, s.
         first: f64,
-        /// Never shorter, s.
+        /// Smallest step, s.
         smallest: f64,
-        /// Never longer, s.
+        /// Largest step, s.
         largest: f64,
     },
 }
 
-/// Work done.
+/// Counts of work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Work {
     /// Accepted steps.
     pub steps: u64,
     /// Rejected steps.
     pub rejected: u64,
-    /// Newton iterations; linear scenes have none.
+    /// Newton iterations; none for linear problems.
     pub newton_iterations: u64,
     /// Iterations of conjugate gradients.
     pub cg_iterations: u64,
     /// Solves by conjugate gradients.
     pub cg_solves: u64,
-    /// Times the levels of multigrid were made.
+    /// Constructions of multigrid levels.
     pub levels: u64,
     /// Factorizations.
     pub factorizations: u64,
@@ -76,8 +76,8 @@ pub struct Work {
     pub evaluations: u64,
     /// Responses of materials at points.
     pub responses: u64,
-    /// Times that elements were added to the equations.
+    /// Additions of elements to the equations.
     pub builds: u64,
-    /// Elements visited for that: those added and their neighbours.
+    /// Elements visited in these: those added and their neighbours.
     pub visited: u64,
 }

@@ -1,60 +1,62 @@
-//! One stage: E(T) − E(start) + a Q(T) + known = 0 at the free nodes.
+//! Stages: solve E(T) − E(start) + a Q(T) + known = 0 at the free nodes.
 
 use super::Work;
 use super::matrix::{Matrix, key};
 use crate::error::Error;
-use crate::ledger::NOTHING;
+use crate::ledger::REFERENCE_SHIFT;
 use crate::problem::Problem;
 use crate::solver::{
-    Cached, Direct, Ended, Goal, Iterative, Method, Multigrid, Operator, Packed, norm_squared,
+    Cached, Direct, Iterative, LinearMethod, Multigrid, Operator, PackedRows, SolveOutcome,
+    StoppingCriterion, norm_squared,
 };
 use crate::system::vector::{combine, dot, largest, set, sum};
-use crate::system::{Evaluation, Memory, StepInput, System};
+use crate::system::{Evaluation, PointMemory, StepInput, ThermalSystem};
 
-/// Newton iterations at most.
-const MOST_ITERATIONS: usize = 60;
-/// Halvings of a Newton step at most.
-const MOST_HALVINGS: usize = 7;
-/// Newton steps in a row, where k jumps, that are taken whole though the residual does not fall.
-const MOST_FULL_STEPS: usize = 8;
-/// Corrections of the balance of a linear stage at most.
-const MOST_SHIFTS: usize = 3;
-/// Share of the heat moved that the sum of all residuals may be; the audit promises 1e-10.
-const BALANCED: f64 = 2e-11;
+/// Limit on Newton iterations.
+const MAX_ITERATIONS: usize = 60;
+/// Limit on halvings of a Newton step.
+const MAX_HALVINGS: usize = 7;
+/// Limit on consecutive full Newton steps at a jump of k while the residual does not fall.
+const MAX_FULL_STEPS: usize = 8;
+/// Limit on balance corrections of a linear stage.
+const MAX_SHIFTS: usize = 3;
+/// Largest sum of all residuals over the heat moved; the energy audit promises 1e-10.
+const BALANCE_TOLERANCE: f64 = 2e-11;
 
 /// Equation of a stage.
 #[derive(Clone, Copy)]
-pub struct Stage<'a> {
+pub struct StageEquation<'a> {
     /// Factor of Q, s.
     pub weight: f64,
     /// Length of the increment, s.
     pub dt: f64,
-    /// Time at its end, s.
+    /// Time at the end, s.
     pub time: f64,
-    /// Heat of former stages, J; empty for none.
+    /// Heat of earlier stages, J; empty for none.
     pub known: &'a [f64],
     /// Temperatures at the start, K.
     pub start: &'a [f64],
     /// Points at the start.
-    pub old: &'a Memory,
-    /// Whether to give up.
+    pub old: &'a PointMemory,
+    /// Requests a stop.
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// Solves stages; keeps what does not change between them.
+/// Solver of stages, with cached matrices.
 #[derive(Default)]
 pub struct Stages {
     /// E, Q and tangents at the last temperature.
     pub evaluation: Evaluation,
-    /// E − E(start) + a Q + known at the last temperature, J, prescribed nodes included; a correction takes it for its own.
+    /// E − E(start) + a Q + known at the last temperature, J, prescribed nodes included; also used as work
+    /// vector by corrections.
     pub residual: Vec<f64>,
-    /// What is wanted; factors and levels are made when first needed.
-    pub method: Method,
+    /// Requested method; factors and levels are made when first needed.
+    pub method: LinearMethod,
     matrix: Cached<Matrix>,
-    /// Factors of the matrix; analysed for its build.
+    /// Factors of the matrix, with their analysis for the present build.
     factors: Cached<Option<Direct>>,
     iterative: Iterative,
-    packed: Packed,
+    packed: PackedRows,
     /// Right-hand side of a filter.
     right: Vec<f64>,
     correction: Vec<f64>,
@@ -62,7 +64,7 @@ pub struct Stages {
 }
 
 impl Stages {
-    /// Forgets everything made for another system, but keeps the memory for it.
+    /// Invalidates everything made for another system, but keeps the memory.
     pub fn reset(&mut self) {
         (self.factors, self.iterative.multigrid) = Default::default();
         self.matrix.forget();
@@ -74,25 +76,25 @@ impl Stages {
         self.matrix.value.sensitivity
     }
 
-    /// The matrix of the last evaluation, unless it is still that of a linear system.
-    fn prepare(&mut self, system: &System, weight: f64) {
+    /// Computes the matrix of the last evaluation, unless a linear system has it already.
+    fn prepare(&mut self, system: &ThermalSystem, weight: f64) {
         let key = key(system, weight);
-        if !(self.matrix.is_for(key) && system.is_linear()) {
+        if !(self.matrix.matches(key) && system.is_linear()) {
             self.matrix.value.compute(system, &self.evaluation, weight);
-            self.matrix.made_for(key);
+            self.matrix.set_key(key);
         }
     }
 
-    /// Solves a stage; `temperature` is the first guess and becomes the solution, at which `evaluation` and
-    /// `residual` stand.
+    /// Solves a stage; `temperature` is the initial guess and becomes the solution, at which `evaluation` and
+    /// `residual` are valid.
     ///
     /// # Errors
     /// [`Error::NotConverged`], [`Error::NotFinite`].
     pub fn solve(
         &mut self,
         problem: &Problem,
-        system: &mut System,
-        stage: &Stage,
+        system: &mut ThermalSystem,
+        stage: &StageEquation,
         temperature: &mut Vec<f64>,
         tolerance: f64,
         work: &mut Work,
@@ -106,8 +108,8 @@ impl Stages {
                 *t += correction;
             }
             self.evaluate(problem, system, stage, temperature, work)?;
-            // very long steps: what the linear solve believes left, and what is left, differ by rounding
-            for _ in 0..MOST_SHIFTS {
+            // for very long steps the residual of the linear solve and the true one differ by rounding
+            for _ in 0..MAX_SHIFTS {
                 if self.balanced(system, stage.weight) {
                     break;
                 }
@@ -121,7 +123,7 @@ impl Stages {
         }
         let mut error = f64::INFINITY;
         let mut best = (f64::INFINITY, 0);
-        for iteration in 0..MOST_ITERATIONS {
+        for iteration in 0..MAX_ITERATIONS {
             self.prepare(system, stage.weight);
             let square = norm_squared(&self.residual, &self.matrix.value.inverse);
             error = (square / self.matrix.value.capacity).sqrt();
@@ -133,28 +135,28 @@ impl Stages {
             }
             work.newton_iterations += 1;
             self.correct(problem, system, stage, (1e-3 * error).max(0.3 * tolerance), work)?;
-            // line search along the correction, by the norm of this iterate's matrix
+            // line search along the correction, in the norm of this iterate's matrix
             let inverse = std::mem::take(&mut self.matrix.value.inverse);
             let mut part = 1.0;
             let mut trial = std::mem::take(&mut self.trial);
             trial.resize(temperature.len(), 0.0);
-            // across a kink of a convex or concave balance whole steps come back by themselves, from one side; shorter
-            // ones creep towards the kink
+            // across a kink of a convex or concave balance full steps recover by themselves, from one side;
+            // shorter ones creep towards the kink
             if square < best.0 {
                 best = (square, iteration);
             }
-            let whole = !system.is_symmetric() && iteration - best.1 < MOST_FULL_STEPS;
-            for halving in 0..=MOST_HALVINGS {
+            let whole = !system.is_symmetric() && iteration - best.1 < MAX_FULL_STEPS;
+            for halving in 0..=MAX_HALVINGS {
                 let correction = &self.correction;
                 set(&mut trial, |k| temperature[k] + part * correction[k]);
                 let evaluated = self.evaluate(problem, system, stage, &trial, work);
                 let reached = norm_squared(&self.residual, &inverse);
                 let better = reached <= (1.0 - 0.1 * part) * square || reached <= self.matrix.value.floor;
                 let better = better || (whole && reached.is_finite());
-                if evaluated.is_ok() && (better || (halving == MOST_HALVINGS && reached.is_finite())) {
+                if evaluated.is_ok() && (better || (halving == MAX_HALVINGS && reached.is_finite())) {
                     break;
                 }
-                if halving == MOST_HALVINGS {
+                if halving == MAX_HALVINGS {
                     evaluated?;
                     return Err(not_finite(problem, system, stage, &trial));
                 }
@@ -167,31 +169,31 @@ impl Stages {
         Err(Error::NotConverged {
             method: "Newton's iteration",
             time: stage.time,
-            iterations: MOST_ITERATIONS,
+            iterations: MAX_ITERATIONS,
             error,
             wanted: tolerance,
         })
     }
 
-    /// Solves A e = right with the matrix of the last stage, coarsely: the filter of the error estimate. The
-    /// result is the largest |e|, K.
+    /// Filters the error estimate: solves A e = right coarsely with the matrix of the last stage. Returns the
+    /// largest |e|, K.
     pub fn filter(
         &mut self,
         problem: &Problem,
-        system: &System,
+        system: &ThermalSystem,
         weight: f64,
         right: impl Fn(usize) -> f64 + Sync,
         tolerance: f64,
         work: &mut Work,
     ) -> f64 {
         self.prepare(system, weight);
-        self.raise(problem, system, weight, work);
+        self.build_levels(problem, system, weight, work);
         let size = system.size();
         self.right.resize(size, 0.0);
         set(&mut self.right, |k| system.free[k] * right(k));
         let packed = pack(&mut self.packed, system, weight);
         let operator = Operator { packed, ..self.matrix.value.operator(system, weight, &self.evaluation) };
-        let goal = Goal {
+        let goal = StoppingCriterion {
             capacity: self.matrix.value.capacity,
             tolerance,
             floor: 0.0,
@@ -199,9 +201,9 @@ impl Stages {
             stop: &|| false,
         };
         self.correction.resize(size, 0.0);
-        let factored = self.factors.is_for(key(system, weight)) && system.is_linear();
+        let factored = self.factors.matches(key(system, weight)) && system.is_linear();
         match &mut self.factors.value {
-            Some(factors) if self.method == Method::Factors && factored => {
+            Some(factors) if self.method == LinearMethod::Factors && factored => {
                 factors.solve(&self.right, &mut self.correction);
                 work.direct_solves += 1;
             }
@@ -220,8 +222,8 @@ impl Stages {
     fn evaluate(
         &mut self,
         problem: &Problem,
-        system: &mut System,
-        stage: &Stage,
+        system: &mut ThermalSystem,
+        stage: &StageEquation,
         temperature: &[f64],
         work: &mut Work,
     ) -> Result<(), Error> {
@@ -240,14 +242,14 @@ impl Stages {
         Ok(())
     }
 
-    /// Levels of multigrid where they are wanted, for the matrix that is prepared.
-    fn raise(&mut self, problem: &Problem, system: &System, weight: f64, work: &mut Work) {
-        if self.method != Method::Multigrid || !system.is_symmetric() {
+    /// Builds requested multigrid levels for the prepared matrix.
+    fn build_levels(&mut self, problem: &Problem, system: &ThermalSystem, weight: f64, work: &mut Work) {
+        if self.method != LinearMethod::Multigrid || !system.is_symmetric() {
             self.iterative.multigrid.value = None;
             return;
         }
         let levels = &mut self.iterative.multigrid;
-        if !levels.is_for_build(system.build) || levels.value.is_none() {
+        if !levels.matches_build(system.build) || levels.value.is_none() {
             let operator = self.matrix.value.operator(system, weight, &self.evaluation);
             let place = |k: usize| problem.mesh.points[system.nodes()[k] as usize];
             levels.value = Some(Multigrid::new(&operator, &system.free, place));
@@ -255,7 +257,7 @@ impl Stages {
             work.levels += 1;
         }
         let key = key(system, weight);
-        let set = levels.is_for(key) && system.is_linear();
+        let set = levels.matches(key) && system.is_linear();
         if let Some(multigrid) = levels.value.as_mut().filter(|_| !set) {
             if system.consistent {
                 let mut lumped = self.evaluation.capacity(system).to_vec();
@@ -265,47 +267,48 @@ impl Stages {
             } else {
                 multigrid.set(&self.matrix.value.diagonal, weight);
             }
-            levels.made_for(key);
+            levels.set_key(key);
         }
     }
 
-    /// The correction of temperature: A δ = −residual, and Σ(residual + A δ) = 0 over the free nodes to rounding.
+    /// Computes the correction of temperature: A δ = −residual, with Σ(residual + A δ) = 0 over the free
+    /// nodes to rounding.
     fn correct(
         &mut self,
         problem: &Problem,
-        system: &System,
-        stage: &Stage,
+        system: &ThermalSystem,
+        stage: &StageEquation,
         tolerance: f64,
         work: &mut Work,
     ) -> Result<(), Error> {
         let size = system.size();
-        // both are in the residual, and evaluated anew after the correction
+        // both are work vectors here, and evaluated again after the correction
         self.iterative.swap_vectors(&mut self.evaluation.change, &mut self.evaluation.rate);
-        self.raise(problem, system, stage.weight, work);
+        self.build_levels(problem, system, stage.weight, work);
         self.correction.resize(size, 0.0);
         combine(&mut self.residual, |k, residual| -system.free[k] * residual);
         let operator = self.matrix.value.operator(system, stage.weight, &self.evaluation);
-        let goal = Goal {
+        let goal = StoppingCriterion {
             capacity: self.matrix.value.capacity,
             tolerance,
             floor: self.matrix.value.floor,
             limit: limit(size),
             stop: stage.stop,
         };
-        let factored = self.method == Method::Factors && system.is_symmetric() && {
+        let factored = self.method == LinearMethod::Factors && system.is_symmetric() && {
             let key = key(system, stage.weight);
-            if !self.factors.is_for_build(system.build) {
+            if !self.factors.matches_build(system.build) {
                 let place = |e: u32| problem.mesh.points[system.nodes()[e as usize] as usize];
                 self.factors.value = Direct::analyse(&operator, &system.free, place);
                 self.factors.forget();
             }
-            // without memory for factors, or with a matrix that is singular to rounding, the other method takes over
-            if !(self.factors.is_for(key) && system.is_linear()) {
+            // without memory for factors, or with a matrix singular to rounding, the other method takes over
+            if !(self.factors.matches(key) && system.is_linear()) {
                 work.factorizations += 1;
                 if !self.factors.value.as_mut().is_some_and(|factors| factors.factor(&operator)) {
                     self.factors.value = None;
                 }
-                self.factors.made_for(key);
+                self.factors.set_key(key);
             }
             self.factors.value.is_some()
         };
@@ -320,10 +323,10 @@ impl Stages {
             }
         }
         let symmetric = system.is_symmetric();
-        // 1·(r + A δ) by the sums of the columns, where the iterations know A to single precision only
+        // 1·(r + A δ) from column sums, as the iterations know A to single precision only
         let mut total = 0.0;
         let ended = if factored {
-            Ended { iterations: 0, error: 0.0, converged: true }
+            SolveOutcome { iterations: 0, error: 0.0, converged: true }
         } else {
             work.cg_solves += 1;
             let packed = pack(&mut self.packed, system, stage.weight);
@@ -362,18 +365,24 @@ impl Stages {
         Ok(())
     }
 
-    /// Returns whether the free nodes' residuals add up to nothing.
-    fn balanced(&self, system: &System, weight: f64) -> bool {
+    /// Returns true if the residuals of the free nodes sum to zero, within [`BALANCE_TOLERANCE`].
+    fn balanced(&self, system: &ThermalSystem, weight: f64) -> bool {
         let size = system.size();
         let total = dot(&system.free, &self.residual);
         let mut gross = sum(size, |k| self.evaluation.change[k].abs());
         gross += weight * self.evaluation.exchange.gross();
         gross +=
             system.fixed.iter().map(|&(equation, _)| self.residual[equation as usize].abs()).sum::<f64>();
-        total.abs() <= BALANCED * (gross + NOTHING * self.sensitivity())
+        total.abs() <= BALANCE_TOLERANCE * (gross + REFERENCE_SHIFT * self.sensitivity())
     }
 
-    fn finite(&self, problem: &Problem, system: &System, stage: &Stage, found: &[f64]) -> Result<(), Error> {
+    fn finite(
+        &self,
+        problem: &Problem,
+        system: &ThermalSystem,
+        stage: &StageEquation,
+        found: &[f64],
+    ) -> Result<(), Error> {
         if sum(found.len(), |k| found[k]).is_finite() && sum(found.len(), |k| self.residual[k]).is_finite() {
             return Ok(());
         }
@@ -385,13 +394,13 @@ fn limit(size: usize) -> usize {
     (10 * size + 100).min(100_000)
 }
 
-/// Packed rows of a symmetric matrix, where there are any.
-fn pack<'a>(packed: &'a mut Packed, system: &System, weight: f64) -> Option<&'a Packed> {
+/// Packs the rows of a symmetric matrix; `None` if none are packed.
+fn pack<'a>(packed: &'a mut PackedRows, system: &ThermalSystem, weight: f64) -> Option<&'a PackedRows> {
     let weights = if system.consistent { [1.0, weight] } else { [0.0, 1.0] };
     (system.is_symmetric() && packed.update(&system.rows, weights)).then_some(packed)
 }
 
-fn not_finite(problem: &Problem, system: &System, stage: &Stage, found: &[f64]) -> Error {
+fn not_finite(problem: &Problem, system: &ThermalSystem, stage: &StageEquation, found: &[f64]) -> Error {
     let place = match found.iter().position(|t| !t.is_finite()) {
         Some(k) => {
             let node = system.nodes()[k];

@@ -1,31 +1,33 @@
-//! One step of a scheme, not yet accepted.
+//! Attempted steps of the schemes.
 
-use super::{Scheme, Stage, Stages, Work};
+use super::{Scheme, StageEquation, Stages, Work};
 use crate::error::Error;
 use crate::problem::Problem;
 use crate::system::vector::set;
-use crate::system::{Evaluation, Exchange, Memory, StepInput, System};
+use crate::system::{Evaluation, Exchange, PointMemory, StepInput, ThermalSystem};
 
-/// γ, and the weights w, w, d of TR-BDF2: 2 − √2, √2/4, √2/4, γ/2.
+/// γ of TR-BDF2, 2 − √2.
 const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
+/// Weight w = √2/4 of the first two rates.
 const W: f64 = 0.25 * std::f64::consts::SQRT_2;
+/// Weight d = γ/2 of the last rate.
 const D: f64 = 0.5 * GAMMA;
 
 /// State at the start of a step.
 #[derive(Clone, Copy)]
-pub struct Start<'a> {
+pub struct StepStart<'a> {
     /// Time, s.
     pub time: f64,
     /// Temperatures, K.
     pub temperature: &'a [f64],
-    /// Their rates of change over the last step, K/s; empty after a jump.
+    /// Rates of change over the last step, K/s; empty after a jump.
     pub slope: &'a [f64],
-    /// Q, W; empty if not known.
+    /// Q, W; empty if unknown.
     pub rate: &'a [f64],
-    /// Heat going in, W.
+    /// Heat supplied, W.
     pub exchange: &'a Exchange,
     /// Material points.
-    pub memory: &'a Memory,
+    pub memory: &'a PointMemory,
 }
 
 /// Result of a step.
@@ -35,16 +37,16 @@ pub struct Attempt {
     pub error: Option<f64>,
     /// Order of the error estimate in Δt.
     pub order: i32,
-    /// The smallest wish of a material for the next step over this one.
+    /// Smallest ratio of next to present step requested by a material.
     pub step_ratio: Option<f64>,
-    /// Heat that went in over the step, J.
+    /// Heat supplied over the step, J.
     pub exchange: Exchange,
 }
 
-/// Carries out steps. After an attempt, `temperature` and `stages` hold its end.
+/// Stepper; after an attempt, `temperature` and `stages` hold its end.
 #[derive(Default)]
 pub struct Stepper {
-    /// The last stage.
+    /// Last stage.
     pub stages: Stages,
     /// Temperatures at the end, K.
     pub temperature: Vec<f64>,
@@ -53,20 +55,20 @@ pub struct Stepper {
 }
 
 impl Stepper {
-    /// Forgets everything made for another system, but keeps the room for it.
+    /// Invalidates everything made for another system, but keeps the memory.
     pub fn reset(&mut self) {
         self.stages.reset();
     }
 
-    /// Q at the start, where a step needs it: after a jump nothing else knows it.
+    /// Computes Q at the start, if a step needs it and it is unknown after a jump.
     ///
     /// # Errors
-    /// Those of the materials.
+    /// Errors of the materials.
     pub fn rate(
         &mut self,
         problem: &Problem,
-        system: &mut System,
-        state: &Start,
+        system: &mut ThermalSystem,
+        state: &StepStart,
     ) -> Result<(Vec<f64>, Exchange), Error> {
         let mut evaluation = Evaluation::default();
         let temperature = state.temperature;
@@ -75,16 +77,17 @@ impl Stepper {
         Ok((evaluation.rate, evaluation.exchange))
     }
 
-    /// A step of length `dt`, which ends at `end`; the temporal error is estimated to a fraction of `accuracy`, if given.
+    /// Attempts a step of length `dt` that ends at `end`; the temporal error is estimated to a fraction of
+    /// `accuracy`, if given.
     ///
     /// # Errors
-    /// Those of the stages.
+    /// Errors of the stages.
     #[allow(clippy::too_many_arguments)]
     pub fn attempt(
         &mut self,
         problem: &Problem,
-        system: &mut System,
-        state: &Start,
+        system: &mut ThermalSystem,
+        state: &StepStart,
         scheme: Scheme,
         [dt, end]: [f64; 2],
         tolerance: f64,
@@ -93,13 +96,13 @@ impl Stepper {
         work: &mut Work,
     ) -> Result<Attempt, Error> {
         let size = system.size();
-        let Start { temperature: start, slope, memory: old, .. } = *state;
+        let StepStart { temperature: start, slope, memory: old, .. } = *state;
         self.temperature.resize(size, 0.0);
         let ahead = |time: f64, guess: &mut [f64]| match slope.is_empty() {
             true => guess.copy_from_slice(start),
             false => set(guess, |k| start[k] + time * slope[k]),
         };
-        let stage = Stage { weight: dt, dt, time: end, known: &[], start, old, stop };
+        let stage = StageEquation { weight: dt, dt, time: end, known: &[], start, old, stop };
         let mut exchange = Exchange::default();
         if scheme == Scheme::BackwardEuler {
             ahead(dt, &mut self.temperature);
@@ -118,8 +121,13 @@ impl Stepper {
         let weight = D * dt;
         self.known.resize(size, 0.0);
         set(&mut self.known, |k| weight * state.rate[k]);
-        let middle =
-            Stage { weight, dt: GAMMA * dt, time: state.time + GAMMA * dt, known: &self.known, ..stage };
+        let middle = StageEquation {
+            weight,
+            dt: GAMMA * dt,
+            time: state.time + GAMMA * dt,
+            known: &self.known,
+            ..stage
+        };
         ahead(GAMMA * dt, &mut self.temperature);
         self.stages.solve(problem, system, &middle, &mut self.temperature, tolerance, work)?;
         self.middle.clone_from(&self.stages.evaluation.rate);
@@ -129,7 +137,7 @@ impl Stepper {
         for (guess, start) in self.temperature.iter_mut().zip(start) {
             *guess = start + (*guess - start) / GAMMA;
         }
-        let last = Stage { weight, known: &self.known, ..stage };
+        let last = StageEquation { weight, known: &self.known, ..stage };
         self.stages.solve(problem, system, &last, &mut self.temperature, tolerance, work)?;
         exchange.add(D * dt, &self.stages.evaluation.exchange);
         let step_ratio = self.stages.evaluation.step_ratio;

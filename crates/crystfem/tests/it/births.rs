@@ -1,7 +1,7 @@
 //! Births conserve energy, and lumped capacity never overshoots.
 
 use crate::bodies::{PA12, conductor, everywhere, film, grid, held, pa12, radiation, run};
-use crystfem::boundary::{Field, Where};
+use crystfem::boundary::{FaceSelection, Field};
 use crystfem::problem::{Birth, Capacity, Problem};
 use crystfem::simulation::{Settings, Simulation};
 use crystfem::time::Scheme;
@@ -9,14 +9,14 @@ use crystfem::time::Scheme;
 const HOT: f64 = 493.15;
 const COLD: f64 = 353.15;
 
-/// Four layers of one element on a block of glass, one every 8 s, with film and radiation on the outer surface and
-/// the bottom held.
-fn printing(latent_heat: Option<f64>, elements: usize) -> Problem {
+/// Creates four layers of one element on a block of glass, one every 8 s, with film and radiation on the
+/// outer surface and a fixed bottom temperature.
+fn printing_moves(latent_heat: Option<f64>, elements: usize) -> Problem {
     let (layers, glass) = (4, 3);
     let mesh = grid([4e-3, 2e-3, 3.5e-3], [2 * elements, elements, layers + glass]);
     let plane = 2 * elements * elements;
     let bottom = mesh.surfaces["bottom"].clone();
-    let surface = || Where::Outer { except: bottom.clone() };
+    let surface = || FaceSelection::Outer { except: bottom.clone() };
     let births = (0..layers)
         .map(|layer| Birth {
             time: 8.0 * layer as f64,
@@ -41,20 +41,20 @@ fn printing(latent_heat: Option<f64>, elements: usize) -> Problem {
 fn a_printed_bar_balances_its_energy() {
     for scheme in [Scheme::BackwardEuler, Scheme::TrBdf2] {
         for latent_heat in [None, Some(209e3)] {
-            let problem = printing(latent_heat, 2);
+            let problem = printing_moves(latent_heat, 2);
             let settings = Settings { scheme, ..Settings::adaptive(0.01) };
             let mut simulation = Simulation::new(problem, settings).unwrap();
             let steps = run(&mut simulation, 40.0);
             let ledger = simulation.state().ledger;
             println!("{scheme:?} {latent_heat:?}: {ledger:?} {:?}", simulation.state().work);
             assert!(ledger.worst < 1e-10, "{ledger:?}");
-            // four layers at 220 °C: 4 × 2 × 0.5 mm³ each
-            let brought = 4.0 * 4e-9 * PA12[1] * PA12[2] * HOT;
+            // four layers at 220 °C of 4 × 2 × 0.5 mm³ each
+            let supplied = 4.0 * 4e-9 * PA12[1] * PA12[2] * HOT;
             if latent_heat.is_none() {
-                assert!((ledger.birth / brought - 1.0).abs() < 1e-12, "{ledger:?}, {brought}");
+                assert!((ledger.birth / supplied - 1.0).abs() < 1e-12, "{ledger:?}, {supplied}");
             }
             let balance = ledger.stored - ledger.birth - ledger.exchange.total() - ledger.reaction;
-            assert!(balance.abs() < 1e-10 * brought, "{balance}");
+            assert!(balance.abs() < 1e-10 * supplied, "{balance}");
             for time in [8.0, 16.0, 24.0, 40.0] {
                 assert!(steps.iter().any(|step| step.time == time), "no step ends at {time} s");
             }
@@ -65,8 +65,8 @@ fn a_printed_bar_balances_its_energy() {
     }
 }
 
-/// Nothing is lost however few elements a layer has: one element per layer and node keeps its heat, adiabatically.
-/// CalculiX, whose interface nodes keep their old temperature, loses half of it (formulation.md).
+/// An insulated layer of a single element keeps its heat. CalculiX, whose interface nodes keep their old
+/// temperature, loses half of it (formulation.md).
 #[test]
 fn an_insulated_layer_keeps_all_of_its_heat() {
     for capacity in [Capacity::Lumped, Capacity::Consistent] {
@@ -88,9 +88,9 @@ fn an_insulated_layer_keeps_all_of_its_heat() {
     }
 }
 
-/// At Fo = 0.056, below the 1/6 that consistent capacity needs: the first step along a line solves
-/// c e_{i−1} + d e_i + c e_{i+1} = 0 with c = 1/6 − Fo, d = 2/3 + 2 Fo, e_i ~ λ^i, λ < 0, so that the second node beyond
-/// the interface overshoots. (formulation.md has +1.75 K for a scene that it does not describe.)
+/// At Fo = 0.056, below the 1/6 that consistent capacity needs, the first step along a line solves c e_{i−1}
+/// + d e_i + c e_{i+1} = 0 with c = 1/6 − Fo, d = 2/3 + 2 Fo, e_i ~ λ^i, λ < 0: the second node beyond the
+/// interface overshoots. (formulation.md has +1.75 K for a scene that it does not describe.)
 #[test]
 fn overshoot_at_birth() {
     let overshoot = |capacity| {
@@ -110,16 +110,16 @@ fn overshoot_at_birth() {
     println!("overshoot: lumped {lumped}, consistent {consistent}");
     let (c, d) = (1.0 / 6.0 - 0.056, 2.0 / 3.0 + 2.0 * 0.056);
     let lambda = (-d + f64::sqrt(d * d - 4.0 * c * c)) / (2.0 * c);
-    // the interface has the mean of both
+    // the interface has the mean of both sides
     let exact = -0.5 * (HOT - COLD) * 0.056 / (d + c * lambda) * lambda;
     assert!(lumped <= 1e-7 && (consistent - exact).abs() < 1e-5, "{lumped}, {consistent}, {exact}");
 }
 
-/// Latent heat in the mixture: crystals of the layer below melt when the new layer touches them, and the heat for it
-/// is taken from both.
+/// Latent heat in the mixture: crystals of the lower layer melt at contact with the new layer, and both
+/// supply the heat.
 #[test]
 fn birth_on_crystals_melts_them_and_balances() {
-    let problem = printing(Some(209e3), 1);
+    let problem = printing_moves(Some(209e3), 1);
     let mut simulation = Simulation::new(problem, Settings::adaptive(0.01)).unwrap();
     run(&mut simulation, 8.0);
     let before = simulation.state().clone();
@@ -129,9 +129,9 @@ fn birth_on_crystals_melts_them_and_balances() {
     assert!(after.ledger.worst < 1e-10, "{:?}", after.ledger);
 }
 
-/// An empty birth, births at one time, and a birth of everything.
+/// An empty birth, simultaneous births, and a birth of all elements.
 #[test]
-fn odd_births() {
+fn unusual_births() {
     let mesh = grid([3e-3, 1e-3, 1e-3], [3, 1, 1]);
     let birth =
         |time, elements: &[u32], temperature| Birth { time, elements: elements.to_vec(), temperature };
@@ -146,14 +146,14 @@ fn odd_births() {
         ..Problem::new(mesh, conductor(PA12), COLD)
     };
     let mut simulation = Simulation::new(problem.clone(), Settings::adaptive(0.1)).unwrap();
-    // the node between both has the mean
+    // the node between both elements has the mean
     let middle = simulation.problem().mesh.points.iter().position(|p| p[0] == 1e-3).unwrap();
     assert!((simulation.temperature(middle as u32).unwrap() - 425.0).abs() < 1e-10);
     assert!(simulation.is_born(1) && !simulation.is_born(2));
     run(&mut simulation, 10.0);
     assert!(simulation.is_born(2) && simulation.state().ledger.worst < 1e-10);
 
-    // nothing exists before the first birth: time passes all the same
+    // without elements before the first birth, time still advances
     let late = Problem { births: vec![birth(3.0, &[0, 1, 2], 400.0)], ..problem.clone() };
     let mut simulation = Simulation::new(late, Settings::adaptive(0.1)).unwrap();
     run(&mut simulation, 2.0);

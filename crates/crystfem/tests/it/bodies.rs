@@ -1,9 +1,9 @@
-//! What several tests are made of.
+//! Materials, meshes and conditions shared by tests.
 
-use crystfem::boundary::{Condition, Field, Schedule, Where};
-use crystfem::kinetics::{Constants, Kinetics};
-use crystfem::ledger::Record;
-use crystfem::material::{Conductor, Polymer, Property, Semicrystalline, ThermalMaterial};
+use crystfem::boundary::{Condition, FaceSelection, Field, Schedule};
+use crystfem::kinetics::{KineticConstants, Kinetics};
+use crystfem::ledger::StepBalance;
+use crystfem::material::{Conductor, Polymer, Semicrystalline, ThermalMaterial, ThermalProperty};
 use crystfem::melting::Melting;
 use crystfem::mesh::{Grid, Mesh};
 use crystfem::simulation::Simulation;
@@ -14,17 +14,17 @@ use std::sync::Arc;
 pub const PA12: [f64; 3] = [0.25, 1010.0, 2200.0];
 
 pub fn conductor([k, density, c]: [f64; 3]) -> Arc<dyn ThermalMaterial> {
-    let property = |name, value| Property::constant(name, value).unwrap();
+    let property = |name, value| ThermalProperty::constant(name, value).unwrap();
     Arc::new(Conductor::new(density, property("k", k), property("c", c)).unwrap())
 }
 
-/// Semicrystalline PA12, Table 4.1, column 1.
+/// Creates semicrystalline PA12, Table 4.1, column 1.
 pub fn pa12(latent_heat: Option<f64>) -> Arc<dyn ThermalMaterial> {
     let polymer = Polymer {
         density: PA12[1],
-        conductivity: Property::constant("k", PA12[0]).unwrap(),
-        specific_heat: Property::constant("c", PA12[2]).unwrap(),
-        kinetics: Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap(),
+        conductivity: ThermalProperty::constant("k", PA12[0]).unwrap(),
+        specific_heat: ThermalProperty::constant("c", PA12[2]).unwrap(),
+        kinetics: Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1).unwrap(),
         melting: Some(Melting::PA12),
         ultimate_crystallinity: 0.25,
         latent_heat,
@@ -41,7 +41,7 @@ pub fn held(mesh: &Mesh, side: &str, value: Field) -> Condition {
     Condition::Temperature { nodes: mesh.node_sets[side].clone(), value }
 }
 
-pub fn film(surface: Where, coefficient: f64, ambient: f64) -> Condition {
+pub fn film(surface: FaceSelection, coefficient: f64, ambient: f64) -> Condition {
     Condition::Film {
         surface,
         coefficient: Schedule::constant(coefficient),
@@ -49,16 +49,16 @@ pub fn film(surface: Where, coefficient: f64, ambient: f64) -> Condition {
     }
 }
 
-pub fn radiation(surface: Where, emissivity: f64, ambient: f64) -> Condition {
+pub fn radiation(surface: FaceSelection, emissivity: f64, ambient: f64) -> Condition {
     Condition::Radiation { surface, emissivity, ambient: Schedule::constant(ambient) }
 }
 
-pub fn everywhere() -> Where {
-    Where::Outer { except: Vec::new() }
+pub fn everywhere() -> FaceSelection {
+    FaceSelection::Outer { except: Vec::new() }
 }
 
-/// Advances, and returns every step.
-pub fn run(simulation: &mut Simulation, until: f64) -> Vec<Record> {
+/// Advances the simulation and returns all steps.
+pub fn run(simulation: &mut Simulation, until: f64) -> Vec<StepBalance> {
     let mut records = Vec::new();
     let _ = simulation
         .advance(until, &mut |_, record| {

@@ -1,9 +1,9 @@
-//! The brick of `shared/peers/heat`: film and radiation on five sides, the bottom held, 20 steps of 0.5 s by backward
-//! Euler. Peers: scikit-fem 476.76311907 K (mean of the nodes at 26³ elements, consistent capacity), CalculiX
-//! 476.763087 K (printed to 1e-3 K).
+//! Brick of `shared/peers/heat`: film and radiation on five sides, fixed bottom, 20 steps of 0.5 s by
+//! backward Euler. References: scikit-fem 476.76311907 K (nodal mean at 26³ elements, consistent capacity),
+//! CalculiX 476.763087 K (printed to 1e-3 K).
 
 use crate::bodies::{PA12, conductor, film, grid, held, radiation, run};
-use crystfem::boundary::{Field, Where};
+use crystfem::boundary::{FaceSelection, Field};
 use crystfem::mesh::Mesh;
 use crystfem::problem::{Capacity, Problem};
 use crystfem::simulation::{Settings, Simulation};
@@ -14,7 +14,7 @@ fn brick(elements: usize, capacity: Capacity) -> Simulation {
 
 fn brick_of(mesh: Mesh, capacity: Capacity) -> Simulation {
     let bottom = mesh.surfaces["bottom"].clone();
-    let surface = || Where::Outer { except: bottom.clone() };
+    let surface = || FaceSelection::Outer { except: bottom.clone() };
     let conditions = vec![
         held(&mesh, "bottom", Field::constant(353.15)),
         film(surface(), 15.0, 353.15),
@@ -30,22 +30,22 @@ fn mean(simulation: &Simulation) -> f64 {
 }
 
 #[test]
-fn mean_temperature_is_that_of_the_peers() {
+fn mean_temperature_agrees_with_peers() {
     let mut simulation = brick(26, Capacity::Consistent);
     let steps = run(&mut simulation, 10.0);
     assert_eq!(steps.len(), 20);
     assert!((mean(&simulation) - 476.763_119_07).abs() < 1e-7, "{}", mean(&simulation));
     let work = simulation.state().work;
     println!("{work:?}");
-    // three Newton iterations a step at most; formulation.md: 10 to 15 iterations for one linear solve
+    // at most three Newton iterations per step; formulation.md: 10 to 15 iterations per linear solve
     assert!(work.newton_iterations <= 60 && work.cg_iterations <= 20 * 25, "{work:?}");
     assert!(simulation.state().ledger.worst < 1e-10, "{:?}", simulation.state().ledger);
 }
 
-/// No two elements are equal, and no rows of the matrix: scikit-fem 12 (`xtask/src/bench/brick.py` on the same nodes) has
-/// 472.69432700776 K, the nodes apart by up to 8e-7 K; CalculiX 2.20 472.694327 K.
+/// All elements and matrix rows differ: scikit-fem 12 (`xtask/src/bench/brick.py` on the same nodes) gives
+/// 472.69432700776 K, with nodal differences up to 8e-7 K; CalculiX 2.20 gives 472.694327 K.
 #[test]
-fn distorted_elements_have_the_temperatures_of_the_peers() {
+fn distorted_elements_agree_with_peers() {
     let mesh = grid([0.02; 3], [13; 3]).distorted(0.1).unwrap();
     let mut simulation = brick_of(mesh, Capacity::Consistent);
     run(&mut simulation, 10.0);
@@ -53,7 +53,8 @@ fn distorted_elements_have_the_temperatures_of_the_peers() {
     assert!(simulation.state().ledger.worst < 1e-10, "{:?}", simulation.state().ledger);
 }
 
-/// Both capacities converge to one solution: their difference falls with h², by about 4 from 13 to 26 elements.
+/// Both capacities converge to the same solution: their difference falls with h², by about 4 from 13 to 26
+/// elements.
 #[test]
 fn lumped_capacity_comes_close() {
     let difference = [13, 26].map(|elements| {

@@ -1,4 +1,4 @@
-//! The examples do what they say.
+//! Results of the examples.
 
 #[path = "../../examples/fit_kinetics.rs"]
 mod fit_kinetics;
@@ -9,7 +9,7 @@ mod print_gcode;
 #[path = "../../examples/stress_and_warpage.rs"]
 mod stress_and_warpage;
 
-/// The constants come back.
+/// The true constants are recovered.
 #[test]
 fn kinetics_are_fitted() {
     let fit = fit_kinetics::fitted().unwrap();
@@ -30,7 +30,7 @@ fn quick_layers_heal_better() {
     assert!(quick[0] > slow[0] && quick[1] > slow[1] && slow[0] > 0.0, "{quick:?} {slow:?}");
 }
 
-/// The release relieves stress and lets the bar bend, by less than its length.
+/// The release relieves stress and bends the bar, by less than its length.
 #[test]
 fn a_bar_warps() {
     let [on_bed, released, warpage] = stress_and_warpage::bar().unwrap();

@@ -1,7 +1,7 @@
-//! Stiff and extreme problems: never NaN, and the balance of energy holds.
+//! Stiff and extreme problems: no NaN, and balanced energy.
 
 use crate::bodies::{PA12, conductor, everywhere, film, grid, held, pa12, radiation, run};
-use crystfem::boundary::{Field, Source};
+use crystfem::boundary::{Field, HeatSource};
 use crystfem::exact::Wall;
 use crystfem::mesh::Mesh;
 use crystfem::problem::Problem;
@@ -13,7 +13,8 @@ fn balanced(simulation: &Simulation) {
     assert!(simulation.temperatures(0.0).iter().all(|t| t.is_finite() && *t >= 0.0));
 }
 
-/// Glass in powder, 1e8 : 1, in one step of 1e9 s and in small ones; the powder's side takes all of the gradient.
+/// Glass and powder, conductivity 1e8 : 1, in one step of 1e9 s and in small ones; the powder takes the whole
+/// gradient.
 #[test]
 fn conductivity_contrast() {
     let mesh = grid([0.01, 0.004, 0.004], [10, 4, 4]);
@@ -35,21 +36,21 @@ fn conductivity_contrast() {
         if dt > 1.0 {
             for (place, found) in simulation.problem().mesh.points.iter().zip(simulation.temperatures(0.0)) {
                 let exact = 300.0 + 100.0 * ((place[0] - 0.005) / 0.005).max(0.0);
-                // 1e-8 of the drop is on the glass; rounding of 300 K in a matrix with entries 1e8 apart
+                // 1e-8 of the drop is in the glass; rounding of 300 K in a matrix with entries 1e8 apart
                 assert!((found - exact).abs() < 1e-4, "{found}, {exact}");
             }
         }
     }
 }
 
-/// Bi = hL/k from 1e-6 to 1e6: a wall's insulated face against the series.
+/// Bi = hL/k from 1e-6 to 1e6: insulated face of a wall against the series.
 #[test]
 fn biot_numbers() {
     let (length, diffusivity) = (5e-3, PA12[0] / (PA12[1] * PA12[2]));
     for exponent in [-6, -3, 0, 3, 6] {
         let biot = 10.0_f64.powi(exponent);
         let mesh = grid([length, 2e-4, 2e-4], [25, 1, 1]);
-        let surface = crystfem::boundary::Where::Faces(mesh.surfaces["right"].clone());
+        let surface = crystfem::boundary::FaceSelection::Faces(mesh.surfaces["right"].clone());
         let problem = Problem {
             conditions: vec![film(surface, biot * PA12[0] / length, 353.15)],
             ..Problem::new(mesh, conductor(PA12), 493.15)
@@ -61,14 +62,15 @@ fn biot_numbers() {
         run(&mut simulation, end);
         balanced(&simulation);
         let share = (simulation.temperature(0).unwrap() - 353.15) / 140.0;
-        // (πh/L)²/24 of space, 0.1 K a step of time
+        // (πh/L)²/24 in space, 0.1 K per step in time
         let exact = Wall { biot }.share(0.0, fourier);
         println!("Bi {biot}: {share}, {exact}, {:?}", simulation.state().work);
         assert!((share - exact).abs() < 5e-3, "Bi = {biot}: {share}, {exact}");
     }
 }
 
-/// To 0 K: T = (T_i⁻³ + 3ct)^{−1/3} for a body of one temperature, over 1e12 s, and never below.
+/// Radiation to 0 K: T = (T_i⁻³ + 3ct)^{−1/3} for a body of uniform temperature, over 1e12 s, and never below
+/// 0 K.
 #[test]
 fn radiation_to_nothing() {
     let problem = Problem {
@@ -82,14 +84,14 @@ fn radiation_to_nothing() {
     let exact = (3000.0_f64.powi(-3) + 3.0 * c * 1e12).powf(-1.0 / 3.0);
     println!("radiation: {}, {exact}, {:?}", simulation.temperature(0).unwrap(), simulation.state().work);
     assert!((simulation.temperature(0).unwrap() - exact).abs() < 0.5, "{exact}");
-    // one step across everything
+    // one step for the whole time
     let mut simulation = Simulation::new(problem, Settings::backward_euler(1e12)).unwrap();
     run(&mut simulation, 1e12);
     balanced(&simulation);
     assert!(simulation.temperature(0).unwrap() < 100.0);
 }
 
-/// A floating body without boundary conditions: it evens out, and its energy stays.
+/// A body without boundary conditions: the temperature becomes uniform, and the energy is constant.
 #[test]
 fn a_floating_body() {
     for dt in [0.1, 1e9] {
@@ -119,7 +121,7 @@ fn a_floating_body() {
     }
 }
 
-/// One element of each kind, heated: T = T₀ + rt/ρc.
+/// One heated element of each kind: T = T₀ + rt/ρc.
 #[test]
 fn one_element() {
     let tetrahedron = Mesh {
@@ -130,7 +132,7 @@ fn one_element() {
     for mesh in [grid([1e-3; 3], [1; 3]), tetrahedron] {
         for settings in [Settings::adaptive(1.0), Settings::backward_euler(1e9)] {
             let problem = Problem {
-                sources: vec![Source { elements: vec![0], power: Field::constant(1e-4) }],
+                sources: vec![HeatSource { elements: vec![0], power: Field::constant(1e-4) }],
                 ..Problem::new(mesh.clone(), conductor(PA12), 300.0)
             };
             let mut simulation = Simulation::new(problem, settings).unwrap();
@@ -144,7 +146,7 @@ fn one_element() {
     }
 }
 
-/// PA12 with latent heat from melt to ice within one step of 1e9 s, and in a film of Bi = 1e6.
+/// PA12 with latent heat from melt to 280 K within one step of 1e9 s, and with a film of Bi = 1e6.
 #[test]
 fn crystallization_in_one_step() {
     for (coefficient, dt) in [(10.0, 1e9), (1e6, 1e9), (1e6, 1e-3), (10.0, 10.0)] {
@@ -160,7 +162,7 @@ fn crystallization_in_one_step() {
     }
 }
 
-/// What cannot be solved is refused by name.
+/// Invalid problems are refused with their reason.
 #[test]
 fn refusals() {
     let good = Problem::new(grid([1e-3; 3], [2; 3]), conductor(PA12), 300.0);
@@ -190,7 +192,7 @@ fn refusals() {
     assert!(message(good.clone(), Settings::backward_euler(0.0)).contains("time step"));
     assert!(message(good.clone(), Settings::backward_euler(f64::NAN)).contains("time step"));
     assert!(message(good.clone(), Settings { tolerance: -1.0, ..euler }).contains("tolerance"));
-    let source = Source { elements: vec![8], power: Field::constant(1.0) };
+    let source = HeatSource { elements: vec![8], power: Field::constant(1.0) };
     assert!(message(Problem { sources: vec![source], ..good.clone() }, euler).contains("element 8"));
     let mut simulation = Simulation::new(good, euler).unwrap();
     run(&mut simulation, 1.0);

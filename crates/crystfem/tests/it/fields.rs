@@ -1,19 +1,19 @@
 //! Crystallinity in bodies.
 
 use crate::bodies::{PA12, conductor, film, grid, pa12, run};
-use crystfem::boundary::{Condition, Field, Schedule, Where};
+use crystfem::boundary::{Condition, FaceSelection, Field, Schedule};
 use crystfem::problem::{Capacity, Problem};
 use crystfem::simulation::{Settings, Simulation};
 
-/// Half glass, half PA12, cooled slowly: glass has no crystallinity, PA12 the same everywhere, with points at nodes
-/// (lumped) and in elements (consistent capacity, latent heat).
+/// Half glass, half PA12, cooled slowly: glass has no crystallinity, PA12 a uniform one, with points at nodes
+/// (lumped capacity) and in elements (consistent capacity, latent heat).
 #[test]
 fn crystallinity_of_half_a_body() {
     for (capacity, latent_heat) in
         [(Capacity::Lumped, None), (Capacity::Lumped, Some(209e3)), (Capacity::Consistent, Some(209e3))]
     {
         let mesh = grid([4e-4, 1e-4, 1e-4], [4, 1, 1]);
-        let conditions = vec![film(Where::Outer { except: Vec::new() }, 2.0, 293.15)];
+        let conditions = vec![film(FaceSelection::Outer { except: Vec::new() }, 2.0, 293.15)];
         let problem = Problem {
             materials: vec![conductor(PA12), pa12(latent_heat)],
             material_of: vec![0, 0, 1, 1],
@@ -30,7 +30,7 @@ fn crystallinity_of_half_a_body() {
         {
             assert_eq!(alpha.is_none(), place[0] < 1.9e-4);
             if let (Some(alpha), Some(crystallinity)) = (alpha, crystallinity) {
-                // 0.4 mm are of one temperature within 1e-2 K
+                // the temperature in 0.4 mm is uniform within 1e-2 K
                 assert!(
                     (0.5..=1.0).contains(alpha) && (crystallinity - 0.25 * alpha).abs() < 1e-12,
                     "{alpha}"
@@ -42,8 +42,8 @@ fn crystallinity_of_half_a_body() {
     }
 }
 
-/// All nodes cooled at 1, 2, 10 K/min: α = 0.5 where formulation.md's table has it, ± 0.02 K; steps follow the
-/// material's wish, as no temporal error of temperature limits them.
+/// All nodes cooled at 1, 2, 10 K/min: α = 0.5 at the temperatures in formulation.md, ± 0.02 K. The material
+/// limits the steps, because the temperature has no temporal error.
 #[test]
 fn cooling_rates() {
     for (rate, half) in [(1.0, 162.05), (2.0, 159.77), (10.0, 152.77)] {

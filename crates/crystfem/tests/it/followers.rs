@@ -1,15 +1,15 @@
-//! States that only follow the temperature are computed for all points of a law at once, in their own place with steps of one length:
-//! the same as point by point, old beside new.
+//! States that only follow the temperature are integrated for all points of a law at once, in place for steps
+//! of equal length, with the same results as point by point with separate old and new states.
 
 use crate::bodies::{PA12, conductor, film, grid, pa12, run};
-use crystfem::boundary::Where;
+use crystfem::boundary::FaceSelection;
 use crystfem::error::Error;
-use crystfem::material::{Filled, Point, Response, ThermalMaterial};
+use crystfem::material::{Filled, PointInput, ThermalMaterial, ThermalResponse};
 use crystfem::problem::{Birth, Problem};
 use crystfem::simulation::{Settings, Simulation, State};
 use std::sync::Arc;
 
-/// A material whose law is not known.
+/// A material of a type that the solver does not know.
 struct PointByPoint(Arc<dyn ThermalMaterial>);
 
 impl ThermalMaterial for PointByPoint {
@@ -37,14 +37,14 @@ impl ThermalMaterial for PointByPoint {
     fn constant_conductivity(&self) -> bool {
         self.0.constant_conductivity()
     }
-    fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
+    fn respond(&self, at: &PointInput, old: &[f64], new: &mut [f64]) -> Result<ThermalResponse, Error> {
         self.0.respond(at, old, new)
     }
 }
 
-/// Lines of five elements on a plate that exists, crossing from layer to layer, of a full and a half-filled material of one law, in
-/// two work items. With `latent`, a third material has latent heat.
-fn path(latent: bool, of: impl Fn(Arc<dyn ThermalMaterial>) -> Arc<dyn ThermalMaterial>) -> Problem {
+/// Creates lines of five elements on an existing plate, layer by layer, of a full and a half-filled material
+/// of one law, in two work items. With `latent`, a third material has latent heat.
+fn path(latent: bool, wrap: impl Fn(Arc<dyn ThermalMaterial>) -> Arc<dyn ThermalMaterial>) -> Problem {
     let (side, layers, plate) = (20, 20, 10);
     let mesh = grid([10e-3, 10e-3, 10e-3], [22, side, layers]);
     let plane = 22 * side;
@@ -68,9 +68,9 @@ fn path(latent: bool, of: impl Fn(Arc<dyn ThermalMaterial>) -> Arc<dyn ThermalMa
         _ => 0,
     };
     Problem {
-        materials: vec![of(pa12(None)), of(half), of(third), conductor(PA12)],
+        materials: vec![wrap(pa12(None)), wrap(half), wrap(third), conductor(PA12)],
         material_of: (0..layers * plane).map(material_of).collect(),
-        conditions: vec![film(Where::Outer { except: Vec::new() }, 50.0, 353.15)],
+        conditions: vec![film(FaceSelection::Outer { except: Vec::new() }, 50.0, 353.15)],
         births,
         ..Problem::new(mesh, conductor(PA12), 400.0)
     }
@@ -82,11 +82,11 @@ fn bits(state: &State) -> Vec<u64> {
 }
 
 #[test]
-fn rows_are_points() {
+fn rows_agree_with_single_points() {
     for (latent, settings, kelvin) in [
         (false, Settings::backward_euler(0.02), 0.0),
         (true, Settings::backward_euler(0.02), 1e-9),
-        // the wish for the next step is that of points to rounding
+        // the requested next step equals that of points to rounding
         (false, Settings::adaptive(0.01), 1e-6),
     ] {
         let mut rows = Simulation::new(path(latent, |material| material), settings).unwrap();
@@ -101,7 +101,7 @@ fn rows_are_points() {
         let states = rows.memory.nodal.state.iter().zip(&points.memory.nodal.state);
         let mut grown = 0;
         for (a, b) in states {
-            // rounding of 50 steps; a kelvin changes z by a tenth or so
+            // rounding of 50 steps; a kelvin changes z by about a tenth
             assert!((a - b).abs() <= (1e-12 + kelvin) * b.abs().max(1e-200), "{a:e} {b:e}");
             grown += usize::from(*b > 1e-4);
         }
@@ -112,7 +112,7 @@ fn rows_are_points() {
     }
 }
 
-/// Threads, and restarts between births, leave the same bits.
+/// Results are bit-identical on any number of threads, and after restarts between births.
 #[test]
 fn same_bits() {
     for (latent, settings) in [
@@ -144,30 +144,30 @@ fn same_bits() {
     }
 }
 
-/// Fields weigh points by their masses, stored or not: means of z follow from element shapes alone.
+/// Fields weigh points by their masses, stored or not: means of z depend on element shapes only.
 #[test]
 fn masses_that_are_not_stored() {
     let settings = Settings::backward_euler(0.02);
-    let of = |latent| {
+    let alpha = |latent| {
         let mut problem = path(latent, |material| material);
         problem.material_of.iter_mut().filter(|material| **material == 2).for_each(|material| *material = 0);
         let mut simulation = Simulation::new(problem, settings).unwrap();
         run(&mut simulation, 0.5);
         simulation.field("alpha")
     };
-    // that a material with latent heat could appear makes masses stored
-    let (found, stored) = (of(false), of(true));
+    // masses are stored as soon as a material with latent heat may appear
+    let (found, stored) = (alpha(false), alpha(true));
     assert!(found == stored && found.iter().flatten().any(|alpha| *alpha > 0.0));
 }
 
-/// Cells filled in eight ways need the points of full ones and, as of a million equations, less than a packed copy for their rows: after
-/// births as when all is built at once, but for lists that wait to be dropped.
+/// Cells with eight filled fractions need the points of full cells and, for large systems, less than a packed
+/// copy of their rows, both after births and when built at once, apart from lists that are freed later.
 #[test]
 fn unequal_cells_need_little_more_than_equal_ones() {
     let storage = |fills: u16| {
         let (count, layers, piece, width) = (24, 12, 12, 2);
         let mesh = grid([12e-3, 12e-3, 6e-3], [count, count, layers]);
-        // one material for all parts, which then share its points
+        // one material for all fractions, which then share its points
         let whole = pa12(None);
         let filled =
             |k| Arc::new(Filled::new(whole.clone(), 0.5 + 0.5 * f64::from(k) / f64::from(fills)).unwrap());
@@ -177,7 +177,7 @@ fn unequal_cells_need_little_more_than_equal_ones() {
                 let cells = along.flat_map(|a| (0..width).map(move |w| (a, width * line + w)));
                 let place = |(a, b)| if layer % 2 == 0 { [a, b] } else { [b, a] };
                 let cell = |[x, y]: [usize; 2]| ((layer * count + y) * count + x) as u32;
-                let mut elements: Vec<u32> = cells.map(|cell_of| cell(place(cell_of))).collect();
+                let mut elements: Vec<u32> = cells.map(|indices| cell(place(indices))).collect();
                 elements.sort_unstable();
                 births.push(Birth { time: 0.0, elements, temperature: 493.15 });
             }
@@ -187,13 +187,13 @@ fn unequal_cells_need_little_more_than_equal_ones() {
             birth.time = 0.5 * k as f64;
         }
         let bottom = mesh.surfaces["bottom"].clone();
-        let outer = Where::Outer { except: bottom.clone() };
+        let outer = FaceSelection::Outer { except: bottom.clone() };
         let problem = Arc::new(Problem {
             materials: (1..=fills).map(|k| filled(k) as Arc<dyn ThermalMaterial>).collect(),
             material_of: (0..mesh.element_count())
                 .map(|e| ((e as u64 * 2_654_435_761) >> 16) as u16 % fills)
                 .collect(),
-            conditions: vec![film(Where::Faces(bottom), 300.0, 353.15), film(outer, 15.0, 353.15)],
+            conditions: vec![film(FaceSelection::Faces(bottom), 300.0, 353.15), film(outer, 15.0, 353.15)],
             births,
             ..Problem::new(mesh, pa12(None), 353.15)
         });

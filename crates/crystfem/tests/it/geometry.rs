@@ -1,4 +1,4 @@
-//! Parts of files of other programs, from the scene to the report: right, or refused with the key that is wrong.
+//! Meshes from files of other programs, from scene to report: correct results, or refusals at the wrong key.
 
 use crystfem::program::run::{Crystfem, explain};
 use harness::case::{Options, run};
@@ -41,7 +41,7 @@ fn report(here: &Path, mesh: &str, rest: &str) -> Report {
     run::<Crystfem>(&source, Options::new(&here.join("out"))).unwrap().report
 }
 
-/// Boxes from corner to corner as STL, each outward or inward.
+/// Returns boxes from corner to corner as STL, each outward or inward.
 fn stl(boxes: &[([f64; 3], [f64; 3], bool)]) -> String {
     let mut text = "solid part\n".to_owned();
     for (low, high, outward) in boxes {
@@ -62,8 +62,8 @@ fn stl(boxes: &[([f64; 3], [f64; 3], bool)]) -> String {
     text + "endsolid part\n"
 }
 
-/// Blocks of 10 mm on cells of 1 mm that cool for 100 s: one that reaches over half of the other is 1.5 of them (63.08 °C, as one block of
-/// 15 × 10 × 10 mm); what is inside changes nothing; a cavity does.
+/// Blocks of 10 mm on cells of 1 mm cool for 100 s. Two blocks that overlap by half are 1.5 blocks (63.08 °C,
+/// as one block of 15 × 10 × 10 mm); shells inside change nothing; a cavity does.
 #[test]
 fn shells_of_a_file_are_one_part() {
     let whole = ([0.0; 3], [10.0; 3], true);
@@ -100,9 +100,9 @@ fn shells_of_a_file_are_one_part() {
     }
 }
 
-/// A cube of 10 units: sizes that no print has are errors at `unit`, with the size.
+/// A cube of 10 units: implausible sizes of prints are errors at `unit`, with the size.
 #[test]
-fn sizes_that_are_not_plausible_name_the_unit() {
+fn implausible_sizes_are_errors_of_the_unit() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
     for (side, unit, cell, says) in [
@@ -117,21 +117,22 @@ fn sizes_that_are_not_plausible_name_the_unit() {
         fs::write(here.join("part.stl"), stl(&[([0.0; 3], [side; 3], true)])).unwrap();
         let cells = format!("[\"{cell}\", \"{cell}\", \"{cell}\"]");
         let mesh = format!("[mesh.stl]\nfile = \"part.stl\"\nunit = \"{unit}\"\ncell = {cells}\n");
-        let told = explain(&source(here, &mesh, COOLS), false).map_err(|error| error.to_string());
-        match (told, says) {
+        let result = explain(&source(here, &mesh, COOLS), false).map_err(|error| error.to_string());
+        match (result, says) {
             (Ok(lines), None) => {
                 assert!(lines.iter().any(|line| line.contains("the part is 10")), "{side} {unit}: {lines:?}");
             }
             (Err(error), Some(size)) => {
-                let words = ["mesh.stl.unit", size, "the file's own numbers"];
+                let words = ["mesh.stl.unit", size, "(the file contains"];
                 assert!(words.iter().all(|word| error.contains(word)), "{side} {unit}: {error}");
             }
-            (told, _) => panic!("{side} {unit}: {told:?}"),
+            (result, _) => panic!("{side} {unit}: {result:?}"),
         }
     }
 }
 
-/// A bar of eight bricks of `step` units along x, as a deck of Abaqus and CalculiX with sets of nodes at its ends.
+/// Returns a bar of eight bricks of `step` units along x, as a deck of Abaqus and CalculiX with node sets at
+/// its ends.
 fn deck(step: usize) -> String {
     let mut text = "*HEADING\nbar\n*NODE, NSET=ALL\n".to_owned();
     for i in 0..9 {
@@ -143,14 +144,17 @@ fn deck(step: usize) -> String {
     for i in 0..8 {
         let at = |k: usize| 4 * i + k;
         let ends = [1, 2, 3, 4, 5, 6, 7, 8].map(at);
-        // one end's square, then the other's
+        // corners of one end, then of the other
         writeln!(text, "{}, {}", i + 1, ends.map(|n| n.to_string()).join(", ")).unwrap();
     }
-    text + "*NSET, NSET=COLD, GENERATE\n1, 4, 1\n*NSET, NSET=HOT\n33, 34, 35, 36\n*NSET, NSET=EDGE\n1, 2\n*MATERIAL, NAME=STEEL\n*CONDUCTIVITY\n50.,\n\
-            *AMPLITUDE, NAME=RAMP\n0., 0., 1., 1.\n*STEP\n*HEAT TRANSFER\n1., 1.\n*BOUNDARY\nCOLD, 11, 11, 20.\n*END STEP\n"
+    text + "*NSET, NSET=COLD, GENERATE\n1, 4, 1\n*NSET, NSET=HOT\n33, 34, 35, 36\n*NSET, NSET=EDGE\n1, 2\n\
+                *MATERIAL, NAME=STEEL\n*CONDUCTIVITY\n50.,\n\
+            *AMPLITUDE, NAME=RAMP\n0., 0., 1., 1.\n*STEP\n*HEAT TRANSFER\n1., 1.\n*BOUNDARY\nCOLD, 11, 11, \
+            20.\n*END STEP\n"
 }
 
-/// Node sets bear temperatures at their nodes, films on their faces; the rest of the deck is named.
+/// Node sets carry temperatures at their nodes and films on their faces; unused keywords of the deck are
+/// listed.
 #[test]
 fn node_sets_of_a_deck_are_boundaries() {
     let directory = tempfile::tempdir().unwrap();
@@ -170,7 +174,7 @@ fn node_sets_of_a_deck_are_boundaries() {
     // k/h = 1 mm: as if the bar were 1 mm longer
     let found = at_two(film("COLD") + &hold("HOT", 100.0));
     assert!((found - (20.0 + 80.0 * 3.0 / 9.0)).abs() < 1e-6, "{found}");
-    // an edge of nodes has a temperature, but no film
+    // nodes along an edge can have a temperature, but no film
     assert!(at_two(hold("EDGE", 20.0) + &hold("HOT", 100.0)) > 40.0);
     let refused = |rest: String| explain(&source(here, mesh, &(rest + end)), false).unwrap_err().to_string();
     let error = refused(film("EDGE"));
@@ -178,14 +182,15 @@ fn node_sets_of_a_deck_are_boundaries() {
     let error = refused(hold("WARM", 20.0));
     assert!(error.contains("`WARM`") && error.contains("COLD"), "{error}");
     let lines = explain(&source(here, mesh, &(hold("COLD", 20.0) + end)), false).unwrap().join("\n");
-    for told in [
+    for note in [
         "the part is 8 × 1 × 1 mm",
-        "*CONDUCTIVITY (line 56, `50.,`) is NOT used: the deck has no units; give `conductivity` of [materials.NAME]",
+        "*CONDUCTIVITY (line 56, `50.,`) is NOT used: the deck has no units; give `conductivity` of \
+         [materials.NAME]",
         "*AMPLITUDE (line 58, `RAMP`) is NOT used",
         "*BOUNDARY (line 63, `COLD, 11, 11, 20.`) is NOT used",
         "keywords not used: *END STEP (1), *STEP (1)",
     ] {
-        assert!(lines.contains(told), "{told}:\n{lines}");
+        assert!(lines.contains(note), "{note}:\n{lines}");
     }
     // without a unit the bar is 8 m long
     let lines = explain(
@@ -197,11 +202,7 @@ fn node_sets_of_a_deck_are_boundaries() {
     fs::write(here.join("bar.inp"), deck(10)).unwrap();
     let error =
         explain(&source(here, "[mesh]\nfile = \"bar.inp\"\n", "[time]\nend = \"1 s\"\n"), false).unwrap_err();
-    assert!(
-        error
-            .to_string()
-            .contains("`mesh.unit`: found nothing, and with the file's unit as 1 m the part is 80 × 1 × 1 m")
-    );
+    assert!(error.to_string().contains("missing `mesh.unit`: in metres the part is 80 × 1 × 1 m"));
 }
 
 /// `check` opens the files of thermal analyses.
@@ -218,8 +219,8 @@ fn files_of_thermal_analyses_are_opened_by_check() {
         let (ends, kinds) = (array("offsets", "Int32", "3"), array("types", "UInt8", "5"));
         let values = array("T", "Float64", temperatures);
         format!(
-            "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece><Points>{points}</Points><Cells>{cells}{ends}{kinds}</Cells>\
-             <PointData>{values}</PointData></Piece></UnstructuredGrid></VTKFile>"
+            "<VTKFile \
+             type=\"UnstructuredGrid\"><UnstructuredGrid><Piece><Points>{points}</Points><Cells>{cells}{ends}{kinds}</Cells><PointData>{values}</PointData></Piece></UnstructuredGrid></VTKFile>"
         )
     };
     let write = |name: &str, text: &str| fs::write(here.join(name), text).unwrap();
@@ -228,7 +229,8 @@ fn files_of_thermal_analyses_are_opened_by_check() {
     write("short.vtu", &grid("480 470"));
     let series = |file: &str| {
         format!(
-            "<VTKFile><Collection><DataSet timestep=\"0\" file=\"good.vtu\"/><DataSet timestep=\"9\" file=\"{file}\"/></Collection></VTKFile>"
+            "<VTKFile><Collection><DataSet timestep=\"0\" file=\"good.vtu\"/><DataSet timestep=\"9\" \
+             file=\"{file}\"/></Collection></VTKFile>"
         )
     };
     write("good.pvd", &series("good.vtu"));
@@ -236,8 +238,11 @@ fn files_of_thermal_analyses_are_opened_by_check() {
     write("no.vtu", "no XML");
     let scene = |file: &str, more: &str| {
         let text = format!(
-            "version = 1\nprogram = \"crystfem\"\n[material]\nlaw = \"semicrystalline\"\ndensity = \"1010 kg/m^3\"\nconductivity = \"0.25 W/(m K)\"\n\
-             specific_heat = \"2200 J/(kg K)\"\nkinetics = \"table-4.1-column-1\"\ncrystallinity = 0.25\n[output]\npictures = false\n\
+            "version = 1\nprogram = \"crystfem\"\n[material]\nlaw = \"semicrystalline\"\ndensity = \"1010 \
+             kg/m^3\"\n\
+                         conductivity = \"0.25 W/(m K)\"\n\
+             specific_heat = \"2200 J/(kg K)\"\nkinetics = \"table-4.1-column-1\"\ncrystallinity = \
+             0.25\n[output]\npictures = false\n\
              [[nodes]]\nname = \"n\"\nfile = \"{file}\"\nunit = \"K\"\n{more}"
         );
         write("nodes.toml", &text);
@@ -246,14 +251,14 @@ fn files_of_thermal_analyses_are_opened_by_check() {
     for (file, more, says) in [
         ("cold.vtu", "", "above 0 K"),
         ("short.vtu", "", "2 values of `T`; allowed: 3"),
-        ("gone.pvd", "", "gone.vtu, which is not there"),
+        ("gone.pvd", "", "gone.vtu, which does not exist"),
         ("no.vtu", "", "no.vtu"),
         ("good.vtu", "array = \"Temp\"\n", "T"),
     ] {
         let source = scene(file, more);
         let check = explain(&source, false).unwrap_err().to_string();
         assert!(check.contains("nodes[0].file") && check.contains(says), "{file}: {check}");
-        // a run says the same, before it writes
+        // a run gives the same error, before it writes files
         let output = here.join("out");
         let error = run::<Crystfem>(&source, Options::new(&output)).unwrap_err().to_string();
         assert_eq!(error, check, "{file}");
@@ -265,19 +270,25 @@ fn files_of_thermal_analyses_are_opened_by_check() {
     assert_eq!(finished.report.scalar("n.least_alpha"), Some(0.0));
 }
 
-/// A bar of tetrahedra of second order on a stiff bed cools: the elastic law, from scene to report, against hexahedra.
+/// A bar of second-order tetrahedra on a stiff bed cools: the elastic law, from scene to report, against
+/// hexahedra.
 #[test]
 fn tetrahedra_warp_as_hexahedra_do() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
     let scene = |cells: &str, elements: &str, order: u8| {
         let mesh = format!(
-            "[mesh]\norder = {order}\n[mesh.brick]\nsize = [\"24 mm\", \"4 mm\", \"4 mm\"]\nelements = {elements}\ncells = \"{cells}\"\n"
+            "[mesh]\norder = {order}\n[mesh.brick]\nsize = [\"24 mm\", \"4 mm\", \"4 mm\"]\n\
+                         elements = {elements}\ncells = \"{cells}\"\n"
         );
         let capacity = if order == 2 { "capacity = \"consistent\"\n" } else { "" };
         let rest = format!(
-            "[mechanics]\nmaterial = \"m\"\nbed = \"bottom\"\nlaw = {{ elastic = {{ modulus = \"1 GPa\", poisson = 0.3, expansion = \"1e-4 1/K\" }} }}\n\
-             strain_step = 1e-3\n[[boundary]]\nsurface = \"top\"\nfilm = \"500 W/(m^2 K)\"\nambient = \"20 degC\"\n[time]\nend = \"20 s\"\nstep = \"1 s\"\n{capacity}"
+            "[mechanics]\nmaterial = \"m\"\nbed = \"bottom\"\n\
+                         law = {{ elastic = {{ modulus = \"1 GPa\", poisson = 0.3, expansion = \"1e-4 1/K\" \
+                         }} }}\n\
+              strain_step = 1e-3\n[[boundary]]\nsurface = \"top\"\nfilm = \"500 W/(m^2 K)\"\nambient = \"20 \
+              degC\"\n\
+                          [time]\nend = \"20 s\"\nstep = \"1 s\"\n{capacity}"
         );
         report(here, &mesh, &rest)
     };

@@ -1,9 +1,9 @@
-//! Observed orders of convergence with the manufactured solution of formulation.md.
+//! Observed convergence orders for the manufactured solution of formulation.md.
 
 use crate::bodies::{PA12, conductor, grid, run};
-use crystfem::boundary::{Field, Source};
+use crystfem::boundary::{Field, HeatSource};
 use crystfem::exact::Manufactured;
-use crystfem::mesh::{Block, Grid, Mesh, Split};
+use crystfem::mesh::{Block, CellSplit, Grid, Mesh};
 use crystfem::problem::{Capacity, Problem};
 use crystfem::simulation::{Settings, Simulation};
 use crystfem::time::{Scheme, Steps};
@@ -21,7 +21,7 @@ fn simulation(mesh: Mesh, capacity: Capacity, scheme: Scheme, dt: f64) -> Simula
     let elements = (0..mesh.element_count() as u32).collect();
     let problem = Problem {
         initial: Field::function(|x, _| EXACT.temperature(x, 0.0)),
-        sources: vec![Source { elements, power: Field::function(|x, t| EXACT.source(x, t)) }],
+        sources: vec![HeatSource { elements, power: Field::function(|x, t| EXACT.source(x, t)) }],
         capacity,
         ..Problem::new(mesh, conductor(PA12), 0.0)
     };
@@ -29,13 +29,13 @@ fn simulation(mesh: Mesh, capacity: Capacity, scheme: Scheme, dt: f64) -> Simula
     Simulation::new(problem, settings).unwrap()
 }
 
-fn mesh(elements: usize, split: Split, distortion: f64) -> Mesh {
+fn mesh(elements: usize, split: CellSplit, distortion: f64) -> Mesh {
     let block = Block { name: "all".into(), lower: [0.0; 3], upper: [EXACT.length; 3] };
     let grid = Grid::uniform([0.0; 3], [EXACT.length; 3], [elements; 3]).unwrap();
     grid.blocks(&[block], split).unwrap().distorted(distortion).unwrap()
 }
 
-/// Root mean square over the nodes.
+/// Computes the root mean square error over the nodes.
 fn error(simulation: &Simulation) -> f64 {
     let points = &simulation.problem().mesh.points;
     let squares = simulation.temperatures(f64::NAN).into_iter().zip(points).map(|(found, &place)| {
@@ -48,11 +48,11 @@ fn error(simulation: &Simulation) -> f64 {
 #[test]
 fn order_two_in_space() {
     for (split, distortion) in [
-        (Split::Hexahedra, 0.0),
-        (Split::Hexahedra, 0.1),
-        (Split::SixTetrahedra, 0.0),
-        (Split::SixTetrahedra, 0.1),
-        (Split::Wedges, 0.1),
+        (CellSplit::Hexahedra, 0.0),
+        (CellSplit::Hexahedra, 0.1),
+        (CellSplit::SixTetrahedra, 0.0),
+        (CellSplit::SixTetrahedra, 0.1),
+        (CellSplit::Wedges, 0.1),
     ] {
         for capacity in [Capacity::Lumped, Capacity::Consistent] {
             let errors = [4, 8, 16].map(|elements| {
@@ -72,12 +72,15 @@ fn order_two_in_space() {
     }
 }
 
-/// Second-order elements: three in L2 (Strang & Fix, 1973), here at the nodes, of any shape.
+/// Second-order elements of any shape: order three in L2 (Strang & Fix, 1973), here at the nodes.
 #[test]
 fn order_three_in_space_of_second_order_elements() {
-    for (split, distortion) in
-        [(Split::Hexahedra, 0.0), (Split::Hexahedra, 0.1), (Split::SixTetrahedra, 0.1), (Split::Wedges, 0.1)]
-    {
+    for (split, distortion) in [
+        (CellSplit::Hexahedra, 0.0),
+        (CellSplit::Hexahedra, 0.1),
+        (CellSplit::SixTetrahedra, 0.1),
+        (CellSplit::Wedges, 0.1),
+    ] {
         let errors = [6, 8].map(|elements| {
             let mesh = mesh(elements, split, distortion).second_order();
             let mut simulation = simulation(mesh, Capacity::Consistent, Scheme::TrBdf2, 0.05);
@@ -85,7 +88,7 @@ fn order_three_in_space_of_second_order_elements() {
             let simulation = &simulation;
             let points = &simulation.problem().mesh.points;
             let exact = |k: usize| EXACT.temperature(points[k], simulation.time());
-            // L2 over the elements, by their volumes at nodes and middles
+            // L2 over the elements, weighted by nodal volumes
             let found = simulation.temperatures(f64::NAN);
             let volumes = simulation
                 .volumes(&(0..simulation.problem().mesh.element_count() as u32).collect::<Vec<_>>());
@@ -94,12 +97,12 @@ fn order_three_in_space_of_second_order_elements() {
         });
         let order = (errors[0] / errors[1]).ln() / (8.0f64 / 6.0).ln();
         println!("{split:?} {distortion} second order: {errors:?}, order {order}");
-        // 3 in the limit; nodes of regular meshes have more
+        // 3 in the limit; more at nodes of regular meshes
         assert!(order > 2.9 && order < 4.0, "{split:?} {distortion}: {errors:?}, order {order}");
     }
 }
 
-/// Differences between halved steps, on one mesh, so that no error of space is in them.
+/// Differences between halved steps on one mesh, which exclude the error in space.
 #[test]
 fn order_in_time_is_the_schemes() {
     for (scheme, order) in [(Scheme::BackwardEuler, 1.0), (Scheme::TrBdf2, 2.0)] {
@@ -115,7 +118,7 @@ fn order_in_time_is_the_schemes() {
     }
 }
 
-/// The error control holds: the true temporal error falls with the tolerance, and costs fewer steps than Euler's.
+/// Error control: the true temporal error falls with the tolerance, with fewer steps than Euler's.
 #[test]
 fn adaptive_steps_follow_their_tolerance() {
     let end = |scheme, tolerance| {
@@ -135,7 +138,7 @@ fn adaptive_steps_follow_their_tolerance() {
             ((found - exact).abs(), steps)
         });
         println!("{scheme:?}: {runs:?}");
-        // errors of steps add up at most
+        // errors of the steps add up at most
         for ((error, steps), tolerance) in runs.into_iter().zip([1e-1, 1e-2, 1e-3]) {
             assert!(error < tolerance * steps as f64, "{scheme:?}: {runs:?}");
         }

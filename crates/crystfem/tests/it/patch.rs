@@ -1,8 +1,8 @@
 //! Patch tests: a linear field is exact on any mesh.
 
 use crate::bodies::{PA12, conductor, run};
-use crystfem::boundary::{Condition, Field, Where};
-use crystfem::mesh::{BOX_SIDES, Block, Grid, Split};
+use crystfem::boundary::{Condition, FaceSelection, Field};
+use crystfem::mesh::{BOX_SIDES, Block, CellSplit, Grid};
 use crystfem::problem::{Capacity, Problem};
 use crystfem::simulation::{Settings, Simulation};
 
@@ -12,7 +12,8 @@ fn linear([x, y, z]: [f64; 3]) -> f64 {
 
 #[test]
 fn a_linear_field_is_exact_on_distorted_meshes() {
-    let splits = [Split::Hexahedra, Split::FiveTetrahedra, Split::SixTetrahedra, Split::Wedges];
+    let splits =
+        [CellSplit::Hexahedra, CellSplit::FiveTetrahedra, CellSplit::SixTetrahedra, CellSplit::Wedges];
     for (split, second) in splits.into_iter().flat_map(|split| [(split, false), (split, true)]) {
         for capacity in [Capacity::Lumped, Capacity::Consistent] {
             if second && capacity == Capacity::Lumped {
@@ -39,11 +40,11 @@ fn a_linear_field_is_exact_on_distorted_meshes() {
             let tolerance = if second { 1e-11 } else { 1e-10 };
             let settings = Settings { tolerance, ..Settings::backward_euler(1e9) };
             let mut simulation = Simulation::new(problem, settings).unwrap();
-            // each step leaves τ/Δt ≈ 1e-7 of what was there
+            // each step leaves τ/Δt ≈ 1e-7 of the initial field
             run(&mut simulation, 4e9);
             let points = &simulation.problem().mesh.points;
             for (found, &place) in simulation.temperatures(0.0).iter().zip(points) {
-                // rounding of a solve with 350 K
+                // rounding of a solve at 350 K
                 let error = (found - linear(place)).abs();
                 assert!(error < 1e-9, "{split:?} {second} {capacity:?}: {found} at {place:?}");
             }
@@ -51,16 +52,16 @@ fn a_linear_field_is_exact_on_distorted_meshes() {
     }
 }
 
-/// The same with the gradient driven by a flux: 1000 W/m² through a bar with one end held.
+/// A flux gives its gradient: 1000 W/m² through a bar with one fixed end.
 #[test]
 fn a_flux_makes_its_gradient() {
     for (split, second) in [
-        (Split::Hexahedra, false),
-        (Split::SixTetrahedra, false),
-        (Split::Wedges, false),
-        (Split::Hexahedra, true),
-        (Split::SixTetrahedra, true),
-        (Split::Wedges, true),
+        (CellSplit::Hexahedra, false),
+        (CellSplit::SixTetrahedra, false),
+        (CellSplit::Wedges, false),
+        (CellSplit::Hexahedra, true),
+        (CellSplit::SixTetrahedra, true),
+        (CellSplit::Wedges, true),
     ] {
         let block = Block { name: "all".into(), lower: [0.0; 3], upper: [0.02, 0.01, 0.01] };
         let grid = Grid::uniform([0.0; 3], [0.02, 0.01, 0.01], [6, 3, 4]).unwrap();
@@ -69,7 +70,7 @@ fn a_flux_makes_its_gradient() {
             mesh = mesh.second_order();
         }
         let nodes = mesh.node_sets["left"].clone();
-        let surface = Where::Faces(mesh.surfaces["right"].clone());
+        let surface = FaceSelection::Faces(mesh.surfaces["right"].clone());
         let problem = Problem {
             conditions: vec![
                 Condition::Temperature { nodes, value: Field::constant(300.0) },
@@ -86,7 +87,7 @@ fn a_flux_makes_its_gradient() {
             let exact = 300.0 + 1e3 / PA12[0] * place[0];
             assert!((found - exact).abs() < 1e-9, "{split:?} {second}: {found}, {exact} at {place:?}");
         }
-        // all heat that goes in is taken by the support: 1e3 W/m² × 1e-4 m²
+        // the support takes all supplied heat: 1e3 W/m² × 1e-4 m²
         assert!(simulation.state().ledger.worst < 1e-10, "{:?}", simulation.state().ledger);
         assert!((simulation.state().exchange.flux - 0.1).abs() < 1e-15);
     }

@@ -1,13 +1,13 @@
-//! Scenes of the material alone, and fits, from their text to their report.
+//! Point scenes and fits, from text to report.
 
-use crystfem::kinetics::{Constants, Kinetics, cooling_curve};
-use crystfem::program::run::{Crystfem, Failure};
+use crystfem::kinetics::{KineticConstants, Kinetics, cooling_curve};
+use crystfem::program::run::Crystfem;
 use harness::case::Options;
 use harness::report::Report;
-use harness::scene::Source;
+use harness::scene::{Failure, Source};
 use std::path::Path;
 
-fn run_quietly(source: &Source, output: &Path, quick: bool) -> Result<Report, Failure> {
+fn run_quietly(source: &Source, output: &Path, quick: bool) -> Result<Report, Failure<crystfem::Error>> {
     let options = Options { quick, ..Options::new(output) };
     harness::case::run::<Crystfem>(source, options).map(|finished| finished.report)
 }
@@ -65,7 +65,7 @@ fn a_scene_gives_the_same_files_again() {
     let again = run_in(folder.path(), SCENE, false);
     assert!(first == read());
     assert_eq!(report.values, again.values);
-    // 1 K/min from the table of the history; some melts at 172 °C
+    // 1 K/min from the table of the history; some crystals melt at 172 °C
     let at = |name: &str| report.scalar(name).expect(name);
     assert!((at("slow.temperature_at_0.5") - 162.05).abs() < 0.02);
     assert!(at("cooling.highest_alpha") > 0.999 && at("cooling.final_alpha") < 0.9);
@@ -74,7 +74,7 @@ fn a_scene_gives_the_same_files_again() {
     assert!(quick.scalar("slow.final_alpha").is_none() && quick.passed());
 }
 
-/// The curve that one scene writes is what another one fits.
+/// One scene writes the curve that another scene fits.
 #[test]
 fn a_fit_reads_what_a_point_writes() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -94,7 +94,7 @@ equilibrium_melting = "193.2 degC"
 glass_transition = "51 degC"
 data = [{ file = "out/slow.csv" }, { file = "fast.csv" }]
 "#;
-    // up to the hold: the fit knows no melting
+    // up to the hold, because the fit ignores melting
     let text = std::fs::read_to_string(folder.path().join("out/cooling.csv")).expect("a table");
     let cooling = text.lines().enumerate().take_while(|(row, line)| {
         *row == 0 || line.split(',').next().is_some_and(|time| time.parse::<f64>().is_ok_and(|t| t <= 480.0))
@@ -112,17 +112,18 @@ data = [{ file = "out/slow.csv" }, { file = "fast.csv" }]
     }
 }
 
-/// Raw heat flow of known kinetics, ΔH dα/dt with α of Nakamura's law by Gauss' quadrature, over a sloped baseline: enthalpies
-/// and constants come back, of heat flows in mW that point down and in W/g that point up.
+/// Raw heat flow of known kinetics, ΔH dα/dt with α of Nakamura's law by Gauss quadrature, over a sloped
+/// baseline: enthalpies and constants are recovered, from heat flows in mW (exothermal down) and W/g
+/// (exothermal up).
 #[test]
 fn a_fit_reads_heat_flows() {
-    let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1).expect("constants");
+    let kinetics = Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1).expect("constants");
     let folder = tempfile::tempdir().expect("a folder");
     let (enthalpy, mass) = (52e3, 5.2e-6);
     let export = |name: &str, per_minute: f64, heading: &str, scale: f64| {
         let rate = per_minute / 60.0;
         let curve = cooling_curve(&kinetics, rate, 466.35, 400.0, 0.0, 6000);
-        // a minute in the melt first
+        // one minute in the melt first
         let mut text =
             format!("time [min],temperature [degC],heat_flow [{heading}]\n0,193.2,{}\n", scale * 20.0);
         for (&temperature, &z) in curve.temperature.iter().zip(&curve.z).skip(1) {

@@ -1,7 +1,7 @@
-//! A printed part in a few lines is the one of the scene.
+//! A printed part from the library equals that of the scene.
 
 use crystfem::Error;
-use crystfem::material::{Conductor, Property, Semicrystalline};
+use crystfem::material::{Conductor, Semicrystalline, ThermalProperty};
 use crystfem::mesh::layers::Layers;
 use crystfem::mesh::{Bar, Grid, Substrate};
 use crystfem::printed::PrintedPart;
@@ -10,10 +10,10 @@ use crystfem::simulation::{Settings, Simulation};
 use harness::scene::Source;
 use std::sync::Arc;
 
-const SCENE: &str = include_str!("../../../../cases/ch4/printed-bar/case.toml");
+const SCENE: &str = include_str!("../fixtures/printed_bar.toml");
 
 fn glass() -> Conductor {
-    Conductor::new(2500.0, Property::Constant(1.0), Property::Constant(800.0)).unwrap()
+    Conductor::new(2500.0, ThermalProperty::Constant(1.0), ThermalProperty::Constant(800.0)).unwrap()
 }
 
 #[test]
@@ -38,14 +38,14 @@ fn equals_the_scene() {
         simulation.run_until(22.0).unwrap();
         simulation.temperatures(0.0)
     });
-    // the order of materials and conditions differs, and with it that of sums
+    // materials and conditions have another order, and so have sums
     let [a, b] = &temperatures;
     let apart = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(apart < 1e-5, "{apart} K");
 }
 
 #[test]
-fn faults_are_named() {
+fn errors_name_the_parameter() {
     let bar =
         || PrintedPart::bar(&Bar::new([0.01, 0.01], 2, 1e-3), Semicrystalline::pa12().unwrap()).unwrap();
     let fault = |part: PrintedPart| match part.problem() {

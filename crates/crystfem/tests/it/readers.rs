@@ -1,4 +1,5 @@
-//! Readers of mesh files on damaged input: an error or a checked mesh, never a panic, a hang or a huge allocation.
+//! Mesh readers on damaged input give an error or a checked mesh, but no panic, endless loop or huge
+//! allocation.
 
 use std::path::Path;
 
@@ -24,7 +25,7 @@ fn fixture(name: &str) -> Vec<u8> {
     std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)).unwrap()
 }
 
-/// What is read is a mesh that holds together.
+/// Checks that the result is a valid mesh or an error.
 fn judge(name: &str, parse: Parse, bytes: &[u8]) {
     match parse(Path::new(name), bytes, 1.0) {
         Ok(read) => {
@@ -39,7 +40,7 @@ fn judge(name: &str, parse: Parse, bytes: &[u8]) {
     }
 }
 
-/// Words that files are made of, put where they do not belong.
+/// Words of such files, inserted at wrong places.
 const WORDS: [&str; 16] = [
     "0",
     "-1",
@@ -59,7 +60,8 @@ const WORDS: [&str; 16] = [
     "\0",
 ];
 
-const PATH: &str = "G28 ; home\nG1 X0 Y0.25 Z0.2 F600\nM83\nG1 X10 E1\nG0 Y0.75\nG1 X0 E1 (back)\nG4 P100\nG92 E0\nG91\n\
+const PATH: &str = "G28 ; home\nG1 X0 Y0.25 Z0.2 F600\nM83\nG1 X10 E1\nG0 Y0.75\nG1 X0 E1 (back)\nG4 \
+    P100\nG92 E0\nG91\n\
                     G1 Z0.2\nG90\nM117 layer\n";
 
 #[derive(Clone, Debug)]
@@ -92,7 +94,7 @@ fn apply(bytes: &mut Vec<u8>, damage: &Damage) {
             }
         }
         Damage::Cut(at) => {
-            // most cuts near the end, or little is left to read
+            // cut mostly near the end, so that something is left to read
             let at = bytes.len() - place(at) / 8;
             bytes.truncate(at);
         }
@@ -118,7 +120,9 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
 
     #[test]
-    fn damaged_files_are_errors_or_meshes(file in 0..FILES.len(), damages in prop::collection::vec(damage(), 1..4)) {
+     fn damaged_files_are_errors_or_meshes(
+        file in 0..FILES.len(), damages in prop::collection::vec(damage(), 1..4)
+    ) {
         let (name, parse) = FILES[file];
         let mut bytes = fixture(name);
         for damage in &damages {
@@ -128,7 +132,9 @@ proptest! {
     }
 
     #[test]
-    fn numbers_of_binary_files(at in 0usize..7000, value in prop_oneof![Just(u64::MAX), Just(1u64 << 40), any::<u64>()]) {
+     fn numbers_of_binary_files(
+        at in 0usize..7000, value in prop_oneof![Just(u64::MAX), Just(1u64 << 40), any::<u64>()]
+    ) {
         let mut bytes = fixture("hexes_binary.msh");
         if let Some(place) = bytes.get_mut(at..at + 8) {
             place.copy_from_slice(&value.to_le_bytes());
@@ -147,7 +153,7 @@ proptest! {
         match path::parse(Path::new("a.gcode"), &bytes) {
             Ok(path) => {
                 prop_assert!(path.moves.windows(2).all(|pair| pair[0].end <= pair[1].start && pair[0].start <= pair[0].end));
-                if let Ok(mut activation) = path.activation(&mesh, &all, Bead { width: 4e-4, height: 3e-4 }) {
+                if let Ok(mut activation) = path.activation_times(&mesh, &all, Bead { width: 4e-4, height: 3e-4 }) {
                     activation.fill(&mesh);
                     prop_assert!(activation.times.iter().all(|time| *time >= 0.0));
                 }
@@ -158,7 +164,8 @@ proptest! {
 
     #[test]
     fn noise(bytes in prop::collection::vec(any::<u8>(), 0..300), binary in any::<bool>()) {
-        let header = if binary { &b"$MeshFormat\n4.1 1 8\n\x01\0\0\0\n$EndMeshFormat\n$Nodes\n"[..] } else { b"*NODE\n" };
+        let header = if binary { &b"$MeshFormat\n4.1 1 \
+            8\n\x01\0\0\0\n$EndMeshFormat\n$Nodes\n"[..] } else { b"*NODE\n" };
         let all = [header, &bytes].concat();
         judge("noise", if binary { gmsh::parse } else { abaqus::parse }, &all);
         judge("noise", abaqus::parse, &bytes);
@@ -167,7 +174,7 @@ proptest! {
     }
 }
 
-/// Cut at each byte of the first part of a small file, and at each hundredth of the rest.
+/// Files truncated at each byte of their first part, and at each hundredth of the rest.
 #[test]
 fn cut_files() {
     for (name, parse) in FILES {
@@ -178,11 +185,11 @@ fn cut_files() {
     }
 }
 
-/// Counts that a file announces and does not hold cost nothing.
+/// Announced counts without data allocate nothing.
 #[cfg(target_os = "linux")]
 #[test]
 fn announced_counts_allocate_nothing() {
-    // greatest address space so far, bytes
+    // peak address space, bytes
     let peak = || -> usize {
         let status = std::fs::read_to_string("/proc/self/status").unwrap();
         let line = status.lines().find(|line| line.starts_with("VmPeak")).unwrap();
@@ -203,12 +210,12 @@ fn announced_counts_allocate_nothing() {
         let text = format!("*NODE\n1,0,0,0\n{count},0,0,1\n*NSET,NSET=a,GENERATE\n1,{count}\n");
         judge("announced", abaqus::parse, text.as_bytes());
     }
-    // the other tests of this program stay below this together
+    // the other tests of this program need less in total
     assert!(peak() - before < 2 << 30);
 }
 
 #[test]
-fn files_are_told_by_their_ending() {
+fn readers_are_chosen_by_extension() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
     assert_eq!(mesh::read(&folder.join("hexes.inp"), 1.0).unwrap().mesh.hexahedra.len(), 16);
     assert_eq!(mesh::read(&folder.join("hexes_binary.msh"), 1.0).unwrap().mesh.hexahedra.len(), 16);

@@ -1,20 +1,21 @@
-//! The same bits on any number of threads, and after a restart.
+//! Results are bit-identical on any number of threads, and after a restart.
 
 use crate::bodies::{PA12, conductor, everywhere, film, grid, held, pa12, radiation, run};
 use crystfem::boundary::Field;
-use crystfem::material::{Conductor, Property};
+use crystfem::material::{Conductor, ThermalProperty};
 use crystfem::problem::{Birth, Capacity, Problem};
 use crystfem::simulation::{Settings, Simulation, State};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// More than two work items of nodes, with births, radiation, latent heat, and conductivity that follows temperature.
+/// Creates more than two work items of nodes, with births, radiation, latent heat, and temperature-dependent
+/// conductivity.
 fn problem(general: bool) -> Problem {
     let mesh = grid([10e-3, 10e-3, 10e-3], [22, 20, 20]);
     let plane = 22 * 20;
-    let table = Property::table("k", vec![300.0, 500.0], vec![0.9, 1.1]).unwrap();
-    let glass = Conductor::new(2500.0, table, Property::constant("c", 800.0).unwrap()).unwrap();
+    let table = ThermalProperty::table("k", vec![300.0, 500.0], vec![0.9, 1.1]).unwrap();
+    let glass = Conductor::new(2500.0, table, ThermalProperty::constant("c", 800.0).unwrap()).unwrap();
     Problem {
         materials: vec![if general { Arc::new(glass) } else { conductor(PA12) }, pa12(Some(209e3))],
         material_of: (0..20 * plane).map(|e| u16::from(e >= 10 * plane)).collect(),
@@ -35,7 +36,8 @@ fn problem(general: bool) -> Problem {
     }
 }
 
-/// The same, its layers laid in lines of five elements: equations are numbered in groups, of which some are out of use.
+/// Creates the same problem with layers in lines of five elements: equations are numbered in groups, partly
+/// unused.
 fn path(general: bool) -> Problem {
     let mut problem = problem(general);
     let layers = std::mem::take(&mut problem.births);
@@ -50,7 +52,7 @@ fn path(general: bool) -> Problem {
     problem
 }
 
-/// The same on distorted elements: rows of the matrix are unequal.
+/// Distorts the elements: rows of the matrix are unequal.
 fn distorted(problem: Problem) -> Problem {
     Problem { mesh: problem.mesh.distorted(0.1).unwrap(), ..problem }
 }
@@ -81,7 +83,8 @@ fn on_any_number_of_threads() {
     }
 }
 
-/// What is added birth by birth is what is built at once: resumed simulations build all that exists. A birth visits its neighbourhood.
+/// Adding birth by birth equals building at once, as resumed simulations do. A birth visits its neighbourhood
+/// only.
 #[test]
 fn along_a_path() {
     for (general, unequal) in [(false, false), (true, false), (false, true)] {
@@ -106,7 +109,7 @@ fn along_a_path() {
     }
 }
 
-/// A stop within a step restores the state before that step; the simulation continues to the same bits.
+/// A stop within a step restores the state before that step; the simulation then continues bit-identically.
 #[test]
 fn stopped_within_a_step() {
     let settings = Settings::adaptive(0.05);

@@ -1,4 +1,4 @@
-//! Conditions that change over time, against closed forms of a body without gradients.
+//! Time-dependent conditions against closed forms of a body with uniform temperature.
 
 use crate::bodies::{PA12, conductor, everywhere, grid, run};
 use crystfem::boundary::{Condition, Schedule};
@@ -11,12 +11,12 @@ const AMBIENT: f64 = 350.0;
 const FILM: f64 = 50.0;
 const EDGE: f64 = 1e-3;
 
-/// ρcV/(hA) of a cube.
+/// Returns the time constant ρcV/(hA) of a cube.
 fn time_constant() -> f64 {
     PA12[1] * PA12[2] * EDGE / (6.0 * FILM)
 }
 
-/// One element under a film: all nodes have one temperature.
+/// Solves one element with a film: all nodes have the same temperature.
 fn cube(coefficient: &Schedule, ambient: &Schedule, settings: Settings) -> (f64, Vec<f64>) {
     let film =
         Condition::Film { surface: everywhere(), coefficient: coefficient.clone(), ambient: ambient.clone() };
@@ -32,7 +32,7 @@ fn precise() -> Settings {
     Settings { steps, tolerance: 1e-9, ..Settings::adaptive(1.0) }
 }
 
-/// Surroundings that warm at r = 2 K/s for 10 s and then stay: T = T_a + r(t − τ) + (T₀ − T_a + rτ)e^{−t/τ}.
+/// Surroundings that warm at r = 2 K/s for 10 s, then constant: T = T_a + r(t − τ) + (T₀ − T_a + rτ)e^{−t/τ}.
 #[test]
 fn surroundings_that_change() {
     let (tau, rate) = (time_constant(), 2.0);
@@ -41,13 +41,13 @@ fn surroundings_that_change() {
     let at_10 = AMBIENT + rate * (10.0 - tau) + (START - AMBIENT + rate * tau) * (-10.0 / tau).exp();
     let last = AMBIENT + 10.0 * rate;
     let exact = last + (at_10 - last) * (-20.0 / tau).exp();
-    // second order with an error of 1e-6 K a step
+    // second order with an error of 1e-6 K per step
     assert!((found - exact).abs() < 1e-3, "{found} {exact}");
-    assert!(times.contains(&10.0), "a step lands on the kink");
+    assert!(times.contains(&10.0), "a step ends at the kink");
 }
 
-/// A film that grows as h(1 + t/t₁) for t₁ = 10 s and then stays: T = T_a + (T₀ − T_a)e^{−(t + t²/2t₁)/τ}. Every linear
-/// solver sees the matrix change.
+/// A film that grows as h(1 + t/t₁) for t₁ = 10 s, then constant: T = T_a + (T₀ − T_a)e^{−(t + t²/2t₁)/τ}.
+/// The matrix changes in each linear solver.
 #[test]
 fn a_film_that_changes() {
     let film = Schedule::linear(&[(0.0, FILM), (10.0, 2.0 * FILM)]).unwrap();
@@ -56,8 +56,8 @@ fn a_film_that_changes() {
     for solver in [LinearSolver::ConjugateGradients, LinearSolver::Direct] {
         let (found, times) = cube(&film, &ambient, Settings { solver, ..precise() });
         assert!((found - exact).abs() < 1e-3, "{solver:?}: {found} {exact}");
-        assert!(times.contains(&10.0), "a step lands on the kink");
-        // equal steps, whose matrix would otherwise be kept: first order, 100 K over τ times the step
+        assert!(times.contains(&10.0), "a step ends at the kink");
+        // equal steps, whose matrix is otherwise reused: first order, 100 K over τ times the step
         let fixed =
             Settings { scheme: Scheme::BackwardEuler, steps: Steps::Fixed { dt: 0.01 }, solver, ..precise() };
         let (found, _) = cube(&film, &ambient, fixed);

@@ -1,10 +1,10 @@
-//! Factors and conjugate gradients give one temperature, and the choice follows the scene.
+//! Direct and iterative solvers give the same temperatures, and the automatic choice depends on the problem.
 
 use crate::bodies::{PA12, conductor, everywhere, film, grid, held, radiation, run};
-use crystfem::boundary::{Condition, Field, Where};
-use crystfem::mesh::{Block, Grid, Split};
+use crystfem::boundary::{Condition, FaceSelection, Field};
+use crystfem::mesh::{Block, CellSplit, Grid};
 use crystfem::problem::{Capacity, Problem};
-use crystfem::simulation::{LinearSolver, Method, Settings, Simulation};
+use crystfem::simulation::{LinearMethod, LinearSolver, Settings, Simulation};
 use crystfem::time::{Scheme, Steps};
 
 fn brick(elements: usize, capacity: Capacity, settings: Settings) -> Simulation {
@@ -12,7 +12,7 @@ fn brick(elements: usize, capacity: Capacity, settings: Settings) -> Simulation 
     let bottom = mesh.surfaces["bottom"].clone();
     let conditions = vec![
         held(&mesh, "bottom", Field::constant(353.15)),
-        film(Where::Outer { except: bottom }, 15.0, 353.15),
+        film(FaceSelection::Outer { except: bottom }, 15.0, 353.15),
     ];
     Simulation::new(Problem { conditions, capacity, ..Problem::new(mesh, conductor(PA12), 493.15) }, settings)
         .unwrap()
@@ -31,13 +31,13 @@ fn both_solvers_agree() {
                 run(&mut simulation, 500.0);
                 simulation
             });
-            // the tolerance of both, and steps that pass errors on
+            // tolerance of both solvers, and propagation over steps
             for (a, b) in cg.temperatures(0.0).iter().zip(direct.temperatures(0.0)) {
                 assert!((a - b).abs() < 1e-6, "{capacity:?} {scheme:?}: {a}, {b}");
             }
             let work = direct.state().work;
             assert!(cg.state().work.cg_iterations > 0 && cg.state().work.factorizations == 0);
-            // TR-BDF2 begins with one step of backward Euler, which has another matrix
+            // TR-BDF2 starts with one step of backward Euler, which has another matrix
             let (factorizations, solves) = if scheme == Scheme::TrBdf2 { (2, 39) } else { (1, 20) };
             assert_eq!(
                 (work.factorizations, work.direct_solves, work.cg_iterations),
@@ -48,9 +48,9 @@ fn both_solvers_agree() {
     }
 }
 
-/// Asked for where the matrix changes, factors are made for each.
+/// Factors on request are recomputed whenever the matrix changes.
 #[test]
-fn factors_of_a_scene_that_is_not_linear() {
+fn factors_of_a_nonlinear_problem() {
     let run_with = |solver| {
         let conditions = vec![radiation(everywhere(), 0.9, 300.0)];
         let problem =
@@ -65,27 +65,27 @@ fn factors_of_a_scene_that_is_not_linear() {
     assert!(work.cg_iterations == 0 && work.factorizations == work.newton_iterations, "{work:?}");
 }
 
-/// On a brick of equal elements conjugate gradients win at any step; along a line of them, factors.
+/// Conjugate gradients win for a brick of equal elements at any step; factors win along a line.
 #[test]
 fn the_choice_follows_the_scene() {
     let settings = |dt| settings(LinearSolver::Auto, Scheme::BackwardEuler, dt);
-    assert_eq!(brick(12, Capacity::Lumped, settings(0.5)).choose(500.0).method, Method::Diagonal);
+    assert_eq!(brick(12, Capacity::Lumped, settings(0.5)).choose(500.0).method, LinearMethod::Diagonal);
     let adaptive = brick(4, Capacity::Lumped, Settings::adaptive(1.0));
     assert!(adaptive.choose(1e6).reason.contains("adaptive"));
     let mesh = grid([0.2, 1e-3, 1e-3], [200, 1, 1]);
     let conditions = vec![held(&mesh, "left", Field::constant(353.15))];
     let problem = Problem { conditions, ..Problem::new(mesh, conductor(PA12), 493.15) };
     let mut line = Simulation::new(problem, settings(100.0)).unwrap();
-    assert_eq!(line.choose(1e4).method, Method::Factors, "{:?}", line.choose(1e4));
+    assert_eq!(line.choose(1e4).method, LinearMethod::Factors, "{:?}", line.choose(1e4));
     let lines = line.explain(1e4);
     assert!(lines.iter().any(|line| line.contains("804 equations for 200 of 200 elements")), "{lines:#?}");
     run(&mut line, 1e4);
     assert_eq!((line.state().work.factorizations, line.state().work.direct_solves), (1, 100));
 }
 
-/// A block of `elements` along an edge, of distorted hexahedra or of five tetrahedra for each.
+/// Creates a cube with `elements` along an edge, of distorted hexahedra or five tetrahedra each.
 fn distorted(elements: usize, tetrahedra: bool, surface: Condition, settings: Settings) -> Simulation {
-    let into = if tetrahedra { Split::FiveTetrahedra } else { Split::Hexahedra };
+    let into = if tetrahedra { CellSplit::FiveTetrahedra } else { CellSplit::Hexahedra };
     let block = Block { name: "body".into(), lower: [0.0; 3], upper: [0.02; 3] };
     let grid = Grid::uniform(block.lower, block.upper, [elements; 3]).unwrap();
     let mesh = grid.blocks(&[block], into).unwrap().distorted(0.1).unwrap();
@@ -95,8 +95,8 @@ fn distorted(elements: usize, tetrahedra: bool, surface: Condition, settings: Se
     Simulation::new(Problem { conditions, ..Problem::new(mesh, conductor(PA12), 493.15) }, settings).unwrap()
 }
 
-/// Iterations on unequal rows know the matrix to single precision, and reach 1e-9 K from 140 K all the same: factors, of the matrix itself,
-/// give the same temperatures in short and in very long steps.
+/// Iterations on unequal rows use a single-precision matrix and still reach 1e-9 K from 140 K: direct solves
+/// with the exact matrix give the same temperatures in short and very long steps.
 #[test]
 fn packed_rows_and_factors_agree() {
     for (capacity, tetrahedra) in
@@ -115,15 +115,15 @@ fn packed_rows_and_factors_agree() {
             });
             for found in [diagonal, multigrid] {
                 let far = found.iter().zip(&direct).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-                // the tolerance is that of the root mean square, and of two steps
+                // the tolerance is a root mean square, and applies to two steps
                 assert!(far < 1e-8, "{capacity:?}, tetrahedra {tetrahedra}, {dt} s: {far:e}");
             }
         }
     }
 }
 
-/// On meshes of 8³ to 24³ elements and in steps of 10 to 1e5 s multigrid takes at most 22 iterations, and gives the same
-/// temperatures as the diagonal.
+/// On meshes of 8³ to 24³ elements and steps of 10 to 1e5 s, multigrid needs at most 22 iterations, and gives
+/// the same temperatures as the diagonal.
 #[test]
 fn few_iterations_with_multigrid() {
     let run_with = |simulation: &mut Simulation, until: f64| -> f64 {
@@ -148,7 +148,7 @@ fn few_iterations_with_multigrid() {
                 most = most.max(few);
                 assert_eq!(multigrid.state().work.levels, 1);
                 for (a, b) in diagonal.temperatures(0.0).iter().zip(multigrid.temperatures(0.0)) {
-                    // the tolerance of both
+                    // tolerance of both solvers
                     assert!((a - b).abs() < 1e-6, "{a} {b}");
                 }
             }
@@ -157,16 +157,17 @@ fn few_iterations_with_multigrid() {
     }
 }
 
-/// Where solves take many iterations the automatic choice goes over to multigrid in the run, to the same temperatures.
+/// With many iterations per solve, the automatic choice switches to multigrid during the run, with the same
+/// temperatures.
 #[test]
 fn multigrid_takes_over() {
     let run_with = |solver| {
-        // a matrix for each solve, so that factors do not pay
+        // a new matrix for each solve, so that factors do not pay
         let surface = radiation(everywhere(), 0.9, 300.0);
         let mut simulation = distorted(24, true, surface, settings(solver, Scheme::BackwardEuler, 1e3));
         let begun = simulation.choose(1e4).method;
         run(&mut simulation, 1e4);
-        assert_eq!(begun, Method::Diagonal);
+        assert_eq!(begun, LinearMethod::Diagonal);
         simulation
     };
     let [diagonal, auto] = [LinearSolver::ConjugateGradients, LinearSolver::Auto].map(run_with);

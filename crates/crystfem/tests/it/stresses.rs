@@ -1,12 +1,12 @@
-//! Stress of curved bodies on distorted hexahedra: a hot spot in a plate, a ball that cools.
+//! Stress of curved bodies on distorted hexahedra: a hot spot in a plate, and a cooling ball.
 
-use crystfem::mechanics::{Body, SolidifyingMaxwell, Support};
+use crystfem::mechanics::{Body, FixedComponent, SolidifyingMaxwell};
 use crystfem::mesh::Mesh;
 use evidence::{at_most, near};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
-/// Hexahedra from blocks that share sides; nodes in one place are one.
+/// Hexahedra from blocks with shared sides; coincident nodes are merged.
 #[derive(Default)]
 struct Blocks {
     mesh: Mesh,
@@ -14,7 +14,7 @@ struct Blocks {
 }
 
 impl Blocks {
-    /// A block of `count` elements, `map` from its unit cube.
+    /// Adds a block of `count` elements, mapped from the unit cube.
     fn add(&mut self, count: [usize; 3], map: impl Fn([f64; 3]) -> [f64; 3]) {
         let mut node = |index: [usize; 3]| {
             let point = map(std::array::from_fn(|d| index[d] as f64 / count[d] as f64));
@@ -38,20 +38,21 @@ impl Blocks {
     }
 }
 
-/// A point of [−1, 1]² or [−1, 1]³ from a cube to a ball: at `share` 1 the sides are round.
+/// Maps a point of [−1, 1]² or [−1, 1]³ from a cube towards a ball, which is round for `share` = 1.
 fn rounded<const N: usize>(place: [f64; N], share: f64) -> [f64; N] {
     let largest = place.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     let norm = place.iter().map(|x| x * x).sum::<f64>().sqrt();
     if norm == 0.0 { place } else { place.map(|x| x * (1.0 - share + share * largest / norm)) }
 }
 
-/// One elastic step of all elements with a free strain by place, and symmetry where a coordinate is 0.
+/// Computes one elastic step of all elements with a free strain by position; planes through 0 are symmetry
+/// planes.
 pub(crate) fn heated(mesh: &Mesh, poisson: f64, strain: impl Fn([f64; 3]) -> f64) -> Body<'_> {
     let mut body = Body::new(mesh, poisson).unwrap();
     body.tolerance = 1e-10;
-    body.born(0..mesh.element_count(), 1);
+    body.activate(0..mesh.element_count(), 1);
     let law = SolidifyingMaxwell::elastic(1.0, poisson, 0.0, f64::INFINITY);
-    let supports: Vec<Support> = (0..mesh.points.len() as u32)
+    let supports: Vec<FixedComponent> = (0..mesh.points.len() as u32)
         .flat_map(|node| (0..3).map(move |d| (node, d)))
         .filter(|&(node, d)| mesh.points[node as usize][d].abs() < 1e-12)
         .collect();
@@ -60,17 +61,18 @@ pub(crate) fn heated(mesh: &Mesh, poisson: f64, strain: impl Fn([f64; 3]) -> f64
     body
 }
 
-/// The middle of an element.
+/// Returns the center of an element.
 fn middle(mesh: &Mesh, element: usize) -> [f64; 3] {
     let corners = mesh.hexahedra[element].map(|node| mesh.points[node as usize]);
     std::array::from_fn(|d| corners.iter().map(|corner| corner[d]).sum::<f64>() / 8.0)
 }
 
-/// A quarter of a square plate of 20 mm with a hot spot of 1 mm: `n` elements along each eighth of its circle.
+/// Creates a quarter of a square plate of 20 mm with a hot spot of 1 mm: `n` elements along each eighth of
+/// its circle.
 pub(crate) fn hot_spot(n: usize) -> Mesh {
     let mut blocks = Blocks::default();
     let thick = 0.1 / n as f64;
-    // a core, a ring up to the circle, and one up to the square, growing outwards
+    // a core, a ring up to the circle, and a ring up to the square, growing outwards
     blocks.add([n, n, 1], |[x, y, z]| {
         let [x, y] = rounded([0.5 * x, 0.5 * y], 0.3);
         [x, y, thick * z]
@@ -93,7 +95,8 @@ pub(crate) fn hot_spot(n: usize) -> Mesh {
     blocks.mesh
 }
 
-/// NAFEMS T1, Eε = 100 MPa: inside −49.550398 MPa; outside 50/r² of an infinite plate, and what the square adds, 0.446005 at the circle.
+/// NAFEMS T1, Eε = 100 MPa: −49.550398 MPa inside; outside 50/r² of an infinite plate, plus 0.446005 at the
+/// circle from the square.
 #[test]
 fn a_hot_spot_in_a_plate() {
     let mut errors = Vec::new();
@@ -108,9 +111,9 @@ fn a_hot_spot_in_a_plate() {
         for element in 0..mesh.hexahedra.len() {
             let [x, y, _] = middle(&mesh, element);
             let radius = x.hypot(y);
-            // beside the jump, elements oscillate: 1.9 MPa at 1.11 mm with n = 8
+            // elements beside the jump oscillate: 1.9 MPa at 1.11 mm for n = 8
             if radius > 1.25 && radius < 2.0 && y < 0.3 {
-                // the hoop stress, turned from the axes
+                // hoop stress
                 let [xx, yy, _, xy, ..] = body.mean_stress(element);
                 let (c, s) = (x / radius, y / radius);
                 let hoop = 100.0 * (xx * s * s + yy * c * c - 2.0 * xy * s * c);
@@ -122,13 +125,13 @@ fn a_hot_spot_in_a_plate() {
     near("hot_spot_order", (errors[0] / errors[1]).log2(), 2.0, 0.1);
 }
 
-/// An eighth of a ball of radius 1: `n` elements along each edge of its core.
+/// Creates an eighth of a ball of radius 1: `n` elements along each edge of its core.
 pub(crate) fn ball(n: usize) -> Mesh {
     let mut blocks = Blocks::default();
     let core = |place: [f64; 3]| rounded(place.map(|x| 0.5 * x), 0.4);
     blocks.add([n; 3], core);
     for axis in 0..3 {
-        // cyclic, so that elements stay right-handed: outwards, then the two others
+        // cyclic axes keep elements right-handed: outwards, then the two others
         let place = |out: f64, a: f64, b: f64| {
             let mut place = [0.0; 3];
             (place[axis], place[(axis + 1) % 3], place[(axis + 2) % 3]) = (out, a, b);
@@ -142,7 +145,7 @@ pub(crate) fn ball(n: usize) -> Mesh {
     blocks.mesh
 }
 
-/// Σ over the eigenvalues of a ball that cools from 1 to 0 on its surface, Fo = 0.1.
+/// Sums the series over the eigenvalues of a ball that cools from 1 to 0 on its surface, Fo = 0.1.
 fn series(value: impl Fn(f64) -> f64) -> f64 {
     let term = |n: i32| {
         let k = PI * f64::from(n);
@@ -152,18 +155,19 @@ fn series(value: impl Fn(f64) -> f64) -> f64 {
     (1..40).map(term).sum()
 }
 
-/// T(r) of that ball.
+/// Returns T(r) of that ball.
 pub(crate) fn cooling(r: f64) -> f64 {
     series(|k| if r > 1e-6 { (k * r).sin() / r } else { k })
 }
 
-/// ∫T r² dr from 0 to r.
+/// Returns ∫T r² dr from 0 to r.
 pub(crate) fn heat_within(r: f64) -> f64 {
     series(|k| (k * r).sin() / (k * k) - r * (k * r).cos() / k)
 }
 
-/// A ball that cools from 1 to 0 on its surface, Fo = 0.1 (Carslaw and Jaeger), and its stresses (Timoshenko and Goodier, Eα = 1): σ_r =
-/// 2/(1 − ν) [I(1) − I(r)/r³], σ_θ = 1/(1 − ν) [2I(1) + I(r)/r³ − T], I = ∫Tr² dr from 0 to r; the surface moves by 3I(1).
+/// Ball that cools from 1 to 0 on its surface, Fo = 0.1 (Carslaw and Jaeger), with stresses of Timoshenko and
+/// Goodier, Eα = 1: σ_r = 2/(1 − ν) [I(1) − I(r)/r³], σ_θ = 1/(1 − ν) [2I(1) + I(r)/r³ − T], I = ∫Tr² dr from
+/// 0 to r; the surface moves by 3I(1).
 #[test]
 fn a_ball_cools() {
     const POISSON: f64 = 0.4;
@@ -178,7 +182,7 @@ fn a_ball_cools() {
             .filter(|(point, _)| (radius(**point) - 1.0).abs() < 1e-9)
             .map(|(point, u)| ((0..3).map(|d| point[d] * u[d]).sum::<f64>() / (3.0 * heat(1.0)) - 1.0).abs())
             .fold(0.0, f64::max);
-        // of the whole stress tensor, by volume
+        // error of the whole stress tensor, weighted by volume
         let (mut difference, mut whole) = (0.0, 0.0);
         for element in 0..mesh.hexahedra.len() {
             let place = middle(&mesh, element);

@@ -1,20 +1,20 @@
-//! Stress of tetrahedra of first and second order: exact states, beams, curved bodies.
+//! Stress of first- and second-order tetrahedra: exact states, beams, curved bodies.
 
 use crate::stresses::{ball, cooling, heat_within, heated, hot_spot};
-use crystfem::mechanics::{Body, SolidifyingMaxwell, Support};
-use crystfem::mesh::{Block, Grid, Mesh, Split};
+use crystfem::mechanics::{Body, FixedComponent, SolidifyingMaxwell};
+use crystfem::mesh::{Block, CellSplit, Grid, Mesh};
 use evidence::{at_most, near, within};
 use std::collections::HashMap;
 
-fn brick(size: [f64; 3], count: [usize; 3], split: Split, second: bool) -> Mesh {
+fn brick(size: [f64; 3], count: [usize; 3], split: CellSplit, second: bool) -> Mesh {
     let grid = Grid::uniform([0.0; 3], size, count).unwrap();
     let block = [Block { name: "all".into(), lower: [0.0; 3], upper: size }];
     let mesh = grid.blocks(&block, split).unwrap();
     if second { mesh.second_order() } else { mesh }
 }
 
-/// 3-2-1 supports of a brick from the origin on.
-fn resting(mesh: &Mesh) -> Vec<Support> {
+/// Returns 3-2-1 supports of a brick with a corner at the origin.
+fn three_two_one_supports(mesh: &Mesh) -> Vec<FixedComponent> {
     let far = |d: usize| {
         let most = mesh.points.iter().map(|p| p[d]).fold(0.0, f64::max);
         let at = |p: &[f64; 3]| p[d] == most && (0..3).all(|e| e == d || p[e] == 0.0);
@@ -24,7 +24,7 @@ fn resting(mesh: &Mesh) -> Vec<Support> {
     vec![(origin, 0), (origin, 1), (origin, 2), (far(0), 1), (far(0), 2), (far(1), 2)]
 }
 
-/// One elastic step: moduli of elements, free strains by place.
+/// Computes one elastic step with moduli of elements and free strains by position.
 fn step<'a>(
     mesh: &'a Mesh,
     poisson: f64,
@@ -32,10 +32,10 @@ fn step<'a>(
     strain: impl Fn(usize, [f64; 3]) -> f64,
 ) -> Body<'a> {
     let mut body = Body::new(mesh, poisson).unwrap();
-    body.born(0..mesh.element_count(), 1);
+    body.activate(0..mesh.element_count(), 1);
     let law = |e| SolidifyingMaxwell::elastic(modulus(e), poisson, 0.0, f64::INFINITY);
     let hold = |e| law(e).increment([300.0, 0.0], [300.0, 0.0], 0.0);
-    body.step(hold, |e, _, place| strain(e, place), &resting(mesh)).unwrap();
+    body.step(hold, |e, _, place| strain(e, place), &three_two_one_supports(mesh)).unwrap();
     body
 }
 
@@ -44,18 +44,18 @@ fn largest(body: &Body, mesh: &Mesh) -> f64 {
     points.flat_map(|(e, p)| body.stress(e, p)).fold(0.0, |most: f64, s| most.max(s.abs()))
 }
 
-/// A body that expands by itself, or by a linear function of place, is free of stress: in distorted meshes, on curved edges.
+/// Bodies with uniform or linear free strain are stress-free, on distorted meshes and with curved edges.
 #[test]
 fn free_bodies_have_no_stress() {
     let size = [3e-3, 2e-3, 2e-3];
     for (name, split, second, linear, least, most) in [
-        ("tet4", Split::FiveTetrahedra, false, false, 0.0, 1e-10),
-        ("tet4_six", Split::SixTetrahedra, false, false, 0.0, 1e-10),
-        ("tet10", Split::FiveTetrahedra, true, false, 0.0, 1e-10),
-        ("tet10_linear", Split::SixTetrahedra, true, true, 0.0, 1e-10),
-        ("hex8_linear", Split::Hexahedra, false, true, 0.0, 1e-10),
-        // constant strains cannot bend: this is the locking of the first order
-        ("tet4_linear", Split::SixTetrahedra, false, true, 0.05, 0.5),
+        ("tet4", CellSplit::FiveTetrahedra, false, false, 0.0, 1e-10),
+        ("tet4_six", CellSplit::SixTetrahedra, false, false, 0.0, 1e-10),
+        ("tet10", CellSplit::FiveTetrahedra, true, false, 0.0, 1e-10),
+        ("tet10_linear", CellSplit::SixTetrahedra, true, true, 0.0, 1e-10),
+        ("hex8_linear", CellSplit::Hexahedra, false, true, 0.0, 1e-10),
+        // constant strains cannot bend: locking of the first order
+        ("tet4_linear", CellSplit::SixTetrahedra, false, true, 0.05, 0.5),
     ] {
         let mesh = brick(size, [3, 2, 2], split, second);
         let mesh = if linear { mesh } else { mesh.distorted(0.15).unwrap() };
@@ -65,7 +65,7 @@ fn free_bodies_have_no_stress() {
     }
 }
 
-/// Curvature of the lower edge by least squares over the middle quarter.
+/// Fits the curvature of the lower edge by least squares over the middle quarter.
 fn curvature(mesh: &Mesh, body: &Body) -> f64 {
     let length = mesh.points.iter().map(|p| p[0]).fold(0.0, f64::max);
     let edge: Vec<[f64; 2]> = (0..mesh.points.len())
@@ -78,12 +78,13 @@ fn curvature(mesh: &Mesh, body: &Body) -> f64 {
     2.0 * matrix.svd(true, true).solve(&right, 1e-14).unwrap()[2] / (length * length)
 }
 
-/// Timoshenko's bimetal, 1 mm of 3 GPa and 2 mm of 1.5 GPa, free strains of −1 and −2 %, ν = 0: κ = 4.864864865 /m. In the second order it is
-/// exact away from the ends; the first bends too little, and converges from below.
+/// Timoshenko's bimetal, 1 mm of 3 GPa and 2 mm of 1.5 GPa, free strains of −1 and −2 %, ν = 0: κ =
+/// 4.864864865 /m. The second order is exact away from the ends; the first order is too stiff, and converges
+/// from below.
 #[test]
 fn a_bimetal_bends() {
     let found = |count: [usize; 3], second: bool| {
-        let mesh = brick([0.04, 2e-3, 3e-3], count, Split::SixTetrahedra, second);
+        let mesh = brick([0.04, 2e-3, 3e-3], count, CellSplit::SixTetrahedra, second);
         let low = |e: usize| mesh.centre(e as u32)[2] < 1e-3;
         let body =
             step(&mesh, 0.0, |e| if low(e) { 3e9 } else { 1.5e9 }, |e, _| if low(e) { -0.01 } else { -0.02 });
@@ -95,8 +96,8 @@ fn a_bimetal_bends() {
     within("tetrahedra_bimetal_tet4_half", first[1], 0.74, 0.82);
 }
 
-/// Four tetrahedra on each side of each hexahedron, around its middle. New nodes and, of second order, those on edges are moved to the
-/// circle or sphere of radius 1 if all around them lie on it.
+/// Splits each hexahedron into four tetrahedra per side, around its center. New nodes, and second-order nodes
+/// on edges, move to the circle or sphere of radius 1 if all surrounding nodes lie on it.
 fn split(hexahedra: &Mesh, second: bool, radius: impl Fn([f64; 3]) -> f64) -> Mesh {
     let mut mesh = Mesh { points: hexahedra.points.clone(), ..Mesh::default() };
     let round = |places: &[[f64; 3]], axes: usize| {
@@ -108,7 +109,7 @@ fn split(hexahedra: &Mesh, second: bool, radius: impl Fn([f64; 3]) -> f64) -> Me
         }
         mean
     };
-    // a circle is round in x and y alone
+    // a circle is round in x and y only
     let axes = if radius([0.0, 0.0, 1.0]) == 0.0 { 2 } else { 3 };
     let mut middles: HashMap<[u32; 4], u32> = HashMap::new();
     for (element, corners) in (0_u32..).zip(&hexahedra.hexahedra) {
@@ -140,7 +141,8 @@ fn split(hexahedra: &Mesh, second: bool, radius: impl Fn([f64; 3]) -> f64) -> Me
     mesh
 }
 
-/// A ball that cools, as of hexahedra: error of the surface's displacement, and of the stress in the middles of elements, by volume.
+/// Computes errors of a cooling ball, as for hexahedra: surface displacement, and stress at element centers,
+/// weighted by volume.
 fn ball_errors(n: usize, second: bool) -> [f64; 2] {
     const POISSON: f64 = 0.4;
     let radius = |[x, y, z]: [f64; 3]| (x * x + y * y + z * z).sqrt();
@@ -189,7 +191,7 @@ fn a_ball_cools() {
     }
 }
 
-/// NAFEMS T1, a hot spot in a plate, Eε = 100 MPa: −49.550398 MPa in the middle.
+/// NAFEMS T1, a hot spot in a plate, Eε = 100 MPa: −49.550398 MPa at the center.
 #[test]
 fn a_hot_spot_in_a_plate() {
     let radius = |[x, y, _]: [f64; 3]| x.hypot(y);
@@ -197,7 +199,7 @@ fn a_hot_spot_in_a_plate() {
         let mesh = split(&hot_spot(n), true, radius);
         let hot = |place: [f64; 3]| if radius(place) < 1.0 { 1.0 } else { 0.0 };
         let body = heated(&mesh, 0.3, hot);
-        // the tetrahedra of the first hexahedron, at the middle of the spot
+        // tetrahedra of the first hexahedron, at the center of the spot
         let mean = (0..24).map(|e| 100.0 * body.mean_stress(e)[1]).sum::<f64>() / 24.0;
         (mean + 49.550_398).abs()
     };
@@ -206,14 +208,14 @@ fn a_hot_spot_in_a_plate() {
     within("tetrahedra_hot_spot_order", (coarse / fine).log2(), 2.5, 6.0);
 }
 
-/// Elements of all kinds beside each other, and those that have none.
+/// Mixed element types, and unsupported ones.
 #[test]
-fn kinds_are_told_apart() {
-    let wedges = brick([1.0; 3], [1, 1, 1], Split::Wedges, false);
+fn element_types_can_be_mixed() {
+    let wedges = brick([1.0; 3], [1, 1, 1], CellSplit::Wedges, false);
     assert!(Body::new(&wedges, 0.3).is_err());
     assert!(Body::new(&wedges.second_order(), 0.3).is_err());
-    let mut both = brick([1.0; 3], [1, 1, 1], Split::Hexahedra, false);
-    // a tetrahedron with one face's nodes, and one of second order upside down
+    let mut both = brick([1.0; 3], [1, 1, 1], CellSplit::Hexahedra, false);
+    // a tetrahedron on a face of the hexahedron
     both.points.push([0.3, 0.3, 2.0]);
     both.tetrahedra.push([4, 5, 7, 8]);
     let body = step(&both, 0.3, |_| 1e9, |_, _| 1e-2);

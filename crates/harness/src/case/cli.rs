@@ -1,6 +1,8 @@
-//! The command line that all programs have: run, resume, check, sweep, schema, completions, and a program's own commands.
+//! The command line that all programs have: run, resume, check, sweep, schema, completions, and a program's
+//! own commands.
 
 use super::inputs::{InputArguments, attach, describe};
+use super::summary::summary;
 use super::terminal::{
     self, Progress, Threads, default_output, exit, interrupted, seconds, with_negative_numbers,
 };
@@ -12,7 +14,7 @@ use polycore::Error;
 use polycore::file::prepare_directory;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 #[derive(Parser)]
 struct Cli<V: Subcommand> {
@@ -20,6 +22,9 @@ struct Cli<V: Subcommand> {
     command: Command<V>,
     #[command(flatten)]
     threads: Threads,
+    /// Show all values and expectations of a run, not only the main ones.
+    #[arg(long, global = true, display_order = 101)]
+    verbose: bool,
 }
 
 #[derive(Subcommand)]
@@ -37,7 +42,7 @@ enum Command<V: Subcommand> {
     Check {
         /// The scene (TOML).
         scene: PathBuf,
-        /// As `run --quick` would.
+        /// Check as `run --quick` would.
         #[arg(long)]
         quick: bool,
         #[command(flatten)]
@@ -96,12 +101,13 @@ pub struct RunArguments {
 struct SweepArguments {
     /// The scene (TOML).
     scene: PathBuf,
-    /// A key of the scene and its values, e.g. print.layer_time=10s,20s,40s; several make a grid, and keys joined with
-    /// `;` change together.
+    /// A key of the scene and its values, e.g. print.layer_time=10s,20s,40s; several make a grid, and keys
+    /// joined with `;` change together.
     #[arg(long, value_name = "KEY=VALUE,…", required_unless_present_any = ["search", "sample"])]
     vary: Vec<Vary>,
     /// A table of the scene and a CSV file with draws of its keys, such as a fit writes, e.g.
-    /// materials.pa12.kinetics=out/fit/nakamura_posterior.csv: gives the band of every value; may be repeated.
+    /// materials.pa12.kinetics=out/fit/nakamura_posterior.csv: gives the band of every value; may be
+    /// repeated.
     #[arg(long, value_name = "KEY=FILE", conflicts_with = "search")]
     sample: Vec<Sample>,
     /// Draws of the samples to run; default: 20, or all of a shorter file.
@@ -147,8 +153,8 @@ impl Checkpoints {
     }
 }
 
-/// The main function of a program: its commands on scenes, and `own`, which runs its own commands `V`. Each gives whether
-/// it passed.
+/// The main function of a program: its commands on scenes, and `own`, which runs its own commands `V`. Each
+/// gives whether it passed.
 pub fn main<C: Case, V: Subcommand>(own: impl FnOnce(V) -> Result<bool, Failure<C::Error>>) -> ExitCode {
     let program = C::PROGRAM;
     let mut command = with_negative_numbers(Cli::<V>::command())
@@ -156,7 +162,8 @@ pub fn main<C: Case, V: Subcommand>(own: impl FnOnce(V) -> Result<bool, Failure<
         .version(program.version)
         .about(program.about)
         .after_help(format!(
-            "Examples:\n{}\n\nExit codes: 0 done, 1 an expectation or the run failed, 2 bad input, 130 interrupted.",
+            "Examples:\n{}\n\n\
+             Exit codes: 0 done, 1 an expectation or the run failed, 2 bad input, 130 interrupted.",
             program.examples
         ));
     let matches = command.clone().get_matches();
@@ -168,10 +175,10 @@ pub fn main<C: Case, V: Subcommand>(own: impl FnOnce(V) -> Result<bool, Failure<
     exit(match cli.command {
         Command::Run(arguments) => Source::read(&arguments.scene)
             .map_err(Failure::from)
-            .and_then(|source| solve::<C>(&source, &arguments)),
-        Command::Resume { output, checkpoints } => resume::<C>(&output, checkpoints.every()),
+            .and_then(|source| run_shown::<C>(&source, &arguments, cli.verbose)),
+        Command::Resume { output, checkpoints } => resume::<C>(&output, checkpoints.every(), cli.verbose),
         Command::Check { scene, quick, inputs } => check::<C>(&scene, quick, &inputs),
-        Command::Sweep(arguments) => sweep::<C>(*arguments),
+        Command::Sweep(arguments) => sweep::<C>(*arguments, cli.verbose),
         Command::View { output, html } => show::<C>(&output, html.as_deref()),
         Command::Own(command) => own(command),
         Command::Schema => {
@@ -186,7 +193,7 @@ pub fn main<C: Case, V: Subcommand>(own: impl FnOnce(V) -> Result<bool, Failure<
         }
         Command::Man { output } => prepare_directory(&output)
             .and_then(|()| {
-                clap_mangen::generate_to(command, &output).map_err(Error::io("write into", &output))
+                clap_mangen::generate_to(command, &output).map_err(Error::from_io("write into", &output))
             })
             .map(|()| true)
             .map_err(Failure::from),
@@ -198,32 +205,41 @@ pub fn main<C: Case, V: Subcommand>(own: impl FnOnce(V) -> Result<bool, Failure<
 /// # Errors
 /// [`Failure`].
 pub fn solve<C: Case>(source: &Source, arguments: &RunArguments) -> Result<bool, Failure<C::Error>> {
+    run_shown::<C>(source, arguments, false)
+}
+
+fn run_shown<C: Case>(
+    source: &Source,
+    arguments: &RunArguments,
+    verbose: bool,
+) -> Result<bool, Failure<C::Error>> {
     let RunArguments { scene, output, quick, explain, checkpoints, with_inputs, inputs } = arguments;
     let output = output.clone().unwrap_or_else(|| default_output(scene));
     let source = &attach::<C>(source.clone(), &output, *quick, inputs, *with_inputs)?;
     if *explain {
         explain_all::<C>(source, &output, *quick, inputs)?;
     }
-    finish::<C>(source, &output, *quick, checkpoints.every(), false)
+    finish::<C>(source, &output, (*quick, false), checkpoints.every(), verbose)
 }
 
-fn resume<C: Case>(output: &Path, every: Duration) -> Result<bool, Failure<C::Error>> {
+fn resume<C: Case>(output: &Path, every: Duration, verbose: bool) -> Result<bool, Failure<C::Error>> {
     if terminal::is_finished(output) {
         return Ok(true);
     }
     let header = Header::read(output, C::PROGRAM.magic)?;
     header.check(output)?;
     let source = Source::new(header.scene_path, header.scene).with_inputs(header.stamp.inputs);
-    finish::<C>(&source, output, header.quick, every, true)
+    finish::<C>(&source, output, (header.quick, true), every, verbose)
 }
 
 fn finish<C: Case>(
     source: &Source,
     output: &Path,
-    quick: bool,
+    (quick, resume): (bool, bool),
     checkpoint_every: Duration,
-    resume: bool,
+    verbose: bool,
 ) -> Result<bool, Failure<C::Error>> {
+    let begun = Instant::now();
     let mut bar = Progress::start();
     let mut progress = |part: f64, line: &dyn Fn() -> String| bar.show(part, line);
     let interrupted = interrupted();
@@ -237,7 +253,12 @@ fn finish<C: Case>(
     };
     let finished = super::run::<C>(source, options)?;
     bar.finish();
-    terminal::print(format_args!("{}results in {}\n", finished.text, output.display()));
+    if verbose {
+        terminal::print(format_args!("{}results in {}\n", finished.text, output.display()));
+    } else {
+        let style = terminal::TerminalStyle::of_output();
+        terminal::print(summary(&C::PROGRAM, source, &finished, output, begun.elapsed(), &style));
+    }
     Ok(finished.report.passed())
 }
 
@@ -267,7 +288,7 @@ fn show<C: Case>(output: &Path, html: Option<&Path>) -> Result<bool, Failure<C::
     Ok(true)
 }
 
-fn sweep<C: Case>(arguments: SweepArguments) -> Result<bool, Failure<C::Error>> {
+fn sweep<C: Case>(arguments: SweepArguments, verbose: bool) -> Result<bool, Failure<C::Error>> {
     let SweepArguments { scene, mut vary, sample, count, search, shard, merge, slurm, column, .. } =
         arguments;
     let output = &arguments.output.unwrap_or_else(|| {
@@ -299,11 +320,13 @@ fn sweep<C: Case>(arguments: SweepArguments) -> Result<bool, Failure<C::Error>> 
         None => super::sweep::<C>(source, &vary, &mut options)?,
     };
     bar.finish();
-    terminal::print(format_args!("{}results in {}\n", finished.text, output.display()));
+    let text = finished.table.as_ref().filter(|_| !verbose).unwrap_or(&finished.text);
+    terminal::print(format_args!("{text}results in {}\n", output.display()));
     Ok(finished.report.passed())
 }
 
-/// The command line of this process without `--slurm N` and `--threads N`, which its jobs do not take over.
+/// Returns the command line of this process without `--slurm N` and `--threads N`, which its jobs do not take
+/// over.
 fn without_slurm() -> Vec<String> {
     let program = std::env::current_exe().map(|path| path.display().to_string());
     let mut words = vec![program.unwrap_or_else(|_| "sweep".into())];

@@ -5,8 +5,8 @@ use polycore::file::prepare_directory;
 use std::fs::{self, File};
 use std::path::Path;
 
-/// The directory of a new run: as [`prepare_directory`], without what an earlier run left, which must not pass for this
-/// one's, and held against a second run.
+/// Returns the directory of a new run: as [`prepare_directory`], without what an earlier run left, which must
+/// not pass for this one's, and held against a second run.
 ///
 /// # Errors
 /// As [`prepare_directory`] and [`lock_run`].
@@ -21,7 +21,7 @@ pub fn prepare_run(directory: impl AsRef<Path>) -> Result<RunLock, Error> {
     Ok(lock)
 }
 
-/// The directory of a resumed run: without half-written files, and held against a second run.
+/// Returns the directory of a resumed run: without half-written files, and held against a second run.
 ///
 /// # Errors
 /// As [`lock_run`].
@@ -38,8 +38,8 @@ pub struct RunLock {
     _handle: Option<File>,
 }
 
-/// Keeps a second run, or a second `resume`, out of a directory. Where the system or its file system has no such locks,
-/// nothing is kept out.
+/// Keeps a second run, or a second `resume`, out of a directory. Where the system or its file system has no
+/// such locks, nothing is kept out.
 ///
 /// # Errors
 /// [`Error::OutputDirectory`] (exit code 2) where another run holds it.
@@ -66,7 +66,8 @@ fn locked(directory: &Path, lock: fn(&File) -> Result<(), fs::TryLockError>) -> 
     }
 }
 
-/// Removes what a killed run leaves: files and folders that it had begun to write under their temporary names.
+/// Removes what a killed run leaves: files and folders that it had begun to write under their temporary
+/// names.
 pub fn remove_unfinished(directory: &Path) {
     for entry in fs::read_dir(directory).into_iter().flatten().flatten() {
         let name = entry.file_name();

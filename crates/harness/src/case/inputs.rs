@@ -1,4 +1,5 @@
-//! Chains of scenes: whether the results that a scene reads are there and still hold, and how they are computed first.
+//! Chains of scenes: whether the results that a scene reads are there and still hold, and how they are
+//! computed first.
 
 use super::Case;
 use super::terminal::{default_output, interrupted};
@@ -15,24 +16,24 @@ use std::process::{Command, ExitStatus, Stdio};
 use std::str::FromStr;
 use std::time::{Duration, Instant};
 
-/// How long an input that is asked to stop may take before it is killed; its checkpoint remains.
+/// Time after which an input that does not stop is killed; its checkpoint remains.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// Where the results of inputs lie.
+/// Folders of the results of inputs.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub(super) struct InputArguments {
     /// Folder of the results of an input, where it is not beside this run's own; may be repeated.
     #[arg(long = "input", value_name = "NAME=FOLDER")]
-    inputs: Vec<Placed>,
+    inputs: Vec<PlacedInput>,
 }
 
 #[derive(Clone, Debug)]
-struct Placed {
+struct PlacedInput {
     name: String,
     output: PathBuf,
 }
 
-impl FromStr for Placed {
+impl FromStr for PlacedInput {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -48,31 +49,31 @@ impl FromStr for Placed {
 /// A scene that another one names in `[inputs]`.
 #[derive(Clone, Debug)]
 pub struct Input {
-    /// Its name there.
+    /// Name in `[inputs]`.
     pub name: String,
     /// The scene.
     pub source: Source,
-    /// Its program.
+    /// Program that runs the scene.
     pub program: &'static str,
     /// The folder of its results.
     pub output: PathBuf,
 }
 
-/// Whether the results of an input can be used.
+/// State of the results of an input.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum InputState {
-    /// They are what its scene, its files and its own inputs give now.
+    /// Results agree with the scene, its files and its own inputs.
     Current {
         /// The [`identity`](crate::scene::Stamp::identity).
         identity: String,
-        /// Whether all its expectations are satisfied.
+        /// True if all expectations are met.
         passed: bool,
     },
-    /// There are none.
+    /// No results.
     Missing,
-    /// A run was stopped on the way.
+    /// The run was interrupted.
     Unfinished,
-    /// They no longer hold.
+    /// The results no longer hold.
     Stale(String),
 }
 
@@ -89,7 +90,7 @@ impl fmt::Display for InputState {
 }
 
 impl Input {
-    /// What a user types to compute it.
+    /// Returns the command that computes the input.
     fn command(&self, quick: bool) -> String {
         let quick = if quick { " --quick" } else { "" };
         let (scene, output) = (self.source.path.display(), self.output.display());
@@ -97,7 +98,8 @@ impl Input {
     }
 }
 
-/// The scenes that a scene names, whose results lie beside `output`, the folder of its own, or where `placed` says.
+/// Returns the scenes that a scene names, whose results lie beside `output`, the folder of its own, or where
+/// `placed` says.
 ///
 /// # Errors
 /// A scene that is missing or names no program; one that, by way of others, needs its own results.
@@ -171,7 +173,7 @@ fn tidy(path: &Path) -> String {
     parts.into_iter().collect::<PathBuf>().display().to_string()
 }
 
-/// Whether the results of an input can be used; a `quick` run may use results of quick runs.
+/// Returns the state of the results of an input; a `quick` run may use results of quick runs.
 pub fn input_state(input: &Input, quick: bool) -> InputState {
     let stale = |why: String| InputState::Stale(why);
     if input.output.join(crate::checkpoint::FILE_NAME).is_file() {
@@ -216,7 +218,7 @@ impl InputArguments {
         self.inputs.iter().map(|placed| (placed.name.clone(), placed.output.clone())).collect()
     }
 
-    fn of(&self, source: &Source, output: &Path) -> Result<Vec<Input>, SceneError> {
+    fn list(&self, source: &Source, output: &Path) -> Result<Vec<Input>, SceneError> {
         inputs(source, output, &self.placed())
     }
 }
@@ -228,7 +230,7 @@ pub(super) fn describe(
     quick: bool,
     arguments: &InputArguments,
 ) -> Result<(), SceneError> {
-    let inputs = arguments.of(source, output)?;
+    let inputs = arguments.list(source, output)?;
     if !inputs.is_empty() {
         crate::say!("inputs");
     }
@@ -239,7 +241,8 @@ pub(super) fn describe(
     Ok(())
 }
 
-/// A scene with the results of its inputs; `with_inputs`: those that are not current are computed first.
+/// Returns a scene with the results of its inputs; `with_inputs`: those that are not current are computed
+/// first.
 ///
 /// # Errors
 /// Results that are missing or stale, with the command that computes them; an input that fails.
@@ -253,8 +256,8 @@ pub(super) fn attach<C: Case>(
     attached::<C::Error>(source, output, quick, &arguments.placed(), with_inputs)
 }
 
-/// A scene with the results of its inputs, which lie beside `output` or where `placed` says; `with_inputs`: those that are not
-/// current are computed first, by the programs beside this one.
+/// Returns a scene with the results of its inputs, which lie beside `output` or where `placed` says;
+/// `with_inputs`: those that are not current are computed first, by the programs beside this one.
 ///
 /// # Errors
 /// Results that are missing or stale, with the command that computes them; an input that fails.
@@ -325,7 +328,7 @@ fn compute<E: From<Error>>(
     Ok(())
 }
 
-/// Whether an unfinished run is one of the scene and the files as they are now.
+/// Returns whether an unfinished run is one of the scene and the files as they are now.
 fn continues(input: &Input, quick: bool) -> bool {
     let directory = &input.output;
     let file = File::open(directory.join(crate::checkpoint::FILE_NAME));
@@ -337,22 +340,23 @@ fn continues(input: &Input, quick: bool) -> bool {
         })
 }
 
-/// The executable beside this one.
+/// Returns the executable beside this one.
 fn sibling(program: &str) -> Result<PathBuf, String> {
     let own = std::env::current_exe().map_err(|error| format!("no place of this program: {error}"))?;
     let path = own.with_file_name(program).with_extension(std::env::consts::EXE_EXTENSION);
     if path.is_file() { Ok(path) } else { Err(format!("no program {}", path.display())) }
 }
 
-/// Waits for a program; nothing where the user stopped it. One that leaves no results explains itself on standard error.
+/// Waits for a program; nothing where the user stopped it. One that leaves no results explains itself on
+/// standard error.
 fn finished(command: &mut Command) -> Result<Option<ExitStatus>, Error> {
     let asked = interrupted();
     let program = PathBuf::from(command.get_program());
-    let mut child = command.stdin(Stdio::null()).spawn().map_err(Error::io("start", &program))?;
+    let mut child = command.stdin(Stdio::null()).spawn().map_err(Error::from_io("start", &program))?;
     let mut since = None;
     let mut pause = Duration::from_millis(2);
     loop {
-        if let Some(status) = child.try_wait().map_err(Error::io("wait for", &program))? {
+        if let Some(status) = child.try_wait().map_err(Error::from_io("wait for", &program))? {
             let stopped = status.code() == Some(i32::from(polycore::error::EXIT_INTERRUPTED));
             return Ok((!stopped && since.is_none()).then_some(status));
         }

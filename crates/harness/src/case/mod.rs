@@ -1,20 +1,25 @@
-//! The harness of the command lines: what a program is, and how one run, a resumed run and a sweep of it are driven.
+//! The harness of the command lines: what a program is, and how one run, a resumed run and a sweep of it are
+//! driven.
 //!
-//! A program implements [`Case`]: it reads a scene, says what it builds, and solves it. Everything around that is here,
-//! once: command line, lock and checkpoint of the output directory, progress, interruption, sweeps, the report.
+//! A program implements [`Case`]: it reads a scene, says what it builds, and solves it. Everything around
+//! that is here, once: command line, lock and checkpoint of the output directory, progress, interruption,
+//! sweeps, the report.
 
 mod cli;
 mod folder;
 mod inputs;
 mod rows;
+mod summary;
 mod sweep;
 pub mod terminal;
 
 pub use cli::{RunArguments, main, solve};
 pub use folder::{RunLock, lock_run, prepare_run, remove_unfinished, resume_run, share_run};
 pub use inputs::{Input, InputState, attached, input_state, inputs};
-use rows::fits;
+pub(crate) use rows::matches_pattern;
+pub(crate) use rows::natural;
 pub use rows::{Row, Rows, STATISTICS};
+pub(crate) use summary::{Names, main_names};
 pub use sweep::{
     OF_SAMPLES, OF_SWEEPS, Part, Sample, Search, Shard, SweepOptions, Vary, drawn, job, search, sweep,
 };
@@ -28,55 +33,60 @@ use serde::de::DeserializeOwned;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// How long a run that is asked to stop looks for a moment from which it can continue.
+/// Time that an interrupted run may take to reach a state from which it can continue.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// What a command line says of itself.
+/// Name, help texts and checkpoint format of a program.
 #[derive(Debug)]
 pub struct Program {
-    /// Its name, as it is called.
+    /// Name of the executable.
     pub name: &'static str,
-    /// Its version.
+    /// Version.
     pub version: &'static str,
-    /// One line.
+    /// Description in one line.
     pub about: &'static str,
     /// Lines of examples.
     pub examples: &'static str,
     /// First bytes of its checkpoints: program and version of what they hold.
     pub magic: &'static Magic,
-    /// Values that a sweep shows of each run, before the columns that the user names; `*` stands for any text.
+    /// Values that a sweep shows of each run, before the columns that the user names; `*` stands for any
+    /// text.
     pub columns: &'static [&'static str],
 }
 
 /// A program of scenes.
 pub trait Case {
-    /// What it is called and says.
+    /// Name and help texts.
     const PROGRAM: Program;
-    /// What can go wrong in it.
+    /// Error of a run.
     type Error: Fault;
 
-    /// What a scene builds and leaves out, in lines; `quick`: without what is marked `quick = false`.
+    /// Returns lines that say what a scene builds and leaves out; `quick` skips what is marked `quick =
+    /// false`.
     ///
     /// # Errors
     /// A fault of the scene.
     fn explain(source: &Source, quick: bool) -> Result<Vec<String>, Failure<Self::Error>>;
 
-    /// Runs a scene. It calls [`Run::begin`] when the scene is known to be right, and [`Run::pause`] between its steps.
+    /// Runs a scene. It calls [`Run::begin`] when the scene is known to be right, and [`Run::pause`] between
+    /// its steps.
     ///
     /// # Errors
     /// [`Failure`].
     fn solve(source: &Source, run: &mut Run) -> Result<Finished, Failure<Self::Error>>;
 
-    /// Keys of a scene that a sweep sets to `false`: what they name is large, and nobody looks at it run by run.
+    /// Keys of a scene that a sweep sets to `false`: what they name is large, and nobody looks at it run by
+    /// run.
     fn bulky(_source: &Source) -> &'static [&'static str] {
         &[]
     }
 
-    /// The JSON Schema of its scenes.
+    /// Returns the JSON Schema of its scenes.
     fn schema() -> serde_json::Value;
 }
 
-/// Refuses an expectation of a scalar that a program does not declare, where it cannot say which of them a scene has.
+/// Refuses an expectation of a scalar that a program does not declare, where it cannot say which of them a
+/// scene has.
 ///
 /// # Errors
 /// The name, and those that are most like it.
@@ -87,7 +97,7 @@ pub fn check_expectations(
 ) -> Result<(), SceneError> {
     let known: Vec<&str> = declared.iter().flat_map(|list| *list).map(|quantity| quantity.name).collect();
     check_quantities(source, expectations, &known, |name| {
-        declared.iter().flat_map(|list| *list).any(|quantity| fits(&quantity.pattern(), name))
+        declared.iter().flat_map(|list| *list).any(|quantity| matches_pattern(&quantity.pattern(), name))
     })
 }
 
@@ -114,7 +124,7 @@ pub trait Fault: std::error::Error + From<Error> + Send + 'static {
     /// 1 for a failed run, 2 for bad input, 130 for an interrupted run.
     fn exit_code(&self) -> u8;
 
-    /// Whether the user requested this end.
+    /// Returns whether the user interrupted the run.
     fn is_interruption(&self) -> bool {
         self.exit_code() == polycore::error::EXIT_INTERRUPTED
     }
@@ -126,7 +136,7 @@ impl Fault for Error {
     }
 }
 
-/// Sees the part done, from 0 to 1, and a line about it.
+/// Callback for the fraction done, 0 to 1, and a line about it.
 pub type Watcher<'a> = &'a mut (dyn FnMut(f64, &dyn Fn() -> String) + Send);
 
 /// A finished step of a run, for whoever watches it.
@@ -141,9 +151,9 @@ pub struct Step {
 /// A field at a step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepField {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// Its unit.
+    /// Unit.
     pub unit: &'static str,
     /// Components at each place.
     pub components: usize,
@@ -151,12 +161,12 @@ pub struct StepField {
     pub data: Vec<f64>,
 }
 
-/// Sees each finished step; the run stops where it gives `false`, as on a signal.
+/// Callback for each finished step; the run stops if it returns `false`, as on a signal.
 pub type StepWatcher<'a> = &'a mut (dyn FnMut(Step) -> bool + Send);
 
-/// How a run behaves towards its user.
+/// Options of a run.
 pub struct Options<'a> {
-    /// Where results go.
+    /// Folder of the results.
     pub output: &'a Path,
     /// Leave out what is marked `quick = false`.
     pub quick: bool,
@@ -164,16 +174,16 @@ pub struct Options<'a> {
     pub resume: bool,
     /// Time between checkpoints.
     pub checkpoint_every: Duration,
-    /// Whether the user asked to stop.
+    /// Returns true once the user has asked to stop.
     pub interrupted: &'a (dyn Fn() -> bool + Sync),
-    /// Sees progress.
+    /// Callback for progress.
     pub progress: Option<Watcher<'a>>,
-    /// Sees finished steps.
+    /// Callback for finished steps.
     pub on_step: Option<StepWatcher<'a>>,
 }
 
 impl<'a> Options<'a> {
-    /// A new, whole run into a directory, which nobody watches.
+    /// Returns a new, whole run into a directory, which nobody watches.
     pub fn new(output: &'a Path) -> Self {
         Self {
             output,
@@ -190,21 +200,40 @@ impl<'a> Options<'a> {
 /// A run that came to its end.
 #[derive(Debug)]
 pub struct Finished {
-    /// What is in `report.json`.
+    /// Content of `report.json`.
     pub report: Report,
-    /// What the user is shown of it.
+    /// All values, for `--verbose`.
     pub text: String,
+    /// The table of main values, where the harness should not choose it.
+    pub table: Option<String>,
+    /// Warnings and remarks, which are always shown.
+    pub notes: Vec<String>,
+}
+
+impl Finished {
+    /// Returns a finished run with all its values as text.
+    pub fn new(report: Report, text: String) -> Self {
+        Self { report, text, table: None, notes: Vec::new() }
+    }
+
+    /// Adds the warnings and remarks in the lines of a text, which are part of [`Self::text`] too.
+    #[must_use]
+    pub fn with_notes(mut self, notes: &str) -> Self {
+        self.notes.extend(notes.lines().map(str::to_owned));
+        self
+    }
 }
 
 impl From<Report> for Finished {
     fn from(report: Report) -> Self {
-        Self { text: report.table(), report }
+        let text = report.table();
+        Self::new(report, text)
     }
 }
 
 /// A run under way, and its output directory.
 pub struct Run<'a> {
-    /// How it behaves.
+    /// Options.
     pub options: Options<'a>,
     program: &'static Program,
     source: Source,
@@ -213,20 +242,20 @@ pub struct Run<'a> {
     saved: Instant,
     asked: Option<Instant>,
     pub(crate) stopped: bool,
-    kept: Option<Kept<'a>>,
+    kept: Option<VariantCheckpoint<'a>>,
 }
 
-/// A run's part in the checkpoint of the run that it belongs to.
+/// Part of a variant in the checkpoint of the whole run.
 #[derive(Clone)]
-pub(crate) struct Kept<'a> {
-    /// Takes what the part has reached.
+pub(crate) struct VariantCheckpoint<'a> {
+    /// Stores the state of the variant.
     pub keep: &'a (dyn Fn(Vec<u8>) -> Result<(), Error> + Sync),
-    /// What it had reached, where the whole is resumed.
+    /// State from the checkpoint, if the whole run is resumed.
     pub reached: Option<Vec<u8>>,
 }
 
 impl<'a> Run<'a> {
-    /// A run of a scene.
+    /// Returns a run of a scene.
     pub fn new(program: &'static Program, source: &Source, options: Options<'a>) -> Self {
         let header = Header::new(source, options.quick);
         Self {
@@ -242,8 +271,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// A run of one variant, into the checkpoint of this one.
-    pub(crate) fn of_variant<'b>(&self, options: Options<'b>, kept: Kept<'b>) -> Run<'b> {
+    /// Returns a run of one variant, into the checkpoint of this one.
+    pub(crate) fn of_variant<'b>(&self, options: Options<'b>, kept: VariantCheckpoint<'b>) -> Run<'b> {
         Run { kept: Some(kept), ..Run::new(self.program, &self.source, options) }
     }
 
@@ -277,7 +306,8 @@ impl<'a> Run<'a> {
         match finished().or_else(begun).and_then(|path| file(&path)) {
             Some(other) if file(&self.source.path).is_some_and(|own| own != other) => {
                 let reason = format!(
-                    "it has the results of another scene, {}; choose another folder with --output, or remove this one",
+                    "it has the results of another scene, {}; choose another folder with --output, or \
+                     remove this one",
                     other.display()
                 );
                 Err(Error::OutputDirectory { path: directory.to_path_buf(), reason })
@@ -286,7 +316,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// What the last [`Run::save`] wrote, where the run is resumed and one did.
+    /// Returns the state that [`Run::save`] wrote last, if the run is resumed.
     ///
     /// # Errors
     /// The checkpoint cannot be read.
@@ -315,8 +345,8 @@ impl<'a> Run<'a> {
         checkpoint::save(self.options.output, self.program.magic, &self.header, Some(state))
     }
 
-    /// Between steps: writes the checkpoint where one is due, and ends the run where the user requested it. `state` gives
-    /// nothing at a moment from which the run cannot continue.
+    /// Between steps: writes the checkpoint where one is due, and ends the run where the user requested it.
+    /// `state` gives nothing at a moment from which the run cannot continue.
     ///
     /// # Errors
     /// [`Error::Interrupted`]; the checkpoint cannot be written.
@@ -337,7 +367,7 @@ impl<'a> Run<'a> {
         if state.is_some() || since.elapsed() > PATIENCE { Err(self.interruption()) } else { Ok(()) }
     }
 
-    /// The error of a run that the user stopped.
+    /// Returns the error of a run that the user stopped.
     pub fn interruption(&self) -> Error {
         Error::Interrupted { program: self.program.name, output: self.options.output.to_path_buf() }
     }
@@ -349,7 +379,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Shows a finished step where somebody watches; one who wants no more of them stops the run at the next [`Run::pause`].
+    /// Shows a finished step where somebody watches; one who wants no more of them stops the run at the next
+    /// [`Run::pause`].
     pub fn step(&mut self, step: impl FnOnce() -> Step) {
         if let Some(watcher) = &mut self.options.on_step
             && !self.stopped
@@ -358,8 +389,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Writes the report, the last file of a run, with the stamp of what it was computed from: a directory with a checkpoint
-    /// holds an unfinished one.
+    /// Writes the report, the last file of a run, with the stamp of what it was computed from: a directory
+    /// with a checkpoint holds an unfinished one.
     ///
     /// # Errors
     /// It cannot be written.

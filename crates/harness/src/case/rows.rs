@@ -5,19 +5,23 @@ use crate::study::Solved;
 use polycore::file::atomic_write;
 use std::path::Path;
 
-/// Statistics of a field: its mean by volume, its extremes, and its standard deviation, which measures uniformity.
+/// Statistics of a field: its mean by volume, its extremes, and its standard deviation, which measures
+/// uniformity.
 pub const STATISTICS: [&str; 4] = ["mean_", "least_", "largest_", "deviation_of_"];
+
+/// Rows of the short table at most.
+const SHOWN: usize = 15;
 
 /// Heading of the column that says whether a run meets the scene's expectations.
 const ENDS: &str = "passed";
 
 /// A run among others.
 pub struct Row {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// What was set, one text for each heading.
+    /// Values that were set, one for each heading.
     pub settings: Vec<String>,
-    /// Its report, or why there is none.
+    /// Report, or the error that ended the run.
     pub outcome: Result<Report, String>,
 }
 
@@ -50,13 +54,13 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Whether every run came to its end.
+    /// Returns whether every run has ended without an error.
     pub fn passed(&self) -> bool {
         self.rows.iter().all(|row| row.outcome.is_ok())
     }
 
-    /// Whether some run has a value.
-    pub fn has(&self, name: &str) -> bool {
+    /// Returns whether some run has a value.
+    pub fn has_value(&self, name: &str) -> bool {
         self.reports().any(|report| report.scalar(name).is_some())
     }
 
@@ -72,11 +76,12 @@ impl Rows {
         fields
     }
 
-    /// Names of values that the further columns ask for, in the order of the columns, numbers by their size.
-    pub fn asked(&self) -> Vec<String> {
+    /// Returns names of values that the further columns ask for, in the order of the columns, numbers by
+    /// their size.
+    pub fn requested(&self) -> Vec<String> {
         let mut names: Vec<String> = Vec::new();
         for pattern in &self.columns {
-            let fit = |name: &&String| fits(pattern, name);
+            let fit = |name: &&String| matches_pattern(pattern, name);
             let mut found: Vec<&String> =
                 self.reports().flat_map(|report| report.values.keys()).filter(fit).collect();
             found.sort_by_key(|name| natural(name));
@@ -86,14 +91,15 @@ impl Rows {
         names
     }
 
-    /// Names of all values that the table shows: the statistics of each field, and what further columns ask for.
+    /// Returns names of all values that the table shows: the statistics of each field, and what further
+    /// columns ask for.
     pub fn names(&self) -> Vec<String> {
         let fields = self.fields();
         let statistics = fields.iter().flat_map(|field| STATISTICS.map(|name| format!("{name}{field}")));
-        statistics.chain(self.asked()).collect()
+        statistics.chain(self.requested()).collect()
     }
 
-    /// Whether some run has expectations.
+    /// Returns whether some run has expectations.
     fn judged(&self) -> bool {
         self.reports().any(|report| !report.expect.is_empty())
     }
@@ -112,13 +118,44 @@ impl Rows {
         unit.map_or_else(|| name.to_owned(), |unit| format!("{name} [{unit}]"))
     }
 
-    /// The table to be read: a column for each field, with its mean, extremes and deviation.
+    /// Returns the table to be read: a column for each field, with its mean, extremes and deviation.
     pub fn text(&self) -> String {
+        aligned(&self.table())
+    }
+
+    /// Returns the first rows and columns of the table, as many as a screen holds.
+    pub fn short_text(&self, width: usize) -> String {
+        let mut table = self.table();
+        let hidden_rows = table.len().saturating_sub(1 + SHOWN);
+        table.truncate(1 + SHOWN);
+        let fixed = 1 + self.settings.len();
+        let (mut text, mut hidden) = (aligned(&table), 0);
+        while text.lines().any(|line| line.chars().count() > width) && table[0].len() > fixed + 1 {
+            // values go before the verdict and the steps
+            let ends = 1 + usize::from(self.judged());
+            let at =
+                if table[0].len() > fixed + ends { table[0].len() - ends - 1 } else { table[0].len() - 1 };
+            let columns = table[0].len();
+            table.iter_mut().filter(|row| row.len() == columns).for_each(|row| drop(row.remove(at)));
+            hidden += 1;
+            text = aligned(&table);
+        }
+        let plural = |count: usize| if count == 1 { "" } else { "s" };
+        if hidden_rows > 0 {
+            text += &format!("… {hidden_rows} more run{} in the table\n", plural(hidden_rows));
+        }
+        if hidden > 0 {
+            text += &format!("… {hidden} more column{} in the table\n", plural(hidden));
+        }
+        text
+    }
+
+    fn table(&self) -> Vec<Vec<String>> {
         let fields = self.fields();
         let mut head = vec!["run".to_owned()];
         head.extend(self.settings.iter().cloned());
         head.extend(fields.iter().map(|name| format!("{name}: mean (least to largest) ± deviation")));
-        let asked = self.asked();
+        let asked = self.requested();
         head.extend(asked.iter().map(|name| self.heading(name)));
         if self.judged() {
             head.push(ENDS.into());
@@ -149,7 +186,7 @@ impl Rows {
             }
             table.push(line);
         }
-        aligned(&table)
+        table
     }
 
     /// The table as CSV, with all digits; what a run does not tell is empty.
@@ -196,18 +233,20 @@ fn verdict(report: &Report) -> String {
     if missed.is_empty() { "yes".to_owned() } else { format!("no: {}", missed.join(" ")) }
 }
 
-/// Whether a name fits a pattern in which `*` stands for any text.
-pub(super) fn fits(pattern: &str, name: &str) -> bool {
+/// Returns whether a name matches_pattern a pattern in which `*` stands for any text.
+pub(crate) fn matches_pattern(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
         Some((before, after)) => name.strip_prefix(before).is_some_and(|rest| {
-            (0..=rest.len()).filter(|&at| rest.is_char_boundary(at)).any(|at| fits(after, &rest[at..]))
+            (0..=rest.len())
+                .filter(|&at| rest.is_char_boundary(at))
+                .any(|at| matches_pattern(after, &rest[at..]))
         }),
     }
 }
 
-/// A name's pieces of text and numbers, so that `layer-10` comes after `layer-9`.
-fn natural(name: &str) -> Vec<(String, u64)> {
+/// Returns a name's pieces of text and numbers, so that `layer-10` comes after `layer-9`.
+pub(crate) fn natural(name: &str) -> Vec<(String, u64)> {
     let mut pieces = Vec::new();
     let mut rest = name;
     while !rest.is_empty() {
@@ -225,10 +264,42 @@ mod tests {
 
     #[test]
     fn patterns_and_their_order() {
-        assert!(fits("layer-*.mean_alpha", "layer-12.mean_alpha") && fits("a", "a") && fits("*", ""));
-        assert!(!fits("layer-*.mean_alpha", "layer-1.least_alpha") && !fits("a", "ab") && !fits("a*b", "a"));
+        assert!(
+            matches_pattern("layer-*.mean_alpha", "layer-12.mean_alpha")
+                && matches_pattern("a", "a")
+                && matches_pattern("*", "")
+        );
+        assert!(
+            !matches_pattern("layer-*.mean_alpha", "layer-1.least_alpha")
+                && !matches_pattern("a", "ab")
+                && !matches_pattern("a*b", "a")
+        );
         let mut names = ["layer-10.x", "layer-9.x", "layer-9.a"];
         names.sort_by_key(|name| natural(name));
         assert_eq!(names, ["layer-9.a", "layer-9.x", "layer-10.x"]);
+    }
+
+    #[test]
+    fn a_short_table_fits_a_screen() {
+        let row = |index: usize| {
+            let mut report = Report::new("test", "1", "");
+            for k in 0..9 {
+                let name = format!("a_long_name_of_a_value_{k}");
+                report.value(crate::report::Named::new(name, "N"), index as f64);
+            }
+            Row { name: format!("run-{index}"), settings: vec![index.to_string()], outcome: Ok(report) }
+        };
+        let mut rows = Rows {
+            settings: vec!["key".into()],
+            columns: vec!["a_long*".into()],
+            rows: (0..20).map(row).collect(),
+        };
+        let text = rows.short_text(100);
+        assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
+        assert!(text.contains("run-14") && text.contains("… 5 more runs in the table"), "{text}");
+        assert!(text.contains("_value_1 [N]") && text.contains("… 7 more columns in the table"), "{text}");
+        rows.rows.truncate(1);
+        rows.columns = vec!["a_long_name_of_a_value_3".into()];
+        assert_eq!(rows.short_text(100), rows.text());
     }
 }

@@ -1,6 +1,7 @@
 //! Many runs of one scene over a grid of values: in parallel, one thread each; finished ones are kept.
 
 use super::rows::{Row, Rows};
+use super::terminal::WIDTH;
 use super::{Case, Fault, Finished, Options, Program};
 use crate::report::{Phases, Report};
 use crate::scene::{Failure, Source};
@@ -41,19 +42,20 @@ const MOST: usize = 10_000;
 /// A key of the scene and the values that it takes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Vary {
-    /// Its path: `print.layer_time`, `boundary[1].film`.
+    /// Path of the key: `print.layer_time`, `boundary[1].film`.
     pub key: String,
     /// The values as the user wrote them.
     pub values: Vec<String>,
-    /// Whether they are draws from a [`Sample`], over which the sweep gives bands.
+    /// True for draws from a [`Sample`], over which the sweep computes bands.
     pub drawn: bool,
 }
 
 impl FromStr for Vary {
     type Err = String;
 
-    /// From `KEY=VALUE,VALUE,…`; commas in brackets, braces and quotes belong to a value. Keys that change together stand
-    /// behind one another, `KEY=A,B;OTHER=C,D`, with as many values each: the values are then `A;C` and `B;D`.
+    /// Parses `KEY=VALUE,VALUE,…`; commas in brackets, braces and quotes belong to a value. Keys that change
+    /// together stand behind one another, `KEY=A,B;OTHER=C,D`, with as many values each: the values are then
+    /// `A;C` and `B;D`.
     fn from_str(text: &str) -> Result<Self, String> {
         let usage = "KEY=VALUE,VALUE,…, e.g. print.layer_time=10s,20s,40s";
         let mut linked = Self { key: String::new(), values: Vec::new(), drawn: false };
@@ -86,7 +88,7 @@ impl FromStr for Vary {
 }
 
 impl Vary {
-    /// Its keys, several where they change together.
+    /// Returns the keys, several if they change together.
     fn keys(&self) -> Vec<String> {
         divided(&self.key, ';')
     }
@@ -112,36 +114,38 @@ fn divided(text: &str, separator: char) -> Vec<String> {
     pieces
 }
 
-/// How a sweep behaves towards its user.
+/// Options of a sweep.
 pub struct SweepOptions<'a> {
-    /// Where results go; each run in a folder of its own.
+    /// Folder of the results; each run has a folder of its own in it.
     pub output: &'a Path,
     /// Further values to report, by name; `*` stands for any text.
     pub columns: &'a [String],
     /// Leave out what is marked `quick = false`.
     pub quick: bool,
-    /// What of the sweep is computed.
+    /// Part of the sweep to compute.
     pub part: Part,
     /// Time between checkpoints of each run.
     pub checkpoint_every: Duration,
-    /// Whether the user asked to stop.
+    /// Returns true once the user has asked to stop.
     pub interrupted: &'a (dyn Fn() -> bool + Sync),
     /// Sees how many of how many runs are done, and the name of the last.
     pub progress: &'a mut (dyn FnMut(usize, usize, &str) + Send),
 }
 
-/// Runs a scene for every combination of values; those that an earlier sweep into the same folder has finished are kept.
+/// Runs a scene for every combination of values; those that an earlier sweep into the same folder has
+/// finished are kept.
 ///
 /// # Errors
-/// Faults of the scene or of a key, before anything is run; [`Error::SweepInterrupted`]. What ends a single run does
-/// not end the sweep: its row says so, and the report fails.
+/// Faults of the scene or of a key, before anything is run; [`Error::SweepInterrupted`]. What ends a single
+/// run does not end the sweep: its row says so, and the report fails.
 pub fn sweep<C: Case>(
     source: &Source,
     vary: &[Vary],
     options: &mut SweepOptions,
 ) -> Result<Finished, Failure<C::Error>> {
     let (rows, bands, report) = rows::<C>(source, vary, options)?;
-    Ok(Finished { text: rows.text() + &bands, report })
+    let table = rows.short_text(WIDTH) + &bands;
+    Ok(Finished { table: Some(table), ..Finished::new(report, rows.text() + &bands) })
 }
 
 /// [`sweep`], and its rows: those requested first, in their order. And the bands of what was sampled.
@@ -153,7 +157,7 @@ fn rows<C: Case>(
     let mut runs = runs::<C>(source, vary, options.quick)?;
     if let Part::Shard(shard) = options.part {
         let mut numbers = 0..runs.len();
-        runs.retain(|_| numbers.next().is_some_and(|number| shard.has(number)));
+        runs.retain(|_| numbers.next().is_some_and(|number| shard.contains(number)));
         polycore::file::prepare_directory(options.output)?;
         let _lock = crate::case::share_run(options.output)?;
         let rows = rows_of(&C::PROGRAM, &runs, solve::<C>(&runs, options)?, vary, options);
@@ -165,8 +169,8 @@ fn rows<C: Case>(
         && let Some((number, run)) = (1..).zip(&runs).find(|(_, run)| run.finished(options.output).is_none())
     {
         let reason = format!(
-            "found run {number} of {}, {}, unfinished or of another scene; allowed: finished runs, of `--shard 1/N` to \
-             `--shard N/N` into {}",
+            "found run {number} of {}, {}, unfinished or of another scene; allowed: finished runs, of \
+             `--shard 1/N` to `--shard N/N` into {}",
             runs.len(),
             run.name,
             options.output.display()
@@ -251,7 +255,7 @@ fn former(vary: &[Vary], output: &Path) -> Result<Vec<Vec<String>>, Error> {
     Err(Error::Option { option: format!("--output {}", output.display()), reason })
 }
 
-/// The runs of a grid, each checked.
+/// Returns the runs of a grid, each checked.
 fn runs<C: Case>(source: &Source, vary: &[Vary], quick: bool) -> Result<Vec<Run>, Failure<C::Error>> {
     let keys: Vec<String> = vary.iter().flat_map(Vary::keys).collect();
     if let Some(twice) = (1..keys.len()).find(|&k| keys[..k].contains(&keys[k])) {
@@ -322,7 +326,10 @@ fn solve<C: Case>(
         }
     });
     let (outcomes, _) = finished.into_inner().unwrap_or_else(PoisonError::into_inner);
-    let stopped = |outcome: &Result<Report, Failure<C::Error>>| matches!(outcome, Err(Failure::Run(error)) if error.is_interruption());
+    let stopped = |outcome: &Result<Report, Failure<C::Error>>| match outcome {
+        Err(Failure::Run(error)) => error.is_interruption(),
+        _ => false,
+    };
     if outcomes.len() < runs.len() || outcomes.values().any(stopped) {
         return Err(Error::SweepInterrupted(output.to_path_buf()).into());
     }

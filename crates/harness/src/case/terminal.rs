@@ -1,4 +1,4 @@
-//! What the command lines of this workspace share: exit codes, progress, threads, where results go.
+//! Shared parts of all command lines: exit codes, progress, threads, folder of the results.
 
 use super::Fault;
 use crate::scene::Failure;
@@ -13,11 +13,12 @@ use std::time::{Duration, Instant};
 /// Time between lines of progress where there is no terminal.
 const LOG_EVERY: Duration = Duration::from_secs(10);
 
-/// Whether standard output took less than was printed.
+/// True if standard output took less than was printed.
 static CUT_SHORT: AtomicBool = AtomicBool::new(false);
 
-/// Prints a line to standard output as `println!` does, but without its panic: a reader that has seen enough (`| head`)
-/// is no reason to fail; what else goes wrong, a full disk for example, is said once and makes [`exit`] fail.
+/// Prints a line to standard output as `println!` does, but without its panic: a reader that has seen enough
+/// (`| head`) is no reason to fail; what else goes wrong, a full disk for example, is said once and makes
+/// [`exit`] fail.
 ///
 /// [`exit`]: crate::case::terminal::exit
 #[macro_export]
@@ -43,7 +44,88 @@ pub fn complain(text: impl Display) {
     let _ = write!(std::io::stderr(), "{text}");
 }
 
-/// The exit code of a command that tells whether it passed; a failure is printed.
+/// Longest line of a summary, in columns.
+pub(super) const WIDTH: usize = 100;
+
+/// Colours and width of standard output.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TerminalStyle {
+    colors: bool,
+    /// Columns that a line may take.
+    pub width: usize,
+}
+
+impl TerminalStyle {
+    /// Returns the style of standard output: no colours if it is no terminal or `NO_COLOR` is set.
+    pub fn of_output() -> Self {
+        let terminal = std::io::stdout().is_terminal();
+        let size = console::Term::stdout().size_checked().filter(|_| terminal);
+        let width = size.map_or(WIDTH, |(_, columns)| usize::from(columns).clamp(40, WIDTH));
+        Self { colors: terminal && std::env::var_os("NO_COLOR").is_none(), width }
+    }
+
+    /// Returns the style of a file.
+    #[cfg(test)]
+    pub fn plain() -> Self {
+        Self { colors: false, width: WIDTH }
+    }
+
+    fn paint(&self, code: u8, text: &str) -> String {
+        match self.colors && !text.is_empty() {
+            true => format!("\x1b[{code}m{text}\x1b[0m"),
+            false => text.to_owned(),
+        }
+    }
+
+    pub fn bold(&self, text: &str) -> String {
+        self.paint(1, text)
+    }
+
+    pub fn red(&self, text: &str) -> String {
+        self.paint(31, text)
+    }
+
+    pub fn green(&self, text: &str) -> String {
+        self.paint(32, text)
+    }
+
+    pub fn yellow(&self, text: &str) -> String {
+        self.paint(33, text)
+    }
+
+    /// Cuts a line to the width.
+    pub fn fitted(&self, line: &str) -> String {
+        match line.char_indices().nth(self.width) {
+            Some(_) => line.chars().take(self.width - 1).chain("…".chars()).collect(),
+            None => line.to_owned(),
+        }
+    }
+
+    /// Breaks a line between words; further lines are indented.
+    pub fn wrapped(&self, line: &str) -> String {
+        if line.chars().count() <= self.width {
+            return format!("{line}\n");
+        }
+        let indent = line.len() - line.trim_start().len();
+        let mut text = " ".repeat(indent);
+        let mut column = indent;
+        for word in line.split_whitespace() {
+            let length = word.chars().count();
+            if column > indent && column + 1 + length > self.width {
+                text += &format!("\n{}", " ".repeat(indent + 2));
+                column = indent + 2;
+            } else if column > indent {
+                text.push(' ');
+                column += 1;
+            }
+            text += word;
+            column += length;
+        }
+        text + "\n"
+    }
+}
+
+/// Returns the exit code of a command that tells whether it passed; a failure is printed.
 pub fn exit<E: Fault>(result: Result<bool, Failure<E>>) -> ExitCode {
     match result {
         Ok(true) if !CUT_SHORT.load(Ordering::Relaxed) => ExitCode::SUCCESS,
@@ -67,7 +149,8 @@ pub fn default_output(scene: &Path) -> PathBuf {
     Path::new("out").join(name)
 }
 
-/// Whether the run of an output directory is finished, which is said: its report is there, and its checkpoint is gone.
+/// Returns whether the run of an output folder is finished (it has a report and no checkpoint), and prints
+/// so.
 pub fn is_finished(output: &Path) -> bool {
     let there = |name: &str| output.join(name).is_file();
     let finished = !there(crate::checkpoint::FILE_NAME) && there(crate::report::FILE_NAME);
@@ -77,7 +160,8 @@ pub fn is_finished(output: &Path) -> bool {
     finished
 }
 
-/// A command line on which negative numbers are values and no options: the range of each is then told.
+/// Returns a command line on which negative numbers are values and no options: the range of each is then
+/// told.
 pub(super) fn with_negative_numbers(command: clap::Command) -> clap::Command {
     let takes = |arg: clap::Arg| match arg.get_action().takes_values() {
         true => arg.allow_negative_numbers(true),
@@ -86,7 +170,7 @@ pub(super) fn with_negative_numbers(command: clap::Command) -> clap::Command {
     command.mut_args(takes).mut_subcommands(with_negative_numbers)
 }
 
-/// A time in seconds, for clap.
+/// Parses a time in seconds, for clap.
 ///
 /// # Errors
 /// The text is not a number, or none of 0 to 1e9.
@@ -118,7 +202,7 @@ impl Threads {
     }
 }
 
-/// Whether the user asked to stop (Ctrl-C, SIGTERM) since the first call.
+/// Returns a function that is true once the user has asked to stop (Ctrl-C, SIGTERM) since the first call.
 pub fn interrupted() -> &'static (dyn Fn() -> bool + Sync) {
     static STOP: AtomicBool = AtomicBool::new(false);
     // a second handler cannot be set; the first does the same
@@ -133,7 +217,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Nothing is shown yet.
+    /// Returns a bar that shows nothing yet.
     pub fn start() -> Self {
         let bar = match std::io::stderr().is_terminal() {
             true => ProgressBar::new(1000),
@@ -145,7 +229,7 @@ impl Progress {
         Self { bar, logged: Instant::now() }
     }
 
-    /// The part done, 0 to 1, and what to say of it.
+    /// Shows the fraction done, 0 to 1, and a message.
     pub fn show(&mut self, part: f64, message: impl FnOnce() -> String) {
         if !self.bar.is_hidden() {
             self.bar.set_position((1000.0 * part) as u64);
@@ -156,7 +240,7 @@ impl Progress {
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn finish(self) {
         self.bar.finish_and_clear();
     }
@@ -199,6 +283,15 @@ mod tests {
         let Verb::Run { every, quick } =
             <Line as clap::FromArgMatches>::from_arg_matches(&matches).unwrap().verb;
         assert_eq!((every, quick), (2.0, true));
+    }
+
+    #[test]
+    fn lines_are_broken_between_words() {
+        let style = TerminalStyle { colors: false, width: 12 };
+        assert_eq!(style.wrapped("  one two three four"), "  one two\n    three\n    four\n");
+        assert_eq!(style.fitted("one two three four"), "one two thr…");
+        assert_eq!(style.red("x"), "x");
+        assert_eq!(TerminalStyle { colors: true, width: 12 }.red("x"), "\x1b[31mx\x1b[0m");
     }
 
     #[test]

@@ -17,7 +17,7 @@ pub fn write(path: impl AsRef<Path>, columns: &[Column<'_>]) -> Result<(), Error
     write_cells(path.as_ref(), columns, |number| format!("{number:?}"))
 }
 
-/// As [`write()`], with an empty cell for NaN: where there is no value.
+/// Writes as [`write()`], with an empty cell for NaN.
 ///
 /// # Errors
 /// As [`write()`].
@@ -45,12 +45,12 @@ fn write_cells(path: &Path, columns: &[Column<'_>], cell: impl Fn(f64) -> String
 /// Reads a table of numbers: headings and columns. Lines that begin with `#` are comments.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read; [`Error::Format`] with the line for text that is not a number or for rows
-/// of different lengths.
+/// [`Error::Io`] if the file cannot be read; [`Error::Format`] with the line for text that is not a number or
+/// for rows of different lengths.
 pub fn read(path: impl AsRef<Path>) -> Result<Vec<(String, Vec<f64>)>, Error> {
     let path = path.as_ref();
     let fail = |reason: String| Error::Format { path: path.to_path_buf(), format: "CSV table", reason };
-    let text = std::fs::read_to_string(path).map_err(Error::io("read", path))?;
+    let text = std::fs::read_to_string(path).map_err(Error::from_io("read", path))?;
     let mut reader =
         csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
     let headings = reader.headers().map_err(|error| fail(error.to_string()))?;
@@ -69,7 +69,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Vec<(String, Vec<f64>)>, Error> {
     Ok(columns)
 }
 
-/// The error of the system inside: its kind says whether there is room on the disk.
+/// Returns the error of the system inside: its kind says whether there is room on the disk.
 fn plain(error: csv::Error) -> std::io::Error {
     match error.into_kind() {
         csv::ErrorKind::Io(error) => error,

@@ -9,8 +9,8 @@ pub(crate) const NONE: u32 = u32::MAX;
 /// Neighbours at both ends of each axis: side 2d lies before a particle along axis d, side 2d + 1 behind it.
 pub(crate) type Sides = [u32; 6];
 
-/// Two neighbours that have moved apart this many times farther than both have from the next ones behind them have a crack
-/// between them.
+/// Two neighbours that have moved apart this many times farther than both have from the next ones behind them
+/// have a crack between them.
 const JUMP: f64 = 2.0;
 /// Distance of a particle from its place in the lattice, in spacings, at most.
 const OFF: f64 = 0.05;
@@ -68,11 +68,11 @@ pub(crate) fn joined<const D: usize>(
     (0..next.len() as u32).into_par_iter().map(of).collect()
 }
 
-/// Cells around the particles of a lattice along its first `axes` axes.
-pub(crate) struct Cells<'a, const D: usize> {
+/// LatticeCells around the particles of a lattice along its first `axes` axes.
+pub(crate) struct LatticeCells<'a, const D: usize> {
     /// Positions.
     pub positions: &'a [[f64; D]],
-    /// As [`joined`] returns them.
+    /// Pairs of neighbours from [`joined`].
     pub joined: &'a [Sides],
     /// Distance of neighbours.
     pub spacing: f64,
@@ -80,12 +80,12 @@ pub(crate) struct Cells<'a, const D: usize> {
     pub axes: usize,
 }
 
-impl<const D: usize> Cells<'_, D> {
+impl<const D: usize> LatticeCells<'_, D> {
     fn beside(&self, particle: usize, side: usize) -> Option<usize> {
         Some(self.joined[particle][side] as usize).filter(|&other| other != NONE as usize)
     }
 
-    /// From a particle to the middle of its cell's side.
+    /// Vector from a particle to the middle of a side of its cell.
     fn half(&self, particle: usize, side: usize) -> [f64; D] {
         for (side, sign) in [(side, 0.5), (side ^ 1, -0.5)] {
             if let Some(other) = self.beside(particle, side) {
@@ -98,8 +98,8 @@ impl<const D: usize> Cells<'_, D> {
         half
     }
 
-    /// A corner of a cell, the mean over the connected cells around it, so that they share the corner: bit d of `corner` is
-    /// its end along axis d.
+    /// Returns a corner of a cell, the mean over the connected cells around it, so that they share the
+    /// corner: bit d of `corner` is its end along axis d.
     pub fn corner(&self, particle: usize, corner: u8) -> [f64; D] {
         // bit d of a place: the other side of the corner along axis d
         let side = |place: usize, d: usize| 2 * d + (usize::from(corner) ^ place) / (1 << d) % 2;

@@ -1,4 +1,5 @@
-//! Pictures without any system library or font: line plots (PNG, SVG), particle fields and solids (PNG), by [`kuva`].
+//! Pictures without any system library or font: line plots (PNG, SVG), particle fields and solids (PNG), by
+//! [`kuva`].
 
 use std::path::Path;
 

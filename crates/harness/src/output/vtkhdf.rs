@@ -1,13 +1,14 @@
 //! Fields over time as VTKHDF, the HDF5 format that VTK (≥ 9.3) and ParaView (≥ 5.12) read natively.
 //!
-//! Layout: <https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format/index.html>. Particles that move are
-//! `PolyData`, one vertex cell each, with the topology once, points and point data for every step; meshes that do not
-//! are `UnstructuredGrid`, with points and cells once, point and cell data for every step.
+//! Layout: <https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format/index.html>. Particles that
+//! move are `PolyData`, one vertex cell each, with the topology once, points and point data for every step;
+//! meshes that do not are `UnstructuredGrid`, with points and cells once, point and cell data for every step.
 //!
-//! A run can be killed at any moment: each step becomes a complete file `NAME.frames/000k.vtkhdf` of its own, written
-//! under another name and renamed. `finish` merges them into `NAME.vtkhdf` in the same way and removes the frames. A
-//! resumed run goes on with the frame after its checkpoint. Each dataset stores a step as one chunk, and the merge copies
-//! chunks without unpacking them. Second-order tensors are stored in single precision, all other numbers in double.
+//! A run can be killed at any moment: each step becomes a complete file `NAME.frames/000k.vtkhdf` of its own,
+//! written under another name and renamed. `finish` merges them into `NAME.vtkhdf` in the same way and
+//! removes the frames. A resumed run goes on with the frame after its checkpoint. Each dataset stores a step
+//! as one chunk, and the merge copies chunks without unpacking them. Second-order tensors are stored in
+//! single precision, all other numbers in double.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -30,7 +31,8 @@ pub use mesh::MeshSeries;
 pub use particles::ParticleSeries;
 pub use read::{Series, read};
 
-/// An array: name, number of components, values `[points · components]`, the components of a point (or cell) together.
+/// An array: name, number of components, values `[points · components]`, the components of a point (or cell)
+/// together.
 pub type Data<'a> = (&'a str, usize, &'a [f64]);
 
 /// A number of a step as a whole: name and value, NaN where it has none.
@@ -40,7 +42,7 @@ pub type Moment<'a> = (&'a str, f64);
 const OF_THE_FORMAT: [&str; 6] =
     ["Values", "PartOffsets", "NumberOfParts", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets"];
 
-/// What all steps have in common.
+/// Layout that all steps share.
 #[derive(Clone, Debug, PartialEq)]
 struct Layout {
     points: usize,
@@ -54,14 +56,14 @@ struct Layout {
 
 impl Layout {
     /// Checks arrays against the number of points and cells.
-    fn of(counts: [usize; 2], point_data: &[Data<'_>], cell_data: &[Data<'_>]) -> Result<Self, Error> {
+    fn from_data(counts: [usize; 2], point_data: &[Data<'_>], cell_data: &[Data<'_>]) -> Result<Self, Error> {
         let arrays = named("point", counts[0], point_data)?;
         let cell_arrays = named("cell", counts[1], cell_data)?;
         Ok(Self { points: counts[0], arrays, cells: counts[1], cell_arrays, moments: Vec::new() })
     }
 }
 
-/// Names and numbers of components of arrays on `count` points or cells.
+/// Returns names and numbers of components of arrays on `count` points or cells.
 fn named(kind: &str, count: usize, data: &[Data<'_>]) -> Result<Vec<(String, usize)>, Error> {
     let mut arrays: Vec<(String, usize)> = Vec::new();
     for &(name, components, values) in data {
@@ -81,7 +83,7 @@ fn named(kind: &str, count: usize, data: &[Data<'_>]) -> Result<Vec<(String, usi
 }
 
 impl Layout {
-    /// With numbers of each step.
+    /// Adds numbers of each step.
     fn and(mut self, moments: &[Moment<'_>]) -> Result<Self, Error> {
         for &(name, _) in moments {
             if name.is_empty() || name.contains('/') || OF_THE_FORMAT.contains(&name) {
@@ -127,7 +129,7 @@ fn whole_file(target: &Path, write: impl FnOnce(&Path) -> Result<(), Error>) -> 
     let temporary = temporary_name(target);
     remove(&temporary)?;
     let result = write(&temporary)
-        .and_then(|()| fs::rename(&temporary, target).map_err(Error::io("rename to", target)));
+        .and_then(|()| fs::rename(&temporary, target).map_err(Error::from_io("rename to", target)));
     if result.is_err() {
         let _ = remove(&temporary);
     }
@@ -146,7 +148,7 @@ fn remove(path: &Path) -> Result<(), Error> {
         Ok(metadata) if metadata.is_dir() => fs::remove_dir_all(path),
         Ok(_) => fs::remove_file(path),
     };
-    removed.map_err(Error::io("remove", path))
+    removed.map_err(Error::from_io("remove", path))
 }
 
 fn data_error(path: &Path, reason: String) -> Error {

@@ -1,4 +1,4 @@
-//! What a case must reproduce, and the judgement whether it did.
+//! Expectations of a case, and their judgement.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -13,9 +13,9 @@ use polycore::units::Ratio;
 ///
 /// ```toml
 /// [[expect]]
-/// quantity = "stress_concentration"   # the name of a scalar of the report, or a quotient of two: "NAME / NAME"
+/// quantity = "stress_concentration"   # a scalar of the report, or a quotient of two: "NAME / NAME"
 /// reference = 3.0
-/// tolerance = "1 %"                   # of |reference|; or a plain number, absolute, in the unit of the value
+/// tolerance = "1 %"                   # of |reference|; or a number in the unit of the value
 /// kind = "closed-form"                # what kind of evidence the figure is: see [`Kind`]
 /// source = "Kirsch (1898), infinite plate"
 /// quick = false                       # optional: not judged in --quick runs
@@ -27,17 +27,17 @@ use polycore::units::Ratio;
 pub struct Expect {
     /// The name of a scalar of the report, or a quotient of two: `peak[a] / peak[b]`.
     pub quantity: String,
-    /// Between which numbers it must lie.
+    /// Accepted range.
     pub bound: Bound,
-    /// What kind of evidence the figure is.
+    /// Kind of evidence.
     pub kind: Kind,
-    /// Where the figure and its tolerance come from.
+    /// Source of the figure and its tolerance.
     pub source: String,
     /// Judged in `--quick` runs too.
     pub quick: bool,
 }
 
-/// What kind of evidence an expectation is.
+/// Kind of evidence of an expectation.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema,
 )]
@@ -68,7 +68,19 @@ impl Kind {
         Self::Regression,
     ];
 
-    /// Whether a verdict may rest on it: everything but our own earlier figures.
+    /// Returns its name in scenes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::ClosedForm => "closed-form",
+            Self::Published => "published",
+            Self::IndependentProgram => "independent-program",
+            Self::Convergence => "convergence",
+            Self::Bound => "bound",
+            Self::Regression => "regression",
+        }
+    }
+
+    /// Returns whether a verdict may rest on it: all but our own earlier figures.
     pub fn is_evidence(self) -> bool {
         self != Self::Regression
     }
@@ -106,17 +118,17 @@ pub enum Bound {
     },
 }
 
-/// How far a value may lie from its reference.
+/// Accepted distance of a value from its reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tolerance {
     /// A share of |reference|: `"1 %"`.
     Relative(f64),
-    /// In the unit of the value: `"0.01"` or `0.01`.
+    /// Distance in the unit of the value: `"0.01"` or `0.01`.
     Absolute(f64),
 }
 
 impl Tolerance {
-    /// The accepted distance from `reference`.
+    /// Returns the accepted distance from `reference`.
     pub fn distance(self, reference: f64) -> f64 {
         match self {
             Self::Relative(share) => share * reference.abs(),
@@ -216,16 +228,16 @@ struct Written {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     /// Instead of a reference: an upper bound.
     at_most: Option<f64>,
-    /// What kind of evidence the figure is.
+    /// Kind of evidence.
     kind: Kind,
-    /// Where the figure and its tolerance come from.
+    /// Source of the figure and its tolerance.
     source: String,
-    #[serde(default = "yes")]
+    #[serde(default = "default_true")]
     /// Judged in `--quick` runs too.
     quick: bool,
 }
 
-fn yes() -> bool {
+fn default_true() -> bool {
     true
 }
 
@@ -256,7 +268,8 @@ impl TryFrom<Written> for Expect {
             }
             _ => {
                 return Err(format!(
-                    "expectation of `{quantity}`: give either `reference` and `tolerance`, or `at_least` and/or `at_most`"
+                    "expectation of `{quantity}`: give `reference` and `tolerance`, or `at_least`, `at_most` \
+                     or both"
                 ));
             }
         };
@@ -276,7 +289,7 @@ impl From<Expect> for Written {
 }
 
 impl Expect {
-    /// The scalars that it needs: one name, or the two of a quotient.
+    /// Returns the scalars that it needs: one name, or the two of a quotient.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.quantity.split(QUOTIENT)
     }
@@ -317,24 +330,24 @@ fn scalar(values: &BTreeMap<String, Value>, name: &str) -> Result<f64, String> {
     }
 }
 
-/// An expectation with what was found.
+/// An expectation with the value of the report.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Judgement {
     /// The requirement.
     #[serde(flatten)]
     pub expect: Expect,
-    /// What was found.
+    /// Value of the report.
     #[serde(with = "number::option")]
     pub value: Option<f64>,
-    /// Whether it fits.
+    /// True if the expectation is met.
     pub pass: bool,
-    /// Why there was nothing to compare.
+    /// Reason if there is no value to compare.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub message: Option<String>,
 }
 
 impl Judgement {
-    /// A row of a table: verdict, quantity, value, requirement, source.
+    /// Returns a row of a table: verdict, quantity, value, requirement, source.
     pub fn row(&self) -> [String; 5] {
         let verdict = if self.pass { "pass" } else { "FAIL" };
         let value = match (&self.message, self.value) {

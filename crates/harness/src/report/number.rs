@@ -63,17 +63,17 @@ pub(super) fn short(value: f64) -> String {
 }
 
 #[derive(Serialize, Deserialize)]
-struct Number(#[serde(with = "self::super::number")] f64);
+struct JsonNumber(#[serde(with = "self::super::number")] f64);
 
 pub(super) mod list {
     use super::*;
 
     pub fn serialize<S: Serializer>(values: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_seq(values.iter().map(|value| Number(*value)))
+        serializer.collect_seq(values.iter().map(|value| JsonNumber(*value)))
     }
 
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
-        Ok(Vec::<Number>::deserialize(deserializer)?.into_iter().map(|number| number.0).collect())
+        Ok(Vec::<JsonNumber>::deserialize(deserializer)?.into_iter().map(|number| number.0).collect())
     }
 }
 
@@ -81,11 +81,11 @@ pub(super) mod option {
     use super::*;
 
     pub fn serialize<S: Serializer>(value: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
-        value.map(Number).serialize(serializer)
+        value.map(JsonNumber).serialize(serializer)
     }
 
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
-        Ok(Option::<Number>::deserialize(deserializer)?.map(|number| number.0))
+        Ok(Option::<JsonNumber>::deserialize(deserializer)?.map(|number| number.0))
     }
 }
 
@@ -98,13 +98,13 @@ pub(super) mod map {
         values: &BTreeMap<String, f64>,
         serializer: S,
     ) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(values.iter().map(|(name, value)| (name, Number(*value))))
+        serializer.collect_map(values.iter().map(|(name, value)| (name, JsonNumber(*value))))
     }
 
     pub fn deserialize<'de, D: Deserializer<'de>>(
         deserializer: D,
     ) -> Result<BTreeMap<String, f64>, D::Error> {
-        let map = BTreeMap::<String, Number>::deserialize(deserializer)?;
+        let map = BTreeMap::<String, JsonNumber>::deserialize(deserializer)?;
         Ok(map.into_iter().map(|(name, number)| (name, number.0)).collect())
     }
 }

@@ -1,4 +1,4 @@
-//! Which program, from which commit, ran which scene, where and when.
+//! Provenance of a report: program, commit, scene, machine and date.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,33 +7,34 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use crate::stamp::Stamp;
 use serde::{Deserialize, Serialize};
 
-/// Where a report comes from.
+/// Origin of a report.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Provenance {
     /// The command line that ran.
     pub program: String,
-    /// Its version.
+    /// Version.
     pub version: String,
     /// The commit, if the executable was built in a git checkout that is still there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub git: Option<Git>,
     /// The scene as it was run.
     pub scene: String,
-    /// Its file, once the run is finished.
+    /// File of the scene, once the run is finished.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<PathBuf>,
-    /// What else the results were computed from, once the run is finished.
+    /// Hashes of all that the results were computed from, once the run is finished.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stamp: Option<Stamp>,
     /// The machine.
     pub host: Host,
-    /// When the report was begun, UTC, ISO 8601.
+    /// Time at which the report was begun, UTC, ISO 8601.
     pub date: String,
 }
 
 /// The state of the checkout the executable was built in.
 ///
-/// Read when the program runs, not when it is built: a build script would recompile everything after each commit.
+/// Read when the program runs, not when it is built: a build script would recompile everything after each
+/// commit.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Git {
     /// The commit that is checked out.
@@ -112,7 +113,7 @@ impl Git {
     }
 }
 
-/// The commit checked out in `root`, and the file whose modification tells when it was.
+/// Returns the commit checked out in `root`, and the file whose modification tells when it was.
 fn head(root: &Path) -> Option<(String, PathBuf)> {
     let mut directory = root.join(".git");
     if directory.is_file() {
@@ -142,7 +143,8 @@ fn head(root: &Path) -> Option<(String, PathBuf)> {
     valid.then_some((hash, if log.is_file() { log } else { directory.join("HEAD") }))
 }
 
-/// ISO 8601 in UTC; civil date from days after H. Hinnant, "chrono-compatible low-level date algorithms" (2013).
+/// ISO 8601 in UTC; civil date from days after H. Hinnant, "chrono-compatible low-level date algorithms"
+/// (2013).
 fn date(time: SystemTime) -> String {
     let seconds = time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
     let (days, second) = (seconds / 86400, seconds % 86400);

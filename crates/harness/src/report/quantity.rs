@@ -1,13 +1,14 @@
-//! Scalars that reports can have: declared once, with unit and description, by the program that computes them.
+//! Scalars that reports can have: declared once, with unit and description, by the program that computes
+//! them.
 
 /// A scalar that a report can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Quantity {
-    /// Its name; `{axis}`, `{probe}` and the like stand for what is filled in.
+    /// Name; `{axis}`, `{probe}` and the like are filled in.
     pub name: &'static str,
-    /// Its unit, empty if dimensionless; `*` where it depends on what is filled in.
+    /// Unit, empty if dimensionless; `*` if it depends on the words filled in.
     pub unit: &'static str,
-    /// What it is.
+    /// Description.
     pub about: &'static str,
 }
 
@@ -21,7 +22,7 @@ pub struct Named {
 }
 
 impl Quantity {
-    /// The name with `parts` in place of its words in braces, in this order.
+    /// Returns the name with `parts` in place of its words in braces, in this order.
     pub fn of(&self, parts: &[&str]) -> Named {
         debug_assert_eq!(parts.len(), self.name.matches('{').count(), "`{}`", self.name);
         let mut parts = parts.iter();
@@ -37,19 +38,19 @@ impl Quantity {
         Named { name: name + rest, unit: self.unit.to_owned() }
     }
 
-    /// The name with `*` for what is filled in.
+    /// Returns the name with `*` for its words in braces.
     pub fn pattern(&self) -> String {
         self.of(&vec!["*"; self.name.matches('{').count()]).name
     }
 }
 
 impl Named {
-    /// One that no program declares: of another report, say.
+    /// Creates a name that no program declares, such as one of another report.
     pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
         Self { name: name.into(), unit: unit.into() }
     }
 
-    /// Names with their units, in a line.
+    /// Returns names with their units, in a line.
     pub fn list<'a>(all: impl IntoIterator<Item = &'a Self>) -> String {
         let one = |Self { name, unit }: &Self| match unit.as_str() {
             "" => name.clone(),
@@ -58,7 +59,7 @@ impl Named {
         all.into_iter().map(one).collect::<Vec<_>>().join(", ")
     }
 
-    /// The same in a unit that only the result knows.
+    /// Returns the same name with a unit that only the result knows.
     pub fn in_unit(self, unit: &str) -> Self {
         Self { unit: unit.to_owned(), ..self }
     }

@@ -87,9 +87,9 @@ fn quotients() {
 #[test]
 fn bad_expectations() {
     for (rest, part) in [
-        ("source = 's'", "either `reference` and `tolerance`"),
-        ("reference = 1\nsource = 's'", "either `reference`"),
-        ("reference = 1\ntolerance = 1\nat_most = 2\nsource = 's'", "either `reference`"),
+        ("source = 's'", "give `reference` and `tolerance`"),
+        ("reference = 1\nsource = 's'", "give `reference`"),
+        ("reference = 1\ntolerance = 1\nat_most = 2\nsource = 's'", "give `reference`"),
         ("at_least = 3\nat_most = 2\nsource = 's'", "exceeds"),
         ("reference = nan\ntolerance = 1\nsource = 's'", "not finite"),
         ("reference = 1\ntolerance = '-1 %'\nsource = 's'", "negative"),

@@ -12,19 +12,20 @@ use polycore::constitutive::hyperelastic::{Compressible, Hyperelastic, MODELS, M
 use polycore::constitutive::surrogate::Surrogate;
 use polycore::units::Stress;
 
-/// A hyperelastic law with a volumetric energy ¼λ(J² − 1 − 2 ln J) that gives it a bulk modulus, or a law learnt from data.
+/// A hyperelastic law with a volumetric energy ¼λ(J² − 1 − 2 ln J) that gives it a bulk modulus, or a law
+/// learnt from data.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ConstitutiveSpec {
     /// Name of the law.
     pub model: Option<String>,
-    /// Its parameters by their names: stresses with a unit, other numbers without.
+    /// Parameters by name: stresses with a unit, other numbers without.
     pub parameters: Option<BTreeMap<String, Constant>>,
     /// Bulk modulus at rest.
     pub bulk_modulus: Option<Stress>,
-    /// In their place: a law learnt from data, a file of `mdsurrogate`, relative to the scene.
+    /// Instead of a model and parameters: file of a law learnt by `mdsurrogate`, relative to the scene.
     pub learnt: Option<PathBuf>,
-    /// With `learnt`: the file lies in the results of this scene of `[inputs]`.
+    /// Name in `[inputs]` of the scene whose results contain the file of `learnt`.
     pub input: Option<String>,
 }
 
@@ -44,7 +45,10 @@ impl schemars::JsonSchema for Constant {
 
     fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
         let stress = generator.subschema_for::<Stress>();
-        schemars::json_schema!({ "description": "a number or a stress", "anyOf": [{ "type": "number" }, stress] })
+        schemars::json_schema!({
+            "description": "a number or a stress",
+            "anyOf": [{ "type": "number" }, stress],
+        })
     }
 }
 
@@ -72,7 +76,7 @@ impl<'de> Deserialize<'de> for Constant {
 }
 
 impl ConstitutiveSpec {
-    /// The learnt law, where the block names one; `key` is where it stands.
+    /// Returns the learnt law, where the block names one; `key` is where it stands.
     ///
     /// # Errors
     /// Another key beside it, a file that is missing, larger than the memory, or no law.
@@ -123,15 +127,15 @@ impl ConstitutiveSpec {
         read.map(Some).map_err(|found| source.error(&key, found, "a law that `mdsurrogate` wrote"))
     }
 
-    /// The law in closed form; `key` is where this block stands.
+    /// Returns the law in closed form; `key` is where this block stands.
     ///
     /// # Errors
     /// A [`SceneError`] that names the key, the value found and what is allowed.
     pub fn law(&self, source: &Source, key: &str) -> Result<Compressible<Box<dyn Hyperelastic>>, SceneError> {
         let names: Vec<&str> = MODELS.iter().map(|model| model.key).collect();
-        let missing = |name: &str, allowed: &str| source.error(&format!("{key}.{name}"), "nothing", allowed);
+        let missing = |name: &str, why: &str| source.missing(&format!("{key}.{name}"), why);
         let Some(name) = &self.model else {
-            return Err(missing("model", &format!("one of {}, or `learnt`, a file", names.join(", "))));
+            return Err(missing("model", &format!("write one of {}, or `learnt`, a file", names.join(", "))));
         };
         let Some(model) = MODELS.iter().find(|model| model.key == name) else {
             return Err(source.unknown(&format!("{key}.model"), name, &names));
@@ -142,7 +146,10 @@ impl ConstitutiveSpec {
             |error: Error| source.error(&format!("{key}.parameters"), error, "values of their domains");
         let compressible = |lame: f64| Compressible::new(model.law(&values)?, Volumetric::Ciarlet { lame });
         let least = compressible(0.0).and_then(|law| law.bulk_modulus()).map_err(wrong)?;
-        let bulk = self.bulk_modulus.ok_or_else(|| missing("bulk_modulus", "a stress"))?.si();
+        let bulk = self
+            .bulk_modulus
+            .ok_or_else(|| missing("bulk_modulus", "a compressible law needs it; write a stress"))?
+            .si();
         if !(bulk >= least && bulk.is_finite()) {
             let allowed =
                 format!("at least {least:.6e} Pa, that of `{}` without a volumetric energy", model.key);
@@ -152,7 +159,7 @@ impl ConstitutiveSpec {
     }
 }
 
-/// The parameters in the model's order, SI.
+/// Returns the parameters in the model's order, SI.
 fn values(
     given: &BTreeMap<String, Constant>,
     source: &Source,

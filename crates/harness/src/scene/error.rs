@@ -10,22 +10,22 @@ use toml::de::DeTable;
 
 use super::{EXIT_BAD_INPUT, Source, VERSION, locate};
 
-/// What is wrong with a scene: a [`miette::Diagnostic`] with file, line, caret and help.
+/// Error in a scene: a [`miette::Diagnostic`] with file, line, caret and help.
 #[derive(Debug)]
-pub struct SceneError(Box<Inside>);
+pub struct SceneError(Box<ErrorContent>);
 
 #[derive(Debug)]
-struct Inside {
+struct ErrorContent {
     code: &'static str,
     message: String,
     key: Option<String>,
     help: Option<String>,
     /// Label, place, line and text; none when the file could not be read at all.
-    place: Option<Place>,
+    place: Option<ErrorPlace>,
 }
 
 #[derive(Debug)]
-struct Place {
+struct ErrorPlace {
     /// Bytes in the longest line that the picture would show.
     longest_line: usize,
     label: String,
@@ -44,38 +44,39 @@ const MOST_SHOWN: usize = 12;
 const LONGEST_LINE: usize = 2000;
 
 impl SceneError {
-    /// The whole message in one line, without the picture of the source.
+    /// Returns the whole message in one line, without the picture of the source.
     pub fn message(&self) -> &str {
         &self.0.message
     }
 
-    /// The dotted path of the key the error is about.
+    /// Returns the dotted path of the key the error is about.
     pub fn key(&self) -> Option<&str> {
         self.0.key.as_deref()
     }
 
-    /// The line, counted from 1.
+    /// Returns the line, counted from 1.
     pub fn line(&self) -> Option<usize> {
         self.0.place.as_ref().map(|place| place.line)
     }
 
-    /// The exit code for bad input.
+    /// Returns the exit code for bad input.
     pub fn exit_code(&self) -> u8 {
         EXIT_BAD_INPUT
     }
 
-    /// The message with the lines of the source it is about, as the command lines print it: one message line, never
-    /// wrapped, so that it can be searched for; in colours if standard error is a terminal.
+    /// Returns the message with the lines of the source it is about, as the command lines print it: one
+    /// message line, never wrapped, so that it can be searched for; in colours if standard error is a
+    /// terminal.
     pub fn render(&self) -> String {
-        self.drawn(std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
+        self.render_with(std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
     }
 
     /// [`Self::render`] without colours, for messages that other programs show.
     pub fn plain(&self) -> String {
-        self.drawn(false)
+        self.render_with(false)
     }
 
-    fn drawn(&self, colors: bool) -> String {
+    fn render_with(&self, colors: bool) -> String {
         let theme = if colors { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
         let handler = GraphicalReportHandler::new_themed(theme).with_wrap_lines(false);
         let mut text = String::new();
@@ -96,10 +97,10 @@ impl SceneError {
 
     pub(super) fn file(path: &Path, code: &'static str, what: String, help: Option<String>) -> Self {
         let message = format!("{}: {what}", path.display());
-        Self(Box::new(Inside { code, message, key: None, help, place: None }))
+        Self(Box::new(ErrorContent { code, message, key: None, help, place: None }))
     }
 
-    fn at(
+    fn from_span(
         source: &Source,
         code: &'static str,
         key: Option<String>,
@@ -116,8 +117,8 @@ impl SceneError {
         let from = source.text[..start].rmatch_indices('\n').nth(1).map_or(0, |(at, _)| at);
         let to = source.text[end..].match_indices('\n').nth(1).map_or(length, |(at, _)| end + at);
         let longest_line = source.text[from..to].lines().map(str::len).max().unwrap_or(0);
-        let place = Place { longest_line, label: String::new(), span: start..end, line, text };
-        Self(Box::new(Inside { code, message, key, help: None, place: Some(place) }))
+        let place = ErrorPlace { longest_line, label: String::new(), span: start..end, line, text };
+        Self(Box::new(ErrorContent { code, message, key, help: None, place: Some(place) }))
     }
 
     fn label(mut self, label: impl Into<String>) -> Self {
@@ -142,32 +143,52 @@ impl SceneError {
         }
         let help = cut.then(|| "the text ends unexpectedly; is the file complete?".to_owned());
         let message = format!("not valid TOML: {}", error.message());
-        Self::at(source, "scene::syntax", None, span, message).label("here").help(help)
+        Self::from_span(source, "scene::syntax", None, span, message).label("here").help(help)
     }
 
     pub(super) fn no_version(source: &Source, similar: Option<(String, Range<usize>)>) -> Self {
         let suggestion = similar.as_ref().map(|(name, _)| format!("; did you mean `version` by `{name}`?"));
         let message =
-            format!("`version` is missing; allowed: `version = {VERSION}`{}", suggestion.unwrap_or_default());
+            format!("missing `version`; allowed: `version = {VERSION}`{}", suggestion.unwrap_or_default());
         let span = similar.map_or(0..0, |(_, span)| span);
         let help = Some(format!("begin the file with `version = {VERSION}`"));
-        Self::at(source, "scene::version", Some("version".into()), span, message).label("here").help(help)
+        Self::from_span(source, "scene::version", Some("version".into()), span, message)
+            .label("here")
+            .help(help)
     }
 
     pub(super) fn bad_version(source: &Source, span: Range<usize>) -> Self {
         let found = source.text.get(span.clone()).unwrap_or_default();
         let message = format!("`version`: found {}; allowed: {VERSION}", shorten(found));
-        Self::at(source, "scene::version", Some("version".into()), span, message).label("here")
+        Self::from_span(source, "scene::version", Some("version".into()), span, message).label("here")
     }
 
     pub(super) fn value(source: &Source, key: &str, span: Range<usize>, found: &str, allowed: &str) -> Self {
         let message = format!("`{key}`: found {found}; allowed: {allowed}");
-        Self::at(source, "scene::value", Some(key.into()), span, message).label("here")
+        Self::from_span(source, "scene::value", Some(key.into()), span, message).label("here")
     }
 
     pub(super) fn refused(source: &Source, key: String, span: Range<usize>, what: &str) -> Self {
         let message = format!("`{key}`: {what}");
-        Self::at(source, "scene::value", Some(key), span, message).label("found here")
+        Self::from_span(source, "scene::value", Some(key), span, message).label("found here")
+    }
+
+    pub(super) fn missing(source: &Source, key: String, span: Range<usize>, why: &str) -> Self {
+        let message = format!("missing `{key}`: {why}");
+        // a block that the file lacks belongs to its end
+        let end = source.text.trim_end().len();
+        let span = if span.is_empty() { end.saturating_sub(1)..end } else { span };
+        Self::from_span(source, "scene::missing_key", Some(key), span, message).label("needed here")
+    }
+
+    pub(super) fn unexpected(source: &Source, key: String, span: Range<usize>, why: &str) -> Self {
+        let message = format!("unexpected `{key}`: {why}");
+        Self::from_span(source, "scene::unexpected_key", Some(key), span, message).label("remove this")
+    }
+
+    pub(super) fn conflict(source: &Source, key: String, span: Range<usize>, other: &str, why: &str) -> Self {
+        let message = format!("`{key}` conflicts with `{other}`: {why}");
+        Self::from_span(source, "scene::conflict", Some(key), span, message).label("here")
     }
 
     /// Translates serde's words for the reader of a TOML file.
@@ -210,9 +231,9 @@ impl SceneError {
         if serde.starts_with("missing field") {
             let path = parent.map_or_else(|| name.to_owned(), |path| format!("{path}.{name}"));
             let place = if path == name { 0..0 } else { span };
-            let message = format!("`{path}` is missing");
+            let message = format!("missing `{path}`");
             let label = format!("`{name}` is needed here");
-            return Self::at(source, "scene::missing_key", Some(path), place, message).label(label);
+            return Self::from_span(source, "scene::missing_key", Some(path), place, message).label(label);
         }
         Self::wrong(source, parent, span, serde)
     }
@@ -221,7 +242,7 @@ impl SceneError {
         let words = translate(serde);
         match key {
             Some(key) => Self::refused(source, key, span, &words),
-            None => Self::at(source, "scene::value", None, span, words).label("found here"),
+            None => Self::from_span(source, "scene::value", None, span, words).label("found here"),
         }
     }
 
@@ -262,11 +283,11 @@ impl SceneError {
             .map(|advice| format!("; {advice}"))
             .unwrap_or_default();
         let message = format!("{what}; allowed: {list}{hint}{advice}");
-        Self::at(source, code, Some(key), span, message).label(label)
+        Self::from_span(source, code, Some(key), span, message).label(label)
     }
 }
 
-/// What a word of other programs is here.
+/// Returns the name used here for a word of other programs.
 fn advice(name: &str) -> Option<&'static str> {
     let plain: String = name.to_lowercase().chars().filter(char::is_ascii_alphanumeric).collect();
     Some(match plain.as_str() {
@@ -274,7 +295,8 @@ fn advice(name: &str) -> Option<&'static str> {
         "reducedpolynomial" => "the reduced polynomial of third order is `yeoh` here",
         "prony" | "viscoelastic" => "rates and relaxation are not modelled: laws are elastic",
         "poissonratio" | "poissonsratio" => {
-            "Poisson's ratio follows from `bulk_modulus` and the shear modulus, ν = (3K − 2G)/(6K + 2G), or from the law"
+            "Poisson's ratio follows from `bulk_modulus` and the shear modulus, ν = (3K − 2G)/(6K + 2G), or \
+             from the law"
         }
         _ => return None,
     })
@@ -308,7 +330,7 @@ impl Diagnostic for SceneError {
     }
 }
 
-/// The candidate that `name` most likely stands for.
+/// Returns the candidate that `name` most likely stands for.
 pub(super) fn nearest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     let lower = name.to_lowercase();
     let scored = candidates
@@ -336,7 +358,7 @@ pub(super) fn scene_inside(directory: &Path) -> Option<String> {
     case.is_file().then(|| format!("did you mean {}?", case.display()))
 }
 
-/// The words between backticks.
+/// Returns the words between backticks.
 fn quoted(message: &str) -> Vec<&str> {
     message.split('`').skip(1).step_by(2).collect()
 }

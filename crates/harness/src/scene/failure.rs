@@ -1,4 +1,4 @@
-//! What stops a run.
+//! Errors that end a run.
 
 use super::SceneError;
 

@@ -1,4 +1,4 @@
-//! What a scene is computed from beside its text: files, and results of other scenes. Their hashes tell whether results
+//! Files and results of other scenes that a scene is computed from. Their hashes tell whether results
 //! still hold.
 
 use std::collections::BTreeMap;
@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use sha2::{Digest, Sha256};
 use toml::de::{DeTable, DeValue};
 
-use super::{INPUTS, SceneError, Source};
+use super::{INPUTS, REPORT, SceneError, Source};
 use crate::report::{FILE_NAME, Report};
 use crate::stamp::{InputStamp, Stamp};
 
@@ -20,7 +20,7 @@ pub(super) type Notes = Arc<Mutex<BTreeMap<PathBuf, String>>>;
 /// Results of other scenes, by their names.
 pub(super) type Inputs = Arc<BTreeMap<String, InputStamp>>;
 
-/// What results no longer agree with.
+/// Input that results no longer agree with.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Changed {
     /// The contents of a file, or the file is gone.
@@ -39,7 +39,7 @@ impl fmt::Display for Changed {
 }
 
 impl Stamp {
-    /// What no longer is as it was; `scene` is the path of the scene.
+    /// Returns the first input that has changed; `scene` is the path of the scene.
     pub fn changed(&self, scene: &Path) -> Option<Changed> {
         let folder = scene.parent().unwrap_or(Path::new(""));
         let other = |(path, hash): &(&PathBuf, &String)| {
@@ -54,8 +54,8 @@ impl Stamp {
         self.inputs.iter().find(other).map(|(name, _)| Changed::Input(name.clone()))
     }
 
-    /// SHA-256 of everything that determines the results: equal programs compute equal bits from it. Where the results of
-    /// inputs lie makes no difference.
+    /// SHA-256 of everything that determines the results: equal programs compute equal bits from it. Where
+    /// the results of inputs lie makes no difference.
     pub fn identity(&self, program: &str, version: &str) -> String {
         let mut text = format!("{program} {version} {} {}\n", self.scene, self.quick);
         for (path, hash) in &self.files {
@@ -70,7 +70,7 @@ impl Stamp {
         hash(text.as_bytes())
     }
 
-    /// The identity of the results in a folder, if they are finished.
+    /// Returns the identity of the results in a folder, if they are finished.
     pub fn identity_of(output: &Path) -> Option<String> {
         let provenance = Report::read(output.join(FILE_NAME)).ok()?.provenance;
         Some(provenance.stamp?.identity(&provenance.program, &provenance.version))
@@ -78,13 +78,13 @@ impl Stamp {
 }
 
 impl Source {
-    /// The folder of the scene, from which the paths in it count.
+    /// Returns the folder of the scene, from which the paths in it count.
     pub fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new(""))
     }
 
-    /// The path of a file that the scene names. It is noted with the hash of its contents: results are stale when that
-    /// changes.
+    /// Returns the path of a file that the scene names. It is noted with the hash of its contents: results
+    /// are stale when that changes.
     pub fn file(&self, name: impl AsRef<Path>) -> PathBuf {
         let (path, key) = (self.folder().join(&name), name.as_ref().to_path_buf());
         let mut notes = self.files.lock().unwrap_or_else(PoisonError::into_inner);
@@ -98,13 +98,13 @@ impl Source {
         path
     }
 
-    /// What its results are computed from, as far as it has been read.
+    /// Returns the hashes of all that has been read for the scene.
     pub fn stamp(&self, quick: bool) -> Stamp {
         let files = self.files.lock().unwrap_or_else(PoisonError::into_inner).clone();
         Stamp { scene: hash(self.text.as_bytes()), quick, files, inputs: (*self.inputs).clone() }
     }
 
-    /// The same scene with the results of its inputs.
+    /// Returns the same scene with the results of its inputs.
     #[must_use]
     pub fn with_inputs(mut self, inputs: BTreeMap<String, InputStamp>) -> Self {
         self.inputs = Arc::new(inputs);
@@ -117,7 +117,7 @@ impl Source {
         Self { inputs: Arc::clone(&self.inputs), ..Self::new(&self.path, text) }
     }
 
-    /// The folder of the results of an input, named at `key`.
+    /// Returns the folder of the results of an input, named at `key`.
     ///
     /// # Errors
     /// No input has that name.
@@ -135,7 +135,7 @@ impl Source {
         }
     }
 
-    /// The scenes named in `[inputs]`: names, and paths as they are written.
+    /// Returns the scenes named in `[inputs]`: names, and paths as they are written.
     ///
     /// # Errors
     /// A syntax error; an entry that is no path.
@@ -162,10 +162,28 @@ impl Source {
         Ok(named)
     }
 
-    /// The program that the scene names.
+    /// Returns the program that the scene names.
     pub fn program(&self) -> Option<String> {
         let root = DeTable::parse(&self.text).ok()?;
         Some(root.get_ref().get("program")?.get_ref().as_str()?.to_owned())
+    }
+
+    /// Returns the title of the scene, if it has one.
+    pub fn title(&self) -> Option<String> {
+        let root = DeTable::parse(&self.text).ok()?;
+        let title = root.get_ref().get("title")?.get_ref().as_str()?.trim();
+        (!title.is_empty()).then(|| title.to_owned())
+    }
+
+    /// Returns the names and patterns of `[report] values`.
+    pub fn report_values(&self) -> Vec<String> {
+        let values = || {
+            let root = DeTable::parse(&self.text).ok()?;
+            let table = root.get_ref().get(REPORT)?.get_ref().as_table()?.clone();
+            let names = table.get("values")?.get_ref().as_array()?.clone();
+            Some(names.iter().filter_map(|name| Some(name.get_ref().as_str()?.to_owned())).collect())
+        };
+        values().unwrap_or_default()
     }
 }
 

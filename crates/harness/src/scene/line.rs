@@ -17,11 +17,11 @@ const MOST_CHARACTERS: usize = 64;
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LineSpec {
-    /// Its name, a part of its file's.
+    /// Name, a part of the name of its file.
     pub name: String,
-    /// One end.
+    /// First end.
     pub from: Vec<Length>,
-    /// The other end.
+    /// Second end.
     pub to: Vec<Length>,
     /// Points at equal distances, with both ends.
     #[serde(default = "points")]
@@ -96,7 +96,7 @@ impl LineSpec {
         Ok(())
     }
 
-    /// Whether a column is written; `by_default` where the scene names no fields.
+    /// Returns whether a column is written; `by_default` if the scene names no fields.
     pub fn wants(&self, column: &str, by_default: bool) -> bool {
         let of = |field: &String| {
             column.strip_prefix(field.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('_'))
@@ -104,7 +104,7 @@ impl LineSpec {
         self.fields.as_ref().map_or(by_default, |fields| fields.iter().any(of))
     }
 
-    /// Its points, m, after [`Self::check`].
+    /// Returns the points, m, after [`Self::check`].
     pub fn places<const D: usize>(&self) -> Vec<[f64; D]> {
         let ends = [&self.from, &self.to].map(|end| -> [f64; D] { std::array::from_fn(|d| end[d].si()) });
         let last = (self.points - 1) as f64;

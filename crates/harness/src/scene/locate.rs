@@ -1,4 +1,4 @@
-//! From key paths to places in the text, and back.
+//! Conversion between key paths and places in the text.
 
 use std::ops::Range;
 
@@ -6,23 +6,24 @@ use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
 type Key<'i> = Spanned<DeString<'i>>;
-type Value<'i> = Spanned<DeValue<'i>>;
+type TreeValue<'i> = Spanned<DeValue<'i>>;
 
-/// The span of the value at `path` (`a.b[2].c`), or of its nearest existing parent other than the root.
+/// Returns the span of the value at `path` (`a.b[2].c`), or of its nearest existing parent other than the
+/// root.
 pub(super) fn span(root: &DeTable<'_>, path: &str) -> Option<Range<usize>> {
     let mut found = None;
     walk(root, path, &mut |value| found = Some(value.span()));
     found
 }
 
-/// The value at `path`.
-pub(super) fn value<'t, 'i>(root: &'t DeTable<'i>, path: &str) -> Option<&'t Value<'i>> {
+/// Returns the value at `path`.
+pub(super) fn value<'t, 'i>(root: &'t DeTable<'i>, path: &str) -> Option<&'t TreeValue<'i>> {
     let mut last = None;
     walk(root, path, &mut |value| last = Some(value)).then_some(last).flatten()
 }
 
 /// Visits what lies on the way to `path`; whether its end exists. A key may itself be a path, in quotes.
-fn walk<'t, 'i>(table: &'t DeTable<'i>, path: &str, visit: &mut impl FnMut(&'t Value<'i>)) -> bool {
+fn walk<'t, 'i>(table: &'t DeTable<'i>, path: &str, visit: &mut impl FnMut(&'t TreeValue<'i>)) -> bool {
     let mut ends: Vec<usize> = path.match_indices('.').map(|(at, _)| at).collect();
     ends.push(path.len());
     // the longest name first
@@ -55,7 +56,7 @@ fn without_indices(part: &str) -> &str {
     }
 }
 
-/// The path of the innermost key or value around `place`.
+/// Returns the path of the innermost key or value around `place`.
 pub(super) fn path(root: &DeTable<'_>, place: &Range<usize>) -> Option<String> {
     // what is missing from the file as a whole has no place, not the first key's
     if place.is_empty() {
@@ -72,7 +73,7 @@ pub(super) fn path(root: &DeTable<'_>, place: &Range<usize>) -> Option<String> {
     found
 }
 
-/// The span of a key called `name`, preferably directly in the table at `parent`.
+/// Returns the span of a key called `name`, preferably directly in the table at `parent`.
 pub(super) fn key(root: &DeTable<'_>, parent: &str, name: &str) -> Option<(String, Range<usize>)> {
     let mut found: Option<(String, Range<usize>)> = None;
     visit(root, "", &mut |path, key, _| {
@@ -89,7 +90,7 @@ pub(super) fn key(root: &DeTable<'_>, parent: &str, name: &str) -> Option<(Strin
 fn visit<'t, 'i>(
     table: &'t DeTable<'i>,
     above: &str,
-    each: &mut impl FnMut(&str, Option<&'t Key<'i>>, &'t Value<'i>),
+    each: &mut impl FnMut(&str, Option<&'t Key<'i>>, &'t TreeValue<'i>),
 ) {
     for (key, value) in table {
         let name = key.get_ref();
@@ -100,9 +101,9 @@ fn visit<'t, 'i>(
 }
 
 fn inside<'t, 'i>(
-    value: &'t Value<'i>,
+    value: &'t TreeValue<'i>,
     path: &str,
-    each: &mut impl FnMut(&str, Option<&'t Key<'i>>, &'t Value<'i>),
+    each: &mut impl FnMut(&str, Option<&'t Key<'i>>, &'t TreeValue<'i>),
 ) {
     match value.get_ref() {
         DeValue::Table(table) => visit(table, path, each),

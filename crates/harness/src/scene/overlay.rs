@@ -7,18 +7,19 @@ use toml::de::{DeString, DeTable, DeValue};
 
 use super::{SWEEP, SceneError, Source, locate};
 
-/// One change, from a place in the scene to another.
+/// Replacement of a part of the scene by another part.
 #[derive(Clone, Debug)]
 pub(super) enum Overlay {
     /// The value written at `by` stands at `key`.
     Replace { key: String, by: String },
-    /// Each entry `PATH = VALUE` of the table at `by` stands at its path; tables are merged, all else is replaced.
+    /// Each entry `PATH = VALUE` of the table at `by` stands at its path; tables are merged, all else is
+    /// replaced.
     Merge { by: String },
 }
 
 impl Source {
-    /// The same scene where the value of `key` is the one written at `by`: [`Source::parse`] finds it there, and errors
-    /// about the first point at the second. Of several that concern a key the first holds.
+    /// Returns the same scene where the value of `key` is the one written at `by`: [`Source::parse`] finds it
+    /// there, and errors about the first point at the second. Of several that concern a key the first holds.
     #[must_use]
     pub fn with_replaced(&self, key: &str, by: &str) -> Self {
         let mut source = self.clone();
@@ -26,8 +27,8 @@ impl Source {
         source
     }
 
-    /// The same scene with the table at `by` over it. Its keys are paths (`"boundary[1].film"`, or nested tables);
-    /// tables are merged, all else is replaced, and what is not there yet is added.
+    /// Returns the same scene with the table at `by` over it. Its keys are paths (`"boundary[1].film"`, or
+    /// nested tables); tables are merged, all else is replaced, and what is not there yet is added.
     #[must_use]
     pub fn with_merged(&self, by: &str) -> Self {
         let mut source = self.clone();
@@ -69,7 +70,7 @@ impl Source {
         Ok(())
     }
 
-    /// The key in the text that holds what stands at `key`.
+    /// Returns the key in the text that holds what stands at `key`.
     pub(super) fn origin(&self, root: &DeTable<'_>, key: &str) -> Option<String> {
         let sweep = Overlay::Merge { by: format!("{SWEEP}.set") };
         std::iter::once(&sweep).chain(&self.overlays).find_map(|overlay| match overlay {

@@ -4,11 +4,12 @@ use schemars::generate::SchemaSettings;
 use schemars::{Schema, SchemaGenerator};
 use serde_json::{Value, json};
 
-use super::{INPUTS, VERSION};
+use super::{INPUTS, REPORT, VERSION};
 use crate::report::Quantity;
 
-/// The schema (draft 7, which editors of TOML read) of the scenes of a program: one of the types that `alternatives`
-/// asks the generator for, with the `version` that every scene begins with. An expectation's `quantity` is one of `quantities`.
+/// Returns the schema (draft 7, which editors of TOML read) of the scenes of a program: one of the types that
+/// `alternatives` asks the generator for, with the `version` that every scene begins with. An expectation's
+/// `quantity` is one of `quantities`.
 ///
 /// ```
 /// #[derive(schemars::JsonSchema)]
@@ -59,14 +60,15 @@ fn name_quantities(expect: &mut Value, quantities: &[&[Quantity]]) {
         }
     };
     let mut choices: Vec<Value> = quantities.iter().flat_map(|list| *list).map(one).collect();
-    choices.push(json!({ "type": "string", "description": "with studies, a name with that of the study; or \"NAME / NAME\"" }));
+    let description = "with studies, a name with that of the study; or \"NAME / NAME\"";
+    choices.push(json!({ "type": "string", "description": description }));
     if let Some(quantity) = expect.pointer_mut("/properties/quantity").and_then(Value::as_object_mut) {
         quantity.remove("type");
         quantity.insert("anyOf".to_owned(), choices.into());
     }
 }
 
-/// A name with places in braces as a regular expression.
+/// Returns a name with places in braces as a regular expression.
 fn regex(name: &str) -> String {
     let pieces: Vec<&str> = name.split(['{', '}']).collect();
     let piece = |(index, piece): (usize, &&str)| match index % 2 {
@@ -83,7 +85,16 @@ fn add_version(scene: &mut Value) {
     scene["properties"][INPUTS] = json!({
         "type": "object",
         "additionalProperties": { "type": "string" },
-        "description": "Scenes whose results this one reads: NAME = \"PATH of the scene, relative to this one\".",
+        "description": "Scenes whose results this one reads: NAME = \"PATH of the scene, relative to \
+                        this one\".",
+    });
+    scene["properties"][REPORT] = json!({
+        "type": "object",
+        "additionalProperties": false,
+        "required": ["values"],
+        "properties": { "values": { "type": "array", "items": { "type": "string" } } },
+        "description": "Values to show first in the terminal and on the page: names, or patterns with `*`; \
+                        a name without its variant stands for those of all variants.",
     });
     match scene["required"].as_array_mut() {
         Some(required) => required.insert(0, json!("version")),

@@ -6,7 +6,7 @@ use super::{SceneError, Source};
 use crate::output::picture::{Plane, View};
 use polycore::units::{Angle, Length};
 
-/// How pictures show solids.
+/// View of solids in pictures.
 #[derive(Clone, Copy, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SolidSpec {
@@ -54,7 +54,7 @@ impl SolidSpec {
         Ok(())
     }
 
-    /// The viewer.
+    /// Returns the viewer.
     pub fn view(&self) -> View {
         let View { azimuth, elevation } = View::default();
         View {

@@ -10,24 +10,24 @@ use polycore::units::{Length, Ratio};
 #[allow(dead_code)]
 struct Scene {
     name: Option<String>,
-    body: Body,
+    body: BodySpec,
     #[serde(default)]
-    load: Vec<Load>,
+    load: Vec<LoadSpec>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 #[allow(dead_code)]
-struct Body {
+struct BodySpec {
     spacing: Length,
     horizon: f64,
     count: Option<u32>,
-    law: Option<Law>,
+    law: Option<LawSpec>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-enum Law {
+enum LawSpec {
     Subtract,
     Shift,
     Chain,
@@ -36,9 +36,24 @@ enum Law {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(dead_code)]
-struct Load {
+struct LoadSpec {
     at: [Length; 2],
     weight: Ratio,
+}
+
+#[test]
+fn missing_unexpected_and_conflicting_keys() {
+    let source = Source::new("scene.toml", GOOD);
+    let missing = source.missing("body.count", "needed for a test");
+    assert_eq!(missing.message(), "missing `body.count`: needed for a test");
+    assert_eq!((missing.key(), missing.line()), (Some("body.count"), Some(5)));
+    assert_eq!(source.missing("grip", "needed for a test").line(), Some(16), "the end of the file");
+    let unexpected = source.unexpected("body.law", "a test has none");
+    assert_eq!(unexpected.message(), "unexpected `body.law`: a test has none");
+    assert_eq!(unexpected.line(), Some(8));
+    let conflict = source.conflict("load[1].weight", "at", "write one of them");
+    assert_eq!(conflict.message(), "`load[1].weight` conflicts with `at`: write one of them");
+    assert_eq!(conflict.line(), Some(16));
 }
 
 const GOOD: &str = r#"
@@ -73,7 +88,7 @@ fn rendered(error: &SceneError) -> String {
 fn good_scene() {
     let scene: Scene = Source::new("scene.toml", GOOD).parse().unwrap();
     assert_eq!(scene.body.spacing.si(), 0.002);
-    assert!(matches!(scene.body.law, Some(Law::Chain)));
+    assert!(matches!(scene.body.law, Some(LawSpec::Chain)));
     assert_eq!(scene.load[1].weight.si(), 0.5);
 }
 
@@ -114,7 +129,7 @@ fn every_error_names_place_found_and_allowed() {
             8,
             &["found integer `-3`; allowed: a whole number, not negative"],
         ),
-        ("horizon = 3.015\n", "", "body.horizon", 5, &["`body.horizon` is missing"]),
+        ("horizon = 3.015\n", "", "body.horizon", 5, &["missing `body.horizon`"]),
         ("[body]", "[bodi]", "bodi", 5, &["unknown key `bodi`", "did you mean `body`?"]),
         ("[\"0 mm\", \"2 mm\"]", "[\"0 mm\"]", "load[1].at", 15, &["found", "array"]),
     ] {
@@ -175,7 +190,7 @@ fn unknown_names_show_the_nearest() {
 #[test]
 fn version_comes_first() {
     let missing = fail(&GOOD.replace("version = 1", ""));
-    assert!(missing.message().contains("`version` is missing; allowed: `version = 1`"), "{missing}");
+    assert!(missing.message().contains("missing `version`; allowed: `version = 1`"), "{missing}");
     let other = fail(&GOOD.replace("version = 1", "version = 2").replace("spacing", "anything"));
     assert_eq!(other.message(), "`version`: found 2; allowed: 1");
     assert_eq!(other.line(), Some(2));
@@ -205,6 +220,19 @@ fn cross_field_errors_find_their_value() {
     let error = source.error("body.horizon", 3.015, "at least 5");
     assert_eq!(error.message(), "`body.horizon`: found 3.015; allowed: at least 5");
     assert_eq!(error.exit_code(), 2);
+}
+
+#[test]
+fn keys_are_missing_unexpected_or_in_conflict() {
+    let source = Source::new("scene.toml", GOOD);
+    let missing = source.missing("body.thickness", "a plane body needs it; write a length");
+    assert_eq!(missing.message(), "missing `body.thickness`: a plane body needs it; write a length");
+    assert!(rendered(&missing).contains("needed here"), "{}", rendered(&missing));
+    let unexpected = source.unexpected("load[1].at", "remove it");
+    assert_eq!(unexpected.message(), "unexpected `load[1].at`: remove it");
+    let conflict = source.conflict("body.horizon", "body.spacing", "keep one of them");
+    assert_eq!(conflict.message(), "`body.horizon` conflicts with `body.spacing`: keep one of them");
+    assert_eq!([missing, unexpected, conflict].map(|error| error.line()), [Some(5), Some(15), Some(7)]);
 }
 
 #[test]
@@ -293,8 +321,8 @@ set = { "load[0].weight" = "3 kg", "body.count" = 12 }
 struct WithStudies {
     #[serde(flatten)]
     _rest: BTreeMap<String, serde::de::IgnoredAny>,
-    body: Body,
-    load: Vec<Load>,
+    body: BodySpec,
+    load: Vec<LoadSpec>,
 }
 
 #[test]
@@ -310,7 +338,7 @@ fn parts_stand_in_for_others() {
     // merged: the rest stays
     let merged = source.with_merged("study[1].set");
     let found = of(merged.clone()).unwrap();
-    assert!(matches!(found.body.law, Some(Law::Shift)) && found.body.spacing.si() == 2e-3);
+    assert!(matches!(found.body.law, Some(LawSpec::Shift)) && found.body.spacing.si() == 2e-3);
     assert_eq!(found.load.iter().map(|load| load.weight.si()).collect::<Vec<_>>(), [0.5, 0.25]);
     assert_eq!(merged.error("load[1].weight", 1, 2).line(), Some(22));
     assert_eq!(merged.error("body.law", 1, 2).key(), Some("study[1].set.body.law"));

@@ -39,8 +39,8 @@ impl Compare {
         Err(source.error("output.compare", found, allowed))
     }
 
-    /// Adds to a report the error |q/q₀ − 1| of every variant but the reference, under `error` of quantity and variant, and a
-    /// curve of errors over run time for each `method`.
+    /// Adds to a report the error |q/q₀ − 1| of every variant but the reference, under `error` of quantity
+    /// and variant, and a curve of errors over run time for each `method`.
     pub fn add<S: Solved>(
         &self,
         report: &mut Report,

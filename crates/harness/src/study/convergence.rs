@@ -16,11 +16,11 @@ use serde::Deserialize;
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Convergence {
-    /// Its name: values are `NAME.limit` and `NAME.order`.
+    /// Name: values are `NAME.limit` and `NAME.order`.
     pub name: String,
     /// The quantity, without the study's name.
     pub quantity: String,
-    /// From coarse to fine.
+    /// Studies from coarse to fine.
     pub studies: [String; 3],
     /// The two lowest powers of h in the error; default 2 and 4, those of finite elements in space.
     #[serde(default = "space")]
@@ -32,8 +32,8 @@ fn space() -> [u32; 2] {
 }
 
 impl Convergence {
-    /// The limit, without the two powers of h (Richardson 1911, doi:10.1098/rsta.1911.0009), and the observed order
-    /// log₂ |(v₀ − v₁)/(v₁ − v₂)|.
+    /// The limit, without the two powers of h (Richardson 1911, doi:10.1098/rsta.1911.0009), and the observed
+    /// order log₂ |(v₀ − v₁)/(v₁ − v₂)|.
     pub fn limit_and_order(&self, [coarse, middle, fine]: [f64; 3]) -> [f64; 2] {
         let [first, second] = self.powers.map(|power| f64::from(power).exp2());
         let without = |fine: f64, coarse: f64, factor: f64| fine + (fine - coarse) / (factor - 1.0);

@@ -17,7 +17,7 @@ use serde::Deserialize;
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ErrorAgainstTime {
-    /// Its name: values are `NAME.error_of_STUDY`.
+    /// Name: values are `NAME.error_of_STUDY`.
     pub name: String,
     /// Quantities, without the study's name; the error is the root of the mean of their squared differences.
     pub quantities: Vec<String>,
@@ -53,7 +53,7 @@ impl ErrorAgainstTime {
         }
         let count = self.quantities.len();
         match (&self.truth, &self.values) {
-            _ if count == 0 => fault("quantities", "nothing".to_owned(), "at least one"),
+            _ if count == 0 => fault("quantities", "an empty list".to_owned(), "at least one"),
             (Some(name), None) if known(&name) => fault("truth", format!("`{name}`"), "the name of a study"),
             (None, Some(values)) if values.len() != count => {
                 let allowed = format!("one for each of the {count} quantities");

@@ -1,10 +1,11 @@
-//! The variants of a scene, as many at a time as the program says. All are parts of one run, and of its checkpoint.
+//! The variants of a scene, as many at a time as the program says. All are parts of one run, and of its
+//! checkpoint.
 //!
-//! Each thread solves one variant; what its loops hand out is taken by threads that have no variant of their own any more. A
-//! variant's numbers do not depend on the threads, so neither do those of a scene.
+//! Each thread solves one variant; what its loops hand out is taken by threads that have no variant of their
+//! own any more. A variant's numbers do not depend on the threads, so neither do those of a scene.
 
 use super::Naming;
-use crate::case::{Fault, Kept, Options, Run, Step};
+use crate::case::{Fault, Options, Run, Step, VariantCheckpoint};
 use crate::scene::Failure;
 use polycore::Error;
 use serde::Serialize;
@@ -13,7 +14,8 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Progress of the whole run. The outcomes of finished variants, and what those under way have reached, are its checkpoint.
+/// Progress of the whole run. The outcomes of finished variants, and what those under way have reached, are
+/// its checkpoint.
 struct Whole<'a, 'r, O> {
     run: &'a mut Run<'r>,
     finished: BTreeMap<usize, O>,
@@ -32,8 +34,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Solves the variants called `names` that the checkpoint does not have, `at_once` of them at a time, each by `solve` in a run
-/// of its own; their outcomes in their order. Variants after one that fails stop.
+/// Solves the variants called `names` that the checkpoint does not have, `at_once` of them at a time, each by
+/// `solve` in a run of its own; their outcomes in their order. Variants after one that fails stop.
 ///
 /// # Errors
 /// That of the first variant that fails; an interruption; a checkpoint that cannot be read or written.
@@ -87,7 +89,7 @@ where
             whole.states.insert(index, state);
             whole.save()
         };
-        let mut own = lock(&whole).run.of_variant(options, Kept { keep: &keep, reached });
+        let mut own = lock(&whole).run.of_variant(options, VariantCheckpoint { keep: &keep, reached });
         let outcome = solve(index, &mut own)?;
         drop(own);
         let mut whole = lock(&whole);
@@ -125,7 +127,7 @@ where
     }
 }
 
-/// The text of an error that the scene expects, a part of which is `text`, in place of the outcome.
+/// Returns the text of an error that the scene expects, a part of which is `text`, in place of the outcome.
 ///
 /// # Errors
 /// Any other.

@@ -9,7 +9,7 @@ use std::path::Path;
 /// A variant in the table of a suite.
 #[derive(Debug)]
 pub struct SuiteRow<'a> {
-    /// Its name.
+    /// Name.
     pub name: &'a str,
     /// Expected behaviour.
     pub description: Option<&'a str>,
@@ -21,8 +21,8 @@ pub struct SuiteRow<'a> {
     pub seconds: f64,
 }
 
-/// Writes `suite.md` if a variant has a description, with the verdict of the report on each; `counted` heads the column of
-/// counts. Returns the rows.
+/// Writes `suite.md` if a variant has a description, with the verdict of the report on each; `counted` heads
+/// the column of counts. Returns the rows.
 ///
 /// # Errors
 /// A file that cannot be written.

@@ -27,11 +27,13 @@ fn names(variants: &[Variant]) -> Vec<&str> {
     variants.iter().map(|variant| variant.name.as_str()).collect()
 }
 
-/// Lists are a grid whose last list runs fastest; they hold over single keys, and these over blocks. What is equal runs once.
+/// Lists are a grid whose last list runs fastest; they hold over single keys, and these over blocks. What is
+/// equal runs once.
 #[test]
 fn lists_keys_and_blocks() {
     let studies = "[[study]]\nspacing = [4, 2]\nlaw = ['a', 'b']\n[[study]]\nspacing = [2, 1]\n
-        [[study]]\nname = ' x'\nspacing = [3]\nplate = { hole = 5, spacing = 7 }\nset = { 'plate.hole' = 6, law = 'c' }\n
+        [[study]]\nname = ' x'\nspacing = [3]\n
+        plate = { hole = 5, spacing = 7 }\nset = { 'plate.hole' = 6, law = 'c' }\n
         [[study]]\nname = ' y'\nquick = false\nexpect_error = 'no hole'\nhole = 0";
     let all = plates(studies, false, Naming::Brackets).unwrap();
     assert_eq!(names(&all), ["a 4 1", "b 4 1", "a 2 1", "b 2 1", "a 1 1", "c 3 6 x", "a 8 0 y"]);
@@ -49,7 +51,8 @@ fn lists_keys_and_blocks() {
 /// Values of any keys, named as in a sweep; no name is needed.
 #[test]
 fn any_keys() {
-    let studies = "[[study]]\nvary = { 'plate.hole' = [1, 0.5], law = ['b c'] }\n[[study]]\nname = 'x'\nvary = { 'plate.new' = [3] }";
+    let studies = "[[study]]\nvary = { 'plate.hole' = [1, 0.5], law = ['b c'] }\n\
+                   [[study]]\nname = 'x'\nvary = { 'plate.new' = [3] }";
     let all = plates(studies, false, Naming::Folders).unwrap();
     let expected = ["b c 8 1law-bc_hole-1", "b c 8 0.5law-bc_hole-0_5", "a 8 1x_new-3"];
     assert_eq!(names(&all), expected);
@@ -61,7 +64,7 @@ fn names_that_are_refused() {
     for (studies, naming, message) in [
         ("[[study]]\nname = 'a/b'", Naming::Brackets, "found `a/b`; allowed: a name without `/`"),
         ("[[study]]\nname = 'a b'", Naming::Folders, "it names files"),
-        ("[[study]]\nhole = 2", Naming::Folders, "`study[0].name`: found nothing"),
+        ("[[study]]\nhole = 2", Naming::Folders, "missing `study[0].name`: the values"),
         ("[[study]]\n[[study]]\nhole = 1", Naming::Brackets, "`study[1]`: found a second variant `a 8 1`"),
         ("[[study]]\nname = 'f'\n[[study]]\nname = 'F'", Naming::Folders, "`a 8 1F` twice"),
         ("[[study]]\nname = 'f'\nquick = false", Naming::Folders, "no variant left in a --quick run"),

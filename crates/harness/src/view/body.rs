@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use super::frames::Frames;
-use super::pack::{Levels, NOTHING, PLACES, Slot, Store, VALUES};
-use super::particles::Choice;
-use super::scalars::{Scalar, scalars};
-use super::solid::{Solid, corners_of};
+use super::frames::FrameReader;
+use super::pack::{LevelRange, NOTHING, PLACES, Slot, Store, VALUES};
+use super::particles::ParticleChoice;
+use super::scalars::{ArrayScalar, scalars};
+use super::solid::{PageSolid, corners_of};
 use polycore::Error;
 
 /// Arrays of displacements, m: they move the points.
@@ -16,7 +16,7 @@ const EXISTS: &str = "exists";
 /// Fields of a body at most.
 const FIELDS: usize = 10;
 
-/// How much of a file is shown.
+/// Resolution of a body in steps and cells.
 #[derive(Clone, Copy, Debug)]
 pub struct Detail {
     /// Steps at most.
@@ -27,7 +27,7 @@ pub struct Detail {
 
 /// A body as the page reads it; its numbers are in a [`Store`].
 #[derive(Debug, Serialize)]
-pub struct Body {
+pub struct PageBody {
     name: String,
     /// Particles: times count load steps.
     particles: bool,
@@ -36,13 +36,13 @@ pub struct Body {
     cells: Vec<Group>,
     /// x, y, z; the numbers are lengths in m.
     points: [Slot; 3],
-    levels: [Levels; 3],
-    moves: Option<Moves>,
+    levels: [LevelRange; 3],
+    moves: Option<PageMoves>,
     /// Step from which each cell exists.
     births: Option<Slot>,
-    frames: Vec<Frame>,
-    fields: Vec<Field>,
-    /// What is left out.
+    frames: Vec<PageFrame>,
+    fields: Vec<PageField>,
+    /// Notes on what is left out.
     notes: Vec<String>,
 }
 
@@ -56,41 +56,46 @@ struct Group {
 
 /// Displacements: a row for each step.
 #[derive(Debug, Serialize)]
-struct Moves {
+struct PageMoves {
     slots: [Slot; 3],
-    levels: Levels,
+    levels: LevelRange,
 }
 
 #[derive(Debug, Serialize)]
-struct Frame {
+struct PageFrame {
     time: f64,
     displacement: Option<f64>,
     load: Option<f64>,
 }
 
 #[derive(Debug, Serialize)]
-struct Field {
+struct PageField {
     name: String,
     unit: &'static str,
-    /// Of cells, else of points.
+    /// True for a field of cells, false for one of points.
     cells: bool,
-    levels: Levels,
+    levels: LevelRange,
     slot: Slot,
 }
 
 /// A field that is read: the array, of cells or of points, and what is made of it.
-struct Source<'a> {
+struct FieldSource<'a> {
     array: &'a str,
     of_cells: bool,
-    scalar: Scalar,
+    scalar: ArrayScalar,
 }
 
-impl Body {
+impl PageBody {
     /// Reads a file. Neighbours of a lattice up to `bridge` spacings apart have no crack between them.
     ///
     /// # Errors
     /// [`Error::Format`] for damaged data; [`Error::Data`] where nothing can be drawn.
-    pub fn new(frames: &Frames, name: String, bridge: f64, detail: Detail) -> Result<(Self, Store), Error> {
+    pub fn new(
+        frames: &FrameReader,
+        name: String,
+        bridge: f64,
+        detail: Detail,
+    ) -> Result<(Self, Store), Error> {
         let steps = chosen(frames.len(), detail.steps);
         let mut notes = Vec::new();
         if steps.len() < frames.len() {
@@ -105,7 +110,7 @@ impl Body {
         let mut store = Store::default();
         let axes = [0, 1, 2].map(|d| {
             let values: Vec<f64> = solid.points.iter().map(|x| x[d]).collect();
-            let levels = Levels::over(values.iter().copied(), PLACES)?;
+            let levels = LevelRange::over(values.iter().copied(), PLACES)?;
             Some((levels, store.push(&[values.iter().map(|&x| levels.level(x)).collect()])))
         });
         let [Some(x), Some(y), Some(z)] = axes else { return Err(nothing()) };
@@ -114,9 +119,13 @@ impl Body {
         let cells = groups(&solid, &mut store);
         let fields = fields(frames, &steps, &solid, plane, &mut store, &mut notes)?;
         let frame = |&step: &usize| {
-            frames.at(step, |series, step| {
+            frames.read_step(step, |series, step| {
                 let of = |name: &str| series.moment(step, name).filter(|x| x.is_finite());
-                Ok(Frame { time: series.times()[step], displacement: of("displacement"), load: of("load") })
+                Ok(PageFrame {
+                    time: series.times()[step],
+                    displacement: of("displacement"),
+                    load: of("load"),
+                })
             })
         };
         let times = steps.iter().map(frame).collect::<Result<_, _>>()?;
@@ -149,16 +158,16 @@ fn chosen(count: usize, most: usize) -> Vec<usize> {
     }
 }
 
-/// The particles of a file as cells.
+/// Returns the particles of a file as cells.
 fn particles(
-    frames: &Frames,
+    frames: &FrameReader,
     steps: &[usize],
     bridge: f64,
     detail: Detail,
     notes: &mut Vec<String>,
-) -> Result<(Solid, bool), Error> {
+) -> Result<(PageSolid, bool), Error> {
     let displaced = frames.arrays()[0].iter().any(|(name, n)| name == DISPLACEMENT[0] && *n == 3);
-    let reference = frames.at(0, |series, step| {
+    let reference = frames.read_step(0, |series, step| {
         let mut points = series.points(step)?;
         if displaced {
             let moved = series.data(step, DISPLACEMENT[0])?;
@@ -166,26 +175,27 @@ fn particles(
         }
         Ok(points)
     })?;
-    let choice = Choice::of(&reference, detail.coarser);
+    let choice = ParticleChoice::from_positions(&reference, detail.coarser);
     if choice.kept.len() < reference.len() {
         notes.push(format!("{} cells for {} particles", choice.kept.len(), reference.len()));
     }
     let keep =
         |all: Vec<[f64; 3]>| -> Vec<[f64; 3]> { choice.kept.iter().map(|&k| all[k as usize]).collect() };
-    let positions = steps.iter().map(|&step| frames.at(step, |series, step| Ok(keep(series.points(step)?))));
+    let positions =
+        steps.iter().map(|&step| frames.read_step(step, |series, step| Ok(keep(series.points(step)?))));
     let positions = positions.collect::<Result<Vec<_>, Error>>()?;
     Ok((choice.solid(&keep(reference), &positions, bridge).by_kind(), choice.plane))
 }
 
-/// The mesh of a file.
+/// Returns the mesh of a file.
 fn mesh(
-    frames: &Frames,
+    frames: &FrameReader,
     steps: &[usize],
     detail: Detail,
     notes: &mut Vec<String>,
-) -> Result<(Solid, bool), Error> {
-    let (points, cells) = (frames.at(0, |series, _| series.points(0))?, frames.cells()?);
-    let mut solid = Solid::mesh(&points, &cells, detail.coarser).by_kind();
+) -> Result<(PageSolid, bool), Error> {
+    let (points, cells) = (frames.read_step(0, |series, _| series.points(0))?, frames.cells()?);
+    let mut solid = PageSolid::mesh(&points, &cells, detail.coarser).by_kind();
     let drawn: std::collections::HashSet<u32> = solid.cell_of.iter().copied().collect();
     if solid.points.len() < points.len() && drawn.len() < cells.len() {
         notes.push(format!("{} of {} points of the mesh", solid.points.len(), points.len()));
@@ -193,7 +203,7 @@ fn mesh(
     let names = &frames.arrays()[0];
     if let Some((name, _)) = names.iter().find(|(name, n)| DISPLACEMENT.contains(&name.as_str()) && *n == 3) {
         for &step in steps {
-            let all = frames.at(step, |series, step| series.data(step, name))?;
+            let all = frames.read_step(step, |series, step| series.data(step, name))?;
             // what does not exist yet has not moved
             let known = |x: f64| if x.is_finite() { x } else { 0.0 };
             let of = |&point: &u32| [0, 1, 2].map(|d| known(all[3 * point as usize + d]));
@@ -204,23 +214,23 @@ fn mesh(
     Ok((solid, plane))
 }
 
-fn moves(solid: &Solid, store: &mut Store) -> Option<Moves> {
-    let levels = Levels::over(solid.moved.iter().flatten().flatten().copied(), PLACES)?;
+fn moves(solid: &PageSolid, store: &mut Store) -> Option<PageMoves> {
+    let levels = LevelRange::over(solid.moved.iter().flatten().flatten().copied(), PLACES)?;
     let slots = [0, 1, 2].map(|d| {
         let row = |step: &Vec<[f64; 3]>| step.iter().map(|u| levels.level(u[d])).collect();
         store.push(&solid.moved.iter().map(row).collect::<Vec<Vec<u16>>>())
     });
-    Some(Moves { slots, levels })
+    Some(PageMoves { slots, levels })
 }
 
-/// The first of the steps at which each cell exists.
-fn births(frames: &Frames, steps: &[usize], solid: &Solid) -> Result<Option<Vec<u16>>, Error> {
+/// Returns the first of the steps at which each cell exists.
+fn births(frames: &FrameReader, steps: &[usize], solid: &PageSolid) -> Result<Option<Vec<u16>>, Error> {
     if !frames.arrays()[1].iter().any(|(name, n)| name == EXISTS && *n == 1) {
         return Ok(None);
     }
     let mut births = vec![NOTHING; solid.cell_of.len()];
     for (index, &step) in steps.iter().enumerate() {
-        let exists = frames.at(step, |series, step| series.cell_data(step, EXISTS))?;
+        let exists = frames.read_step(step, |series, step| series.cell_data(step, EXISTS))?;
         for (birth, &cell) in births.iter_mut().zip(&solid.cell_of) {
             if *birth == NOTHING && exists[cell as usize] > 0.5 {
                 *birth = index as u16;
@@ -231,7 +241,7 @@ fn births(frames: &Frames, steps: &[usize], solid: &Solid) -> Result<Option<Vec<
 }
 
 /// Cells by type, as corners.
-fn groups(solid: &Solid, store: &mut Store) -> Vec<Group> {
+fn groups(solid: &PageSolid, store: &mut Store) -> Vec<Group> {
     let mut first = 0;
     let groups = solid.kinds.chunk_by(|a, b| a == b).map(|kinds| {
         let count = corners_of(kinds[0]);
@@ -248,13 +258,13 @@ fn groups(solid: &Solid, store: &mut Store) -> Vec<Group> {
 }
 
 fn fields(
-    frames: &Frames,
+    frames: &FrameReader,
     steps: &[usize],
-    solid: &Solid,
+    solid: &PageSolid,
     plane: bool,
     store: &mut Store,
     notes: &mut Vec<String>,
-) -> Result<Vec<Field>, Error> {
+) -> Result<Vec<PageField>, Error> {
     let [of_points, of_cells] = frames.arrays();
     let sources = |arrays: &'_ [(String, usize)], of_cells: bool| -> Vec<(String, usize, bool)> {
         let shown = |(name, _): &&(String, usize)| {
@@ -264,10 +274,10 @@ fn fields(
     };
     let mut arrays = sources(of_points, false);
     arrays.extend(sources(of_cells, true));
-    let mut wanted: Vec<Source> = Vec::new();
+    let mut wanted: Vec<FieldSource> = Vec::new();
     for (array, components, of_cells) in &arrays {
         let scalars = scalars(array, *components, plane).into_iter();
-        wanted.extend(scalars.map(|scalar| Source { array, of_cells: *of_cells, scalar }));
+        wanted.extend(scalars.map(|scalar| FieldSource { array, of_cells: *of_cells, scalar }));
     }
     wanted.sort_by_key(|source| source.scalar.rank);
     if wanted.len() > FIELDS {
@@ -276,13 +286,13 @@ fn fields(
         wanted.truncate(FIELDS);
     }
     let mut fields = Vec::new();
-    for Source { array, of_cells, scalar } in &wanted {
+    for FieldSource { array, of_cells, scalar } in &wanted {
         // particles are cells here, and the arrays of their file are of points
         let cells = *of_cells || solid.point_of.is_empty();
         let places = if cells { &solid.cell_of } else { &solid.point_of };
         let mut rows: Vec<Vec<f64>> = Vec::new();
         for &step in steps {
-            let all = frames.at(step, |series, step| match of_cells {
+            let all = frames.read_step(step, |series, step| match of_cells {
                 true => series.cell_data(step, array),
                 false => series.data(step, array),
             })?;
@@ -295,11 +305,11 @@ fn fields(
         let largest = rows.iter().flatten().filter(|x| x.is_finite()).fold(0.0, |m: f64, x| m.max(x.abs()));
         let (unit, scale) = scalar.shown(largest);
         // a field without any value is there all the same, and grey
-        let levels = Levels::over(rows.iter().flatten().map(|x| x * scale), VALUES)
-            .unwrap_or(Levels { low: 0.0, step: 0.0 });
+        let levels = LevelRange::over(rows.iter().flatten().map(|x| x * scale), VALUES)
+            .unwrap_or(LevelRange { low: 0.0, step: 0.0 });
         let row = |row: &Vec<f64>| row.iter().map(|x| levels.level(x * scale)).collect();
         let slot = store.push(&rows.iter().map(row).collect::<Vec<_>>());
-        fields.push(Field { name: scalar.name.clone(), unit, cells, levels, slot });
+        fields.push(PageField { name: scalar.name.clone(), unit, cells, levels, slot });
     }
     Ok(fields)
 }

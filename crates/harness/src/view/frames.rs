@@ -7,18 +7,19 @@ use crate::output::vtkhdf::{self, Cells, Series};
 use polycore::Error;
 
 /// Steps that are read on demand.
-pub struct Frames {
+pub struct FrameReader {
     /// NAME of NAME.vtkhdf.
     pub name: String,
-    /// Particles that move: time counts load steps. Otherwise a mesh that stands still, and time is in seconds.
+    /// Particles that move: time counts load steps. Otherwise a mesh that stands still, and time is in
+    /// seconds.
     pub moves: bool,
     first: Series,
-    /// Of an unfinished run: the file of each step.
+    /// File of each step, if the run is unfinished.
     files: Vec<PathBuf>,
 }
 
-impl Frames {
-    /// All field files of a folder by name, those of an unfinished run included.
+impl FrameReader {
+    /// Returns all field files of a folder by name, those of an unfinished run included.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] for a damaged file.
@@ -51,7 +52,7 @@ impl Frames {
         Ok(Some(Self { name, moves: first.moves(), first, files }))
     }
 
-    /// Whether the run that writes it has not ended.
+    /// Returns whether the run that writes the file has not ended.
     pub fn unfinished(&self) -> bool {
         !self.files.is_empty()
     }
@@ -66,7 +67,7 @@ impl Frames {
         [self.first.arrays(), self.first.cell_arrays()]
     }
 
-    /// The cells of a mesh.
+    /// Returns the cells of a mesh.
     ///
     /// # Errors
     /// [`Error::Format`].
@@ -78,7 +79,7 @@ impl Frames {
     ///
     /// # Errors
     /// Those of reading a damaged file.
-    pub fn at<T>(
+    pub fn read_step<T>(
         &self,
         step: usize,
         read: impl FnOnce(&Series, usize) -> Result<T, Error>,
@@ -90,12 +91,12 @@ impl Frames {
     }
 }
 
-/// What is in a folder.
+/// Returns the sorted names of the entries of a folder.
 ///
 /// # Errors
 /// [`Error::Io`].
 pub fn names(folder: &Path) -> Result<Vec<String>, Error> {
-    let entries = fs::read_dir(folder).map_err(Error::io("read", folder))?;
+    let entries = fs::read_dir(folder).map_err(Error::from_io("read", folder))?;
     let mut names: Vec<String> =
         entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
     names.sort();

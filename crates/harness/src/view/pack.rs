@@ -8,14 +8,14 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use serde::Serialize;
 
-/// Levels of positions and displacements: a 16th of a pixel on a screen of a thousand.
+/// LevelRange of positions and displacements: a 16th of a pixel on a screen of a thousand.
 pub const PLACES: u16 = 16_383;
-/// Levels of fields: a quarter of a thousandth of the colour bar.
+/// LevelRange of fields: a quarter of a thousandth of the colour bar.
 pub const VALUES: u16 = 4_095;
 /// Stands for no value.
 pub const NOTHING: u16 = u16::MAX;
 
-/// Where an array of `rows` × `count` numbers lies in a [`Store`].
+/// Position of an array of `rows` × `count` numbers in a [`Store`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Slot {
     /// First byte.
@@ -28,15 +28,15 @@ pub struct Slot {
 
 /// The range of quantised numbers: level k stands for `low + k · step`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Levels {
+pub struct LevelRange {
     /// The least number.
     pub low: f64,
     /// Distance of levels.
     pub step: f64,
 }
 
-impl Levels {
-    /// Of `count` + 1 levels over the finite numbers; none where there are none.
+impl LevelRange {
+    /// Returns `count` + 1 levels over the finite numbers, if there are any.
     pub fn over(numbers: impl IntoIterator<Item = f64>, count: u16) -> Option<Self> {
         let finite = numbers.into_iter().filter(|number| number.is_finite());
         let [low, high] = polycore::numerics::range(finite);
@@ -44,7 +44,7 @@ impl Levels {
         (low <= high).then_some(Self { low, step })
     }
 
-    /// The level next to a number; [`NOTHING`] for one that is not finite.
+    /// Returns the level next to a number; [`NOTHING`] for one that is not finite.
     pub fn level(&self, number: f64) -> u16 {
         match number.is_finite() {
             true if self.step > 0.0 => (number / self.step - self.low / self.step).round() as u16,
@@ -59,8 +59,9 @@ impl Levels {
 pub struct Store(Vec<u8>);
 
 impl Store {
-    /// Appends rows of equal length. Each row is kept as its difference from the one before, the first as differences of
-    /// neighbours, in zigzag order, low bytes before high bytes: what changes little deflates well.
+    /// Appends rows of equal length. Each row is kept as its difference from the one before, the first as
+    /// differences of neighbours, in zigzag order, low bytes before high bytes: what changes little deflates
+    /// well.
     pub fn push(&mut self, rows: &[Vec<u16>]) -> Slot {
         let (at, count) = (self.0.len(), rows.first().map_or(0, Vec::len));
         for (index, row) in rows.iter().enumerate() {
@@ -78,7 +79,7 @@ impl Store {
         Slot { at, rows: rows.len(), count }
     }
 
-    /// As text: gzip in base 64.
+    /// Returns the store as text: gzip in base 64.
     pub fn text(&self) -> String {
         zipped(&self.0)
     }
@@ -102,7 +103,7 @@ fn zigzag(change: u16) -> u16 {
 mod tests {
     use super::*;
 
-    /// As the page reads it.
+    /// Unpacks an array as the page does.
     fn unpacked(bytes: &[u8], slot: Slot) -> Vec<Vec<u16>> {
         let mut rows: Vec<Vec<u16>> = Vec::new();
         for index in 0..slot.rows {
@@ -137,15 +138,15 @@ mod tests {
     #[test]
     fn levels_cover_the_finite_numbers() {
         let numbers = [f64::NAN, -1.5, 3.0, f64::INFINITY, 0.1];
-        let levels = Levels::over(numbers, VALUES).unwrap();
+        let levels = LevelRange::over(numbers, VALUES).unwrap();
         assert_eq!((levels.level(-1.5), levels.level(3.0), levels.level(f64::NAN)), (0, VALUES, NOTHING));
         let back = levels.low + f64::from(levels.level(0.1)) * levels.step;
         assert!((back - 0.1).abs() <= 0.5 * levels.step, "{back}");
-        let constant = Levels::over([2.0, 2.0], VALUES).unwrap();
+        let constant = LevelRange::over([2.0, 2.0], VALUES).unwrap();
         assert_eq!((constant.low, constant.step, constant.level(2.0)), (2.0, 0.0, 0));
-        assert_eq!(Levels::over([f64::NAN], VALUES), None);
+        assert_eq!(LevelRange::over([f64::NAN], VALUES), None);
         // the difference of the ends is not finite
-        let wide = Levels::over([-1e308, 1e308], VALUES).unwrap();
+        let wide = LevelRange::over([-1e308, 1e308], VALUES).unwrap();
         assert!(wide.step.is_finite() && wide.level(1e308) == VALUES);
     }
 }

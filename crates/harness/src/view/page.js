@@ -1,97 +1,125 @@
 "use strict";
-// Controls and pictures of the page.
+// Values, controls and what they change.
 
 const run = JSON.parse(document.getElementById("run").textContent);
 const at = (id) => document.getElementById(id);
-const say = (tag, text, kind) => Object.assign(document.createElement(tag), { textContent: text, className: kind ?? "" });
-const short = (x) => x === null || x === undefined ? "–" : String(+x.toPrecision(4));
-const unit = (name, unit) => unit ? `${name} [${unit}]` : name;
+const make = (tag, text, kind) => Object.assign(document.createElement(tag), { textContent: text ?? "", className: kind ?? "" });
+const unit = (name, of) => of ? `${name} [${of}]` : name;
 const SCALES = [0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
-const LOOK = { displaylogo: false, responsive: true, scrollZoom: true, modeBarButtonsToRemove: ["resetCameraLastSave3d"] };
-const FONT = { family: "system-ui, sans-serif", size: 13 };
+// curves at first, and rows of a list at most
+const FIRST = 6, LISTED = 200;
+const INFERNO = ["#2a0b54", "#4a0c6b", "#781c6d", "#a52c60", "#cf4446", "#ed6925", "#fb9b06", "#f7d13d", "#fcffa4"];
+const VIRIDIS = ["#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80", "#5ec962", "#addc30", "#fde725"];
+const CIVIDIS = ["#00224e", "#123570", "#3b496c", "#575d6d", "#707173", "#8a8678", "#a59c74", "#c3b369", "#e1cc55", "#fee838"];
 
-let solid = null, step = 0, playing = null, busy = false, again = false, group = [];
+let solid = null, stage = null, step = 0, playing = null, group = [], chosen = [];
+const chart = new Chart(at("chart"));
 
 function options(select, names, chosen = 0) {
-  select.replaceChildren(...names.map((name, k) => Object.assign(say("option", name), { value: k, selected: k === chosen })));
-  select.parentElement.hidden = names.length === 0;
+  select.replaceChildren(...names.map((name, k) => Object.assign(make("option", name), { value: k, selected: k === chosen })));
+  select.closest("label").hidden = names.length < 2;
 }
 
-// head and numbers
+// light and dark
+
+function paint(theme) {
+  document.documentElement.dataset.theme = theme;
+  at("theme").textContent = theme === "dark" ? "Light" : "Dark";
+  if (solid) draw();
+}
+
+function themes() {
+  const system = matchMedia("(prefers-color-scheme: dark)");
+  paint(system.matches ? "dark" : "light");
+  system.onchange = () => paint(system.matches ? "dark" : "light");
+  at("theme").onclick = () => paint(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
+}
+
+// head and values
 
 function header() {
-  const about = at("about"), { report } = run;
-  if (report) {
-    about.append(`${report.program} ${report.version}, ${report.date} `);
-    const failed = run.expect.filter((e) => !e.pass).length;
-    const verdict = report.passed ? "passed" : `failed: ${failed} of ${run.expect.length} expectations, ${report.non_finite.length} values that are not finite`;
-    about.append(say("strong", verdict, report.passed ? "good" : "bad"));
+  const { verdict, report } = run;
+  at("verdict").textContent = verdict.text;
+  at("verdict").className = verdict.state;
+  const about = report ? [`${report.program} ${report.version}`, report.date, run.name] : [run.name];
+  at("about").textContent = about.join(" · ");
+  if (run.left_out.length) {
+    const details = make("details");
+    details.append(make("summary", "What this page leaves out"), make("p", run.left_out.join("; ")));
+    at("notes").append(details);
   }
-  if (run.unfinished || !report) about.append(say("strong", " the run has not ended: this is what it has written so far", "bad"));
-  const empty = run.bodies.length === 0 && run.tables.length === 0;
-  if (empty) at("notes").append("It has written no fields and no tables. ");
-  else if (run.bodies.length === 0) at("notes").append("It has written no fields (in a scene, [output] fields and every). ");
-  if (run.left_out.length) at("notes").append(`Left out of this page: ${run.left_out.join(", ")}.`);
+  if (!run.bodies.length) {
+    const missing = run.tables.length ? "no fields (in a scene, `[output] fields` asks for them)" : "no fields and no tables";
+    at("notes").append(make("p", `The run has written ${missing}.`));
+  }
 }
 
-function numbers() {
-  const rows = (head, list) => {
-    const table = document.createElement("table");
-    for (const [tag, cells] of [["th", head], ...list.map((cells) => ["td", cells])]) {
-      const row = table.insertRow();
-      for (const cell of cells) row.append(say(tag, cell, cell === "FAIL" ? "bad" : ""));
+const shown = ({ value }) => value === null ? "not finite" : number(value, 5);
+
+// main values: a table over variants, and tiles
+function main_values() {
+  const main = run.scalars.filter((scalar) => scalar.main !== null).sort((a, b) => a.main - b.main);
+  at("main").hidden = !main.length;
+  const distinct = (key) => [...new Set(main.filter((s) => s.variant).map((s) => s[key]))];
+  const variants = run.variants.filter((name) => distinct("variant").includes(name)), quantities = distinct("quantity").slice(0, 6);
+  if (variants.length) {
+    const table = make("table"), head = table.createTHead().insertRow(), of = (quantity) => main.find((s) => s.quantity === quantity).unit;
+    head.append(make("th", "variant"), ...quantities.map((name) => make("th", unit(name, of(name)), "number")));
+    const body = table.createTBody();
+    for (const variant of variants.slice(0, 12)) {
+      const row = body.insertRow();
+      row.append(make("td", variant));
+      for (const quantity of quantities) {
+        const scalar = main.find((s) => s.variant === variant && s.quantity === quantity);
+        row.append(make("td", scalar ? shown(scalar) : "–", scalar?.pass === false ? "number bad" : "number"));
+      }
     }
-    return table;
-  };
-  const block = (title, table, open) => {
-    const details = Object.assign(document.createElement("details"), { open });
-    details.append(say("summary", title), table);
-    at("numbers").append(details);
-  };
-  if (run.expect.length) {
-    block(`Expectations (${run.expect.length})`, rows(["", "quantity", "value"],
-      run.expect.map((e) => [e.pass ? "ok" : "FAIL", e.quantity, short(e.value)])), !run.report.passed);
+    const card = make("div", "", "card scroll");
+    card.tabIndex = 0;
+    card.append(table);
+    at("main").append(card);
   }
-  if (run.scalars.length) {
-    block(`Values (${run.scalars.length})`, rows(["name", "value", "unit"],
-      run.scalars.map((s) => [s.name, s.value === null ? "not finite" : short(s.value), s.unit])), run.bodies.length === 0 && run.tables.length === 0);
+  for (const scalar of main.filter((s) => !s.variant).slice(0, 8)) {
+    const tile = make("div", "", "tile");
+    tile.append(make("b", `${shown(scalar)} ${scalar.unit}`.trim(), scalar.pass === false ? "bad" : ""), make("span", scalar.name));
+    at("main").append(tile);
   }
 }
 
-// the solid
-
-function stageLayout() {
-  const { plane } = solid.told, scale = +at("scale").value;
-  const box = scale <= 1 ? solid.box : solid.bounds(scale), names = ["x", "y", "z"];
-  const pad = 0.02 * Math.max(...box.map(([low, high]) => high - low)) || 1;
-  const sizes = box.map(([low, high]) => high - low + 2 * pad), longest = Math.max(...sizes);
-  // beside the colour bar; lengths are in parts of the height
-  const { clientWidth: width, clientHeight: height } = at("stage"), share = Math.max(0.6, 1 - 95 / width);
-  const room = share * width / height;
-  const fill = plane ? 1.8 * longest * Math.min(1 / sizes[1], room / sizes[0]) : 1.9 * Math.min(1, room);
-  const scene = {
-    uirevision: `${solid.told.name}`, dragmode: "orbit", aspectmode: "manual", domain: { x: [0, share] },
-    aspectratio: Object.fromEntries(names.map((name, d) => [name, fill * sizes[d] / longest])),
-    camera: plane
-      ? { eye: { x: 0, y: 0, z: 1.2 }, up: { x: 0, y: 1, z: 0 }, projection: { type: "orthographic" } }
-      : { eye: { x: 0.65, y: -1, z: 0.55 }, up: { x: 0, y: 0, z: 1 }, projection: { type: "orthographic" } },
+// a table with a search field above it
+function searched(id, search, rows, head, more) {
+  const table = at(id), line = table.createTHead().insertRow(), body = table.createTBody();
+  head.forEach(([name, kind]) => line.append(make("th", name, kind)));
+  const fill = () => {
+    const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
+    const fits = ({ text, failed }) => words.every((word) => text.includes(word)) && (!more?.checked || failed);
+    body.replaceChildren(...rows.filter(fits).map(({ cells, failed }) => {
+      const row = make("tr");
+      cells.forEach((cell, k) => row.append(make("td", cell, `${head[k][1] ?? ""} ${failed && k === 0 ? "bad" : ""}`.trim())));
+      return row;
+    }));
   };
-  names.forEach((name, d) => {
-    scene[`${name}axis`] = {
-      title: { text: unit(name, solid.unit) }, range: [box[d][0] - pad, box[d][1] + pad], visible: !(plane && d === 2),
-      showbackground: false, gridcolor: "#e3e6ea", zeroline: false, nticks: sizes[d] < 0.3 * longest ? 4 : 7,
-    };
-  });
-  return { scene, margin: { l: 0, r: 0, t: 0, b: 0 }, font: FONT, showlegend: false };
+  search.oninput = fill;
+  if (more) more.onchange = fill;
+  fill();
 }
 
-// Inferno of matplotlib without its black end, on which no light shows a shape
-const INFERNO = ["#2a0b54", "#4a0c6b", "#781c6d", "#a52c60", "#cf4446", "#ed6925", "#fb9b06", "#f7d13d", "#fcffa4"];
-
-function colours(name) {
-  if (/temperature/.test(name)) return INFERNO.map((colour, k) => [k / (INFERNO.length - 1), colour]);
-  return /damage|flags/.test(name) ? "Cividis" : "Viridis";
+function tables() {
+  const row = (cells, failed) => ({ cells, failed, text: cells.join(" ").toLowerCase() });
+  const failed = run.expect.filter((e) => !e.pass).length;
+  at("judged").hidden = !run.expect.length;
+  at("judged-title").textContent = `Expectations (${run.expect.length})`;
+  at("only-failed").closest("label").hidden = !failed;
+  searched("expect", at("find-expect"), run.expect.map((e) =>
+    row([e.pass ? "met" : "not met", e.quantity, e.value, e.bound, e.kind.replace("-", " "), e.source], !e.pass)),
+  [["", ""], ["quantity"], ["value", "number"], ["expected", "number"], ["evidence"], ["source", "source"]], at("only-failed"));
+  at("values").hidden = !run.scalars.length;
+  at("values-title").textContent = `All values (${run.scalars.length})`;
+  searched("scalars", at("find-value"), run.scalars.map((s) => row([s.name, shown(s), s.unit], s.value === null)),
+    [["name"], ["value", "number"], ["unit"]]);
 }
+
+// the body
 
 function cutting() {
   const axis = at("axis").selectedIndex - 1;
@@ -103,56 +131,42 @@ function cutting() {
   return { axis, at: low - slack + (high - low + 2 * slack) * at("cut").value / 1000, sign };
 }
 
-function traces() {
-  const field = at("fields").options.length ? +at("fields").value : -1, told = solid.told.fields[field];
-  const { soups: [coloured, grey], range } = solid.surface({ step, field, scale: +at("scale").value, cut: cutting() });
-  const own = at("own-range").checked && range[0] <= range[1];
-  const [low, high] = !told ? [0, 1] : own ? range : [told.levels.low, told.levels.low + 4095 * told.levels.step];
-  const light = solid.told.plane ? { ambient: 1, diffuse: 0, specular: 0, fresnel: 0 } : { ambient: 0.55, diffuse: 0.6, specular: 0.1, fresnel: 0, roughness: 0.8, facenormalsepsilon: 0, vertexnormalsepsilon: 0 };
-  // the light stands in the space of the viewer: above, on the left
-  const common = { type: "mesh3d", flatshading: true, lighting: light, lightposition: { x: -1e5, y: 1e5, z: -1e5 } };
-  const { x, y, z, i, j, k, intensity } = told ? coloured : grey;
-  document.body.dataset.triangles = coloured.i.length + grey.i.length;
-  document.body.dataset.low = low;
-  document.body.dataset.high = high;
-  const place = "x %{x:.4g}, y %{y:.4g}, z %{z:.4g} " + solid.unit;
-  const body = {
-    ...common, x, y, z, i, j, k, hovertemplate: place + "<extra></extra>",
-    ...(told ? {
-      intensity, cmin: low, cmax: high > low ? high : low + (Math.abs(low) || 1) * 1e-6, colorscale: colours(told.name), showscale: true,
-      colorbar: { title: { text: unit(told.name, told.unit), side: "right" }, thickness: 14, len: 0.8, x: 1, xanchor: "right" },
-      hovertemplate: `${told.name} %{intensity:.4g} ${told.unit}<br>${place}<extra></extra>`,
-    } : { color: "#9fb4c7" }),
-  };
-  // parts without a value
-  const rest = { ...common, color: "#b8bcc2", hovertemplate: `no value<br>${place}<extra></extra>`, ...(told ? grey : soup()) };
-  delete rest.intensity;
-  return [body, rest];
+const colours = (name) => /temperature/.test(name) ? INFERNO : /damage|flags/.test(name) ? CIVIDIS : VIRIDIS;
+
+function bar(told, [low, high]) {
+  at("bar").hidden = !told;
+  if (!told) return;
+  at("bar-name").textContent = unit(told.name, told.unit);
+  at("colours").style.background = `linear-gradient(to right, ${colours(told.name).join(", ")})`;
+  at("ticks").replaceChildren(...[0, 0.25, 0.5, 0.75, 1].map((part) => make("span", number(low + part * (high - low), 3))));
 }
 
-async function draw() {
-  if (busy) { again = true; return; }
-  busy = true;
-  do {
-    again = false;
-    const frame = solid.told.frames[step];
-    at("moment").textContent = moment(frame);
-    at("step").value = step;
-    await Plotly.react("stage", traces(), stageLayout(), LOOK);
-    mark();
-    document.body.dataset.step = step;
-  } while (again);
-  busy = false;
+function draw() {
+  const field = at("fields").options.length ? +at("fields").value : -1, told = solid.told.fields[field];
+  const scale = +at("scale").value;
+  const { soups, range } = solid.surface({ step, field, scale, cut: cutting() });
+  const own = at("own-range").checked && range[0] <= range[1];
+  const ends = !told ? [0, 1] : own ? range : [told.levels.low, told.levels.low + 4095 * told.levels.step];
+  const box = scale <= 1 ? solid.box : solid.bounds(scale), style = getComputedStyle(document.documentElement);
+  const plain = ["--body", "--void"].map((name) => style.getPropertyValue(name).trim());
+  Object.assign(stage, { plane: solid.told.plane, box, unit: solid.unit });
+  // without a field all is in the second soup
+  stage.show(soups, { range: told && ends, colours: told && colours(told.name), plain: told ? plain : [plain[0], plain[0]] });
+  bar(told, ends);
+  at("moment").textContent = moment(solid.told.frames[step]);
+  at("step").value = step;
+  marks();
+  Object.assign(document.body.dataset, { step, triangles: soups[0].i.length + soups[1].i.length, grey: soups[1].i.length, low: ends[0], high: ends[1] });
 }
 
 function moment({ time, displacement, load }) {
-  const many = solid.told.frames.length;
-  if (!solid.told.particles) return `t = ${short(time)} s (${step + 1} of ${many})`;
-  const held = displacement === null ? "" : `, displacement ${short(1e3 * displacement)} mm`;
-  const pulled = load === null ? "" : `, load ${short(load)} N`;
+  const many = solid.told.frames.length, of = `${step + 1} of ${many}`;
+  if (!solid.told.particles) return `t = ${number(time)} s (${of})`;
+  const held = displacement === null ? "" : `, displacement ${number(1e3 * displacement)} mm`;
+  const pulled = load === null ? "" : `, load ${number(load)} N`;
   // between two steps: 1/2, 2/3, 3/4, …
   const part = time % 1, within = part ? `, equilibrium ${Math.round(part / (1 - part))}` : "";
-  return `load step ${Math.ceil(time)}${within}${held}${pulled} (${step + 1} of ${many})`;
+  return `load step ${Math.ceil(time)}${within}${held}${pulled} (${of})`;
 }
 
 async function choose(index) {
@@ -160,57 +174,47 @@ async function choose(index) {
   solid = new Solid(told, await unzip(`body-${index}`));
   step = told.frames.length - 1;
   at("step").max = step;
-  at("play").disabled = step === 0;
+  at("steps").hidden = step === 0;
   options(at("fields"), told.fields.map((field) => unit(field.name, field.unit)));
-  at("scale").replaceChildren(...(solid.moves ? SCALES : []).map((x) => Object.assign(say("option", x), { value: x, selected: x === 1 })));
-  at("scale").parentElement.hidden = !solid.moves;
-  if (!solid.moves) at("scale").append(Object.assign(say("option", "1"), { value: 1 }));
-  at("bodies").title = told.notes.join("; ");
-  at("stage-notes")?.remove();
-  if (told.notes.length) at("body").append(Object.assign(say("p", `Shown: ${told.notes.join("; ")}.`), { id: "stage-notes" }));
-  await draw();
+  at("fields").closest("label").hidden = !told.fields.length;
+  options(at("scale"), (solid.moves ? SCALES : [1]).map(String), solid.moves ? 1 : 0);
+  [...at("scale").options].forEach((option) => { option.value = option.text; });
+  at("stage-notes").hidden = !told.notes.length;
+  at("stage-notes").lastElementChild.textContent = `${told.notes.join("; ")}.`;
+  draw();
+  stage.reset();
 }
 
 function go(to) {
   step = Math.max(0, Math.min(to, solid.told.frames.length - 1));
-  return draw();
+  draw();
 }
 
 function play() {
   const on = playing === null;
   at("play").textContent = on ? "⏸" : "▶";
+  at("play").ariaLabel = on ? "Pause" : "Play all steps";
   clearTimeout(playing);
   playing = null;
   if (!on) return;
   if (step === solid.told.frames.length - 1) step = -1;
-  const next = async () => {
-    await go(step + 1);
+  const next = () => {
+    go(step + 1);
     if (playing === null) return;
     if (step === solid.told.frames.length - 1) play(); else playing = setTimeout(next, 120);
   };
   playing = setTimeout(next, 0);
 }
 
-// two fingers: nearer or farther, by turns of the wheel that each scale by a tenth
-function pinch(stage) {
-  const turn = Math.log(1.1);
-  let apart = 0, left = 0;
-  const distance = ({ touches: [a, b] }) => Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY);
-  const start = (event) => { [apart, left] = [event.touches.length === 2 ? distance(event) : 0, 0]; };
-  const move = (event) => {
-    const canvas = stage._fullLayout?.scene?._scene?.glplot?.canvas;
-    if (event.touches.length !== 2 || !apart || !canvas) return;
-    event.preventDefault();
-    event.stopPropagation();
-    const now = distance(event);
-    left += Math.log(Math.max(now, 1) / Math.max(apart, 1));
-    apart = now;
-    for (; Math.abs(left) >= turn; left -= Math.sign(left) * turn) {
-      canvas.dispatchEvent(new WheelEvent("wheel", { deltaY: -100 * Math.sign(left), bubbles: true, cancelable: true }));
-    }
-  };
-  stage.addEventListener("touchstart", start, { capture: true, passive: false });
-  stage.addEventListener("touchmove", move, { capture: true, passive: false });
+let pointed = null;
+function point(x, y) {
+  cancelAnimationFrame(pointed);
+  pointed = requestAnimationFrame(() => {
+    const found = stage.pick(x, y), told = solid.told.fields[+at("fields").value];
+    const place = found?.place.slice(0, solid.told.plane ? 2 : 3).map((v, d) => `${"xyz"[d]} ${number(v)}`).join(", ");
+    const value = told && found && !Number.isNaN(found.value) ? `${told.name} ${number(found.value)} ${told.unit} at ` : "";
+    at("probe").textContent = found ? `${value}${place} ${solid.unit}` : "Point at the body to read values.";
+  });
 }
 
 // the curves
@@ -224,8 +228,12 @@ function groups() {
     if (!found.has(key)) found.set(key, { name: kind, tables: [] });
     found.get(key).tables.push(table);
   }
-  const first = (name) => ["history", "probe", "point", "profile"].findIndex((kind) => kind === name) >>> 0;
-  const list = [...found.values()].sort((a, b) => first(a.name) - first(b.name));
+  const first = ({ name, tables }) => tables.some((table) => table.main !== null)
+    ? -1 : ["history", "load", "probe", "point", "profile"].indexOf(name) >>> 0;
+  const list = [...found.values()].sort((a, b) => first(a) - first(b));
+  // variants in the order of the scene
+  const place = ({ name }) => run.variants.findIndex((variant) => name.endsWith(`[${variant}]`));
+  list.forEach((entry) => entry.tables.sort((a, b) => place(a) - place(b)));
   list.forEach((entry) => { entry.label = entry.tables.length === 1 ? entry.tables[0].name : `${entry.name} (${entry.tables.length})`; });
   return list;
 }
@@ -237,16 +245,63 @@ function columns() {
   const names = group[0].columns.map(({ name, unit: of }) => unit(name, of));
   options(at("x"), names, 0);
   options(at("y"), names, 1);
-  return chart();
+  // those of the scene, otherwise some of all
+  const main = group.filter((table) => table.main !== null).sort((a, b) => a.main - b.main || group.indexOf(a) - group.indexOf(b));
+  const spread = Array.from({ length: Math.min(FIRST, group.length) }, (_, k) =>
+    group[Math.round(k * (group.length - 1) / Math.max(1, Math.min(FIRST, group.length) - 1))]);
+  chosen = (main.length ? main : spread).slice(0, FIRST);
+  at("choose").hidden = group.length < 2;
+  list_curves();
+  curves();
+}
+
+function list_curves() {
+  const words = at("find-curve").value.toLowerCase().split(/\s+/).filter(Boolean);
+  const found = group.filter(({ name }) => words.every((word) => name.toLowerCase().includes(word)));
+  at("curve-list").replaceChildren(...found.slice(0, LISTED).map((table) => {
+    const box = Object.assign(make("input"), { type: "checkbox", checked: chosen.includes(table) });
+    box.onchange = () => {
+      chosen = box.checked ? [...chosen, table] : chosen.filter((other) => other !== table);
+      curves();
+    };
+    const label = make("label");
+    label.append(box, table.name);
+    const item = make("li");
+    item.append(label);
+    return item;
+  }));
+  at("curve-count").textContent = `${found.length} of ${group.length}`;
+}
+
+// names without what all of them have
+function short_names(tables) {
+  const plain = tables.map(({ name }) => name.replace(/^history_|^probe_|^profile_|^point_/, ""));
+  return new Set(plain).size === plain.length ? plain : tables.map(({ name }) => name);
+}
+
+function curves() {
+  const [x, y] = [+at("x").value, +at("y").value], names = short_names(chosen);
+  const lines = chosen.map((table, k) => ({ name: names[k], x: table.columns[x].data, y: table.columns[y].data }));
+  const head = [x, y].map((k) => unit(group[0].columns[k].name, group[0].columns[k].unit));
+  chart.show(lines, head, [at("log-x").checked, at("log-y").checked]);
+  at("legend").replaceChildren(...lines.map(({ name }, k) => {
+    const item = make("li"), key = make("i");
+    key.style.borderColor = colour_of(k);
+    key.style.borderTopStyle = k < 6 ? "solid" : "dashed";
+    item.append(key, name);
+    return item;
+  }));
+  document.body.dataset.curves = lines.length;
+  marks();
 }
 
 // the times of a table's rows where it belongs to the body: load steps of its history, or seconds
-function timesOf(table) {
+function times_of(table) {
   const folder = (name) => name.replace(/[^/]*$/, ""), own = solid?.told.name;
   if (!solid || folder(table.name) !== folder(own)) return null;
-  if (!solid.told.particles) return table.columns.find((column) => column.name === "time")?.data ?? null;
-  const isHistory = table.name === `${folder(own)}history_${own.slice(folder(own).length)}`;
-  return isHistory ? table.columns[0].data.map((_, row) => row * table.every + 1) : null;
+  if (!solid.told.particles) return table.times ?? null;
+  const is_history = table.name === `${folder(own)}history_${own.slice(folder(own).length)}`;
+  return is_history ? table.columns[0].data.map((_, row) => row * table.every + 1) : null;
 }
 
 const nearest = (times, wanted) => {
@@ -255,8 +310,8 @@ const nearest = (times, wanted) => {
 };
 
 // the row of a table at a step of the body, where they belong together
-function rowOf(table, frame) {
-  const times = frame && timesOf(table);
+function row_of(table, frame) {
+  const times = frame && times_of(table);
   if (!times) return -1;
   if (solid.told.particles) return nearest(times, Math.ceil(frame.time));
   // a probe that is not there yet has no row
@@ -266,58 +321,39 @@ function rowOf(table, frame) {
 
 function marks() {
   const [x, y] = [+at("x").value, +at("y").value], frame = solid?.told.frames[step];
-  const found = group.map((table) => [table, rowOf(table, frame)]).filter(([, row]) => row >= 0);
-  return { x: found.map(([table, row]) => table.columns[x].data[row]), y: found.map(([table, row]) => table.columns[y].data[row]) };
-}
-
-function mark() {
-  if (!charts.length || !at("chart").data) return;
-  const { x, y } = marks();
-  document.body.dataset.mark = JSON.stringify([x, y]);
-  Plotly.restyle("chart", { x: [x], y: [y] }, [group.length]);
-}
-
-async function chart() {
-  const [x, y] = [+at("x").value, +at("y").value], [across, up] = [x, y].map((k) => group[0].columns[k]);
-  const label = (table) => table.name.replace(/^history_|^probe_|^profile_/, "");
-  const lines = group.map((table) => ({
-    type: "scatter", mode: table.columns[x].data.length < 40 ? "lines+markers" : "lines", name: label(table),
-    x: table.columns[x].data, y: table.columns[y].data, marker: { size: 5 },
-  }));
-  const now = { type: "scatter", mode: "markers", ...marks(), name: "this step", marker: { size: 12, color: "#d1242f", line: { color: "#fff", width: 2 } }, hoverinfo: "skip" };
-  const axis = ({ name, unit: of }) => ({ title: { text: unit(name, of) }, gridcolor: "#e3e6ea", zerolinecolor: "#c9ced4", exponentformat: "power" });
-  const layout = {
-    xaxis: axis(across), yaxis: axis(up), margin: { l: 64, r: 10, t: 10, b: 46 }, font: FONT, hovermode: "closest",
-    showlegend: group.length > 1, legend: { orientation: "h", y: 1.02, yanchor: "bottom" }, dragmode: "pan",
-  };
-  await Plotly.react("chart", [...lines, now], layout, LOOK);
-  document.body.dataset.mark = JSON.stringify([now.x, now.y]);
+  const found = chosen.map((table) => [table, row_of(table, frame)]).filter(([, row]) => row >= 0);
+  const points = found.map(([table, row]) => [table.columns[x].data[row], table.columns[y].data[row]]);
+  chart.mark(points);
+  document.body.dataset.mark = JSON.stringify(points);
 }
 
 // a point of a curve chooses the nearest step
-function clicked({ points: [point] }) {
-  const times = group[point.curveNumber] && timesOf(group[point.curveNumber]);
-  if (times) go(nearest(solid.told.frames.map((frame) => frame.time), times[point.pointNumber]));
+function clicked(index, row) {
+  const times = chosen[index] && times_of(chosen[index]);
+  if (times) go(nearest(solid.told.frames.map((frame) => frame.time), times[row]));
 }
 
 async function start() {
+  themes();
   header();
-  numbers();
-  if (!run.bodies.length && !charts.length) { document.body.dataset.ready = "nothing"; return; }
-  const script = document.createElement("script");
-  script.textContent = new TextDecoder().decode(await unzip("plotly"));
-  document.head.append(script);
+  main_values();
+  tables();
   // both before either is drawn: they share the width
   at("curves").hidden = !charts.length;
   at("body").hidden = !run.bodies.length;
+  document.querySelector("main").classList.toggle("single", !charts.length || !run.bodies.length);
   if (charts.length) {
     options(at("tables"), charts.map((entry) => entry.label));
-    await columns();
+    columns();
     at("tables").onchange = columns;
-    at("x").onchange = at("y").onchange = chart;
-    at("chart").on("plotly_click", clicked);
+    for (const id of ["x", "y", "log-x", "log-y"]) at(id).onchange = curves;
+    at("find-curve").oninput = list_curves;
+    at("whole").onclick = () => chart.whole();
+    chart.onchoose = clicked;
   }
   if (run.bodies.length) {
+    stage = new Stage(at("stage"), at("canvas"), at("axes"));
+    stage.onpoint = point;
     options(at("bodies"), run.bodies.map((body) => body.name));
     await choose(0);
     at("bodies").onchange = () => choose(+at("bodies").value);
@@ -325,14 +361,14 @@ async function start() {
     at("cut").oninput = draw;
     at("step").oninput = () => go(+at("step").value);
     at("play").onclick = play;
-    at("reset").onclick = () => Plotly.relayout("stage", { "scene.camera": stageLayout().scene.camera, "scene.aspectratio": stageLayout().scene.aspectratio });
-    pinch(at("stage"));
+    at("reset").onclick = () => stage.reset();
   }
-  document.body.dataset.ready = "yes";
+  document.body.dataset.ready = run.bodies.length || charts.length ? "yes" : "nothing";
 }
 
 start().catch((error) => {
-  at("notes").append(say("strong", typeof DecompressionStream === "undefined"
-    ? "This browser is too old for this page: it needs Chrome 80, Firefox 113, Safari 16.4 or newer." : `This page failed: ${error.message}`, "bad"));
+  const old = typeof DecompressionStream === "undefined"
+    ? "This browser is too old for this page: it needs Chrome 80, Firefox 113, Safari 16.4 or newer." : `This page failed: ${error.message}`;
+  at("notes").append(make("strong", old, "bad"));
   throw error;
 });

@@ -1,14 +1,17 @@
-//! Particles as cells: deformed cells of a lattice that come apart at cracks, or a block for each particle of a cloud.
+//! Particles as cells: deformed cells of a lattice that come apart at cracks, or a block for each particle of
+//! a cloud.
 
-use polycore::numerics::Sets;
+use polycore::numerics::DisjointSets;
 use rayon::prelude::*;
 
-use super::solid::{HEXAHEDRON, QUADRILATERAL, Solid};
-use crate::output::lattice::{Cells, NONE, Sides, joined, neighbours};
+use super::solid::{HEXAHEDRON, PageSolid, QUADRILATERAL};
+use crate::output::lattice::{LatticeCells, NONE, Sides, joined, neighbours};
 
 /// Particles of a lattice that are drawn at most, and of a cloud, whose blocks share no corners.
 const MOST: [usize; 2] = [30_000, 8_000];
-/// How far from its place in the lattice, in spacings, a particle may be.
+/// Cells of a plane lattice at most: a cell is one face.
+const MOST_IN_PLANE: usize = 80_000;
+/// Largest distance of a particle from its place in the lattice, in spacings.
 const OFF: f64 = 0.05;
 /// Part of the particles with a neighbour along each axis that makes a lattice.
 const LATTICE: f64 = 0.9;
@@ -17,9 +20,9 @@ const LAYERS: i64 = 4;
 /// Particles of a cloud whose nearest neighbours tell its spacing.
 const ASKED: usize = 100;
 
-/// Which particles of a body are drawn, and how large each is.
+/// Particles of a body that are drawn, and their sizes.
 #[derive(Debug)]
-pub struct Choice {
+pub struct ParticleChoice {
     /// Numbers of the particles.
     pub kept: Vec<u32>,
     /// Sides of a cell, m.
@@ -29,9 +32,10 @@ pub struct Choice {
     lattice: bool,
 }
 
-impl Choice {
-    /// The particles that are drawn: all, or every k-th along each axis of a large body; `coarser` drops more.
-    pub fn of(reference: &[[f64; 3]], coarser: usize) -> Self {
+impl ParticleChoice {
+    /// The particles that are drawn: all, or every k-th along each axis of a large body; `coarser` drops
+    /// more.
+    pub fn from_positions(reference: &[[f64; 3]], coarser: usize) -> Self {
         let extent = [0, 1, 2].map(|d| polycore::numerics::range(reference.iter().map(|x| x[d])));
         let longest = extent.iter().map(|[low, high]| high - low).fold(f64::MIN_POSITIVE, f64::max);
         let flat = extent.map(|[low, high]| high - low <= 1e-9 * longest);
@@ -64,7 +68,8 @@ impl Choice {
             let kept: Vec<u32> =
                 (0..reference.len() as u32).filter(|&k| keep(&reference[k as usize])).collect();
             let coarsest = (0..3).all(|d| steps[d] >= layers[d] / LAYERS);
-            if kept.len() <= MOST[0] / coarser.max(1) || coarsest {
+            let most = if plane { MOST_IN_PLANE } else { MOST[0] };
+            if kept.len() <= most / coarser.max(1) || coarsest {
                 let sides = [0, 1, 2].map(|d| spacing[d] * steps[d] as f64);
                 return Self { kept, sides, plane, lattice: true };
             }
@@ -80,9 +85,9 @@ impl Choice {
         Self { kept, sides: [side; 3], plane, lattice: false }
     }
 
-    /// The solid, with the displacement of its points at each step of `positions`, those of the chosen particles. Neighbours
-    /// up to `bridge` spacings apart have no crack between them.
-    pub fn solid(&self, reference: &[[f64; 3]], positions: &[Vec<[f64; 3]>], bridge: f64) -> Solid {
+    /// The solid, with the displacement of its points at each step of `positions`, those of the chosen
+    /// particles. Neighbours up to `bridge` spacings apart have no crack between them.
+    pub fn solid(&self, reference: &[[f64; 3]], positions: &[Vec<[f64; 3]>], bridge: f64) -> PageSolid {
         // lengths in spacings
         let scaled = |x: &[f64; 3]| [0, 1, 2].map(|d| x[d] / self.sides[d]);
         let rest: Vec<[f64; 3]> = reference.iter().map(scaled).collect();
@@ -107,7 +112,8 @@ impl Choice {
         }
         let (owner, corner_of) = self.corners(&always);
         let place = |positions: &[[f64; 3]], joined: &[Sides], &(particle, corner): &(u32, u8)| -> [f64; 3] {
-            let cells = Cells { positions, joined, spacing: 1.0, axes: if self.plane { 2 } else { 3 } };
+            let cells =
+                LatticeCells { positions, joined, spacing: 1.0, axes: if self.plane { 2 } else { 3 } };
             let at = cells.corner(particle as usize, corner);
             [0, 1, 2].map(|d| at[d] * self.sides[d])
         };
@@ -122,7 +128,7 @@ impl Choice {
                 owner.iter().zip(&points).map(u).collect()
             })
             .collect();
-        Solid {
+        PageSolid {
             points,
             moved,
             kinds: vec![if self.plane { QUADRILATERAL } else { HEXAHEDRON }; reference.len()],
@@ -132,11 +138,11 @@ impl Choice {
         }
     }
 
-    /// Corners that joined cells share: a particle and a corner of its cell that stand for each, and the corners of all cells,
-    /// in VTK's order.
+    /// Corners that joined cells share: a particle and a corner of its cell that stand for each, and the
+    /// corners of all cells, in VTK's order.
     fn corners(&self, joined: &[Sides]) -> (Vec<(u32, u8)>, Vec<u32>) {
         let count = if self.plane { 4 } else { 8 };
-        let mut sets = Sets::new(joined.len() * count);
+        let mut sets = DisjointSets::new(joined.len() * count);
         for (particle, beside) in joined.iter().enumerate() {
             for axis in 0..3 {
                 let other = beside[2 * axis + 1];
@@ -196,13 +202,14 @@ mod tests {
             .collect()
     }
 
-    /// Cells of unequal sides deform as one: every corner goes to its image, no corner twice, the volume is that of the block.
+    /// Cells of unequal sides deform as one: every corner goes to its image, no corner twice, the volume is
+    /// that of the block.
     #[test]
     fn blocks_deform_as_one() {
         let rest = lattice([6, 5, 4]);
         let image =
             |x: &[f64; 3]| [2.0 * x[0] + 0.3 * x[1], 0.9 * x[1] - 0.1 * x[2], 1.1 * x[2] + 0.2 * x[0]];
-        let choice = Choice::of(&rest, 1);
+        let choice = ParticleChoice::from_positions(&rest, 1);
         assert!(
             (0..3).all(|d| (choice.sides[d] - [0.5, 0.2, 0.5][d]).abs() < 1e-12)
                 && !choice.plane
@@ -231,7 +238,7 @@ mod tests {
         let rest = lattice([8, 6, 1]);
         let torn: Vec<[f64; 3]> =
             rest.iter().map(|x| [x[0], x[1] + if x[1] > 0.5 { 1.0 } else { 0.0 }, 0.0]).collect();
-        let choice = Choice::of(&rest, 1);
+        let choice = ParticleChoice::from_positions(&rest, 1);
         assert!(choice.plane);
         let solid = choice.solid(&rest, &[rest.clone(), torn], 100.0);
         assert_eq!(solid.points.len(), 9 * 7 + 9, "a second row of corners");
@@ -243,17 +250,17 @@ mod tests {
     #[test]
     fn fewer_of_many_and_clouds() {
         let rest = lattice([100, 80, 10]);
-        let choice = Choice::of(&rest, 1);
+        let choice = ParticleChoice::from_positions(&rest, 1);
         assert!(choice.kept.len() <= MOST[0] && choice.kept.len() > MOST[0] / 10, "{}", choice.kept.len());
         let extent = 100.0 * 80.0 * 10.0 * 0.05;
         let volume = choice.kept.len() as f64 * choice.sides.iter().product::<f64>();
         assert!((volume / extent - 1.0).abs() < 0.1, "{volume} of {extent}");
-        assert!(Choice::of(&rest, 4).kept.len() < choice.kept.len() / 3);
+        assert!(ParticleChoice::from_positions(&rest, 4).kept.len() < choice.kept.len() / 3);
         // a turned lattice is a cloud
         let (s, c) = 0.4f64.sin_cos();
         let turned: Vec<[f64; 3]> =
             lattice([30, 20, 1]).iter().map(|x| [c * x[0] - s * x[1], s * x[0] + c * x[1], 0.0]).collect();
-        let choice = Choice::of(&turned, 1);
+        let choice = ParticleChoice::from_positions(&turned, 1);
         assert!(
             !choice.lattice && choice.plane && (choice.sides[0] - 0.2).abs() < 1e-9,
             "{:?}",
@@ -263,6 +270,6 @@ mod tests {
         assert_eq!(solid.points.len(), 4 * 600);
         // one particle
         let one = [[1.0, 2.0, 0.0]];
-        assert_eq!(Choice::of(&one, 1).solid(&one, &[one.to_vec()], 2.0).points.len(), 4);
+        assert_eq!(ParticleChoice::from_positions(&one, 1).solid(&one, &[one.to_vec()], 2.0).points.len(), 4);
     }
 }

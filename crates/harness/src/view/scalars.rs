@@ -1,19 +1,19 @@
-//! What is shown of an array: its components and invariants, each with name and unit.
+//! Components and invariants of an array that are shown, each with name and unit.
 
 use nalgebra::Matrix3;
 use polycore::tensor::von_mises;
 
 /// The value of a scalar from the components of an array at a place.
-pub type Rule = Box<dyn Fn(&[f64]) -> f64>;
+pub type ScalarRule = Box<dyn Fn(&[f64]) -> f64>;
 
 /// A scalar made of the components of an array at a place.
-pub struct Scalar {
-    /// As the page shows it.
+pub struct ArrayScalar {
+    /// Name on the page.
     pub name: String,
     /// Components of the array.
     pub components: usize,
-    /// Its value.
-    pub of: Rule,
+    /// Value at a place.
+    pub of: ScalarRule,
     /// The least are shown first, and dropped last.
     pub rank: u8,
     unit: &'static str,
@@ -21,11 +21,11 @@ pub struct Scalar {
 
 /// Names of the components of a symmetric tensor of six, in VTK's order, and of one of nine, rows first.
 const SIX: [&str; 6] = ["11", "22", "33", "12", "23", "13"];
-/// Where the six components of a symmetric tensor are among nine, rows first.
+/// Positions of the six components of a symmetric tensor among nine, rows first.
 const OF_NINE: [usize; 6] = [0, 4, 8, 1, 5, 2];
 
-impl Scalar {
-    /// The unit of values up to `largest`, and what to multiply by.
+impl ArrayScalar {
+    /// Returns the unit of values up to `largest`, and what to multiply by.
     pub fn shown(&self, largest: f64) -> (&'static str, f64) {
         let units: &[(&'static str, f64)] = match self.unit {
             "Pa" => &[("GPa", 1e-9), ("MPa", 1e-6), ("kPa", 1e-3)],
@@ -37,8 +37,8 @@ impl Scalar {
     }
 }
 
-/// The scalars of an array, those of bodies in a plane without the third direction.
-pub fn scalars(array: &str, components: usize, plane: bool) -> Vec<Scalar> {
+/// Returns the scalars of an array, those of bodies in a plane without the third direction.
+pub fn scalars(array: &str, components: usize, plane: bool) -> Vec<ArrayScalar> {
     let (stem, unit) = match array {
         _ if array.starts_with("cauchy") || array.starts_with("piola") => (array, "Pa"),
         _ => [("_Pa", "Pa"), ("_degC", "°C"), ("_m", "m")]
@@ -47,9 +47,9 @@ pub fn scalars(array: &str, components: usize, plane: bool) -> Vec<Scalar> {
             .unwrap_or((array, "")),
     };
     let rank = u8::from(array.starts_with("piola")) * 8;
-    let scalar = |what: &str, order: u8, of: Rule| {
+    let scalar = |what: &str, order: u8, of: ScalarRule| {
         let name = if what.is_empty() { stem.to_owned() } else { format!("{stem} {what}") };
-        Scalar { name, components, of, rank: rank + order, unit }
+        ArrayScalar { name, components, of, rank: rank + order, unit }
     };
     match components {
         1 => vec![scalar("", 0, Box::new(|values| values[0]))],

@@ -23,8 +23,8 @@ const DRAWN: [(u8, u8, usize); 11] = [
     (25, HEXAHEDRON, 8),
     (26, 13, 6),
 ];
-/// Tetrahedra of a cell by its type. Those of a hexahedron share its diagonal from corner 0 to 6, so that cells of a
-/// structured mesh fit together.
+/// Tetrahedra of a cell by its type. Those of a hexahedron share its diagonal from corner 0 to 6, so that
+/// cells of a structured mesh fit together.
 const PARTS: [(u8, &[[usize; 4]]); 4] = [
     (TETRAHEDRON, &[[0, 1, 2, 3]]),
     (HEXAHEDRON, &[[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]]),
@@ -38,7 +38,7 @@ const POINTS: usize = 9_000;
 
 /// Points, cells, and displacements at steps.
 #[derive(Debug, Default)]
-pub struct Solid {
+pub struct PageSolid {
     /// Before any displacement, m.
     pub points: Vec<[f64; 3]>,
     /// The displacement of each point at each step, m; no steps where nothing moves.
@@ -58,8 +58,9 @@ pub fn corners_of(kind: u8) -> usize {
     DRAWN.iter().find(|(_, linear, _)| *linear == kind).map_or(0, |(_, _, corners)| *corners)
 }
 
-impl Solid {
-    /// A mesh; one of very many cells with fewer, `coarser` with fewer still. Cells of other types are left out.
+impl PageSolid {
+    /// A mesh; one of very many cells with fewer, `coarser` with fewer still. Cells of other types are left
+    /// out.
     pub fn mesh(points: &[[f64; 3]], cells: &Cells, coarser: usize) -> Self {
         let whole = Self::whole(points, cells);
         if whole.kinds.len() <= MOST && coarser <= 1 {
@@ -92,8 +93,8 @@ impl Solid {
         solid
     }
 
-    /// About `count` points: one for each cell of a grid, and the tetrahedra that keep four points (clusters of vertices:
-    /// Rossignac, Borrel 1993).
+    /// About `count` points: one for each cell of a grid, and the tetrahedra that keep four points (clusters
+    /// of vertices: Rossignac, Borrel 1993).
     fn coarse(&self, count: usize) -> Self {
         let [low, high] = polycore::numerics::bounds(self.points.iter().copied());
         let longest = (0..3).map(|d| high[d] - low[d]).fold(f64::MIN_POSITIVE, f64::max);
@@ -157,7 +158,7 @@ impl Solid {
         coarse
     }
 
-    /// With the cells of each type together.
+    /// Returns the same solid with its cells sorted by type.
     pub fn by_kind(mut self) -> Self {
         let mut starts = Vec::with_capacity(self.kinds.len());
         let mut first = 0;
@@ -180,7 +181,7 @@ impl Solid {
 mod tests {
     use super::*;
 
-    /// A brick of n³ hexahedra, with a tetrahedron of second order and a vertex beside it.
+    /// Returns a brick of n³ hexahedra, with a tetrahedron of second order and a vertex beside it.
     fn brick(n: usize) -> (Vec<[f64; 3]>, Cells) {
         let m = n + 1;
         let mut points: Vec<[f64; 3]> =
@@ -200,7 +201,7 @@ mod tests {
         (points, cells)
     }
 
-    fn volume(solid: &Solid) -> f64 {
+    fn volume(solid: &PageSolid) -> f64 {
         let (mut sum, mut first) = (0.0, 0);
         for &kind in &solid.kinds {
             let corners = &solid.corners[first..first + corners_of(kind)];
@@ -217,7 +218,7 @@ mod tests {
     #[test]
     fn meshes_by_their_corners() {
         let (points, cells) = brick(3);
-        let solid = Solid::mesh(&points, &cells, 1).by_kind();
+        let solid = PageSolid::mesh(&points, &cells, 1).by_kind();
         assert_eq!((solid.kinds.len(), solid.points.len()), (28, 64 + 4));
         assert_eq!(
             (solid.kinds[0], solid.cell_of[0]),
@@ -225,7 +226,7 @@ mod tests {
             "types together, vertices left out"
         );
         let hexahedra =
-            Solid { kinds: solid.kinds[1..].to_vec(), corners: solid.corners[4..].to_vec(), ..solid };
+            PageSolid { kinds: solid.kinds[1..].to_vec(), corners: solid.corners[4..].to_vec(), ..solid };
         assert!((volume(&hexahedra) - 1.0).abs() < 1e-12);
     }
 
@@ -233,11 +234,11 @@ mod tests {
     #[test]
     fn large_meshes_become_coarse() {
         let (points, cells) = brick(35);
-        let solid = Solid::mesh(&points, &cells, 1);
+        let solid = PageSolid::mesh(&points, &cells, 1);
         assert!(solid.points.len() <= POINTS && solid.points.len() > POINTS / 4, "{}", solid.points.len());
         assert!(solid.kinds.iter().all(|&kind| kind == TETRAHEDRON));
         assert!((volume(&solid) - 1.0).abs() < 0.1, "{}", volume(&solid));
-        assert!(Solid::mesh(&points, &cells, 4).points.len() <= POINTS / 4);
+        assert!(PageSolid::mesh(&points, &cells, 4).points.len() <= POINTS / 4);
         let source = |(k, &point): (usize, &u32)| solid.points[k] == points[point as usize];
         assert!(solid.point_of.iter().enumerate().all(source));
     }

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::report::{Report, Value};
+use crate::case::matches_pattern;
+use crate::report::{Report, SceneUnits, Value};
 use polycore::Error;
 
 /// Rows of a table at most: longer ones are thinned.
@@ -14,16 +15,21 @@ const NUMBERS: usize = 80_000;
 
 /// Columns of numbers.
 #[derive(Debug, Serialize)]
-pub struct Table {
-    /// Its file without `.csv`, or the name of a curve.
+pub struct PageTable {
+    /// File without `.csv`, or name of a curve.
     name: String,
     /// Row k is row k · `every` of the file.
     every: usize,
-    columns: Vec<Column>,
+    /// Place among the curves that the scene shows first.
+    main: Option<usize>,
+    /// Times of the rows, s, where the column is in another unit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    times: Option<Vec<Option<f64>>>,
+    columns: Vec<PageColumn>,
 }
 
 #[derive(Debug, Serialize)]
-struct Column {
+struct PageColumn {
     name: String,
     unit: String,
     data: Vec<Option<f64>>,
@@ -31,15 +37,15 @@ struct Column {
 
 /// All tables of a page, and what had no room.
 #[derive(Debug, Default)]
-pub struct Tables {
-    /// In the order in which they came.
-    pub tables: Vec<Table>,
+pub struct PageTables {
+    /// PageTables in the order in which they came.
+    pub tables: Vec<PageTable>,
     /// Names of those left out.
     pub left_out: Vec<String>,
     numbers: usize,
 }
 
-impl Tables {
+impl PageTables {
     /// Adds a CSV file; cells that hold no number are gaps, and columns without any number are left out.
     ///
     /// # Errors
@@ -50,7 +56,7 @@ impl Tables {
             format: "CSV table",
             reason: error.to_string(),
         };
-        let text = std::fs::read(path).map_err(Error::io("read", path))?;
+        let text = std::fs::read(path).map_err(Error::from_io("read", path))?;
         let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(text.as_slice());
         let headings = reader.headers().map_err(fail)?;
         let mut columns: Vec<(String, String, Vec<f64>)> = headings
@@ -80,15 +86,34 @@ impl Tables {
         }
     }
 
+    /// Converts columns to the units of a scene, and marks the curves that it lists.
+    pub fn prepare(&mut self, units: &SceneUnits, listed: &[String]) {
+        for table in &mut self.tables {
+            let plain = table.name.split('[').next().unwrap_or_default();
+            table.main = listed
+                .iter()
+                .position(|name| matches_pattern(name, &table.name) || matches_pattern(name, plain));
+            for column in &mut table.columns {
+                let largest = column.data.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+                let Some(unit) = units.shown(&column.unit, largest) else { continue };
+                if unit.factor != 1.0 && column.name == "time" {
+                    table.times = Some(column.data.clone());
+                }
+                column.data.iter_mut().flatten().for_each(|x| *x = rounded(*x * unit.factor));
+                column.unit = unit.name.to_owned();
+            }
+        }
+    }
+
     fn push(&mut self, name: &str, columns: Vec<(String, String, Vec<f64>)>) {
         let every = columns.first().map_or(1, |(_, _, data)| data.len().div_ceil(ROWS)).max(1);
-        let columns: Vec<Column> = columns
+        let columns: Vec<PageColumn> = columns
             .into_iter()
             .filter(|(_, _, data)| data.iter().any(|x| x.is_finite()))
             .map(|(name, unit, data)| {
                 let last = data.len() - 1;
                 let rows = (0..data.len()).filter(|row| row % every == 0 || *row == last);
-                Column { name, unit, data: rows.map(|row| short(data[row])).collect() }
+                PageColumn { name, unit, data: rows.map(|row| short(data[row])).collect() }
             })
             .collect();
         let numbers: usize = columns.iter().map(|column| column.data.len()).sum();
@@ -100,13 +125,17 @@ impl Tables {
             return;
         }
         self.numbers += numbers;
-        self.tables.push(Table { name: name.to_owned(), every, columns });
+        self.tables.push(PageTable { name: name.to_owned(), every, main: None, times: None, columns });
     }
 }
 
 /// Six digits; none of what is not finite.
 fn short(number: f64) -> Option<f64> {
-    number.is_finite().then(|| format!("{number:.5e}").parse().unwrap_or(number))
+    number.is_finite().then(|| rounded(number))
+}
+
+fn rounded(number: f64) -> f64 {
+    format!("{number:.5e}").parse().unwrap_or(number)
 }
 
 #[cfg(test)]
@@ -119,7 +148,7 @@ mod tests {
         let path = folder.path().join("study.csv");
         let text = "variant,dx [m],\"peak, of all [N]\",empty\n# comment\na,0.1,NaN,\nb,0.123456789,5,\n";
         std::fs::write(&path, text).unwrap();
-        let mut tables = Tables::default();
+        let mut tables = PageTables::default();
         tables.file(&path, "study").unwrap();
         let columns = &tables.tables[0].columns;
         let heads: Vec<[&str; 2]> = columns.iter().map(|c| [c.name.as_str(), c.unit.as_str()]).collect();
@@ -134,7 +163,7 @@ mod tests {
 
     #[test]
     fn long_tables_are_thinned_and_pages_end() {
-        let mut tables = Tables::default();
+        let mut tables = PageTables::default();
         let rows = || (0..10_001).map(f64::from).collect::<Vec<f64>>();
         for name in 0..30 {
             let columns =

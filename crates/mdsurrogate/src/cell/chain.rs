@@ -1,10 +1,10 @@
-//! One chain: its backbone, the screw from monomer to monomer, its hydrogens and oxygens.
+//! Conformation of one chain: backbone, screw from monomer to monomer, hydrogens and oxygens.
 
-use super::{ATOMS_OF_MONOMER, Element, Vec3};
+use super::{ATOMS_OF_MONOMER, ChemicalElement, Vec3};
 use crate::Error;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 
-/// Lengths and angles of the chain: standard ones of amides and alkanes, as in the project's own data.
+/// Bond lengths, Å, and angles, degrees: standard values of amides and alkanes, as in the project's data.
 mod geometry {
     pub const C_C: f64 = 1.530;
     pub const C_CO: f64 = 1.515;
@@ -21,10 +21,10 @@ mod geometry {
     pub const H_C_H: f64 = 107.5;
 }
 
-/// Backbone atoms of a monomer: N, eleven CH₂, CO.
+/// Number of backbone atoms of a monomer: N, eleven CH₂, CO.
 const BACKBONE: usize = 13;
 
-/// Backbone frames of four monomers: origin at the atom, x along the bond that leads to it.
+/// Returns the backbone frames of four monomers: origin at the atom, x along the bond that leads to it.
 pub(super) fn backbone(torsions: [f64; 2]) -> Vec<Isometry3<f64>> {
     use geometry::{C_C, C_C_C, C_C_CO, C_CO, C_CO_N, CO_N, CO_N_C, N_C, N_C_C};
     let mut frames = vec![Isometry3::identity()];
@@ -35,7 +35,7 @@ pub(super) fn backbone(torsions: [f64; 2]) -> Vec<Isometry3<f64>> {
             12 => C_CO,
             _ => C_C,
         };
-        // at the atom before
+        // angle at the previous atom
         let angle = match (atom - 1) % BACKBONE {
             0 => CO_N_C,
             1 => N_C_C,
@@ -43,7 +43,7 @@ pub(super) fn backbone(torsions: [f64; 2]) -> Vec<Isometry3<f64>> {
             12 => C_CO_N,
             _ => C_C_C,
         };
-        // about the bond that ends there, named by its first atom
+        // torsion about the bond that ends there, named by its first atom
         let torsion = match (atom + 2 * BACKBONE - 2) % BACKBONE {
             0 => torsions[0],
             11 => torsions[1],
@@ -58,12 +58,12 @@ pub(super) fn backbone(torsions: [f64; 2]) -> Vec<Isometry3<f64>> {
     frames
 }
 
-/// The screw that maps one monomer to the next.
+/// Screw motion that maps one monomer to the next.
 pub(super) struct Screw {
     axis: Vec3,
-    /// A point on the axis (for a half turn).
+    /// Point on the axis (for a half turn).
     point: Vec3,
-    /// sin of the angle: 0 at the half turn, changing sign there.
+    /// Sine of the angle: 0 at the half turn, with a change of sign.
     sine: f64,
     pub(super) cosine: f64,
     pub(super) rise: f64,
@@ -89,10 +89,10 @@ pub(super) fn screw(frames: &[Isometry3<f64>]) -> Screw {
     Screw { axis, point: (shift - rise * axis) / 2.0, sine, cosine, rise }
 }
 
-/// The torsions beside the amide (CO–N–C–C and C–C–CO–N, degrees) of a 2₁ screw with this rise, Å.
+/// Solves for the torsions beside the amide (CO–N–C–C and C–C–CO–N, degrees) of a 2₁ screw with this rise, Å.
 ///
 /// # Errors
-/// [`Error::Parameter`] for a rise out of the chain's reach.
+/// Returns [`Error::Parameter`] for a rise beyond the reach of the chain.
 pub fn amide_torsions(rise: f64) -> Result<[f64; 2], Error> {
     let residual = |torsions: [f64; 2]| {
         let screw = screw(&backbone(torsions));
@@ -117,13 +117,13 @@ pub fn amide_torsions(rise: f64) -> Result<[f64; 2], Error> {
                 break;
             }
             let newton = [(d * at[0] - b * at[1]) / determinant, (a * at[1] - c * at[0]) / determinant];
-            // a long step would leave for another branch
+            // limit the step: a longer one may lead to another solution
             let scale = (10.0 / newton[0].abs().max(newton[1].abs()).max(1e-12)).min(1.0);
             torsions = [torsions[0] - scale * newton[0], torsions[1] - scale * newton[1]];
         }
         let at = residual(torsions);
         let solved = at[0].abs() + at[1].abs() < 1e-9 && at[2] < -0.9;
-        // of several solutions the most symmetric one: the amide plane leans as little as it can
+        // of several solutions take the most symmetric one, with the smallest tilt of the amide plane
         let lean = |t: [f64; 2]| (t[0].abs() - t[1].abs()).abs();
         if solved && best.is_none_or(|best| lean(torsions) < lean(best)) {
             best = Some(torsions.map(|t| t - 360.0 * (t / 360.0).round()));
@@ -132,9 +132,9 @@ pub fn amide_torsions(rise: f64) -> Result<[f64; 2], Error> {
     best.ok_or_else(|| Error::parameter("rise of a monomer, Å", rise, "about 15 to 16.4 for this chain"))
 }
 
-/// One monomer with the screw axis along z through the origin, N–H towards x turned by `setting` degrees, the middle
-/// between the C of its amide and the N that follows at z = 0.
-pub(super) fn placed_monomer(rise: f64, setting: f64) -> Result<Vec<(Element, Vec3)>, Error> {
+/// Returns one monomer with its screw axis along z through the origin, N–H turned by `setting` degrees from
+/// x, and the middle between its amide C and the next N at z = 0.
+pub(super) fn placed_monomer(rise: f64, setting: f64) -> Result<Vec<(ChemicalElement, Vec3)>, Error> {
     use geometry::{C_H, C_O, H_C_H, N_H};
     let frames = backbone(amide_torsions(rise)?);
     let screw = screw(&frames);
@@ -146,13 +146,13 @@ pub(super) fn placed_monomer(rise: f64, setting: f64) -> Result<Vec<(Element, Ve
         let (u, v) = ((p - at(index - 1)).normalize(), (p - at(index + 1)).normalize());
         let (outwards, across) = ((u + v).normalize(), u.cross(&v).normalize());
         match k {
-            0 => atoms.extend([(Element::N, p), (Element::H, p + N_H * outwards)]),
-            12 => atoms.extend([(Element::C, p), (Element::O, p + C_O * outwards)]),
+            0 => atoms.extend([(ChemicalElement::N, p), (ChemicalElement::H, p + N_H * outwards)]),
+            12 => atoms.extend([(ChemicalElement::C, p), (ChemicalElement::O, p + C_O * outwards)]),
             _ => {
                 let (sine, cosine) = (H_C_H / 2.0).to_radians().sin_cos();
-                atoms.push((Element::C, p));
-                atoms.push((Element::H, p + C_H * (cosine * outwards + sine * across)));
-                atoms.push((Element::H, p + C_H * (cosine * outwards - sine * across)));
+                atoms.push((ChemicalElement::C, p));
+                atoms.push((ChemicalElement::H, p + C_H * (cosine * outwards + sine * across)));
+                atoms.push((ChemicalElement::H, p + C_H * (cosine * outwards - sine * across)));
             }
         }
     }

@@ -1,56 +1,58 @@
-//! F of periodic boxes: each run from its own undeformed box, with the flips of tilted boxes undone.
+//! Deformation gradients of periodic boxes: relative to the undeformed box of each run, with flips of tilted
+//! boxes undone.
 
-use super::options::{LENGTHS, Origin, ReadOptions, TILTS};
-use super::table::{Column, Table};
+use super::options::{BoxReference, LENGTHS, ReadOptions, TILTS};
+use super::table::{ColumnIndex, DataTable};
 use crate::Error;
 use crate::kinematics::PeriodicBox;
 use polycore::tensor::DeformationGradient;
 
-/// The rows of one run.
-pub(super) struct Run {
-    /// Its name.
+/// Rows of one run.
+pub(super) struct TableRun {
+    /// Name of the run.
     pub id: String,
-    /// All its rows, as they stand in the file.
+    /// All rows, in file order.
     pub all: Vec<usize>,
-    /// The first of them.
+    /// First row.
     pub first: usize,
-    /// Those with values, with their samples, in the order of the samples.
+    /// Rows with values: sample and row, in the order of the samples.
     pub rows: Vec<(u64, usize)>,
 }
 
-/// F of a row in which a box is taken for undeformed may be so far from 1: how tables round.
-const ROUNDED: f64 = 1e-6;
+/// Tolerance of F = 1 for the undeformed box, from the rounding of tables.
+const ROUNDING: f64 = 1e-6;
 
-/// LAMMPS flips beyond half a length (`fix deform`) or 0.6 of it (`fix npt`): a larger tilt says that boxes are not flipped.
+/// LAMMPS flips a tilt beyond 0.5 (`fix deform`) or 0.6 (`fix npt`) of a length; larger tilts mean that boxes
+/// are not flipped.
 const FLIPPED_BELOW: f64 = 0.65;
 
-/// Parts of a length: what lies so far between two sides of a flip is a mean of both.
-const BETWEEN: f64 = 0.02;
+/// Distance from both sides of a flip, over the length, beyond which a value is a mean of both sides.
+const MIXED_MARGIN: f64 = 0.02;
 
-/// Steps of a tilt over its length, beyond which either direction may be meant.
-const COARSE: f64 = 0.4;
+/// Change of a tilt over its length between rows, beyond which its direction is ambiguous.
+const AMBIGUOUS_STEP: f64 = 0.4;
 
-/// Columns of the box.
-pub(super) struct Boxes {
-    lengths: [Column; 3],
-    tilts: Option<[Column; 3]>,
+/// Columns of a periodic box.
+pub(super) struct BoxColumns {
+    lengths: [ColumnIndex; 3],
+    tilts: Option<[ColumnIndex; 3]>,
     averaged: bool,
 }
 
-impl Boxes {
-    pub fn new(table: &Table, prefix: &str) -> Result<Self, Error> {
+impl BoxColumns {
+    pub fn new(table: &DataTable, prefix: &str) -> Result<Self, Error> {
         let prefixed = |name: &str| format!("{prefix}{name}");
-        let tilted = TILTS.iter().any(|name| table.has(&prefixed(name)));
+        let tilted = TILTS.iter().any(|name| table.contains(&prefixed(name)));
         let tilts = if tilted { Some(table.columns(TILTS.map(prefixed))?) } else { None };
         Ok(Self { lengths: table.columns(LENGTHS.map(prefixed))?, tilts, averaged: !prefix.is_empty() })
     }
 
-    pub fn lengths(&self) -> &[Column; 3] {
+    pub fn lengths(&self) -> &[ColumnIndex; 3] {
         &self.lengths
     }
 
-    fn at(&self, table: &Table, row: usize) -> Result<PeriodicBox, Error> {
-        let in_angstroms = |columns: &[Column; 3]| -> Result<[f64; 3], Error> {
+    fn box_of_row(&self, table: &DataTable, row: usize) -> Result<PeriodicBox, Error> {
+        let in_angstroms = |columns: &[ColumnIndex; 3]| -> Result<[f64; 3], Error> {
             let mut numbers = table.numbers(row, columns)?;
             for (number, column) in numbers.iter_mut().zip(columns) {
                 *number *= table.length_unit(*column)?;
@@ -61,28 +63,28 @@ impl Boxes {
         Ok(PeriodicBox { lengths: in_angstroms(&self.lengths)?, tilts })
     }
 
-    /// The box at the instant of a row, where the table has it.
-    fn instant(&self, table: &Table, row: usize) -> Result<PeriodicBox, Error> {
-        let of = |names: [&str; 3]| {
+    /// Returns the instantaneous box of a row, if the table has it, else the averaged one.
+    fn instant(&self, table: &DataTable, row: usize) -> Result<PeriodicBox, Error> {
+        let found = |names: [&str; 3]| {
             let [Some(a), Some(b), Some(c)] = names.map(|name| table.find(name)) else { return None };
             Some([a, b, c])
         };
         Self {
-            lengths: of(LENGTHS).unwrap_or(self.lengths),
-            tilts: of(TILTS).or(self.tilts),
+            lengths: found(LENGTHS).unwrap_or(self.lengths),
+            tilts: found(TILTS).or(self.tilts),
             averaged: false,
         }
-        .at(table, row)
+        .box_of_row(table, row)
     }
 
-    /// F of each row of each run, and notes on what was done.
+    /// Computes F of each row of each run; returns it with notes.
     ///
     /// # Errors
-    /// A run without an undeformed row, means across a flip, lengths that are none.
+    /// Returns an error for a run without undeformed row, means across a flip, and invalid lengths.
     pub fn deformations(
         &self,
-        table: &Table,
-        runs: &[Run],
+        table: &DataTable,
+        runs: &[TableRun],
         options: &ReadOptions,
     ) -> Result<(Vec<Vec<DeformationGradient>>, Vec<String>), Error> {
         let mut flips = Vec::new();
@@ -90,25 +92,25 @@ impl Boxes {
         for run in runs {
             let reference = self.reference(table, run, runs, options)?;
             let boxes: Vec<PeriodicBox> =
-                run.rows.iter().map(|(_, row)| self.at(table, *row)).collect::<Result<_, _>>()?;
+                run.rows.iter().map(|(_, row)| self.box_of_row(table, *row)).collect::<Result<_, _>>()?;
             if self.averaged && self.tilts.is_some() {
-                refuse_mixed(table, run, &boxes)?;
+                refuse_averaged_flips(table, run, &boxes)?;
             }
-            let (boxes, flipped) = unwrapped(reference, &boxes);
+            let (boxes, flipped) = undo_flips(reference, &boxes);
             if !flipped.is_empty() {
-                refuse_coarse(table, run, reference, &boxes)?;
+                refuse_ambiguous_steps(table, run, reference, &boxes)?;
             }
             flips.extend(flipped.first().map(|&place| (run, run.rows[place].0, flipped.len())));
-            let of = |(current, (_, row)): (&PeriodicBox, &(u64, usize))| {
+            let deformation = |(current, (_, row)): (&PeriodicBox, &(u64, usize))| {
                 current.deformation_from(&reference).map_err(|error| table.at_row(*row, error))
             };
-            all.push(boxes.iter().zip(&run.rows).map(of).collect::<Result<_, _>>()?);
+            all.push(boxes.iter().zip(&run.rows).map(deformation).collect::<Result<_, _>>()?);
         }
         let mut notes = Vec::new();
         if let Some((run, sample, _)) = flips.first() {
             let count: usize = flips.iter().map(|(.., count)| count).sum();
             notes.push(format!(
-                "{count} flips of the tilted box undone in {} runs (the first: run `{}`, sample {sample})",
+                "{count} flips of the tilted box undone in {} runs (first: run `{}`, sample {sample})",
                 flips.len(),
                 run.id
             ));
@@ -118,23 +120,24 @@ impl Boxes {
 
     fn reference(
         &self,
-        table: &Table,
-        run: &Run,
-        runs: &[Run],
+        table: &DataTable,
+        run: &TableRun,
+        runs: &[TableRun],
         options: &ReadOptions,
     ) -> Result<PeriodicBox, Error> {
         if let Some(reference) = options.reference {
             return Ok(reference);
         }
         match options.origin {
-            Some(Origin::Run) => self.instant(table, run.first),
-            Some(Origin::File) => {
+            Some(BoxReference::Run) => self.instant(table, run.first),
+            Some(BoxReference::File) => {
                 self.instant(table, runs.iter().map(|run| run.first).min().unwrap_or(run.first))
             }
             None => {
                 if let [Some(a), Some(b), Some(c)] = ["F11", "F22", "F33"].map(|name| table.find(name)) {
                     for &row in &run.all {
-                        let rest = table.numbers(row, &[a, b, c])?.iter().all(|f| (f - 1.0).abs() <= ROUNDED);
+                        let rest =
+                            table.numbers(row, &[a, b, c])?.iter().all(|f| (f - 1.0).abs() <= ROUNDING);
                         if rest {
                             return self.instant(table, row);
                         }
@@ -143,18 +146,19 @@ impl Boxes {
                 let whose = if runs.len() > 1 { format!(" of run `{}`", run.id) } else { String::new() };
                 Err(Error::file(
                     &table.path,
-                    format!("box lengths, but no row{whose} with F11 = F22 = F33 = 1 and its lx, ly, lz"),
-                    "such a row in each run, `reference = \"run\"` where the first row of each run is undeformed \
-                     (`\"file\"`: the first of the file), or `reference_lengths` in the scene",
+                    format!("no undeformed row{whose} with F11 = F22 = F33 = 1 and lx, ly, lz"),
+                    "such a row in each run; or in the scene `reference = \"run\"` (the first row of each \
+                     run is undeformed), `reference = \"file\"` (the first row of the file is) or \
+                     `reference_lengths`",
                 ))
             }
         }
     }
 }
 
-/// Boxes that follow each other without jumps: a flipped box has the edges b + n a and c + m a + k b of the same lattice.
-/// Also the places of flips.
-fn unwrapped(start: PeriodicBox, boxes: &[PeriodicBox]) -> (Vec<PeriodicBox>, Vec<usize>) {
+/// Returns the boxes without jumps, and the places of flips: a flipped box has the edges b + n a and c + m a
+/// + k b of the same lattice.
+fn undo_flips(start: PeriodicBox, boxes: &[PeriodicBox]) -> (Vec<PeriodicBox>, Vec<usize>) {
     let far = |cell: &PeriodicBox| {
         let ([x, y, _], [xy, xz, yz]) = (cell.lengths, cell.tilts);
         [xy / x, xz / x, yz / y].iter().any(|part| part.abs() > FLIPPED_BELOW)
@@ -180,28 +184,30 @@ fn unwrapped(start: PeriodicBox, boxes: &[PeriodicBox]) -> (Vec<PeriodicBox>, Ve
     (found, flips)
 }
 
+/// Refuses rows between which the direction of a tilt is ambiguous.
+///
 /// # Errors
-/// Rows between which a tilt changes by so much that the direction cannot be told.
-fn refuse_coarse(
-    table: &Table,
-    run: &Run,
+/// Returns [`Error::File`] with the tilt, line and sample.
+fn refuse_ambiguous_steps(
+    table: &DataTable,
+    run: &TableRun,
     mut before: PeriodicBox,
     boxes: &[PeriodicBox],
 ) -> Result<(), Error> {
     for (cell, (sample, row)) in boxes.iter().zip(&run.rows) {
         for (tilt, length) in [(0, 0), (1, 0), (2, 1)] {
             let step = (cell.tilts[tilt] - before.tilts[tilt]).abs() / cell.lengths[length];
-            if step > COARSE {
+            if step > AMBIGUOUS_STEP {
                 return Err(Error::file(
                     &table.path,
                     format!(
-                        "rows too far apart to undo flips of the box: its tilt {} changes by {step:.2} of its length up to line {} \
-                         (run `{}`, sample {sample})",
+                        "rows too far apart to undo flips of the box: tilt {} changes by {step:.2} of its \
+                         length up to line {} (run `{}`, sample {sample})",
                         TILTS[tilt],
                         table.line(*row),
                         run.id
                     ),
-                    "samples between which it changes by less than 0.4, or a run with `flip no`",
+                    "changes below 0.4 between samples, or a run with `flip no`",
                 ));
             }
         }
@@ -210,9 +216,11 @@ fn refuse_coarse(
     Ok(())
 }
 
+/// Refuses means over an interval with a flip: they are neither a shape nor a strain.
+///
 /// # Errors
-/// A mean over an interval in which the box was flipped: neither shape nor strain.
-fn refuse_mixed(table: &Table, run: &Run, boxes: &[PeriodicBox]) -> Result<(), Error> {
+/// Returns [`Error::File`] with the tilt, line and sample.
+fn refuse_averaged_flips(table: &DataTable, run: &TableRun, boxes: &[PeriodicBox]) -> Result<(), Error> {
     for (tilt, length) in [(0, 0), (1, 0), (2, 1)] {
         let part: Vec<f64> = boxes.iter().map(|cell| cell.tilts[tilt] / cell.lengths[length]).collect();
         if part.iter().any(|part| part.abs() > FLIPPED_BELOW) {
@@ -223,9 +231,9 @@ fn refuse_mixed(table: &Table, run: &Run, boxes: &[PeriodicBox]) -> Result<(), E
         let usual = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
         let mixed = part.windows(3).position(|three| {
             let (low, high) = (three[0].min(three[2]), three[0].max(three[2]));
-            high - low > 0.6 && three[1] > low + BETWEEN && three[1] < high - BETWEEN
+            high - low > 0.6 && three[1] > low + MIXED_MARGIN && three[1] < high - MIXED_MARGIN
         });
-        // at the end nothing follows that would tell the other side
+        // at the end no row shows the other side
         let last = part.last_chunk().filter(|[a, b]| {
             a.abs() > 0.3
                 && b.abs() < a.abs()
@@ -238,8 +246,8 @@ fn refuse_mixed(table: &Table, run: &Run, boxes: &[PeriodicBox]) -> Result<(), E
             return Err(Error::file(
                 &table.path,
                 format!(
-                    "the mean tilt avg_{} = {} in line {} (run `{}`, sample {sample}), between the two sides of a flip of \
-                     the box",
+                    "the mean tilt avg_{} = {} in line {} (run `{}`, sample {sample}), averaged across a \
+                     flip of the box",
                     TILTS[tilt],
                     boxes[place].tilts[tilt],
                     table.line(row),
@@ -256,7 +264,7 @@ fn refuse_mixed(table: &Table, run: &Run, boxes: &[PeriodicBox]) -> Result<(), E
 mod tests {
     use super::*;
 
-    /// A shear of any size in small steps, flipped as LAMMPS flips (yz takes xz along), comes back as it was.
+    /// A shear of any size in small steps, flipped as in LAMMPS (yz shifts xz as well), is recovered.
     #[test]
     fn flips_of_all_tilts_are_undone() {
         let lengths = [10.0, 12.0, 9.0];
@@ -278,7 +286,7 @@ mod tests {
                 raw.push(PeriodicBox { lengths, tilts: [xy, xz, yz] });
                 true_.push(whole);
             }
-            let (found, flips) = unwrapped(PeriodicBox::orthogonal(lengths), &raw);
+            let (found, flips) = undo_flips(PeriodicBox::orthogonal(lengths), &raw);
             assert!(!flips.is_empty());
             for (found, expected) in found.iter().zip(true_) {
                 for (a, b) in found.tilts.iter().zip(expected) {
@@ -286,8 +294,8 @@ mod tests {
                 }
             }
         }
-        // tilts beyond what LAMMPS flips at are as they are
+        // larger tilts than those of flips are kept
         let far = [PeriodicBox { lengths, tilts: [0.0; 3] }, PeriodicBox { lengths, tilts: [7.0, 0.0, 0.0] }];
-        assert_eq!(unwrapped(far[0], &far).0, far);
+        assert_eq!(undo_flips(far[0], &far).0, far);
     }
 }

@@ -1,40 +1,41 @@
-//! Data sets as HDF5, the project's own layout.
+//! Data sets in HDF5, in the project's layout.
 //!
-//! Root: attributes `format` = [`FORMAT`], `skipped`; datasets `C`, `S` (N, 6), `F` (N, 9, row by row), `cauchy`
-//! (N, 6), all SI, `sample`, `path` (N, i64), `time` (N, s); group `paths`: `id`, `kind` (P, strings), `rates`
-//! (P, 3, 1/s, NaN where an axis is not pulled); `provenance` (strings). A written split adds `split` (N, u8: 0
-//! train, 1 validation, 2 test) and the standardisation of the training rows, `mean` and `deviation` (6) of group
-//! `standardisation`. Files of others need `C` and `S` only, (N, 6) or (N, 3, 3), of any type of numbers, or `F` (N, 9 or 3, 3) with
-//! `cauchy` or `P` (first Piola–Kirchhoff stress); without `path` they are one path.
+//! Root: attributes `format` = [`FORMAT`], `skipped`; datasets `C`, `S` (N, 6), `F` (N, 9, row by row),
+//! `cauchy` (N, 6), all SI, `sample`, `path` (N, i64), `time` (N, s); group `paths`: `id`, `kind` (P,
+//! strings), `rates` (P, 3, 1/s, NaN for an axis that is not pulled); `provenance` (strings). A written split
+//! adds `split` (N, u8: 0 train, 1 validation, 2 test) and the standardisation of the training rows, `mean`
+//! and `deviation` (6) in the group `standardisation`. Other files need only `C` and `S`, (N, 6) or (N, 3,
+//! 3), of any numeric type, or `F` (N, 9 or 3, 3) with `cauchy` or `P` (first Piola–Kirchhoff stress);
+//! without `path` they are one path.
 
-use super::stress::{Symmetry, cauchy_of_first};
-use super::{Dataset, Path, Row, Split, Standardisation};
+use super::stress::{SymmetryCheck, cauchy_of_first};
+use super::{DataRow, DataSplit, Dataset, Path, Standardisation};
 use crate::Error;
-use crate::kinematics::{cauchy_of_material, material_pair, stretch_of};
+use crate::kinematics::{cauchy_from_material, material_pair, stretch_from_c};
 use polycore::hdf5::{Created, dataset};
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group};
 
-/// The value of the attribute `format`.
+/// Value of the attribute `format`.
 pub const FORMAT: &str = "mdsurrogate data 1";
 
 const DEFLATE_LEVEL: u32 = 4;
 const CHUNK_ROWS: usize = 4096;
-/// Whole numbers up to here are exact in f64.
+/// Largest integer up to which f64 is exact.
 const LARGEST_WHOLE: f64 = 9_007_199_254_740_992.0;
-/// Single precision rounds a symmetric tensor to this.
-const ROUNDED: f64 = 1e-5;
+/// Relative asymmetry of a symmetric tensor in single precision.
+const ASYMMETRY_TOLERANCE: f64 = 1e-5;
 
-type Hdf5<T> = Result<T, rust_hdf5::Hdf5Error>;
+type Hdf5Result<T> = Result<T, rust_hdf5::Hdf5Error>;
 
-/// Writes a set, and its split with the standardisation of the training rows if there is one; whole or not at all.
+/// Writes a set, optionally with its split and the standardisation of the training rows; whole or not at all.
 ///
 /// # Errors
-/// [`Error::File`] or an I/O error; an existing file stays as it was then.
+/// Returns [`Error::File`] or an I/O error; an existing file then stays unchanged.
 pub fn write(
     path: impl AsRef<std::path::Path>,
     set: &Dataset,
-    split: Option<(&Split, &Standardisation)>,
+    split: Option<(&DataSplit, &Standardisation)>,
 ) -> Result<(), Error> {
     let path = path.as_ref();
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -42,26 +43,32 @@ pub fn write(
         .prefix(".")
         .suffix(".part")
         .tempdir_in(folder.unwrap_or(".".as_ref()))
-        .map_err(Error::io("create a folder beside", path))?;
+        .map_err(Error::from_io("create a folder beside", path))?;
     let inside = temporary.path().join("data.h5");
     fill(&inside, set, split).map_err(|error| polycore::hdf5::write_error(path, error))?;
-    std::fs::File::open(&inside).and_then(|file| file.sync_all()).map_err(Error::io("synchronise", path))?;
-    std::fs::rename(&inside, path).map_err(Error::io("write", path))
+    std::fs::File::open(&inside)
+        .and_then(|file| file.sync_all())
+        .map_err(Error::from_io("synchronise", path))?;
+    std::fs::rename(&inside, path).map_err(Error::from_io("write", path))
 }
 
-fn fill(path: &std::path::Path, set: &Dataset, split: Option<(&Split, &Standardisation)>) -> Hdf5<()> {
+fn fill(
+    path: &std::path::Path,
+    set: &Dataset,
+    split: Option<(&DataSplit, &Standardisation)>,
+) -> Hdf5Result<()> {
     let file = Created::new(path)?;
     let root = file.root_group();
     file.set_attr_string("format", FORMAT)?;
     file.set_attr_numeric("skipped", &(set.skipped as i64))?;
-    let rows: Vec<&Row> = set.rows().collect();
-    let six = |pick: fn(&Row) -> &Voigt| -> Vec<f64> {
+    let rows: Vec<&DataRow> = set.rows().collect();
+    let six = |pick: fn(&DataRow) -> &Voigt| -> Vec<f64> {
         rows.iter().flat_map(|row| pick(row).iter().copied()).collect()
     };
     table(&root, "C", 6, &six(|row| &row.c))?;
     table(&root, "S", 6, &six(|row| &row.s))?;
     table(&root, "cauchy", 6, &six(|row| &row.cauchy))?;
-    // nalgebra stores columns; the transpose's columns are the rows
+    // nalgebra stores columns: the columns of the transpose are the rows
     let gradients: Vec<f64> =
         rows.iter().flat_map(|row| row.deformation.matrix().transpose().as_slice().to_vec()).collect();
     table(&root, "F", 9, &gradients)?;
@@ -89,32 +96,32 @@ fn fill(path: &std::path::Path, set: &Dataset, split: Option<(&Split, &Standardi
     file.close()
 }
 
-fn table(group: &H5Group, name: &str, columns: usize, data: &[f64]) -> Hdf5<()> {
+fn table(group: &H5Group, name: &str, columns: usize, data: &[f64]) -> Hdf5Result<()> {
     let rows = data.len() / columns;
     let builder = group.new_dataset::<f64>().shape([rows, columns]);
     let builder = builder.chunk(&[rows.clamp(1, CHUNK_ROWS), columns]).shuffle_deflate(DEFLATE_LEVEL);
     builder.create(name)?.write_raw(data)
 }
 
-/// Reads a set.
+/// Reads a data set.
 ///
 /// # Errors
-/// [`Error::File`] for what is no HDF5 file, for missing datasets, for shapes that do not fit and for numbers that
-/// are no deformation.
+/// Returns [`Error::File`] for other formats, missing datasets, wrong shapes, and invalid deformations.
 pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
     let path = path.as_ref();
-    let size = std::fs::metadata(path).map_err(Error::io("open", path))?.len();
-    let none = |error: rust_hdf5::Hdf5Error| Error::file(path, format!("no HDF5 file ({error})"), "HDF5");
-    let file = H5File::open(path).map_err(none)?;
+    let size = std::fs::metadata(path).map_err(Error::from_io("open", path))?.len();
+    let damaged =
+        |error: rust_hdf5::Hdf5Error| Error::file(path, format!("an unreadable file ({error})"), "HDF5");
+    let file = H5File::open(path).map_err(damaged)?;
     let root = file.root_group();
-    let names = root.dataset_names().map_err(none)?;
+    let names = root.dataset_names().map_err(damaged)?;
     let fail = |found: String, allowed: &str| Error::file(path, found, allowed);
     let numbers = |name: &str, columns: usize| -> Result<Vec<f64>, Error> {
         if !names.iter().any(|other| other == name) {
             let similar = crate::error::nearest(name, names.iter().map(String::as_str));
             return Err(Error::MissingColumn { path: path.to_path_buf(), column: name.into(), similar });
         }
-        let dataset = dataset(&file, name, size).map_err(none)?;
+        let dataset = dataset(&file, name, size).map_err(damaged)?;
         let shape = dataset.shape();
         let tensors = shape.len() == 3 && shape[1..] == [3, 3];
         if !(tensors || shape.len() == 2 && shape[1] == columns) {
@@ -124,7 +131,7 @@ pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
         let mut data = floats(&dataset, name, path)?;
         if tensors && columns == 6 {
             data = symmetric(&data).ok_or_else(|| {
-                fail(format!("tensors of dataset `{name}` that are not symmetric"), "symmetric tensors")
+                fail(format!("asymmetric tensors in dataset `{name}`"), "symmetric tensors")
             })?;
         }
         match data.iter().position(|value| !value.is_finite()) {
@@ -139,10 +146,10 @@ pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
         if !names.iter().any(|other| other == name) {
             return Ok(None);
         }
-        let data = floats(&dataset(&file, name, size).map_err(none)?, name, path)?;
+        let data = floats(&dataset(&file, name, size).map_err(damaged)?, name, path)?;
         let whole = |value: &f64| value.fract() == 0.0 && (0.0..=LARGEST_WHOLE).contains(value);
         if let Some(wrong) = data.iter().find(|value| !whole(value)) {
-            return Err(fail(format!("{wrong} in dataset `{name}`"), "whole numbers, none negative"));
+            return Err(fail(format!("{wrong} in dataset `{name}`"), "non-negative integers"));
         }
         if data.len() != rows {
             return Err(fail(format!("{} numbers in dataset `{name}`", data.len()), &rows.to_string()));
@@ -150,27 +157,30 @@ pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
         Ok(Some(data.into_iter().map(|value| value as i64).collect()))
     };
     let has = |name: &str| names.iter().any(|other| other == name);
-    let of_gradient = !has("C") && has("F");
-    let (c, s) = if of_gradient {
-        of_gradients(path, &numbers, has("P"))?
+    let from_gradient = !has("C") && has("F");
+    let (c, s) = if from_gradient {
+        from_gradients(path, &numbers, has("P"))?
     } else {
         (numbers("C", 6)?, numbers("S", 6)?)
     };
     let rows = c.len() / 6;
     if s.len() != c.len() {
-        return Err(fail(format!("{} rows of S for {rows} of C", s.len() / 6), "as many"));
+        return Err(fail(format!("{} rows of S for {rows} of C", s.len() / 6), "the same number"));
     }
     let full = ["F", "cauchy"].into_iter().all(has);
     let gradients = if full { Some((numbers("F", 9)?, numbers("cauchy", 6)?)) } else { None };
     if let Some((f, cauchy)) = &gradients
         && (f.len() != 9 * rows || cauchy.len() != 6 * rows)
     {
-        return Err(fail(format!("F and cauchy with other numbers of rows than C ({rows})"), "as many"));
+        return Err(fail(
+            format!("different numbers of rows in F, cauchy and C ({rows})"),
+            "the same number",
+        ));
     }
     let samples = integers("sample", rows)?;
     let of_rows = integers("path", rows)?.unwrap_or_else(|| vec![0; rows]);
     let times = match has("time") {
-        true => floats(&dataset(&file, "time", size).map_err(none)?, "time", path)?,
+        true => floats(&dataset(&file, "time", size).map_err(damaged)?, "time", path)?,
         false => Vec::new(),
     };
     let mut set = Dataset { paths: paths(&file, path, size, &of_rows)?, ..Dataset::default() };
@@ -187,22 +197,22 @@ pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
                 (f.map_err(|error| at(error.into()))?, six(cauchy))
             }
             None => {
-                let f = stretch_of(&c).map_err(at)?;
-                (f, cauchy_of_material(&f, &s))
+                let f = stretch_from_c(&c).map_err(at)?;
+                (f, cauchy_from_material(&f, &s))
             }
         };
-        target.push(Row { sample, time, deformation, cauchy, c, s, nominal: None });
+        target.push(DataRow { sample, time, deformation, cauchy, c, s, nominal: None });
     }
     if has("provenance") {
         let lines = dataset(&file, "provenance", size).and_then(|dataset| dataset.read_vlen_strings());
-        set.provenance = lines.map_err(none)?;
+        set.provenance = lines.map_err(damaged)?;
     }
     set.provenance.push(format!("{}: {size} bytes, HDF5, {rows} rows", polycore::file::name_of(path)));
     Ok(set)
 }
 
-/// C and S, six numbers a row, of F and either P (nine) or σ (six).
-fn of_gradients(
+/// Returns C and S, six numbers per row, from F and either P (nine) or σ (six).
+fn from_gradients(
     path: &std::path::Path,
     numbers: &impl Fn(&str, usize) -> Result<Vec<f64>, Error>,
     first: bool,
@@ -210,10 +220,10 @@ fn of_gradients(
     let (name, width) = if first { ("P", 9) } else { ("cauchy", 6) };
     let (f, stress) = (numbers("F", 9)?, numbers(name, width)?);
     let (mut c, mut s) = (Vec::new(), Vec::new());
-    let mut symmetry = Symmetry::default();
+    let mut symmetry = SymmetryCheck::default();
     if stress.len() / width != f.len() / 9 {
         let found = format!("{} rows of {name} for {} of F", stress.len() / width, f.len() / 9);
-        return Err(Error::file(path, found, "as many"));
+        return Err(Error::file(path, found, "the same number"));
     }
     for (row, (f, stress)) in f.chunks_exact(9).zip(stress.chunks_exact(width)).enumerate() {
         let f = DeformationGradient::new(Tensor::from_row_slice(f));
@@ -230,7 +240,7 @@ fn of_gradients(
     Ok((c, s))
 }
 
-/// The numbers of a dataset of floats or whole numbers of any width and order of bytes.
+/// Reads a dataset of floats or integers of any width and byte order.
 fn floats(dataset: &H5Dataset, name: &str, path: &std::path::Path) -> Result<Vec<f64>, Error> {
     let damaged =
         |error: rust_hdf5::Hdf5Error| Error::file(path, format!("dataset `{name}`: {error}"), "HDF5");
@@ -255,12 +265,15 @@ fn floats(dataset: &H5Dataset, name: &str, path: &std::path::Path) -> Result<Vec
     }
 }
 
-/// Components in the order 11, 22, 33, 12, 13, 23 of tensors of nine; none where one is not symmetric.
+/// Returns the components 11, 22, 33, 12, 13, 23 of tensors of nine; `None` for an asymmetric tensor.
 fn symmetric(data: &[f64]) -> Option<Vec<f64>> {
     let mut six = Vec::with_capacity(data.len() / 9 * 6);
     for tensor in data.chunks_exact(9) {
         let size = tensor.iter().fold(0.0, |size: f64, value| size.max(value.abs()));
-        if [(1, 3), (2, 6), (5, 7)].iter().any(|&(a, b)| (tensor[a] - tensor[b]).abs() > ROUNDED * size) {
+        if [(1, 3), (2, 6), (5, 7)]
+            .iter()
+            .any(|&(a, b)| (tensor[a] - tensor[b]).abs() > ASYMMETRY_TOLERANCE * size)
+        {
             return None;
         }
         let mean = |a: usize, b: usize| 0.5 * (tensor[a] + tensor[b]);
@@ -269,15 +282,19 @@ fn symmetric(data: &[f64]) -> Option<Vec<f64>> {
     Some(six)
 }
 
-/// Empty paths with their names, kinds and rates.
+/// Returns empty paths with names, kinds and rates.
 fn paths(file: &H5File, path: &std::path::Path, size: u64, of_rows: &[i64]) -> Result<Vec<Path>, Error> {
-    let none = |error: rust_hdf5::Hdf5Error| Error::file(path, format!("damaged HDF5 ({error})"), "HDF5");
+    let damaged = |error: rust_hdf5::Hdf5Error| Error::file(path, format!("damaged HDF5 ({error})"), "HDF5");
     let count = of_rows.iter().max().map_or(0, |last| *last as usize + 1);
-    let groups = file.root_group().group_names().map_err(none)?;
+    let groups = file.root_group().group_names().map_err(damaged)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     if !groups.iter().any(|group| group == "paths") {
         if count > of_rows.len() {
-            return Err(Error::file(path, format!("path number {}", count - 1), "one below the row count"));
+            return Err(Error::file(
+                path,
+                format!("path number {}", count - 1),
+                "a number below the row count",
+            ));
         }
         let blank = |index| Path {
             id: if count == 1 { name.to_string() } else { format!("{name}:{index}") },
@@ -289,13 +306,13 @@ fn paths(file: &H5File, path: &std::path::Path, size: u64, of_rows: &[i64]) -> R
     }
     let strings = |name: &str| {
         let dataset = dataset(file, &format!("paths/{name}"), size);
-        dataset.and_then(|dataset| dataset.read_vlen_strings()).map_err(none)
+        dataset.and_then(|dataset| dataset.read_vlen_strings()).map_err(damaged)
     };
     let (ids, kinds) = (strings("id")?, strings("kind")?);
-    let rates = floats(&dataset(file, "paths/rates", size).map_err(none)?, "paths/rates", path)?;
+    let rates = floats(&dataset(file, "paths/rates", size).map_err(damaged)?, "paths/rates", path)?;
     if kinds.len() != ids.len() || rates.len() != 3 * ids.len() || count > ids.len() {
         let found = format!("{} ids, {} kinds, {} rates", ids.len(), kinds.len(), rates.len());
-        return Err(Error::file(path, found, "one id, one kind and three rates a path"));
+        return Err(Error::file(path, found, "one id, one kind and three rates per path"));
     }
     let build = |(index, (id, kind)): (usize, (String, String))| {
         let rates = [rates[3 * index], rates[3 * index + 1], rates[3 * index + 2]];

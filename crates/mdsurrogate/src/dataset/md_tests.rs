@@ -1,9 +1,9 @@
-//! Tables of boxes, of F beside stresses of all kinds, and LAMMPS' own files.
+//! Tables of boxes, of F with stresses of all measures, and LAMMPS output.
 
-use super::lammps_tests::log;
+use super::lammps_tests::lammps_log;
 use super::*;
 
-pub(super) fn file(name: &str, text: &str, options: &ReadOptions) -> Result<Dataset, Error> {
+pub(super) fn read_file(name: &str, text: &str, options: &ReadOptions) -> Result<Dataset, Error> {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join(name);
     std::fs::write(&path, text).unwrap();
@@ -11,23 +11,23 @@ pub(super) fn file(name: &str, text: &str, options: &ReadOptions) -> Result<Data
 }
 
 fn csv(text: &str) -> Result<Dataset, Error> {
-    file("t.csv", text, &ReadOptions::default())
+    read_file("t.csv", text, &ReadOptions::default())
 }
 
-/// What an error says; the set read otherwise.
+/// Returns the message of a refusal.
 pub(super) fn refused(found: Result<Dataset, Error>) -> String {
     let error = found.expect_err("refused");
     assert_eq!(harness::case::Fault::exit_code(&error), 2);
     error.to_string()
 }
 
-/// A compressible neo-Hookean σ at F, Pa: μ 5 MPa, λ 20 MPa.
+/// Computes σ of a compressible neo-Hookean solid, Pa: μ = 5 MPa, λ = 20 MPa.
 fn cauchy(f: &Tensor) -> Tensor {
     let j = f.determinant();
     (5e6 * (f * f.transpose() - Tensor::identity()) + 20e6 * j.ln() * Tensor::identity()) / j
 }
 
-fn s_of(f: &Tensor) -> Voigt {
+fn second_stress(f: &Tensor) -> Voigt {
     let c = polycore::tensor::voigt::from_stress(&(f.transpose() * f));
     let c = polycore::tensor::voigt::to_stress(&c);
     let inverse = c.try_inverse().unwrap();
@@ -35,7 +35,7 @@ fn s_of(f: &Tensor) -> Voigt {
     polycore::tensor::voigt::from_stress(&s)
 }
 
-/// Shears, stretches and turns of every kind.
+/// Returns gradients with shears, stretches and rotations.
 fn gradients() -> Vec<Tensor> {
     (0..12)
         .map(|k| {
@@ -60,15 +60,16 @@ fn row(numbers: impl IntoIterator<Item = f64>) -> String {
 }
 
 const F: &str = "F11,F12,F13,F21,F22,F23,F31,F32,F33";
-const BOX: &str = "run_id,sample,F11,F22,F33,lx,ly,lz,xy,xz,yz,avg_lx,avg_ly,avg_lz,avg_xy,avg_xz,avg_yz,avg_sxx,avg_syy,avg_szz,avg_sxy,avg_sxz,avg_syz\n";
+const BOX: &str = "run_id,sample,F11,F22,F33,lx,ly,lz,xy,xz,yz,avg_lx,avg_ly,avg_lz,avg_xy,avg_xz,avg_yz,\
+                   avg_sxx,avg_syy,avg_szz,avg_sxy,avg_sxz,avg_syz\n";
 
-/// A row of [`BOX`] at one instant and as a mean.
+/// Formats a row of [`BOX`], with instantaneous and averaged lengths.
 fn boxed(run: &str, sample: usize, f: [f64; 3], instant: [f64; 6], mean: [f64; 6]) -> String {
     let stress = [sample as f64 + 1.0, 0.0, 0.0, 5.0 * sample as f64, 0.0, 0.0];
     format!("{run},{sample},") + &row(f.into_iter().chain(instant).chain(mean).chain(stress))
 }
 
-/// Two runs of one cell at two temperatures: each has its own undeformed box, tilted or not.
+/// Runs of one cell at different temperatures: each has its own undeformed box, tilted or not.
 #[test]
 fn each_run_by_its_own_box() {
     for tilts in [[0.0; 3], [4.0, -3.0, 2.0]] {
@@ -95,16 +96,16 @@ fn each_run_by_its_own_box() {
                 );
             }
         }
-        // the undeformed row of one run is missing: it is named
+        // the run without undeformed row is named
         let without: String =
             text.lines().filter(|line| !line.starts_with("hot,0")).map(|l| l.to_owned() + "\n").collect();
         let error = refused(csv(&without));
-        assert!(error.contains("no row of run `hot` with F11 = F22 = F33 = 1"), "{error}");
-        let first = ReadOptions { origin: Some(Origin::Run), ..ReadOptions::default() };
-        let set = file("t.csv", &without, &first).unwrap();
+        assert!(error.contains("no undeformed row of run `hot` with F11 = F22 = F33 = 1"), "{error}");
+        let first = ReadOptions { origin: Some(BoxReference::Run), ..ReadOptions::default() };
+        let set = read_file("t.csv", &without, &first).unwrap();
         assert!((set.paths[1].rows[1].c[0] - (1.1f64 / 1.05).powi(2)).abs() < 1e-12);
     }
-    // a tilt of the reference by a shear: F = H H₀⁻¹, here a further shear of γ in a cell tilted by 4
+    // shear of a tilted reference: F = H H₀⁻¹, here a shear of γ in a cell tilted by 4
     let mut text = BOX.to_owned();
     for sample in 0..4 {
         let now = [10.0, 20.0, 30.0, 4.0 + 2.0 * sample as f64, 0.0, 0.0];
@@ -119,11 +120,11 @@ fn each_run_by_its_own_box() {
 #[test]
 fn flips_are_undone() {
     let flipped = |tilt: f64| tilt - 20.0 * (tilt / 20.0).round();
-    let of = |speed: f64, averaged: bool| {
+    let read_shear = |speed: f64, averaged: bool| {
         let mut text = BOX.to_owned();
         for sample in 0..9 {
             let tilt = speed * sample as f64;
-            // a mean over an interval in which the box flips is the mean of both sides
+            // a mean over an interval with a flip is the mean of both sides
             let steps = (0..=40).map(|part| flipped(tilt - speed * f64::from(part) / 40.0));
             let mean = if averaged && sample > 0 { steps.sum::<f64>() / 41.0 } else { flipped(tilt) };
             let at = |xy: f64| [20.0, 20.0, 20.0, xy, 0.0, 0.0];
@@ -132,7 +133,7 @@ fn flips_are_undone() {
         csv(&text)
     };
     for speed in [2.0, 1.8, -2.0, 4.5, -1.3] {
-        let set = of(speed, false).unwrap();
+        let set = read_shear(speed, false).unwrap();
         for (sample, row) in set.paths[0].rows.iter().enumerate() {
             let shear = speed * sample as f64 / 20.0;
             assert!(
@@ -147,10 +148,10 @@ fn flips_are_undone() {
             set.provenance
         );
     }
-    let error = refused(of(2.2, true));
-    assert!(error.contains("between the two sides of a flip") && error.contains("instantaneous"), "{error}");
-    // a step of more than half a length cannot be told from one the other way
-    assert!(refused(of(9.0, false)).contains("too far apart"));
+    let error = refused(read_shear(2.2, true));
+    assert!(error.contains("averaged across a flip") && error.contains("instantaneous"), "{error}");
+    // a step of more than half a length is ambiguous
+    assert!(refused(read_shear(9.0, false)).contains("too far apart"));
     // a box that turns back is not flipped
     let mut text = BOX.to_owned();
     for (sample, xy) in [0.0, 3.0, 6.0, 9.0, 6.0, 3.0, 0.0, -3.0, -6.0, -9.0].into_iter().enumerate() {
@@ -160,11 +161,11 @@ fn flips_are_undone() {
     assert!((csv(&text).unwrap().paths[0].rows[9].c[3] + 0.45).abs() < 1e-12);
 }
 
-/// One law in all measures: σ, −σ, P and S beside F give the same S, in every unit.
+/// All measures of one law give the same S in every unit: σ, −σ, P and S with F.
 #[test]
 fn stresses_beside_f() {
     let six = |t: Tensor| [t[(0, 0)], t[(1, 1)], t[(2, 2)], t[(0, 1)], t[(0, 2)], t[(1, 2)]];
-    let pressure = ReadOptions { measure: Some(Measure::Pressure), ..ReadOptions::default() };
+    let pressure = ReadOptions { pressure: Some(PressureConvention::Pressure), ..ReadOptions::default() };
     for (heading, unit, options) in [
         ("sxx,syy,szz,sxy,sxz,syz", 1e6, ReadOptions::default()),
         (
@@ -190,24 +191,31 @@ fn stresses_beside_f() {
                     .transpose()
                     .as_slice()
                     .to_vec(),
-                "S11" => s_of(&f).as_slice().to_vec(),
+                "S11" => second_stress(&f).as_slice().to_vec(),
                 _ => six(cauchy(&f)).to_vec(),
             };
             text += &row(f.transpose().as_slice().iter().copied().chain(stress.iter().map(|s| s / unit)));
         }
-        let set = file("t.csv", &text, &options).unwrap_or_else(|error| panic!("{heading}: {error}"));
+        let set = read_file("t.csv", &text, &options).unwrap_or_else(|error| panic!("{heading}: {error}"));
         for (row, f) in set.rows().zip(gradients()) {
-            assert!((row.s - s_of(&f)).amax() < 1e-6 * 5e6, "{heading}: {} {}", row.s, s_of(&f));
+            assert!(
+                (row.s - second_stress(&f)).amax() < 1e-6 * 5e6,
+                "{heading}: {} {}",
+                row.s,
+                second_stress(&f)
+            );
         }
         if heading.starts_with("pxx") {
             let error = refused(csv(&text));
             assert!(
-                error.contains("a pressure has the other sign") && error.contains("stress = \"pressure\""),
+                error.contains("pressures (p = −σ)") && error.contains("stress = \"pressure\""),
                 "{error}"
             );
         }
         if heading.starts_with("Pxx") {
-            assert!(refused(file("t.csv", &text, &pressure)).contains("pressure (σ = −p) without a unit"));
+            assert!(
+                refused(read_file("t.csv", &text, &pressure)).contains("pressure (σ = −p) without a unit")
+            );
         }
         if heading.starts_with("P11") {
             let swapped = text.replacen("P12,P13,P21,P22,P23,P31,P32", "P21,P31,P12,P22,P32,P13,P23", 1);
@@ -217,27 +225,28 @@ fn stresses_beside_f() {
         }
     }
     let error = refused(csv("F11,F22,F33,sxx\n1,1,1,0\n"));
-    assert!(error.contains("all nine of F11") && error.contains("columns of zeros"), "{error}");
+    assert!(error.contains("all nine columns F11") && error.contains("columns of zeros"), "{error}");
 }
 
-/// Decimal commas, semicolons, units below the headings and lengths in nm.
+/// Decimal commas, semicolons, units below the headings, and lengths in nm.
 #[test]
-fn tables_as_people_write_them() {
-    let text = "Werkstoff;PA12\nrun_id;F11;F22;F33;lx;ly;lz;sxx;syy;szz;sxy;sxz;syz\n;;;;nm;nm;nm;kbar;kbar;kbar;kbar;kbar;kbar\n\
+fn tables_of_spreadsheets() {
+    let text = "Werkstoff;PA12\nrun_id;F11;F22;F33;lx;ly;lz;sxx;syy;szz;sxy;sxz;syz\n\
+                    ;;;;nm;nm;nm;kbar;kbar;kbar;kbar;kbar;kbar\n\
                 a;1,0;1,0;1,0;2,0;2,0;2,0;0;0;0;0;0;0\na;1,1;1,0;1,0;2,2;2,0;2,0;1,5;0;0;0;0;0\n";
-    let options = ReadOptions { columns: Columns::Instantaneous, ..ReadOptions::default() };
-    let set = file("t.csv", text, &options).unwrap();
+    let options = ReadOptions { columns: SampledColumns::Instantaneous, ..ReadOptions::default() };
+    let set = read_file("t.csv", text, &options).unwrap();
     let row = &set.paths[0].rows[1];
     assert!((row.c[0] - 1.21).abs() < 1e-12 && (row.cauchy[0] / 1.5e8 - 1.0).abs() < 1e-12);
     assert!(set.provenance[0].contains("separator `;`, decimal comma"), "{:?}", set.provenance);
     let given =
         ReadOptions { reference: Some(crate::kinematics::PeriodicBox::orthogonal([20.0; 3])), ..options };
-    assert!((file("t.csv", text, &given).unwrap().paths[0].rows[1].c[0] - 1.21).abs() < 1e-12);
-    let error = refused(file("t.csv", &text.replace("1,5;0", "1.5;0"), &given));
+    assert!((read_file("t.csv", text, &given).unwrap().paths[0].rows[1].c[0] - 1.21).abs() < 1e-12);
+    let error = refused(read_file("t.csv", &text.replace("1,5;0", "1.5;0"), &given));
     assert!(error.contains("column `sxx`: found `1.5`") && error.contains("decimal comma"), "{error}");
 }
 
-/// Columns of one's own names.
+/// Columns with other names.
 #[test]
 fn named_columns() {
     let names = |list: &[(&str, &str)]| ReadOptions {
@@ -246,12 +255,12 @@ fn named_columns() {
     };
     let text = format!("{F},a,b,c,d,e,f\n1.1,0,0,0,1,0,0,0,1,7,0,0,0,0,0\n");
     let given = [("sxx", "a"), ("syy", "b"), ("szz", "c"), ("sxy", "d"), ("sxz", "e"), ("syz", "f")];
-    assert_eq!(file("t.csv", &text, &names(&given)).unwrap().paths[0].rows[0].cauchy[0], 7e6);
-    assert!(refused(file("t.csv", &text, &names(&[("sxx", "F111")]))).contains("did you mean `F11`"));
-    assert!(refused(file("t.csv", &text, &names(&[("sx", "a")]))).contains("`sxx`"));
+    assert_eq!(read_file("t.csv", &text, &names(&given)).unwrap().paths[0].rows[0].cauchy[0], 7e6);
+    assert!(refused(read_file("t.csv", &text, &names(&[("sxx", "F111")]))).contains("did you mean `F11`"));
+    assert!(refused(read_file("t.csv", &text, &names(&[("sx", "a")]))).contains("`sxx`"));
 }
 
-/// Tables that a law was trained on are asked for again: F, boxes, logs and HDF5.
+/// Strains are read from training tables: F, boxes, logs and HDF5.
 #[test]
 fn strains_of_any_table() {
     let directory = tempfile::tempdir().unwrap();
@@ -263,7 +272,7 @@ fn strains_of_any_table() {
                 + &boxed("r", 0, [1.0; 3], [1.0, 1.0, 1.0, 0.0, 0.0, 0.0], [1.1, 1.0, 1.0, 0.11, 0.0, 0.0]),
             1,
         ),
-        ("log", log("units metal\n", 1), 5),
+        ("log", lammps_log("units metal\n", 1), 5),
     ] {
         let path = directory.path().join(name);
         std::fs::write(&path, text).unwrap();
@@ -274,7 +283,7 @@ fn strains_of_any_table() {
     }
 }
 
-/// Numbers of every width and order of bytes; C and S as tensors; F beside P.
+/// HDF5 numbers of each width and byte order; C and S as tensors; F with P.
 #[cfg(feature = "hdf5")]
 #[test]
 fn hdf5_of_all_types() {
@@ -338,7 +347,7 @@ fn hdf5_of_all_types() {
     })
     .unwrap();
     for (row, f) in gradients.rows().zip(&rows) {
-        assert!((row.s - s_of(f)).amax() < 1e-6 * 5e6);
+        assert!((row.s - second_stress(f)).amax() < 1e-6 * 5e6);
     }
     let half = make(&|root| {
         put(root, "C", &[6, 6], six.clone());

@@ -1,65 +1,65 @@
-//! How tables are to be understood.
+//! Options for reading tables.
 
 use crate::kinematics::PeriodicBox;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Which columns of a molecular dynamics table are read.
+/// Kind of columns to read from a molecular-dynamics table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
-pub enum Columns {
-    /// `avg_…`: means over the interval before each sample. Stress at one instant in a small cell is mostly the
-    /// vibration of bonds (formulation.md, chapter 3).
+pub enum SampledColumns {
+    /// Columns `avg_…`: means over the interval before each sample. In a small cell the instantaneous stress
+    /// is mostly bond vibration (formulation.md, chapter 3).
     #[default]
     Averaged,
-    /// The values at the instant of sampling.
+    /// Columns of the instantaneous values.
     Instantaneous,
 }
 
-/// The box that lengths are referred to.
+/// Undeformed box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
-pub enum Origin {
-    /// That of the first row of each run.
+pub enum BoxReference {
+    /// Box of the first row of each run.
     Run,
-    /// That of the first row of the file, the runs of which continue each other.
+    /// Box of the first row of the file, whose runs continue each other.
     File,
 }
 
-/// What the columns `pxx …` are.
+/// Stress measure of the columns `pxx …`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
-pub enum Measure {
-    /// Pressures as of LAMMPS: σ = −p.
+pub enum PressureConvention {
+    /// Pressures as in LAMMPS: σ = −p.
     Pressure,
 }
 
-/// Units of LAMMPS (`units` in its documentation); those of `lj` have no size.
+/// Units of LAMMPS (`units` in its documentation); `lj` is dimensionless and not supported.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum LammpsUnits {
-    /// atm, fs.
+    /// Pressure in atm, time in fs.
     Real,
-    /// bar, ps.
+    /// Pressure in bar, time in ps.
     Metal,
-    /// Pa, s.
+    /// Pressure in Pa, time in s.
     Si,
-    /// dyn/cm², s.
+    /// Pressure in dyn/cm², time in s.
     Cgs,
-    /// Pa, fs.
+    /// Pressure in Pa, time in fs.
     Electron,
-    /// pg/(µm µs²) = 1 kPa, µs.
+    /// Pressure in pg/(µm µs²) = 1 kPa, time in µs.
     Micro,
-    /// ag/(nm ns²) = 1 MPa, ns.
+    /// Pressure in ag/(nm ns²) = 1 MPa, time in ns.
     Nano,
 }
 
 impl LammpsUnits {
-    /// All of them, by name.
+    /// All units, by name.
     pub const ALL: [(&'static str, Self); 7] = [
         ("real", Self::Real),
         ("metal", Self::Metal),
@@ -70,12 +70,12 @@ impl LammpsUnits {
         ("nano", Self::Nano),
     ];
 
-    /// Its name.
+    /// Returns the name.
     pub fn name(self) -> &'static str {
-        Self::ALL.iter().find(|(_, one)| *one == self).map_or("", |(name, _)| name)
+        Self::ALL.iter().find(|(_, units)| *units == self).map_or("", |(name, _)| name)
     }
 
-    /// Pa in a unit of pressure, s in a unit of time.
+    /// Returns the units of pressure, Pa, and of time, s.
     pub fn sizes(self) -> [f64; 2] {
         match self {
             Self::Real => [crate::kinematics::ATMOSPHERE, 1e-15],
@@ -89,38 +89,38 @@ impl LammpsUnits {
     }
 }
 
-/// How a table is to be understood.
+/// Options for reading a table.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ReadOptions {
-    /// Averaged or instantaneous.
-    pub columns: Columns,
-    /// The undeformed box, Å; without it, lengths are referred to the row of each run where the file's own F is 1.
+    /// Averaged or instantaneous columns.
+    pub columns: SampledColumns,
+    /// Undeformed box, Å; default: the row of each run at which the F of the file is 1.
     pub reference: Option<PeriodicBox>,
-    /// Which row of lengths is undeformed, where no row says so.
-    pub origin: Option<Origin>,
-    /// Pa in one unit of stress, for columns whose heading has no `[unit]`; MPa without it (of pressures: none).
+    /// Row whose box is undeformed, if no row shows it.
+    pub origin: Option<BoxReference>,
+    /// Unit of stress, Pa, for columns without `[unit]` in the heading; default MPa (none for pressures).
     pub stress_unit: Option<f64>,
-    /// What columns `pxx …` of a table are; without it they are refused.
-    pub measure: Option<Measure>,
-    /// Units of LAMMPS' own files, where a log does not tell them.
+    /// Stress measure of columns `pxx …` in a table; by default they are refused.
+    pub pressure: Option<PressureConvention>,
+    /// Units of LAMMPS output, if the log does not state them.
     pub units: Option<LammpsUnits>,
-    /// Properties (`lx`, `pxx`, `F11`, …) and the headings of their columns.
+    /// Headings of the columns, by property (`lx`, `pxx`, `F11`, …).
     pub names: BTreeMap<String, String>,
-    /// Blocks of a LAMMPS log that are read, from 1; all where none is named.
+    /// Blocks of a LAMMPS log to read, from 1; default: all.
     pub blocks: Vec<usize>,
 }
 
 impl ReadOptions {
-    /// What the headings of a table's samples begin with.
+    /// Returns the prefix of sampled columns.
     pub(super) fn prefix(&self) -> &'static str {
         match self.columns {
-            Columns::Averaged => "avg_",
-            Columns::Instantaneous => "",
+            SampledColumns::Averaged => "avg_",
+            SampledColumns::Instantaneous => "",
         }
     }
 }
 
-/// What a table can have.
+/// Properties of a table.
 pub const PROPERTIES: [&str; 52] = [
     "run_id", "kind", "sample", "time_fs", "lx", "ly", "lz", "xy", "xz", "yz", "sxx", "syy", "szz", "sxy",
     "sxz", "syz", "pxx", "pyy", "pzz", "pxy", "pxz", "pyz", "F11", "F12", "F13", "F21", "F22", "F23", "F31",
@@ -130,10 +130,11 @@ pub const PROPERTIES: [&str; 52] = [
 
 pub(super) const LENGTHS: [&str; 3] = ["lx", "ly", "lz"];
 pub(super) const TILTS: [&str; 3] = ["xy", "xz", "yz"];
-/// Places in the order of this crate, which is LAMMPS', too.
+/// Components in the order of this crate and of LAMMPS.
 pub(super) const PLACES: [&str; 6] = ["xx", "yy", "zz", "xy", "xz", "yz"];
 
-/// Whether a property is of the box or of stress at a sample, which averaged columns have with `avg_`.
+/// Tells if a property is a box length, tilt or stress of a sample, which has the prefix `avg_` in averaged
+/// columns.
 pub(super) fn is_sampled(property: &str) -> bool {
     LENGTHS.contains(&property)
         || TILTS.contains(&property)

@@ -1,12 +1,12 @@
-//! Data sets from CSV tables in four forms, from LAMMPS' own files, and from HDF5.
+//! Data sets from CSV tables, LAMMPS output and HDF5.
 
-use super::boxes::{Boxes, Run};
-use super::options::{Columns, LENGTHS, Origin, ReadOptions};
-use super::stress::{Stress, Symmetry, nine};
-use super::table::{Column, Table};
-use super::{Dataset, Path, Row};
+use super::boxes::{BoxColumns, TableRun};
+use super::options::{BoxReference, LENGTHS, ReadOptions, SampledColumns};
+use super::stress::{StressColumns, SymmetryCheck, tensor_names};
+use super::table::{ColumnIndex, DataTable};
+use super::{DataRow, Dataset, Path};
 use crate::Error;
-use crate::kinematics::{NAMES, stretch_of};
+use crate::kinematics::{NAMES, stretch_from_c};
 use polycore::constitutive::{self, hyperelastic};
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 use std::collections::HashMap;
@@ -14,26 +14,26 @@ use std::collections::HashMap;
 /// Seconds in a femtosecond.
 const FEMTOSECOND: f64 = 1e-15;
 
-/// Reads a CSV table (also gzip) or HDF5 file, and checks it ([`Dataset::check`]).
+/// Reads and checks a CSV table (also compressed by gzip), LAMMPS output or an HDF5 file.
 ///
-/// Forms of a table, told by its headings:
-/// - `lx ly lz` (Å; with `xy xz yz` if the box is tilted) and `sxx syy szz sxy sxz syz` (σ), or the same with `avg_`; F is
-///   H H₀⁻¹ of each run's own undeformed box H₀, and flips of a tilted box are undone;
-/// - `F11 F12 … F33` (all nine) and `sxx …` or `avg_sxx …`, `S11 …`, or nine components `P11 P12 … P33` of the first
-///   Piola–Kirchhoff stress;
-/// - thermo output of LAMMPS in logs (also `thermo_style yaml`) and files of `fix ave/time`;
+/// Forms of a table, recognized by its headings:
+/// - `lx ly lz` (Å; with `xy xz yz` if the box is tilted) and `sxx syy szz sxy sxz syz` (σ), or the same with
+///   `avg_`; F is H H₀⁻¹ with the undeformed box H₀ of each run, and flips of a tilted box are undone;
+/// - `F11 F12 … F33` (all nine) and `sxx …` or `avg_sxx …`, `S11 …`, or the nine components `P11 P12 … P33`
+///   of the first Piola–Kirchhoff stress;
+/// - thermo output in LAMMPS logs (also `thermo_style yaml`), and files of `fix ave/time`;
 /// - `C11 C22 C33 C12 C13 C23` and `S11 … S23`;
-/// - nominal stresses of an incompressible body, as [`hyperelastic::data::Table`] has them: `stretch,nominal_MPa`,
-///   `mode,stretch,nominal_MPa` (a run for each mode) or `stretch_1,stretch_2,nominal_1_MPa,nominal_2_MPa`.
+/// - nominal stresses of an incompressible body, as in [`hyperelastic::data::TestData`]:
+///   `stretch,nominal_MPa`, `mode,stretch,nominal_MPa` (a run per mode) or
+///   `stretch_1,stretch_2,nominal_1_MPa,nominal_2_MPa`.
 ///
-/// Optional columns: `run_id` (without it a file is one path), `kind`, `rate_x rate_y rate_z` (1/fs), `sample`,
-/// `time_fs`. Stress is in MPa, or in the unit of its heading. Pressures (`pxx …`, σ = −p) are read where [`Measure`] says so.
-/// A row whose averaged cells are all empty (the state before a run) is skipped and counted.
-///
-/// [`Measure`]: super::Measure
+/// Optional columns: `run_id` (default: a file is one path), `kind`, `rate_x rate_y rate_z` (1/fs), `sample`,
+/// `time_fs`. Stress is in MPa, or in the unit of its heading. Pressures (`pxx …`, σ = −p) need
+/// [`ReadOptions::pressure`].
+/// Rows whose averaged cells are all empty (the state before a run) are skipped and counted.
 ///
 /// # Errors
-/// File, line, column, what was found and what is allowed; [`Dataset::check`].
+/// Returns file, line, column, value and allowed values, and the errors of [`Dataset::check`].
 pub fn read(path: impl AsRef<std::path::Path>, options: &ReadOptions) -> Result<Dataset, Error> {
     let path = path.as_ref();
     let set = if is_hdf5(path)? {
@@ -44,7 +44,7 @@ pub fn read(path: impl AsRef<std::path::Path>, options: &ReadOptions) -> Result<
         #[cfg(feature = "hdf5")]
         set
     } else {
-        let text = Table::read(path, options)?;
+        let text = DataTable::read(path, options)?;
         if is_rubber(&text) { nominal(&text)? } else { table(&text, options)? }
     };
     set.check().map_err(|error| match error {
@@ -59,132 +59,136 @@ pub fn read(path: impl AsRef<std::path::Path>, options: &ReadOptions) -> Result<
     Ok(set)
 }
 
-/// Whether a table has tests of rubber: stretches or strains, and nothing of a body in space.
-fn is_rubber(table: &Table) -> bool {
-    let of_space = ["C11", "F11", "lx", "avg_lx", "P11", "S11"].iter().any(|name| table.has(name));
+/// Tells if a table has tests of rubber: stretches or strains, but no tensors or boxes.
+fn is_rubber(table: &DataTable) -> bool {
+    let has_tensors = ["C11", "F11", "lx", "avg_lx", "P11", "S11"].iter().any(|name| table.contains(name));
     let words = ["stretch", "strain", "dehnung"];
-    let is = |name: &str| {
+    let is_stretch = |name: &str| {
         let lower = name.to_lowercase();
         lower == "mode" || words.iter().any(|word| lower.contains(word))
     };
-    !of_space && !table.is_lammps() && table.headings.iter().any(|(name, _)| is(name))
+    !has_tensors && !table.is_lammps() && table.headings.iter().any(|(name, _)| is_stretch(name))
 }
 
 pub(super) fn is_hdf5(path: &std::path::Path) -> Result<bool, Error> {
     use std::io::Read;
     let mut start = Vec::new();
-    let file = std::fs::File::open(path).map_err(Error::io("open", path))?;
-    file.take(8).read_to_end(&mut start).map_err(Error::io("read", path))?;
+    let file = std::fs::File::open(path).map_err(Error::from_io("open", path))?;
+    file.take(8).read_to_end(&mut start).map_err(Error::from_io("read", path))?;
     let named = path.extension().is_some_and(|e| e == "h5" || e == "hdf5");
     Ok(named || start == b"\x89HDF\r\n\x1a\n")
 }
 
-/// Where a table keeps the deformation.
-enum Form {
-    Box(Boxes),
-    Gradient([Column; 9]),
-    Material([Column; 6]),
+/// Columns of the deformation.
+enum DeformationColumns {
+    Box(BoxColumns),
+    Gradient([ColumnIndex; 9]),
+    Material([ColumnIndex; 6]),
 }
 
-/// Where a table keeps its values.
-pub(super) struct Layout {
-    form: Form,
-    stress: Option<Stress>,
-    /// What was taken for what, in words.
+/// Columns of a table.
+pub(super) struct TableLayout {
+    form: DeformationColumns,
+    stress: Option<StressColumns>,
+    /// Description of the columns.
     name: String,
 }
 
-impl Layout {
-    /// The layout of a table; without its stress for predictions.
-    pub fn new(table: &Table, options: &ReadOptions, stressed: bool) -> Result<Self, Error> {
-        if table.has("C11") {
+impl TableLayout {
+    /// Finds the columns of a table; `stressed` is false for predictions.
+    pub fn new(table: &DataTable, options: &ReadOptions, stressed: bool) -> Result<Self, Error> {
+        if table.contains("C11") {
             let names = |letter: &str| NAMES.map(|name| format!("{letter}{name}"));
             require_material(table, [names("C"), names("S")].as_flattened())?;
             let (c, s) = (table.columns(names("C"))?, table.columns(names("S"))?);
             return Ok(Self {
-                form: Form::Material(c),
-                stress: Some(Stress::Second(s)),
+                form: DeformationColumns::Material(c),
+                stress: Some(StressColumns::Second(s)),
                 name: "C and S".into(),
             });
         }
         let (mut prefix, mut name) = match (table.is_lammps(), options.columns) {
             (true, _) => ("", "LAMMPS"),
-            (_, Columns::Averaged) => ("avg_", "averaged columns"),
-            (_, Columns::Instantaneous) => ("", "instantaneous columns"),
+            (_, SampledColumns::Averaged) => ("avg_", "averaged columns"),
+            (_, SampledColumns::Instantaneous) => ("", "instantaneous columns"),
         };
-        let form = if table.has("F12") {
-            // a table without any averaged column has nothing to choose from
+        let form = if table.contains("F12") {
+            // a table without averaged columns leaves no choice
             if !prefix.is_empty() && !table.headings.iter().any(|(name, _)| name.starts_with(prefix)) {
                 (prefix, name) = ("", "F");
             }
-            Form::Gradient(table.columns(nine("F"))?)
-        } else if LENGTHS.iter().any(|name| table.has(&format!("{prefix}{name}"))) {
-            Form::Box(Boxes::new(table, prefix)?)
+            DeformationColumns::Gradient(table.columns(tensor_names("F"))?)
+        } else if LENGTHS.iter().any(|name| table.contains(&format!("{prefix}{name}"))) {
+            DeformationColumns::Box(BoxColumns::new(table, prefix)?)
         } else {
             return Err(unknown_form(table, options.columns));
         };
-        let stress = if stressed { Some(Stress::of_deformation(table, prefix, options)?) } else { None };
+        let stress = if stressed { Some(StressColumns::find(table, prefix, options)?) } else { None };
         let name = match stress {
-            None | Some(Stress::Cauchy(_)) => name.to_owned(),
+            None | Some(StressColumns::Cauchy(_)) => name.to_owned(),
             Some(stress) => format!("{name}, {}", stress.name()),
         };
         Ok(Self { form, stress, name })
     }
 
-    fn stress(&self) -> &[Column] {
-        self.stress.as_ref().map_or(&[], Stress::columns)
+    fn stress(&self) -> &[ColumnIndex] {
+        self.stress.as_ref().map_or(&[], StressColumns::columns)
     }
 
-    /// Whether a row has none of the values looked for.
-    fn is_blank(&self, table: &Table, row: usize) -> bool {
-        let blank = |column: &Column| table.text(row, *column).is_empty();
+    /// Tells if a row has no values.
+    fn is_blank(&self, table: &DataTable, row: usize) -> bool {
+        let blank = |column: &ColumnIndex| table.text(row, *column).is_empty();
         match &self.form {
-            Form::Box(boxes) => boxes.lengths().iter().chain(self.stress()).all(blank),
-            Form::Gradient(_) => !self.stress().is_empty() && self.stress().iter().all(blank),
-            Form::Material(_) => false,
+            DeformationColumns::Box(boxes) => boxes.lengths().iter().chain(self.stress()).all(blank),
+            DeformationColumns::Gradient(_) => !self.stress().is_empty() && self.stress().iter().all(blank),
+            DeformationColumns::Material(_) => false,
         }
     }
 
-    /// F of each row of each run, and notes on what was done.
+    /// Computes F of each row of each run; returns it with notes.
     pub fn deformations(
         &self,
-        table: &Table,
-        runs: &[Run],
+        table: &DataTable,
+        runs: &[TableRun],
         options: &ReadOptions,
     ) -> Result<(Vec<Vec<DeformationGradient>>, Vec<String>), Error> {
-        let of = |&(_, row): &(u64, usize)| -> Result<DeformationGradient, Error> {
+        let deformation = |&(_, row): &(u64, usize)| -> Result<DeformationGradient, Error> {
             match &self.form {
-                Form::Material(c) => stretch_of(&Voigt::from_row_slice(&table.numbers(row, c)?))
-                    .map_err(|error| table.at_row(row, error)),
-                Form::Gradient(columns) => {
+                DeformationColumns::Material(c) => {
+                    stretch_from_c(&Voigt::from_row_slice(&table.numbers(row, c)?))
+                        .map_err(|error| table.at_row(row, error))
+                }
+                DeformationColumns::Gradient(columns) => {
                     DeformationGradient::new(Tensor::from_row_slice(&table.numbers(row, columns)?))
                         .map_err(|error| table.at_row(row, error.into()))
                 }
-                Form::Box(_) => Err(Error::file(&table.path, "a box", "a deformation")),
+                DeformationColumns::Box(_) => Err(Error::file(&table.path, "a box", "a deformation")),
             }
         };
         match &self.form {
-            Form::Box(boxes) => boxes.deformations(table, runs, options),
+            DeformationColumns::Box(boxes) => boxes.deformations(table, runs, options),
             _ => {
-                let all =
-                    runs.iter().map(|run| run.rows.iter().map(of).collect()).collect::<Result<_, _>>()?;
+                let all = runs
+                    .iter()
+                    .map(|run| run.rows.iter().map(deformation).collect())
+                    .collect::<Result<_, _>>()?;
                 Ok((all, Vec::new()))
             }
         }
     }
 
-    /// The runs of a table, in order of appearance, and how many rows are blank.
-    pub fn runs(&self, table: &Table) -> Result<(Vec<Run>, usize), Error> {
+    /// Returns the runs of a table, in order of appearance, and the number of blank rows.
+    pub fn runs(&self, table: &DataTable) -> Result<(Vec<TableRun>, usize), Error> {
         let [id, sample] = ["run_id", "sample"].map(|name| table.find(name));
         let file_name = polycore::file::name_of(&table.path);
-        let mut runs: Vec<Run> = Vec::new();
+        let mut runs: Vec<TableRun> = Vec::new();
         let mut index: HashMap<String, usize> = HashMap::new();
         let mut samples: HashMap<(usize, u64), u64> = HashMap::new();
         let mut skipped = 0;
         for row in 0..table.rows() {
             let id = id.map_or(file_name.as_str(), |column| table.text(row, column));
             let number = *index.entry(id.to_owned()).or_insert_with(|| {
-                runs.push(Run { id: id.to_owned(), all: Vec::new(), first: row, rows: Vec::new() });
+                runs.push(TableRun { id: id.to_owned(), all: Vec::new(), first: row, rows: Vec::new() });
                 runs.len() - 1
             });
             let run = &mut runs[number];
@@ -197,7 +201,7 @@ impl Layout {
                 Some(column) => table
                     .text(row, column)
                     .parse()
-                    .map_err(|_| table.cell(row, column, "a whole number, not negative"))?,
+                    .map_err(|_| table.cell(row, column, "a non-negative integer"))?,
                 None => run.rows.len() as u64,
             };
             if let Some(line) = samples.insert((number, sample), table.line(row)) {
@@ -208,7 +212,7 @@ impl Layout {
                         table.line(row),
                         table.path.display()
                     ),
-                    allowed: "each sample of a run once".into(),
+                    allowed: "different samples in a run".into(),
                 });
             }
             run.rows.push((sample, row));
@@ -221,10 +225,12 @@ impl Layout {
     }
 }
 
+/// Checks that all components of C and S have a column.
+///
 /// # Errors
-/// A component of C or S without a column.
-fn require_material(table: &Table, all: &[String]) -> Result<(), Error> {
-    let Some(missing) = all.iter().find(|name| !table.has(name)) else { return Ok(()) };
+/// Returns an error for a missing column.
+fn require_material(table: &DataTable, all: &[String]) -> Result<(), Error> {
+    let Some(missing) = all.iter().find(|name| !table.contains(name)) else { return Ok(()) };
     let others = table.headings.iter().map(|(name, _)| name).filter(|name| !all.contains(name));
     let similar = crate::error::nearest(missing, others.map(String::as_str));
     if similar.is_some() {
@@ -233,15 +239,15 @@ fn require_material(table: &Table, all: &[String]) -> Result<(), Error> {
     }
     let mut allowed = "C11 C22 C33 C12 C13 C23 and S11 S22 S33 S12 S13 S23".to_owned();
     if missing.ends_with(['2', '3']) && !missing.ends_with("22") && !missing.ends_with("33") {
-        allowed += "; where there is no shear, add columns of zeros";
+        allowed += "; without shear, add columns of zeros";
     }
     Err(Error::file(&table.path, format!("no column `{missing}`"), allowed))
 }
 
-/// Nominal stresses over stretches: a run for each test, in order of appearance.
-fn nominal(table: &Table) -> Result<Dataset, Error> {
+/// Reads nominal stresses over stretches: one run per test, in order of appearance.
+fn nominal(table: &DataTable) -> Result<Dataset, Error> {
     let path = &table.path;
-    let reading = hyperelastic::data::Table::read_as(path, &hyperelastic::Meaning::default());
+    let reading = hyperelastic::data::TestData::read_as(path, &hyperelastic::TestFormat::default());
     let reading = reading.map_err(|error| match error {
         polycore::Error::Constitutive(constitutive::Error::Data { reason, .. }) => {
             Error::file(path, reason, "stretches and nominal stresses of an incompressible body")
@@ -259,10 +265,10 @@ fn nominal(table: &Table) -> Result<Dataset, Error> {
             set.paths.push(Path { id, kind: kind.to_owned(), rates: [f64::NAN; 3], rows: Vec::new() });
             set.paths.len() - 1
         });
-        // a body at rest is a condition, which every law here meets
+        // the undeformed state is a condition that each law here satisfies
         if state.nominal != [0.0; 2] {
             let rows = &mut set.paths[run].rows;
-            rows.push(Row::of_nominal(rows.len() as u64, state.stretches, state.nominal)?);
+            rows.push(DataRow::from_nominal(rows.len() as u64, state.stretches, state.nominal)?);
         } else {
             set.skipped += 1;
         }
@@ -276,37 +282,36 @@ fn nominal(table: &Table) -> Result<Dataset, Error> {
         set.paths.len(),
         set.skipped
     );
-    let more = table.understood().map(|_| &reading.understood).into_iter().chain(&reading.notes);
+    let more = table.layout_note().map(|_| &reading.description).into_iter().chain(&reading.notes);
     set.provenance.push(more.fold(line, |line, note| line + "; " + note));
     Ok(set)
 }
 
-/// The error of a table without any of the forms of [`read`].
-fn unknown_form(table: &Table, columns: Columns) -> Error {
+/// Returns the error for a table without any of the forms of [`read`].
+fn unknown_form(table: &DataTable, columns: SampledColumns) -> Error {
     let headings: Vec<&str> = table.headings.iter().map(|(name, _)| name.as_str()).collect();
     let found = format!("the headings {}", headings.join(", "));
-    let forms = "C11 C22 C33 C12 C13 C23 and S11 … S23, or F11 F12 … F33 or lx ly lz and sxx syy szz sxy sxz syz, or (rubber) \
-         mode, stretch, nominal_MPa";
+    let forms = "C11 C22 C33 C12 C13 C23 and S11 … S23, or F11 F12 … F33 or lx ly lz and sxx syy szz sxy \
+        sxz syz, or (rubber) mode, stretch, nominal_MPa";
     let allowed = match columns {
-        _ if table.has("F11") => {
-            "all nine of F11 F12 F13 F21 … F33; where there is no shear, add columns of zeros".into()
+        _ if table.contains("F11") => {
+            "all nine columns F11 F12 F13 F21 … F33; without shear, add columns of zeros".into()
         }
-        Columns::Averaged if table.has("lx") => {
-            "avg_lx … avg_syz; for lx … syz as they are, `columns = \"instantaneous\"` (`--instantaneous`)"
-                .into()
+        SampledColumns::Averaged if table.contains("lx") => {
+            "avg_lx … avg_syz, or lx … syz with `columns = \"instantaneous\"` (`--instantaneous`)".into()
         }
-        Columns::Averaged => format!("{forms}, the last two forms with `avg_` before lx … syz"),
-        Columns::Instantaneous => forms.to_owned(),
+        SampledColumns::Averaged => format!("{forms}; boxes and their stresses with the prefix `avg_`"),
+        SampledColumns::Instantaneous => forms.to_owned(),
     };
     Error::file(&table.path, found, allowed)
 }
 
-fn table(table: &Table, options: &ReadOptions) -> Result<Dataset, Error> {
+fn table(table: &DataTable, options: &ReadOptions) -> Result<Dataset, Error> {
     let mut options = options.clone();
     if let Some(origin) = table.lammps() {
-        options.origin = options.origin.or(origin.first_is_undeformed.then_some(Origin::Run));
+        options.origin = options.origin.or(origin.first_is_undeformed.then_some(BoxReference::Run));
     }
-    let layout = Layout::new(table, &options, true)?;
+    let layout = TableLayout::new(table, &options, true)?;
     let Some(stress) = &layout.stress else { return Ok(Dataset::default()) };
     let units = stress.units(table, &options)?;
     let (runs, skipped) = layout.runs(table)?;
@@ -314,7 +319,7 @@ fn table(table: &Table, options: &ReadOptions) -> Result<Dataset, Error> {
     let rates = ["rate_x", "rate_y", "rate_z"].map(|name| table.find(name));
     let (deformations, notes) = layout.deformations(table, &runs, &options)?;
     let mut set = Dataset { skipped, ..Dataset::default() };
-    let mut symmetry = Symmetry::default();
+    let mut symmetry = SymmetryCheck::default();
     for (run, deformations) in runs.iter().zip(deformations) {
         let Some(&(_, row)) = run.rows.first() else { continue };
         let mut of_axes = [f64::NAN; 3];
@@ -331,14 +336,14 @@ fn table(table: &Table, options: &ReadOptions) -> Result<Dataset, Error> {
             for (column, unit) in stress.columns().iter().zip(&units) {
                 numbers.push(table.number(row, *column)? * unit);
             }
-            if matches!(stress, Stress::First(_)) {
+            if matches!(stress, StressColumns::First(_)) {
                 symmetry.add(&f, &numbers);
             }
             let time = match time {
                 Some(column) => table.number(row, column)? * FEMTOSECOND,
                 None => f64::NAN,
             };
-            rows.push(Row::new(sample, time, f, stress.cauchy(&f, &numbers)));
+            rows.push(DataRow::new(sample, time, f, stress.cauchy(&f, &numbers)));
         }
         set.paths.push(Path { id: run.id.clone(), kind, rates: of_axes, rows });
     }
@@ -352,7 +357,7 @@ fn table(table: &Table, options: &ReadOptions) -> Result<Dataset, Error> {
         set.paths.len(),
         set.skipped
     );
-    if let Some(how) = table.understood() {
+    if let Some(how) = table.layout_note() {
         line += "; ";
         line += &how;
     }

@@ -1,41 +1,41 @@
-//! How noisy the data are, and how far a split keeps its sets apart.
+//! Noise of the data, and separation of the sets of a split.
 
-use super::{Dataset, Row, Split, Standardisation};
+use super::{DataRow, DataSplit, Dataset, Standardisation};
 use polycore::tensor::Voigt;
 
-/// Rows in the moving fit whose residual tells the correlation of the noise.
+/// Rows of the moving fit whose residual gives the correlation of the noise.
 const WINDOW: usize = 11;
 
 /// Noise of a stress along the paths.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Noise {
-    /// Standard deviation of each component, Pa: √(mean of squared second differences / 6), exact for white noise on
-    /// a path that is straight over three samples (var of a − 2b + c is 6σ²).
+    /// Standard deviation of each component, Pa: √(mean of squared second differences / 6), exact for white
+    /// noise on a path that is straight over three samples (var of a − 2b + c is 6σ²).
     pub deviation: Voigt,
-    /// Sum of the six variances, Pa²: the floor of the loss (3.12) for any law that is scored on single rows.
+    /// Sum of the six variances, Pa²: lower bound of the loss (3.12) of any law on single rows.
     pub floor: f64,
-    /// Correlation of neighbouring residuals of a moving quadratic fit over eleven rows, all components; none where
-    /// no path is that long.
+    /// Correlation of neighbouring residuals of a moving quadratic fit over eleven rows, all components;
+    /// `None` if all paths are shorter.
     pub lag_1: Option<f64>,
-    /// What that number is for white noise (the fit itself correlates its residuals): a larger one says that the
-    /// noise is correlated along the path and that a random split leaks.
+    /// This correlation for white noise (the fit itself correlates residuals). A larger `lag_1` means that
+    /// the noise is correlated along the path and that a random split leaks.
     pub lag_1_of_white_noise: f64,
-    /// Second differences that were averaged, of each component.
+    /// Number of averaged second differences per component.
     pub differences: usize,
 }
 
-/// The noise of a stress, from second differences along the paths; none where no path has three rows, and none of nominal
-/// stresses ([`Row::nominal`]): tables of tests are too coarse and uneven for it.
+/// Estimates the noise of a stress from second differences along the paths. Returns `None` if no path has
+/// three rows, and for nominal stresses ([`DataRow::nominal`]), whose tables are too coarse and uneven.
 ///
-/// `stress` picks it from a row: σ or S.
-pub fn noise(set: &Dataset, stress: fn(&Row) -> Voigt) -> Option<Noise> {
+/// `stress` selects σ or S of a row.
+pub fn noise(set: &Dataset, stress: fn(&DataRow) -> Voigt) -> Option<Noise> {
     if set.is_nominal() {
         return None;
     }
     let filter = residual_filter();
     let (mut squares, mut differences) = (Voigt::zeros(), 0);
     let (mut products, mut powers) = (0.0, 0.0);
-    // components of different scale count alike: each is divided by its own noise, known after the first pass
+    // each component is divided by its own noise, known after the first pass, so that all count alike
     for path in &set.paths {
         for rows in path.rows.windows(3) {
             let second = stress(&rows[0]) - 2.0 * stress(&rows[1]) + stress(&rows[2]);
@@ -73,9 +73,9 @@ pub fn noise(set: &Dataset, stress: fn(&Row) -> Voigt) -> Option<Noise> {
     })
 }
 
-/// Weights of (value − quadratic least-squares fit) at the middle of eleven points (Savitzky & Golay 1964,
-/// <https://doi.org/10.1021/ac60214a047>): for 2m + 1 points the fit's weights are
-/// 3[(3m² + 3m − 1) − 5i²]/[(2m + 3)(2m + 1)(2m − 1)].
+/// Returns the weights of (value − quadratic least-squares fit) at the middle of eleven points (Savitzky &
+/// Golay 1964, <https://doi.org/10.1021/ac60214a047>). For 2m + 1 points the weights of the fit are 3[(3m² +
+/// 3m − 1) − 5i²]/[(2m + 3)(2m + 1)(2m − 1)].
 fn residual_filter() -> [f64; WINDOW] {
     let m = (WINDOW / 2) as f64;
     let mut weights = [0.0; WINDOW];
@@ -88,32 +88,32 @@ fn residual_filter() -> [f64; WINDOW] {
     weights
 }
 
-/// How near the test rows lie to what was learnt from, in standardised C.
+/// Distances of test rows to training rows, in standardised C.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Leak {
-    /// Median distance of a test row to the nearest training row.
+    /// Median distance from a test row to the nearest training row.
     pub across: f64,
-    /// Median distance of a training row to the nearest other training row.
+    /// Median distance from a training row to the nearest other training row.
     pub within: f64,
-    /// across/within: about 1 for test rows strewn between the training rows (a leak where noise is correlated along
-    /// paths), larger the further the sets are apart. None where `within` is 0 (duplicates).
+    /// Ratio across/within: about 1 for test rows between training rows (a leak if noise is correlated along
+    /// paths), larger for separate sets. `None` if `within` is 0 (duplicates).
     pub ratio: Option<f64>,
-    /// Share of test rows whose nearest training row is of the same run: 0 for a split by path.
+    /// Fraction of test rows whose nearest training row belongs to the same run: 0 for a split by path.
     pub same_path: f64,
-    /// Distances computed.
+    /// Number of computed distances.
     pub distances: u64,
 }
 
-/// Nearest neighbours in standardised C across a split against those within its training set; none for an empty test
-/// set or fewer than two training rows.
-pub fn leak(set: &Dataset, split: &Split, standardisation: &Standardisation) -> Option<Leak> {
+/// Compares nearest neighbours across a split with those inside its training set, in standardised C. Returns
+/// `None` for an empty test set or fewer than two training rows.
+pub fn leak(set: &Dataset, split: &DataSplit, standardisation: &Standardisation) -> Option<Leak> {
     if split.test.is_empty() || split.train.len() < 2 {
         return None;
     }
     let points: Vec<Voigt> = set.rows().map(|row| standardisation.apply(&row.c)).collect();
     let paths = set.path_of_rows();
     let mut distances = 0;
-    // sorted along the first component: the search leaves off where that component alone is further than the best
+    // sorted along the first component: the search ends when that component alone is farther than the best
     let mut sorted = split.train.clone();
     sorted.sort_by(|&a, &b| points[a][0].total_cmp(&points[b][0]).then(a.cmp(&b)));
     let mut nearest = |row: usize| {
@@ -164,7 +164,7 @@ pub fn leak(set: &Dataset, split: &Split, standardisation: &Standardisation) -> 
     Some(Leak { across, within, ratio, same_path, distances })
 }
 
-/// The value in the middle; NaN of none.
+/// Returns the median; NaN for an empty list.
 pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let middle = values.len() / 2;

@@ -1,99 +1,96 @@
-//! Columns of stress in the measures that tables have, turned into σ.
+//! Stress columns in different measures, and their conversion to σ.
 
-use super::options::{Measure, PLACES, ReadOptions};
-use super::table::{Column, Table};
+use super::options::{PLACES, PressureConvention, ReadOptions};
+use super::table::{ColumnIndex, DataTable};
 use crate::Error;
-use crate::kinematics::{NAMES, cauchy_of_material};
+use crate::kinematics::{NAMES, cauchy_from_material};
 use polycore::tensor::{DeformationGradient, Tensor, Voigt, voigt};
 
-/// P Fᵀ of a first Piola–Kirchhoff stress is symmetric; rounding in tables and noise stay below this part of it.
+/// Largest relative asymmetry of P Fᵀ for a first Piola–Kirchhoff stress with rounding and noise.
 const ASYMMETRY: f64 = 0.01;
 
-/// Headings of the six components of σ, of its pressure, and of S; `%` stands for the place.
+/// Headings of the components of σ and of pressures; `%` stands for the component.
 const CAUCHY: [&str; 4] = ["s%", "sigma_%", "stress_%", "cauchy_%"];
 const PRESSURE: [&str; 5] = ["p%", "P%", "p_%", "press_%", "pressure_%"];
 
-/// Where a table keeps stress.
+/// Columns of stress.
 #[derive(Clone, Copy)]
-pub(super) enum Stress {
-    /// σ.
-    Cauchy([Column; 6]),
-    /// −σ.
-    Pressure([Column; 6]),
-    /// S.
-    Second([Column; 6]),
-    /// P, row by row.
-    First([Column; 9]),
+pub(super) enum StressColumns {
+    /// Cauchy stress σ.
+    Cauchy([ColumnIndex; 6]),
+    /// Pressure −σ.
+    Pressure([ColumnIndex; 6]),
+    /// Second Piola–Kirchhoff stress S.
+    Second([ColumnIndex; 6]),
+    /// First Piola–Kirchhoff stress P, row by row.
+    First([ColumnIndex; 9]),
 }
 
-impl Stress {
-    /// The stress beside a deformation F.
-    pub fn of_deformation(table: &Table, prefix: &str, options: &ReadOptions) -> Result<Self, Error> {
+impl StressColumns {
+    /// Finds the stress columns of a table with deformations.
+    pub fn find(table: &DataTable, prefix: &str, options: &ReadOptions) -> Result<Self, Error> {
         let named = |pattern: &str| PLACES.map(|place| format!("{prefix}{}", pattern.replace('%', place)));
-        let first = |pattern: &&&str| named(pattern).iter().any(|name| table.has(name));
+        let first = |pattern: &&&str| named(pattern).iter().any(|name| table.contains(name));
         if let Some(pattern) = CAUCHY.iter().find(first) {
             return Ok(Self::Cauchy(table.columns(named(pattern))?));
         }
-        // P12 and P21: of a symmetric tensor nobody writes both
-        if ["P12", "P21"].iter().all(|name| table.has(name)) {
-            return Ok(Self::First(table.columns(nine("P"))?));
+        // P12 and P21 are both written for an asymmetric tensor only
+        if ["P12", "P21"].iter().all(|name| table.contains(name)) {
+            return Ok(Self::First(table.columns(tensor_names("P"))?));
         }
-        if table.has("S11") {
+        if table.contains("S11") {
             return Ok(Self::Second(table.columns(NAMES.map(|name| format!("S{name}")))?));
         }
         if let Some(pattern) = PRESSURE.iter().find(first) {
-            if options.measure != Some(Measure::Pressure) && !table.is_lammps() {
+            if options.pressure != Some(PressureConvention::Pressure) && !table.is_lammps() {
                 let names = named(pattern);
                 return Err(Error::file(
                     &table.path,
+                    format!("the pressures (p = −σ) {} … {}", names[0], names[5]),
                     format!(
-                        "the pressures {} … {}: a pressure has the other sign, p = −σ",
-                        names[0], names[5]
-                    ),
-                    format!(
-                        "`stress = \"pressure\"` in `[data]` (then σ = −p is taken), or columns {prefix}sxx … {prefix}syz, \
-                         positive in tension"
+                        "`stress = \"pressure\"` in `[data]`, which takes σ = −p, or columns {prefix}sxx … \
+                         {prefix}syz, positive in tension"
                     ),
                 ));
             }
             return Ok(Self::Pressure(table.columns(named(pattern))?));
         }
-        if table.has("P11") {
-            let allowed = "nine components of the first Piola–Kirchhoff stress, P11 P12 P13 P21 … P33, row by row, or of \
-                           another stress sxx … syz or S11 … S23";
-            return Err(Error::file(&table.path, "P11, but not both of P12 and P21", allowed));
+        if table.contains("P11") {
+            let allowed = "nine components of the first Piola–Kirchhoff stress P11 P12 P13 P21 … P33, row \
+                by row, or another stress sxx … syz or S11 … S23";
+            return Err(Error::file(&table.path, "P11 without P12 and P21", allowed));
         }
         Ok(Self::Cauchy(table.columns(named(CAUCHY[0]))?))
     }
 
-    pub fn columns(&self) -> &[Column] {
+    pub fn columns(&self) -> &[ColumnIndex] {
         match self {
             Self::Cauchy(six) | Self::Pressure(six) | Self::Second(six) => six,
             Self::First(nine) => nine,
         }
     }
 
-    /// Pa in a unit of each column.
-    pub fn units(&self, table: &Table, options: &ReadOptions) -> Result<Vec<f64>, Error> {
+    /// Returns the unit of each column, Pa.
+    pub fn units(&self, table: &DataTable, options: &ReadOptions) -> Result<Vec<f64>, Error> {
         let default = match self {
             Self::Pressure(_) => options.stress_unit.or(table.pressure_unit()),
-            // a variable of somebody's own may have any unit
+            // variables of the user may have any unit
             _ if table.is_lammps() => options.stress_unit,
             _ => Some(options.stress_unit.unwrap_or(1e6)),
         };
-        let of = |column: &Column| match table.stress_unit(*column)?.or(default) {
+        let unit = |column: &ColumnIndex| match table.stress_unit(*column)?.or(default) {
             Some(unit) => Ok(unit),
             None => Err(Error::file(
                 &table.path,
                 format!("{} without a unit", self.name()),
-                "a unit in the headings, as `pxx [atm]`, or `stress_unit` in the scene (pressures of LAMMPS: 1 atm with `units real`, 1 bar \
-                 with `units metal`)",
+                "a unit in the headings, as `pxx [atm]`, or `stress_unit` in the scene (pressures of \
+                 LAMMPS: 1 atm with `units real`, 1 bar with `units metal`)",
             )),
         };
-        self.columns().iter().map(of).collect()
+        self.columns().iter().map(unit).collect()
     }
 
-    /// What it is called, for a line that tells how a table was understood.
+    /// Returns the name of the measure.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Cauchy(_) => "Cauchy stress",
@@ -103,37 +100,37 @@ impl Stress {
         }
     }
 
-    /// σ at F of the numbers of its columns, Pa.
+    /// Computes σ at F from the numbers of the columns, Pa.
     pub fn cauchy(&self, f: &DeformationGradient, numbers: &[f64]) -> Voigt {
         match self {
             Self::Cauchy(_) => Voigt::from_row_slice(numbers),
             Self::Pressure(_) => -Voigt::from_row_slice(numbers),
-            Self::Second(_) => cauchy_of_material(f, &Voigt::from_row_slice(numbers)),
+            Self::Second(_) => cauchy_from_material(f, &Voigt::from_row_slice(numbers)),
             Self::First(_) => cauchy_of_first(f, numbers),
         }
     }
 }
 
-/// σ = P Fᵀ/J of P row by row; its symmetric part.
+/// Computes σ = P Fᵀ/J, its symmetric part; P row by row.
 pub(super) fn cauchy_of_first(f: &DeformationGradient, first: &[f64]) -> Voigt {
     let kirchhoff = Tensor::from_row_slice(first) * f.matrix().transpose();
     voigt::from_stress(&(0.5 / f.jacobian() * (kirchhoff + kirchhoff.transpose())))
 }
 
-/// Names of nine components, row by row.
-pub(super) fn nine(letter: &str) -> [String; 9] {
+/// Returns the names of nine components, row by row.
+pub(super) fn tensor_names(letter: &str) -> [String; 9] {
     std::array::from_fn(|k| format!("{letter}{}{}", k / 3 + 1, k % 3 + 1))
 }
 
-/// Whether P and F go together: P Fᵀ = J σ is symmetric.
+/// Check that P and F belong together: P Fᵀ = J σ is symmetric.
 #[derive(Default)]
-pub(super) struct Symmetry {
+pub(super) struct SymmetryCheck {
     skew: f64,
     skew_of_transpose: f64,
     size: f64,
 }
 
-impl Symmetry {
+impl SymmetryCheck {
     pub fn add(&mut self, f: &DeformationGradient, numbers: &[f64]) {
         let first = Tensor::from_row_slice(numbers);
         let skew = |tensor: Tensor| (tensor - tensor.transpose()).norm_squared();
@@ -142,8 +139,10 @@ impl Symmetry {
         self.size += first.norm_squared();
     }
 
+    /// Refuses a stress that does not belong to the deformation.
+    ///
     /// # Errors
-    /// A stress that is none of this deformation.
+    /// Returns [`Error::File`] with the probable reason.
     pub fn check(&self, path: &std::path::Path) -> Result<(), Error> {
         let limit = ASYMMETRY * ASYMMETRY * self.size;
         if self.skew <= limit {
@@ -151,12 +150,12 @@ impl Symmetry {
         }
         let (found, allowed) = if self.skew_of_transpose <= limit {
             (
-                "the transpose of the first Piola–Kirchhoff stress (the nominal stress of some authors)",
-                "P_iJ with the face second",
+                "the transpose of the first Piola–Kirchhoff stress (nominal stress)",
+                "P_iJ, with the normal as second index",
             )
         } else {
-            ("P11 … P33 that are no first Piola–Kirchhoff stress of F: P Fᵀ is not symmetric", "P = J σ F⁻ᵀ")
+            ("no first Piola–Kirchhoff stress of F: P Fᵀ is not symmetric", "P = J σ F⁻ᵀ")
         };
-        Err(Error::file(path, found, format!("{allowed}, P11 P12 P13 P21 … P33")))
+        Err(Error::file(path, found, format!("{allowed}, in the order P11 P12 P13 P21 … P33")))
     }
 }

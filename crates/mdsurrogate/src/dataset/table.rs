@@ -1,4 +1,4 @@
-//! Tables of text, packed (gzip) or not, with the place of each cell.
+//! Text tables, compressed by gzip or not, with the place of each cell.
 
 use super::lammps;
 use super::options::{PROPERTIES, ReadOptions, is_sampled};
@@ -12,46 +12,46 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// A larger text is refused: no table of this kind, but perhaps a bomb.
+/// Largest size of an unpacked text, bytes: larger ones may be decompression bombs.
 pub(super) const LARGEST: u64 = 2 << 30;
 
-/// Å in a metre.
+/// Å per metre.
 const METRE: f64 = 1e10;
 
-/// How programs write a table, where nothing needs to be said about it.
+/// Usual layout of a table, which needs no note.
 const USUAL: &str = "separator `,`, decimal point, UTF-8, headings in line";
 
-/// The rows of a file.
-enum Cells {
-    /// Of a table of people and programs.
+/// Rows of a file.
+enum TableCells {
+    /// Rows of a CSV table.
     Table(Box<table::Table>),
-    /// Of a file of LAMMPS.
+    /// Rows of LAMMPS output.
     Lammps(Vec<csv::StringRecord>),
 }
 
 /// Headings and rows of a file.
-pub(super) struct Table {
+pub(super) struct DataTable {
     pub path: PathBuf,
-    /// Bytes and checksum of the file, for provenance.
+    /// Bytes and checksum of the file, for the provenance.
     pub fingerprint: String,
-    /// Names, and units if there are any.
+    /// Names and units.
     pub headings: Vec<(String, Option<String>)>,
-    cells: Cells,
-    /// How a file of LAMMPS was understood.
-    lammps: Option<lammps::Origin>,
+    cells: TableCells,
+    /// Interpretation of LAMMPS output.
+    lammps: Option<lammps::LammpsReading>,
 }
 
-/// A column that was looked up.
+/// Index of a column.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Column(usize);
+pub(super) struct ColumnIndex(usize);
 
-impl Table {
-    /// Reads a table, of LAMMPS' own files too.
+impl DataTable {
+    /// Reads a table or LAMMPS output.
     pub fn read(path: &Path, options: &ReadOptions) -> Result<Self, Error> {
-        let (text, fingerprint) = unpacked(path)?;
+        let (text, fingerprint) = read_text(path)?;
         if let Some(kind) = lammps::kind(&text) {
             let (headings, records, origin) = lammps::read(path, &text, kind, options)?;
-            let (path, cells) = (path.to_path_buf(), Cells::Lammps(records));
+            let (path, cells) = (path.to_path_buf(), TableCells::Lammps(records));
             return Ok(Self { path, fingerprint, headings, cells, lammps: Some(origin) });
         }
         let read = table::Table::parse(path, text).map_err(polycore::Error::from)?;
@@ -60,19 +60,19 @@ impl Table {
         }
         let heading = |heading: &table::Heading| {
             let unit = heading.unit.as_ref().filter(|unit| !unit.is_empty());
-            // `c_p[1]` has a number in its brackets, no unit
+            // `c_p[1]` has an index in its brackets, not a unit
             let name =
                 if unit.is_none() && heading.text.ends_with(']') { &heading.text } else { &heading.name };
             (name.clone(), unit.cloned())
         };
         let headings = read.headings.iter().map(heading).collect();
-        let (path, cells) = (path.to_path_buf(), Cells::Table(Box::new(read)));
+        let (path, cells) = (path.to_path_buf(), TableCells::Table(Box::new(read)));
         let mut table = Self { path, fingerprint, headings, cells, lammps: None };
         table.rename(options)?;
         Ok(table)
     }
 
-    /// Gives columns the names of the properties that they are said to be.
+    /// Renames columns to their properties, as the options say.
     fn rename(&mut self, options: &ReadOptions) -> Result<(), Error> {
         let averaged = options.prefix();
         let mut named = Vec::new();
@@ -82,7 +82,7 @@ impl Table {
                 let allowed = similar.map_or(PROPERTIES.join(", "), |name| format!("`{name}`?"));
                 return Err(Error::parameter("names", format!("`{property}`"), allowed));
             }
-            let Some(Column(column)) = self.find(name) else {
+            let Some(ColumnIndex(column)) = self.find(name) else {
                 let similar = nearest(name, self.headings.iter().map(|(other, _)| other.as_str()));
                 return Err(Error::MissingColumn { path: self.path.clone(), column: name.clone(), similar });
             };
@@ -95,22 +95,22 @@ impl Table {
         Ok(())
     }
 
-    /// Whether LAMMPS wrote the file.
+    /// Tells if LAMMPS wrote the file.
     pub fn is_lammps(&self) -> bool {
         self.lammps.is_some()
     }
 
-    /// How a file of LAMMPS was understood.
-    pub fn lammps(&self) -> Option<&lammps::Origin> {
+    /// Returns the interpretation of LAMMPS output.
+    pub fn lammps(&self) -> Option<&lammps::LammpsReading> {
         self.lammps.as_ref()
     }
 
-    /// Pa in LAMMPS' unit of pressure.
+    /// Returns the pressure unit of LAMMPS, Pa.
     pub fn pressure_unit(&self) -> Option<f64> {
         self.lammps.as_ref()?.units.map(|units| units.sizes()[0])
     }
 
-    /// An error of the numbers of a row, with its line.
+    /// Locates an error at the line of a row.
     pub fn at_row(&self, row: usize, error: Error) -> Error {
         let (found, allowed) = match error {
             Error::Parameter { name, found, allowed } => (format!("{name}: {found}"), allowed),
@@ -119,31 +119,31 @@ impl Table {
         Error::file(&self.path, format!("line {}: {found}", self.line(row)), allowed)
     }
 
-    /// How the file is written, where that is not as programs do.
-    pub fn understood(&self) -> Option<String> {
-        let Cells::Table(table) = &self.cells else { return None };
+    /// Describes the layout of the file, if it is unusual.
+    pub fn layout_note(&self) -> Option<String> {
+        let TableCells::Table(table) = &self.cells else { return None };
         let layout = table.layout().to_string();
         (!layout.starts_with(USUAL) || layout.contains("units in line")).then_some(layout)
     }
 
     pub fn rows(&self) -> usize {
         match &self.cells {
-            Cells::Table(table) => table.rows(),
-            Cells::Lammps(records) => records.len(),
+            TableCells::Table(table) => table.rows(),
+            TableCells::Lammps(records) => records.len(),
         }
     }
 
-    pub fn has(&self, name: &str) -> bool {
+    pub fn contains(&self, name: &str) -> bool {
         self.find(name).is_some()
     }
 
-    pub fn find(&self, name: &str) -> Option<Column> {
-        self.headings.iter().position(|(other, _)| other == name).map(Column)
+    pub fn find(&self, name: &str) -> Option<ColumnIndex> {
+        self.headings.iter().position(|(other, _)| other == name).map(ColumnIndex)
     }
 
-    /// All of these columns; one that is missing is not likened to another of them.
-    pub fn columns<const N: usize>(&self, names: [String; N]) -> Result<[Column; N], Error> {
-        let mut columns = [Column(0); N];
+    /// Returns the columns with these names; a missing name is not compared to the other names in the list.
+    pub fn columns<const N: usize>(&self, names: [String; N]) -> Result<[ColumnIndex; N], Error> {
+        let mut columns = [ColumnIndex(0); N];
         for (column, name) in columns.iter_mut().zip(&names) {
             let others = self.headings.iter().map(|(other, _)| other).filter(|other| !names.contains(other));
             *column = self.find(name).ok_or_else(|| Error::MissingColumn {
@@ -155,34 +155,34 @@ impl Table {
         Ok(columns)
     }
 
-    pub fn text(&self, row: usize, column: Column) -> &str {
+    pub fn text(&self, row: usize, column: ColumnIndex) -> &str {
         match &self.cells {
-            Cells::Table(table) => table.text(row, column.0),
-            Cells::Lammps(records) => records[row].get(column.0).unwrap_or_default(),
+            TableCells::Table(table) => table.text(row, column.0),
+            TableCells::Lammps(records) => records[row].get(column.0).unwrap_or_default(),
         }
     }
 
     pub fn line(&self, row: usize) -> u64 {
         match &self.cells {
-            Cells::Table(table) => table.line(row) as u64,
-            Cells::Lammps(records) => records[row].position().map_or(0, csv::Position::line),
+            TableCells::Table(table) => table.line(row) as u64,
+            TableCells::Lammps(records) => records[row].position().map_or(0, csv::Position::line),
         }
     }
 
-    /// A finite number.
-    pub fn number(&self, row: usize, column: Column) -> Result<f64, Error> {
+    /// Parses a finite number.
+    pub fn number(&self, row: usize, column: ColumnIndex) -> Result<f64, Error> {
         let text = self.text(row, column);
         let number = match &self.cells {
-            Cells::Table(table) => table.layout().decimal.number(text),
-            Cells::Lammps(_) => text.parse().ok(),
+            TableCells::Table(table) => table.layout().decimal.number(text),
+            TableCells::Lammps(_) => text.parse().ok(),
         };
         number.filter(|number| number.is_finite()).ok_or_else(|| {
-            let how = self.understood().map_or(String::new(), |how| format!(" ({how})"));
+            let how = self.layout_note().map_or(String::new(), |how| format!(" ({how})"));
             self.cell(row, column, &format!("a finite number{how}"))
         })
     }
 
-    pub fn numbers<const N: usize>(&self, row: usize, columns: &[Column; N]) -> Result<[f64; N], Error> {
+    pub fn numbers<const N: usize>(&self, row: usize, columns: &[ColumnIndex; N]) -> Result<[f64; N], Error> {
         let mut numbers = [0.0; N];
         for (number, &column) in numbers.iter_mut().zip(columns) {
             *number = self.number(row, column)?;
@@ -190,7 +190,7 @@ impl Table {
         Ok(numbers)
     }
 
-    pub fn cell(&self, row: usize, column: Column, allowed: &str) -> Error {
+    pub fn cell(&self, row: usize, column: ColumnIndex, allowed: &str) -> Error {
         let text = self.text(row, column);
         Error::Cell {
             path: self.path.clone(),
@@ -201,34 +201,35 @@ impl Table {
         }
     }
 
-    /// Pa in one unit of a column by its heading (`S11 [GPa]`, `pxx (eV/Å³)`).
-    pub fn stress_unit(&self, column: Column) -> Result<Option<f64>, Error> {
-        // an ampere has no place in a stress
+    /// Returns the unit in the heading of a stress column, Pa (`S11 [GPa]`, `pxx (eV/Å³)`).
+    pub fn stress_unit(&self, column: ColumnIndex) -> Result<Option<f64>, Error> {
+        // `A` means Å: an ampere is no part of a stress unit
         let plain = |unit: &str| table::plain_unit(unit).replace("/A", "/Å");
-        let one = |unit: &str| format!("1 {}", plain(unit)).parse::<Stress>().map(|one| one.si());
-        self.unit(column, one, "a unit of stress, as in `S11 [MPa]`")
+        let parse = |unit: &str| format!("1 {}", plain(unit)).parse::<Stress>().map(|stress| stress.si());
+        self.unit(column, parse, "a unit of stress, as in `S11 [MPa]`")
     }
 
-    /// Å in one unit of a column by its heading.
-    pub fn length_unit(&self, column: Column) -> Result<f64, Error> {
+    /// Returns the unit in the heading of a length column, Å.
+    pub fn length_unit(&self, column: ColumnIndex) -> Result<f64, Error> {
         let plain = |unit: &str| if unit == "A" { "Å".to_owned() } else { table::plain_unit(unit) };
-        let one = |unit: &str| format!("1 {}", plain(unit)).parse::<Length>().map(|one| one.si() * METRE);
-        Ok(self.unit(column, one, "a unit of length, as in `lx [nm]`")?.unwrap_or(1.0))
+        let parse =
+            |unit: &str| format!("1 {}", plain(unit)).parse::<Length>().map(|length| length.si() * METRE);
+        Ok(self.unit(column, parse, "a unit of length, as in `lx [nm]`")?.unwrap_or(1.0))
     }
 
     fn unit(
         &self,
-        column: Column,
-        one: impl Fn(&str) -> Result<f64, polycore::units::UnitError>,
+        column: ColumnIndex,
+        parse: impl Fn(&str) -> Result<f64, polycore::units::UnitError>,
         allowed: &str,
     ) -> Result<Option<f64>, Error> {
         let (name, unit) = &self.headings[column.0];
         let Some(unit) = unit else { return Ok(None) };
         let line = match &self.cells {
-            Cells::Table(table) => table.layout().unit_line.unwrap_or(table.layout().heading_line),
-            Cells::Lammps(_) => 1,
+            TableCells::Table(table) => table.layout().unit_line.unwrap_or(table.layout().heading_line),
+            TableCells::Lammps(_) => 1,
         };
-        let found = one(unit).map_err(|error| Error::Cell {
+        let found = parse(unit).map_err(|error| Error::Cell {
             path: self.path.clone(),
             line: line as u64,
             column: name.clone(),
@@ -239,12 +240,12 @@ impl Table {
     }
 }
 
-/// The text of a file, and its bytes and checksum.
-fn unpacked(path: &Path) -> Result<(Vec<u8>, String), Error> {
+/// Returns the text of a file, with its bytes and checksum.
+fn read_text(path: &Path) -> Result<(Vec<u8>, String), Error> {
     let mut packed = Vec::new();
     File::open(path)
         .and_then(|file| file.take(LARGEST + 1).read_to_end(&mut packed))
-        .map_err(Error::io("read", path))?;
+        .map_err(Error::from_io("read", path))?;
     let mut crc = Crc::new();
     crc.update(&packed);
     let fingerprint = format!("{} bytes, CRC-32 {:08x}", packed.len(), crc.sum());
@@ -255,7 +256,7 @@ fn unpacked(path: &Path) -> Result<(Vec<u8>, String), Error> {
         unpack.map_err(|error| {
             Error::file(
                 path,
-                format!("a gzip file that is truncated or damaged after {} bytes ({error})", text.len()),
+                format!("a gzip file truncated or damaged after {} bytes ({error})", text.len()),
                 "a complete gzip file",
             )
         })?;
@@ -266,7 +267,7 @@ fn unpacked(path: &Path) -> Result<(Vec<u8>, String), Error> {
         return Err(Error::file(path, "more than 2 GiB of text", "tables up to 2 GiB"));
     }
     if text.iter().all(u8::is_ascii_whitespace) {
-        return Err(Error::file(path, "an empty file", "a CSV table with a line of headings"));
+        return Err(Error::file(path, "an empty file", "a CSV table with headings"));
     }
     Ok((text, fingerprint))
 }

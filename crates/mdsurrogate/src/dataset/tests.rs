@@ -3,7 +3,7 @@ use crate::random::SplitMix64;
 use harness::case::Fault;
 use polycore::tensor::Tensor;
 
-/// Paths of sheared rows with σ = 100 MPa on 11 plus noise of a stated deviation, uniform in ±√3 of it.
+/// Creates paths of sheared rows with σ = 100 MPa on 11 plus uniform noise of a given deviation.
 pub(crate) fn synthetic(paths: usize, rows: usize, deviation: f64) -> Dataset {
     let mut random = SplitMix64::new(7);
     let path = |index: usize| {
@@ -16,7 +16,7 @@ pub(crate) fn synthetic(paths: usize, rows: usize, deviation: f64) -> Dataset {
             let mut noise = || deviation * 12f64.sqrt() * (random.uniform() - 0.5);
             let cauchy = Voigt::from_fn(|a, _| if a == 0 { 1e8 } else { 0.0 } + noise());
             let f = DeformationGradient::new(matrix).unwrap();
-            Row::new(sample as u64, sample as f64 * 1e-15, f, cauchy)
+            DataRow::new(sample as u64, sample as f64 * 1e-15, f, cauchy)
         };
         let rows = (0..rows).map(row).collect();
         Path { id: format!("p{index}"), kind: format!("u{}", index % 3), rates: [f64::NAN; 3], rows }
@@ -33,9 +33,10 @@ fn read_text(text: &str) -> Result<Dataset, Error> {
 }
 
 const MATERIAL: &str = "run_id,C11,C22,C33,C12,C13,C23,S11,S22,S33,S12,S13,S23\n";
-const BOX: &str = "run_id,sample,F11,F22,F33,lx,ly,lz,avg_lx,avg_ly,avg_lz,avg_sxx,avg_syy,avg_szz,avg_sxy,avg_sxz,avg_syz\n";
+const BOX: &str = "run_id,sample,F11,F22,F33,lx,ly,lz,avg_lx,avg_ly,avg_lz,\
+                   avg_sxx,avg_syy,avg_szz,avg_sxy,avg_sxz,avg_syz\n";
 
-/// The estimate has a relative spread of about √(35/36n) for n second differences of white noise.
+/// The estimate from n second differences of white noise has a relative spread of about √(35/36n).
 #[test]
 fn noise_of_known_deviation() {
     let set = synthetic(4, 500, 5e6);
@@ -44,9 +45,9 @@ fn noise_of_known_deviation() {
     for deviation in &noise.deviation {
         assert!((deviation / 5e6 - 1.0).abs() < 0.1, "{deviation}");
     }
-    // white: no more correlated than the fit makes it; spread 1/√(6·2000)
+    // white noise: correlated by the fit only; spread 1/√(6·2000)
     assert!((noise.lag_1.unwrap() - noise.lag_1_of_white_noise).abs() < 0.04, "{noise:?}");
-    // the fit passes a parabola: without noise there is no residual
+    // the fit reproduces a parabola: no residual without noise
     let smooth = super::noise(&synthetic(1, 50, 0.0), |row| row.cauchy).unwrap();
     assert_eq!((smooth.floor, smooth.lag_1), (0.0, None));
     assert!(super::noise(&synthetic(3, 2, 1.0), |row| row.cauchy).is_none());
@@ -55,7 +56,8 @@ fn noise_of_known_deviation() {
 #[test]
 fn a_split_by_path_keeps_paths_and_kinds_together() {
     let set = synthetic(30, 10, 1e6);
-    let parts = split(&set, Method::Path, Fractions { train: 0.6, validation: 0.2, test: 0.2 }, 3).unwrap();
+    let parts =
+        split(&set, SplitMethod::Path, Fractions { train: 0.6, validation: 0.2, test: 0.2 }, 3).unwrap();
     assert_eq!((parts.train.len(), parts.validation.len(), parts.test.len()), (180, 60, 60));
     let of_rows = set.path_of_rows();
     let labels = parts.labels();
@@ -66,9 +68,11 @@ fn a_split_by_path_keeps_paths_and_kinds_together() {
         *test_of_kind.entry(&set.paths[path].kind).or_insert(0) += usize::from(own.contains(&2));
     }
     assert_eq!(test_of_kind.into_values().collect::<Vec<_>>(), [2, 2, 2]);
-    let again = split(&set, Method::Path, Fractions { train: 0.6, validation: 0.2, test: 0.2 }, 3).unwrap();
+    let again =
+        split(&set, SplitMethod::Path, Fractions { train: 0.6, validation: 0.2, test: 0.2 }, 3).unwrap();
     assert_eq!(parts, again);
-    let other = split(&set, Method::Path, Fractions { train: 0.6, validation: 0.2, test: 0.2 }, 4).unwrap();
+    let other =
+        split(&set, SplitMethod::Path, Fractions { train: 0.6, validation: 0.2, test: 0.2 }, 4).unwrap();
     assert_ne!(parts, other);
 }
 
@@ -78,8 +82,8 @@ fn a_random_split_leaks_and_a_split_by_path_does_not() {
     let measured = |method| {
         let parts = split(&set, method, Fractions::default(), 1).unwrap();
         let rows: Vec<Voigt> = set.rows().map(|row| row.c).collect();
-        let standardisation = Standardisation::of(parts.train.iter().map(|&row| &rows[row])).unwrap();
-        // the same by comparing every pair
+        let standardisation = Standardisation::from_rows(parts.train.iter().map(|&row| &rows[row])).unwrap();
+        // the same by comparing all pairs
         let points: Vec<Voigt> = rows.iter().map(|c| standardisation.apply(c)).collect();
         let nearest = |row: usize| {
             let others = parts.train.iter().filter(|&&other| other != row);
@@ -95,25 +99,25 @@ fn a_random_split_leaks_and_a_split_by_path_does_not() {
         assert!(found.distances < (rows.len() * parts.train.len()) as u64);
         found
     };
-    assert_eq!(measured(Method::Path).same_path, 0.0);
-    let random = measured(Method::Random);
+    assert_eq!(measured(SplitMethod::Path).same_path, 0.0);
+    let random = measured(SplitMethod::Random);
     assert!(random.same_path > 0.5 && (0.7..1.5).contains(&random.ratio.unwrap()), "{random:?}");
 }
 
 #[test]
 fn small_and_wrong_splits() {
     let one = synthetic(1, 5, 0.0);
-    let error = split(&one, Method::Path, Fractions::default(), 1).unwrap_err().to_string();
+    let error = split(&one, SplitMethod::Path, Fractions::default(), 1).unwrap_err().to_string();
     assert!(error.contains("found 1 path;") && error.contains("at least 3 paths"), "{error}");
     let three = synthetic(3, 5, 0.0);
-    let parts = split(&three, Method::Path, Fractions::default(), 1).unwrap();
+    let parts = split(&three, SplitMethod::Path, Fractions::default(), 1).unwrap();
     assert!([&parts.train, &parts.validation, &parts.test].iter().all(|rows| rows.len() == 5));
     let all = Fractions { train: 1.0, validation: 0.0, test: 0.0 };
-    assert_eq!(split(&one, Method::Path, all, 1).unwrap().train.len(), 5);
+    assert_eq!(split(&one, SplitMethod::Path, all, 1).unwrap().train.len(), 5);
     for train in [-0.1, f64::NAN, 0.7, 0.0] {
         let fractions = Fractions { train, ..Fractions::default() };
         assert!(matches!(
-            split(&three, Method::Random, fractions, 1),
+            split(&three, SplitMethod::Random, fractions, 1),
             Err(Error::Parameter { name: "split", .. })
         ));
     }
@@ -122,16 +126,16 @@ fn small_and_wrong_splits() {
 #[test]
 fn standardisation_of_components_without_variance() {
     let rows = [Voigt::new(1.0, 2.0, 0.0, 5.0, 0.1, 0.0), Voigt::new(3.0, 2.0, 0.0, 5.0, 0.1, 0.0)];
-    let standardisation = Standardisation::of(rows.iter()).unwrap();
+    let standardisation = Standardisation::from_rows(rows.iter()).unwrap();
     assert_eq!(standardisation.constant(), ["22", "33", "12", "13", "23"]);
     assert_eq!(standardisation.apply(&rows[1]), Voigt::new(1.0, 0.0, 0.0, 0.0, 0.0, 0.0));
     assert_eq!(standardisation.invert(&standardisation.apply(&rows[1])), rows[1]);
-    // shear where there was none is not answered with infinity
+    // shear without variance in the data does not give infinity
     assert_eq!(standardisation.apply(&Voigt::repeat(9.0))[3], 0.0);
-    assert!(Standardisation::of(rows[..0].iter()).is_err());
-    assert!(Standardisation::of([Voigt::repeat(f64::NAN)].iter()).is_err());
-    // one row: everything is constant
-    assert_eq!(Standardisation::of(rows[..1].iter()).unwrap().constant().len(), 6);
+    assert!(Standardisation::from_rows(rows[..0].iter()).is_err());
+    assert!(Standardisation::from_rows([Voigt::repeat(f64::NAN)].iter()).is_err());
+    // one row: all components are constant
+    assert_eq!(Standardisation::from_rows(rows[..1].iter()).unwrap().constant().len(), 6);
 }
 
 #[test]
@@ -149,7 +153,7 @@ fn tables_of_c_and_s() {
     assert_eq!(set.constant_components().len(), 12);
 }
 
-/// The pressure of a free face is eliminated: a neo-Hookean S = μ1 has P = μ(λ − λ₃²/λ) in every mode.
+/// The pressure of a free face is eliminated: a neo-Hookean S = μ1 gives P = μ(λ − λ₃²/λ) in each mode.
 #[test]
 fn nominal_stresses_of_rubber() {
     let text = "# source: by hand\nmode,stretch,nominal_MPa\nuniaxial,1,0\nuniaxial,2,1\npure-shear,3,1.5\n";
@@ -160,20 +164,20 @@ fn nominal_stresses_of_rubber() {
     let row = &set.paths[1].rows[0];
     assert!((row.c - Voigt::new(9.0, 1.0, 1.0 / 9.0, 0.0, 0.0, 0.0)).amax() < 1e-15);
     let pressure = 7e6;
-    let of = |mu: f64| Voigt::from_fn(|a, _| if a < 3 { mu - pressure / row.c[a] } else { 0.0 });
-    let [measured, predicted] = row.compared(&of(0.4e6));
+    let stress = |mu: f64| Voigt::from_fn(|a, _| if a < 3 { mu - pressure / row.c[a] } else { 0.0 });
+    let [measured, predicted] = row.compared(&stress(0.4e6));
     assert_eq!(measured, Voigt::new(1.5e6, 0.0, 0.0, 0.0, 0.0, 0.0));
     assert!((predicted[0] / (0.4e6 * (3.0 - 1.0 / 27.0)) - 1.0).abs() < 1e-12);
     // the other stress was not measured
     assert_eq!(predicted[1], 0.0);
-    // a thickness of 0.05 is no wrong unit, a stretch of 20 is
+    // a thickness of 0.05 is plausible, a stretch of 20 is not
     let sheet = |stretch: f64| format!("mode,stretch,nominal_MPa\nequibiaxial,{stretch},2.45\n");
     assert!(read_text(&sheet(4.45)).is_ok() && read_text(&sheet(20.0)).is_err());
     let biaxial = "stretch_1,stretch_2,nominal_1_kPa,nominal_2_kPa\n2,1.5,300,200\n";
     let set = read_text(biaxial).unwrap();
     assert_eq!((set.paths[0].id.as_str(), set.paths[0].kind.as_str()), ("t", "biaxial"));
     assert_eq!(set.paths[0].rows[0].nominal, Some([3e5, 2e5]));
-    // as laboratories write them: strain in per cent, decimal commas
+    // laboratory format: strain in per cent, decimal commas
     let set = read_text("Strain (%);Stress (MPa)\n0,0;0\n100,0;1,0\n200,0;1,8\n").unwrap();
     assert_eq!((set.len(), set.paths[0].rows[0].nominal), (2, Some([1e6, 0.0])));
     assert!((set.paths[0].rows[0].c[0] - 4.0).abs() < 1e-12);
@@ -189,7 +193,7 @@ fn nominal_stresses_of_rubber() {
 }
 
 #[test]
-fn every_fault_of_a_table_is_named() {
+fn each_error_of_a_table_is_located() {
     let box_row = "a,0,1,1,1,10,10,10,11,10,10,50,0,0,0,0,0\n";
     for (text, parts) in [
         (String::new(), vec!["t.csv: found an empty file"]),
@@ -220,9 +224,9 @@ fn every_fault_of_a_table_is_named() {
         ),
         (
             format!("{BOX}{}", box_row.replace("a,0,1,1,1", "a,0,1,1,1.1")),
-            vec!["no row with F11 = F22 = F33 = 1"],
+            vec!["no undeformed row with F11 = F22 = F33 = 1"],
         ),
-        // lengths in another unit by 1e6, stress in another unit by 1e6 either way
+        // lengths or stresses in a unit that is wrong by 1e6
         (
             format!("{BOX}{}", box_row.replace(",11,10,10,", ",11e6,10e6,10e6,")),
             vec!["principal stretch = 1.1000e6", "is a unit wrong?"],
@@ -242,7 +246,7 @@ fn every_fault_of_a_table_is_named() {
                 box_row.replace("a,0", "b,0"),
                 box_row.replace("a,0", "b,1").replace(",50,", ",60,")
             ),
-            vec!["the runs `a` and `b` with the same rows"],
+            vec!["the same rows in the runs `a` and `b`"],
         ),
     ] {
         let error = read_text(&text).expect_err(&text);
@@ -275,7 +279,7 @@ fn broken_gzip() {
     for cut in [3, 20, bytes.len() - 1] {
         std::fs::write(&path, &bytes[..cut]).unwrap();
         let error = read(&path, &ReadOptions::default()).unwrap_err().to_string();
-        assert!(error.contains("is truncated or damaged"), "{error}");
+        assert!(error.contains("truncated or damaged"), "{error}");
     }
 }
 
@@ -285,8 +289,8 @@ fn hdf5_there_and_back() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("d.h5");
     let set = synthetic(5, 7, 1e6);
-    let parts = split(&set, Method::Path, Fractions::default(), 1).unwrap();
-    let standardisation = Standardisation::of(set.rows().map(|row| &row.c)).unwrap();
+    let parts = split(&set, SplitMethod::Path, Fractions::default(), 1).unwrap();
+    let standardisation = Standardisation::from_rows(set.rows().map(|row| &row.c)).unwrap();
     hdf5::write(&path, &set, Some((&parts, &standardisation))).unwrap();
     let back = read(&path, &ReadOptions::default()).unwrap();
     assert_eq!(back.paths.len(), 5);
@@ -294,19 +298,19 @@ fn hdf5_there_and_back() {
         assert_eq!((&a.id, &a.kind, &a.rows), (&b.id, &b.kind, &b.rows));
     }
     assert_eq!(back.provenance[0], "made");
-    // a second write replaces the first as a whole and leaves nothing beside it
+    // a second write replaces the whole file and leaves no temporary files
     hdf5::write(&path, &synthetic(2, 3, 1e6), None).unwrap();
     assert_eq!(read(&path, &ReadOptions::default()).unwrap().len(), 6);
     assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 1);
 
     std::fs::write(&path, "run_id,C11\n").unwrap();
     let error = read(&path, &ReadOptions::default()).unwrap_err().to_string();
-    assert!(error.contains("no HDF5 file"), "{error}");
+    assert!(error.contains("an unreadable file"), "{error}");
 }
 
 #[cfg(feature = "hdf5")]
 #[test]
-fn hdf5_of_others() {
+fn hdf5_of_other_programs() {
     use rust_hdf5::H5File;
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("d.h5");
@@ -328,8 +332,8 @@ fn hdf5_of_others() {
     assert!(fails(&c, &[f64::NAN; 12], "S").contains("NaN in row 0"));
 }
 
-/// Twelve paths of 40 rows of a compressible neo-Hookean solid, S = μ(I − C⁻¹) + λ ln J C⁻¹ with μ = 1 GPa, λ = 2 GPa
-/// (Bonet & Wood 2008, Eq. 6.28): stretched along one or two axes up to 20 to 30 %.
+/// Returns twelve paths of 40 rows of a compressible neo-Hookean solid, S = μ(I − C⁻¹) + λ ln J C⁻¹ with μ =
+/// 1 GPa, λ = 2 GPa (Bonet & Wood 2008, Eq. 6.28), stretched along one or two axes by up to 20 to 30 %.
 pub(crate) fn set_of_a_law() -> Dataset {
     let path = |index: usize| {
         let row = |sample: usize| {
@@ -341,7 +345,7 @@ pub(crate) fn set_of_a_law() -> Dataset {
             }
             let f = DeformationGradient::new(matrix).unwrap();
             let s = neo_hookean(&polycore::tensor::voigt::from_stress(&f.right_cauchy_green()));
-            Row::new(sample as u64, f64::NAN, f, crate::kinematics::cauchy_of_material(&f, &s))
+            DataRow::new(sample as u64, f64::NAN, f, crate::kinematics::cauchy_from_material(&f, &s))
         };
         let rows = (0..40).map(row).collect();
         let kind = format!("{}{}", if index % 6 > 2 { "b" } else { "u" }, index % 3);
@@ -350,12 +354,12 @@ pub(crate) fn set_of_a_law() -> Dataset {
     Dataset { paths: (0..12).map(path).collect(), provenance: vec!["made".into()], skipped: 0 }
 }
 
-/// The rows of [`set_of_a_law`].
-pub(crate) fn rows_of_a_law() -> Vec<Row> {
+/// Returns the rows of [`set_of_a_law`].
+pub(crate) fn rows_of_a_law() -> Vec<DataRow> {
     set_of_a_law().rows().copied().collect()
 }
 
-/// S of [`set_of_a_law`] at C, Pa.
+/// Computes S of [`set_of_a_law`] at C, Pa.
 pub(crate) fn neo_hookean(c: &Voigt) -> Voigt {
     use polycore::tensor::voigt;
     let c = voigt::to_stress(c);
@@ -364,7 +368,7 @@ pub(crate) fn neo_hookean(c: &Voigt) -> Voigt {
     voigt::from_stress(&(1e9 * (Tensor::identity() - inverse) + 2e9 * half_log * inverse))
 }
 
-/// A missing shear column is answered with what to do, not with a stress's name.
+/// A missing shear column gives advice, not a similar name of a stress.
 #[test]
 fn columns_without_shear() {
     let error = read_text("C11,C22,C33,S11,S22,S33\n1,1,1,0,0,0\n").unwrap_err().to_string();
@@ -372,7 +376,7 @@ fn columns_without_shear() {
     assert!(!error.contains("did you mean"), "{error}");
 }
 
-/// One row a million times the others is refused with its place; a stress that grows steeply is not.
+/// One row of a million times the others is refused with its place; a steeply growing stress is not.
 #[test]
 fn an_outlier_is_named() {
     let rows = |last: f64| {
@@ -387,29 +391,30 @@ fn an_outlier_is_named() {
     assert!(read_text(&rows(3e3)).is_ok());
 }
 
-/// Strains of any table: what it was trained on, too.
+/// Strains are read from any table, including training data.
 #[test]
 fn strains_of_tables() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("t.csv");
-    let of = |text: &str| {
+    let strains = |text: &str| {
         std::fs::write(&path, text).unwrap();
         read_strains(&path)
     };
-    let trained = of(&(MATERIAL.to_owned() + "r0,1.1,1,1,0.1,0,0,5,0,0,0,0,0\n")).unwrap();
+    let trained = strains(&(MATERIAL.to_owned() + "r0,1.1,1,1,0.1,0,0,5,0,0,0,0,0\n")).unwrap();
     assert_eq!(trained, [Voigt::new(1.1, 1.0, 1.0, 0.1, 0.0, 0.0)]);
     assert!(
-        (of("name,stretch\nx,4\n").unwrap()[0] - Voigt::new(16.0, 0.25, 0.25, 0.0, 0.0, 0.0)).norm() < 1e-12
+        (strains("name,stretch\nx,4\n").unwrap()[0] - Voigt::new(16.0, 0.25, 0.25, 0.0, 0.0, 0.0)).norm()
+            < 1e-12
     );
     for (text, part) in [
         ("C11,C22,C33\n", "headings without rows"),
-        ("mode,stretch\nequibiaxial,4\n", "beside a mode"),
+        ("mode,stretch\nequibiaxial,4\n", "a mode with one stretch only"),
         ("stretch_1\n-2\n", "a positive stretch"),
         ("stretch_1,stretch_3\n2,1\n", "stretch_3 without stretch_2"),
         ("C11,C22,C33,C21\n1,1,1,0\n", "column `C21`"),
         ("C11,C33\n1,1\n", "`C22` is missing"),
     ] {
-        let error = of(text).unwrap_err();
+        let error = strains(text).unwrap_err();
         assert!(error.to_string().contains(part) && error.exit_code() == 2, "{error}");
     }
 }
@@ -422,7 +427,7 @@ fn arrays_there_and_back() {
     let back = Dataset::from_arrays("all", c.view(), s.view()).unwrap();
     for (own, other) in set.rows().zip(back.rows()) {
         assert_eq!((own.c, own.s), (other.c, other.s));
-        // F is symmetric there, as here
+        // F is symmetric in both
         assert!((own.cauchy - other.cauchy).amax() <= 1e-12 * own.cauchy.amax());
     }
     assert!(Dataset::from_arrays("one", c.view(), s.slice(ndarray::s![1.., ..])).is_err());

@@ -1,43 +1,43 @@
-//! Loss of ellipticity of a law in the range that it was trained on.
+//! Loss of ellipticity of a law in its training range.
 
 use crate::Error;
-use crate::kinematics::stretch_of;
+use crate::kinematics::stretch_from_c;
 use nalgebra::{Matrix3, Vector3};
 use polycore::constitutive::{Law, Workspace};
 use polycore::tensor::{Tensor, Voigt, voigt};
 
-/// Directions of waves that are tried at a state, over half of the sphere.
+/// Number of tested wave directions per state, over half of the sphere.
 const DIRECTIONS: usize = 200;
 
-/// Below this part of the tangent's norm an eigenvalue is rounding.
+/// Relative eigenvalue, to the norm of the tangent, below which it is rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Where waves have the smallest stiffness.
+/// Result of a scan for loss of ellipticity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ellipticity {
-    /// States that were looked at.
+    /// Number of tested states.
     pub states: usize,
-    /// Those with a direction in which no wave runs: the smallest eigenvalue of the acoustic tensor is below zero.
+    /// Number of states that lost ellipticity: the smallest eigenvalue of the acoustic tensor is negative.
     pub lost: usize,
-    /// The smallest eigenvalue of all, Pa: ρ₀ times the square of the slowest wave.
+    /// Smallest eigenvalue of all states, Pa: ρ₀ times the square of the slowest wave speed.
     pub least: f64,
-    /// C of that state.
+    /// C of the state with this eigenvalue.
     pub at: Voigt,
-    /// N, the direction of that wave in the undeformed body.
+    /// Direction N of this wave in the undeformed body.
     pub direction: [f64; 3],
 }
 
 impl Ellipticity {
-    /// Scans a law at some strains; none where there is no strain. The acoustic tensor is Q_ik = 𝔸_iJkL N_J N_L with
-    /// 𝔸 = ∂P/∂F, of an `ann` its symmetric part (Ogden 1997, *Non-linear elastic deformations*, 6.2.7).
+    /// Scans a law at some strains; `None` without strains. The acoustic tensor is Q_ik = 𝔸_iJkL N_J N_L with
+    /// 𝔸 = ∂P/∂F; for an `ann` its symmetric part (Ogden 1997, *Non-linear elastic deformations*, 6.2.7).
     ///
     /// # Errors
-    /// What the law refuses.
-    pub fn of(law: &dyn Law, strains: &[Voigt]) -> Result<Option<Self>, Error> {
+    /// Returns the errors of the law.
+    pub fn scan(law: &dyn Law, strains: &[Voigt]) -> Result<Option<Self>, Error> {
         let mut memory = Workspace::default();
         let mut found: Option<Self> = None;
         for c in strains {
-            let f = stretch_of(c)?;
+            let f = stretch_from_c(c)?;
             let answer = law.tangent(c, &mut memory)?;
             let tangent = answer.tangent.unwrap_or_default();
             let moduli = voigt::nominal_tangent(&f, &answer.stress, &tangent);
@@ -49,7 +49,7 @@ impl Ellipticity {
             };
             let tried = directions().map(|n| (acoustic(&n), n));
             let Some((mut least, mut n)) = tried.min_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
-            // closer to the smallest one
+            // refine the direction
             let mut step = 0.1;
             while step > 1e-3 {
                 let better = (0..6).find_map(|k| {
@@ -81,7 +81,7 @@ impl Ellipticity {
     }
 }
 
-/// Evenly over half of the sphere, on a spiral of golden angles.
+/// Iterates over directions, evenly on half of the sphere, along a spiral of golden angles.
 fn directions() -> impl Iterator<Item = Vector3<f64>> {
     (0..DIRECTIONS).map(|k| {
         let z = (k as f64 + 0.5) / DIRECTIONS as f64;
@@ -96,34 +96,34 @@ mod tests {
     use super::*;
     use polycore::constitutive::hyperelastic::{Compressible, Volumetric, model};
 
-    /// μ (F Fᵀ − 1) + λ ln J: Q at I has the eigenvalues μ, μ, λ + 2μ. Under a dilation l it is μ and
-    /// μ + (μ + λ − 3λ ln l)/l² along N; below zero beyond a dilation that a bisection finds.
+    /// Law μ (F Fᵀ − 1) + λ ln J: Q at I has the eigenvalues μ, μ, λ + 2μ. Under a dilation l they are μ and
+    /// μ + (μ + λ − 3λ ln l)/l² along N, negative for large l.
     #[test]
     fn waves_of_a_closed_form() {
         let (mu, lame) = (0.2e6, 4e6);
         let law = model("neo-hookean").unwrap().law(&[mu]).unwrap();
         let law = Compressible::new(law, Volumetric::Logarithmic { lame }).unwrap();
         let at = |l: f64| Voigt::new(l * l, l * l, l * l, 0.0, 0.0, 0.0);
-        let rest = Ellipticity::of(&law, &[at(1.0)]).unwrap().unwrap();
+        let rest = Ellipticity::scan(&law, &[at(1.0)]).unwrap().unwrap();
         assert!((rest.least / mu - 1.0).abs() < 1e-9 && rest.lost == 0, "{rest:?}");
         for l in [0.8, 1.1, 1.4, 2.5] {
-            let found = Ellipticity::of(&law, &[at(l)]).unwrap().unwrap();
+            let found = Ellipticity::scan(&law, &[at(l)]).unwrap().unwrap();
             let along = mu + (mu + lame - 3.0 * lame * f64::ln(l)) / (l * l);
             let expected = along.min(mu);
             assert!((found.least / expected - 1.0).abs() < 1e-6, "{l}: {found:?} {expected}");
             assert_eq!(found.lost, usize::from(expected < 0.0));
         }
-        let all = Ellipticity::of(&law, &[at(1.0), at(2.5), at(1.1)]).unwrap().unwrap();
+        let all = Ellipticity::scan(&law, &[at(1.0), at(2.5), at(1.1)]).unwrap().unwrap();
         assert_eq!((all.states, all.lost, all.at), (3, 1, at(2.5)));
-        assert!(Ellipticity::of(&law, &[]).unwrap().is_none());
+        assert!(Ellipticity::scan(&law, &[]).unwrap().is_none());
     }
 
-    /// Pulled along x until λ(1 − ln J) < 0: waves across, where the edges are as they were, stop first.
+    /// Extension along x until λ(1 − ln J) < 0: waves across, along the unstretched edges, stop first.
     #[test]
     fn direction_of_a_lost_wave() {
         let law = model("neo-hookean").unwrap().law(&[1e5]).unwrap();
         let law = Compressible::new(law, Volumetric::Logarithmic { lame: 4e6 }).unwrap();
-        let found = Ellipticity::of(&law, &[Voigt::new(16.0, 1.0, 1.0, 0.0, 0.0, 0.0)]).unwrap().unwrap();
+        let found = Ellipticity::scan(&law, &[Voigt::new(16.0, 1.0, 1.0, 0.0, 0.0, 0.0)]).unwrap().unwrap();
         assert!(found.lost == 1 && found.direction[0].abs() < 1e-3, "{found:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! How good a law is: errors on data, and whether it obeys what every elastic solid does.
+//! Quality of a law: errors on data, and properties of elastic solids.
 
 mod ellipticity;
 mod physics;
@@ -6,60 +6,62 @@ mod uncertainty;
 pub mod uniaxial;
 
 pub use ellipticity::Ellipticity;
-pub use physics::Physics;
-pub use uncertainty::{FLAGS, Uncertainty};
+pub use physics::PhysicsChecks;
+pub use uncertainty::{FLAGS, FlagStatistics};
 
 use crate::Error;
-use crate::dataset::{Dataset, Path, Row};
-use crate::surrogate::{History, Prediction, Surrogate, Workspace};
+use crate::dataset::{DataRow, Dataset, Path};
+use crate::surrogate::{Prediction, SofteningHistory, Surrogate, Workspace};
 use polycore::numerics::range;
 use polycore::tensor::Voigt;
 use std::time::Instant;
 
-/// Evaluations in a measurement of the time of one.
+/// Number of evaluations per time measurement.
 const TIMED: usize = 2000;
-/// Measurements, of which the shortest counts: a busy machine only adds.
+/// Number of measurements; the shortest counts, as other load only adds time.
 const ROUNDS: usize = 5;
 
 /// Errors of a law on some rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
-    /// Rows.
+    /// Number of rows.
     pub rows: usize,
-    /// Mean over the rows of the squared error of each component, Pa².
+    /// Mean squared error of each component, Pa².
     pub squares: Voigt,
-    /// Mean of (3.13), %, over the rows with a stress.
+    /// Mean of (3.13), %, over the rows with nonzero stress.
     pub percentage: f64,
-    /// Rows whose C lies outside the box of the training data.
+    /// Number of rows whose C lies outside the box of the training data.
     pub flagged: usize,
 }
 
 impl Errors {
-    /// (3.12): mean over the rows of ‖S − Ŝ‖², Pa²; Keras reports a sixth of it.
+    /// Returns (3.12): mean of ‖S − Ŝ‖² over the rows, Pa²; Keras reports a sixth of it.
     pub fn mean_square(&self) -> f64 {
         self.squares.sum()
     }
 }
 
-/// Errors of a law on some rows; zero for none.
+/// Computes the errors of a law on some rows; zeros for no rows.
 ///
 /// # Errors
-/// Those of [`Surrogate::stress`].
-pub fn errors<'a>(law: &Surrogate, rows: impl Iterator<Item = &'a Row>) -> Result<Errors, Error> {
+/// Returns the errors of [`Surrogate::stress`].
+pub fn errors<'a>(law: &Surrogate, rows: impl Iterator<Item = &'a DataRow>) -> Result<Errors, Error> {
     let mut memory = Workspace::default();
-    sum_up(rows.map(|row| Ok((row, law.stress(&row.c, &mut memory)?))))
+    sum_errors(rows.map(|row| Ok((row, law.stress(&row.c, &mut memory)?))))
 }
 
-/// Errors of a law along a whole run, the history of which its damage variable follows.
+/// Computes the errors of a law along a whole run; the damage variable follows its history.
 ///
 /// # Errors
-/// Those of [`Surrogate::stress`].
+/// Returns the errors of [`Surrogate::stress`].
 pub fn errors_along(law: &Surrogate, run: &Path) -> Result<Errors, Error> {
-    let (mut memory, mut history) = (Workspace::default(), History::default());
-    sum_up(run.rows.iter().map(|row| Ok((row, law.follow(&row.c, false, &mut history, &mut memory)?))))
+    let (mut memory, mut history) = (Workspace::default(), SofteningHistory::default());
+    sum_errors(run.rows.iter().map(|row| Ok((row, law.follow(&row.c, false, &mut history, &mut memory)?))))
 }
 
-fn sum_up<'a>(answers: impl Iterator<Item = Result<(&'a Row, Prediction), Error>>) -> Result<Errors, Error> {
+fn sum_errors<'a>(
+    answers: impl Iterator<Item = Result<(&'a DataRow, Prediction), Error>>,
+) -> Result<Errors, Error> {
     let (mut squares, mut percentage, mut flagged) = (Voigt::zeros(), 0.0, 0);
     let (mut count, mut stressed) = (0, 0);
     for answer in answers {
@@ -83,27 +85,27 @@ fn sum_up<'a>(answers: impl Iterator<Item = Result<(&'a Row, Prediction), Error>
     })
 }
 
-/// How well a law follows measured nominal stresses, in the figures that fits to rubber are published with.
+/// NominalAgreement of a law with measured nominal stresses, in the measures of published fits to rubber.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Agreement {
-    /// Measured stresses.
+pub struct NominalAgreement {
+    /// Number of measured stresses.
     pub count: usize,
     /// Mean of |P − P̂|, Pa.
     pub absolute: f64,
-    /// Σ(P − P̂)², Pa².
+    /// Sum of (P − P̂)², Pa².
     pub squares: f64,
-    /// 1 − Σ(P − P̂)²/Σ(P − P̄)² with P̄ the mean; none where all are the same.
+    /// R² = 1 − Σ(P − P̂)²/Σ(P − P̄)² with the mean P̄; `None` if all stresses are equal.
     pub r2: Option<f64>,
 }
 
-/// The agreement of a law with the nominal stresses among some rows; none without any.
+/// Computes the agreement of a law with the nominal stresses in some rows; `None` without nominal stresses.
 ///
 /// # Errors
-/// Those of [`Surrogate::stress`].
+/// Returns the errors of [`Surrogate::stress`].
 pub fn agreement<'a>(
     law: &Surrogate,
-    rows: impl Iterator<Item = &'a Row>,
-) -> Result<Option<Agreement>, Error> {
+    rows: impl Iterator<Item = &'a DataRow>,
+) -> Result<Option<NominalAgreement>, Error> {
     let mut memory = Workspace::default();
     let mut pairs = Vec::new();
     for row in rows {
@@ -118,7 +120,7 @@ pub fn agreement<'a>(
     let mean = pairs.iter().map(|[measured, _]| measured).sum::<f64>() / count;
     let squares = pairs.iter().map(|[measured, predicted]| (predicted - measured).powi(2)).sum::<f64>();
     let variation: f64 = pairs.iter().map(|[measured, _]| (measured - mean).powi(2)).sum();
-    Ok(Some(Agreement {
+    Ok(Some(NominalAgreement {
         count: pairs.len(),
         absolute: pairs.iter().map(|[measured, predicted]| (predicted - measured).abs()).sum::<f64>() / count,
         squares,
@@ -126,14 +128,14 @@ pub fn agreement<'a>(
     }))
 }
 
-/// 100 ‖S − Ŝ‖/‖S‖ (3.13) with the norm of the six components; none where S = 0.
+/// Computes 100 ‖S − Ŝ‖/‖S‖ (3.13), with the norm of the six components; `None` for S = 0.
 pub fn percentage_error(stress: &Voigt, predicted: &Voigt) -> Option<f64> {
     let norm = stress.norm();
     (norm > 0.0).then(|| 100.0 * (stress - predicted).norm() / norm)
 }
 
-/// Whether a held-out run was pulled at rates that the training runs of its kind enclose; none where rates are unknown
-/// or no run is of its kind.
+/// Tells if the rates of a held-out run lie within those of the training runs of its kind; `None` for unknown
+/// rates or kinds.
 pub fn within_rates(run: &Path, training: &Dataset) -> Option<bool> {
     let of_kind = || training.paths.iter().filter(|path| path.kind == run.kind);
     let pulled = || (0..3).filter(|&axis| !run.rates[axis].is_nan());
@@ -148,11 +150,12 @@ pub fn within_rates(run: &Path, training: &Dataset) -> Option<bool> {
     Some(pulled().all(enclosed))
 }
 
-/// Seconds of one stress at the C of some rows, on one thread: the shortest of a few measurements.
+/// Measures the seconds per stress at the C of some rows, on one thread: the shortest of several
+/// measurements.
 ///
 /// # Errors
-/// Those of [`Surrogate::stress`]; [`Error::Data`] for no row.
-pub fn seconds_of_a_stress(law: &Surrogate, rows: &[&Row]) -> Result<f64, Error> {
+/// Returns the errors of [`Surrogate::stress`], and [`Error::Data`] for no rows.
+pub fn time_per_stress(law: &Surrogate, rows: &[&DataRow]) -> Result<f64, Error> {
     if rows.is_empty() {
         let (found, allowed) = ("no row".into(), "at least one row".into());
         return Err(Error::Data { what: "measuring a stress", found, allowed });
@@ -165,7 +168,7 @@ pub fn seconds_of_a_stress(law: &Surrogate, rows: &[&Row]) -> Result<f64, Error>
         for k in 0..TIMED {
             sum += law.stress(&rows[k % rows.len()].c, &mut memory)?.stress[0];
         }
-        // so that nothing is left out
+        // keeps the compiler from removing the loop
         std::hint::black_box(sum);
         shortest = shortest.min(since.elapsed().as_secs_f64() / TIMED as f64);
     }
@@ -183,7 +186,7 @@ mod tests {
     fn errors_by_hand() {
         let set = set_of_a_law();
         let mut header = Header::new(Kind::Ann, &[(3, Tanh)], 1);
-        // a law that answers with 7 MPa on 22 and nothing else
+        // a law that predicts 7 MPa on 22 and zero elsewhere
         header.output_deviation = vec![0.0; 6];
         header.output_mean[1] = 7e6;
         let law = Surrogate::random(header, 1).unwrap();
@@ -196,10 +199,10 @@ mod tests {
         assert_eq!((found.rows, found.flagged), (1, 1));
         assert_eq!(errors(&law, [].into_iter()).unwrap().mean_square(), 0.0);
         assert_eq!(percentage_error(&Voigt::zeros(), &row.s), None);
-        // the first row is C = I, S = 0: it has no percentage
+        // the first row is C = I, S = 0 and has no percentage
         assert_eq!(errors(&law, set.paths[0].rows[..1].iter()).unwrap().percentage, 0.0);
-        assert!(seconds_of_a_stress(&law, &[row]).unwrap() > 0.0);
-        assert!(seconds_of_a_stress(&law, &[]).is_err());
+        assert!(time_per_stress(&law, &[row]).unwrap() > 0.0);
+        assert!(time_per_stress(&law, &[]).is_err());
     }
 
     #[test]

@@ -1,16 +1,16 @@
-//! What every elastic solid obeys, measured on a law.
+//! Properties of elastic solids, measured on a law.
 
 use crate::Error;
-use crate::dataset::Row;
+use crate::dataset::DataRow;
 use crate::surrogate::{Surrogate, Workspace};
 use polycore::constitutive::Law;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt, voigt};
 
-/// Amount of simple shear at which the shear stress of a law is evaluated.
+/// Amount of simple shear at which the shear stress is evaluated.
 pub const SHEAR: f64 = 0.05;
-/// Pieces of each side of the closed cycle.
+/// Number of pieces of each side of the closed cycle.
 const PIECES: usize = 64;
-/// Points and weights of Gauss' rule of four points on [0, 1].
+/// Points and weights of the four-point Gauss rule on [0, 1].
 const GAUSS: [(f64, f64); 4] = [
     (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
     (0.330_009_478_207_571_87, 0.326_072_577_431_273_07),
@@ -20,31 +20,31 @@ const GAUSS: [(f64, f64); 4] = [
 
 /// Deviations of a law from an elastic solid.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Physics {
-    /// ‖S(I)‖, Pa: an undeformed solid has no stress.
+pub struct PhysicsChecks {
+    /// ‖S(I)‖, Pa, the stress of the undeformed state: 0 for a solid at rest.
     pub rest: f64,
-    /// Mean over the rows of ‖ℂ − ℂᵀ‖/‖ℂ‖: the tangent of a potential is symmetric.
+    /// Mean of ‖ℂ − ℂᵀ‖/‖ℂ‖ over the rows: 0 for the tangent of a potential.
     pub asymmetry: f64,
-    /// The largest of it.
+    /// Largest ‖ℂ − ℂᵀ‖/‖ℂ‖.
     pub largest_asymmetry: f64,
-    /// |∮ S:dC/2| / ∮ |S:dC/2| around a rectangle from I to half of the training box in C₁₁ and C₃₃: an elastic solid
-    /// takes no work in a cycle.
+    /// |∮ S:dC/2| / ∮ |S:dC/2| around a rectangle from I to half of the training box in C₁₁ and C₃₃: 0 for an
+    /// elastic solid.
     pub cycle: f64,
-    /// The largest ‖σ(RF) − R σ(F) Rᵀ‖/‖σ(F)‖ of the rows and some rotations R.
+    /// Largest ‖σ(RF) − R σ(F) Rᵀ‖/‖σ(F)‖ for the rows and some rotations R.
     pub objectivity: f64,
-    /// Share of states with simple shear in one of three planes that are flagged as never seen; none where the training
-    /// data have shear.
+    /// Fraction of states with simple shear in one of three planes that are flagged as never varied; `None`
+    /// if the training data contain shear.
     pub shear_flagged: Option<f64>,
-    /// Norm of the shear stresses answered there, Pa, mean over the states.
+    /// Mean norm of the predicted shear stresses in these states, Pa.
     pub shear_stress: f64,
 }
 
-impl Physics {
+impl PhysicsChecks {
     /// Measures a law at the deformations of some rows.
     ///
     /// # Errors
-    /// Those of [`Surrogate::tangent`].
-    pub fn of(law: &Surrogate, rows: &[&Row]) -> Result<Self, Error> {
+    /// Returns the errors of [`Surrogate::tangent`].
+    pub fn measure(law: &Surrogate, rows: &[&DataRow]) -> Result<Self, Error> {
         let mut memory = Workspace::default();
         let rest = law.stress(&Voigt::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0), &mut memory)?.stress.norm();
         let (mut asymmetry, mut largest, mut objectivity) = (0.0, 0.0f64, 0.0f64);
@@ -55,7 +55,7 @@ impl Physics {
             let own = if norm > 0.0 { (tangent - tangent.transpose()).norm() / norm } else { 0.0 };
             asymmetry += own / rows.len() as f64;
             largest = largest.max(own);
-            objectivity = objectivity.max(rotated(law, row, index, &mut memory)?);
+            objectivity = objectivity.max(objectivity_error(law, row, index, &mut memory)?);
             for [i, j] in [[0, 1], [0, 2], [1, 2]] {
                 let mut matrix = Tensor::identity();
                 matrix[(i, j)] = SHEAR;
@@ -72,7 +72,7 @@ impl Physics {
             rest,
             asymmetry,
             largest_asymmetry: largest,
-            cycle: cycle(law, &mut memory)?,
+            cycle: cycle_error(law, &mut memory)?,
             objectivity,
             shear_flagged: unseen.then(|| f64::from(flagged as u32) / sheared),
             shear_stress: shear / sheared,
@@ -80,8 +80,13 @@ impl Physics {
     }
 }
 
-/// ‖σ(RF) − R σ(F) Rᵀ‖/‖σ(F)‖ for a rotation that depends on the row's number.
-fn rotated(law: &Surrogate, row: &Row, index: usize, memory: &mut Workspace) -> Result<f64, Error> {
+/// Computes ‖σ(RF) − R σ(F) Rᵀ‖/‖σ(F)‖ for a rotation that depends on the row number.
+fn objectivity_error(
+    law: &Surrogate,
+    row: &DataRow,
+    index: usize,
+    memory: &mut Workspace,
+) -> Result<f64, Error> {
     let angle = 0.1 + index as f64;
     let axis = nalgebra::Unit::new_normalize(nalgebra::Vector3::new(angle.sin(), angle.cos(), 0.4));
     let rotation = nalgebra::Rotation3::from_axis_angle(&axis, angle).into_inner();
@@ -93,11 +98,11 @@ fn rotated(law: &Surrogate, row: &Row, index: usize, memory: &mut Workspace) -> 
     Ok(if norm > 0.0 { (voigt::to_stress(&other) - expected).norm() / norm } else { 0.0 })
 }
 
-/// Work of a closed cycle over the work of its parts.
-fn cycle(law: &Surrogate, memory: &mut Workspace) -> Result<f64, Error> {
+/// Computes the work of a closed cycle over the sum of the absolute work of its pieces.
+fn cycle_error(law: &Surrogate, memory: &mut Workspace) -> Result<f64, Error> {
     let half = |a: usize| {
         let [low, high] = law.header().training_box[a];
-        // the side of the box that is further from rest
+        // the side of the box that is farther from the undeformed state
         let far = if high - 1.0 >= 1.0 - low { high } else { low };
         1.0 + 0.5 * (far - 1.0)
     };
@@ -130,7 +135,7 @@ mod tests {
 
     fn law(kind: Kind) -> Surrogate {
         let rows = rows_of_a_law();
-        let rows: Vec<&Row> = rows.iter().collect();
+        let rows: Vec<&DataRow> = rows.iter().collect();
         let architecture =
             Architecture::new(kind.inputs(), &[(16, Softplus), (16, Softplus)], kind.outputs());
         Surrogate::random(crate::fitted::header(kind, architecture, 2, &rows, true).unwrap(), 3).unwrap()
@@ -139,22 +144,22 @@ mod tests {
     #[test]
     fn an_energy_is_elastic_and_a_map_of_stress_is_not() {
         let rows = rows_of_a_law();
-        let rows: Vec<&Row> = rows.iter().step_by(20).collect();
-        let energy = Physics::of(&law(Kind::energy(Symmetry::Orthotropic)), &rows).unwrap();
+        let rows: Vec<&DataRow> = rows.iter().step_by(20).collect();
+        let energy = PhysicsChecks::measure(&law(Kind::energy(Symmetry::Orthotropic)), &rows).unwrap();
         assert_eq!(energy.rest, 0.0);
-        // rounding; the cycle also has the error of Gauss' rule on 64 pieces
+        // rounding; the cycle also has the error of the Gauss rule on 64 pieces
         assert!(
             energy.largest_asymmetry < 1e-13 && energy.cycle < 1e-12 && energy.objectivity < 1e-12,
             "{energy:?}"
         );
-        let ann = Physics::of(&law(Kind::Ann), &rows).unwrap();
+        let ann = PhysicsChecks::measure(&law(Kind::Ann), &rows).unwrap();
         assert!(ann.rest > 1e6 && ann.asymmetry > 0.01 && ann.cycle > 1e-3, "{ann:?}");
         assert!(ann.objectivity < 1e-12);
         for physics in [ann, energy] {
             assert_eq!(physics.shear_flagged, Some(1.0));
             assert!(physics.asymmetry <= physics.largest_asymmetry);
         }
-        // the rows have no shear stress to learn
+        // the rows contain no shear stress
         assert_eq!([ann.shear_stress, energy.shear_stress], [0.0; 2]);
     }
 }

@@ -1,42 +1,47 @@
-//! Whether the flags of a model catch its bad predictions, and how many good ones they spoil.
+//! Quality of the flags of a model: bad predictions caught, and false alarms.
 
 use crate::Error;
-use crate::dataset::Row;
+use crate::dataset::DataRow;
 use crate::surrogate::{Surrogate, Workspace};
 
-/// Wrong by more than this part of the stress is badly wrong.
+/// Relative error above which a prediction is bad.
 const BAD: f64 = 0.1;
-/// If it is also more than so many times the noise of the data, which no law can follow.
+/// Error over the noise of the data above which a prediction is bad; no law can follow the noise.
 const ABOVE_NOISE: f64 = 3.0;
 
-/// The flags, in the order of the lists of [`Uncertainty`].
+/// Names of the flags, in the order of the lists in [`FlagStatistics`].
 pub const FLAGS: [&str; 4] = ["any flag", "the box", "the distance", "the spread"];
 
-/// Predictions at some rows by whether they are badly wrong and flagged.
+/// Counts of predictions by error and flags.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Uncertainty {
-    /// Rows with an error above a tenth of their stress and three times the noise.
+pub struct FlagStatistics {
+    /// Number of rows with an error above a tenth of their stress and three times the noise.
     pub bad: usize,
-    /// The others.
+    /// Number of the other rows.
     pub good: usize,
-    /// How many of the bad have each of [`FLAGS`].
+    /// Number of bad rows with each of [`FLAGS`].
     pub caught: [usize; 4],
-    /// How many of the good: false alarms.
+    /// Number of good rows with each of [`FLAGS`]: false alarms.
     pub alarms: [usize; 4],
-    /// Spearman's rank correlation of the ensemble's spread and the error; none for a single member or two rows.
+    /// Spearman's rank correlation of spread and error; `None` for a single member or fewer than three rows.
     pub correlation: Option<f64>,
-    /// Of each component of S: the share of rows whose measured value lies within one and within two standard deviations
-    /// of the ensemble ([`Prediction::deviation`](crate::surrogate::Prediction::deviation)) from the predicted one. None
-    /// for a single member, nominal stresses (their deviation needs the covariance) and where the members always agree.
+    /// For each component of S, the fractions of rows whose measured value lies within one and two standard
+    /// deviations of the ensemble ([`Prediction::deviation`](crate::surrogate::Prediction::deviation)).
+    /// `None` for a single member, nominal stresses (which need the covariance), and members that always
+    /// agree.
     pub within: [Option<[f64; 2]>; 6],
 }
 
-impl Uncertainty {
-    /// Counts them; `noise` is the root mean square of ‖S‖ that the data have by chance, Pa, 0 for none.
+impl FlagStatistics {
+    /// Counts the predictions; `noise` is the root mean square noise of ‖S‖ in the data, Pa, or 0.
     ///
     /// # Errors
-    /// Those of [`Surrogate::stress`].
-    pub fn of<'a>(law: &Surrogate, rows: impl Iterator<Item = &'a Row>, noise: f64) -> Result<Self, Error> {
+    /// Returns the errors of [`Surrogate::stress`].
+    pub fn count<'a>(
+        law: &Surrogate,
+        rows: impl Iterator<Item = &'a DataRow>,
+        noise: f64,
+    ) -> Result<Self, Error> {
         let mut memory = Workspace::default();
         let mut found = Self::default();
         let (mut errors, mut spreads) = (Vec::new(), Vec::new());
@@ -47,12 +52,12 @@ impl Uncertainty {
             let error = (predicted - measured).norm();
             let flags = answer.flags;
             let raised = [flags.any(), flags.outside.contains(&true), flags.far, flags.spread];
-            let (count, of) = match error > BAD * measured.norm() && error > ABOVE_NOISE * noise {
+            let (count, flagged) = match error > BAD * measured.norm() && error > ABOVE_NOISE * noise {
                 true => (&mut found.bad, &mut found.caught),
                 false => (&mut found.good, &mut found.alarms),
             };
             *count += 1;
-            for (sum, flag) in of.iter_mut().zip(raised) {
+            for (sum, flag) in flagged.iter_mut().zip(raised) {
                 *sum += usize::from(flag);
             }
             nominal |= row.nominal.is_some();
@@ -75,7 +80,7 @@ impl Uncertainty {
     }
 }
 
-/// Places in ascending order; equal values share the mean of theirs.
+/// Returns the ranks in ascending order; equal values share their mean rank.
 fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
@@ -91,12 +96,13 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     ranks
 }
 
-/// Pearson's; none where one list is constant.
+/// Computes Pearson's correlation; `None` for a constant list.
 fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     let count = a.len() as f64;
     let mean = |list: &[f64]| list.iter().sum::<f64>() / count;
-    let (of_a, of_b) = (mean(a), mean(b));
-    let sum = |f: &dyn Fn(f64, f64) -> f64| a.iter().zip(b).map(|(a, b)| f(a - of_a, b - of_b)).sum::<f64>();
+    let (mean_a, mean_b) = (mean(a), mean(b));
+    let sum =
+        |f: &dyn Fn(f64, f64) -> f64| a.iter().zip(b).map(|(a, b)| f(a - mean_a, b - mean_b)).sum::<f64>();
     let root = (sum(&|a, _| a * a) * sum(&|_, b| b * b)).sqrt();
     (root > 0.0).then(|| sum(&|a, b| a * b) / root)
 }
@@ -117,7 +123,7 @@ mod tests {
         assert_eq!(correlation(&[1.0, 2.0], &[3.0, 3.0]), None);
     }
 
-    /// Two members that answer with m ± s: shares counted by hand.
+    /// Two members that predict m ± s: fractions counted by hand.
     #[test]
     fn shares_within_deviations() {
         let rows = rows_of_a_law();
@@ -136,7 +142,7 @@ mod tests {
         let share = |reach: f64| {
             rows.iter().filter(|row| (row.s[1] - mean).abs() <= reach).count() as f64 / rows.len() as f64
         };
-        let found = Uncertainty::of(&law, rows.iter(), 0.0).unwrap();
+        let found = FlagStatistics::count(&law, rows.iter(), 0.0).unwrap();
         // the members agree on all components but 22
         let expected = [None, Some([share(deviation), share(2.0 * deviation)]), None, None, None, None];
         assert_eq!(found.within, expected);
@@ -147,29 +153,29 @@ mod tests {
         );
         header.members = 1;
         let alone = Surrogate::new(header.clone(), vec![member(1.0)]).unwrap();
-        assert_eq!(Uncertainty::of(&alone, rows.iter(), 0.0).unwrap().within, [None; 6]);
+        assert_eq!(FlagStatistics::count(&alone, rows.iter(), 0.0).unwrap().within, [None; 6]);
     }
 
-    /// Laws that answer with nothing, and with the stress of one row.
+    /// Laws that predict zero, and the stress of one row.
     #[test]
     fn bad_and_good_by_hand() {
         let rows = rows_of_a_law();
-        let rows: Vec<&Row> = rows[1..40].iter().collect();
+        let rows: Vec<&DataRow> = rows[1..40].iter().collect();
         let mut header = Header::new(Kind::Ann, &[], 2);
         header.output_deviation = vec![0.0; 6];
         let law = Surrogate::random(header.clone(), 1).unwrap();
-        let found = Uncertainty::of(&law, rows.iter().copied(), 0.0).unwrap();
-        // no answer but 0: all bad, all outside the box of C = I, the members agree
+        let found = FlagStatistics::count(&law, rows.iter().copied(), 0.0).unwrap();
+        // predictions are 0: all bad, all outside the box C = I, members agree
         assert_eq!((found.bad, found.good, found.caught), (39, 0, [39, 39, 0, 0]));
         assert_eq!(found.correlation, None);
-        // with a noise as large as the stress nothing is bad
-        let noisy = Uncertainty::of(&law, rows.iter().copied(), 1e9).unwrap();
+        // with noise as large as the stress no prediction is bad
+        let noisy = FlagStatistics::count(&law, rows.iter().copied(), 1e9).unwrap();
         assert_eq!((noisy.bad, noisy.alarms), (0, [39, 39, 0, 0]));
-        // the answer is right at one row, whose C the box has
+        // the prediction is right at one row, whose C lies in the box
         header.training_box = [[-9.0, 9.0]; 6];
         header.output_mean = rows[9].s.as_slice().to_vec();
         let law = Surrogate::random(header, 1).unwrap();
-        let found = Uncertainty::of(&law, rows[9..10].iter().copied(), 0.0).unwrap();
+        let found = FlagStatistics::count(&law, rows[9..10].iter().copied(), 0.0).unwrap();
         assert_eq!((found.bad, found.good, found.alarms), (0, 1, [0; 4]));
     }
 }

@@ -2,19 +2,19 @@
 
 use crate::dataset::Path as Run;
 
-/// Strains of the modulus: below, the drift of a crystal that is not yet at rest rules; above, it softens or stiffens.
+/// Strain range for the modulus: below, the crystal is still relaxing; above, it softens or stiffens.
 pub const MODULUS: [f64; 2] = [0.02, 0.08];
-/// Strains before and after 12 %, where the thesis sees a crystal pulled in x stiffen (§3.2).
+/// Strain ranges before and after 12 %, where the thesis finds stiffening in x (§3.2).
 pub const STIFFENING: [[f64; 2]; 2] = [[0.04, 0.12], [0.12, 0.20]];
-/// Samples of a moving mean, so that a peak is none of the noise.
+/// Window of the moving mean, which removes peaks of the noise.
 const MEAN_OF: usize = 5;
 
-/// Engineering strain and Cauchy stress (Pa) along the axis.
+/// Returns engineering strain and Cauchy stress (Pa) along the axis.
 pub fn curve(run: &Run, axis: usize) -> Vec<[f64; 2]> {
     run.rows.iter().map(|row| [row.deformation.matrix()[(axis, axis)] - 1.0, row.cauchy[axis]]).collect()
 }
 
-/// Slope of the line through the points between two strains by least squares; none for fewer than five.
+/// Computes the least-squares slope between two strains; `None` for fewer than five points.
 pub fn slope(points: &[[f64; 2]], [low, high]: [f64; 2]) -> Option<f64> {
     let own: Vec<[f64; 2]> = points.iter().filter(|p| (low..=high).contains(&p[0])).copied().collect();
     let mean = |k: usize| own.iter().map(|p| p[k]).sum::<f64>() / own.len() as f64;
@@ -24,7 +24,7 @@ pub fn slope(points: &[[f64; 2]], [low, high]: [f64; 2]) -> Option<f64> {
     (own.len() >= 5 && width > 0.0).then(|| sum(&|p| (p[0] - x) * (p[1] - y)) / width)
 }
 
-/// The largest of a moving mean, and its strain.
+/// Returns strain and value of the largest moving mean.
 pub fn peak(points: &[[f64; 2]]) -> Option<[f64; 2]> {
     let mean = |window: &[[f64; 2]], k: usize| window.iter().map(|p| p[k]).sum::<f64>() / MEAN_OF as f64;
     let means = points.windows(MEAN_OF).map(|window| [mean(window, 0), mean(window, 1)]);
@@ -37,7 +37,7 @@ mod tests {
 
     #[test]
     fn slopes_and_peaks_by_hand() {
-        // 2 and 6 Pa before and after 0.12, then down
+        // slopes of 2 and 6 Pa before and after 0.12, then falling
         let stress = |e: f64| match e {
             e if e <= 0.12 => 1.0 + 2.0 * e,
             e if e <= 0.2 => 1.24 + 6.0 * (e - 0.12),

@@ -1,29 +1,29 @@
-//! Graphs of ONNX: nodes, constants, layers of networks and their derivatives.
+//! ONNX graphs: nodes, constants, layers of networks and their derivatives.
 
-use super::protobuf::{Attribute, Node, Tensor};
+use super::protobuf::{OnnxAttribute, OnnxNode, OnnxTensor};
 use crate::network::{Activation, Layer};
 
-/// Types of elements.
+/// Element types of ONNX.
 const SINGLE: i32 = 1;
 const DOUBLE: i32 = 11;
 const INTEGER: i32 = 7;
 pub(super) const BOOLEAN: i32 = 9;
 
-/// A graph as it grows.
+/// An ONNX graph under construction.
 pub(super) struct Builder {
-    pub nodes: Vec<Node>,
-    pub constants: Vec<Tensor>,
-    /// The type of its numbers.
+    pub nodes: Vec<OnnxNode>,
+    pub constants: Vec<OnnxTensor>,
+    /// Element type of the numbers.
     pub element: i32,
 }
 
 impl Builder {
-    /// A graph in single or double precision.
+    /// Creates a graph in single or double precision.
     pub fn new(single: bool) -> Self {
         Self { nodes: Vec::new(), constants: Vec::new(), element: if single { SINGLE } else { DOUBLE } }
     }
 
-    /// The bytes of numbers.
+    /// Returns the bytes of numbers in the element type.
     fn bytes(&self, values: &[f64]) -> Vec<u8> {
         if self.element == SINGLE {
             return values.iter().flat_map(|value| (*value as f32).to_le_bytes()).collect();
@@ -31,7 +31,7 @@ impl Builder {
         values.iter().flat_map(|value| value.to_le_bytes()).collect()
     }
 
-    /// A row of limits, which rounding moves outwards only.
+    /// Adds a row of limits, rounded outwards in single precision.
     pub fn limit(&mut self, values: &[f64], outwards: fn(f32) -> f32) -> String {
         let rounded =
             |value: &f64| if self.element == SINGLE { f64::from(outwards(*value as f32)) } else { *value };
@@ -39,7 +39,7 @@ impl Builder {
         self.row(&values)
     }
 
-    pub fn with(&mut self, operator: &str, inputs: &[&str], attribute: Vec<Attribute>) -> String {
+    pub fn node_with(&mut self, operator: &str, inputs: &[&str], attribute: Vec<OnnxAttribute>) -> String {
         let name = format!("n{}", self.nodes.len());
         self.named(operator, inputs, &name);
         if let Some(node) = self.nodes.last_mut() {
@@ -49,11 +49,11 @@ impl Builder {
     }
 
     pub fn node(&mut self, operator: &str, inputs: &[&str]) -> String {
-        self.with(operator, inputs, Vec::new())
+        self.node_with(operator, inputs, Vec::new())
     }
 
     pub fn named(&mut self, operator: &str, inputs: &[&str], output: &str) {
-        self.nodes.push(Node {
+        self.nodes.push(OnnxNode {
             input: inputs.iter().map(|&input| input.to_owned()).collect(),
             output: vec![output.to_owned()],
             op_type: operator.to_owned(),
@@ -63,11 +63,11 @@ impl Builder {
 
     fn constant(&mut self, dims: Vec<i64>, data_type: i32, raw_data: Vec<u8>) -> String {
         let name = format!("c{}", self.constants.len());
-        self.constants.push(Tensor { dims, data_type, name: name.clone(), raw_data });
+        self.constants.push(OnnxTensor { dims, data_type, name: name.clone(), raw_data });
         name
     }
 
-    /// (rows, columns), row by row.
+    /// Adds a constant matrix, row by row.
     pub fn matrix(&mut self, values: &[f64], columns: usize) -> String {
         let bytes = self.bytes(values);
         self.constant(vec![(values.len() / columns) as i64, columns as i64], self.element, bytes)
@@ -89,7 +89,7 @@ impl Builder {
 
     pub fn column(&mut self, x: &str, index: usize) -> String {
         let index = self.integers(&[index as i64]);
-        self.with("Gather", &[x, &index], vec![integer("axis", 1)])
+        self.node_with("Gather", &[x, &index], vec![integer("axis", 1)])
     }
 
     pub fn concatenated(&mut self, columns: &[String]) -> String {
@@ -97,19 +97,19 @@ impl Builder {
     }
 
     pub fn joined(&mut self, parts: &[String], axis: i64) -> String {
-        self.with("Concat", &refs(parts), vec![integer("axis", axis)])
+        self.node_with("Concat", &refs(parts), vec![integer("axis", axis)])
     }
 
-    /// (points, rows, columns) with rows and columns exchanged.
+    /// Transposes the rows and columns of (points, rows, columns).
     pub fn transposed(&mut self, x: &str) -> String {
-        self.with("Transpose", &[x], vec![integers("perm", &[0, 2, 1])])
+        self.node_with("Transpose", &[x], vec![integers("perm", &[0, 2, 1])])
     }
 
-    /// Jᵀ diag(f) J of J (points, rows, columns) or (rows, columns) and f (points, rows).
+    /// Computes Jᵀ diag(f) J for J (points, rows, columns) or (rows, columns), and f (points, rows).
     pub fn quadratic(&mut self, change: &str, factor: &str) -> String {
         let axis = self.integers(&[2]);
         let factor = self.node("Unsqueeze", &[factor, &axis]);
-        // of each point, where J was one for all
+        // expand a J that is common to all points
         let zero = self.node("Sub", &[&factor, &factor]);
         let change = self.node("Add", &[change, &zero]);
         let weighted = self.node("Mul", &[&change, &factor]);
@@ -117,8 +117,8 @@ impl Builder {
         self.node("MatMul", &[&transposed, &weighted])
     }
 
-    /// W J, times σ′ where it is not 1.
-    pub fn through(&mut self, layer: &Layer<f64>, change: &str, slope: Option<&str>) -> String {
+    /// Computes W J, times σ′ if it is not 1.
+    pub fn chain_rule(&mut self, layer: &Layer<f64>, change: &str, slope: Option<&str>) -> String {
         let weights = self.matrix(&layer.weights, layer.weights.len() / layer.bias.len());
         let product = self.node("MatMul", &[&weights, change]);
         let Some(slope) = slope else { return product };
@@ -127,8 +127,8 @@ impl Builder {
         self.node("Mul", &[&slope, &product])
     }
 
-    /// A product with a constant, for each point of C, also where the factor is the same for all.
-    pub fn of_points(&mut self, x: &str, factors: &str) -> String {
+    /// Multiplies by a constant for each point of C, also if `x` is common to all points.
+    pub fn scaled_per_point(&mut self, x: &str, factors: &str) -> String {
         let product = self.node("Mul", &[x, factors]);
         let zero = self.scalar(0.0);
         let none = self.node("Mul", &["C", &zero]);
@@ -142,7 +142,7 @@ impl Builder {
         self.node("ReduceSum", &[x, &axis])
     }
 
-    /// σ(W x + b), and of the derivatives σ′ and σ″ so many as are wanted, where they are not 1 and 0.
+    /// Computes σ(W x + b), and σ′ and σ″ as far as requested, if they are not 1 and 0.
     pub fn layer(
         &mut self,
         layer: &Layer<f64>,
@@ -151,7 +151,7 @@ impl Builder {
     ) -> (String, Option<String>, Option<String>) {
         let (weights, bias) =
             (self.matrix(&layer.weights, layer.weights.len() / layer.bias.len()), self.row(&layer.bias));
-        let z = self.with("Gemm", &[x, &weights, &bias], vec![integer("transB", 1)]);
+        let z = self.node_with("Gemm", &[x, &weights, &bias], vec![integer("transB", 1)]);
         let unit = self.scalar(1.0);
         let value = match layer.activation {
             Activation::Linear => return (z, None, None),
@@ -185,7 +185,7 @@ impl Builder {
             Activation::Relu => {
                 let zero = self.scalar(0.0);
                 let on = self.node("Greater", &[&z, &zero]);
-                self.with("Cast", &[&on], vec![integer("to", self.element.into())])
+                self.node_with("Cast", &[&on], vec![integer("to", self.element.into())])
             }
             Activation::Softplus => self.node("Sigmoid", &[&z]),
             Activation::Tanh => {
@@ -209,12 +209,12 @@ impl Builder {
         (value, Some(slope), bend)
     }
 
-    /// σ″ of z, from σ and σ′, where it is not 0.
+    /// Computes σ″ from z, σ and σ′; `None` if it is 0.
     fn bend(&mut self, activation: Activation, z: &str, value: &str, slope: &str) -> Option<String> {
         let (unit, two) = (self.scalar(1.0), self.scalar(2.0));
         Some(match activation {
             Activation::Linear | Activation::Relu => return None,
-            // s (1 − s), with s = σ′
+            // s (1 − s), s = σ′
             Activation::Softplus => {
                 let rest = self.node("Sub", &[&unit, slope]);
                 self.node("Mul", &[slope, &rest])
@@ -239,17 +239,17 @@ impl Builder {
                 let sum = self.node("Add", &[&part, &two]);
                 self.node("Mul", &[&fall, &sum])
             }
-            // e^z below 0
+            // e^z for z < 0
             Activation::Elu => {
                 let zero = self.scalar(0.0);
                 let below = self.node("Less", &[z, &zero]);
-                let below = self.with("Cast", &[&below], vec![integer("to", self.element.into())]);
+                let below = self.node_with("Cast", &[&below], vec![integer("to", self.element.into())]);
                 self.node("Mul", &[slope, &below])
             }
         })
     }
 
-    /// e^min(z, 0).
+    /// Computes e^min(z, 0).
     fn exp_of_negative_part(&mut self, z: &str) -> String {
         let turned = self.node("Neg", &[z]);
         let below = self.node("Relu", &[&turned]);
@@ -258,17 +258,17 @@ impl Builder {
     }
 }
 
-/// An attribute of one number.
-pub(super) fn integer(name: &str, value: i64) -> Attribute {
-    Attribute { name: name.into(), i: value, ints: Vec::new(), r#type: 2 }
+/// Creates an integer attribute.
+pub(super) fn integer(name: &str, value: i64) -> OnnxAttribute {
+    OnnxAttribute { name: name.into(), i: value, ints: Vec::new(), r#type: 2 }
 }
 
-/// An attribute of several.
-pub(super) fn integers(name: &str, values: &[i64]) -> Attribute {
-    Attribute { name: name.into(), i: 0, ints: values.to_vec(), r#type: 7 }
+/// Creates a list attribute.
+pub(super) fn integers(name: &str, values: &[i64]) -> OnnxAttribute {
+    OnnxAttribute { name: name.into(), i: 0, ints: values.to_vec(), r#type: 7 }
 }
 
-/// Names of inputs.
+/// Returns the names as string slices.
 pub(super) fn refs(list: &[String]) -> Vec<&str> {
     list.iter().map(String::as_str).collect()
 }

@@ -1,21 +1,21 @@
-//! Exported laws with a history: routines of Abaqus and CalculiX along a path, and in CalculiX itself.
+//! Exported laws with softening: routines for Abaqus and CalculiX along a path, and in CalculiX itself.
 
-use super::tests::{numbers_of, run, there};
+use super::tests::{has_program, numbers_of, run};
 use super::*;
 use crate::network::Activation::Softplus;
-use crate::surrogate::{History, Kind, Softening, Workspace};
+use crate::surrogate::{Kind, Softening, SofteningHistory, Workspace};
 use evidence::hosts;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt, voigt};
 use std::process::Command;
 
-/// An energy in its own axes that softens.
+/// Creates an energy in its own axes, with softening.
 fn law() -> Surrogate {
     let header = Header::new(Kind::polyconvex_energy(Symmetry::Transverse), &[(8, Softplus)], 2);
     let softening = Softening { units: vec![[0.4, 3.0, 0.5], [0.3, 20.0, 4.0]], greatest: 1e6 };
     Surrogate::random(header, 5).unwrap().with_softening(softening).unwrap()
 }
 
-/// Sheared and stretched, and back halfway.
+/// Returns a path of shear and stretch, and halfway back.
 fn path() -> Vec<DeformationGradient> {
     let at = |part: f64| {
         Tensor::new(1.0 + 0.2 * part, 0.1 * part, 0.0, 0.0, 1.0 - 0.05 * part, 0.0, 0.0, 0.0, 1.0)
@@ -24,21 +24,22 @@ fn path() -> Vec<DeformationGradient> {
     parts.map(|part| DeformationGradient::new(at(part)).unwrap()).collect()
 }
 
-/// S along the path, MPa.
+/// Computes S along the path, MPa.
 fn stresses(law: &Surrogate) -> Vec<Voigt> {
-    let (mut memory, mut history) = (Workspace::default(), History::default());
+    let (mut memory, mut history) = (Workspace::default(), SofteningHistory::default());
     let c = |f: &DeformationGradient| voigt::from_stress(&f.right_cauchy_green());
     path().iter().map(|f| law.follow(&c(f), false, &mut history, &mut memory).unwrap().stress / 1e6).collect()
 }
 
-/// `umat` and `umat_user` with their state variables, called along the path, and `umat_user`'s tangent by differences.
+/// Calls `umat` and `umat_user` with state variables along the path; checks the tangent of `umat_user` by
+/// differences.
 #[test]
 fn routines_follow_the_history() {
     assert!(
         c_source(&law(), "law").unwrap_err().to_string().contains("--form fortran")
             && onnx(&law(), OnnxOptions::default()).is_err()
     );
-    if !there("gfortran") {
+    if !has_program("gfortran") {
         return;
     }
     let directory = tempfile::tempdir().unwrap();
@@ -68,9 +69,9 @@ fn routines_follow_the_history() {
         let size = s.norm();
         assert!((Voigt::from_row_slice(&numbers[..6]) - cauchy).norm() < 1e-12 * size, "{line}");
         assert!((Voigt::from_row_slice(&numbers[6..12]) - s).norm() < 1e-12 * size, "{line}");
-        // largest difference of a column of the tangent from central differences, over the tangent
+        // largest error of a tangent column against central differences, over the tangent
         assert!(numbers[12] < 1e-7, "{line}");
-        // SSE and SPD of the undeformed volume are the work so far, and SPD is that of the greatest energy alone
+        // SSE and SPD per undeformed volume sum to the work; SPD depends on the largest energy only
         let [sse, spd] = [numbers[13], numbers[14]].map(|energy| energy * f.matrix().determinant());
         let strain = 0.5 * (voigt::from_stress(&f.right_cauchy_green()) - before.0);
         let doubled = Voigt::from_fn(|k, _| strain[k] * if k < 3 { 1.0 } else { 2.0 });
@@ -80,7 +81,7 @@ fn routines_follow_the_history() {
         lost = spd;
         sums.push((sse + spd, work));
     }
-    // ten steps and back: the trapezoidal rule, where the slope jumps at the turn
+    // ten steps and back: trapezoidal rule with a jump of the slope at the turning point
     for (sum, work) in &sums[2..] {
         assert!((sum / work - 1.0).abs() < 0.03, "{sums:?}");
     }
@@ -88,7 +89,7 @@ fn routines_follow_the_history() {
     assert_eq!(text.lines().count(), path().len());
 }
 
-/// Both routines after the same history; the tangent of `umat_user` against differences of its stress.
+/// Calls both routines with the same history; checks the tangent of `umat_user` by differences of the stress.
 const MAIN: &str = "program main
     implicit none
     double precision :: f(3, 3), statev(3) = 0, before(3, 1, 1) = 0, after(3, 1, 1) = 0
@@ -98,7 +99,8 @@ contains
         double precision, intent(in) :: f(3, 3)
         logical, intent(in) :: back
         double precision :: cauchy(6), ddsdde(6, 6), unused, six(6), two(2), square(3, 3), pnewdt, one(1)
-        double precision :: e(3, 3), emec(6), s(6), stiff(21), up(6), low(6), dense(6, 6), worst, none(21), energies(2)
+        double precision :: e(3, 3), emec(6), s(6), stiff(21), up(6), low(6), dense(6, 6), worst, none(21)
+        double precision :: energies(2)
         integer :: jstep(4), a, b
         unused = 0
         six = 0
@@ -108,8 +110,9 @@ contains
         pnewdt = 1
         one = 1d6
         energies = 0
-        call umat(cauchy, statev, ddsdde, energies(1), energies(2), unused, unused, six, six, unused, six, six, two, &
-            unused, unused, unused, two, two, repeat('x', 80), 3, 3, 6, 3, one, 1, two, square, pnewdt, &
+        call umat(cauchy, statev, ddsdde, energies(1), energies(2), unused, unused, six, six, unused, six, \
+        six, &
+            two, unused, unused, unused, two, two, repeat('x', 80), 3, 3, 6, 3, one, 1, two, square, pnewdt, &
             unused, square, f, 1, 1, 1, 1, jstep, 1)
         e = matmul(transpose(f), f) / 2
         emec = [e(1, 1) - 0.5d0, e(2, 2) - 0.5d0, e(3, 3) - 0.5d0, e(1, 2), e(1, 3), e(2, 3)]
@@ -149,13 +152,16 @@ contains
         list = 1
         pnewdt = -1
         one = 1d6
-        call umat_user(repeat('x', 80), 1, 1, -101, one, emec, six, six, square, unused, square, unused, list, unused, unused, &
-            unused, unused, icmd, 0, list, 3, before, after, s, stiff, 0, three, orab, pnewdt, list)
+        call umat_user(repeat('x', 80), 1, 1, -101, one, emec, six, six, square, unused, square, unused, \
+        list, &
+            unused, unused, unused, unused, icmd, 0, list, 3, before, after, s, stiff, 0, three, orab, \
+            pnewdt, &
+            list)
     end subroutine material
 end program main
 ";
 
-/// One element along the path in CalculiX.
+/// Runs one element along the path in CalculiX.
 #[test]
 fn calculix_follows_the_history() {
     let Some(source) = hosts::calculix() else { return };
@@ -165,8 +171,9 @@ fn calculix_follows_the_history() {
     hosts::link_calculix(&source, &[&file("law.f90")], &[], &file("ccx"));
     let mut deck = String::from(
         "*NODE, NSET=ALL\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1,0,1\n7,1,1,1\n8,0,1,1\n\
-         *ELEMENT, TYPE=C3D8, ELSET=CUBE\n1,1,2,3,4,5,6,7,8\n*MATERIAL, NAME=USER_LAW\n*USER MATERIAL, CONSTANTS=1\n1.0e6\n\
-         *DEPVAR\n3\n*SOLID SECTION, ELSET=CUBE, MATERIAL=USER_LAW\n",
+         *ELEMENT, TYPE=C3D8, ELSET=CUBE\n1,1,2,3,4,5,6,7,8\n*MATERIAL, NAME=USER_LAW\n\
+         *USER MATERIAL, CONSTANTS=1\n1.0e6\n*DEPVAR\n3\n\
+         *SOLID SECTION, ELSET=CUBE, MATERIAL=USER_LAW\n",
     );
     let corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
     for f in path() {
@@ -181,7 +188,7 @@ fn calculix_follows_the_history() {
         deck += "*EL PRINT, ELSET=CUBE\nS, SDV\n*END STEP\n";
     }
     let (_, results) = hosts::run_calculix(&file("ccx"), directory.path(), &deck);
-    // Cauchy stress in the order xx yy zz xy xz yz, of eight points a step
+    // Cauchy stress in the order xx yy zz xy xz yz, at eight points per step
     let blocks: Vec<&str> = results.split("stresses").skip(1).collect();
     assert_eq!(blocks.len(), path().len());
     let mut off = 0.0_f64;

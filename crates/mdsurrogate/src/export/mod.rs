@@ -1,4 +1,4 @@
-//! Models for other programs: C, Fortran, ONNX.
+//! Export of models to C, Fortran and ONNX.
 
 mod c;
 mod fortran;
@@ -12,16 +12,16 @@ pub use onnx::{OnnxOptions, onnx};
 
 use crate::Error;
 use crate::network::{Activation, LANES, Network};
-use crate::surrogate::{Coefficients, Header, Invariants, Surrogate, Symmetry, derivative};
+use crate::surrogate::{Coefficients, Header, Surrogate, Symmetry, SymmetryInvariants, derivative};
 
-/// A model and its numbers.
-struct Model<'a> {
+/// A model and its coefficients.
+struct ExportModel<'a> {
     header: &'a Header,
     members: &'a [Network<f64>],
-    of: Coefficients<'a, f64>,
+    coefficients: Coefficients<'a, f64>,
 }
 
-/// All numbers of a law in the order in which source code lists them.
+/// All numbers of a law, in the order of the source code.
 struct Description {
     layers: usize,
     members: usize,
@@ -30,18 +30,18 @@ struct Description {
     widest: usize,
     parameters: usize,
     energetic: bool,
-    invariants: Invariants,
+    invariants: SymmetryInvariants,
     widths: Vec<usize>,
-    /// Places in [`Activation::ALL`].
+    /// Indices in [`Activation::ALL`].
     activations: Vec<usize>,
     mean: Vec<f64>,
     inverse: Vec<f64>,
     output_mean: Vec<f64>,
     output: Vec<f64>,
     training_box: Vec<f64>,
-    /// C into material axes, row by row.
+    /// Rotation of C into the material axes, row by row.
     turn: Vec<f64>,
-    /// Of each member: −∂W/∂c and W at I, then what is added to ∂W/∂x, and x at I.
+    /// For each member: −∂W/∂c and W at I, the correction of ∂W/∂x, and x at I.
     rest: Vec<f64>,
     representatives: Vec<f64>,
     representative_weight: Vec<f64>,
@@ -50,21 +50,21 @@ struct Description {
     weights: Vec<f64>,
 }
 
-/// A language of formulas.
+/// Target language of formulas.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Language {
     C,
     Fortran,
 }
 
-impl<'a> Model<'a> {
+impl<'a> ExportModel<'a> {
     fn new(model: &'a Surrogate) -> Self {
-        Self { header: model.header(), members: model.members(), of: model.coefficients() }
+        Self { header: model.header(), members: model.members(), coefficients: model.coefficients() }
     }
 
-    /// Those of an energy; the inputs of an `ann` are the components of C.
-    fn invariants(&self) -> Invariants {
-        self.header.kind.invariants().unwrap_or(Invariants::new(Symmetry::Triclinic, false, false))
+    /// Returns the invariants of an energy; the inputs of an `ann` are the components of C.
+    fn invariants(&self) -> SymmetryInvariants {
+        self.header.kind.invariants().unwrap_or(SymmetryInvariants::new(Symmetry::Triclinic, false, false))
     }
 
     fn description(&self) -> Description {
@@ -72,10 +72,10 @@ impl<'a> Model<'a> {
         let code = |activation: &Activation| {
             Activation::ALL.iter().position(|other| other == activation).unwrap_or_default()
         };
-        let inputs = self.of.mean.len();
+        let inputs = self.coefficients.mean.len();
         let identity = |i: usize| f64::from(u8::from(i / 6 == i % 6));
         let rest = |m: usize| {
-            let rest = self.of.rest.get(m).copied().unwrap_or_default();
+            let rest = self.coefficients.rest.get(m).copied().unwrap_or_default();
             let mut list = rest.slope.to_vec();
             list.push(rest.value);
             list.extend(&rest.invariants[..inputs.min(LANES)]);
@@ -88,26 +88,26 @@ impl<'a> Model<'a> {
             layers: architecture.activations.len(),
             members: self.members.len(),
             inputs,
-            outputs: self.of.output.len(),
+            outputs: self.coefficients.output.len(),
             widest: architecture.widths.iter().max().copied().unwrap_or(1),
             parameters: architecture.parameters(),
             energetic: self.header.kind.invariants().is_some(),
             invariants: self.invariants(),
             widths: architecture.widths.clone(),
             activations: architecture.activations.iter().map(code).collect(),
-            mean: self.of.mean.to_vec(),
-            inverse: self.of.inverse.to_vec(),
-            output_mean: self.of.output_mean.to_vec(),
-            output: self.of.output.to_vec(),
+            mean: self.coefficients.mean.to_vec(),
+            inverse: self.coefficients.inverse.to_vec(),
+            output_mean: self.coefficients.output_mean.to_vec(),
+            output: self.coefficients.output.to_vec(),
             training_box: self.header.training_box.as_flattened().to_vec(),
-            turn: match self.of.turn {
+            turn: match self.coefficients.turn {
                 Some(turn) => turn.as_flattened().to_vec(),
                 None => (0..36).map(identity).collect(),
             },
             rest: (0..self.members.len()).flat_map(rest).collect(),
             representatives: support.map_or(vec![0.0; 6], |support| support.points.as_flattened().to_vec()),
             representative_weight: support.map_or(vec![0.0; 6], |support| support.weights.to_vec()),
-            farthest: self.of.farthest.unwrap_or(0.0),
+            farthest: self.coefficients.farthest.unwrap_or(0.0),
             spread_limit: self.header.spread_limit,
             weights: layers.flat_map(|layer| layer.weights.iter().chain(&layer.bias).copied()).collect(),
         }
@@ -115,7 +115,7 @@ impl<'a> Model<'a> {
 }
 
 impl Description {
-    /// Names and values of the sizes.
+    /// Returns names and values of the sizes.
     fn sizes(&self) -> [(&'static str, usize); 9] {
         let representatives = if self.farthest > 0.0 { self.representatives.len() / 6 } else { 0 };
         [
@@ -131,7 +131,7 @@ impl Description {
         ]
     }
 
-    /// Names and numbers of the lists but the weights.
+    /// Returns names and numbers of all lists except the weights.
     fn lists(&self) -> [(&'static str, &[f64]); 9] {
         [
             ("mean", &self.mean),
@@ -146,7 +146,7 @@ impl Description {
         ]
     }
 
-    /// Statements that compute x, d = ∂x/∂c and dd = ∂²x/∂c∂c.
+    /// Returns the statements that compute x, d = ∂x/∂c and dd = ∂²x/∂c∂c.
     fn inputs_with_derivatives(&self, language: Language) -> Vec<String> {
         let mut lines = Vec::new();
         let place = |indices: &[usize]| language.place(indices);
@@ -182,7 +182,7 @@ impl Description {
 impl Language {
     fn number(self, value: f64) -> String {
         match self {
-            // the shortest text that reads back to the same bits
+            // shortest text that parses to the same bits
             Self::C => format!("{value:e}"),
             Self::Fortran => format!("{value:e}").replace('e', "d"),
         }
@@ -210,7 +210,7 @@ impl Language {
     }
 }
 
-/// Keywords of C99 (ISO/IEC 9899:1999, 6.4.1) and the function that every program has.
+/// Keywords of C99 (ISO/IEC 9899:1999, 6.4.1), and `main`.
 const KEYWORDS: [&str; 35] = [
     "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum",
     "extern", "float", "for", "goto", "if", "inline", "int", "long", "main", "register", "restrict",
@@ -218,30 +218,34 @@ const KEYWORDS: [&str; 35] = [
     "void", "volatile", "while",
 ];
 
+/// Checks the name of an exported function.
+///
 /// # Errors
-/// [`Error::Parameter`] for a name that is no identifier of both C and Fortran.
+/// Returns [`Error::Parameter`] for a name that is not an identifier in C and Fortran.
 fn check_name(name: &str) -> Result<(), Error> {
     let first = name.chars().next().is_some_and(|c| c.is_ascii_alphabetic());
     let letters = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
-    // Fortran reserves no words
+    // Fortran has no reserved words
     if first && letters && name.len() <= 50 && !KEYWORDS.contains(&name) {
         return Ok(());
     }
-    let allowed = "a letter, then letters, digits and `_`, up to 50, no keyword of C";
+    let allowed = "a letter, then letters, digits and `_`, at most 50, no keyword of C";
     Err(Error::parameter("name of the function", format!("`{name}`"), allowed))
 }
 
+/// Refuses laws whose stress depends on the history.
+///
 /// # Errors
-/// [`Error::Parameter`] for a law with softening, in a form without state.
+/// Returns [`Error::Parameter`] for a law with softening.
 fn refuse_history(model: &Surrogate) -> Result<(), Error> {
     if model.header().softening.is_none() {
         return Ok(());
     }
     let found = "a law with softening, whose stress depends on its history";
-    Err(Error::parameter("export", found, "`--form fortran`, the routines of which have state variables"))
+    Err(Error::parameter("export", found, "`--form fortran`, whose routines have state variables"))
 }
 
-/// Numbers of C source, with the shortest text that reads back to the same bits.
+/// Formats numbers for C source: the shortest texts that parse to the same bits.
 fn numbers(values: &[f64]) -> String {
     values.iter().map(|value| format!("{value:e}")).collect::<Vec<_>>().join(", ")
 }

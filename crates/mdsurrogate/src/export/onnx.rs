@@ -1,48 +1,51 @@
-//! A law as ONNX: operators of set 17, W's derivatives written out.
+//! Export of a law as ONNX: operator set 17, with explicit derivatives of W.
 
 use super::graph::{BOOLEAN, Builder, refs};
-use super::protobuf::{Dimension, Graph, Model as File, OperatorSet, Shape, TensorType, Type, ValueInfo};
-use super::{Model, refuse_history};
+use super::protobuf::{
+    OnnxDimension, OnnxGraph, OnnxModel, OnnxShape, OperatorSet, TensorType, Type, ValueInfo,
+};
+use super::{ExportModel, refuse_history};
 use crate::Error;
-use crate::surrogate::{Kind, Surrogate, UNSEEN, derivative};
+use crate::surrogate::{CONSTANT_TOLERANCE, Kind, Surrogate, derivative};
 use prost::Message;
 
-/// The operator set, and the version of the format that came with it.
+/// Operator set, and the format version released with it.
 const OPERATORS: i64 = 17;
 const FORMAT: i64 = 8;
 
-/// What an ONNX model has.
+/// Options of an ONNX model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OnnxOptions {
     /// Numbers of 32 bits instead of 64.
     pub single: bool,
-    /// The output `tangent`, too.
+    /// Adds the output `tangent`.
     pub tangent: bool,
 }
 
-/// A model as the bytes of an ONNX model (operator set 17, doubles unless the options say otherwise).
+/// Exports a model as an ONNX file (operator set 17, double precision by default).
 ///
-/// Input `C` (points, 6), C_12 not doubled. Outputs: `S` (points, 6) in Pa; `W` (points, 1) in J/m³ of an energy;
-/// `spread` (points, 1) in Pa; `tangent` (points, 6, 6), ℂ = 2 ∂S/∂C in Pa, if asked for; `outside` (points, 6), whether a
-/// component leaves the training box; `far` (points, 1) of a model with a [`Support`](crate::surrogate::Support). C is not checked: the result at a C that is not positive definite
-/// means nothing.
+/// Input `C` (points, 6), C_12 not doubled. Outputs: `S` (points, 6) in Pa; `W` (points, 1) in J/m³ for an
+/// energy; `spread` (points, 1) in Pa; `tangent` (points, 6, 6), ℂ = 2 ∂S/∂C in Pa, if requested; `outside`
+/// (points, 6), components outside the training box; `far` (points, 1) for a model with a
+/// [`Support`](crate::surrogate::Support). C is not checked: results at a C that is not positive definite are
+/// meaningless.
 ///
 /// # Errors
-/// [`Error::Parameter`] for a law with softening.
+/// Returns [`Error::Parameter`] for a law with softening.
 pub fn onnx(model: &Surrogate, options: OnnxOptions) -> Result<Vec<u8>, Error> {
     refuse_history(model)?;
-    Ok(Model::new(model).onnx(options))
+    Ok(ExportModel::new(model).onnx(options))
 }
 
-/// The invariants and what their derivatives are made of.
+/// Invariants, and the parts of their derivatives.
 struct Invariant {
-    /// (points, inputs).
+    /// Invariants x, (points, inputs).
     x: String,
-    /// Slopes of the polynomials by each component, (points, inputs).
+    /// Derivatives of the polynomials by each component, (points, inputs).
     slopes: Vec<String>,
-    /// ∂x/∂p where some are roots of p, (points, inputs).
+    /// ∂x/∂p for invariants that are roots of polynomials p, (points, inputs).
     root: Option<String>,
-    /// All monomials, (points, monomials), and which they are.
+    /// All monomials, (points, monomials), and their factors.
     powers: String,
     monomials: Vec<Vec<usize>>,
 }
@@ -55,7 +58,7 @@ struct Members {
     tangents: Vec<String>,
 }
 
-impl Model<'_> {
+impl ExportModel<'_> {
     fn onnx(&self, options: OnnxOptions) -> Vec<u8> {
         let mut graph = Builder::new(options.single);
         let element = graph.element;
@@ -97,25 +100,28 @@ impl Model<'_> {
             r#type: Some(Type {
                 tensor_type: Some(TensorType {
                     elem_type: *element,
-                    shape: Some(Shape {
-                        dim: std::iter::once(Dimension { dim_value: None, dim_param: Some("points".into()) })
-                            .chain(
-                                widths
-                                    .iter()
-                                    .map(|width| Dimension { dim_value: Some(*width), dim_param: None }),
-                            )
-                            .collect(),
+                    shape: Some(OnnxShape {
+                        dim: std::iter::once(OnnxDimension {
+                            dim_value: None,
+                            dim_param: Some("points".into()),
+                        })
+                        .chain(
+                            widths
+                                .iter()
+                                .map(|width| OnnxDimension { dim_value: Some(*width), dim_param: None }),
+                        )
+                        .collect(),
                     }),
                 }),
             }),
             doc_string: String::new(),
         };
-        let model = File {
+        let model = OnnxModel {
             ir_version: FORMAT,
             producer_name: "mdsurrogate".into(),
             producer_version: env!("CARGO_PKG_VERSION").into(),
             doc_string: "C (11 22 33 12 13 23, C_12 not doubled) -> second Piola-Kirchhoff stress, Pa".into(),
-            graph: Some(Graph {
+            graph: Some(OnnxGraph {
                 node: graph.nodes,
                 name: "law".into(),
                 initializer: graph.constants,
@@ -129,37 +135,39 @@ impl Model<'_> {
 
     fn mapped_stresses(&self, graph: &mut Builder, tangent: bool) -> Members {
         let input = self.standardised(graph, "C");
-        let (scale, shift) = (graph.row(self.of.output), graph.row(self.of.output_mean));
+        let (scale, shift) = (graph.row(self.coefficients.output), graph.row(self.coefficients.output_mean));
         let mut found = Members::default();
         for member in self.members {
             let mut y = input.clone();
-            // ∂y/∂c: at first a constant matrix
-            let start: Vec<f64> =
-                (0..36).map(|i| if i / 6 == i % 6 { self.of.inverse[i / 6] } else { 0.0 }).collect();
+            // ∂y/∂c: initially a constant matrix
+            let start: Vec<f64> = (0..36)
+                .map(|i| if i / 6 == i % 6 { self.coefficients.inverse[i / 6] } else { 0.0 })
+                .collect();
             let mut change = graph.matrix(&start, 6);
             for layer in member.layers() {
                 let (value, slope, _) = graph.layer(layer, &y, u8::from(tangent));
                 y = value;
                 if tangent {
-                    change = graph.through(layer, &change, slope.as_deref());
+                    change = graph.chain_rule(layer, &change, slope.as_deref());
                 }
             }
             let scaled = graph.node("Mul", &[&y, &scale]);
             found.stresses.push(graph.node("Add", &[&scaled, &shift]));
             if tangent {
-                // 2 ∂S/∂C of the normal components, ∂S/∂C of shears, which count once
-                let factors: Vec<f64> =
-                    (0..36).map(|i| self.of.output[i / 6] * if i % 6 < 3 { 2.0 } else { 1.0 }).collect();
+                // 2 ∂S/∂C of normal components, ∂S/∂C of shears, which count once
+                let factors: Vec<f64> = (0..36)
+                    .map(|i| self.coefficients.output[i / 6] * if i % 6 < 3 { 2.0 } else { 1.0 })
+                    .collect();
                 let factors = graph.matrix(&factors, 6);
-                found.tangents.push(graph.of_points(&change, &factors));
+                found.tangents.push(graph.scaled_per_point(&change, &factors));
             }
         }
         found
     }
 
-    /// S and W of each member, and ℂ.
+    /// Computes S, W and ℂ of each member.
     fn energetic_stresses(&self, graph: &mut Builder, tangent: bool) -> Members {
-        let turn = self.of.turn.map(|turn| {
+        let turn = self.coefficients.turn.map(|turn| {
             let flat = turn.as_flattened();
             let transposed: Vec<f64> = (0..36).map(|i| flat[6 * (i % 6) + i / 6]).collect();
             (graph.matrix(flat, 6), graph.matrix(&transposed, 6))
@@ -177,8 +185,8 @@ impl Model<'_> {
         let twice = [2.0, 2.0, 2.0, 1.0, 1.0, 1.0];
         let two = graph.row(&twice);
         let mut found = Members::default();
-        for (member, rest) in self.members.iter().zip(self.of.rest) {
-            let inputs = self.of.mean.len();
+        for (member, rest) in self.members.iter().zip(self.coefficients.rest) {
+            let inputs = self.coefficients.mean.len();
             let (mut y, mut slopes_of_layers) = (input.clone(), Vec::new());
             // ∂z/∂x̂ of each layer, and σ″
             let mut changes = Vec::new();
@@ -188,13 +196,13 @@ impl Model<'_> {
             for layer in member.layers() {
                 let (value, slope, bend) = graph.layer(layer, &y, if tangent { 2 } else { 1 });
                 if tangent {
-                    changes.push((graph.through(layer, &change, None), bend));
-                    change = graph.through(layer, &change, slope.as_deref());
+                    changes.push((graph.chain_rule(layer, &change, None), bend));
+                    change = graph.chain_rule(layer, &change, slope.as_deref());
                 }
                 y = value;
                 slopes_of_layers.push(slope);
             }
-            // reverse mode: δ = g σ′, g of the layer before = δ W
+            // reverse mode: δ = g σ′, and g of the previous layer = δ W
             let mut g = graph.matrix(&[1.0], 1);
             let mut bent: Vec<String> = Vec::new();
             for (number, (layer, slope)) in member.layers().iter().zip(&slopes_of_layers).enumerate().rev() {
@@ -208,7 +216,12 @@ impl Model<'_> {
                 let weights = graph.matrix(&layer.weights, layer.weights.len() / layer.bias.len());
                 g = graph.node("MatMul", &[&g, &weights]);
             }
-            let scale: Vec<f64> = self.of.inverse.iter().map(|inverse| self.of.output[0] * inverse).collect();
+            let scale: Vec<f64> = self
+                .coefficients
+                .inverse
+                .iter()
+                .map(|inverse| self.coefficients.output[0] * inverse)
+                .collect();
             let (scale, added) = (graph.row(&scale), graph.row(&rest.invariants[..inputs]));
             let scaled = graph.node("Mul", &[&g, &scale]);
             let by_invariant = graph.node("Add", &[&scaled, &added]);
@@ -244,7 +257,7 @@ impl Model<'_> {
                 let shape = graph.integers(&[-1, 6, 6]);
                 let mut hessian = graph.node("Reshape", &[&flat, &shape]);
                 if root.is_some() {
-                    // ∂²√p = ½ ∂²p/√p − ∂√p ∂√p/√p, of the roots alone
+                    // ∂²√p = ½ ∂²p/√p − ∂√p ∂√p/√p, for the roots only
                     let is_root: Vec<f64> =
                         (0..inputs).map(|k| f64::from(u8::from(self.invariants().polynomial(k).1))).collect();
                     let is_root = graph.row(&is_root);
@@ -258,7 +271,9 @@ impl Model<'_> {
                     let sum = graph.node("Sum", &refs(&bent));
                     let scales: Vec<f64> = (0..inputs * inputs)
                         .map(|i| {
-                            self.of.output[0] * self.of.inverse[i / inputs] * self.of.inverse[i % inputs]
+                            self.coefficients.output[0]
+                                * self.coefficients.inverse[i / inputs]
+                                * self.coefficients.inverse[i % inputs]
                         })
                         .collect();
                     let scales = graph.matrix(&scales, inputs);
@@ -276,7 +291,7 @@ impl Model<'_> {
                 let factors = graph.matrix(&factors, 6);
                 found.tangents.push(graph.node("Mul", &[&hessian, &factors]));
             }
-            let (unit, value) = (graph.scalar(self.of.output[0]), graph.scalar(rest.value));
+            let (unit, value) = (graph.scalar(self.coefficients.output[0]), graph.scalar(rest.value));
             let energy = graph.node("Mul", &[&y, &unit]);
             let at = graph.row(&rest.at[..inputs]);
             let from_rest = graph.node("Sub", &[x, &at]);
@@ -291,7 +306,8 @@ impl Model<'_> {
         found
     }
 
-    /// ∂x/∂c, (points, inputs, 6), and second derivatives of the polynomials by each pair of components, (points, inputs).
+    /// Computes ∂x/∂c, (points, inputs, 6), and second derivatives of the polynomials by each pair of
+    /// components, (points, inputs).
     fn curvatures(&self, graph: &mut Builder, invariants: &Invariant) -> (String, Vec<String>) {
         let axis = graph.integers(&[2]);
         let columns: Vec<String> = invariants
@@ -308,13 +324,19 @@ impl Model<'_> {
         let gradient = graph.joined(&columns, 2);
         let pairs = (0..6).flat_map(|b| (0..=b).map(move |a| [a, b]));
         let seconds = pairs
-            .map(|pair| self.combined(graph, &invariants.powers, &invariants.monomials, &pair))
+            .map(|pair| self.polynomial_derivatives(graph, &invariants.powers, &invariants.monomials, &pair))
             .collect();
         (gradient, seconds)
     }
 
-    /// Derivatives of all polynomials by some components, (points, inputs).
-    fn combined(&self, graph: &mut Builder, powers: &str, monomials: &[Vec<usize>], by: &[usize]) -> String {
+    /// Computes derivatives of all polynomials by some components, (points, inputs).
+    fn polynomial_derivatives(
+        &self,
+        graph: &mut Builder,
+        powers: &str,
+        monomials: &[Vec<usize>],
+        by: &[usize],
+    ) -> String {
         let invariants = self.invariants();
         let count = invariants.count();
         let (mut matrix, mut constant) = (vec![0.0; monomials.len() * count], vec![0.0; count]);
@@ -332,7 +354,8 @@ impl Model<'_> {
         graph.node("Add", &[&product, &constant])
     }
 
-    /// The invariants and their slopes: all polynomials as products of one list of monomials with constant matrices.
+    /// Computes invariants and slopes: all polynomials as products of one list of monomials with constant
+    /// matrices.
     fn polynomials(&self, graph: &mut Builder, c: &str) -> Invariant {
         let invariants = self.invariants();
         let count = invariants.count();
@@ -356,13 +379,14 @@ impl Model<'_> {
             columns.push(product);
         }
         let powers = graph.concatenated(&columns);
-        let x = self.combined(graph, &powers, &monomials, &[]);
-        let slopes: Vec<String> = (0..6).map(|a| self.combined(graph, &powers, &monomials, &[a])).collect();
+        let x = self.polynomial_derivatives(graph, &powers, &monomials, &[]);
+        let slopes: Vec<String> =
+            (0..6).map(|a| self.polynomial_derivatives(graph, &powers, &monomials, &[a])).collect();
         let is_root = |k: usize| invariants.polynomial(k).1;
         if !(0..count).any(is_root) {
             return Invariant { x, slopes, root: None, powers, monomials };
         }
-        // √p instead of p, and ½/√p before its slopes
+        // √p instead of p, and ½/√p as factor of its slopes
         let half = graph.scalar(0.5);
         let (mut all, mut factors) = (Vec::new(), Vec::new());
         for k in 0..count {
@@ -377,13 +401,13 @@ impl Model<'_> {
     }
 
     fn standardised(&self, graph: &mut Builder, x: &str) -> String {
-        let (mean, inverse) = (graph.row(self.of.mean), graph.row(self.of.inverse));
+        let (mean, inverse) = (graph.row(self.coefficients.mean), graph.row(self.coefficients.inverse));
         let difference = graph.node("Sub", &[x, &mean]);
         graph.node("Mul", &[&difference, &inverse])
     }
 
     fn box_flags(&self, graph: &mut Builder) {
-        let slack = |[low, high]: &[f64; 2]| if low == high { UNSEEN } else { 0.0 };
+        let slack = |[low, high]: &[f64; 2]| if low == high { CONSTANT_TOLERANCE } else { 0.0 };
         let limits = &self.header.training_box;
         let low: Vec<f64> = limits.iter().map(|limit| limit[0] - slack(limit)).collect();
         let high: Vec<f64> = limits.iter().map(|limit| limit[1] + slack(limit)).collect();
@@ -393,9 +417,11 @@ impl Model<'_> {
         graph.named("Or", &[&below, &above], "outside");
     }
 
-    /// Whether there is one.
+    /// Adds the output `far`; returns false if the model has no support.
     fn distance_flag(&self, graph: &mut Builder) -> bool {
-        let (Some(support), Some(farthest)) = (&self.header.support, self.of.farthest) else { return false };
+        let (Some(support), Some(farthest)) = (&self.header.support, self.coefficients.farthest) else {
+            return false;
+        };
         let points = graph.matrix(support.points.as_flattened(), 6);
         let (weights, axis) = (graph.row(&support.weights), graph.integers(&[1]));
         let apart = graph.node("Unsqueeze", &["C", &axis]);
@@ -403,9 +429,9 @@ impl Model<'_> {
         let weighted = graph.node("Mul", &[&difference, &weights]);
         let square = graph.node("Mul", &[&weighted, &weighted]);
         let axis = graph.integers(&[2]);
-        let sum = graph.with("ReduceSum", &[&square, &axis], vec![super::graph::integer("keepdims", 0)]);
+        let sum = graph.node_with("ReduceSum", &[&square, &axis], vec![super::graph::integer("keepdims", 0)]);
         let axes = super::graph::integers("axes", &[1]);
-        let least = graph.with("ReduceMin", &[&sum], vec![axes, super::graph::integer("keepdims", 1)]);
+        let least = graph.node_with("ReduceMin", &[&sum], vec![axes, super::graph::integer("keepdims", 1)]);
         let distance = graph.node("Sqrt", &[&least]);
         let limit = graph.scalar(farthest);
         graph.named("Greater", &[&distance, &limit], "far");
@@ -413,7 +439,7 @@ impl Model<'_> {
     }
 }
 
-/// The place of a pair of components, upper triangle column by column.
+/// Returns the index of a pair of components in the upper triangle, column by column.
 fn pair(a: usize, b: usize) -> usize {
     let (a, b) = (a.min(b), a.max(b));
     b * (b + 1) / 2 + a

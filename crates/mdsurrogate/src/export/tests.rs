@@ -1,4 +1,5 @@
-//! Exported laws, compiled and run, against Rust: 1e-12 of the norm, a few hundred roundings in another order.
+//! Exported laws, compiled and run, compared with Rust to 1e-12 of the norm: some hundred roundings in
+//! another order.
 
 use super::*;
 use crate::kinematics::jaumann_tangent;
@@ -7,7 +8,7 @@ use crate::network::{
     Architecture,
 };
 use crate::surrogate::{Flags, Header, Kind, Prediction, Support, Workspace, examples};
-pub(super) use evidence::hosts::{run, there};
+pub(super) use evidence::hosts::{has_program, run};
 use polycore::constitutive::Law;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt, Voigt6x6, voigt};
 use std::path::Path;
@@ -22,20 +23,20 @@ fn deformations() -> Vec<DeformationGradient> {
     (0..5).map(|_| f()).collect()
 }
 
-fn c_of(f: &DeformationGradient) -> Voigt {
+fn right_cauchy_green(f: &DeformationGradient) -> Voigt {
     voigt::from_stress(&f.right_cauchy_green())
 }
 
-/// All laws, beside them one with kinks, limits and representatives, and the thesis' network.
+/// Returns all example laws, a law with kinks, limits and representatives, and the thesis' network.
 fn laws() -> Vec<(String, Surrogate<f64>)> {
     let mut laws = examples().unwrap();
     let mut header = Header::new(Kind::Ann, &[(6, Relu), (5, Elu)], 2);
     header.spread_limit = Some(1.0);
     header.training_box = [[0.5, 2.0], [0.5, 2.0], [0.9, 1.0], [0.0, 0.0], [-1.0, 1.0], [-1.0, 1.0]];
-    // rows near each other: the other deformations are far from them
-    let near = c_of(&deformations()[0]);
+    // training rows near each other: the other deformations are far away
+    let near = right_cauchy_green(&deformations()[0]);
     let rows = [near, 1.01 * near, 1.02 * near];
-    header.support = Some(Support::of(&rows, 2).unwrap());
+    header.support = Some(Support::from_rows(&rows, 2).unwrap());
     laws.push(("relu".into(), Surrogate::random(header, 2).unwrap()));
     let mut header = Header::new(Kind::Ann, &[], 1);
     header.architecture = Architecture::thesis(4).unwrap();
@@ -55,8 +56,8 @@ fn bits(flags: &Flags) -> f64 {
     f64::from(bits)
 }
 
-/// Status, flags, S, tangent row by row, W, spread.
-fn same(name: &str, numbers: &[f64], prediction: &Prediction<f64>) {
+/// Compares status, flags, S, tangent row by row, W and spread.
+fn compare_results(name: &str, numbers: &[f64], prediction: &Prediction<f64>) {
     assert_eq!((numbers[0], numbers[1]), (0.0, bits(&prediction.flags)), "{name}");
     let stress = Voigt::from_row_slice(&numbers[2..8]);
     assert!((stress - prediction.stress).norm() < 1e-12 * (stress.norm() + 1e6), "{name}");
@@ -73,7 +74,7 @@ fn write(path: &Path, text: &str) {
 
 #[test]
 fn exported_c_agrees() {
-    if !there("gcc") {
+    if !has_program("gcc") {
         return;
     }
     let directory = tempfile::tempdir().unwrap();
@@ -93,7 +94,10 @@ fn exported_c_agrees() {
         build.arg(file(&format!("{name}.c")));
         main += &format!("#include \"{name}.h\"\n");
         for f in deformations() {
-            calls += &format!("{{ double c[6] = {{{}}}; show({name}, c); }}\n", numbers(c_of(&f).as_slice()));
+            calls += &format!(
+                "{{ double c[6] = {{{}}}; show({name}, c); }}\n",
+                numbers(right_cauchy_green(&f).as_slice())
+            );
         }
     }
     main += "typedef int law(const double *, double *, double *, double *, double *, unsigned *);\n\
@@ -110,9 +114,9 @@ fn exported_c_agrees() {
     let mut far = 0;
     for (name, law) in &laws {
         for f in deformations() {
-            let prediction = law.tangent(&c_of(&f), &mut memory).unwrap();
+            let prediction = law.tangent(&right_cauchy_green(&f), &mut memory).unwrap();
             far += u32::from(prediction.flags.far);
-            same(name, &numbers_of(lines.next().unwrap()), &prediction);
+            compare_results(name, &numbers_of(lines.next().unwrap()), &prediction);
         }
     }
     assert!(far > 0);
@@ -125,10 +129,10 @@ fn exported_c_agrees() {
     assert!(c_source(&Surrogate::random(wide, 1).unwrap(), "law").unwrap_err().to_string().contains("stack"));
 }
 
-/// The subroutine against the law, the UMAT against the push-forward in Rust, each law a program of its own.
+/// Compares the subroutine with the law, and the UMAT with the push-forward in Rust; one program per law.
 #[test]
 fn exported_fortran_agrees() {
-    if !there("gfortran") {
+    if !has_program("gfortran") {
         return;
     }
     let directory = tempfile::tempdir().unwrap();
@@ -149,19 +153,19 @@ fn exported_fortran_agrees() {
         let text = run(&mut Command::new(file("law")));
         let mut lines = text.lines();
         for f in deformations() {
-            let prediction = law.tangent(&c_of(&f), &mut memory).unwrap();
-            same(&name, &numbers_of(lines.next().unwrap()), &prediction);
+            let prediction = law.tangent(&right_cauchy_green(&f), &mut memory).unwrap();
+            compare_results(&name, &numbers_of(lines.next().unwrap()), &prediction);
             let umat = numbers_of(lines.next().unwrap());
-            // in MPa
+            // stress in MPa
             let stress = law.cauchy_stress(&f, &mut memory).unwrap().0 / 1e6;
             let tangent = jaumann_tangent(&f, &prediction.stress, &prediction.tangent.unwrap()) / 1e6;
             let difference = (Voigt::from_row_slice(&umat[..6]) - stress).norm();
             assert!(difference < 1e-12 * (stress.norm() + 1.0), "{name}: {difference:e}");
             let difference = (Voigt6x6::from_row_slice(&umat[6..42]) - tangent).norm();
             assert!(difference < 1e-12 * (tangent.norm() + 1.0), "{name}: {difference:e}");
-            // state variables: flags, spread; PNEWDT as it was
+            // state variables: flags, spread; PNEWDT unchanged
             assert_eq!((umat[42], umat[44]), (bits(&prediction.flags), 1.0), "{name}");
-            // W/J in MPa; an ann leaves what it was given
+            // W/J in MPa; an ann leaves the given value
             let stored = prediction.energy.map_or(-7.0, |energy| energy / f.matrix().determinant() / 1e6);
             assert!(
                 (umat[45] - stored).abs() < 1e-12 * (stored.abs() + 1.0),
@@ -169,13 +173,14 @@ fn exported_fortran_agrees() {
                 umat[45]
             );
         }
-        // four components, as in plane strain, are those of six; a folded element asks for a smaller increment
+        // four components, as in plane strain, equal those of six; a folded element requests a smaller
+        // increment
         let (plane, folded) = (numbers_of(lines.next().unwrap()), numbers_of(lines.next().unwrap()));
         assert_eq!((plane[0], folded[0]), (0.0, 0.25), "{name}");
     }
 }
 
-/// Prints status, flags and results of the subroutine, then those of the UMAT, for each F.
+/// Prints status, flags and results of the subroutine, and those of the UMAT, for each F.
 const MAIN: &str = "program main
     implicit none
     double precision :: f(3, 3), six(6), four(4), stiffness6(6, 6), stiffness4(4, 4), statev(2), pnewdt
@@ -194,7 +199,8 @@ contains
         double precision :: statev(2), pnewdt, sse
         integer :: flags, status
         cg = matmul(transpose(f), f)
-        call law([cg(1, 1), cg(2, 2), cg(3, 3), cg(1, 2), cg(1, 3), cg(2, 3)], s, tangent, energy, spread, flags, status)
+        call law([cg(1, 1), cg(2, 2), cg(3, 3), cg(1, 2), cg(1, 3), cg(2, 3)], s, tangent, energy, spread, &
+            flags, status)
         print '(2i6, 44es26.17e3)', status, flags, s, transpose(tangent), energy, spread
         call material(f, 6, stress, stiffness, statev, pnewdt, sse)
         print '(46es26.17e3)', stress, transpose(stiffness), statev, pnewdt, sse
@@ -217,25 +223,25 @@ contains
         one = 1d6
         stress = 0
         stored = -7
-        call umat(stress, statev, stiffness, stored, unused, unused, unused, list(:n), list(:n), unused, list(:n), &
-            list(:n), two, unused, unused, unused, two, two, cmname, 3, n - 3, n, 2, one, 1, two, square, pnewdt, unused, &
-            square, f, 1, 1, 1, 1, jstep, 1)
+        call umat(stress, statev, stiffness, stored, unused, unused, unused, list(:n), list(:n), unused, &
+            list(:n), list(:n), two, unused, unused, unused, two, two, cmname, 3, n - 3, n, 2, one, 1, two, &
+            square, pnewdt, unused, square, f, 1, 1, 1, 1, jstep, 1)
         if (present(sse)) sse = stored
     end subroutine material
 end program main
 ";
 
-/// Every law in onnxruntime (the python named by `ONNX_PYTHON`, or `python3`), all points at once.
+/// Evaluates all laws in onnxruntime (with the Python of `ONNX_PYTHON`, or `python3`), all points at once.
 #[test]
 fn exported_onnx_agrees() {
     let python = std::env::var("ONNX_PYTHON").unwrap_or("python3".into());
     let probe = Command::new(&python).args(["-c", "import onnxruntime"]).output();
     if !probe.is_ok_and(|output| output.status.success()) {
-        evidence::skipped(&format!("onnxruntime in {python} (ONNX_PYTHON names another)"));
+        evidence::skipped(&format!("onnxruntime in {python} (set ONNX_PYTHON to use another)"));
         return;
     }
     let directory = tempfile::tempdir().unwrap();
-    let points: Vec<Voigt> = deformations().iter().map(c_of).collect();
+    let points: Vec<Voigt> = deformations().iter().map(right_cauchy_green).collect();
     let mut memory = Workspace::default();
     for (name, law) in laws() {
         let model = directory.path().join("law.onnx");
@@ -246,7 +252,7 @@ fn exported_onnx_agrees() {
         let text = run(&mut command);
         let lines: Vec<Vec<f64>> = text.lines().map(numbers_of).collect();
         assert_eq!(lines.len(), points.len());
-        // S, spread, W (NaN without), far (NaN without), outside
+        // S, spread, W (NaN if absent), far (NaN if absent), outside
         for (c, numbers) in points.iter().zip(&lines) {
             let prediction = law.stress(c, &mut memory).unwrap();
             let stress = Voigt::from_row_slice(&numbers[..6]);
@@ -267,20 +273,20 @@ fn exported_onnx_agrees() {
     }
 }
 
-/// Every law with its tangent and in single precision, in onnxruntime.
+/// Evaluates all laws with tangents and in single precision in onnxruntime.
 #[test]
 fn exported_onnx_has_tangents_and_single_precision() {
     let python = std::env::var("ONNX_PYTHON").unwrap_or("python3".into());
     let probe = Command::new(&python).args(["-c", "import onnxruntime"]).output();
     if !probe.is_ok_and(|output| output.status.success()) {
-        evidence::skipped(&format!("onnxruntime in {python} (ONNX_PYTHON names another)"));
+        evidence::skipped(&format!("onnxruntime in {python} (set ONNX_PYTHON to use another)"));
         return;
     }
     let directory = tempfile::tempdir().unwrap();
-    let points: Vec<Voigt> = deformations().iter().map(c_of).collect();
+    let points: Vec<Voigt> = deformations().iter().map(right_cauchy_green).collect();
     let mut memory = Workspace::default();
     for (name, law) in laws() {
-        // of single precision: some thousand roundings of 6e-8, and differences of large invariants
+        // single precision: some thousand roundings of 6e-8, and differences of large invariants
         for (options, tolerance) in [
             (OnnxOptions { single: false, tangent: true }, 1e-11),
             (OnnxOptions { single: true, tangent: true }, 2e-3),
@@ -311,15 +317,15 @@ fn exported_onnx_has_tangents_and_single_precision() {
     }
 }
 
-/// DDSDDE by its meaning: a small symmetric, spin-free change of F gives the change of the Kirchhoff stress over J
-/// (Sun et al. 2008), by central differences: 1e-7 is ε/h = 2e-11 and h² = 1e-10 of the largest entries.
+/// Checks DDSDDE by its definition: a small symmetric change of F without spin changes the Kirchhoff stress
+/// over J (Sun et al. 2008). Central differences: 1e-7 for ε/h = 2e-11 and h² = 1e-10 of the largest entries.
 #[test]
 fn jaumann_tangent_by_differences() {
     const PAIRS: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [0, 1], [0, 2], [1, 2]];
     let mut memory = Workspace::default();
     for (name, law) in examples().unwrap() {
         for f in &deformations()[..2] {
-            let prediction = law.tangent(&c_of(f), &mut memory).unwrap();
+            let prediction = law.tangent(&right_cauchy_green(f), &mut memory).unwrap();
             let expected = jaumann_tangent(f, &prediction.stress, &prediction.tangent.unwrap());
             for (b, [k, l]) in PAIRS.into_iter().enumerate() {
                 let mut kirchhoff = |step: f64| {

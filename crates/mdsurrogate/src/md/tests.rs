@@ -4,7 +4,7 @@ use harness::case::Fault;
 /// Table 3.2 and formulation.md, chapter 3: 720 runs; [3.3, 50], [4, 60], [1, 15]e-6 per step of 0.5 fs.
 #[test]
 fn the_thesis_grid() {
-    let (protocol, grid) = (Protocol::default(), Grid::default());
+    let (protocol, grid) = (Protocol::default(), RateGrid::default());
     let runs = grid.runs(&protocol).unwrap();
     assert_eq!(runs.len(), 720);
     for (rates, [least, greatest]) in
@@ -12,12 +12,12 @@ fn the_thesis_grid() {
     {
         assert_eq!(rates.len(), 15);
         let per_step = |rate: f64| rate * protocol.time_step * 1e6;
-        // two digits in the table
+        // the table has two digits
         assert!((per_step(rates[0]) - least).abs() < 0.005 && (per_step(rates[14]) - greatest).abs() < 1e-9);
         let gap = rates[1] - rates[0];
         assert!(rates.windows(2).all(|pair| ((pair[1] - pair[0]) / gap - 1.0).abs() < 1e-9));
     }
-    // 10,000 steps at the greatest rate are the ultimate strain
+    // 10,000 steps at the largest rate give the ultimate strain
     assert!((grid.rates(&protocol)[1][14] * 5000.0 - 0.6).abs() < 1e-12);
     let count = |kind: &str| runs.iter().filter(|run| run.kind == kind).count();
     assert_eq!(["ux", "uy", "uz", "bxy", "bxz", "byz"].map(count), [15, 15, 15, 225, 225, 225]);
@@ -30,7 +30,7 @@ fn the_thesis_grid() {
 #[test]
 fn the_grid_of_the_shipped_data() {
     let protocol = Protocol { steps: 5000, every: 50, ..Protocol::default() };
-    let rates = Grid { levels: 5, ..Grid::default() }.rates(&protocol);
+    let rates = RateGrid { levels: 5, ..RateGrid::default() }.rates(&protocol);
     for (found, expected) in rates[0].iter().zip([1.333333333e-5, 6e-5, 1.066666667e-4, 1.533333333e-4, 2e-4])
     {
         assert!((found / expected - 1.0).abs() < 1e-8);
@@ -40,31 +40,36 @@ fn the_grid_of_the_shipped_data() {
 
 #[test]
 fn general_paths() {
-    let run = Run::parse("x=1e-5, xy=-2e-5", "p0".into(), 0).unwrap();
+    let run = MdRun::parse("x=1e-5, xy=-2e-5", "p0".into(), 0).unwrap();
     assert_eq!(run.rates, [Some(1e-5), None, None, Some(-2e-5), None, None]);
     assert_eq!(run.kind, "mxxy");
-    assert_eq!(Run::parse("yz=1e-5", "p".into(), 0).unwrap().kind, "gyz");
+    assert_eq!(MdRun::parse("yz=1e-5", "p".into(), 0).unwrap().kind, "gyz");
     for bad in ["", "x", "w=1", "x=fast", "x=inf", "x=1,x=2"] {
-        assert!(Run::parse(bad, "p".into(), 0).is_err(), "{bad}");
+        assert!(MdRun::parse(bad, "p".into(), 0).is_err(), "{bad}");
     }
     let text = input::deform(&Protocol::default(), &run, "d", "o");
     assert!(text.contains("change_box      all triclinic\n"));
     assert!(text.contains("deform 1 x erate 1e-5 xy erate -2e-5 remap x units box flip no\n"));
     assert!(text.contains("npt temp 300 300 50 y 1 1 500 z 1 1 500 scalexy no"));
-    let all = Run::parse("x=1e-5,y=1e-5,z=1e-5", "p".into(), 0).unwrap();
+    let all = MdRun::parse("x=1e-5,y=1e-5,z=1e-5", "p".into(), 0).unwrap();
     assert!(input::deform(&Protocol::default(), &all, "d", "o").contains("all nvt temp"));
 }
 
-/// Loading and unloading at the same rate of the initial lengths, so that the box comes back; replicas have velocities of their own.
+/// Loading and unloading at the same rate of the initial lengths restore the box; replicas have other
+/// velocities.
 #[test]
 fn unloading_and_replicas() {
     let protocol = Protocol { steps: 5000, every: 50, ..Protocol::default() };
-    let run = Run::parse("z=1e-5,xz=2e-5,unload=0.6", "p0".into(), 5).unwrap();
+    let run = MdRun::parse("z=1e-5,xz=2e-5,unload=0.6", "p0".into(), 5).unwrap();
     assert_eq!((run.unload, run.kind.as_str()), (Some(0.6), "mzxz"));
     let text = input::deform(&protocol, &run, "d", "o");
     for line in [
-        "variable        vz equal $(lz)*-1e-5\nvariable        vxz equal $(lz)*-2e-5\nfix             pull all deform 1 z erate 1e-5 xz erate 2e-5 remap x units box flip no\n",
-        "run             3000\nunfix           pull\nfix             pull all deform 1 z vel ${vz} xz vel ${vxz} remap x units box flip no\nrun             2000\n",
+        "variable        vz equal $(lz)*-1e-5\nvariable        vxz equal $(lz)*-2e-5\n\
+                     fix             pull all deform 1 z erate 1e-5 xz erate 2e-5 remap x units box flip \
+                     no\n",
+        "run             3000\nunfix           pull\n\
+                     fix             pull all deform 1 z vel ${vz} xz vel ${vxz} remap x units box flip no\n\
+                     run             2000\n",
     ] {
         assert!(text.contains(line), "{line}\n{text}");
     }
@@ -78,34 +83,35 @@ fn unloading_and_replicas() {
             && text.contains("run             400\nunfix           bath\n")
     );
     let plan = serde_json::to_string(&all[0]).unwrap();
-    assert!(!plan.contains("seed") && serde_json::from_str::<Run>(&plan).unwrap() == all[0]);
+    assert!(!plan.contains("seed") && serde_json::from_str::<MdRun>(&plan).unwrap() == all[0]);
     for bad in ["unload=0.5", "x=1e-5,unload=1", "x=1e-5,unload=0", "x=1e-5,unload=0.5,unload=0.5"] {
-        assert!(Run::parse(bad, "p".into(), 0).is_err(), "{bad}");
+        assert!(MdRun::parse(bad, "p".into(), 0).is_err(), "{bad}");
     }
 }
 
-/// §3.2: a hundred parts of the final strain, each relaxed, then 5 ps of averages; lengths as at a constant rate at the end
-/// of each interval.
+/// §3.2: a hundred strain increments, each relaxed, then 5 ps of averages; at the end of each interval the
+/// lengths are those at a constant rate.
 #[test]
 fn pulling_in_steps() {
     let stepwise = Some(Stepwise { pull: 100, relax: 2000 });
     let protocol = Protocol { steps: 1_210_000, every: 12_100, stepwise, ..Protocol::default() };
     protocol.check().unwrap();
-    let run = Run::parse("z=2.5e-7,yz=1e-7", "p".into(), 0).unwrap();
+    let run = MdRun::parse("z=2.5e-7,yz=1e-7", "p".into(), 0).unwrap();
     let text = input::deform(&protocol, &run, "d", "o");
     for line in [
         "variable        k loop 100\n",
         "variable        fz equal (1+1.5125e-3*v_k)/(1+1.5125e-3*(v_k-1))\n",
         "variable        dyz equal $(lz)*6.05e-4\n",
         "fix             pull all deform 1 z scale ${fz} yz delta ${dyz} remap x units box flip no\n",
-        "fix             bath all npt temp 300 300 50 x 1 1 500 y 1 1 500 scalexy no scalexz no scaleyz no\nrun             100\n",
+        "fix             bath all npt temp 300 300 50 x 1 1 500 y 1 1 500 scalexy no scalexz no scaleyz no\n\
+                     run             100\n",
         "fix             bath all nvt temp 300 300 50\nrun             12000\n",
         "fix             mean all ave/time 1 10000 12100 ",
         "fix             now all ave/time 1 1 12100 ",
     ] {
         assert!(text.contains(line), "{line}\n{text}");
     }
-    // an old plan has no such key, and a constant rate none in its new one
+    // old plans lack this key, and new plans with constant rates omit it
     let plain = serde_json::to_string(&Protocol::default()).unwrap();
     assert!(!plain.contains("stepwise"));
     assert_eq!(serde_json::from_str::<Protocol>(&plain).unwrap(), Protocol::default());
@@ -115,7 +121,7 @@ fn pulling_in_steps() {
     }
 }
 
-/// LAMMPS runs in the set's folder: an engine beside the caller must be found from there.
+/// LAMMPS runs in the folder of the set: a relative path to an engine must still be found.
 #[test]
 fn an_engine_is_named_from_anywhere() {
     let directory = tempfile::tempdir_in(".").unwrap();
@@ -127,7 +133,7 @@ fn an_engine_is_named_from_anywhere() {
 }
 
 #[test]
-fn what_cannot_be_run() {
+fn invalid_plans_are_refused() {
     let good = Protocol::default();
     for bad in [
         Protocol { every: 0, ..good.clone() },
@@ -140,17 +146,17 @@ fn what_cannot_be_run() {
     ] {
         assert!(bad.check().is_err(), "{bad:?}");
     }
-    assert!(Grid { levels: 201, ..Grid::default() }.runs(&good).is_err());
-    assert!(Grid { rate_scale: 0.0, ..Grid::default() }.runs(&good).is_err());
+    assert!(RateGrid { levels: 201, ..RateGrid::default() }.runs(&good).is_err());
+    assert!(RateGrid { rate_scale: 0.0, ..RateGrid::default() }.runs(&good).is_err());
     let directory = tempfile::tempdir().unwrap();
-    let plan = |runs| Plan { protocol: Protocol::default(), runs };
+    let plan = |runs| MdPlan { protocol: Protocol::default(), runs };
     assert!(Folder::create(directory.path(), plan(vec![])).is_err());
-    let run = Run::parse("x=1e-5", "p".into(), 0).unwrap();
+    let run = MdRun::parse("x=1e-5", "p".into(), 0).unwrap();
     let twice = Folder::create(directory.path(), plan(vec![run.clone(), run.clone()])).unwrap_err();
     assert!(twice.to_string().contains("`p` twice"), "{twice}");
     Folder::create(directory.path(), plan(vec![run.clone()])).unwrap();
     Folder::create(directory.path(), plan(vec![run])).unwrap();
-    let other = Run::parse("x=2e-5", "p".into(), 0).unwrap();
+    let other = MdRun::parse("x=2e-5", "p".into(), 0).unwrap();
     assert!(
         Folder::create(directory.path(), plan(vec![other])).unwrap_err().to_string().contains("another plan")
     );

@@ -1,14 +1,15 @@
-//! The `mdsurrogate` command line.
+//! Command line of `mdsurrogate`.
 
-// harness::say! prints without a panic where nobody reads any more
+// harness::say! does not panic when the reader of a pipe has gone
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 use crate::Error;
-use crate::dataset::{Columns, LammpsUnits, Measure, Origin, ReadOptions, read};
+use crate::dataset::{BoxReference, LammpsUnits, PressureConvention, ReadOptions, SampledColumns, read};
 use crate::export::{CSource, OnnxOptions, c_source, fortran_source, onnx};
-use crate::program::run::{Failure, Mdsurrogate, describe};
+use crate::program::run::{Mdsurrogate, describe};
 use crate::surrogate::Surrogate;
 use harness::report::Report;
+use harness::scene::Failure;
 use polycore::file::atomic_write;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -20,42 +21,42 @@ mod predict;
 
 #[derive(clap::Subcommand)]
 enum Command {
-    /// Judge laws on the data of a scene: errors, physics, held-out runs, error against time.
+    /// Evaluate laws on the data of a scene: errors, physics, held-out runs, error against time.
     Eval(eval::Eval),
     /// Describe a table (CSV, CSV.GZ, HDF5): runs, ranges, noise.
     Info {
-        /// The table.
+        /// Table (CSV, CSV.GZ, HDF5, LAMMPS output).
         file: PathBuf,
-        /// Read the columns at the instant of sampling instead of the averaged ones.
+        /// Read instantaneous instead of averaged columns.
         #[arg(long)]
         instantaneous: bool,
-        /// Units of a LAMMPS file that does not tell them: real, metal, si, cgs, electron, micro, nano.
+        /// Units of LAMMPS output that does not state them: real, metal, si, cgs, electron, micro, nano.
         #[arg(long)]
         units: Option<String>,
-        /// Which row is undeformed: the first of each run, or of the file (run, file).
+        /// Undeformed row: the first row of each run (run) or of the file (file).
         #[arg(long)]
         reference: Option<String>,
         /// Read columns pxx … as pressures of LAMMPS, σ = −p.
         #[arg(long)]
         pressure: bool,
     },
-    /// Molecular dynamics with LAMMPS: write, prepare, run (also to continue), collect.
+    /// Run molecular dynamics with LAMMPS: write, prepare, run (also to continue), collect.
     #[command(subcommand)]
     Md(md::Md),
-    /// Write a law (safetensors) as source code or as ONNX.
+    /// Export a law (safetensors) as source code or ONNX.
     Export {
-        /// The law.
+        /// Law to export.
         law: PathBuf,
-        /// Where the files go; the last part is the name of the function: out/pa12 gives out/pa12.c and out/pa12.h,
-        /// out/pa12.f90 or out/pa12.onnx.
+        /// Output files, named after the function: out/pa12 gives out/pa12.c and out/pa12.h, out/pa12.f90 or
+        /// out/pa12.onnx.
         output: PathBuf,
-        /// In which form.
-        #[arg(long, value_enum, default_value_t = Form::C)]
-        form: Form,
-        /// Of ONNX: numbers of 32 bits instead of 64.
+        /// Format of the export.
+        #[arg(long, value_enum, default_value_t = ExportFormat::C)]
+        form: ExportFormat,
+        /// Write ONNX with numbers of 32 bits instead of 64.
         #[arg(long)]
         single: bool,
-        /// Of ONNX: the tangent, too, which the other forms always have.
+        /// Write ONNX with the tangent; C and Fortran always have it.
         #[arg(long)]
         tangent: bool,
     },
@@ -79,7 +80,7 @@ pub fn main() -> ExitCode {
     })
 }
 
-/// How a table is to be understood, as in `[data]` of a scene.
+/// Returns options for reading a table, as in `[data]` of a scene.
 fn read_options(
     instantaneous: bool,
     units: Option<&str>,
@@ -97,15 +98,15 @@ fn read_options(
         known.map(|(_, units)| *units).ok_or_else(|| wrong("units", name, &names))
     });
     let origin = reference.map(|name| match name {
-        "run" => Ok(Origin::Run),
-        "file" => Ok(Origin::File),
+        "run" => Ok(BoxReference::Run),
+        "file" => Ok(BoxReference::File),
         other => Err(wrong("reference", other, "run, file")),
     });
     Ok(ReadOptions {
-        columns: if instantaneous { Columns::Instantaneous } else { Columns::Averaged },
+        columns: if instantaneous { SampledColumns::Instantaneous } else { SampledColumns::Averaged },
         units: units.transpose()?,
         origin: origin.transpose()?,
-        measure: pressure.then_some(Measure::Pressure),
+        pressure: pressure.then_some(PressureConvention::Pressure),
         ..ReadOptions::default()
     })
 }
@@ -115,34 +116,33 @@ fn info(file: &Path, options: &ReadOptions) -> Result<bool, Error> {
     let mut report = Report::new("mdsurrogate", env!("CARGO_PKG_VERSION"), "");
     describe(&mut report, "", &set);
     harness::case::terminal::print(report.table());
-    harness::say!("without variance: {}", set.constant_components().join(", "));
+    harness::say!("constant components: {}", set.constant_components().join(", "));
     for line in &set.provenance {
         harness::say!("{line}");
     }
     Ok(true)
 }
 
-fn export(law: &Path, output: &Path, form: Form, options: OnnxOptions) -> Result<bool, Error> {
-    if options != OnnxOptions::default() && form != Form::Onnx {
+fn export(law: &Path, output: &Path, form: ExportFormat, options: OnnxOptions) -> Result<bool, Error> {
+    if options != OnnxOptions::default() && form != ExportFormat::Onnx {
         let found = if options.single { "--single" } else { "--tangent" }.to_owned();
-        let allowed =
-            "with `--form onnx`; C and Fortran are in double precision and have the tangent".to_owned();
+        let allowed = "`--form onnx` (C and Fortran have double precision and the tangent)".to_owned();
         return Err(Error::Parameter { name: "option of export", found, allowed });
     }
-    // `out/` names a folder and no function
+    // `out/` names a folder but no function
     let folder = output.as_os_str().as_encoded_bytes().ends_with(b"/");
     let name = output.file_name().filter(|_| !folder).unwrap_or_default().to_string_lossy().into_owned();
     let law = Surrogate::read(law)?;
     let files = match form {
-        Form::C => {
+        ExportFormat::C => {
             let CSource { header, source } = c_source(&law, &name)?;
             vec![("h", header.into_bytes()), ("c", source.into_bytes())]
         }
-        Form::Fortran => vec![("f90", fortran_source(&law, &name)?.into_bytes())],
-        Form::Onnx => vec![("onnx", onnx(&law, options)?)],
+        ExportFormat::Fortran => vec![("f90", fortran_source(&law, &name)?.into_bytes())],
+        ExportFormat::Onnx => vec![("onnx", onnx(&law, options)?)],
     };
     if let Some(folder) = output.parent() {
-        std::fs::create_dir_all(folder).map_err(Error::io("create", folder))?;
+        std::fs::create_dir_all(folder).map_err(Error::from_io("create", folder))?;
     }
     for (end, bytes) in files {
         let path = output.with_file_name(format!("{name}.{end}"));
@@ -152,9 +152,9 @@ fn export(law: &Path, output: &Path, form: Form, options: OnnxOptions) -> Result
     Ok(true)
 }
 
-/// Forms of an exported law.
+/// Format of an exported law.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Form {
+enum ExportFormat {
     /// C99: source and header.
     C,
     /// Fortran 2008: a subroutine and a UMAT.

@@ -1,6 +1,7 @@
-//! Bayesian optimisation: a Gaussian process of the losses, and the candidate of largest expected improvement.
+//! Bayesian optimisation: a Gaussian process of the losses, and the candidate with the largest expected
+//! improvement.
 
-use super::{Candidate, Journal, Method, Oracle, Space, ask};
+use super::{Journal, Oracle, SearchCandidate, SearchMethod, SearchSpace, ask};
 use crate::Error;
 use crate::random::SplitMix64;
 use egobox_gp::GaussianProcess;
@@ -9,25 +10,27 @@ use egobox_gp::mean_models::ConstantMean;
 use linfa::traits::Fit;
 use ndarray::{Array1, Array2};
 
-/// Candidates among which the expected improvement is compared: at random, and near the best ones.
+/// Number of compared candidates, each at random and near the best ones.
 const SAMPLED: usize = 500;
-/// Of the best so far, how many have neighbours looked at.
+/// Number of best candidates whose neighbours are compared.
 const BEST: usize = 5;
-/// Noise of a loss relative to the spread of all: two seeds of one network differ by about a tenth of it.
+/// Noise variance of a loss relative to the variance of all losses: two seeds of a network differ by about a
+/// tenth of the spread.
 const NUGGET: f64 = 1e-2;
-/// Starts of the likelihood's maximisation; more than one, because egobox draws a single one without a seed.
+/// Number of starts of the likelihood maximisation; above one, because egobox draws a single start without a
+/// seed.
 const STARTS: usize = 2;
 
 /// Searches with `trials` trainings of `epochs`, the first `initial` of them at random.
 ///
-/// The process (Matérn 5/2, constant mean, egobox) is of the logarithm of the loss; a training that diverged counts as
-/// twice the worst loss.
+/// The Gaussian process (Matérn 5/2, constant mean, egobox) models the logarithm of the loss; a diverged
+/// training counts as twice the largest loss.
 ///
 /// # Errors
-/// [`Error::Parameter`] for fewer than 3 initial trials or fewer trials than those, [`Space::check`], and what the
-/// oracle tells.
+/// Returns [`Error::Parameter`] for fewer than 3 initial trials or fewer trials than these, and the errors of
+/// [`SearchSpace::check`] and the oracle.
 pub fn bayesian(
-    space: &Space,
+    space: &SearchSpace,
     [initial, trials]: [usize; 2],
     epochs: u32,
     seed: u64,
@@ -36,34 +39,34 @@ pub fn bayesian(
 ) -> Result<(), Error> {
     space.check()?;
     if !(3..=10_000).contains(&initial) || !(initial..=10_000).contains(&trials) {
-        let allowed = "3 or more initial ones, and 10,000 trials at most";
+        let allowed = "at least 3 initial and at most 10,000 trials";
         return Err(Error::parameter("trials", format!("{trials}, {initial} of them initial"), allowed));
     }
     let mut random = SplitMix64::new(seed);
-    let (mut points, mut losses): (Vec<Candidate>, Vec<Option<f64>>) = (Vec::new(), Vec::new());
+    let (mut points, mut losses): (Vec<SearchCandidate>, Vec<Option<f64>>) = (Vec::new(), Vec::new());
     for number in 0..trials {
         let candidate = match number < initial {
             true => space.sample(&mut random),
             false => most_promising(space, &points, &losses, &mut random),
         };
-        losses.push(ask(oracle, journal, Method::Bayesian, number, &candidate, epochs)?);
-        oracle.forget(Method::Bayesian, &[number]);
+        losses.push(ask(oracle, journal, SearchMethod::Bayesian, number, &candidate, epochs)?);
+        oracle.forget(SearchMethod::Bayesian, &[number]);
         points.push(candidate);
     }
     Ok(())
 }
 
-/// The candidate, not yet tried, of the largest expected improvement; any one where no process can be fitted (all
-/// losses equal) or all was tried.
+/// Returns the untried candidate with the largest expected improvement; a random one if no process can be
+/// fitted (equal losses) or all candidates were tried.
 fn most_promising(
-    space: &Space,
-    tried: &[Candidate],
+    space: &SearchSpace,
+    tried: &[SearchCandidate],
     losses: &[Option<f64>],
     random: &mut SplitMix64,
-) -> Candidate {
+) -> SearchCandidate {
     let mut order: Vec<usize> = (0..tried.len()).collect();
     order.sort_by(|&a, &b| losses[a].unwrap_or(f64::INFINITY).total_cmp(&losses[b].unwrap_or(f64::INFINITY)));
-    let mut sampled: Vec<Candidate> = (0..SAMPLED).map(|_| space.sample(random)).collect();
+    let mut sampled: Vec<SearchCandidate> = (0..SAMPLED).map(|_| space.sample(random)).collect();
     for k in 0..SAMPLED {
         sampled.push(space.neighbour(&tried[order[k % order.len().min(BEST)]], random));
     }
@@ -75,9 +78,9 @@ fn most_promising(
         losses.iter().map(|loss| loss.unwrap_or(2.0 * worst).max(f64::MIN_POSITIVE).ln()).collect();
     let least = targets.iter().copied().fold(f64::INFINITY, f64::min);
     let width = space.encode(first).len();
-    let table = |of: &[Candidate]| {
-        let flat: Vec<f64> = of.iter().flat_map(|candidate| space.encode(candidate)).collect();
-        Array2::from_shape_vec((of.len(), width), flat).ok()
+    let table = |list: &[SearchCandidate]| {
+        let flat: Vec<f64> = list.iter().flat_map(|candidate| space.encode(candidate)).collect();
+        Array2::from_shape_vec((list.len(), width), flat).ok()
     };
     let (Some(x), Some(asked)) = (table(tried), table(&sampled)) else { return fallback };
     let process = GaussianProcess::<f64, ConstantMean, Matern52Corr>::params(
@@ -100,7 +103,7 @@ fn most_promising(
     best.1.map_or(fallback, |k| sampled[k].clone())
 }
 
-/// (f* − μ)Φ(z) + σφ(z) with z = (f* − μ)/σ (Jones et al. 1998, Eq. 15).
+/// Computes (f* − μ)Φ(z) + σφ(z) with z = (f* − μ)/σ (Jones et al. 1998, Eq. 15).
 fn expected_improvement(least: f64, mean: f64, deviation: f64) -> f64 {
     let gain = least - mean;
     if deviation <= 0.0 {
@@ -116,7 +119,7 @@ fn expected_improvement(least: f64, mean: f64, deviation: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// By quadrature of max(f* − y, 0) over the normal distribution.
+    /// Quadrature of max(f* − y, 0) over the normal distribution.
     #[test]
     fn expected_improvement_is_an_expectation() {
         for (mean, deviation) in [(0.0, 1.0), (1.5, 0.7), (-2.0, 0.3), (4.0, 1.0)] {
@@ -127,7 +130,7 @@ mod tests {
                 (0.5 - (mean + deviation * z)).max(0.0) * density * step
             };
             let sum: f64 = (-100_000..=100_000).map(gain).sum();
-            // the rule's error is of order step² at the kink
+            // the error of the rule at the kink is of order step²
             assert!((expected_improvement(0.5, mean, deviation) - sum).abs() < 1e-8);
         }
         assert_eq!(expected_improvement(1.0, 0.25, 0.0), 0.75);

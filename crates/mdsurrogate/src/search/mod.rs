@@ -1,8 +1,8 @@
 //! Search for the hyperparameters of an `ann`: Hyperband and Bayesian optimisation over Table 3.3.
 //!
-//! A search asks an [`Oracle`] for the validation loss of candidates after some epochs and remembers every answer in a
-//! [`Journal`]. It is a function of seed and answers alone: a search that continues with the journal of a killed one asks
-//! the same questions again, gets the answers that are known from the journal, and continues where it was.
+//! A search asks an [`Oracle`] for the validation loss of candidates after some epochs, and records each
+//! answer in a [`Journal`]. It depends only on seed and answers: a search that continues with the journal of
+//! an interrupted one repeats its questions, takes known answers from the journal, and continues from there.
 
 mod bayesian;
 mod hyperband;
@@ -13,30 +13,30 @@ mod tests;
 
 pub use bayesian::bayesian;
 pub use hyperband::{brackets, hyperband};
-pub use space::{Candidate, Space};
+pub use space::{SearchCandidate, SearchSpace};
 
 use crate::Error;
 use crate::random::SplitMix64;
 use serde::{Deserialize, Serialize};
 
-/// How candidates are chosen.
+/// Search method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
-pub enum Method {
-    /// Many candidates for few epochs, the best of them for more (Li et al. 2018,
+pub enum SearchMethod {
+    /// Many candidates for few epochs, the best ones for more (Li et al. 2018,
     /// <https://jmlr.org/papers/v18/16-558.html>).
     Hyperband,
-    /// Candidates where a Gaussian process of the losses so far expects the largest improvement (Jones et al. 1998,
-    /// <https://doi.org/10.1023/A:1008306431147>).
+    /// Candidates with the largest expected improvement by a Gaussian process of the losses (Jones et al.
+    /// 1998, <https://doi.org/10.1023/A:1008306431147>).
     Bayesian,
-    /// Candidates at random, all for the most epochs (Bergstra & Bengio 2012,
-    /// <https://jmlr.org/papers/v13/bergstra12a.html>): what the others must beat.
+    /// Random candidates, all for the largest number of epochs (Bergstra & Bengio 2012,
+    /// <https://jmlr.org/papers/v13/bergstra12a.html>): the baseline of the other methods.
     Random,
 }
 
-impl Method {
-    /// As in a scene.
+impl SearchMethod {
+    /// Returns the name in scenes.
     pub fn name(self) -> &'static str {
         match self {
             Self::Hyperband => "hyperband",
@@ -49,53 +49,53 @@ impl Method {
 /// One trial of a search.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Trial {
-    /// Which method asked.
-    pub method: Method,
-    /// The number of the candidate within its method, from 0.
+    /// Search method.
+    pub method: SearchMethod,
+    /// Number of the candidate in its method, from 0.
     pub number: usize,
-    /// What was trained.
-    pub candidate: Candidate,
-    /// For how many epochs in all.
+    /// Hyperparameters of the candidate.
+    pub candidate: SearchCandidate,
+    /// Total number of epochs.
     pub epochs: u32,
-    /// The best validation loss up to then, MPa²; none of a training that diverged.
+    /// Lowest validation loss so far, MPa²; `None` for a diverged training.
     pub loss: Option<f64>,
 }
 
 /// All trials so far, in order.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Journal {
-    /// The answers.
+    /// Trials with their losses.
     pub trials: Vec<Trial>,
 }
 
 impl Journal {
-    fn known(&self, method: Method, number: usize, epochs: u32) -> Option<&Trial> {
+    fn known(&self, method: SearchMethod, number: usize, epochs: u32) -> Option<&Trial> {
         self.trials.iter().find(|t| t.method == method && t.number == number && t.epochs == epochs)
     }
 
-    /// The longest trained trial of each candidate, best first; diverged ones last.
+    /// Returns the longest trial of each candidate, best first, diverged ones last.
     pub fn ranking(&self) -> Vec<&Trial> {
         let longest = |t: &Trial| {
             let same = |o: &&Trial| o.method == t.method && o.number == t.number;
             self.trials.iter().filter(same).map(|o| o.epochs).max() == Some(t.epochs)
         };
         let mut best: Vec<&Trial> = self.trials.iter().filter(|t| longest(t)).collect();
-        // a stable sort: equal losses stay in the order of the questions
-        best.sort_by(|a, b| worth(a).total_cmp(&worth(b)));
+        // stable sort: equal losses keep the order of the trials
+        best.sort_by(|a, b| loss_or_infinity(a).total_cmp(&loss_or_infinity(b)));
         best
     }
 }
 
-fn worth(trial: &Trial) -> f64 {
+fn loss_or_infinity(trial: &Trial) -> f64 {
     trial.loss.unwrap_or(f64::INFINITY)
 }
 
-/// Asks for `trials` candidates at random, each for `epochs`.
+/// Tries `trials` random candidates, each for `epochs`.
 ///
 /// # Errors
-/// [`Space::check`], and what the oracle returns.
-pub fn at_random(
-    space: &Space,
+/// Returns the errors of [`SearchSpace::check`] and the oracle.
+pub fn random_search(
+    space: &SearchSpace,
     trials: usize,
     epochs: u32,
     seed: u64,
@@ -106,32 +106,32 @@ pub fn at_random(
     let mut random = SplitMix64::new(seed);
     for number in 0..trials {
         let candidate = space.sample(&mut random);
-        ask(oracle, journal, Method::Random, number, &candidate, epochs)?;
-        oracle.forget(Method::Random, &[number]);
+        ask(oracle, journal, SearchMethod::Random, number, &candidate, epochs)?;
+        oracle.forget(SearchMethod::Random, &[number]);
     }
     Ok(())
 }
 
-/// A trainer of candidates.
+/// Trainer of candidates.
 pub trait Oracle {
-    /// The best validation loss of a candidate after so many epochs in all; none if its training diverged. The journal
-    /// has all answers before this one.
+    /// Returns the lowest validation loss of a candidate after a total number of epochs; `None` if its
+    /// training diverged. The journal contains all earlier answers.
     ///
     /// # Errors
-    /// Anything that ends the search.
+    /// Returns any error that ends the search.
     fn loss(&mut self, question: &Trial, journal: &Journal) -> Result<Option<f64>, Error>;
 
-    /// No more questions about these candidates will come.
-    fn forget(&mut self, method: Method, numbers: &[usize]);
+    /// Drops the trainings of candidates that will not continue.
+    fn forget(&mut self, method: SearchMethod, numbers: &[usize]);
 }
 
-/// An answer from the journal, or a new one.
+/// Returns the answer of the journal, or asks the oracle.
 fn ask(
     oracle: &mut dyn Oracle,
     journal: &mut Journal,
-    method: Method,
+    method: SearchMethod,
     number: usize,
-    candidate: &Candidate,
+    candidate: &SearchCandidate,
     epochs: u32,
 ) -> Result<Option<f64>, Error> {
     if let Some(known) = journal.known(method, number, epochs) {

@@ -1,4 +1,4 @@
-//! What may be chosen.
+//! Search space of the hyperparameters.
 
 use crate::Error;
 use crate::network::{Activation, Architecture, MOST_NEURONS};
@@ -10,21 +10,22 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
-pub struct Space {
-    /// Fewest and most hidden layers.
+pub struct SearchSpace {
+    /// Smallest and largest number of hidden layers.
     pub layers: [usize; 2],
-    /// Fewest and most neurons in a layer.
+    /// Smallest and largest number of neurons per layer.
     pub neurons: [usize; 2],
-    /// Distance of the numbers of neurons tried.
+    /// Step of the number of neurons.
     pub step: usize,
-    /// Of a layer.
+    /// Activations of the layers.
     pub activations: Vec<Activation>,
-    /// Of Adam.
+    /// Learning rates of Adam.
     pub learning_rates: Vec<f64>,
 }
 
-impl Default for Space {
-    /// Table 3.3. The distance of 32 neurons is not printed there: all widths of Table 3.4 are multiples of it.
+impl Default for SearchSpace {
+    /// Returns Table 3.3. The step of 32 neurons is not printed there: all widths of Table 3.4 are multiples
+    /// of it.
     fn default() -> Self {
         Self {
             layers: [2, 5],
@@ -36,31 +37,33 @@ impl Default for Space {
     }
 }
 
-/// One choice.
+/// One choice of hyperparameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Candidate {
+pub struct SearchCandidate {
     /// Neurons and activation of each hidden layer.
     pub hidden: Vec<(usize, Activation)>,
-    /// Of Adam.
+    /// Learning rate of Adam.
     pub learning_rate: f64,
 }
 
-impl Candidate {
-    /// Its network from C to S.
+impl SearchCandidate {
+    /// Returns its network from C to S.
     pub fn architecture(&self) -> Architecture {
         Architecture::new(6, &self.hidden, 6)
     }
 
-    /// Its layers as Table 3.4 writes them.
+    /// Describes its layers as in Table 3.4.
     pub fn layers(&self) -> String {
         let layer = |(neurons, activation): &(usize, Activation)| format!("{neurons} × {activation:?}");
         self.hidden.iter().map(layer).collect::<Vec<_>>().join(", ")
     }
 }
 
-impl Space {
+impl SearchSpace {
+    /// Checks the ranges.
+    ///
     /// # Errors
-    /// [`Error::Parameter`] for an empty range, a step of 0, or numbers that no network or training can have.
+    /// Returns [`Error::Parameter`] for an empty range, a step of 0, and invalid values.
     pub fn check(&self) -> Result<(), Error> {
         let [least, most] = self.layers;
         if !(1..=most).contains(&least) || most > 20 {
@@ -85,7 +88,7 @@ impl Space {
         }
     }
 
-    /// How many numbers of neurons there are.
+    /// Counts the possible numbers of neurons.
     fn widths(&self) -> usize {
         1 + (self.neurons[1] - self.neurons[0]) / self.step
     }
@@ -95,16 +98,19 @@ impl Space {
         (neurons, self.activations[random.below(self.activations.len())])
     }
 
-    /// Any candidate, each number of layers, width, activation and rate being as likely as the others.
-    pub fn sample(&self, random: &mut SplitMix64) -> Candidate {
+    /// Draws a random candidate; depth, widths, activations and rate are uniformly distributed.
+    pub fn sample(&self, random: &mut SplitMix64) -> SearchCandidate {
         let layers = self.layers[0] + random.below(self.layers[1] - self.layers[0] + 1);
         let hidden = (0..layers).map(|_| self.layer(random)).collect();
-        Candidate { hidden, learning_rate: self.learning_rates[random.below(self.learning_rates.len())] }
+        SearchCandidate {
+            hidden,
+            learning_rate: self.learning_rates[random.below(self.learning_rates.len())],
+        }
     }
 
-    /// A candidate that differs from another in one layer, its depth or its rate.
-    pub fn neighbour(&self, of: &Candidate, random: &mut SplitMix64) -> Candidate {
-        let mut near = of.clone();
+    /// Returns a candidate that differs in one layer, the depth or the rate.
+    pub fn neighbour(&self, from: &SearchCandidate, random: &mut SplitMix64) -> SearchCandidate {
+        let mut near = from.clone();
         match random.below(4) {
             0 => near.learning_rate = self.learning_rates[random.below(self.learning_rates.len())],
             1 if near.hidden.len() < self.layers[1] => near.hidden.push(self.layer(random)),
@@ -119,16 +125,17 @@ impl Space {
         near
     }
 
-    /// A candidate as a point for a Gaussian process: depth, decimal logarithm of the rate, and of each layer that it
-    /// might have the width (0 for none) and one number for each activation but the first, all about 0 to 1.
-    pub fn encode(&self, candidate: &Candidate) -> Vec<f64> {
+    /// Encodes a candidate as a point of a Gaussian process: depth, decimal logarithm of the rate, and for
+    /// each possible layer the width (0 without it) and one number per activation except the first, all about
+    /// 0 to 1.
+    pub fn encode(&self, candidate: &SearchCandidate) -> Vec<f64> {
         let share =
             |value: f64, [low, high]: [f64; 2]| if high > low { (value - low) / (high - low) } else { 0.0 };
         let rates = || self.learning_rates.iter().map(|rate| rate.log10());
-        let of_rates = range(rates());
+        let rate_range = range(rates());
         let mut point = vec![
             share(candidate.hidden.len() as f64, self.layers.map(|count| count as f64)),
-            share(candidate.learning_rate.log10(), of_rates),
+            share(candidate.learning_rate.log10(), rate_range),
         ];
         for layer in 0..self.layers[1] {
             let at = candidate.hidden.get(layer);

@@ -1,19 +1,20 @@
 use super::*;
 use crate::network::Activation::{Relu, Softplus};
 
-/// A loss that is known: best for four layers of 128, softplus last, rate 0.01; more epochs, less of it.
-struct Known {
+/// Oracle with a known loss: smallest for four layers of 128, softplus last, rate 0.01; it falls with the
+/// epochs.
+struct KnownOracle {
     asked: Vec<(usize, u32)>,
     forgotten: usize,
     stop_after: usize,
 }
 
-impl Known {
+impl KnownOracle {
     fn new() -> Self {
         Self { asked: Vec::new(), forgotten: 0, stop_after: usize::MAX }
     }
 
-    fn value(candidate: &Candidate) -> f64 {
+    fn value(candidate: &SearchCandidate) -> f64 {
         let depth = (candidate.hidden.len() as f64 - 4.0).powi(2);
         let width: f64 = candidate.hidden.iter().map(|(n, _)| ((*n as f64 - 128.0) / 128.0).powi(2)).sum();
         let last = f64::from(u8::from(candidate.hidden[candidate.hidden.len() - 1].1 == Relu));
@@ -22,7 +23,7 @@ impl Known {
     }
 }
 
-impl Oracle for Known {
+impl Oracle for KnownOracle {
     fn loss(&mut self, question: &Trial, journal: &Journal) -> Result<Option<f64>, Error> {
         if self.asked.len() == self.stop_after {
             return Err(Error::parameter("test", "an interruption", "none"));
@@ -34,7 +35,7 @@ impl Oracle for Known {
         Ok((question.candidate.learning_rate < 0.05).then_some(value))
     }
 
-    fn forget(&mut self, _: Method, numbers: &[usize]) {
+    fn forget(&mut self, _: SearchMethod, numbers: &[usize]) {
         self.forgotten += numbers.len();
     }
 }
@@ -58,9 +59,9 @@ fn brackets_are_those_published() {
 
 #[test]
 fn hyperband_keeps_the_best_of_each_round() {
-    let (mut journal, mut oracle) = (Journal::default(), Known::new());
-    hyperband(&Space::default(), 9, 3, 4, &mut journal, &mut oracle).unwrap();
-    // 9, 3, 1; 5, 1; 3 trainings, fewer where too few converged
+    let (mut journal, mut oracle) = (Journal::default(), KnownOracle::new());
+    hyperband(&SearchSpace::default(), 9, 3, 4, &mut journal, &mut oracle).unwrap();
+    // 9, 3, 1; 5, 1; 3 trainings, fewer if few converge
     assert!(
         oracle.asked.len() <= 9 + 3 + 1 + 5 + 1 + 3 && oracle.asked.len() >= 17 + 3,
         "{:?}",
@@ -74,54 +75,55 @@ fn hyperband_keeps_the_best_of_each_round() {
     let dropped: Vec<f64> = (0..9).filter(|&k| loss(k, 3).is_none()).filter_map(|k| loss(k, 1)).collect();
     assert_eq!(promoted.len() + dropped.len(), 9);
     assert!(promoted.iter().all(|kept| dropped.iter().all(|gone| kept <= gone)), "{promoted:?} {dropped:?}");
-    // every candidate is let go
+    // each candidate is dropped at the end
     assert!(oracle.forgotten >= 15);
 }
 
 #[test]
-fn a_process_finds_what_chance_does_not() {
-    let space = Space::default();
+fn bayesian_search_beats_random_search() {
+    let space = SearchSpace::default();
     let best = |initial: usize, seed: u64| {
         let mut journal = Journal::default();
-        bayesian(&space, [initial, 30], 10, seed, &mut journal, &mut Known::new()).unwrap();
+        bayesian(&space, [initial, 30], 10, seed, &mut journal, &mut KnownOracle::new()).unwrap();
         journal.ranking()[0].loss.unwrap()
     };
     let seeds = 0..6;
     let guided: Vec<f64> = seeds.clone().map(|seed| best(8, seed)).collect();
     let by_chance: Vec<f64> = seeds.map(|seed| best(30, seed)).collect();
     let mean = |losses: &[f64]| losses.iter().sum::<f64>() / losses.len() as f64;
-    // the least value is 1.1; over ten seeds the means are 1.66 and 2.26, and nine of ten searches are better
+    // the smallest loss is 1.1; over ten seeds the means are 1.66 and 2.26, and nine of ten searches are
+    // better
     assert!(mean(&guided) < 0.8 * mean(&by_chance), "{guided:?} {by_chance:?}");
     let better = guided.iter().zip(&by_chance).filter(|(guided, by_chance)| guided < by_chance).count();
     assert!(better >= 5, "{guided:?} {by_chance:?}");
 }
 
 #[test]
-fn a_search_goes_on_where_it_stopped() {
-    let space = Space::default();
-    let search = |journal: &mut Journal, oracle: &mut Known| {
+fn a_search_continues_from_its_journal() {
+    let space = SearchSpace::default();
+    let search = |journal: &mut Journal, oracle: &mut KnownOracle| {
         hyperband(&space, 9, 3, 4, journal, oracle)?;
         bayesian(&space, [4, 9], 9, 4, journal, oracle)?;
-        at_random(&space, 5, 9, 4, journal, oracle)
+        random_search(&space, 5, 9, 4, journal, oracle)
     };
-    let (mut whole, mut oracle) = (Journal::default(), Known::new());
+    let (mut whole, mut oracle) = (Journal::default(), KnownOracle::new());
     search(&mut whole, &mut oracle).unwrap();
     for stop in [0, 5, 14, whole.trials.len() - 1] {
         let mut journal = Journal::default();
-        let mut first = Known { stop_after: stop, ..Known::new() };
+        let mut first = KnownOracle { stop_after: stop, ..KnownOracle::new() };
         assert!(search(&mut journal, &mut first).is_err());
         assert_eq!(journal.trials.len(), stop);
-        let mut second = Known::new();
+        let mut second = KnownOracle::new();
         search(&mut journal, &mut second).unwrap();
         assert_eq!(journal, whole);
-        // no question twice
+        // no question is repeated
         assert_eq!(first.asked.len() + second.asked.len(), oracle.asked.len());
     }
 }
 
 #[test]
 fn candidates_stay_in_their_space() {
-    let space = Space::default();
+    let space = SearchSpace::default();
     space.check().unwrap();
     let mut random = crate::random::SplitMix64::new(3);
     let mut near = space.sample(&mut random);
@@ -142,17 +144,17 @@ fn candidates_stay_in_their_space() {
         near = candidate;
     }
     for bad in [
-        Space { layers: [0, 3], ..Space::default() },
-        Space { layers: [4, 3], ..Space::default() },
-        Space { neurons: [0, 3], ..Space::default() },
-        Space { neurons: [32, 1 << 20], ..Space::default() },
-        Space { step: 0, ..Space::default() },
-        Space { activations: vec![], ..Space::default() },
-        Space { learning_rates: vec![], ..Space::default() },
-        Space { learning_rates: vec![f64::NAN], ..Space::default() },
+        SearchSpace { layers: [0, 3], ..SearchSpace::default() },
+        SearchSpace { layers: [4, 3], ..SearchSpace::default() },
+        SearchSpace { neurons: [0, 3], ..SearchSpace::default() },
+        SearchSpace { neurons: [32, 1 << 20], ..SearchSpace::default() },
+        SearchSpace { step: 0, ..SearchSpace::default() },
+        SearchSpace { activations: vec![], ..SearchSpace::default() },
+        SearchSpace { learning_rates: vec![], ..SearchSpace::default() },
+        SearchSpace { learning_rates: vec![f64::NAN], ..SearchSpace::default() },
     ] {
         assert!(bad.check().is_err(), "{bad:?}");
     }
-    assert!(bayesian(&space, [2, 9], 9, 4, &mut Journal::default(), &mut Known::new()).is_err());
-    assert!(bayesian(&space, [9, 8], 9, 4, &mut Journal::default(), &mut Known::new()).is_err());
+    assert!(bayesian(&space, [2, 9], 9, 4, &mut Journal::default(), &mut KnownOracle::new()).is_err());
+    assert!(bayesian(&space, [9, 8], 9, 4, &mut Journal::default(), &mut KnownOracle::new()).is_err());
 }

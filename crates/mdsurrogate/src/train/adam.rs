@@ -1,17 +1,18 @@
-//! Adam on one list of parameters.
+//! The optimizer Adam on one list of parameters.
 
-use super::model::Gradients;
-use super::parameters::Layout;
+use super::model::ParameterGradients;
+use super::parameters::ParameterLayout;
 use serde::{Deserialize, Serialize};
 
-/// Rates at which the means of gradients and of their squares forget.
+/// Decay rates of the means of gradients and of their squares.
 const BETAS: [f64; 2] = [0.9, 0.999];
-/// Keras' ε, which the thesis used.
+/// ε of Keras, as in the thesis.
 const EPSILON: f32 = 1e-7;
 
-/// Algorithm 1 of Kingma & Ba 2015 (<https://arxiv.org/abs/1412.6980>), in one pass over the parameters.
+/// Adam, Algorithm 1 of Kingma & Ba 2015 (<https://arxiv.org/abs/1412.6980>), in one pass over the
+/// parameters.
 ///
-/// It stands here and not in burn because its three lists are most of a checkpoint, and because burn's takes a dozen
+/// It replaces burn's Adam because its three lists are most of a checkpoint, and because burn needs a dozen
 /// tensor operations for each weight and bias.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Adam {
@@ -29,8 +30,14 @@ impl Adam {
         self.first.len().min(self.second.len())
     }
 
-    /// θ ← θ − η m̂/(√v̂ + ε) with m̂ = m/(1 − β₁ᵗ), v̂ = v/(1 − β₂ᵗ).
-    pub fn step(&mut self, rate: f64, parameters: &mut [f32], layout: &Layout, gradients: &Gradients) {
+    /// Updates θ ← θ − η m̂/(√v̂ + ε) with m̂ = m/(1 − β₁ᵗ), v̂ = v/(1 − β₂ᵗ).
+    pub fn step(
+        &mut self,
+        rate: f64,
+        parameters: &mut [f32],
+        layout: &ParameterLayout,
+        gradients: &ParameterGradients,
+    ) {
         self.steps += 1;
         let unbiased = |beta: f64| 1.0 - beta.powf(self.steps as f64);
         let rate = (rate / unbiased(BETAS[0])) as f32;
@@ -39,13 +46,13 @@ impl Adam {
             let [weights, bias] = &gradients.layers[l];
             for (range, gradient) in [(layout.weights(l), weights), (layout.bias(l), bias)] {
                 let (first, second) = (&mut self.first[range.clone()], &mut self.second[range.clone()]);
-                pass(rate, scale, &mut parameters[range], first, second, gradient);
+                update(rate, scale, &mut parameters[range], first, second, gradient);
             }
         }
     }
 }
 
-fn pass(rate: f32, scale: f32, theta: &mut [f32], m: &mut [f32], v: &mut [f32], g: &[f32]) {
+fn update(rate: f32, scale: f32, theta: &mut [f32], m: &mut [f32], v: &mut [f32], g: &[f32]) {
     let [beta_1, beta_2] = BETAS.map(|beta| beta as f32);
     let count = theta.len();
     let (m, v, g) = (&mut m[..count], &mut v[..count], &g[..count]);
@@ -63,10 +70,10 @@ mod tests {
     use burn::optim::{AdamConfig, Optimizer};
     use burn::tensor::{Device, Tensor, TensorData};
 
-    /// burn's own Adam takes the same steps.
+    /// The steps agree with those of burn's Adam.
     #[test]
-    fn steps_are_those_of_burn() {
-        let layout = Layout::new(&Architecture::new(3, &[], 2));
+    fn steps_agree_with_burn() {
+        let layout = ParameterLayout::new(&Architecture::new(3, &[], 2));
         assert_eq!(Architecture::new(3, &[], 2).activations, [Activation::Linear]);
         let mut ours: Vec<f32> = (0..8).map(|i| 0.3 * i as f32 - 1.0).collect();
         let device = Device::flex();
@@ -76,7 +83,8 @@ mod tests {
         for step in 0..50 {
             let gradient: Vec<f32> =
                 (0..8).map(|i| ((i * 7 + step) as f32).sin() * 10f32.powi(i - 4)).collect();
-            let gradients = Gradients { layers: vec![[gradient[..6].to_vec(), gradient[6..].to_vec()]] };
+            let gradients =
+                ParameterGradients { layers: vec![[gradient[..6].to_vec(), gradient[6..].to_vec()]] };
             adam.step(0.01, &mut ours, &layout, &gradients);
             let given = Tensor::<1>::from_data(TensorData::new(gradient, [8]), &device);
             (theirs, state) = burn.step(0.01, theirs, given, state);

@@ -1,30 +1,32 @@
-//! Rows as networks see them: single precision, standardised, in batches.
+//! Training examples: single precision, standardised, in batches.
 
 use super::Loss;
-use crate::dataset::Row;
+use crate::dataset::DataRow;
 use crate::surrogate::{Header, Kind, Surrogate};
 use burn::tensor::TensorData;
 
-/// Pa in the unit of the loss.
+/// Pascals per megapascal.
 const MEGAPASCAL: f64 = 1e6;
 
 /// Inputs and targets of some rows.
 pub(super) struct Examples {
     inputs: usize,
-    /// (rows, inputs).
+    /// Inputs, (rows, inputs).
     x: Vec<f32>,
-    /// (rows, inputs · 6): what the gradient of N by its inputs is multiplied with to give S in MPa; of an energy. Of a
-    /// polyconvex one, by its invariants: also by those without variance in these rows, which its stress at rest needs.
+    /// Factors from the gradient of N by its inputs to S in MPa, for an energy: (rows, inputs · 6). For a
+    /// polyconvex energy by its invariants, also by those without variance in these rows, which the stress at
+    /// rest needs.
     slopes: Vec<f32>,
-    /// (rows, 6): targets, in units of [`units`].
+    /// Targets in units of [`units`], (rows, 6).
     s: Vec<f32>,
-    /// (rows, 36): from S to what was measured ([`Row::elimination`]); empty where all rows have whole stresses.
+    /// Maps from S to the measured stresses ([`DataRow::elimination`]), (rows, 36); empty if all rows have
+    /// full stresses.
     maps: Vec<f32>,
     /// Variances of the components of S, MPa².
     variances: [f64; 6],
 }
 
-/// Some rows as tensors.
+/// Batch of rows as tensors.
 pub(super) struct Batch {
     pub rows: usize,
     pub x: TensorData,
@@ -33,7 +35,7 @@ pub(super) struct Batch {
     pub maps: Option<TensorData>,
 }
 
-/// What a network's outputs are multiplied with and added to, to give S in MPa.
+/// Returns factor and offset from the outputs of a network to S in MPa.
 pub(super) fn units(header: &Header) -> ([f64; 6], [f64; 6]) {
     let (mut unit, mut mean) = ([1.0; 6], [0.0; 6]);
     if header.kind == Kind::Ann {
@@ -45,7 +47,8 @@ pub(super) fn units(header: &Header) -> ([f64; 6], [f64; 6]) {
     (unit, mean)
 }
 
-/// S in MPa = Σ_k slopes[k] ∂N/∂x_k before the correction at the identity: (inputs · 6), in f32.
+/// Returns the factors of S in MPa = Σ_k slopes[k] ∂N/∂x_k, before the correction at the identity: (inputs ·
+/// 6), in f32.
 pub(super) fn scaled_slopes(law: &Surrogate<f64>, slopes: &[[f64; 6]]) -> Vec<f32> {
     let scale = law.header().output_deviation[0] / MEGAPASCAL;
     // S_ii = 2 ∂W/∂C_ii, S_12 = ∂W/∂C_12 with C_12 not doubled
@@ -58,7 +61,7 @@ pub(super) fn scaled_slopes(law: &Surrogate<f64>, slopes: &[[f64; 6]]) -> Vec<f3
 }
 
 impl Examples {
-    pub fn new(law: &Surrogate<f64>, rows: &[&Row]) -> Self {
+    pub fn new(law: &Surrogate<f64>, rows: &[&DataRow]) -> Self {
         let inputs = law.header().kind.inputs();
         let (unit, mean) = units(law.header());
         let energetic = law.header().kind != Kind::Ann;
@@ -81,7 +84,7 @@ impl Examples {
             }
             for a in 0..6 {
                 let target = measured[a] / MEGAPASCAL - mean[a];
-                // a component that never changes has no unit and is not learnt
+                // constant components have no unit and are not trained
                 examples.s.push(if unit[a] > 0.0 { (target / unit[a]) as f32 } else { 0.0 });
             }
             if nominal {
@@ -97,12 +100,12 @@ impl Examples {
         examples
     }
 
-    /// Rows.
+    /// Returns the number of rows.
     pub fn len(&self) -> usize {
         self.s.len() / 6
     }
 
-    /// What each component's square, MPa², counts in the loss.
+    /// Returns the weight of the squared error of each component, 1/MPa², in the loss.
     pub fn weights(&self, loss: Loss) -> [f64; 6] {
         match loss {
             Loss::Stress => [1.0; 6],
@@ -110,7 +113,7 @@ impl Examples {
         }
     }
 
-    /// The rows of these numbers.
+    /// Returns a batch of rows by number.
     pub fn batch(&self, rows: &[usize]) -> Batch {
         let gather = |from: &[f32], width: usize| {
             let mut data = Vec::with_capacity(rows.len() * width);

@@ -1,12 +1,14 @@
-//! Training of laws on [burn](https://burn.dev): the loss (3.12), Adam, early stopping, runs that continue after a kill.
+//! Training of laws with [burn](https://burn.dev): loss (3.12), Adam, early stopping, and resumption after
+//! interruptions.
 //!
-//! [`fit`] trains a law to the end; [`Training`] trains one network epoch by epoch. Its [`State`] is all that changes, to the bit: a training that goes
-//! on from a stored state ends with the same weights as an undisturbed one, and so does every rerun. [`ensemble`]
-//! makes a law of several of them; [`Surrogate::with_spread_limit`] tells it from where on they disagree.
+//! [`fit`] trains a law to the end; [`Training`] trains one network epoch by epoch. Its [`TrainingState`]
+//! contains everything that changes: a training resumed from a stored state gives bit-identical weights, as
+//! does a repetition. [`ensemble`] combines several networks in a law; [`Surrogate::with_spread_limit`] sets
+//! the limit of their disagreement.
 //!
 //! ```
-//! use mdsurrogate::dataset::{Dataset, Path, Row};
-//! use mdsurrogate::kinematics::cauchy_of_material;
+//! use mdsurrogate::dataset::{Dataset, Path, DataRow};
+//! use mdsurrogate::kinematics::cauchy_from_material;
 //! use mdsurrogate::network::{Activation::Softplus, Architecture};
 //! use mdsurrogate::surrogate::{Header, Kind, Symmetry, Workspace};
 //! use mdsurrogate::train::{Settings, fit};
@@ -18,11 +20,12 @@
 //!     let stretch = 0.9 + 0.003 * f64::from(sample);
 //!     let f = DeformationGradient::new(Tensor::new(stretch, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0))?;
 //!     let s = Voigt::new(1e9 * (stretch * stretch - 1.0) / 2.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-//!     rows.push(Row::new(sample as u64, f64::NAN, f, cauchy_of_material(&f, &s)));
+//!     rows.push(DataRow::new(sample as u64, f64::NAN, f, cauchy_from_material(&f, &s)));
 //! }
-//! let rows: Vec<&Row> = rows.iter().collect();
+//! let rows: Vec<&DataRow> = rows.iter().collect();
 //! let architecture = Architecture::new(7, &[(16, Softplus)], 1);
-//! let header = mdsurrogate::fitted::header(Kind::energy(Symmetry::Orthotropic), architecture, 1, &rows, true)?;
+//! let kind = Kind::energy(Symmetry::Orthotropic);
+//! let header = mdsurrogate::fitted::header(kind, architecture, 1, &rows, true)?;
 //! let settings = Settings { epochs: 200, batch: 16, ..Settings::default() };
 //! let (law, _) = fit(header, &rows, &[], settings)?;
 //! let stress = law.stress(&Voigt::new(1.1, 1.0, 1.0, 0.0, 0.0, 0.0), &mut Workspace::default())?.stress;
@@ -41,41 +44,41 @@ mod state;
 mod tests;
 
 pub use softening::{MOST_UNITS, loading, soften};
-pub use state::{Ending, Epoch, State};
+pub use state::{Ending, Epoch, TrainingState};
 
 use crate::Error;
-use crate::dataset::Row;
+use crate::dataset::DataRow;
 use crate::network::Network;
 use crate::random::SplitMix64;
 use crate::surrogate::{Header, Surrogate};
 use dataset::Examples;
 use model::Model;
-use parameters::Layout;
+use parameters::ParameterLayout;
 use polycore::tensor::Voigt;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// Rows in one evaluation without gradients.
+/// Rows per evaluation without gradients.
 const CHUNK: usize = 4096;
 
-/// What the loss adds up.
+/// Loss function.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Loss {
-    /// ‖S − Ŝ‖² (3.12), MPa²: the largest component rules.
+    /// Squared error ‖S − Ŝ‖² (3.12), MPa²: the largest component dominates.
     #[default]
     Stress,
-    /// Each component over its standard deviation in the training rows: all count alike, whatever their size.
+    /// Squared error of each component over its variance in the training rows: all components count alike.
     Scaled,
 }
 
-/// How the learning rate changes.
+/// Schedule of the learning rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Schedule {
-    /// Not at all, as in the thesis.
+    /// Constant, as in the thesis.
     #[default]
     Constant,
     /// Half a cosine from the given rate to 1 % of it in the last epoch (Loshchilov & Hutter 2017,
@@ -83,28 +86,29 @@ pub enum Schedule {
     Cosine,
 }
 
-/// How a network is trained.
+/// Settings of a training.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
-    /// Passes over the training rows.
+    /// Number of passes over the training rows.
     pub epochs: u32,
-    /// Rows in a step of Adam.
+    /// Rows per step of Adam.
     pub batch: usize,
-    /// Adam's step.
+    /// Learning rate of Adam.
     pub learning_rate: f64,
-    /// How it changes.
+    /// Schedule of the learning rate.
     pub schedule: Schedule,
-    /// Epochs without a better validation loss after which training stops.
+    /// Epochs without a lower validation loss before the training stops.
     pub patience: Option<u32>,
-    /// What is minimised.
+    /// Loss function to minimise.
     pub loss: Loss,
-    /// Names weights at the start and the order of the rows.
+    /// Seed of the initial weights and the order of the rows.
     pub seed: u64,
 }
 
 impl Default for Settings {
-    /// 1000 epochs as in the thesis (§3.3), Keras' batch of 32, no early stopping. The learning rate is 10⁻³: the
-    /// thesis' 10⁻² is for outputs in MPa, which start thousands of times too small.
+    /// Returns 1000 epochs as in the thesis (§3.3), the batch of Keras (32), and no early stopping. The
+    /// learning rate is 10⁻³: the thesis' 10⁻² is for outputs in MPa, which start thousands of times too
+    /// small.
     fn default() -> Self {
         Self {
             epochs: 1000,
@@ -119,9 +123,11 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// Checks the settings.
+    ///
     /// # Errors
-    /// [`Error::Parameter`] for no epoch, no row in a batch, a learning rate that is not positive and finite, or no
-    /// patience at all.
+    /// Returns [`Error::Parameter`] for no epochs, an empty batch, a learning rate that is not positive and
+    /// finite, or no patience.
     pub fn check(&self) -> Result<(), Error> {
         if !(1..=10_000_000).contains(&self.epochs) {
             return Err(Error::parameter("epochs", self.epochs, "1 to 10 million"));
@@ -133,12 +139,12 @@ impl Settings {
             return Err(Error::parameter("learning rate", self.learning_rate, "a positive, finite number"));
         }
         match self.patience {
-            Some(0) => Err(Error::parameter("patience", 0, "1 epoch or more, or none for no early stopping")),
+            Some(0) => Err(Error::parameter("patience", 0, "1 epoch or more, or no `patience`")),
             _ => Ok(()),
         }
     }
 
-    /// The learning rate in an epoch, from 0.
+    /// Returns the learning rate in an epoch, counted from 0.
     pub fn rate(&self, epoch: u32) -> f64 {
         match self.schedule {
             Schedule::Constant => self.learning_rate,
@@ -151,56 +157,57 @@ impl Settings {
     }
 }
 
-/// The training of one network.
+/// Training of one network.
 pub struct Training {
     header: Header,
     settings: Settings,
-    layout: Layout,
+    layout: ParameterLayout,
     model: Model,
     train: Examples,
     validation: Option<Examples>,
-    state: State,
+    state: TrainingState,
 }
 
 impl Training {
-    /// A network with random weights ([`Surrogate::random`] of the seed), to be trained as one member of a law.
+    /// Creates a network with random weights ([`Surrogate::random`] of the seed), trained as one member of a
+    /// law.
     ///
-    /// Without validation rows the training loss of an epoch takes their place.
+    /// Without validation rows, the training loss of an epoch replaces the validation loss.
     ///
     /// # Errors
-    /// [`Settings::check`], [`Header::check`]; [`Error::Data`] for no training row; [`Error::Parameter`] for an energy
-    /// of ReLU, whose stress would be a step function.
+    /// Returns the errors of [`Settings::check`] and [`Header::check`]; [`Error::Data`] for no training rows;
+    /// [`Error::Parameter`] for an energy of ReLU, whose stress would be a step function.
     pub fn new(
         header: &Header,
-        train: &[&Row],
-        validation: &[&Row],
+        train: &[&DataRow],
+        validation: &[&DataRow],
         settings: Settings,
     ) -> Result<Self, Error> {
         let law = Surrogate::random(Header { members: 1, ..header.clone() }, settings.seed)?;
-        let layout = Layout::new(&header.architecture);
-        let state = State::new(layout.flat(&law.members()[0]));
+        let layout = ParameterLayout::new(&header.architecture);
+        let state = TrainingState::new(layout.flat(&law.members()[0]));
         Self::resume(header, train, validation, settings, state)
     }
 
-    /// Goes on from a state of the same training.
+    /// Continues from a state of the same training.
     ///
     /// # Errors
-    /// As [`Training::new`]; [`Error::Parameter`] for the state of another architecture.
+    /// As [`Training::new`], and [`Error::Parameter`] for the state of another architecture.
     pub fn resume(
         header: &Header,
-        train: &[&Row],
-        validation: &[&Row],
+        train: &[&DataRow],
+        validation: &[&DataRow],
         settings: Settings,
-        state: State,
+        state: TrainingState,
     ) -> Result<Self, Error> {
         settings.check()?;
         header.check()?;
         let mut header = header.clone();
         header.members = 1;
-        let layout = Layout::new(&header.architecture);
+        let layout = ParameterLayout::new(&header.architecture);
         state.check(layout.len())?;
         if train.is_empty() {
-            let (found, allowed) = ("no row".into(), "at least one row to learn from".into());
+            let (found, allowed) = ("no row".into(), "at least one training row".into());
             return Err(Error::Data { what: "training", found, allowed });
         }
         let law = Surrogate::random(header.clone(), 0)?;
@@ -210,7 +217,7 @@ impl Training {
         Ok(Self { header, settings, layout, model, train, validation, state })
     }
 
-    /// Why training is over; none while it is not.
+    /// Returns the reason of the end; `None` before the end.
     pub fn ending(&self) -> Option<Ending> {
         let done = self.state.history.len() as u32;
         let patient = |patience| done.saturating_sub(self.state.best_epoch) >= patience;
@@ -220,25 +227,27 @@ impl Training {
         (done >= self.settings.epochs).then_some(Ending::Epochs)
     }
 
-    /// All that changes.
-    pub fn state(&self) -> &State {
+    /// Returns the state.
+    pub fn state(&self) -> &TrainingState {
         &self.state
     }
 
-    /// Parameters of the best epoch so far: by validation loss, or training loss where there are no validation rows.
+    /// Returns the parameters of the best epoch so far: by validation loss, or by training loss without
+    /// validation rows.
     pub fn best(&self) -> &[f32] {
         &self.state.best
     }
 
-    /// Forgets where it stood in a step and continues to more epochs, as Hyperband's promotions do.
+    /// Extends the training to more epochs, as Hyperband does.
     pub fn extend(&mut self, epochs: u32) {
         self.settings.epochs = epochs;
     }
 
-    /// One pass over the training rows in an order named by seed and epoch, and the loss of the validation rows.
+    /// Trains one epoch in an order that depends on seed and epoch, and evaluates the validation loss.
     ///
     /// # Errors
-    /// [`Error::Diverged`] where a loss or a parameter is no longer finite; the state is then that before the epoch.
+    /// Returns [`Error::Diverged`] for a non-finite loss or parameter; the state remains that before the
+    /// epoch.
     pub fn epoch(&mut self) -> Result<&Epoch, Error> {
         let since = Instant::now();
         let index = self.state.history.len() as u32;
@@ -249,7 +258,7 @@ impl Training {
             Err(Error::Diverged { epoch: index + 1, batch, loss, learning_rate: rate })
         };
         let mut order: Vec<usize> = (0..self.train.len()).collect();
-        // a seed of its own for each epoch, so that a resumed training needs no generator
+        // each epoch has its own seed, so that a resumed training needs no generator state
         let mut named = SplitMix64::new(self.settings.seed);
         let mut random = SplitMix64::new(named.next_u64() ^ u64::from(index));
         random.shuffle(&mut order);
@@ -260,7 +269,7 @@ impl Training {
                 return diverged(self, batch + 1, step.loss);
             }
             self.state.adam.step(rate, &mut self.state.weights, &self.layout, &step.gradients);
-            // projected Adam: weights in steps, states and files are the same numbers; softplus(r) was not better
+            // projected Adam: states and files contain the weights themselves; softplus(r) was not better
             self.layout.project(&self.header.kind, &mut self.state.weights);
             for (sum, square) in squares.iter_mut().zip(step.squares) {
                 *sum += square;
@@ -289,11 +298,11 @@ impl Training {
             judged: loss,
             seconds: since.elapsed().as_secs_f64(),
         });
-        // just pushed
+        // the entry was just pushed
         Ok(&self.state.history[index as usize])
     }
 
-    /// Mean squared error of each component, MPa², of some rows with the weights as they are.
+    /// Computes the mean squared error of each component, MPa², with the current weights.
     fn squares(&self, examples: &Examples) -> [f64; 6] {
         let mut squares = [0.0; 6];
         let rows: Vec<usize> = (0..examples.len()).collect();
@@ -306,26 +315,26 @@ impl Training {
         squares
     }
 
-    /// The network of the best epoch.
+    /// Returns the network of the best epoch.
     ///
     /// # Errors
-    /// Parameters that are not finite, which no finished epoch has.
+    /// Returns an error for non-finite parameters, which no finished epoch has.
     pub fn network(&self) -> Result<Network<f64>, Error> {
         self.layout.network(&self.header.architecture, &self.state.best)
     }
 }
 
-/// Trains all members of a law to their ends, with seeds that follow one another; returns the law with the limit of its
-/// spread on the training rows, and how each member was trained.
+/// Trains all members of a law to the end, with consecutive seeds; returns the law with the spread limit from
+/// its training rows, and the final state of each member.
 ///
 /// # Errors
-/// Those of [`Training`].
+/// Returns the errors of [`Training`].
 pub fn fit(
     header: Header,
-    rows: &[&Row],
-    validation: &[&Row],
+    rows: &[&DataRow],
+    validation: &[&DataRow],
     settings: Settings,
-) -> Result<(Surrogate, Vec<State>), Error> {
+) -> Result<(Surrogate, Vec<TrainingState>), Error> {
     let mut states = Vec::new();
     for member in 0..header.members as u64 {
         let settings = Settings { seed: settings.seed.wrapping_add(member), ..settings };
@@ -340,14 +349,14 @@ pub fn fit(
     Ok((ensemble(header, &weights)?.with_spread_limit(&strains)?, states))
 }
 
-/// A law whose members have these parameters ([`Training::best`]).
+/// Combines parameters ([`Training::best`]) in a law with these members.
 ///
 /// # Errors
-/// [`Error::Parameter`] for parameters of another architecture.
+/// Returns [`Error::Parameter`] for parameters of another architecture.
 pub fn ensemble(mut header: Header, members: &[Vec<f32>]) -> Result<Surrogate<f64>, Error> {
     header.members = members.len();
     header.check()?;
-    let layout = Layout::new(&header.architecture);
+    let layout = ParameterLayout::new(&header.architecture);
     let network = |flat: &Vec<f32>| layout.network(&header.architecture, flat);
     let networks = members.iter().map(network).collect::<Result<Vec<_>, _>>()?;
     Ok(Surrogate::new(header, networks)?)

@@ -1,73 +1,73 @@
-//! Networks in burn's tensors: prediction, loss and its gradients.
+//! Networks in tensors of burn: prediction, loss and its gradients.
 
 use super::dataset::{Batch, scaled_slopes, units};
-use super::parameters::Layout;
+use super::parameters::ParameterLayout;
 use crate::Error;
 use crate::network::Activation;
-use crate::surrogate::{Invariants, Kind, StressAtRest, Surrogate, Symmetry};
+use crate::surrogate::{Kind, StressAtRest, Surrogate, Symmetry, SymmetryInvariants};
 use burn::tensor::{Device, Tensor, TensorData, activation};
 use polycore::tensor::Voigt;
 
-/// A law's networks, without their weights.
+/// Networks of a law, without their weights.
 pub(super) struct Model {
     activations: Vec<Activation>,
-    /// Of an energy.
-    rest: Option<Rest>,
+    /// Correction of an energy at C = I.
+    rest: Option<RestState>,
     /// Squares of the units of the outputs, MPa².
     unit_squares: [f64; 6],
-    /// What a component's square, MPa², counts.
+    /// Weight of the squared error of each component, 1/MPa².
     weights: [f64; 6],
     device: Device,
     tracking: Device,
 }
 
-/// How the stress of an energy vanishes at C = I.
-struct Rest {
-    /// Inputs there.
+/// Correction that makes the stress of an energy vanish at C = I.
+struct RestState {
+    /// Inputs at C = I.
     x: TensorData,
-    taken: Taken,
+    taken: RestCorrection,
 }
 
-/// What an energy's stress S(C) loses.
-enum Taken {
-    /// S(I) = Σ_k ∂N/∂x_k · slopes_k, the slopes at I: (1, inputs, 6).
+/// Kind of correction.
+enum RestCorrection {
+    /// Subtracts S(I) = Σ_k ∂N/∂x_k · slopes_k, with the slopes at I: (1, inputs, 6).
     Stress(TensorData),
-    /// Multiples of the invariants, see `Surrogate::rest_of`.
+    /// Adds multiples of the invariants, see `Surrogate::rest_of`.
     Polyconvex(Box<Polyconvex>),
 }
 
-/// Matrices from ∂N/∂x at I, with x the invariants, to the multiples of the invariants that are added to W.
+/// Matrices from ∂N/∂x at I, with the invariants x, to the multiples of the invariants that are added to W.
 struct Polyconvex {
-    /// (1, inputs): from the derivative by an input to that by an invariant.
+    /// Factors from the derivative by an input to that by an invariant, (1, inputs).
     scales: TensorData,
-    /// (inputs, 3): the parts s of S(I) along directions.
+    /// Parts s of S(I) along directions, (inputs, 3).
     along: TensorData,
-    /// (3, inputs): what is added for a negative and for a positive s.
+    /// Corrections for a negative and for a positive s, (3, inputs).
     negative: TensorData,
     positive: TensorData,
-    /// (inputs, inputs): what is added for the pressure at I.
+    /// Correction of the pressure at I, (inputs, inputs).
     spherical: TensorData,
 }
 
 impl Polyconvex {
-    /// In units in which the energy is Σ_k weight_k x_k.
-    fn new(law: &Surrogate<f64>, symmetry: Symmetry, invariants: Invariants) -> Self {
+    /// Creates the matrices, in units in which the energy is Σ_k weight_k x_k.
+    fn new(law: &Surrogate<f64>, symmetry: Symmetry, invariants: SymmetryInvariants) -> Self {
         let inputs = invariants.count();
         let StressAtRest { spherical, along } = symmetry.stress_at_rest();
         let identity = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0];
         // S_ii = 2 Σ_k ∂W/∂x_k ∂x_k/∂C_ii
-        let part = |k: usize, of: [f64; 3]| {
+        let part = |k: usize, direction: [f64; 3]| {
             let slope = invariants.gradient(&identity, k);
-            (0..3).map(|i| 2.0 * slope[i] * of[i]).sum::<f64>()
+            (0..3).map(|i| 2.0 * slope[i] * direction[i]).sum::<f64>()
         };
         let (mut parts, mut pressure) = (vec![0.0; 3 * inputs], vec![0.0; inputs * inputs]);
         let (mut negative, mut positive) = (vec![0.0; 3 * inputs], vec![0.0; 3 * inputs]);
         for k in 0..inputs {
             pressure[(k + 1) * inputs - 1] = -part(k, spherical);
         }
-        for (d, &(of, plain, cofactor)) in along.iter().enumerate() {
+        for (d, &(direction, plain, cofactor)) in along.iter().enumerate() {
             for k in 0..inputs {
-                parts[3 * k + d] = part(k, of);
+                parts[3 * k + d] = part(k, direction);
             }
             negative[d * inputs + plain] = 0.5;
             positive[d * inputs + cofactor] = 0.5;
@@ -85,7 +85,8 @@ impl Polyconvex {
         }
     }
 
-    /// ∂W/∂x by the invariants from ∂N/∂x by the inputs, (rows, inputs), and the same at I, (1, inputs).
+    /// Computes ∂W/∂x by the invariants from ∂N/∂x by the inputs, (rows, inputs), and the same at I, (1,
+    /// inputs).
     fn corrected(&self, gradient: Tensor<2>, at_rest: Tensor<2>, device: &Device) -> Tensor<2> {
         let tensor = |data: &TensorData| Tensor::<2>::from_data(data.clone(), device);
         let at_rest = at_rest * tensor(&self.scales);
@@ -97,51 +98,51 @@ impl Polyconvex {
     }
 }
 
-/// A layer's parameters as tensors: (inputs, outputs) and (1, outputs).
+/// Parameters of a layer as tensors: (inputs, outputs) and (1, outputs).
 struct Tensors {
     weights: Tensor<2>,
     bias: Tensor<2>,
 }
 
 /// Derivatives of the loss by all parameters: weights and biases of each layer.
-pub(super) struct Gradients {
+pub(super) struct ParameterGradients {
     pub layers: Vec<[Vec<f32>; 2]>,
 }
 
-/// What a batch gives.
-pub(super) struct Step {
-    /// The loss that is minimised.
+/// Results of a batch.
+pub(super) struct BatchResult {
+    /// Loss that is minimised.
     pub loss: f64,
-    /// Sum over the rows of each component's squared error, MPa².
+    /// Squared error of each component, MPa², summed over the rows.
     pub squares: [f64; 6],
-    pub gradients: Gradients,
+    pub gradients: ParameterGradients,
 }
 
 impl Model {
-    /// The model of a law's networks; `weights` is what a component's square counts.
+    /// Creates the model of a law; `weights` weigh the squared errors of the components.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for an energy of ReLU.
+    /// Returns [`Error::Parameter`] for an energy of ReLU.
     pub fn new(law: &Surrogate<f64>, weights: &[f64; 6]) -> Result<Self, Error> {
         let header = law.header();
         let activations = header.architecture.activations.clone();
         let rest = match (&header.kind, header.kind.invariants()) {
             (Kind::Energy { symmetry, polyconvex, .. }, Some(invariants)) => {
                 if activations.contains(&Activation::Relu) {
-                    let allowed = "softplus, tanh, sigmoid, silu or elu (the stress is a derivative)";
+                    let allowed = "softplus, tanh, sigmoid, silu or elu (with a continuous derivative)";
                     return Err(Error::parameter("activation of an energy", "relu", allowed));
                 }
                 let at = law.features(&Voigt::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0));
                 let inputs = header.kind.inputs();
                 let values: Vec<f32> = at.values[..inputs].iter().map(|value| *value as f32).collect();
                 let taken = match polyconvex {
-                    true => Taken::Polyconvex(Box::new(Polyconvex::new(law, *symmetry, invariants))),
+                    true => RestCorrection::Polyconvex(Box::new(Polyconvex::new(law, *symmetry, invariants))),
                     false => {
                         let slopes = scaled_slopes(law, &at.slopes[..inputs]);
-                        Taken::Stress(TensorData::new(slopes, [1, inputs, 6]))
+                        RestCorrection::Stress(TensorData::new(slopes, [1, inputs, 6]))
                     }
                 };
-                Some(Rest { x: TensorData::new(values, [1, inputs]), taken })
+                Some(RestState { x: TensorData::new(values, [1, inputs]), taken })
             }
             _ => None,
         };
@@ -156,40 +157,40 @@ impl Model {
         })
     }
 
-    /// The loss of mean squared errors in MPa².
+    /// Computes the loss from mean squared errors in MPa².
     pub fn loss(&self, squares: &[f64; 6]) -> f64 {
         squares.iter().zip(&self.weights).map(|(square, weight)| square * weight).sum()
     }
 
-    /// Loss and gradients of a batch.
-    pub fn step(&self, layout: &Layout, parameters: &[f32], batch: &Batch) -> Step {
+    /// Computes loss and gradients of a batch.
+    pub fn step(&self, layout: &ParameterLayout, parameters: &[f32], batch: &Batch) -> BatchResult {
         let layers: Vec<Tensors> = tensors(layout, parameters, &self.tracking)
             .into_iter()
             .map(|layer| Tensors { weights: layer.weights.require_grad(), bias: layer.bias.require_grad() })
             .collect();
         let squares = self.squared_errors(&layers, batch, &self.tracking);
         let each = numbers(squares.clone().inner());
-        // (3.12): the sum over components, the mean over rows
+        // (3.12): sum over components, mean over rows
         let weight = |a: usize| (self.weights[a] * self.unit_squares[a] / batch.rows as f64) as f32;
         let weights = TensorData::new([0, 1, 2, 3, 4, 5].map(weight).to_vec(), [1, 6]);
         let loss = (squares * Tensor::from_data(weights, &self.tracking)).sum();
         let mut gradients = loss.backward();
         let mut taken = |tensor: &Tensor<2>, length: usize| match tensor.grad_remove(&mut gradients) {
             Some(gradient) => numbers(gradient),
-            // the last bias of an energy has no part in the stress
+            // the stress does not depend on the last bias of an energy
             None => vec![0.0; length],
         };
         let layers = layers.iter().enumerate().map(|(l, layer)| {
             [taken(&layer.weights, layout.weights(l).len()), taken(&layer.bias, layout.bias(l).len())]
         });
-        let gradients = Gradients { layers: layers.collect() };
+        let gradients = ParameterGradients { layers: layers.collect() };
         let squares = self.in_megapascal(&each);
         let mean = squares.map(|square| square / batch.rows as f64);
-        Step { loss: self.loss(&mean), squares, gradients }
+        BatchResult { loss: self.loss(&mean), squares, gradients }
     }
 
-    /// Sum over the rows of each component's squared error, MPa².
-    pub fn squares(&self, layout: &Layout, parameters: &[f32], batch: &Batch) -> [f64; 6] {
+    /// Computes the squared error of each component, MPa², summed over the rows.
+    pub fn squares(&self, layout: &ParameterLayout, parameters: &[f32], batch: &Batch) -> [f64; 6] {
         let layers = tensors(layout, parameters, &self.device);
         self.in_megapascal(&numbers(self.squared_errors(&layers, batch, &self.device)))
     }
@@ -202,7 +203,7 @@ impl Model {
         result
     }
 
-    /// Sum over the rows of each component's squared error, in units of the outputs: (1, 6).
+    /// Computes the squared error of each component, summed over the rows, in units of the outputs: (1, 6).
     fn squared_errors(&self, layers: &[Tensors], batch: &Batch, device: &Device) -> Tensor<2> {
         let tensor = |data: &TensorData| Tensor::<2>::from_data(data.clone(), device);
         let outputs = match (&self.rest, &batch.slopes) {
@@ -215,10 +216,12 @@ impl Model {
                 let gradient = self.input_gradient(layers, tensor(&batch.x));
                 let at_rest = self.input_gradient(layers, tensor(&rest.x));
                 match &rest.taken {
-                    Taken::Stress(slopes_at_rest) => {
+                    RestCorrection::Stress(slopes_at_rest) => {
                         stress(gradient, slopes) - stress(at_rest, slopes_at_rest)
                     }
-                    Taken::Polyconvex(part) => stress(part.corrected(gradient, at_rest, device), slopes),
+                    RestCorrection::Polyconvex(part) => {
+                        stress(part.corrected(gradient, at_rest, device), slopes)
+                    }
                 }
             }
             _ => self.forward(layers, tensor(&batch.x)),
@@ -234,7 +237,7 @@ impl Model {
         (error.clone() * error).sum_dim(0)
     }
 
-    /// N(x), row by row.
+    /// Computes N(x), row by row.
     fn forward(&self, layers: &[Tensors], x: Tensor<2>) -> Tensor<2> {
         let mut y = x;
         for (layer, kind) in layers.iter().zip(&self.activations) {
@@ -243,8 +246,8 @@ impl Model {
         y
     }
 
-    /// ∂N/∂x of the first output, row by row, written out in tensor operations: reverse mode through the layers, since
-    /// burn differentiates once and the loss takes that one.
+    /// Computes ∂N/∂x of the first output, row by row, in explicit tensor operations: reverse mode through
+    /// the layers, because burn differentiates once, and the loss uses that.
     fn input_gradient(&self, layers: &[Tensors], x: Tensor<2>) -> Tensor<2> {
         let last = layers.len() - 1;
         let mut slopes = Vec::with_capacity(last);
@@ -269,7 +272,7 @@ impl Model {
     }
 }
 
-fn tensors(layout: &Layout, parameters: &[f32], device: &Device) -> Vec<Tensors> {
+fn tensors(layout: &ParameterLayout, parameters: &[f32], device: &Device) -> Vec<Tensors> {
     let tensor = |range: std::ops::Range<usize>, shape: [usize; 2]| {
         Tensor::from_data(TensorData::new(parameters[range].to_vec(), shape), device)
     };
@@ -280,13 +283,13 @@ fn tensors(layout: &Layout, parameters: &[f32], device: &Device) -> Vec<Tensors>
     layout.shapes.iter().enumerate().map(layer).collect()
 }
 
-/// The numbers of a tensor of f32.
+/// Returns the numbers of a tensor of f32.
 fn numbers(tensor: Tensor<2>) -> Vec<f32> {
-    // all tensors here are f32 on a device without faults
+    // all tensors here are f32
     tensor.into_data().try_into_vec::<f32>().unwrap_or_default()
 }
 
-/// σ(a).
+/// Computes σ(a).
 fn value(kind: Activation, a: Tensor<2>) -> Tensor<2> {
     match kind {
         Activation::Linear => a,
@@ -300,7 +303,7 @@ fn value(kind: Activation, a: Tensor<2>) -> Tensor<2> {
     }
 }
 
-/// σ′(a).
+/// Computes σ′(a).
 fn slope(kind: Activation, a: Tensor<2>) -> Tensor<2> {
     match kind {
         Activation::Linear => a.ones_like(),
@@ -319,7 +322,7 @@ fn slope(kind: Activation, a: Tensor<2>) -> Tensor<2> {
             let s = activation::sigmoid(a.clone());
             s.clone() * ((-s + 1.0) * a + 1.0)
         }
-        // eᵃ below 0, 1 above
+        // eᵃ for a < 0, 1 for a > 0
         Activation::Elu => a.clamp_max(0.0).exp(),
     }
 }

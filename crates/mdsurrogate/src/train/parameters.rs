@@ -5,15 +5,15 @@ use crate::network::{Architecture, Layer, Network};
 use crate::surrogate::Kind;
 use std::ops::Range;
 
-/// Where in the list the parts of each layer stand: weights (inputs, outputs), then biases.
+/// Positions of the parts of each layer in the list: weights (inputs, outputs), then biases.
 #[derive(Debug, Clone)]
-pub(super) struct Layout {
+pub(super) struct ParameterLayout {
     /// Inputs and outputs of each layer.
     pub shapes: Vec<[usize; 2]>,
     starts: Vec<usize>,
 }
 
-impl Layout {
+impl ParameterLayout {
     pub fn new(architecture: &Architecture) -> Self {
         let shapes: Vec<[usize; 2]> = architecture.widths.windows(2).map(|pair| [pair[0], pair[1]]).collect();
         let mut starts = vec![0];
@@ -23,7 +23,7 @@ impl Layout {
         Self { shapes, starts }
     }
 
-    /// Parameters in all.
+    /// Returns the number of parameters.
     pub fn len(&self) -> usize {
         self.starts[self.shapes.len()]
     }
@@ -37,7 +37,7 @@ impl Layout {
         self.weights(layer).end..self.starts[layer + 1]
     }
 
-    /// A network's parameters, rounded to f32.
+    /// Returns the parameters of a network, rounded to f32.
     pub fn flat(&self, network: &Network<f64>) -> Vec<f32> {
         let mut flat = Vec::with_capacity(self.len());
         for (layer, [inputs, outputs]) in network.layers().iter().zip(&self.shapes) {
@@ -49,7 +49,8 @@ impl Layout {
         flat
     }
 
-    /// Puts weights that must not be negative ([`Kind::non_negative`]) back to 0; NaN stays, so that it is found.
+    /// Sets negative weights to 0 if they must not be negative ([`Kind::non_negative`]); keeps NaN, so that
+    /// it is detected.
     pub fn project(&self, kind: &Kind, flat: &mut [f32]) {
         if !kind.is_polyconvex() {
             return;
@@ -65,7 +66,7 @@ impl Layout {
         }
     }
 
-    /// The network of these parameters, to the bit.
+    /// Creates the network with these parameters, bit by bit.
     pub fn network(&self, architecture: &Architecture, flat: &[f32]) -> Result<Network<f64>, Error> {
         if flat.len() != self.len() {
             return Err(Error::parameter("parameters", flat.len(), format!("{}", self.len())));
@@ -73,12 +74,12 @@ impl Layout {
         let layer = |l: usize| {
             let [inputs, outputs] = self.shapes[l];
             let (weights, bias) = (&flat[self.weights(l)], &flat[self.bias(l)]);
-            let mut turned = Vec::with_capacity(weights.len());
+            let mut transposed = Vec::with_capacity(weights.len());
             for o in 0..outputs {
-                turned.extend((0..inputs).map(|i| f64::from(weights[i * outputs + o])));
+                transposed.extend((0..inputs).map(|i| f64::from(weights[i * outputs + o])));
             }
             let bias = bias.iter().copied().map(f64::from).collect();
-            Layer { weights: turned, bias, activation: architecture.activations[l] }
+            Layer { weights: transposed, bias, activation: architecture.activations[l] }
         };
         Ok(Network::new(architecture.clone(), (0..self.shapes.len()).map(layer).collect())?)
     }

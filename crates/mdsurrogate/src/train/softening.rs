@@ -1,28 +1,28 @@
-//! The damage variable of an energy, fitted to runs that unload.
+//! Damage variable of an energy, fitted to runs with unloading.
 
 use crate::Error;
 use crate::dataset::Path;
-use crate::surrogate::{History, Softening, Surrogate, Workspace};
+use crate::surrogate::{Softening, SofteningHistory, Surrogate, Workspace};
 use nalgebra::{DMatrix, DVector};
 use polycore::numerics::least_squares::levenberg_marquardt;
 use polycore::tensor::Voigt;
 
-/// A row unloads where ‖C − 1‖ is below this part of the greatest of its run so far: fluctuations of a small cell are no
-/// unloading.
+/// A row unloads if ‖C − 1‖ is below this fraction of its largest value in the run; fluctuations of a small
+/// cell are not unloading.
 const UNLOADED: f64 = 0.9;
 
-/// Weight of a prior: the logarithm of each number less its start, times this, beside errors over the stress. Few runs do not
-/// determine all numbers, and without it some leave for e^±20.
+/// Weight of a prior that pulls the logarithm of each constant to its start value. A few runs do not
+/// determine all constants; without the prior some drift to e^±20.
 const PRIOR: f64 = 0.03;
 
-/// Units at most: twelve runs do not determine more.
+/// Largest number of units; twelve runs do not determine more.
 pub const MOST_UNITS: usize = 8;
 
-/// Whether each row of a run is on the curve of loading.
+/// Tells for each row of a run if it is on the loading curve.
 pub fn loading(path: &Path) -> Vec<bool> {
     let mut greatest = 0.0f64;
     let identity = Voigt::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0);
-    let row = |row: &crate::dataset::Row| {
+    let row = |row: &crate::dataset::DataRow| {
         let strain = (row.c - identity).norm();
         greatest = greatest.max(strain);
         strain >= UNLOADED * greatest
@@ -30,17 +30,18 @@ pub fn loading(path: &Path) -> Vec<bool> {
     path.rows.iter().map(row).collect()
 }
 
-/// The same energy with a damage variable of so many units, by least squares of ‖S − Ŝ‖ over the rows of these runs that
-/// unload.
+/// Fits a damage variable with this number of units to an energy, by least squares of ‖S − Ŝ‖ over the
+/// unloading rows of the runs.
 ///
 /// # Errors
-/// [`Error::Data`] where no row unloads; those of [`Surrogate::stress`] and [`Surrogate::with_softening`].
+/// Returns [`Error::Data`] without unloading rows, and the errors of [`Surrogate::stress`] and
+/// [`Surrogate::with_softening`].
 pub fn soften(law: Surrogate, paths: &[&Path], units: usize) -> Result<Surrogate, Error> {
     let mut memory = Workspace::default();
     let mut rows = Vec::new();
     let mut greatest = 0.0f64;
     for path in paths {
-        let mut history = History::default();
+        let mut history = SofteningHistory::default();
         for (row, loading) in path.rows.iter().zip(loading(path)) {
             let answer = law.stress(&row.c, &mut memory)?;
             let energy = answer.energy.unwrap_or(0.0);
@@ -52,28 +53,28 @@ pub fn soften(law: Surrogate, paths: &[&Path], units: usize) -> Result<Surrogate
         greatest = greatest.max(history.greatest);
     }
     if rows.is_empty() {
-        let (found, allowed) = ("no row that unloads".into(), "runs that turn round".into());
+        let (found, allowed) = ("no unloading rows".into(), "runs with unloading".into());
         return Err(Error::Data { what: "softening", found, allowed });
     }
     let scale = (rows.iter().map(|row| row.3.norm_squared()).sum::<f64>() / rows.len() as f64).sqrt();
-    // ln a, ln b, ln c: different c tell the units apart
+    // ln a, ln b, ln c: different c separate the units
     let unit = |k: usize| [(0.5 / units as f64).ln(), 1.0, 2.0 * k as f64 - 1.0];
     let start = DVector::from_vec((0..units).flat_map(unit).collect());
-    let problem = Problem { rows, greatest, scale, start: start.clone() };
+    let problem = SofteningProblem { rows, greatest, scale, start: start.clone() };
     let (residuals, jacobian) = (|at: &_| Some(problem.residuals(at)), |at: &_| Some(problem.jacobian(at)));
     let found = levenberg_marquardt(start, 100, residuals, jacobian);
     law.with_softening(problem.softening(&found.at)).map_err(Error::from)
 }
 
-struct Problem {
-    /// W, the history, S of the energy, S measured.
-    rows: Vec<(f64, History, Voigt, Voigt)>,
+struct SofteningProblem {
+    /// Energy W, history, S of the energy, and measured S.
+    rows: Vec<(f64, SofteningHistory, Voigt, Voigt)>,
     greatest: f64,
     scale: f64,
     start: DVector<f64>,
 }
 
-impl Problem {
+impl SofteningProblem {
     fn softening(&self, at: &DVector<f64>) -> Softening {
         let unit = |unit: &[f64]| [unit[0].exp(), unit[1].exp(), unit[2].exp()];
         Softening { units: at.as_slice().chunks(3).map(unit).collect(), greatest: self.greatest }
@@ -81,7 +82,7 @@ impl Problem {
 
     fn residuals(&self, at: &DVector<f64>) -> DVector<f64> {
         let softening = self.softening(at);
-        let row = |(energy, history, own, measured): &(f64, History, Voigt, Voigt)| -> [f64; 6] {
+        let row = |(energy, history, own, measured): &(f64, SofteningHistory, Voigt, Voigt)| -> [f64; 6] {
             let [damage, _] = softening.damage(*energy, *history);
             ((own * (1.0 - damage) - measured) / self.scale).into()
         };
@@ -98,7 +99,7 @@ impl Problem {
             for (unit, [a, b, c]) in softening.units.iter().enumerate() {
                 let (x, y) = (1.0 - energy / history.greatest, history.greatest / self.greatest);
                 let (fall, reached) = ((b * x).tanh(), y.powf(*c));
-                // by ln a, ln b, ln c
+                // derivatives by ln a, ln b, ln c
                 let slopes = [
                     a * fall * reached,
                     a * b * x * (1.0 - fall * fall) * reached,
@@ -122,26 +123,26 @@ impl Problem {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::Row;
-    use crate::kinematics::cauchy_of_material;
+    use crate::dataset::DataRow;
+    use crate::kinematics::cauchy_from_material;
     use crate::network::Activation::Softplus;
     use crate::surrogate::{Header, Kind, Symmetry};
     use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 
-    /// Stretched along x to `most` and back.
+    /// Returns a stretch along x to `most` and back.
     fn there_and_back(law: &Surrogate, most: f64) -> Path {
-        let (mut memory, mut history) = (Workspace::default(), History::default());
+        let (mut memory, mut history) = (Workspace::default(), SofteningHistory::default());
         let rows = (0..=100u64).map(|sample| {
             let stretch = 1.0 + (most - 1.0) * (1.0 - (sample as f64 / 50.0 - 1.0).abs());
             let f = DeformationGradient::new(Tensor::from_diagonal(&[stretch, 1.0, 1.0].into())).unwrap();
             let c = Voigt::new(stretch * stretch, 1.0, 1.0, 0.0, 0.0, 0.0);
             let s = law.follow(&c, false, &mut history, &mut memory).unwrap().stress;
-            Row::new(sample, f64::NAN, f, cauchy_of_material(&f, &s))
+            DataRow::new(sample, f64::NAN, f, cauchy_from_material(&f, &s))
         });
         Path { id: most.to_string(), kind: "ux".into(), rates: [f64::NAN; 3], rows: rows.collect() }
     }
 
-    /// The damage that made the data comes back, on runs between those of the fit, too.
+    /// The damage of the data is recovered, also on runs between those of the fit.
     #[test]
     fn finds_the_damage_of_its_data() {
         let header = Header::new(Kind::polyconvex_energy(Symmetry::Isotropic), &[(8, Softplus)], 1);
@@ -150,12 +151,12 @@ mod tests {
         let softened = energy.clone().with_softening(truth).unwrap();
         let runs: Vec<Path> = [1.1, 1.2, 1.3].map(|most| there_and_back(&softened, most)).into();
         let paths: Vec<&Path> = runs.iter().collect();
-        // C₁₁ − 1 is below 0.9 · 0.21 for strains of 0.09 and less
+        // C₁₁ − 1 is below 0.9 · 0.21 for strains up to 0.09
         assert_eq!(loading(paths[0]).iter().filter(|loading| !**loading).count(), 46);
         let found = soften(energy.clone(), &paths, 1).unwrap();
-        // the prior takes 1e-4 of the stress
+        // the prior costs 1e-4 of the stress
         let between = there_and_back(&softened, 1.25);
-        let (mut memory, mut history) = (Workspace::default(), History::default());
+        let (mut memory, mut history) = (Workspace::default(), SofteningHistory::default());
         for row in &between.rows {
             let stress = found.follow(&row.c, false, &mut history, &mut memory).unwrap().stress;
             assert!((stress - row.s).norm() <= 1e-3 * row.s.norm().max(1.0), "{} {stress}", row.s);

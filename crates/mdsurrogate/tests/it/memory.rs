@@ -1,4 +1,4 @@
-//! What a finite element code calls millions of times allocates nothing.
+//! Evaluations for finite element codes do not allocate.
 
 use mdsurrogate::network::Activation::{Relu, Softplus};
 use mdsurrogate::surrogate::{Header, Kind, Prediction, Surrogate, Symmetry, Workspace};
@@ -6,7 +6,7 @@ use nalgebra::SVector;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-/// The system's allocator, counting what each thread asks of it.
+/// System allocator that counts the allocations of each thread.
 struct Counting;
 
 thread_local! {

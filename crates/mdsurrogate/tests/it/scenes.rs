@@ -1,7 +1,7 @@
-//! Scenes through the command line: what is refused, and how; kills; data that are no data.
+//! Scenes through the command line: refusals, interruptions, invalid data.
 //!
-//! A scene in `tests/bad/` says itself what it must be told: each leading `# expect: TEXT` is a part of the message; the
-//! line at fault ends in `# <- here`.
+//! A scene in `tests/bad/` states its message: each leading `# expect: TEXT` is a part of it; the line of the
+//! error ends in `# <- here`.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
-/// Twelve paths of 30 rows, S = E in GPa along one axis or two.
+/// Returns twelve paths of 30 rows, S = E in GPa along one or two axes.
 pub fn table() -> String {
     let mut text = String::from("run_id,kind,C11,C22,C33,C12,C13,C23,S11,S22,S33,S12,S13,S23\n");
     for path in 0..12 {
@@ -31,8 +31,8 @@ pub fn table() -> String {
 
 fn run(arguments: &str, here: &Path) -> Output {
     let output = program(arguments, here).output().unwrap();
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert!(!told.contains("panicked") && output.status.code() != Some(101), "a panic:\n{told}");
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(!text.contains("panicked") && output.status.code() != Some(101), "a panic:\n{text}");
     output
 }
 
@@ -43,11 +43,11 @@ fn program(arguments: &str, here: &Path) -> Command {
     command
 }
 
-fn told(output: &Output) -> String {
+fn message(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// A folder with data and a scene.
+/// Creates a folder with data and a scene.
 fn folder(scene: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("data.csv"), table()).unwrap();
@@ -57,12 +57,13 @@ fn folder(scene: &str) -> tempfile::TempDir {
 
 const HEAD: &str = "version = 1\nprogram = \"mdsurrogate\"\n[data]\nfiles = [\"data.csv\"]\n";
 
-/// Some seconds of training, so that there is something to kill; an ensemble and an energy.
+/// Trains an ensemble and an energy for some seconds, long enough for interruptions.
 const LONG: &str = "[training]\nepochs = 25\nlearning_rate = 3e-3\nschedule = \"cosine\"\n\
     [[model]]\nkind = \"ann\"\nhidden = [[64, \"relu\"], [64, \"softplus\"], [64, \"tanh\"]]\nmembers = 2\n\
     [[model]]\nkind = \"energy\"\nhidden = [[32, \"softplus\"], [32, \"softplus\"]]\n";
 
-const SEARCH: &str = "[search]\nepochs = 9\ntrials = 5\ninitial = 3\n[search.space]\nlayers = [1, 2]\nneurons = [8, 24]\nstep = 8\n";
+const SEARCH: &str = "[search]\nepochs = 9\ntrials = 5\ninitial = 3\n\
+                      [search.space]\nlayers = [1, 2]\nneurons = [8, 24]\nstep = 8\n";
 
 #[test]
 fn every_bad_scene_gets_its_message() {
@@ -81,8 +82,8 @@ fn every_bad_scene_gets_its_message() {
         expected.push(format!("[scene.toml:{line}:"));
         for verb in ["check scene.toml", "run scene.toml --output out"] {
             let output = run(verb, folder.path());
-            // quoted lines of the scene are no message
-            let message: Vec<String> = told(&output)
+            // quoted lines of the scene are not part of the message
+            let message: Vec<String> = message(&output)
                 .lines()
                 .filter(|line| {
                     !line.trim_start().trim_start_matches(|c: char| c.is_ascii_digit()).starts_with(" │")
@@ -102,9 +103,9 @@ fn every_bad_scene_gets_its_message() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// Each fault of a table is named with file, line and column or run; nothing is written.
+/// Errors of a table name file, line and column or run; nothing is written.
 #[test]
-fn data_that_are_no_data() {
+fn invalid_data_are_refused() {
     let rows = table();
     let lines: Vec<&str> = rows.lines().collect();
     let replaced = |line: usize, text: String| {
@@ -131,20 +132,21 @@ fn data_that_are_no_data() {
         let folder = folder(&(HEAD.to_owned() + LONG));
         fs::write(folder.path().join("data.csv"), table).unwrap();
         let output = run("run scene.toml --output out", folder.path());
-        assert!(told(&output).contains(part), "`{part}` is not in\n{}", told(&output));
+        assert!(message(&output).contains(part), "`{part}` is not in\n{}", message(&output));
         assert_eq!(output.status.code(), Some(2));
         assert!(!folder.path().join("out").exists());
     }
 }
 
-/// A learning rate of 1000: named with epoch and batch, the curve and the checkpoint stay, the exit code is 1.
+/// A learning rate of 1000 diverges: the message has epoch and batch, curve and checkpoint remain, the exit
+/// code is 1.
 #[test]
-fn divergence_is_told() {
+fn divergence_is_reported() {
     let scene = HEAD.to_owned()
         + &LONG.replace("learning_rate = 3e-3", "learning_rate = 1e3").replace("members = 2", "");
     let folder = folder(&scene.replace("[64, \"tanh\"]", "[64, \"relu\"], [64, \"relu\"], [64, \"relu\"]"));
     let output = run("run scene.toml --output out", folder.path());
-    let message = told(&output);
+    let message = message(&output);
     assert!(
         message.contains("training diverged in epoch 1, batch ") && message.contains("learning rate 1e3"),
         "{message}"
@@ -161,22 +163,22 @@ fn weights_of_another_architecture() {
     let here = folder.path();
     assert_eq!(run("run scene.toml --output out", here).status.code(), Some(0));
     let both = run("eval scene.toml out/energy.safetensors out/ann.safetensors --output judged", here);
-    assert_eq!(both.status.code(), Some(0), "{}", told(&both));
+    assert_eq!(both.status.code(), Some(0), "{}", message(&both));
     assert!(String::from_utf8_lossy(&both.stdout).contains("energy.stress_at_rest"));
-    // a header that tells of other widths
+    // a header with other widths
     let mut bytes = fs::read(here.join("out/energy.safetensors")).unwrap();
     let place = bytes.windows(8).position(|window| window == b"[7,32,32").unwrap();
     bytes[place + 4] = b'1';
     fs::write(here.join("bad.safetensors"), bytes).unwrap();
     for (law, part) in [("bad.safetensors", "shape"), ("data.csv", "no safetensors file")] {
         let output = run(&format!("eval scene.toml {law} --output refused"), here);
-        assert_eq!(output.status.code(), Some(2), "{}", told(&output));
-        assert!(told(&output).contains(part), "{}", told(&output));
+        assert_eq!(output.status.code(), Some(2), "{}", message(&output));
+        assert!(message(&output).contains(part), "{}", message(&output));
         assert!(!here.join("refused").exists());
     }
 }
 
-/// Files that are results, not times: name and bytes.
+/// Returns name and bytes of the result files, without times.
 fn results(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut files: Vec<(String, Vec<u8>)> = fs::read_dir(folder)
         .unwrap()
@@ -200,14 +202,14 @@ fn results(folder: &Path) -> Vec<(String, Vec<u8>)> {
     files
 }
 
-/// Killed again and again, resumed, the same bits at the end: trainings and searches.
+/// Trainings and searches that are killed repeatedly and resumed give bit-identical results.
 #[test]
 fn killed_at_any_time() {
     for scene in [LONG, SEARCH] {
         let folder = folder(&(HEAD.to_owned() + scene));
         let here = folder.path();
         let undisturbed = run("run scene.toml --output undisturbed", here);
-        assert_eq!(undisturbed.status.code(), Some(0), "{}", told(&undisturbed));
+        assert_eq!(undisturbed.status.code(), Some(0), "{}", message(&undisturbed));
         let out = here.join("killed");
         let (mut kills, begun) = (0, Instant::now());
         loop {
@@ -220,7 +222,7 @@ fn killed_at_any_time() {
                 .stderr(std::process::Stdio::null())
                 .spawn()
                 .unwrap();
-            // longer and longer, so that each gets further
+            // longer and longer, so that each attempt gets further
             std::thread::sleep(Duration::from_millis(60 + 40 * kills));
             let _ = child.kill();
             if child.wait().unwrap().success() {
@@ -237,7 +239,7 @@ fn killed_at_any_time() {
         for ((name, x), (_, y)) in a.iter().zip(&b) {
             assert!(x == y, "{name} differs");
         }
-        // nothing more to do
+        // nothing is left to do
         assert!(String::from_utf8_lossy(&run("resume killed", here).stdout).contains("nothing to resume"));
     }
 }

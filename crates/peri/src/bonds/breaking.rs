@@ -1,4 +1,4 @@
-//! Which bonds are stretched beyond what they bear.
+//! Finds bonds beyond their critical stretch, and the fragments that broken bonds leave.
 
 use super::{BodyGeometry, BondForces, Property};
 use crate::field::{CHUNK, Field, chunk_range};
@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// A bond, seen from one of its ends, that is to be severed.
+/// A bond to be severed, seen from one of its ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Overstretched {
     /// Site of the particle.
     pub site: u32,
-    /// Its number among the particle's bonds, see [`super::Neighbour::index`].
+    /// Number among the particle's bonds, see [`super::Neighbour::index`].
     pub index: u32,
     /// λ² − 1.
     pub elongation: f64,
@@ -23,17 +23,17 @@ pub struct Overstretched {
     pub weight: f64,
 }
 
-/// Stretches that forces of a displacement have met; empty where none were looked for.
+/// Stretches met while computing the forces of a displacement; empty if none were tracked.
 #[derive(Clone, Debug, Default)]
 pub struct StretchScan {
-    /// Sites that were looked at together, a divisor of a work item.
+    /// Sites of one range, a divisor of a work item.
     pub part: usize,
-    /// Their extremes, in order.
+    /// Extreme stretches of each range of sites, in order.
     pub ranges: Vec<StretchRange>,
 }
 
 impl StretchScan {
-    /// Those of `sites`, a work item, among which bonds beyond e = `least` may begin.
+    /// Returns the ranges of `sites`, a work item, in which bonds beyond e = `least` may begin.
     fn beyond(&self, sites: Range<usize>, least: f64) -> Vec<Range<usize>> {
         if self.ranges.is_empty() {
             return vec![sites];
@@ -41,7 +41,7 @@ impl StretchScan {
         let mut found: Vec<Range<usize>> = Vec::new();
         for start in sites.clone().step_by(self.part) {
             let borne = self.ranges.get(start / self.part).is_some_and(|range| range.high <= least);
-            // a stretch that is not a number is one to look at
+            // a stretch that is NaN must be examined
             if !borne {
                 let end = (start + self.part).min(sites.end);
                 match found.last_mut().filter(|last| last.end == start) {
@@ -54,8 +54,9 @@ impl StretchScan {
     }
 }
 
-/// All intact bonds beyond the `critical` stretch of the weaker of their ends, each from both of them: λ² − 1 =
-/// η·(2ξ + η)/|ξ|² has the same bits from either. `seen` is what [`BondForces::force`] has collected of this displacement.
+/// Lists all intact bonds beyond the `critical` stretch of the weaker of their ends, each from both ends: λ²
+/// − 1 = η·(2ξ + η)/|ξ|² has the same bits from either. `seen` is the scan that [`BondForces::force`] made of
+/// this displacement.
 pub fn overstretched<const D: usize, B: BondForces<D> + ?Sized>(
     bonds: &B,
     displacement: &Field<D>,
@@ -63,7 +64,7 @@ pub fn overstretched<const D: usize, B: BondForces<D> + ?Sized>(
     seen: &StretchScan,
 ) -> Vec<Overstretched> {
     let sites = bonds.sites();
-    // vectorised loops find the bonds to look at; their last bits may differ from those below
+    // vectorised loops find the bonds to examine; their last bits may differ from those below
     let least = (critical.least() * critical.least() - 1.0) * (1.0 - 1e-9) - 1e-12;
     let beyond = |[site, index]: [u32; 2]| {
         let bond = bonds.bond(site as usize, index);
@@ -95,22 +96,22 @@ pub fn overstretched<const D: usize, B: BondForces<D> + ?Sized>(
     found
 }
 
-/// One number for a set of bonds: FNV-1a over their ends, in the order of [`overstretched`].
+/// Hashes a set of bonds to one number: FNV-1a over their ends, in the order of [`overstretched`].
 pub fn fingerprint(bonds: &[Overstretched]) -> u64 {
     let words = bonds.iter().flat_map(|bond| [bond.site, bond.index]).flat_map(u32::to_le_bytes);
     words.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// A part of the body that hangs together by intact bonds.
+/// A part of the body connected by intact bonds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fragment {
-    /// Its particles, two or more.
+    /// Number of particles, at least two.
     pub particles: usize,
-    /// Their volume, m³.
+    /// Volume, m³.
     pub volume: f64,
 }
 
-/// Parts of the body that hang together by intact bonds, single particles left out; the largest first.
+/// Lists the parts connected by intact bonds, largest first, without single particles.
 pub fn fragments<const D: usize, B: BodyGeometry<D> + ?Sized>(bonds: &B) -> Vec<Fragment> {
     let roots = components(bonds, |_, _| true);
     // by its first site, which is its root
@@ -125,7 +126,7 @@ pub fn fragments<const D: usize, B: BodyGeometry<D> + ?Sized>(bonds: &B) -> Vec<
     fragments
 }
 
-/// The first site of the part that each site hangs together with by intact bonds that `holds` accepts, by their sites.
+/// Returns, for each site, the first site of the part to which intact bonds that `holds` accepts connect it.
 pub fn components<const D: usize, B: BodyGeometry<D> + ?Sized>(
     bonds: &B,
     holds: impl Fn(usize, usize) -> bool,

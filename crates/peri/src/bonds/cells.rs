@@ -3,14 +3,15 @@
 use polycore::numerics::bounds;
 use rayon::prelude::*;
 
-/// Cells farther than this from the first are one: there, positions are not known to a cell.
+/// Cells farther than this from the first are merged: positions there are not resolved to a cell.
 const FARTHEST: i64 = 1 << 40;
 
-/// Points in cells of equal edge. Cells without points are not stored: a point far from all others costs nothing.
+/// Points in cells of equal edge. Empty cells are not stored: a point far from all others costs nothing.
 pub struct CellGrid<const D: usize> {
     low: [f64; D],
     edge: f64,
-    /// Cells that hold points, ascending; the last axis comes first, so that rows along the first axis lie together.
+    /// Cells that hold points, ascending; the last axis comes first, so that rows along the first axis lie
+    /// together.
     cells: Vec<[i64; D]>,
     /// The greatest cell along each axis.
     last: [i64; D],
@@ -47,23 +48,24 @@ impl<const D: usize> CellGrid<D> {
         grid
     }
 
-    /// All members, cell by cell: an order in which near points are near.
+    /// Returns all members, cell by cell: near points are near in this order.
     pub fn order(&self) -> &[u32] {
         &self.members
     }
 
-    /// The members of every cell, in the order of the cells.
+    /// Iterates over the members of each cell, in the order of the cells.
     pub fn members(&self) -> impl Iterator<Item = &[u32]> {
         self.starts.windows(2).map(|ends| &self.members[ends[0]..ends[1]])
     }
 
-    /// Visits the cells from one on, by their numbers, that are at most `rings` cells away from it, with how many.
+    /// Visits the cells at most `rings` cells away from the cell with this number, each with its distance in
+    /// cells.
     pub fn around(&self, number: usize, rings: i64, mut visit: impl FnMut(usize, i64)) {
         let own = self.cells[number];
         let away = |cell: &[i64; D]| (0..D).map(|d| (cell[d] - own[d]).abs()).max().unwrap_or(0);
         let mut at = number;
         while let Some(cell) = self.cells.get(at) {
-            // the first axis on which it is too far away, and where the next cell that is not may be
+            // the first axis on which it is too far away, and the next cell that may be near enough
             let Some(d) = (0..D).find(|&d| (cell[d] - own[d]).abs() > rings) else {
                 visit(at, away(cell));
                 at += 1;
@@ -83,7 +85,7 @@ impl<const D: usize> CellGrid<D> {
         }
     }
 
-    /// The cell of a point, last axis first; that of NaN is the first.
+    /// Returns the cell of a point, last axis first; NaN belongs to the first cell.
     fn cell(&self, point: [f64; D]) -> [i64; D] {
         std::array::from_fn(|d| {
             let axis = D - 1 - d;
@@ -91,7 +93,8 @@ impl<const D: usize> CellGrid<D> {
         })
     }
 
-    /// Visits every point in the cells that a ball around `point` may touch (farther points are visited too).
+    /// Visits every point in the cells that a ball around `point` may touch, including points beyond the
+    /// ball.
     pub fn near(&self, point: [f64; D], radius: f64, mut visit: impl FnMut(usize)) {
         let (low, high) = (self.cell(point.map(|x| x - radius)), self.cell(point.map(|x| x + radius)));
         let low: [i64; D] = low.map(|c| c.max(0));
@@ -130,7 +133,7 @@ impl<const D: usize> CellGrid<D> {
 mod tests {
     use super::*;
 
-    /// Scattered points, one of them at the end of the world: all pairs, in the order of dense cells.
+    /// Scattered points, one of them very far away: all pairs are found, in the order of dense cells.
     #[test]
     fn finds_all_pairs() {
         let mut points: Vec<[f64; 3]> = (0..300)

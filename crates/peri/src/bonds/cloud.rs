@@ -1,12 +1,12 @@
 //! A cloud of particles of any position and volume: neighbour lists in compressed rows, sorted for locality.
 
 use super::cells::CellGrid;
-use super::cloud_kernel::{CloudData, Rows};
-use super::cloud_lists::{Lists, NeighbourLists};
+use super::cloud_kernel::{CloudData, ParticleRows};
+use super::cloud_lists::{NeighbourLists, NeighbourRows};
 use super::rows::{CloudKernel, cloud_kernel};
-use super::softening::{Softened, Softening, integrity};
+use super::softening::{Softened, SoftenedBonds, integrity};
 use super::{
-    BodyGeometry, BondDamage, BondForces, Bonds, Kind, Neighbour, Overstretched, VolumeCorrection,
+    BodyGeometry, BondDamage, BondForces, BondKind, Bonds, Neighbour, Overstretched, VolumeCorrection,
     plain_force, refuse_one_sided, surface_weight,
 };
 use crate::error::Error;
@@ -27,28 +27,28 @@ pub struct CloudBonds<const D: usize> {
     thickness: f64,
     volume_correction: VolumeCorrection,
     lists: NeighbourLists,
-    law: CloudLaw<D>,
+    law: CloudBondLaw<D>,
     factors: Option<Field<D>>,
-    softening: Softening,
+    softening: SoftenedBonds,
     /// θ of [`BodyGeometry::relief`].
     relief: Option<Field<D>>,
 }
 
 /// The law of the bonds of a cloud.
 #[derive(Default)]
-struct CloudLaw<const D: usize> {
+struct CloudBondLaw<const D: usize> {
     /// w V_J of each bond, where bonds differ in it.
     weights: Vec<f64>,
     /// 2kθ, times the common w V_J.
     stiffness: f64,
-    /// All particles in the displacement last given to [`BondForces::prepare`]; none before.
-    rows: Rows,
+    /// Displacement of all particles last given to [`BondForces::prepare`]; empty before.
+    rows: ParticleRows,
     kernel: Option<Box<dyn CloudKernel<D>>>,
     /// A law that only a table represents, and kθ.
     table: Option<(KernelFit, f64)>,
 }
 
-/// Refuses what is no cloud.
+/// Validates points, volumes and horizon.
 fn check<const D: usize>(points: &[[f64; D]], volumes: &[f64], horizon: f64) -> Result<(), Error> {
     let what = if points.is_empty() {
         "the body contains no particle".to_owned()
@@ -67,11 +67,11 @@ fn check<const D: usize>(points: &[[f64; D]], volumes: &[f64], horizon: f64) -> 
 }
 
 impl<const D: usize> CloudBonds<D> {
-    /// Bonds of all pairs within `horizon`, less those that cross a cut.
+    /// Bonds all pairs within `horizon`, except those that cross a cut.
     ///
     /// # Errors
-    /// [`Error::Geometry`] for an empty cloud, positions that are not finite, volumes too few, too many or not positive,
-    /// two particles in one place, or a horizon that is not positive.
+    /// [`Error::Geometry`] for an empty cloud, positions that are not finite, volumes too few, too many or
+    /// not positive, two particles in one place, or a horizon that is not positive.
     pub fn new(
         points: &[[f64; D]],
         volumes: &[f64],
@@ -83,7 +83,7 @@ impl<const D: usize> CloudBonds<D> {
         Self::with_gaps(points, volumes, thickness, horizon, volume_correction, cuts, None)
     }
 
-    /// As [`Self::new`], without the bonds that cross a gap.
+    /// Builds bonds as [`Self::new`] does, except those that cross a gap.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -116,9 +116,9 @@ impl<const D: usize> CloudBonds<D> {
             thickness,
             volume_correction,
             lists,
-            law: CloudLaw::default(),
+            law: CloudBondLaw::default(),
             factors: None,
-            softening: Softening::default(),
+            softening: SoftenedBonds::default(),
             relief: None,
         };
         refuse_one_sided(&bonds)?;
@@ -135,7 +135,7 @@ impl<const D: usize> CloudBonds<D> {
         &self.input_order
     }
 
-    /// Sites whose family a cut has parted, ascending.
+    /// Sites whose family a cut has divided, ascending.
     pub fn parted(&self) -> &[u32] {
         &self.lists.parted
     }
@@ -148,19 +148,19 @@ impl<const D: usize> CloudBonds<D> {
         &self.volumes
     }
 
-    pub(super) fn lists(&self) -> Lists<'_> {
+    pub(super) fn lists(&self) -> NeighbourRows<'_> {
         let partial =
             (self.volume_correction == VolumeCorrection::Linear).then_some([self.horizon, self.spacing]);
         let NeighbourLists { starts, neighbours, inverse_length, .. } = &self.lists;
-        Lists { starts, neighbours, inverse_length, partial }
+        NeighbourRows { starts, neighbours, inverse_length, partial }
     }
 
-    /// A bond of a site by its [`Neighbour::index`], as if it were not softened.
+    /// Returns a bond of a site by its [`Neighbour::index`], ignoring softening.
     pub fn whole_bond(&self, site: usize, index: u32) -> Neighbour<D> {
         self.whole(site, self.lists.starts[site] + index as usize)
     }
 
-    /// e = λ² − 1 of the bonds of a site; 0 of those that are broken.
+    /// Computes e = λ² − 1 of the bonds of a site; 0 for broken ones.
     fn excesses<'a>(&'a self, displacement: &'a Field<D>, site: usize) -> impl Iterator<Item = f64> + 'a {
         let (position, moved) = (self.position.components(), displacement.components());
         let (here, own) = (self.position.get(site), displacement.get(site));
@@ -177,8 +177,8 @@ impl<const D: usize> CloudBonds<D> {
         })
     }
 
-    /// All sites from the first to the last that bonds of these have as ends.
-    fn met_by(&self, sites: Range<usize>) -> Range<usize> {
+    /// Returns the range of sites that bonds of `sites` reach.
+    fn reached_by(&self, sites: Range<usize>) -> Range<usize> {
         let met = &self.lists.neighbours[self.lists.starts[sites.start]..self.lists.starts[sites.end]];
         let first = met.iter().min().map_or(sites.start, |&first| sites.start.min(first as usize));
         let last = met.iter().max().map_or(sites.end, |&last| sites.end.max(last as usize + 1));
@@ -202,8 +202,8 @@ impl<const D: usize> CloudBonds<D> {
     }
 }
 
-/// A whole bond, as it is among the softened ones of its site.
-fn weakened<const D: usize>(bond: Neighbour<D>, soft: &[Softened]) -> Neighbour<D> {
+/// Applies softening to an intact bond.
+fn with_softening<const D: usize>(bond: Neighbour<D>, soft: &[Softened]) -> Neighbour<D> {
     let part = integrity(soft, bond.index);
     Neighbour { volume: part * bond.volume, weight: part * bond.weight, ..bond }
 }
@@ -237,13 +237,13 @@ impl<const D: usize> BodyGeometry<D> for CloudBonds<D> {
         let soft = self.softening.among(site..site + 1);
         for k in self.lists.row(site) {
             if self.lists.neighbours[k] as usize != site {
-                visit(weakened(self.whole(site, k), soft));
+                visit(with_softening(self.whole(site, k), soft));
             }
         }
     }
 
     fn bond(&self, site: usize, index: u32) -> Neighbour<D> {
-        weakened(self.whole_bond(site, index), self.softening.among(site..site + 1))
+        with_softening(self.whole_bond(site, index), self.softening.among(site..site + 1))
     }
 
     fn bonded(&self, site: usize) -> u32 {
@@ -287,7 +287,7 @@ impl<const D: usize> BondForces<D> for CloudBonds<D> {
     fn prepare(&mut self, displacement: &Field<D>) {
         match self.law.kernel {
             Some(_) if self.law.rows.is_empty() => {
-                self.law.rows = Rows::new(&self.position, displacement, 0..self.volumes.len());
+                self.law.rows = ParticleRows::new(&self.position, displacement, 0..self.volumes.len());
             }
             Some(_) => self.law.rows.load(displacement),
             None => {}
@@ -304,12 +304,16 @@ impl<const D: usize> BondForces<D> for CloudBonds<D> {
         if let Some(kernel) = &self.law.kernel {
             let own;
             let rows = if self.law.rows.is_empty() {
-                own = Rows::new(&self.position, displacement, self.met_by(start..start + force[0].len()));
+                own = ParticleRows::new(
+                    &self.position,
+                    displacement,
+                    self.reached_by(start..start + force[0].len()),
+                );
                 &own
             } else {
-                assert!(self.law.rows.are_of::<D>(self.volumes.len()));
+                assert!(self.law.rows.has_particles::<D>(self.volumes.len()));
                 debug_assert!(
-                    self.law.rows.holds(displacement, start..start + force[0].len()),
+                    self.law.rows.matches(displacement, start..start + force[0].len()),
                     "of another displacement"
                 );
                 &self.law.rows
@@ -353,13 +357,13 @@ impl<const D: usize> BondForces<D> for CloudBonds<D> {
 }
 
 impl<const D: usize> BondDamage<D> for CloudBonds<D> {
-    fn sever(&mut self, bonds: &[Overstretched]) {
+    fn break_bonds(&mut self, bonds: &[Overstretched]) {
         for bond in bonds {
-            self.lists.sever(bond.site, self.lists.starts[bond.site as usize] + bond.index as usize);
+            self.lists.break_bond(bond.site, self.lists.starts[bond.site as usize] + bond.index as usize);
         }
     }
 
-    fn softening(&self) -> &Softening {
+    fn softening(&self) -> &SoftenedBonds {
         &self.softening
     }
 
@@ -386,7 +390,7 @@ impl<const D: usize> BondDamage<D> for CloudBonds<D> {
         for site in 0..self.volumes.len() {
             for k in self.lists.row(site) {
                 if self.lists.inverse_length[k] > 0.0 && words[k / 64] >> (k % 64) & 1 == 0 {
-                    self.lists.sever(site as u32, k);
+                    self.lists.break_bond(site as u32, k);
                 }
             }
         }
@@ -408,7 +412,7 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
             + [&self.factors, &self.relief].into_iter().flatten().map(|f| 8 * D * f.sites()).sum::<usize>()
     }
 
-    fn kind(&self) -> Kind<'_, D> {
-        Kind::Cloud(self)
+    fn kind(&self) -> BondKind<'_, D> {
+        BondKind::Cloud(self)
     }
 }

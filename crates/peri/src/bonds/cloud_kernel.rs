@@ -1,56 +1,57 @@
 //! The cloud kernel: the neighbours of one particle gathered a vector at a time.
 //!
-//! A particle lies in one or two rows of four numbers. Rows of as many bonds as a vector has lanes are loaded whole and turned into
-//! columns by shuffles: with AVX2 and AVX-512 the kernel takes 0.7 of the time that it takes number by number.
+//! A particle occupies one or two rows of four numbers. Groups of as many rows as a vector has lanes are
+//! loaded whole and transposed by shuffles: with AVX2 and AVX-512 this takes 0.7 of the time of scalar loads.
 
-use super::kernel::{Pass, law};
-use super::real::Real;
+use super::kernel::{ForceKernel, law};
+use super::real::KernelReal;
 use crate::field::{CHUNK, Field};
 use crate::potential::StretchRange;
 use pulp::Simd;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Neighbour lists are padded to a multiple of this with bonds of no stiffness to the particle itself.
+/// Neighbour lists are padded to a multiple of this with bonds of zero stiffness from the particle to itself.
 pub const GROUP: usize = 8;
 
 /// Numbers of a row.
 const ROW: usize = 4;
 
-/// Positions and displacements of consecutive particles: (x, y, u_x, u_y) in a plane, in space (x, y, z, 0) and (u_x, u_y, u_z, 0).
+/// Positions and displacements of consecutive particles: (x, y, u_x, u_y) in a plane, in space (x, y, z, 0)
+/// and (u_x, u_y, u_z, 0).
 #[derive(Default)]
-pub struct Rows {
+pub struct ParticleRows {
     /// The first particle.
     first: usize,
     rows: Vec<[f64; ROW]>,
 }
 
-impl Rows {
-    /// Of these particles, in a displacement.
+impl ParticleRows {
+    /// Gathers these particles in a displacement.
     pub fn new<const D: usize>(position: &Field<D>, displacement: &Field<D>, range: Range<usize>) -> Self {
         let mut rows = Self { first: range.start, rows: vec![[0.0; ROW]; range.len() * (D - 1)] };
-        rows.place(position, 0);
-        rows.place(displacement, ROW * (D - 1) / 2);
+        rows.write(position, 0);
+        rows.write(displacement, ROW * (D - 1) / 2);
         rows
     }
 
-    /// Whether there is none.
+    /// Returns true if no particle is held.
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
-    /// Bytes that it holds.
+    /// Bytes in memory.
     pub fn bytes(&self) -> usize {
         size_of_val(self.rows.as_slice())
     }
 
-    /// Whether they are those of so many particles from the first on.
-    pub fn are_of<const D: usize>(&self, particles: usize) -> bool {
+    /// Returns true if these are `particles` particles from the first on.
+    pub fn has_particles<const D: usize>(&self, particles: usize) -> bool {
         self.first == 0 && self.rows.len() == particles * (D - 1)
     }
 
-    /// Whether they are those of these particles in this displacement.
-    pub fn holds<const D: usize>(&self, displacement: &Field<D>, sites: Range<usize>) -> bool {
+    /// Returns true if these are the rows of `sites` in this displacement.
+    pub fn matches<const D: usize>(&self, displacement: &Field<D>, sites: Range<usize>) -> bool {
         let rows = self.rows.as_flattened().chunks_exact(ROW * (D - 1)).skip(sites.start - self.first);
         sites.zip(rows).all(|(site, row)| {
             let moved = &row[ROW * (D - 1) / 2..][..D];
@@ -58,13 +59,13 @@ impl Rows {
         })
     }
 
-    /// Takes another displacement.
+    /// Loads another displacement.
     pub fn load<const D: usize>(&mut self, displacement: &Field<D>) {
-        self.place(displacement, ROW * (D - 1) / 2);
+        self.write(displacement, ROW * (D - 1) / 2);
     }
 
-    /// Writes a vector of each particle, beginning with a number of its rows.
-    fn place<const D: usize>(&mut self, field: &Field<D>, at: usize) {
+    /// Writes a vector of each particle, beginning with column `at` of its rows.
+    fn write<const D: usize>(&mut self, field: &Field<D>, at: usize) {
         let (first, components) = (self.first, field.components());
         self.rows.par_chunks_mut(CHUNK * (D - 1)).enumerate().for_each(|(chunk, rows)| {
             let sites = first + chunk * CHUNK..;
@@ -77,17 +78,17 @@ impl Rows {
     }
 }
 
-/// What the cloud kernel reads: compressed rows of neighbours.
+/// Input of the cloud kernel: compressed rows of neighbours.
 pub struct CloudData<'a, const D: usize> {
-    /// All particles that a work item meets.
-    pub rows: &'a Rows,
+    /// All particles that a work item reads.
+    pub rows: &'a ParticleRows,
     /// First bond of each particle, and the end of the last.
     pub starts: &'a [usize],
     /// Neighbour of each bond.
     pub neighbours: &'a [u32],
     /// 1/|ξ| of each bond; 0 where broken.
     pub inverse_length: &'a [f64],
-    /// w V_J of each bond; empty where all bonds have the same, which is then part of `stiffness`.
+    /// w V_J of each bond; empty if all are equal and included in `stiffness`.
     pub weights: &'a [f64],
     /// 2kθ, times the common w V_J.
     pub stiffness: f64,
@@ -99,11 +100,11 @@ pub struct CloudPass<'a, const D: usize, const P: usize, const Q: usize> {
     pub data: &'a CloudData<'a, D>,
     /// q(0), numerator and denominator of the law in e = λ² − 1.
     pub law: (f64, [f64; P], [f64; Q]),
-    /// Ends of the law in e; outside of them q stays what it is there.
+    /// Ends of the fitted range in e; q is constant beyond them.
     pub clamp: [f64; 2],
 }
 
-impl<const D: usize, const P: usize, const Q: usize> Pass<D> for CloudPass<'_, D, P, Q> {
+impl<const D: usize, const P: usize, const Q: usize> ForceKernel<D> for CloudPass<'_, D, P, Q> {
     #[inline(always)]
     fn run<S: Simd>(
         &self,
@@ -131,8 +132,8 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for CloudPass<'_, D
             let mut sum = [zero; D];
             for first in (starts[own]..starts[own + 1]).step_by(lanes) {
                 let group = &neighbours[first..first + lanes];
-                // SAFETY: the rows hold every neighbour of this work item: those of all particles, of which there is one row or two each
-                // (asserted in `CloudBonds::force`), or those of `met_by`
+                // SAFETY: the rows hold every neighbour of this work item: those of all particles, of which
+                // there is one row or two each (asserted in `CloudBonds::force`), or those of `reached_by`
                 let (x, u) = unsafe {
                     let whole = columns::<S, D>(simd, rows, 0, group, &order);
                     let (mut x, mut u) = ([zero; D], [zero; D]);
@@ -183,14 +184,14 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for CloudPass<'_, D
     }
 }
 
-/// Row `at` of each of a vector of particles, column by column.
+/// Loads row `at` of a vector of particles, column by column.
 ///
 /// # Safety
-/// `rows` hold all of `group`.
+/// `rows` hold every particle of `group`.
 #[inline(always)]
 unsafe fn columns<S: Simd, const D: usize>(
     simd: S,
-    rows: &Rows,
+    rows: &ParticleRows,
     at: usize,
     group: &[u32],
     order: &[usize; GROUP],
@@ -205,10 +206,10 @@ unsafe fn columns<S: Simd, const D: usize>(
     turned(simd, &raw)
 }
 
-/// Rows as columns; which lane a row comes to is for [`order`] to tell.
+/// Transposes rows to columns; [`order`] returns the lane of each row.
 #[inline(always)]
 fn turned<S: Simd>(simd: S, raw: &[[f64; ROW]; GROUP]) -> [S::f64s; ROW] {
-    // slices of it would be made by functions that are not inlined here
+    // slices would be made by functions that are not inlined here
     let start = std::ptr::from_ref(raw).cast::<S::f64s>();
     let mut vectors = [simd.splat_f64s(0.0); ROW];
     for k in 0..ROW {
@@ -218,7 +219,8 @@ fn turned<S: Simd>(simd: S, raw: &[[f64; ROW]; GROUP]) -> [S::f64s; ROW] {
     simd.deinterleave_shfl_f64s(vectors)
 }
 
-/// The lane of each row in its column: bonds are loaded in that order, so that columns have them in the order of the lists.
+/// Returns the lane of each row in its column: loading bonds in this order restores the order of the lists in
+/// the columns.
 #[inline(always)]
 fn order<S: Simd>(simd: S) -> [usize; GROUP] {
     let mut raw = [[0.0; ROW]; GROUP];

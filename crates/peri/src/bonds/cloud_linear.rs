@@ -1,16 +1,17 @@
-//! Both passes of materials whose forces are linear in a bond, on a cloud: moments of a family's displacements, and forces.
+//! The two passes of materials whose forces are linear in a bond, on clouds: moments of family displacements,
+//! and forces.
 //!
-//! What a neighbour brings lies together in four lanes, so that plain loops become vector instructions.
+//! The data of a neighbour lie together in four lanes, so that plain loops become vector instructions.
 
-use super::cloud_lists::Lists;
-use super::kernel::{Pass, dispatch};
+use super::cloud_lists::NeighbourRows;
+use super::kernel::{ForceKernel, dispatch};
 use super::{BodyGeometry, CloudBonds};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::StretchRange;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-type Lanes = [f64; 4];
+type FourLanes = [f64; 4];
 
 /// Particles whose forces are summed before they are written.
 const BLOCK: usize = 16;
@@ -18,21 +19,21 @@ const BLOCK: usize = 16;
 /// A particle in one line of the cache: position and volume, displacement.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
-struct Place {
+struct CloudParticle {
     /// X, then V in the last lane.
-    x: Lanes,
-    u: Lanes,
+    x: FourLanes,
+    u: FourLanes,
 }
 
-/// The particles of a cloud as both passes read them.
+/// Particles of a cloud in the layout of both passes.
 pub struct CloudPlaces<const D: usize> {
-    places: Vec<Place>,
+    places: Vec<CloudParticle>,
     /// θ of [`BodyGeometry::relief`]; empty where there is none.
-    shifts: Vec<Lanes>,
+    shifts: Vec<FourLanes>,
 }
 
 /// S column by column, with A in the last lane of the first column, or P alike.
-pub type Columns<const D: usize> = [Lanes; D];
+pub type MomentColumns<const D: usize> = [FourLanes; D];
 
 /// Moments of a family, over its intact bonds; columns by ξ.
 #[derive(Clone, Copy)]
@@ -40,23 +41,23 @@ pub struct CloudMoments<const D: usize> {
     /// Σ_J (V_J/|ξ|²)|η|².
     pub square: f64,
     /// Σ_J (V_J/|ξ|²) η⊗ξ.
-    pub first: Columns<D>,
+    pub first: MomentColumns<D>,
     /// Σ_J (V_J/|ξ|²) η⊗(θ_J − θ_I); zero where there is no θ.
-    pub shifted: Columns<D>,
+    pub shifted: MomentColumns<D>,
 }
 
 impl<const D: usize> CloudPlaces<D> {
-    /// Of a cloud at rest, without θ.
+    /// Builds the layout of an undeformed cloud, without θ.
     pub(super) fn new(position: &Field<D>, volumes: &[f64]) -> Self {
         let place = |(site, &volume): (usize, &f64)| {
             let mut x = lanes(position.get(site));
             x[3] = volume;
-            Place { x, u: [0.0; 4] }
+            CloudParticle { x, u: [0.0; 4] }
         };
         Self { places: volumes.iter().enumerate().map(place).collect(), shifts: Vec::new() }
     }
 
-    /// Takes a displacement.
+    /// Loads a displacement.
     pub fn load(&mut self, displacement: &Field<D>) {
         self.places.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, places)| {
             for (at, place) in places.iter_mut().enumerate() {
@@ -65,23 +66,23 @@ impl<const D: usize> CloudPlaces<D> {
         });
     }
 
-    /// How many [`Columns`] a particle has in the second pass: S, and P where there is θ.
+    /// Number of [`MomentColumns`] of a particle in the second pass: S, and P if there is θ.
     pub fn stride(&self) -> usize {
         if self.shifts.is_empty() { 1 } else { 2 }
     }
 }
 
-fn lanes<const D: usize>(value: [f64; D]) -> Lanes {
+fn lanes<const D: usize>(value: [f64; D]) -> FourLanes {
     std::array::from_fn(|d| if d < D { value[d] } else { 0.0 })
 }
 
 impl<const D: usize> CloudBonds<D> {
-    /// The particles for both passes, without θ.
+    /// Builds the layout for both passes, without θ.
     pub fn bare_places(&self) -> CloudPlaces<D> {
         CloudPlaces::new(self.positions(), self.volumes())
     }
 
-    /// The particles for [`Self::moments`] and [`Self::linear_force`].
+    /// Builds the layout for [`Self::moments`] and [`Self::linear_force`].
     pub fn places(&self) -> CloudPlaces<D> {
         let mut places = self.bare_places();
         if let Some(relief) = self.relief() {
@@ -90,42 +91,42 @@ impl<const D: usize> CloudBonds<D> {
         places
     }
 
-    /// Moments of the particles of work item `chunk`; `visit` takes the site of each.
+    /// Computes the moments of the particles of work item `chunk`; `visit` receives each site.
     pub fn moments(
         &self,
         places: &CloudPlaces<D>,
         chunk: usize,
         visit: &mut dyn FnMut(usize, &CloudMoments<D>),
     ) {
-        Arch::new().dispatch(MomentPass { lists: self.lists(), places, chunk, visit });
+        Arch::new().dispatch(CloudMomentPass { lists: self.lists(), places, chunk, visit });
     }
 
-    /// Σ_J (V_J/|ξ|²)[(A_I + A_J) η + (S_I + S_J) ξ + (P_I + P_J)(θ_J − θ_I)] of the particles of work item `chunk`, with
-    /// [`CloudPlaces::stride`] `terms` a particle.
+    /// Computes Σ_J (V_J/|ξ|²)[(A_I + A_J) η + (S_I + S_J) ξ + (P_I + P_J)(θ_J − θ_I)] of the particles of
+    /// work item `chunk`, with [`CloudPlaces::stride`] `terms` a particle.
     pub fn linear_force(
         &self,
         places: &CloudPlaces<D>,
-        terms: &[Columns<D>],
+        terms: &[MomentColumns<D>],
         chunk: usize,
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     ) {
         let start = chunk_range(chunk, places.places.len()).start;
-        dispatch(LinearPass { lists: self.lists(), places, terms }, start, force, track);
+        dispatch(CloudLinearPass { lists: self.lists(), places, terms }, start, force, track);
     }
 }
 
-struct MomentPass<'a, const D: usize> {
-    lists: Lists<'a>,
+struct CloudMomentPass<'a, const D: usize> {
+    lists: NeighbourRows<'a>,
     places: &'a CloudPlaces<D>,
     chunk: usize,
     visit: &'a mut dyn FnMut(usize, &CloudMoments<D>),
 }
 
-impl<const D: usize> WithSimd for MomentPass<'_, D> {
+impl<const D: usize> WithSimd for CloudMomentPass<'_, D> {
     type Output = ();
 
-    /// For the instruction set alone.
+    /// Compiles the loop for the instruction set.
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
         let relieved = !self.places.shifts.is_empty();
@@ -144,7 +145,7 @@ impl<const D: usize> WithSimd for MomentPass<'_, D> {
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "lanes of several arrays at once")]
 fn moments_of<const D: usize, const RELIEVED: bool>(
-    lists: &Lists,
+    lists: &NeighbourRows,
     places: &CloudPlaces<D>,
     site: usize,
 ) -> CloudMoments<D> {
@@ -182,13 +183,13 @@ fn moments_of<const D: usize, const RELIEVED: bool>(
     CloudMoments { square: squares[0] + squares[1] + squares[2] + squares[3], first, shifted }
 }
 
-struct LinearPass<'a, const D: usize> {
-    lists: Lists<'a>,
+struct CloudLinearPass<'a, const D: usize> {
+    lists: NeighbourRows<'a>,
     places: &'a CloudPlaces<D>,
-    terms: &'a [Columns<D>],
+    terms: &'a [MomentColumns<D>],
 }
 
-impl<const D: usize> Pass<D> for LinearPass<'_, D> {
+impl<const D: usize> ForceKernel<D> for CloudLinearPass<'_, D> {
     #[inline(always)]
     fn run<S: Simd>(
         &self,
@@ -198,7 +199,7 @@ impl<const D: usize> Pass<D> for LinearPass<'_, D> {
         track: Option<&mut StretchRange>,
     ) {
         let mut seen = StretchRange::REST;
-        // whole lanes are kept: three of four would become single numbers
+        // full lanes are kept: three of four would become scalars
         let mut sums = [[0.0; 4]; BLOCK];
         for first in (0..force[0].len()).step_by(BLOCK) {
             let length = BLOCK.min(force[0].len() - first);
@@ -223,13 +224,13 @@ impl<const D: usize> Pass<D> for LinearPass<'_, D> {
     }
 }
 
-impl<const D: usize> LinearPass<'_, D> {
+impl<const D: usize> CloudLinearPass<'_, D> {
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "lanes of several arrays at once")]
     fn sum<const RELIEVED: bool, const TRACK: bool>(
         &self,
         site: usize,
-        out: &mut Lanes,
+        out: &mut FourLanes,
         seen: &mut StretchRange,
     ) {
         let (lists, places) = (&self.lists, self.places);

@@ -15,12 +15,13 @@ pub(super) struct NeighbourLists {
     pub(super) inverse_length: Vec<f64>,
     /// Intact bonds, each counted from both ends.
     pub(super) directed_bonds: u64,
-    /// Sites whose family a cut has parted, ascending.
+    /// Sites whose family a cut has divided, ascending.
     pub(super) parted: Vec<u32>,
 }
 
 impl NeighbourLists {
-    /// Lists all pairs within `horizon`, less those that cross a cut or a gap; `order` is the index of each point in the input.
+    /// Lists all pairs within `horizon`, except those that cross a cut or a gap; `order` is the index of each
+    /// point in the input.
     ///
     /// # Errors
     /// [`Error::Geometry`] for two particles in one place.
@@ -83,21 +84,21 @@ impl NeighbourLists {
         Ok(Self { starts, neighbours, inverse_length, directed_bonds, parted })
     }
 
-    /// The bonds of a site, and what its list is padded with.
+    /// Returns the range of a site's bonds and padding.
     pub(super) fn row(&self, site: usize) -> Range<usize> {
         self.starts[site]..self.starts[site + 1]
     }
 
-    /// Severs the bond `k` of a site: as the padding, a bond of no stiffness to itself.
-    pub(super) fn sever(&mut self, site: u32, k: usize) {
+    /// Severs bond `k` of a site: like padding, it becomes a bond of zero stiffness to the site itself.
+    pub(super) fn break_bond(&mut self, site: u32, k: usize) {
         self.neighbours[k] = site;
         self.inverse_length[k] = 0.0;
         self.directed_bonds -= 1;
     }
 }
 
-/// The compressed rows, and what makes a weight of a volume.
-pub(super) struct Lists<'a> {
+/// Compressed rows, and the data that turn a volume into a weight.
+pub(super) struct NeighbourRows<'a> {
     pub(super) starts: &'a [usize],
     pub(super) neighbours: &'a [u32],
     /// 1/|ξ|; 0 where broken.
@@ -106,14 +107,14 @@ pub(super) struct Lists<'a> {
     pub(super) partial: Option<[f64; 2]>,
 }
 
-impl Lists<'_> {
+impl NeighbourRows<'_> {
     /// V_J/|ξ|², V_J with its correction.
     #[inline(always)]
     pub(super) fn share(&self, inverse: f64, volume: f64) -> f64 {
         let share = inverse * inverse * volume;
         match self.partial {
             None => share,
-            // without a call, which would not inherit the instruction set
+            // inlined: a call would not inherit the instruction set
             Some([horizon, spacing]) => {
                 let part = (horizon + 0.5 * spacing - 1.0 / inverse) / spacing;
                 share * part.clamp(0.0, 1.0)

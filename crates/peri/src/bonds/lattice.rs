@@ -1,15 +1,15 @@
-//! A regular lattice of particles: one stencil of offsets, a bit mask of intact bonds per particle, no neighbour list.
+//! A regular lattice: one stencil of offsets, a bit mask of intact bonds per particle, no neighbour list.
 
 mod connect;
 mod mixed;
 
-use super::lattice_kernel::{Class, Factors, TILE, Tiles};
+use super::lattice_kernel::{Factors, TILE, TileClass, Tiles};
 use super::lattice_sums::{GradientSums, Span, Spans, Weights};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
-use super::softening::{Softened, Softening, integrity};
+use super::softening::{Softened, SoftenedBonds, integrity};
 use super::stencil::{Stencil, fullest, layout, storage};
 use super::{
-    BodyGeometry, BondDamage, BondForces, Bonds, Kind, Neighbour, Overstretched, VolumeCorrection,
+    BodyGeometry, BondDamage, BondForces, BondKind, Bonds, Neighbour, Overstretched, VolumeCorrection,
     plain_force, refuse_one_sided, surface_weight,
 };
 use crate::error::Error;
@@ -27,7 +27,7 @@ pub struct LatticeBonds<const D: usize> {
     spans: Vec<Span<D>>,
     ratio: f64,
     volume_correction: VolumeCorrection,
-    /// Axes, from that on which neighbours are neighbours in storage.
+    /// Axes, in the order in which neighbours are adjacent in storage.
     order: [usize; D],
     /// Steps in sites along each axis.
     strides: [usize; D],
@@ -35,26 +35,26 @@ pub struct LatticeBonds<const D: usize> {
     sites: usize,
     particles: Vec<u32>,
     intact: Vec<Vec<u64>>,
-    classes: Vec<Class>,
+    classes: Vec<TileClass>,
     factors: Option<Field<D>>,
-    /// Whether they are the same along all axes.
+    /// True if the factors are equal along all axes.
     even: bool,
-    /// Interior value of the factors, a part of every stencil bond's weight; the stored factors are relative to it.
+    /// Interior value of the factors, part of each bond's weight; stored factors are relative to it.
     interior_factor: f64,
     kernel: Option<Box<dyn LatticeKernel<D>>>,
-    /// A law that only a table represents, and kθ.
-    table: Option<(KernelFit, f64)>,
+    /// The fitted law, and kθ.
+    law: Option<(KernelFit, f64)>,
     directed_bonds: u64,
-    softening: Softening,
+    softening: SoftenedBonds,
     mixed: Option<Mixed<D>>,
 }
 
 impl<const D: usize> LatticeBonds<D> {
-    /// Bonds of all occupied cells within `ratio` spacings, less those that cross a cut.
+    /// Bonds all occupied cells within `ratio` spacings, except pairs that cross a cut.
     ///
     /// # Errors
-    /// [`Error::Geometry`] where no cell is occupied, the list of occupied cells does not fit the box, the spacing is not
-    /// positive, the horizon is not finite or reaches no neighbour, or bonds need more memory than is left.
+    /// [`Error::Geometry`] if no cell is occupied, the list of cells does not fit the box, the spacing is not
+    /// positive, the horizon is not finite or reaches no neighbour, or memory does not suffice.
     pub fn new(
         lattice: Lattice<D>,
         ratio: f64,
@@ -64,7 +64,7 @@ impl<const D: usize> LatticeBonds<D> {
         Self::with_gaps(lattice, ratio, volume_correction, cuts, None)
     }
 
-    /// As [`Self::new`], without the bonds that cross a gap.
+    /// Builds bonds as [`Self::new`] does, except those that cross a gap.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -111,14 +111,14 @@ impl<const D: usize> LatticeBonds<D> {
             sites,
             particles: Vec::new(),
             intact: Vec::new(),
-            classes: vec![Class::Empty; sites / TILE],
+            classes: vec![TileClass::Empty; sites / TILE],
             factors: None,
             even: true,
             interior_factor: 1.0,
             kernel: None,
-            table: None,
+            law: None,
             directed_bonds: 0,
-            softening: Softening::default(),
+            softening: SoftenedBonds::default(),
             mixed: None,
             lattice,
         };
@@ -158,7 +158,7 @@ impl<const D: usize> LatticeBonds<D> {
         shift(self.strides, offset)
     }
 
-    /// Whether bond `k` of the particle in `site` is intact.
+    /// Returns true if bond `k` of the particle in `site` is intact.
     pub fn is_intact(&self, site: usize, k: usize) -> bool {
         self.intact[k / 64][site] >> (k % 64) & 1 == 1
     }
@@ -171,14 +171,14 @@ impl<const D: usize> LatticeBonds<D> {
         share * self.interior_factor * surface_weight(bond, length, factors.get(site), factors.get(other))
     }
 
-    /// What [`Self::weight`] and [`Self::is_intact`] of bond `k` come from.
+    /// Data of [`Self::weight`] and [`Self::is_intact`] for bond `k`.
     pub(crate) fn weights(&self, k: usize) -> Weights<'_, D> {
         let factors = self.factors.as_ref().map(Field::components);
         let share = self.spans[k].share * self.interior_factor;
         Weights { share, factors, words: &self.intact[k / 64], bit: 1 << (k % 64) }
     }
 
-    /// A bond of a site with the softened ones `soft`.
+    /// Returns a bond of a site, given the softened bonds of that site.
     fn bond_among(&self, soft: &[Softened], site: usize, index: u32) -> Neighbour<D> {
         let Span { shift, bond, length, share, .. } = self.spans[index as usize];
         let whole = integrity(soft, index) * self.lattice.volume;
@@ -193,7 +193,7 @@ impl<const D: usize> LatticeBonds<D> {
         }
     }
 
-    /// The bonds of the stencil, measured once.
+    /// Computes length, direction and share of each bond of the stencil.
     fn measure(&self) -> Vec<Span<D>> {
         let spacing = self.lattice.spacing;
         let span = |(k, &offset): (usize, &[i32; D])| {
@@ -206,12 +206,12 @@ impl<const D: usize> LatticeBonds<D> {
         self.stencil.offsets.iter().enumerate().map(span).collect()
     }
 
-    /// What sums over half of the stencil read: every bond of the body once.
+    /// Input of sums over half of the stencil: every bond of the body once.
     pub(super) fn spans<'a>(&'a self, displacement: &'a Field<D>) -> Spans<'a, D> {
         Spans { spans: &self.spans, tiles: self.tiles(displacement) }
     }
 
-    /// The bonds of the stencil with their stiffness 2kθ w V/|ξ|, for a modulus kθ.
+    /// Returns the bonds of the stencil with their stiffness 2kθ w V/|ξ|, for a modulus kθ.
     pub(crate) fn stencil_bonds(&self, modulus: f64) -> Vec<StencilBond<D>> {
         let scaled = |span: &Span<D>| {
             let stiffness =
@@ -221,12 +221,18 @@ impl<const D: usize> LatticeBonds<D> {
         self.spans.iter().map(scaled).collect()
     }
 
-    /// Whether no bond carries a weight of its own: integrities, or surface factors.
+    /// Returns true if no bond has its own weight from integrity or surface factors.
     pub(crate) fn is_uniform(&self) -> bool {
         self.factors.is_none() && self.softening.bonds().is_empty()
     }
 
-    /// What lattice kernels read, with a displacement.
+    /// The fitted law and kθ, N/m⁶, where they are set.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn law(&self) -> Option<(&KernelFit, f64)> {
+        self.law.as_ref().map(|(fit, modulus)| (fit, *modulus))
+    }
+
+    /// Input of lattice kernels for a displacement.
     pub(super) fn tiles<'a>(&'a self, displacement: &'a Field<D>) -> Tiles<'a, D> {
         Tiles {
             displacement: displacement.components(),
@@ -247,7 +253,7 @@ impl<const D: usize> LatticeBonds<D> {
     ) {
         if let Some(kernel) = &self.kernel {
             kernel.run(&self.tiles(displacement), start, force, track);
-        } else if let Some((fit, modulus)) = &self.table {
+        } else if let Some((fit, modulus)) = &self.law {
             plain_force(self, fit, *modulus, displacement, start, force, track);
         }
     }
@@ -359,7 +365,7 @@ impl<const D: usize> BondForces<D> for LatticeBonds<D> {
             mixed.set_law(fit, &stencil, self.lattice.spacing);
         }
         self.kernel = lattice_kernel(fit, &stencil);
-        self.table = self.kernel.is_none().then(|| (fit.clone(), modulus));
+        self.law = Some((fit.clone(), modulus));
     }
 
     fn set_factors(&mut self, mut factors: Field<D>) {
@@ -392,7 +398,7 @@ impl<const D: usize> BondForces<D> for LatticeBonds<D> {
 
     fn prepare(&mut self, displacement: &Field<D>) {
         if let Some(mixed) = &mut self.mixed {
-            mixed.round(displacement, self.lattice.spacing);
+            mixed.set_displacement(displacement, self.lattice.spacing);
         }
     }
 
@@ -431,7 +437,7 @@ impl<const D: usize> BondForces<D> for LatticeBonds<D> {
         self.is_uniform().then(|| self.spans(displacement).stiffness(sites, volume, table, least))
     }
 
-    /// Of bonds that do not soften.
+    /// Ignores softened bonds.
     fn gradient_sums(&self, displacement: &Field<D>, chunk: usize) -> Option<Vec<GradientSums<D>>> {
         let sites = chunk_range(chunk, self.sites);
         self.softening.bonds().is_empty().then(|| self.spans(displacement).gradient_sums(sites))
@@ -439,7 +445,7 @@ impl<const D: usize> BondForces<D> for LatticeBonds<D> {
 }
 
 impl<const D: usize> BondDamage<D> for LatticeBonds<D> {
-    fn sever(&mut self, bonds: &[Overstretched]) {
+    fn break_bonds(&mut self, bonds: &[Overstretched]) {
         for bond in bonds {
             let (site, k) = (bond.site as usize, bond.index as usize);
             self.intact[k / 64][site] &= !(1 << (k % 64));
@@ -449,11 +455,11 @@ impl<const D: usize> BondDamage<D> for LatticeBonds<D> {
         tiles.dedup();
         for tile in tiles {
             let empty = (tile * TILE..(tile + 1) * TILE).all(|s| self.intact.iter().all(|w| w[s] == 0));
-            self.classes[tile] = if empty { Class::Empty } else { Class::Partial };
+            self.classes[tile] = if empty { TileClass::Empty } else { TileClass::Partial };
         }
     }
 
-    fn softening(&self) -> &Softening {
+    fn softening(&self) -> &SoftenedBonds {
         &self.softening
     }
 
@@ -493,7 +499,7 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         self.sites * 8 * self.intact.len() + self.classes.len() + self.particles.len() * 4 + factors + mixed
     }
 
-    fn kind(&self) -> Kind<'_, D> {
-        Kind::Lattice(self)
+    fn kind(&self) -> BondKind<'_, D> {
+        BondKind::Lattice(self)
     }
 }

@@ -1,24 +1,24 @@
-//! The lattice kernel: vectors of neighbouring particles, one bond of the stencil at a time, no gather.
+//! The lattice kernel: vectors of neighbouring particles, one bond of the stencil at a time, without gather.
 
-use super::kernel::{Pass, law};
-use super::real::Real;
+use super::kernel::{ForceKernel, law};
+use super::real::KernelReal;
 use crate::potential::StretchRange;
 use pulp::Simd;
 
 /// Sites per tile: the unit of the lattice kernel's classification. Storage is padded to a multiple of it.
 pub const TILE: usize = 16;
 
-/// One bond of the stencil with the law's coefficients scaled to its length and stiffness, for `P` numerator and
-/// `Q` denominator coefficients: q·c = E·ΣₖaₖEᵏ/(1 + ΣₖbₖEᵏ⁺¹), E = η·(2ξ + η).
+/// A bond of the stencil with the law's coefficients scaled to its length and stiffness, for `P` numerator
+/// and `Q` denominator coefficients: q·c = E·ΣₖaₖEᵏ/(1 + ΣₖbₖEᵏ⁺¹), E = η·(2ξ + η).
 #[derive(Clone, Copy, Debug)]
-pub struct Row<T, const D: usize, const P: usize, const Q: usize> {
+pub struct StencilRow<T, const D: usize, const P: usize, const Q: usize> {
     /// Distance to the neighbour in sites.
     pub shift: isize,
     /// Reference bond ξ.
     pub bond: [T; D],
     /// 1/|ξ|².
     pub inverse_square: T,
-    /// Ends of the law in E; outside of them q stays what it is there.
+    /// Ends of the fitted range in E; q is constant beyond them.
     pub clamp: [T; 2],
     /// Value at E = 0 (0 for stress-free laws).
     pub constant: T,
@@ -28,48 +28,48 @@ pub struct Row<T, const D: usize, const P: usize, const Q: usize> {
     pub denominator: [T; Q],
 }
 
-/// What a tile's particles need.
+/// Work that the particles of a tile need.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
-pub enum Class {
+pub enum TileClass {
     /// No particle has a bond.
     Empty,
     /// Every particle has every bond, with the stencil's own weight.
     Full,
-    /// Bonds are missing or carry a weight of their own.
+    /// Bonds are missing or have weights of their own.
     Partial,
 }
 
-/// What the lattice kernel reads, beside its rows.
+/// Input of the lattice kernel besides its rows.
 pub struct Tiles<'a, const D: usize, T = f64> {
     /// Displacement.
     pub displacement: [&'a [T]; D],
     /// Bit k of word w at a site: bond 64w + k is intact.
     pub intact: &'a [Vec<u64>],
     /// Class of each tile.
-    pub classes: &'a [Class],
-    /// Per-particle correction factors g (see [`super::correction`]), where the scene asks for them.
+    pub classes: &'a [TileClass],
+    /// Per-particle correction factors g (see [`super::correction`]), if the scene asks for them.
     pub factors: Option<Factors<'a, D, T>>,
     /// Largest |shift|: sites closer than this to either end hold no particle.
     pub guard: usize,
 }
 
-/// Factors of particles.
+/// Surface-correction factors of particles.
 #[derive(Clone, Copy)]
 pub enum Factors<'a, const D: usize, T = f64> {
-    /// The same along all axes: the weight of a bond is their mean.
+    /// Equal along all axes: the weight of a bond is the mean of its ends.
     Even(&'a [T]),
     /// Along each axis.
     Along([&'a [T]; D]),
 }
 
 impl<'a, const D: usize, T> Factors<'a, D, T> {
-    /// Of the components of a field, which are `even` where all are the same.
+    /// Wraps the components of a field; `even` if all are equal.
     pub fn new(components: [&'a [T]; D], even: bool) -> Self {
         if even { Self::Even(components[0]) } else { Self::Along(components) }
     }
 
-    fn are_of(&self, sites: usize) -> bool {
+    fn cover(&self, sites: usize) -> bool {
         match self {
             Self::Even(factors) => factors.len() == sites,
             Self::Along(factors) => factors.iter().all(|component| component.len() == sites),
@@ -77,17 +77,19 @@ impl<'a, const D: usize, T> Factors<'a, D, T> {
     }
 }
 
-/// The lattice kernel: tiles under a set of rows.
+/// The lattice kernel: tiles and rows.
 pub struct LatticePass<'a, T, const D: usize, const P: usize, const Q: usize> {
     /// The stencil.
-    pub rows: &'a [Row<T, D, P, Q>],
+    pub rows: &'a [StencilRow<T, D, P, Q>],
     /// The storage, in units of the rows.
     pub tiles: &'a Tiles<'a, D, T>,
     /// Unit of the rows' forces.
     pub unit: f64,
 }
 
-impl<T: Real, const D: usize, const P: usize, const Q: usize> Pass<D> for LatticePass<'_, T, D, P, Q> {
+impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> ForceKernel<D>
+    for LatticePass<'_, T, D, P, Q>
+{
     /// `start` and the length are multiples of [`TILE`].
     #[inline(always)]
     fn run<S: Simd>(
@@ -98,8 +100,8 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Pass<D> for Lattic
         track: Option<&mut StretchRange>,
     ) {
         let length = force[0].len();
-        // SAFETY of the unchecked loads below: a tile is visited only where `classes` says that it holds a bond,
-        // and then every site of it lies at least `guard` ≥ max|shift| from both ends of every slice.
+        // SAFETY of the unchecked loads below: a tile is visited only where `classes` says that it holds a
+        // bond, and then every site of it lies at least `guard` ≥ max|shift| from both ends of every slice.
         assert!(start.is_multiple_of(TILE) && length.is_multiple_of(TILE));
         let sites = self.tiles.displacement[0].len();
         assert!(start + length <= sites && self.tiles.displacement.iter().all(|c| c.len() == sites));
@@ -108,22 +110,22 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Pass<D> for Lattic
             self.tiles.intact.iter().all(|w| w.len() == sites)
                 && self.tiles.intact.len() * 64 >= self.rows.len()
         );
-        assert!(self.tiles.factors.is_none_or(|factors| factors.are_of(sites)));
+        assert!(self.tiles.factors.is_none_or(|factors| factors.cover(sites)));
         assert!(self.rows.iter().all(|r| r.shift.unsigned_abs() <= self.tiles.guard));
         let tracking = track.is_some();
-        let mut seen = [T::splat(simd, T::of(0.0)); 2];
+        let mut seen = [T::splat(simd, T::from_f64(0.0)); 2];
         for offset in (0..length).step_by(TILE) {
             let base = start + offset;
             let class = self.tiles.classes[base / TILE];
             for f in force.iter_mut() {
                 f[offset..offset + TILE].fill(0.0);
             }
-            if class == Class::Empty {
+            if class == TileClass::Empty {
                 continue;
             }
             assert!(base >= self.tiles.guard && base + TILE + self.tiles.guard <= sites);
             let lanes = T::lanes::<S>();
-            // two vectors at once share the loads of coefficients, where registers hold both
+            // two vectors at once share the loads of coefficients if registers suffice
             let pair = 2 * lanes <= TILE && (D < 3 || S::REGISTER_COUNT >= 32);
             let step = if pair { 2 * lanes } else { lanes };
             for sub in (0..TILE).step_by(step) {
@@ -136,7 +138,7 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Pass<D> for Lattic
                 };
                 // SAFETY: see above; `out` has at least `step` elements left in its tile.
                 unsafe {
-                    match (class == Class::Full, pair) {
+                    match (class == TileClass::Full, pair) {
                         (true, true) => self.full::<S, 2>(simd, base + sub, out, tracking, &mut seen),
                         (true, false) => self.full::<S, 1>(simd, base + sub, out, tracking, &mut seen),
                         // at the end of a row: one vector
@@ -161,14 +163,14 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Pass<D> for Lattic
     }
 }
 
-impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T, D, P, Q> {
-    /// Rows whose stretches are tracked: those of one direction see every bond of the body once.
+impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T, D, P, Q> {
+    /// Returns the number of rows whose stretches are tracked: rows of one direction visit every bond once.
     #[inline(always)]
     fn tracked(&self, tracking: bool) -> usize {
         if tracking { self.rows.len() / 2 } else { 0 }
     }
 
-    /// Every bond present: nothing but loads and arithmetic.
+    /// Sums a tile in which every bond is present: only loads and arithmetic.
     ///
     /// # Safety
     /// Sites `base − guard .. base + V·lanes + guard` exist in every slice; `out` takes V·lanes values.
@@ -185,8 +187,8 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
         let [mut low, mut high] = *seen;
         let displacement = self.tiles.displacement;
         // SAFETY: as above
-        let own = unsafe { self.own::<S, V>(simd, base) };
-        let mut sum = [[T::splat(simd, T::of(0.0)); V]; D];
+        let own = unsafe { self.displacements::<S, V>(simd, base) };
+        let mut sum = [[T::splat(simd, T::from_f64(0.0)); V]; D];
         for rows in tracked.chunks(T::RUN) {
             for row in rows {
                 let inverse = T::splat(simd, row.inverse_square);
@@ -226,7 +228,8 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
         unsafe { self.pass_on(simd, out, sum, true) };
     }
 
-    /// Bonds masked by their bits, where particles differ in them, and weighted by their ends' factors; those that no particle of the block has are left out.
+    /// Sums bonds masked by their bits and weighted by the factors of their ends; skips bonds that no
+    /// particle of the block has.
     ///
     /// # Safety
     /// As [`Self::full`].
@@ -244,8 +247,8 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
         let tracked = self.tracked(tracking);
         let displacement = self.tiles.displacement;
         // SAFETY: as above
-        let own = unsafe { self.own::<S, V>(simd, base) };
-        let zero = T::splat(simd, T::of(0.0));
+        let own = unsafe { self.displacements::<S, V>(simd, base) };
+        let zero = T::splat(simd, T::from_f64(0.0));
         let mut sum = [[zero; V]; D];
         for (word, rows) in self.rows.chunks(64).enumerate() {
             let words = &self.tiles.intact[word][base..base + V * lanes];
@@ -254,10 +257,10 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
                 present |= bits;
                 common &= if bits == 0 { u64::MAX } else { bits };
             }
-            // what all particles have that have any bond of this word needs no mask, bond by bond
+            // bonds of this word that all particles with any such bond share need no mask
             common &= if self.tiles.factors.is_none() { present } else { 0 };
             present &= !common;
-            // a particle has all common bonds, or none of this word: one bit tells
+            // a particle has all common bonds or none of this word: one bit decides
             let (one, mut left) = (common & common.wrapping_neg(), common);
             while left != 0 {
                 let (mut part, mut run) = ([[zero; V]; D], T::RUN);
@@ -333,7 +336,7 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
         *seen = [low, high];
     }
 
-    /// Adds forces to those of V vectors: after each run where it has an end, else at the end of all; what is left to add.
+    /// Adds forces of V vectors to the output, after each run of sums and at the end; returns the remainder.
     ///
     /// # Safety
     /// `out` takes V·lanes values.
@@ -350,20 +353,20 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
                 for v in 0..V {
                     // SAFETY: as above
                     unsafe { T::add_to(simd, out[d].add(v * T::lanes::<S>()), self.unit, sum[d][v]) };
-                    sum[d][v] = T::splat(simd, T::of(0.0));
+                    sum[d][v] = T::splat(simd, T::from_f64(0.0));
                 }
             }
         }
         sum
     }
 
-    /// Displacements of V vectors of particles.
+    /// Loads the displacements of V vectors of particles.
     ///
     /// # Safety
     /// As [`Self::full`].
     #[inline(always)]
-    unsafe fn own<S: Simd, const V: usize>(&self, simd: S, base: usize) -> [[T::Vector<S>; D]; V] {
-        let mut own = [[T::splat(simd, T::of(0.0)); D]; V];
+    unsafe fn displacements<S: Simd, const V: usize>(&self, simd: S, base: usize) -> [[T::Vector<S>; D]; V] {
+        let mut own = [[T::splat(simd, T::from_f64(0.0)); D]; V];
         for v in 0..V {
             for d in 0..D {
                 // SAFETY: as above
@@ -374,8 +377,8 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
     }
 }
 
-impl<T: Real, const D: usize, const P: usize, const Q: usize> Row<T, D, P, Q> {
-    /// ζ of a bond of the particles from `here` on, and E = η·(2ξ + η) = |ζ|² − |ξ|².
+impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> StencilRow<T, D, P, Q> {
+    /// Computes ζ of a bond of the particles from `here` on, and E = η·(2ξ + η) = |ζ|² − |ξ|².
     ///
     /// # Safety
     /// The sites `here` and `here + shift` are followed by a vector's width in every slice.
@@ -387,13 +390,13 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Row<T, D, P, Q> {
         own: &[T::Vector<S>; D],
         here: usize,
     ) -> ([T::Vector<S>; D], T::Vector<S>) {
-        let zero = T::splat(simd, T::of(0.0));
+        let zero = T::splat(simd, T::from_f64(0.0));
         let there = here.wrapping_add_signed(self.shift);
         let (mut e, mut zeta) = (zero, [zero; D]);
         for d in 0..D {
             // SAFETY: as above
             let other = unsafe { T::load::<S>(displacement[d], there) };
-            // few registers are for sums
+            // few registers remain for sums
             // SAFETY: as above
             let own =
                 if S::REGISTER_COUNT >= 32 { own[d] } else { unsafe { T::load::<S>(displacement[d], here) } };
@@ -405,7 +408,7 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Row<T, D, P, Q> {
         (zeta, e)
     }
 
-    /// λ² − 1 = E/|ξ|² of the particles that have all bits of `bit` in their words; 0 of others.
+    /// Computes λ² − 1 = E/|ξ|² of the particles that have all bits of `bit` in their words; 0 for others.
     ///
     /// # Safety
     /// `words` are as many as a vector has lanes.
@@ -428,8 +431,8 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Row<T, D, P, Q> {
         law::<T, S, P, Q>(simd, e, self.clamp, self.constant, &self.numerator, &self.denominator)
     }
 
-    /// Weight of a bond from the correction factors g of its two ends, (Σ_d (n_d/ḡ_d)²)^(−1/2), ḡ = ½(g_I + g_J); ḡ where
-    /// they are even.
+    /// Computes the weight of a bond from the correction factors g of its two ends, (Σ_d (n_d/ḡ_d)²)^(−1/2),
+    /// ḡ = ½(g_I + g_J); ḡ if they are even.
     ///
     /// # Safety
     /// `here` and `there` are followed by a vector's width in every slice.
@@ -445,13 +448,13 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Row<T, D, P, Q> {
             Factors::Even(factors) => {
                 // SAFETY: as above
                 let pair = unsafe { T::add(simd, T::load::<S>(factors, here), T::load::<S>(factors, there)) };
-                return T::mul(simd, pair, T::splat(simd, T::of(0.5)));
+                return T::mul(simd, pair, T::splat(simd, T::from_f64(0.5)));
             }
             Factors::Along(factors) => factors,
         };
-        let four = T::splat(simd, T::of(4.0));
+        let four = T::splat(simd, T::from_f64(4.0));
         let inverse = T::mul(simd, four, T::splat(simd, self.inverse_square));
-        let mut sum = T::splat(simd, T::of(0.0));
+        let mut sum = T::splat(simd, T::from_f64(0.0));
         for d in 0..D {
             let bond = T::splat(simd, self.bond[d]);
             // 4/(g_I + g_J)² = 1/ḡ²
@@ -461,6 +464,6 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Row<T, D, P, Q> {
             let cosine = T::mul(simd, T::mul(simd, bond, bond), inverse);
             sum = T::add(simd, sum, T::div(simd, cosine, T::mul(simd, pair, pair)));
         }
-        T::div(simd, T::splat(simd, T::of(1.0)), T::sqrt(simd, sum))
+        T::div(simd, T::splat(simd, T::from_f64(1.0)), T::sqrt(simd, sum))
     }
 }

@@ -1,6 +1,7 @@
-//! Sums over the bonds of a lattice without forces: stretches, and energies, each bond seen from one of its ends.
+//! Sums over the bonds of a lattice other than forces: stretches, energies, gradients; each bond seen from
+//! one end.
 
-use super::lattice_kernel::{Class, TILE, Tiles};
+use super::lattice_kernel::{TILE, TileClass, Tiles};
 use crate::potential::{StretchRange, TangentTable};
 use pulp::bytemuck::cast_slice;
 use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
@@ -21,9 +22,9 @@ pub struct Span<const D: usize> {
     pub inverse_square: f64,
 }
 
-/// The weights of all particles' bonds of one type.
+/// Weights of all particles' bonds of one offset.
 pub(crate) struct Weights<'a, const D: usize> {
-    /// That of bonds without surface correction.
+    /// Weight without surface correction.
     pub share: f64,
     /// Factors g of the surface correction, site by site.
     pub factors: Option<[&'a [f64]; D]>,
@@ -32,7 +33,7 @@ pub(crate) struct Weights<'a, const D: usize> {
     pub bit: u64,
 }
 
-/// A stencil over a displacement.
+/// A stencil applied to a displacement.
 pub struct Spans<'a, const D: usize> {
     /// All bonds of the stencil; bond k and bond (n − 1 − k) are opposite.
     pub spans: &'a [Span<D>],
@@ -41,12 +42,12 @@ pub struct Spans<'a, const D: usize> {
 }
 
 impl<const D: usize> Spans<'_, D> {
-    /// Calls `add` for the tiles of some sites that hold bonds: with the first site, and which of the first `count` bonds of the stencil
-    /// any of the particles has.
+    /// Calls `add` for each tile of some sites that holds bonds: with its first site, and the bonds among the
+    /// first `count` of the stencil that any of its particles has.
     #[inline(always)]
     fn tiles<A: Add<D>>(&self, sites: Range<usize>, count: usize, add: &mut A) {
         let mut present = Vec::with_capacity(count);
-        for base in sites.step_by(TILE).filter(|base| self.tiles.classes[base / TILE] != Class::Empty) {
+        for base in sites.step_by(TILE).filter(|base| self.tiles.classes[base / TILE] != TileClass::Empty) {
             present.clear();
             for (word, words) in self.tiles.intact.iter().enumerate() {
                 let mut any = words[base..base + TILE].iter().fold(0, |any, bits| any | bits);
@@ -60,7 +61,7 @@ impl<const D: usize> Spans<'_, D> {
         }
     }
 
-    /// e = λ² − 1 of bond k of each particle of a tile, where it is intact; 0 elsewhere.
+    /// Computes e = λ² − 1 of bond k of each particle of a tile; 0 if broken.
     #[inline(always)]
     fn elongations(&self, base: usize, k: usize) -> [f64; TILE] {
         let span = &self.spans[k];
@@ -76,14 +77,14 @@ impl<const D: usize> Spans<'_, D> {
         }
         let words = &self.tiles.intact[k / 64][base..base + TILE];
         for i in 0..TILE {
-            // all bits of what is present: a condition would be a branch for each particle
+            // all bits of the mask: a condition would branch for each particle
             let present = 0_u64.wrapping_sub(words[i] >> (k % 64) & 1);
             out[i] = f64::from_bits((out[i] * span.inverse_square).to_bits() & present);
         }
         out
     }
 
-    /// Extremes of e over the bonds that begin in these sites, of one direction each.
+    /// Computes the extremes of e over the bonds that begin in these sites, of one direction each.
     pub fn range(&self, sites: Range<usize>) -> StretchRange {
         let mut found = Extremes { low: [0.0; TILE], high: [0.0; TILE] };
         self.sum(sites, self.spans.len() / 2, &mut found);
@@ -94,22 +95,23 @@ impl<const D: usize> Spans<'_, D> {
         }
     }
 
-    /// The bonds beyond e = `least` that begin in these sites, of one direction each: by site and bond of the stencil, from both ends.
+    /// Lists the bonds beyond e = `least` that begin in these sites, of one direction each: by site and bond
+    /// of the stencil, from both ends.
     pub fn beyond(&self, sites: Range<usize>, least: f64) -> Vec<[u32; 2]> {
-        let mut found = Beyond { least, bonds: Vec::new() };
+        let mut found = BeyondScan { least, bonds: Vec::new() };
         self.sum(sites, self.spans.len() / 2, &mut found);
         found.bonds
     }
 
-    /// Σ share·|ξ|·φ(e) over the bonds that begin in these sites, of one direction each.
+    /// Computes Σ share·|ξ|·φ(e) over the bonds that begin in these sites, of one direction each.
     pub fn energy(&self, sites: Range<usize>, energy: impl Fn(f64) -> f64) -> f64 {
         let mut found = Energy { energy, total: 0.0 };
         self.sum(sites, self.spans.len() / 2, &mut found);
         found.total
     }
 
-    /// Of each of these sites, whole tiles: Σ (2 share V/|ξ|)·max(table(e), least)·(1 + max_{d≠e} |n_d n_e|) over all its bonds,
-    /// n the direction of the deformed bond.
+    /// Computes, for each site of whole tiles, Σ (2 share V/|ξ|)·max(table(e), least)·(1 + max_{d≠e} |n_d
+    /// n_e|) over all its bonds, n the direction of the deformed bond.
     pub fn stiffness(&self, sites: Range<usize>, volume: f64, table: &TangentTable, least: f64) -> Vec<f64> {
         let sums = vec![0.0; sites.len()];
         let mut found = Stiffness { first: sites.start, volume, table, least, sums };
@@ -117,32 +119,32 @@ impl<const D: usize> Spans<'_, D> {
         found.sums
     }
 
-    /// Of each of these sites, whole tiles, over all its bonds.
+    /// Computes the sums of each site of whole tiles over all its bonds.
     pub fn gradient_sums(&self, sites: Range<usize>) -> Vec<GradientSums<D>> {
         let mut sums = vec![GradientSums::NONE; sites.len()];
-        Arch::new().dispatch(Gradients { spans: self, first: sites.start, sums: &mut sums });
+        Arch::new().dispatch(GradientKernel { spans: self, first: sites.start, sums: &mut sums });
         sums
     }
 
     fn sum<A: Add<D>>(&self, sites: Range<usize>, count: usize, add: &mut A) {
-        Arch::new().dispatch(Sum { spans: self, sites, count, add });
+        Arch::new().dispatch(TileSum { spans: self, sites, count, add });
     }
 }
 
-/// What a tile adds to a sum: `present` are the bonds of the stencil that any of its particles has.
+/// Adds a tile to a sum: `present` are the bonds of the stencil that any of its particles has.
 trait Add<const D: usize> {
     fn tile(&mut self, spans: &Spans<D>, base: usize, present: &[usize]);
 }
 
-/// A sum, compiled as a whole for the vectors of the machine.
-struct Sum<'a, 'b, const D: usize, A> {
+/// A sum, compiled as a whole for the instruction set.
+struct TileSum<'a, 'b, const D: usize, A> {
     spans: &'b Spans<'a, D>,
     sites: Range<usize>,
     count: usize,
     add: &'b mut A,
 }
 
-impl<const D: usize, A: Add<D>> NullaryFnOnce for Sum<'_, '_, D, A> {
+impl<const D: usize, A: Add<D>> NullaryFnOnce for TileSum<'_, '_, D, A> {
     type Output = ();
     #[inline(always)]
     fn call(self) {
@@ -162,7 +164,7 @@ impl<const D: usize> Add<D> for Extremes {
         for &k in present {
             let e = spans.elongations(base, k);
             for i in 0..TILE {
-                // a stretch that is not a number is no extreme, as in the kernels
+                // NaN stretches are skipped, as in the kernels
                 low[i] = if e[i] < low[i] { e[i] } else { low[i] };
                 high[i] = if e[i] > high[i] { e[i] } else { high[i] };
             }
@@ -170,12 +172,12 @@ impl<const D: usize> Add<D> for Extremes {
     }
 }
 
-struct Beyond {
+struct BeyondScan {
     least: f64,
     bonds: Vec<[u32; 2]>,
 }
 
-impl<const D: usize> Add<D> for Beyond {
+impl<const D: usize> Add<D> for BeyondScan {
     #[inline(always)]
     fn tile(&mut self, spans: &Spans<D>, base: usize, present: &[usize]) {
         for &k in present {
@@ -239,7 +241,7 @@ impl<const D: usize> Add<D> for Stiffness<'_> {
     }
 }
 
-/// What the mean deformation of a family follows from.
+/// Sums from which the mean deformation of a family follows.
 #[derive(Clone, Copy, Debug)]
 pub struct GradientSums<const D: usize> {
     /// Σ share ξ⊗ξ/|ξ|².
@@ -252,14 +254,14 @@ impl<const D: usize> GradientSums<D> {
     const NONE: Self = Self { shape: [[0.0; D]; D], change: [[0.0; D]; D] };
 }
 
-/// The sums of whole tiles from `first` on, a vector of sites at a time.
-struct Gradients<'a, 'b, const D: usize> {
+/// Sums of whole tiles from `first` on, one vector of sites at a time.
+struct GradientKernel<'a, 'b, const D: usize> {
     spans: &'b Spans<'a, D>,
     first: usize,
     sums: &'b mut [GradientSums<D>],
 }
 
-impl<const D: usize> WithSimd for Gradients<'_, '_, D> {
+impl<const D: usize> WithSimd for GradientKernel<'_, '_, D> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
@@ -267,7 +269,7 @@ impl<const D: usize> WithSimd for Gradients<'_, '_, D> {
         let zero = simd.splat_f64s(0.0);
         for (at, sums) in self.sums.chunks_mut(S::F64_LANES).enumerate() {
             let base = self.first + at * S::F64_LANES;
-            if tiles.classes[base / TILE] == Class::Empty {
+            if tiles.classes[base / TILE] == TileClass::Empty {
                 continue;
             }
             let (mut shape, mut change) = ([[zero; D]; D], [[zero; D]; D]);
@@ -276,12 +278,12 @@ impl<const D: usize> WithSimd for Gradients<'_, '_, D> {
                 let bit = simd.splat_u64s(1 << (k % 64));
                 let has = simd.equal_u64s(simd.and_u64s(words, bit), bit);
                 let weight = simd.select_f64s(has, simd.splat_f64s(span.share * span.inverse_square), zero);
-                // a bond out of the storage is never intact
+                // a bond that leads outside the storage is never intact
                 let there = base.wrapping_add_signed(span.shift);
                 if there > tiles.displacement[0].len() - S::F64_LANES {
                     continue;
                 }
-                // closures would not be compiled for the vectors of the machine
+                // closures would not be compiled for the instruction set
                 let mut weighted = [zero; D];
                 for b in 0..D {
                     weighted[b] = simd.mul_f64s(weight, simd.splat_f64s(span.bond[b]));

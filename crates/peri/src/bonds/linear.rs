@@ -1,4 +1,5 @@
-//! Sums over the bonds of a lattice: energies, and both passes of materials whose forces are linear in a bond.
+//! Sums over the bonds of a lattice: energies, and both passes of materials whose forces are linear in a
+//! bond.
 
 use super::LatticeBonds;
 use super::kernel::dispatch;
@@ -10,7 +11,7 @@ use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
 impl<const D: usize> LatticeBonds<D> {
-    /// Σ_I V_I Σ_J w V_J |ξ| φ(e), each bond computed once; `None` where bonds carry weights of their own.
+    /// Computes Σ_I V_I Σ_J w V_J |ξ| φ(e), each bond once; `None` if bonds have their own weights.
     pub fn energy(&self, displacement: &Field<D>, energy: impl Fn(f64) -> f64 + Sync) -> Option<f64> {
         if !self.is_uniform() {
             return None;
@@ -21,7 +22,7 @@ impl<const D: usize> LatticeBonds<D> {
         Some(2.0 * volume * volume * ordered_sum((0..sites.div_ceil(CHUNK)).into_par_iter().map(of)))
     }
 
-    /// The stencil for [`Self::moments`] and [`Self::linear_force`].
+    /// Builds the stencil for [`Self::moments`] and [`Self::linear_force`].
     pub fn linear_rows(&self) -> Vec<LinearRow<D>> {
         let spacing = self.spacing();
         let row = |(k, &offset): (usize, &[i32; D])| {
@@ -39,8 +40,8 @@ impl<const D: usize> LatticeBonds<D> {
         self.stencil().offsets.iter().enumerate().map(row).collect()
     }
 
-    /// Σ_J (V_J/|ξ|²)|η|² and Σ_J (V_J/|ξ|²) η⊗ξ of the particles of work item `chunk`, tile by tile: `visit` takes the first site
-    /// of a tile. N = 1 + D²; tiles without bonds are left out.
+    /// Computes Σ_J (V_J/|ξ|²)|η|² and Σ_J (V_J/|ξ|²) η⊗ξ of the particles of work item `chunk`, tile by
+    /// tile: `visit` receives the first site of a tile. N = 1 + D²; tiles without bonds are skipped.
     pub fn moments<const N: usize>(
         &self,
         rows: &[LinearRow<D>],
@@ -53,7 +54,8 @@ impl<const D: usize> LatticeBonds<D> {
         linear_kernel::moments(MomentPass { rows, tiles, start, length, visit });
     }
 
-    /// Σ_J (V_J/|ξ|²)[(A_I + A_J) η + (S_I + S_J) ξ] of the particles of work item `chunk`, with `terms` = (A, S rows first).
+    /// Computes Σ_J (V_J/|ξ|²)[(A_I + A_J) η + (S_I + S_J) ξ] of the particles of work item `chunk`, with
+    /// `terms` = (A, S row by row).
     pub fn linear_force<const N: usize>(
         &self,
         rows: &[LinearRow<D>],

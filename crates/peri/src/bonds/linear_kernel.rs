@@ -1,14 +1,15 @@
-//! Lattice kernels of materials with two passes: moments of a family's displacements, and forces that are linear in a bond.
+//! Lattice kernels of materials with two passes: moments of family displacements, and forces linear in a
+//! bond.
 //!
-//! Fields of `N` = 1 + D² components hold a scalar and then a tensor, rows first.
+//! Fields of `N` = 1 + D² components hold a scalar and then a tensor, row by row.
 
-use super::kernel::Pass;
-use super::lattice_kernel::{Class, TILE, Tiles};
-use super::real::Real;
+use super::kernel::ForceKernel;
+use super::lattice_kernel::{TILE, TileClass, Tiles};
+use super::real::KernelReal;
 use crate::potential::StretchRange;
 use pulp::{Arch, Simd, WithSimd};
 
-/// One bond of the stencil.
+/// A bond of the stencil.
 #[derive(Clone, Copy, Debug)]
 pub struct LinearRow<const D: usize> {
     /// Distance to the neighbour in sites.
@@ -24,17 +25,17 @@ pub struct LinearRow<const D: usize> {
 /// Moments of the particles in one tile: Σ_J (V_J/|ξ|²)|η|² and Σ_J (V_J/|ξ|²) η⊗ξ over the intact bonds.
 pub type Moments<const N: usize> = [[f64; TILE]; N];
 
-/// The first pass: moments of the tiles of a work item, each given to `visit` with its first site.
+/// The first pass: moments of the tiles of a work item; `visit` receives each tile's moments and first site.
 pub struct MomentPass<'a, const D: usize, const N: usize> {
     /// The stencil.
     pub rows: &'a [LinearRow<D>],
     /// The storage.
     pub tiles: &'a Tiles<'a, D>,
-    /// Sites from `start` on, `length` of them, both multiples of [`TILE`].
+    /// First site, a multiple of [`TILE`].
     pub start: usize,
-    /// As above.
+    /// Number of sites, a multiple of [`TILE`].
     pub length: usize,
-    /// Takes the moments.
+    /// Receives the moments.
     pub visit: &'a mut dyn FnMut(usize, &Moments<N>),
 }
 
@@ -48,7 +49,7 @@ pub struct LinearPass<'a, const D: usize, const N: usize> {
     pub terms: [&'a [f64]; N],
 }
 
-/// Asserts what the unchecked loads of both passes rely on; whether a tile of `base` may be read is asserted there.
+/// Asserts the bounds that the unchecked loads of both passes rely on, except those of each tile.
 fn check<const D: usize>(rows: &[LinearRow<D>], tiles: &Tiles<D>, start: usize, length: usize) -> usize {
     let sites = tiles.displacement[0].len();
     assert!(start.is_multiple_of(TILE) && length.is_multiple_of(TILE) && start + length <= sites);
@@ -58,7 +59,7 @@ fn check<const D: usize>(rows: &[LinearRow<D>], tiles: &Tiles<D>, start: usize, 
     sites
 }
 
-/// Which of the lanes from `base` have bond `k`.
+/// Returns the mask of the lanes from `base` that have bond `k`.
 ///
 /// # Safety
 /// A vector's width of sites follows `base` in every word.
@@ -80,7 +81,7 @@ impl<const D: usize, const N: usize> WithSimd for MomentPass<'_, D, N> {
         let mut moments = [[0.0; TILE]; N];
         for base in (start..start + length).step_by(TILE) {
             let class = tiles.classes[base / TILE];
-            if class == Class::Empty {
+            if class == TileClass::Empty {
                 continue;
             }
             assert!(base >= tiles.guard && base + TILE + tiles.guard <= sites);
@@ -88,7 +89,7 @@ impl<const D: usize, const N: usize> WithSimd for MomentPass<'_, D, N> {
                 // SAFETY: every site up to `guard` ≥ max|shift| from the tile lies in every slice.
                 let sums: [S::f64s; N] = unsafe {
                     match class {
-                        Class::Full => sums::<S, D, N, true>(simd, rows, tiles, base + sub),
+                        TileClass::Full => sums::<S, D, N, true>(simd, rows, tiles, base + sub),
                         _ => sums::<S, D, N, false>(simd, rows, tiles, base + sub),
                     }
                 };
@@ -139,7 +140,7 @@ unsafe fn sums<S: Simd, const D: usize, const N: usize, const FULL: bool>(
     sums
 }
 
-impl<const D: usize, const N: usize> Pass<D> for LinearPass<'_, D, N> {
+impl<const D: usize, const N: usize> ForceKernel<D> for LinearPass<'_, D, N> {
     #[inline(always)]
     fn run<S: Simd>(
         &self,
@@ -156,7 +157,7 @@ impl<const D: usize, const N: usize> Pass<D> for LinearPass<'_, D, N> {
         for offset in (0..length).step_by(TILE) {
             let base = start + offset;
             let class = self.tiles.classes[base / TILE];
-            if class == Class::Empty {
+            if class == TileClass::Empty {
                 force.iter_mut().for_each(|f| f[offset..offset + TILE].fill(0.0));
                 continue;
             }
@@ -165,7 +166,7 @@ impl<const D: usize, const N: usize> Pass<D> for LinearPass<'_, D, N> {
                 // SAFETY: as in the first pass.
                 let sum = unsafe {
                     match (class, track.is_some()) {
-                        (Class::Full, false) => self.sum::<S, true, false>(simd, base + sub, &mut seen),
+                        (TileClass::Full, false) => self.sum::<S, true, false>(simd, base + sub, &mut seen),
                         (_, false) => self.sum::<S, false, false>(simd, base + sub, &mut seen),
                         _ => self.sum::<S, false, true>(simd, base + sub, &mut seen),
                     }

@@ -1,4 +1,4 @@
-//! Who is bonded to whom, and the forces that follow: a regular lattice without a neighbour list, or a cloud with one.
+//! Bonds of a body and their forces: a regular lattice without neighbour lists, or a cloud with them.
 
 mod breaking;
 mod cells;
@@ -25,33 +25,33 @@ pub use breaking::{Fragment, Overstretched, StretchScan, components, fingerprint
 pub use cells::CellGrid;
 pub use cloud::CloudBonds;
 pub use cloud_kernel::GROUP;
-pub use cloud_linear::{CloudMoments, CloudPlaces, Columns};
+pub use cloud_linear::{CloudMoments, CloudPlaces, MomentColumns};
 pub use lattice::LatticeBonds;
 pub use lattice_kernel::TILE;
 pub use lattice_sums::GradientSums;
 pub(crate) use lattice_sums::Weights;
 pub use linear_kernel::{LinearRow, Moments};
 pub use property::Property;
-pub use softening::{Softened, Softening, among};
+pub use softening::{Softened, SoftenedBonds, among};
 pub use stencil::{Stencil, storage};
-pub use traits::{BodyGeometry, BondDamage, BondForces, Bonds, Kind, Neighbour};
+pub use traits::{BodyGeometry, BondDamage, BondForces, BondKind, Bonds, Neighbour};
 
 #[cfg(feature = "gpu")]
-pub(crate) use rows::{StencilBond, scaled_laws};
+pub(crate) use rows::Rational;
 
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::KernelFit;
 use rayon::prelude::*;
 
-/// Refuses a body in which a bond pulls at one of its ends only: its forces would not sum to zero.
+/// Refuses a body in which a bond acts on one of its ends only: its forces would not sum to zero.
 fn refuse_one_sided<const D: usize>(bonds: &dyn BodyGeometry<D>) -> Result<(), Error> {
     let Some(pair) = bonds.one_sided() else { return Ok(()) };
     let [here, there] = pair.map(|site| bonds.position(site));
     Err(Error::geometry(format!("the bond from {here:?} to {there:?} m has no counterpart")))
 }
 
-/// What is not finite in a site, and when: for errors.
+/// Builds the error of a quantity that is not finite at a site.
 pub(crate) fn not_finite<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     quantity: &'static str,
@@ -63,7 +63,7 @@ pub(crate) fn not_finite<const D: usize>(
     Error::NotFinite { quantity, particle, position: bonds.position(site).to_vec(), step, iteration }
 }
 
-/// Force densities of the whole body, N/m³.
+/// Computes the force densities of the whole body, N/m³.
 pub fn force<const D: usize, B: BondForces<D> + ?Sized>(
     bonds: &B,
     displacement: &Field<D>,
@@ -76,7 +76,7 @@ pub fn force<const D: usize, B: BondForces<D> + ?Sized>(
     });
 }
 
-/// Extremes of e = λ² − 1 over all intact bonds.
+/// Computes the extremes of e = λ² − 1 over all intact bonds.
 pub fn stretch_range<const D: usize, B: BondForces<D> + ?Sized>(
     bonds: &B,
     displacement: &Field<D>,
@@ -88,13 +88,14 @@ pub fn stretch_range<const D: usize, B: BondForces<D> + ?Sized>(
         .reduce(|| StretchRange::REST, StretchRange::join)
 }
 
-/// The stretches [λ_low, λ_high] of the bonds in a displacement, with a margin for rounding: the range of a fitted law.
+/// Returns the range of bond stretches [λ_low, λ_high] of a displacement, with a margin for rounding: the
+/// range of a fitted law.
 pub fn covered_stretches<const D: usize>(bonds: &dyn BondForces<D>, displacement: &Field<D>) -> [f64; 2] {
     let range = stretch_range(bonds, displacement);
     [(1.0 + range.low).max(0.0).sqrt() - 1e-3, (1.0 + range.high).sqrt() + 1e-3].map(|s| s.max(1e-3))
 }
 
-/// The plain loop over bonds, for laws that only a table represents.
+/// Loops plainly over bonds, for laws that only a table represents.
 fn plain_force<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     fit: &KernelFit,
@@ -138,8 +139,8 @@ pub fn surface_weight<const D: usize>(bond: [f64; D], length: f64, own: [f64; D]
     1.0 / sum.sqrt()
 }
 
-/// Whether pairs at distance r ≤ δ carry their full volume or the linear partial volume
-/// clamp((δ + Δx/2 − r)/Δx, 0, 1) of a particle that the horizon cuts.
+/// Volume of a pair at distance r ≤ δ: full, or the linear partial volume clamp((δ + Δx/2 − r)/Δx, 0, 1) of a
+/// particle that the horizon cuts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
@@ -152,7 +153,7 @@ pub enum VolumeCorrection {
 }
 
 impl VolumeCorrection {
-    /// The factor for a bond of `length`.
+    /// Returns the factor for a bond of `length`.
     pub fn factor(self, length: f64, horizon: f64, spacing: f64) -> f64 {
         match self {
             Self::None => 1.0,
@@ -167,7 +168,7 @@ mod tests {
     use crate::geometry::{Operation, Shape, lattice};
     use crate::potential::Law;
 
-    /// What a build asks of every body: a bond severed from one end only is found, and refused.
+    /// Finds and refuses a bond severed from one end only.
     #[test]
     fn a_one_sided_bond_is_found() {
         let body = [Operation::Add(Shape::Box { min: [0.0; 2], max: [6.0, 5.0] })];
@@ -183,14 +184,14 @@ mod tests {
             let mut index = None;
             bonds.neighbours(site as usize, &mut |bond| index = index.or(Some(bond.index)));
             let index = index.unwrap();
-            bonds.sever(&[Overstretched { site, index, elongation: 0.0, length: 1.0, weight: 1.0 }]);
+            bonds.break_bonds(&[Overstretched { site, index, elongation: 0.0, length: 1.0, weight: 1.0 }]);
             assert_eq!(bonds.one_sided().map(|pair| pair[1]), Some(site as usize));
             assert!(refuse_one_sided(bonds).unwrap_err().to_string().contains("no counterpart"));
         }
     }
 
-    /// Stretches across the knee of the chain force need a table: the plain loop, on both representations, against the
-    /// exact law bond by bond.
+    /// Compares laws with stretches across the knee of the chain force, which need a table, with the exact
+    /// law bond by bond, on both representations.
     #[test]
     fn laws_that_need_a_table() {
         let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();

@@ -1,9 +1,9 @@
-//! Properties as fields over the particles.
+//! Properties as fields over particles.
 
 use super::BodyGeometry;
 
-/// A property of the particles: one value for all, which costs nothing, or a value for each site. A number is one: `3.0.into()`.
-/// Bonds may be weaker than both of their ends.
+/// A property of the particles: one value for all, which costs nothing, or a value for each site. Numbers
+/// convert: `3.0.into()`. Single bonds may be weaker than both of their ends.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Property {
     /// Site by site; empty where all particles have `least`.
@@ -21,7 +21,7 @@ impl From<f64> for Property {
 }
 
 impl Property {
-    /// A field: `value` of the site and the position, m, of each particle.
+    /// Evaluates `value` at the site and position, m, of each particle.
     pub fn new<const D: usize>(bonds: &dyn BodyGeometry<D>, value: impl Fn(usize, [f64; D]) -> f64) -> Self {
         let mut field = Self {
             values: vec![0.0; bonds.sites()],
@@ -35,17 +35,17 @@ impl Property {
             field.least = field.least.min(value);
             field.greatest = field.greatest.max(value);
         }
-        // no field where it would say nothing
+        // a uniform field is stored as one value
         if field.least == field.greatest { field.least.into() } else { field }
     }
 
-    /// The value of the particle in a site.
+    /// Value of the particle in a site.
     #[inline]
-    pub fn at(&self, site: usize) -> f64 {
+    pub fn value_at(&self, site: usize) -> f64 {
         self.values.get(site).copied().unwrap_or(self.greatest)
     }
 
-    /// Weakens single bonds, named by their sites from one end each, below the values of their ends.
+    /// Weakens single bonds below the values of their ends; each is given once, by its two sites.
     #[must_use]
     pub fn weakened(mut self, bonds: Vec<([u32; 2], f64)>) -> Self {
         let below =
@@ -57,10 +57,14 @@ impl Property {
         self
     }
 
-    /// The value of a bond: that of the weaker of its ends, unless the bond is weaker than both.
+    /// Value of a bond: that of the weaker of its ends, unless the bond is weaker than both.
     #[inline]
     pub fn weaker(&self, site: usize, other: usize) -> f64 {
-        let ends = if self.values.is_empty() { self.greatest } else { self.at(site).min(self.at(other)) };
+        let ends = if self.values.is_empty() {
+            self.greatest
+        } else {
+            self.value_at(site).min(self.value_at(other))
+        };
         if self.bonds.is_empty() {
             return ends;
         }
@@ -68,7 +72,7 @@ impl Property {
         found.map_or(ends, |at| self.bonds[at].1)
     }
 
-    /// The one value of all particles and bonds; `None` of a field.
+    /// The single value of all particles and bonds; `None` for a field.
     pub fn uniform(&self) -> Option<f64> {
         (self.values.is_empty() && self.bonds.is_empty()).then_some(self.least)
     }

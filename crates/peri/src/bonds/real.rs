@@ -2,17 +2,17 @@
 
 use pulp::Simd;
 
-/// A number of a lattice kernel, and vectors of it. Sums of forces are taken in double precision in either case.
-pub trait Real: Copy + Send + Sync + 'static {
+/// Scalar type of a lattice kernel, and vectors of it. Forces are summed in double precision in either case.
+pub trait KernelReal: Copy + Send + Sync + 'static {
     /// A vector with instructions `S`.
     type Vector<S: Simd>: Copy;
-    /// Number of bonds whose forces are summed in this precision; the sum is then added in double precision.
+    /// Number of bonds summed in this precision; the sum is then added in double precision.
     const RUN: usize;
-    /// Numbers in a vector.
+    /// Number of lanes of a vector.
     fn lanes<S: Simd>() -> usize;
-    /// The nearest number.
-    fn of(value: f64) -> Self;
-    /// The same number in all lanes.
+    /// Rounds to the nearest number.
+    fn from_f64(value: f64) -> Self;
+    /// Fills all lanes with a number.
     fn splat<S: Simd>(simd: S, value: Self) -> Self::Vector<S>;
     /// a + b.
     fn add<S: Simd>(simd: S, a: Self::Vector<S>, b: Self::Vector<S>) -> Self::Vector<S>;
@@ -39,12 +39,12 @@ pub trait Real: Copy + Send + Sync + 'static {
     fn least<S: Simd>(simd: S, a: Self::Vector<S>) -> f64;
     /// The greatest of all lanes.
     fn greatest<S: Simd>(simd: S, a: Self::Vector<S>) -> f64;
-    /// What has all bits of `bit` in the word of its lane; 0 elsewhere.
+    /// Keeps the lanes that have all bits of `bit` in their word; 0 elsewhere.
     ///
     /// # Safety
     /// `words` are as many as a vector has lanes.
     unsafe fn keep<S: Simd>(simd: S, a: Self::Vector<S>, words: *const u64, bit: u64) -> Self::Vector<S>;
-    /// A vector of consecutive sites.
+    /// Loads a vector of consecutive sites.
     ///
     /// # Safety
     /// `at + lanes ≤ slice.len()`.
@@ -56,11 +56,11 @@ pub trait Real: Copy + Send + Sync + 'static {
     unsafe fn add_to<S: Simd>(simd: S, out: *mut f64, unit: f64, a: Self::Vector<S>);
 }
 
-/// What the two have in common but for names.
+/// Code common to both precisions.
 macro_rules! real {
     ($real:ty, $run:expr, $vector:ident, $lanes:ident, $splat:ident, $least:ident, $greatest:ident;
      { $($name:ident = $operation:ident($($of:ident),*);)* } $($rest:item)*) => {
-        impl Real for $real {
+        impl KernelReal for $real {
             type Vector<S: Simd> = S::$vector;
             const RUN: usize = $run;
             #[inline(always)]
@@ -68,7 +68,7 @@ macro_rules! real {
                 S::$lanes
             }
             #[inline(always)]
-            fn of(value: f64) -> Self {
+            fn from_f64(value: f64) -> Self {
                 value as $real
             }
             #[inline(always)]
@@ -128,7 +128,7 @@ real! {
     }
     #[inline(always)]
     unsafe fn keep<S: Simd>(_simd: S, mut a: S::f32s, words: *const u64, bit: u64) -> S::f32s {
-        // a loop that compilers turn into vectors: half a vector of words at a time
+        // compilers vectorise this loop: half a vector of words at a time
         let lanes = pulp::bytemuck::cast_slice_mut::<S::f32s, f32>(std::slice::from_mut(&mut a));
         for (lane, value) in lanes.iter_mut().enumerate() {
             // SAFETY: as the trait asks
@@ -139,7 +139,8 @@ real! {
     }
     #[inline(always)]
     unsafe fn add_to<S: Simd>(_simd: S, out: *mut f64, unit: f64, a: S::f32s) {
-        for (lane, &value) in pulp::bytemuck::cast_slice::<S::f32s, f32>(std::slice::from_ref(&a)).iter().enumerate() {
+        let lanes = pulp::bytemuck::cast_slice::<S::f32s, f32>(std::slice::from_ref(&a));
+        for (lane, &value) in lanes.iter().enumerate() {
             // SAFETY: as the trait asks
             unsafe { *out.add(lane) += unit * f64::from(value) };
         }

@@ -1,13 +1,13 @@
-//! From a fitted law to kernel rows of a fixed size, chosen once per scene.
+//! Builds kernel rows of a compiled size from a fitted law, once per scene.
 
 use super::cloud_kernel::{CloudData, CloudPass};
 use super::kernel::dispatch;
-use super::lattice_kernel::{LatticePass, Row, Tiles};
-use super::real::Real;
+use super::lattice_kernel::{LatticePass, StencilRow, Tiles};
+use super::real::KernelReal;
 use crate::potential::{KernelFit, StretchRange};
 use std::any::Any;
 
-/// One bond of the stencil: its distance in sites, ξ, and its stiffness 2kθ w V/|ξ|.
+/// A bond of the stencil: its distance in sites, ξ, and its stiffness 2kθ w V/|ξ|.
 #[derive(Clone, Copy, Debug)]
 pub struct StencilBond<const D: usize> {
     /// Distance to the neighbour in sites.
@@ -20,7 +20,7 @@ pub struct StencilBond<const D: usize> {
 
 /// A lattice kernel with its law in place.
 pub trait LatticeKernel<const D: usize, T = f64>: Send + Sync {
-    /// See [`super::kernel::Pass::run`]; `tiles` in the unit of length of the stencil.
+    /// Runs [`super::kernel::ForceKernel::run`]; `tiles` in the unit of length of the stencil.
     fn run(
         &self,
         tiles: &Tiles<D, T>,
@@ -32,7 +32,7 @@ pub trait LatticeKernel<const D: usize, T = f64>: Send + Sync {
 
 /// A cloud kernel with its law in place.
 pub trait CloudKernel<const D: usize>: Send + Sync {
-    /// See [`super::kernel::Pass::run`].
+    /// Runs [`super::kernel::ForceKernel::run`].
     fn run(
         &self,
         data: &CloudData<D>,
@@ -43,11 +43,11 @@ pub trait CloudKernel<const D: usize>: Send + Sync {
 }
 
 struct LatticeRows<T, const D: usize, const P: usize, const Q: usize> {
-    rows: Vec<Row<T, D, P, Q>>,
+    rows: Vec<StencilRow<T, D, P, Q>>,
     unit: f64,
 }
 
-impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticeKernel<D, T>
+impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> LatticeKernel<D, T>
     for LatticeRows<T, D, P, Q>
 {
     fn run(
@@ -61,9 +61,9 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticeKernel<D, T
     }
 }
 
-struct CloudLaw<const P: usize, const Q: usize>((f64, [f64; P], [f64; Q]), [f64; 2]);
+struct CompiledCloudLaw<const P: usize, const Q: usize>((f64, [f64; P], [f64; Q]), [f64; 2]);
 
-impl<const D: usize, const P: usize, const Q: usize> CloudKernel<D> for CloudLaw<P, Q> {
+impl<const D: usize, const P: usize, const Q: usize> CloudKernel<D> for CompiledCloudLaw<P, Q> {
     fn run(
         &self,
         data: &CloudData<D>,
@@ -75,16 +75,21 @@ impl<const D: usize, const P: usize, const Q: usize> CloudKernel<D> for CloudLaw
     }
 }
 
-/// q(e) = constant + e·M(e)/(1 + Σ bₖ eᵏ⁺¹), the one form the kernels know.
-struct Rational {
-    clamp: [f64; 2],
-    constant: f64,
-    numerator: Vec<f64>,
-    denominator: Vec<f64>,
+/// q(e) = constant + e·M(e)/(1 + Σ bₖ eᵏ⁺¹), the form of all kernels.
+pub struct Rational {
+    /// Least and greatest e, beyond which q is constant.
+    pub clamp: [f64; 2],
+    /// q(0).
+    pub constant: f64,
+    /// Coefficients of M.
+    pub numerator: Vec<f64>,
+    /// b.
+    pub denominator: Vec<f64>,
 }
 
 impl Rational {
-    fn new(fit: &KernelFit) -> Option<Self> {
+    /// Form of a fitted law; `None` for a table.
+    pub fn new(fit: &KernelFit) -> Option<Self> {
         let KernelFit { numerator, denominator, stress_free, .. } = fit;
         if numerator.is_empty() {
             return None;
@@ -102,18 +107,18 @@ impl Rational {
     }
 }
 
-/// The law of one bond of the stencil: its coefficients in E = |ξ|² e, times the bond's stiffness; see [`Row`].
-pub struct ScaledLaw {
+/// Law of a bond of the stencil: coefficients in E = |ξ|² e, times the bond's stiffness; see [`StencilRow`].
+struct ScaledLaw {
     /// 1/|ξ|².
-    pub inverse_square: f64,
+    inverse_square: f64,
     /// Ends of the law in E.
-    pub clamp: [f64; 2],
+    clamp: [f64; 2],
     /// Value at E = 0.
-    pub constant: f64,
+    constant: f64,
     /// Scaled numerator.
-    pub numerator: Vec<f64>,
+    numerator: Vec<f64>,
     /// Scaled denominator beyond its leading 1.
-    pub denominator: Vec<f64>,
+    denominator: Vec<f64>,
 }
 
 impl Rational {
@@ -133,25 +138,18 @@ impl Rational {
     }
 }
 
-/// The law of every bond of a stencil; `None` where the law is a table.
-#[cfg(feature = "gpu")]
-pub fn scaled_laws<const D: usize>(fit: &KernelFit, stencil: &[StencilBond<D>]) -> Option<Vec<ScaledLaw>> {
-    let law = Rational::new(fit)?;
-    Some(stencil.iter().map(|bond| law.scaled(bond)).collect())
+fn padded<T: KernelReal, const N: usize>(values: &[f64]) -> [T; N] {
+    std::array::from_fn(|k| T::from_f64(values.get(k).copied().unwrap_or(0.0)))
 }
 
-fn padded<T: Real, const N: usize>(values: &[f64]) -> [T; N] {
-    std::array::from_fn(|k| T::of(values.get(k).copied().unwrap_or(0.0)))
-}
-
-/// Sizes (numerator, denominator) that are compiled; a fit is padded with zeros to the first that holds it.
+/// Compiled sizes (numerator, denominator); a fit is padded with zeros to the first that holds it.
 macro_rules! for_size {
     ($d:literal, $rational:expr, $make:ident $arguments:tt) => {
         for_size!(@try $d, $rational, $make $arguments;
             (3, 0) (4, 0) (5, 0) (6, 0) (7, 0) (8, 0) (9, 0) (10, 0) (12, 0)
             (3, 3) (4, 4) (5, 5) (7, 6) (8, 7) (9, 8) (11, 10))
     };
-    // laws fitted to a part in 10⁶, as is enough for single precision
+    // laws fitted to 1e-6, which suffices for single precision
     (single $d:literal, $rational:expr, $make:ident $arguments:tt) => {
         for_size!(@try $d, $rational, $make $arguments;
             (3, 0) (4, 0) (5, 0) (6, 0) (8, 0) (10, 0) (12, 0) (4, 4) (5, 5) (7, 6) (11, 10))
@@ -164,7 +162,7 @@ macro_rules! for_size {
     }};
 }
 
-/// The lattice kernel for a fitted law; `None` where the law is a table or larger than any compiled size.
+/// Builds the lattice kernel of a fitted law; `None` if the law is a table or exceeds all compiled sizes.
 pub fn lattice_kernel<const D: usize>(
     fit: &KernelFit,
     stencil: &[StencilBond<D>],
@@ -177,7 +175,7 @@ pub fn lattice_kernel<const D: usize>(
     }
 }
 
-/// The same in single precision, of displacements over `spacing`.
+/// Builds the lattice kernel in single precision, for displacements over `spacing`.
 pub fn single_kernel<const D: usize>(
     fit: &KernelFit,
     stencil: &[StencilBond<D>],
@@ -198,13 +196,13 @@ pub fn single_kernel<const D: usize>(
     }
 }
 
-/// The cloud kernel for a fitted law; `None` as in [`lattice_kernel`].
+/// Builds the cloud kernel of a fitted law; `None` as in [`lattice_kernel`].
 pub fn cloud_kernel<const D: usize>(fit: &KernelFit) -> Option<Box<dyn CloudKernel<D>>> {
     let rational = Rational::new(fit)?;
     if D == 2 { same(plane_cloud(&rational)?) } else { same(solid_cloud(&rational)?) }
 }
 
-// these six are not generic, so that the kernels are compiled in this crate alone and not in every program that makes bonds
+// these six are not generic, so that the kernels are compiled in this crate only
 
 fn plane_lattice(law: &Rational, stencil: Vec<StencilBond<2>>) -> Option<Box<dyn LatticeKernel<2>>> {
     for_size!(2, law, double_rows(law, &stencil))
@@ -238,25 +236,25 @@ fn solid_cloud(law: &Rational) -> Option<Box<dyn CloudKernel<3>>> {
     for_size!(3, law, cloud_law(law))
 }
 
-/// A value whose type is known under another name: `X<D>` is `X<2>` where D = 2.
+/// Converts a value to the same type under another name: `X<D>` is `X<2>` if D = 2.
 fn same<A: 'static, B: 'static>(value: A) -> Option<B> {
     let mut value = Some(value);
     (&mut value as &mut dyn Any).downcast_mut::<Option<B>>()?.take()
 }
 
-fn lattice_rows<T: Real, const D: usize, const P: usize, const Q: usize>(
+fn lattice_rows<T: KernelReal, const D: usize, const P: usize, const Q: usize>(
     law: &Rational,
     stencil: &[StencilBond<D>],
     unit: f64,
 ) -> Box<dyn LatticeKernel<D, T>> {
     let row = |bond: &StencilBond<D>| {
         let scaled = law.scaled(bond);
-        Row {
+        StencilRow {
             shift: bond.shift,
-            bond: bond.bond.map(T::of),
-            inverse_square: T::of(scaled.inverse_square),
-            clamp: scaled.clamp.map(T::of),
-            constant: T::of(scaled.constant),
+            bond: bond.bond.map(T::from_f64),
+            inverse_square: T::from_f64(scaled.inverse_square),
+            clamp: scaled.clamp.map(T::from_f64),
+            constant: T::from_f64(scaled.constant),
             numerator: padded(&scaled.numerator),
             denominator: padded(&scaled.denominator),
         }
@@ -281,5 +279,5 @@ fn single_rows<const D: usize, const P: usize, const Q: usize>(
 
 fn cloud_law<const D: usize, const P: usize, const Q: usize>(law: &Rational) -> Box<dyn CloudKernel<D>> {
     let coefficients = (law.constant, padded(&law.numerator), padded(&law.denominator));
-    Box::new(CloudLaw::<P, Q>(coefficients, law.clamp))
+    Box::new(CompiledCloudLaw::<P, Q>(coefficients, law.clamp))
 }

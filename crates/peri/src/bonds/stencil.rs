@@ -2,7 +2,7 @@
 
 use super::lattice_kernel::TILE;
 
-/// The offsets within the horizon, in an order in which bond k and bond (n − 1 − k) are opposite.
+/// Offsets within the horizon, ordered so that bonds k and n − 1 − k are opposite.
 #[derive(Clone, Debug)]
 pub struct Stencil<const D: usize> {
     /// Offsets in cells.
@@ -33,10 +33,10 @@ impl<const D: usize> Stencil<D> {
     }
 }
 
-/// Sites that vectors of kernels take at once, where they are widest.
+/// Sites that the widest vectors of kernels take at once.
 const VECTOR: usize = 8;
 
-/// The axes from that on which neighbours follow each other in storage, with `first` in its place and the others in order.
+/// Returns the axes in the order in which neighbours follow each other in storage: `first`, then the others.
 fn order<const D: usize>(first: usize) -> [usize; D] {
     std::array::from_fn(|k| match k {
         0 => first,
@@ -44,8 +44,8 @@ fn order<const D: usize>(first: usize) -> [usize; D] {
     })
 }
 
-/// The order of axes in which the particles of a box of cells fill vectors best: a bar of ten particles across fills them along its axis
-/// alone. The first axis comes first where that is nearly as good.
+/// Chooses the order of axes in which the particles of a box of cells fill vectors best: a bar ten particles
+/// thick fills them along its axis only. Keeps the first axis first if that is nearly as good.
 pub(super) fn fullest<const D: usize>(cells: [usize; D], occupied: &[bool], ratio: f64) -> [usize; D] {
     let vectors = |first: usize| {
         let (strides, guard, sites) = layout(cells, ratio, order(first));
@@ -65,14 +65,16 @@ pub(super) fn fullest<const D: usize>(cells: [usize; D], occupied: &[bool], rati
     order(if 20 * counts[best] < 17 * counts[0] { best } else { 0 })
 }
 
-/// Steps in sites along each axis, empty sites before the first cell, and all sites of a box of cells, for an order of axes.
+/// Returns the steps in sites along each axis, the number of empty sites before the first cell, and the
+/// number of all sites of a box of cells, for an order of axes.
 pub(super) fn layout<const D: usize>(
     cells: [usize; D],
     ratio: f64,
     order: [usize; D],
 ) -> ([usize; D], usize, usize) {
-    // empty cells between rows, so that nothing within twice the horizon and a cell wraps into the next row: stress
-    // measures look that far; odd strides, or rows of a power of two would fall into the same cache sets
+    // empty cells between rows, so that nothing within twice the horizon and a cell reaches the next row
+    // (stress measures look that far); odd strides, as rows of a power of two would fall into the same cache
+    // sets
     let far = ratio.floor() as usize;
     let mut strides = [1; D];
     for axes in order.windows(2) {
@@ -82,9 +84,10 @@ pub(super) fn layout<const D: usize>(
     (strides, guard, (2 * guard + strides[order[D - 1]] * cells[order[D - 1]]).next_multiple_of(TILE))
 }
 
-/// The fewest sites of a box of cells and a horizon over the spacing, as a real number: a thin box has many more than cells.
+/// Returns a lower bound on the number of sites of a box of cells, for a ratio of horizon to spacing, as a
+/// real number: a thin box has many more sites than cells.
 pub fn storage<const D: usize>(cells: [f64; D], ratio: f64) -> f64 {
-    // larger boxes need no exact number, and have none
+    // larger boxes exceed exact integers and need none
     if cells.iter().product::<f64>() < 1e12 && ratio < 1e3 {
         let sites = |first: usize| layout(cells.map(|c| c as usize), ratio, order(first)).2;
         return (0..D).map(sites).min().unwrap_or(0) as f64;

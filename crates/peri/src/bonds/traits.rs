@@ -1,7 +1,7 @@
 //! Traits of a bonded body: its geometry, the forces of its bonds, and their damage.
 
 use super::lattice_sums::GradientSums;
-use super::{CloudBonds, LatticeBonds, Overstretched, Softened, Softening};
+use super::{CloudBonds, LatticeBonds, Overstretched, Softened, SoftenedBonds};
 use crate::field::{CHUNK, Field};
 use crate::potential::{EnergyTable, KernelFit, StretchRange, TangentTable};
 use rayon::prelude::*;
@@ -18,15 +18,15 @@ pub struct Neighbour<const D: usize> {
     pub bond: [f64; D],
     /// |ξ|, m.
     pub length: f64,
-    /// Volume correction times V_J, m³ (without surface correction), of a softened bond times its integrity.
+    /// V_J times volume correction and integrity, m³ (without surface correction).
     pub volume: f64,
-    /// All corrections: volume × surface factor.
+    /// V_J with all corrections, m³: volume × surface factor.
     pub weight: f64,
-    /// θ_J − θ_I of [`BodyGeometry::relief`], m; zero where there is none.
+    /// θ_J − θ_I of [`BodyGeometry::relief`], m; zero if there is none.
     pub relief: [f64; D],
 }
 
-/// Particles of a body of dimension `D` and their families: the particles that intact bonds lead to.
+/// Particles of a body of dimension `D` and their families: particles connected by intact bonds.
 pub trait BodyGeometry<const D: usize>: Send + Sync {
     /// Storage sites; fields have this length.
     fn sites(&self) -> usize;
@@ -38,13 +38,13 @@ pub trait BodyGeometry<const D: usize>: Send + Sync {
     fn volume(&self, site: usize) -> f64;
     /// Horizon δ, m.
     fn horizon(&self) -> f64;
-    /// Distance of neighbouring particles (of a cloud: the cube or square root of the mean volume), m.
+    /// Distance of neighbouring particles (for clouds the cube or square root of the mean volume), m.
     fn spacing(&self) -> f64;
     /// Visits the intact bonds of a site.
     fn neighbours(&self, site: usize, visit: &mut dyn FnMut(Neighbour<D>));
-    /// The intact bond of a site with a [`Neighbour::index`].
+    /// Returns the intact bond of a site with a [`Neighbour::index`].
     fn bond(&self, site: usize, index: u32) -> Neighbour<D>;
-    /// Whether an intact bond leads from a site to another.
+    /// Returns true if an intact bond connects two sites.
     fn is_bonded(&self, site: usize, other: usize) -> bool {
         let mut bonded = false;
         self.neighbours(site, &mut |bond| bonded |= bond.site == other);
@@ -56,24 +56,25 @@ pub trait BodyGeometry<const D: usize>: Send + Sync {
         self.neighbours(site, &mut |_| count += 1);
         count
     }
-    /// Whether a site has no intact bond.
+    /// Returns true if a site has no intact bond.
     fn is_alone(&self, site: usize) -> bool {
         self.bonded(site) == 0
     }
-    /// Number of bonds of a whole family, where all such families are alike: of lattices.
+    /// Number of bonds of a whole family, if all such families are alike: on lattices.
     fn whole_family(&self) -> Option<u32> {
         None
     }
-    /// Whether a family is whole and no bond of the body has a weight of its own: such families are alike in all sums over them.
+    /// Returns true if a family is whole and no bond of the body has its own weight: sums over all such
+    /// families are equal.
     fn has_whole_family(&self, site: usize) -> bool {
         let _ = site;
         false
     }
-    /// θ, m, where it is set, see [`BondForces::set_relief`].
+    /// θ, m, if it is set, see [`BondForces::set_relief`].
     fn relief(&self) -> Option<&Field<D>> {
         None
     }
-    /// The sites of a bond that only the first of them has; `None` where every family is symmetric, as it must be.
+    /// Finds a bond that only the first of its sites has; `None` if every family is symmetric, as it must be.
     fn one_sided(&self) -> Option<[usize; 2]> {
         self.particles().par_iter().find_map_first(|&site| {
             let mut lone = None;
@@ -87,23 +88,25 @@ pub trait BodyGeometry<const D: usize>: Send + Sync {
     }
 }
 
-/// Kernels of bond laws. Whatever else acts along bonds is a [`crate::material::Material`].
+/// Kernels of bond laws. All other forces along bonds belong to a [`crate::material::Material`].
 pub trait BondForces<const D: usize>: BodyGeometry<D> {
     /// Sets the bond law q(e) and its modulus kθ, N/m⁶.
     fn set_law(&mut self, fit: &KernelFit, modulus: f64);
     /// Sets per-particle surface-correction factors (one field of `D` components over the sites).
     fn set_factors(&mut self, factors: Field<D>);
-    /// Sets θ of solids of the mean deformation of a family, see [`crate::material::relief`]: before any bond breaks. Lattices have none.
+    /// Sets θ of solids of the mean family deformation, see [`crate::material::relief`]; call it before any
+    /// bond breaks. Lattices have none.
     fn set_relief(&mut self, relief: Field<D>) {
         let _ = relief;
     }
-    /// Copies a displacement before [`Self::force`] of it, where that reads a copy: in mixed precision ([`LatticeBonds::set_mixed`]), and
-    /// in clouds, where forces without a copy take longer. From the first call on, both give the forces of the displacement last copied.
+    /// Copies a displacement for later calls of [`Self::force`] that read a copy: in mixed precision
+    /// ([`LatticeBonds::set_mixed`]), and in clouds, whose forces take longer without a copy. From the first
+    /// call on, both return the forces of the displacement last copied.
     fn prepare(&mut self, displacement: &Field<D>) {
         let _ = displacement;
     }
-    /// Force densities Σ_J f V_J, N/m³, of whole [`Self::piece`]s from the site `start` on; collects the stretches observed if
-    /// asked, of every bond in at least one of the work items that hold its ends.
+    /// Computes the force densities Σ_J f V_J, N/m³, of whole [`Self::piece`]s from the site `start` on;
+    /// tracks, if asked, the stretches of every bond in at least one of the work items that hold its ends.
     fn force(
         &self,
         displacement: &Field<D>,
@@ -111,23 +114,24 @@ pub trait BondForces<const D: usize>: BodyGeometry<D> {
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     );
-    /// Sites that [`Self::force`] may begin with: multiples of this, of which a work item is one. The bits of a force may depend on which
-    /// bonds the other sites of its piece have, and on no others.
+    /// Granularity of [`Self::force`] in sites: `start` is a multiple of it, and it divides a work item. The
+    /// bits of a force may depend on the bonds of the other sites of its piece only.
     fn piece(&self) -> usize {
         CHUNK
     }
-    /// Extremes of e = λ² − 1 over bonds with an end in work item `chunk`; those of all items together are those of the body.
+    /// Computes the extremes of e = λ² − 1 over bonds with an end in work item `chunk`; those of all items
+    /// together are those of the body.
     fn stretches(&self, displacement: &Field<D>, chunk: usize) -> StretchRange;
-    /// The intact bonds with e > `least`, up to rounding, by site and [`Neighbour::index`]; for all sites together each once from both
-    /// of its ends: what some sites add, whole pieces of one work item.
+    /// Lists the intact bonds with e > `least`, up to rounding, by site and [`Neighbour::index`]. `sites` are
+    /// whole pieces of one work item; all sites together list each bond from both ends.
     fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<[u32; 2]>;
-    /// Σ_I V_I Σ_J w V_J |ξ| φ(e) over the body; `None` where bonds are to be visited one by one.
+    /// Computes Σ_I V_I Σ_J w V_J |ξ| φ(e) over the body; `None` if bonds must be visited one by one.
     fn energy_sum(&self, displacement: &Field<D>, table: &EnergyTable) -> Option<f64> {
         let _ = (displacement, table);
         None
     }
-    /// Σ_J (2 w V_J/|ξ|)·max(table(e), least)·(1 + max_{d≠e} |n_d n_e|) of each site of a work item, n the direction of the
-    /// deformed bond; `None` as [`Self::energy_sum`].
+    /// Computes Σ_J (2 w V_J/|ξ|)·max(table(e), least)·(1 + max_{d≠e} |n_d n_e|) for each site of a work
+    /// item, n the direction of the deformed bond; `None` as in [`Self::energy_sum`].
     fn stiffness_sums(
         &self,
         displacement: &Field<D>,
@@ -138,7 +142,8 @@ pub trait BondForces<const D: usize>: BodyGeometry<D> {
         let _ = (displacement, chunk, table, least);
         None
     }
-    /// Σ share ξ⊗ξ/|ξ|² and Σ share η⊗ξ/|ξ|² over the intact bonds of each site of a work item; `None` as [`Self::energy_sum`].
+    /// Computes Σ share ξ⊗ξ/|ξ|² and Σ share η⊗ξ/|ξ|² over the intact bonds of each site of a work item;
+    /// `None` as in [`Self::energy_sum`].
     fn gradient_sums(&self, displacement: &Field<D>, chunk: usize) -> Option<Vec<GradientSums<D>>> {
         let _ = (displacement, chunk);
         None
@@ -147,25 +152,26 @@ pub trait BondForces<const D: usize>: BodyGeometry<D> {
 
 /// Damage of bonds.
 pub trait BondDamage<const D: usize>: BodyGeometry<D> {
-    /// Severs bonds, each named from both of its ends.
-    fn sever(&mut self, bonds: &[Overstretched]);
+    /// Severs bonds, each given from both ends.
+    fn break_bonds(&mut self, bonds: &[Overstretched]);
     /// Damaged bonds (integrity below 1).
-    fn softening(&self) -> &Softening;
-    /// Takes these to be the softened bonds, each named from both of its ends: [`BodyGeometry::neighbours`] weighs them by their
-    /// integrity, [`BondForces::force`] does not.
+    fn softening(&self) -> &SoftenedBonds;
+    /// Replaces the softened bonds, each given from both ends: [`BodyGeometry::neighbours`] weighs them by
+    /// their integrity, [`BondForces::force`] does not.
     fn soften(&mut self, bonds: Vec<Softened>);
-    /// Which bonds are intact, for checkpoints: as many words as [`Self::restore`] takes.
+    /// Bits of the intact bonds, for checkpoints: as many words as [`Self::restore`] takes.
     fn intact(&self) -> Vec<u64>;
-    /// Where [`Self::intact`] has the bond of a site with a [`Neighbour::index`]: word and bit.
+    /// Word and bit of a bond in [`Self::intact`], by site and [`Neighbour::index`].
     fn bit(&self, site: usize, index: u32) -> (usize, u64);
-    /// Severs what is not intact in `words`; false where their number does not fit these bonds.
+    /// Severs the bonds that are not intact in `words`; returns false if their number does not fit these
+    /// bonds.
     fn restore(&mut self, words: &[u64]) -> bool;
     /// Intact bonds, each counted from both ends: the work of one force evaluation.
     fn directed_bonds(&self) -> u64;
 }
 
-/// The two representations, for what only one of them has.
-pub enum Kind<'a, const D: usize> {
+/// The two representations, for functions that only one of them has.
+pub enum BondKind<'a, const D: usize> {
     /// A regular lattice.
     Lattice(&'a LatticeBonds<D>),
     /// A cloud.
@@ -174,12 +180,12 @@ pub enum Kind<'a, const D: usize> {
 
 /// The bonds of a body: its geometry, the kernels of bond laws, and damage.
 pub trait Bonds<const D: usize>: BondForces<D> + BondDamage<D> {
-    /// Bytes this representation holds for bonds and particles.
+    /// Bytes held for bonds and particles.
     fn bytes(&self) -> usize;
-    /// Which representation this is.
-    fn kind(&self) -> Kind<'_, D>;
+    /// Representation of these bonds.
+    fn kind(&self) -> BondKind<'_, D>;
     /// The lattice behind these bonds, if there is one.
     fn as_lattice(&self) -> Option<&LatticeBonds<D>> {
-        if let Kind::Lattice(lattice) = self.kind() { Some(lattice) } else { None }
+        if let BondKind::Lattice(lattice) = self.kind() { Some(lattice) } else { None }
     }
 }

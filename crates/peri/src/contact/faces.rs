@@ -1,27 +1,30 @@
-//! Faces of a body: points of its true surface that share out a force among the particles below them.
+//! Faces of a body: points of its true surface that distribute a force over the particles below them.
 //!
 //! A face f at X_f with the outward normal N_f has the area A_f = Σ_I ψ_f(I) h_I·N_f and the weights
-//! w_fI = ψ_f(I) h_I·N_f/A_f, with the area vectors h_I of [`crate::material::surface_load`] and hat functions ψ_f of the
-//! distance along the surface, Σ_f ψ_f = 1. A uniform pressure on all faces then balances a uniform stress.
+//! w_fI = ψ_f(I) h_I·N_f/A_f, with the area vectors h_I of [`crate::material::surface_load`] and hat
+//! functions ψ_f of the distance along the surface, Σ_f ψ_f = 1. A uniform pressure on all faces then
+//! balances a uniform stress.
 //!
-//! A face touches a plane as a sphere of the radius r_f about Σ_I w_fI x_I, with r_f = N_f·(X_f − Σ_I w_fI X_I); on a flat face of a lattice
-//! r_f = 0. On a staircase, where Σ_I w_fI X_I lies beside X_f as well, the weights gain a term, linear across N_f, that brings it below
-//! X_f. No place depends on a rotation, so that forces have an energy and conserve momentum and angular momentum.
+//! A face touches a plane as a sphere of the radius r_f about Σ_I w_fI x_I, with r_f = N_f·(X_f − Σ_I w_fI
+//! X_I); on a flat face of a lattice r_f = 0. On a staircase, where Σ_I w_fI X_I lies beside X_f as well, the
+//! weights gain a term, linear across N_f, that shifts it below X_f. No position depends on a rotation, so
+//! forces have an energy and conserve momentum and angular momentum.
 
 use crate::bonds::{BodyGeometry, Bonds, CellGrid};
 use crate::field::Field;
-use crate::material::{Tensor, surface_load};
-use crate::surface::{Face, Surface};
+use crate::material::{BodyTensor, surface_load};
+use crate::surface::{BodySurface, SurfaceFace};
 use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
 /// Half-width of the hat functions, and depth of the particles below a face, in spacings and horizons.
 const HAT: f64 = 1.0;
 const DEPTH: f64 = 2.16;
-/// Part of the area of a particle below which a face joins a neighbour, and distance of that neighbour in spacings.
+/// Faces with less than this fraction of a particle's area join a neighbour within this distance in spacings.
 const SMALL: f64 = 0.5;
 const JOINED: f64 = 2.1;
-/// Least variance of the particles along a direction, in squared spacings, for which weights gain a linear term.
+/// Least variance of the particles along a direction, in squared spacings, for which weights gain a linear
+/// term.
 const FLAT: f64 = 1e-3;
 /// Particles of a work item.
 const BATCH: usize = 1024;
@@ -42,7 +45,7 @@ pub struct Faces<const D: usize> {
     starts: Vec<u32>,
     sites: Vec<u32>,
     weights: Vec<f64>,
-    /// Sites with faces, ascending, the ends of their entries, and these: face and weight.
+    /// Sites with faces, ascending; ends of their entries; entries of face and weight.
     pub particles: Vec<u32>,
     ends: Vec<u32>,
     shares: Vec<(u32, f64)>,
@@ -50,7 +53,7 @@ pub struct Faces<const D: usize> {
 
 /// A particle below a face.
 #[derive(Clone, Copy)]
-struct Below {
+struct FaceParticle {
     face: u32,
     site: u32,
     /// ψ_f(I), and the depth, m.
@@ -59,20 +62,21 @@ struct Below {
 }
 
 impl<const D: usize> Faces<D> {
-    /// Faces of a body; none where the surface has none. Faces whose area bonds of a crack or of
-    /// another side take away are left out.
+    /// Builds the faces of a body; none if the surface has none. Skips faces whose area belongs to bonds of a
+    /// crack or of another side.
     ///
-    /// `tied` faces have r_f = 0: the weights gain a term along the normal as well, so that faces turn with the body.
-    pub fn new(bonds: &dyn Bonds<D>, surface: &Surface<D>, tied: bool) -> Self {
+    /// `tied` faces have r_f = 0: the weights gain a term along the normal as well, so that faces rotate with
+    /// the body.
+    pub fn new(bonds: &dyn Bonds<D>, surface: &BodySurface<D>, tied: bool) -> Self {
         let area = typical_area(bonds);
-        let load = surface_load(bonds, Tensor::<D>::identity());
+        let load = surface_load(bonds, BodyTensor::<D>::identity());
         let mut below = below(bonds, surface);
-        let share = |below: &Below| {
+        let share = |below: &FaceParticle| {
             let (site, normal) = (below.site as usize, surface.faces()[below.face as usize].normal);
             let load = load.get(site);
             below.hat * bonds.volume(site) * (0..D).map(|d| load[d] * normal[d]).sum::<f64>()
         };
-        let sum = |below: &[Below]| {
+        let sum = |below: &[FaceParticle]| {
             let mut areas = vec![0.0; surface.faces().len()];
             below.iter().for_each(|below| areas[below.face as usize] += share(below));
             areas
@@ -96,7 +100,7 @@ impl<const D: usize> Faces<D> {
         };
         for group in below.chunk_by(|a, b| a.face == b.face) {
             let face = group[0].face as usize;
-            // an area that bonds of a crack or the other side take away
+            // area lost to bonds of a crack or of the other side
             if areas[face] < SMALL * area {
                 continue;
             }
@@ -122,13 +126,13 @@ impl<const D: usize> Faces<D> {
         self.areas.len()
     }
 
-    /// Sites below a face with their weights.
+    /// Iterates over the sites below a face with their weights.
     pub fn below(&self, face: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let range = self.starts[face] as usize..self.starts[face + 1] as usize;
         self.sites[range.clone()].iter().map(|&site| site as usize).zip(self.weights[range].iter().copied())
     }
 
-    /// Adds entries to every face: what it is tied to.
+    /// Adds entries to every face for its ties.
     pub fn tie(&mut self, others: impl Fn(usize) -> Vec<(u32, f64)>) {
         let (mut starts, mut sites, mut weights) = (vec![0], Vec::new(), Vec::new());
         for face in 0..self.len() {
@@ -143,7 +147,7 @@ impl<const D: usize> Faces<D> {
         self.transpose();
     }
 
-    /// Adds to force densities, N/m³, on the sites from `start` on, forces on faces, N.
+    /// Adds forces on faces, N, to force densities, N/m³, of the sites from `start` on.
     pub fn spread(&self, pushes: &[[f64; D]], volumes: &[f64], start: usize, force: &mut [&mut [f64]; D]) {
         let at = |end: usize| self.particles.partition_point(|&site| (site as usize) < end);
         for particle in at(start)..at(start + force[0].len()) {
@@ -155,7 +159,7 @@ impl<const D: usize> Faces<D> {
         }
     }
 
-    /// Force on a particle, by its number in [`Self::particles`], of forces on faces, N.
+    /// Sums forces on faces, N, to the force on a particle, by its number in [`Self::particles`].
     pub fn sum(&self, particle: usize, pushes: &[[f64; D]]) -> [f64; D] {
         let mut sum = [0.0; D];
         for &(face, weight) in self.above(particle) {
@@ -164,13 +168,13 @@ impl<const D: usize> Faces<D> {
         sum
     }
 
-    /// Faces above a particle with their weights, by its number in [`Self::particles`].
+    /// Returns the faces above a particle with their weights, by its number in [`Self::particles`].
     pub fn above(&self, particle: usize) -> &[(u32, f64)] {
         let start = particle.checked_sub(1).map_or(0, |before| self.ends[before]);
         &self.shares[start as usize..self.ends[particle] as usize]
     }
 
-    /// Σ_I w_fI u_I of a face.
+    /// Computes Σ_I w_fI u_I of a face.
     pub fn mean(&self, face: usize, field: &Field<D>) -> [f64; D] {
         let mut sum = [0.0; D];
         for (site, weight) in self.below(face) {
@@ -180,14 +184,15 @@ impl<const D: usize> Faces<D> {
         sum
     }
 
-    /// The particle of a face with the greatest weight.
+    /// Returns the particle with the greatest weight in a face.
     pub fn head(&self, face: usize) -> usize {
         let greatest = self.below(face).max_by(|a, b| a.1.total_cmp(&b.1));
         greatest.map_or(0, |(site, _)| site)
     }
 
-    /// max_f Σ_g √(A_f A_g)|Σ_I w_fI w_gI/V_I|, m⁻¹: that times the stiffness of a plane over its area, Pa/m, bounds the greatest
-    /// eigenvalue that faces in touch add to the stiffness over volumes, N/m⁴ (Gershgorin over faces).
+    /// Computes max_f Σ_g √(A_f A_g)|Σ_I w_fI w_gI/V_I|, m⁻¹. Times the stiffness of a plane over its area,
+    /// Pa/m, it bounds the greatest eigenvalue that faces in contact add to the stiffness over volumes, N/m⁴
+    /// (Gershgorin over faces).
     pub fn greatest(&self, bonds: &dyn BodyGeometry<D>) -> f64 {
         let row = |face: usize| {
             let mut products: Vec<(u32, f64)> = Vec::new();
@@ -226,14 +231,15 @@ impl<const D: usize> Faces<D> {
     }
 }
 
-/// Area of the side of a particle, m²: its volume over the spacing.
+/// Computes the side area of a particle, m²: its volume over the spacing.
 pub fn typical_area<const D: usize>(bonds: &dyn BodyGeometry<D>) -> f64 {
     let volumes: f64 = bonds.particles().iter().map(|&site| bonds.volume(site as usize)).sum();
     volumes / bonds.particles().len().max(1) as f64 / bonds.spacing()
 }
 
-/// All particles below faces, each nearer to its face than to an opposite one; hats add up to 1 over the faces of a patch.
-fn below<const D: usize>(bonds: &dyn BodyGeometry<D>, surface: &Surface<D>) -> Vec<Below> {
+/// Lists all particles below faces, each nearer to its face than to an opposite one; hats sum to 1 over the
+/// faces of a patch.
+fn below<const D: usize>(bonds: &dyn BodyGeometry<D>, surface: &BodySurface<D>) -> Vec<FaceParticle> {
     let (faces, spacing) = (surface.faces(), bonds.spacing());
     if faces.is_empty() {
         return Vec::new();
@@ -241,17 +247,17 @@ fn below<const D: usize>(bonds: &dyn BodyGeometry<D>, surface: &Surface<D>) -> V
     let (depth, width) = (DEPTH * bonds.horizon(), HAT * spacing);
     let places: Vec<[f64; D]> = faces.iter().map(|face| face.place).collect();
     let grid = CellGrid::new(&places, depth);
-    let of = |site: u32, all: &mut Vec<Below>| {
+    let of = |site: u32, all: &mut Vec<FaceParticle>| {
         let here = bonds.position(site as usize);
-        let mut near: Vec<Below> = Vec::new();
+        let mut near: Vec<FaceParticle> = Vec::new();
         grid.near(here, depth.hypot(width), |number| {
             let (aside, down) = surface.reach(&faces[number], here);
             if aside < width && down > 0.0 && down < depth {
-                near.push(Below { face: number as u32, site, hat: 1.0 - aside / width, depth: down });
+                near.push(FaceParticle { face: number as u32, site, hat: 1.0 - aside / width, depth: down });
             }
         });
         near.sort_unstable_by_key(|below| (faces[below.face as usize].patch, below.face));
-        let opposed = |own: &Below| {
+        let opposed = |own: &FaceParticle| {
             let normal = faces[own.face as usize].normal;
             near.iter().any(|other| {
                 let there = faces[other.face as usize].normal;
@@ -260,13 +266,13 @@ fn below<const D: usize>(bonds: &dyn BodyGeometry<D>, surface: &Surface<D>) -> V
             })
         };
         for patch in near.chunk_by(|a, b| faces[a.face as usize].patch == faces[b.face as usize].patch) {
-            // of the steps of a staircase the nearest
+            // the nearest step of a staircase
             let nearest = patch.iter().map(|below| below.depth).fold(f64::INFINITY, f64::min);
-            let kept = |below: &&Below| below.depth < nearest + 0.75 * spacing;
+            let kept = |below: &&FaceParticle| below.depth < nearest + 0.75 * spacing;
             let sum: f64 = patch.iter().filter(kept).map(|below| below.hat).sum();
-            let own = |below: &&Below| !surface.is_bound(below.face as usize) && !opposed(below);
+            let own = |below: &&FaceParticle| !surface.is_bound(below.face as usize) && !opposed(below);
             for below in patch.iter().filter(kept).filter(own) {
-                all.push(Below { hat: below.hat / sum, ..*below });
+                all.push(FaceParticle { hat: below.hat / sum, ..*below });
             }
         }
     };
@@ -275,15 +281,15 @@ fn below<const D: usize>(bonds: &dyn BodyGeometry<D>, surface: &Surface<D>) -> V
         sites.iter().for_each(|&site| of(site, &mut all));
         all
     };
-    let parts: Vec<Vec<Below>> = bonds.particles().par_chunks(BATCH).map(batch).collect();
+    let parts: Vec<Vec<FaceParticle>> = bonds.particles().par_chunks(BATCH).map(batch).collect();
     parts.concat()
 }
 
-/// Gives the particles of faces with a small area to the nearest face of the same patch with a larger one.
+/// Moves the particles of small faces to the nearest larger face of the same patch.
 fn join_small<const D: usize>(
-    surface: &Surface<D>,
+    surface: &BodySurface<D>,
     areas: &[f64],
-    below: &mut [Below],
+    below: &mut [FaceParticle],
     area: f64,
     spacing: f64,
 ) {
@@ -313,23 +319,24 @@ fn join_small<const D: usize>(
     below.iter_mut().for_each(|below| below.face = target[below.face as usize]);
 }
 
-/// Adds to weights the term, linear across the normal of the face, with which Σ w X lies below it; how far below, m.
+/// Adds the term, linear across the normal of the face, that brings Σ w X below the face; returns its depth,
+/// m.
 fn centre<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
-    face: &Face<D>,
-    group: &[Below],
+    face: &SurfaceFace<D>,
+    group: &[FaceParticle],
     weights: &mut [f64],
     tied: bool,
 ) -> f64 {
     let (spacing, normal) = (bonds.spacing(), SVector::<f64, D>::from(face.normal));
-    // near the surface most
+    // mostly near the surface
     let measure: Vec<f64> = group.iter().map(|below| below.hat * (-below.depth / spacing).exp()).collect();
     let total: f64 = measure.iter().sum();
-    let from = |below: &Below| {
+    let from = |below: &FaceParticle| {
         let here = bonds.position(below.site as usize);
         SVector::<f64, D>::from_fn(|d, _| (here[d] - face.place[d]) / spacing)
     };
-    let aside = |below: &Below| {
+    let aside = |below: &FaceParticle| {
         let from = from(below);
         if tied { from } else { from - normal * normal.dot(&from) }
     };

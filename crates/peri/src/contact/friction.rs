@@ -1,7 +1,7 @@
-//! Friction of all that touches: between equilibria and in explicit dynamics.
+//! Friction of all contacts: between equilibria and in explicit dynamics.
 
 use super::Contact;
-use super::grip::{Grip, Pair};
+use super::friction_pair::{ContactPair, FrictionPair};
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
@@ -9,7 +9,7 @@ use std::ops::Range;
 
 /// Friction after a step of explicit dynamics.
 #[derive(Clone, Debug, Default)]
-pub struct Sliding {
+pub struct SlidingFriction {
     /// Force on the body by each plane, N.
     pub planes: Vec<[f64; 3]>,
     /// Energy of elastic slip, J.
@@ -17,34 +17,34 @@ pub struct Sliding {
 }
 
 impl<const D: usize> Contact<D> {
-    /// Has friction act as `grips` say, from the displacement `start` on.
-    pub fn hold(&mut self, start: &Field<D>, grips: Vec<Grip>) {
+    /// Sets the friction of `grips`, from the displacement `start` on.
+    pub fn begin_friction(&mut self, start: &Field<D>, grips: Vec<FrictionPair>) {
         self.held = grips;
         self.start = Some(start.clone());
     }
 
     /// Ends friction between equilibria.
-    pub fn release(&mut self) {
+    pub fn end_friction(&mut self) {
         self.held.clear();
         self.start = None;
     }
 
-    /// Friction of all that touches at a displacement, sorted by pair: the slips of `old` go on with the normal forces there. What has
-    /// begun to touch since `start` slips for the rest of its way only.
+    /// Computes the friction of all contacts at a displacement, sorted by pair: the slips of `old` continue
+    /// with the present normal forces. Contacts that began after `start` slip for the rest of their way only.
     pub fn grips(
         &self,
         bonds: &dyn BodyGeometry<D>,
         displacement: &Field<D>,
         start: &Field<D>,
-        old: &[Grip],
-    ) -> Vec<Grip> {
+        old: &[FrictionPair],
+    ) -> Vec<FrictionPair> {
         let of = |chunk: usize| {
             let mut grips = Vec::new();
             let sites = chunk_range(chunk, displacement.sites());
             for (own, touching) in self.pairs(bonds, displacement, sites, 0.0).filter(|_| self.friction > 0.0)
             {
                 for touch in touching {
-                    let pair = Pair::Particles(own.site, touch.site);
+                    let pair = ContactPair::Particles(own.site, touch.site);
                     let known = old.binary_search_by_key(&pair, |grip| grip.pair).ok().map(|at| &old[at]);
                     let volumes = [own.site, touch.site].map(|site| bonds.volume(site as usize));
                     let push = self.pair(own.site, touch.site) * volumes[0] * volumes[1];
@@ -55,8 +55,8 @@ impl<const D: usize> Contact<D> {
                     let then = touch.overlap_at(start, own.site as usize);
                     let share = if then >= 0.0 { 1.0 } else { touch.overlap() / (touch.overlap() - then) };
                     let slip = known.map_or([0.0; 3], |grip| grip.slip);
-                    let mut grip = Grip { pair, slip, bound, stiffness, normal, share };
-                    grip.fit();
+                    let mut grip = FrictionPair { pair, slip, bound, stiffness, normal, share };
+                    grip.project();
                     if bound > 0.0 {
                         grips.push(grip);
                     }
@@ -65,25 +65,25 @@ impl<const D: usize> Contact<D> {
             grips.sort_unstable_by_key(|grip| grip.pair);
             grips
         };
-        let parts: Vec<Vec<Grip>> =
+        let parts: Vec<Vec<FrictionPair>> =
             (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
         let mut grips = parts.concat();
         grips.extend(self.planes.iter().flat_map(|planes| planes.grips(displacement, start, old)));
         grips
     }
 
-    /// Friction after a load step, sorted by pair, for the next one; energy dissipated in the step, J, and force of friction of each
-    /// plane, N.
-    pub fn slide(&self, displacement: &Field<D>) -> (Vec<Grip>, f64, Vec<[f64; 3]>) {
+    /// Returns the friction after a load step, sorted by pair, for the next one; the energy dissipated in the
+    /// step, J; and the friction force of each plane, N.
+    pub fn slide(&self, displacement: &Field<D>) -> (Vec<FrictionPair>, f64, Vec<[f64; 3]>) {
         let mut forces = vec![[0.0; 3]; self.planes().count()];
         let (mut dissipated, mut grips) = (0.0, self.held.clone());
         for grip in &mut grips {
             let drag = grip.drag(self.slipped(grip.pair, displacement));
             grip.slip = drag.slip;
             match grip.pair {
-                // the other half is seen from the other side
-                Pair::Particles(..) => dissipated += 0.5 * drag.dissipated,
-                Pair::Face(plane, _) | Pair::Particle(plane, _) => {
+                // the other half is counted from the other side
+                ContactPair::Particles(..) => dissipated += 0.5 * drag.dissipated,
+                ContactPair::Face(plane, _) | ContactPair::Particle(plane, _) => {
                     dissipated += drag.dissipated;
                     (0..3).for_each(|d| forces[plane as usize][d] += drag.force[d]);
                 }
@@ -93,9 +93,9 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Motion of the first side of a pair against the second since friction began to act, m.
-    fn slipped(&self, pair: Pair, displacement: &Field<D>) -> [f64; 3] {
+    fn slipped(&self, pair: ContactPair, displacement: &Field<D>) -> [f64; 3] {
         let Some(start) = &self.start else { return [0.0; 3] };
-        let Pair::Particles(own, other) = pair else {
+        let ContactPair::Particles(own, other) = pair else {
             return self.planes.as_ref().map_or([0.0; 3], |planes| planes.slipped(pair, displacement, start));
         };
         let since = |site: u32, d: usize| {
@@ -106,54 +106,57 @@ impl<const D: usize> Contact<D> {
 
     /// Energy of elastic slip, J.
     pub(super) fn slip_energy(&self, displacement: &Field<D>) -> f64 {
-        let of = |grip: &Grip| {
+        let of = |grip: &FrictionPair| {
             let slip = grip.drag(self.slipped(grip.pair, displacement)).slip;
-            let part = if matches!(grip.pair, Pair::Particles(..)) { 0.5 } else { 1.0 };
-            part * Grip { slip, ..*grip }.energy()
+            let part = if matches!(grip.pair, ContactPair::Particles(..)) { 0.5 } else { 1.0 };
+            part * FrictionPair { slip, ..*grip }.energy()
         };
         self.held.iter().map(of).sum()
     }
 
-    /// Adds the force densities of friction between particles, N/m³, on the sites from `start` on, of one work item.
+    /// Adds the force densities of friction between particles, N/m³, on the sites from `start` on, of one
+    /// work item.
     pub(super) fn hold_pairs(&self, displacement: &Field<D>, start: usize, force: &mut [&mut [f64]; D]) {
         if self.start.is_none() {
             return;
         }
         let end = start + force[0].len();
-        for grip in self.held_by(start..end) {
-            let Pair::Particles(own, _) = grip.pair else { continue };
+        for grip in self.active_on(start..end) {
+            let ContactPair::Particles(own, _) = grip.pair else { continue };
             let drag = grip.drag(self.slipped(grip.pair, displacement)).force;
             let volume = self.list.volume(own as usize);
             (0..D).for_each(|d| force[d][own as usize - start] += drag[d] / volume);
         }
     }
 
-    /// Friction in force between particles, of those of some sites.
-    fn held_by(&self, sites: Range<usize>) -> &[Grip] {
+    /// Returns the active friction between particles of a range of sites.
+    fn active_on(&self, sites: Range<usize>) -> &[FrictionPair] {
         let before = |end: usize| {
-            self.held
-                .partition_point(|grip| matches!(grip.pair, Pair::Particles(own, _) if (own as usize) < end))
+            self.held.partition_point(
+                |grip| matches!(grip.pair, ContactPair::Particles(own, _) if (own as usize) < end),
+            )
         };
         &self.held[before(sites.start)..before(sites.end)]
     }
 
-    /// Friction after a step of explicit dynamics, s, with the velocity at the half step, m/s: the slips of `old` go on with the
-    /// present normal forces. Takes effect in [`Self::add_friction`].
+    /// Computes the friction after a step of explicit dynamics, s, with the velocity at the half step, m/s:
+    /// the slips of `old` continue with the present normal forces. It acts in [`Self::add_friction`].
     pub fn slide_on(
         &mut self,
         bonds: &dyn BodyGeometry<D>,
         displacement: &Field<D>,
         velocity: &Field<D>,
         step: f64,
-        old: &[Grip],
-    ) -> Sliding {
+        old: &[FrictionPair],
+    ) -> SlidingFriction {
         let mut grips = self.grips(bonds, displacement, displacement, old);
-        let mut sliding = Sliding { planes: vec![[0.0; 3]; self.planes().count()], ..Sliding::default() };
+        let mut sliding =
+            SlidingFriction { planes: vec![[0.0; 3]; self.planes().count()], ..SlidingFriction::default() };
         let at = |site: u32| velocity.get(site as usize);
         for grip in &mut grips {
             grip.share = 1.0;
             let moved = match (grip.pair, &self.planes) {
-                (Pair::Particles(own, other), _) => {
+                (ContactPair::Particles(own, other), _) => {
                     let (own, other) = (at(own), at(other));
                     std::array::from_fn(|d| if d < D { step * (own[d] - other[d]) } else { 0.0 })
                 }
@@ -162,9 +165,9 @@ impl<const D: usize> Contact<D> {
             };
             let drag = grip.drag(moved);
             grip.slip = drag.slip;
-            let part = if matches!(grip.pair, Pair::Particles(..)) { 0.5 } else { 1.0 };
+            let part = if matches!(grip.pair, ContactPair::Particles(..)) { 0.5 } else { 1.0 };
             sliding.stored += part * grip.energy();
-            if let Pair::Face(plane, _) | Pair::Particle(plane, _) = grip.pair {
+            if let ContactPair::Face(plane, _) | ContactPair::Particle(plane, _) = grip.pair {
                 (0..3).for_each(|d| sliding.planes[plane as usize][d] += drag.force[d]);
             }
         }
@@ -175,22 +178,23 @@ impl<const D: usize> Contact<D> {
         sliding
     }
 
-    /// Friction in force, sorted by pair.
-    pub fn active_grips(&self) -> &[Grip] {
+    /// Active friction, sorted by pair.
+    pub fn active_grips(&self) -> &[FrictionPair] {
         &self.held
     }
 
-    /// Has friction of explicit dynamics act as `grips` say.
-    pub fn resume(&mut self, grips: &[Grip]) {
+    /// Sets the friction of explicit dynamics.
+    pub fn resume_friction(&mut self, grips: &[FrictionPair]) {
         self.held = grips.to_vec();
         self.start = None;
     }
 
-    /// Adds the force densities of friction after [`Self::slide_on`], N/m³, on the particles of work item `chunk`.
+    /// Adds the force densities of friction after [`Self::slide_on`], N/m³, on the particles of work item
+    /// `chunk`.
     pub fn add_friction(&self, chunk: usize, force: &mut [&mut [f64]; D]) {
         let start = chunk * CHUNK;
-        for grip in self.held_by(start..start + force[0].len()) {
-            let Pair::Particles(own, _) = grip.pair else { continue };
+        for grip in self.active_on(start..start + force[0].len()) {
+            let ContactPair::Particles(own, _) = grip.pair else { continue };
             let volume = self.list.volume(own as usize);
             (0..D).for_each(|d| force[d][own as usize - start] -= grip.stiffness * grip.slip[d] / volume);
         }

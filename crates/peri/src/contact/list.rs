@@ -1,4 +1,4 @@
-//! Which particles without a bond are near each other, and how near.
+//! Lists unbonded pairs of particles near each other, with their distances.
 
 use super::vicinity::Vicinity;
 use crate::bonds::{BodyGeometry, CellGrid};
@@ -8,17 +8,17 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Largest contact distance over the reference distance, and over the sum of the radii.
-const OF_REFERENCE: f64 = 0.9;
-const OF_RADII: f64 = 1.35;
+const REFERENCE_FACTOR: f64 = 0.9;
+const RADII_FACTOR: f64 = 1.35;
 /// Skin of the list, in spacings.
 const SKIN: f64 = 0.5;
-/// Above the part of a squared length by which single precision rounds it.
+/// Upper bound of the relative rounding error of a squared length in single precision.
 const ROUNDED: f64 = 1e-6;
-/// Farther than this many cells from the origin, particles are looked for in one place.
-const FAR: f64 = (1_u64 << 38) as f64;
+/// Particles farther than this many cells from the origin share one cell.
+const FARTHEST_CELLS: f64 = (1_u64 << 38) as f64;
 
 /// Pairs of particles without a bond that are nearer than their contact distance, a gap and a skin.
-pub struct List<const D: usize> {
+pub struct ContactList<const D: usize> {
     /// Particles' radii, m; empty where all are `largest`.
     radii: Vec<f64>,
     largest: f64,
@@ -28,49 +28,50 @@ pub struct List<const D: usize> {
     spacing: f64,
     gap: f64,
     skin: f64,
-    /// Where particles were when the list was made; `None` before, and where it is to be made anew.
+    /// Positions of particles when the list was made; `None` before, and if it must be rebuilt.
     vicinity: Option<Vicinity<D>>,
-    /// Particles with candidates, ascending, and where each one's end.
-    listed: Vec<Listed>,
-    candidates: Vec<Candidate<D>>,
+    /// Particles with candidates, ascending, with the end of each one's candidates.
+    listed: Vec<ListedParticle>,
+    candidates: Vec<ContactCandidate<D>>,
     /// Particles without bonds, ascending.
     pub alone: Vec<u32>,
-    /// How often it was made.
+    /// Number of rebuilds.
     pub rebuilds: u64,
 }
 
-/// A particle that others are near to.
+/// A particle with others near it.
 #[derive(Clone, Copy)]
-pub struct Listed {
+pub struct ListedParticle {
     pub site: u32,
-    /// Ends of its candidates, of which the first begin where those of the particle before it end.
+    /// End of its candidates, which begin at the end of those of the previous particle.
     end: usize,
-    /// Whether it has no bonds.
+    /// True if it has no bonds.
     pub alone: bool,
 }
 
-/// A particle near another, seen from there. Lists are long and most of their pairs apart: it holds no more than shows that.
+/// A particle near another, as seen from the latter. Lists are long and most pairs are apart, so it holds
+/// only what shows that.
 #[derive(Clone, Copy)]
-struct Candidate<const D: usize> {
+struct ContactCandidate<const D: usize> {
     site: u32,
     /// ξ in spacings, rounded.
     bond: [f32; D],
 }
 
-/// A particle that is near enough to another, seen from there.
-pub struct Near<const D: usize> {
+/// A particle near enough to another, as seen from the latter.
+pub struct NearbyParticle<const D: usize> {
     pub site: u32,
     /// ξ, m.
     bond: [f64; D],
     /// d, m.
     pub distance: f64,
-    /// ζ, m, and r = |ζ|: the same bits from either side, but for the sign of ζ.
+    /// ζ, m, and r = |ζ|: the same bits from either side, except for the sign of ζ.
     pub zeta: [f64; D],
     pub r: f64,
 }
 
-impl<const D: usize> Near<D> {
-    /// ζ/r; of two particles in one place ξ/|ξ|.
+impl<const D: usize> NearbyParticle<D> {
+    /// ζ/r; ξ/|ξ| for two particles at one point.
     pub fn direction(&self) -> [f64; D] {
         let (along, size) = if self.r > 0.0 { (self.zeta, self.r) } else { (self.bond, length(self.bond)) };
         along.map(|x| x / size)
@@ -88,8 +89,8 @@ impl<const D: usize> Near<D> {
     }
 }
 
-impl<const D: usize> List<D> {
-    /// Of the undeformed body.
+impl<const D: usize> ContactList<D> {
+    /// Creates an empty list for the undeformed body.
     pub fn new(bonds: &dyn BodyGeometry<D>, gap: f64) -> Self {
         let volumes: Vec<f64> = bonds.particles().iter().map(|&site| bonds.volume(site as usize)).collect();
         let mean = volumes.iter().sum::<f64>() / volumes.len() as f64;
@@ -124,21 +125,25 @@ impl<const D: usize> List<D> {
 
     /// Sets the skin, m; the list is made at the next update.
     pub fn set_skin(&mut self, skin: f64) {
-        self.skin = skin.max(0.0).min(FAR * self.largest);
+        self.skin = skin.max(0.0).min(FARTHEST_CELLS * self.largest);
         self.vicinity = None;
     }
 
-    /// Rebuilds the list where pairs that it lacks may have come near since it was made.
+    /// Rebuilds the list if pairs outside it may have come near since it was made.
     pub fn update(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
-        if !self.vicinity.as_mut().is_some_and(|vicinity| vicinity.holds(bonds.particles(), displacement)) {
+        if !self
+            .vicinity
+            .as_mut()
+            .is_some_and(|vicinity| vicinity.is_current(bonds.particles(), displacement))
+        {
             self.rebuild(bonds, displacement);
         }
     }
 
-    /// Takes in the pairs of sites whose bonds have just broken, each from both of its ends: the list is then that which would
-    /// have been made of the bonds that are left.
-    pub fn part(&mut self, bonds: &dyn BodyGeometry<D>, pairs: &[[u32; 2]]) {
-        // else the next update makes it anew
+    /// Adds the pairs of sites whose bonds have just broken, each from both ends: the result equals a list
+    /// made from the remaining bonds.
+    pub fn add_broken_pairs(&mut self, bonds: &dyn BodyGeometry<D>, pairs: &[[u32; 2]]) {
+        // otherwise the next update rebuilds it
         let Some(vicinity) = &self.vicinity else { return };
         let reach = self.gap + self.skin;
         let near = |&[own, other]: &[u32; 2]| {
@@ -146,7 +151,7 @@ impl<const D: usize> List<D> {
             let near = self.near(own as usize, other as usize, bond, &vicinity.listed_at, reach)?;
             Some((own, self.candidate(&near)))
         };
-        let mut found: Vec<(u32, Candidate<D>)> = pairs.par_iter().filter_map(near).collect();
+        let mut found: Vec<(u32, ContactCandidate<D>)> = pairs.par_iter().filter_map(near).collect();
         found.sort_unstable_by_key(|(own, candidate)| (*own, candidate.site));
         let (listed, candidates) = (std::mem::take(&mut self.listed), std::mem::take(&mut self.candidates));
         self.candidates.reserve(candidates.len() + found.len());
@@ -163,13 +168,14 @@ impl<const D: usize> List<D> {
             let (new, others) = found.split_at(found.partition_point(|new| new.0 == site));
             found = others;
             if !new.is_empty() {
-                // a list made since the bonds broke has them
-                let lacks =
-                    |new: &&(u32, Candidate<D>)| known.binary_search_by_key(&new.1.site, |c| c.site).is_err();
+                // a list made after the bonds broke has these pairs
+                let lacks = |new: &&(u32, ContactCandidate<D>)| {
+                    known.binary_search_by_key(&new.1.site, |c| c.site).is_err()
+                };
                 self.candidates.extend(new.iter().filter(lacks).map(|new| new.1));
                 self.candidates[from..].sort_unstable_by_key(|candidate| candidate.site);
             }
-            self.listed.push(Listed {
+            self.listed.push(ListedParticle {
                 site,
                 end: self.candidates.len(),
                 alone: bonds.is_alone(site as usize),
@@ -181,14 +187,14 @@ impl<const D: usize> List<D> {
         self.alone.dedup();
     }
 
-    /// Makes the list for a displacement.
+    /// Rebuilds the list for a displacement.
     pub fn rebuild(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
         // frees its memory first
         self.vicinity = None;
         let particles = bonds.particles();
         let reach = self.gap + self.skin;
-        let edge = 2.0 * OF_RADII * self.largest + reach;
-        let far = FAR * edge;
+        let edge = 2.0 * RADII_FACTOR * self.largest + reach;
+        let far = FARTHEST_CELLS * edge;
         let home: Vec<[f64; D]> = particles.par_iter().map(|&site| bonds.position(site as usize)).collect();
         let place = |(&site, home): (&u32, &[f64; D])| {
             let moved = displacement.get(site as usize);
@@ -199,8 +205,8 @@ impl<const D: usize> List<D> {
         let near = |own: usize, found: &mut Vec<u32>| {
             found.clear();
             let site = particles[own] as usize;
-            // a little more: far from the origin places are rounded to 2⁻¹⁴ of an edge
-            let radius = OF_RADII * (self.radius(site) + self.largest) + reach + 1e-3 * edge;
+            // a little more: far from the origin positions are rounded to 2⁻¹⁴ of an edge
+            let radius = RADII_FACTOR * (self.radius(site) + self.largest) + reach + 1e-3 * edge;
             let here = places[own];
             grid.near(here, radius, |other| {
                 let there = places[other];
@@ -227,18 +233,18 @@ impl<const D: usize> List<D> {
                 }
                 if candidates.len() > before {
                     let alone = bonds.is_alone(site);
-                    listed.push(Listed { site: site as u32, end: candidates.len(), alone });
+                    listed.push(ListedParticle { site: site as u32, end: candidates.len(), alone });
                 }
             }
             (listed, candidates)
         };
-        let parts: Vec<(Vec<Listed>, Vec<Candidate<D>>)> =
+        let parts: Vec<(Vec<ListedParticle>, Vec<ContactCandidate<D>>)> =
             (0..particles.len().div_ceil(CHUNK)).into_par_iter().map(of).collect();
         self.listed.clear();
         self.candidates.clear();
         for (listed, candidates) in parts {
             let before = self.candidates.len();
-            self.listed.extend(listed.into_iter().map(|own| Listed { end: before + own.end, ..own }));
+            self.listed.extend(listed.into_iter().map(|own| ListedParticle { end: before + own.end, ..own }));
             self.candidates.extend(candidates);
         }
         self.alone = particles.iter().copied().filter(|&site| bonds.is_alone(site as usize)).collect();
@@ -256,7 +262,7 @@ impl<const D: usize> List<D> {
         self.radii.get(site).copied().unwrap_or(self.largest)
     }
 
-    /// What two particles with the reference bond ξ are to each other where r < d + `gap`.
+    /// Returns the pair of two particles with the reference bond ξ if r < d + `gap`.
     fn near(
         &self,
         own: usize,
@@ -264,35 +270,36 @@ impl<const D: usize> List<D> {
         bond: [f64; D],
         displacement: &Field<D>,
         gap: f64,
-    ) -> Option<Near<D>> {
-        let radii = OF_RADII * (self.radius(own) + self.radius(other));
-        let distance = (OF_REFERENCE * length(bond)).min(radii);
+    ) -> Option<NearbyParticle<D>> {
+        let radii = RADII_FACTOR * (self.radius(own) + self.radius(other));
+        let distance = (REFERENCE_FACTOR * length(bond)).min(radii);
         let (here, there) = (displacement.get(own), displacement.get(other));
         let zeta = std::array::from_fn(|d| bond[d] + (there[d] - here[d]));
         let r = length(zeta);
-        (r < distance + gap).then_some(Near { site: other as u32, bond, distance, zeta, r })
+        (r < distance + gap).then_some(NearbyParticle { site: other as u32, bond, distance, zeta, r })
     }
 
-    fn candidate(&self, near: &Near<D>) -> Candidate<D> {
-        Candidate { site: near.site, bond: near.bond.map(|x| (x / self.spacing) as f32) }
+    fn candidate(&self, near: &NearbyParticle<D>) -> ContactCandidate<D> {
+        ContactCandidate { site: near.site, bond: near.bond.map(|x| (x / self.spacing) as f32) }
     }
 
-    /// The particles of `sites` that others are near to, each with those at r < d + `gap`, up to the gap of the list.
+    /// Iterates over the particles of `sites` that have others at r < d + `gap`, up to the gap of the list,
+    /// with these.
     pub fn pairs<'a>(
         &'a self,
         bonds: &'a dyn BodyGeometry<D>,
         displacement: &'a Field<D>,
         sites: Range<usize>,
         gap: f64,
-    ) -> impl Iterator<Item = (Listed, impl Iterator<Item = Near<D>> + 'a)> + 'a {
+    ) -> impl Iterator<Item = (ListedParticle, impl Iterator<Item = NearbyParticle<D>> + 'a)> + 'a {
         let at = |site: usize| self.listed.partition_point(|own| (own.site as usize) < site);
-        let most = 2.0 * OF_RADII * self.largest;
+        let most = 2.0 * RADII_FACTOR * self.largest;
         (at(sites.start)..at(sites.end)).map(move |k| {
             let start = k.checked_sub(1).map_or(0, |before| self.listed[before].end);
             let listed = self.listed[k];
             let own = listed.site as usize;
             let here = displacement.get(own);
-            let near = move |candidate: &Candidate<D>| {
+            let near = move |candidate: &ContactCandidate<D>| {
                 let other = candidate.site as usize;
                 let there = displacement.get(other);
                 let (mut reference, mut square) = (0.0, 0.0);
@@ -302,8 +309,9 @@ impl<const D: usize> List<D> {
                     reference += bond * bond;
                     square += zeta * zeta;
                 }
-                // most are farther apart by much more than rounding of ξ to single precision, which costs no root to see
-                let closest = (OF_REFERENCE * OF_REFERENCE * reference).min(most * most);
+                // most are apart by far more than the single-precision rounding of ξ; no root is needed to
+                // see it
+                let closest = (REFERENCE_FACTOR * REFERENCE_FACTOR * reference).min(most * most);
                 if square
                     > 2.0 * gap * gap + (1.0 + f64::from(gap > 0.0) + ROUNDED) * closest + ROUNDED * reference
                 {

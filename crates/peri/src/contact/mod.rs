@@ -1,32 +1,35 @@
-//! Contact: repulsion of particles that no intact bond joins, rigid planes, friction.
+//! Contact: repulsion of unbonded particles, rigid planes, friction.
 //!
-//! Two particles at the distance r = |ζ| < d repel each other along ζ = ξ + η with the force density pair k(d − r) and
-//! d = min(0.9|ξ|, 1.35(r_I + r_J)), radius r = ½(V/thickness)^(1/D), half the distance of neighbours on a lattice. 0.9|ξ| makes
-//! the reference state free of contact, and a bond that breaks in tension leaves no force behind; 1.35·2r exceeds the
-//! distance of neighbours, so that no particle slips between two. The stiffness is
+//! Two particles at the distance r = |ζ| < d repel each other along ζ = ξ + η with the force density pair k(d
+//! − r) and d = min(0.9|ξ|, 1.35(r_I + r_J)), radius r = ½(V/thickness)^(1/D), half the distance of
+//! neighbours on a lattice. 0.9|ξ| makes the reference state free of contact, and a bond that breaks in
+//! tension leaves no force behind; 1.35·2r exceeds the distance of neighbours, so that no particle slips
+//! between two. The stiffness is
 //!
-//! - k = ½s M_IJ/(Δx²V̄), M_IJ = 2M_I M_J/(M_I + M_J), of [`Contact::new`], with the longitudinal modulus M and the mean volume V̄: an
-//!   interface is as compliant as 2/s layers of confined material;
-//! - k = κ(c/δ), c = 6kθ, of [`Contact::short_range`]: the bond constant of the linear bond as a dual force. κ = 15 is that of Macek &
-//!   Silling (2007), doi:10.1016/j.finel.2007.08.012 (their c_s = 15c), and Parks et al. (2008), doi:10.1016/j.cpc.2008.06.011.
+//! - k = ½s M_IJ/(Δx²V̄), M_IJ = 2M_I M_J/(M_I + M_J), of [`Contact::new`], with the longitudinal modulus M
+//!   and the mean volume V̄: an interface is as compliant as 2/s layers of confined material;
+//! - k = κ(c/δ), c = 6kθ, of [`Contact::short_range`]: the bond constant of the linear bond as a dual force.
+//!   κ = 15 is that of Macek & Silling (2007), doi:10.1016/j.finel.2007.08.012 (their c_s = 15c), and Parks
+//!   et al. (2008), doi:10.1016/j.cpc.2008.06.011.
 //!
-//! Intact bonds do not repel otherwise: their own law resists compression. Particles have their whole volume, whatever the
-//! corrections of bonds.
+//! Intact bonds repel by their own law only. Particles have their whole volume, whatever the corrections of
+//! bonds.
 //!
-//! The pairs come from a list of all that are within d, a gap, and a skin, rebuilt where particles near each other have
-//! moved against each other by the skin; where a bond breaks its pair is added. Pairs beyond d add nothing, not even a
-//! rounding: the list is no part of the state, and how often it is made makes no difference to any bit.
+//! Pairs come from a list of all within d, a gap and a skin. It is rebuilt when nearby particles have moved
+//! against each other by the skin; a broken bond adds its pair. Pairs beyond d add nothing, not even
+//! rounding: the list is not part of the state, and the number of rebuilds changes no bit.
 //!
-//! Limits. Contact of particles knows distances only: a particle that leaps past another in one step stays there. Force and energy
-//! are finite in full overlap (r = 0: kd along the reference ξ; energy ½kd² V_I V_J), so that loads beyond that press particles
-//! through each other.
+//! Limits. Contact of particles depends on distances only: a particle that jumps past another in one step
+//! stays there. Force and energy are finite at full overlap (r = 0: kd along the reference ξ; energy ½kd² V_I
+//! V_J), so larger loads press particles through each other.
 //!
-//! Planes act on faces, see `faces`. Friction is Coulomb's with an elastic slip, see `grip`: of pairs equal and opposite, but not along
-//! the pair: particles have no spin, so that it does not conserve angular momentum.
+//! Planes act on faces, see `faces`. Friction is Coulomb's with an elastic slip, see `friction_pair`: equal
+//! and opposite within a pair, but not along it. Particles have no spin, so friction does not conserve
+//! angular momentum.
 
 mod faces;
 mod friction;
-mod grip;
+mod friction_pair;
 mod list;
 mod plane;
 mod plane_friction;
@@ -38,18 +41,18 @@ mod vicinity;
 use crate::bonds::{BodyGeometry, Bonds, LatticeBonds, Property};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
-use crate::surface::Surface;
-pub use friction::Sliding;
-pub use grip::{Drag, Grip, Pair};
-use list::{List, Listed, Near};
-pub use plane::{Plane, PlaneReaction};
+use crate::surface::BodySurface;
+pub use friction::SlidingFriction;
+pub use friction_pair::{ContactPair, Drag, FrictionPair};
+use list::{ContactList, ListedParticle, NearbyParticle};
+pub use plane::{PlaneReaction, RigidPlane};
 use planes::Planes;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 pub use stiffness::Spring;
 use ties::Ties;
-pub use ties::{Interface, across, grips};
+pub use ties::{GripInterface, across, grips};
 
 /// κ of Macek & Silling (2007).
 pub const SHORT_RANGE: f64 = 15.0;
@@ -57,44 +60,44 @@ pub const SHORT_RANGE: f64 = 15.0;
 pub const PLANE_STIFFNESS: f64 = 10.0;
 /// Stiffness s of pairs, and of planes in explicit dynamics.
 pub const PAIR_STIFFNESS: f64 = 2.0;
-/// Largest gap, in spacings, over which two particles may be about to touch.
+/// Largest gap, in spacings, at which two particles count as about to touch.
 const NEAR: f64 = 0.25;
 
 /// Contact of a body.
 pub struct Contact<const D: usize> {
-    /// Force density on a particle per volume of the other and per overlap, N/m⁷, where M is the greatest.
+    /// Force density on a particle per volume of the other and per overlap, N/m⁷, for the greatest M.
     stiffness: f64,
-    /// Stiffness given in layers of the material, not as κ.
+    /// True if the stiffness was given in layers of the material, not as κ.
     layered: bool,
-    /// M of each particle over the greatest, where they differ.
+    /// M of each particle over the greatest M; `None` if uniform.
     moduli: Option<Property>,
     /// Volume of the largest particle, m³.
     largest_volume: f64,
     /// Largest gap of particles about to touch, m.
     near: f64,
-    list: List<D>,
+    list: ContactList<D>,
     planes: Option<Planes<D>>,
     ties: Option<Ties<D>>,
     /// μ of pairs of particles, and γ, m.
     friction: f64,
     elastic_slip: Option<f64>,
-    /// Friction in force, sorted by pair, and the displacement from which it counts.
-    held: Vec<Grip>,
+    /// Active friction, sorted by pair, and the displacement from which it counts.
+    held: Vec<FrictionPair>,
     start: Option<Field<D>>,
 }
 
-/// Bodies and planes in touch.
+/// Pairs, faces and energy in contact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ContactSummary {
-    /// Pairs with r < d, and faces that touch a plane.
+    /// Pairs with r < d, and faces in contact with a plane.
     pub pairs: u64,
-    /// Greatest overlap: 1 − r/d of a pair, over half a spacing of a face; 0 where nothing touches.
+    /// Greatest overlap: 1 − r/d of a pair, overlap over half a spacing of a face; 0 without contact.
     pub overlap: f64,
     /// Energy of pairs, planes and elastic slip, J.
     pub energy: f64,
 }
 
-/// Checks that a factor of contact is finite and not negative.
+/// Checks that a contact parameter is finite and not negative.
 fn non_negative(name: &'static str, found: f64) -> Result<(), Error> {
     if found >= 0.0 && found.is_finite() {
         return Ok(());
@@ -103,11 +106,11 @@ fn non_negative(name: &'static str, found: f64) -> Result<(), Error> {
 }
 
 impl<const D: usize> Contact<D> {
-    /// Contact of a body of the longitudinal modulus M = `modulus`, Pa, with the stiffness s = `stiffness`, see [`PAIR_STIFFNESS`]. s = 0
-    /// repels nothing: overlaps are looked at only.
+    /// Contact of a body of the longitudinal modulus M = `modulus`, Pa, with the stiffness s = `stiffness`,
+    /// see [`PAIR_STIFFNESS`]. s = 0 exerts no force: overlaps are only measured.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where s is negative, M is not positive, or either is not finite.
+    /// [`Error::Parameter`] if s is negative, M is not positive, or either is not finite.
     pub fn new(
         bonds: &dyn BodyGeometry<D>,
         modulus: impl Into<Property>,
@@ -122,24 +125,25 @@ impl<const D: usize> Contact<D> {
         let moduli = modulus
             .uniform()
             .is_none()
-            .then(|| Property::new(bonds, |site, _| modulus.at(site) / modulus.greatest()));
-        Ok(Self { moduli, layered: true, ..Self::of_pairs(bonds, unit, stiffness)? })
+            .then(|| Property::new(bonds, |site, _| modulus.value_at(site) / modulus.greatest()));
+        Ok(Self { moduli, layered: true, ..Self::with_stiffness(bonds, unit, stiffness)? })
     }
 
-    /// Contact of a body with the bond modulus `modulus` = kθ, N/m⁶, and κ = `stiffness`, see [`SHORT_RANGE`].
+    /// Contact of a body with the bond modulus `modulus` = kθ, N/m⁶, and κ = `stiffness`, see
+    /// [`SHORT_RANGE`].
     ///
     /// # Errors
-    /// [`Error::Parameter`] where κ is negative, kθ is not positive, or either is not finite.
+    /// [`Error::Parameter`] if κ is negative, kθ is not positive, or either is not finite.
     pub fn short_range(bonds: &dyn BodyGeometry<D>, modulus: f64, stiffness: f64) -> Result<Self, Error> {
         positive("modulus of contact", modulus)?;
         let unit = 6.0 * modulus / bonds.horizon();
         // the same bits as κ·6kθ/δ
-        let mut contact = Self::of_pairs(bonds, unit, stiffness)?;
+        let mut contact = Self::with_stiffness(bonds, unit, stiffness)?;
         contact.stiffness = stiffness * 6.0 * modulus / bonds.horizon();
         Ok(contact)
     }
 
-    fn of_pairs(bonds: &dyn BodyGeometry<D>, unit: f64, stiffness: f64) -> Result<Self, Error> {
+    fn with_stiffness(bonds: &dyn BodyGeometry<D>, unit: f64, stiffness: f64) -> Result<Self, Error> {
         non_negative("contact.stiffness", stiffness)?;
         let volumes = bonds.particles().iter().map(|&site| bonds.volume(site as usize));
         let near = NEAR * bonds.spacing();
@@ -149,7 +153,7 @@ impl<const D: usize> Contact<D> {
             moduli: None,
             largest_volume: volumes.fold(0.0, f64::max),
             near,
-            list: List::new(bonds, near),
+            list: ContactList::new(bonds, near),
             planes: None,
             ties: None,
             friction: 0.0,
@@ -159,17 +163,18 @@ impl<const D: usize> Contact<D> {
         })
     }
 
-    /// With rigid planes beside the faces of `surface`, of a body of the longitudinal modulus M = `modulus`, Pa.
+    /// Adds rigid planes in contact with the faces of `surface`, for a body of the longitudinal modulus M =
+    /// `modulus`, Pa.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a normal without direction, and for what is not finite or negative; [`Error::Geometry`] for a
-    /// bonded plane that touches nothing.
+    /// [`Error::Parameter`] for a normal without direction and for values that are negative or not finite;
+    /// [`Error::Geometry`] for a bonded plane that touches no face.
     pub fn with_planes(
         mut self,
         bonds: &dyn Bonds<D>,
-        surface: &Surface<D>,
+        surface: &BodySurface<D>,
         modulus: impl Into<Property>,
-        planes: Vec<Plane<D>>,
+        planes: Vec<RigidPlane<D>>,
     ) -> Result<Self, Error> {
         if !planes.is_empty() {
             let modulus = modulus.into();
@@ -180,16 +185,17 @@ impl<const D: usize> Contact<D> {
         Ok(self)
     }
 
-    /// With held particles tied to the others at their interface with the stiffness s = `stiffness`, of a body of the outer surface `outside`
-    /// and the longitudinal modulus M = `modulus`, Pa, without bonds [`across`] the interface.
+    /// Ties held particles to the others at their interface with the stiffness s = `stiffness`, for a body of
+    /// the outer surface `outside` and the longitudinal modulus M = `modulus`, Pa, without bonds [`across`]
+    /// the interface.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where s is negative, M is not positive, or either is not finite.
+    /// [`Error::Parameter`] if s is negative, M is not positive, or either is not finite.
     pub fn with_tied(
         mut self,
         bonds: &LatticeBonds<D>,
-        interface: Interface<D>,
-        outside: &Surface<D>,
+        interface: GripInterface<D>,
+        outside: &BodySurface<D>,
         modulus: f64,
         stiffness: f64,
     ) -> Result<Self, Error> {
@@ -200,11 +206,12 @@ impl<const D: usize> Contact<D> {
         Ok(self)
     }
 
-    /// With friction of the coefficient `friction` between particles; `elastic_slip` is the slip γ, m, at which it is Coulomb's,
-    /// `None` that at which tangential and normal stiffness are equal.
+    /// Adds friction of the coefficient `friction` between particles; `elastic_slip` is the slip γ, m, at
+    /// which it reaches Coulomb's limit; `None` makes tangential and normal stiffness equal.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where the coefficient is negative, the slip is not positive, or either is not finite.
+    /// [`Error::Parameter`] if the coefficient is negative, the slip is not positive, or either is not
+    /// finite.
     pub fn with_friction(mut self, friction: f64, elastic_slip: Option<f64>) -> Result<Self, Error> {
         non_negative("contact.friction", friction)?;
         if let Some(slip) = elastic_slip {
@@ -214,73 +221,73 @@ impl<const D: usize> Contact<D> {
         Ok(self)
     }
 
-    /// With another skin, in m: a thin one is filled often, a thick one holds many pairs in vain. The list is made at the
-    /// next update. Values that are not positive count as 0: made at every update.
+    /// Sets the skin, in m: a thin one is rebuilt often, a thick one holds many pairs in vain. The list is
+    /// rebuilt at the next update. Values that are not positive count as 0: rebuilt at every update.
     pub fn with_skin(mut self, skin: f64) -> Self {
         self.list.set_skin(skin);
         self
     }
 
-    /// Returns true where pairs, planes or ties exert forces.
+    /// Returns true if pairs, planes or ties exert forces.
     pub fn repels(&self) -> bool {
         self.has_pairs() || self.has_planes() || self.ties.is_some()
     }
 
-    /// Returns true where particles repel each other.
+    /// Returns true if particles repel each other.
     pub fn has_pairs(&self) -> bool {
         self.stiffness > 0.0
     }
 
-    /// Returns true where there are planes.
+    /// Returns true if there are planes.
     pub fn has_planes(&self) -> bool {
         self.planes.is_some()
     }
 
-    /// Returns true where a coefficient of friction is above 0.
-    pub fn rubs(&self) -> bool {
+    /// Returns true if a friction coefficient is above 0.
+    pub fn has_friction(&self) -> bool {
         (self.has_pairs() && self.friction > 0.0)
             || self.planes().any(|plane| plane.friction > 0.0 && !plane.bonded)
     }
 
-    /// Returns true where planes or grips hold faces in all directions.
+    /// Returns true if planes or grips hold faces in all directions.
     pub fn is_tied(&self) -> bool {
         self.ties.is_some() || self.planes().any(|plane| plane.bonded)
     }
 
-    /// Moves planes to where they are at a load factor and a time, s.
-    pub fn place(&mut self, factor: f64, time: f64) {
+    /// Moves planes to their positions at a load factor and a time, s.
+    pub fn move_planes(&mut self, factor: f64, time: f64) {
         if let Some(planes) = &mut self.planes {
-            planes.place(factor, time);
+            planes.move_to(factor, time);
         }
     }
 
     /// The planes, in their order.
-    pub fn planes(&self) -> impl Iterator<Item = &Plane<D>> {
+    pub fn planes(&self) -> impl Iterator<Item = &RigidPlane<D>> {
         self.planes.iter().flat_map(Planes::planes)
     }
 
-    /// The last move of every plane, m.
+    /// Last move of every plane, m.
     pub fn moved(&self) -> impl Iterator<Item = [f64; D]> {
         self.planes.iter().flat_map(Planes::moved)
     }
 
-    /// Deepest overlap of a plane that has moved, m, before its last move and after it; −∞ where none touches.
+    /// Deepest overlap of a plane that has moved, m, before its last move and after it; −∞ if none touches.
     pub fn approach(&self, displacement: &Field<D>) -> [f64; 2] {
         self.planes.as_ref().map_or([f64::NEG_INFINITY; 2], |planes| planes.approach(displacement))
     }
 
     /// Force, area and width of the contact with each plane, without friction.
-    pub fn resting(&self, displacement: &Field<D>) -> Vec<PlaneReaction> {
-        self.planes.as_ref().map_or_else(Vec::new, |planes| planes.resting(displacement))
+    pub fn plane_reactions(&self, displacement: &Field<D>) -> Vec<PlaneReaction> {
+        self.planes.as_ref().map_or_else(Vec::new, |planes| planes.reactions(displacement))
     }
 
-    /// Σ of the squares of the planes' force densities at the last update, (N/m³)².
-    pub fn square_of_planes(&self) -> f64 {
+    /// Sum of the squares of the planes' force densities at the last update, (N/m³)².
+    pub fn plane_force_square(&self) -> f64 {
         self.planes.as_ref().map_or(0.0, Planes::square)
     }
 
-    /// Force densities of the planes at the last update, N/m³; `None` without any.
-    pub fn of_planes(&self, sites: usize) -> Option<Field<D>> {
+    /// Force densities of the planes at the last update, N/m³; `None` without planes.
+    pub fn plane_forces(&self, sites: usize) -> Option<Field<D>> {
         let planes = self.planes.as_ref()?;
         let mut field = Field::zeros(sites);
         let chunks = field.chunks_mut().into_par_iter().enumerate();
@@ -288,13 +295,13 @@ impl<const D: usize> Contact<D> {
         Some(field)
     }
 
-    /// How often the list was made.
+    /// Number of rebuilds of the list.
     pub fn rebuilds(&self) -> u64 {
         self.list.rebuilds
     }
 
-    /// Prepares the forces of a displacement: rebuilds the list where particles near each other may have moved against each other by the
-    /// skin since it was made, and computes the forces of planes.
+    /// Prepares the forces of a displacement: rebuilds the list if nearby particles may have moved against
+    /// each other by the skin, and computes the forces of planes.
     pub fn update(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
         if self.has_pairs() {
             self.list.update(bonds, displacement);
@@ -307,43 +314,46 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Takes in the pairs of sites whose bonds have just broken, each from both of its ends.
-    pub fn part(&mut self, bonds: &dyn BodyGeometry<D>, pairs: &[[u32; 2]]) {
+    /// Adds the pairs of sites whose bonds have just broken, each from both ends.
+    pub fn add_broken_pairs(&mut self, bonds: &dyn BodyGeometry<D>, pairs: &[[u32; 2]]) {
         if self.has_pairs() {
-            self.list.part(bonds, pairs);
+            self.list.add_broken_pairs(bonds, pairs);
         }
         if let Some(planes) = &mut self.planes {
-            planes.lose(bonds, pairs.iter().map(|pair| pair[0] as usize));
+            planes.expose(bonds, pairs.iter().map(|pair| pair[0] as usize));
         }
     }
 
-    /// Makes the list for a displacement; to be called where bonds have changed, otherwise than by [`Self::part`].
+    /// Rebuilds the list for a displacement; required after bonds change other than by
+    /// [`Self::add_broken_pairs`].
     pub fn rebuild(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
         self.list.rebuild(bonds, displacement);
         if let Some(planes) = &mut self.planes {
-            planes.lose(bonds, bonds.particles().iter().map(|&site| site as usize));
+            planes.expose(bonds, bonds.particles().iter().map(|&site| site as usize));
         }
     }
 
     /// Stiffness of a pair, N/m⁷.
     fn pair(&self, own: u32, other: u32) -> f64 {
         let Some(moduli) = &self.moduli else { return self.stiffness };
-        let [a, b] = [own, other].map(|site| moduli.at(site as usize));
+        let [a, b] = [own, other].map(|site| moduli.value_at(site as usize));
         self.stiffness * 2.0 * a * b / (a + b)
     }
 
-    /// Of `sites`, the particles with those at r < d + `gap` from them; none where particles do not repel each other.
+    /// Iterates over the particles of `sites` that have others at r < d + `gap`, with these; empty if
+    /// particles do not repel each other.
     fn pairs<'a>(
         &'a self,
         bonds: &'a dyn BodyGeometry<D>,
         displacement: &'a Field<D>,
         sites: Range<usize>,
         gap: f64,
-    ) -> impl Iterator<Item = (Listed, impl Iterator<Item = Near<D>> + 'a)> + 'a {
+    ) -> impl Iterator<Item = (ListedParticle, impl Iterator<Item = NearbyParticle<D>> + 'a)> + 'a {
         self.has_pairs().then(|| self.list.pairs(bonds, displacement, sites, gap)).into_iter().flatten()
     }
 
-    /// Adds the force densities of pairs, −Σ_J k(d − r) V_J ζ/r, of planes, and of friction between equilibria, N/m³, on the particles from the site `start` on, of one work item.
+    /// Adds the force densities of pairs, −Σ_J k(d − r) V_J ζ/r, of planes, and of friction between
+    /// equilibria, N/m³, on the particles from the site `start` on, of one work item.
     pub fn force(
         &self,
         bonds: &dyn BodyGeometry<D>,
@@ -368,7 +378,7 @@ impl<const D: usize> Contact<D> {
                     sum[d] -= push * direction[d];
                 }
             }
-            // what is listed but does not touch must not even turn −0 into 0
+            // pairs beyond contact must not even turn −0 into 0
             let Some(sum) = sum else { continue };
             for d in 0..D {
                 force[d][own.site as usize - start] += sum[d];
@@ -376,7 +386,7 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Greatest overlap 1 − r/d of pairs whose stiffness is that of the material, with their distance d, m.
+    /// Greatest overlap 1 − r/d of the pairs as stiff as the material, with their distance d, m.
     pub fn deepest_pair(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> Option<[f64; 2]> {
         if !self.layered {
             return None;
@@ -392,8 +402,8 @@ impl<const D: usize> Contact<D> {
         parts.into_iter().flatten().max_by(|a, b| a[0].total_cmp(&b[0]))
     }
 
-    /// What touches.
-    pub fn touching(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> ContactSummary {
+    /// Counts and measures all contacts.
+    pub fn summary(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> ContactSummary {
         let none = ContactSummary { pairs: 0, overlap: 0.0, energy: 0.0 };
         let of = |chunk: usize| {
             let (mut part, sites) = (none, chunk_range(chunk, displacement.sites()));
@@ -403,7 +413,7 @@ impl<const D: usize> Contact<D> {
                     let [volume, other] = [own.site, touch.site].map(|site| bonds.volume(site as usize));
                     part.pairs += u64::from(own.site < touch.site);
                     part.overlap = part.overlap.max(overlap / touch.distance);
-                    // half of a pair's from either side
+                    // half of a pair's energy from either side
                     let stiffness = self.pair(own.site, touch.site);
                     part.energy += 0.25 * stiffness * overlap * overlap * other * volume;
                 }
@@ -418,7 +428,7 @@ impl<const D: usize> Contact<D> {
             energy: a.energy + b.energy,
         });
         if let Some(planes) = &self.planes {
-            let (count, overlap, energy) = planes.touching(displacement);
+            let (count, overlap, energy) = planes.summary(displacement);
             all.pairs += count;
             all.energy += energy;
             all.overlap = all.overlap.max(overlap);

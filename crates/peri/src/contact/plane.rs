@@ -5,29 +5,31 @@ use crate::error::Error;
 use crate::geometry::length;
 use serde::{Deserialize, Serialize};
 
-/// A rigid half-space behind a plane. A face of the body at the depth o below it is pushed out with the pressure s(M/Δx)o, with the
-/// longitudinal modulus M and the spacing Δx: s layers of confined material are as stiff as the contact.
+/// A rigid half-space behind a plane. A face of the body at the depth o below it is pushed out with the
+/// pressure s(M/Δx)o, with the longitudinal modulus M and the spacing Δx: s layers of confined material are
+/// as stiff as the contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plane<const D: usize> {
+pub struct RigidPlane<const D: usize> {
     /// A point of the plane, m.
     pub point: [f64; D],
-    /// Its normal, of any length, towards the body.
+    /// Normal, of any length, towards the body.
     pub normal: [f64; D],
     /// Stiffness s.
     pub stiffness: f64,
     /// Coefficient of friction μ.
     pub friction: f64,
-    /// Elastic slip γ at which friction is Coulomb's, m; `None`: tangential and normal stiffness are equal.
+    /// Elastic slip γ at which friction reaches Coulomb's limit, m; `None`: tangential and normal stiffness
+    /// are equal.
     pub elastic_slip: Option<f64>,
-    /// Ties the faces that it touches at rest: no gap, no slip.
+    /// Ties the faces that touch it in the reference state: no gap, no slip.
     pub bonded: bool,
-    /// Displacement at load factor 1, m; the plane follows the factor.
+    /// Displacement at load factor 1, m, in proportion to the factor.
     pub displacement: [f64; D],
-    /// Velocity, m/s, in explicit dynamics; added to the displacement.
+    /// Velocity in explicit dynamics, m/s, in addition to the displacement.
     pub velocity: [f64; D],
 }
 
-impl<const D: usize> Plane<D> {
+impl<const D: usize> RigidPlane<D> {
     /// A plane at rest, without friction, of stiffness [`super::PLANE_STIFFNESS`].
     pub fn new(point: [f64; D], normal: [f64; D]) -> Self {
         Self {
@@ -47,10 +49,10 @@ impl<const D: usize> Plane<D> {
         (0..D).map(|d| (place[d] - self.point[d]) * self.normal[d]).sum()
     }
 
-    /// The plane with a unit normal.
+    /// Checks the plane and normalises its normal.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a normal without direction and for what is not finite or negative.
+    /// [`Error::Parameter`] for a normal without direction and for values that are negative or not finite.
     pub(super) fn checked(mut self) -> Result<Self, Error> {
         non_negative("stiffness of a plane", self.stiffness)?;
         non_negative("friction of a plane", self.friction)?;
@@ -82,13 +84,13 @@ impl<const D: usize> Plane<D> {
 pub struct PlaneReaction {
     /// Force of the plane on the body, N.
     pub force: [f64; 3],
-    /// Area of the faces in touch, m².
+    /// Area of the faces in contact, m².
     pub area: f64,
-    /// Root of the mean square distance from the centre of pressure, weighted with the pressure, m. A Hertzian strip of
-    /// half-width b has b/2.
+    /// Root of the mean square distance from the centre of pressure, weighted with the pressure, m; b/2 for a
+    /// Hertzian strip of half-width b.
     pub spread: f64,
     /// Least gap, m, negative for an overlap.
     pub gap: f64,
-    /// Largest extent of the faces in touch across the normal, m: in a plane body the width of the contact.
+    /// Largest extent of the faces in contact across the normal, m: in a plane body the width of the contact.
     pub width: f64,
 }

@@ -1,12 +1,12 @@
 //! Friction of faces and particles on rigid planes.
 
-use super::grip::{Grip, Pair};
+use super::friction_pair::{ContactPair, FrictionPair};
 use super::planes::Planes;
 use crate::field::Field;
 
 impl<const D: usize> Planes<D> {
     /// Motion of a face or particle against a plane since `start`, m.
-    pub fn slipped(&self, pair: Pair, field: &Field<D>, start: &Field<D>) -> [f64; 3] {
+    pub fn slipped(&self, pair: ContactPair, field: &Field<D>, start: &Field<D>) -> [f64; 3] {
         let Some((number, element)) = self.element(pair) else { return [0.0; 3] };
         let (now, then) = (self.displacement(field, element), self.displacement(start, element));
         let placed = &self.each[number];
@@ -15,14 +15,14 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Motion of a face or particle against a plane in a step, s, with a velocity, m/s, m.
-    pub fn carried(&self, pair: Pair, velocity: &Field<D>, step: f64) -> [f64; 3] {
+    pub fn carried(&self, pair: ContactPair, velocity: &Field<D>, step: f64) -> [f64; 3] {
         let Some((number, element)) = self.element(pair) else { return [0.0; 3] };
         let (placed, v) = (&self.each[number], self.displacement(velocity, element));
         std::array::from_fn(|d| if d < D { step * v[d] - (placed.now[d] - placed.before[d]) } else { 0.0 })
     }
 
-    /// Takes the forces of friction in explicit dynamics from elastic slips.
-    pub fn drag(&mut self, held: &[Grip]) {
+    /// Computes the friction forces of explicit dynamics from elastic slips.
+    pub fn drag(&mut self, held: &[FrictionPair]) {
         let mut drags = std::mem::take(&mut self.drags);
         drags.clear();
         for grip in held {
@@ -42,9 +42,10 @@ impl<const D: usize> Planes<D> {
         }
     }
 
-    /// Friction of all that touches at a displacement, with the normal forces there; the slips of `old`, sorted by pair, go on. What has begun to touch
-    /// since `start` has slipped for its part of the way alone.
-    pub fn grips(&self, field: &Field<D>, start: &Field<D>, old: &[Grip]) -> Vec<Grip> {
+    /// Computes the friction of all contacts at a displacement, with the normal forces there; the slips of
+    /// `old`, sorted by pair, continue. Contacts that began after `start` slip for their part of the way
+    /// only.
+    pub fn grips(&self, field: &Field<D>, start: &Field<D>, old: &[FrictionPair]) -> Vec<FrictionPair> {
         let mut grips = Vec::new();
         for (number, placed) in self.each.iter().enumerate() {
             let plane = &placed.plane;
@@ -55,21 +56,21 @@ impl<const D: usize> Planes<D> {
             for touch in self.near(placed, field, 0.0) {
                 let bound = plane.friction * touch.stiffness * touch.overlap;
                 let pair = match touch.element.checked_sub(self.faces.len()) {
-                    None => Pair::Face(number as u32, touch.element as u32),
-                    Some(bare) => Pair::Particle(number as u32, self.bare[bare]),
+                    None => ContactPair::Face(number as u32, touch.element as u32),
+                    Some(bare) => ContactPair::Particle(number as u32, self.bare[bare]),
                 };
                 let stiffness = plane.elastic_slip.map_or(touch.stiffness, |slip| bound / slip);
                 let normal = std::array::from_fn(|d| plane.normal.get(d).copied().unwrap_or(0.0));
                 let known = old.binary_search_by_key(&pair, |grip| grip.pair).ok().map(|at| &old[at]);
                 let then = self.beside(placed, start, touch.element).overlap - {
-                    // `beside` has the plane where it is now
+                    // `beside` uses the current position of the plane
                     let now: f64 = (0..D).map(|d| placed.now[d] * plane.normal[d]).sum();
                     now - shift
                 };
                 let share = if then >= 0.0 { 1.0 } else { touch.overlap / (touch.overlap - then) };
                 let slip = known.map_or([0.0; 3], |grip| grip.slip);
-                let mut grip = Grip { pair, slip, bound, stiffness, normal, share };
-                grip.fit();
+                let mut grip = FrictionPair { pair, slip, bound, stiffness, normal, share };
+                grip.project();
                 if bound > 0.0 {
                     grips.push(grip);
                 }

@@ -1,13 +1,13 @@
 //! Contact of faces and particles with rigid planes.
 
 use super::faces::Faces;
-use super::grip::{Grip, Pair};
-use super::plane::{Plane, PlaneReaction};
+use super::friction_pair::{ContactPair, FrictionPair};
+use super::plane::{PlaneReaction, RigidPlane};
 use crate::bonds::{BodyGeometry, Bonds, Property};
 use crate::error::Error;
 use crate::field::Field;
 use crate::geometry::length;
-use crate::surface::Surface;
+use crate::surface::BodySurface;
 use rayon::prelude::*;
 
 /// Distance of a face from a plane up to which it is tied to it, in spacings.
@@ -16,32 +16,32 @@ const TIED: f64 = 0.5;
 const BATCH: usize = 1024;
 
 /// A plane in motion.
-pub(super) struct Placed<const D: usize> {
-    pub(super) plane: Plane<D>,
+pub(super) struct MovingPlane<const D: usize> {
+    pub(super) plane: RigidPlane<D>,
     /// Displacement of the plane now and at the last placement, m.
     pub(super) now: [f64; D],
     pub(super) before: [f64; D],
-    /// Faces tied to it.
+    /// Faces tied to the plane.
     tied: Vec<u32>,
 }
 
-/// A face, or a particle that touches planes itself, beside a plane.
+/// A face, or a particle exposed to planes, beside a plane.
 #[derive(Clone, Copy)]
-pub(super) struct Touch<const D: usize> {
-    /// Number of a face; from the number of faces on, of a bare particle.
+pub(super) struct PlaneContact<const D: usize> {
+    /// Number of a face, or number of faces plus the number of a bare particle.
     pub(super) element: usize,
-    /// Place, m; of a particle on its surface.
+    /// Position, m; of a particle, on its surface.
     place: [f64; D],
     /// Depth behind the plane, m.
     pub(super) overlap: f64,
-    /// Displacement against the plane, m, where it is tied.
+    /// Displacement relative to the plane, m, if tied.
     offset: Option<[f64; D]>,
     /// Area, m², and normal stiffness, N/m.
     area: f64,
     pub(super) stiffness: f64,
 }
 
-impl<const D: usize> Touch<D> {
+impl<const D: usize> PlaneContact<D> {
     /// Energy, J.
     fn energy(&self) -> f64 {
         let square = self.offset.map_or(self.overlap * self.overlap, |x| x.iter().map(|x| x * x).sum());
@@ -57,16 +57,17 @@ impl<const D: usize> Touch<D> {
     }
 }
 
-/// All planes of a scene, and what touches them: the faces of the body, and particles that have lost bonds.
+/// All planes of a scene with the elements they act on: faces of the body, and particles that have lost
+/// bonds.
 pub struct Planes<const D: usize> {
-    pub(super) each: Vec<Placed<D>>,
+    pub(super) each: Vec<MovingPlane<D>>,
     pub(super) faces: Faces<D>,
-    /// Faces whose particles have all their bonds.
+    /// True for faces whose particles have all their bonds.
     sound: Vec<bool>,
-    /// Sites of particles that touch planes themselves, ascending, and where they were at rest, m.
+    /// Sites of bare particles, which touch planes themselves, ascending, and their reference positions, m.
     pub(super) bare: Vec<u32>,
     homes: Vec<[f64; D]>,
-    /// Bonds of each site as the body was built.
+    /// Bonds of each site in the reference state.
     bonded: Vec<u32>,
     /// Radius, m, and volume of the particle of each site.
     radii: Vec<f64>,
@@ -74,24 +75,27 @@ pub struct Planes<const D: usize> {
     /// M/Δx, Pa/m.
     penalty: Property,
     spacing: f64,
-    /// Forces of all planes on faces and on bare particles, N, at the displacement of the last update; empty where nothing touches.
+    /// Forces of all planes on faces and on bare particles, N, at the displacement of the last update; empty
+    /// without contact.
     pushes: Vec<[f64; D]>,
-    /// Forces of friction in explicit dynamics likewise.
+    /// Friction forces in explicit dynamics, likewise.
     pub(super) drags: Vec<[f64; D]>,
-    /// Bound of the eigenvalues that touching faces add to the stiffness over volumes for a penalty of 1 Pa/m.
+    /// Bound of the eigenvalues that faces in contact add to the stiffness over volumes for a penalty of 1
+    /// Pa/m.
     greatest: f64,
 }
 
 impl<const D: usize> Planes<D> {
-    /// Planes at rest beside a body; `modulus` is M, Pa, and `radius` that of a particle, m.
+    /// Places planes at rest beside a body; `modulus` is M, Pa, and `radius` that of a particle, m.
     ///
     /// # Errors
-    /// [`Error::Parameter`] as [`Plane`] says; [`Error::Geometry`] for a bonded plane that touches nothing.
+    /// [`Error::Parameter`] as for [`RigidPlane`]; [`Error::Geometry`] for a bonded plane that touches no
+    /// face.
     pub fn new(
         bonds: &dyn Bonds<D>,
-        surface: &Surface<D>,
+        surface: &BodySurface<D>,
         modulus: &Property,
-        planes: Vec<Plane<D>>,
+        planes: Vec<RigidPlane<D>>,
         radius: impl Fn(usize) -> f64,
     ) -> Result<Self, Error> {
         let faces = Faces::new(bonds, surface, false);
@@ -111,11 +115,12 @@ impl<const D: usize> Planes<D> {
             let tied: Vec<u32> = (0..faces.len() as u32).filter(|face| plane.bonded && near(face)).collect();
             if plane.bonded && tied.is_empty() {
                 return Err(Error::geometry(format!(
-                    "bonded plane {}: found no face of the body within half a spacing; allowed: a plane that touches the body",
+                    "bonded plane {}: found no face of the body within half a spacing; allowed: a plane that \
+                    touches the body",
                     number + 1
                 )));
             }
-            each.push(Placed { plane, now: [0.0; D], before: [0.0; D], tied });
+            each.push(MovingPlane { plane, now: [0.0; D], before: [0.0; D], tied });
         }
         let mut planes = Self {
             each,
@@ -125,7 +130,7 @@ impl<const D: usize> Planes<D> {
             bonded,
             radii,
             volumes,
-            penalty: Property::new(bonds, |site, _| modulus.at(site) / spacing),
+            penalty: Property::new(bonds, |site, _| modulus.value_at(site) / spacing),
             spacing,
             pushes: Vec::new(),
             drags: Vec::new(),
@@ -140,14 +145,14 @@ impl<const D: usize> Planes<D> {
     }
 
     /// The planes.
-    pub fn planes(&self) -> impl Iterator<Item = &Plane<D>> {
+    pub fn planes(&self) -> impl Iterator<Item = &RigidPlane<D>> {
         self.each.iter().map(|placed| &placed.plane)
     }
 
-    /// Moves planes to where they are at a load factor and a time, s.
-    pub fn place(&mut self, factor: f64, time: f64) {
+    /// Moves planes to their positions at a load factor and a time, s.
+    pub fn move_to(&mut self, factor: f64, time: f64) {
         for placed in &mut self.each {
-            let Plane { displacement, velocity, .. } = placed.plane;
+            let RigidPlane { displacement, velocity, .. } = placed.plane;
             placed.before = placed.now;
             placed.now = std::array::from_fn(|d| factor * displacement[d] + time * velocity[d]);
         }
@@ -158,8 +163,9 @@ impl<const D: usize> Planes<D> {
         self.each.iter().map(|placed| std::array::from_fn(|d| placed.now[d] - placed.before[d]))
     }
 
-    /// Takes in the particles among `sites` that have lost bonds: they touch planes themselves, and faces above them no longer do.
-    pub fn lose(&mut self, bonds: &dyn BodyGeometry<D>, sites: impl Iterator<Item = usize>) {
+    /// Exposes the particles among `sites` that have lost bonds: they touch planes themselves, and faces
+    /// above them no longer do.
+    pub fn expose(&mut self, bonds: &dyn BodyGeometry<D>, sites: impl Iterator<Item = usize>) {
         let before = self.bare.len();
         for site in sites.filter(|&site| bonds.bonded(site) < self.bonded[site]) {
             self.bare.push(site as u32);
@@ -177,12 +183,12 @@ impl<const D: usize> Planes<D> {
         }
     }
 
-    /// Faces and bare particles.
+    /// Number of faces and bare particles.
     pub(super) fn elements(&self) -> usize {
         self.faces.len() + self.bare.len()
     }
 
-    /// The site whose particle stands for an element.
+    /// Site of the particle that represents an element.
     fn head(&self, element: usize) -> usize {
         match element.checked_sub(self.faces.len()) {
             None => self.faces.head(element),
@@ -198,9 +204,14 @@ impl<const D: usize> Planes<D> {
         }
     }
 
-    /// An element beside a plane, whatever its overlap.
-    pub(super) fn beside(&self, placed: &Placed<D>, field: &Field<D>, element: usize) -> Touch<D> {
-        let Plane { normal, stiffness, .. } = placed.plane;
+    /// Computes the state of an element beside a plane, whatever its overlap.
+    pub(super) fn beside(
+        &self,
+        placed: &MovingPlane<D>,
+        field: &Field<D>,
+        element: usize,
+    ) -> PlaneContact<D> {
+        let RigidPlane { normal, stiffness, .. } = placed.plane;
         let moved = self.displacement(field, element);
         let (home, radius, area) = match element.checked_sub(self.faces.len()) {
             None => {
@@ -215,12 +226,19 @@ impl<const D: usize> Planes<D> {
         };
         let place: [f64; D] = std::array::from_fn(|d| home[d] + moved[d] - radius * normal[d]);
         let shift: f64 = (0..D).map(|d| placed.now[d] * normal[d]).sum();
-        let stiffness = stiffness * self.penalty.at(self.head(element)) * area;
-        Touch { element, place, overlap: shift - placed.plane.height(place), offset: None, area, stiffness }
+        let stiffness = stiffness * self.penalty.value_at(self.head(element)) * area;
+        PlaneContact {
+            element,
+            place,
+            overlap: shift - placed.plane.height(place),
+            offset: None,
+            area,
+            stiffness,
+        }
     }
 
-    /// Elements that a plane holds, in order: its tied faces, or those behind it.
-    fn touches(&self, placed: &Placed<D>, field: &Field<D>) -> Vec<Touch<D>> {
+    /// Elements that a plane acts on, in order: its tied faces, or those behind it.
+    fn touches(&self, placed: &MovingPlane<D>, field: &Field<D>) -> Vec<PlaneContact<D>> {
         if placed.plane.bonded {
             let tied = |&face: &u32| {
                 let mut element = face as usize;
@@ -239,7 +257,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Elements nearer to a plane than `gap`, m, in order.
-    pub(super) fn near(&self, placed: &Placed<D>, field: &Field<D>, gap: f64) -> Vec<Touch<D>> {
+    pub(super) fn near(&self, placed: &MovingPlane<D>, field: &Field<D>, gap: f64) -> Vec<PlaneContact<D>> {
         let count = self.elements();
         let batch = |start: usize| {
             let range = start * BATCH..((start + 1) * BATCH).min(count);
@@ -251,8 +269,8 @@ impl<const D: usize> Planes<D> {
         (0..count.div_ceil(BATCH)).into_par_iter().map(batch).collect::<Vec<_>>().concat()
     }
 
-    /// Computes the forces of all planes at a displacement, with those of friction for the motion since `start`.
-    pub fn update(&mut self, field: &Field<D>, held: &[Grip], start: Option<&Field<D>>) {
+    /// Computes the forces of all planes at a displacement, with friction for the motion since `start`.
+    pub fn update(&mut self, field: &Field<D>, held: &[FrictionPair], start: Option<&Field<D>>) {
         let mut pushes = std::mem::take(&mut self.pushes);
         pushes.clear();
         let mut add = |planes: &Self, element: usize, force: [f64; D]| {
@@ -276,12 +294,12 @@ impl<const D: usize> Planes<D> {
         self.pushes = pushes;
     }
 
-    /// Plane and element of a pair; `None` of two particles.
-    pub(super) fn element(&self, pair: Pair) -> Option<(usize, usize)> {
+    /// Plane and element of a pair; `None` for two particles.
+    pub(super) fn element(&self, pair: ContactPair) -> Option<(usize, usize)> {
         match pair {
-            Pair::Particles(..) => None,
-            Pair::Face(plane, face) => Some((plane as usize, face as usize)),
-            Pair::Particle(plane, site) => {
+            ContactPair::Particles(..) => None,
+            ContactPair::Face(plane, face) => Some((plane as usize, face as usize)),
+            ContactPair::Particle(plane, site) => {
                 Some((plane as usize, self.faces.len() + self.bare.binary_search(&site).ok()?))
             }
         }
@@ -295,7 +313,7 @@ impl<const D: usize> Planes<D> {
         self.spread(&self.pushes, start, force);
     }
 
-    /// Adds to force densities, N/m³, on the sites from `start` on, forces on elements, N.
+    /// Adds forces on elements, N, to force densities, N/m³, on the sites from `start` on.
     pub(super) fn spread(&self, pushes: &[[f64; D]], start: usize, force: &mut [&mut [f64]; D]) {
         let (faces, bare) = pushes.split_at(self.faces.len());
         self.faces.spread(faces, &self.volumes, start, force);
@@ -308,7 +326,7 @@ impl<const D: usize> Planes<D> {
         }
     }
 
-    /// Σ of the squares of the force densities of the last update, (N/m³)².
+    /// Sum of the squares of the force densities of the last update, (N/m³)².
     pub fn square(&self) -> f64 {
         if self.pushes.is_empty() {
             return 0.0;
@@ -327,8 +345,8 @@ impl<const D: usize> Planes<D> {
             + bare.iter().zip(&self.bare).map(of_bare).sum::<f64>()
     }
 
-    /// Number of faces in touch, deepest overlap over half a spacing, and energy, J.
-    pub fn touching(&self, field: &Field<D>) -> (u64, f64, f64) {
+    /// Number of faces in contact, deepest overlap over half a spacing, and energy, J.
+    pub fn summary(&self, field: &Field<D>) -> (u64, f64, f64) {
         let mut all = (0, 0.0_f64, 0.0);
         for touch in self.each.iter().flat_map(|placed| self.touches(placed, field)) {
             all.0 += 1;
@@ -339,8 +357,8 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Force, area and width of the contact with each plane, without friction.
-    pub fn resting(&self, field: &Field<D>) -> Vec<PlaneReaction> {
-        let of = |placed: &Placed<D>| {
+    pub fn reactions(&self, field: &Field<D>) -> Vec<PlaneReaction> {
+        let of = |placed: &MovingPlane<D>| {
             let normal = placed.plane.normal;
             let mut resting = PlaneReaction { gap: f64::INFINITY, ..PlaneReaction::default() };
             let (mut push, mut first, mut second) = (0.0, [0.0; D], [0.0; D]);
@@ -352,7 +370,7 @@ impl<const D: usize> Planes<D> {
                 resting.area += touch.area;
                 push += along;
                 let from: [f64; D] = std::array::from_fn(|d| touch.place[d] - placed.plane.point[d]);
-                let across = super::grip::across(&normal, from);
+                let across = super::friction_pair::across(&normal, from);
                 (0..D).for_each(|d| {
                     first[d] += along * across[d];
                     second[d] += along * across[d] * across[d];
@@ -361,7 +379,7 @@ impl<const D: usize> Planes<D> {
                 (0..D).for_each(|d| (low[d], high[d]) = (low[d].min(across[d]), high[d].max(across[d])));
                 count += 1.0;
             }
-            // a face stands for half of what lies between two, on either side; in space there are as many in each row
+            // a face covers half the distance to its neighbours on either side; in space each row has as many
             let rows: f64 = if D == 2 { count } else { count.sqrt() };
             let spans: [f64; D] = std::array::from_fn(|d| (high[d] - low[d]).max(0.0));
             let extent = if D == 2 { length(spans) } else { spans.into_iter().fold(0.0, f64::max) };
@@ -394,10 +412,10 @@ impl<const D: usize> Planes<D> {
         most
     }
 
-    /// Bound of what planes add to the stiffness over volumes, N/m⁴, however many faces touch.
+    /// Bound of the stiffness that planes add over volumes, N/m⁴, however many faces touch.
     pub fn stiffness(&self) -> f64 {
         let mut matrix = nalgebra::Matrix3::<f64>::zeros();
-        for Placed { plane, .. } in &self.each {
+        for MovingPlane { plane, .. } in &self.each {
             let isotropic = plane.bonded || plane.friction > 0.0;
             let n = |d: usize| plane.normal.get(d).copied().unwrap_or(0.0);
             matrix += nalgebra::Matrix3::from_fn(|a, b| {
@@ -408,8 +426,8 @@ impl<const D: usize> Planes<D> {
         matrix.symmetric_eigenvalues().max() * self.penalty.greatest() * self.greatest
     }
 
-    /// Visits what touches or is nearer than `gap`, m: the particles below it with their weights, the directions in which the plane
-    /// holds it, and the stiffness, N/m.
+    /// Visits elements in contact or nearer than `gap`, m: the particles below with their weights, the
+    /// directions in which the plane holds them, and the stiffness, N/m.
     pub fn springs(&self, field: &Field<D>, gap: f64, visit: &mut super::Spring<D>) {
         let mut below = Vec::new();
         for placed in &self.each {
@@ -428,7 +446,7 @@ impl<const D: usize> Planes<D> {
         }
     }
 
-    /// Plane and element of all that touches, ascending.
+    /// Plane and element of all contacts, ascending.
     pub fn in_touch(&self, field: &Field<D>) -> Vec<[u32; 2]> {
         let each = self.each.iter().enumerate();
         each.flat_map(|(number, placed)| {

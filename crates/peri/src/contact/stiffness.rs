@@ -1,47 +1,50 @@
-//! Stiffness of contact: for time steps, masses of relaxation, preconditioners and the lengths of their steps.
+//! Stiffness of contact: for time steps, masses of relaxation, preconditioners and their step lengths.
 
 use super::Contact;
-use super::list::{Listed, Near};
+use super::list::{ListedParticle, NearbyParticle};
 use super::planes::Planes;
 use super::ties::Ties;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
 
-/// Sees a face: particles below it with weights, the direction in which it is held (`None`: all), the stiffness, N/m.
+/// Visitor of a face: particles below with weights, the direction in which it is held (`None`: all), the
+/// stiffness, N/m.
 pub type Spring<'a, const D: usize> = dyn FnMut(&[(usize, f64)], Option<[f64; D]>, f64) + 'a;
 
 impl<const D: usize> Contact<D> {
-    /// max_I Σ_J k V_J over what touches, with half of what planes add, N/m⁴: twice that over the density bounds what contact adds to
-    /// the squared greatest frequency.
+    /// Computes max_I Σ_J k V_J over all contacts plus half the stiffness of planes, N/m⁴: twice that over
+    /// the density bounds the share of contact in the squared greatest frequency.
     pub fn greatest_stiffness(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> f64 {
         let sites = displacement.sites();
         let of = |chunk: usize| {
             let pairs = self.pairs(bonds, displacement, chunk_range(chunk, sites), 0.0);
-            let stiffness =
-                |own: u32, touch: Near<D>| self.pair(own, touch.site) * bonds.volume(touch.site as usize);
+            let stiffness = |own: u32, touch: NearbyParticle<D>| {
+                self.pair(own, touch.site) * bonds.volume(touch.site as usize)
+            };
             let sums = pairs.map(|(own, touching)| touching.map(|t| stiffness(own.site, t)).sum::<f64>());
             sums.fold(0.0, f64::max)
         };
         let pairs = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of).reduce(|| 0.0, f64::max);
-        pairs + self.half_of_planes()
+        pairs + self.half_plane_stiffness()
     }
 
-    fn half_of_planes(&self) -> f64 {
+    fn half_plane_stiffness(&self) -> f64 {
         let planes = self.planes.as_ref().map_or(0.0, Planes::stiffness);
         0.5 * (planes + self.ties.as_ref().map_or(0.0, Ties::greatest))
     }
 
-    /// k V of the largest particle, and half of what planes add: the least that [`Contact::greatest_stiffness`] is where anything
-    /// touches, if all are alike.
+    /// Sums k V of the largest particle and half the stiffness of planes: the least value of
+    /// [`Contact::greatest_stiffness`] with any contact, if all particles are alike.
     pub fn pair_stiffness(&self) -> f64 {
-        self.stiffness * self.largest_volume + self.half_of_planes()
+        self.stiffness * self.largest_volume + self.half_plane_stiffness()
     }
 
-    /// Adds to the Gershgorin sums of dynamic relaxation, in units of `tangent`, those of what touches or is about to:
-    /// Σ_J k V_J (1 + max_{d≠e} |n_d n_e|), and of planes. A particle that became heavy only in touch would be driven far into
-    /// another as a light one, out again as a heavy one, and so on indefinitely. A particle without bonds has twice that alone:
-    /// it starts each step from rest, see [`Contact::still`], and so must not go farther than a gradient step may.
+    /// Adds contacts, present or imminent, to the Gershgorin sums of dynamic relaxation, in units of
+    /// `tangent`: Σ_J k V_J (1 + max_{d≠e} |n_d n_e|), and planes. A particle that became heavy only in
+    /// contact would enter another as a light one and leave as a heavy one, and so on indefinitely. A
+    /// particle without bonds has twice the sum: it starts each step from rest, see
+    /// [`Contact::stop_detached`], and must not go farther than a gradient step.
     pub fn add_stiffness(
         &self,
         bonds: &dyn BodyGeometry<D>,
@@ -60,7 +63,7 @@ impl<const D: usize> Contact<D> {
         });
     }
 
-    /// As [`Self::add_stiffness`], of pairs alone.
+    /// Adds the sums of pairs only, as [`Self::add_stiffness`].
     pub fn add_pairs(
         &self,
         bonds: &dyn BodyGeometry<D>,
@@ -68,9 +71,9 @@ impl<const D: usize> Contact<D> {
         tangent: f64,
         masses: &mut [f64],
     ) {
-        let of = |own: u32, Near { site, zeta, r, .. }: Near<D>| {
+        let of = |own: u32, NearbyParticle { site, zeta, r, .. }: NearbyParticle<D>| {
             let unit = zeta.map(|x| x / r.max(f64::MIN_POSITIVE));
-            // friction holds in all directions
+            // friction acts in all directions
             let mixed = if self.friction > 0.0 { 1.0 } else { mixed(unit) };
             self.pair(own, site) * bonds.volume(site as usize) * (1.0 + mixed)
         };
@@ -81,14 +84,15 @@ impl<const D: usize> Contact<D> {
                 pairs.map(|(own, near)| (own, near.map(|near| of(own.site, near)).sum::<f64>() / tangent));
             all.filter(|(_, sum)| *sum > 0.0).collect()
         });
-        let sums: Vec<Vec<(Listed, f64)>> = sums.collect();
+        let sums: Vec<Vec<(ListedParticle, f64)>> = sums.collect();
         for (own, sum) in sums.into_iter().flatten() {
             let mass = &mut masses[own.site as usize];
             *mass = if own.alone { 2.0 * sum } else { *mass + sum };
         }
     }
 
-    /// Visits faces that touch planes or are tied: particles below with weights, the normal of a plane without friction, the stiffness, N/m.
+    /// Visits faces in contact with planes or tied: particles below with weights, the normal of a plane
+    /// without friction, the stiffness, N/m.
     pub fn springs(&self, displacement: &Field<D>, visit: &mut Spring<D>) {
         self.near_springs(displacement, 0.0, visit);
     }
@@ -102,13 +106,13 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Numbers of the faces in touch with planes, plane by plane.
+    /// Numbers of the faces in contact with planes, plane by plane.
     pub fn in_touch(&self, displacement: &Field<D>) -> Vec<[u32; 2]> {
         self.planes.as_ref().map_or_else(Vec::new, |planes| planes.in_touch(displacement))
     }
 
-    /// How far a step along a direction may go so that none leaps past another: by a quarter of a spacing against each
-    /// other where they touch or are about to, by half of one at all. ∞ along a direction of zeros.
+    /// Longest step along a direction in which no particle jumps past another: a relative motion of a quarter
+    /// of a spacing for contacts present or imminent, of half a spacing for all. ∞ along a zero direction.
     pub fn longest_step(
         &self,
         bonds: &dyn BodyGeometry<D>,
@@ -116,7 +120,7 @@ impl<const D: usize> Contact<D> {
         direction: &Field<D>,
     ) -> f64 {
         if !self.has_pairs() {
-            // nothing leaps past a plane
+            // nothing jumps past a plane
             return f64::INFINITY;
         }
         let sites = displacement.sites();
@@ -141,8 +145,8 @@ impl<const D: usize> Contact<D> {
         self.near / (0.5 * farthest.sqrt()).max(closing.sqrt())
     }
 
-    /// Brings particles without bonds to rest: what is pushed aside does not fly on in a search for equilibrium.
-    pub fn still(&self, velocity: &mut Field<D>) {
+    /// Stops particles without bonds, so that they do not fly on in a search for equilibrium.
+    pub fn stop_detached(&self, velocity: &mut Field<D>) {
         self.list.alone.iter().for_each(|&site| velocity.set(site as usize, [0.0; D]));
     }
 }

@@ -1,15 +1,17 @@
-//! Grips tied at their surface: no bond leads from held particles to others, whose faces follow them instead.
+//! Ties of grips at their surface: bonds between held and free particles are removed, and faces follow
+//! instead.
 //!
-//! A region of prescribed displacement that holds a body by its bonds gives way: families that reach across its surface see half of the
-//! strain on either side, as if the body were about one layer longer. A face of the free side at X_f, pulled by the traction s(M/Δx)(u_f − U(X_f)),
-//! with U extrapolated linearly from the two held particles behind it, has no such layer.
+//! A region of prescribed displacement that holds a body by its bonds is compliant: families that reach
+//! across its surface see half of the strain on either side, as if the body were about one layer longer. A
+//! face of the free side at X_f, pulled by the traction s(M/Δx)(u_f − U(X_f)), with U extrapolated linearly
+//! from the two held particles behind it, has no such layer.
 
 use super::faces::Faces;
 use crate::bonds::{BodyGeometry, LatticeBonds, Overstretched};
 use crate::field::Field;
-use crate::surface::{Face, Surface};
+use crate::surface::{BodySurface, SurfaceFace};
 
-/// Bonds between held particles and others, each from both ends.
+/// Lists bonds between held particles and others, each from both ends.
 pub fn across<const D: usize>(bonds: &dyn BodyGeometry<D>, held: &[bool]) -> Vec<Overstretched> {
     let mut list = Vec::new();
     for &site in bonds.particles() {
@@ -24,7 +26,8 @@ pub fn across<const D: usize>(bonds: &dyn BodyGeometry<D>, held: &[bool]) -> Vec
     list
 }
 
-/// Particles of the regions that are held in all components and as large as a family, by site: what holds single particles holds no surface.
+/// Marks, by site, the particles of regions that are held in all components and at least as large as a
+/// family: single held particles have no surface.
 pub fn grips<const D: usize>(bonds: &LatticeBonds<D>, constrained: &[u8]) -> Vec<bool> {
     let all = (1_u8 << D) - 1;
     let is_held = |site: usize| constrained.get(site).is_some_and(|bits| *bits == all);
@@ -54,26 +57,27 @@ pub fn grips<const D: usize>(bonds: &LatticeBonds<D>, constrained: &[u8]) -> Vec
 pub struct Ties<const D: usize> {
     /// Faces, with the held particles among their entries.
     faces: Faces<D>,
-    /// Entries of each face that are free: the first ones.
+    /// Number of free entries of each face, which come first.
     free: Vec<usize>,
     volumes: Vec<f64>,
     /// sM/Δx, Pa/m.
     penalty: f64,
     /// Forces on faces, N, at the displacement of the last update.
     pushes: Vec<[f64; D]>,
-    /// See [`Faces::greatest`].
+    /// Value of [`Faces::greatest`].
     greatest: f64,
 }
 
-/// Sides of free particles beside held ones, with the held particles that extrapolate to them, each with its factor.
-pub struct Interface<const D: usize> {
+/// Sides of free particles beside held ones, with the held particles from which to extrapolate and their
+/// factors.
+pub struct GripInterface<const D: usize> {
     /// The sides, with normals towards the held particles.
-    pub surface: Surface<D>,
+    pub surface: BodySurface<D>,
     behind: Vec<Vec<(u32, f64)>>,
 }
 
-impl<const D: usize> Interface<D> {
-    /// The surface between held particles and others.
+impl<const D: usize> GripInterface<D> {
+    /// Finds the surface between held particles and others.
     pub fn new(bonds: &LatticeBonds<D>, held: &[bool]) -> Self {
         let (mut sides, mut behind) = (Vec::new(), Vec::new());
         let mut occupied = vec![false; bonds.sites()];
@@ -90,22 +94,27 @@ impl<const D: usize> Interface<D> {
                 let mut place = bonds.position(site as usize);
                 place[axis] += 0.5 * f64::from(outward) * bonds.spacing();
                 let normal = std::array::from_fn(|d| if d == axis { f64::from(outward) } else { 0.0 });
-                sides.push(Face { place, normal, patch: patch as u32 });
+                sides.push(SurfaceFace { place, normal, patch: patch as u32 });
                 behind.push(match beyond(first) {
                     Some(second) => vec![(first as u32, -1.5), (second as u32, 0.5)],
                     None => vec![(first as u32, -1.0)],
                 });
             }
         }
-        Self { surface: Surface::of_sides(sides), behind }
+        Self { surface: BodySurface::of_sides(sides), behind }
     }
 }
 
 impl<const D: usize> Ties<D> {
-    /// Ties the sides of an interface to what is behind it, in a body with the outer surface `outside` and no bonds across the interface; the
-    /// penalty is sM/Δx, Pa/m.
-    pub fn new(bonds: &LatticeBonds<D>, interface: Interface<D>, outside: &Surface<D>, penalty: f64) -> Self {
-        let Interface { surface, behind } = interface;
+    /// Ties the sides of an interface to the particles behind, in a body with the outer surface `outside` and
+    /// no bonds across the interface; the penalty is sM/Δx, Pa/m.
+    pub fn new(
+        bonds: &LatticeBonds<D>,
+        interface: GripInterface<D>,
+        outside: &BodySurface<D>,
+        penalty: f64,
+    ) -> Self {
+        let GripInterface { surface, behind } = interface;
         let mut faces = Faces::new(bonds, &surface.bounded_by(outside), true);
         let greatest = faces.greatest(bonds);
         let free: Vec<usize> = (0..faces.len()).map(|face| faces.below(face).count()).collect();
@@ -148,7 +157,7 @@ impl<const D: usize> Ties<D> {
         (0..self.faces.len()).map(of).sum()
     }
 
-    /// Bound of what the ties add to the stiffness over volumes, N/m⁴.
+    /// Bound of the stiffness that the ties add over volumes, N/m⁴.
     pub fn greatest(&self) -> f64 {
         self.penalty * self.greatest
     }

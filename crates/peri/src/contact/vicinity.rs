@@ -1,42 +1,43 @@
-//! How long a list of close pairs holds: as long as particles near each other move together, however far.
+//! Validity of a list of close pairs: it holds while nearby particles move together, however far.
 
 use crate::bonds::CellGrid;
 use crate::field::{CHUNK, Field, chunk_range};
 use polycore::numerics::bounds;
 use rayon::prelude::*;
 
-/// Cells within this many of each other are compared one by one, those farther apart all at once.
+/// Cells at most this far apart are compared one by one, the others all at once.
 const RINGS: i64 = 3;
-/// A list is made anew where less than this part of its skin is left.
+/// The list is rebuilt if less than this fraction of its skin is left.
 const LEAST: f64 = 0.2;
 
-/// The particles of a list in cells, and how far they have moved against each other.
+/// The particles of a list in cells, and their relative motion.
 pub struct Vicinity<const D: usize> {
     grid: CellGrid<D>,
     edge: f64,
     skin: f64,
     /// Displacement at which the list was made.
     pub listed_at: Field<D>,
-    /// The last displacement at which cells were compared, and what any two particles may move against each other from there on, m.
+    /// Last displacement at which cells were compared, and the relative motion left to any two particles from
+    /// there on, m.
     compared_at: Field<D>,
     left: f64,
 }
 
 impl<const D: usize> Vicinity<D> {
-    /// Of a list that holds all pairs which may touch until two particles have moved by `skin` against each other; pairs that do not share
-    /// a cell of the grid or neighbouring ones are `edge` or more apart.
+    /// Tracks a list of all pairs that may touch until two particles have moved by `skin` against each other;
+    /// pairs that do not share a cell of the grid or neighbouring ones are at least `edge` apart.
     pub fn new(grid: CellGrid<D>, displacement: &Field<D>, edge: f64, skin: f64) -> Self {
         let (listed_at, compared_at) = (displacement.clone(), displacement.clone());
         Self { grid, edge, skin, listed_at, compared_at, left: skin }
     }
 
-    /// Whether the list holds for a displacement; `particles` are the sites that the grid was made of.
-    pub fn holds(&mut self, particles: &[u32], displacement: &Field<D>) -> bool {
+    /// Returns true if the list holds for a displacement; `particles` are the sites of the grid.
+    pub fn is_current(&mut self, particles: &[u32], displacement: &Field<D>) -> bool {
         if self.skin == 0.0 {
             return false;
         }
         let sites = self.compared_at.sites();
-        // half of what is left; a little less, for the rounding of places far from the origin
+        // half of the rest; a little less, for the rounding of positions far from the origin
         let limit = (0.49 * self.left).powi(2);
         let (now, then) = (displacement.components(), self.compared_at.components());
         let moved = |chunk: usize| {
@@ -46,7 +47,7 @@ impl<const D: usize> Vicinity<D> {
                 let parts = now[d][range.clone()].iter().zip(&then[d][range.clone()]);
                 square.iter_mut().zip(parts).for_each(|(s, (a, b))| *s += (a - b) * (a - b));
             }
-            // NaN has moved, too
+            // NaN counts as moved
             !square[..range.len()].iter().all(|&s| s <= limit)
         };
         if !(0..sites.div_ceil(CHUNK)).into_par_iter().any(moved) {
@@ -57,9 +58,10 @@ impl<const D: usize> Vicinity<D> {
         self.left > LEAST * self.skin
     }
 
-    /// What any two particles that the list lacks may still move against each other, m; below 0 where that was too much, or is not known.
+    /// Computes the relative motion left to any two particles outside the list, m; negative if it was
+    /// exceeded or is unknown.
     fn compare(&self, particles: &[u32], displacement: &Field<D>) -> f64 {
-        // least and greatest components of the moves in every cell
+        // least and greatest components of the displacements in every cell
         let of = |members: &[u32]| {
             let (mut low, mut high) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
             for &member in members {
@@ -67,7 +69,7 @@ impl<const D: usize> Vicinity<D> {
                 let (now, then) = (displacement.get(site), self.listed_at.get(site));
                 for d in 0..D {
                     let moved = now[d] - then[d];
-                    // NaN stays
+                    // NaN propagates
                     low[d] = if moved < low[d] || moved.is_nan() { moved } else { low[d] };
                     high[d] = if moved > high[d] || moved.is_nan() { moved } else { high[d] };
                 }
@@ -80,8 +82,9 @@ impl<const D: usize> Vicinity<D> {
             let along = |d: usize| (a[1][d] - b[0][d]).max(b[1][d] - a[0][d]);
             (0..D).map(|d| along(d) * along(d)).sum::<f64>().sqrt()
         };
-        // pairs k ≥ 2 cells apart were at least (k − 1) edges apart, and an edge is no less than a contact distance, the gap of the list
-        // and the skin: they may move by (k − 2) edges and a skin against each other
+        // pairs k ≥ 2 cells apart were at least (k − 1) edges apart, and an edge is at least a contact
+        // distance, the gap of the list and the skin: they may move by (k − 2) edges and a skin against each
+        // other
         let allowed = |rings: i64| (rings - 2).max(0) as f64 * self.edge + self.skin;
         let left = |number: usize| {
             let mut left = f64::INFINITY;

@@ -1,10 +1,10 @@
-//! Area of the cracks that a run makes, from the bonds that break.
+//! Area of the cracks that form in a run, from the bonds that break.
 
 use super::crossing::{Crossing, SHORT};
 use crate::bonds::Bonds;
 use rayon::prelude::*;
 
-/// The bonds of a body before it is loaded, as far as its crack area needs them.
+/// Bonds of a body before loading, as far as its crack area needs them.
 pub struct CrackArea {
     /// Σ_J w V_J |ξ_e|/|ξ| over short bonds, m³.
     short: f64,
@@ -15,7 +15,7 @@ pub struct CrackArea {
 }
 
 impl CrackArea {
-    /// Of a body whose bonds are those of its cracks' flanks at the start.
+    /// Records a body whose bonds are intact except across its initial cracks.
     pub fn new<const D: usize>(bonds: &dyn Bonds<D>, crossing: &Crossing) -> Self {
         let (mut words, mut pairs) = (Vec::new(), Vec::new());
         if bonds.as_lattice().is_some() {
@@ -33,12 +33,13 @@ impl CrackArea {
         Self { short: crossing.short, words, pairs }
     }
 
-    /// Area of new cracks, m². Two particles up to 1.8 spacings apart are parted where their bond has broken and no particle is left that is
-    /// bonded to both: of a crack's tip that holds up to a horizon behind its foremost broken bond, of bonds that broke beside the crack
-    /// nowhere. By the formula of Cauchy and Crofton the area is Σ V_I V_J/|ξ| over these pairs, over ½ Σ_J V_J |ξ_e|/|ξ|: lines of all
-    /// directions meet a surface in proportion to its area. With 1/|ξ| planes along the axes, at 45° and along (111) count the same to 2 %
-    /// (cf. Boykov & Kolmogorov, ICCV 2003, doi:10.1109/ICCV.2003.1238310).
-    pub fn of<const D: usize>(&self, bonds: &dyn Bonds<D>) -> f64 {
+    /// Computes the area of new cracks, m². Two particles up to 1.8 spacings apart are separated if their
+    /// bond has broken and no particle is bonded to both. Thus a crack tip is counted up to a horizon behind
+    /// its foremost broken bond, and scattered broken bonds beside the crack are not. By the formula of
+    /// Cauchy and Crofton the area is Σ V_I V_J/|ξ| over these pairs, over ½ Σ_J V_J |ξ_e|/|ξ|: lines of all
+    /// directions meet a surface in proportion to its area. With 1/|ξ| planes along the axes, at 45° and
+    /// along (111) count the same to 2 % (cf. Boykov & Kolmogorov, ICCV 2003, doi:10.1109/ICCV.2003.1238310).
+    pub fn area<const D: usize>(&self, bonds: &dyn Bonds<D>) -> f64 {
         let share = |site: usize, other: usize, length: f64| {
             let mut common = false;
             bonds.neighbours(site, &mut |bond| common = common || bonds.is_bonded(bond.site, other));

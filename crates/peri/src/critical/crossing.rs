@@ -1,24 +1,24 @@
-//! Bonds across a cut through a body, and the energy that a crack takes where it breaks them.
+//! Bonds across a cut through a body, and the energy of a crack that breaks them.
 
 use crate::bonds::{BodyGeometry, surface_weight};
 use crate::field::Field;
 use rayon::prelude::*;
 use serde::Deserialize;
 
-/// What the fracture energy G of a bond law is the energy of.
+/// Energy that the fracture energy G of a bond law refers to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Convention {
-    /// The tearing energy, at which a crack in equilibrium runs: that of the lattice's own bonds across a unit of crack at λ_c, and what
-    /// is lost when they snap and at the lattice's barriers. What tests measure.
+    /// Tearing energy, at which a crack in equilibrium runs, as tests measure it: that of the lattice's bonds
+    /// across a unit of crack at λ_c, plus the losses when they snap and at the lattice's barriers.
     #[default]
     Tearing,
-    /// The continuum's energy of the bonds across a unit of crack at λ_c, G₀ of Silling & Askari, Comput. Struct. 83 (2005) 1526: for
-    /// comparison with published values of G₀ and s₀ and with other programs.
+    /// Continuum energy of the bonds across a unit of crack at λ_c, G₀ of Silling & Askari, Comput. Struct.
+    /// 83 (2005) 1526: for comparison with published values of G₀ and s₀ and with other programs.
     Bonds,
-    /// The tearing energy of bonds that soften and break at no load: nothing is lost but what is in them, and a crack runs at the energy of the
-    /// lattice's bonds across it at every horizon ratio.
+    /// Tearing energy of bonds that soften to zero load before they break: there are no other losses, and a
+    /// crack runs at the energy of the lattice's bonds across it at every horizon ratio.
     Softening,
 }
 
@@ -33,32 +33,36 @@ impl Convention {
     }
 }
 
-/// s of κ = 1 + sD/N in the plane and in space, from strips of pure shear at N = 12 to 196 and 32 to 256 (formulation-tearing.md, 1, 2).
+/// s of κ = 1 + sD/N in the plane and in space, from strips in pure shear at N = 12 to 196 and 32 to 256
+/// (formulation-tearing.md, 1, 2).
 const SNAP: [f64; 2] = [6.2, 8.0];
-/// Length up to which bonds are short, in spacings: along edges and diagonals of a lattice's cells.
+/// Greatest length of short bonds, in spacings: along edges and diagonals of a lattice's cells.
 pub(super) const SHORT: f64 = 1.8;
-/// Part of the horizon by which the centroid of the bonds of a particle at a surface lies off it: 0.33 in the outermost layer of a plane
-/// body, 0.24 to 0.28 in space, 0 inside; jitter of 0.3 spacings moves it by 0.07.
-const OFF: f64 = 0.2;
+/// Distance of the bonds' centroid from a particle, over the horizon, above which the particle is at a
+/// surface: 0.33 in the outermost layer of a plane body, 0.24 to 0.28 in space, 0 inside; jitter of 0.3
+/// spacings moves it by 0.07.
+const SURFACE_OFFSET: f64 = 0.2;
 
 /// Bonds of a particle inside a body, across planes through it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
-    /// Σ_J w V_J |ξ_e||ξ|, m⁵, with the axis e of the largest sum: kθΦ times it is the energy of the bonds across a unit area.
+    /// Σ_J w V_J |ξ_e||ξ|, m⁵, with the axis e of the largest sum: kθΦ times it is the energy of the bonds
+    /// across a unit area.
     pub reach: f64,
-    /// Σ_J w V_J |ξ_e|/|ξ| over bonds up to `SHORT` spacings, m³, along the same axis: short bonds across a unit area, see [`super::CrackArea`].
+    /// Σ_J w V_J |ξ_e|/|ξ| over bonds up to `SHORT` spacings, m³, along the same axis: short bonds across a
+    /// unit area, see [`super::CrackArea`].
     pub short: f64,
-    /// Bonds N of the particle.
+    /// Number N of the particle's bonds.
     pub bonds: f64,
     /// κ = 1 + sD/N: energy at which a crack runs over that of the bonds across it.
     pub loss: f64,
-    /// Whether it is a particle with a whole family; the largest family of the body where there is none.
+    /// True for a particle with a whole family; else the largest family of the body is used.
     pub whole: bool,
 }
 
 /// Sums of one family.
 #[derive(Clone, Copy)]
-struct Sums<const D: usize> {
+struct FamilySums<const D: usize> {
     /// Σ w V |ξ_d||ξ|.
     reach: [f64; D],
     /// Σ w V |ξ_d|/|ξ| over short bonds.
@@ -66,9 +70,10 @@ struct Sums<const D: usize> {
     bonds: f64,
 }
 
-impl<const D: usize> Sums<D> {
-    /// Those of the particle in a site, whose neighbours have its own surface factors.
-    fn of(bonds: &dyn BodyGeometry<D>, surface: Option<&Field<D>>, site: usize) -> Self {
+impl<const D: usize> FamilySums<D> {
+    /// Sums over the family of the particle in a site; its neighbours are assumed to have its surface
+    /// factors.
+    fn new(bonds: &dyn BodyGeometry<D>, surface: Option<&Field<D>>, site: usize) -> Self {
         let mut sums = Self { reach: [0.0; D], short: [0.0; D], bonds: 0.0 };
         let short = SHORT * bonds.spacing();
         let factors = surface.map(|field| field.get(site));
@@ -86,8 +91,8 @@ impl<const D: usize> Sums<D> {
 }
 
 impl Crossing {
-    /// Of one particle with a whole family on a lattice, of the mean over such particles in a cloud, before the bonds have factors of
-    /// their own; `surface` are those of the surface correction.
+    /// Evaluates one particle with a whole family on a lattice, or the mean over such particles in a cloud,
+    /// before the bonds have factors of their own; `surface` are those of the surface correction.
     pub fn new<const D: usize>(bonds: &dyn BodyGeometry<D>, surface: Option<&Field<D>>) -> Self {
         let inner = match bonds.whole_family() {
             Some(all) => {
@@ -97,8 +102,8 @@ impl Crossing {
             None => inside(bonds),
         };
         let whole = !inner.is_empty();
-        let of = |sites: &[u32]| -> Vec<Sums<D>> {
-            sites.par_iter().map(|&site| Sums::of(bonds, surface, site as usize)).collect()
+        let of = |sites: &[u32]| -> Vec<FamilySums<D>> {
+            sites.par_iter().map(|&site| FamilySums::new(bonds, surface, site as usize)).collect()
         };
         let each = if whole {
             of(&inner)
@@ -110,8 +115,9 @@ impl Crossing {
                 .reduce(|a, b| if bonds.bonded(b as usize) > bonds.bonded(a as usize) { b } else { a });
             of(largest.as_slice())
         };
-        let mean =
-            |get: &dyn Fn(&Sums<D>) -> f64| each.iter().map(get).sum::<f64>() / each.len().max(1) as f64;
+        let mean = |get: &dyn Fn(&FamilySums<D>) -> f64| {
+            each.iter().map(get).sum::<f64>() / each.len().max(1) as f64
+        };
         let reaches: Vec<f64> = (0..D).map(|d| mean(&|sums| sums.reach[d])).collect();
         let axis = (0..D).fold(0, |most, d| if reaches[d] > reaches[most] { d } else { most });
         let count = mean(&|sums| sums.bonds);
@@ -133,7 +139,7 @@ fn inside<const D: usize>(bonds: &dyn BodyGeometry<D>) -> Vec<u32> {
             sum += bond.volume;
             (0..D).for_each(|d| first[d] += bond.volume * bond.bond[d]);
         });
-        first.iter().map(|x| x * x).sum::<f64>().sqrt() > OFF * bonds.horizon() * sum || sum == 0.0
+        first.iter().map(|x| x * x).sum::<f64>().sqrt() > SURFACE_OFFSET * bonds.horizon() * sum || sum == 0.0
     };
     let mut at_surface = vec![false; bonds.sites()];
     let flags: Vec<bool> = bonds.particles().par_iter().map(off).collect();

@@ -1,18 +1,19 @@
-//! Computed stresses around a hole at the origin of a plate under tension along x, compared with closed forms.
+//! Computed stresses around a hole at the origin of a plate under tension along x, compared with closed
+//! forms.
 
 use super::{Plate, kirsch};
 use crate::bonds::Bonds;
-use crate::stress::Tensor;
+use crate::stress::StressTensor;
 use rayon::prelude::*;
 
 /// Particles of a plate with a hole, with the exact σ₁₁/σ∞ at each.
 pub struct HoleComparison {
     /// Kirsch's solution, Eq. (2.81).
     pub kirsch: Vec<f64>,
-    /// That of the plate, where it is known; else Kirsch's.
+    /// Solution of the finite plate, if known; else Kirsch's.
     pub exact: Vec<f64>,
     radius: f64,
-    /// Where the ring about the hole ends, m.
+    /// Outer radius of the ring around the hole, m.
     near: f64,
     distance: Vec<f64>,
     inner: Vec<bool>,
@@ -22,19 +23,19 @@ pub struct HoleComparison {
 
 /// Particles over which an error is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Region {
-    /// All of them.
+pub enum HoleRegion {
+    /// All particles.
     All,
-    /// Those on which no load or support acts.
+    /// Particles without loads and supports.
     Inner,
-    /// Those up to 2δ from the hole.
+    /// Particles up to 2δ from the hole.
     Ring,
-    /// Those beyond, up to five radii.
+    /// Particles farther than 2δ, up to five radii.
     Bulk,
 }
 
 impl HoleComparison {
-    /// Evaluates the exact stresses of a hole of this radius, m, in a body of whose sites some are `loaded`.
+    /// Evaluates the exact stresses of a hole of this radius, m, in a body; `loaded` marks its loaded sites.
     pub fn new<const D: usize>(
         bonds: &dyn Bonds<D>,
         radius: f64,
@@ -60,29 +61,29 @@ impl HoleComparison {
     }
 
     /// σ₁₁/σ∞ of a stress field under the remote stress σ∞, Pa.
-    pub fn normal<const D: usize>(field: &[Tensor<D>], remote: f64) -> Vec<f64> {
+    pub fn normal<const D: usize>(field: &[StressTensor<D>], remote: f64) -> Vec<f64> {
         field.iter().map(|s| s[0][0] / remote).collect()
     }
 
     /// Root mean square (2.84) of the difference of σ₁₁/σ∞ from an exact one over a region.
-    pub fn error(&self, normal: &[f64], exact: &[f64], region: Region) -> f64 {
+    pub fn error(&self, normal: &[f64], exact: &[f64], region: HoleRegion) -> f64 {
         let wanted = |&i: &usize| match region {
-            Region::All => true,
-            Region::Inner => self.inner[i],
-            Region::Ring => self.distance[i] <= self.near,
-            Region::Bulk => self.distance[i] > self.near && self.distance[i] < 5.0 * self.radius,
+            HoleRegion::All => true,
+            HoleRegion::Inner => self.inner[i],
+            HoleRegion::Ring => self.distance[i] <= self.near,
+            HoleRegion::Bulk => self.distance[i] > self.near && self.distance[i] < 5.0 * self.radius,
         };
         let squares = (0..normal.len()).filter(wanted).map(|i| (normal[i] - exact[i]).powi(2));
         let (sum, count) = squares.fold((0.0, 0_usize), |(sum, count), square| (sum + square, count + 1));
         (sum / count.max(1) as f64).sqrt()
     }
 
-    /// Largest value of the particles on which no load or support acts.
+    /// Largest value of the particles without loads and supports.
     pub fn most(&self, normal: &[f64]) -> f64 {
         (0..normal.len()).filter(|&i| self.inner[i]).map(|i| normal[i]).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Heights above the hole, m, and the mean values there; empty where no particle is near the line x = 0.
+    /// Heights above the hole, m, and the mean values there; empty if no particle is near the line x = 0.
     pub fn profile(&self, values: &[f64]) -> [Vec<f64>; 2] {
         let mean = |members: &[usize]| members.iter().map(|&i| values[i]).sum::<f64>() / members.len() as f64;
         [self.column.iter().map(|row| row.0).collect(), self.column.iter().map(|row| mean(&row.1)).collect()]

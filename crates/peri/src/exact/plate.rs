@@ -1,7 +1,8 @@
-//! Rectangular plate with a free circular hole under tension: the truth that plates of finite size are judged by.
+//! Rectangular plate with a free circular hole under tension: reference solution for plates of finite size.
 //!
-//! Kolosov's potentials Φ, Ψ as even powers with real coefficients (Muskhelishvili, 1953, §§ 32, 56): the coefficients of Ψ
-//! follow from those of Φ so that the hole is free of traction exactly; the outer edges are satisfied by least squares.
+//! Kolosov's potentials Φ, Ψ as even powers with real coefficients (Muskhelishvili, 1953, §§ 32, 56): the
+//! coefficients of Ψ follow from those of Φ so that the hole is free of traction exactly; the outer edges are
+//! satisfied by least squares.
 
 use crate::quadrature::panel;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -11,33 +12,34 @@ type C = Complex<f64>;
 /// Even powers of z in Φ, upwards and downwards.
 const POWERS: usize = 60;
 
-/// ν of every plane body here, plane strain read as ν/(1 − ν): central bonds leave no choice.
+/// ν of every plane body here, in plane strain ν/(1 − ν): fixed by central bonds.
 const POISSON: f64 = 1.0 / 3.0;
 
-/// Stresses of a plate |x| ≤ half₁, |y| ≤ half₂ with a free hole about the origin under unit tension along x: by
-/// tractions on the edges x = ±half₁ where `layer` is 0, else by the body force 1/layer within a layer of that width
-/// at each of these edges, as `peri` applies tractions.
+/// Stresses of a plate |x| ≤ half₁, |y| ≤ half₂ with a free hole about the origin under unit tension along x:
+/// by tractions on the edges x = ±half₁ where `layer` is 0, else by the body force 1/layer within a layer of
+/// that width at each of these edges, as `peri` applies tractions.
 ///
-/// A body force has the particular solution σ = (1, ν, 0)·min(1, (half₁ − |x|)/layer) of uniaxial strain; what is left is
-/// smooth and has tractions σ₁₁ = 1 on x = ±half₁ and σ₂₂ = ν·ramp(x) on y = ±half₂, ramp = max(0, (|x| − half₁ +
-/// layer)/layer); subtracting ramp·(1, ν, 0) gives the plate's stress.
+/// A body force has the particular solution σ = (1, ν, 0)·min(1, (half₁ − |x|)/layer) of uniaxial strain; the
+/// remainder is smooth and has tractions σ₁₁ = 1 on x = ±half₁ and σ₂₂ = ν·ramp(x) on y = ±half₂, ramp =
+/// max(0, (|x| − half₁ + layer)/layer); subtracting ramp·(1, ν, 0) gives the plate's stress.
 pub struct Plate {
     radius: f64,
     half: [f64; 2],
     layer: f64,
-    /// From the origin to a corner.
+    /// Distance from the origin to a corner.
     corner: f64,
     coefficients: Vec<f64>,
-    /// Root mean square of the tractions left on the edges, over the tension.
+    /// Root mean square of the remaining tractions on the edges, over the tension.
     pub edge_error: f64,
 }
 
 impl Plate {
-    /// Finds the coefficients; lengths in any one unit. None unless 0 < `radius` < both halves and 0 ≤ `layer` < half₁ −
-    /// `radius`.
+    /// Finds the coefficients; lengths in any one unit. `None` unless 0 < `radius` < both halves and 0 ≤
+    /// `layer` < half₁ − `radius`.
     ///
-    /// For the square with half = 25/3 radii, which reproduces the figures of an independent finite-element program (tests):
-    /// 8 digits without a layer; with one, 5e-5 but for the last twentieth of the edges.
+    /// Accuracy for the square with half = 25/3 radii, which reproduces the figures of an independent
+    /// finite-element program (tests): 8 digits without a layer; with one, 5e-5 except in the last twentieth
+    /// of the edges.
     pub fn new(radius: f64, half: [f64; 2], layer: f64) -> Option<Self> {
         let fits = 0.0 < radius && radius < half[0].min(half[1]) && 0.0 <= layer && layer < half[0] - radius;
         if !fits || !half.iter().all(|h| h.is_finite()) {
@@ -76,8 +78,9 @@ impl Plate {
         Some(plate)
     }
 
-    /// Visits the stresses [σ₁₁, σ₂₂, σ₁₂] of every unknown's term at z: Φ = α₀ + Σ α_m (z/R)^m + γ_m (a/R)^{m−2} (a/z)^m
-    /// over even m, R the distance of a corner; σ₁₁ + σ₂₂ = 4 Re Φ, σ₂₂ − σ₁₁ + 2iσ₁₂ = 2(z̄Φ′ + Ψ).
+    /// Visits the stresses [σ₁₁, σ₂₂, σ₁₂] of every unknown's term at z: Φ = α₀ + Σ α_m (z/R)^m + γ_m
+    /// (a/R)^{m−2} (a/z)^m over even m, R the distance of a corner; σ₁₁ + σ₂₂ = 4 Re Φ, σ₂₂ − σ₁₁ + 2iσ₁₂ =
+    /// 2(z̄Φ′ + Ψ).
     fn terms(&self, z: C, mut visit: impl FnMut(usize, [f64; 3])) {
         let (w, v) = (z / self.corner, self.radius / z);
         let (w2, v2, turn) = (w * w, v * v, z.conj() / z);
@@ -125,25 +128,26 @@ mod tests {
         Plate::new(60.0, [500.0; 2], layer).unwrap()
     }
 
-    /// Rows of a table in docs/reference/plate.
+    /// Rows of a table that docs/reference/plate/plate_series.py wrote.
     fn table(text: &str) -> Vec<Vec<f64>> {
         let lines = text.lines().filter(|line| !line.starts_with('#')).skip(1);
         lines.map(|line| line.split(',').map(|x| x.parse().unwrap()).collect()).collect()
     }
 
-    /// The ligament by another program's series, whose peaks a third one, of quadratic finite elements, confirms to the
-    /// digits below: 3.12474, 3.12770, 3.13642, 3.13917, 3.15280.
+    /// Compares the ligament with another program's series, whose peaks a third one, of quadratic finite
+    /// elements, confirms to the digits below: 3.12474, 3.12770, 3.13642, 3.13917, 3.15280.
     #[test]
     fn ligament_and_peaks() {
         let layers = [0.0, 3.0, 6.0, 12.0, 15.0, 30.0];
-        let rows = table(include_str!("../../../../docs/reference/plate/plate_ligament.csv"));
+        let rows = table(include_str!("../../tests/data/plate_ligament.csv"));
         let elements = [3.12474, 3.12770, f64::NAN, 3.13642, 3.13917, 3.15280];
         for (column, (layer, element)) in layers.into_iter().zip(elements).enumerate() {
             let plate = square(layer);
             let peak = plate.stress(0.0, 60.0)[0];
             // the finite elements' last step of refinement moved the peak by 7e-5
             assert!(element.is_nan() || (peak - element).abs() < 7e-5, "L = {layer}: {peak} and {element}");
-            // digits printed; with layers what other numbers of powers change, and its tenfold at the edge
+            // printed digits; with layers, the difference between numbers of powers, and ten times that at
+            // the edge
             for row in rows.iter().filter(|row| row[0] <= 500.0) {
                 let bound = if layer == 0.0 {
                     1e-6
@@ -158,11 +162,11 @@ mod tests {
         }
     }
 
-    /// All components on the 60 radii and angles of the other program (every seventh is shipped).
+    /// Compares all components on the 60 radii and angles of the other program (every seventh is shipped).
     #[test]
     fn polar_grid() {
         let plate = square(0.0);
-        let rows = table(include_str!("../../../../docs/reference/plate/plate_polar.csv"));
+        let rows = table(include_str!("../../tests/data/plate_polar.csv"));
         assert!(rows.len() > 300);
         for row in rows {
             let (radius, angle) = (row[0], row[1].to_radians());
@@ -174,15 +178,15 @@ mod tests {
         }
     }
 
-    /// Kirsch's plate is the limit of a small hole; a strip three times as long has 3.05245 in the other program and
-    /// 3.047 ± 1 % by Heywood.
+    /// Checks that Kirsch's plate is the limit of a small hole; a strip three times as long has 3.05245 in
+    /// the other program and 3.047 ± 1 % by Heywood.
     #[test]
     fn other_plates() {
         let wide = Plate::new(1.0, [60.0; 2], 0.0).unwrap();
         for [x, y] in [[0.0, 1.0], [1.0, 0.0], [0.9, 1.1], [-2.0, 1.5]] {
             let kirsch = crate::exact::kirsch(x, y, 1.0, 1.0);
             for (found, expected) in wide.stress(x, y).iter().zip(kirsch) {
-                // edges act as (radius/half)² times a few
+                // edges have an effect of a few times (radius/half)²
                 assert!((found - expected).abs() < 5e-3, "{x} {y}: {found} {expected}");
             }
         }
@@ -213,7 +217,7 @@ mod tests {
                 assert!((d(east, west, 0) + d(north, south, 2) + force).abs() < 1e-8, "{layer} {x} {y}");
                 assert!((d(east, west, 2) + d(north, south, 1)).abs() < 1e-8, "{layer} {x} {y}");
             }
-            // what is pulled at the ends passes through the ligament
+            // the load at the ends passes through the ligament
             let edge = |k: usize| 60.0 + 440.0 * k as f64 / 200.0;
             let force: f64 = (0..200)
                 .flat_map(|k| panel(edge(k), edge(k + 1)))

@@ -3,7 +3,7 @@
 /// A crack of zero width that severs the bonds crossing it: a segment in 2D, a parallelogram in 3D.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cut<const D: usize> {
-    /// One corner.
+    /// A corner.
     pub corner: [f64; D],
     /// The D − 1 edges from that corner (the last entry is unused).
     pub edges: [[f64; D]; D],
@@ -17,7 +17,7 @@ impl Cut<2> {
 }
 
 impl<const D: usize> Cut<D> {
-    /// Its two ends in 2D, its four corners in 3D.
+    /// Corners: two ends in 2D, four corners in 3D.
     pub fn corners(&self) -> Vec<[f64; D]> {
         self.edges.iter().take(D - 1).fold(vec![self.corner], |corners, edge| {
             let moved = corners.iter().map(|c| std::array::from_fn(|d| c[d] + edge[d]));
@@ -25,16 +25,16 @@ impl<const D: usize> Cut<D> {
         })
     }
 
-    /// Where the segment from `a` to `b` meets the closed cut, or passes it by no more than `slack` of its length; `None` where it does
-    /// not, lies along it or ends on it.
-    fn meets(&self, a: [f64; D], b: [f64; D], slack: f64) -> Option<Meeting<D>> {
+    /// Finds the point where the segment from `a` to `b` meets the closed cut, or passes it by no more than
+    /// `slack` of its length; `None` if it misses, lies along or ends on the cut.
+    fn intersection(&self, a: [f64; D], b: [f64; D], slack: f64) -> Option<Intersection<D>> {
         let solution = self.passage(a, b)?;
         let size = length(std::array::from_fn::<f64, D, _>(|d| b[d] - a[d]));
         let sizes = self.edges.map(length);
         if !(NEAR..=1.0 - NEAR).contains(&solution[0]) {
             return None;
         }
-        let mut meeting = Meeting { at: solution[0], rims: Vec::new(), inward: [0.0; D] };
+        let mut meeting = Intersection { at: solution[0], rims: Vec::new(), inward: [0.0; D] };
         for edge in 0..D - 1 {
             let (place, near) = (solution[edge + 1], NEAR * size / sizes[edge]);
             let slack = slack * size / sizes[edge];
@@ -49,7 +49,8 @@ impl<const D: usize> Cut<D> {
         Some(meeting)
     }
 
-    /// Where the line from `a` to `b` passes its plane (in 2D its line): the part of the way, and of each of its edges.
+    /// Intersects the line from `a` to `b` with the plane of the cut (in 2D its line): fractions of the
+    /// segment and of each edge.
     pub fn passage(&self, a: [f64; D], b: [f64; D]) -> Option<[f64; D]> {
         let mut columns = [[0.0; D]; D];
         columns[0] = std::array::from_fn(|d| b[d] - a[d]);
@@ -65,7 +66,7 @@ impl<const D: usize> Cut<D> {
         }))
     }
 
-    /// A vector of length 1 across it.
+    /// Unit normal of the cut.
     pub fn normal(&self) -> [f64; D] {
         let [a, b] = [self.edges[0], self.edges[D - 2]];
         let across: [f64; D] = match D {
@@ -76,18 +77,18 @@ impl<const D: usize> Cut<D> {
         across.map(|x| x / size)
     }
 
-    /// Distance of a point from it, m; infinite beside its ends.
+    /// Distance of a point from the cut, m; infinite beside its ends.
     pub fn distance(&self, point: [f64; D]) -> f64 {
         let normal = self.normal();
         let height: f64 = (0..D).map(|d| (point[d] - self.corner[d]) * normal[d]).sum();
-        // a short way through it meets it, unless it passes beside
+        // a short segment along the normal meets the cut, unless the point is beside it
         let reach = self.edges.iter().take(D - 1).map(|&edge| length(edge)).fold(height.abs(), f64::max);
         let [below, above] =
             [-reach, reach].map(|way| std::array::from_fn(|d| point[d] + (way - height) * normal[d]));
-        if self.meets(below, above, NEAR).is_some() { height.abs() } else { f64::INFINITY }
+        if self.intersection(below, above, NEAR).is_some() { height.abs() } else { f64::INFINITY }
     }
 
-    /// Whether a way of length `reach` from a point may meet it.
+    /// Returns true if a segment of length `reach` from a point may meet the cut.
     pub fn is_within(&self, point: [f64; D], reach: f64) -> bool {
         let reach = reach * (1.0 + 1e-6);
         let beside = |d: usize| {
@@ -98,27 +99,27 @@ impl<const D: usize> Cut<D> {
         };
         let normal = self.normal();
         let height: f64 = (0..D).map(|d| (point[d] - self.corner[d]) * normal[d]).sum();
-        // a cut without area has no normal, and no height: near as far as its box tells
+        // a cut without area has no normal and no height: only its box decides
         let away = height.abs() > reach;
         !away && !(0..D).any(beside)
     }
 
-    /// [`severed`] by this cut alone.
+    /// Returns true if this cut alone breaks the bond, see [`severed`].
     pub fn severs(&self, a: [f64; D], b: [f64; D]) -> bool {
         severed(std::slice::from_ref(self), a, b)
     }
 }
 
-/// The cuts that bonds of length `reach` from a point may meet.
+/// Selects the cuts that bonds of length `reach` from a point may meet.
 pub fn cuts_within<const D: usize>(cuts: &[Cut<D>], point: [f64; D], reach: f64) -> Vec<Cut<D>> {
     cuts.iter().filter(|cut| cut.is_within(point, reach)).copied().collect()
 }
 
-/// Part of a bond's length within which it counts as touching a cut's rim, or as ending on a cut.
+/// Fraction of a bond's length within which it counts as touching a cut's rim, or as ending on a cut.
 const NEAR: f64 = 1e-9;
 
-/// Part of a bond's length by which two cuts may miss each other and still meet: of bonds as long as the spacing to the horizon a
-/// thousandth of the spacing, or so.
+/// Gap between two cuts that count as connected, over a bond's length: for bonds between the spacing and the
+/// horizon about a thousandth of the spacing.
 const JOINED: f64 = 5e-4;
 
 /// ‖x‖.
@@ -127,31 +128,32 @@ pub(crate) fn length<const D: usize>(x: [f64; D]) -> f64 {
     x.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Of two or three columns.
+/// Determinant of two or three columns.
 fn determinant<const D: usize>(c: &[[f64; D]; D]) -> f64 {
     let minor = |i: usize, j: usize| c[D - 2][i] * c[D - 1][j] - c[D - 2][j] * c[D - 1][i];
     if D == 2 { minor(0, 1) } else { (0..D).map(|d| c[0][d] * minor((d + 1) % 3, (d + 2) % 3)).sum() }
 }
 
-/// Where a bond meets a cut.
-struct Meeting<const D: usize> {
-    /// Part of the bond's length.
+/// Intersection of a bond with a cut.
+struct Intersection<const D: usize> {
+    /// Fraction of the bond's length.
     at: f64,
     /// Directions of the cut's rims there (in 2D its end: any vector); none inside.
     rims: Vec<[f64; D]>,
-    /// From there towards the cut's middle.
+    /// Direction from there to the cut's middle.
     inward: [f64; D],
 }
 
-/// Whether cuts break the bond of `a` and `b`: solves a + s(b − a) = corner + Σ wᵢ edgeᵢ and asks for 0 < s < 1, 0 < w < 1.
+/// Returns true if cuts break the bond of `a` and `b`: solves a + s(b − a) = corner + Σ wᵢ edgeᵢ and requires
+/// 0 < s < 1, 0 < w < 1.
 ///
-/// The answer is one for the pair, whichever end comes first. A bond through a tip (in 3D: the rim) stays, however the
-/// tip is rounded, unless another cut continues from there on the bond's other side: cuts that miss each other by less than a
-/// thousandth of the spacing meet. A bond parallel to a cut, or that ends
+/// The result is the same whichever end comes first. A bond through a tip (in 3D: the rim) stays, however the
+/// tip is rounded, unless another cut continues from there on the bond's other side: cuts that miss each
+/// other by less than a thousandth of the spacing count as connected. A bond parallel to a cut, or that ends
 /// on it, stays.
 pub fn severed<const D: usize>(cuts: &[Cut<D>], a: [f64; D], b: [f64; D]) -> bool {
     let (a, b) = if a <= b { (a, b) } else { (b, a) };
-    let met: Vec<Meeting<D>> = cuts.iter().filter_map(|cut| cut.meets(a, b, JOINED)).collect();
+    let met: Vec<Intersection<D>> = cuts.iter().filter_map(|cut| cut.intersection(a, b, JOINED)).collect();
     let side = |rim: &[f64; D], inward: &[f64; D]| {
         let mut columns = [*inward; D];
         columns[0] = std::array::from_fn(|d| b[d] - a[d]);
@@ -174,8 +176,8 @@ pub fn severed<const D: usize>(cuts: &[Cut<D>], a: [f64; D], b: [f64; D]) -> boo
 mod tests {
     use super::*;
 
-    /// Two cuts that meet in a corner are one crack: what passes through the corner from one side to the other goes,
-    /// what only touches it stays.
+    /// Two cuts that meet in a corner are one crack: a bond through the corner from one side to the other
+    /// breaks, one that only touches it stays.
     #[test]
     fn cuts_that_meet_leave_no_gap() {
         let cut = |from: [f64; 2], to: [f64; 2]| Cut {

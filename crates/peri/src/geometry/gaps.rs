@@ -1,20 +1,20 @@
-//! Gaps of a body: bonds end at parts that do not touch, and at cuts narrower than the horizon.
+//! Gaps of a body: bonds end between parts that do not touch, and at cut-outs narrower than the horizon.
 //!
-//! A bond crosses a gap where its straight line
+//! A bond crosses a gap if its straight line
 //! * passes from one added shape to another that does not touch it, or
-//! * passes through the empty part of a box cut out (a disc: a flat cylinder) with its ends on opposite sides, or through a hole
-//!   narrower than the horizon.
+//! * passes through the empty part of a box cut out (a disc: a flat cylinder) with its ends on opposite
+//!   sides, or through a hole narrower than the horizon.
 //!
-//! Bonds around a re-entrant corner, and chords of wide holes, stay. Shapes touch where they overlap or share a part of a face; points and
-//! edges do not join them.
+//! Bonds around a re-entrant corner, and chords of wide holes, stay. Shapes touch if they overlap or share a
+//! part of a face; points and edges do not connect them.
 
 use super::{Lattice, Operation, Shape, length};
 use crate::bonds::CellGrid;
 use std::collections::HashMap;
 
-/// Width, over the spacing, below which a gap is closed, and a face no face.
+/// Width, over the spacing, below which a gap is closed and a face has no area.
 const CLOSED: f64 = 1e-3;
-/// Distance of points of one part, over the edge of their cubes (of a plane body: squares).
+/// Greatest distance of points of one part, over the edge of their cubes (in plane bodies: squares).
 const JOINED: f64 = 1.5;
 
 /// The gaps of a body.
@@ -23,21 +23,22 @@ pub struct Gaps<const D: usize> {
     horizon: f64,
     /// Width of a closed gap, m.
     closed: f64,
-    kind: Kind<D>,
+    kind: GapKind<D>,
 }
 
 #[derive(Clone, Debug)]
-enum Kind<const D: usize> {
-    /// Shapes, and which of them touch: row by row.
+enum GapKind<const D: usize> {
+    /// Shapes, and the pairs of them that touch: row by row.
     Shapes { operations: Vec<Operation<D>>, touching: Vec<bool> },
     /// A lattice and the part of each of its cells.
     Cells { spacing: f64, origin: [f64; D], cells: [usize; D], parts: Vec<u32> },
-    /// Points, by the bits of their places, and their parts.
+    /// Points, by the bits of their positions, and their parts.
     Points { parts: HashMap<[u64; D], u32> },
 }
 
 impl<const D: usize> Gaps<D> {
-    /// Those of shapes filled with a lattice; `None` where no bond of length `horizon`, m, can cross one.
+    /// Finds the gaps of shapes filled with a lattice; `None` if no bond of length `horizon`, m, can cross
+    /// one.
     pub fn of_shapes(operations: &[Operation<D>], lattice: &Lattice<D>, horizon: f64) -> Option<Self> {
         let closed = CLOSED * lattice.spacing;
         let adds = operations.iter().filter(|operation| matches!(operation, Operation::Add(_))).count();
@@ -49,29 +50,31 @@ impl<const D: usize> Gaps<D> {
             return None;
         }
         let touching = vec![true; operations.len().pow(2)];
-        let kind = Kind::Shapes { operations: operations.to_vec(), touching };
+        let kind = GapKind::Shapes { operations: operations.to_vec(), touching };
         let mut gaps = Self { horizon, closed, kind };
         let found: Vec<bool> = (0..operations.len().pow(2))
             .map(|pair| gaps.touch(lattice, operations, pair / operations.len(), pair % operations.len()))
             .collect();
         let parted = found.contains(&false);
-        if let Kind::Shapes { touching, .. } = &mut gaps.kind {
+        if let GapKind::Shapes { touching, .. } = &mut gaps.kind {
             *touching = found;
         }
         (narrow || parted).then_some(gaps)
     }
 
-    /// Those between the parts of a lattice: cells belong together that share a face, an edge or a corner. `None` where there is one part.
+    /// Finds the gaps between the parts of a lattice: cells that share a face, an edge or a corner belong
+    /// together. `None` if there is one part.
     pub fn of_cells(lattice: &Lattice<D>) -> Option<Self> {
         let parts = connected(lattice);
         let several = parts.iter().any(|&part| part > 1);
         let Lattice { spacing, origin, cells, .. } = *lattice;
-        let kind = Kind::Cells { spacing, origin, cells, parts };
+        let kind = GapKind::Cells { spacing, origin, cells, parts };
         several.then_some(Self { horizon: f64::INFINITY, closed: CLOSED * spacing, kind })
     }
 
-    /// Those between the parts of a cloud: points belong together that are nearer than 1.5 edges of the larger of their cubes. `None`
-    /// where there is one part, or the parts have less than ten points in the mean: points then are far from cubes.
+    /// Finds the gaps between the parts of a cloud: points nearer than 1.5 edges of the larger of their cubes
+    /// belong together. `None` if there is one part, or if parts have fewer than ten points on average, which
+    /// are not cubes then.
     pub fn of_points(points: &[[f64; D]], volumes: &[f64], thickness: f64) -> Option<Self> {
         let edges: Vec<f64> = volumes.iter().map(|v| JOINED * (v / thickness).powf(1.0 / D as f64)).collect();
         let largest = edges.iter().copied().fold(0.0, f64::max);
@@ -98,13 +101,13 @@ impl<const D: usize> Gaps<D> {
         }
         let parts = points.iter().zip(parts).map(|(point, part)| (point.map(f64::to_bits), part)).collect();
         let parted = count > 1 && 10 * count as usize <= points.len();
-        parted.then_some(Self { horizon: f64::INFINITY, closed: 0.0, kind: Kind::Points { parts } })
+        parted.then_some(Self { horizon: f64::INFINITY, closed: 0.0, kind: GapKind::Points { parts } })
     }
 
-    /// What bonds of length `reach` from a point may meet; `None`: no gap.
-    pub fn within(&self, point: [f64; D], reach: f64) -> Option<Near<'_, D>> {
-        let Kind::Shapes { operations, touching } = &self.kind else {
-            return Some(Near { gaps: self, shapes: Vec::new() });
+    /// Selects the gaps that bonds of length `reach` from a point may meet; `None`: no gap.
+    pub fn within(&self, point: [f64; D], reach: f64) -> Option<NearbyGaps<'_, D>> {
+        let GapKind::Shapes { operations, touching } = &self.kind else {
+            return Some(NearbyGaps { gaps: self, shapes: Vec::new() });
         };
         let near = |shape: &Shape<D>| {
             let (low, high) = shape.bounds();
@@ -117,10 +120,10 @@ impl<const D: usize> Gaps<D> {
             Operation::Cut(shape) => shape.width() < self.horizon,
             Operation::Add(_) => apart(index),
         });
-        gap.then_some(Near { gaps: self, shapes })
+        gap.then_some(NearbyGaps { gaps: self, shapes })
     }
 
-    /// Whether two operations add shapes that touch, after what is cut out later; true for others.
+    /// Returns true if two operations add shapes that touch after all later cuts; true for other operations.
     fn touch(&self, lattice: &Lattice<D>, operations: &[Operation<D>], a: usize, b: usize) -> bool {
         let (Operation::Add(one), Operation::Add(other)) = (&operations[a], &operations[b]) else {
             return true;
@@ -132,7 +135,7 @@ impl<const D: usize> Gaps<D> {
         if !(a.min(b)..operations.len()).any(cut) {
             return true;
         }
-        // a particle of both, or two neighbours without a gap between them
+        // a common particle, or two neighbours without a gap between them
         let (low, high) = one.bounds();
         let (from, to) = other.bounds();
         let reach = 1.5 * lattice.spacing;
@@ -144,7 +147,7 @@ impl<const D: usize> Gaps<D> {
                 (place(high[d].min(to[d]) + reach).ceil() as usize).min(lattice.cells[d]),
             ]
         });
-        let near = Near { gaps: self, shapes: (0..operations.len()).collect() };
+        let near = NearbyGaps { gaps: self, shapes: (0..operations.len()).collect() };
         let count: usize = range.iter().map(|[low, high]| high.saturating_sub(*low)).product();
         (0..count).any(|mut index| {
             let mut cell = [0; D];
@@ -168,26 +171,26 @@ impl<const D: usize> Gaps<D> {
 }
 
 /// The gaps near a point.
-pub struct Near<'a, const D: usize> {
+pub struct NearbyGaps<'a, const D: usize> {
     gaps: &'a Gaps<D>,
     /// Operations whose shapes are near.
     shapes: Vec<usize>,
 }
 
-impl<const D: usize> Near<'_, D> {
-    /// Whether the bond of `a` and `b` crosses a gap; the same whichever end comes first.
+impl<const D: usize> NearbyGaps<'_, D> {
+    /// Returns true if the bond of `a` and `b` crosses a gap, whichever end comes first.
     pub fn severs(&self, a: [f64; D], b: [f64; D]) -> bool {
         let (a, b) = if a <= b { (a, b) } else { (b, a) };
         let (operations, touching) = match &self.gaps.kind {
-            Kind::Shapes { operations, touching } => (operations, touching),
-            Kind::Cells { spacing, origin, cells, parts } => {
+            GapKind::Shapes { operations, touching } => (operations, touching),
+            GapKind::Cells { spacing, origin, cells, parts } => {
                 let part = |point: [f64; D]| {
                     let place = |d: usize| ((point[d] - origin[d]) / spacing).round() as usize;
                     parts.get((0..D).rev().fold(0, |index, d| index * cells[d] + place(d)))
                 };
                 return part(a) != part(b);
             }
-            Kind::Points { parts } => {
+            GapKind::Points { parts } => {
                 return parts.get(&a.map(f64::to_bits)) != parts.get(&b.map(f64::to_bits));
             }
         };
@@ -214,16 +217,17 @@ impl<const D: usize> Near<'_, D> {
         crosses || !(last.is_empty() || end.is_empty() || joined(&last, &end))
     }
 
-    /// Whether the way from `a` to `b` leaves the body.
+    /// Returns true if the segment from `a` to `b` leaves the body.
     fn leaves(&self, a: [f64; D], b: [f64; D]) -> bool {
         let mut leaves = false;
         self.pieces(a, b, |middle| leaves |= self.covering(middle).is_empty());
         leaves
     }
 
-    /// Visits the middles of the pieces into which shapes cut the way from `a` to `b`, less those that count as closed.
+    /// Visits the middles of the pieces into which shapes divide the segment from `a` to `b`, except closed
+    /// ones.
     fn pieces(&self, a: [f64; D], b: [f64; D], mut visit: impl FnMut([f64; D])) {
-        let Kind::Shapes { operations, .. } = &self.gaps.kind else { return };
+        let GapKind::Shapes { operations, .. } = &self.gaps.kind else { return };
         let mut ends = vec![0.0, 1.0];
         ends.extend(self.shapes.iter().filter_map(|&index| operations[index].shape().span(a, b)).flatten());
         ends.sort_by(f64::total_cmp);
@@ -236,14 +240,14 @@ impl<const D: usize> Near<'_, D> {
         }
     }
 
-    /// The added shapes that a point belongs to.
+    /// Added shapes that contain a point.
     fn covering(&self, point: [f64; D]) -> Vec<usize> {
         self.shapes.iter().copied().filter(|&index| self.belongs(index, point)).collect()
     }
 
-    /// Whether an operation adds a point that none later cuts out.
+    /// Returns true if an operation adds a point that no later one removes.
     fn belongs(&self, index: usize, point: [f64; D]) -> bool {
-        let Kind::Shapes { operations, .. } = &self.gaps.kind else { return false };
+        let GapKind::Shapes { operations, .. } = &self.gaps.kind else { return false };
         let (Operation::Add(shape), later) = (&operations[index], &operations[index + 1..]) else {
             return false;
         };
@@ -260,13 +264,14 @@ impl<const D: usize> Operation<D> {
 }
 
 impl<const D: usize> Shape<D> {
-    /// Its least width, m.
+    /// Least width, m.
     fn width(&self) -> f64 {
         let (low, high) = self.bounds();
         (0..D).map(|d| high[d] - low[d]).fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether it lies between two points as a slot between its flanks, or is a hole narrower than `horizon`, m.
+    /// Returns true if it separates two points as a slot separates its flanks, or is a hole narrower than
+    /// `horizon`, m.
     fn is_between(&self, a: [f64; D], b: [f64; D], horizon: f64) -> bool {
         let (low, high) = self.bounds();
         let beyond =
@@ -278,7 +283,7 @@ impl<const D: usize> Shape<D> {
         }
     }
 
-    /// The part of the way from `a` to `b` in it, from 0 to 1.
+    /// Fraction of the segment from `a` to `b` inside the shape, from 0 to 1.
     pub fn span(&self, a: [f64; D], b: [f64; D]) -> Option<[f64; 2]> {
         let slab = |d: usize, low: f64, high: f64| {
             let way = b[d] - a[d];
@@ -319,11 +324,11 @@ impl<const D: usize> Shape<D> {
         (joint[0] < joint[1]).then_some(joint)
     }
 
-    /// Whether it overlaps another, or shares a part of a face with it, within `near`, m.
+    /// Returns true if it overlaps another, or shares a part of a face with it, within `near`, m.
     fn touches(&self, other: &Self, near: f64) -> bool {
         let ((low, high), (from, to)) = (self.bounds(), other.bounds());
         let common: [f64; D] = std::array::from_fn(|d| high[d].min(to[d]) - low[d].max(from[d]));
-        // flat faces meet along one axis at most
+        // flat faces meet along at most one axis
         if common.iter().any(|&c| c < -near) || common.iter().filter(|&&c| c <= near).count() > 1 {
             return false;
         }
@@ -380,7 +385,7 @@ impl<const D: usize> Shape<D> {
     }
 }
 
-/// The part of each cell of a lattice, from 1; 0 of empty cells.
+/// Labels the part of each cell of a lattice, from 1; 0 for empty cells.
 fn connected<const D: usize>(lattice: &Lattice<D>) -> Vec<u32> {
     let Lattice { cells, occupied, .. } = lattice;
     let mut parts = vec![0; occupied.len()];

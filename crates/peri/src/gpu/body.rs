@@ -1,8 +1,8 @@
-//! A lattice on a device: its buffers, and what is computed on them.
+//! A lattice on a device: its buffers, and the launches of its kernels.
 
-use super::kernels::{Form, HEAD, leap, pull};
+use super::kernels::{CUBE, KernelForm, ROW, SUMS};
 use super::{Device, Precision};
-use crate::bonds::{BodyGeometry, BondDamage, LatticeBonds, StencilBond, not_finite, scaled_laws};
+use crate::bonds::{BodyGeometry, BondDamage, LatticeBonds, Rational, not_finite};
 use crate::error::Error;
 use crate::field::Field;
 use crate::potential::KernelFit;
@@ -10,324 +10,282 @@ use cubecl::client::Client;
 use cubecl::prelude::*;
 use cubecl::server::{Handle, ServerError};
 
-/// Threads that start together.
-const CUBE: u32 = 128;
-/// Launches between two waits for the device, so that its queue stays short.
-const QUEUE: u64 = 256;
+/// Threads that sum over particles.
+pub(super) const THREADS: usize = 1 << 17;
+/// Threads of the first fold of ranges, and numbers of each list that the host reads.
+pub(super) const FOLDED: usize = 1 << 14;
+pub(super) const LANES: usize = 256;
+/// Steps that may be taken before the host reads their sums.
+pub const MOST_STEPS: usize = 64;
+/// Bonds beyond their limit that are listed in one step, from both ends.
+pub(super) const LISTED: usize = 1 << 20;
+/// Particles of a thread.
+const TILE: usize = 2;
 
-/// Displacement, velocity and force density of all sites.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Motion<const D: usize> {
-    /// u, m.
-    pub displacement: Field<D>,
-    /// v, m/s.
-    pub velocity: Field<D>,
-    /// Force density of the intact bonds, N/m³.
-    pub force: Field<D>,
+/// Loads of a body as its kernels take them.
+#[derive(Clone, Copy)]
+pub struct DeviceLoads<'a, const D: usize> {
+    /// Bit d of a site: component d is held. Empty where all are free.
+    pub held: &'a [u8],
+    /// Displacement of held components at factor 1, m.
+    pub displacement: Option<&'a Field<D>>,
+    /// Body force at factor 1, N/m³.
+    pub body_force: Option<&'a Field<D>>,
 }
 
-/// Where and how motion begins.
-#[derive(Clone, Debug)]
-pub struct Start<const D: usize> {
-    /// u, m.
-    pub displacement: Field<D>,
-    /// v, m/s.
-    pub velocity: Field<D>,
-    /// Bit d: component d of a site keeps the velocity that it has; empty where all are free.
-    pub held: Vec<u8>,
-    /// ρ, kg/m³.
-    pub density: f64,
-    /// Δt, s. Not compared with the critical one.
-    pub time_step: f64,
-}
-
-/// A lattice with its law on a device. It begins at rest, undeformed.
-pub struct DeviceBody<'a, const D: usize> {
-    bonds: &'a LatticeBonds<D>,
-    client: Client,
-    precision: Precision,
-    form: Form,
-    spacing: f64,
+/// A lattice with its law on a device.
+pub struct DeviceBody<const D: usize> {
+    pub(super) client: Client,
+    pub(super) precision: Precision,
+    pub(super) form: KernelForm,
+    pub(super) sites: usize,
+    pub(super) particles: usize,
+    pub(super) spacing: f64,
+    pub(super) volume: f64,
     /// Force density of a unit force on the device, N/m³.
-    unit: f64,
-    time_step: f64,
-    /// ½Δt²·`unit`/(ρ·spacing): the half kick, in spacings a step.
-    push: f64,
-    steps: u64,
-    particles: Handle,
-    shifts: Handle,
-    rows: Handle,
-    intact: Handle,
-    held: Handle,
-    displacement: Handle,
-    velocity: Handle,
-    force: Handle,
+    pub(super) unit: f64,
+    /// Δt that velocities are measured in, s.
+    pub(super) time_step: f64,
+    pub(super) sites_of_particles: Handle,
+    pub(super) shifts: Handle,
+    pub(super) rows: Handle,
+    pub(super) law: Handle,
+    pub(super) intact: Handle,
+    pub(super) held: Handle,
+    pub(super) full: Handle,
+    pub(super) body: Handle,
+    pub(super) fields: [Handle; 3],
+    pub(super) kept: Option<[Handle; 3]>,
+    pub(super) partial: Handle,
+    pub(super) sums: Handle,
+    pub(super) ranges: Handle,
+    pub(super) folded: Handle,
+    pub(super) extremes: Handle,
+    pub(super) count: Handle,
+    pub(super) list: Handle,
+    pub(super) elongations: Handle,
 }
 
-impl<'a, const D: usize> DeviceBody<'a, D> {
-    /// Puts particles, intact bonds and a law q(e) with its modulus kθ, N/m⁶, on a device. Bonds beyond the stretch `critical`
-    /// break; law and stretches are those of [`crate::bonds::BondForces::set_law`] and [`crate::bonds::overstretched`].
+impl<const D: usize> DeviceBody<D> {
+    /// Puts particles, intact bonds and a law q(e) with its modulus kθ, N/m⁶, on a device, without loads, at
+    /// rest, undeformed.
     ///
     /// # Errors
-    /// [`Error::Device`] for what the kernels do not know, and for a body that the device's memory does not hold;
-    /// [`Error::Parameter`] for a critical stretch that is not above 0.
+    /// [`Error::Device`] for bonds and laws that kernels do not know, and for a body that the device's memory
+    /// does not hold.
     pub fn new(
         device: &Device,
-        bonds: &'a LatticeBonds<D>,
+        bonds: &LatticeBonds<D>,
         law: &KernelFit,
         modulus: f64,
-        critical: Option<f64>,
     ) -> Result<Self, Error> {
-        if let Some(found) = critical.filter(|stretch| !(*stretch > 0.0 && stretch.is_finite())) {
-            let allowed = "above 0, finite".to_owned();
-            return Err(Error::Parameter { name: "critical stretch", found, allowed });
-        }
         if !bonds.is_uniform() {
-            let what = "bonds with surface factors or softened bonds; allowed: the stencil's own weights";
-            return Err(Error::Device(format!("kernels of lattices: found {what}")));
+            let what = "bonds with surface factors, of inclusions, or that soften";
+            return Err(Error::Device(format!("unexpected {what}: kernels take the stencil's own weights")));
         }
         let precision = device.precision;
-        let (form, rows, unit) = stencil(bonds, law, modulus, critical)?;
-        let sites = bonds.sites();
+        let (sites, particles) = (bonds.sites(), bonds.particles().len());
+        let stencil = bonds.stencil_bonds(modulus);
+        let form = KernelForm {
+            dimension: D,
+            bonds: stencil.len(),
+            numerator: 1,
+            denominator: 0,
+            clamped: false,
+            stressed: false,
+            held: false,
+            loaded: false,
+            tile: TILE,
+            unroll: 2,
+        };
         let field = (D * sites) as u64 * precision.bytes();
         let words = 4 * (sites * form.bonds.div_ceil(32)) as u64;
         let fields = [("displacement", field), ("velocity", field), ("force", field)];
         hold(device, &[&fields[..], &[("intact bonds", words)]].concat())?;
+        let spacing = bonds.spacing();
+        let unit = spacing * stencil.iter().map(|bond| bond.stiffness.abs()).fold(0.0, f64::max);
+        let mut rows = Vec::with_capacity(form.bonds * (D + ROW));
+        for (bond, offset) in stencil.iter().zip(&bonds.stencil().offsets) {
+            let offset = offset.map(f64::from);
+            let square: f64 = offset.iter().map(|x| x * x).sum();
+            rows.extend(offset);
+            rows.extend([1.0 / square, bond.stiffness * spacing / unit]);
+        }
         let client = device.client.clone();
+        let shifts: Vec<i32> = stencil.iter().map(|bond| bond.shift as i32).collect();
+        let bytes = precision.bytes() as usize;
         let whole = |list: &[u32]| client.create_from_slice(u32::as_bytes(list));
-        let shifts: Vec<i32> = bonds.stencil_bonds(modulus).iter().map(|bond| bond.shift as i32).collect();
+        let empty = |length: usize| client.empty(length * bytes);
         let zeros = Field::<D>::zeros(sites);
-        Ok(Self {
+        let threads = particles.min(THREADS);
+        let ranges = 2 * cubes(particles, form.tile) * CUBE;
+        let mut body = Self {
             precision,
             form,
-            spacing: bonds.spacing(),
+            sites,
+            particles,
+            spacing,
+            volume: bonds.volume(0),
             unit,
             time_step: 0.0,
-            push: 0.0,
-            steps: 0,
-            particles: whole(bonds.particles()),
+            sites_of_particles: whole(bonds.particles()),
             shifts: client.create_from_slice(i32::as_bytes(&shifts)),
             rows: numbers(&client, precision, rows.into_iter()),
+            law: empty(1),
             intact: whole(&halves(&bonds.intact(), sites, form.bonds)),
-            held: whole(&vec![0; sites]),
-            displacement: upload(&client, precision, &zeros, 1.0),
-            velocity: upload(&client, precision, &zeros, 1.0),
-            force: upload(&client, precision, &zeros, 1.0),
-            bonds,
+            held: whole(&[0]),
+            full: empty(1),
+            body: empty(1),
+            fields: std::array::from_fn(|_| upload(&client, precision, &zeros, 1.0)),
+            kept: None,
+            partial: empty(SUMS * threads),
+            sums: empty(MOST_STEPS * SUMS * LANES),
+            ranges: empty(ranges),
+            // kernels take the length of a list from its buffer
+            folded: empty(2 * (ranges / 2).min(FOLDED)),
+            extremes: empty(2 * LANES),
+            count: whole(&[0]),
+            list: client.empty(4 * 2 * LISTED),
+            elongations: empty(LISTED),
             client,
-        })
-    }
-
-    /// Force densities, N/m³, in a displacement, m, without a step. No bond breaks.
-    ///
-    /// # Errors
-    /// [`Error::NotFinite`] for forces that are not finite; [`Error::Geometry`] for the field of another body;
-    /// [`Error::Device`] where the device fails.
-    pub fn force(&self, displacement: &Field<D>) -> Result<Field<D>, Error> {
-        self.fits(&[displacement.sites()])?;
-        let there = upload(&self.client, self.precision, displacement, 1.0 / self.spacing);
-        let found = upload(&self.client, self.precision, &Field::<D>::zeros(self.bonds.sites()), 1.0);
-        self.pull(&there, &found, Form { breaks: false, kicks: false, ..self.form });
-        let force = self.download(&found, self.unit)?;
-        self.finite("force", &force)?;
-        Ok(force)
-    }
-
-    /// Takes a state, at which bonds break, as the beginning of motion.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] for a density or time step that is not positive; [`Error::Geometry`] for fields of another body.
-    pub fn start(&mut self, start: &Start<D>) -> Result<(), Error> {
-        for (name, found) in [("density", start.density), ("time step", start.time_step)] {
-            if !(found > 0.0 && found.is_finite()) {
-                return Err(Error::Parameter { name, found, allowed: "above 0, finite".to_owned() });
-            }
-        }
-        let sites = self.bonds.sites();
-        let held = if start.held.is_empty() { sites } else { start.held.len() };
-        self.fits(&[start.displacement.sites(), start.velocity.sites(), held])?;
-        let held: Vec<u32> =
-            (0..sites).map(|site| start.held.get(site).map_or(0, |&bits| bits.into())).collect();
-        self.time_step = start.time_step;
-        self.push = 0.5 * start.time_step.powi(2) * self.unit / (start.density * self.spacing);
-        self.steps = 0;
-        self.held = self.client.create_from_slice(u32::as_bytes(&held));
-        self.displacement = upload(&self.client, self.precision, &start.displacement, 1.0 / self.spacing);
-        self.velocity = upload(&self.client, self.precision, &start.velocity, self.time_step / self.spacing);
-        self.pull(&self.displacement, &self.force, Form { kicks: false, ..self.form });
-        Ok(())
-    }
-
-    /// Steps of velocity Verlet: v ← v + ½Δt f/ρ, u ← u + Δt v, new f, v ← v + ½Δt f/ρ, then bonds break.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] without a [`Self::start`]; [`Error::Device`] where the device fails.
-    pub fn advance(&mut self, steps: u64) -> Result<(), Error> {
-        if self.time_step == 0.0 {
-            let allowed = "above 0: `start` sets it".to_owned();
-            return Err(Error::Parameter { name: "time step", found: 0.0, allowed });
-        }
-        for step in 1..=steps {
-            self.leap();
-            self.pull(&self.displacement, &self.force, self.form);
-            if step.is_multiple_of(QUEUE) || step == steps {
-                cubecl::future::block_on(self.client.sync()).map_err(|error| failed(&error))?;
-            }
-        }
-        self.steps += steps;
-        Ok(())
-    }
-
-    /// Displacement, velocity and force density.
-    ///
-    /// # Errors
-    /// [`Error::NotFinite`] for a state that is not finite; [`Error::Device`] where the device fails.
-    pub fn state(&self) -> Result<Motion<D>, Error> {
-        let speed = if self.time_step > 0.0 { self.spacing / self.time_step } else { 0.0 };
-        let motion = Motion {
-            displacement: self.download(&self.displacement, self.spacing)?,
-            velocity: self.download(&self.velocity, speed)?,
-            force: self.download(&self.force, self.unit)?,
         };
-        self.finite("force", &motion.force)?;
-        self.finite("velocity", &motion.velocity)?;
-        self.finite("displacement", &motion.displacement)?;
-        Ok(motion)
+        body.set_law(law, f64::INFINITY)?;
+        Ok(body)
     }
 
-    /// Which bonds are intact, as [`crate::bonds::BondDamage::restore`] takes it.
+    /// Takes another law for the same modulus; bonds with e above `limit` are listed.
+    ///
+    /// # Errors
+    /// [`Error::Device`] for a law that only a table represents.
+    pub fn set_law(&mut self, fit: &KernelFit, limit: f64) -> Result<(), Error> {
+        let law = Rational::new(fit).filter(|_| self.unit > 0.0 && self.unit.is_finite());
+        let Some(law) = law else {
+            return Err(Error::Device(format!(
+                "law of the bonds: unexpected {} with a force of {} N/m³; kernels take polynomials and \
+                 rationals above 0",
+                fit.kind(),
+                self.unit
+            )));
+        };
+        self.form = KernelForm {
+            numerator: law.numerator.len(),
+            denominator: law.denominator.len(),
+            clamped: law.clamp.iter().any(|end| end.is_finite()),
+            stressed: law.constant != 0.0,
+            ..self.form
+        };
+        let ends = [law.constant, law.clamp[0], law.clamp[1], limit];
+        let numbers_of_law = law.numerator.iter().chain(&law.denominator).chain(&ends).copied();
+        self.law = numbers(&self.client, self.precision, numbers_of_law);
+        Ok(())
+    }
+
+    /// Takes loads.
+    pub fn set_loads(&mut self, loads: &DeviceLoads<D>) {
+        let (client, precision) = (&self.client, self.precision);
+        self.form.held = !loads.held.is_empty();
+        self.form.loaded = loads.body_force.is_some();
+        if self.form.held {
+            let held: Vec<u32> = loads.held.iter().map(|&bits| bits.into()).collect();
+            self.held = client.create_from_slice(u32::as_bytes(&held));
+            let zeros = Field::zeros(self.sites);
+            let full = loads.displacement.unwrap_or(&zeros);
+            self.full = upload(client, precision, full, 1.0 / self.spacing);
+        }
+        if let Some(body) = loads.body_force {
+            self.body = upload(client, precision, body, 1.0 / self.unit);
+        }
+    }
+
+    /// Takes intact bonds, displacement, m, velocity, m/s, and force density, N/m³; `time_step`, s, is that
+    /// of velocities on the device.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] for the fields of another body.
+    pub fn set_state(
+        &mut self,
+        bonds: &LatticeBonds<D>,
+        [displacement, velocity, force]: [&Field<D>; 3],
+        time_step: f64,
+    ) -> Result<(), Error> {
+        self.fits(&[displacement.sites(), velocity.sites(), force.sites(), bonds.sites()])?;
+        self.time_step = time_step;
+        let intact = halves(&bonds.intact(), self.sites, self.form.bonds);
+        self.intact = self.client.create_from_slice(u32::as_bytes(&intact));
+        let scales = [1.0 / self.spacing, time_step / self.spacing, 1.0 / self.unit];
+        let fields = [displacement, velocity, force];
+        self.fields = std::array::from_fn(|k| upload(&self.client, self.precision, fields[k], scales[k]));
+        Ok(())
+    }
+
+    /// Displacement, m, velocity, m/s, and force density with body forces, N/m³.
     ///
     /// # Errors
     /// [`Error::Device`] where the device fails.
-    pub fn intact(&self) -> Result<Vec<u64>, Error> {
-        let bytes = self.client.read_one(self.intact.clone()).map_err(|error| failed(&error))?;
-        let sites = self.bonds.sites();
-        let mut words = vec![0; sites * self.form.bonds.div_ceil(64)];
-        for (index, half) in u32::from_bytes(&bytes).iter().enumerate() {
-            let (word, site) = (index / sites, index % sites);
-            words[word / 2 * sites + site] |= u64::from(*half) << (32 * (word % 2));
+    pub fn state(&self) -> Result<[Field<D>; 3], Error> {
+        let speed = if self.time_step > 0.0 { self.spacing / self.time_step } else { 0.0 };
+        let [displacement, velocity, force] = &self.fields;
+        Ok([
+            self.download(displacement, self.spacing)?,
+            self.download(velocity, speed)?,
+            self.download(force, self.unit)?,
+        ])
+    }
+
+    /// Force densities, N/m³, in a displacement, m, without body forces.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] for forces that are not finite; [`Error::Geometry`] for the field of another
+    /// body; [`Error::Device`] where the device fails.
+    pub fn force(&self, bonds: &LatticeBonds<D>, displacement: &Field<D>) -> Result<Field<D>, Error> {
+        self.fits(&[displacement.sites(), bonds.sites()])?;
+        let there = upload(&self.client, self.precision, displacement, 1.0 / self.spacing);
+        let found = upload(&self.client, self.precision, &Field::<D>::zeros(self.sites), 1.0);
+        let form = KernelForm { loaded: false, ..self.form };
+        self.launch_pull([&there, &found], (&self.sites_of_particles, self.particles), 0.0, form, false);
+        let force = self.download(&found, self.unit)?;
+        match force.non_finite() {
+            Some((site, _)) => Err(not_finite(bonds, "force", site, 0, 0)),
+            None => Ok(force),
         }
-        Ok(words)
+    }
+
+    /// Δt that velocities are measured in, s.
+    pub fn time_step(&self) -> f64 {
+        self.time_step
     }
 
     fn fits(&self, lengths: &[usize]) -> Result<(), Error> {
-        let sites = self.bonds.sites();
-        if lengths.iter().all(|&length| length == sites) {
+        if lengths.iter().all(|&length| length == self.sites) {
             return Ok(());
         }
-        Err(Error::geometry(format!("fields over {lengths:?} sites for a body of {sites}")))
+        Err(Error::geometry(format!("fields over {lengths:?} sites for a body of {}", self.sites)))
     }
+}
 
-    fn finite(&self, quantity: &'static str, field: &Field<D>) -> Result<(), Error> {
-        let wrong = field.non_finite().map(|(site, _)| site);
-        wrong.map_or(Ok(()), |site| Err(not_finite(self.bonds, quantity, site, 0, self.steps)))
-    }
-
+impl<const D: usize> DeviceBody<D> {
     fn download(&self, from: &Handle, scale: f64) -> Result<Field<D>, Error> {
-        let bytes = self.client.read_one(from.clone()).map_err(|error| failed(&error))?;
-        let values: Vec<f64> = match self.precision {
-            Precision::Single => f32::from_bytes(&bytes).iter().map(|&x| f64::from(x) * scale).collect(),
-            Precision::Double => f64::from_bytes(&bytes).iter().map(|x| x * scale).collect(),
-        };
-        let mut field = Field::zeros(self.bonds.sites());
-        for (to, from) in field.components_mut().into_iter().zip(values.chunks(self.bonds.sites())) {
-            to.copy_from_slice(from);
+        let values = self.values(from)?;
+        let mut field = Field::zeros(self.sites);
+        for (to, from) in field.components_mut().into_iter().zip(values.chunks(self.sites)) {
+            to.iter_mut().zip(from).for_each(|(to, from)| *to = from * scale);
         }
         Ok(field)
     }
 
-    fn cubes(&self) -> CubeCount {
-        cubecl::calculate_cube_count_elemwise(
-            &self.client,
-            self.bonds.particles().len(),
-            CubeDim::new_1d(CUBE),
-        )
-    }
-
-    fn pull(&self, displacement: &Handle, force: &Handle, form: Form) {
-        let (sites, element) = (self.bonds.sites(), self.precision.element());
-        let words = form.bonds.div_ceil(32);
-        pull::launch(
-            &self.client,
-            self.cubes(),
-            CubeDim::new_1d(CUBE),
-            buffer(displacement, D * sites),
-            buffer(&self.particles, self.bonds.particles().len()),
-            buffer(&self.held, sites),
-            buffer(&self.shifts, form.bonds),
-            buffer(&self.rows, form.bonds * form.width()),
-            buffer(&self.intact, words * sites),
-            buffer(force, D * sites),
-            buffer(&self.velocity, D * sites),
-            InputScalar::new(self.push, element),
-            form,
-            element,
-        );
-    }
-
-    fn leap(&self) {
-        let (sites, element) = (self.bonds.sites(), self.precision.element());
-        leap::launch(
-            &self.client,
-            self.cubes(),
-            CubeDim::new_1d(CUBE),
-            buffer(&self.force, D * sites),
-            buffer(&self.particles, self.bonds.particles().len()),
-            buffer(&self.held, sites),
-            buffer(&self.velocity, D * sites),
-            buffer(&self.displacement, D * sites),
-            InputScalar::new(self.push, element),
-            D,
-            element,
-        );
-    }
-}
-
-/// A buffer as a kernel takes it.
-fn buffer(handle: &Handle, length: usize) -> BufferArg {
-    // SAFETY: every buffer is made from a list of `length` numbers of the kernel's type, here and in `upload`.
-    unsafe { BufferArg::from_raw_parts(handle.clone(), length) }
-}
-
-/// The rows of a stencil in spacings, what they are compiled for, and the force density, N/m³, that is 1 in them: the greatest
-/// stiffness times the spacing.
-fn stencil<const D: usize>(
-    bonds: &LatticeBonds<D>,
-    law: &KernelFit,
-    modulus: f64,
-    critical: Option<f64>,
-) -> Result<(Form, Vec<f64>, f64), Error> {
-    let (spacing, physical) = (bonds.spacing(), bonds.stencil_bonds(modulus));
-    let unit = spacing * physical.iter().map(|bond| bond.stiffness.abs()).fold(0.0, f64::max);
-    let offsets = physical.iter().zip(&bonds.stencil().offsets);
-    let scaled: Vec<StencilBond<D>> = offsets
-        .map(|(bond, offset)| StencilBond {
-            bond: offset.map(f64::from),
-            stiffness: bond.stiffness * spacing / unit,
-            ..*bond
+    /// Numbers of a buffer.
+    pub(super) fn values(&self, from: &Handle) -> Result<Vec<f64>, Error> {
+        let bytes = self.client.read_one(from.clone()).map_err(|error| failed(&error))?;
+        Ok(match self.precision {
+            Precision::Single => f32::from_bytes(&bytes).iter().map(|&x| f64::from(x)).collect(),
+            Precision::Double => f64::from_bytes(&bytes).to_vec(),
         })
-        .collect();
-    let Some(laws) = scaled_laws(law, &scaled).filter(|_| unit > 0.0 && unit.is_finite()) else {
-        let what = format!("{} of modulus {modulus} N/m⁶", law.kind());
-        return Err(Error::Device(format!(
-            "law of the bonds: found a {what}; allowed: a polynomial or rational, above 0"
-        )));
-    };
-    let form = Form {
-        dimension: D,
-        bonds: scaled.len(),
-        numerator: laws[0].numerator.len(),
-        denominator: laws[0].denominator.len(),
-        breaks: critical.is_some(),
-        kicks: true,
-    };
-    let mut rows = Vec::with_capacity(form.bonds * form.width());
-    for (bond, law) in scaled.iter().zip(&laws) {
-        let breaks = critical.map_or(f64::INFINITY, |stretch| (stretch * stretch - 1.0) / law.inverse_square);
-        let head: [f64; HEAD] = [law.clamp[0], law.clamp[1], law.constant, breaks];
-        rows.extend(bond.bond.iter().chain(&head).chain(&law.numerator).chain(&law.denominator));
     }
-    Ok((form, rows, unit))
+}
+
+/// Cubes of threads with `tile` particles each.
+pub(super) fn cubes(particles: usize, tile: usize) -> usize {
+    particles.div_ceil(CUBE * tile)
 }
 
 /// Words of 64 bonds, each over all sites, as words of 32.
@@ -342,9 +300,10 @@ fn upload<const D: usize>(client: &Client, precision: Precision, field: &Field<D
     numbers(client, precision, field.components().into_iter().flatten().map(|x| x * scale))
 }
 
-fn numbers(client: &Client, precision: Precision, values: impl Iterator<Item = f64>) -> Handle {
+pub(super) fn numbers(client: &Client, precision: Precision, values: impl Iterator<Item = f64>) -> Handle {
     match precision {
-        // not beyond what single precision holds: ends of a law may be infinite, and no kernel has to know that
+        // not beyond the range of single precision: ends of a law may be infinite, and no kernel has to know
+        // that
         Precision::Single => {
             let single = |x: f64| if x.is_infinite() { f32::MAX.copysign(x as f32) } else { x as f32 };
             client.create_from_slice(f32::as_bytes(&values.map(single).collect::<Vec<_>>()))
@@ -353,12 +312,12 @@ fn numbers(client: &Client, precision: Precision, values: impl Iterator<Item = f
     }
 }
 
-fn failed(error: &ServerError) -> Error {
+pub(super) fn failed(error: &ServerError) -> Error {
     let text = error.to_string();
     Error::Device(text.split("\nBacktrace").next().unwrap_or_default().to_owned())
 }
 
-/// Whether a device holds these buffers, bytes each by name.
+/// Refuses buffers, bytes each by name, that a device does not hold.
 fn hold(device: &Device, buffers: &[(&str, u64)]) -> Result<(), Error> {
     let (name, one) = (device.name(), device.largest_buffer());
     if let Some((what, bytes)) = buffers.iter().find(|(_, bytes)| *bytes > one) {

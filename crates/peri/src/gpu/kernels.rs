@@ -1,11 +1,29 @@
-//! What runs on a device, one particle a thread. Fields lie component by component, as in [`crate::field::Field`].
+//! Kernels of a lattice in motion. Fields lie component by component, as in [`crate::field::Field`]; lengths
+//! are in spacings and velocities in spacings a step. No kernel checks its indices: buffers have the lengths
+//! that [`super::body`] gives them.
 
 use cubecl::ir::ElemType;
 use cubecl::prelude::*;
 
-/// What the kernels are compiled for.
+/// Threads of a cube.
+pub const CUBE: usize = 128;
+/// Sums of the first half of a step: force times increment where held, velocity times increment where free,
+/// body force times increment, greatest increment.
+pub const LEAP_SUMS: usize = 4;
+/// Sums of the second half: v², force times increment where held, gain of v² where held, velocity times
+/// increment where free, body force times increment.
+pub const KICK_SUMS: usize = 5;
+/// Sums of a step.
+pub const SUMS: usize = LEAP_SUMS + KICK_SUMS;
+/// Numbers of a bond: ξ, 1/|ξ|², stiffness.
+pub const ROW: usize = 2;
+/// Numbers of a law beyond its coefficients: value at e = 0, least and greatest e, the e from which bonds are
+/// listed.
+pub const ENDS: usize = 4;
+
+/// Constants that kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Form {
+pub struct KernelForm {
     /// Dimension of the body.
     pub dimension: usize,
     /// Bonds of the stencil.
@@ -14,157 +32,459 @@ pub struct Form {
     pub numerator: usize,
     /// Coefficients of its denominator beyond the leading 1.
     pub denominator: usize,
-    /// Whether bonds break.
-    pub breaks: bool,
-    /// Whether velocities follow the forces.
-    pub kicks: bool,
+    /// Whether the law is constant beyond its ends.
+    pub clamped: bool,
+    /// Whether the law has a value at e = 0.
+    pub stressed: bool,
+    /// Whether components are held.
+    pub held: bool,
+    /// Whether body forces act.
+    pub loaded: bool,
+    /// Particles of a thread.
+    pub tile: usize,
+    /// Bonds of a particle that are taken together, a divisor of all its bonds: 1 or 2.
+    pub unroll: usize,
 }
 
-/// Numbers of a row before its bond's coefficients: the ends of the law in E, its value at E = 0, and the E at which the bond breaks.
-pub const HEAD: usize = 4;
-
-impl Form {
-    /// Numbers of a row: the bond ξ, [`HEAD`], numerator, denominator.
-    pub fn width(&self) -> usize {
-        self.dimension + HEAD + self.numerator + self.denominator
+impl KernelForm {
+    /// Numbers of the law.
+    pub fn law(&self) -> usize {
+        self.numerator + self.denominator + ENDS
     }
 }
 
-/// Forces Σ_J q(E) ζ with E = η·(2ξ + η) of every particle, the half kick v ← v + `push`·f of its free components, and the bonds
-/// with E > E_c taken from those that are intact: f is then the force of what is left.
+/// Adds the force of bond `k` on the particle `p` of a thread, in `site`; its e.
+#[cube]
+#[allow(clippy::too_many_arguments)]
+fn add_bond<F: Float>(
+    displacement: &[F],
+    shifts: &[i32],
+    rows: &[F],
+    law: &Array<F>,
+    own: &Array<F>,
+    sum: &mut Array<F>,
+    site: u32,
+    k: usize,
+    #[comptime] p: usize,
+    #[comptime] form: KernelForm,
+) -> F {
+    let dimension = comptime!(form.dimension);
+    let sites = displacement.len() / dimension;
+    let row = k * comptime!(form.dimension + ROW);
+    let there = (site as i32 + shifts[k]) as usize;
+    let mut zeta = Array::<F>::new(dimension);
+    let mut e = F::new(0.0);
+    #[unroll]
+    for d in 0..dimension {
+        let bond = rows[row + d];
+        let eta = displacement[d * sites + there] - own[p * dimension + d];
+        zeta[d] = bond + eta;
+        e = fma(eta, zeta[d] + bond, e);
+    }
+    e *= rows[row + dimension];
+    let ends = comptime!(form.numerator + form.denominator);
+    let mut at = e;
+    if comptime!(form.clamped) {
+        at = F::max(law[ends + 1], F::min(e, law[ends + 2]));
+    }
+    let mut q = law[comptime!(form.numerator - 1)];
+    #[unroll]
+    for j in 1..comptime!(form.numerator) {
+        q = fma(q, at, law[comptime!(form.numerator - 1 - j)]);
+    }
+    if comptime!(form.denominator > 0) {
+        let mut below = law[comptime!(form.numerator + form.denominator - 1)];
+        #[unroll]
+        for j in 1..comptime!(form.denominator) {
+            below = fma(below, at, law[comptime!(form.numerator + form.denominator - 1 - j)]);
+        }
+        q /= fma(below, at, F::new(1.0));
+    }
+    q *= at;
+    if comptime!(form.stressed) {
+        q += law[ends];
+    }
+    q *= rows[row + dimension + 1];
+    #[unroll]
+    for d in 0..dimension {
+        sum[p * dimension + d] = fma(q, zeta[d], sum[p * dimension + d]);
+    }
+    e
+}
+
+/// Lists a bond, and counts it where the list is full.
+#[cube]
+fn note<F: Float>(count: &[Atomic<u32>], list: &mut [u32], elongations: &mut [F], site: u32, k: usize, e: F) {
+    let place = count[0].fetch_add(1u32) as usize;
+    if place < elongations.len() {
+        list[2 * place] = site;
+        list[2 * place + 1] = k as u32;
+        elongations[place] = e;
+    }
+}
+
+/// Force densities Σ_J c q(e) ζ of particles, with e = η·(2ξ + η)/|ξ|², plus `factor` times the body force.
+/// Where it `looks`, each thread writes the least and greatest e of its bonds, and lists bonds beyond the
+/// law's last number.
 ///
-/// A thread writes what belongs to its own particle; the two ends of a bond find the same bits of E, so both break it.
-#[cube(launch)]
-// a kernel's buffers; what is decided before it is compiled, around what is decided when it runs
+/// The two ends of a bond find the same bits of e.
+#[cube(launch_unchecked)]
 #[allow(clippy::too_many_arguments, clippy::collapsible_if)]
 pub fn pull<F: Float>(
     displacement: &[F],
     particles: &[u32],
-    held: &[u32],
     shifts: &[i32],
     rows: &[F],
-    intact: &mut [u32],
+    law: &[F],
+    intact: &[u32],
+    body: &[F],
     force: &mut [F],
-    velocity: &mut [F],
-    push: InputScalar,
-    #[comptime] form: Form,
+    ranges: &mut [F],
+    count: &[Atomic<u32>],
+    list: &mut [u32],
+    elongations: &mut [F],
+    factor: InputScalar,
+    #[comptime] form: KernelForm,
+    #[comptime] looks: bool,
     #[define(F)] _precision: ElemType,
 ) {
-    if ABSOLUTE_POS >= particles.len() {
+    let dimension = comptime!(form.dimension);
+    let tile = comptime!(form.tile);
+    let total = particles.len();
+    let first = ABSOLUTE_POS / comptime!(CUBE) * comptime!(CUBE * form.tile) + ABSOLUTE_POS % comptime!(CUBE);
+    if ABSOLUTE_POS / comptime!(CUBE) * comptime!(CUBE * form.tile) >= total {
         terminate!();
     }
-    let dimension = comptime!(form.dimension);
-    let numerator = comptime!(form.dimension + HEAD);
-    let denominator = comptime!(form.dimension + HEAD + form.numerator);
-    let site = particles[ABSOLUTE_POS] as usize;
     let sites = displacement.len() / dimension;
-    let mut own = Array::<F>::new(dimension);
-    let mut zeta = Array::<F>::new(dimension);
-    let mut sum = Array::<F>::new(dimension);
-    let mut lost = Array::<F>::new(dimension);
+    let mut site = Array::<u32>::new(tile);
+    let mut before = Array::<u32>::new(tile);
+    let mut own = Array::<F>::new(comptime!(form.tile * form.dimension));
+    let mut sum = Array::<F>::new(comptime!(form.tile * form.dimension));
+    let mut coefficients = Array::<F>::new(comptime!(form.law()));
     #[unroll]
-    for d in 0..dimension {
-        own[d] = displacement[d * sites + site];
-        sum[d] = F::new(0.0);
-        lost[d] = F::new(0.0);
+    for j in 0..comptime!(form.law()) {
+        coefficients[j] = law[j];
     }
+    #[unroll]
+    for p in 0..tile {
+        site[p] = particles[usize::min(first + p * comptime!(CUBE), total - 1)];
+        #[unroll]
+        for d in 0..dimension {
+            own[p * dimension + d] = displacement[d * sites + site[p] as usize];
+            sum[p * dimension + d] = F::new(0.0);
+        }
+    }
+    let mut low = F::new(0.0);
+    let mut high = F::new(0.0);
+    let ends = comptime!(form.numerator + form.denominator);
     let words = comptime!(form.bonds.div_ceil(32));
     for word in 0..words {
-        let before = intact[word * sites + site];
-        let mut after = before;
-        let first = 32 * word;
-        let last = usize::min(first + 32, comptime!(form.bonds));
-        for k in first..last {
-            let bit = 1u32 << ((k - first) as u32);
-            if before & bit != 0 {
-                let row = k * comptime!(form.width());
-                let there = (site as i32 + shifts[k]) as usize;
-                let mut e = F::new(0.0);
-                #[unroll]
-                for d in 0..dimension {
-                    let bond = rows[row + d];
-                    let eta = displacement[d * sites + there] - own[d];
-                    zeta[d] = bond + eta;
-                    e = fma(eta, zeta[d] + bond, e);
-                }
-                let clamped = F::max(rows[row + dimension], F::min(e, rows[row + dimension + 1]));
-                let mut q = rows[row + numerator + comptime!(form.numerator - 1)];
-                #[unroll]
-                for j in 1..comptime!(form.numerator) {
-                    q = fma(q, clamped, rows[row + numerator + comptime!(form.numerator - 1 - j)]);
-                }
-                if comptime!(form.denominator > 0) {
-                    let mut below = rows[row + denominator + comptime!(form.denominator - 1)];
+        let mut any = 0u32;
+        let mut all = 0xffff_ffffu32;
+        #[unroll]
+        for p in 0..tile {
+            let inside = first + p * comptime!(CUBE) < total;
+            before[p] = select(inside, intact[word * sites + site[p] as usize], 0u32);
+            any |= before[p];
+            all &= before[p];
+        }
+        if any != 0 {
+            let start = 32 * word;
+            let last = usize::min(start + 32, comptime!(form.bonds));
+            let whole = 0xffff_ffffu32 >> ((32 - (last - start)) as u32);
+            if all == whole {
+                // no branch, so that loads of several bonds are under way together
+                let mut k = start;
+                while k < last {
+                    let mut seen = Array::<F>::new(comptime!(form.tile * form.unroll));
+                    let mut greatest = F::new(0.0);
                     #[unroll]
-                    for j in 1..comptime!(form.denominator) {
-                        below = fma(
-                            below,
-                            clamped,
-                            rows[row + denominator + comptime!(form.denominator - 1 - j)],
-                        );
-                    }
-                    q /= fma(below, clamped, F::new(1.0));
-                }
-                q = fma(q, clamped, rows[row + dimension + 2]);
-                #[unroll]
-                for d in 0..dimension {
-                    sum[d] = fma(q, zeta[d], sum[d]);
-                }
-                if comptime!(form.breaks) {
-                    if e > rows[row + dimension + 3] {
-                        after &= !bit;
+                    for next in 0..comptime!(form.unroll) {
                         #[unroll]
-                        for d in 0..dimension {
-                            lost[d] = fma(q, zeta[d], lost[d]);
+                        for p in 0..tile {
+                            let e = add_bond::<F>(
+                                displacement,
+                                shifts,
+                                rows,
+                                &coefficients,
+                                &own,
+                                &mut sum,
+                                site[p],
+                                k + next,
+                                p,
+                                form,
+                            );
+                            if comptime!(looks) {
+                                seen[next * tile + p] = e;
+                                low = F::min(low, e);
+                                greatest = F::max(greatest, e);
+                            }
+                        }
+                    }
+                    if comptime!(looks) {
+                        high = F::max(high, greatest);
+                        if greatest > coefficients[ends + 3] {
+                            #[unroll]
+                            for next in 0..comptime!(form.unroll) {
+                                #[unroll]
+                                for p in 0..tile {
+                                    let e = seen[next * tile + p];
+                                    if e > coefficients[ends + 3] {
+                                        note::<F>(count, list, elongations, site[p], k + next, e);
+                                    }
+                                }
+                            }
+                        }
+                    }
+                    k += comptime!(form.unroll);
+                }
+            } else {
+                for k in start..last {
+                    let bit = 1u32 << ((k - start) as u32);
+                    #[unroll]
+                    for p in 0..tile {
+                        if before[p] & bit != 0 {
+                            let e = add_bond::<F>(
+                                displacement,
+                                shifts,
+                                rows,
+                                &coefficients,
+                                &own,
+                                &mut sum,
+                                site[p],
+                                k,
+                                p,
+                                form,
+                            );
+                            if comptime!(looks) {
+                                low = F::min(low, e);
+                                high = F::max(high, e);
+                                if e > coefficients[ends + 3] {
+                                    note::<F>(count, list, elongations, site[p], k, e);
+                                }
+                            }
                         }
                     }
                 }
             }
         }
-        if comptime!(form.breaks) {
-            if after != before {
-                intact[word * sites + site] = after;
+    }
+    let factor = factor.get::<F>();
+    #[unroll]
+    for p in 0..tile {
+        if first + p * comptime!(CUBE) < total {
+            #[unroll]
+            for d in 0..dimension {
+                let to = d * sites + site[p] as usize;
+                let mut all = sum[p * dimension + d];
+                if comptime!(form.loaded) {
+                    all = fma(factor, body[to], all);
+                }
+                force[to] = all;
             }
         }
     }
-    let push = push.get::<F>();
-    #[unroll]
-    for d in 0..dimension {
-        if comptime!(form.kicks) {
-            if held[site] >> (d as u32) & 1 == 0 {
-                velocity[d * sites + site] = fma(push, sum[d], velocity[d * sites + site]);
-            }
-        }
-        force[d * sites + site] = sum[d] - lost[d];
+    if comptime!(looks) {
+        ranges[ABSOLUTE_POS] = low;
+        ranges[ranges.len() / 2 + ABSOLUTE_POS] = high;
     }
 }
 
-/// The half kick of the free components, v ← v + `push`·f, and u ← u + v; velocities are displacements a step.
-#[cube(launch)]
+/// The half kick of the free components, v ← `keep`·v + `push`·f, and u ← u + v; held components go to
+/// `after` times the full displacement. Each thread writes its [`LEAP_SUMS`].
+#[cube(launch_unchecked)]
+#[allow(clippy::too_many_arguments)]
 pub fn leap<F: Float>(
     force: &[F],
     particles: &[u32],
     held: &[u32],
+    full: &[F],
+    body: &[F],
     velocity: &mut [F],
     displacement: &mut [F],
+    partial: &mut [F],
+    ratio: InputScalar,
+    keep: InputScalar,
     push: InputScalar,
-    #[comptime] dimension: usize,
+    after: InputScalar,
+    #[comptime] form: KernelForm,
     #[define(F)] _precision: ElemType,
 ) {
-    if ABSOLUTE_POS >= particles.len() {
+    let dimension = comptime!(form.dimension);
+    let threads = partial.len() / comptime!(SUMS);
+    if ABSOLUTE_POS >= threads {
         terminate!();
     }
-    let site = particles[ABSOLUTE_POS] as usize;
     let sites = displacement.len() / dimension;
+    let ratio = ratio.get::<F>();
+    let keep = keep.get::<F>();
     let push = push.get::<F>();
-    #[unroll]
-    for d in 0..dimension {
-        let at = d * sites + site;
-        let mut speed = velocity[at];
-        if held[site] >> (d as u32) & 1 == 0 {
-            speed = fma(push, force[at], speed);
+    let after = after.get::<F>();
+    let mut held_work = F::new(0.0);
+    let mut damped = F::new(0.0);
+    let mut body_work = F::new(0.0);
+    let mut greatest = F::new(0.0);
+    let mut index = ABSOLUTE_POS;
+    while index < particles.len() {
+        let site = particles[index] as usize;
+        #[unroll]
+        for d in 0..dimension {
+            let at = d * sites + site;
+            let old = ratio * velocity[at];
+            let pull = force[at];
+            let here = displacement[at];
+            let mut speed = fma(push, pull, keep * old);
+            let mut increment = speed;
+            let mut there = here + speed;
+            if comptime!(form.held) {
+                if (held[site] >> (d as u32)) & 1u32 != 0 {
+                    there = after * full[at];
+                    increment = there - here;
+                    speed = old;
+                    held_work = fma(pull, increment, held_work);
+                } else {
+                    damped = fma(old, increment, damped);
+                }
+            } else {
+                damped = fma(old, increment, damped);
+            }
+            if comptime!(form.loaded) {
+                body_work = fma(body[at], increment, body_work);
+            }
+            greatest = F::max(greatest, F::max(increment, F::new(0.0) - increment));
+            velocity[at] = speed;
+            displacement[at] = there;
+        }
+        index += threads;
+    }
+    partial[ABSOLUTE_POS] = held_work;
+    partial[threads + ABSOLUTE_POS] = damped;
+    partial[2 * threads + ABSOLUTE_POS] = body_work;
+    partial[3 * threads + ABSOLUTE_POS] = greatest;
+}
+
+/// The second half kick of the free components, v ← `keep`·(v + `push`·f); held components have `rate` times
+/// the full displacement and have moved by `gain` times it. Each thread writes its [`KICK_SUMS`].
+#[cube(launch_unchecked)]
+#[allow(clippy::too_many_arguments)]
+pub fn kick<F: Float>(
+    force: &[F],
+    particles: &[u32],
+    held: &[u32],
+    full: &[F],
+    body: &[F],
+    velocity: &mut [F],
+    partial: &mut [F],
+    keep: InputScalar,
+    push: InputScalar,
+    rate: InputScalar,
+    gain: InputScalar,
+    #[comptime] form: KernelForm,
+    #[define(F)] _precision: ElemType,
+) {
+    let dimension = comptime!(form.dimension);
+    let threads = partial.len() / comptime!(SUMS);
+    if ABSOLUTE_POS >= threads {
+        terminate!();
+    }
+    let sites = velocity.len() / dimension;
+    let keep = keep.get::<F>();
+    let push = push.get::<F>();
+    let rate = rate.get::<F>();
+    let gain = gain.get::<F>();
+    let mut square = F::new(0.0);
+    let mut held_work = F::new(0.0);
+    let mut gained = F::new(0.0);
+    let mut damped = F::new(0.0);
+    let mut body_work = F::new(0.0);
+    let mut index = ABSOLUTE_POS;
+    while index < particles.len() {
+        let site = particles[index] as usize;
+        #[unroll]
+        for d in 0..dimension {
+            let at = d * sites + site;
+            let old = velocity[at];
+            let pull = force[at];
+            let mut increment = old;
+            let mut speed = keep * fma(push, pull, old);
+            if comptime!(form.held) {
+                if (held[site] >> (d as u32)) & 1u32 != 0 {
+                    increment = gain * full[at];
+                    speed = rate * full[at];
+                    held_work = fma(pull, increment, held_work);
+                    gained += speed * speed - old * old;
+                } else {
+                    damped = fma(speed, increment, damped);
+                }
+            } else {
+                damped = fma(speed, increment, damped);
+            }
+            if comptime!(form.loaded) {
+                body_work = fma(body[at], increment, body_work);
+            }
+            square = fma(speed, speed, square);
             velocity[at] = speed;
         }
-        displacement[at] += speed;
+        index += threads;
+    }
+    let start = comptime!(LEAP_SUMS) * threads + ABSOLUTE_POS;
+    partial[start] = square;
+    partial[start + threads] = held_work;
+    partial[start + 2 * threads] = gained;
+    partial[start + 3 * threads] = damped;
+    partial[start + 4 * threads] = body_work;
+}
+
+/// Sums, or extremes, of `rows` lists: thread i of `lanes` takes every `lanes`th number from i on, in order.
+/// Bit r of `greatest` and `least`: list r has its extreme taken.
+#[cube(launch_unchecked)]
+pub fn fold<F: Float>(
+    from: &[F],
+    into: &mut [F],
+    lanes: InputScalar,
+    start: InputScalar,
+    #[comptime] rows: usize,
+    #[comptime] greatest: u32,
+    #[comptime] least: u32,
+    #[define(F)] _precision: ElemType,
+) {
+    let lanes = lanes.get::<u32>() as usize;
+    let start = start.get::<u32>() as usize;
+    if ABSOLUTE_POS >= lanes {
+        terminate!();
+    }
+    let length = from.len() / rows;
+    #[unroll]
+    for row in 0..rows {
+        let mut sum = F::new(0.0);
+        let mut index = ABSOLUTE_POS;
+        while index < length {
+            let value = from[row * length + index];
+            if comptime!((greatest >> row) & 1 == 1) {
+                sum = F::max(sum, value);
+            } else if comptime!((least >> row) & 1 == 1) {
+                sum = F::min(sum, value);
+            } else {
+                sum += value;
+            }
+            index += lanes;
+        }
+        into[start + row * lanes + ABSOLUTE_POS] = sum;
+    }
+}
+
+/// Replaces words of a list.
+#[cube(launch_unchecked)]
+pub fn scatter(places: &[u32], values: &[u32], into: &mut [u32]) {
+    if ABSOLUTE_POS < places.len() {
+        into[places[ABSOLUTE_POS] as usize] = values[ABSOLUTE_POS];
+    }
+}
+
+/// Copies a list.
+#[cube(launch_unchecked)]
+pub fn copy<F: Float>(from: &[F], into: &mut [F], #[define(F)] _precision: ElemType) {
+    if ABSOLUTE_POS < from.len() {
+        into[ABSOLUTE_POS] = from[ABSOLUTE_POS];
     }
 }

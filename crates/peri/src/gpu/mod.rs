@@ -1,31 +1,22 @@
-//! Lattices on a graphics card (feature `gpu`): forces and velocity Verlet with bonds that break, many steps without a copy to the host.
+//! Lattices on a graphics card (feature `gpu`): velocity Verlet with bonds that break.
 //!
-//! A [`Device`] is a card, or a program that does as one does; [`DeviceBody`] is a lattice on it, with the stencil, the fitted law and
-//! the bits of intact bonds of the host's kernel (see [`crate::potential::KernelFit`]). The kernels are written once, in Rust, and
-//! compiled for the device when they first run ([`cubecl`](https://docs.rs/cubecl)). Lengths are in spacings there and velocities in
-//! spacings a step, so that nothing leaves the range of single precision; stretches come from differences of displacements.
+//! A [`Device`] is a card, or a program that stands for one; [`DeviceBody`] is a lattice on it, with the
+//! stencil, the fitted law and the bits of intact bonds of the host's kernel (see
+//! [`crate::potential::KernelFit`]). The kernels are written once, in Rust, and compiled for the device when
+//! they first run ([`cubecl`](https://docs.rs/cubecl)). Lengths are in spacings there and velocities in
+//! spacings a step, so that nothing leaves the range of single precision; stretches come from differences of
+//! displacements.
 //!
-//! ```no_run
-//! # use peri::{Error, bonds::{BodyGeometry, BondDamage, BondForces, LatticeBonds}, field::Field, potential::KernelFit};
-//! use peri::gpu::{Device, DeviceBody, Start};
-//! # fn run(mut bonds: LatticeBonds<3>, law: &KernelFit, modulus: f64, start: &Start<3>) -> Result<(), Error> {
-//! let device = Device::portable()?;
-//! let mut body = DeviceBody::new(&device, &bonds, law, modulus, Some(1.02))?;
-//! body.start(start)?;
-//! body.advance(1000)?;
-//! let (state, intact) = (body.state()?, body.intact()?);
-//! bonds.restore(&intact);
-//! # Ok(())
-//! # }
-//! ```
-//!
-//! What the kernels do not know is refused by name: laws that only a table represents, surface factors, softened bonds. Contact,
-//! body forces, damping and a watch on the time step are the host's ([`crate::solver::VelocityVerlet`]).
+//! [`VelocityVerlet::solve_on`](crate::solver::VelocityVerlet::solve_on) takes the steps of a
+//! [`System`](crate::solver::System) on a device: the host decides as it does without one, from sums of each
+//! step, and fetches fields for rows of the history only.
 
 mod body;
 mod kernels;
+mod steps;
 
-pub use body::{DeviceBody, Motion, Start};
+pub use body::{DeviceBody, DeviceLoads, MOST_STEPS};
+pub use steps::{DeviceStep, ListedBond, StepSums};
 
 use crate::error::Error;
 use cubecl::client::Client;
@@ -69,8 +60,9 @@ pub struct Device {
 }
 
 impl Device {
-    /// A card behind Vulkan, Metal or DirectX 12, the fastest there is; where there is no card, a program that stands for one
-    /// (Mesa's lavapipe). `CUBECL_WGPU_DEFAULT_DEVICE` names another one: `DiscreteGpu(1)`, `Cpu`.
+    /// A card behind Vulkan, Metal or DirectX 12, the fastest there is; where there is no card, a program
+    /// that stands for one (Mesa's lavapipe). `CUBECL_WGPU_DEFAULT_DEVICE` names another one:
+    /// `DiscreteGpu(1)`, `Cpu`.
     ///
     /// # Errors
     /// [`Error::Device`] where this machine has none.
@@ -78,8 +70,8 @@ impl Device {
         Self::open(cubecl::Device::wgpu(WgpuDeviceKind::default()))
     }
 
-    /// The card that CUDA counts as `index`, in programs that depend on `cubecl` with its feature `cuda`: this crate does not turn it
-    /// on, as its build downloads a compiler from GitHub.
+    /// The card that CUDA counts as `index`, in programs that depend on `cubecl` with its feature `cuda`:
+    /// this crate does not turn it on, as its build downloads a compiler from GitHub.
     ///
     /// # Errors
     /// [`Error::Device`] where this machine has none, or this build no CUDA.
@@ -94,13 +86,18 @@ impl Device {
         Ok(Self { client, precision })
     }
 
-    /// What the device calls itself.
+    /// True for a card, false for a program that stands for one.
+    pub fn is_card(&self) -> bool {
+        self.client.properties().identity.physical.is_some()
+    }
+
+    /// Name that the device gives itself.
     pub fn name(&self) -> &str {
         &self.client.properties().identity.name
     }
 
-    /// Bytes that a buffer may have: a field of a body, of D numbers a site, must fit into one. At most 4 GiB, as kernels count in
-    /// 32 bits.
+    /// Bytes that a buffer may have: a field of a body, of D numbers a site, must fit into one. At most 4
+    /// GiB, as kernels count in 32 bits.
     pub fn largest_buffer(&self) -> u64 {
         self.client.properties().memory.max_page_size.min(1 << 32)
     }

@@ -1,22 +1,24 @@
-//! Rubber as the full network: a Langevin chain along every bond, and a pressure that keeps the volume.
+//! Rubber as the full network: a Langevin chain along every bond, and a pressure that conserves the volume.
 
-use super::crushed::{logarithm, logarithm_slopes};
+use super::compression::{logarithm, logarithm_slopes};
 use super::eight_chain::LINEAR;
 use super::point::{GRADIENT, LEAST_SHAPE};
-use super::tensor::{Tensor, cofactor, invert};
+use super::tensor::{BodyTensor, cofactor, invert};
 use super::{Bond, Family, Material};
 use crate::bonds::BodyGeometry;
 use crate::calibrate::modulus_in;
 use crate::error::Error;
 use polycore::langevin;
 
-/// Chains of n links along the bonds of a family in space, which move with it (Treloar & Riding 1979, doi:10.1098/rspa.1979.0163):
-/// W = Σ ŵψ(λ) − ½ψ′(1)(M − 1/3):(FᵀF − 1) − ⅓ψ′(1) ln J + ¼κ(J² − 1 − 2 ln J), per intact part I of the family, with ŵ, M and F of
-/// [`super::Deformation`] and ψ = c n [xβ + ln(β/sinh β)], x = λ/√n, β = 𝓛⁻¹(x), ψ′ = c√n β.
+/// Chains of n links along the bonds of a family in space, which move with it (Treloar & Riding 1979,
+/// doi:10.1098/rspa.1979.0163): W = Σ ŵψ(λ) − ½ψ′(1)(M − 1/3):(FᵀF − 1) − ⅓ψ′(1) ln J + ¼κ(J² − 1 − 2 ln J),
+/// per intact part I of the family, with ŵ, M and F of [`super::Deformation`] and ψ = c n [xβ + ln(β/sinh
+/// β)], x = λ/√n, β = 𝓛⁻¹(x), ψ′ = c√n β.
 ///
-/// The second term takes off what the pre-tension of chains does in families that are not isotropic (edges, lattices). A homogeneous
-/// deformation is exact, rest has no force, and Poisson's ratio is free. Where too few bonds are left for a gradient, springs of the
-/// same shear modulus act as in [`super::NonlocalSolid`].
+/// The second term removes the effect of the chains' pre-tension in families that are not isotropic (edges,
+/// lattices). A homogeneous deformation is exact, the reference state has no force, and Poisson's ratio is
+/// free. If too few bonds are left for a gradient, springs of the same shear modulus act as in
+/// [`super::NonlocalSolid`].
 #[derive(Clone, Copy, Debug)]
 pub struct Affine {
     shear: f64,
@@ -28,7 +30,7 @@ pub struct Affine {
 }
 
 impl Affine {
-    /// Of a shear modulus μ and a bulk modulus K at rest, Pa, and n > 1 links a chain.
+    /// Creates the law of a shear modulus μ and a bulk modulus K at rest, Pa, and n > 1 links a chain.
     ///
     /// # Errors
     /// [`Error::Parameter`].
@@ -89,26 +91,26 @@ impl Affine {
     }
 }
 
-/// What a particle knows of its family.
+/// State of a particle's family.
 #[derive(Clone, Debug)]
 pub struct AffinePoint {
     /// Σ_J V_J of the whole family and of the intact bonds, m³.
     whole: f64,
     intact: f64,
     /// M, M⁻¹ and 3 λ_min(M).
-    shape: Tensor<3>,
-    inverse: Tensor<3>,
+    shape: BodyTensor<3>,
+    inverse: BodyTensor<3>,
     least: f64,
-    gradient: Tensor<3>,
-    /// Q = P M⁻¹ of what is not chains, Pa.
-    stress: Tensor<3>,
-    /// A bound of the stiffness of `stress`, N/m⁴.
+    gradient: BodyTensor<3>,
+    /// Q = P M⁻¹ without chains, Pa.
+    stress: BodyTensor<3>,
+    /// Bound of the stiffness of `stress`, N/m⁴.
     own: f64,
 }
 
 impl Default for AffinePoint {
     fn default() -> Self {
-        let zero = Tensor::zeros();
+        let zero = BodyTensor::zeros();
         let (shape, inverse, gradient, stress) = (zero, zero, zero, zero);
         Self { whole: 0.0, intact: 0.0, shape, inverse, least: 0.0, gradient, stress, own: 0.0 }
     }
@@ -133,7 +135,7 @@ impl Material<3> for Affine {
     }
 
     fn prepare(&self, family: &Family<3>, point: &mut AffinePoint) {
-        let (mut shape, mut moment, mut intact) = (Tensor::<3>::zeros(), Tensor::<3>::zeros(), 0.0);
+        let (mut shape, mut moment, mut intact) = (BodyTensor::<3>::zeros(), BodyTensor::<3>::zeros(), 0.0);
         family.each(|bond| {
             let share = bond.volume / (bond.length * bond.length);
             let reference = nalgebra::Vector3::from(bond.reference);
@@ -149,11 +151,11 @@ impl Material<3> for Affine {
             point.intact = intact;
         }
         if !point.has_gradient() {
-            (point.gradient, point.stress) = (Tensor::zeros(), Tensor::zeros());
+            (point.gradient, point.stress) = (BodyTensor::zeros(), BodyTensor::zeros());
             return;
         }
-        point.gradient = moment / intact * point.inverse + Tensor::identity();
-        let excess = point.shape - Tensor::identity() / 3.0;
+        point.gradient = moment / intact * point.inverse + BodyTensor::identity();
+        let excess = point.shape - BodyTensor::identity() / 3.0;
         let pressure = cofactor(&point.gradient) * self.volume(point.change())[1];
         point.stress = (pressure - point.gradient * excess * self.tension(1.0)[0]) * point.inverse;
     }
@@ -164,7 +166,7 @@ impl Material<3> for Affine {
             return;
         }
         let [_, first, second] = self.volume(point.change());
-        let excess = (point.shape - Tensor::identity() / 3.0).norm() * self.tension(1.0)[0];
+        let excess = (point.shape - BodyTensor::identity() / 3.0).norm() * self.tension(1.0)[0];
         let gradient = excess
             + first.abs() * point.gradient.norm()
             + second.max(0.0) * cofactor(&point.gradient).norm_squared();
@@ -175,7 +177,7 @@ impl Material<3> for Affine {
     /// τ = [ψ′ ζ/(|ζ||ξ|) + Qξ/|ξ|²]/Σ_K V_K of both ends.
     fn force(&self, bond: &Bond<3>, own: &AffinePoint, other: &AffinePoint) -> [f64; 3] {
         let square = bond.length * bond.length;
-        let (mut along, mut stress) = (0.0, Tensor::<3>::zeros());
+        let (mut along, mut stress) = (0.0, BodyTensor::<3>::zeros());
         for end in [own, other] {
             if end.has_gradient() {
                 along += self.tension(bond.stretch())[0] / end.whole;
@@ -197,13 +199,13 @@ impl Material<3> for Affine {
             return 7.5 * self.shear * springs / point.whole;
         }
         let chains = family.sum(|bond| bond.volume * self.chain_energy(bond.stretch())) / point.whole;
-        let excess = point.shape - Tensor::identity() / 3.0;
-        let strain = point.gradient.transpose() * point.gradient - Tensor::identity();
+        let excess = point.shape - BodyTensor::identity() / 3.0;
+        let strain = point.gradient.transpose() * point.gradient - BodyTensor::identity();
         let rest = self.volume(point.change())[0] - 0.5 * self.tension(1.0)[0] * excess.dot(&strain);
         chains + point.intact / point.whole * rest
     }
 
-    /// Chains and springs of both ends by Gershgorin; of what is not chains as in [`super::NonlocalSolid`].
+    /// Chains and springs of both ends by Gershgorin; the other terms as in [`super::NonlocalSolid`].
     fn stiffness(&self, family: &Family<3>, points: &[AffinePoint]) -> f64 {
         let mut most = points[family.site()].own;
         let springs = family.sum(|bond| {

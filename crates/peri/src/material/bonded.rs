@@ -1,7 +1,7 @@
 //! Bond laws as materials: no state of a particle, forces by the kernels of [`crate::bonds`].
 
-use super::softened::{Lacking, lacking_energy};
-use super::{Bond, Family, LawCover, LawRange, Material, Response};
+use super::softened::{SofteningLoss, lacking_energy};
+use super::{Bond, Family, LawCover, LawRange, Material, SolverMaterial};
 use crate::bonds::{BodyGeometry, Bonds, Overstretched, Property};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
@@ -12,8 +12,9 @@ use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// From this ratio of the largest tangent to that at rest on, every particle has the stiffness of its own bonds.
-const MUCH: f64 = 1.2;
+/// Ratio of the largest tangent to that at rest above which every particle has the stiffness of its own
+/// bonds.
+const STIFFENED: f64 = 1.2;
 /// Least tangent of a bond in its particles' stiffness, over that at rest.
 const LEAST_TANGENT: f64 = 0.25;
 /// Samples of a law over a range of stretches.
@@ -29,12 +30,12 @@ pub struct BondMaterial<'a> {
 }
 
 impl<'a> BondMaterial<'a> {
-    /// Of a law, or a reference to one, in units of kθ = `modulus`, N/m⁶.
+    /// Creates the material of a law, or of a reference to one, in units of kθ = `modulus`, N/m⁶.
     pub fn new(law: impl BondPotential + 'a, modulus: f64) -> Self {
         Self { law: Arc::new(law), modulus, end: None }
     }
 
-    /// With bonds that soften and bear nothing at a stretch λ_f, that of the weaker of their ends, see [`integrity`].
+    /// Makes bonds soften to zero load at a stretch λ_f, that of the weaker of their ends, see [`integrity`].
     pub fn softening(self, end: Property) -> Self {
         Self { end: Some(end), ..self }
     }
@@ -91,11 +92,11 @@ impl<const D: usize> Material<D> for BondMaterial<'_> {
         self.modulus * self.law.tangent() / 3.0
     }
 
-    fn respond<'a>(self, _bonds: &dyn Bonds<D>) -> Box<dyn Response<D> + 'a>
+    fn respond<'a>(self, _bonds: &dyn Bonds<D>) -> Box<dyn SolverMaterial<D> + 'a>
     where
         Self: 'a,
     {
-        let lacking = Lacking::default();
+        let lacking = SofteningLoss::default();
         Box::new(Kernels { material: self, fitted: None, table: None, tangents: None, fit: None, lacking })
     }
 }
@@ -109,19 +110,20 @@ pub(super) fn mixed<const D: usize>(n: [f64; D]) -> f64 {
 /// A bond law in the kernels.
 struct Kernels<'a> {
     material: BondMaterial<'a>,
-    /// Energies of the fit, where it is not a table.
+    /// Energies of the fit, unless it is a table.
     fitted: Option<EnergyTable>,
-    /// Energies of the law over the range of stretches last requested: it costs more to sample than bonds to sum.
+    /// Energies of the law over the range of stretches last requested: sampling it takes longer than summing
+    /// bonds.
     table: Option<(StretchRange, EnergyTable)>,
     /// Tangents likewise.
     tangents: Option<(StretchRange, TangentTable)>,
-    /// The fit, where bonds soften.
+    /// The fit, if bonds soften.
     fit: Option<KernelFit>,
-    /// What soft bonds of the present displacement lack.
-    lacking: Lacking,
+    /// Forces that softened bonds of the present displacement have lost.
+    lacking: SofteningLoss,
 }
 
-impl<const D: usize> Response<D> for Kernels<'_> {
+impl<const D: usize> SolverMaterial<D> for Kernels<'_> {
     fn bond_law(&self) -> (&dyn BondPotential, f64) {
         (&*self.material.law, self.material.modulus)
     }
@@ -147,12 +149,16 @@ impl<const D: usize> Response<D> for Kernels<'_> {
 
     fn prepare(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
         if let Some((end, fit)) = self.material.end.as_ref().zip(self.fit.as_ref()) {
-            self.lacking = Lacking::new(&self.material, end, fit, bonds, displacement);
+            self.lacking = SofteningLoss::new(&self.material, end, fit, bonds, displacement);
         }
     }
 
     fn has_points(&self) -> bool {
         false
+    }
+
+    fn is_fitted_law(&self) -> bool {
+        self.material.end.is_none()
     }
 
     fn force(
@@ -211,8 +217,8 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         modulus * ordered_sum(bonds.particles().par_chunks(CHUNK).map(of)) + lacking.unwrap_or(0.0)
     }
 
-    /// Half of a bond's energy 2kθ|ξ|φ w V_I V_J from either end. Beyond what is fitted q is constant: the energy grows with half
-    /// of it.
+    /// Half of a bond's energy 2kθ|ξ|φ w V_I V_J from either end. q is constant beyond the fit, so the energy
+    /// grows with half of it.
     fn released(&self, bonds: &dyn Bonds<D>, list: &[Overstretched], most: f64) -> Option<f64> {
         let law = &*self.material.law;
         let energy = |bond: &Overstretched| {
@@ -233,7 +239,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
     }
 
     fn has_own_stiffness(&self, tangent: f64) -> bool {
-        tangent > MUCH * self.material.modulus * self.material.law.tangent().abs()
+        tangent > STIFFENED * self.material.modulus * self.material.law.tangent().abs()
     }
 
     /// Σ_J (2 w V_J/|ξ|)·max(|t′|, |t|/λ)(1 + max_{d≠e} |n_d n_e|) with the directions of the deformed bonds.
@@ -244,13 +250,13 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         stretches: [f64; 2],
     ) -> Vec<f64> {
         let law = &*self.material.law;
-        // bonds crushed to nothing have no bound: the law's own at a thousandth
+        // bonds crushed to zero have no bound: the law's value at a thousandth
         let [low, high] = stretches.map(|stretch| stretch.powi(2) - 1.0);
         let range = StretchRange { low, high };
         let tangents = self.tangents.take().filter(|(sampled, _)| *sampled == range);
         let (_, table) =
             self.tangents.insert(tangents.unwrap_or_else(|| (range, TangentTable::new(law, range))));
-        // a bond past its greatest force is soft, but a light particle would leap when it meets a stiff one
+        // a bond past its greatest force is soft, but a light particle would jump when it meets a stiff one
         let least = LEAST_TANGENT * law.tangent().abs();
         let sites = bonds.sites();
         let chunk = |chunk| bonds.stiffness_sums(displacement, chunk, table, least);

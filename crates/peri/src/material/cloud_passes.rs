@@ -1,22 +1,23 @@
-//! Both passes of a solid on a cloud, by the kernels of [`crate::bonds`].
+//! The two passes of a solid on a cloud, by the kernels of [`crate::bonds`].
 
 use super::family::Bond;
-use super::point::Point;
+use super::point::SolidPoint;
 use super::point_law::{NonlocalSolid, PointLaw};
 use super::pointwise::Passes;
 use super::solid_passes::Families;
-use super::tensor::Tensor;
+use super::tensor::BodyTensor;
 use crate::bonds::{
-    BodyGeometry, BondDamage, Bonds, CloudBonds, CloudPlaces, Columns, Kind, Softened, StretchRange, among,
+    BodyGeometry, BondDamage, BondKind, Bonds, CloudBonds, CloudPlaces, MomentColumns, Softened,
+    StretchRange, among,
 };
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
 
-/// What both passes read of every particle.
+/// Data of every particle that both passes read.
 pub struct CloudPasses<const D: usize> {
     places: CloudPlaces<D>,
-    /// A and S, and where there is θ also P, over Σ_K V_K.
-    terms: Vec<Columns<D>>,
+    /// A and S, and if there is θ also P, over Σ_K V_K.
+    terms: Vec<MomentColumns<D>>,
     families: Families,
 }
 
@@ -28,7 +29,7 @@ impl<const D: usize> CloudPasses<D> {
     }
 }
 
-/// A softened bond, and what it lacks of V/|ξ|², as a negative number.
+/// Returns a softened bond and its loss of V/|ξ|², as a negative number.
 fn lack<const D: usize>(cloud: &CloudBonds<D>, soft: &Softened, displacement: &Field<D>) -> (f64, Bond<D>) {
     let site = soft.site as usize;
     let bond = Bond::new(site, &cloud.whole_bond(site, soft.index), displacement);
@@ -41,9 +42,9 @@ impl<L: PointLaw<D>, const D: usize> Passes<NonlocalSolid<L>, D> for CloudPasses
         solid: &NonlocalSolid<L>,
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
-        points: &mut [Point<D>],
+        points: &mut [SolidPoint<D>],
     ) {
-        let Kind::Cloud(cloud) = bonds.kind() else { return };
+        let BondKind::Cloud(cloud) = bonds.kind() else { return };
         let changes = self.families.changes(bonds);
         let softening = cloud.softening();
         self.places.load(displacement);
@@ -58,14 +59,14 @@ impl<L: PointLaw<D>, const D: usize> Passes<NonlocalSolid<L>, D> for CloudPasses
                 let (at, point) = (site - first, &mut points[site - first]);
                 if point.has_gradient() {
                     let mut square = moments.square;
-                    let mut moment = Tensor::<D>::from_fn(|a, b| moments.first[b][a]);
-                    let mut shifted = Tensor::<D>::from_fn(|a, b| moments.shifted[b][a]);
-                    // the kernel takes every bond for intact
+                    let mut moment = BodyTensor::<D>::from_fn(|a, b| moments.first[b][a]);
+                    let mut shifted = BodyTensor::<D>::from_fn(|a, b| moments.shifted[b][a]);
+                    // the kernel treats every bond as intact
                     for soft in among(soft, site..site + 1) {
                         let (lack, bond) = lack(cloud, soft, displacement);
                         square += bond.change.iter().map(|x| lack * x * x).sum::<f64>();
-                        moment += Tensor::from_fn(|a, b| lack * bond.change[a] * bond.reference[b]);
-                        shifted += Tensor::from_fn(|a, b| lack * bond.change[a] * bond.relief[b]);
+                        moment += BodyTensor::from_fn(|a, b| lack * bond.change[a] * bond.reference[b]);
+                        shifted += BodyTensor::from_fn(|a, b| lack * bond.change[a] * bond.relief[b]);
                     }
                     point.deform(moment, shifted, square);
                     point.answer(&solid.0);
@@ -87,12 +88,12 @@ impl<L: PointLaw<D>, const D: usize> Passes<NonlocalSolid<L>, D> for CloudPasses
         _solid: &NonlocalSolid<L>,
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
-        points: &[Point<D>],
+        points: &[SolidPoint<D>],
         chunk: usize,
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     ) {
-        let Kind::Cloud(cloud) = bonds.kind() else { return };
+        let BondKind::Cloud(cloud) = bonds.kind() else { return };
         cloud.linear_force(&self.places, &self.terms, chunk, force, track);
         let first = chunk * CHUNK;
         for soft in cloud.softening().among(first..first + force[0].len()) {

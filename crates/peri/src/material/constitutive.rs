@@ -1,7 +1,7 @@
 //! Any constitutive law C → (W, S, ℂ) as the law of a family's mean deformation.
 
 use super::point_law::{Deformation, PointLaw, PointStress};
-use super::tensor::{Tensor, embed};
+use super::tensor::{BodyTensor, embed};
 use crate::calibrate::Space;
 use crate::error::Error;
 use nalgebra::Matrix3;
@@ -9,12 +9,13 @@ use polycore::constitutive::{Flags, Law, Prediction, Workspace};
 use polycore::tensor::voigt::{self, Voigt, component};
 use std::cell::RefCell;
 
-/// W = W(C) + ½ a μ · residual, C = FᵀF, for any [`Law`] that has an energy and no stress at rest: correspondence with the
-/// stabilisation a = 1 (Silling 2017, doi:10.1016/j.cma.2017.03.043, made exact). In plane stress the law gives the stretch of the
-/// thickness by S₃₃ = 0.
+/// W = W(C) + ½ a μ · residual, C = FᵀF, for any [`Law`] that has an energy and no stress at rest:
+/// correspondence with the stabilisation a = 1 (Silling 2017, doi:10.1016/j.cma.2017.03.043, made exact). In
+/// plane stress the law gives the stretch of the thickness by S₃₃ = 0.
 ///
-/// The axes of an anisotropic law are those of the body; its μ is the mean over all directions ([`Law::moduli`]), and in a plane
-/// body z must be normal to one of its planes of symmetry. A learnt law is one with an energy: its stress at rest is 0 by construction.
+/// The axes of an anisotropic law are those of the body; its μ is the mean over all directions
+/// ([`Law::moduli`]), and in a plane body z must be normal to one of its planes of symmetry. A learnt law is
+/// one with an energy: its stress at rest is 0 by construction.
 #[derive(Clone, Debug)]
 pub struct Correspondence<L, const D: usize> {
     law: L,
@@ -25,21 +26,21 @@ pub struct Correspondence<L, const D: usize> {
 }
 
 thread_local! {
-    /// Memory in which laws work.
+    /// Scratch memory of laws.
     static MEMORY: RefCell<Workspace> = RefCell::default();
 }
 
 impl<L: Law, const D: usize> Correspondence<L, D> {
-    /// With the stabilisation a = 1: accurate in the bulk and at free surfaces.
+    /// Uses the stabilisation a = 1: accurate in the bulk and at free surfaces.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a law without energy, with stress or without stiffness at rest, or, in a plane body, with shear stress out of
-    /// the plane.
+    /// [`Error::Parameter`] for a law without energy, with stress or without stiffness at rest, or, in a
+    /// plane body, with shear stress out of the plane.
     pub fn new(law: L, space: Space) -> Result<Self, Error> {
         Self::stabilised(law, space, 1.0)
     }
 
-    /// With another stabilisation a ≥ 0: 4/3 is the most accurate in the bulk, below 0.1 soft modes appear.
+    /// Uses another stabilisation a ≥ 0: 4/3 is the most accurate in the bulk; below 0.1 soft modes appear.
     ///
     /// # Errors
     /// As [`Self::new`]; a below 0.
@@ -83,7 +84,7 @@ impl<L: Law, const D: usize> Correspondence<L, D> {
         Ok(Self { law, space, shear: moduli.shear, bulk: moduli.bulk, stabilisation })
     }
 
-    /// What the law predicts: W(C) does not see a body turned inside out.
+    /// Evaluates the law; `None` for an inverted body, which W(C) cannot detect.
     fn upright(&self, deformation: &Deformation<D>) -> Option<Prediction> {
         let upright = deformation.volume_change() > -1.0;
         self.predict(&deformation.gradient(), false).filter(|_| upright).map(|(_, found)| found)
@@ -94,12 +95,12 @@ impl<L: Law, const D: usize> Correspondence<L, D> {
         &self.law
     }
 
-    /// λ₃² and what the law predicts at C, with ℂ if asked for.
-    fn predict(&self, gradient: &Tensor<D>, tangent: bool) -> Option<(f64, Prediction)> {
+    /// Computes λ₃² and the law's prediction at C, with ℂ if requested.
+    fn predict(&self, gradient: &BodyTensor<D>, tangent: bool) -> Option<(f64, Prediction)> {
         let mut c = voigt::from_stress(&embed(&(gradient.transpose() * gradient), 1.0));
         MEMORY.with_borrow_mut(|memory| {
             if self.space == Space::PlaneStress {
-                // from the stretch of a body that keeps its volume
+                // starts from the stretch of an isochoric body
                 c[2] = 1.0 / (c[0] * c[1] - c[3] * c[3]);
                 let mut change = f64::INFINITY;
                 for _ in 0..60 {
@@ -109,12 +110,12 @@ impl<L: Law, const D: usize> Correspondence<L, D> {
                     let before = change;
                     change = (next - c[2]).abs() / next;
                     c[2] = next;
-                    // or nothing but rounding is left
+                    // otherwise only rounding is left
                     if change <= 1e-15 || (change >= before && change < 1e-13) {
                         break;
                     }
                 }
-                // no thickness without stress: not a solution
+                // no stress-free thickness: not a solution
                 if change.is_nan() || change > 1e-9 {
                     return None;
                 }
@@ -134,7 +135,7 @@ impl<L: Law, const D: usize> PointLaw<D> for Correspondence<L, D> {
     fn respond(&self, deformation: &Deformation<D>) -> PointStress<D> {
         let found = self.upright(deformation);
         let stress = found.map_or(Matrix3::from_element(f64::NAN), |found| voigt::to_stress(&found.stress));
-        let plane = Tensor::<D>::from_fn(|a, b| stress[(a, b)]);
+        let plane = BodyTensor::<D>::from_fn(|a, b| stress[(a, b)]);
         PointStress { piola: deformation.gradient() * plane, stabilisation: self.stabilisation * self.shear }
     }
 
@@ -145,7 +146,7 @@ impl<L: Law, const D: usize> PointLaw<D> for Correspondence<L, D> {
             return f64::NAN;
         };
         let stress = voigt::to_stress(&stress);
-        // in plane stress the thickness gives way
+        // in plane stress the thickness adapts
         let thin = if self.space == Space::PlaneStress { 1.0 / c[(2, 2)] } else { 0.0 };
         let material = |i, j, k, l| {
             component(&c, i, j, k, l) - thin * component(&c, i, j, 2, 2) * component(&c, 2, 2, k, l)
@@ -184,12 +185,13 @@ impl<L: Law, const D: usize> PointLaw<D> for Correspondence<L, D> {
 
     fn flags(&self, deformation: &Deformation<D>) -> Flags {
         let found = self.predict(&deformation.gradient(), false);
-        // where it has no answer
+        // points without a result
         found.map_or(Flags { outside: [true; 6], ..Flags::default() }, |(_, found)| found.flags)
     }
 }
 
-/// The largest of |S₁₃| and |S₂₃| at in-plane strains of 1, and of 2 % over 2 %, Pa: 0 if z is normal to a plane of symmetry.
+/// Computes the largest of |S₁₃| and |S₂₃| at in-plane strains of 1, and of 2 % over 2 %, Pa: 0 if z is
+/// normal to a plane of symmetry.
 fn out_of_plane(law: &impl Law, memory: &mut Workspace) -> f64 {
     let rest = Voigt::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0);
     let tangent = law.tangent(&rest, memory).ok().and_then(|found| found.tangent);
@@ -197,7 +199,7 @@ fn out_of_plane(law: &impl Law, memory: &mut Workspace) -> f64 {
     for column in 0..4 {
         let mut strain = Voigt::zeros();
         strain[column] = 0.02;
-        // a law that locks has no answer
+        // a locking law has no result
         let finite = law.stress(&(rest + strain), memory).map_or(Voigt::zeros(), |found| found.stress / 0.02);
         for row in 4..6 {
             largest =

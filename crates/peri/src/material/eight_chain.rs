@@ -1,6 +1,6 @@
-//! Rubber as a network of Langevin chains whose volume is kept by a pressure.
+//! Rubber as a network of Langevin chains with a pressure that conserves the volume.
 
-use super::crushed::{CRUSHED, inverse_square, logarithm, logarithm_slopes};
+use super::compression::{CRUSH_LIMIT, inverse_square, logarithm, logarithm_slopes};
 use super::point_law::{Deformation, PointLaw, PointStress};
 use super::tensor::cofactor;
 use crate::calibrate::Space;
@@ -8,33 +8,34 @@ use crate::error::Error;
 use crate::quadrature::mean;
 use polycore::langevin;
 
-/// Eight chains of n links each (Arruda & Boyce 1993, doi:10.1016/0022-5096(93)90013-6) on the nonlocal trace of C,
-/// S = tr FᵀF + residual, and on J = det F:
-/// W = ψ(I₁) − μ₀ ln J + ¼κ(J² − 1 − 2 ln J), μ = 2ψ′ = μ₀ (β/β₁)/Λ with Λ = √(I₁/3), β = 𝓛⁻¹(Λ/√n), β₁ = 𝓛⁻¹(1/√n).
+/// Eight chains of n links each (Arruda & Boyce 1993, doi:10.1016/0022-5096(93)90013-6) on the nonlocal trace
+/// of C, S = tr FᵀF + residual, and on J = det F: W = ψ(I₁) − μ₀ ln J + ¼κ(J² − 1 − 2 ln J), μ = 2ψ′ = μ₀
+/// (β/β₁)/Λ with Λ = √(I₁/3), β = 𝓛⁻¹(Λ/√n), β₁ = 𝓛⁻¹(1/√n).
 ///
-/// I₁ = S in three dimensions, S + 1 in plane strain, and S + λ₃² in plane stress, where the stretch λ₃ of the thickness
-/// follows from W; incompressible sheets have λ₃ = 1/J.
+/// I₁ = S in three dimensions, S + 1 in plane strain, and S + λ₃² in plane stress, where the stretch λ₃ of
+/// the thickness follows from W; incompressible sheets have λ₃ = 1/J.
 #[derive(Clone, Copy, Debug)]
-pub struct EightChain<const D: usize> {
+pub struct EightChainSolid<const D: usize> {
     space: Space,
     modulus: f64,
     links: f64,
     bulk: f64,
-    /// κ, Pa; infinite of an incompressible sheet.
+    /// κ, Pa; infinite for an incompressible sheet.
     volumetric: f64,
     /// β₁.
     rest: f64,
     filter: bool,
 }
 
-/// Relative extension beyond which β grows linearly: a chain that a load step stretches too far has a force nevertheless.
+/// Relative extension beyond which β grows linearly, so that a chain overstretched by a load step still has a
+/// force.
 pub(super) const LINEAR: f64 = 0.995;
-/// Excess of I₁ below which the energy is an integral of μ, which does not cancel.
+/// Excess of I₁ below which the energy is integrated from μ, without cancellation.
 const SMALL: f64 = 0.05;
 
-impl<const D: usize> EightChain<D> {
-    /// Of a shear modulus μ₀ > 0 in Pa and n > 1 links a chain. The bulk modulus K in Pa is above
-    /// 2μ₀/3 + 2 dμ/dI₁ at rest, or infinite in plane stress.
+impl<const D: usize> EightChainSolid<D> {
+    /// Creates the law of a shear modulus μ₀ > 0 in Pa and n > 1 links a chain. The bulk modulus K in Pa is
+    /// above 2μ₀/3 + 2 dμ/dI₁ at rest, or infinite in plane stress.
     ///
     /// # Errors
     /// [`Error::Parameter`]; [`Error::Geometry`] for a space of another dimension.
@@ -65,10 +66,11 @@ impl<const D: usize> EightChain<D> {
         Ok(law)
     }
 
-    /// The same with U(bJ), b the average over nearest neighbours of a lattice: pressures of large bulk moduli become smoother at corners.
+    /// Uses U(bJ), b the average over nearest neighbours of a lattice: pressures of large bulk moduli become
+    /// smoother at corners.
     ///
     /// # Errors
-    /// [`Error::Parameter`] in plane stress, whose thickness gives way.
+    /// [`Error::Parameter`] in plane stress, whose thickness adapts.
     pub fn filtered(mut self) -> Result<Self, Error> {
         if self.space == Space::PlaneStress {
             let allowed = "solids and plane strain".into();
@@ -130,14 +132,14 @@ impl<const D: usize> EightChain<D> {
         network * self.links * (free(x) - free(1.0 / root))
     }
 
-    /// λ₃² and what W_J and W_JJ need of it, in plane stress.
+    /// λ₃² and its terms in W_J and W_JJ, in plane stress.
     fn thickness(&self, excess: f64, change: f64) -> Thickness {
         let jacobian = 1.0 + change;
         if self.volumetric.is_infinite() {
             let square = inverse_square(jacobian);
             // J⁻² − 1 with all digits
             let third =
-                if jacobian > CRUSHED { -change * (2.0 + change) * square[0] } else { square[0] - 1.0 };
+                if jacobian > CRUSH_LIMIT { -change * (2.0 + change) * square[0] } else { square[0] - 1.0 };
             return Thickness { third, change: 0.0, square };
         }
         // ∂W/∂λ₃ = μλ₃ + U′(Jλ₃) J = 0
@@ -204,7 +206,7 @@ impl<const D: usize> EightChain<D> {
     }
 }
 
-/// J below which the thickness is that at this J, of a sheet with finite K.
+/// J below which the thickness is that at this J, for a sheet with finite K.
 const THINNEST: f64 = 0.05;
 
 struct Thickness {
@@ -212,11 +214,11 @@ struct Thickness {
     third: f64,
     /// Jλ₃ − 1.
     change: f64,
-    /// λ₃², and of an incompressible sheet its derivatives by J.
+    /// λ₃², and for an incompressible sheet its derivatives by J.
     square: [f64; 3],
 }
 
-impl<const D: usize> PointLaw<D> for EightChain<D> {
+impl<const D: usize> PointLaw<D> for EightChainSolid<D> {
     fn energy(&self, deformation: &Deformation<D>) -> f64 {
         let (excess, change) = (deformation.excess_trace(), deformation.volume_change());
         if self.space != Space::PlaneStress {
@@ -227,7 +229,7 @@ impl<const D: usize> PointLaw<D> for EightChain<D> {
         if self.volumetric.is_infinite() {
             return chains;
         }
-        // below the thinnest, along the slope there
+        // below the thinnest state, continued along the slope there
         let slope = self.volume(found.change)[0] * found.square[0].sqrt();
         chains + self.volume_energy(found.change) + slope * (1.0 + change - THINNEST).min(0.0)
     }

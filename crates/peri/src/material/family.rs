@@ -1,4 +1,4 @@
-//! Families and bonds, as a material sees them.
+//! Families and bonds as a material sees them.
 
 use crate::bonds::{BodyGeometry, Neighbour};
 use crate::field::Field;
@@ -23,16 +23,16 @@ pub struct Bond<const D: usize> {
     pub length: f64,
     /// u_J − u_I, m.
     pub change: [f64; D],
-    /// Volume correction times V_J, m³: what sums over a family weigh a bond by.
+    /// Volume correction times V_J, m³: the weight of a bond in sums over a family.
     pub volume: f64,
     /// `volume` times the factors of surface correction and micromodulus, m³.
     pub weight: f64,
-    /// θ_J − θ_I of [`super::relief`], m; zero where there is none.
+    /// θ_J − θ_I of [`super::relief`], m; zero if there is none.
     pub relief: [f64; D],
 }
 
 impl<const D: usize> Bond<D> {
-    /// The bond of the particle in `from` to a neighbour, under a displacement.
+    /// Builds the bond of the particle in `from` to a neighbour, under a displacement.
     pub fn new(from: usize, neighbour: &Neighbour<D>, displacement: &Field<D>) -> Self {
         let (own, other) = (displacement.get(from), displacement.get(neighbour.site));
         Self {
@@ -52,7 +52,7 @@ impl<const D: usize> Bond<D> {
         std::array::from_fn(|d| self.reference[d] + self.change[d])
     }
 
-    /// e = λ² − 1 = η·(2ξ + η)/|ξ|², which loses no digits at small strains.
+    /// e = λ² − 1 = η·(2ξ + η)/|ξ|², exact to all digits at small strains.
     pub fn elongation(&self) -> f64 {
         let product = |d: usize| self.change[d] * (2.0 * self.reference[d] + self.change[d]);
         (0..D).map(product).sum::<f64>() / (self.length * self.length)
@@ -63,12 +63,12 @@ impl<const D: usize> Bond<D> {
         (1.0 + self.elongation()).max(0.0).sqrt()
     }
 
-    /// λ − 1, which loses no digits at small strains.
+    /// λ − 1, exact to all digits at small strains.
     pub fn strain(&self) -> f64 {
         self.elongation() / (1.0 + self.stretch())
     }
 
-    /// ζ/|ζ|; zero where both ends are in one place.
+    /// ζ/|ζ|; zero if both ends are at one point.
     pub fn direction(&self) -> [f64; D] {
         let current = self.current();
         let length = current.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -77,7 +77,7 @@ impl<const D: usize> Bond<D> {
 }
 
 impl<'a, const D: usize> Family<'a, D> {
-    /// The family of the particle in a site.
+    /// Family of the particle in a site.
     pub fn new(bonds: &'a dyn BodyGeometry<D>, displacement: &'a Field<D>, site: usize) -> Self {
         Self { bonds, displacement, site }
     }
@@ -102,7 +102,7 @@ impl<'a, const D: usize> Family<'a, D> {
         self.bonds.horizon()
     }
 
-    /// Whether bonds have a [`Bond::relief`].
+    /// Returns true if bonds have a [`Bond::relief`].
     pub fn is_relieved(&self) -> bool {
         self.bonds.relief().is_some()
     }
@@ -112,7 +112,7 @@ impl<'a, const D: usize> Family<'a, D> {
         self.bonds.neighbours(self.site, &mut |bond| visit(Bond::new(self.site, &bond, self.displacement)));
     }
 
-    /// Σ over the intact bonds.
+    /// Sums a term over the intact bonds.
     pub fn sum(&self, mut term: impl FnMut(Bond<D>) -> f64) -> f64 {
         let mut sum = 0.0;
         self.each(|bond| sum += term(bond));

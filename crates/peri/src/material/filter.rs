@@ -1,28 +1,29 @@
-//! Pressures averaged over nearest neighbours: at a bulk modulus of a thousand shear moduli those of single particles are rough
-//! at corners of grips.
+//! Average of pressures over nearest neighbours: at a bulk modulus of a thousand shear moduli the pressures
+//! of single particles are rough at corners of grips.
 
-use super::point::Point;
+use super::point::SolidPoint;
 use super::point_law::PointLaw;
 use crate::bonds::BodyGeometry;
 use rayon::prelude::*;
 
-/// The symmetric average b = 1 + (A − D)/(2·dimension + 1) of the particles of a lattice, with A = 1 between nearest neighbours whose bond is
-/// intact and D its sums over rows: rows of b sum to 1, none of its entries is negative.
+/// The symmetric average b = 1 + (A − D)/(2·dimension + 1) of the particles of a lattice, with A = 1 between
+/// nearest neighbours whose bond is intact and D its sums over rows: rows of b sum to 1, and no entry is
+/// negative.
 #[derive(Default)]
 pub(super) struct Filter {
     /// Neighbours of each site; `u32::MAX`: none.
     neighbours: Vec<[u32; 6]>,
-    /// What is averaged, site by site, and its average.
+    /// Values to average, site by site, and their averages.
     values: Vec<f64>,
     means: Vec<f64>,
 }
 
 impl Filter {
-    /// Finds the neighbours, where bonds have changed.
+    /// Finds the neighbours after bonds have changed.
     pub(super) fn link<const D: usize>(
         &mut self,
         bonds: &dyn BodyGeometry<D>,
-        points: &[Point<D>],
+        points: &[SolidPoint<D>],
         spacing: f64,
     ) {
         let of = |site: usize| {
@@ -43,10 +44,10 @@ impl Filter {
         (0..points.len()).into_par_iter().map(of).collect_into_vec(&mut self.neighbours);
     }
 
-    /// Brings the energy to Σ_I V_I I_I U((bJ)_I) by the part of each particle in it: with p_I = Σ_J b_IJ I_J U′((bJ)_J)/I_I in place of U′(J_I),
-    /// forces are its exact variation.
-    pub(super) fn apply<L: PointLaw<D>, const D: usize>(&mut self, law: &L, points: &mut [Point<D>]) {
-        let change = |point: &Point<D>| point.deformation().map_or(0.0, |found| found.volume_change());
+    /// Changes the energy to Σ_I V_I I_I U((bJ)_I): with p_I = Σ_J b_IJ I_J U′((bJ)_J)/I_I in place of
+    /// U′(J_I), forces are its exact variation.
+    pub(super) fn apply<L: PointLaw<D>, const D: usize>(&mut self, law: &L, points: &mut [SolidPoint<D>]) {
+        let change = |point: &SolidPoint<D>| point.deformation().map_or(0.0, |found| found.volume_change());
         points.par_iter().map(change).collect_into_vec(&mut self.values);
         self.average::<D>();
         let own = |change: f64| law.filtered(change).unwrap_or_default();

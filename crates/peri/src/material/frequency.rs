@@ -1,25 +1,29 @@
-//! A bound of the greatest frequency of a [`super::NonlocalSolid`] at any deformation and with any bonds broken, by Schur's test.
+//! Bound of the greatest frequency of a [`super::NonlocalSolid`] at any deformation and with any bonds
+//! broken, by Schur's test.
 //!
-//! F of a particle i depends on u_j by B_ij = V_j M⁻¹ξ/(|ξ|² Σ_J V_J), on its own by b_i = |Σ_j B_ij|. With k_i = ‖∂P/∂F‖ less what the
-//! springs of the stabilisation have, R_i = Σ_j |B_ij| + b_i and a_i = I_i k_i R_i the Hessian K of the energy has
+//! F of a particle i depends on u_j by B_ij = V_j M⁻¹ξ/(|ξ|² Σ_J V_J), on its own displacement by b_i = |Σ_j
+//! B_ij|. With k_i = ‖∂P/∂F‖ without the springs of the stabilisation, R_i = Σ_j |B_ij| + b_i and a_i = I_i
+//! k_i R_i the Hessian K of the energy has
 //!
 //! K ≤ diag(V_j m_j), m_j = Σ_i (V_i/V_j) a_i |B_ij| + a_j b_j + springs, ρω² ≤ max m_j.
 //!
-//! That is proven and two to three times too much: waves on a lattice do not reach all signs that Schur's test allows. So the first two terms
-//! are taken by [`WAVES`] and the springs by the greatest of Σ_j ω(1 − cos k·ξ) over Σ_j ω, both measured. Shape tensors come in by R_i: few
-//! bonds are stiff, and it is their neighbours among whom that is shared.
+//! This bound is proven but two to three times too large: waves on a lattice do not reach all signs that
+//! Schur's test allows. The first two terms are therefore multiplied by [`WAVES`] and the springs by the
+//! greatest of Σ_j ω(1 − cos k·ξ) over Σ_j ω, both measured. Shape tensors enter by R_i: a family of few
+//! bonds is stiff, and its neighbours share that stiffness.
 
-use super::point::{Point, Reach};
+use super::point::{FrequencyTerms, SolidPoint};
 use super::point_law::PointLaw;
-use super::{Body, Family};
+use super::{DeformedBody, Family};
 use crate::field::{CHUNK, chunk_range};
 use nalgebra::SVector;
 use rayon::prelude::*;
 
-/// Part of the bound by Schur's test that frequencies reach: at stretches of 1 to 3 and with up to half of the bonds broken.
+/// Fraction of the bound by Schur's test that frequencies reach: at stretches of 1 to 3 and with up to half
+/// of the bonds broken.
 const WAVES: f64 = 0.4;
 
-/// Part of a family below which its bonds are few.
+/// Fraction of a family below which its bonds are few.
 const FEW: f64 = 0.7;
 
 /// Greatest Σ_j ω 2(1 − cos k·ξ) over Σ_j ω in lattices.
@@ -27,8 +31,8 @@ fn greatest_wave<const D: usize>() -> f64 {
     if D == 2 { 2.6 } else { 2.4 }
 }
 
-impl<const D: usize> Point<D> {
-    /// R, b and Σ V/|ξ|² of the intact bonds.
+impl<const D: usize> SolidPoint<D> {
+    /// Computes R, b and Σ V/|ξ|² of the intact bonds.
     fn measure(&mut self, family: &Family<D>) {
         let (mut size, mut sum, mut squares) = (0.0, SVector::<f64, D>::zeros(), 0.0);
         let mut greatest = 0.0_f64;
@@ -47,7 +51,7 @@ impl<const D: usize> Point<D> {
         self.reach.among = all + self.reach.own;
     }
 
-    /// The law's part; gives what bounds ρω² where all neighbours are alike.
+    /// Computes the share of the law; returns the bound of ρω² if all neighbours are alike.
     fn stiffen_waves(&mut self, law: &(impl PointLaw<D> + ?Sized), family: &Family<D>) -> f64 {
         if self.intact <= 0.0 {
             (self.reach.front, self.reach.slope) = (0.0, 0.0);
@@ -56,7 +60,7 @@ impl<const D: usize> Point<D> {
         if self.reach.size.is_nan() {
             self.measure(family);
         }
-        let Reach { size, among, squares, .. } = self.reach;
+        let FrequencyTerms { size, among, squares, .. } = self.reach;
         if !self.has_gradient() {
             (self.reach.front, self.reach.slope) = (0.0, 0.0);
             return 4.0 * self.spring * squares;
@@ -73,8 +77,8 @@ impl<const D: usize> Point<D> {
     }
 }
 
-/// m_j of a particle.
-fn of_particle<const D: usize>(family: &Family<D>, points: &[Point<D>]) -> f64 {
+/// Computes m_j of a particle.
+fn of_particle<const D: usize>(family: &Family<D>, points: &[SolidPoint<D>]) -> f64 {
     let own = &points[family.site()];
     let mut sum = own.reach.front * own.reach.own;
     family.each(|bond| {
@@ -90,15 +94,15 @@ fn of_particle<const D: usize>(family: &Family<D>, points: &[Point<D>]) -> f64 {
     sum
 }
 
-/// max m_j, or `enough` where that is more.
+/// Computes max m_j, or returns `enough` if that is larger.
 pub fn bound<const D: usize>(
     law: &(impl PointLaw<D> + ?Sized),
-    (bonds, displacement): Body<D>,
-    points: &mut [Point<D>],
+    (bonds, displacement): DeformedBody<D>,
+    points: &mut [SolidPoint<D>],
     enough: f64,
 ) -> f64 {
     let particles = bonds.particles();
-    let of_chunk = |(chunk, points): (usize, &mut [Point<D>])| {
+    let of_chunk = |(chunk, points): (usize, &mut [SolidPoint<D>])| {
         let range = chunk_range(chunk, bonds.sites());
         let [from, to] =
             [range.start, range.end].map(|end| particles.partition_point(|&s| (s as usize) < end));
@@ -112,7 +116,7 @@ pub fn bound<const D: usize>(
         beyond
     };
     let beyond: Vec<Vec<u32>> = points.par_chunks_mut(CHUNK).enumerate().map(of_chunk).collect();
-    // who has one of these in its family, or is one
+    // particles that have one of these in their family, and these themselves
     let mut near = beyond.concat();
     for site in beyond.concat() {
         bonds.neighbours(site as usize, &mut |bond| near.push(bond.site as u32));

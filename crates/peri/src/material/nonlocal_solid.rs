@@ -1,29 +1,30 @@
-//! Solids of the mean deformation of a family, with any Poisson ratio: correspondence and its stabilisation as one energy.
+//! Solids of the mean family deformation, with any Poisson ratio: correspondence and its stabilisation as one
+//! energy.
 
 use super::cloud_passes::CloudPasses;
-use super::crushed::CRUSHED;
-use super::point::{GRADIENT, Point, Relieved};
+use super::compression::CRUSH_LIMIT;
+use super::point::{GRADIENT, ReliefTerms, SolidPoint};
 use super::point_law::{Deformation, NonlocalSolid, PointLaw};
 use super::solid_passes::SolidPasses;
-use super::tensor::Tensor;
-use super::{Body, Bond, Family, Material, Passes};
-use crate::bonds::{BodyGeometry, Bonds, Kind};
+use super::tensor::BodyTensor;
+use super::{Bond, DeformedBody, Family, Material, Passes};
+use crate::bonds::{BodyGeometry, BondKind, Bonds};
 use crate::calibrate::modulus_in;
 use nalgebra::SVector;
 
 impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
-    type Point = Point<D>;
+    type Point = SolidPoint<D>;
 
-    fn begin(&self, family: &Family<D>) -> Point<D> {
-        let zero = Tensor::zeros();
-        let relief = || Box::new(Relieved { gradient: zero, part: zero, piola: zero });
+    fn begin(&self, family: &Family<D>) -> SolidPoint<D> {
+        let zero = BodyTensor::zeros();
+        let relief = || Box::new(ReliefTerms { gradient: zero, part: zero, piola: zero });
         let relief = family.is_relieved().then(relief);
-        Point { whole: family.sum(|bond| bond.volume), relief, ..Point::default() }
+        SolidPoint { whole: family.sum(|bond| bond.volume), relief, ..SolidPoint::default() }
     }
 
-    fn prepare(&self, family: &Family<D>, point: &mut Point<D>) {
-        let (mut moment, mut intact, mut square) = (Tensor::<D>::zeros(), 0.0, 0.0);
-        let (relieved, mut shifted) = (point.relief.is_some(), Tensor::<D>::zeros());
+    fn prepare(&self, family: &Family<D>, point: &mut SolidPoint<D>) {
+        let (mut moment, mut intact, mut square) = (BodyTensor::<D>::zeros(), 0.0, 0.0);
+        let (relieved, mut shifted) = (point.relief.is_some(), BodyTensor::<D>::zeros());
         family.each(|bond| {
             let share = bond.volume / (bond.length * bond.length);
             intact += bond.volume;
@@ -49,7 +50,7 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         }
     }
 
-    fn stiffen(&self, family: &Family<D>, point: &mut Point<D>) {
+    fn stiffen(&self, family: &Family<D>, point: &mut SolidPoint<D>) {
         let squares = family.sum(|bond| bond.volume / (bond.length * bond.length));
         point.own = if !point.has_gradient() {
             4.0 * point.spring * squares
@@ -65,15 +66,15 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
     }
 
     /// T_IJ/V_J = (A ζ + Q ξ + P (θ_J − θ_I))/(|ξ|² Σ_K V_K) of both ends, with ζ = ξ + η.
-    fn force(&self, bond: &Bond<D>, own: &Point<D>, other: &Point<D>) -> [f64; D] {
+    fn force(&self, bond: &Bond<D>, own: &SolidPoint<D>, other: &SolidPoint<D>) -> [f64; D] {
         let (linear, pull) = (own.linear(other, bond), own.pull(other, bond));
         let unit = 1.0 / (bond.length * bond.length);
         std::array::from_fn(|a| unit * linear[a] + pull[a])
     }
 
-    /// W − ½Gr + [z·PM⁻¹ξ + ½ D G|z|²]/|ξ|² with z = ζ − Fξ; of springs their energy per share. With θ, C = Σ_J ω ζ⊗z(θ)/I:
-    /// z = ζ − (F − C)ξ, and z·Pz(θ)/|ξ|² − P:C in addition.
-    fn released_energy(&self, bond: &Bond<D>, own: &Point<D>, weighed: f64) -> Option<f64> {
+    /// W − ½Gr + [z·PM⁻¹ξ + ½ D G|z|²]/|ξ|² with z = ζ − Fξ; for springs their energy per share. With θ, C =
+    /// Σ_J ω ζ⊗z(θ)/I: z = ζ − (F − C)ξ, and z·Pz(θ)/|ξ|² − P:C in addition.
+    fn released_energy(&self, bond: &Bond<D>, own: &SolidPoint<D>, weighed: f64) -> Option<f64> {
         let square = bond.length * bond.length;
         let Some(deformation) = own.deformation() else {
             return Some(0.5 * own.spring * own.whole * bond.strain().powi(2));
@@ -97,7 +98,7 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
     }
 
     fn passes(&self, bonds: &dyn Bonds<D>) -> Option<Box<dyn Passes<Self, D>>> {
-        if let Kind::Cloud(cloud) = bonds.kind() {
+        if let BondKind::Cloud(cloud) = bonds.kind() {
             return Some(Box::new(CloudPasses::new(cloud)));
         }
         // 1 + D², which a type cannot compute
@@ -108,31 +109,36 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         }
     }
 
-    fn energy(&self, family: &Family<D>, point: &Point<D>) -> f64 {
+    fn energy(&self, family: &Family<D>, point: &SolidPoint<D>) -> f64 {
         match point.deformation() {
             Some(_) => point.integrity() * point.energy(&self.0).unwrap_or(0.0),
             None => 0.5 * point.spring * family.sum(|bond| bond.volume * bond.strain().powi(2)),
         }
     }
 
-    /// Half of 1.75 (2D) or 1 (3D) times the greatest part of a particle and its neighbours: 1.1 to 3 times the true bound on
-    /// lattices and clouds.
-    fn stiffness(&self, family: &Family<D>, points: &[Point<D>]) -> f64 {
+    /// Half of 1.75 (2D) or 1 (3D) times the greatest share of a particle and its neighbours: 1.1 to 3 times
+    /// the true bound on lattices and clouds.
+    fn stiffness(&self, family: &Family<D>, points: &[SolidPoint<D>]) -> f64 {
         let mut most = points[family.site()].own;
         family.each(|bond| most = most.max(points[bond.to].own));
         0.5 * if D == 2 { 1.75 } else { 1.0 } * most
     }
 
-    fn frequency_bound(&self, body: Body<D>, points: &mut [Point<D>], enough: f64) -> Option<f64> {
+    fn frequency_bound(
+        &self,
+        body: DeformedBody<D>,
+        points: &mut [SolidPoint<D>],
+        enough: f64,
+    ) -> Option<f64> {
         Some(super::frequency::bound(&self.0, body, points, enough))
     }
 
-    fn is_crushed(&self, point: &Point<D>) -> bool {
+    fn is_crushed(&self, point: &SolidPoint<D>) -> bool {
         let change = point.deformation().map_or(0.0, Deformation::volume_change);
-        change.is_nan() || change < CRUSHED - 1.0
+        change.is_nan() || change < CRUSH_LIMIT - 1.0
     }
 
-    /// Of Young's modulus E ≈ 3μ.
+    /// Micromodulus for Young's modulus E ≈ 3μ.
     fn micromodulus(&self, bonds: &dyn BodyGeometry<D>) -> f64 {
         modulus_in(bonds, 3.0 * self.0.shear_modulus())
     }
@@ -140,7 +146,7 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
     /// ∂P₁₁/∂F₁₁ at rest, by a central difference: truncation and rounding are about 1e-10 of it.
     fn longitudinal_modulus(&self, _bonds: &dyn BodyGeometry<D>) -> f64 {
         let at = |strain: f64| {
-            let mut gradient = Tensor::<D>::zeros();
+            let mut gradient = BodyTensor::<D>::zeros();
             gradient[(0, 0)] = strain;
             self.0.respond(&Deformation { displacement_gradient: gradient, residual: 0.0 }).piola[(0, 0)]
         };

@@ -1,56 +1,57 @@
-//! States of the particles of a [`super::NonlocalSolid`].
+//! Particle states of a [`super::NonlocalSolid`].
 
 use super::family::{Bond, Family};
 use super::point_law::{Deformation, PointLaw, PointStress};
-use super::tensor::{Tensor, cofactor, invert};
-use crate::bonds::Columns;
+use super::tensor::{BodyTensor, cofactor, invert};
+use crate::bonds::MomentColumns;
 use nalgebra::SVector;
 
-/// D λ_min(M) below which a family has no deformation gradient. Intact corners have 0.50 and more.
+/// D λ_min(M) below which a family has no deformation gradient. Intact corners have at least 0.50.
 pub(super) const LEAST_SHAPE: f64 = 0.1;
 
-/// (|q̂|δ)² of the largest gradient that particles one spacing apart feel: 2.69 to 3.09 for δ of 2 to 6 spacings.
+/// (|q̂|δ)² of the largest gradient that particles one spacing apart feel: 2.69 to 3.09 for δ of 2 to 6
+/// spacings.
 pub(super) const GRADIENT: f64 = 3.1;
 
-/// What a particle knows of its family.
+/// State of a particle's family.
 #[derive(Clone, Debug)]
-pub struct Point<const D: usize> {
-    /// Σ_J V_J of the whole family, m³, and of the intact bonds that `inverse` and `shape` belong to.
+pub struct SolidPoint<const D: usize> {
+    /// Σ_J V_J of the whole family, m³, and of the intact bonds of `inverse` and `shape`.
     pub(super) whole: f64,
     pub(super) intact: f64,
     /// M⁻¹.
-    pub(super) inverse: Tensor<D>,
+    pub(super) inverse: BodyTensor<D>,
     /// D λ_min(M).
     pub(super) shape: f64,
     pub(super) deformation: Deformation<D>,
-    /// What [`super::filter`] adds to W and ∂W/∂J; 0 without.
+    /// Contributions of [`super::filter`] to W and ∂W/∂J; 0 without.
     pub(super) filtered: [f64; 2],
-    /// A, Q + A 1, both over Σ_J V_J, and the stiffness of the springs over it, Pa/m³.
+    /// A and Q + A 1, both over Σ_J V_J, and the stiffness of the springs over Σ_J V_J, Pa/m³.
     pub(super) slope: f64,
-    pub(super) stress: Tensor<D>,
+    pub(super) stress: BodyTensor<D>,
     pub(super) spring: f64,
-    /// The particle's own part in the bound of the stiffness, N/m⁴.
+    /// Share of the particle in the bound of the stiffness, N/m⁴.
     pub(super) own: f64,
-    /// What the bound of the frequency needs, see [`super::frequency`].
-    pub(super) reach: Reach,
-    /// Where bonds have θ.
-    pub(super) relief: Option<Box<Relieved<D>>>,
+    /// Terms of the frequency bound, see [`super::frequency`].
+    pub(super) reach: FrequencyTerms,
+    /// Correction by θ, if bonds have one.
+    pub(super) relief: Option<Box<ReliefTerms<D>>>,
 }
 
-/// What θ adds to a particle.
+/// Correction of a particle by θ.
 #[derive(Clone, Debug)]
-pub(super) struct Relieved<const D: usize> {
+pub(super) struct ReliefTerms<const D: usize> {
     /// G = Σ_J ω (θ_J − θ_I)⊗ξ M⁻¹/I.
-    pub(super) gradient: Tensor<D>,
+    pub(super) gradient: BodyTensor<D>,
     /// Σ_J ω ζ⊗z(θ)/I, a part of the displacement gradient.
-    pub(super) part: Tensor<D>,
+    pub(super) part: BodyTensor<D>,
     /// P over Σ_J V_J, Pa/m³.
-    pub(super) piola: Tensor<D>,
+    pub(super) piola: BodyTensor<D>,
 }
 
-impl<const D: usize> Default for Point<D> {
+impl<const D: usize> Default for SolidPoint<D> {
     fn default() -> Self {
-        let zero = Tensor::zeros();
+        let zero = BodyTensor::zeros();
         Self {
             whole: 0.0,
             intact: 0.0,
@@ -62,23 +63,23 @@ impl<const D: usize> Default for Point<D> {
             stress: zero,
             spring: 0.0,
             own: 0.0,
-            reach: Reach::default(),
+            reach: FrequencyTerms::default(),
             relief: None,
         }
     }
 }
 
-impl<const D: usize> Point<D> {
-    /// Σ_J V_J, M⁻¹ and D λ_min(M) of the intact bonds.
+impl<const D: usize> SolidPoint<D> {
+    /// Computes Σ_J V_J, M⁻¹ and D λ_min(M) of the intact bonds.
     pub(super) fn reshape(&mut self, family: &Family<D>) {
-        let (mut shape, mut shifted, mut intact) = (Tensor::<D>::zeros(), Tensor::<D>::zeros(), 0.0);
+        let (mut shape, mut shifted, mut intact) = (BodyTensor::<D>::zeros(), BodyTensor::<D>::zeros(), 0.0);
         let relieved = self.relief.is_some();
         family.each(|bond| {
             let share = bond.volume / (bond.length * bond.length);
             intact += bond.volume;
-            shape += Tensor::from_fn(|a, b| share * bond.reference[a] * bond.reference[b]);
+            shape += BodyTensor::from_fn(|a, b| share * bond.reference[a] * bond.reference[b]);
             if relieved {
-                shifted += Tensor::from_fn(|a, b| share * bond.relief[a] * bond.reference[b]);
+                shifted += BodyTensor::from_fn(|a, b| share * bond.relief[a] * bond.reference[b]);
             }
         });
         self.intact = intact;
@@ -90,19 +91,19 @@ impl<const D: usize> Point<D> {
         }
     }
 
-    /// Whether the intact bonds span space.
+    /// Returns true if the intact bonds span space.
     pub(super) fn has_gradient(&self) -> bool {
         self.shape > LEAST_SHAPE
     }
 
-    /// A/Σ_K V_K and (Q + A 1)/Σ_K V_K, rows first.
+    /// A/Σ_K V_K and (Q + A 1)/Σ_K V_K, row by row.
     pub(super) fn terms(&self) -> impl Iterator<Item = f64> + '_ {
         let stress = (0..D * D).map(|k| self.stress[(k / D, k % D)]);
         std::iter::once(self.slope).chain(stress)
     }
 
-    /// The same for the kernels of clouds; of a particle with θ, P/Σ_K V_K as well.
-    pub(super) fn fill(&self, terms: &mut [Columns<D>]) {
+    /// Writes the same terms for the cloud kernels; for a particle with θ, also P/Σ_K V_K.
+    pub(super) fn fill(&self, terms: &mut [MomentColumns<D>]) {
         let tensors = std::iter::once(&self.stress).chain(self.relief.as_ref().map(|relief| &relief.piola));
         for (columns, tensor) in terms.iter_mut().zip(tensors) {
             (0..D).for_each(|b| (0..D).for_each(|a| columns[b][a] = tensor[(a, b)]));
@@ -110,7 +111,8 @@ impl<const D: usize> Point<D> {
         terms[0][0][3] = self.slope;
     }
 
-    /// A η + (Q + A 1) ξ + P (θ_J − θ_I), over Σ_K V_K, of both ends, Pa/m²: |ξ|² times the force density without springs.
+    /// Computes A η + (Q + A 1) ξ + P (θ_J − θ_I), over Σ_K V_K, of both ends, Pa/m²: |ξ|² times the force
+    /// density without springs.
     pub(super) fn linear(&self, other: &Self, bond: &Bond<D>) -> [f64; D] {
         let slope = self.slope + other.slope;
         let relief =
@@ -133,7 +135,7 @@ impl<const D: usize> Point<D> {
         bond.direction().map(|x| size * x)
     }
 
-    /// The part of a bond's force density that is its own, T_IJ/V_J.
+    /// Own part T_IJ/V_J of a bond's force density.
     pub fn own_force(&self, bond: &Bond<D>) -> [f64; D] {
         let nothing = Self::default();
         let (linear, pull) = (self.linear(&nothing, bond), self.pull(&nothing, bond));
@@ -143,8 +145,9 @@ impl<const D: usize> Point<D> {
         std::array::from_fn(|a| unit * (linear[a] + relief[a]) + pull[a])
     }
 
-    /// Brings the deformation to Σ_J (V_J/|ξ|²) η⊗ξ, Σ_J (V_J/|ξ|²) η⊗(θ_J − θ_I) and Σ_J (V_J/|ξ|²)|η|² over the intact bonds.
-    pub(super) fn deform(&mut self, moment: Tensor<D>, shifted: Tensor<D>, square: f64) {
+    /// Sets the deformation from Σ_J (V_J/|ξ|²) η⊗ξ, Σ_J (V_J/|ξ|²) η⊗(θ_J − θ_I) and Σ_J (V_J/|ξ|²)|η|² over
+    /// the intact bonds.
+    pub(super) fn deform(&mut self, moment: BodyTensor<D>, shifted: BodyTensor<D>, square: f64) {
         let (dimension, moment) = (D as f64, moment / self.intact);
         let gradient = moment * self.inverse;
         let residual = dimension * (square / self.intact - gradient.dot(&moment));
@@ -157,10 +160,10 @@ impl<const D: usize> Point<D> {
         }
     }
 
-    /// Takes the stress of a law at the deformation.
+    /// Evaluates a law at the deformation.
     pub(super) fn answer(&mut self, law: &(impl PointLaw<D> + ?Sized)) {
         let found = self.respond(law);
-        let relieved = self.relief.as_ref().map_or_else(Tensor::zeros, |relief| relief.part);
+        let relieved = self.relief.as_ref().map_or_else(BodyTensor::zeros, |relief| relief.part);
         let gradient = self.deformation.displacement_gradient - relieved;
         self.slope = D as f64 * found.stabilisation / self.whole;
         self.stress = found.piola * self.inverse / self.whole - gradient * self.slope;
@@ -171,20 +174,20 @@ impl<const D: usize> Point<D> {
         self.spring = 0.0;
     }
 
-    /// Takes springs in place of a law.
+    /// Replaces the law by springs.
     pub(super) fn spring(&mut self, law: &(impl PointLaw<D> + ?Sized)) {
         let dimension = D as f64;
         let stiffness = dimension * (dimension + 2.0) * law.shear_modulus();
-        (self.slope, self.stress) = (0.0, Tensor::zeros());
+        (self.slope, self.stress) = (0.0, BodyTensor::zeros());
         if let Some(relief) = &mut self.relief {
-            relief.piola = Tensor::zeros();
+            relief.piola = BodyTensor::zeros();
         }
         if self.whole > 0.0 {
             self.spring = stiffness / self.whole;
         }
     }
 
-    /// The mean deformation; `None` where too few bonds are left.
+    /// Mean deformation; `None` if too few bonds are left.
     pub fn deformation(&self) -> Option<&Deformation<D>> {
         self.has_gradient().then_some(&self.deformation)
     }
@@ -198,39 +201,39 @@ impl<const D: usize> Point<D> {
         found
     }
 
-    /// Energy density of a law at the mean deformation, J/m³; `None` where too few bonds are left.
+    /// Energy density of a law at the mean deformation, J/m³; `None` if too few bonds are left.
     pub fn energy(&self, law: &(impl PointLaw<D> + ?Sized)) -> Option<f64> {
         Some(law.energy(self.deformation()?) + self.filtered[0])
     }
 
-    /// I: the part of the family that is intact, 0 to 1.
+    /// I: intact fraction of the family, 0 to 1.
     pub fn integrity(&self) -> f64 {
         if self.whole > 0.0 { self.intact / self.whole } else { 0.0 }
     }
 }
 
-/// What a particle adds to the bound of the frequency, see [`super::frequency`].
+/// Terms of a particle in the frequency bound, see [`super::frequency`].
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Reach {
-    /// R and b, 1/m, and Σ_J V_J/|ξ|² of the intact bonds, m; not numbers until they are asked for.
+pub(super) struct FrequencyTerms {
+    /// R and b, 1/m, and Σ_J V_J/|ξ|² of the intact bonds, m; NaN until computed.
     pub(super) size: f64,
     pub(super) own: f64,
     pub(super) squares: f64,
-    /// What R is where all neighbours are such particles: more than R where few bonds are left.
+    /// R if all neighbours are such particles: larger than R if few bonds are left.
     pub(super) among: f64,
-    /// WAVES·a, Pa/m, and A of the springs with what the residual adds, over Σ_K V_K.
+    /// WAVES·a, Pa/m, and A of the springs including the residual's part, over Σ_K V_K.
     pub(super) front: f64,
     pub(super) slope: f64,
 }
 
-impl Default for Reach {
+impl Default for FrequencyTerms {
     fn default() -> Self {
         Self { size: f64::NAN, own: f64::NAN, squares: f64::NAN, among: f64::NAN, front: 0.0, slope: 0.0 }
     }
 }
 
-impl Reach {
-    /// Its bonds have changed.
+impl FrequencyTerms {
+    /// Marks the terms as outdated after bonds have changed.
     pub fn forget(&mut self) {
         self.size = f64::NAN;
     }

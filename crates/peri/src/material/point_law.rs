@@ -1,26 +1,27 @@
 //! Laws of the mean deformation of a family.
 
-use super::tensor::{Tensor, embed};
+use super::tensor::{BodyTensor, embed};
 use polycore::constitutive::Flags;
 use std::sync::Arc;
 
-/// The mean deformation of a family: with ω_IJ = V_J/(|ξ|² Σ_K V_K) over the whole family, I = Σ_J V_J/Σ_K V_K over the intact
-/// bonds, M = Σ_J ω ξ⊗ξ/I and η = u_J − u_I.
+/// Mean deformation of a family: with ω_IJ = V_J/(|ξ|² Σ_K V_K) over the whole family, I = Σ_J V_J/Σ_K V_K
+/// over the intact bonds, M = Σ_J ω ξ⊗ξ/I and η = u_J − u_I.
 #[derive(Clone, Copy, Debug)]
 pub struct Deformation<const D: usize> {
-    /// H = F − 1 = (Σ_J ω η⊗ξ/I) M⁻¹, and of a cloud the part of [`super::relief`].
-    pub displacement_gradient: Tensor<D>,
-    /// D Σ_J ω|ζ − Fξ|²/I, F without that part: the part of the deformation that no gradient describes. 0 where it is homogeneous.
+    /// H = F − 1 = (Σ_J ω η⊗ξ/I) M⁻¹, on clouds plus the part of [`super::relief`].
+    pub displacement_gradient: BodyTensor<D>,
+    /// D Σ_J ω|ζ − Fξ|²/I, F without that part: the part of the deformation that no gradient describes. 0 for
+    /// a homogeneous deformation.
     pub residual: f64,
 }
 
 impl<const D: usize> Deformation<D> {
     /// F.
-    pub fn gradient(&self) -> Tensor<D> {
-        self.displacement_gradient + Tensor::identity()
+    pub fn gradient(&self) -> BodyTensor<D> {
+        self.displacement_gradient + BodyTensor::identity()
     }
 
-    /// J − 1 = det F − 1, which loses no digits at small strains.
+    /// J − 1 = det F − 1, exact to all digits at small strains.
     pub fn volume_change(&self) -> f64 {
         let h = &self.displacement_gradient;
         let minor = |a: usize, b: usize| h[(a, a)] * h[(b, b)] - h[(a, b)] * h[(b, a)];
@@ -30,34 +31,35 @@ impl<const D: usize> Deformation<D> {
         h.trace() + minor(0, 1) + minor(1, 2) + minor(0, 2) + embed(h, 1.0).determinant()
     }
 
-    /// tr FᵀF − D + residual, which loses no digits at small strains.
+    /// tr FᵀF − D + residual, exact to all digits at small strains.
     pub fn excess_trace(&self) -> f64 {
         2.0 * self.displacement_gradient.trace() + self.displacement_gradient.norm_squared() + self.residual
     }
 }
 
-/// What a solid does at a deformation.
+/// Stress of a solid at a deformation.
 #[derive(Clone, Copy, Debug)]
 pub struct PointStress<const D: usize> {
     /// P = ∂W/∂F at a constant residual, Pa.
-    pub piola: Tensor<D>,
+    pub piola: BodyTensor<D>,
     /// 2 ∂W/∂(residual), Pa: the shear modulus of the stabilisation.
     pub stabilisation: f64,
 }
 
-/// A solid whose energy follows from the mean deformation of a family. [`NonlocalSolid`] makes a material of it.
+/// A solid whose energy follows from the mean deformation of a family. [`NonlocalSolid`] makes it a material.
 pub trait PointLaw<const D: usize>: Send + Sync {
     /// Energy density W, J/m³, 0 at rest.
     fn energy(&self, deformation: &Deformation<D>) -> f64;
 
-    /// Stress. A deformation outside the law's domain gives values that are not finite; solvers report them.
+    /// Computes the stress. A deformation outside the law's domain gives values that are not finite; solvers
+    /// report them.
     fn respond(&self, deformation: &Deformation<D>) -> PointStress<D>;
 
-    /// A bound of ‖∂P/∂F‖₂, Pa.
+    /// Bound of ‖∂P/∂F‖₂, Pa.
     fn stiffness(&self, deformation: &Deformation<D>) -> f64;
 
-    /// κ = 4 W_SS ≥ 0, Pa, of a law whose W depends on tr FᵀF + residual alone: `stiffness` holds the residual constant, and a
-    /// change of both takes κ(F:δF + ½δ residual)² in all. 0 where W is linear in the residual.
+    /// κ = 4 W_SS ≥ 0, Pa, of a law whose W depends only on tr FᵀF + residual: `stiffness` holds the residual
+    /// constant, and a change of both takes κ(F:δF + ½δ residual)² in all. 0 if W is linear in the residual.
     fn residual_stiffness(&self, deformation: &Deformation<D>) -> f64 {
         let _ = deformation;
         0.0
@@ -66,7 +68,7 @@ pub trait PointLaw<const D: usize>: Send + Sync {
     /// Shear modulus at rest, Pa.
     fn shear_modulus(&self) -> f64;
 
-    /// Bulk modulus at rest, Pa; 0 in plane stress, where the thickness gives way.
+    /// Bulk modulus at rest, Pa; 0 in plane stress, where the thickness adapts.
     fn bulk_modulus(&self) -> f64;
 
     /// Stretch λ₃ of the thickness in plane stress; 1 elsewhere.
@@ -75,14 +77,14 @@ pub trait PointLaw<const D: usize>: Send + Sync {
         1.0
     }
 
-    /// Why the answer of a law learnt from data is uncertain; nothing of other laws.
+    /// Reasons why a learnt law is uncertain here; none for other laws.
     fn flags(&self, deformation: &Deformation<D>) -> Flags {
         let _ = deformation;
         Flags::default()
     }
 
-    /// U and U′ at J = 1 + `change` of the part U(J) of W that is to depend on J averaged over nearest neighbours instead, on a lattice;
-    /// `None`: no part.
+    /// U and U′ at J = 1 + `change` of the part U(J) of W to be averaged over nearest neighbours of a
+    /// lattice; `None`: no part.
     fn filtered(&self, change: f64) -> Option<[f64; 2]> {
         let _ = change;
         None
@@ -119,15 +121,15 @@ impl<L: PointLaw<D> + ?Sized, const D: usize> PointLaw<D> for Arc<L> {
     }
 }
 
-/// A solid of [`PointLaw`] as a material: W_I = I W(F, residual), an exact variation for any law, whose bonds
-/// carry T_IJ = ω (A ζ + Q ξ) with A = D G, Q = P M⁻¹ − D G F and G = [`PointStress::stabilisation`]. A homogeneous deformation
-/// gives its exact P in every particle, at edges too; bonds are not parallel to their forces.
+/// Material of a [`PointLaw`]: W_I = I W(F, residual), an exact variation for any law, whose bonds carry
+/// T_IJ = ω (A ζ + Q ξ) with A = D G, Q = P M⁻¹ − D G F and G = [`PointStress::stabilisation`]. A homogeneous
+/// deformation gives its exact P in every particle, at edges too; bonds are not parallel to their forces.
 ///
-/// Where too few bonds are left (D λ_min(M) ≤ 0.1) a particle has springs of the same shear modulus instead,
-/// W_I = ½D(D + 2)μ Σ_J ω(|ζ| − |ξ|)². The guide (*Solids with any Poisson ratio*) has more; the stabilisation is that of
-/// Silling 2017, doi:10.1016/j.cma.2017.03.043.
+/// If too few bonds are left (D λ_min(M) ≤ 0.1) a particle has springs of the same shear modulus instead,
+/// W_I = ½D(D + 2)μ Σ_J ω(|ζ| − |ξ|)². See the guide (*Solids with any Poisson ratio*); the stabilisation is
+/// that of Silling 2017, doi:10.1016/j.cma.2017.03.043.
 ///
-/// On an irregular cloud with [`super::relief`] F has one more term, Σ_J ω ζ⊗z(θ)/I with z(θ) = θ_J − θ_I − G ξ, G = Σ_J ω (θ_J − θ_I)⊗ξ M⁻¹/I,
-/// and T_IJ gains ω P z(θ): uniform stress is in equilibrium.
+/// On an irregular cloud with [`super::relief`] F has one more term, Σ_J ω ζ⊗z(θ)/I with z(θ) = θ_J − θ_I − G
+/// ξ, G = Σ_J ω (θ_J − θ_I)⊗ξ M⁻¹/I, and T_IJ gains ω P z(θ): uniform stress is in equilibrium.
 #[derive(Clone, Debug)]
 pub struct NonlocalSolid<L>(pub L);

@@ -1,6 +1,6 @@
-//! Materials by plain loops over families: any [`Material`] at work, with the states of all particles.
+//! Materials by plain loops over families: any [`Material`] with the states of all particles.
 
-use super::{Bond, Family, LawCover, LawRange, Material, Response};
+use super::{Bond, Family, LawCover, LawRange, Material, SolverMaterial};
 use crate::bonds::{Bonds, Overstretched, Property, StretchScan, overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
@@ -8,8 +8,9 @@ use crate::potential::{BondPotential, LinearBond, StretchRange};
 use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
-/// Both passes of a material over a whole body, for one that has something faster than plain loops over bonds. The states and
-/// forces must be those of [`Material::prepare`] and [`Material::force`] but for rounding.
+/// The two passes of a material over a whole body, for materials with something faster than plain loops over
+/// bonds. States and forces must equal those of [`Material::prepare`] and [`Material::force`] except for
+/// rounding.
 pub trait Passes<M: Material<D> + ?Sized, const D: usize>: Send + Sync {
     /// The first pass: states of all sites.
     fn prepare(
@@ -20,7 +21,7 @@ pub trait Passes<M: Material<D> + ?Sized, const D: usize>: Send + Sync {
         points: &mut [M::Point],
     );
 
-    /// The second pass, of a work item; see [`Response::force`].
+    /// Runs the second pass over a work item; see [`SolverMaterial::force`].
     #[expect(clippy::too_many_arguments, reason = "those of the response, and what it has")]
     fn force(
         &self,
@@ -37,17 +38,17 @@ pub trait Passes<M: Material<D> + ?Sized, const D: usize>: Send + Sync {
 /// A material with the states of all particles.
 pub struct Pointwise<M: Material<D>, const D: usize> {
     material: M,
-    /// Site by site.
+    /// States, site by site.
     points: Vec<M::Point>,
     passes: Option<Box<dyn Passes<M, D>>>,
-    /// kθ of linear bonds about as stiff.
+    /// kθ of linear bonds of similar stiffness.
     modulus: f64,
     /// Greatest s_I/u_I when stretches last left the covered range.
     tangent: f64,
 }
 
 impl<M: Material<D>, const D: usize> Pointwise<M, D> {
-    /// At rest in a body as it was built.
+    /// Initialises the states of a body in the reference state.
     pub fn new(material: M, bonds: &dyn Bonds<D>) -> Self {
         let rest = Field::zeros(bonds.sites());
         let begin = |&site: &u32| material.begin(&Family::new(bonds, &rest, site as usize));
@@ -61,7 +62,7 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
         Self { material, points, passes, modulus, tangent: 0.0 }
     }
 
-    /// Brings the states of all particles up to date.
+    /// Updates the states of all particles.
     fn visit(
         &mut self,
         bonds: &dyn Bonds<D>,
@@ -80,7 +81,8 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
         });
     }
 
-    /// Force densities τ_IJ − τ_JI, N/m⁶, of the intact bonds of a particle, after [`Response::prepare`].
+    /// Visits the force densities τ_IJ − τ_JI, N/m⁶, of the intact bonds of a particle, after
+    /// [`SolverMaterial::prepare`].
     pub fn bond_forces(
         &self,
         bonds: &dyn Bonds<D>,
@@ -107,7 +109,7 @@ fn particles_of<const D: usize>(bonds: &dyn Bonds<D>, chunk: usize) -> &[u32] {
     &particles[place(range.start)..place(range.end)]
 }
 
-impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
+impl<M: Material<D>, const D: usize> SolverMaterial<D> for Pointwise<M, D> {
     fn bond_law(&self) -> (&dyn BondPotential, f64) {
         (&LinearBond, self.modulus)
     }
@@ -207,7 +209,7 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
         critical: &Property,
         _seen: &StretchScan,
     ) -> Vec<Overstretched> {
-        // passes may collect a bond's stretch in another work item than the one that looks for it here
+        // passes may track a bond's stretch in another work item than the one that examines it here
         if self.material.least_rest() == 1.0 {
             return overstretched(bonds, displacement, critical, &StretchScan::default());
         }

@@ -1,42 +1,44 @@
-//! Bond laws in a body whose particles would have another shape if they were free: eigenstrains of printing, swelling, heat.
+//! Bond laws in a body whose particles would have another shape if free: eigenstrains of printing, swelling,
+//! heat.
 
 use super::bonded::mixed;
 use super::{Bond, BondMaterial, Family, Material};
 use crate::bonds::BodyGeometry;
 use std::sync::Arc;
 
-/// A bond law whose bonds are at rest at the stretch λ* = |(1 + ε*)n|, with n = ξ/|ξ| and the mean ε* of the prestrains of both ends:
-/// the energy of a bond is w = |ξ|λ*φ(λ/λ*), its tension t = φ′(λ/λ*). A free body with a uniform ε* takes the displacement ε*X without any force,
-/// and rigid rotations change nothing. 1 + n·ε*n in the place of λ* would leave stresses of second order in a free body.
+/// A bond law whose bonds are at rest at the stretch λ* = |(1 + ε*)n|, with n = ξ/|ξ| and the mean ε* of the
+/// prestrains of both ends: the energy of a bond is w = |ξ|λ*φ(λ/λ*), its tension t = φ′(λ/λ*). A free body
+/// with a uniform ε* takes the displacement ε*X without any force, and rigid rotations change nothing. λ* =
+/// 1 + n·ε*n would leave stresses of second order in a free body.
 ///
-/// By plain loops over bonds, several times slower than [`BondMaterial`].
+/// Evaluated by plain loops over bonds, several times slower than [`BondMaterial`].
 #[derive(Clone)]
 pub struct Prestrained<const D: usize> {
     bonded: BondMaterial<'static>,
     /// ε* site by site.
     strain: Arc<Vec<[[f64; D]; D]>>,
-    /// A lower bound of λ*; below 1 where there is any ε*.
+    /// Lower bound of λ*; below 1 if any ε* is negative.
     least_rest: f64,
     /// λ/λ* beyond which tension is constant.
     most: f64,
 }
 
 impl<const D: usize> Prestrained<D> {
-    /// Of a law, and ε* of each site; symmetric, above −1.
+    /// Creates the material from a law and ε* of each site; ε* is symmetric, above −1.
     pub fn new(bonded: BondMaterial<'static>, strain: Vec<[[f64; D]; D]>) -> Self {
-        // no eigenvalue is further from 0 than the largest sum of a row
+        // no eigenvalue is farther from 0 than the largest row sum
         let row = |row: &[f64; D]| row.iter().map(|x| x.abs()).sum::<f64>();
         let most = strain.iter().flatten().map(row).fold(0.0, f64::max);
         let least_rest = (1.0 - most).max(0.0);
         Self { bonded, strain: Arc::new(strain), least_rest, most: f64::INFINITY }
     }
 
-    /// With a tension that is constant beyond λ/λ* = `most`: of bonds that break before.
+    /// Keeps the tension constant beyond λ/λ* = `most`, for bonds that break before.
     pub fn clamped(self, most: f64) -> Self {
         Self { most, ..self }
     }
 
-    /// λ/λ* − 1 up to the limit, and what is beyond it.
+    /// λ/λ* − 1 up to the limit, and the excess.
     fn relative(&self, bond: &Bond<D>) -> [f64; 2] {
         let rest = self.rest_strain(bond);
         let strain = (bond.strain() - rest) / (1.0 + rest);
@@ -44,7 +46,7 @@ impl<const D: usize> Prestrained<D> {
         [within, strain - within]
     }
 
-    /// λ* − 1 of a bond, which loses no digits at small strains.
+    /// λ* − 1 of a bond, exact to all digits at small strains.
     fn rest_strain(&self, bond: &Bond<D>) -> f64 {
         let (own, other) = (&self.strain[bond.from], &self.strain[bond.to]);
         let (mut along, mut square) = (0.0, 0.0);

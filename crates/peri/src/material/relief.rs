@@ -1,40 +1,42 @@
-//! What makes an irregular cloud pass the patch test: a field θ, found once.
+//! Relief field θ with which irregular clouds pass the patch test, computed once.
 //!
-//! Families of an irregular cloud see B_IJ = ω_IJ M⁻¹ξ of each bond, F = Σ_J ζ⊗B_IJ. Uniform stress P leaves the force −P h_I on a
-//! particle, h_I = Σ_J (V_J B_JI − V_I B_IJ), which is 0 inside of a lattice and not in a cloud. With
-//! B_IJ + ω_IJ z_IJ(θ), z(θ) = θ_J − θ_I − G ξ, G = Σ_J ω (θ_J − θ_I)⊗ξ M⁻¹, affine deformations stay exact (Σ_J ω z⊗ξ = 0), and
-//! h + Lθ takes the place of h, with L of the stabilisation, f = −Lu where A = 1 and P = 0: symmetric and positive definite as soon as some
-//! particles have θ = 0. Cf. Chen, Hillman & Rüter 2013, doi:10.1002/nme.4512.
+//! Families of an irregular cloud see B_IJ = ω_IJ M⁻¹ξ of each bond, F = Σ_J ζ⊗B_IJ. Uniform stress P leaves
+//! the force −P h_I on a particle, h_I = Σ_J (V_J B_JI − V_I B_IJ), which is 0 inside a lattice but not in a
+//! cloud. With B_IJ + ω_IJ z_IJ(θ), z(θ) = θ_J − θ_I − G ξ, G = Σ_J ω (θ_J − θ_I)⊗ξ M⁻¹, affine deformations
+//! stay exact (Σ_J ω z⊗ξ = 0), and h + Lθ replaces h, with L of the stabilisation, f = −Lu for A = 1 and P =
+//! 0: symmetric and positive definite as soon as some particles have θ = 0. Cf. Chen, Hillman & Rüter 2013,
+//! doi:10.1002/nme.4512.
 
-use super::levels::Levels;
 use super::point::LEAST_SHAPE;
+use super::spline_levels::SplineLevels;
 use super::tensor::{Vector, invert};
-use crate::bonds::{BodyGeometry, Bonds, CloudBonds, CloudPlaces, Columns, Kind};
+use crate::bonds::{BodyGeometry, BondKind, Bonds, CloudBonds, CloudPlaces, MomentColumns};
 use crate::field::{CHUNK, Field};
 use nalgebra::SMatrix;
 use polycore::numerics::{conjugate_gradients, ordered_sum};
 use rayon::prelude::*;
 
-/// The largest |h + Lθ| over the largest |h| inside.
+/// Largest |h + Lθ| over the largest |h| inside.
 const TOLERANCE: f64 = 1e-13;
-/// 140 for 10⁴ particles of a plane body, 50 for those of a solid one.
+/// Iteration limit; 10⁴ particles take 140 in a plane body, 50 in a solid one.
 const MOST_ITERATIONS: usize = 1000;
-/// Cosine of half the angle of a cone without neighbours that only particles at a surface have.
+/// Cosine of half the angle of a cone without neighbours that only surface particles have.
 const OPEN: f64 = 0.5;
 /// Spacings within which such a cone has no neighbour.
 const NEAR: f64 = 2.0;
 
-/// θ with h + Lθ = 0 in all particles whose family no surface cuts, and θ = 0 elsewhere, for [`crate::bonds::BondForces::set_relief`]; `None` where there
-/// is no such particle, and of lattices, which need none. To be found before any bond breaks: θ stays what it is, and the bonds that
-/// are left keep their part of the correction, so that forces follow from an energy however many break.
+/// Computes θ with h + Lθ = 0 in all particles whose family no surface cuts, and θ = 0 elsewhere, for
+/// [`crate::bonds::BondForces::set_relief`]; `None` if there is no such particle, and for lattices, which
+/// need none. Call it before any bond breaks: θ then stays constant, and the remaining bonds keep their part
+/// of the correction, so that forces follow from an energy however many break.
 pub fn relief<const D: usize>(bonds: &dyn Bonds<D>) -> Option<Field<D>> {
-    let Kind::Cloud(cloud) = bonds.kind() else { return None };
+    let BondKind::Cloud(cloud) = bonds.kind() else { return None };
     let inside = complete(cloud);
-    inside.contains(&true).then(|| Problem::new(cloud, inside).solve())
+    inside.contains(&true).then(|| ReliefProblem::new(cloud, inside).solve())
 }
 
-/// Which families lie inside of the body: no bond leads to a particle at a surface that is nearer than δ − ½Δx (its half cell ends
-/// there), and no cut has parted them.
+/// Marks the families inside the body: no bond leads to a surface particle nearer than δ − ½Δx (its half cell
+/// ends there), and no cut divides them.
 fn complete<const D: usize>(cloud: &CloudBonds<D>) -> Vec<bool> {
     let directions = directions::<D>();
     let sites = 0..cloud.sites();
@@ -49,7 +51,7 @@ fn complete<const D: usize>(cloud: &CloudBonds<D>) -> Vec<bool> {
     sites.into_par_iter().map(is_inside).collect()
 }
 
-/// Whether a particle lies at a surface: some cone of 120° holds none of its near neighbours.
+/// Returns true if a particle lies at a surface: some cone of 120° holds none of its near neighbours.
 fn is_exposed<const D: usize>(cloud: &CloudBonds<D>, site: usize, directions: &[[f64; D]]) -> bool {
     let own = (cloud.volume(site) / cloud.thickness()).powf(1.0 / D as f64);
     let reach = NEAR * own.max(cloud.spacing());
@@ -63,7 +65,7 @@ fn is_exposed<const D: usize>(cloud: &CloudBonds<D>, site: usize, directions: &[
     !open.is_empty()
 }
 
-/// Unit vectors all around: of a circle, and of Fibonacci's spiral on a sphere.
+/// Unit vectors in all directions: of a circle, and of Fibonacci's spiral on a sphere.
 fn directions<const D: usize>() -> Vec<[f64; D]> {
     use std::f64::consts::PI;
     let count = if D == 2 { 48 } else { 200 };
@@ -78,17 +80,17 @@ fn directions<const D: usize>() -> Vec<[f64; D]> {
     (0..count).map(place).collect()
 }
 
-struct Problem<'a, const D: usize> {
+struct ReliefProblem<'a, const D: usize> {
     cloud: &'a CloudBonds<D>,
     places: CloudPlaces<D>,
-    terms: Vec<Columns<D>>,
+    terms: Vec<MomentColumns<D>>,
     force: Field<D>,
     inside: Vec<bool>,
-    /// Σ_J V_J and M⁻¹ of each family; 0 where it does not span space.
+    /// Σ_J V_J and M⁻¹ of each family; 0 if it does not span space.
     families: Vec<(f64, SMatrix<f64, D, D>)>,
 }
 
-impl<'a, const D: usize> Problem<'a, D> {
+impl<'a, const D: usize> ReliefProblem<'a, D> {
     fn new(cloud: &'a CloudBonds<D>, mut inside: Vec<bool>) -> Self {
         let family = |site: usize| {
             let (mut shape, mut whole) = (SMatrix::<f64, D, D>::zeros(), 0.0);
@@ -106,17 +108,18 @@ impl<'a, const D: usize> Problem<'a, D> {
         Self { cloud, places, terms, force: Field::zeros(cloud.sites()), inside, families }
     }
 
-    /// Conjugate gradients. L is about a biharmonic operator: its diagonal alone takes iterations as the square of the body's size.
+    /// Solves by conjugate gradients. L is similar to a biharmonic operator: with its diagonal alone,
+    /// iterations grow as the square of the body's size.
     fn solve(mut self) -> Field<D> {
         let sites = self.cloud.sites();
         // −h
         let mut residual = self.apply(None);
         let scale: Vec<f64> = (0..sites).into_par_iter().map(|site| self.diagonal(site)).collect();
         let allowed = TOLERANCE * largest(&residual);
-        // Lθ is about ¼m ∫(Δθ)², m = Σωξ₁⁴, of smooth fields
+        // Lθ is about ¼m ∫(Δθ)², m = Σωξ₁⁴, for smooth fields
         let fourth = if D == 2 { 3.0 / 16.0 } else { 3.0 / 25.0 } * self.cloud.horizon().powi(2);
         let cloud = self.cloud;
-        let mut levels = Levels::new(cloud, &self.inside, 0.25 * fourth);
+        let mut levels = SplineLevels::new(cloud, &self.inside, 0.25 * fourth);
         let precondition = |residual: &[Vector<D>], scaled: &mut [Vector<D>]| {
             let each = scaled.par_iter_mut().zip(residual).zip(&scale);
             each.for_each(|((scaled, r), scale)| *scaled = r / *scale);
@@ -136,7 +139,8 @@ impl<'a, const D: usize> Problem<'a, D> {
         field
     }
 
-    /// −h, or −Lu, inside, m² (2D: times the thickness) and m³: forces on particles where P = 1, and where A = 1.
+    /// Computes −h, or −Lu, inside, m² (2D: times the thickness) and m³: forces on particles for P = 1, and
+    /// for A = 1.
     fn apply(&mut self, displacement: Option<&[Vector<D>]>) -> Vec<Vector<D>> {
         if let Some(displacement) = displacement {
             let mut field = Field::zeros(displacement.len());
@@ -168,7 +172,7 @@ impl<'a, const D: usize> Problem<'a, D> {
         (0..cloud.sites()).into_par_iter().map(value).collect()
     }
 
-    /// About the diagonal of L, m (2D: times the thickness).
+    /// Approximate diagonal of L, m (2D: times the thickness).
     fn diagonal(&self, site: usize) -> f64 {
         let part = |site: usize| if self.families[site].0 > 0.0 { 1.0 / self.families[site].0 } else { 0.0 };
         let mut sum = 0.0;
@@ -183,7 +187,7 @@ fn largest<const D: usize>(field: &[Vector<D>]) -> f64 {
     field.iter().map(Vector::amax).fold(0.0, f64::max)
 }
 
-/// In the order of the work items.
+/// Sums a term in the order of the work items.
 fn sum(sites: usize, term: impl Fn(usize) -> f64 + Sync) -> f64 {
     let of = |chunk: usize| crate::field::chunk_range(chunk, sites).map(&term).sum::<f64>();
     ordered_sum((0..sites.div_ceil(CHUNK)).into_par_iter().map(of))

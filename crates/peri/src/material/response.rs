@@ -1,4 +1,4 @@
-//! What solvers ask of a material at work in a body.
+//! Interface of a material to the solvers.
 
 use crate::bonds::{Bonds, Overstretched, Property, StretchScan, overstretched};
 use crate::error::Error;
@@ -12,16 +12,16 @@ pub struct LawCover {
     pub stretches: [f64; 2],
     /// Largest relative error of a fit.
     pub bound: f64,
-    /// Whether the law stays what it is at the ends beyond them, as it must where bonds break.
+    /// True if the law stays constant beyond the ends, as it must if bonds break.
     pub clamped: bool,
-    /// What [`Response::cover`] gave for these stretches, of a resumed run.
+    /// Result of [`SolverMaterial::cover`] for these stretches in a resumed run.
     pub known: Option<f64>,
 }
 
-/// What a material does over a range of stretches, in one unit.
+/// Bounds of a material over a range of stretches, in one unit.
 #[derive(Clone, Copy, Debug)]
 pub struct LawRange {
-    /// max |t′| + (D − 1)·max(t/λ, 0): D times the mean tangent of bonds in all directions, where it is greatest.
+    /// max |t′| + (D − 1)·max(t/λ, 0): D times the greatest mean tangent of bonds in all directions.
     pub mean_tangent: f64,
     /// min |t′|.
     pub least_tangent: f64,
@@ -29,18 +29,18 @@ pub struct LawRange {
     pub least_energy: f64,
 }
 
-/// A material at work. Forces are taken by work items, so that a trait object costs nothing.
-pub trait Response<const D: usize>: Send + Sync {
-    /// A bond law and its kθ, N/m⁶, about as stiff as this material: its own where it is one.
+/// A material as solvers use it. Forces are computed by work items, so that a trait object costs nothing.
+pub trait SolverMaterial<const D: usize>: Send + Sync {
+    /// A bond law and its kθ, N/m⁶, of similar stiffness; the material's own for bond laws.
     fn bond_law(&self) -> (&dyn BondPotential, f64);
 
-    /// Lamé's λ, Pa, in addition to that of [`Self::bond_law`]: how much stiffer volumes are than those of bonds.
+    /// Lamé's λ, Pa, in excess of that of [`Self::bond_law`]: the stiffness of volumes beyond that of bonds.
     fn volumetric(&self) -> f64 {
         0.0
     }
 
-    /// Brings the law to a range of stretches; a bound of the relative tangent of bonds, N/m⁶: with u_I = Σ_J 2 w V_J/|ξ|
-    /// no particle is stiffer than tangent × u_I.
+    /// Extends the law to a range of stretches; returns a bound of the relative tangent of bonds, N/m⁶: with
+    /// u_I = Σ_J 2 w V_J/|ξ| no particle is stiffer than tangent × u_I.
     ///
     /// # Errors
     /// As [`crate::potential::KernelFit::new`].
@@ -51,13 +51,19 @@ pub trait Response<const D: usize>: Send + Sync {
         cover: &LawCover,
     ) -> Result<f64, Error>;
 
-    /// The first pass: to be called before forces of a displacement, and where bonds have changed.
+    /// Runs the first pass: required before forces of a displacement, and after bonds have changed.
     fn prepare(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>);
 
-    /// Whether forces of a particle depend on more than its own bonds.
+    /// Returns true if forces of a particle depend on more than its own bonds.
     fn has_points(&self) -> bool;
 
-    /// Force densities, N/m³, of whole pieces from the site `start` on; collects the stretches observed if asked.
+    /// Whether forces are those of the bonds' fitted law, and nothing else, as graphics cards evaluate them.
+    fn is_fitted_law(&self) -> bool {
+        false
+    }
+
+    /// Computes the force densities, N/m³, of whole pieces from the site `start` on; tracks the stretches
+    /// observed if asked.
     fn force(
         &self,
         bonds: &dyn Bonds<D>,
@@ -67,25 +73,25 @@ pub trait Response<const D: usize>: Send + Sync {
         track: Option<&mut StretchRange>,
     );
 
-    /// Sites that [`Response::force`] may begin with, see [`crate::bonds::BondForces::piece`].
+    /// Granularity of [`SolverMaterial::force`] in sites, see [`crate::bonds::BondForces::piece`].
     fn piece(&self, bonds: &dyn Bonds<D>) -> usize {
         let _ = bonds;
         CHUNK
     }
 
-    /// Energy of the body, J; `observed` holds the stretches within which the law itself is to be taken.
+    /// Energy of the body, J; `observed` are the stretches within which the law itself is evaluated.
     fn energy(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, observed: StretchRange) -> f64;
 
-    /// Energy of bonds about to be severed, J, where it does not depend on others; `most` is the largest stretch of the law
-    /// itself. `None`: what the body loses when they are.
+    /// Energy of bonds about to be severed, J, if it does not depend on others; `most` is the largest stretch
+    /// of the law itself. `None`: the energy that the body loses when they break.
     fn released(&self, bonds: &dyn Bonds<D>, list: &[Overstretched], most: f64) -> Option<f64>;
 
-    /// The least stretch λ* at which any bond is at rest; critical stretches are multiples of λ*.
+    /// Least stretch λ* at which any bond is at rest; critical stretches are multiples of λ*.
     fn least_rest(&self) -> f64 {
         1.0
     }
 
-    /// As [`overstretched`], with λ/λ* for λ where bonds are at rest at another stretch.
+    /// Lists overstretched bonds as [`overstretched`] does, with λ/λ* for λ if bonds have a stretch at rest.
     fn overstretched(
         &self,
         bonds: &dyn Bonds<D>,
@@ -96,8 +102,9 @@ pub trait Response<const D: usize>: Send + Sync {
         overstretched(bonds, displacement, critical, seen)
     }
 
-    /// Intact bonds of free particles that are stretched, and whose breaking would release more than `limit`, J/m³, with that
-    /// energy, each from both ends, by site and index; none of materials without [`super::Material::released_energy`].
+    /// Lists intact, stretched bonds of free particles whose breaking would release more than `limit`, J/m³,
+    /// with that energy, each from both ends, by site and index; none for materials without
+    /// [`super::Material::released_energy`].
     fn overloaded(
         &mut self,
         bonds: &dyn Bonds<D>,
@@ -109,11 +116,12 @@ pub trait Response<const D: usize>: Send + Sync {
         Vec::new()
     }
 
-    /// Whether bonds differ so much in their tangent, of which `tangent` is the greatest, that every particle needs the
-    /// stiffness of its own.
+    /// Returns true if bonds differ so much in their tangent, of which `tangent` is the greatest, that every
+    /// particle needs its own stiffness.
     fn has_own_stiffness(&self, tangent: f64) -> bool;
 
-    /// Bounds of the stiffness of all particles, in their order, over kθ: s_I of [`super::Material::stiffness`].
+    /// Bounds of the stiffness of all particles, in their order, over kθ: s_I of
+    /// [`super::Material::stiffness`].
     fn own_stiffness(
         &mut self,
         bonds: &dyn Bonds<D>,
@@ -121,14 +129,14 @@ pub trait Response<const D: usize>: Send + Sync {
         stretches: [f64; 2],
     ) -> Vec<f64>;
 
-    /// A bound of ρω², N/m⁴, of oscillations about the displacement last prepared, of materials with states of particles; where it is
-    /// below `enough`, `enough` will do. See [`super::Material::frequency_bound`].
+    /// Bound of ρω², N/m⁴, of oscillations about the displacement last prepared, for materials with particle
+    /// states; a result below `enough` may be replaced by `enough`. See [`super::Material::frequency_bound`].
     fn frequency_bound(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, enough: f64) -> f64 {
         let _ = (bonds, displacement, enough);
         f64::INFINITY
     }
 
-    /// Of some sites those that their bonds crush, see [`super::Material::is_crushed`].
+    /// Selects the sites that their bonds crush, see [`super::Material::is_crushed`].
     fn crushed(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, sites: &[u32]) -> Vec<u32> {
         let _ = (bonds, displacement, sites);
         Vec::new()

@@ -1,4 +1,5 @@
-//! Bond laws whose bonds soften before they break: what the few soft bonds of a body lack against the law of the kernels.
+//! Bond laws whose bonds soften before they break: the force that the few softened bonds of a body have lost
+//! relative to the law of the kernels.
 
 use super::{Bond, BondMaterial};
 use crate::bonds::{BondForces, Property};
@@ -7,11 +8,13 @@ use crate::potential::{EnergyTable, KernelFit, integrity, onset, softened_energy
 use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
-/// The soft bonds of a displacement, by work items: site, and force density that its bonds lack, N/m³ (to be added).
+/// Softened bonds of a displacement, by work items: site, and the force density lost by its bonds, N/m³ (to
+/// be added).
 #[derive(Default)]
-pub(super) struct Lacking(Vec<Vec<(u32, [f64; 3])>>);
+pub(super) struct SofteningLoss(Vec<Vec<(u32, [f64; 3])>>);
 
-/// Visits the bonds beyond the onset that a work item finds, with their stretch and λ_f; all items find each once from both of its ends.
+/// Visits the bonds beyond the onset that a work item finds, with their stretch and λ_f; all items together
+/// find each bond from both ends.
 fn each<const D: usize>(
     end: &Property,
     bonds: &dyn BondForces<D>,
@@ -27,8 +30,8 @@ fn each<const D: usize>(
     }
 }
 
-impl Lacking {
-    /// Of a displacement, with the fit that the kernels have.
+impl SofteningLoss {
+    /// Collects the losses of a displacement, with the fit of the kernels.
     pub fn new<const D: usize>(
         material: &BondMaterial,
         end: &Property,
@@ -62,7 +65,7 @@ impl Lacking {
         Self(items)
     }
 
-    /// Adds what the sites of `force`, from `start` on in one work item, lack.
+    /// Adds the losses of the sites of `force`, from `start` on in one work item.
     pub fn add<const D: usize>(&self, start: usize, force: &mut [&mut [f64]; D]) {
         let Some(lacking) = self.0.get(start / CHUNK) else { return };
         let sites = start..start + force[0].len();
@@ -72,7 +75,7 @@ impl Lacking {
     }
 }
 
-/// Energy that soft bonds lack against `table`, over kθ.
+/// Energy lost by softened bonds relative to `table`, over kθ.
 pub(super) fn lacking_energy<const D: usize>(
     material: &BondMaterial,
     end: &Property,

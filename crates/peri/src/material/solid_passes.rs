@@ -1,17 +1,17 @@
-//! Both passes of a solid on a lattice, by the kernels of [`crate::bonds`], and what they share with clouds.
+//! The two passes of a solid on a lattice, by the kernels of [`crate::bonds`], and parts shared with clouds.
 
-use super::Body;
+use super::DeformedBody;
 use super::family::Family;
 use super::filter::Filter;
-use super::point::Point;
+use super::point::SolidPoint;
 use super::point_law::{NonlocalSolid, PointLaw};
 use super::pointwise::Passes;
-use super::tensor::Tensor;
+use super::tensor::BodyTensor;
 use crate::bonds::{BodyGeometry, BondDamage, Bonds, LinearRow, Softened, StretchRange, among};
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
 
-/// What the second pass reads, N = 1 + D²: A and S of every site.
+/// Data of the second pass, N = 1 + D²: A and S of every site.
 pub struct SolidPasses<const D: usize, const N: usize> {
     rows: Vec<LinearRow<D>>,
     terms: Field<N>,
@@ -19,15 +19,15 @@ pub struct SolidPasses<const D: usize, const N: usize> {
     filter: Filter,
 }
 
-/// Families whose bonds change.
+/// Tracks changes of families.
 pub(super) struct Families {
     /// Intact bonds of each site when its shape tensor was last computed.
     pub(super) bonded: Vec<u32>,
-    /// Intact directed bonds of the body then; none before the first pass.
+    /// Intact directed bonds of the body then; `None` before the first pass.
     known: Option<u64>,
     /// Revision of its softened bonds then.
     revision: u64,
-    /// Particles with springs in place of the law, and their neighbours; empty where there are none.
+    /// Particles with springs in place of the law, and their neighbours; empty if there are none.
     sprung: Vec<bool>,
 }
 
@@ -36,17 +36,22 @@ impl Families {
         Self { bonded: vec![0; sites], known: None, revision: 0, sprung: Vec::new() }
     }
 
-    /// What has changed since the last pass.
-    pub(super) fn changes<const D: usize>(&mut self, bonds: &dyn Bonds<D>) -> Changes {
+    /// Detects changes since the last pass.
+    pub(super) fn changes<const D: usize>(&mut self, bonds: &dyn Bonds<D>) -> FamilyChanges {
         let revision = bonds.softening().revision();
         let softer = self.revision != revision;
         let any = softer || self.known != Some(bonds.directed_bonds());
         (self.known, self.revision) = (Some(bonds.directed_bonds()), revision);
-        Changes { any, softer }
+        FamilyChanges { any, softer }
     }
 
-    /// Finds the particles with springs and their neighbours, where there are `springs`.
-    pub(super) fn mark<const D: usize>(&mut self, bonds: &dyn Bonds<D>, points: &[Point<D>], springs: bool) {
+    /// Finds the particles with springs and their neighbours, if there are `springs`.
+    pub(super) fn mark<const D: usize>(
+        &mut self,
+        bonds: &dyn Bonds<D>,
+        points: &[SolidPoint<D>],
+        springs: bool,
+    ) {
         self.sprung.clear();
         if springs {
             self.sprung.resize(bonds.sites(), false);
@@ -59,12 +64,12 @@ impl Families {
         }
     }
 
-    /// Adds what springs pull to the forces from site `first` on.
+    /// Adds the forces of springs from site `first` on.
     pub(super) fn pull<const D: usize>(
         &self,
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
-        points: &[Point<D>],
+        points: &[SolidPoint<D>],
         first: usize,
         force: &mut [&mut [f64]; D],
     ) {
@@ -80,22 +85,23 @@ impl Families {
     }
 }
 
-/// Whether bonds, or the softened ones among them, are others than in the last pass.
+/// Changes of bonds, and of the softened ones among them, since the last pass.
 #[derive(Clone, Copy)]
-pub(super) struct Changes {
+pub(super) struct FamilyChanges {
     any: bool,
     softer: bool,
 }
 
-impl Changes {
-    /// Reshapes the particles from the site `first` on whose bonds have changed; `soft` are the softened bonds of these.
+impl FamilyChanges {
+    /// Reshapes the particles from the site `first` on whose bonds have changed; `soft` are their softened
+    /// bonds.
     pub(super) fn reshape<const D: usize>(
         self,
         law: &impl PointLaw<D>,
-        (bonds, displacement): Body<D>,
+        (bonds, displacement): DeformedBody<D>,
         (first, soft): (usize, &[Softened]),
         bonded: &mut [u32],
-        points: &mut [Point<D>],
+        points: &mut [SolidPoint<D>],
     ) {
         if !self.any {
             return;
@@ -114,7 +120,7 @@ impl Changes {
 }
 
 impl<const D: usize, const N: usize> SolidPasses<D, N> {
-    /// On a lattice; `None` elsewhere.
+    /// Creates the passes on a lattice; `None` for clouds.
     pub fn new(bonds: &dyn Bonds<D>) -> Option<Self> {
         let rows = bonds.as_lattice()?.linear_rows();
         let families = Families::new(bonds.sites());
@@ -122,7 +128,7 @@ impl<const D: usize, const N: usize> SolidPasses<D, N> {
     }
 }
 
-/// What a softened bond lacks of V/|ξ|², as a negative number, its other end, η and ξ.
+/// Loss of V/|ξ|² of a softened bond, as a negative number, with its other end, η and ξ.
 fn lack<const D: usize>(
     rows: &[LinearRow<D>],
     bond: &Softened,
@@ -141,7 +147,7 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
         solid: &NonlocalSolid<L>,
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
-        points: &mut [Point<D>],
+        points: &mut [SolidPoint<D>],
     ) {
         let Some(lattice) = bonds.as_lattice() else { return };
         let softening = lattice.softening();
@@ -160,15 +166,15 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
                     let at = base + lane - first;
                     let point = &mut points[at];
                     if point.has_gradient() {
-                        let mut moment = Tensor::<D>::from_fn(|a, b| moments[1 + a * D + b][lane]);
+                        let mut moment = BodyTensor::<D>::from_fn(|a, b| moments[1 + a * D + b][lane]);
                         let mut square = moments[0][lane];
-                        // the kernel takes every bond for intact
+                        // the kernel treats every bond as intact
                         for bond in among(soft, base + lane..base + lane + 1) {
                             let (lack, _, change, reference) = lack(rows, bond, displacement);
                             square += change.iter().map(|x| lack * x * x).sum::<f64>();
-                            moment += Tensor::from_fn(|a, b| lack * change[a] * reference[b]);
+                            moment += BodyTensor::from_fn(|a, b| lack * change[a] * reference[b]);
                         }
-                        point.deform(moment, Tensor::zeros(), square);
+                        point.deform(moment, BodyTensor::zeros(), square);
                         if filters {
                             continue;
                         }
@@ -206,7 +212,7 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
         _solid: &NonlocalSolid<L>,
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
-        points: &[Point<D>],
+        points: &[SolidPoint<D>],
         chunk: usize,
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,

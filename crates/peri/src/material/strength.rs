@@ -1,29 +1,32 @@
-//! Uniform states at which a solid has its strength.
+//! Uniform states in which a solid reaches its strength.
 
 use super::point_law::{Deformation, PointLaw};
-use super::tensor::Tensor;
+use super::tensor::BodyTensor;
 use polycore::numerics::bisect;
 use std::cmp::Ordering;
 
-/// No solid is strained farther.
+/// Greatest stretch considered.
 const GREATEST: f64 = 1e3;
 
-/// Uniaxial tension of stretch λ₁: the other stretch, at which the sides are free, by bisection.
-fn pulled<const D: usize>(law: &(impl PointLaw<D> + ?Sized), stretch: f64) -> (Deformation<D>, Tensor<D>) {
+/// Finds uniaxial tension of stretch λ₁: the lateral stretch with free sides, by bisection.
+fn pulled<const D: usize>(
+    law: &(impl PointLaw<D> + ?Sized),
+    stretch: f64,
+) -> (Deformation<D>, BodyTensor<D>) {
     let at = |side: f64| {
         let entry = |a: usize| if a == 0 { stretch - 1.0 } else { side - 1.0 };
-        let displacement_gradient = Tensor::from_fn(|a, b| if a == b { entry(a) } else { 0.0 });
+        let displacement_gradient = BodyTensor::from_fn(|a, b| if a == b { entry(a) } else { 0.0 });
         let deformation = Deformation { displacement_gradient, residual: 0.0 };
         let piola = law.respond(&deformation).piola;
         (deformation, piola)
     };
-    // a body without volume is outside of most laws
+    // a body without volume is outside the domain of most laws
     at(bisect(0.0, 2.0, 60, |side| at(side).1[(1, 1)].partial_cmp(&0.0) != Some(Ordering::Greater))[1])
 }
 
-/// Energy density W, J/m³, of the uniform state of uniaxial tension in which the stress is first `strength`, Pa: force over the
-/// undeformed section (first Piola–Kirchhoff), as tensile tests of rubber report it (ISO 37). In plane strain the thickness is held. `None`
-/// where the law does not reach it.
+/// Energy density W, J/m³, of the uniform state of uniaxial tension in which the stress first reaches
+/// `strength`, Pa: force over the undeformed section (first Piola–Kirchhoff), as tensile tests of rubber
+/// report it (ISO 37). In plane strain the thickness is held. `None` if the law does not reach it.
 pub fn energy_at_strength<const D: usize>(law: &(impl PointLaw<D> + ?Sized), strength: f64) -> Option<f64> {
     let beyond = |strain: f64| {
         let stress = pulled(law, 1.0 + strain).1[(0, 0)];

@@ -1,13 +1,13 @@
-//! Tractions on the surfaces that the families of a solid see.
+//! Tractions on the surfaces as seen by the families of a solid.
 
 use super::point_law::{Deformation, NonlocalSolid, PointLaw, PointStress};
-use super::tensor::Tensor;
-use super::{Pointwise, Response};
+use super::tensor::BodyTensor;
+use super::{Pointwise, SolverMaterial};
 use crate::bonds::Bonds;
 use crate::field::{CHUNK, Field};
 
-/// A uniform stress, whatever the deformation.
-struct Uniform<const D: usize>(Tensor<D>);
+/// A uniform stress, independent of the deformation.
+struct Uniform<const D: usize>(BodyTensor<D>);
 
 impl<const D: usize> PointLaw<D> for Uniform<D> {
     fn energy(&self, _: &Deformation<D>) -> f64 {
@@ -27,10 +27,11 @@ impl<const D: usize> PointLaw<D> for Uniform<D> {
     }
 }
 
-/// The body force P h_I/V_I, N/m³, that balances a uniform Piola stress P in a [`NonlocalSolid`], with
-/// h_I = Σ_J (V_J I_J B_JI − V_I I_I B_IJ) and B_IJ = ω M⁻¹ξ/I: the area vector of the surface that the families of I and of its
-/// neighbours see. Σ h = 0; inside a lattice h = 0, and a flat face has a normal h in two horizons below it.
-pub fn surface_load<const D: usize>(bonds: &dyn Bonds<D>, piola: Tensor<D>) -> Field<D> {
+/// Body force P h_I/V_I, N/m³, that balances a uniform Piola stress P in a [`NonlocalSolid`], with h_I = Σ_J
+/// (V_J I_J B_JI − V_I I_I B_IJ) and B_IJ = ω M⁻¹ξ/I: the area vector of the surface as seen by the families
+/// of I and its neighbours. Σ h = 0; inside a lattice h = 0, and a flat face has a normal h within two
+/// horizons below it.
+pub fn surface_load<const D: usize>(bonds: &dyn Bonds<D>, piola: BodyTensor<D>) -> Field<D> {
     let mut solid = Pointwise::new(NonlocalSolid(Uniform(piola)), bonds);
     let rest = Field::zeros(bonds.sites());
     solid.prepare(bonds, &rest);

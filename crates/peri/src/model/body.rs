@@ -4,7 +4,7 @@ use crate::bonds::{LatticeBonds, VolumeCorrection};
 use crate::calibrate::Space;
 use crate::error::Error;
 use crate::geometry::{Cut, Gaps, Operation, Shape, lattice};
-use crate::surface::Surface;
+use crate::surface::BodySurface;
 
 /// Shapes filled with particles on a regular lattice; lengths in m.
 #[derive(Clone, Debug)]
@@ -20,8 +20,8 @@ pub struct Body<const D: usize> {
 }
 
 impl<const D: usize> Body<D> {
-    /// A shape with particles `spacing` apart and a horizon of 3.015 spacings: a solid in three dimensions, in two a sheet
-    /// in plane stress, 1 m thick.
+    /// Fills a shape with particles `spacing` apart and a horizon of 3.015 spacings: a solid in three
+    /// dimensions, in two a sheet in plane stress, 1 m thick.
     pub fn lattice(shape: Shape<D>, spacing: f64) -> Self {
         Self {
             operations: vec![Operation::Add(shape)],
@@ -35,51 +35,53 @@ impl<const D: usize> Body<D> {
         }
     }
 
-    /// Joins another shape to what has been added so far.
+    /// Adds another shape.
     pub fn join(mut self, shape: Shape<D>) -> Self {
         self.operations.push(Operation::Add(shape));
         self
     }
 
-    /// Cuts a shape out of what has been added so far.
+    /// Cuts a shape out of everything added so far.
     pub fn cut(mut self, shape: Shape<D>) -> Self {
         self.operations.push(Operation::Cut(shape));
         self
     }
 
-    /// A crack of zero width: no bond crosses it.
+    /// Adds a crack of zero width: no bond crosses it.
     pub fn crack(mut self, crack: Cut<D>) -> Self {
         self.cracks.push(crack);
         self
     }
 
-    /// Keeps the bonds across [`Gaps`]: between shapes that do not touch, and across cuts narrower than the horizon.
+    /// Keeps the bonds across [`Gaps`]: between shapes that do not touch, and across cut-outs narrower than
+    /// the horizon.
     pub fn bond_gaps(mut self) -> Self {
         self.bond_gaps = true;
         self
     }
 
-    /// The horizon δ, in spacings.
+    /// Sets the horizon δ, in spacings.
     pub fn horizon(mut self, ratio: f64) -> Self {
         self.ratio = ratio;
         self
     }
 
-    /// How volumes of neighbours near the horizon are corrected; they are not by default.
+    /// Sets the volume correction of neighbours near the horizon; default: none.
     pub fn volume_correction(mut self, correction: VolumeCorrection) -> Self {
         self.correction = correction;
         self
     }
 
-    /// Face points of its surface.
-    pub fn surface(&self) -> Surface<D> {
-        Surface::of_shapes(&self.operations, self.spacing)
+    /// Face points of the surface.
+    pub fn surface(&self) -> BodySurface<D> {
+        BodySurface::of_shapes(&self.operations, self.spacing)
     }
 
-    /// Its particles and bonds.
+    /// Builds particles and bonds.
     ///
     /// # Errors
-    /// [`Error::Geometry`] as [`lattice()`] and [`LatticeBonds::new`]; for a thickness that is not positive, too.
+    /// [`Error::Geometry`] of [`lattice()`] and [`LatticeBonds::new`], and for a thickness that is not
+    /// positive.
     pub fn build(&self) -> Result<LatticeBonds<D>, Error> {
         if !(self.thickness > 0.0 && self.thickness.is_finite()) {
             let found = self.thickness;

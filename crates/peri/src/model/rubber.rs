@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// Rubber whose bonds follow a [`Law`], or a law of the caller.
 #[derive(Clone)]
 pub struct Rubber {
-    law: Kind,
+    law: RubberLaw,
     youngs_modulus: f64,
     links: f64,
     dissociation: f64,
@@ -22,52 +22,52 @@ pub struct Rubber {
 }
 
 #[derive(Clone)]
-enum Kind {
+enum RubberLaw {
     Named(Law),
     Own(Arc<dyn BondPotential>),
 }
 
 impl Rubber {
-    /// Rubber of Young's modulus E, Pa, that does not break. Chains have n̄ = 720 links of D̂ = 1200 unless
-    /// [`Self::chains`] says otherwise.
+    /// Creates rubber of Young's modulus E, Pa, that does not break. Chains have n̄ = 720 links of D̂ = 1200
+    /// unless [`Self::chains`] sets others.
     pub fn new(law: Law, youngs_modulus: f64) -> Self {
-        Self::of(Kind::Named(law), youngs_modulus)
+        Self::from_law(RubberLaw::Named(law), youngs_modulus)
     }
 
-    /// Rubber of any law, which is scaled so that t′(1) = 3, as the calibration of kθ expects.
-    pub fn of_law(law: impl BondPotential + 'static, youngs_modulus: f64) -> Self {
-        Self::of(Kind::Own(Arc::new(law)), youngs_modulus)
+    /// Creates rubber of any law, scaled so that t′(1) = 3, as the calibration of kθ expects.
+    pub fn with_law(law: impl BondPotential + 'static, youngs_modulus: f64) -> Self {
+        Self::from_law(RubberLaw::Own(Arc::new(law)), youngs_modulus)
     }
 
-    fn of(law: Kind, youngs_modulus: f64) -> Self {
+    fn from_law(law: RubberLaw, youngs_modulus: f64) -> Self {
         let (links, dissociation, calibration) = (720.0, 1200.0, Calibration::Continuum);
         Self { law, youngs_modulus, links, dissociation, calibration, critical: None }
     }
 
-    /// Chains of n̄ `links` and a dissociation energy D̂, in units of kθ.
+    /// Sets chains of n̄ `links` and a dissociation energy D̂, in units of kθ.
     pub fn chains(mut self, links: f64, dissociation: f64) -> Self {
         (self.links, self.dissociation) = (links, dissociation);
         self
     }
 
-    /// Takes kθ from the lattice's own sums or from the continuum's integrals, which is the default.
+    /// Sets the source of kθ: the lattice's sums or the continuum's integrals, the default.
     pub fn calibration(mut self, calibration: Calibration) -> Self {
         self.calibration = calibration;
         self
     }
 
-    /// Bonds break at a stretch λ_c.
+    /// Breaks bonds at a stretch λ_c.
     pub fn critical_stretch(mut self, stretch: f64) -> Self {
         self.critical = Some(Critical { stretch: Some(stretch), ..Critical::default() });
         self
     }
 
-    /// Bonds break at the stretch that follows from a tearing energy G, J/m², see [`Convention::Tearing`].
+    /// Breaks bonds at the stretch that follows from a tearing energy G, J/m², see [`Convention::Tearing`].
     pub fn fracture_energy(self, energy: f64) -> Self {
         self.fracture_energy_by(Convention::Tearing, energy)
     }
 
-    /// Bonds break at the stretch that follows from a fracture energy G, J/m², by a convention.
+    /// Breaks bonds at the stretch that follows from a fracture energy G, J/m², by a convention.
     pub fn fracture_energy_by(mut self, convention: Convention, energy: f64) -> Self {
         let (energy, convention) = (Some(EnergyPerArea::from_si(energy)), Some(convention));
         self.critical = Some(Critical { fracture_energy: energy, convention, ..Critical::default() });
@@ -89,11 +89,11 @@ impl<const D: usize> IntoMaterial<D> for Rubber {
             return Err(Error::Parameter { name: "Young's modulus", found, allowed });
         }
         let (law, links): (Box<dyn BondPotential>, _) = match self.law {
-            Kind::Named(law) => {
+            RubberLaw::Named(law) => {
                 let links = law.is_chain().then_some(self.links);
                 (law.build(self.links, self.dissociation, law.rescales())?, links)
             }
-            Kind::Own(law) => {
+            RubberLaw::Own(law) => {
                 let found = law.tangent();
                 if !(found > 0.0 && found.is_finite()) {
                     let allowed = "above 0, finite".into();

@@ -1,13 +1,14 @@
-//! One chain with extensible links: the implicit relation (2.41) in closed parametric form.
+//! A chain with extensible links: the implicit relation (2.41) in closed parametric form.
 //!
-//! With x = 𝓛(β): λ_b = exp(βx/D̂), λ̄ = √n̄ x λ_b, T = √n̄ β/λ_b. λ̄(β) is strictly monotone, so the only inversion is
-//! one scalar root; nothing implicit is left in a bond.
+//! With x = 𝓛(β): λ_b = exp(βx/D̂), λ̄ = √n̄ x λ_b, T = √n̄ β/λ_b. λ̄(β) is strictly monotone, so a scalar
+//! root is the only inversion; a bond has no implicit relation.
 
 use crate::error::Error;
 use polycore::langevin::{complement, derivative, free_energy, inverse, langevin};
 use polycore::numerics::bisected;
 
-/// Newton's method needs 3 to 8 steps; its fallback, bisection, more for absurd parameters only.
+/// Iteration limit. Newton's method needs 3 to 8 steps; its fallback, bisection, more for absurd parameters
+/// only.
 const MOST_STEPS: usize = 400;
 
 /// A chain of n̄ links whose bonds have the energy ½ D (ln λ_b)².
@@ -33,10 +34,10 @@ pub struct ChainPoint {
 }
 
 impl Chain {
-    /// A chain of n̄ = `links` ≥ 1 and D̂ = D/kθ = `dissociation` > 0.
+    /// Creates a chain of n̄ = `links` ≥ 1 and D̂ = D/kθ = `dissociation` > 0.
     ///
     /// # Errors
-    /// [`Error::Parameter`] outside.
+    /// [`Error::Parameter`] outside these domains.
     pub fn new(links: f64, dissociation: f64) -> Result<Self, Error> {
         for (name, found, least) in [("links", links, 1.0), ("dissociation", dissociation, f64::MIN_POSITIVE)]
         {
@@ -47,8 +48,8 @@ impl Chain {
         Ok(Self { links, dissociation })
     }
 
-    /// The state at parameter β ≥ 0; at ∞ the torn chain: no force, no stiffness.
-    pub fn at(&self, beta: f64) -> ChainPoint {
+    /// State at parameter β ≥ 0; at ∞ the torn chain: no force, no stiffness.
+    pub fn state_at(&self, beta: f64) -> ChainPoint {
         if beta == f64::INFINITY {
             return ChainPoint {
                 stretch: beta,
@@ -73,16 +74,16 @@ impl Chain {
         }
     }
 
-    /// The state at chain stretch λ̄ ≥ 0 (its magnitude is taken).
+    /// State at chain stretch λ̄ ≥ 0 (its magnitude is used).
     pub fn stretched(&self, stretch: f64) -> ChainPoint {
-        self.at(self.beta(stretch))
+        self.state_at(self.beta(stretch))
     }
 
-    /// β at a chain stretch λ̄ (its magnitude is taken): x λ_b = λ̄/√n̄. A few ulp of the exact value for the given λ̄, also
-    /// at λ̄ ≈ √n̄, where the curve is nearly vertical; ∞ at ∞.
+    /// β at a chain stretch λ̄ (its magnitude is used): x λ_b = λ̄/√n̄. Accurate to a few ulp for the given
+    /// λ̄, also at λ̄ ≈ √n̄, where the curve is nearly vertical; ∞ at ∞.
     pub fn beta(&self, stretch: f64) -> f64 {
         let ratio = stretch.abs() / self.links.sqrt();
-        // also the limits: 0, ∞, and NaN for NaN
+        // includes the limits: 0, ∞, and NaN for NaN
         if ratio == 0.0 || !ratio.is_finite() {
             ratio
         } else if ratio < 0.5 {
@@ -92,7 +93,7 @@ impl Chain {
         }
     }
 
-    /// x λ_b = r for r < 1/2. The rigid chain gives an upper bound.
+    /// Solves x λ_b = r for r < 1/2. The rigid chain gives an upper bound.
     fn slack(&self, ratio: f64) -> f64 {
         let start = inverse(ratio);
         newton(start, start, |beta| {
@@ -103,7 +104,7 @@ impl Chain {
         })
     }
 
-    /// ln x + βx/D̂ = ln r for r ≥ 1/2: both terms keep their digits where x → 1.
+    /// Solves ln x + βx/D̂ = ln r for r ≥ 1/2: both terms keep their digits as x → 1.
     fn taut(&self, logarithm: f64) -> f64 {
         // with ln x ≈ −1/β and βx ≈ β − 1: β² − D̂bβ − D̂ = 0
         let b = logarithm + 1.0 / self.dissociation;
@@ -128,16 +129,18 @@ impl Chain {
         0.5 * (excess / self.links).ln_1p()
     }
 
-    /// The greatest force, at β = D̂ up to terms e^{−2D̂}: where d(β/λ_b)/dβ = 0.
+    /// State of greatest force, at β = D̂ up to terms e^{−2D̂}: where d(β/λ_b)/dβ = 0.
     pub fn strongest(&self) -> ChainPoint {
-        // root of 1 = β(x + βx′)/D̂; β(x + βx′) lies between 2β²/3 and β, so the root between D̂ and √(3D̂/2) or about
+        // root of 1 = β(x + βx′)/D̂; β(x + βx′) lies between 2β²/3 and β, so the root lies roughly between D̂
+        // and √(3D̂/2)
         let excess = |beta: f64| beta * (langevin(beta) + beta * derivative(beta)) / self.dissociation - 1.0;
         let (low, high) = (1e-3 * self.dissociation.min(1.0), 2.0 * self.dissociation.max(2.0));
-        self.at(bisected(low, high, 200, |beta| excess(beta) < 0.0))
+        self.state_at(bisected(low, high, 200, |beta| excess(beta) < 0.0))
     }
 }
 
-/// The positive root of an increasing function, from its value and slope: Newton's method kept inside a shrinking bracket.
+/// Finds the positive root of an increasing function from its value and slope: Newton's method kept inside a
+/// shrinking bracket.
 fn newton(start: f64, upper: f64, value_and_slope: impl Fn(f64) -> (f64, f64)) -> f64 {
     let (mut low, mut high) = (0.0, upper);
     let mut at = start;
@@ -213,7 +216,7 @@ mod tests {
         }
     }
 
-    /// The implicit relation (2.41) solved directly for λ_b by bisection.
+    /// Compares with the implicit relation (2.41), solved directly for λ_b by bisection.
     #[test]
     fn agrees_with_the_implicit_relation_solved_directly() {
         let mut worst: f64 = 0.0;
@@ -235,8 +238,8 @@ mod tests {
     }
 
     proptest! {
-        /// λ̄(β) back to β: what is lost is the rounding of λ̄ times the condition number of the inversion, which is
-        /// up to √D̂ at locking.
+        /// Inverts λ̄(β): the error is the rounding of λ̄ times the condition number of the inversion, up to
+        /// √D̂ at locking.
         #[test]
         fn inversion(exponent in -8.0..9.0f64, links in 0.0..6.0f64, dissociation in 0.0..9.0f64) {
             let chain = Chain::new(10f64.powf(links), 10f64.powf(dissociation)).unwrap();
@@ -247,23 +250,25 @@ mod tests {
             let sensitivity = beta * (slope / x + (x + beta * slope) / chain.dissociation);
             // λ̄ itself: 𝓛 3.5 ulp, the exponent 4 ulp, two roundings and √n̄
             let rounding = (6.0 + 4.0 * work) * f64::EPSILON / sensitivity;
-            let error = (chain.beta(chain.at(beta).stretch) / beta - 1.0).abs();
+            let error = (chain.beta(chain.state_at(beta).stretch) / beta - 1.0).abs();
             prop_assert!(error < rounding + 8.0 * f64::EPSILON, "{} {}", error, rounding);
         }
 
-        /// φ → T → dT/dλ̄ on both sides of locking and of the maximum.
+        /// Differentiates φ → T → dT/dλ̄ on both sides of locking and of the maximum.
         #[test]
         fn differences(ratio in 0.01..4.0f64, links in 0.31..5.0f64, dissociation in 0.0..3.5f64) {
             let chain = Chain::new(10f64.powf(links), 10f64.powf(dissociation)).unwrap();
             let stretch = ratio * chain.links.sqrt();
             // the curve bends over √n̄/√D̂ > 0.017 λ̄: truncation (2e-6/0.017)²/6, cancellation ε/2e-6
-            let (left, right) = (chain.stretched(stretch * (1.0 - 2e-6)), chain.stretched(stretch * (1.0 + 2e-6)));
+            let left = chain.stretched(stretch * (1.0 - 2e-6));
+            let right = chain.stretched(stretch * (1.0 + 2e-6));
             let (width, here) = (4e-6 * stretch, chain.stretched(stretch));
             let force = (right.energy - left.energy) / width;
             prop_assert!((force - here.force).abs() < 1e-6 * here.force.max(1e-3 * here.energy / stretch));
             let stiffness = (right.force - left.force) / width;
             let scale = here.stiffness.abs() + here.force / stretch;
-            prop_assert!((stiffness - here.stiffness).abs() < 1e-6 * scale, "{} {}", stiffness, here.stiffness);
+            let error = (stiffness - here.stiffness).abs();
+            prop_assert!(error < 1e-6 * scale, "{} {}", stiffness, here.stiffness);
         }
     }
 }

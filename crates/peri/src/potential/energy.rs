@@ -4,10 +4,11 @@ use super::{BondPotential, KernelFit, StretchRange};
 
 /// Pieces of the table.
 const PIECES: usize = 2048;
-/// Pieces of the table of a fit, whose range is wider.
+/// Pieces of the table of a fit, which has a wider range.
 const FINE: usize = 8192;
 
-/// φ(e)/kθ by cubic Hermite interpolation, with dφ/de = t/2λ at its nodes: relative error about 1e-9 of the largest.
+/// φ(e)/kθ by cubic Hermite interpolation, with dφ/de = t/2λ at its nodes: relative error about 1e-9 of the
+/// largest.
 pub struct EnergyTable {
     low: f64,
     step: f64,
@@ -15,9 +16,9 @@ pub struct EnergyTable {
 }
 
 impl EnergyTable {
-    /// The energies of the stretches observed.
+    /// Tabulates the energies of the stretches observed.
     pub fn new(law: &dyn BondPotential, observed: StretchRange) -> Self {
-        // never empty, never a bond of no length
+        // never empty, never a bond of zero length
         let low = observed.low.max(-1.0 + 1e-12);
         let high = observed.high.max(low + 1e-9);
         let step = (high - low) / PIECES as f64;
@@ -29,8 +30,8 @@ impl EnergyTable {
         Self { low, step, nodes: (0..=PIECES).map(node).collect() }
     }
 
-    /// The energies of a fitted law, ½∫q de from the energy `at_rest` on: the potential of the forces that the kernels compute. `None`
-    /// for a law that only a table represents.
+    /// Tabulates the energies of a fitted law, ½∫q de from the energy `at_rest` on: the potential of the
+    /// kernels' forces. `None` for a law that only a table represents.
     pub fn of_fit(fit: &KernelFit, at_rest: f64) -> Option<Self> {
         if fit.numerator.is_empty() {
             return None;
@@ -63,7 +64,7 @@ impl EnergyTable {
         Some(Self { low: -step * below as f64, step, nodes })
     }
 
-    /// φ(e)/kθ; beyond the table its ends' tangents continue.
+    /// φ(e)/kθ; beyond the table, along its end tangents.
     #[inline]
     pub fn value(&self, e: f64) -> f64 {
         let place = (e - self.low) / self.step;
@@ -87,7 +88,7 @@ pub struct TangentTable {
 }
 
 impl TangentTable {
-    /// The tangents of the stretches observed.
+    /// Tabulates the tangents of the stretches observed.
     pub fn new(law: &dyn BondPotential, observed: StretchRange) -> Self {
         let low = observed.low.max(-1.0 + 1e-6);
         let high = observed.high.max(low + 1e-9);
@@ -100,7 +101,7 @@ impl TangentTable {
         Self { low, step, pieces: nodes.windows(2).map(|ends| ends[0].max(ends[1])).collect() }
     }
 
-    /// The bound at e; beyond the table that of its end.
+    /// Bound at e; beyond the table, the value at its end.
     #[inline]
     pub fn value(&self, e: f64) -> f64 {
         let piece = (((e - self.low) / self.step).max(0.0) as usize).min(PIECES - 1);
@@ -127,7 +128,7 @@ mod tests {
         }
     }
 
-    /// Energies of the fit against those of the law, relative to their size down to small strains.
+    /// Compares energies of the fit with those of the law, relative to their size down to small strains.
     #[test]
     fn energies_of_fits() {
         for law in Law::ALL {

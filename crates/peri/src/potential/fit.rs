@@ -1,28 +1,28 @@
 //! The bond law as the kernels need it: q = t/l as a function of e = l² − 1, so that no square root is taken.
 //!
-//! A stress-free law is q(e) = e·N(e)/D(e), exact at rest; any other N(e)/D(e). The cheapest polynomial or rational fit
-//! whose measured error meets the bound is taken, a cubic Hermite table where none does.
+//! A stress-free law is q(e) = e·N(e)/D(e), exact at rest; any other N(e)/D(e). The cheapest polynomial or
+//! rational fit whose measured error meets the bound is used, or a cubic Hermite table if none does.
 
 use super::{BondPotential, ratio};
 use crate::error::Error;
 use pulp::Simd;
 
-/// Most numbers in a vector.
+/// Most lanes of a vector.
 const WIDEST: usize = 8;
 
-/// Intervals between the points at which a candidate is judged.
+/// Intervals between the points at which a candidate is tested.
 const DENSE: usize = 4096;
-/// One in so many of these points is fitted.
+/// Stride of the points that are fitted.
 const STRIDE: usize = 32;
 /// Fewest pieces of a table, and most nodes.
 const LEAST_PIECES: usize = 64;
 const MOST_NODES: usize = 1 << 17;
 /// Cost of a division in multiply-adds, for choosing between candidates.
 const DIVISION: usize = 5;
-/// Sizes of numerator and denominator (beyond its 1): those that the kernels are compiled for, cheapest first. On stretch
-/// ranges that scenes meet, all the laws need nearly the same, hence the choice of ratios.
+/// Compiled sizes of numerator and denominator (beyond its 1), cheapest first. On common stretch ranges all
+/// laws need nearly the same size, hence the choice of ratios.
 ///
-/// (10, 9) is padded to (11, 10): a size more than needed may have a pole and its zero in the same place.
+/// (10, 9) is padded to (11, 10): a size larger than needed may have a pole and its zero at the same point.
 const CANDIDATES: [(usize, usize); 17] = [
     (3, 0),
     (4, 0),
@@ -50,20 +50,21 @@ pub struct KernelFit {
     pub numerator: Vec<f64>,
     /// Coefficients of D beyond its leading 1.
     pub denominator: Vec<f64>,
-    /// Whether q carries the factor e.
+    /// True if q has the factor e.
     pub stress_free: bool,
     /// Stretches covered.
     pub range: [f64; 2],
     /// Largest relative error of q over the range, measured.
     pub max_error: f64,
-    /// Outside of these e, q stays what it is at their ends; infinite unless set.
+    /// Range of e outside of which q is constant; infinite unless set.
     pub clamp: [f64; 2],
     /// Strain l − 1, tension and its derivative at the nodes.
     table: Vec<[f64; 3]>,
 }
 
 impl KernelFit {
-    /// Fits `law` over stretches `range` to relative error `bound` of q/e (q for laws that are not stress-free).
+    /// Fits `law` over stretches `range` to relative error `bound` of q/e (of q for laws that are not
+    /// stress-free).
     ///
     /// # Errors
     /// [`Error::Parameter`] for an empty range or a bound that even the table misses.
@@ -85,7 +86,7 @@ impl KernelFit {
         let dense = target.samples(DENSE)?;
         let sparse: Vec<(f64, f64)> = dense.iter().step_by(STRIDE).copied().collect();
         for (p, q) in CANDIDATES {
-            // a little less, for what lies between the sparse points
+            // a little less, for the error between the sparse points
             let Some(ratio) = ratio::fit(&sparse, p, q, 0.97 * bound) else { continue };
             let safe = ratio.has_no_pole(target.low, target.high);
             let ratio::Ratio { numerator, denominator, .. } = ratio;
@@ -107,15 +108,16 @@ impl KernelFit {
         target.table(range, bound, &dense)
     }
 
-    /// Keeps q constant outside of the range, where a fit must not be followed: bonds beyond it are about to break, and bonds
-    /// crushed below it push along ζ with a bounded stiffness, where the law's direction jumps as ζ passes through 0.
+    /// Keeps q constant outside of the range, where the fit must not be extrapolated: bonds beyond it are
+    /// about to break, and bonds crushed below it push along ζ with a bounded stiffness, where the law's
+    /// direction jumps as ζ passes through 0.
     #[must_use]
     pub fn clamped(mut self) -> Self {
         self.clamp = self.range.map(|stretch| stretch * stretch - 1.0);
         self
     }
 
-    /// q(e).
+    /// Evaluates q(e).
     pub fn value(&self, e: f64) -> f64 {
         let e = e.clamp(self.clamp[0], self.clamp[1]);
         if !self.table.is_empty() {
@@ -126,7 +128,7 @@ impl KernelFit {
         if self.stress_free { e * ratio } else { ratio }
     }
 
-    /// q of several vectors of e.
+    /// Evaluates q for several vectors of e.
     #[inline(always)]
     pub(crate) fn vectors<S: Simd, const V: usize>(&self, simd: S, mut e: [S::f64s; V]) -> [S::f64s; V] {
         if !self.table.is_empty() {
@@ -146,7 +148,7 @@ impl KernelFit {
         for v in 0..V {
             e[v] = simd.min_f64s(simd.max_f64s(e[v], low), high);
         }
-        // iterators, closures and functions of arrays would not become part of code for vectors
+        // iterators, closures and functions of arrays would not be inlined into vector code
         for k in (0..self.numerator.len()).rev() {
             let c = simd.splat_f64s(self.numerator[k]);
             for v in 0..V {
@@ -171,7 +173,7 @@ impl KernelFit {
         q
     }
 
-    /// What is fitted: `polynomial of degree 6`, `rational 3/2`, `table of 2000 nodes`.
+    /// Form of the fit: `polynomial of degree 6`, `rational 3/2`, `table of 2000 nodes`.
     pub fn kind(&self) -> String {
         if !self.table.is_empty() {
             format!("table of {} nodes", self.table.len())
@@ -187,8 +189,8 @@ impl KernelFit {
         self.numerator.len() + self.denominator.len() + if self.denominator.is_empty() { 0 } else { DIVISION }
     }
 
-    /// Largest relative error of q over the range where single precision evaluates it; infinite for a table. The ratio of
-    /// a chain law over stretches of 0.1 to 3 loses all digits.
+    /// Largest relative error of q over the range in single precision; infinite for a table. The ratio of a
+    /// chain law over stretches of 0.1 to 3 loses all digits.
     pub fn single_error(&self) -> f64 {
         if self.numerator.is_empty() {
             return f64::INFINITY;
@@ -204,7 +206,7 @@ impl KernelFit {
             let exact = self.value(e.into());
             if found == exact { 0.0 } else { (found / exact - 1.0).abs() }
         };
-        // a value that is not a number is no small error
+        // NaN is no small error
         (0..=DENSE).map(error).fold(0.0, |most: f64, error| if error <= most { most } else { error })
     }
 
@@ -237,7 +239,7 @@ impl KernelFit {
     }
 }
 
-/// The cubic through two nodes with their slopes.
+/// Evaluates the cubic through two nodes with their slopes.
 fn hermite([x0, t0, d0]: &[f64; 3], [x1, t1, d1]: &[f64; 3], strain: f64) -> f64 {
     let width = x1 - x0;
     // both differences, so that neither cancels beside the node at rest
@@ -250,7 +252,7 @@ fn horner(coefficients: &[f64], x: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c)
 }
 
-/// What is to be fitted.
+/// Function to be fitted.
 struct Target<'a> {
     law: &'a dyn BondPotential,
     low: f64,
@@ -259,7 +261,7 @@ struct Target<'a> {
 }
 
 impl Target<'_> {
-    /// q/e, or q.
+    /// q/e, or q for laws that are not stress-free.
     fn exact(&self, e: f64) -> f64 {
         let stretch = (1.0 + e).sqrt();
         // l − 1 = e/(1 + l), without cancellation
@@ -271,7 +273,7 @@ impl Target<'_> {
         }
     }
 
-    /// Samples graded towards both ends.
+    /// Samples the function, graded towards both ends.
     fn samples(&self, count: usize) -> Result<Vec<(f64, f64)>, Error> {
         let point = |k: usize| {
             let sine = (0.5 * std::f64::consts::PI * k as f64 / count as f64).sin();
@@ -289,7 +291,8 @@ impl Target<'_> {
         }
     }
 
-    /// Cubic Hermite pieces of t over the strain, halved until each meets the bound at its quarter points.
+    /// Builds cubic Hermite pieces of t over the strain, halved until each meets the bound at its quarter
+    /// points.
     fn table(&self, range: [f64; 2], bound: f64, dense: &[(f64, f64)]) -> Result<KernelFit, Error> {
         let [low, high] = range.map(|stretch| stretch - 1.0);
         let node = |strain: f64| {
@@ -300,7 +303,7 @@ impl Target<'_> {
             .map(|k| node(low + (high - low) * k as f64 / LEAST_PIECES as f64))
             .collect();
         if low < 0.0 && high > 0.0 {
-            // rest is a node: the error relative to t must not blow up beside its zero
+            // rest is a node: the error relative to t must not diverge beside its zero
             pending.retain(|[strain, ..]| strain.abs() > 1e-12);
             let after = pending.partition_point(|[strain, ..]| *strain > 0.0);
             pending.insert(after, node(0.0));

@@ -3,16 +3,16 @@
 use super::{BondPotential, Chain};
 use crate::quadrature::mean;
 
-/// Strains below which T(l) − T(1) is an integral of T′, which does not cancel.
+/// Strains below which T(l) − T(1) is integrated from T′, without cancellation.
 const SMALL_DIFFERENCE: f64 = 0.03;
 
-/// Strains below which an energy is an integral of the tension, which does not cancel.
+/// Strains below which an energy is integrated from the tension, without cancellation.
 const SMALL_ENERGY: f64 = 0.05;
 
 /// `chain-offset`: t = T(l) − T(1).
 ///
-/// K = T′(1) = 3 + 27/(5n̄) − 36/(n̄D̂) + O(n̄⁻²). Far beyond the greatest force of the chain t turns negative again and tends
-/// to −T(1); bonds break long before.
+/// K = T′(1) = 3 + 27/(5n̄) − 36/(n̄D̂) + O(n̄⁻²). Far beyond the greatest force of the chain t becomes
+/// negative again and tends to −T(1); bonds break long before.
 pub struct BondStretch {
     chain: Chain,
     force_at_rest: f64,
@@ -70,13 +70,13 @@ impl BondPotential for Shifted {
 pub struct NetworkStretch(pub Chain);
 
 impl NetworkStretch {
-    /// g(l) of Eq. (2.38): stretch of a chain in a network of which one direction is stretched by l at constant volume.
-    /// Least at l = 1, where it is 1; ∞ at 0 and at ∞.
+    /// g(l) of Eq. (2.38): stretch of a chain in a network stretched by l in one direction at constant
+    /// volume. Minimum 1 at l = 1; ∞ at 0 and at ∞.
     pub fn chain_stretch(stretch: f64) -> f64 {
         if stretch == f64::INFINITY {
             return f64::INFINITY;
         }
-        // g = l^{−1/3}√((l² + 2)/3), l² kept from overflow
+        // g = l^{−1/3}√((l² + 2)/3), l² guarded against overflow
         let scale = if stretch > 1.0 { stretch } else { 1.0 };
         let reduced = stretch / scale;
         ((reduced * reduced + 2.0 / scale / scale) / 3.0).sqrt() * scale / stretch.cbrt()
@@ -87,7 +87,7 @@ impl NetworkStretch {
         Self::chain_stretch(stretch) * Self::rate(stretch, stretch - 1.0) / stretch
     }
 
-    /// l g′/g = (2/3)(l² − 1)/(l² + 2), l = 1 + s given twice: each as exact as it can be.
+    /// l g′/g = (2/3)(l² − 1)/(l² + 2), l = 1 + s given twice, each as exact as possible.
     fn rate(stretch: f64, strain: f64) -> f64 {
         if stretch > 1e100 {
             2.0 / 3.0
@@ -137,9 +137,9 @@ impl BondPotential for NetworkStretch {
 }
 
 /// `as-published`: t = T(l). Not stress-free; a body of it collapses.
-pub struct AsPublished(pub Chain);
+pub struct PublishedChain(pub Chain);
 
-impl BondPotential for AsPublished {
+impl BondPotential for PublishedChain {
     fn tension(&self, stretch: f64) -> f64 {
         self.0.stretched(stretch).force
     }
@@ -203,7 +203,7 @@ fn energy_from_rest(chain: &Chain, stretch: f64) -> f64 {
     chain.stretched(stretch).energy - chain.stretched(1.0).energy
 }
 
-/// The energy by quadrature of the tension, where a difference of energies would cancel.
+/// Integrates the tension to the energy if a difference of energies would cancel.
 fn energy_near_rest(law: &impl BondPotential, stretch: f64) -> Option<f64> {
     let strain = stretch - 1.0;
     (strain.abs() < SMALL_ENERGY).then(|| strain * mean(0.0, strain, |part| law.tension_at_strain(part)))

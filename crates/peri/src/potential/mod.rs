@@ -13,14 +13,14 @@ mod tests;
 pub use chain::{Chain, ChainPoint};
 pub use energy::{EnergyTable, TangentTable};
 pub use fit::KernelFit;
-pub use laws::{AsPublished, BondStretch, LinearBond, NetworkStretch, Scaled, Shifted};
+pub use laws::{BondStretch, LinearBond, NetworkStretch, PublishedChain, Scaled, Shifted};
 pub use range::StretchRange;
 pub use softened::{DUCTILITY, integrity, onset, softened_energy};
 
 use crate::error::Error;
 use serde::Deserialize;
 
-/// A law on bond stretches. Laws are sampled when a kernel is fitted, never in a hot loop.
+/// A law of bond stretches. Laws are sampled when a kernel is fitted, never in a hot loop.
 ///
 /// Stretches are ≥ 0; at 0 and ∞ laws have their limits, NaN gives NaN.
 pub trait BondPotential: Send + Sync {
@@ -34,17 +34,17 @@ pub trait BondPotential: Send + Sync {
     fn tension_derivative(&self, stretch: f64) -> f64;
     /// Energy φ/kθ per unit reference length of the bond, Eq. (2.39); zero at l = 1.
     fn energy(&self, stretch: f64) -> f64;
-    /// Whether t(1) = 0.
+    /// Returns true if t(1) = 0.
     fn is_stress_free(&self) -> bool {
         true
     }
-    /// Small-strain tangent K = t′(1); the calibration of kθ takes K = 3.
+    /// Small-strain tangent K = t′(1); the calibration of kθ assumes K = 3.
     fn tangent(&self) -> f64 {
         self.tension_derivative(1.0)
     }
 }
 
-/// What a reference, a box or an [`Arc`](std::sync::Arc) points to.
+/// Implements the law for references, boxes and [`Arc`](std::sync::Arc).
 macro_rules! pointers_are_laws {
     ($($pointer:ty),*) => {$(
         impl<L: BondPotential + ?Sized> BondPotential for $pointer {
@@ -76,10 +76,10 @@ pointers_are_laws!(&L, Box<L>, std::sync::Arc<L>);
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema, clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Law {
-    /// t = T(l) − T(1): the printed chain force less its value at rest.
+    /// t = T(l) − T(1): the printed chain force minus its value at rest.
     #[default]
     ChainOffset,
-    /// t = T(l − 1), odd: the only one that obeys (2.70) literally.
+    /// t = T(l − 1), odd: the only law that obeys (2.70) literally.
     ChainShifted,
     /// t = T(g(l)) g′(l) with (2.38) as the chain stretch.
     ChainAffine,
@@ -90,7 +90,7 @@ pub enum Law {
 }
 
 impl Law {
-    /// Every law.
+    /// All laws.
     pub const ALL: [Self; 5] =
         [Self::ChainOffset, Self::ChainShifted, Self::ChainAffine, Self::AsPublished, Self::Linear];
 
@@ -105,25 +105,25 @@ impl Law {
         }
     }
 
-    /// Whether the law has chain parameters n̄ and D̂.
+    /// Returns true if the law has chain parameters n̄ and D̂.
     pub fn is_chain(self) -> bool {
         self != Self::Linear
     }
 
-    /// Whether kθ is scaled to an exact small-strain modulus unless the scene says otherwise.
+    /// Returns true if kθ is scaled to an exact small-strain modulus by default.
     pub fn rescales(self) -> bool {
         self == Self::ChainAffine
     }
 
-    /// Factor on the fictitious mass of dynamic relaxation that the law's stiffening asks for.
+    /// Factor on the fictitious mass of dynamic relaxation, for the law's stiffening.
     pub fn mass_safety(self) -> f64 {
         if self == Self::ChainAffine { 1.5 } else { 1.1 }
     }
 
-    /// The law with n̄ `links` and D̂ = `dissociation`, times 3/K where `rescale`.
+    /// Builds the law with n̄ `links` and D̂ = `dissociation`, times 3/K if `rescale`.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where a chain parameter is out of its domain.
+    /// [`Error::Parameter`] if a chain parameter is out of its domain.
     pub fn build(
         self,
         links: f64,
@@ -135,7 +135,7 @@ impl Law {
             Self::ChainOffset => scaled(BondStretch::new(chain()?), rescale),
             Self::ChainShifted => scaled(Shifted(chain()?), rescale),
             Self::ChainAffine => scaled(NetworkStretch(chain()?), rescale),
-            Self::AsPublished => scaled(AsPublished(chain()?), rescale),
+            Self::AsPublished => scaled(PublishedChain(chain()?), rescale),
             Self::Linear => scaled(LinearBond, rescale),
         })
     }

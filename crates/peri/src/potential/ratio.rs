@@ -1,11 +1,11 @@
-//! Ratios of polynomials of least relative error.
+//! Ratios of polynomials with least relative error.
 
 use nalgebra::{DMatrix, Schur};
 
-/// The denominator is linearised about its last value, so often.
+/// Number of linearisations of the denominator about its last value.
 const LINEARISATIONS: usize = 5;
 
-/// Rounds from least squares towards the least maximum, tried where that might meet the bound.
+/// Rounds from least squares towards the least maximum, tried if they might meet the bound.
 const REWEIGHTINGS: usize = 12;
 const WORTH_REWEIGHTING: f64 = 8.0;
 
@@ -15,13 +15,13 @@ pub(super) struct Ratio {
     pub numerator: Vec<f64>,
     /// Coefficients of D beyond its constant 1.
     pub denominator: Vec<f64>,
-    /// The largest relative error at the samples.
+    /// Largest relative error at the samples.
     pub error: f64,
 }
 
 impl Ratio {
-    /// Every zero of D keeps a distance from [low, high]: 2 % of its width, or a quarter of that to the singular
-    /// point −1.
+    /// Returns true if every zero of D keeps a distance from [low, high]: 2 % of its width, or a quarter of
+    /// that to the singular point −1.
     pub fn has_no_pole(&self, low: f64, high: f64) -> bool {
         let width = high - low;
         let margin = (0.02 * width).min(0.25 * (low + 1.0));
@@ -46,11 +46,12 @@ impl Ratio {
     }
 }
 
-/// The ratio with `p` coefficients of N and `q` of D beyond its 1 of nearly least relative error at the samples (x, f),
-/// if its error can be brought below `bound`.
+/// Finds the ratio with `p` coefficients of N and `q` of D beyond its 1 of nearly least relative error at the
+/// samples (x, f), if its error can be brought below `bound`.
 ///
-/// Sanathanan and Koerner's iteration (1963, doi:10.1109/TAC.1963.1105517), with N and D in polynomials orthogonal under
-/// the current weights, so that neither a wide range nor a steep D costs digits; then Lawson's reweighting.
+/// Sanathanan and Koerner's iteration (1963, doi:10.1109/TAC.1963.1105517), with N and D in polynomials
+/// orthogonal under the current weights, so that neither a wide range nor a steep D costs digits; then
+/// Lawson's reweighting.
 pub(super) fn fit(samples: &[(f64, f64)], p: usize, q: usize, bound: f64) -> Option<Ratio> {
     let at: Vec<f64> = samples.iter().map(|(x, _)| *x).collect();
     let mut weights = vec![1.0; at.len()];
@@ -63,7 +64,7 @@ pub(super) fn fit(samples: &[(f64, f64)], p: usize, q: usize, bound: f64) -> Opt
             return Some(ratio);
         }
         divisor = step.divisor;
-        // from one linearisation to the next a fit gains two digits or so
+        // a fit gains about two digits from one linearisation to the next
         let hopeless = if round + 1 < linearisations { 1e9 } else { WORTH_REWEIGHTING };
         if ratio.error.is_nan() || ratio.error > hopeless * bound {
             return None;
@@ -79,7 +80,7 @@ pub(super) fn fit(samples: &[(f64, f64)], p: usize, q: usize, bound: f64) -> Opt
     None
 }
 
-struct Step {
+struct FitStep {
     ratio: Ratio,
     /// |D| at the samples.
     divisor: Vec<f64>,
@@ -87,7 +88,7 @@ struct Step {
     errors: Vec<f64>,
 }
 
-/// Least squares of w(N − fD)/(fD₀) with the D₀ before.
+/// Solves the least squares of w(N − fD)/(fD₀) with the previous D₀.
 fn step(
     samples: &[(f64, f64)],
     at: &[f64],
@@ -95,12 +96,12 @@ fn step(
     divisor: &[f64],
     p: usize,
     q: usize,
-) -> Option<Step> {
+) -> Option<FitStep> {
     let rows = at.len();
     let scale: Vec<f64> = (0..rows).map(|i| weights[i] / divisor[i]).collect();
     let above = Orthogonal::new(at, (0..rows).map(|i| scale[i] / samples[i].1).collect(), p)?;
     let below = Orthogonal::new(at, scale.clone(), q + 1)?;
-    // what of f·D lies outside the space of N
+    // part of f·D outside the space of N
     let mut overlap = above.columns.tr_mul(&below.columns);
     let mut rest = &below.columns - &above.columns * &overlap;
     let again = above.columns.tr_mul(&rest);
@@ -128,18 +129,18 @@ fn step(
     let ratio = Ratio {
         numerator: numerator.iter().map(|c| c / constant).collect(),
         denominator: denominator[1..].iter().map(|c| c / constant).collect(),
-        // a change of sign is a pole: worse than any error, and perhaps gone after the next step
+        // a change of sign is a pole: worse than any error, but it may vanish in the next step
         error: if one_sign { error } else { error.max(1e-3) },
     };
-    Some(Step { ratio, divisor: divided, errors })
+    Some(FitStep { ratio, divisor: divided, errors })
 }
 
-/// Polynomials orthonormal under weights on points, by Arnoldi's recurrence (Brubeck, Nakatsukasa and Trefethen 2021,
-/// doi:10.1137/19M130100X).
+/// Polynomials orthonormal under weights on points, by Arnoldi's recurrence (Brubeck, Nakatsukasa and
+/// Trefethen 2021, doi:10.1137/19M130100X).
 struct Orthogonal {
     /// Column k: weight × polynomial of degree k at the points.
     columns: DMatrix<f64>,
-    /// Row k: that polynomial in powers of x.
+    /// Row k: the polynomial of degree k in powers of x.
     powers: Vec<Vec<f64>>,
 }
 

@@ -1,4 +1,4 @@
-//! One check over the list of all laws, and the figures of formulation.md.
+//! A shared check over all laws, and the figures of formulation.md.
 
 use super::*;
 
@@ -12,13 +12,14 @@ fn laws(links: f64, dissociation: f64) -> Vec<(String, Box<dyn BondPotential>)> 
         .collect()
 }
 
-/// Energy → force → tangent by finite differences, the reference state, finite values everywhere.
+/// Checks energy → force → tangent by finite differences, the reference state, and finite values everywhere.
 #[test]
 fn every_law() {
     for (links, dissociation) in [(720.0, 1200.0), (100.0, 2300.0), (8.0, 50.0)] {
         for (name, law) in laws(links, dissociation) {
             for stretch in [0.2, 0.5, 0.9, 0.999, 1.001, 1.1, 1.5, 2.0, 3.0, 5.0, 20.0] {
-                // central differences: truncation h²/6 of the third derivative, rounding ε/h of values up to ~n̄
+                // central differences: truncation h²/6 of the third derivative, rounding ε/h of values up to
+                // ~n̄
                 let h = 1e-5 * stretch;
                 let slope = |f: &dyn Fn(f64) -> f64| (f(stretch + h) - f(stretch - h)) / (2.0 * h);
                 let (t, k) = (law.tension(stretch), law.tension_derivative(stretch));
@@ -87,7 +88,7 @@ fn limits_at_zero_and_infinity() {
         assert_eq!(get(Law::ChainAffine).tension(0.0), f64::NEG_INFINITY);
         assert_eq!(get(Law::AsPublished).tension(0.0), 0.0);
         assert_eq!(get(Law::Linear).tension(0.0), -3.0);
-        // the scission of a chain in the end: no force is left
+        // the final scission of a chain: no force is left
         assert_eq!(get(Law::ChainAffine).tension(f64::INFINITY), 0.0);
         assert_eq!(get(Law::AsPublished).tension(f64::INFINITY), 0.0);
     }
@@ -101,8 +102,9 @@ fn printed_law_never_rests() {
     assert!((1..=100).all(|k| printed.tension(0.01 * f64::from(k)) > 0.0));
 }
 
-/// (2.61)–(2.65) with the second derivatives of (2.39), n̄ kept where (2.67) and (2.69) lose it, against the closed form; and
-/// the value that (2.72) takes from λ̄ = λ_b = 1, β → 0: 3 − 9/(n̄D̂ + 3), where 3 − 9/(D̂ + 3) is printed.
+/// Compares (2.61)–(2.65) with the second derivatives of (2.39), keeping n̄ where (2.67) and (2.69) lose it,
+/// with the closed form; and the value that (2.72) takes from λ̄ = λ_b = 1, β → 0: 3 − 9/(n̄D̂ + 3), printed
+/// as 3 − 9/(D̂ + 3).
 #[test]
 fn tangent_with_the_links_on_the_bond_energy() {
     use polycore::langevin;
@@ -154,7 +156,7 @@ fn extreme_parameters_stay_finite() {
     }
 }
 
-/// The parametric solution satisfies the implicit relation (2.45): D̂ ln(λ_b) λ_b = λ̄β/√n̄.
+/// Checks the parametric solution against the implicit relation (2.45): D̂ ln(λ_b) λ_b = λ̄β/√n̄.
 #[test]
 fn satisfies_the_implicit_relation() {
     for (links, dissociation) in [(720.0, 1200.0), (12.5, 2300.0), (2.0, 1.0)] {
@@ -162,7 +164,7 @@ fn satisfies_the_implicit_relation() {
         for share in [0.05, 0.3, 0.7, 0.95, 1.0, 1.05, 1.2, 1.5, 2.7, 10.0] {
             let stretch = share * links.sqrt();
             let beta = chain.beta(stretch);
-            let point = chain.at(beta);
+            let point = chain.state_at(beta);
             assert!(
                 (point.stretch / stretch - 1.0).abs() < 1e-13,
                 "{share}: {}",
@@ -177,7 +179,7 @@ fn satisfies_the_implicit_relation() {
     }
 }
 
-/// formulation.md: the force maximum, 1e-9 relative to the closed form; its printed digits.
+/// Compares with formulation.md: the force maximum, 1e-9 relative to the closed form; its printed digits.
 #[test]
 fn greatest_force() {
     for (dissociation, printed) in
@@ -196,7 +198,8 @@ fn greatest_force() {
     }
 }
 
-/// formulation.md: T(1), the tangents at rest and the values of `chain-offset` and `chain-affine`.
+/// Compares with formulation.md: T(1), the tangents at rest and the values of `chain-offset` and
+/// `chain-affine`.
 #[test]
 fn values_of_the_formulation() {
     let chain = Chain::new(720.0, 1200.0).unwrap();
@@ -231,8 +234,8 @@ fn values_of_the_formulation() {
     }
 }
 
-/// formulation.md, "Max relative error of a table" (n̄ = 720, D̂ = 1200, λ̄ 0.3 … 1.25√n̄). Its figures have two digits
-/// or one, and depend on the sampling: within 30 % here.
+/// Compares with formulation.md, "Max relative error of a table" (n̄ = 720, D̂ = 1200, λ̄ 0.3 … 1.25√n̄). Its
+/// figures have one or two digits and depend on the sampling: within 30 % here.
 #[test]
 fn interpolation_errors_of_the_formulation() {
     let chain = Chain::new(720.0, 1200.0).unwrap();
@@ -246,7 +249,7 @@ fn interpolation_errors_of_the_formulation() {
     };
     let graded = |n: usize| -> Vec<ChainPoint> {
         let (from, to) = (chain.beta(low).asinh(), chain.beta(high).asinh());
-        (0..n).map(|k| chain.at((from + (to - from) * k as f64 / (n - 1) as f64).sinh())).collect()
+        (0..n).map(|k| chain.state_at((from + (to - from) * k as f64 / (n - 1) as f64).sinh())).collect()
     };
     let worst = |nodes: &[ChainPoint], cubic: bool| -> f64 {
         samples
@@ -281,8 +284,8 @@ fn interpolation_errors_of_the_formulation() {
     evidence::within("error of the linear table, 200 nodes", linear, 0.7 * 1.6e-3, 1.3 * 1.6e-3);
 }
 
-/// Every law on every range a scene is likely to need meets the default bound, by a form no dearer than stated; the fit is
-/// what it says it is.
+/// Every law on every common range of scenes meets the default bound, by a form no dearer than stated; the
+/// fit reports its form correctly.
 #[test]
 fn fits_meet_their_bound() {
     for (name, law) in laws(720.0, 1200.0) {
@@ -309,14 +312,14 @@ fn fits_meet_their_bound() {
                 fit.max_error
             );
             assert!(fit.cost() <= cost, "{name} {range:?} {kind}");
-            // only where bonds are crushed to a twentieth no ratio of this size suffices
+            // no ratio of this size suffices only if bonds are crushed to a twentieth
             assert!(range[0] < 0.3 || fit.cost() > 0, "{name} {range:?} {kind}");
             check_fit(&fit, &*law, 1e-9, &format!("{name} {range:?} {kind}"));
         }
     }
 }
 
-/// Between the points at which the fit measured itself.
+/// Checks a fit between the points at which it was measured.
 fn check_fit(fit: &KernelFit, law: &dyn BondPotential, bound: f64, name: &str) {
     let [low, high] = fit.range;
     assert!(fit.max_error <= bound, "{name}: {:e}", fit.max_error);
@@ -324,7 +327,7 @@ fn check_fit(fit: &KernelFit, law: &dyn BondPotential, bound: f64, name: &str) {
         let stretch = low + (high - low) * (f64::from(k) + 0.37) / 1000.0;
         let e = (stretch - 1.0) * (stretch + 1.0);
         let exact = law.tension(stretch) / stretch;
-        // 4097 points do not hit every extremum, and the law itself carries some roundings
+        // 4097 points do not hit every extremum, and the law itself carries some rounding
         let limit = (1.05 * fit.max_error + 5e-14) * exact.abs();
         assert!(
             (fit.value(e) - exact).abs() <= limit,
@@ -358,7 +361,7 @@ fn extreme_laws_are_fitted() {
     }
 }
 
-/// A bond that carries nothing has no force to be fitted relative to.
+/// A bond without tension has no force to fit relative to.
 #[test]
 fn a_slack_law_is_refused() {
     struct Slack;

@@ -5,14 +5,14 @@ use crate::bonds::Bonds;
 use crate::error::Error;
 use crate::solver::State;
 
-/// How near, in spacings, particles of a crack's tip lie.
+/// Distance of the particles of a crack's tip, in spacings.
 const TIP: f64 = 2.0;
 
-/// J-integral of a crack of a plane solid that grows along an axis, over a ring about its tip.
+/// J-integral of a crack of a plane solid that grows along an axis, over a ring around its tip.
 ///
-/// J = Σ V/t (P_ij u_i,1 − W δ_1j) ∂q/∂X_j along the axis 1, J/m²: the domain form of Li, Shih & Needleman (1985),
-/// doi:10.1016/0013-7944(85)90029-3, of Rice's integral in the reference configuration, for flanks without traction. q falls linearly
-/// from 1 at the inner radius to 0 at the outer.
+/// J = Σ V/t (P_ij u_i,1 − W δ_1j) ∂q/∂X_j along the axis 1, J/m²: the domain form of Li, Shih & Needleman
+/// (1985), doi:10.1016/0013-7944(85)90029-3, of Rice's integral in the reference configuration, for flanks
+/// without traction. q falls linearly from 1 at the inner radius to 0 at the outer.
 pub struct JIntegral {
     sites: Vec<u32>,
     /// V/t ∇q of each site, m.
@@ -21,10 +21,11 @@ pub struct JIntegral {
 }
 
 impl JIntegral {
-    /// Finds the particles whose distance from `tip`, m, is between two radii, m, of a body of this thickness, m.
+    /// Finds the particles whose distance from `tip`, m, is between two radii, m, in a body of this
+    /// thickness, m.
     ///
     /// # Errors
-    /// [`Error::Geometry`]: no particle is there.
+    /// [`Error::Geometry`] if no particle is there.
     pub fn new<const D: usize>(
         bonds: &dyn Bonds<D>,
         thickness: f64,
@@ -68,21 +69,21 @@ impl JIntegral {
 
 /// Tip of a crack that grows along an axis through some sites.
 pub struct CrackTip {
-    /// Where it is looked for.
+    /// Sites to search.
     pub sites: Vec<u32>,
-    /// Intact bonds of each site as the body was built.
+    /// Intact bonds of each site in the reference state.
     pub whole: Vec<u32>,
-    /// Damage, from and to, of particles at the tip: less is not torn, more lies behind it.
+    /// Damage range of particles at the tip: less is intact, more lies behind it.
     pub damage: [f64; 2],
-    /// The axis along which it grows.
+    /// Axis along which the crack grows.
     pub axis: usize,
-    /// An axis along which its distance from 0 is wanted.
+    /// Axis along which to measure its distance from 0.
     pub across: Option<usize>,
 }
 
 impl CrackTip {
-    /// Place along the axis of the farthest particle at rest with damage in the range, and the largest distance from 0 across it of
-    /// those near it, m; NaN where there is none.
+    /// Position along the axis of the farthest particle (reference configuration) with damage in the range,
+    /// and the largest distance from 0 across it of the particles near it, m; NaN if there is none.
     pub fn value<const D: usize>(&self, bonds: &dyn Bonds<D>) -> [f64; 2] {
         let [low, high] = self.damage;
         let damaged = |&site: &u32| {

@@ -1,29 +1,29 @@
-//! Forces, stresses, energy-momentum and flags of a state, of bond laws and of solids.
+//! Forces, stresses, energy-momentum and flags of a state, for bond laws and solids.
 
 use crate::bonds::Bonds;
-use crate::material::{BondMaterial, Family, NonlocalSolid, PointLaw, Pointwise, Response, Tensor as Matrix};
+use crate::material::{BodyTensor, BondMaterial, Family, NonlocalSolid, PointLaw, Pointwise, SolverMaterial};
 use crate::potential::KernelFit;
 use crate::solver::State;
-use crate::stress::{Tensor, force_over_length};
+use crate::stress::{StressTensor, force_over_length};
 use polycore::constitutive::Flags;
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A solid of any law.
-pub type Solid<const D: usize> = NonlocalSolid<Arc<dyn PointLaw<D>>>;
+pub type AnySolid<const D: usize> = NonlocalSolid<Arc<dyn PointLaw<D>>>;
 
 /// Evaluates forces and stresses of a material in the states of a body.
-pub struct StressEvaluator<const D: usize>(Kind<D>);
+pub struct StressEvaluator<const D: usize>(EvaluatorKind<D>);
 
-enum Kind<const D: usize> {
-    /// A bond law, with the fit that the solver makes: bonds then carry the solver's own forces.
+enum EvaluatorKind<const D: usize> {
+    /// A bond law, with the solver's fit: bonds then carry the solver's forces.
     Bonds {
         material: BondMaterial<'static>,
         /// Largest relative error of the fit.
         bound: f64,
-        /// Whether the law is constant beyond the fitted stretches.
+        /// True if the law is constant beyond the fitted stretches.
         clamped: bool,
-        /// The fit made last, with its stretches.
+        /// Last fit, with its stretches.
         last: Mutex<Option<([f64; 2], KernelFit)>>,
     },
     Nothing,
@@ -31,38 +31,39 @@ enum Kind<const D: usize> {
     Solid {
         law: Arc<dyn PointLaw<D>>,
         learnt: bool,
-        states: Mutex<Pointwise<Solid<D>, D>>,
+        states: Mutex<Pointwise<AnySolid<D>, D>>,
     },
 }
 
 impl<const D: usize> StressEvaluator<D> {
-    /// An evaluator of nothing: no forces, no stresses.
+    /// Creates an empty evaluator: no forces, no stresses.
     pub fn none() -> Self {
-        Self(Kind::Nothing)
+        Self(EvaluatorKind::Nothing)
     }
 
-    /// An evaluator of a bond law that is fitted to a relative error of `bound`; where bonds break the law is `clamped` beyond the
-    /// fitted stretches.
-    pub fn of_bonds(material: BondMaterial<'static>, bound: f64, clamped: bool) -> Self {
-        Self(Kind::Bonds { material, bound, clamped, last: Mutex::new(None) })
+    /// Creates an evaluator of a bond law that is fitted to a relative error of `bound`; the law is `clamped`
+    /// beyond the fitted stretches if bonds break.
+    pub fn for_bonds(material: BondMaterial<'static>, bound: f64, clamped: bool) -> Self {
+        Self(EvaluatorKind::Bonds { material, bound, clamped, last: Mutex::new(None) })
     }
 
-    /// An evaluator of a solid; `bonds` are those of the body as it was built. A law `learnt` from data has flags.
-    pub fn of_solid(law: Arc<dyn PointLaw<D>>, learnt: bool, bonds: &dyn Bonds<D>) -> Self {
+    /// Creates an evaluator of a solid; `bonds` are those of the reference state. A law `learnt` from data
+    /// has flags.
+    pub fn for_solid(law: Arc<dyn PointLaw<D>>, learnt: bool, bonds: &dyn Bonds<D>) -> Self {
         let states = Mutex::new(Pointwise::new(NonlocalSolid(law.clone()), bonds));
-        Self(Kind::Solid { law, learnt, states })
+        Self(EvaluatorKind::Solid { law, learnt, states })
     }
 
-    /// The bond law, where it is one.
+    /// Bond law, if the material is one.
     pub fn bond_material(&self) -> Option<&BondMaterial<'static>> {
         match &self.0 {
-            Kind::Bonds { material, .. } => Some(material),
+            EvaluatorKind::Bonds { material, .. } => Some(material),
             _ => None,
         }
     }
 
-    /// Sums forces of the bonds of `sites` to the sites that `wanted` names, N, each on the particle in the first: `visit` takes
-    /// that site and the sum.
+    /// Sums the forces of the bonds from `sites` to the sites that `wanted` accepts, N, each on its first
+    /// particle: `visit` receives that site and the sum.
     pub fn forces(
         &self,
         bonds: &dyn Bonds<D>,
@@ -72,8 +73,8 @@ impl<const D: usize> StressEvaluator<D> {
         visit: &mut dyn FnMut(usize, [f64; D]),
     ) {
         match &self.0 {
-            Kind::Nothing => {}
-            Kind::Bonds { material, bound, clamped, last } => {
+            EvaluatorKind::Nothing => {}
+            EvaluatorKind::Bonds { material, bound, clamped, last } => {
                 let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
                 if last.as_ref().is_none_or(|(stretches, _)| *stretches != state.stretches.fitted) {
                     let fit = KernelFit::new(material.law(), state.stretches.fitted, *bound).ok();
@@ -105,7 +106,7 @@ impl<const D: usize> StressEvaluator<D> {
                     visit(site, sum);
                 }
             }
-            Kind::Solid { states, .. } => {
+            EvaluatorKind::Solid { states, .. } => {
                 let states = prepared(states, bonds, state);
                 for site in sites.iter().map(|&site| site as usize) {
                     let (mut sum, volume) = ([0.0; D], bonds.volume(site));
@@ -122,10 +123,11 @@ impl<const D: usize> StressEvaluator<D> {
         }
     }
 
-    /// Couples Σ V_I V_J (x_J − x_I) × T_IJ of the bonds of `sites` to the sites that `wanted` names, N m.
+    /// Couples Σ V_I V_J (x_J − x_I) × T_IJ of the bonds of `sites` to the sites that `wanted` accepts, N m.
     ///
-    /// Bonds of solids are not parallel to their forces, T_IJ − T_JI, and Σ_J V_J (x_J − x_I) × T_IJ = 0 in a whole family alone.
-    /// With it, the moment of the forces of `sites` is what the body transmits.
+    /// Bonds of solids are not parallel to their forces, T_IJ − T_JI, and Σ_J V_J (x_J − x_I) × T_IJ = 0
+    /// holds in a whole family only. With these couples, the moment of the forces of `sites` is the moment
+    /// that the body transmits.
     pub fn couple(
         &self,
         bonds: &dyn Bonds<D>,
@@ -134,7 +136,7 @@ impl<const D: usize> StressEvaluator<D> {
         wanted: &dyn Fn(usize) -> bool,
     ) -> [f64; 3] {
         let mut sum = [0.0; 3];
-        let Kind::Solid { states, .. } = &self.0 else { return sum };
+        let EvaluatorKind::Solid { states, .. } = &self.0 else { return sum };
         let states = prepared(states, bonds, state);
         for site in sites.iter().map(|&site| site as usize) {
             let (volume, points) = (bonds.volume(site), states.points());
@@ -155,8 +157,8 @@ impl<const D: usize> StressEvaluator<D> {
     }
 
     /// First Piola–Kirchhoff and Cauchy stress of a solid's law in every particle, Pa; `None` for bond laws.
-    pub fn stress(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<[Vec<Tensor<D>>; 2]> {
-        let Kind::Solid { law, states, .. } = &self.0 else { return None };
+    pub fn stress(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<[Vec<StressTensor<D>>; 2]> {
+        let EvaluatorKind::Solid { law, states, .. } = &self.0 else { return None };
         let states = prepared(states, bonds, state);
         let both = bonds.particles().iter().map(|&site| {
             let point = &states.points()[site as usize];
@@ -165,38 +167,39 @@ impl<const D: usize> StressEvaluator<D> {
             let piola = point.respond(&**law).piola * point.integrity();
             let volume = (1.0 + deformation.volume_change()) * law.thickness_stretch(deformation);
             let cauchy = piola * gradient.transpose() / volume;
-            let rows = |t: &Matrix<D>| std::array::from_fn(|a| std::array::from_fn(|b| t[(a, b)]));
+            let rows = |t: &BodyTensor<D>| std::array::from_fn(|a| std::array::from_fn(|b| t[(a, b)]));
             (rows(&piola), rows(&cauchy))
         });
         let (piola, cauchy) = both.unzip();
         Some([piola, cauchy])
     }
 
-    /// Eshelby's energy–momentum ∇uᵀP − W 1 of a solid at some sites, Pa; `visit` takes the place in `sites` with it. Nothing
-    /// of bond laws, and of particles without deformation gradient.
+    /// Computes Eshelby's energy–momentum ∇uᵀP − W 1 of a solid at some sites, Pa; `visit` receives the index
+    /// in `sites` with it. Skips bond laws, and particles without deformation gradient.
     pub fn energy_momentum(
         &self,
         bonds: &dyn Bonds<D>,
         state: &State<D>,
         sites: &[u32],
-        visit: &mut dyn FnMut(usize, Tensor<D>),
+        visit: &mut dyn FnMut(usize, StressTensor<D>),
     ) {
-        let Kind::Solid { law, states, .. } = &self.0 else { return };
+        let EvaluatorKind::Solid { law, states, .. } = &self.0 else { return };
         let states = prepared(states, bonds, state);
         for (at, &site) in sites.iter().enumerate() {
             let point = &states.points()[site as usize];
             let Some(deformation) = point.deformation() else { continue };
             let piola = point.respond(&**law).piola;
             let tensor = (deformation.displacement_gradient.transpose() * piola
-                - Matrix::<D>::identity() * point.energy(&**law).unwrap_or(0.0))
+                - BodyTensor::<D>::identity() * point.energy(&**law).unwrap_or(0.0))
                 * point.integrity();
             visit(at, std::array::from_fn(|a| std::array::from_fn(|b| tensor[(a, b)])));
         }
     }
 
-    /// Where and why a learnt law is uncertain, particle by particle; none where it is not at work; `None` for laws in closed form.
+    /// Uncertainties of a learnt law, particle by particle; none for particles without it; `None` for laws in
+    /// closed form.
     pub fn flags(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<Vec<Flags>> {
-        let Kind::Solid { law, learnt: true, states } = &self.0 else { return None };
+        let EvaluatorKind::Solid { law, learnt: true, states } = &self.0 else { return None };
         let states = prepared(states, bonds, state);
         let of = |&site: &u32| {
             states.points()[site as usize].deformation().map_or(Flags::default(), |found| law.flags(found))
@@ -204,7 +207,7 @@ impl<const D: usize> StressEvaluator<D> {
         Some(bonds.particles().par_iter().map(of).collect())
     }
 
-    /// The shares of particles outside of the box of the training data, and with any flag.
+    /// Fractions of particles outside the box of the training data, and with any flag.
     pub fn flagged(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<[f64; 2]> {
         let flags = self.flags(bonds, state)?;
         let share = |is: &dyn Fn(&Flags) -> bool| {
@@ -214,12 +217,12 @@ impl<const D: usize> StressEvaluator<D> {
     }
 }
 
-/// States of particles at a displacement.
+/// Computes the states of particles at a displacement.
 fn prepared<'a, const D: usize>(
-    states: &'a Mutex<Pointwise<Solid<D>, D>>,
+    states: &'a Mutex<Pointwise<AnySolid<D>, D>>,
     bonds: &dyn Bonds<D>,
     state: &State<D>,
-) -> MutexGuard<'a, Pointwise<Solid<D>, D>> {
+) -> MutexGuard<'a, Pointwise<AnySolid<D>, D>> {
     let mut states = states.lock().unwrap_or_else(PoisonError::into_inner);
     states.prepare(bonds, &state.displacement);
     states

@@ -1,21 +1,23 @@
-//! Fields along lines through the body at rest, between particles by moving least squares with a linear basis.
+//! Fields along lines through the body at rest, interpolated between particles by moving least squares with a
+//! linear basis.
 //!
-//! Lancaster & Salkauskas (1981), doi:10.1090/S0025-5718-1981-0616367-1, over the nearest particle and those that intact bonds
-//! join to it, with the weights w = (δ/d − 1)⁴ of their distances d: a linear field is exact, and a particle has its own value.
-//! No value crosses a crack of the body at rest: the nearest particle is one on the same side, and so is what is bonded to it.
-//! Where bonds broke later, the side is that of the nearest particle.
+//! Lancaster & Salkauskas (1981), doi:10.1090/S0025-5718-1981-0616367-1, over the nearest particle and its
+//! neighbours by intact bonds, with the weights w = (δ/d − 1)⁴ of their distances d: a linear field is exact,
+//! and a particle has its own value. No value crosses a crack of the reference configuration: the nearest
+//! particle is on the same side, and so are its neighbours. At bonds that broke later, the side is that of
+//! the nearest particle.
 
-use crate::bonds::{BodyGeometry, Bonds, CellGrid, Kind};
+use crate::bonds::{BodyGeometry, BondKind, Bonds, CellGrid};
 use crate::geometry::{Cut, length, severed};
 use nalgebra::{Matrix3, Vector3};
 
-/// A distance over the spacing that counts as none.
+/// Distance over the spacing that counts as zero.
 const NEAR: f64 = 1e-9;
-/// Two particles are as near as one another up to this part of the spacing.
+/// Difference of distances, over the spacing, up to which two particles count as equally near.
 const TIE: f64 = 1e-6;
 /// Extent along a direction, over the largest, below which particles have none there.
 const FLAT: f64 = 1e-10;
-/// How often a value may enter through the slope along one direction: from particles nearly in a row, a place beside it would
+/// Greatest weight of the slope along one direction: from particles nearly in a row, a point beside it would
 /// take large multiples of small differences.
 const MOST: f64 = 5.0;
 
@@ -30,17 +32,17 @@ pub struct LineSampler<'a, const D: usize> {
     most: f64,
 }
 
-/// How far a particle stands for the body along each axis, m: half its cell; in a cloud, which has no cells, the whole edge of
-/// the square or cube of its volume.
+/// Extent of a particle from its centre along each axis, m: half its cell; in a cloud, which has no cells,
+/// the whole edge of the square or cube of its volume.
 fn reach<const D: usize>(bonds: &dyn Bonds<D>, site: usize) -> f64 {
     match bonds.kind() {
-        Kind::Lattice(lattice) => 0.5 * lattice.spacing(),
-        Kind::Cloud(cloud) => (cloud.volume(site) / cloud.thickness()).powf(1.0 / D as f64),
+        BondKind::Lattice(lattice) => 0.5 * lattice.spacing(),
+        BondKind::Cloud(cloud) => (cloud.volume(site) / cloud.thickness()).powf(1.0 / D as f64),
     }
 }
 
 impl<'a, const D: usize> LineSampler<'a, D> {
-    /// Finds the particles near the line between two `ends`, m, of a body with these cracks.
+    /// Finds the particles near the line between two `ends`, m, in a body with these cracks.
     pub fn new(bonds: &'a dyn Bonds<D>, cuts: &'a [Cut<D>], ends: [[f64; D]; 2]) -> Self {
         let along: [f64; D] = std::array::from_fn(|d| ends[1][d] - ends[0][d]);
         let square: f64 = along.iter().map(|x| x * x).sum();
@@ -57,8 +59,8 @@ impl<'a, const D: usize> LineSampler<'a, D> {
         Self { bonds, cuts, grid: CellGrid::new(&places, most), sites, places, most }
     }
 
-    /// Sites whose values make up that at a place of the line, m, and their weights; none outside of the body, and where the nearest
-    /// particles lie on both sides of a crack.
+    /// Sites and weights of the value at a point of the line, m; `None` outside of the body, and where the
+    /// nearest particles lie on both sides of a crack.
     pub fn weights(&self, at: [f64; D]) -> Option<Vec<(usize, f64)>> {
         let (bonds, small) = (self.bonds, self.bonds.spacing());
         if self.sites.is_empty() {
@@ -96,7 +98,7 @@ impl<'a, const D: usize> LineSampler<'a, D> {
         if least >= horizon {
             return Some(vec![(nearest, 1.0)]);
         }
-        // site, weight, place from `at`
+        // site, weight, position relative to `at`
         let mut members = Vec::new();
         let mut add = |site: usize, place: [f64; D]| {
             let from: [f64; D] = std::array::from_fn(|d| place[d] - at[d]);
@@ -115,7 +117,7 @@ impl<'a, const D: usize> LineSampler<'a, D> {
         let spread = |(_, weight, from): &(usize, f64, Vector3<f64>)| {
             *weight * (from - mean) * (from - mean).transpose()
         };
-        // where the particles have no extent the value is that of the nearest along it
+        // along directions without extent the value is that of the nearest particle
         let eigen = members.iter().map(spread).sum::<Matrix3<f64>>().symmetric_eigen();
         let largest = eigen.eigenvalues.max();
         let mut slope = Vector3::zeros();
@@ -129,7 +131,8 @@ impl<'a, const D: usize> LineSampler<'a, D> {
                 slope -= axis * share;
             }
         }
-        // that of the nearest follows from their sum: on its own it is a difference of large numbers
+        // the weight of the nearest follows from the sum: computed directly it is a difference of large
+        // numbers
         let mut weights = vec![(nearest, 1.0)];
         for (site, weight, from) in &members[1..] {
             let share = weight * (1.0 / total + slope.dot(&(from - mean)));
@@ -212,12 +215,12 @@ mod tests {
             }
             assert_eq!(value(bonds, [6.0, 8.0], &linear), None);
         }
-        // of one row of particles the value is that along it
+        // for one row of particles the value is that along it
         let row = regular([12.0, 1.0], &[]);
         assert!((value(&row, [4.2, 0.7], &linear).unwrap() - linear([4.2, 0.5])).abs() < 1e-12);
     }
 
-    /// Each flank of a crack keeps its own values; on the crack, as near to both, there is none.
+    /// Each flank of a crack keeps its own values; on the crack, equally near to both, there is none.
     #[test]
     fn no_value_crosses_a_crack() {
         let bonds = regular([12.0, 6.0], &[CRACK]);
@@ -228,7 +231,8 @@ mod tests {
         assert!(value(&bonds, [9.2, 3.0], &jump).is_some());
     }
 
-    /// A crack nearer to one row: what lies in the cells of that row but below the crack belongs to the row below.
+    /// A crack nearer to one row: points in the cells of that row but below the crack belong to the row
+    /// below.
     #[test]
     fn no_value_crosses_a_crack_beside_a_row() {
         let cut = Cut { corner: [-1.0, 3.4], edges: [[4.5, 0.0], [0.0; 2]] };
@@ -242,7 +246,7 @@ mod tests {
         assert_eq!(beside(&bonds, std::slice::from_ref(&cut), [1.2, 3.4], &jump), None);
     }
 
-    /// A row of particles that is straight but for rounding: beside it the value is that along it.
+    /// A row of particles that is straight up to rounding: a point beside it has the value along it.
     #[test]
     fn nearly_straight_rows() {
         for uneven in [1e-8, 1e-4, 1e-2] {
@@ -259,7 +263,7 @@ mod tests {
         }
     }
 
-    /// A large particle holds places that are nearer to small ones, or farther than the horizon from all.
+    /// A large particle covers points that are nearer to small ones, or farther than the horizon from all.
     #[test]
     fn nearest_of_unequal_particles() {
         let small = [[2.0, 0.0], [2.0, 0.6], [2.6, -0.6], [2.6, 0.5]];

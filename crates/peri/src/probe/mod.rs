@@ -1,5 +1,5 @@
-//! Quantities of a body in a state: forces across sections, J-integrals and crack tips, motion of parts, fields along lines, and what
-//! follows from their histories.
+//! Quantities of a body in a state: forces across sections, J-integrals and crack tips, motion of parts,
+//! fields along lines, and quantities of their histories.
 
 mod crack;
 mod evaluator;
@@ -9,7 +9,7 @@ mod path;
 mod section;
 
 pub use crack::{CrackTip, JIntegral};
-pub use evaluator::{Solid, StressEvaluator};
+pub use evaluator::{AnySolid, StressEvaluator};
 pub use line::LineSampler;
 pub use motion::{WaveFront, mean_displacement, rotation, strain};
 pub use path::{crossing, envelope, first_swing, load_at, unwrapped};

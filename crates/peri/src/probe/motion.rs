@@ -1,4 +1,5 @@
-//! Motion of parts of a body: mean displacement, best-fit rotation, strain between marks, the front of a wave.
+//! Motion of parts of a body: mean displacement, best-fit rotation, strain between marks, the front of a
+//! wave.
 
 use crate::bonds::Bonds;
 use crate::solver::State;
@@ -9,7 +10,8 @@ pub fn mean_displacement<const D: usize>(state: &State<D>, sites: &[u32], axis: 
     sum / sites.len() as f64
 }
 
-/// Rotation of some sites about an axis through the origin that fits best, rad: the angle of Σ (X × x, X · x) across the axis.
+/// Best-fit rotation of some sites about an axis through the origin, rad: the angle of Σ (X × x, X · x)
+/// across the axis.
 pub fn rotation<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>, sites: &[u32], axis: usize) -> f64 {
     let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
     let (mut cross, mut dot) = (0.0, 0.0);
@@ -23,7 +25,7 @@ pub fn rotation<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>, sites: &
     cross.atan2(dot)
 }
 
-/// Distance between the centres of two marks over that at rest, less 1.
+/// Distance between the centres of two marks over that at rest, minus 1.
 pub fn strain<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>, marks: &[Vec<u32>; 2]) -> f64 {
     let mean = |sites: &[u32], moved: bool| -> [f64; D] {
         let mut sum = [0.0; D];
@@ -42,16 +44,18 @@ pub fn strain<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>, marks: &[V
     length(true) / length(false) - 1.0
 }
 
-/// Front of a wave that runs along an axis: where the largest velocity of a plane of particles falls below a part of the largest.
+/// Front of a wave that runs along an axis: the position where the largest velocity of a plane of particles
+/// falls below a fraction of the overall maximum.
 pub struct WaveFront {
-    /// Planes at right angles to the axis, ascending: place, m, and particles.
+    /// Planes at right angles to the axis, ascending: position, m, and particles.
     planes: Vec<(f64, Vec<u32>)>,
     axis: usize,
     part: f64,
 }
 
 impl WaveFront {
-    /// Sorts the particles of some sites into planes across the axis; the front has `part` of the largest velocity.
+    /// Sorts the particles of some sites into planes across the axis; `part` is the fraction of the largest
+    /// velocity at the front.
     pub fn new<const D: usize>(bonds: &dyn Bonds<D>, mut sites: Vec<u32>, axis: usize, part: f64) -> Self {
         let place = |site: u32| bonds.position(site as usize)[axis];
         sites.sort_by(|&a, &b| place(a).total_cmp(&place(b)).then(a.cmp(&b)));
@@ -65,7 +69,7 @@ impl WaveFront {
         Self { planes, axis, part }
     }
 
-    /// Its place along the axis, m, between two planes linearly; NaN where nothing moves.
+    /// Position along the axis, m, interpolated linearly between two planes; NaN if nothing moves.
     pub fn value<const D: usize>(&self, state: &State<D>) -> f64 {
         let speed = |(at, sites): &(f64, Vec<u32>)| {
             let speeds = sites.iter().map(|&site| state.velocity.get(site as usize)[self.axis].abs());

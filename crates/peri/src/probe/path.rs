@@ -1,8 +1,9 @@
-//! Paths of two quantities: swings over time, places that are reached, the envelope of equilibria that snap back.
+//! Paths of two quantities: swings over time, crossings of positions, the envelope of equilibria that snap
+//! back.
 
 use std::f64::consts::PI;
 
-/// Angles over time, as `atan2` gives them, without jumps of 2π.
+/// Removes jumps of 2π from angles over time, as `atan2` returns them.
 pub fn unwrapped(mut rows: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     let turn = 2.0 * PI;
     for k in 1..rows.len() {
@@ -11,8 +12,8 @@ pub fn unwrapped(mut rows: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     rows
 }
 
-/// First half swing of a pendulum from rows of time and angle: the first row beyond the zero that ends it, and the time of that
-/// zero; the frequency is π over it.
+/// Finds the first half swing of a pendulum from rows of time and angle: the first row beyond the zero that
+/// ends it, and the time of that zero; the frequency is π over it.
 pub fn first_swing(rows: &[(f64, f64)]) -> Option<(usize, f64)> {
     let most = rows.iter().map(|r| r.1.abs()).fold(0.0, f64::max);
     let inside = rows.iter().position(|r| r.1.abs() >= 0.5 * most && most > 0.0)?;
@@ -21,14 +22,15 @@ pub fn first_swing(rows: &[(f64, f64)]) -> Option<(usize, f64)> {
     (t1 > 0.0).then(|| (end, t0 + a0 / (a0 - a1) * (t1 - t0)))
 }
 
-/// Time at which a place is first reached, between two rows linearly; none where the first row is there.
+/// Time at which a position is first reached, interpolated linearly; `None` if the first row is already
+/// there.
 pub fn crossing(rows: &[(f64, f64)], place: f64) -> Option<f64> {
     let k = rows.iter().position(|r| r.1 >= place).filter(|&k| k > 0)?;
     let ((t0, x0), (t1, x1)) = (rows[k - 1], rows[k]);
     Some(t0 + (place - x0) / (x1 - x0) * (t1 - t0))
 }
 
-/// Load at a displacement of a path of displacements and loads that begins at rest, between two points linearly.
+/// Load at a displacement of a path of displacements and loads that begins at rest, interpolated linearly.
 pub fn load_at(path: impl IntoIterator<Item = [f64; 2]>, displacement: f64) -> Option<f64> {
     let mut before = [0.0; 2];
     for here in path {
@@ -41,9 +43,9 @@ pub fn load_at(path: impl IntoIterator<Item = [f64; 2]>, displacement: f64) -> O
     None
 }
 
-/// Envelope that a test machine records of equilibria that snap back: the greatest load at each displacement of a path of
-/// displacements and loads, linear between them; at the greatest displacement the fall to the load at the end of the path.
-/// Displacements, ascending, and loads.
+/// Envelope of equilibria that snap back, as a test machine records it: the greatest load at each
+/// displacement of a path of displacements and loads, linear between them; at the greatest displacement the
+/// fall to the load at the end of the path. Returns displacements, ascending, and loads.
 pub fn envelope(path: &[[f64; 2]]) -> [Vec<f64>; 2] {
     let mut at: Vec<f64> = path.iter().map(|point| point[0]).collect();
     at.sort_by(f64::total_cmp);
@@ -75,12 +77,13 @@ mod tests {
 
     #[test]
     fn a_machine_sees_the_upper_branch_and_the_fall() {
-        // up to 3 N at 3 m, back to 1 m, a second branch that crosses the first one's range, and the end at 2 m
+        // up to 3 N at 3 m, back to 1 m, a second branch that crosses the range of the first, and the end at
+        // 2 m
         let path = [[0.0, 0.0], [3.0, 3.0], [1.0, 0.5], [2.0, 2.5], [2.0, 0.0]];
         let [at, load] = envelope(&path);
         assert_eq!(at, [0.0, 1.0, 2.0, 3.0, 3.0]);
         assert_eq!(load, [0.0, 1.0, 2.5, 3.0, 0.0]);
-        // without snap back it is the path
+        // without snap-back it is the path
         assert_eq!(
             envelope(&[[0.0, 0.0], [1.0, 2.0], [2.0, 1.0]]),
             [vec![0.0, 1.0, 2.0], vec![0.0, 2.0, 1.0]]
@@ -91,7 +94,7 @@ mod tests {
     fn a_pendulum() {
         let rows: Vec<(f64, f64)> =
             (0..=40).map(|k| 0.1 * f64::from(k)).map(|t| (t, 4.0 * (2.5 * t).sin())).collect();
-        // as atan2 would give it
+        // as atan2 would return it
         let wrapped = rows.iter().map(|&(t, a)| (t, a.sin().atan2(a.cos()))).collect();
         let rows_again = unwrapped(wrapped);
         assert!(rows.iter().zip(&rows_again).all(|(a, b)| (a.1 - b.1).abs() < 1e-12));

@@ -1,5 +1,5 @@
-//! Forces across sections of a body: the sum of the bond forces that cross a plane, as the areal force density of Silling
-//! (2000), doi:10.1016/S0022-5096(99)00029-0, over the whole plane.
+//! Forces across sections of a body: the sum of the bond forces that cross a plane, as the areal force
+//! density of Silling (2000), doi:10.1016/S0022-5096(99)00029-0, over the whole plane.
 
 use super::StressEvaluator;
 use crate::bonds::Bonds;
@@ -9,11 +9,12 @@ use crate::solver::State;
 /// Distance from a plane, over the spacing, up to which a particle counts as behind it.
 const ON_PLANE: f64 = 1e-9;
 
-/// A plane through the body at rest (a line in a plane body), and the particles behind it that bonds join to those in front.
+/// A plane through the body at rest (a line in a plane body), with the particles behind it that have bonds to
+/// the front.
 pub struct Section<const D: usize> {
     point: [f64; D],
     normal: [f64; D],
-    /// Sites behind the plane that bonds joined to those in front as the body was built.
+    /// Sites behind the plane with bonds to the front in the reference state.
     behind: Vec<u32>,
     /// Distance up to which a particle counts as behind, m.
     on: f64,
@@ -23,7 +24,7 @@ impl<const D: usize> Section<D> {
     /// Finds the bonds that cross the plane through `point`, m, with a unit `normal`.
     ///
     /// # Errors
-    /// [`Error::Geometry`]: no bond crosses it.
+    /// [`Error::Geometry`] if no bond crosses it.
     pub fn new(bonds: &dyn Bonds<D>, point: [f64; D], normal: [f64; D]) -> Result<Self, Error> {
         let mut section = Self { point, normal, behind: Vec::new(), on: ON_PLANE * bonds.spacing() };
         let crosses = |site: usize| {
@@ -50,9 +51,10 @@ impl<const D: usize> Section<D> {
         self.height(place) > self.on
     }
 
-    /// Force, N, with which the part in front of the plane pulls at the part behind, and its moment about the point, N m:
-    /// F = Σ f_IJ V_I V_J over the intact bonds from behind to front, and the moments of these forces in deformed positions; of
-    /// solids with the couples of their bonds ([`StressEvaluator::couple`]).
+    /// Computes the force, N, by which the part in front of the plane pulls the part behind, and its moment
+    /// about the point, N m: F = Σ f_IJ V_I V_J over the intact bonds from behind to front, and the moments
+    /// of these forces in deformed positions; for solids with the couples of their bonds
+    /// ([`StressEvaluator::couple`]).
     pub fn force(
         &self,
         evaluator: &StressEvaluator<D>,

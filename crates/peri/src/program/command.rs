@@ -1,6 +1,6 @@
-//! The `peri` command line. It is a part of the library, so that the solvers are compiled once for all commands.
+//! Command line of `peri`, part of the library so that solvers are compiled once.
 
-// harness::say! prints without a panic where nobody reads any more
+// harness::say! does not panic on a closed pipe
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 use crate::program::run::Peri;
@@ -13,16 +13,16 @@ mod exact;
 enum Command {
     /// Print closed-form solutions and the constants of a bond law.
     #[command(subcommand)]
-    Exact(exact::Exact),
-    /// Write a scene for another engine.
+    Exact(exact::ExactCommand),
+    /// Write a scene for another engine (LAMMPS).
     #[command(subcommand)]
-    Export(bridge::Export),
-    /// Read the results of another engine.
+    Export(bridge::ExportCommand),
+    /// Read the results of another engine (LAMMPS).
     #[command(subcommand)]
-    Import(bridge::Import),
-    /// Compare an export with the engine that it is for.
+    Import(bridge::ImportCommand),
+    /// Compare forces of an export with those of its engine.
     #[command(subcommand)]
-    Compare(bridge::Compare),
+    Compare(bridge::CompareCommand),
 }
 
 /// Runs the command line of this process.

@@ -1,116 +1,177 @@
-//! The scalars that reports of `peri` can have. A scene's own are those of [`crate::program::observe::quantities`].
+//! Scalars of reports of `peri`; [`crate::program::observe::quantities`] lists those of a scene.
 
 harness::quantities! {
-    /// Scalars of every variant; with several variants each has its variant's name behind it in square brackets.
+    /// Scalars of every variant; with several variants their names end with that of the variant in square
+    /// brackets.
     pub OF_A_VARIANT:
-    SMALLEST_STRETCH = "smallest_stretch", "", "smallest stretch of an intact bond at the end of any step (with `[dynamics]` in any row of the history)";
-    LARGEST_STRETCH = "largest_stretch", "", "largest stretch of an intact bond at the end of any step (with `[dynamics]` in any row of the history)";
-    SMALLEST_STRETCH_MET = "smallest_stretch_met", "", "smallest stretch that the law was evaluated at on the way, in any iteration";
-    LARGEST_STRETCH_MET = "largest_stretch_met", "", "largest stretch that the law was evaluated at on the way, in any iteration and in bonds that then broke";
+    SMALLEST_STRETCH = "smallest_stretch", "", "smallest stretch of an intact bond at the end of any step \
+        (with `[dynamics]` in any row of the history)";
+    LARGEST_STRETCH = "largest_stretch", "", "largest stretch of an intact bond at the end of any step (with \
+        `[dynamics]` in any row of the history)";
+    SMALLEST_STRETCH_MET = "smallest_stretch_met", "", "smallest stretch at which the law was evaluated in \
+        any iteration";
+    LARGEST_STRETCH_MET = "largest_stretch_met", "", "largest stretch at which the law was evaluated in any \
+        iteration, broken bonds included";
     FIT_ERROR = "fit_error", "", "measured relative error of the fitted law at the final stretches";
     LARGEST_DISPLACEMENT = "largest_displacement", "m", "length of the longest displacement vector";
-    REACTION = "reaction_{axis}", "N", "with a prescribed displacement: net reactions of these regions along an axis, the larger of the summed positive and negative ones; the history has each region's with its sign";
-    APPLIED = "applied_{axis}", "N", "with a traction or force: applied force along an axis, of both directions the larger";
-    PEAK_LOAD = "peak_load", "N", "with two steps or more: largest load of all steps";
+    REACTION = "reaction_{axis}", "N", "with a prescribed displacement: the larger of the summed positive \
+        and negative reactions of regions along an axis; the history has the signed reaction of each region";
+    APPLIED = "applied_{axis}", "N", "with a traction or force: the larger of the applied forces in both \
+        directions of an axis";
+    PEAK_LOAD = "peak_load", "N", "with two steps or more: largest load";
     DISPLACEMENT_AT_PEAK = "displacement_at_peak", "m", "displacement of the grips at the largest load";
-    LOAD_AT = "load_at_{displacement}mm", "N", "with `output.load_at`: load at this displacement, where the run comes so far";
-    WORK_OF_LOADS = "work_of_loads", "J", "work of the loads up to the end";
+    LOAD_AT = "load_at_{displacement}mm", "N", "with `output.load_at`: load at this displacement, if the run \
+        reaches it";
+    WORK_OF_LOADS = "work_of_loads", "J", "work of the loads";
     STORED_ENERGY = "stored_energy", "J", "energy in bonds and contact at the end";
-    DAMPED_ENERGY = "damped_energy", "J", "work less stored and released energy and that of friction; of a quasi-static run the work is summed by the trapezoidal rule, and the value may be as small as this error, about 1e-3 of the work, and negative";
-    RELEASED_ENERGY = "released_energy", "J", "with `material.critical`: energy that broken bonds held when they broke";
-    CRITICAL_STRETCH = "critical_stretch", "", "with `material.critical`: least stretch at which a bond of the body breaks";
-    CRITICAL_ENERGY = "critical_energy", "J/m³", "with `fracture_energy` of a `solid`: energy, over a bond's share of a family, beyond which it breaks";
-    TEARING_ENERGY = "tearing_energy", "J/m²", "with `material.critical`: energy per area at which a crack in equilibrium runs; of a bond law κB of the critical stretch, of a `solid` its `fracture_energy`";
-    NEW_CRACK_AREA = "new_crack_area", "m²", "with `material.critical`: area of new cracks, from pairs of neighbours whose bond broke and that have no neighbour in common any more, where there are any";
-    DISSIPATED_PER_AREA = "dissipated_per_area", "J/m²", "work less stored, kinetic and friction's energy, over `new_crack_area`: what new cracks took, with the energy lost when bonds snap and at barriers of the lattice, and in bonds that broke elsewhere";
-    DISSIPATION_BIAS = "dissipation_bias", "", "this over `tearing_energy`, less 1: 0 where the crack ran at G; above it where the load supplied more";
-    FRAGMENTS = "fragments", "", "with `material.critical`: pieces of two particles or more that intact bonds hold together";
-    LARGEST_FRAGMENT = "largest_fragment", "", "with `material.critical`: volume of the largest of these over that of the body";
-    FIRST_BREAK = "first_break", "m", "displacement of the step in which the first bond breaks";
-    LOAD_AT_FIRST_BREAK = "load_at_first_break", "N", "load at the end of the last step before the one in which the first bond breaks";
-    LOAD_OF_FIRST_EVENT = "load_of_first_event", "N", "without `[dynamics]`: load of the equilibrium, within its step, in which the first bonds break";
-    BROKEN_BONDS = "broken_bonds", "", "broken bonds at the end";
-    BREAKING_EVENTS = "breaking_events", "", "with `material.critical`, without `[dynamics]`: equilibria in which bonds broke together";
-    DETACHED_PARTICLES = "detached_particles", "", "particles that have lost all their bonds";
+    DAMPED_ENERGY = "damped_energy", "J", "work less stored, released and friction energy; in a quasi-static \
+        run only as exact as the trapezoidal rule of the work, about 1e-3 of the work, and possibly negative";
+    RELEASED_ENERGY = "released_energy", "J", "with `material.critical`: energy of bonds at the moment they \
+        broke";
+    CRITICAL_STRETCH = "critical_stretch", "", "with `material.critical`: smallest stretch at which a bond \
+        of the body breaks";
+    CRITICAL_ENERGY = "critical_energy", "J/m³", "with `fracture_energy` of a `solid`: energy over its share \
+        of a family above which a bond breaks";
+    TEARING_ENERGY = "tearing_energy", "J/m²", "with `material.critical`: energy per area at which a crack \
+        runs in equilibrium; for a bond law κB of the critical stretch, for a `solid` its `fracture_energy`";
+    NEW_CRACK_AREA = "new_crack_area", "m²", "with `material.critical`: area of new cracks, from pairs of \
+        neighbours whose bond broke and that share no neighbour any more";
+    DISSIPATED_PER_AREA = "dissipated_per_area", "J/m²", "work less stored, kinetic and friction energy, \
+        over `new_crack_area`: the energy of new cracks, including losses when bonds snap, at barriers of \
+        the lattice, and in bonds that broke elsewhere";
+    DISSIPATION_BIAS = "dissipation_bias", "", "`dissipated_per_area` over `tearing_energy`, less 1: 0 if \
+        the crack ran at G, positive if the load supplied more";
+    FRAGMENTS = "fragments", "", "with `material.critical`: number of pieces of at least two particles \
+        joined by intact bonds";
+    LARGEST_FRAGMENT = "largest_fragment", "", "with `material.critical`: volume of the largest fragment \
+        over that of the body";
+    FIRST_BREAK = "first_break", "m", "displacement of the grips in the step of the first broken bond";
+    LOAD_AT_FIRST_BREAK = "load_at_first_break", "N", "load of the last step before the first broken bond";
+    LOAD_OF_FIRST_EVENT = "load_of_first_event", "N", "without `[dynamics]`: load of the equilibrium, within \
+        its step, in which the first bonds break";
+    BROKEN_BONDS = "broken_bonds", "", "number of broken bonds at the end";
+    BREAKING_EVENTS = "breaking_events", "", "with `material.critical`, without `[dynamics]`: number of \
+        equilibria in which bonds broke";
+    DETACHED_PARTICLES = "detached_particles", "", "number of particles without any bond at the end";
     LAST_LOAD = "last_load", "N", "load of the last step";
     LAST_DISPLACEMENT = "last_displacement", "m", "displacement of the grips in the last step";
-    CONTACT_ENERGY = "contact_energy", "J", "with `[contact]`: energy of pairs, planes and elastic slip, a part of `stored_energy`";
-    CONTACTS = "contacts", "", "with `[contact]`: pairs of particles, and faces and planes, that touch at the end";
-    DEEPEST_OVERLAP = "deepest_overlap", "", "with `[contact]`: largest overlap at the end of any step, 1 − r/d of a pair of particles, of a face behind a plane over half a spacing";
-    CONTACT_SHARE = "contact_share", "", "with `[contact]`: energy of contact over the stored energy at the end, about the part of the load that the compliance of contact takes away";
-    CONTACT_STIFFNESS = "contact_stiffness", "", "with `[contact]`: stiffness s of the first plane, else of pairs of particles; κ where `short_range` is given";
-    FRICTION_WORK = "friction_work", "J", "with `friction`: energy that friction has taken up to the end";
+    CONTACT_ENERGY = "contact_energy", "J", "with `[contact]`: energy of pairs, planes and elastic slip, \
+        part of `stored_energy`";
+    CONTACTS = "contacts", "", "with `[contact]`: number of touching pairs of particles, and of faces and \
+        planes, at the end";
+    DEEPEST_OVERLAP = "deepest_overlap", "", "with `[contact]`: largest overlap at the end of any step: 1 − \
+        r/d of a pair of particles, depth of a face behind a plane over half a spacing";
+    CONTACT_SHARE = "contact_share", "", "with `[contact]`: energy of contact over the stored energy at the \
+        end; the load is too low by about this fraction";
+    CONTACT_STIFFNESS = "contact_stiffness", "", "with `[contact]`: stiffness s of the first plane, else of \
+        pairs of particles; κ with `short_range`";
+    FRICTION_WORK = "friction_work", "J", "with `friction`: energy dissipated by friction";
     PLANE_FORCE = "{plane}_force_{axis}", "N", "force of a rigid plane on the body along an axis at the end";
-    PLANE_AREA = "{plane}_area", "m²", "undeformed area of the faces of the body that touch a rigid plane at the end";
-    PLANE_WIDTH = "{plane}_width", "m", "largest extent of these faces along the plane at the end: in a plane body the width of the contact";
-    PLANE_SPREAD = "{plane}_spread", "m", "root of the mean square distance from the centre of pressure on a rigid plane at the end, weighted with the pressure; half the half-width of a Hertzian strip";
+    PLANE_AREA = "{plane}_area", "m²", "undeformed area of the faces of the body that touch a rigid plane at \
+        the end";
+    PLANE_WIDTH = "{plane}_width", "m", "largest extent along a rigid plane of the faces that touch it at \
+        the end; in a plane body the width of contact";
+    PLANE_SPREAD = "{plane}_spread", "m", "root mean square distance from the centre of pressure on a rigid \
+        plane at the end, weighted by pressure; half the half-width of a Hertzian strip";
     CRITICAL_TIME_STEP = "critical_time_step", "s", "critical time step 2/ω of the body at the start";
     TIME_STEP = "time_step", "s", "time step at the end";
     KINETIC_ENERGY = "kinetic_energy", "J", "kinetic energy at the end";
-    ENERGY_ERROR = "energy_error", "", "largest error of the energy balance, over the energy turned over";
-    MIXED_ERROR = "mixed_error", "", "with `precision = \"mixed\"`: root mean square of what forces differ by from those in double precision at the end, over that of the latter; 0 where the law needs double precision there";
-    FORCE_IMBALANCE = "force_imbalance", "", "without `[dynamics]`: largest sum of the internal forces in any step, over half the sum of their magnitudes; zero but for rounding, whatever the residual";
-    MOMENT_IMBALANCE = "moment_imbalance", "", "the same of their moments about the body's middle, in deformed positions, over half the body's diagonal as well";
-    REACTION_IMBALANCE = "reaction_imbalance", "", "the same of reactions and loads: what free particles still have out of balance";
+    ENERGY_ERROR = "energy_error", "", "largest error of the energy balance, over the largest work or \
+        kinetic energy";
+    MIXED_ERROR = "mixed_error", "", "with `precision = \"mixed\"`: relative rms difference from forces in \
+        double precision at the end; 0 if the law needs double precision there";
+    FORCE_IMBALANCE = "force_imbalance", "", "without `[dynamics]`: largest sum of the internal forces in \
+        any step, over half the sum of their magnitudes; zero up to rounding at any residual";
+    MOMENT_IMBALANCE = "moment_imbalance", "", "without `[dynamics]`: largest sum of the moments of internal \
+        forces about the middle of the deformed body, over half the sum of their magnitudes and half the \
+        diagonal";
+    REACTION_IMBALANCE = "reaction_imbalance", "", "without `[dynamics]`: largest sum of reactions and \
+        loads, over half the sum of magnitudes of internal forces: the residual of free particles";
     LARGEST_RESIDUAL = "largest_residual", "", "largest residual of any step";
-    OUTSIDE_SHARE = "outside_share", "", "of a learnt law: share of particles outside of the box of its training data at the end";
-    FLAGGED_SHARE = "flagged_share", "", "of a learnt law: share of particles where it is uncertain at the end, for any reason: outside of the box, in a gap of the data, a spread of its members";
-    FIRST_STEP_OUTSIDE = "first_step_outside", "", "of a learnt law: first load step (with `[dynamics]` row of the history) in which a particle leaves the box of its training data, if one does";
-    FAILED_AS_EXPECTED = "failed_as_expected", "", "1 if a variant with `expect_error` ended with this error, else 0";
+    OUTSIDE_SHARE = "outside_share", "", "of a learnt law: share of particles outside the box of its \
+        training data at the end";
+    FLAGGED_SHARE = "flagged_share", "", "of a learnt law: share of uncertain particles at the end: outside \
+        the box, in a gap of the data, or with a spread of members";
+    FIRST_STEP_OUTSIDE = "first_step_outside", "", "of a learnt law: first load step (with `[dynamics]` row \
+        of the history) in which a particle leaves the box of its training data";
+    FAILED_AS_EXPECTED = "failed_as_expected", "", "1 if a variant with `expect_error` ended with this \
+        error, else 0";
     PROBE = "{probe}", "*", "value of a probe at the end (m, rad, J/m² or a strain)";
-    PROBE_PEAK = "{probe}_peak", "*", "its value of the largest size; of a rotation up to the end of its first half swing";
-    PROBE_FREQUENCY = "{probe}_frequency", "rad/s", "of a rotation: π over the time of the zero that ends its first half swing";
-    PROBE_RATE = "{probe}_rate", "rad/s", "frequency times peak: the rate at which a harmonic swing of this peak begins";
-    PROBE_SPEED = "{probe}_speed", "m/s", "of a crack or a front: mean speed between its gauges if a row lies before the first; without gauges from its first row to its last";
-    PROBE_BETWEEN_GAUGES = "{probe}_between_gauges", "", "rows of the history with the tip or front between the gauges";
-    PROBE_BACKSTEP = "{probe}_backstep", "m", "largest step back between the gauges";
-    PROBE_ACROSS = "{probe}_across", "m", "of a crack: largest distance of its tip from 0 across its axis, between the gauges if there are any";
-    SECTION_FORCE = "{section}_force_{axis}", "N", "force along an axis that bonds across a section exert at the end on the part of the body behind it";
-    SECTION_MOMENT = "{section}_moment_{axis}", "N m", "moment of these forces about the section's point";
+    PROBE_PEAK = "{probe}_peak", "*", "value of a probe with the largest magnitude; of a rotation up to the \
+        end of its first half swing";
+    PROBE_FREQUENCY = "{probe}_frequency", "rad/s", "of a rotation: π over the time of the zero at the end \
+        of its first half swing";
+    PROBE_RATE = "{probe}_rate", "rad/s", "of a rotation: frequency times peak, the initial rate of a \
+        harmonic swing of this peak";
+    PROBE_SPEED = "{probe}_speed", "m/s", "of a crack or a front: mean speed between its gauges if a row \
+        lies before the first; without gauges between its first and last row";
+    PROBE_BETWEEN_GAUGES = "{probe}_between_gauges", "", "number of rows of the history with the tip or \
+        front between the gauges";
+    PROBE_BACKSTEP = "{probe}_backstep", "m", "of a crack or a front: largest backward step between the \
+        gauges";
+    PROBE_ACROSS = "{probe}_across", "m", "of a crack: largest distance of its tip from 0 across its axis, \
+        between the gauges if there are any";
+    SECTION_FORCE = "{section}_force_{axis}", "N", "force along an axis that bonds across a section exert on \
+        the part of the body behind it at the end";
+    SECTION_MOMENT = "{section}_moment_{axis}", "N m", "moment of the forces across a section about its \
+        point at the end";
     KIRSCH_FIRST = "kirsch_first", "", "σ₁₁/σ∞ of Kirsch's plate at the particles nearest to the hole";
-    EXACT_FIRST = "exact_first", "", "of `plate-with-hole`: exact σ₁₁/σ∞ at the particles nearest to the hole";
+    EXACT_FIRST = "exact_first", "", "of `plate-with-hole`: exact σ₁₁/σ∞ at the particles nearest to the \
+        hole";
     EXACT_PEAK = "exact_peak", "", "of `plate-with-hole`: exact σ₁₁/σ∞ at the rim of the hole";
-    MEASURE_MAX = "{measure}_max", "", "largest σ₁₁/σ∞ of all particles on which no load or support acts";
+    MEASURE_MAX = "{measure}_max", "", "largest σ₁₁/σ∞ of all particles without loads and supports";
     MEASURE_FIRST = "{measure}_first", "", "computed σ₁₁/σ∞ at the particles nearest to the hole";
     MEASURE_PEAK = "{measure}_peak", "", "largest σ₁₁/σ∞ above the hole";
-    MEASURE_PEAK_ERROR = "{measure}_peak_error", "", "this over the exact value at the particles nearest to the hole, less 1";
-    MEASURE_ERROR = "{measure}_{error}", "", "error (2.84) of σ₁₁/σ∞: `rmse` over all particles, `rmse_inner` without those on which a load or support acts; of `plate-with-hole` also `rmse_ring` up to 2δ from the hole, `rmse_bulk` beyond, to five radii, and `rmse_kirsch`, `rmse_inner_kirsch` against Kirsch's solution";
+    MEASURE_PEAK_ERROR = "{measure}_peak_error", "", "`MEASURE_peak` over the exact value at the particles \
+        nearest to the hole, less 1";
+    MEASURE_ERROR = "{measure}_{error}", "", "error (2.84) of σ₁₁/σ∞: `rmse` over all particles, \
+        `rmse_inner` without particles with loads or supports; of `plate-with-hole` also `rmse_ring` up to \
+        2δ from the hole, `rmse_bulk` from there to five radii, and `rmse_kirsch`, `rmse_inner_kirsch` \
+        against Kirsch's solution";
 }
 
 harness::quantities! {
     /// Scalars of a variant for each parameter that follows a field of another scene (`[[material.fields]]`).
     pub OF_A_FIELD:
-    FIELD_MEAN = "{parameter}_field_mean", "*", "mean over the particles, by their volumes, of the field that the parameter follows";
-    FIELD_MESH_MEAN = "{parameter}_field_mesh_mean", "*", "mean of that field over its mesh, where it has values";
-    FIELD_LEAST = "{parameter}_field_least", "*", "its least value in a particle";
-    FIELD_LARGEST = "{parameter}_field_largest", "*", "its largest value in a particle";
+    FIELD_MEAN = "{parameter}_field_mean", "*", "mean over the particles, weighted by volume, of the field \
+        that the parameter follows";
+    FIELD_MESH_MEAN = "{parameter}_field_mesh_mean", "*", "mean over its mesh of the field that the \
+        parameter follows";
+    FIELD_LEAST = "{parameter}_field_least", "*", "smallest value in a particle of the field that the \
+        parameter follows";
+    FIELD_LARGEST = "{parameter}_field_largest", "*", "largest value in a particle of the field that the \
+        parameter follows";
 }
 
 harness::quantities! {
     /// Scalars of a whole scene.
     pub OF_A_SCENE:
-    KT_FINITE_WIDTH = "kt_finite_width", "", "Heywood's peak σ₁₁/σ∞ of a long strip of the plate's width";
+    KT_FINITE_WIDTH = "kt_finite_width", "", "peak σ₁₁/σ∞ of a long strip of the plate's width, by Heywood";
     MEASURE_ORDER = "{measure}_{error}_order[{variants}]", "", "observed order of an error over the spacing";
-    PEAK_LOAD_CHANGE = "peak_load_change[{variants}]", "", "change of the peak load between the two finest spacings, over the finest";
+    PEAK_LOAD_CHANGE = "peak_load_change[{variants}]", "", "relative change of the peak load between the two \
+        finest spacings";
     COMPARED = "{quantity}_error[{variant}]", "", "with `output.compare`: |q/q₀ − 1|";
-    SAME_EVENTS = "same_events[{variant}]", "", "with `output.compare`: how many of the first events broke the same bonds in the same load step";
+    SAME_EVENTS = "same_events[{variant}]", "", "with `output.compare`: number of first events that broke \
+        the same bonds in the same load step as the reference";
     INTEGRAL_DISK_1111 = "integral_disk_1111", "", "∫ ξ₁⁴/|ξ|³ dV over the unit disk, see Appendix A";
     INTEGRAL_DISK_1122 = "integral_disk_1122", "", "∫ ξ₁²ξ₂²/|ξ|³ dV over the unit disk";
     INTEGRAL_BALL_1111 = "integral_ball_1111", "", "∫ ξ₁⁴/|ξ|³ dV over the unit ball";
     INTEGRAL_BALL_1122 = "integral_ball_1122", "", "∫ ξ₁²ξ₂²/|ξ|³ dV over the unit ball";
     DOUBLE_INTEGRAL_DISK_TRACE = "double_integral_disk_trace", "", "∬ |ξ| dV dV over the unit disk";
     DOUBLE_INTEGRAL_BALL_TRACE = "double_integral_ball_trace", "", "∬ |ξ| dV dV over the unit ball";
-    PRINTED_OVER_DISK = "printed_over_double_integral_disk", "", "trace of (A.18) as published over the integral";
-    PRINTED_OVER_BALL = "printed_over_double_integral_ball", "", "trace of (A.38) as published over the integral";
+    PRINTED_OVER_DISK = "printed_over_double_integral_disk", "", "trace of (A.18) as published over the \
+        integral";
+    PRINTED_OVER_BALL = "printed_over_double_integral_ball", "", "trace of (A.38) as published over the \
+        integral";
 }
 
 use harness::report::{Named, Quantity};
 
-/// Sums over the whole body that must vanish, see [`crate::solver::Balance`], over its forces; of several variants the
-/// largest is a value of its own.
+/// Imbalances of the whole body, see [`crate::solver::Balance`]; of several variants the report also has the
+/// largest.
 pub const BALANCES: [Quantity; 3] = [FORCE_IMBALANCE, MOMENT_IMBALANCE, REACTION_IMBALANCE];
 
-/// Those of [`crate::integrals::all`], in its order.
+/// Scalars of [`crate::integrals::all`], in its order.
 pub const INTEGRALS: [Quantity; 8] = [
     INTEGRAL_DISK_1111,
     INTEGRAL_DISK_1122,
@@ -122,10 +183,10 @@ pub const INTEGRALS: [Quantity; 8] = [
     PRINTED_OVER_BALL,
 ];
 
-/// The load at a displacement, m.
+/// Names the load at a displacement, m.
 pub fn load_at(displacement: f64) -> Named {
     LOAD_AT.of(&[&((displacement * 1e9).round() / 1e6).to_string()])
 }
 
-/// All of them.
+/// All scalars.
 pub const ALL: &[&[Quantity]] = &[OF_A_VARIANT, OF_A_FIELD, OF_A_SCENE, harness::study::OF_STUDIES];

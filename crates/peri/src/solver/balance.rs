@@ -1,51 +1,51 @@
-//! When forces balance, for every method alike: ‖F_free‖₂ against a reference R, the greatest of
+//! Balance of forces, for all methods: ‖F_free‖₂ against a reference R, the greatest of
 //!
 //! - the reactions ‖F_held‖₂ and the body forces ‖b‖₂;
-//! - a twentieth of what these were in any equilibrium so far, for bodies that are torn;
-//! - a hundredth of what bonds at the grips would pull if the body were strained by min(U/L, 1): δ‖s_held‖₂, with U the
-//!   largest prescribed displacement, L the body's diagonal and s = Σ_J 2kθK w V_J/|ξ|, for bodies that grips move
-//!   without resistance;
+//! - a twentieth of their greatest value in any equilibrium so far, for torn bodies;
+//! - a hundredth of what bonds at the grips would pull if the body were strained by min(U/L, 1): δ‖s_held‖₂,
+//!   with U the largest prescribed displacement, L the body's diagonal and s = Σ_J 2kθK w V_J/|ξ|, for bodies
+//!   that grips move without resistance;
 //! - what rounding of displacements alone makes of forces, 4ε‖s u‖₂, over the tolerance.
 
-use super::passes::Sums;
-use super::scale::Balance;
+use super::force_scale::Balance;
+use super::passes::ForceSums;
 use super::state::State;
 use super::system::System;
 use crate::error::Error;
 use crate::field::CHUNK;
 use rayon::prelude::*;
 
-/// Part of the greatest reference of an equilibrium below which a reference does not fall.
+/// Lower limit of a reference over the greatest reference of an equilibrium.
 const LEAST_REFERENCE: f64 = 0.05;
-/// Rounding of displacements, in units of the last place, that forces may show.
+/// Rounding of displacements, in units of the last place, tolerated in forces.
 const ROUNDING: f64 = 4.0;
-/// Iterations after which the rounding of displacements is computed again.
-const LOOK: u64 = 50;
+/// Iterations between updates of the rounding of displacements.
+const CHECK_INTERVAL: u64 = 50;
 
-/// How well forces must balance, and how long a search may take.
+/// Required balance of forces, and limits of a search.
 #[derive(Clone, Copy, Debug)]
-pub struct Goal {
+pub struct SearchLimits {
     /// Out-of-balance force over reference force.
     pub tolerance: f64,
-    /// Iterations.
+    /// Limit of iterations.
     pub max_iterations: u64,
-    /// Residual that will do where all iterations are used.
+    /// Residual accepted if all iterations are used.
     pub accept: f64,
 }
 
-impl Sums {
-    /// Whether every sum is finite.
+impl ForceSums {
+    /// Returns true if every sum is finite.
     pub fn is_finite(&self) -> bool {
         let sums = [self.free, self.constrained, self.external, self.quotient_top, self.quotient_bottom];
         sums.iter().all(|x| x.is_finite())
     }
 
-    /// Reference force of these sums alone.
+    /// Reference force of these sums only.
     fn reference(&self) -> f64 {
         self.constrained.sqrt().max(self.external.sqrt())
     }
 
-    /// Out-of-balance force over its reference, which is `floor` at least.
+    /// Out-of-balance force over its reference, which is at least `floor`.
     pub fn residual(&self, floor: f64) -> f64 {
         let reference = self.reference().max(floor);
         if self.free == 0.0 { 0.0 } else { self.free.sqrt() / reference.max(f64::MIN_POSITIVE) }
@@ -53,9 +53,9 @@ impl Sums {
 }
 
 impl<const D: usize> State<D> {
-    /// Takes note of an iterate's sums: its residual, against the floor of its reference.
-    pub(super) fn note(&mut self, system: &System<D>, sums: &Sums, goal: &Goal) {
-        if self.counts.iteration.is_multiple_of(LOOK) || self.convergence.floor == 0.0 {
+    /// Records the sums of an iterate: its residual, relative to the floor of its reference.
+    pub(super) fn record_sums(&mut self, system: &System<D>, sums: &ForceSums, goal: &SearchLimits) {
+        if self.counts.iteration.is_multiple_of(CHECK_INTERVAL) || self.convergence.floor == 0.0 {
             let (scale, factor) = (&system.scale, system.factors[self.step]);
             let rounding = ROUNDING * f64::EPSILON * scale.moved(&self.displacement) / goal.tolerance;
             let strained = scale.strain(factor) * scale.constrained;
@@ -66,11 +66,11 @@ impl<const D: usize> State<D> {
         self.convergence.residual = sums.residual(self.convergence.floor);
     }
 
-    /// Whether the search is over; an iterate in which bonds have just `broken` never ends it.
+    /// Returns true if the search is over; an iterate in which bonds have just `broken` never ends it.
     ///
     /// # Errors
-    /// [`Error::NotConverged`].
-    pub(super) fn is_balanced(&mut self, goal: &Goal, broken: bool) -> Result<bool, Error> {
+    /// [`Error::NotConverged`] if all iterations are used.
+    pub(super) fn is_balanced(&mut self, goal: &SearchLimits, broken: bool) -> Result<bool, Error> {
         let balanced = self.convergence.residual <= goal.tolerance;
         let spent = self.counts.iteration >= goal.max_iterations;
         if !broken && (balanced || (spent && self.convergence.residual <= goal.accept)) {
@@ -91,7 +91,7 @@ impl<const D: usize> State<D> {
 }
 
 impl Balance {
-    /// Of a state in equilibrium.
+    /// Sums the forces of a state in equilibrium.
     pub(super) fn new<const D: usize>(system: &System<D>, state: &State<D>) -> Self {
         let (bonds, factor) = (&*system.bonds, system.factors[state.step]);
         let particles = bonds.particles();
@@ -102,7 +102,7 @@ impl Balance {
             }
             _ => [0.0; D],
         };
-        let rigid = system.repulsion().and_then(|contact| contact.of_planes(state.displacement.sites()));
+        let rigid = system.repulsion().and_then(|contact| contact.plane_forces(state.displacement.sites()));
         // force, external force, moment (yz, zx, xy), size
         let of = |sites: &[u32]| {
             let mut sums = [0.0; 10];

@@ -1,18 +1,19 @@
-//! Bonds that break.
+//! Breaking and softening of bonds.
 
 use super::criterion::{Bilinear, Criterion, Policy, most};
-use super::fracture::Event;
+use super::fracture::BreakingEvent;
 use super::state::State;
 use super::system::System;
 use crate::bonds::{Neighbour, Overstretched, Softened, fingerprint};
 use crate::contact::Contact;
 use crate::potential::StretchRange;
 
-/// Softening that an equilibrium may still lack: bonds of it bear up to this part of an intact bond's force too much.
-const LAG: f64 = 0.01;
+/// Softening that an equilibrium may lag behind: its bonds carry up to this fraction of an intact bond's
+/// force too much.
+const SOFTENING_LAG: f64 = 0.01;
 
-/// What bonds beyond the onset come to, each with what its breaking would release: those that break, and all that are soft then; `None`
-/// where no integrity falls by more than `lag`.
+/// Applies softening to bonds beyond the onset, each given with the energy that its breaking would release:
+/// returns those that break, and all softened bonds; `None` if no integrity falls by more than `lag`.
 fn soften(
     law: Bilinear,
     soft: &[Softened],
@@ -42,7 +43,7 @@ fn soften(
 }
 
 impl<const D: usize> System<'_, D> {
-    /// Bonds beyond what they bear, where they break at once.
+    /// Lists bonds beyond their limit, for a criterion without softening.
     pub(super) fn beyond(&mut self, state: &State<D>) -> Vec<Overstretched> {
         match self.breaking.as_ref().map(|breaking| &breaking.criterion) {
             Some(Criterion::Stretch(stretch)) => {
@@ -61,14 +62,15 @@ impl<const D: usize> System<'_, D> {
         self.material.overloaded(&*self.bonds, &state.displacement, limit, &free)
     }
 
-    /// Severs all bonds beyond what they bear, and softens those on the way there; the sites of their ends.
+    /// Severs all bonds beyond their limit, and softens those beyond the onset; returns the sites of their
+    /// ends.
     pub fn break_bonds(&mut self, state: &mut State<D>) -> Vec<u32> {
         let mut softened = None;
-        let mut list = match self.breaking.as_ref().map(|breaking| &breaking.criterion) {
+        let list = match self.breaking.as_ref().map(|breaking| &breaking.criterion) {
             Some(&Criterion::Softening(law)) => {
                 let found = self.overloaded(state, law.onset);
                 // in dynamics forces follow at once
-                let lag = if state.motion.begun { 0.0 } else { LAG };
+                let lag = if state.motion.begun { 0.0 } else { SOFTENING_LAG };
                 let changed = soften(law, &state.fracture.softened, found, lag);
                 changed.map_or_else(Vec::new, |(list, after)| {
                     softened = Some(after);
@@ -77,18 +79,28 @@ impl<const D: usize> System<'_, D> {
             }
             _ => self.beyond(state),
         };
+        self.sever(state, list, softened)
+    }
+
+    /// Severs bonds, and softens those on the way there; the sites of their ends.
+    pub(super) fn sever(
+        &mut self,
+        state: &mut State<D>,
+        mut list: Vec<Overstretched>,
+        softened: Option<Vec<Softened>>,
+    ) -> Vec<u32> {
         if list.is_empty() && softened.is_none() {
             return Vec::new();
         }
         let released = self.material.released(&*self.bonds, &list, most(self.breaking.as_ref()));
-        // what does not follow bond by bond is what the whole body loses
+        // energies that do not follow bond by bond are the loss of the whole body
         let before = released.is_none().then(|| self.stored_energy(state, state.stretches.observed));
         let touches = self.contact.as_ref().is_some_and(Contact::repels);
         let pair =
             |bond: &Overstretched| [bond.site, self.bonds.bond(bond.site as usize, bond.index).site as u32];
         let mut parted: Vec<[u32; 2]> = if touches { list.iter().map(pair).collect() } else { Vec::new() };
         if !list.is_empty() {
-            self.bonds.sever(&list);
+            self.bonds.break_bonds(&list);
         }
         if state.motion.begun && released.is_none() && !list.is_empty() {
             let more = self.crumble(state, &mut list);
@@ -99,7 +111,7 @@ impl<const D: usize> System<'_, D> {
         let [factor, pull, push] = state.control.balanced;
         let load = self.response(factor, (pull, push)).0;
         if bonds > 0 {
-            state.fracture.events.push(Event {
+            state.fracture.events.push(BreakingEvent {
                 step: state.step,
                 bonds,
                 fingerprint: fingerprint(&list),
@@ -117,7 +129,7 @@ impl<const D: usize> System<'_, D> {
         state.fracture.released += released
             .unwrap_or_else(|| before.unwrap_or(0.0) - self.stored_energy(state, state.stretches.observed));
         if let Some(contact) = self.contact.as_mut().filter(|_| touches) {
-            contact.part(&*self.bonds, &parted);
+            contact.add_broken_pairs(&*self.bonds, &parted);
         }
         if bonds > 0 {
             let words = state.fracture.intact.get_or_insert_with(|| self.bonds.intact());
@@ -127,12 +139,12 @@ impl<const D: usize> System<'_, D> {
             }
         }
         sites.dedup();
-        state.fracture.detached += self.release(sites.iter().copied());
+        state.fracture.detached += self.unload_detached(sites.iter().copied());
         sites
     }
 
-    /// Severs the bonds of particles that those left after `list` crush to nothing, and adds them to it: energies that no step could follow
-    /// would come from nothing. Both ends of each.
+    /// Severs the bonds of particles that the bonds left after `list` crush, and adds them to it: otherwise
+    /// energies too steep for any step would appear. Returns both ends of each.
     fn crumble(&mut self, state: &State<D>, list: &mut Vec<Overstretched>) -> Vec<[u32; 2]> {
         let mut pairs = Vec::new();
         let mut ends: Vec<u32> = list.iter().map(|bond| bond.site).collect();
@@ -164,7 +176,7 @@ impl<const D: usize> System<'_, D> {
             for bond in &found {
                 pairs.push([bond.site, self.bonds.bond(bond.site as usize, bond.index).site as u32]);
             }
-            self.bonds.sever(&found);
+            self.bonds.break_bonds(&found);
             ends = found.iter().map(|bond| bond.site).collect();
             list.append(&mut found);
         }
@@ -172,8 +184,9 @@ impl<const D: usize> System<'_, D> {
         pairs
     }
 
-    /// Takes the body forces off particles without bonds, which nothing could balance; their number.
-    pub(super) fn release(&mut self, sites: impl Iterator<Item = u32>) -> u64 {
+    /// Removes the body forces from particles without bonds, which nothing could balance; returns their
+    /// number.
+    pub(super) fn unload_detached(&mut self, sites: impl Iterator<Item = u32>) -> u64 {
         let mut count = 0;
         for site in sites {
             if self.bonds.is_alone(site as usize) {
@@ -186,17 +199,17 @@ impl<const D: usize> System<'_, D> {
         count
     }
 
-    /// Whether bonds break on the way to equilibrium.
+    /// Returns true if bonds break on the way to equilibrium.
     pub(super) fn breaks_on_the_way(&self) -> bool {
         self.breaking.as_ref().is_some_and(|b| b.policy == Policy::EachIteration)
     }
 
-    /// Whether stretches reach the critical one.
+    /// Returns true if stretches reach the critical one.
     pub(super) fn is_overstretched(&self, observed: StretchRange) -> bool {
         self.breaking_stretch().is_some_and(|least| observed.high > least * least - 1.0)
     }
 
-    /// No bond breaks below this stretch; `None` where none breaks at all.
+    /// Stretch below which no bond breaks; `None` if bonds do not break.
     pub(super) fn breaking_stretch(&self) -> Option<f64> {
         let breaking = self.breaking.as_ref()?;
         Some(self.material.least_rest() * breaking.criterion.least_stretch())

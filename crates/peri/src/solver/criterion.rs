@@ -1,37 +1,39 @@
-//! When bonds break.
+//! Criteria for breaking bonds.
 
 use crate::bonds::Property;
 use serde::Deserialize;
 
-/// When bonds break: in tension only, for good.
+/// Criterion and time of breaking: in tension only, and irreversible.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Breaking {
-    /// What a bond bears.
+    /// Limit of a bond.
     pub criterion: Criterion,
-    /// When bonds are looked at.
+    /// Time of the checks.
     pub policy: Policy,
 }
 
-/// What a bond bears.
+/// Limit of a bond.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Criterion {
     /// Critical bond stretch λ_c of the particles; a bond breaks at that of the weaker of its ends.
     Stretch(Property),
-    /// Energy that breaking a bond releases, over its share of the family, J/m³: the mean of both ends. For materials with
-    /// [`crate::material::Material::released_energy`]. Bonds of constrained particles do not break by it: grips do not tear.
+    /// Energy that breaking a bond releases, over its share of the family, J/m³: the mean of both ends. For
+    /// materials with [`crate::material::Material::released_energy`]. Bonds of constrained particles do not
+    /// break: grips do not tear.
     Energy(f64),
-    /// The same of bonds that have a strength: they soften on their way to breaking.
+    /// The same for bonds with a strength: they soften before they break.
     Softening(Bilinear),
 }
 
-/// A bond that softens, of energies over its share of the family, J/m³: with the greatest energy κ that its breaking would have
-/// released, e = √(κ/Y₀) and e_f = Y_c/Y₀ its integrity is d = 1 up to e = 1, (e_f − e)/[e(e_f − 1)] up to e_f, then 0: force over
-/// stretch is bilinear, and ∫Y(−dd) = Y_c. Cf. Camanho & Dávila, NASA/TM-2002-211737.
+/// Softening of a bond, with energies over its share of the family, J/m³: with the greatest energy κ that its
+/// breaking would have released, e = √(κ/Y₀) and e_f = Y_c/Y₀ its integrity is d = 1 up to e = 1, (e_f −
+/// e)/[e(e_f − 1)] up to e_f, then 0: force over stretch is bilinear, and ∫Y(−dd) = Y_c. Cf. Camanho &
+/// Dávila, NASA/TM-2002-211737.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bilinear {
     /// Y₀, at which bonds begin to soften.
     pub onset: f64,
-    /// Y_c ≥ Y₀, which breaking takes in all.
+    /// Y_c ≥ Y₀, the total energy of breaking.
     pub limit: f64,
 }
 
@@ -41,7 +43,7 @@ impl Bilinear {
         self.limit / self.onset
     }
 
-    /// d of a bond that would have released κ = `greatest`.
+    /// Integrity d of a bond that would have released κ = `greatest`.
     pub fn integrity(&self, greatest: f64) -> f64 {
         let (e, last) = ((greatest / self.onset).sqrt(), self.ductility());
         if e <= 1.0 {
@@ -67,7 +69,7 @@ impl From<f64> for Criterion {
 }
 
 impl Criterion {
-    /// No bond breaks below this stretch.
+    /// Stretch below which no bond breaks.
     pub fn least_stretch(&self) -> f64 {
         match self {
             Self::Stretch(stretch) => stretch.least(),
@@ -75,7 +77,7 @@ impl Criterion {
         }
     }
 
-    /// Every bond breaks beyond this stretch.
+    /// Stretch beyond which every bond breaks.
     pub fn greatest_stretch(&self) -> f64 {
         match self {
             Self::Stretch(stretch) => stretch.greatest(),
@@ -83,37 +85,37 @@ impl Criterion {
         }
     }
 
-    /// The largest stretch at which a law is evaluated: bonds beyond it are about to break, however long they are.
+    /// Largest stretch at which a law is evaluated: bonds beyond it are about to break, at any length.
     pub fn most(&self) -> f64 {
         1.25 * self.greatest_stretch() - 0.25
     }
 }
 
-/// When stretches are compared with the critical one.
+/// Time at which stretches are compared with the critical one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Policy {
-    /// In equilibrium: all overstretched bonds break at once, and a new equilibrium is sought until none is left.
-    /// Independent of the method.
+    /// Checks in equilibrium: all overstretched bonds break at once, and a new equilibrium is sought until
+    /// none is left. Independent of the method.
     #[default]
     AtEquilibrium,
-    /// In every iteration of dynamic relaxation, on its way to equilibrium: cheaper, and breaks bonds that an overshoot
+    /// Checks in every iteration of dynamic relaxation: cheaper, but breaks bonds that an overshoot
     /// stretches.
     EachIteration,
 }
 
 /// Stretches below this are not fitted …
 const SMALLEST_STRETCH: f64 = 1e-3;
-/// … nor below this where bonds break: beside a crack without contact bonds are crushed to nothing.
-const CRUSHED: f64 = 0.1;
+/// … nor below this if bonds break: beside a crack without contact bonds are crushed to zero.
+const CRUSHED_STRETCH: f64 = 0.1;
 
-/// The smallest stretch that is fitted.
+/// Smallest fitted stretch.
 pub(super) fn least(breaking: Option<&Breaking>) -> f64 {
-    if breaking.is_some() { CRUSHED } else { SMALLEST_STRETCH }
+    if breaking.is_some() { CRUSHED_STRETCH } else { SMALLEST_STRETCH }
 }
 
-/// The largest stretch that is fitted.
+/// Largest fitted stretch.
 pub(super) fn most(breaking: Option<&Breaking>) -> f64 {
     breaking.map_or(f64::INFINITY, |b| b.criterion.most())
 }

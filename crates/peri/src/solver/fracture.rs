@@ -6,14 +6,14 @@ use serde::{Deserialize, Serialize};
 
 /// Bonds that broke together.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Event {
+pub struct BreakingEvent {
     /// Load step, from 0.
     pub step: usize,
-    /// How many.
+    /// Number of bonds.
     pub bonds: u64,
-    /// Which ones, as a number: two sets of bonds of one body that differ have different ones.
+    /// Hash of the bonds: two sets of bonds of one body have different ones.
     pub fingerprint: u64,
-    /// Load of the equilibrium before, N, see [`Record::load`](super::Record::load); 0 in dynamics.
+    /// Load of the equilibrium before, N, see [`StepRecord::load`](super::StepRecord::load); 0 in dynamics.
     pub load: f64,
 }
 
@@ -26,16 +26,16 @@ pub struct Fracture {
     pub softened: Vec<Softened>,
     /// Bonds broken so far.
     pub broken: u64,
-    /// When they broke.
-    pub events: Vec<Event>,
+    /// Breaking events.
+    pub events: Vec<BreakingEvent>,
     /// Particles that have lost all their bonds so far.
     pub detached: u64,
-    /// Energy of broken bonds when they broke, and what softening took, J.
+    /// Energy of broken bonds when they broke, plus that dissipated by softening, J.
     pub released: f64,
 }
 
 impl Fracture {
-    /// Severs and softens the bonds of a body as it was built as they are in this state.
+    /// Severs and softens the bonds of a body in its reference state to those of this state.
     ///
     /// # Errors
     /// [`Error::Geometry`] for another body.

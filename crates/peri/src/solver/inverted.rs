@@ -1,4 +1,5 @@
-//! Prescribed displacements that no body can follow: grips that pass through each other, regions turned inside out.
+//! Refuses prescribed displacements that no body can follow: grips that pass through each other, regions
+//! turned inside out.
 
 use super::load::Loads;
 use super::system::System;
@@ -6,31 +7,33 @@ use crate::bonds::BodyGeometry;
 use crate::error::Error;
 use std::collections::{BTreeMap, HashMap};
 
-/// Distance, in spacings, across their relative motion within which a particle of one grip passes through one of another.
-const MEETS: f64 = 0.75;
-/// Grips that move as a whole: of more than these, displacements follow a field.
+/// Distance across their relative motion, in spacings, within which a particle of one grip passes through one
+/// of another.
+const PASSING_DISTANCE: f64 = 0.75;
+/// Most grips that move rigidly: displacements of more follow a field.
 const MOST_GRIPS: usize = 16;
-/// What is allowed instead.
+/// Allowed alternatives, for messages.
 pub const INVERTS: &str =
     "displacements that leave the body right side out; reduce them, or hold the regions farther apart";
 /// D λ_min of the shape tensor below which neighbours do not span space.
-const SPANS: f64 = 0.1;
+const LEAST_SHAPE: f64 = 0.1;
 
-/// What is found, or nothing, where prescribed displacements at any of the load factors `factors`, or between them, press a body through itself.
+/// Describes prescribed displacements that press a body through itself at any of the load factors `factors`,
+/// or between them; `None` if there are none.
 pub fn inverted<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     loads: &Loads<D>,
     factors: &[f64],
 ) -> Option<String> {
     loads.displacement.as_ref()?;
-    // a turn is no multiple of its end
+    // a rotation is not proportional to its end
     if !loads.turned.is_empty() {
         return None;
     }
     passing(bonds, loads, factors).or_else(|| turned(bonds, loads, factors))
 }
 
-/// Grips of one displacement each, and whether one of them passes another.
+/// Finds grips of one displacement each that pass through each other.
 fn passing<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>, factors: &[f64]) -> Option<String> {
     let field = loads.displacement.as_ref()?;
     let mut grips: BTreeMap<(u8, [u64; D]), Vec<usize>> = BTreeMap::new();
@@ -50,7 +53,7 @@ fn passing<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>, factor
     let [low, high] = factors.iter().fold([0.0_f64, 0.0_f64], |[low, high], &f| [low.min(f), high.max(f)]);
     for (first, (own_held, own, here)) in grips.iter().enumerate() {
         for (held, other, there) in &grips[first + 1..] {
-            // where one of them is free it gives way
+            // a free component lets it move
             let both = own_held & held;
             let apart: [f64; D] =
                 std::array::from_fn(|d| if both >> d & 1 == 1 { other[d] - own[d] } else { 0.0 });
@@ -58,8 +61,8 @@ fn passing<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>, factor
                 let at: Vec<String> = at.iter().map(|x| format!("{:.4}", x * 1e3)).collect();
                 let [own, other] = [own, other].map(|u| u.map(|x| format!("{:.4}", x * 1e3)).join(", "));
                 return Some(format!(
-                    "prescribed displacements of ({own}) mm and ({other}) mm: from load factor {factor:.4} on the two regions pass \
-                     through each other at X = ({}) mm",
+                    "prescribed displacements of ({own}) mm and ({other}) mm: from load factor \
+                     {factor:.4} on the two regions pass through each other at X = ({}) mm",
                     at.join(", ")
                 ));
             }
@@ -68,10 +71,11 @@ fn passing<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>, factor
     None
 }
 
-/// A particle of the first grip: its place along the relative motion and across it, m, and its site.
+/// A particle of the first grip: position along the relative motion and across it, m, and its site.
 type Passed<const D: usize> = (f64, [f64; D], usize);
 
-/// Where and from which load factor on particles of the second grip, which moves by `apart` against the first, pass through it.
+/// Finds the point and load factor from which particles of the second grip, which moves by `apart` against
+/// the first, pass through it.
 fn passes<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     [here, there]: [&[usize]; 2],
@@ -84,7 +88,7 @@ fn passes<const D: usize>(
         return None;
     }
     let along = apart.map(|x| x / length);
-    // along the motion, and the cell across it
+    // position along the motion, and the cell across it
     let place = |site: usize| {
         let x = bonds.position(site);
         let s: f64 = (0..D).map(|d| x[d] * along[d]).sum();
@@ -106,7 +110,7 @@ fn passes<const D: usize>(
             for (other, off, at) in cells.get(&near).into_iter().flatten() {
                 let distance = (0..D).map(|d| (across[d] - off[d]).powi(2)).sum::<f64>().sqrt();
                 let factor = (other - s) / length;
-                let meets = distance < MEETS * spacing && (other - s).abs() > 0.5 * spacing;
+                let meets = distance < PASSING_DISTANCE * spacing && (other - s).abs() > 0.5 * spacing;
                 if meets && factor > low && factor < high {
                     let sooner = first.is_none_or(|(_, known)| factor.abs() < known.abs());
                     first = if sooner { Some((bonds.position(*at), factor)) } else { first };
@@ -117,7 +121,7 @@ fn passes<const D: usize>(
     first
 }
 
-/// Particles whose whole surroundings are prescribed and have det F ≤ 0 at a load factor.
+/// Finds particles whose whole neighbourhood is prescribed and has det F ≤ 0 at a load factor.
 fn turned<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>, factors: &[f64]) -> Option<String> {
     let field = loads.displacement.as_ref()?;
     let all = (1_u8 << D) - 1;
@@ -156,7 +160,7 @@ fn turned<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>, factors
         };
         let shape = tensor(&shape, 1.0) / weight;
         let shape = nalgebra::Matrix3::from_fn(|a, b| if a == b && a >= D { 1.0 } else { shape[(a, b)] });
-        let spans = weight > 0.0 && D as f64 * shape.symmetric_eigenvalues().min() > SPANS;
+        let spans = weight > 0.0 && D as f64 * shape.symmetric_eigenvalues().min() > LEAST_SHAPE;
         let Some(inverse) = shape.try_inverse().filter(|_| spans) else { continue };
         let gradient = tensor(&moment, 0.0) / weight * inverse;
         // particles of one grip are alike
@@ -167,7 +171,8 @@ fn turned<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>, factors
         if let Some(&factor) = factors.iter().find(|&&factor| determinant(factor) <= 0.0) {
             let at: Vec<String> = bonds.position(site).iter().map(|x| format!("{:.4}", x * 1e3)).collect();
             return Some(format!(
-                "prescribed displacements with det F = {:.3} at X = ({}) mm and load factor {factor:.4}: they turn the body inside out",
+                "prescribed displacements with det F = {:.3} at X = ({}) mm and load factor {factor:.4}: \
+                they turn the body inside out",
                 determinant(factor),
                 at.join(", ")
             ));
@@ -183,7 +188,7 @@ impl<const D: usize> System<'_, D> {
     /// Refuses prescribed displacements that press the body through itself.
     ///
     /// # Errors
-    /// [`Error::Geometry`].
+    /// [`Error::Geometry`] with the regions and the load factor.
     pub(super) fn refuse_inverted(&self, factors: &[f64]) -> Result<(), Error> {
         match inverted(&*self.bonds, &self.loads, factors) {
             Some(found) => Err(Error::geometry(format!("found {found}; allowed: {INVERTS}"))),

@@ -1,13 +1,13 @@
-//! Limited-memory BFGS on the body's energy, by gradients alone, with a two-level preconditioner: Nocedal & Wright, Numerical
-//! Optimization (2006), §7.2; the step is taken where the slope along the direction has fallen enough (its curvature
-//! condition), found by secants.
+//! Limited-memory BFGS on the body's energy, from gradients only, with a two-level preconditioner: Nocedal &
+//! Wright, Numerical Optimization (2006), §7.2; the step ends where the slope along the direction has fallen
+//! enough (the curvature condition), found by secants.
 
-use super::balance::Goal;
+use super::balance::SearchLimits;
+use super::lbfgs_memory::LbfgsMemory;
 use super::load_stepping::{Equilibrium, QuasiStatic};
-use super::memory::Memory;
 use super::method::Watch;
-use super::passes::{Sums, gradient_pass};
-use super::places::Places;
+use super::particle_map::ParticleMap;
+use super::passes::{ForceSums, gradient_pass};
 use super::preconditioner::Preconditioner;
 use super::record::Status;
 use super::state::State;
@@ -21,12 +21,12 @@ use crate::field::Field;
 const SEARCHES: u64 = 25;
 const STEPS: usize = 10;
 const ITERATIONS: u64 = 200;
-/// Iterations between looks at what touches.
+/// Iterations between checks of contact.
 const TOUCHES: u64 = 10;
 /// … and growth of a search over the first one with it, or over so few iterations.
-const WORN: u64 = 2;
+const WORN_GROWTH: u64 = 2;
 const FEW: u64 = 10;
-/// σ: part of the first slope that may be left.
+/// σ: fraction of the first slope that may remain.
 const SLOPE: f64 = 0.9;
 /// Force evaluations of one line search.
 const TRIALS: usize = 12;
@@ -35,31 +35,33 @@ const GROWTH: f64 = 4.0;
 const DECAY: f64 = 0.1;
 /// A pair's curvature s·y over the slope's share α|g·d|, at least.
 const CURVATURE: f64 = 1e-3;
-/// Largest growth of the greatest stretch in a step, and least part of the smallest that is left.
+/// Largest growth of the greatest stretch in a step, and least fraction of the smallest that remains.
 const STRETCH: f64 = 0.3;
 const CRUSH: f64 = 0.6;
 
-/// Largest change of a bond over its length in a step where bonds soften, so that none leaps over its energy's maximum.
-const LEAP: f64 = 0.3;
-/// Scale at which a direction dwarfs the bonds; a power of 2, so that nothing is rounded.
-const FAR: f64 = (1_u64 << 40) as f64;
+/// Largest change of a bond over its length in a step with softening bonds, so that none jumps over its
+/// energy's maximum.
+const LARGEST_CHANGE: f64 = 0.3;
+/// Scale at which a direction exceeds the bonds by far; a power of 2, so that nothing is rounded.
+const HUGE_SCALE: f64 = (1_u64 << 40) as f64;
 
-/// Settings of the method.
+/// Quasi-static solution by limited-memory BFGS with a two-level preconditioner: the fastest method and the
+/// first choice for equilibria, with and without breaking bonds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lbfgs {
     /// Out-of-balance force over reference force at which a step is converged.
     pub tolerance: f64,
     /// Iterations that a search for equilibrium may take.
     pub max_iterations: u64,
-    /// Pairs of steps and gradient changes that are kept.
+    /// Number of pairs of steps and gradient changes kept.
     pub memory: usize,
-    /// Edge of a cell of the coarse level over the particles' distance, at least 2; grows where the coarse level would
-    /// become too large.
+    /// Edge of a cell of the coarse level over the particle spacing, at least 2; larger if the coarse level
+    /// would become too large.
     pub coarsening: f64,
     /// Weight ω of the local part of the preconditioner.
     pub weight: f64,
-    /// A search that has used all its iterations continues if its residual is below this; its residual stays
-    /// in the history.
+    /// Residual below which a search continues after all its iterations are used; the residual is recorded in
+    /// the history.
     pub accept: f64,
 }
 
@@ -77,8 +79,8 @@ impl Default for Lbfgs {
 }
 
 impl Lbfgs {
-    fn goal(&self) -> Goal {
-        Goal { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
+    fn goal(&self) -> SearchLimits {
+        SearchLimits { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
     }
 }
 
@@ -88,13 +90,13 @@ impl<const D: usize> QuasiStatic<D> for Lbfgs {
     }
 }
 
-/// The method at work.
+/// Solver of [`Lbfgs`].
 pub struct LbfgsSolver<const D: usize> {
     settings: Lbfgs,
     preconditioner: Preconditioner<D>,
-    memory: Memory<D>,
-    /// Where particles are: all fields below are over particles.
-    places: Places,
+    memory: LbfgsMemory<D>,
+    /// Positions of particles in storage: all fields below are over particles.
+    places: ParticleMap,
     /// Gradients −V F of the energy at the iterate and at the trial, 0 where constrained.
     gradient: Field<D>,
     trial: Field<D>,
@@ -102,41 +104,42 @@ pub struct LbfgsSolver<const D: usize> {
     image: Field<D>,
     trial_image: Field<D>,
     direction: Field<D>,
-    /// Whether the coarse level is left out: it has failed to give a descent.
+    /// True if the coarse level is left out because it gave no descent direction.
     local_only: bool,
-    /// Searches with this preconditioner, iterations of the first of them, and whether the last took too many.
+    /// Searches with this preconditioner, iterations of the first of them, and whether the last took too
+    /// many.
     searches: u64,
     first: u64,
     worn: bool,
-    /// Faces in touch with planes when the preconditioner was built.
+    /// Faces in contact with planes when the preconditioner was built.
     in_touch: Vec<[u32; 2]>,
 }
 
-/// A point along a direction.
+/// A point along a search direction.
 #[derive(Clone, Copy)]
-struct Point {
-    sums: Sums,
+struct LinePoint {
+    sums: ForceSums,
     observed: StretchRange,
     /// Derivative of the energy along the direction.
     slope: f64,
 }
 
-/// How a line search ended.
-enum Search {
-    /// At a step that will do.
-    Found(f64, Point),
-    /// Nowhere: the iterate is where it was.
+/// Result of a line search.
+enum LineSearch {
+    /// Accepted step.
+    Found(f64, LinePoint),
+    /// No step found: the iterate is unchanged.
     Failed,
 }
 
 impl<const D: usize> LbfgsSolver<D> {
-    /// Nothing is computed yet.
+    /// Creates a solver without any computed data.
     pub fn new(settings: Lbfgs) -> Self {
         Self {
             settings,
             preconditioner: Preconditioner::new(),
-            memory: Memory::new(settings.memory),
-            places: Places::default(),
+            memory: LbfgsMemory::new(settings.memory),
+            places: ParticleMap::default(),
             gradient: Field::zeros(0),
             trial: Field::zeros(0),
             image: Field::zeros(0),
@@ -155,8 +158,8 @@ impl<const D: usize> LbfgsSolver<D> {
         self.preconditioner.coarse_size()
     }
 
-    /// Builds the preconditioner for the present state and forgets everything else: from here a run that begins with
-    /// this state takes the same way.
+    /// Builds the preconditioner for the present state and forgets everything else: a run that begins with
+    /// this state takes the same steps.
     fn begin(&mut self, system: &mut System<D>, state: &State<D>, watch: &mut Watch<D>) -> Result<(), Error> {
         watch(&self.status(system, state, true), state)?;
         system.prepare(&state.displacement);
@@ -170,7 +173,7 @@ impl<const D: usize> LbfgsSolver<D> {
         ];
         if fields[0].sites() != particles {
             fields.into_iter().for_each(|field| *field = Field::zeros(particles));
-            self.places = Places::new(&*system.bonds, &system.loads);
+            self.places = ParticleMap::new(&*system.bonds, &system.loads);
         }
         self.memory.clear(true);
         self.local_only = false;
@@ -184,24 +187,24 @@ impl<const D: usize> LbfgsSolver<D> {
         state.status(system.factors.len(), self.settings.tolerance, 0.0, restartable)
     }
 
-    /// New forces at the present displacement; their gradient goes to `self.trial`.
-    fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> Point {
+    /// Computes forces at the present displacement; their gradient goes to `self.trial`.
+    fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> LinePoint {
         let factor = system.factors[state.step];
         system.prepare(&state.displacement);
         let body = (&self.places, self.preconditioner.volumes());
         let (sums, observed, slope) =
             gradient_pass(system, state, body, &self.direction, factor, &mut self.trial);
         system.count_evaluation(state);
-        Point { sums, observed, slope }
+        LinePoint { sums, observed, slope }
     }
 
-    /// Evaluates, and once more where the fitted law had to be widened.
-    fn look(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<Point, Error> {
+    /// Evaluates, and again if the fitted law had to be widened.
+    fn evaluate_covered(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<LinePoint, Error> {
         let point = self.evaluate(system, state);
         if !point.sums.is_finite() {
             return Ok(point);
         }
-        state.stretches.see(point.observed);
+        state.stretches.observe(point.observed);
         Ok(if system.widen(state)? { self.evaluate(system, state) } else { point })
     }
 
@@ -210,8 +213,8 @@ impl<const D: usize> LbfgsSolver<D> {
         self.places.add_scaled(&mut state.displacement, step, &self.direction);
     }
 
-    /// z = B g of the trial, then the direction from it; the slope along it. The steepest of what is left where the
-    /// memory gives no descent.
+    /// Computes z = B g of the trial and the direction from it; returns the slope along it. Uses the
+    /// remaining steepest descent if the memory gives no descent.
     fn direct(&mut self) -> f64 {
         let slope = self.memory.direction(&self.gradient, &self.image, &mut self.direction);
         if slope < 0.0 && slope.is_finite() {
@@ -222,17 +225,17 @@ impl<const D: usize> LbfgsSolver<D> {
         self.memory.direction(&self.gradient, &self.image, &mut self.direction)
     }
 
-    /// Along the direction from `start`, whose slope is `slope`, to where the slope has fallen enough.
+    /// Searches along the direction from `start`, whose slope is `slope`, until the slope has fallen enough.
     fn search(
         &mut self,
         system: &mut System<D>,
         state: &mut State<D>,
-        start: &Point,
+        start: &LinePoint,
         slope: f64,
-    ) -> Result<Search, Error> {
+    ) -> Result<LineSearch, Error> {
         let [least, most] = allowed(start.observed);
         let longest = self.longest_step(system, state, most);
-        // the slope is too steep below `low` and has turned, or the body is torn, above `high`
+        // the slope is too steep below `low`; above `high` it has turned, or the body is torn
         let (mut low, mut low_slope, mut high) = (0.0, slope, f64::INFINITY);
         let (mut at, mut step) = (0.0, longest.min(1.0));
         for trial in 0..TRIALS {
@@ -246,12 +249,12 @@ impl<const D: usize> LbfgsSolver<D> {
                 step = low + (high - low) * (1.0 / excess).clamp(1e-6, 0.5);
                 continue;
             }
-            state.stretches.see(rough.observed);
+            state.stretches.observe(rough.observed);
             let point = if system.widen(state)? { self.evaluate(system, state) } else { rough };
             if point.sums.residual(state.convergence.floor) <= self.settings.tolerance
                 || point.slope.abs() <= SLOPE * slope.abs()
             {
-                return Ok(Search::Found(step, point));
+                return Ok(LineSearch::Found(step, point));
             }
             let change = point.slope - low_slope;
             let secant = if change > 0.0 { low - low_slope * (step - low) / change } else { f64::INFINITY };
@@ -259,20 +262,20 @@ impl<const D: usize> LbfgsSolver<D> {
                 high = step;
                 step = secant.clamp(low + DECAY * (high - low), high - DECAY * (high - low));
             } else {
-                // hardly any curvature so far: farther, unless the way is barred or long enough
+                // hardly any curvature so far: farther, unless the step is limited or long enough
                 if high.is_finite() || trial > 2 || step >= longest {
-                    return Ok(Search::Found(step, point));
+                    return Ok(LineSearch::Found(step, point));
                 }
                 (low, low_slope) = (step, point.slope);
                 step = secant.clamp(1.5 * step, GROWTH * step).min(longest);
             }
         }
         self.step(state, -at);
-        Ok(Search::Failed)
+        Ok(LineSearch::Failed)
     }
 
-    /// How far a step may go along the direction where bonds soften at stretches up to e = `most`, or particles touch:
-    /// the energy is not convex there.
+    /// Longest step along the direction if bonds soften at stretches up to e = `most`, or particles are in
+    /// contact: the energy is not convex there.
     fn longest_step(&mut self, system: &System<D>, state: &State<D>, most: f64) -> f64 {
         let softens = system.material.bond_law().0.tension_derivative((1.0 + most).sqrt()) < 0.0;
         if !softens && system.repulsion().is_none() {
@@ -289,23 +292,23 @@ impl<const D: usize> LbfgsSolver<D> {
         if !softens {
             return longest;
         }
-        let range = stretch_range(&*system.bonds, &spread(FAR));
-        (LEAP * FAR / (1.0 + range.high).sqrt()).min(longest)
+        let range = stretch_range(&*system.bonds, &spread(HUGE_SCALE));
+        (LARGEST_CHANGE * HUGE_SCALE / (1.0 + range.high).sqrt()).min(longest)
     }
 
-    /// One iteration from `point`; the next iterate, `None` where no direction led anywhere.
+    /// Runs one iteration from `point`; returns the next iterate, `None` if no direction gave a descent.
     fn iterate(
         &mut self,
         system: &mut System<D>,
         state: &mut State<D>,
-        point: &Point,
-    ) -> Result<Option<Point>, Error> {
+        point: &LinePoint,
+    ) -> Result<Option<LinePoint>, Error> {
         let slope = self.direct();
         if slope == 0.0 || !slope.is_finite() {
             return Ok(None);
         }
         match self.search(system, state, point, slope)? {
-            Search::Found(step, point) => {
+            LineSearch::Found(step, point) => {
                 std::mem::swap(&mut self.gradient, &mut self.trial);
                 self.preconditioner.apply(
                     &self.places,
@@ -323,17 +326,18 @@ impl<const D: usize> LbfgsSolver<D> {
                 std::mem::swap(&mut self.image, &mut self.trial_image);
                 Ok(Some(point))
             }
-            Search::Failed => Ok(None),
+            LineSearch::Failed => Ok(None),
         }
     }
 
-    /// After a search that failed: no memory, and without any no coarse level; then all over again.
+    /// Simplifies after a failed search: clears the memory, then drops the coarse level; then starts again.
     fn simplify(&mut self) {
         self.local_only = self.memory.is_empty() && !self.local_only;
         self.memory.clear(true);
     }
 
-    /// Whether a tenth of the faces in touch with planes are others than when the preconditioner was built.
+    /// Returns true if a tenth of the faces in contact with planes have changed since the preconditioner was
+    /// built.
     fn others_touch(&self, system: &System<D>, state: &State<D>) -> bool {
         if system.repulsion().is_none_or(|contact| !contact.has_planes()) {
             return false;
@@ -343,9 +347,9 @@ impl<const D: usize> LbfgsSolver<D> {
         10 * (now.len() + self.in_touch.len() - 2 * kept) > now.len().max(1)
     }
 
-    /// Forces and gradient of an iterate reached otherwise than by a search.
-    fn arrive(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<Point, Error> {
-        let point = self.look(system, state)?;
+    /// Computes forces and gradient of an iterate that no search produced.
+    fn arrive(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<LinePoint, Error> {
+        let point = self.evaluate_covered(system, state)?;
         if !point.sums.is_finite() {
             return Err(system.not_finite(state));
         }
@@ -365,7 +369,8 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
         let goal = self.settings.goal();
         self.memory.clear(false);
         // a run can be interrupted where it is built
-        // small steps between which bonds break leave the body much as it was; contact and large steps do not
+        // small steps between which bonds break leave the body nearly unchanged; contact and large steps do
+        // not
         let kept = system.breaking.is_some() && system.repulsion().is_none();
         let fresh = state.control.round == 0
             && state.contact.renewals == 0
@@ -378,12 +383,12 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
         let mut point = self.arrive(system, state)?;
         let mut broken = false;
         loop {
-            state.note(system, &point.sums, &goal);
+            state.record_sums(system, &point.sums, &goal);
             if state.is_balanced(&goal, broken)? {
                 let took = state.counts.total_iterations - before;
                 self.first = if self.searches == 0 { took } else { self.first };
                 self.searches += 1;
-                self.worn = took > WORN * self.first.max(FEW);
+                self.worn = took > WORN_GROWTH * self.first.max(FEW);
                 return Ok(Some(point.observed));
             }
             broken = false;
@@ -399,8 +404,8 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
                 let sites = system.break_bonds(state);
                 broken = !sites.is_empty();
                 if broken {
-                    self.broke(system, &sites);
-                    system.refuse_adrift(state, self.settings.tolerance)?;
+                    self.bonds_broke(system, &sites);
+                    system.refuse_unsupported(state, self.settings.tolerance)?;
                     point = self.arrive(system, state)?;
                 }
             }
@@ -414,8 +419,8 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
         }
     }
 
-    fn broke(&mut self, system: &System<D>, sites: &[u32]) {
-        self.preconditioner.broke(&*system.bonds, sites);
+    fn bonds_broke(&mut self, system: &System<D>, sites: &[u32]) {
+        self.preconditioner.bonds_broke(&*system.bonds, sites);
         self.memory.clear(false);
     }
 
@@ -424,18 +429,18 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
     }
 }
 
-/// Faces in touch with planes.
+/// Faces in contact with planes.
 fn in_touch<const D: usize>(system: &System<D>, state: &State<D>) -> Vec<[u32; 2]> {
     system.repulsion().map_or_else(Vec::new, |contact| contact.in_touch(&state.displacement))
 }
 
-/// How far stretches may go in one step, as e = λ² − 1.
+/// Range of stretches allowed in one step, as e = λ² − 1.
 fn allowed(observed: StretchRange) -> [f64; 2] {
     let [low, high] = [observed.low, observed.high].map(|e| (1.0 + e).max(0.0).sqrt());
     [(CRUSH * low).powi(2) - 1.0, (high + STRETCH * high.max(1.0)).powi(2) - 1.0]
 }
 
-/// How many times as far as allowed stretches have gone.
+/// Ratio of the change of stretches to the allowed change.
 fn excess(start: StretchRange, observed: StretchRange) -> f64 {
     let root = |e: f64| (1.0 + e).max(0.0).sqrt();
     let far = (root(observed.high) - root(start.high)) / (STRETCH * root(start.high).max(1.0));

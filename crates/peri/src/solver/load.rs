@@ -1,11 +1,12 @@
-//! Loads and supports: body forces and prescribed displacement components, proportional to one load factor but for regions that turn.
+//! Loads and supports: body forces and prescribed displacement components, proportional to one load factor
+//! except in rotating regions.
 
-use super::turn::Turned;
+use super::rotation::RotatingRegion;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
 use rayon::prelude::*;
 
-/// What is prescribed in a region at load factor 1.
+/// Prescribed displacement and body force of a region at load factor 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Support<const D: usize> {
     /// Prescribed displacement components, m; `None` is free.
@@ -14,23 +15,25 @@ pub struct Support<const D: usize> {
     pub body_force: [f64; D],
 }
 
-/// The loads of a body, site by site. What no region asks for is not stored.
+/// Loads of a body, site by site. Absent kinds of load are not stored.
 #[derive(Clone, Debug, Default)]
 pub struct Loads<const D: usize> {
     /// Body force density at load factor 1, N/m³.
     pub body_force: Option<Field<D>>,
-    /// Prescribed displacement at load factor 1, m, where constrained; of turned regions its rate over the load factor.
+    /// Prescribed displacement at load factor 1, m, of constrained components; in rotating regions its rate
+    /// over the load factor.
     pub displacement: Option<Field<D>>,
-    /// Bit d of a site: component d is constrained. Empty where nothing is.
+    /// Bit d of a site: component d is constrained. Empty without constraints.
     pub constrained: Vec<u8>,
     /// Sites of each region of prescribed displacement, in the order given.
     pub held_regions: Vec<Vec<u32>>,
-    /// Regions that turn about an axis.
-    pub turned: Vec<Turned<D>>,
+    /// Regions that rotate about an axis.
+    pub turned: Vec<RotatingRegion<D>>,
 }
 
 impl<const D: usize> Loads<D> {
-    /// Collects regions, each given as its sites and what holds there; body forces add up, the last displacement applies.
+    /// Collects regions, each given by its sites and its support; body forces add up, the last displacement
+    /// applies.
     pub fn new(sites: usize, regions: &[(Vec<u32>, Support<D>)]) -> Self {
         let mut loads = Self::default();
         for (members, support) in regions {
@@ -65,15 +68,16 @@ impl<const D: usize> Loads<D> {
         self.constrained.get(site).copied().unwrap_or(0)
     }
 
-    /// Takes the body force off a site.
+    /// Removes the body force from a site.
     pub fn unload(&mut self, site: usize) {
         if let Some(field) = &mut self.body_force {
             field.set(site, [0.0; D]);
         }
     }
 
-    /// What the loads pull, N·m: Σ −F V·d over constrained components with d the rate of their displacement over the factor, and
-    /// Σ b V·u with b the body force at factor 1. `force` holds out-of-balance force densities.
+    /// Sums of the loads' conjugate quantities, N·m: Σ −F V·d over constrained components with d the rate of
+    /// their displacement over the factor, and Σ b V·u with b the body force at factor 1. `force` holds
+    /// out-of-balance force densities.
     pub fn conjugates(
         &self,
         bonds: &dyn BodyGeometry<D>,
@@ -97,8 +101,8 @@ impl<const D: usize> Loads<D> {
         (pull, push)
     }
 
-    /// How far apart the prescribed displacements are at factor 1, m: √Σ_d (max − min)²; of turned regions the longest arc; `rigid` are
-    /// those of rigid planes.
+    /// Relative prescribed displacement at factor 1, m: √Σ_d (max − min)²; for rotating regions the longest
+    /// arc; `rigid` are the displacements of rigid planes.
     pub fn reach(&self, bonds: &dyn BodyGeometry<D>, rigid: &[[f64; D]]) -> f64 {
         let mut turned = vec![false; if self.turned.is_empty() { 0 } else { bonds.sites() }];
         self.turned.iter().flat_map(|region| &region.sites).for_each(|&site| turned[site as usize] = true);
@@ -121,7 +125,7 @@ impl<const D: usize> Loads<D> {
         if self.turned.is_empty() { straight } else { straight.hypot(self.arc(bonds)) }
     }
 
-    /// Total body force at factor 1 along each axis, N: of both directions the larger.
+    /// Total body force at factor 1 along each axis, N: the larger sum of both directions.
     pub fn applied(&self, bonds: &dyn BodyGeometry<D>) -> [f64; D] {
         let Some(body) = &self.body_force else { return [0.0; D] };
         let sum = |d: usize, sign: f64| {
@@ -134,10 +138,10 @@ impl<const D: usize> Loads<D> {
         std::array::from_fn(|d| sum(d, 1.0).max(sum(d, -1.0)))
     }
 
-    /// The load, N, and the displacement, m, on which it works, from [`Loads::conjugates`]: the force conjugate to the
-    /// grips' distance `factor` · [`Loads::reach`]; where only forces are prescribed, these, and the mean displacement
-    /// of where they act along them (of both ends together where they pull at both).
-    /// `rigid` as [`Loads::reach`].
+    /// Load, N, and its conjugate displacement, m, from [`Loads::conjugates`]: the force conjugate to the
+    /// grips' distance `factor` · [`Loads::reach`]; with prescribed forces only, these, and the mean
+    /// displacement of their points along them (of both ends together if they pull at both). `rigid` as in
+    /// [`Loads::reach`].
     pub fn response(
         &self,
         bonds: &dyn BodyGeometry<D>,
@@ -153,7 +157,7 @@ impl<const D: usize> Loads<D> {
         if applied > 0.0 { (factor * applied, push / applied) } else { (0.0, 0.0) }
     }
 
-    /// Reaction on each region of prescribed displacement, N; components that are not constrained give none.
+    /// Reaction on each region of prescribed displacement, N; unconstrained components give none.
     pub fn reactions(&self, bonds: &dyn BodyGeometry<D>, force: &Field<D>) -> Vec<[f64; 3]> {
         let of_region = |sites: &Vec<u32>| {
             let mut sum = [0.0; 3];
@@ -170,8 +174,8 @@ impl<const D: usize> Loads<D> {
         self.held_regions.iter().map(of_region).collect()
     }
 
-    /// Force with which the regions of prescribed displacement hold or pull along each axis, N: their reactions in one
-    /// direction, or in the other if these are more. A particle counts in the first region that has it.
+    /// Force of the regions of prescribed displacement along each axis, N: the larger of the summed positive
+    /// and negative reactions. A particle counts in the first region that contains it.
     pub fn reaction(&self, bonds: &dyn BodyGeometry<D>, force: &Field<D>) -> [f64; D] {
         let mut counted = vec![false; self.constrained.len()];
         let (mut up, mut down) = ([0.0; D], [0.0; D]);
@@ -195,8 +199,9 @@ impl<const D: usize> Loads<D> {
         std::array::from_fn(|d| up[d].max(down[d]))
     }
 
-    /// An affine field u_d = a_d + Σ_e B_de X_e to start from: closest to the prescribed displacements where there are
-    /// any, in balance with the body forces otherwise. One row (a_d, B_d1, …) per component, at load factor 1.
+    /// Affine field u_d = a_d + Σ_e B_de X_e to start from: closest to the prescribed displacements if there
+    /// are any, otherwise in balance with the body forces. One row (a_d, B_d1, …) per component, at load
+    /// factor 1.
     pub fn affine_predictor(&self, bonds: &dyn BodyGeometry<D>, stiffness: f64) -> [[f64; 4]; D] {
         if self.displacement.is_some() {
             self.affine_closest(bonds)
@@ -207,7 +212,8 @@ impl<const D: usize> Loads<D> {
         }
     }
 
-    /// Least squares, of least norm, over the prescribed displacements: moves the whole body with its grips.
+    /// Least-squares fit, of least norm, to the prescribed displacements: moves the whole body with its
+    /// grips.
     fn affine_closest(&self, bonds: &dyn BodyGeometry<D>) -> [[f64; 4]; D] {
         let mut result = [[0.0; 4]; D];
         let Some(field) = &self.displacement else { return result };
@@ -220,12 +226,12 @@ impl<const D: usize> Loads<D> {
                 .collect();
             let mut normal = nalgebra::Matrix4::<f64>::zeros();
             let mut right = nalgebra::Vector4::<f64>::zeros();
-            // lengths in units of the body, so that the pseudo-inverse's threshold means something
+            // lengths in units of the body, so that the threshold of the pseudo-inverse is meaningful
             let scale = constrained
                 .iter()
                 .flat_map(|&s| bonds.position(s))
                 .fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
-            // a body that is moved as a whole stays unstrained to the last bit
+            // a rigidly moved body stays unstrained to the last bit
             let first = constrained.first().map_or(0.0, |&site| field.get(site)[d]);
             for &site in &constrained {
                 let position = bonds.position(site);
@@ -249,13 +255,13 @@ impl<const D: usize> Loads<D> {
         result
     }
 
-    /// The homogeneous strain H whose bond forces do the same virtual work as the body forces in every homogeneous
-    /// strain: Σ_I V_I Σ_J kθK w V_J |ξ| (n·Hn)(n·Gn) = Σ_I V_I b·G X for all symmetric G (Galerkin's projection).
-    /// `stiffness` is kθK.
+    /// Homogeneous strain H whose bond forces do the same virtual work as the body forces in every
+    /// homogeneous strain: Σ_I V_I Σ_J kθK w V_J |ξ| (n·Hn)(n·Gn) = Σ_I V_I b·G X for all symmetric G
+    /// (Galerkin's projection). `stiffness` is kθK.
     fn affine_balance(&self, bonds: &dyn BodyGeometry<D>, stiffness: f64) -> [[f64; 4]; D] {
         let mut result = [[0.0; 4]; D];
         let Some(body_force) = &self.body_force else { return result };
-        // components (a, b) of H, a ≤ b; off the diagonal each stands for two
+        // components (a, b) of H, a ≤ b; off the diagonal each represents two
         let pairs: Vec<(usize, usize)> = (0..D).flat_map(|a| (a..D).map(move |b| (a, b))).collect();
         let twice = |(a, b): (usize, usize)| if a == b { 1.0 } else { 2.0 };
         let of_site = |site: usize, matrix: &mut [[f64; 6]; 6]| {

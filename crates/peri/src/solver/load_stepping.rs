@@ -1,8 +1,8 @@
-//! Load step after load step: a first guess, an equilibrium, the bonds that break in it, the next equilibrium.
+//! Load stepping: a first guess, an equilibrium, the bonds that break in it, the next equilibrium.
 
-use super::method::{Finished, Method, Watch};
-use super::record::Record;
-use super::scale::{Balance, Scale};
+use super::force_scale::{Balance, ForceScale};
+use super::method::{Method, StepCallback, Watch};
+use super::record::StepRecord;
 use super::state::State;
 use super::system::System;
 
@@ -12,11 +12,11 @@ use crate::error::Error;
 /// A method that finds the equilibrium of a state at the load factor of its step.
 pub trait Equilibrium<const D: usize> {
     /// Moves the free components until the forces balance; leaves the force of the final displacement in
-    /// [`State::force`], counts iterations in [`Counts::iteration`](super::Counts) (reset by the caller) and the others. The stretches of that
-    /// displacement, where it has looked at them.
+    /// [`State::force`], counts iterations in [`Counts::iteration`](super::Counts) (reset by the caller) and
+    /// the others. Returns the stretches of that displacement, if it has computed them.
     ///
     /// # Errors
-    /// [`Error::NotConverged`], [`Error::NotFinite`], and whatever `watch` returns.
+    /// [`Error::NotConverged`], [`Error::NotFinite`], and errors of `watch`.
     fn equilibrate(
         &mut self,
         system: &mut System<D>,
@@ -24,16 +24,16 @@ pub trait Equilibrium<const D: usize> {
         watch: &mut Watch<D>,
     ) -> Result<Option<StretchRange>, Error>;
 
-    /// Takes notice of the sites whose bonds have broken since the last equilibrium.
-    fn broke(&mut self, system: &System<D>, sites: &[u32]);
+    /// Updates for the sites whose bonds have broken since the last equilibrium.
+    fn bonds_broke(&mut self, system: &System<D>, sites: &[u32]);
 
-    /// Out-of-balance force over its reference that will do.
+    /// Required out-of-balance force over its reference.
     fn tolerance(&self) -> f64;
 }
 
-/// Settings of a method that seeks one equilibrium after the other.
+/// Settings of a method that seeks one equilibrium after another.
 pub trait QuasiStatic<const D: usize> {
-    /// The method at work.
+    /// Creates the solver.
     fn solver(&self) -> impl Equilibrium<D>;
 }
 
@@ -44,25 +44,25 @@ impl<const D: usize, M: QuasiStatic<D>> Method<D> for M {
         system: &mut System<D>,
         state: &mut State<D>,
         watch: &mut Watch<D>,
-        finished: &mut Finished<D>,
+        finished: &mut StepCallback<D>,
     ) -> Result<(), Error> {
         load_stepping(&mut self.solver(), system, state, watch, finished)
     }
 }
 
-/// Solves the remaining load steps of `state`; `finished` sees every finished step and, with [`StepControl::round`](super::StepControl) above 0,
-/// every equilibrium in which bonds have just broken.
+/// Solves the remaining load steps of `state`; `finished` receives every finished step and, with
+/// [`StepControl::round`](super::StepControl) above 0, every equilibrium in which bonds have just broken.
 ///
 /// # Errors
-/// As [`Equilibrium::equilibrate`], and whatever `finished` returns;
-/// [`Error::NoEquilibrium`] where nothing holds a part that bears a force, at the start or once it is torn off: `state` is then at the last
-/// finished step; [`Error::Geometry`] for prescribed displacements that press the body through itself.
+/// Errors of [`Equilibrium::equilibrate`] and of `finished`; [`Error::NoEquilibrium`] if nothing holds a part
+/// with a force, at the start or once it is torn off: `state` is then at the last finished step;
+/// [`Error::Geometry`] for prescribed displacements that press the body through itself.
 pub fn load_stepping<const D: usize>(
     method: &mut dyn Equilibrium<D>,
     system: &mut System<D>,
     state: &mut State<D>,
     watch: &mut Watch<D>,
-    finished: &mut Finished<D>,
+    finished: &mut StepCallback<D>,
 ) -> Result<(), Error> {
     if state.step == 0 && !state.control.predicted {
         system.refuse_inverted(&system.factors)?;
@@ -79,16 +79,16 @@ fn step_by_step<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,
     watch: &mut Watch<D>,
-    finished: &mut Finished<D>,
+    finished: &mut StepCallback<D>,
 ) -> Result<(), Error> {
     let stiffness = system.stiffness_at_rest();
-    // of the body as it was built: an interrupted run must guess as if it had not been
+    // from the reference state: an interrupted run must make the same guess
     let predictor = system.loads.affine_predictor(&*system.bonds, stiffness);
-    system.scale = Scale::new(&*system.bonds, &system.loads, stiffness);
+    system.scale = ForceScale::new(&*system.bonds, &system.loads, stiffness);
     let shortest = system.shortest();
     system.restore(state)?;
     let (tolerance, forced) = (method.tolerance(), system.loads.body_force.is_some());
-    system.refuse_adrift(state, tolerance)?;
+    system.refuse_unsupported(state, tolerance)?;
     'steps: while state.step < system.factors.len() {
         if !state.control.predicted && system.friction().is_some() {
             state.contact.start = Some(state.displacement.clone());
@@ -103,7 +103,7 @@ fn step_by_step<const D: usize>(
         if !state.control.predicted {
             predict(system, state, &predictor);
             state.control.predicted = true;
-            // the step may leap out of the fitted range: its first force and mass must know
+            // the step may leave the fitted range: its first force and mass must include it
             system.covers_stretches(state, None)?;
         }
         loop {
@@ -139,8 +139,8 @@ fn step_by_step<const D: usize>(
                 break;
             }
             state.control.cuts = 0;
-            method.broke(system, &sites);
-            system.refuse_adrift(state, tolerance)?;
+            method.bonds_broke(system, &sites);
+            system.refuse_unsupported(state, tolerance)?;
             finished(&*system.bonds, state)?;
             let particles = system.bonds.particles();
             particles.iter().for_each(|&site| state.velocity.set(site as usize, [0.0; D]));
@@ -163,9 +163,10 @@ fn step_by_step<const D: usize>(
     Ok(())
 }
 
-/// Moves the body with its grips and lets it start from rest. Where bonds may break, which takes many small steps, along
-/// the last equilibria u, u′, u″ by 3u − 3u′ + u″ where they are equally far apart and no bond broke since, by 2u − u′
-/// where there are two; affinely otherwise. Where grips turn, with the nearest of them.
+/// Moves the body with its grips and lets it start from rest. If bonds may break, which takes many small
+/// steps, extrapolates the last equilibria u, u′, u″ by 3u − 3u′ + u″ if they are equally spaced and no bond
+/// broke since, by 2u − u′ if there are two; affinely otherwise. If grips rotate, moves with the nearest of
+/// them.
 fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: &[[f64; 4]; D]) {
     let factor = system.factors[state.step];
     let at = |back: usize| {
@@ -174,7 +175,7 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
             .map_or(0.0, |s| s.checked_sub(1).map_or(0.0, |s| system.factors[s]))
     };
     let increment = factor - at(1);
-    // flanks that meet turn displacements in their course
+    // contact of flanks changes the direction of displacements
     let smooth = system.repulsion().is_none();
     if state.step > 0 && system.breaking.is_some() && (smooth || system.refine > 1) {
         state.control.past.push(state.displacement.clone());
@@ -237,7 +238,7 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     if state.control.round > 1 || state.history.last().map_or(0, |r| r.broken) != state.fracture.broken {
         state.control.past.clear();
     }
-    // planes push at the final displacement
+    // planes act at the final displacement
     if let Some(contact) = system.contact.as_mut().filter(|contact| contact.repels()) {
         contact.update(&*system.bonds, &state.displacement);
     }
@@ -250,10 +251,10 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     let stored = system.stored_energy(state, system.fitted_part(observed));
     let row = system.row(state, state.control.balanced, observed, stored);
     let (residual, rounds) = (state.convergence.residual, state.control.round);
-    state.history.push(Record { residual, rounds, balance, time: 0.0, kinetic: 0.0, damped: 0.0, ..row });
+    state.history.push(StepRecord { residual, rounds, balance, time: 0.0, kinetic: 0.0, damped: 0.0, ..row });
 }
 
-/// Whether the load has fallen below the part of its largest at which the run is to stop.
+/// Returns true if the load has fallen below the fraction of its largest value at which the run stops.
 fn severed<const D: usize>(system: &System<D>, state: &State<D>) -> bool {
     let largest = state.history.iter().map(|r| r.load.abs()).fold(0.0, f64::max);
     let last = state.history.last().map_or(0.0, |r| r.load.abs());

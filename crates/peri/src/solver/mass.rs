@@ -1,17 +1,17 @@
-//! Bounds of the stiffness of particles: what fictitious masses and preconditioners are made of.
+//! Bounds of the stiffness of particles, for fictitious masses and preconditioners.
 
 use super::state::State;
 use super::system::System;
 use crate::bonds::BodyGeometry;
 use rayon::prelude::*;
 
-/// Whether bonds differ so much in their tangent that every particle has the mass of its own.
+/// Returns true if bonds differ so much in their tangent that every particle has its own mass.
 pub fn has_own_mass<const D: usize>(system: &System<D>, state: &State<D>) -> bool {
     system.material.has_own_stiffness(state.stretches.tangent)
 }
 
-/// Σ_J (2 w V_J/|ξ|)(1 + max_{d≠e} |n_d n_e|): the Gershgorin sum of a particle for a unit bond tangent.
-/// 1 where there is no bond, so that empty sites and detached particles stay at rest.
+/// Gershgorin sum of a particle for a unit bond tangent: Σ_J (2 w V_J/|ξ|)(1 + max_{d≠e} |n_d n_e|). 1
+/// without bonds, so that empty sites and detached particles stay at rest.
 pub fn update_unit_mass<const D: usize>(bonds: &dyn BodyGeometry<D>, sites: &[u32], mass: &mut [f64]) {
     let sum = |site: u32| {
         let mut sum = 0.0;
@@ -32,7 +32,7 @@ pub fn update_unit_mass<const D: usize>(bonds: &dyn BodyGeometry<D>, sites: &[u3
     }
 }
 
-/// The bounds of all particles with each bond's own tangent, over kθ.
+/// Bounds of all particles with each bond's own tangent, over kθ.
 pub fn own_mass<const D: usize>(system: &mut System<D>, state: &State<D>, mass: &mut Vec<f64>) {
     let sums = system.material.own_stiffness(&*system.bonds, &state.displacement, state.stretches.fitted);
     mass.resize(system.bonds.sites(), 1.0);

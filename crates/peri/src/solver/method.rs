@@ -1,33 +1,35 @@
-//! What all methods have in common.
+//! Interface common to all methods.
 
 use super::{State, Status, System};
 use crate::bonds::Bonds;
 use crate::error::Error;
 
-/// Sees every iteration, and may stop the run by an error.
+/// Callback of every iteration; may stop the run by an error.
 pub type Watch<'a, const D: usize> = dyn FnMut(&Status, &State<D>) -> Result<(), Error> + 'a;
 
-/// Sees the bonds and the state after every finished step; may stop the solution by an error.
-pub type Finished<'a, const D: usize> = dyn FnMut(&dyn Bonds<D>, &State<D>) -> Result<(), Error> + 'a;
+/// Callback of every finished step, with the bonds and the state; may stop the solution by an error.
+pub type StepCallback<'a, const D: usize> = dyn FnMut(&dyn Bonds<D>, &State<D>) -> Result<(), Error> + 'a;
 
-/// A method that brings a state to the end of a system's loads.
+/// A method that solves a system to the end of its loads: [`Lbfgs`](super::Lbfgs) (equilibria, the first
+/// choice), [`DynamicRelaxation`](super::DynamicRelaxation) (equilibria),
+/// [`VelocityVerlet`](super::VelocityVerlet) (explicit dynamics).
 pub trait Method<const D: usize> {
-    /// Continues from `state`. `watch` sees every iteration, `finished` every finished step.
+    /// Continues from `state`. `watch` receives every iteration, `finished` every finished step.
     ///
     /// # Errors
-    /// Those of the method, and whatever `watch` and `finished` return.
+    /// Errors of the method, and of `watch` and `finished`.
     fn solve(
         &self,
         system: &mut System<D>,
         state: &mut State<D>,
         watch: &mut Watch<D>,
-        finished: &mut Finished<D>,
+        finished: &mut StepCallback<D>,
     ) -> Result<(), Error>;
 
-    /// [`Self::solve`] to the end, watched by nobody.
+    /// Runs [`Self::solve`] to the end without callbacks.
     ///
     /// # Errors
-    /// Those of the method.
+    /// Errors of the method.
     fn run(&self, system: &mut System<D>, state: &mut State<D>) -> Result<(), Error> {
         self.solve(system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
     }

@@ -1,53 +1,59 @@
-//! What is to be solved, and how: quasi-static equilibria or explicit dynamics.
+//! Solvers: the equations of a body, its loads, and methods for quasi-static equilibria or explicit dynamics.
+//!
+//! [`Lbfgs`] finds equilibria fastest and is the first choice; [`DynamicRelaxation`] finds the same
+//! equilibria by the method of most publications; [`VelocityVerlet`] computes explicit dynamics: impact,
+//! waves, running cracks.
 
-mod adr;
-mod adrift;
 mod balance;
 mod breaking;
 mod coarse;
-mod covering;
 mod criterion;
-mod cut;
+mod dynamic_relaxation;
+mod fit_range;
+mod force_scale;
 mod fracture;
 mod inverted;
 mod lbfgs;
+mod lbfgs_memory;
 mod load;
 mod load_stepping;
 mod mass;
-mod memory;
 mod method;
 mod motion;
-mod pace;
+mod particle_map;
 mod passes;
-mod places;
 mod preconditioner;
 mod record;
+mod rotating_loads;
 mod rotation;
-mod scale;
 mod snap_back;
 mod state;
-mod steps;
+mod step_control;
+mod step_cuts;
+mod stiffness_control;
 mod system;
 mod time_step;
-mod turn;
+mod unsupported;
 mod verlet;
+#[cfg(feature = "gpu")]
+mod verlet_device;
 mod verlet_friction;
 mod verlet_step;
 
-pub use adr::{DynamicRelaxation, RelaxationSolver};
-pub use adrift::{Adrift, Stops, adrift};
 pub use criterion::{Bilinear, Breaking, Criterion, Policy};
-pub use fracture::{Event, Fracture};
+pub use dynamic_relaxation::{DynamicRelaxation, RelaxationSolver};
+pub use force_scale::Balance;
+pub use fracture::{BreakingEvent, Fracture};
 pub use inverted::{INVERTS, inverted};
 pub use lbfgs::{Lbfgs, LbfgsSolver};
 pub use load::{Loads, Support};
 pub use load_stepping::{Equilibrium, QuasiStatic, load_stepping};
-pub use method::{Finished, Method, Watch};
-pub use motion::{Energies, EqualSteps, Motion, StepLimits};
-pub use record::{Record, Status};
-pub use scale::Balance;
-pub use state::{Convergence, Counts, State, Stretches};
-pub use steps::StepControl;
-pub use system::{LoadCurve, Observer, System};
-pub use turn::{Rotation, Turned};
+pub use method::{Method, StepCallback, Watch};
+pub use motion::{DynamicEnergies, EqualSteps, Motion, StepLimits};
+pub use record::{Status, StepRecord};
+pub use rotation::{RotatingRegion, Rotation};
+pub use state::{BodyStretches, Counts, ForceResiduals, State};
+pub use step_control::StepControl;
+pub use system::{LoadCurve, StateObserver, System};
+pub use unsupported::{ContactStops, Unsupported, find_unsupported};
 pub use verlet::VelocityVerlet;

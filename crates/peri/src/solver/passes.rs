@@ -1,8 +1,8 @@
-//! The passes of an iteration over all sites: new forces with every sum over them, and the move of dynamic relaxation; the gradient of
-//! L-BFGS.
+//! Passes of an iteration over all sites: new forces with all sums over them; the move of dynamic relaxation;
+//! the gradient of L-BFGS.
 
 use super::load::Loads;
-use super::places::Places;
+use super::particle_map::ParticleMap;
 use super::state::State;
 use super::system::System;
 use crate::bonds::StretchRange;
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 /// Sums over all sites, item by item in a fixed order.
 #[derive(Clone, Copy, Default)]
-pub struct Sums {
+pub struct ForceSums {
     /// Σ v·ΔF over free components.
     pub quotient_top: f64,
     /// Σ M v² over free components.
@@ -25,7 +25,7 @@ pub struct Sums {
     pub external: f64,
 }
 
-impl Sums {
+impl ForceSums {
     fn add(mut self, other: Self) -> Self {
         self.quotient_top += other.quotient_top;
         self.quotient_bottom += other.quotient_bottom;
@@ -36,7 +36,7 @@ impl Sums {
     }
 }
 
-/// New forces and, in the same pass, all sums over them.
+/// Computes new forces and, in the same pass, all sums over them.
 pub fn force_pass<const D: usize>(
     system: &System<D>,
     state: &mut State<D>,
@@ -44,11 +44,11 @@ pub fn force_pass<const D: usize>(
     mass: f64,
     factor: f64,
     look: bool,
-) -> (Sums, StretchRange) {
+) -> (ForceSums, StretchRange) {
     let sites = system.bonds.sites();
     let loads = &*system.loads;
     let (displacement, velocity) = (&state.displacement, state.velocity.components());
-    let results: Vec<(Sums, StretchRange)> = state
+    let results: Vec<(ForceSums, StretchRange)> = state
         .force
         .chunks_mut()
         .into_par_iter()
@@ -62,7 +62,7 @@ pub fn force_pass<const D: usize>(
                     std::array::from_fn(|_| &mut parts.next().unwrap_or_default()[..range.len()]);
                 let mut observed = StretchRange::REST;
                 system.internal_force(displacement, chunk * CHUNK, &mut new, look.then_some(&mut observed));
-                let mut sums = Sums::default();
+                let mut sums = ForceSums::default();
                 let constrained = loads.constrained.get(range.clone()).unwrap_or_default();
                 for d in 0..D {
                     if let Some(body) = &loads.body_force {
@@ -94,37 +94,38 @@ pub fn force_pass<const D: usize>(
             },
         )
         .collect();
-    let all = results.into_iter().fold((Sums::default(), StretchRange::REST), |(sums, observed), (s, m)| {
-        (sums.add(s), observed.join(m))
-    });
+    let all =
+        results.into_iter().fold((ForceSums::default(), StretchRange::REST), |(sums, observed), (s, m)| {
+            (sums.add(s), observed.join(m))
+        });
     let (mut sums, observed) = all;
     // planes hold a body, too
-    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.square_of_planes());
+    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.plane_force_square());
     (sums, observed)
 }
 
-/// New forces, the gradient −V F of the energy over particles (0 where constrained), the sums over forces, the stretches, and the slope
-/// of the energy along a direction.
+/// Computes new forces, the gradient −V F of the energy over particles (0 where constrained), the sums over
+/// forces, the stretches, and the slope of the energy along a direction.
 pub fn gradient_pass<const D: usize>(
     system: &System<D>,
     state: &mut State<D>,
-    (places, volumes): (&Places, &[f64]),
+    (places, volumes): (&ParticleMap, &[f64]),
     direction: &Field<D>,
     factor: f64,
     gradient: &mut Field<D>,
-) -> (Sums, StretchRange, f64) {
+) -> (ForceSums, StretchRange, f64) {
     let (sites, loads, displacement) = (system.bonds.sites(), &*system.loads, &state.displacement);
     let direction = direction.components();
     let items = state.force.chunks_mut().into_par_iter().zip(places.parts_mut(gradient)).enumerate();
-    // one work item at a time where there are hardly any
+    // one work item at a time if there are hardly any
     let items = items.with_min_len(if sites <= 2 * CHUNK && D == 2 { 2 } else { 1 });
-    let results: Vec<(Sums, StretchRange, f64)> = items
+    let results: Vec<(ForceSums, StretchRange, f64)> = items
         .map(|(item, (mut force, gradient))| {
             let mut observed = StretchRange::REST;
             system.internal_force(displacement, item * CHUNK, &mut force, Some(&mut observed));
-            let (mut sums, mut slope) = (Sums::default(), 0.0);
+            let (mut sums, mut slope) = (ForceSums::default(), 0.0);
             let particles = places.of_item(item);
-            let held = places.held(particles.clone());
+            let held = places.constrained(particles.clone());
             for d in 0..D {
                 if let Some(body) = &loads.body_force {
                     for (f, b) in force[d].iter_mut().zip(&body.components()[d][chunk_range(item, sites)]) {
@@ -147,19 +148,19 @@ pub fn gradient_pass<const D: usize>(
             (sums, observed, slope)
         })
         .collect();
-    let start = (Sums::default(), StretchRange::REST, 0.0);
+    let start = (ForceSums::default(), StretchRange::REST, 0.0);
     let (mut sums, observed, slope) = results.into_iter().fold(start, |(sums, observed, slope), item| {
         (sums.add(item.0), observed.join(item.1), slope + item.2)
     });
     // planes hold a body, too
-    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.square_of_planes());
+    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.plane_force_square());
     (sums, observed, slope)
 }
 
-/// Parts of a sum, so that it vectorises.
+/// Number of partial sums, so that a sum vectorises.
 pub const LANES: usize = 8;
 
-/// F becomes −V F; Σ F², and the sum of −V F along a direction.
+/// Replaces F by −V F; returns Σ F², and the sum of −V F along a direction.
 struct EnergyGradient<'a> {
     force: &'a mut [f64],
     volumes: &'a [f64],
@@ -195,7 +196,7 @@ impl NullaryFnOnce for EnergyGradient<'_> {
     }
 }
 
-/// The sum of the lanes, in their order.
+/// Sums the lanes in their order.
 #[inline(always)]
 pub fn sum(lanes: &[f64; LANES]) -> f64 {
     let mut sum = 0.0;
@@ -205,7 +206,7 @@ pub fn sum(lanes: &[f64; LANES]) -> f64 {
     sum
 }
 
-/// The sums over components that are all free, in eight interleaved parts so that they vectorise.
+/// Sums over components that are all free, in eight interleaved parts so that they vectorise.
 struct FreeSums<'a> {
     new: &'a [f64],
     old: &'a [f64],
@@ -215,9 +216,9 @@ struct FreeSums<'a> {
 }
 
 impl NullaryFnOnce for FreeSums<'_> {
-    type Output = Sums;
+    type Output = ForceSums;
     #[inline(always)]
-    fn call(self) -> Sums {
+    fn call(self) -> ForceSums {
         let (mut top, mut bottom, mut square) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         let [(new, last), (old, last_old), (v, last_v), (m, last_m)] =
             [self.new, self.old, self.v, self.m].map(|numbers| numbers.as_chunks::<LANES>());
@@ -234,16 +235,16 @@ impl NullaryFnOnce for FreeSums<'_> {
             bottom[lane] += last_v[lane] * last_v[lane] * last_m[lane];
             square[lane] += last[lane] * last[lane];
         }
-        Sums {
+        ForceSums {
             quotient_top: sum(&top),
             quotient_bottom: sum(&bottom) * self.mass,
             free: sum(&square),
-            ..Sums::default()
+            ..ForceSums::default()
         }
     }
 }
 
-/// v ← ((2 − c)v + 2F/M)/(2 + c), at rest v ← F/2M; u ← u + v; constrained components stay.
+/// Updates v ← ((2 − c)v + 2F/M)/(2 + c), at rest v ← F/2M; u ← u + v; constrained components stay.
 pub fn move_pass<const D: usize>(
     loads: &Loads<D>,
     state: &mut State<D>,
@@ -266,13 +267,14 @@ pub fn move_pass<const D: usize>(
             let (f, m) = (&force[d][range.clone()], &unit_mass[range.clone()]);
             let (u, v) = (&mut *u[d], &mut *v[d]);
             let held = if constrained.iter().all(|h| h >> d & 1 == 0) { &[] } else { constrained };
-            Arch::new().dispatch(Move { f, m, u, v, held, bit: 1 << d, keep, push });
+            Arch::new().dispatch(RelaxationMove { f, m, u, v, held, bit: 1 << d, keep, push });
         }
     });
 }
 
-/// [`move_pass`] of a component of a work item. Where any is `held`, so are those with the `bit`.
-struct Move<'a> {
+/// Runs [`move_pass`] over a component of a work item. If `held` is not empty, components with the `bit`
+/// stay.
+struct RelaxationMove<'a> {
     f: &'a [f64],
     m: &'a [f64],
     u: &'a mut [f64],
@@ -283,7 +285,7 @@ struct Move<'a> {
     push: f64,
 }
 
-impl NullaryFnOnce for Move<'_> {
+impl NullaryFnOnce for RelaxationMove<'_> {
     type Output = ();
     #[inline(always)]
     fn call(self) {
@@ -299,7 +301,7 @@ impl NullaryFnOnce for Move<'_> {
         }
         let held = &held[..count];
         for k in 0..count {
-            // a product with 0 or 1, no branch: v of what is held is and stays 0
+            // a product with 0 or 1 instead of a branch: v of held components stays 0
             let free = f64::from(u8::from(held[k] & bit == 0));
             v[k] = free * (keep * v[k] + push * f[k] / m[k]);
             u[k] += v[k];

@@ -1,16 +1,16 @@
-//! An approximate inverse of the body's stiffness, for gradients of its energy: B g = ω g/(V M) + P A_c⁻¹ Pᵀ g, with the
-//! Gershgorin mass M of dynamic relaxation and a coarse level.
+//! Approximate inverse of the body's stiffness, for gradients of its energy: B g = ω g/(V M) + P A_c⁻¹ Pᵀ g,
+//! with the Gershgorin mass M of dynamic relaxation and a coarse level.
 
-use super::coarse::{Anchor, Body, Coarse, Survey};
+use super::coarse::{BondCounts, CoarseBody, CoarseLevel, PlaneAnchor};
 use super::mass::{has_own_mass, own_mass, update_unit_mass};
-use super::places::{Places, in_order};
+use super::particle_map::{ParticleMap, in_order};
 use super::state::State;
 use super::system::System;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field, chunk_range};
 
-/// Degrees of freedom of the coarse level at most, in two and three dimensions: so many in any body, one for so many particles, and so many
-/// however large the body is.
+/// Limits of the coarse level's degrees of freedom, in two and three dimensions: at least, particles per
+/// degree of freedom, and at most.
 const LEAST: [usize; 2] = [30_000, 8_000];
 const SHARE: [usize; 2] = [8, 40];
 const MOST: [usize; 2] = [125_000, 30_000];
@@ -23,24 +23,24 @@ pub struct Preconditioner<const D: usize> {
     volumes: Vec<f64>,
     /// Gershgorin sums of each site for a unit bond tangent.
     unit_mass: Vec<f64>,
-    /// The smallest of `local`: that of particles that nothing holds.
+    /// The smallest of `local`, used for unsupported particles.
     least: f64,
-    coarse: Option<Coarse<D>>,
+    coarse: Option<CoarseLevel<D>>,
 }
 
 impl<const D: usize> Preconditioner<D> {
-    /// Nothing is known yet.
+    /// Creates an empty preconditioner.
     pub fn new() -> Self {
         Self { local: Vec::new(), volumes: Vec::new(), unit_mass: Vec::new(), least: 0.0, coarse: None }
     }
 
-    /// Whether it is built.
+    /// Returns true if it is built.
     pub fn is_built(&self) -> bool {
         !self.local.is_empty()
     }
 
-    /// Builds it for the present state, and from nothing else: `weight` is ω, `coarsening` the edge of a coarse cell over
-    /// the particles' distance.
+    /// Builds it from the present state only: `weight` is ω, `coarsening` the edge of a coarse cell over the
+    /// particle spacing.
     pub fn build(&mut self, system: &mut System<D>, state: &State<D>, weight: f64, coarsening: f64) {
         // half the Gershgorin sum is about a particle's own stiffness
         let mut springs = Vec::new();
@@ -50,7 +50,7 @@ impl<const D: usize> Preconditioner<D> {
         }
         let system = &*system;
         let (bonds, sites) = (&*system.bonds, system.bonds.sites());
-        let survey = Survey::new(bonds, &state.displacement);
+        let survey = BondCounts::new(bonds, &state.displacement);
         self.unit_mass.resize(sites, 1.0);
         self.volumes = bonds.particles().iter().map(|&site| bonds.volume(site as usize)).collect();
         update_unit_mass(bonds, bonds.particles(), &mut self.unit_mass);
@@ -73,7 +73,7 @@ impl<const D: usize> Preconditioner<D> {
                     springs[site] += stiffness * weight * weight / bonds.volume(site);
                     head = if weight > head.1 { (site, weight) } else { head };
                 }
-                anchors.push(Anchor { site: head.0 as u32, normal, stiffness });
+                anchors.push(PlaneAnchor { site: head.0 as u32, normal, stiffness });
             });
         }
         let local = |(&site, volume): (&u32, &f64)| {
@@ -86,7 +86,7 @@ impl<const D: usize> Preconditioner<D> {
             self.least = 1.0;
         }
         self.local.iter_mut().filter(|local| local.is_infinite()).for_each(|local| *local = self.least);
-        let body = Body {
+        let body = CoarseBody {
             bonds,
             loads: &system.loads,
             displacement: &state.displacement,
@@ -97,11 +97,11 @@ impl<const D: usize> Preconditioner<D> {
         };
         let old = self.coarse.take();
         let most = (self.volumes.len() / SHARE[D - 2]).clamp(LEAST[D - 2], MOST[D - 2]);
-        self.coarse = Coarse::new(&body, coarsening * bonds.spacing(), most, old);
+        self.coarse = CoarseLevel::new(&body, coarsening * bonds.spacing(), most, old);
     }
 
-    /// Brings the local part up to date where bonds broke; the coarse one stays.
-    pub fn broke(&mut self, bonds: &dyn BodyGeometry<D>, sites: &[u32]) {
+    /// Updates the local part where bonds broke; the coarse part stays.
+    pub fn bonds_broke(&mut self, bonds: &dyn BodyGeometry<D>, sites: &[u32]) {
         let before: Vec<f64> = sites.iter().map(|&site| self.unit_mass[site as usize]).collect();
         update_unit_mass(bonds, sites, &mut self.unit_mass);
         for (&site, before) in sites.iter().zip(before) {
@@ -112,8 +112,15 @@ impl<const D: usize> Preconditioner<D> {
         }
     }
 
-    /// z = B g over particles, or its local part alone; g is zero where components are constrained, and so is z.
-    pub fn apply(&mut self, places: &Places, gradient: &Field<D>, result: &mut Field<D>, local_only: bool) {
+    /// Computes z = B g over particles, or its local part only; g and z are zero where components are
+    /// constrained.
+    pub fn apply(
+        &mut self,
+        places: &ParticleMap,
+        gradient: &Field<D>,
+        result: &mut Field<D>,
+        local_only: bool,
+    ) {
         if let Some(coarse) = self.coarse.as_mut().filter(|_| !local_only) {
             coarse.solve(gradient);
         }
@@ -136,7 +143,7 @@ impl<const D: usize> Preconditioner<D> {
                     z[d][particle - start] += value[d];
                 }
             }
-            for &(particle, components) in places.held(range) {
+            for &(particle, components) in places.constrained(range) {
                 for d in (0..D).filter(|d| components >> d & 1 == 1) {
                     z[d][particle - start] = 0.0;
                 }
@@ -151,6 +158,6 @@ impl<const D: usize> Preconditioner<D> {
 
     /// Degrees of freedom of the coarse level and entries of its factors.
     pub fn coarse_size(&self) -> [usize; 2] {
-        self.coarse.as_ref().map_or([0; 2], Coarse::size)
+        self.coarse.as_ref().map_or([0; 2], CoarseLevel::size)
     }
 }

@@ -1,137 +1,106 @@
-//! Regions turned about an axis: prescribed along the arc, not in proportion to the load factor.
+//! Rotations about an axis, and rotating regions.
 
-use super::load::Loads;
-use super::system::System;
-use super::turn::Turned;
-use crate::bonds::BodyGeometry;
-use crate::field::{CHUNK, Field};
-use rayon::prelude::*;
+use crate::field::Field;
+use crate::geometry::length;
 
-/// Particles of a region from which the first guess measures distances.
-const SAMPLES: usize = 256;
+/// A rotation about an axis, of the whole angle at load factor 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rotation<const D: usize> {
+    /// A point of the axis, m.
+    pub centre: [f64; D],
+    /// Unit vector of the axis; (0, 0, 1) in the plane.
+    pub axis: [f64; 3],
+    /// Angle at load factor 1, rad.
+    pub angle: f64,
+}
 
-/// A region that carries free particles: its turn, its displacement at load factor 1, m, and places of some of its particles.
-type Carrier<'a, const D: usize> = (Option<&'a Turned<D>>, [f64; D], Vec<[f64; D]>);
-
-impl<const D: usize> Loads<D> {
-    /// Turns a region whose components are constrained already.
-    pub fn turn(&mut self, bonds: &dyn BodyGeometry<D>, turned: Turned<D>) {
-        self.turned.push(turned);
-        self.set_rates(bonds, 0.0, 0.0);
+impl<const D: usize> Rotation<D> {
+    /// Part of a vector across the axis, and n × this part.
+    fn across(&self, from: [f64; D]) -> [[f64; D]; 2] {
+        let n = self.axis;
+        let r: [f64; 3] = std::array::from_fn(|d| from.get(d).copied().unwrap_or(0.0));
+        let along: f64 = (0..3).map(|d| n[d] * r[d]).sum();
+        let cross = |d: usize| n[(d + 1) % 3] * r[(d + 2) % 3] - n[(d + 2) % 3] * r[(d + 1) % 3];
+        [std::array::from_fn(|d| r[d] - along * n[d]), std::array::from_fn(cross)]
     }
 
-    /// Has [`Loads::displacement`] of turned regions be the rate of their displacement over the load factor between two factors: the
-    /// secant, at one factor the tangent.
-    pub(super) fn set_rates(&mut self, bonds: &dyn BodyGeometry<D>, before: f64, after: f64) {
-        let Some(field) = self.displacement.as_mut() else { return };
-        for turned in &self.turned {
-            for &site in &turned.sites {
-                let place = bonds.position(site as usize);
-                let rate = if before == after {
-                    let rate = turned.rotation.rate(place, after);
-                    std::array::from_fn(|d| rate[d] + turned.shift[d])
-                } else {
-                    let [old, new] = [before, after].map(|factor| turned.displacement(place, factor));
-                    std::array::from_fn(|d| (new[d] - old[d]) / (after - before))
-                };
-                turned.set(field, site, rate);
-            }
-        }
+    /// (R(φ) − 1) r of a vector from the axis: sin φ n × r − 2 sin²(φ/2) r_⊥ (Rodrigues).
+    pub fn turn(&self, angle: f64, from: [f64; D]) -> [f64; D] {
+        let [across, cross] = self.across(from);
+        let (sine, half) = (angle.sin(), (0.5 * angle).sin());
+        std::array::from_fn(|d| sine * cross[d] - 2.0 * half * half * across[d])
     }
 
-    /// Places turned regions at a load factor.
-    pub(super) fn place_turned(&self, bonds: &dyn BodyGeometry<D>, factor: f64, displacement: &mut Field<D>) {
-        for turned in &self.turned {
-            for &site in &turned.sites {
-                let moved = turned.displacement(bonds.position(site as usize), factor);
-                turned.set(displacement, site, moved);
-            }
-        }
+    /// Displacement of a position X at a load factor, m.
+    pub fn displacement(&self, place: [f64; D], factor: f64) -> [f64; D] {
+        self.turn(factor * self.angle, self.from(place))
     }
 
-    /// The longest arc of turned particles against those that are not, m; of regions turned both ways their sum.
-    pub(super) fn arc(&self, bonds: &dyn BodyGeometry<D>) -> f64 {
-        let of = |turned: &Turned<D>| {
-            let each = turned.sites.iter().map(|&site| turned.rotation.radius(bonds.position(site as usize)));
-            each.fold(0.0, f64::max)
-        };
-        let radius = self.turned.iter().map(of).fold(0.0, f64::max);
-        let span = |d: usize| {
-            let angles = self.turned.iter().map(|turned| turned.rotation.angle * turned.rotation.axis[d]);
-            let (low, high) = angles.fold((0.0_f64, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
-            high - low
-        };
-        radius * (0..3).map(|d| span(d).powi(2)).sum::<f64>().sqrt()
+    /// Rate of the displacement over the load factor, m: θ n × R(X − c).
+    pub(super) fn rate(&self, place: [f64; D], factor: f64) -> [f64; D] {
+        let (from, moved) = (self.from(place), self.displacement(place, factor));
+        let [_, cross] = self.across(std::array::from_fn(|d| from[d] + moved[d]));
+        cross.map(|x| self.angle * x)
     }
 
-    /// Moves free particles with the regions of prescribed displacement from a load factor to another, as near regions do: each turns a
-    /// particle by a part of its turn, the parts in proportion to 1/distance.
-    pub(super) fn carry(
-        &self,
-        bonds: &dyn BodyGeometry<D>,
-        [before, after]: [f64; 2],
-        displacement: &mut Field<D>,
-    ) {
-        let increment = after - before;
-        let mean = |sites: &[u32]| {
-            let mut sum = [0.0; D];
-            let Some(field) = &self.displacement else { return sum };
-            for &site in sites {
-                let value = field.get(site as usize);
-                (0..D)
-                    .filter(|d| self.constrained(site as usize) >> d & 1 == 1)
-                    .for_each(|d| sum[d] += value[d]);
-            }
-            sum.map(|x| x / sites.len().max(1) as f64)
-        };
-        let regions: Vec<Carrier<D>> = self
-            .held_regions
-            .iter()
-            .enumerate()
-            .filter(|(_, sites)| !sites.is_empty())
-            .map(|(region, sites)| {
-                let turned = self.turned.iter().find(|turned| turned.region == region);
-                let shift = turned.map_or_else(|| mean(sites), |turned| turned.shift);
-                let step = sites.len().div_ceil(SAMPLES);
-                let sample = sites.iter().step_by(step).map(|&site| bonds.position(site as usize)).collect();
-                (turned, shift, sample)
-            })
-            .collect();
-        let moved = |&site: &u32| {
-            let (place, own) = (bonds.position(site as usize), displacement.get(site as usize));
-            let near = |sample: &Vec<[f64; D]>| {
-                let squares =
-                    sample.iter().map(|there| (0..D).map(|d| (there[d] - place[d]).powi(2)).sum::<f64>());
-                1.0 / squares.fold(f64::INFINITY, f64::min).sqrt().max(1e-9 * bonds.spacing())
-            };
-            let weights: Vec<f64> = regions.iter().map(|(_, _, sample)| near(sample)).collect();
-            let sum: f64 = weights.iter().sum();
-            let mut u = own;
-            for ((turned, shift, _), weight) in regions.iter().zip(weights) {
-                let part = weight / sum;
-                if let Some(Turned { rotation, shift, .. }) = turned {
-                    let from =
-                        std::array::from_fn(|d| place[d] + u[d] - rotation.centre[d] - before * shift[d]);
-                    let turn = rotation.turn(part * increment * rotation.angle, from);
-                    (0..D).for_each(|d| u[d] += turn[d]);
-                }
-                (0..D).for_each(|d| u[d] += part * increment * shift[d]);
-            }
-            u
-        };
-        let moved: Vec<Vec<[f64; D]>> =
-            bonds.particles().par_chunks(CHUNK).map(|sites| sites.iter().map(moved).collect()).collect();
-        for (&site, u) in bonds.particles().iter().zip(moved.into_iter().flatten()) {
-            displacement.set(site as usize, u);
-        }
+    /// Distance of a position from the axis, m.
+    pub(super) fn radius(&self, place: [f64; D]) -> f64 {
+        length(self.across(self.from(place))[0])
+    }
+
+    fn from(&self, place: [f64; D]) -> [f64; D] {
+        std::array::from_fn(|d| place[d] - self.centre[d])
     }
 }
 
-impl<const D: usize> System<'_, D> {
-    /// [`Loads::set_rates`], where anything is turned.
-    pub(super) fn set_rates(&mut self, before: f64, after: f64) {
-        if !self.loads.turned.is_empty() {
-            self.loads.to_mut().set_rates(&*self.bonds, before, after);
-        }
+/// A rotating region.
+#[derive(Clone, Debug)]
+pub struct RotatingRegion<const D: usize> {
+    /// Rotation of the region.
+    pub rotation: Rotation<D>,
+    /// Additional displacement at load factor 1, m.
+    pub shift: [f64; D],
+    /// Bit d: component d is prescribed.
+    pub components: u8,
+    /// Index of the region among [`Loads::held_regions`](super::Loads::held_regions).
+    pub region: usize,
+    /// Sites of the region that no later region holds.
+    pub sites: Vec<u32>,
+}
+
+impl<const D: usize> RotatingRegion<D> {
+    pub(super) fn set(&self, field: &mut Field<D>, site: u32, value: [f64; D]) {
+        let old = field.get(site as usize);
+        let prescribed = |d: usize| self.components >> d & 1 == 1;
+        field.set(site as usize, std::array::from_fn(|d| if prescribed(d) { value[d] } else { old[d] }));
+    }
+
+    pub(super) fn displacement(&self, place: [f64; D], factor: f64) -> [f64; D] {
+        let turned = self.rotation.displacement(place, factor);
+        std::array::from_fn(|d| turned[d] + factor * self.shift[d])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// (R − 1) r about z and about a diagonal, which R(120°) permutes; its rate by differences.
+    #[test]
+    fn turns() {
+        let quarter =
+            Rotation { centre: [1.0, 0.0], axis: [0.0, 0.0, 1.0], angle: std::f64::consts::FRAC_PI_2 };
+        let [x, y] = quarter.displacement([2.0, 0.0], 1.0);
+        assert!((x + 1.0).abs() < 1e-15 && (y - 1.0).abs() < 1e-15);
+        let axis = [1.0 / 3.0_f64.sqrt(); 3];
+        let third = Rotation { centre: [0.0; 3], axis, angle: 2.0 * std::f64::consts::FRAC_PI_3 };
+        let moved = third.displacement([1.0, 2.0, 4.0], 1.0);
+        let expected = [4.0 - 1.0, 1.0 - 2.0, 2.0 - 4.0];
+        assert!((0..3).all(|d| (moved[d] - expected[d]).abs() < 1e-14), "{moved:?}");
+        let (place, h) = ([1.0, 2.0, 4.0], 1e-6);
+        let [low, high] = [0.4 - h, 0.4 + h].map(|factor| third.displacement(place, factor));
+        let rate = third.rate(place, 0.4);
+        // central differences: h² and rounding over h
+        assert!((0..3).all(|d| (rate[d] - (high[d] - low[d]) / (2.0 * h)).abs() < 1e-8));
     }
 }

@@ -1,14 +1,14 @@
-//! Responses that snap back: where bonds break and others would follow at once, the load is lowered until none would. The next
-//! break then controls the load, so that a crack advances event by event through equilibria.
+//! Responses that snap back: if more bonds would break at once after a break, the load is lowered until none
+//! would. The next break then controls the load, so that a crack advances event by event through equilibria.
 
-use super::cut::BY_STRETCH;
 use super::state::State;
+use super::step_cuts::BY_STRETCH;
 use super::system::System;
 
 impl<const D: usize> System<'_, D> {
-    /// Whether more bonds would break in the equilibrium after some broke. The load of the step then is lowered to half a
-    /// `shortest` step below that at which the largest stretch is critical, λ − 1 taken as proportional to the load; and `state`
-    /// is near the equilibrium there.
+    /// Lowers the load if more bonds would break in the equilibrium after some broke; returns whether it did.
+    /// The load becomes half a `shortest` step below that at which the largest stretch is critical, λ − 1
+    /// assumed proportional to the load; `state` is then near the equilibrium there.
     pub(super) fn lower(&mut self, state: &mut State<D>, shortest: f64) -> bool {
         let at = state.step;
         let factor = self.factors[at];
@@ -38,7 +38,7 @@ impl<const D: usize> System<'_, D> {
         true
     }
 
-    /// After a step whose load was lowered: puts factors before that of the next one, between which bonds break.
+    /// Inserts load factors before the next step after one whose load was lowered; bonds break between them.
     pub(super) fn raise(&mut self, state: &mut State<D>, shortest: f64) {
         let Some(above) = state.control.lowered.take() else { return };
         if state.step == self.factors.len() {

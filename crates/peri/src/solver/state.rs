@@ -1,15 +1,15 @@
-//! Where a solution is: everything a checkpoint holds of it.
+//! State of a solution: the content of its checkpoints.
 
 use super::fracture::Fracture;
 use super::motion::Motion;
-use super::record::{Record, Status};
-use super::steps::{Accepted, StepControl};
-use crate::contact::Grip;
+use super::record::{Status, StepRecord};
+use super::step_control::{Accepted, StepControl};
+use crate::contact::FrictionPair;
 use crate::field::Field;
 use crate::potential::StretchRange;
 use serde::{Deserialize, Serialize};
 
-/// Everything an interrupted run needs to continue with the same bits.
+/// State that an interrupted run needs to continue with the same bits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct State<const D: usize> {
@@ -23,22 +23,22 @@ pub struct State<const D: usize> {
     pub step: usize,
     /// Work of the solution.
     pub counts: Counts,
-    /// Stretches of the body, and of the law that is fitted to them.
-    pub stretches: Stretches,
-    /// Forces out of balance, and what they are measured by.
-    pub convergence: Convergence,
+    /// Stretches of the body, and of the fitted law.
+    pub stretches: BodyStretches,
+    /// Out-of-balance forces and their references.
+    pub convergence: ForceResiduals,
     /// Broken and softened bonds.
     pub fracture: Fracture,
     /// Friction and moving planes.
     pub(super) contact: ContactState<D>,
-    /// Load steps and the way through them.
+    /// Load steps and their cuts.
     pub control: StepControl<D>,
     /// Time and energies of explicit dynamics.
     pub motion: Motion,
     /// Work of the loads so far, J.
     pub work: f64,
-    /// The finished steps.
-    pub history: Vec<Record>,
+    /// Finished steps.
+    pub history: Vec<StepRecord>,
 }
 
 /// Counts of iterations and evaluations.
@@ -67,9 +67,9 @@ impl Counts {
     }
 }
 
-/// Stretches of a body, as e = λ² − 1, and the law that is fitted to them.
+/// Stretches of a body, as e = λ² − 1, and those of the fitted law.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Stretches {
+pub struct BodyStretches {
     /// Stretches [λ_low, λ_high] that the fitted law covers.
     pub fitted: [f64; 2],
     /// Stretches observed so far.
@@ -80,13 +80,13 @@ pub struct Stretches {
     pub(super) tangent: f64,
 }
 
-impl Stretches {
-    /// Notes stretches.
-    pub(super) fn see(&mut self, observed: StretchRange) {
+impl BodyStretches {
+    /// Records observed stretches.
+    pub(super) fn observe(&mut self, observed: StretchRange) {
         self.observed = self.observed.join(observed);
     }
 
-    /// Widens the fitted range within `[least, most]` where stretches have left it; returns whether they had.
+    /// Widens the fitted range within `[least, most]` if stretches have left it; returns whether they had.
     pub(super) fn widen(&mut self, [least, most]: [f64; 2]) -> bool {
         // bonds crushed below that are extrapolated: no fit covers l → 0
         let low = (1.0 + self.observed.low).max(0.0).sqrt().max(least);
@@ -94,7 +94,7 @@ impl Stretches {
         if low >= self.fitted[0] && high <= self.fitted[1] {
             return false;
         }
-        // twice the strain observed, so that a growing load does not refit at every look
+        // twice the strain observed, so that a growing load does not refit at every check
         self.fitted[0] = self.fitted[0].min((1.0 - 2.0 * (1.0 - low)).max(0.5 * low)).max(least);
         self.fitted[1] = self.fitted[1].max(1.0 + 2.0 * (high - 1.0)).min(most);
         true
@@ -106,7 +106,7 @@ impl Stretches {
     }
 }
 
-impl Default for Stretches {
+impl Default for BodyStretches {
     fn default() -> Self {
         Self {
             fitted: [0.95, 1.05],
@@ -119,12 +119,12 @@ impl Default for Stretches {
 
 /// Forces out of balance over their reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Convergence {
+pub struct ForceResiduals {
     /// Residual of the last iteration.
     pub residual: f64,
     /// Greatest reference force of an equilibrium.
     pub(super) reference: f64,
-    /// Reference force of the last iterate alone.
+    /// Reference force of the last iterate only.
     pub(super) present: f64,
     /// Least reference force.
     pub(super) floor: f64,
@@ -138,19 +138,19 @@ pub(super) struct ContactState<const D: usize> {
     pub friction: Option<Field<D>>,
     /// Friction of each plane, N.
     pub plane_friction: Vec<[f64; 3]>,
-    /// Push of each plane, N, where one moves.
+    /// Force of each plane, N, if any moves.
     pub plane_push: Vec<[f64; 3]>,
-    /// Displacement at the start of the load step, where anything rubs between equilibria.
+    /// Displacement at the start of the load step, with friction between equilibria.
     pub start: Option<Field<D>>,
     /// Friction after the last step.
-    pub grips: Vec<Grip>,
-    /// Friction in force towards the current equilibrium, and how often it has been renewed in this step.
-    pub active: Vec<Grip>,
+    pub grips: Vec<FrictionPair>,
+    /// Active friction in the search for the current equilibrium, and its number of renewals in this step.
+    pub active: Vec<FrictionPair>,
     pub renewals: u32,
 }
 
 impl<const D: usize> State<D> {
-    /// The undeformed body.
+    /// Creates the state of an undeformed body.
     pub fn new(sites: usize) -> Self {
         let [displacement, velocity, force] = [(); 3].map(|()| Field::zeros(sites));
         Self {
@@ -159,8 +159,8 @@ impl<const D: usize> State<D> {
             force,
             step: 0,
             counts: Counts::default(),
-            stretches: Stretches::default(),
-            convergence: Convergence::default(),
+            stretches: BodyStretches::default(),
+            convergence: ForceResiduals::default(),
             fracture: Fracture::default(),
             contact: ContactState::default(),
             control: StepControl::default(),
@@ -170,7 +170,7 @@ impl<const D: usize> State<D> {
         }
     }
 
-    /// Keeps a finished step, see [`Self::retreat`].
+    /// Keeps a finished step for [`Self::retreat`].
     pub(super) fn accept(&mut self) {
         self.control.accepted = Some(Box::new(Accepted {
             displacement: self.displacement.clone(),
@@ -180,8 +180,8 @@ impl<const D: usize> State<D> {
         }));
     }
 
-    /// Goes back to the last finished step, or to the undeformed body; counts of work stay. Bonds are another's: see
-    /// [`Fracture::restore`].
+    /// Returns to the last finished step, or to the undeformed body; counts of work stay. Bonds are restored
+    /// by [`Fracture::restore`].
     pub(super) fn retreat(&mut self) {
         let zero = || Field::zeros(self.velocity.sites());
         let accepted = self.control.accepted.take().map_or_else(
@@ -201,7 +201,7 @@ impl<const D: usize> State<D> {
         (self.counts.iteration, self.counts.step_iterations) = (0, 0);
     }
 
-    /// Shows an iteration of a run of `steps` steps to who watches it.
+    /// Status of an iteration in a run of `steps` steps.
     pub(super) fn status(&self, steps: usize, tolerance: f64, damping: f64, restartable: bool) -> Status {
         Status {
             step: self.step,

@@ -1,62 +1,65 @@
-//! What is solved: a body under its material and loads.
+//! The equations of a body: bonds, material, loads, contact.
 
 use super::criterion::Breaking;
+use super::force_scale::{Balance, ForceScale};
 use super::load::Loads;
-use super::record::Record;
-use super::scale::{Balance, Scale};
+use super::record::StepRecord;
 use super::state::State;
 use crate::bonds::{Bonds, StretchScan, not_finite};
-use crate::contact::{Contact, ContactSummary, Grip, Plane, PlaneReaction};
+use crate::contact::{Contact, ContactSummary, FrictionPair, PlaneReaction, RigidPlane};
 use crate::error::Error;
 use crate::field::Field;
-use crate::material::{Material, Response};
+use crate::material::{Material, SolverMaterial};
 use crate::potential::StretchRange;
 use std::borrow::Cow;
 
-/// Renewals of the normal forces of friction in a load step, and those after which they are averaged: large coefficients may alternate.
+/// Renewals of the normal forces of friction in a load step, and the number after which they are averaged:
+/// large coefficients may alternate.
 const RENEWALS: u32 = 40;
 const ALTERNATING: u32 = 8;
 
-/// The system under solution.
+/// The equations of a body under its loads.
 pub struct System<'a, const D: usize> {
-    /// The bonds; their law is set by the solver.
+    /// Bonds; the solver sets their law.
     pub bonds: &'a mut dyn Bonds<D>,
-    /// The material at work in them.
-    pub(super) material: Box<dyn Response<D> + 'a>,
-    /// Loads at factor 1. Particles without bonds lose theirs.
+    /// Material in these bonds.
+    pub(super) material: Box<dyn SolverMaterial<D> + 'a>,
+    /// Loads at factor 1. Particles without bonds lose their body forces.
     pub loads: Cow<'a, Loads<D>>,
     /// Load factor at the end of each step.
     pub factors: Cow<'a, [f64]>,
-    /// Parts of a load step to which the load at which bonds break is found; 1: they break at the end of the step.
+    /// Fractions of a load step to which the load at which bonds break is found; 1: they break at the end of
+    /// the step.
     pub refine: usize,
-    /// Lower the load after bonds broke, until no others would break at once; with [`Self::refine`] above 1.
+    /// Lowers the load after bonds broke, until no others would break at once; requires [`Self::refine`]
+    /// above 1.
     pub snap_back: bool,
-    /// Whether and when bonds break.
+    /// Criterion of breaking; `None` if bonds do not break.
     pub breaking: Option<Breaking>,
-    /// Stop after the step whose load is below this part of the largest, once bonds broke; 0: never.
+    /// Stops after the step whose load is below this fraction of the largest, once bonds broke; 0: never.
     pub stop_below: f64,
     /// Largest relative error of the fitted bond law.
     pub fit_bound: f64,
-    /// Repulsion of particles without a bond, or a look at how they overlap, where wanted.
+    /// Repulsion of particles without a bond, or a measurement of their overlaps, if wanted.
     pub contact: Option<Contact<D>>,
-    /// Stretches, where they have just been looked at.
+    /// Stretches of the last check.
     pub(super) seen_stretches: StretchScan,
-    /// What forces out of balance are measured by.
-    pub(super) scale: Scale,
-    /// The load factor and its rate over the time, s, in explicit dynamics, instead of the ramp.
+    /// Reference scale of out-of-balance forces.
+    pub(super) scale: ForceScale,
+    /// Load factor and its rate over the time, s, in explicit dynamics, instead of the ramp.
     pub course: Option<&'a LoadCurve<'a>>,
-    /// What is looked at in every row of the history, see [`Record::seen`](super::Record::seen).
-    pub observer: Option<&'a Observer<'a, D>>,
+    /// Values recorded in every row of the history, see [`StepRecord::seen`](super::StepRecord::seen).
+    pub observer: Option<&'a StateObserver<'a, D>>,
 }
 
 /// Load factor and its rate, 1/s, at a time, s.
 pub type LoadCurve<'a> = dyn Fn(f64) -> (f64, f64) + Sync + 'a;
 
-/// Numbers of a body in a state, for its history.
-pub type Observer<'a, const D: usize> = dyn Fn(&dyn Bonds<D>, &State<D>) -> Vec<f64> + Sync + 'a;
+/// Values of a body in a state, for its history.
+pub type StateObserver<'a, const D: usize> = dyn Fn(&dyn Bonds<D>, &State<D>) -> Vec<f64> + Sync + 'a;
 
 impl<'a, const D: usize> System<'a, D> {
-    /// A body whose bonds do not break.
+    /// Creates the system of a body whose bonds do not break.
     pub fn new(
         bonds: &'a mut dyn Bonds<D>,
         material: impl Material<D> + 'a,
@@ -67,10 +70,10 @@ impl<'a, const D: usize> System<'a, D> {
         Self::of_response(bonds, material, loads, factors)
     }
 
-    /// As [`Self::new`], of a material that is at work already.
+    /// Creates the system as [`Self::new`] does, from a material already prepared for solvers.
     pub fn of_response(
         bonds: &'a mut dyn Bonds<D>,
-        material: Box<dyn Response<D> + 'a>,
+        material: Box<dyn SolverMaterial<D> + 'a>,
         loads: &'a Loads<D>,
         factors: &'a [f64],
     ) -> Self {
@@ -86,15 +89,15 @@ impl<'a, const D: usize> System<'a, D> {
             fit_bound: 1e-9,
             contact: None,
             seen_stretches: StretchScan::default(),
-            scale: Scale::default(),
+            scale: ForceScale::default(),
             course: None,
             observer: None,
         }
     }
 
-    /// The first pass over a new displacement, or over bonds that have changed: states of particles, the copy that kernels of clouds and of mixed
-    /// precision read, and pairs in contact where particles have moved far. To be called before the forces, once; how often pairs are looked for makes no difference
-    /// to any bit.
+    /// Runs the first pass over a new displacement, or over changed bonds: states of particles, the copy read
+    /// by kernels of clouds and of mixed precision, and pairs in contact if particles have moved far. Call it
+    /// once before the forces; how often pairs are updated changes no bit.
     pub fn prepare(&mut self, displacement: &Field<D>) {
         if let Some(contact) = self.contact.as_mut().filter(|contact| contact.repels()) {
             contact.update(&*self.bonds, displacement);
@@ -103,35 +106,40 @@ impl<'a, const D: usize> System<'a, D> {
         self.material.prepare(&*self.bonds, displacement);
     }
 
-    /// Moves rigid planes to where they are at a load factor and a time, s.
-    pub(super) fn place(&mut self, factor: f64, time: f64) {
+    /// Moves rigid planes to their positions at a load factor and a time, s.
+    pub(super) fn move_planes(&mut self, factor: f64, time: f64) {
         if let Some(contact) = &mut self.contact {
-            contact.place(factor, time);
+            contact.move_planes(factor, time);
         }
     }
 
-    /// Places rigid planes at the end of a load step, sets the rates of turned regions there, and has friction act from its start on.
+    /// Moves rigid planes to the end of a load step, sets the rates of rotating regions there, and starts
+    /// friction.
     pub(super) fn begin_step(&mut self, state: &State<D>) {
         let before = state.step.checked_sub(1).map_or(0.0, |before| self.factors[before]);
         let after = self.factors[state.step];
         self.set_rates(after, after);
-        self.place(before, 0.0);
-        self.place(after, 0.0);
+        self.move_planes(before, 0.0);
+        self.move_planes(after, 0.0);
         if let Some(start) = &state.contact.start
-            && let Some(contact) = self.contact.as_mut().filter(|contact| contact.rubs())
+            && let Some(contact) = self.contact.as_mut().filter(|contact| contact.has_friction())
         {
-            contact.hold(start, state.contact.active.clone());
+            contact.begin_friction(start, state.contact.active.clone());
         }
     }
 
-    /// Renews the normal forces of friction in an equilibrium; whether they have changed by more than `tolerance` of their sum, so that
-    /// another equilibrium is to be sought.
+    /// Renews the normal forces of friction in an equilibrium; returns true if they have changed by more than
+    /// `tolerance` of their sum, so that another equilibrium must be sought.
     pub(super) fn renew_friction(&mut self, state: &mut State<D>, tolerance: f64) -> bool {
-        let Some(contact) = self.contact.as_mut().filter(|contact| contact.rubs()) else { return false };
+        let Some(contact) = self.contact.as_mut().filter(|contact| contact.has_friction()) else {
+            return false;
+        };
         let Some(start) = &state.contact.start else { return false };
         let mut new = contact.grips(&*self.bonds, &state.displacement, start, &state.contact.grips);
-        let bound = |grips: &[Grip], pair| {
-            grips.binary_search_by_key(&pair, |grip: &Grip| grip.pair).map_or(0.0, |at| grips[at].bound)
+        let bound = |grips: &[FrictionPair], pair| {
+            grips
+                .binary_search_by_key(&pair, |grip: &FrictionPair| grip.pair)
+                .map_or(0.0, |at| grips[at].bound)
         };
         let lost =
             state.contact.active.iter().filter(|grip| bound(&new, grip.pair) == 0.0).map(|grip| grip.bound);
@@ -149,24 +157,24 @@ impl<'a, const D: usize> System<'a, D> {
             new.iter_mut()
                 .for_each(|grip| grip.bound = 0.5 * (grip.bound + bound(&state.contact.active, grip.pair)));
         }
-        contact.hold(start, new.clone());
+        contact.begin_friction(start, new.clone());
         (state.contact.active, state.contact.renewals) = (new, state.contact.renewals + 1);
         true
     }
 
-    /// Contact, where it rubs.
+    /// Contact, if it has friction.
     pub(super) fn friction(&self) -> Option<&Contact<D>> {
-        self.contact.as_ref().filter(|contact| contact.rubs())
+        self.contact.as_ref().filter(|contact| contact.has_friction())
     }
 
-    /// What loads and rigid planes pull, see [`Loads::conjugates`].
+    /// Conjugate sums of loads and rigid planes, see [`Loads::conjugates`].
     pub(super) fn conjugates(&self, state: &State<D>) -> (f64, f64) {
         let (pull, push) = self.loads.conjugates(&*self.bonds, &state.displacement, &state.force);
-        let work = |(plane, resting): (&Plane<D>, &PlaneReaction)| {
+        let work = |(plane, resting): (&RigidPlane<D>, &PlaneReaction)| {
             (0..D).map(|d| plane.displacement[d] * resting.force[d]).sum::<f64>()
         };
         let Some(contact) = self.repulsion() else { return (pull, push) };
-        let resting = self.resting(state);
+        let resting = self.plane_reactions(state);
         (pull + contact.planes().zip(&resting).map(work).sum::<f64>(), push)
     }
 
@@ -177,24 +185,24 @@ impl<'a, const D: usize> System<'a, D> {
         self.loads.response(&*self.bonds, factor, conjugates, &rigid)
     }
 
-    /// How the body rests on rigid planes, with friction.
-    pub(super) fn resting(&self, state: &State<D>) -> Vec<PlaneReaction> {
+    /// Contact of the body with each rigid plane, including friction.
+    pub(super) fn plane_reactions(&self, state: &State<D>) -> Vec<PlaneReaction> {
         let Some(contact) = self.repulsion() else { return Vec::new() };
-        let mut resting = contact.resting(&state.displacement);
+        let mut resting = contact.plane_reactions(&state.displacement);
         for (resting, rub) in resting.iter_mut().zip(&state.contact.plane_friction) {
             (0..3).for_each(|d| resting.force[d] += rub[d]);
         }
         resting
     }
 
-    /// Refuses a state in which particles are behind a plane, or half through each other.
+    /// Refuses a state with particles behind a plane, or halfway through each other.
     ///
     /// # Errors
-    /// [`Error::Penetration`].
+    /// [`Error::Penetration`] with the overlap.
     pub(super) fn check_overlaps(&self, state: &State<D>) -> Result<(), Error> {
         let Some(contact) = self.repulsion() else { return Ok(()) };
         let allowed = 0.5 * self.bonds.spacing();
-        let resting = contact.resting(&state.displacement);
+        let resting = contact.plane_reactions(&state.displacement);
         let planes = contact.planes().zip(resting).enumerate();
         for (number, (plane, resting)) in planes.filter(|(_, (plane, _))| !plane.bonded) {
             if resting.gap < -allowed && plane.stiffness > 0.0 {
@@ -215,29 +223,29 @@ impl<'a, const D: usize> System<'a, D> {
         }
     }
 
-    /// Has contact look for pairs, as it must where bonds have changed.
+    /// Rebuilds the list of contact pairs, as required after bonds have changed.
     pub(super) fn rebuild_contact(&mut self, displacement: &Field<D>) {
         if let Some(contact) = self.contact.as_mut().filter(|contact| contact.repels()) {
             contact.rebuild(&*self.bonds, displacement);
         }
     }
 
-    /// Contact, where it does more than look.
+    /// Contact, if it exerts forces.
     pub fn repulsion(&self) -> Option<&Contact<D>> {
         self.contact.as_ref().filter(|contact| contact.repels())
     }
 
-    /// What touches in a state, where that is looked at.
-    pub(super) fn touching(&mut self, state: &State<D>) -> Option<ContactSummary> {
+    /// Contacts in a state, if they are tracked.
+    pub(super) fn contact_summary(&mut self, state: &State<D>) -> Option<ContactSummary> {
         let contact = self.contact.as_mut()?;
         if !contact.has_pairs() {
             contact.rebuild(&*self.bonds, &state.displacement);
         }
-        Some(contact.touching(&*self.bonds, &state.displacement))
+        Some(contact.summary(&*self.bonds, &state.displacement))
     }
 
-    /// Force densities of whole pieces from the site `start` on, without loads: the material, and all that acts between particles
-    /// beside it. After [`Self::prepare`].
+    /// Computes the force densities of whole pieces from the site `start` on, without loads: of the material,
+    /// contact and friction. Requires [`Self::prepare`].
     pub fn internal_force(
         &self,
         displacement: &Field<D>,
@@ -251,42 +259,43 @@ impl<'a, const D: usize> System<'a, D> {
         }
     }
 
-    /// Sites that [`Self::internal_force`] may begin with: multiples of this.
+    /// Granularity of [`Self::internal_force`] in sites.
     pub(super) fn piece(&self) -> usize {
         self.material.piece(&*self.bonds)
     }
 
-    /// Energy of the material, whose law is taken over the stretches `observed`, and of contact, J.
+    /// Energy of the material, whose law is evaluated over the stretches `observed`, and of contact, J.
     pub fn stored_energy(&mut self, state: &State<D>, observed: StretchRange) -> f64 {
         let bonds = self.material.energy(&*self.bonds, &state.displacement, observed);
         match self.repulsion() {
-            Some(contact) => bonds + contact.touching(&*self.bonds, &state.displacement).energy,
+            Some(contact) => bonds + contact.summary(&*self.bonds, &state.displacement).energy,
             None => bonds,
         }
     }
 
-    /// kθK, N/m⁶, of bonds at rest that are about as stiff as the material.
+    /// kθK, N/m⁶, of undeformed bonds of similar stiffness to the material.
     pub(super) fn stiffness_at_rest(&self) -> f64 {
         let (law, modulus) = self.material.bond_law();
         modulus * law.tangent()
     }
 
-    /// What the observer sees in a state.
+    /// Values of the observer in a state.
     pub(super) fn seen(&self, state: &State<D>) -> Vec<f64> {
         self.observer.map_or_else(Vec::new, |observer| observer(&*self.bonds, state))
     }
 
-    /// Row of history of a state: at a load factor with its conjugate sums, see [`Loads::conjugates`](super::Loads::conjugates), the stretches
-    /// `observed` and the `stored` energy, J. Not of an equilibrium: without residual and balance.
+    /// Builds the history row of a state: at a load factor with its conjugate sums, see
+    /// [`Loads::conjugates`](super::Loads::conjugates), the stretches `observed` and the `stored` energy, J.
+    /// Without residual and balance, which an equilibrium adds.
     pub(super) fn row(
         &mut self,
         state: &State<D>,
         [factor, pull, push]: [f64; 3],
         observed: StretchRange,
         stored: f64,
-    ) -> Record {
+    ) -> StepRecord {
         let (load, displacement) = self.response(factor, (pull, push));
-        Record {
+        StepRecord {
             factor,
             load,
             displacement,
@@ -298,7 +307,7 @@ impl<'a, const D: usize> System<'a, D> {
             detached: state.fracture.detached,
             stored,
             balance: Balance::default(),
-            contact: self.touching(state),
+            contact: self.contact_summary(state),
             work: state.work,
             released: state.fracture.released,
             smallest_stretch: (1.0 + observed.low).max(0.0).sqrt(),
@@ -307,7 +316,7 @@ impl<'a, const D: usize> System<'a, D> {
             kinetic: state.motion.energies.kinetic,
             damped: state.motion.energies.damped,
             rubbed: state.motion.energies.rubbed,
-            resting: self.resting(state),
+            resting: self.plane_reactions(state),
             seen: self.seen(state),
         }
     }
@@ -318,7 +327,7 @@ impl<'a, const D: usize> System<'a, D> {
         state.counts.bond_evaluations += self.bonds.directed_bonds();
     }
 
-    /// The error that names where a state has ceased to be finite.
+    /// Builds the error that names the first value that is not finite.
     pub(super) fn not_finite(&self, state: &State<D>) -> Error {
         let bonds = &*self.bonds;
         let fields =
@@ -328,7 +337,7 @@ impl<'a, const D: usize> System<'a, D> {
                 return not_finite(bonds, quantity, site, state.step, state.counts.iteration);
             }
         }
-        // every entry is finite, their squares are not: the greatest force is to blame
+        // every entry is finite, their squares are not: report the greatest force
         let size = |site: u32| state.force.get(site as usize).iter().fold(0.0_f64, |m, f| m.max(f.abs()));
         let particles = bonds.particles().iter().enumerate();
         let greatest = particles.max_by(|a, b| size(*a.1).total_cmp(&size(*b.1)));

@@ -1,5 +1,5 @@
-//! The critical time step Δt_c = 2/ω_max of explicit dynamics: a bound for every deformation within a range of stretches,
-//! and the sharp value of one deformation.
+//! Critical time step Δt_c = 2/ω_max of explicit dynamics: a bound for every deformation within a range of
+//! stretches, and the sharp value of one deformation.
 
 use super::motion::BondSums;
 use super::state::State;
@@ -8,17 +8,17 @@ use crate::field::{CHUNK, Field, chunk_range};
 use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
-/// Displacement, in shortest bonds, by which the tangent's force differences are taken: truncation and rounding are both
-/// about 1e-10 of the force.
+/// Displacement of the tangent's force differences, in shortest bonds: truncation and rounding are both about
+/// 1e-10 of the force.
 const PROBE: f64 = 1e-5;
-/// Residual of the Ritz pair, over its value, at which the sharp frequency is good enough: a fine spectrum would take
-/// hundreds of forces for the digits that follow.
+/// Residual of the Ritz pair, over its value, at which the sharp frequency is accurate enough: a dense
+/// spectrum would take hundreds of forces for further digits.
 const ENOUGH: f64 = 1e-2;
 /// Most steps of the Lanczos iteration.
 const MOST_STEPS: usize = 200;
 
 impl BondSums {
-    /// One visit of all bonds.
+    /// Sums over all bonds in one visit.
     pub fn new<const D: usize>(system: &System<D>) -> Self {
         let of = |sites: &[u32]| {
             let mut part = Self { stiffness: 0.0, shortest: f64::INFINITY, extent: 0.0 };
@@ -43,16 +43,18 @@ impl BondSums {
     }
 }
 
-/// 2/ω, ∞ where nothing oscillates.
+/// 2/ω, ∞ if nothing oscillates.
 pub fn critical(frequency_squared: f64) -> f64 {
     if frequency_squared > 0.0 { 2.0 / frequency_squared.sqrt() } else { f64::INFINITY }
 }
 
-/// ω_max² of the tangent −∂f/∂u/ρ at a state, 1/s², by the Lanczos iteration (1950, doi:10.6028/jres.045.026) on
-/// differences of forces, constrained components at rest; 0 where the greatest is not positive.
+/// Computes ω_max² of the tangent −∂f/∂u/ρ at a state, 1/s², by the Lanczos iteration (1950,
+/// doi:10.6028/jres.045.026) on differences of forces, constrained components at rest; 0 if the greatest is
+/// not positive.
 ///
-/// Volumes are the weights of the inner product in which the tangent is symmetric. The Ritz value is a lower bound; with
-/// its residual, up to a hundredth of it, added it is on the safe side: half of a hundredth above what 200 steps give.
+/// Volumes are the weights of the inner product in which the tangent is symmetric. The Ritz value is a lower
+/// bound; adding its residual, up to a hundredth of it, makes it safe: half a hundredth above the result of
+/// 200 steps.
 pub fn largest_frequency_squared<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,
@@ -81,7 +83,7 @@ pub fn largest_frequency_squared<const D: usize>(
         combine(&mut product, [(-alpha, &now), (-beta, &before)]);
         let next = product_of(&product, &product, volumes).sqrt();
         let exhausted = next.is_nan() || next <= 1e-12 * alpha.abs() || step == MOST_STEPS;
-        // the small problem costs as the cube of its size: not at every step
+        // the small problem costs the cube of its size: not at every step
         if exhausted || step.is_multiple_of(5) {
             let (largest, last) = largest_pair(&diagonal, &beside);
             value = largest + next * last.abs();
@@ -153,7 +155,7 @@ fn tangent<const D: usize>(
     }
 }
 
-/// A start with a part of every mode: Knuth's linear congruential generator, free components only.
+/// Start vector with a part of every mode: Knuth's linear congruential generator, free components only.
 fn start<const D: usize>(system: &System<D>) -> Field<D> {
     let mut field = Field::zeros(system.bonds.sites());
     let mut seed = 1_u64;

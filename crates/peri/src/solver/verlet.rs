@@ -1,110 +1,99 @@
-//! Explicit dynamics: velocity Verlet, with every energy that the integrator exchanges.
+//! Explicit dynamics: velocity Verlet, with all energies that the integrator exchanges.
 //!
-//! ρü = f + F(t)b − cρu̇ with the load factor F rising linearly over a ramp, or as [`System::course`] says; constrained components follow F(t)d and its rate.
-//! v₊ = v + ½Δt a, u ← u + Δt v₊, v ← v₊ + ½Δt a, the new a = (f + Fb)/ρ − cv; Swope et al. (1982),
-//! doi:10.1063/1.442716, Hairer, Lubich & Wanner (2003), doi:10.1017/S0962492902000144. Works are sums of
-//! ½(force before + force after)·Δu, which change ½ρ(v² − ¼Δt²a²) exactly: the energies balance to O(Δt²) without drift.
+//! ρü = f + F(t)b − cρu̇ with the load factor F rising linearly over a ramp, or given by [`System::course`];
+//! constrained components follow F(t)d and its rate. v₊ = v + ½Δt a, u ← u + Δt v₊, v ← v₊ + ½Δt a, the new
+//! a = (f + Fb)/ρ − cv; Swope et al. (1982), doi:10.1063/1.442716, Hairer, Lubich & Wanner (2003),
+//! doi:10.1017/S0962492902000144. Works are sums of ½(force before + force after)·Δu, which change ½ρ(v² −
+//! ¼Δt²a²) exactly: the energies balance to O(Δt²) without drift.
 
-use super::method::{Finished, Method, Watch};
-use super::motion::{BondSums, Energies, Motion, StepLimits, StretchLook};
+use super::method::{Method, StepCallback, Watch};
+use super::motion::{BondSums, DynamicEnergies, Motion, StepLimits, StretchLook};
 use super::record::Status;
 use super::state::State;
 use super::system::System;
 use super::time_step::{critical, largest_frequency_squared};
 use super::verlet_friction::{friction_pass, plane_pass};
-use super::verlet_step::{Sums, VerletStep, force_pass, kick_pass, leap_pass, refresh, stored, volumes};
+use super::verlet_step::{
+    VerletStep, VerletSums, force_pass, kick_pass, leap_pass, refresh, stored, volumes,
+};
 use crate::bonds::{StretchRange, stretch_range};
 use crate::contact::Contact;
 use crate::error::Error;
 
-/// Part of the energy turned over by which the kinetic energy may exceed what is available before the run is given up:
-/// far above the O(Δt²) error of steps below the critical one, passed within a few steps beyond it.
+/// Fraction of the energy turned over by which the kinetic energy may exceed the available energy before the
+/// run stops: far above the O(Δt²) error of steps below the critical one, exceeded within a few steps beyond
+/// it.
 const EXCESS: f64 = 0.25;
-/// Steps at the start in which a ramped load has not yet done work that the excess could be a part of: the kinetic energy
+/// Steps at the start in which the work of a ramped load is too small for that fraction: the kinetic energy
 /// exceeds the work by (3/n²)·¼ after n steps.
-const LENIENT: u64 = 8;
+const EARLY_STEPS: u64 = 8;
 
-/// Contact that is allowed for, over what was observed: the time step is not shortened for each particle that joins.
+/// Contact stiffness in the limits over that observed, so that the time step is not shortened for each
+/// additional particle.
 const GROWTH: f64 = 1.25;
 
-/// Steps are planned anew where they may become longer by this.
+/// Growth of the allowed step at which steps are planned anew.
 const LONGER: f64 = 1.25;
-/// Cuts of one step, after which it is taken as it is.
+/// Most cuts of one step, which is then accepted.
 const MOST_CUTS: u32 = 12;
 
-/// Settings of explicit dynamics. [`State::velocity`] is the velocity at the start.
+/// Explicit dynamics by velocity Verlet, for impact, waves and running cracks; for equilibria use
+/// [`Lbfgs`](super::Lbfgs). [`State::velocity`] is the velocity at the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VelocityVerlet {
     /// Mass density ρ, kg/m³.
     pub density: f64,
-    /// Largest time step Δt, s; `None`: `safety` times the critical one, reduced where the law stiffens on the way.
+    /// Largest time step Δt, s; `None`: `safety` times the critical one, reduced as the law stiffens.
     pub time_step: Option<f64>,
-    /// Part of the critical time step taken where none is given.
+    /// Fraction of the critical time step used if no time step is given.
     pub safety: f64,
-    /// Mass-proportional damping c, 1/s, of components that are not constrained.
+    /// Mass-proportional damping c, 1/s, of unconstrained components.
     pub damping: f64,
     /// Time over which the loads rise to their full value, s; 0: at once.
     pub ramp: f64,
-    /// When to end, s.
+    /// End time, s.
     pub end_time: f64,
-    /// Rows of history, equally far apart; steps are shortened evenly to fall on them.
+    /// Rows of history, equally spaced in time; steps are shortened evenly to end on them.
     pub records: usize,
 }
 
 impl VelocityVerlet {
-    /// Steps of 0.9 of the critical one up to `end_time`, no damping, loads at once, 100 rows of history.
+    /// Uses steps of 0.9 of the critical one up to `end_time`, no damping, full loads at once, 100 rows of
+    /// history.
     pub fn new(density: f64, end_time: f64) -> Self {
         Self { density, time_step: None, safety: 0.9, damping: 0.0, ramp: 0.0, end_time, records: 100 }
     }
 }
 
 impl<const D: usize> Method<D> for VelocityVerlet {
-    /// Continues from `state` to the end time. Bonds break in every step whose stretches ask for it. `watch` sees every step
-    /// and may stop the run by an error; `finished` sees every row of the history. [`System::factors`] and
-    /// [`System::stop_below`] are not used.
+    /// Continues from `state` to the end time. Bonds break in every step with overstretched bonds. `watch`
+    /// receives every step and may stop the run by an error; `finished` receives every row of the history.
+    /// [`System::factors`] and [`System::stop_below`] are not used.
     ///
-    /// A state that has not moved yet, or the equilibrium that another method found (its velocities reset), is where
-    /// time begins: [`State::work`] is set to the energy that is there, so that kinetic + stored + released + damped + rubbed = work
-    /// in every row but for O(Δt²).
+    /// Time begins at a state that has not moved yet, or at an equilibrium of another method (its velocities
+    /// are reset): [`State::work`] is set to its energy, so that kinetic + stored + released + damped +
+    /// rubbed = work in every row up to O(Δt²).
     ///
     /// # Errors
-    /// [`Error::Parameter`] for settings out of their domain; [`Error::TimeStep`] for a time step beyond the critical one;
-    /// [`Error::Unstable`] where energy grows from nothing; [`Error::NotFinite`] for a state that is not finite at the
-    /// start; [`Error::Geometry`] as [`System::restore`]; whatever `watch` and `finished` return.
+    /// [`Error::Parameter`] for settings out of their domain; [`Error::TimeStep`] for a time step beyond the
+    /// critical one; [`Error::Unstable`] if energy grows without work; [`Error::NotFinite`] for a state that
+    /// is not finite at the start; [`Error::Geometry`] of [`System::restore`]; errors of `watch` and
+    /// `finished`.
     fn solve(
         &self,
         system: &mut System<D>,
         state: &mut State<D>,
         watch: &mut Watch<D>,
-        finished: &mut Finished<D>,
+        finished: &mut StepCallback<D>,
     ) -> Result<(), Error> {
-        self.check()?;
-        if !state.motion.begun && system.course.is_none() {
-            system.refuse_inverted(&[1.0])?;
-        }
-        let volumes = volumes(system);
-        system.contact.iter_mut().for_each(Contact::release);
-        if state.motion.begun {
-            system.place(self.factor(system, state.motion.time).0, state.motion.time);
-            system.restore(state)?;
-            system.contact.iter_mut().for_each(|contact| contact.resume(&state.contact.grips));
-        } else {
-            self.begin(system, state, &volumes)?;
-        }
+        let volumes = self.open(system, state)?;
         while state.step < self.records {
-            // the last of them is the end time to the bit
-            let end = self.end_time * ((state.step + 1) as f64 / self.records as f64);
-            if state.motion.steps.planned == 0 {
-                state.motion.plan(end);
-            }
+            let end = self.end_of_row(state);
             while state.motion.steps.taken < state.motion.steps.planned {
                 self.advance(system, state, &volumes, end)?;
-                watch(&self.status(state), state)?;
+                watch(&self.status(state, true), state)?;
             }
-            system.check_overlaps(state)?;
-            self.record(system, state);
-            state.step += 1;
-            (state.counts.iteration, state.counts.step_iterations, state.motion.steps.planned) = (0, 0, 0);
+            self.close_row(system, state)?;
             finished(&*system.bonds, state)?;
         }
         Ok(())
@@ -135,15 +124,60 @@ impl VelocityVerlet {
         }
     }
 
-    /// Load factor at a time, and its rate from there on.
-    fn factor<const D: usize>(&self, system: &System<D>, time: f64) -> (f64, f64) {
+    /// Begins, or continues, a run; volumes of all sites.
+    pub(super) fn open<const D: usize>(
+        &self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+    ) -> Result<Vec<f64>, Error> {
+        self.check()?;
+        if !state.motion.begun && system.course.is_none() {
+            system.refuse_inverted(&[1.0])?;
+        }
+        let volumes = volumes(system);
+        system.contact.iter_mut().for_each(Contact::end_friction);
+        if state.motion.begun {
+            system.move_planes(self.factor(system, state.motion.time).0, state.motion.time);
+            system.restore(state)?;
+            system.contact.iter_mut().for_each(|contact| contact.resume_friction(&state.contact.grips));
+        } else {
+            self.begin(system, state, &volumes)?;
+        }
+        Ok(volumes)
+    }
+
+    /// Time at the end of the next row of history, s, with steps planned to it.
+    pub(super) fn end_of_row<const D: usize>(&self, state: &mut State<D>) -> f64 {
+        // the last of them is the end time to the bit
+        let end = self.end_time * ((state.step + 1) as f64 / self.records as f64);
+        if state.motion.steps.planned == 0 {
+            state.motion.plan(end);
+        }
+        end
+    }
+
+    /// Adds the row of history that steps have come to.
+    pub(super) fn close_row<const D: usize>(
+        &self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+    ) -> Result<(), Error> {
+        system.check_overlaps(state)?;
+        self.record(system, state);
+        state.step += 1;
+        (state.counts.iteration, state.counts.step_iterations, state.motion.steps.planned) = (0, 0, 0);
+        Ok(())
+    }
+
+    /// Load factor at a time, and its rate from then on.
+    pub(super) fn factor<const D: usize>(&self, system: &System<D>, time: f64) -> (f64, f64) {
         if let Some(course) = system.course {
             return course(time);
         }
         if time < self.ramp { (time / self.ramp, 1.0 / self.ramp) } else { (1.0, 0.0) }
     }
 
-    /// Loads at time 0, forces, energies, the critical time step.
+    /// Computes loads at time 0, forces, energies and the critical time step.
     fn begin<const D: usize>(
         &self,
         system: &mut System<D>,
@@ -151,7 +185,7 @@ impl VelocityVerlet {
         volumes: &[f64],
     ) -> Result<(), Error> {
         let (factor, rate) = self.factor(system, 0.0);
-        system.place(factor, 0.0);
+        system.move_planes(factor, 0.0);
         system.set_rates(factor, factor);
         (state.contact.friction, state.contact.start) = (None, None);
         (state.contact.plane_friction, state.contact.plane_push) = (Vec::new(), Vec::new());
@@ -194,23 +228,23 @@ impl VelocityVerlet {
         });
         let limits =
             StepLimits { critical_step: critical(frequency), contact, bonds, ..StepLimits::default() };
-        let energies = Energies { kinetic, turnover: state.work, ..Energies::default() };
+        let energies = DynamicEnergies { kinetic, turnover: state.work, ..DynamicEnergies::default() };
         state.motion = Motion { begun: true, limits, energies, ..Motion::default() };
         if let Some(found) = self.time_step.filter(|&found| found > state.motion.limits.critical_step) {
             return Err(Error::TimeStep { found, critical: state.motion.limits.critical_step });
         }
         state.motion.look = StretchLook::new(observed);
-        self.know(system, state, frequency);
+        self.record_frequency(system, state, frequency);
         self.cover(system, state);
         let rest = VerletStep { step: 0.0, density: self.density, damping: 0.0, factors: [factor; 2], rate };
         friction_pass(system, state, volumes, &rest, None);
         plane_pass(system, state, &[]);
-        self.sever(system, state, observed, factor);
+        self.break_overstretched(system, state, observed, factor);
         Ok(())
     }
 
-    /// Notes the sharp frequency of the present stretches in units of the law's tangent there.
-    fn know<const D: usize>(&self, system: &mut System<D>, state: &mut State<D>, frequency: f64) {
+    /// Records the sharp frequency of the present stretches in units of the law's tangent there.
+    fn record_frequency<const D: usize>(&self, system: &mut System<D>, state: &mut State<D>, frequency: f64) {
         let tangent = system.material.range(state.motion.look.stretches).least_tangent;
         state.motion.limits.frequency = if frequency > 0.0 { frequency / tangent } else { 0.0 };
         if system.material.has_points() {
@@ -218,7 +252,7 @@ impl VelocityVerlet {
         }
     }
 
-    /// What follows from the stretches that the fitted law covers: bounds of the critical time step and of the energy.
+    /// Computes the bounds of the critical time step and of the energy for the stretches of the fitted law.
     pub(super) fn cover<const D: usize>(&self, system: &System<D>, state: &mut State<D>) {
         let (law, modulus) = (system.material.range(state.stretches.fitted), system.material.bond_law().1);
         let motion = &mut state.motion;
@@ -236,15 +270,15 @@ impl VelocityVerlet {
             ]
         };
         motion.limits.gershgorin_step = critical(bound);
-        // nothing free, or a tangent without a positive frequency: the bound alone
+        // nothing free, or a tangent without a positive frequency: only the bound remains
         motion.limits.covered_step = critical(if estimate > 0.0 { estimate.min(bound) } else { bound });
         motion.energies.floor = law.least_energy * modulus * motion.limits.bonds.extent;
-        // friction follows the normal force, which the tangent of neither has: half of ω²Δt² is left to it
+        // friction follows the normal force, which neither tangent contains: it gets half of ω²Δt²
         let part = if system.friction().is_some() { std::f64::consts::FRAC_1_SQRT_2 } else { 1.0 };
         motion.limits.longest = self.time_step.unwrap_or(part * self.safety * motion.limits.covered_step);
     }
 
-    /// Allows for more contact where more particles touch than so far.
+    /// Raises the contact stiffness of the limits if more particles are in contact than so far.
     fn cover_contact<const D: usize>(&self, system: &System<D>, state: &mut State<D>) {
         let Some(contact) = system.repulsion() else { return };
         let greatest = contact.greatest_stiffness(&*system.bonds, &state.displacement);
@@ -254,7 +288,7 @@ impl VelocityVerlet {
         }
     }
 
-    /// One step.
+    /// Runs one step.
     fn advance<const D: usize>(
         &self,
         system: &mut System<D>,
@@ -271,24 +305,24 @@ impl VelocityVerlet {
             let (factor, rate) = self.factor(system, after);
             let step = state.motion.steps.time_step;
             let leap = VerletStep { step, density, damping, factors: [before, factor], rate };
-            // the leap goes to the factor times this, the kick takes its increment
+            // the drift goes to the factor times this, the kick takes its increment
             system.set_rates(0.0, factor);
             let first = leap_pass(&system.loads, state, volumes, &leap);
             system.set_rates(before, factor);
             // two ends, √D components
             let strain = 2.0 * (D as f64).sqrt() * first.increment / state.motion.limits.bonds.shortest;
             state.motion.look.slack = slack + strain;
-            system.place(factor, after);
+            system.move_planes(factor, after);
             system.prepare(&state.displacement);
             let Some((displacement, velocity)) = &start else { break (after, leap, first) };
             cuts += 1;
             if cuts > MOST_CUTS || !self.is_too_long(system, state, strain) {
                 break (after, leap, first);
             }
-            // a step that ends where it would have been too long is taken back
+            // a step whose end requires a shorter one is undone
             state.displacement.clone_from(displacement);
             state.velocity.clone_from(velocity);
-            system.place(before, state.motion.time);
+            system.move_planes(before, state.motion.time);
             state.motion.plan(end);
         };
         let factor = leap.factors[1];
@@ -301,7 +335,7 @@ impl VelocityVerlet {
         let (mut second, observed) = force_pass(system, state, volumes, &leap, look, !look && !rubs);
         system.count_evaluation(state);
         if look {
-            state.stretches.see(observed);
+            state.stretches.observe(observed);
             state.motion.look = StretchLook::new(observed);
             if state.stretches.observed.high.is_finite() && system.widen(state)? {
                 refresh(system, state, factor, None);
@@ -319,7 +353,7 @@ impl VelocityVerlet {
         motion.steps.taken += 1;
         state.counts.iterate();
         self.account(state, first, second)?;
-        let broken = look && self.sever(system, state, observed, factor);
+        let broken = look && self.break_overstretched(system, state, observed, factor);
         self.cover_contact(system, state);
         let follows = self.follows(system);
         if follows {
@@ -335,8 +369,13 @@ impl VelocityVerlet {
         Ok(())
     }
 
-    /// Energies of a step, and whether they may be.
-    fn account<const D: usize>(&self, state: &mut State<D>, first: Sums, second: Sums) -> Result<(), Error> {
+    /// Updates the energies of a step and checks them.
+    pub(super) fn account<const D: usize>(
+        &self,
+        state: &mut State<D>,
+        first: VerletSums,
+        second: VerletSums,
+    ) -> Result<(), Error> {
         let motion = &mut state.motion;
         motion.energies.kinetic = second.kinetic;
         motion.energies.damped += first.damped + second.damped;
@@ -345,7 +384,7 @@ impl VelocityVerlet {
         let available = state.work - gone - motion.energies.floor;
         motion.energies.turnover = motion.energies.turnover.max(available).max(gone);
         let most = available.max(0.0) + EXCESS * motion.energies.turnover;
-        let grown = motion.energies.kinetic > most && state.counts.total_iterations > LENIENT;
+        let grown = motion.energies.kinetic > most && state.counts.total_iterations > EARLY_STEPS;
         if grown || !motion.energies.kinetic.is_finite() || !available.is_finite() {
             return Err(Error::Unstable {
                 time: motion.time,
@@ -359,8 +398,8 @@ impl VelocityVerlet {
         Ok(())
     }
 
-    /// Breaks what is overstretched; the forces are then those of what is left. Whether anything did.
-    fn sever<const D: usize>(
+    /// Breaks overstretched bonds and updates the forces; returns true if any broke.
+    fn break_overstretched<const D: usize>(
         &self,
         system: &mut System<D>,
         state: &mut State<D>,
@@ -375,12 +414,12 @@ impl VelocityVerlet {
         !sites.is_empty()
     }
 
-    fn status<const D: usize>(&self, state: &State<D>) -> Status {
+    pub(super) fn status<const D: usize>(&self, state: &State<D>, restartable: bool) -> Status {
         let left = 1.0 - state.motion.steps.taken as f64 / state.motion.steps.planned as f64;
-        Status { residual: left, ..state.status(self.records, 0.1, self.damping, true) }
+        Status { residual: left, ..state.status(self.records, 0.1, self.damping, restartable) }
     }
 
-    /// A row of history.
+    /// Adds a row of history.
     fn record<const D: usize>(&self, system: &mut System<D>, state: &mut State<D>) {
         let observed = stretch_range(&*system.bonds, &state.displacement);
         system.count_evaluation(state);

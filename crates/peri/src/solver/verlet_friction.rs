@@ -1,18 +1,18 @@
 //! Friction and rigid planes in a step of velocity Verlet.
 //!
-//! Friction reads the half-step velocities of both sides, so that it has a pass of its own between the forces and the second half of the
-//! kick: no work item changes a velocity that another one reads. Its work is Σ ½(force before + force after)·Δu like all
-//! others, so that the energies balance to O(Δt²).
+//! Friction reads the half-step velocities of both sides, so it has a pass of its own between the forces and
+//! the second half of the kick: no work item changes a velocity that another one reads. Its work is Σ ½(force
+//! before + force after)·Δu like all others, so that the energies balance to O(Δt²).
 
 use super::state::State;
 use super::system::System;
-use super::verlet_step::{Two, VerletStep};
+use super::verlet_step::{FieldPair, VerletStep};
 use crate::field::{Field, chunk_range};
 use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
-/// Computes friction for the half-step velocities, and adds it to the force; `old` are the forces of friction of the step before. Adds to
-/// the energy that friction has dissipated what it took in this step and does not store.
+/// Computes friction for the half-step velocities, and adds it to the force; `old` are the friction forces of
+/// the previous step. Adds the work of friction in this step that is not stored to the dissipated energy.
 pub fn friction_pass<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,
@@ -20,9 +20,9 @@ pub fn friction_pass<const D: usize>(
     leap: &VerletStep,
     old: Option<Field<D>>,
 ) {
-    let Some(contact) = system.contact.as_mut().filter(|contact| contact.rubs()) else { return };
+    let Some(contact) = system.contact.as_mut().filter(|contact| contact.has_friction()) else { return };
     let sites = volumes.len();
-    // what moves at the start has slid as far as it will in the first step
+    // a body moving at the start slides to its limit in the first step
     let span = if leap.step > 0.0 { leap.step } else { state.motion.limits.longest };
     let sliding =
         contact.slide_on(&*system.bonds, &state.displacement, &state.velocity, span, &state.contact.grips);
@@ -42,7 +42,7 @@ pub fn friction_pass<const D: usize>(
         sum
     };
     let mut friction = old.unwrap_or_else(|| Field::zeros(sites));
-    let of = |(chunk, (mut own, total)): (usize, Two<D>)| {
+    let of = |(chunk, (mut own, total)): (usize, FieldPair<D>)| {
         let before = work(chunk, &own);
         own.iter_mut().for_each(|part| part.fill(0.0));
         contact.add_friction(chunk, &mut own);
@@ -53,7 +53,7 @@ pub fn friction_pass<const D: usize>(
     };
     let items = friction.chunks_mut().into_par_iter().zip(state.force.chunks_mut()).enumerate();
     let mut taken = -ordered_sum(items.map(of));
-    // what planes drag is work of theirs, not heat
+    // the drag of planes is work, not heat
     taken += work_of_planes(contact.moved(), &state.contact.plane_friction, &sliding.planes);
     if leap.step > 0.0 {
         state.motion.energies.rubbed += taken - (sliding.stored - state.motion.energies.stuck);
@@ -70,14 +70,14 @@ pub fn plane_pass<const D: usize>(system: &System<D>, state: &mut State<D>, rubb
     if contact.planes().all(|plane| plane.displacement == [0.0; D] && plane.velocity == [0.0; D]) {
         return;
     }
-    let resting = contact.resting(&state.displacement);
+    let resting = contact.plane_reactions(&state.displacement);
     let pushing: Vec<[f64; 3]> = resting.iter().map(|plane| plane.force).collect();
     state.work += work_of_planes(contact.moved(), &state.contact.plane_push, &pushing)
         + work_of_planes(contact.moved(), rubbed, &state.contact.plane_friction);
     state.contact.plane_push = pushing;
 }
 
-/// Σ ½(force before + force after)·Δ; nothing before the first step.
+/// Σ ½(force before + force after)·Δ; zero before the first step.
 fn work_of_planes<const D: usize>(
     moved: impl Iterator<Item = [f64; D]>,
     before: &[[f64; 3]],

@@ -1,5 +1,5 @@
-//! The passes of a step of velocity Verlet over all sites: half a kick and the drift; forces; the other half; and
-//! what a row of history sums.
+//! Passes of a velocity-Verlet step over all sites: half a kick and the drift; forces; the other half; and
+//! the sums of a history row.
 
 use super::load::Loads;
 use super::state::State;
@@ -19,24 +19,24 @@ pub struct VerletStep {
     pub damping: f64,
     /// Load factor before and after.
     pub factors: [f64; 2],
-    /// Its rate after, 1/s.
+    /// Rate of the load factor after the step, 1/s.
     pub rate: f64,
 }
 
 /// Sums over all sites, item by item in a fixed order.
 #[derive(Clone, Copy, Default, Debug)]
-pub struct Sums {
+pub struct VerletSums {
     /// Kinetic energy Σ ½ρV v², J (only after the whole step).
     pub kinetic: f64,
     /// Work of body forces and supports in this half, J.
     pub work: f64,
     /// Work of the damping in this half, J.
     pub damped: f64,
-    /// Largest component of an increment of displacement, m (only of the first half).
+    /// Largest component of an increment of displacement, m (first half only).
     pub increment: f64,
 }
 
-impl Sums {
+impl VerletSums {
     fn add(self, other: Self) -> Self {
         Self {
             kinetic: self.kinetic + other.kinetic,
@@ -47,29 +47,29 @@ impl Sums {
     }
 }
 
-/// Sites whose stretches are looked at together where bonds may break, a divisor of [`CHUNK`]: near a crack, few such parts hold bonds
-/// beyond what they bear, many work items do.
-const LOOK: usize = 256;
+/// Sites whose stretches are tracked together if bonds may break, a divisor of [`CHUNK`]: near a crack, few
+/// such ranges hold overstretched bonds, but many work items do.
+const CHECKED_SITES: usize = 256;
 
 /// A work item of two fields.
-pub type Two<'a, const D: usize> = ([&'a mut [f64]; D], [&'a mut [f64]; D]);
+pub type FieldPair<'a, const D: usize> = ([&'a mut [f64]; D], [&'a mut [f64]; D]);
 
-/// v ← v + ½Δt a and u ← u + Δt v; constrained components go to F d.
+/// Updates v ← v + ½Δt a and u ← u + Δt v; constrained components go to F d.
 pub fn leap_pass<const D: usize>(
     loads: &Loads<D>,
     state: &mut State<D>,
     volumes: &[f64],
     leap: &VerletStep,
-) -> Sums {
+) -> VerletSums {
     let force = state.force.components();
     let keep = 1.0 - 0.5 * leap.damping * leap.step;
     let push = 0.5 * leap.step / leap.density;
     let (displacement, velocity) = (state.displacement.chunks_mut(), state.velocity.chunks_mut());
-    let of = |(chunk, (u, v)): (usize, Two<D>)| {
+    let of = |(chunk, (u, v)): (usize, FieldPair<D>)| {
         let range = chunk_range(chunk, volumes.len());
-        let mut sums = Sums::default();
+        let mut sums = VerletSums::default();
         for d in 0..D {
-            let at = Place::new(loads, volumes, range.clone(), d);
+            let at = AxisLoads::new(loads, volumes, range.clone(), d);
             let (u, v, f) = (&mut *u[d], &mut *v[d], &force[d][range.clone()]);
             if at.is_plain(leap) {
                 sums.increment = sums.increment.max(leap.step * free_leap(u, v, f, keep, push, leap.step));
@@ -95,12 +95,12 @@ pub fn leap_pass<const D: usize>(
         }
         sums
     };
-    let parts: Vec<Sums> = displacement.into_par_iter().zip(velocity).enumerate().map(of).collect();
-    parts.into_iter().fold(Sums::default(), Sums::add)
+    let parts: Vec<VerletSums> = displacement.into_par_iter().zip(velocity).enumerate().map(of).collect();
+    parts.into_iter().fold(VerletSums::default(), VerletSums::add)
 }
 
-/// New forces and, where it `kicks`, the second half of the kick in the same pass: unless stretches are looked at first, or
-/// friction follows.
+/// Computes new forces and, if it `kicks`, the second half of the kick in the same pass; not if stretches are
+/// checked first, or friction follows.
 pub fn force_pass<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,
@@ -108,11 +108,11 @@ pub fn force_pass<const D: usize>(
     leap: &VerletStep,
     look: bool,
     kicks: bool,
-) -> (Sums, StretchRange) {
+) -> (VerletSums, StretchRange) {
     let (loads, displacement, body) = (&*system.loads, &state.displacement, &*system);
     let (force, velocity) = (state.force.chunks_mut(), state.velocity.chunks_mut());
-    let part = if look { body.piece().max(LOOK) } else { CHUNK };
-    let of = |(chunk, (mut f, mut v)): (usize, Two<D>)| {
+    let part = if look { body.piece().max(CHECKED_SITES) } else { CHUNK };
+    let of = |(chunk, (mut f, mut v)): (usize, FieldPair<D>)| {
         let (start, length) = (chunk * CHUNK, f[0].len());
         let mut seen = Vec::new();
         for from in (0..length).step_by(part) {
@@ -123,35 +123,36 @@ pub fn force_pass<const D: usize>(
         }
         load(loads, start, leap.factors[1], &mut f);
         let f = f.map(|f| &*f);
-        (if kicks { kick(loads, volumes, leap, chunk, f, &mut v) } else { Sums::default() }, seen)
+        (if kicks { kick(loads, volumes, leap, chunk, f, &mut v) } else { VerletSums::default() }, seen)
     };
-    let (sums, seen): (Vec<Sums>, Vec<Vec<StretchRange>>) =
+    let (sums, seen): (Vec<VerletSums>, Vec<Vec<StretchRange>>) =
         force.into_par_iter().zip(velocity).enumerate().map(of).unzip();
     let seen = StretchScan { part, ranges: seen.concat() };
     let observed = seen.ranges.iter().copied().fold(StretchRange::REST, StretchRange::join);
     system.seen_stretches = seen;
-    (sums.into_iter().fold(Sums::default(), Sums::add), observed)
+    (sums.into_iter().fold(VerletSums::default(), VerletSums::add), observed)
 }
 
-/// The second half of the kick: v ← v + ½Δt a with the new a; constrained components have the rate of F d.
+/// Runs the second half of the kick: v ← v + ½Δt a with the new a; constrained components have the rate of F
+/// d.
 pub fn kick_pass<const D: usize>(
     loads: &Loads<D>,
     state: &mut State<D>,
     volumes: &[f64],
     leap: &VerletStep,
-) -> Sums {
+) -> VerletSums {
     let force = state.force.components();
     let velocity = state.velocity.chunks_mut();
     let of = |(chunk, mut v): (usize, [&mut [f64]; D])| {
         let range = chunk_range(chunk, volumes.len());
         kick(loads, volumes, leap, chunk, force.map(|f| &f[range.clone()]), &mut v)
     };
-    let parts: Vec<Sums> = velocity.into_par_iter().enumerate().map(of).collect();
-    parts.into_iter().fold(Sums::default(), Sums::add)
+    let parts: Vec<VerletSums> = velocity.into_par_iter().enumerate().map(of).collect();
+    parts.into_iter().fold(VerletSums::default(), VerletSums::add)
 }
 
-/// Forces with loads, and the friction there is, of some sites and those they are computed with, or of all; bonds of others
-/// have not changed.
+/// Computes forces with loads and present friction, of some sites and their neighbours, or of all; bonds of
+/// other sites have not changed.
 pub fn refresh<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,
@@ -159,7 +160,7 @@ pub fn refresh<const D: usize>(
     sites: Option<&[u32]>,
 ) {
     system.prepare(&state.displacement);
-    // states of particles carry what has changed beyond their bonds
+    // states of particles change beyond their own bonds
     let sites = sites.filter(|_| !system.material.has_points());
     let system = &*system;
     let piece = if sites.is_some() { system.piece() } else { CHUNK };
@@ -205,15 +206,15 @@ fn kick<const D: usize>(
     chunk: usize,
     force: [&[f64]; D],
     velocity: &mut [&mut [f64]; D],
-) -> Sums {
+) -> VerletSums {
     let range = chunk_range(chunk, volumes.len());
     let push = 0.5 * leap.step / leap.density;
     let keep = 1.0 / (1.0 + 0.5 * leap.damping * leap.step);
     let [before, after] = leap.factors;
-    let mut sums = Sums::default();
+    let mut sums = VerletSums::default();
     let mut square = 0.0;
     for d in 0..D {
-        let at = Place::new(loads, volumes, range.clone(), d);
+        let at = AxisLoads::new(loads, volumes, range.clone(), d);
         let (v, f) = (&mut *velocity[d], force[d]);
         if at.is_plain(leap) {
             square += free_kick(v, f, at.volumes, push);
@@ -243,7 +244,7 @@ fn kick<const D: usize>(
 }
 
 /// The loads on one axis of a work item.
-struct Place<'a> {
+struct AxisLoads<'a> {
     constrained: &'a [u8],
     bit: usize,
     prescribed: &'a [f64],
@@ -251,7 +252,7 @@ struct Place<'a> {
     volumes: &'a [f64],
 }
 
-impl<'a> Place<'a> {
+impl<'a> AxisLoads<'a> {
     fn new<const D: usize>(
         loads: &'a Loads<D>,
         volumes: &'a [f64],
@@ -267,12 +268,12 @@ impl<'a> Place<'a> {
         Self { constrained, bit: axis, prescribed, body, volumes: &volumes[range.clone()] }
     }
 
-    /// Nothing constrained, nothing loaded, nothing damped.
+    /// Returns true without constraints, loads and damping.
     fn is_plain(&self, leap: &VerletStep) -> bool {
         self.constrained.is_empty() && self.body.is_empty() && leap.damping == 0.0
     }
 
-    /// The prescribed displacement at factor 1 where constrained.
+    /// Prescribed displacement at factor 1, if constrained.
     fn constrained(&self, k: usize) -> Option<f64> {
         let constrained = self.constrained.get(k).is_some_and(|h| h >> self.bit & 1 == 1);
         constrained.then(|| self.prescribed.get(k).copied().unwrap_or(0.0))
@@ -285,7 +286,7 @@ impl<'a> Place<'a> {
 
 const LANES: usize = 8;
 
-/// The first half where nothing is special, in parts that vectorise; the largest |v|.
+/// First half without constraints and loads, in parts that vectorise; returns the largest |v|.
 fn free_leap(u: &mut [f64], v: &mut [f64], f: &[f64], keep: f64, push: f64, step: f64) -> f64 {
     let mut largest = [0.0; LANES];
     let parts = u.chunks_mut(LANES).zip(v.chunks_mut(LANES)).zip(f.chunks(LANES));
@@ -300,7 +301,7 @@ fn free_leap(u: &mut [f64], v: &mut [f64], f: &[f64], keep: f64, push: f64, step
     largest.into_iter().fold(0.0, f64::max)
 }
 
-/// The second half likewise; Σ V v².
+/// Second half likewise; returns Σ V v².
 fn free_kick(v: &mut [f64], f: &[f64], volumes: &[f64], push: f64) -> f64 {
     let mut square = [0.0; LANES];
     let parts = v.chunks_mut(LANES).zip(f.chunks(LANES)).zip(volumes.chunks(LANES));
@@ -313,14 +314,14 @@ fn free_kick(v: &mut [f64], f: &[f64], volumes: &[f64], push: f64) -> f64 {
     square.iter().sum()
 }
 
-/// The energy of material and contact, J; over all stretches that are fitted, so that the law is sampled once a fit.
+/// Energy of material and contact, J; over all fitted stretches, so that the law is sampled once per fit.
 pub fn stored<const D: usize>(system: &mut System<D>, state: &State<D>, observed: StretchRange) -> f64 {
     let [low, high] = state.stretches.fitted.map(|stretch| stretch * stretch - 1.0);
     let inside = observed.low >= low && observed.high <= high;
     system.stored_energy(state, if inside { StretchRange { low, high } } else { observed })
 }
 
-/// Volumes of all sites, 0 where there is no particle.
+/// Volumes of all sites, 0 without a particle.
 pub fn volumes<const D: usize>(system: &System<D>) -> Vec<f64> {
     let mut volumes = vec![0.0; system.bonds.sites()];
     for &site in system.bonds.particles() {

@@ -1,4 +1,4 @@
-//! Balls against segments and cells.
+//! Balls intersected with segments and cells.
 
 /// Volume of a ball of dimension `dimension` (2: a disk, per unit thickness).
 pub fn ball_volume(dimension: usize, radius: f64) -> f64 {
@@ -6,7 +6,7 @@ pub fn ball_volume(dimension: usize, radius: f64) -> f64 {
     if dimension == 2 { PI * radius * radius } else { 4.0 / 3.0 * PI * radius.powi(3) }
 }
 
-/// Part of the segment from `p` to `q` inside the ball of radius² `square` about the origin, in [0, 1].
+/// Fraction of the segment from `p` to `q` inside the ball of radius² `square` about the origin, in [0, 1].
 pub fn segment_fraction<const D: usize>(p: [f64; D], q: [f64; D], square: f64) -> f64 {
     let (mut a, mut b, mut c) = (0.0, 0.0, -square);
     for d in 0..D {
@@ -24,8 +24,9 @@ pub fn segment_fraction<const D: usize>(p: [f64; D], q: [f64; D], square: f64) -
     (leave - enter).max(0.0)
 }
 
-/// For each unit cell that a ball of `radius` about the origin touches: its offset and its share of the ball's volume.
-/// Exact in 2D; in 3D exact areas integrated by the midpoint rule over 64 slices a cell (error below 1e-4).
+/// Lists the unit cells that a ball of `radius` about the origin touches: offset and share of the ball's
+/// volume. Exact in 2D; in 3D exact areas integrated by the midpoint rule over 64 slices a cell (error below
+/// 1e-4).
 pub fn cell_fractions<const D: usize>(radius: f64) -> Vec<([i32; D], f64)> {
     let reach = (radius + 0.5).ceil() as i32;
     let side = (2 * reach + 1) as usize;

@@ -1,40 +1,43 @@
-//! Stress in a cloud, whose bonds have no types.
+//! Stress in a cloud, whose bonds have no common offsets.
 
-use super::window::{Window, bond_function};
-use super::{BallVolume, Loaded, Measure, Tensor, ball_volume, force_over_length, segment_fraction};
+use super::window::{StressWindow, bond_function};
+use super::{
+    BallVolume, StressInput, StressMethod, StressTensor, ball_volume, force_over_length, segment_fraction,
+};
 use crate::bonds::{BodyGeometry, CellGrid, CloudBonds, Neighbour, Stencil};
 use pulp::{Arch, NullaryFnOnce};
 use rayon::prelude::*;
 
 pub fn piola<const D: usize>(
     bonds: &CloudBonds<D>,
-    state: &Loaded<D>,
-    measure: Measure,
+    state: &StressInput<D>,
+    measure: StressMethod,
     ball: BallVolume,
-) -> Vec<Tensor<D>> {
+) -> Vec<StressTensor<D>> {
     let points: Vec<[f64; D]> = bonds.particles().iter().map(|&s| bonds.position(s as usize)).collect();
     let grid = CellGrid::new(&points, bonds.horizon());
     if measure.is_partition() {
         // scenes refuse measures that need a lattice
-        let window = if measure.needs_lattice() { Window::Ball } else { Window::of(measure) };
-        return Shares { bonds, state, window, points: &points, grid: &grid }.stress();
+        let window =
+            if measure.needs_lattice() { StressWindow::Ball } else { StressWindow::for_measure(measure) };
+        return CloudShares { bonds, state, window, points: &points, grid: &grid }.stress();
     }
     in_balls(bonds, state, (measure, ball), &points, &grid)
 }
 
-/// The other measures: every particle looks for the bonds that cross its ball.
+/// Computes the other measures: every particle searches for the bonds that cross its ball.
 fn in_balls<const D: usize>(
     bonds: &CloudBonds<D>,
-    state: &Loaded<D>,
-    (measure, ball): (Measure, BallVolume),
+    state: &StressInput<D>,
+    (measure, ball): (StressMethod, BallVolume),
     points: &[[f64; D]],
     grid: &CellGrid<D>,
-) -> Vec<Tensor<D>> {
+) -> Vec<StressTensor<D>> {
     let radius = bonds.horizon();
     let square = radius * radius;
     let whole = ball_volume(D, radius) * bonds.thickness();
     let filled: Vec<f64> = match (measure, ball) {
-        (Measure::BallShare, BallVolume::Particles | BallVolume::Cells) => {
+        (StressMethod::BallShare, BallVolume::Particles | BallVolume::Cells) => {
             // as for bonds: a distance equal to the horizon counts, whatever the rounding
             let reach = radius * (1.0 + 1e-9);
             let inside: Vec<f64> = points
@@ -49,7 +52,8 @@ fn in_balls<const D: usize>(
                     sum
                 })
                 .collect();
-            // what a lattice of the same mean spacing has in a whole ball: bodies thinner than that have no such ball
+            // bonds of a lattice of the same mean spacing in a whole ball: bodies thinner than that have no
+            // such ball
             let full = (Stencil::<D>::new(reach / bonds.spacing()).offsets.len() + 1) as f64;
             let full = full * bonds.spacing().powi(D as i32) * bonds.thickness();
             inside.into_iter().map(|v| whole * v / full).collect()
@@ -58,13 +62,13 @@ fn in_balls<const D: usize>(
     };
     // a bond that crosses the ball has its nearer end within √(δ² + (δ/2)²) of the centre
     let reach = radius * 1.25_f64.sqrt();
-    let one = |site: usize| -> Tensor<D> {
+    let one = |site: usize| -> StressTensor<D> {
         let here = points[site];
         let mut sum = [[0.0; D]; D];
         let mut add = |own: usize, weight_of: &dyn Fn([f64; D], [f64; D], usize) -> f64| {
             bonds.neighbours(own, &mut |bond| {
                 let p = std::array::from_fn(|d| points[own][d] - here[d]);
-                // not p + ξ: seen from the other end, both must be the same numbers or ties are counted twice or never
+                // not p + ξ: both ends must see the same numbers, or ties are counted twice or never
                 let q = std::array::from_fn(|d| points[bond.site][d] - here[d]);
                 let weight = weight_of(p, q, bond.site);
                 if weight > 0.0 {
@@ -77,7 +81,7 @@ fn in_balls<const D: usize>(
                 }
             });
         };
-        let volume = if measure == Measure::OnePoint {
+        let volume = if measure == StressMethod::OnePoint {
             add(site, &|_, _, _| 0.5);
             bonds.volume(site)
         } else {
@@ -86,12 +90,12 @@ fn in_balls<const D: usize>(
                 if distance_square(points[own], here) > reach * reach {
                     return;
                 }
-                // only the nearer end counts a bond
+                // a bond counts from the nearer end only
                 let nearer = |p, q, other| (norm(p), own) < (norm(q), other);
                 add(own, &|p, q, other| match measure {
                     // either end finds such a bond: half of its ½ from each
-                    Measure::AsPublished if norm(p) < square && norm(q) < square => 0.25,
-                    Measure::AsPublished => 0.0,
+                    StressMethod::AsPublished if norm(p) < square && norm(q) < square => 0.25,
+                    StressMethod::AsPublished => 0.0,
                     _ if nearer(p, q, other) => segment_fraction(p, q, square),
                     _ => 0.0,
                 });
@@ -106,10 +110,10 @@ fn in_balls<const D: usize>(
 /// f V_I V_J ⊗ ξ of a bond, N m.
 fn moment<const D: usize>(
     bonds: &CloudBonds<D>,
-    state: &Loaded<D>,
+    state: &StressInput<D>,
     own: usize,
     bond: &Neighbour<D>,
-) -> Tensor<D> {
+) -> StressTensor<D> {
     let (u, v) = (state.displacement.get(own), state.displacement.get(bond.site));
     let eta: [f64; D] = std::array::from_fn(|d| v[d] - u[d]);
     let volume = bonds.volume(own);
@@ -117,17 +121,18 @@ fn moment<const D: usize>(
     std::array::from_fn(|a| std::array::from_fn(|b| scale * (bond.bond[a] + eta[a]) * bond.bond[b]))
 }
 
-/// The measures whose weights sum to 1: P_p = Σ f V_I V_J ⊗ ξ B_p/(Σ_q V_q B_q) over the bonds, B_p the bond function in p's window.
-struct Shares<'a, const D: usize> {
+/// Measures whose weights sum to 1: P_p = Σ f V_I V_J ⊗ ξ B_p/(Σ_q V_q B_q) over the bonds, B_p the bond
+/// function in p's window.
+struct CloudShares<'a, const D: usize> {
     bonds: &'a CloudBonds<D>,
-    state: &'a Loaded<'a, D>,
-    window: Window,
+    state: &'a StressInput<'a, D>,
+    window: StressWindow,
     points: &'a [[f64; D]],
     grid: &'a CellGrid<D>,
 }
 
-/// Particles about one, relative to it, whose windows its bonds may cross.
-struct Around<const D: usize> {
+/// Particles around one, relative to it, whose windows its bonds may cross.
+struct ParticlesInReach<const D: usize> {
     members: Vec<u32>,
     relative: [Vec<f64>; D],
     volumes: Vec<f64>,
@@ -135,9 +140,10 @@ struct Around<const D: usize> {
     beyond: Vec<f64>,
 }
 
-impl<const D: usize> Shares<'_, D> {
-    /// Bonds are shared out particle by particle; the shares are summed in the order of the particles, so that threads change no bit.
-    fn stress(&self) -> Vec<Tensor<D>> {
+impl<const D: usize> CloudShares<'_, D> {
+    /// Distributes bonds particle by particle; the shares are summed in the order of the particles, so that
+    /// threads change no bit.
+    fn stress(&self) -> Vec<StressTensor<D>> {
         /// Particles whose shares are held at once: about 150 kB each in a solid at m = 4.
         const HELD: usize = 128;
         let mut stress = vec![[[0.0; D]; D]; self.points.len()];
@@ -152,7 +158,7 @@ impl<const D: usize> Shares<'_, D> {
                         bonds.push(bond);
                     }
                 });
-                let shares = arch.dispatch(Given { shares: self, own, bonds: &bonds, around: &around });
+                let shares = arch.dispatch(ShareKernel { shares: self, own, bonds: &bonds, around: &around });
                 (around.members, shares)
             };
             let all: Vec<_> = owners.par_iter().map(of).collect();
@@ -169,10 +175,10 @@ impl<const D: usize> Shares<'_, D> {
         stress
     }
 
-    /// A bond and a ball end within 2δ.
-    fn around(&self, own: usize) -> Around<D> {
+    /// Collects the particles around one: a bond and a ball end within 2δ.
+    fn around(&self, own: usize) -> ParticlesInReach<D> {
         let (here, radius) = (self.points[own], self.bonds.horizon());
-        let mut around = Around {
+        let mut around = ParticlesInReach {
             members: Vec::new(),
             relative: [(); D].map(|()| Vec::new()),
             volumes: Vec::new(),
@@ -194,18 +200,18 @@ impl<const D: usize> Shares<'_, D> {
     }
 }
 
-/// What bonds of `own` give to each particle around it.
-struct Given<'a, const D: usize> {
-    shares: &'a Shares<'a, D>,
+/// Distributes the bonds of `own` over the particles around it.
+struct ShareKernel<'a, const D: usize> {
+    shares: &'a CloudShares<'a, D>,
     own: usize,
     bonds: &'a [Neighbour<D>],
-    around: &'a Around<D>,
+    around: &'a ParticlesInReach<D>,
 }
 
-impl<const D: usize> NullaryFnOnce for Given<'_, D> {
-    type Output = Vec<Tensor<D>>;
+impl<const D: usize> NullaryFnOnce for ShareKernel<'_, D> {
+    type Output = Vec<StressTensor<D>>;
     #[inline(always)]
-    fn call(self) -> Vec<Tensor<D>> {
+    fn call(self) -> Vec<StressTensor<D>> {
         let Self { shares: all, own, bonds, around } = self;
         let count = around.members.len();
         let radius = all.bonds.horizon();
@@ -220,7 +226,7 @@ impl<const D: usize> NullaryFnOnce for Given<'_, D> {
                 crossings += usize::from(*part > 0.0);
             }
             let crossed = &crossed[..crossings];
-            if all.window != Window::Ball {
+            if all.window != StressWindow::Ball {
                 for &k in crossed {
                     let p: [f64; D] = std::array::from_fn(|d| -around.relative[d][k]);
                     let q = std::array::from_fn(|d| bond.bond[d] - around.relative[d][k]);
@@ -242,8 +248,8 @@ impl<const D: usize> NullaryFnOnce for Given<'_, D> {
     }
 }
 
-impl<const D: usize> Around<D> {
-    /// Part of the bond inside the ball of every particle: [`segment_fraction`], for all of them by vectors.
+impl<const D: usize> ParticlesInReach<D> {
+    /// Fraction of the bond inside the ball of every particle: [`segment_fraction`], vectorised.
     #[inline(always)]
     fn fractions(&self, bond: [f64; D], parts: &mut [f64]) {
         let square: f64 = bond.iter().map(|x| x * x).sum();

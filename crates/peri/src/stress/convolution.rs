@@ -1,56 +1,57 @@
-//! The bonds of one type, shared out among the sites whose windows they cross: sums with fixed weights, a block of sites at
-//! a time.
+//! Bonds of one offset, distributed over the sites whose windows they cross: sums with fixed weights, a block
+//! of sites at a time.
 
-use super::Tensor;
+use super::StressTensor;
 use crate::bonds::TILE;
 use crate::field::CHUNK;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// Numbers that are summed at a time, in registers: a block.
+/// Numbers summed at a time in registers: a block.
 const BLOCK: usize = 64;
 
-/// Most taps whose vectors are loaded once for all of them.
+/// Most taps for which vectors are loaded once.
 const RUN: usize = 6;
 
-/// Numbers a site: the force, and in solids 1 where both particles of the bond exist, which fills a vector of four. That
-/// is always aligned, wherever the bond begins; vectors of neighbouring sites cross cache lines at nearly every shift.
-/// In a plane a fourth number would be nothing but work, and a third is needed near surfaces only.
+/// Numbers per site: the force, and in solids 1 if both particles of the bond exist, which fills a vector of
+/// four. That is always aligned, wherever the bond begins; vectors of neighbouring sites cross cache lines at
+/// nearly every shift. In a plane a fourth number would be wasted, and a third is needed near surfaces only.
 pub const fn lanes<const D: usize>() -> usize {
     if D == 2 { 2 } else { 4 }
 }
 
-/// Sites of a block.
+/// Sites per block.
 const fn sites_of_block<const D: usize>() -> usize {
     BLOCK / lanes::<D>()
 }
 
-/// Where a bond must begin, relative to the point of interest, and the weight with which it counts there.
+/// Start of a bond relative to the point of interest, and its weight there.
 pub struct Tap {
-    /// In sites.
+    /// Distance in sites.
     pub shift: isize,
-    /// Its share.
+    /// Weight of the bond.
     pub weight: f64,
 }
 
-/// Taps of which each reads the vectors of the one before from the second on: what V + N − 1 vectors hold serves N taps.
-struct Run {
-    /// The first tap's.
+/// Taps of which each reads the vectors of the previous one from the second on: the contents of V + N − 1
+/// vectors serve N taps.
+struct TapRun {
+    /// Shift of the first tap.
     shift: isize,
     weights: [f64; RUN],
 }
 
-/// Taps in runs of one, two, … [`RUN`].
-type Runs = [Vec<Run>; RUN];
+/// Taps grouped in runs of one, two, … [`RUN`].
+type TapRuns = [Vec<TapRun>; RUN];
 
-/// The taps of a bond in runs, where a vector holds `width` numbers and a site `lanes`.
-fn runs(taps: &[Tap], width: usize, lanes: usize) -> Runs {
-    // vectors that hold less than a site do not overlap like this
+/// Groups the taps of a bond in runs, with `width` numbers per vector and `lanes` per site.
+fn runs(taps: &[Tap], width: usize, lanes: usize) -> TapRuns {
+    // vectors smaller than a site do not overlap like this
     let (ahead, most) = if width < lanes { (1, 1) } else { ((width / lanes) as isize, RUN) };
     let mut left = BTreeMap::new();
     taps.iter().for_each(|tap| *left.entry(tap.shift).or_insert(0.0) += tap.weight);
-    let mut runs: Runs = Default::default();
+    let mut runs: TapRuns = Default::default();
     while let Some((shift, first)) = left.pop_first() {
         let (mut weights, mut count) = ([0.0; RUN], 1);
         weights[0] = first;
@@ -60,12 +61,12 @@ fn runs(taps: &[Tap], width: usize, lanes: usize) -> Runs {
             weights[count] = weight;
             count += 1;
         }
-        runs[count - 1].push(Run { shift, weights });
+        runs[count - 1].push(TapRun { shift, weights });
     }
     runs
 }
 
-/// Numbers in a vector of this machine.
+/// Number of lanes of a vector on this machine.
 struct Width;
 
 impl WithSimd for Width {
@@ -75,14 +76,14 @@ impl WithSimd for Width {
     }
 }
 
-/// Which tiles of sites hold any of those given.
+/// Marks the tiles that hold any of the given sites.
 pub fn tiles(sites: usize, of: &[u32]) -> Vec<bool> {
     let mut filled = vec![false; sites.div_ceil(TILE)];
     of.iter().for_each(|&site| filled[site as usize / TILE] = true);
     filled
 }
 
-/// Numbers of all sites, from the first of a cache line on.
+/// Numbers of all sites, aligned to a cache line.
 struct Aligned {
     numbers: Vec<f64>,
     first: usize,
@@ -104,23 +105,24 @@ impl Aligned {
     }
 }
 
-/// The bonds of one type from every site.
-pub struct Shared<const D: usize> {
+/// Bonds of one offset from every site.
+pub struct OffsetBonds<const D: usize> {
     sites: usize,
-    /// Zeros before and behind the sites, so many of them: whole chunks.
+    /// Number of zeros before and behind the sites: whole chunks.
     margin: usize,
-    /// [`lanes`] numbers a site.
+    /// [`lanes`] numbers per site.
     forces: Aligned,
-    /// 1 where there is a particle.
+    /// 1 for sites with a particle.
     occupied: Vec<f64>,
     /// Tiles with particles.
     filled: Vec<bool>,
-    /// From a bond's site to its other one.
+    /// Distance from a bond's site to its other one.
     shift: isize,
 }
 
-impl<const D: usize> Shared<D> {
-    /// No bonds yet. No tap reaches farther than `reach` sites, no bond farther than `bond`.
+impl<const D: usize> OffsetBonds<D> {
+    /// Allocates storage without bonds. No tap reaches farther than `reach` sites, no bond farther than
+    /// `bond`.
     pub fn new(occupied: &[bool], filled: Vec<bool>, reach: usize, bond: usize) -> Self {
         let (sites, margin) = (occupied.len(), (reach + bond).next_multiple_of(CHUNK));
         let stored = sites.next_multiple_of(CHUNK) + 2 * margin;
@@ -130,8 +132,8 @@ impl<const D: usize> Shared<D> {
         Self { sites, margin, forces, occupied: there, filled, shift: 0 }
     }
 
-    /// Takes the bonds to the sites `shift` farther on, whose forces `force` writes for a chunk from a site on, in the tiles
-    /// that have particles ([`lanes`] numbers a site).
+    /// Sets the bonds to the sites `shift` farther on; `force` writes their forces for a chunk from a site
+    /// on, in the tiles that have particles ([`lanes`] numbers per site).
     pub fn set(&mut self, shift: isize, force: impl Fn(usize, &[bool], &mut [f64]) + Sync) {
         self.shift = shift;
         let lanes = lanes::<D>();
@@ -152,32 +154,33 @@ impl<const D: usize> Shared<D> {
     }
 
     /// Adds the bonds' averages by a measure's taps ⊗ edge to its sums.
-    pub fn add(&self, taps: &[Tap], edge: [f64; D], to: &mut Shares<D>) {
+    pub fn add(&self, taps: &[Tap], edge: [f64; D], to: &mut ShareSums<D>) {
         let arch = Arch::new();
         let width = arch.dispatch(Width);
         let apart = D == lanes::<D>() && to.rim.contains(&true);
         let runs =
-            [runs(taps, width, lanes::<D>()), if apart { runs(taps, width, 1) } else { Runs::default() }];
-        let Shares { sums, completed, rim } = to;
+            [runs(taps, width, lanes::<D>()), if apart { runs(taps, width, 1) } else { TapRuns::default() }];
+        let ShareSums { sums, completed, rim } = to;
         let sums = &mut sums.get_mut()[..self.sites.next_multiple_of(CHUNK) * lanes::<D>() * D];
         sums.par_chunks_mut(CHUNK * lanes::<D>() * D).enumerate().for_each(|(chunk, sums)| {
             let start = chunk * CHUNK;
-            arch.dispatch(Chunk { shared: self, runs: &runs, completed, rim, start, edge, sums });
+            arch.dispatch(ConvolutionChunk { shared: self, runs: &runs, completed, rim, start, edge, sums });
         });
     }
 }
 
 /// Sums of a measure, site by site.
-pub struct Shares<const D: usize> {
-    /// Block by block, for each component of the edge [`lanes`] numbers a site.
+pub struct ShareSums<const D: usize> {
+    /// Block by block, for each component of the edge [`lanes`] numbers per site.
     sums: Aligned,
-    /// 1 in sites whose averages are divided by the weights of the bonds whose two particles exist; and their tiles.
+    /// 1 in sites whose averages are divided by the weights of the bonds whose two particles exist; and their
+    /// tiles.
     completed: Vec<bool>,
     rim: Vec<bool>,
 }
 
-impl<const D: usize> Shares<D> {
-    /// Nothing yet; `rim` are the sites whose averages are completed.
+impl<const D: usize> ShareSums<D> {
+    /// Allocates zero sums; `rim` are the sites whose averages are completed.
     pub fn new(sites: usize, rim: &[u32]) -> Self {
         let stored = sites.next_multiple_of(CHUNK);
         let mut completed = vec![false; stored];
@@ -186,18 +189,18 @@ impl<const D: usize> Shares<D> {
     }
 
     /// The sum of a site.
-    pub fn get(&self, site: usize) -> Tensor<D> {
+    pub fn get(&self, site: usize) -> StressTensor<D> {
         let (block, site) = (site / sites_of_block::<D>(), site % sites_of_block::<D>());
         let sums = &self.sums.get()[block * BLOCK * D..];
         std::array::from_fn(|a| std::array::from_fn(|b| sums[b * BLOCK + site * lanes::<D>() + a]))
     }
 }
 
-/// A chunk of [`Shared::add`].
-struct Chunk<'a, const D: usize> {
-    shared: &'a Shared<D>,
-    /// For the numbers of the bonds, and in a plane for whether they exist.
-    runs: &'a [Runs; 2],
+/// Runs [`OffsetBonds::add`] over a chunk.
+struct ConvolutionChunk<'a, const D: usize> {
+    shared: &'a OffsetBonds<D>,
+    /// Taps for the numbers of the bonds, and in a plane for their existence.
+    runs: &'a [TapRuns; 2],
     completed: &'a [bool],
     rim: &'a [bool],
     start: usize,
@@ -205,7 +208,7 @@ struct Chunk<'a, const D: usize> {
     sums: &'a mut [f64],
 }
 
-impl<const D: usize> WithSimd for Chunk<'_, D> {
+impl<const D: usize> WithSimd for ConvolutionChunk<'_, D> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
@@ -225,7 +228,7 @@ impl<const D: usize> WithSimd for Chunk<'_, D> {
                 continue;
             }
             let mut averages = [0.0; BLOCK];
-            // eight sums at a time hide the latency of additions, and leave registers for the rest
+            // eight sums at a time hide the latency of additions and leave registers for the rest
             self.average::<S, 8>(simd, start, &mut averages);
             if rim {
                 self.complete(simd, start, &mut averages);
@@ -242,12 +245,12 @@ impl<const D: usize> WithSimd for Chunk<'_, D> {
     }
 }
 
-impl<const D: usize> Chunk<'_, D> {
+impl<const D: usize> ConvolutionChunk<'_, D> {
     /// Σ weight·number over the taps, V vectors at a time.
     #[inline(always)]
     fn average<S: Simd, const V: usize>(&self, simd: S, start: usize, averages: &mut [f64; BLOCK]) {
         let (lanes, width) = (lanes::<D>(), V * S::F64_LANES);
-        let source = Source { numbers: self.shared.forces.get(), lanes, bond: 0 };
+        let source = TapSource { numbers: self.shared.forces.get(), lanes, bond: 0 };
         for part in 0..BLOCK / width {
             let here = (self.shared.margin + start) * lanes + part * width;
             let sums = source.total::<S, V, false>(simd, &self.runs[0], here);
@@ -281,11 +284,11 @@ impl<const D: usize> Chunk<'_, D> {
         }
     }
 
-    /// Weights of the bonds whose two particles exist, V vectors at a time.
+    /// Computes the weights of the bonds whose two particles exist, V vectors at a time.
     #[inline(always)]
     fn existing<S: Simd, const V: usize>(&self, simd: S, start: usize, weights: &mut [f64]) {
-        let Shared { occupied, shift, margin, .. } = self.shared;
-        let (source, width) = (Source { numbers: occupied, lanes: 1, bond: *shift }, V * S::F64_LANES);
+        let OffsetBonds { occupied, shift, margin, .. } = self.shared;
+        let (source, width) = (TapSource { numbers: occupied, lanes: 1, bond: *shift }, V * S::F64_LANES);
         for part in 0..weights.len() / width {
             let sums = source.total::<S, V, true>(simd, &self.runs[1], margin + start + part * width);
             let out = &mut S::as_mut_simd_f64s(&mut weights[part * width..][..width]).0[..V];
@@ -297,22 +300,22 @@ impl<const D: usize> Chunk<'_, D> {
     }
 }
 
-/// What taps weigh: numbers, or the product of those at a bond's two ends.
-struct Source<'a> {
+/// Numbers weighted by taps, or the products of those at a bond's two ends.
+struct TapSource<'a> {
     numbers: &'a [f64],
-    /// Of a site.
+    /// Numbers per site.
     lanes: usize,
     /// Sites from one end to the other.
     bond: isize,
 }
 
-impl Source<'_> {
+impl TapSource<'_> {
     /// Sums over all taps of V vectors from the number `here` on.
     #[inline(always)]
     fn total<S: Simd, const V: usize, const ENDS: bool>(
         &self,
         simd: S,
-        runs: &Runs,
+        runs: &TapRuns,
         here: usize,
     ) -> [S::f64s; V] {
         let mut sums = [simd.splat_f64s(0.0); V];
@@ -329,7 +332,7 @@ impl Source<'_> {
     fn sum<S: Simd, const V: usize, const N: usize, const ENDS: bool>(
         &self,
         simd: S,
-        runs: &Runs,
+        runs: &TapRuns,
         here: usize,
         mut sums: [S::f64s; V],
     ) -> [S::f64s; V] {

@@ -1,49 +1,54 @@
-//! On a lattice the bond function depends on offsets only: each measure is, bond by bond of the stencil, a convolution
-//! of that bond's forces with fixed weights. The forces are the same for all measures.
+//! Stress on a lattice, where the bond function depends on offsets only: each measure is, bond by bond of the
+//! stencil, a convolution of that bond's forces with fixed weights. The forces are the same for all measures.
 
-use super::convolution::{Shared, Shares, Tap, tiles};
-use super::pull::forces;
-use super::window::{Averaged, Window, normalise};
-use super::{BallVolume, Loaded, Measure, Measured, ball_volume, cell_fractions, segment_fraction};
+use super::bond_forces::forces;
+use super::convolution::{OffsetBonds, ShareSums, Tap, tiles};
+use super::window::{AveragedWindow, StressWindow, normalise};
+use super::{
+    BallVolume, MeasuredStress, StressInput, StressMethod, ball_volume, cell_fractions, segment_fraction,
+};
 use crate::bonds::{BodyGeometry, LatticeBonds};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-/// What a measure sums up, and what it took.
-struct Sums<const D: usize> {
-    measure: Measure,
-    window: Option<Averaged<D>>,
-    /// Of each bond of half the stencil.
+/// Sums of a measure, and their run time.
+struct StressSums<const D: usize> {
+    measure: StressMethod,
+    window: Option<AveragedWindow<D>>,
+    /// Taps of each bond of half the stencil.
     taps: Vec<Vec<Tap>>,
-    shares: Shares<D>,
+    shares: ShareSums<D>,
     seconds: f64,
 }
 
-impl<const D: usize> Sums<D> {
-    fn new(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Measure) -> Self {
+impl<const D: usize> StressSums<D> {
+    fn new(bonds: &LatticeBonds<D>, state: &StressInput<D>, measure: StressMethod) -> Self {
         let started = Instant::now();
-        let window = measure.is_partition().then(|| Averaged::<D>::new(Window::of(measure), bonds.ratio()));
+        let window = measure
+            .is_partition()
+            .then(|| AveragedWindow::<D>::new(StressWindow::for_measure(measure), bonds.ratio()));
         let mut alike = BTreeMap::new();
         let half = half(bonds).iter();
         let taps = half.map(|&offset| taps(bonds, offset, measure, window.as_ref(), &mut alike)).collect();
-        let shares = Shares::new(bonds.sites(), &rim(bonds, state, measure));
+        let shares = ShareSums::new(bonds.sites(), &rim(bonds, state, measure));
         Self { measure, window, taps, shares, seconds: started.elapsed().as_secs_f64() }
     }
 
-    /// The sums over the volumes.
-    fn finish(self, bonds: &LatticeBonds<D>, state: &Loaded<D>, ball: BallVolume) -> Measured<D> {
+    /// Divides the sums by the volumes.
+    fn finish(self, bonds: &LatticeBonds<D>, state: &StressInput<D>, ball: BallVolume) -> MeasuredStress<D> {
         let started = Instant::now();
         let volumes = volumes(bonds, state, self.measure, ball, self.window.as_ref());
         let one = |(&site, volume): (&u32, f64)| {
             self.shares.get(site as usize).map(|row| row.map(|sum| sum / volume))
         };
         let piola = bonds.particles().par_iter().zip(volumes).map(one).collect();
-        Measured { piola, seconds: self.seconds + started.elapsed().as_secs_f64() }
+        MeasuredStress { piola, seconds: self.seconds + started.elapsed().as_secs_f64() }
     }
 }
 
-/// One direction of every bond; the other adds the same f ⊗ ξ, which the factor ½ of the definition undoes.
+/// Returns one direction of every bond; the other adds the same f ⊗ ξ, which cancels the factor ½ of the
+/// definition.
 fn half<const D: usize>(bonds: &LatticeBonds<D>) -> &[[i32; D]] {
     let offsets = &bonds.stencil().offsets;
     &offsets[..offsets.len() / 2]
@@ -51,17 +56,18 @@ fn half<const D: usize>(bonds: &LatticeBonds<D>) -> &[[i32; D]] {
 
 pub fn piolas<const D: usize>(
     bonds: &LatticeBonds<D>,
-    state: &Loaded<D>,
-    measures: &[Measure],
+    state: &StressInput<D>,
+    measures: &[StressMethod],
     ball: BallVolume,
-) -> Vec<Measured<D>> {
-    let mut all: Vec<Sums<D>> = measures.iter().map(|&measure| Sums::new(bonds, state, measure)).collect();
+) -> Vec<MeasuredStress<D>> {
+    let mut all: Vec<StressSums<D>> =
+        measures.iter().map(|&measure| StressSums::new(bonds, state, measure)).collect();
     let started = Instant::now();
     let reach = all.iter().flat_map(|sums| sums.taps.iter().flatten()).map(|tap| tap.shift.unsigned_abs());
     let longest = half(bonds).iter().map(|&offset| bonds.shift(offset).unsigned_abs());
     let (reach, longest) = (reach.max().unwrap_or(0), longest.max().unwrap_or(0));
     let filled = tiles(bonds.sites(), bonds.particles());
-    let mut shared = Shared::new(&bonds.occupancy(), filled, reach, longest);
+    let mut shared = OffsetBonds::new(&bonds.occupancy(), filled, reach, longest);
     let mut seconds = started.elapsed().as_secs_f64();
     for (k, &offset) in half(bonds).iter().enumerate() {
         let started = Instant::now();
@@ -74,21 +80,21 @@ pub fn piolas<const D: usize>(
             sums.seconds += started.elapsed().as_secs_f64();
         }
     }
-    let finish = |sums: Sums<D>| {
+    let finish = |sums: StressSums<D>| {
         let measured = sums.finish(bonds, state, ball);
-        Measured { seconds: measured.seconds + seconds, ..measured }
+        MeasuredStress { seconds: measured.seconds + seconds, ..measured }
     };
     all.into_iter().map(finish).collect()
 }
 
-/// Bond functions of offsets that are the same but for order and signs of their components.
-type Alike<const D: usize> = BTreeMap<[i32; D], Vec<([i32; D], f64)>>;
+/// Bond functions of offsets that differ only in the order and signs of their components.
+type EquivalentOffsets<const D: usize> = BTreeMap<[i32; D], Vec<([i32; D], f64)>>;
 
-/// The bond function of an offset, from that of the one with ascending components, none of them negative.
+/// Bond function of an offset, from that of the equivalent one with ascending, non-negative components.
 fn bond_function<const D: usize>(
-    window: &Averaged<D>,
+    window: &AveragedWindow<D>,
     offset: [i32; D],
-    alike: &mut Alike<D>,
+    alike: &mut EquivalentOffsets<D>,
 ) -> Vec<([i32; D], f64)> {
     let mut order: [usize; D] = std::array::from_fn(|d| d);
     order.sort_by_key(|&d| offset[d].abs());
@@ -106,17 +112,17 @@ fn bond_function<const D: usize>(
     turned
 }
 
-/// The weights of a stencil bond for a measure.
+/// Weights of a stencil bond for a measure.
 fn taps<const D: usize>(
     bonds: &LatticeBonds<D>,
     offset: [i32; D],
-    measure: Measure,
-    window: Option<&Averaged<D>>,
-    alike: &mut Alike<D>,
+    measure: StressMethod,
+    window: Option<&AveragedWindow<D>>,
+    alike: &mut EquivalentOffsets<D>,
 ) -> Vec<Tap> {
     let weights = match (measure, window) {
-        (Measure::OnePoint, _) => vec![([0; D], 0.5), (offset.map(|o| -o), 0.5)],
-        (Measure::HardyScaled, _) => {
+        (StressMethod::OnePoint, _) => vec![([0; D], 0.5), (offset.map(|o| -o), 0.5)],
+        (StressMethod::HardyScaled, _) => {
             let mut weights = crossing(bonds.ratio(), offset, measure);
             normalise(&mut weights);
             weights
@@ -127,8 +133,9 @@ fn taps<const D: usize>(
     weights.into_iter().map(|(start, weight)| Tap { shift: bonds.shift(start), weight }).collect()
 }
 
-/// Where a bond begins that crosses the ball about a particle, and the part of it inside (as printed: ½ with both ends there).
-fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: Measure) -> Vec<([i32; D], f64)> {
+/// Start of bonds that cross the ball about a particle, and the fraction inside (as printed: ½ with both ends
+/// there).
+fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: StressMethod) -> Vec<([i32; D], f64)> {
     let square = ratio * ratio;
     let reach = 2 * ratio.ceil() as i32;
     let side = (2 * reach + 1) as usize;
@@ -139,8 +146,8 @@ fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: Measure) -> V
             let q = std::array::from_fn(|d| p[d] + f64::from(offset[d]));
             let norm = |x: [f64; D]| x.iter().map(|c| c * c).sum::<f64>();
             let weight = match measure {
-                Measure::AsPublished if norm(p) < square && norm(q) < square => 0.5,
-                Measure::AsPublished => 0.0,
+                StressMethod::AsPublished if norm(p) < square && norm(q) < square => 0.5,
+                StressMethod::AsPublished => 0.0,
                 _ => segment_fraction(p, q, square),
             };
             (weight > 0.0).then_some((start, weight))
@@ -148,16 +155,16 @@ fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: Measure) -> V
         .collect()
 }
 
-/// The sites of particles so near a surface that bonds of their windows are missing, where existing ones make up for them.
-fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Measure) -> Vec<u32> {
+/// Sites near a surface whose windows lack bonds, if existing bonds compensate for them.
+fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &StressInput<D>, measure: StressMethod) -> Vec<u32> {
     let wanted = |site: usize| match measure {
-        Measure::HardyBonds => true,
-        Measure::HardyWindow => false,
+        StressMethod::HardyBonds => true,
+        StressMethod::HardyWindow => false,
         _ => measure.is_partition() && !state.missing.is_window(site),
     };
     // no bond that crosses a window begins farther away
     let reach = (bonds.ratio() + 0.5).floor() as i32 + bonds.ratio().floor() as i32;
-    // axis by axis: whether all within reach along it, and along those before, are occupied
+    // axis by axis: true if all within reach along it, and along previous axes, are occupied
     let mut whole = bonds.occupancy();
     for d in 0..D {
         let mut offset = [0; D];
@@ -175,13 +182,13 @@ fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Meas
     particles.filter(|&s| !whole[s as usize] && wanted(s as usize)).collect()
 }
 
-/// What the sum over bonds is divided by, particle by particle.
+/// Divisor of the sum over bonds, particle by particle.
 fn volumes<const D: usize>(
     bonds: &LatticeBonds<D>,
-    state: &Loaded<D>,
-    measure: Measure,
+    state: &StressInput<D>,
+    measure: StressMethod,
     ball: BallVolume,
-    window: Option<&Averaged<D>>,
+    window: Option<&AveragedWindow<D>>,
 ) -> Vec<f64> {
     let lattice = bonds.lattice();
     let thickness = lattice.volume / lattice.spacing.powi(D as i32);
@@ -192,22 +199,22 @@ fn volumes<const D: usize>(
         offsets.iter().copied().chain([[0; D]]).map(|o| (o, share)).collect::<Vec<_>>()
     };
     let (cells, volume) = match (measure, ball, window) {
-        (Measure::BallShare, BallVolume::Particles, _) => (sites(), whole),
-        (Measure::BallShare, BallVolume::Cells, _) => (cell_fractions::<D>(bonds.ratio()), whole),
-        (Measure::OnePoint, ..) => (Vec::new(), lattice.volume),
-        (Measure::HardyScaled, ..) => (sites(), lattice.volume),
+        (StressMethod::BallShare, BallVolume::Particles, _) => (sites(), whole),
+        (StressMethod::BallShare, BallVolume::Cells, _) => (cell_fractions::<D>(bonds.ratio()), whole),
+        (StressMethod::OnePoint, ..) => (Vec::new(), lattice.volume),
+        (StressMethod::HardyScaled, ..) => (sites(), lattice.volume),
         (_, _, Some(window)) => (window.cells(), lattice.volume),
         _ => (Vec::new(), whole),
     };
     let shared = |site: usize| match measure {
-        Measure::HardyWindow => true,
-        Measure::HardyBonds => false,
+        StressMethod::HardyWindow => true,
+        StressMethod::HardyBonds => false,
         _ => !measure.is_partition() || state.missing.is_window(site),
     };
     shares(bonds, &cells, shared).into_iter().map(|s| s * volume).collect()
 }
 
-/// Sum of the shares of the occupied cells around each particle; 1 where none is wanted or none is given.
+/// Sum of the shares of the occupied cells around each particle; 1 where unwanted or without shares.
 fn shares<const D: usize>(
     bonds: &LatticeBonds<D>,
     cells: &[([i32; D], f64)],

@@ -1,64 +1,65 @@
 //! Stress of a bonded body: first Piola–Kirchhoff P from bond forces, Cauchy σ = P Fᵀ/J.
 //!
-//! With the dual force f = 2t and the bond function B_IJ(X) = ∫₀¹ φ(X_I + α ξ_IJ − X) dα of a window φ (2.15), P = ½ Σ_I Σ_J
-//! f_IJ V_I V_J ⊗ ξ_IJ B_IJ over **all** bonds that cross the window (Eq. (2.14) with f for t); its divergence is the
-//! window's average of the force density. A uniform strain is exact if every bond's weights V B sum to 1 over the
-//! particles: those of a ball do not, those of a ball averaged over a particle's cell do.
+//! With the dual force f = 2t and the bond function B_IJ(X) = ∫₀¹ φ(X_I + α ξ_IJ − X) dα of a window φ
+//! (2.15), P = ½ Σ_I Σ_J f_IJ V_I V_J ⊗ ξ_IJ B_IJ over **all** bonds that cross the window (Eq. (2.14) with f
+//! for t); its divergence is the window's average of the force density. A uniform strain is exact if every
+//! bond's weights V B sum to 1 over the particles: those of a ball do not, those of a ball averaged over a
+//! particle's cell do.
 
 mod ball;
+mod bond_forces;
 mod cloud;
 mod convolution;
 mod lattice;
-mod pull;
 mod window;
 
 pub use ball::{ball_volume, cell_fractions, segment_fraction};
 
-use crate::bonds::{BodyGeometry, BondForces, Bonds, CloudBonds, GradientSums, Kind, LatticeBonds};
+use crate::bonds::{BodyGeometry, BondForces, BondKind, Bonds, CloudBonds, GradientSums, LatticeBonds};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::KernelFit;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// A second-order tensor of dimension `D`, rows first.
-pub type Tensor<const D: usize> = [[f64; D]; D];
+/// A second-order tensor of dimension `D`, row by row.
+pub type StressTensor<const D: usize> = [[f64; D]; D];
 
-/// How stress is measured.
+/// Measure of stress.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
-pub enum Measure {
-    /// All bonds crossing the ball, by the part of them inside, averaged over the particle's cell: weights that sum to 1
-    /// for every type of bond; what is missing at surfaces as [`Missing`] says.
+pub enum StressMethod {
+    /// All bonds crossing the ball, by the fraction inside, averaged over the particle's cell: weights that
+    /// sum to 1 for every bond offset; [`SurfaceCompensation`] treats surfaces.
     #[default]
     Hardy,
-    /// [`Self::Hardy`] with [`Missing::Bonds`] everywhere.
+    /// [`Self::Hardy`] with [`SurfaceCompensation::Bonds`] everywhere.
     HardyBonds,
-    /// [`Self::Hardy`] with [`Missing::Window`] everywhere.
+    /// [`Self::Hardy`] with [`SurfaceCompensation::Window`] everywhere.
     HardyWindow,
-    /// Not averaged over the cell: every bond's weights are divided by their sum.
+    /// Without the average over the cell: every bond's weights are divided by their sum.
     HardyScaled,
     /// [`Self::Hardy`] with a Gaussian window.
     Gaussian,
     /// [`Self::Hardy`] with the cubic spline as window.
     Spline,
-    /// Eq. (2.10) of Lehoucq and Silling with bond forces linear between particles: [`Self::Hardy`] with the particle's own
-    /// cell as window.
+    /// Eq. (2.10) of Lehoucq and Silling with bond forces linear between particles: [`Self::Hardy`] with the
+    /// particle's own cell as window.
     LehoucqSilling,
-    /// All bonds crossing the ball, by the part of them inside; ball volume inside the body. Fails the patch test by up to
-    /// 2.5 %.
+    /// All bonds crossing the ball, by the fraction inside; ball volume inside the body. Fails the patch test
+    /// by up to 2.5 %.
     BallShare,
     /// P = ½ Σ_J f ⊗ ξ V_J: cheap, equals the lattice's stiffness.
     OnePoint,
     /// Eq. (2.31) as printed: t for f, bonds with both ends in the ball only, the whole ball's volume.
     AsPublished,
-    /// P of the law itself at the mean deformation of a family, times its intact part: of solids in place of bond laws.
-    /// [`piola`] of bond forces gives NaN.
+    /// P of the law at the mean deformation of a family, times its intact fraction: for solids. [`piola`] of
+    /// bond forces gives NaN.
     Constitutive,
 }
 
-impl Measure {
+impl StressMethod {
     /// All measures of bond forces.
     pub const ALL: [Self; 10] = [
         Self::Hardy,
@@ -90,31 +91,31 @@ impl Measure {
         }
     }
 
-    /// Whether it needs a lattice: types of bonds, or cells.
+    /// Returns true if it needs the offsets or cells of a lattice.
     pub fn needs_lattice(self) -> bool {
         matches!(self, Self::HardyBonds | Self::HardyWindow | Self::HardyScaled | Self::LehoucqSilling)
     }
 
-    /// Whether it shares every bond out with weights of sum 1.
+    /// Returns true if it distributes every bond with weights of sum 1.
     fn is_partition(self) -> bool {
         !matches!(self, Self::BallShare | Self::OnePoint | Self::AsPublished | Self::Constitutive)
     }
 }
 
-/// How the measures whose weights sum to 1 make up on a lattice for bonds that a surface leaves out.
+/// Compensation for bonds missing at a surface, of the measures whose weights sum to 1, on a lattice.
 #[derive(Clone, Copy, Debug, Default)]
-pub enum Missing<'a> {
-    /// Every type of bond (direction and length) is divided by the weights of those whose two particles exist; a broken one
-    /// counts, with no force. A uniform strain is then exact up to the surface; where a body force acts it extrapolates.
+pub enum SurfaceCompensation<'a> {
+    /// Divides every bond offset by the weights of the bonds whose two particles exist; a broken bond counts,
+    /// with no force. A uniform strain is then exact up to the surface; under a body force it extrapolates.
     #[default]
     Bonds,
-    /// All are divided by the share of the window that the body's cells cover.
+    /// Divides all bonds by the share of the window that the body's cells cover.
     Window,
-    /// [`Self::Window`] in the sites marked (where body forces act), [`Self::Bonds`] elsewhere.
+    /// [`Self::Window`] in the marked sites (where body forces act), [`Self::Bonds`] elsewhere.
     WindowAt(&'a [bool]),
 }
 
-impl Missing<'_> {
+impl SurfaceCompensation<'_> {
     fn is_window(self, site: usize) -> bool {
         match self {
             Self::Bonds => false,
@@ -124,101 +125,105 @@ impl Missing<'_> {
     }
 }
 
-/// Volume Ω of the averaging ball inside the body, for [`Measure::BallShare`].
+/// Volume Ω of the averaging ball inside the body, for [`StressMethod::BallShare`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum BallVolume {
-    /// The ball's volume times the share of its particles that exist.
+    /// Volume of the ball times the share of its particles that exist.
     #[default]
     Particles,
-    /// The part of the ball that the particles' cells cover (lattices; a cloud has no cells and takes `Particles`).
+    /// Part of the ball that the particles' cells cover (lattices; clouds, which have no cells, use
+    /// `Particles`).
     Cells,
-    /// The whole ball.
+    /// Volume of the whole ball.
     Whole,
 }
 
 /// Bond law and state from which stresses follow.
-pub struct Loaded<'a, const D: usize> {
+pub struct StressInput<'a, const D: usize> {
     /// Displacement, m.
     pub displacement: &'a Field<D>,
     /// Fitted bond law, covering the stretches of `displacement`.
     pub fit: &'a KernelFit,
     /// kθ.
     pub modulus: f64,
-    /// What makes up for bonds missing at surfaces.
-    pub missing: Missing<'a>,
+    /// Compensation for bonds missing at surfaces.
+    pub missing: SurfaceCompensation<'a>,
 }
 
 /// Stress of every particle by one of several measures.
 #[derive(Clone, Debug)]
-pub struct Measured<const D: usize> {
+pub struct MeasuredStress<const D: usize> {
     /// First Piola–Kirchhoff stress, in the order of [`BodyGeometry::particles`], Pa.
-    pub piola: Vec<Tensor<D>>,
-    /// What this measure alone would have taken. On a lattice that includes the forces of all bonds, which are computed
-    /// once for all measures: together they took less than the sum of these seconds.
+    pub piola: Vec<StressTensor<D>>,
+    /// Seconds that this measure takes on its own, including the forces of all bonds, which several measures
+    /// on a lattice share.
     pub seconds: f64,
 }
 
-/// [`piola`] of several measures. On a lattice they share the forces of bonds.
+/// Computes [`piola`] of several measures. On a lattice they share the forces of bonds.
 pub fn piolas<const D: usize>(
     bonds: &dyn Bonds<D>,
-    state: &Loaded<D>,
-    measures: &[Measure],
+    state: &StressInput<D>,
+    measures: &[StressMethod],
     ball: BallVolume,
-) -> Vec<Measured<D>> {
-    if let Kind::Lattice(lattice) = bonds.kind()
-        && !measures.contains(&Measure::Constitutive)
+) -> Vec<MeasuredStress<D>> {
+    if let BondKind::Lattice(lattice) = bonds.kind()
+        && !measures.contains(&StressMethod::Constitutive)
     {
         return lattice::piolas(lattice, state, measures, ball);
     }
-    let one = |&measure: &Measure| {
+    let one = |&measure: &StressMethod| {
         let started = Instant::now();
         let piola = piola(bonds, state, measure, ball);
-        Measured { piola, seconds: started.elapsed().as_secs_f64() }
+        MeasuredStress { piola, seconds: started.elapsed().as_secs_f64() }
     };
     measures.iter().map(one).collect()
 }
 
-/// First Piola–Kirchhoff stress of every particle (in the order of [`BodyGeometry::particles`]), Pa.
+/// Computes the first Piola–Kirchhoff stress of every particle (in the order of [`BodyGeometry::particles`]),
+/// Pa.
 pub fn piola<const D: usize>(
     bonds: &dyn Bonds<D>,
-    state: &Loaded<D>,
-    measure: Measure,
+    state: &StressInput<D>,
+    measure: StressMethod,
     ball: BallVolume,
-) -> Vec<Tensor<D>> {
+) -> Vec<StressTensor<D>> {
     match bonds.kind() {
-        Kind::Lattice(lattice) => piola_on_lattice(lattice, state, measure, ball),
-        Kind::Cloud(cloud) => piola_in_cloud(cloud, state, measure, ball),
+        BondKind::Lattice(lattice) => piola_on_lattice(lattice, state, measure, ball),
+        BondKind::Cloud(cloud) => piola_in_cloud(cloud, state, measure, ball),
     }
 }
 
-/// First Piola–Kirchhoff stress of every particle (in the order of [`BodyGeometry::particles`]), Pa, on a lattice.
+/// Computes the first Piola–Kirchhoff stress of every particle (in the order of [`BodyGeometry::particles`]),
+/// Pa, on a lattice.
 pub fn piola_on_lattice<const D: usize>(
     bonds: &LatticeBonds<D>,
-    state: &Loaded<D>,
-    measure: Measure,
+    state: &StressInput<D>,
+    measure: StressMethod,
     ball: BallVolume,
-) -> Vec<Tensor<D>> {
-    if measure == Measure::Constitutive {
+) -> Vec<StressTensor<D>> {
+    if measure == StressMethod::Constitutive {
         return vec![[[f64::NAN; D]; D]; bonds.particles().len()];
     }
     lattice::piolas(bonds, state, &[measure], ball).swap_remove(0).piola
 }
 
-/// First Piola–Kirchhoff stress of every particle (in the order of [`BodyGeometry::particles`]), Pa, in a cloud.
+/// Computes the first Piola–Kirchhoff stress of every particle (in the order of [`BodyGeometry::particles`]),
+/// Pa, in a cloud.
 ///
-/// A cloud has neither types of bonds nor cells: a measure whose weights sum to 1 shares every bond among the particles whose
-/// windows it crosses, by volume × bond function, so that the sum of P V is that of f ⊗ ξ over all bonds;
-/// [`Loaded::missing`] means nothing. Measures that need a lattice ([`Measure::needs_lattice`]) are taken as
-/// [`Measure::Hardy`]; scenes refuse them.
+/// A cloud has neither common offsets of bonds nor cells: a measure whose weights sum to 1 distributes every
+/// bond over the particles whose windows it crosses, by volume × bond function, so that the sum of P V is
+/// that of f ⊗ ξ over all bonds; [`StressInput::missing`] has no effect. Measures that need a lattice
+/// ([`StressMethod::needs_lattice`]) are treated as [`StressMethod::Hardy`]; scenes refuse them.
 pub fn piola_in_cloud<const D: usize>(
     bonds: &CloudBonds<D>,
-    state: &Loaded<D>,
-    measure: Measure,
+    state: &StressInput<D>,
+    measure: StressMethod,
     ball: BallVolume,
-) -> Vec<Tensor<D>> {
-    if measure == Measure::Constitutive {
+) -> Vec<StressTensor<D>> {
+    if measure == StressMethod::Constitutive {
         return vec![[[f64::NAN; D]; D]; bonds.particles().len()];
     }
     cloud::piola(bonds, state, measure, ball)
@@ -238,14 +243,14 @@ pub(crate) fn force_over_length<const D: usize>(
     2.0 * modulus * weight * own_volume * fit.value(e) / square.sqrt()
 }
 
-/// Nonlocal deformation gradient F = (Σ w ζ ⊗ ξ)(Σ w ξ ⊗ ξ)⁻¹ over the intact bonds (Silling et al. 2007,
-/// doi:10.1007/s10659-007-9125-1); the identity where the bonds do not span space.
+/// Computes the nonlocal deformation gradient F = (Σ w ζ ⊗ ξ)(Σ w ξ ⊗ ξ)⁻¹ over the intact bonds (Silling et
+/// al. 2007, doi:10.1007/s10659-007-9125-1); the identity if the bonds do not span space.
 pub fn deformation_gradients<const D: usize>(
     bonds: &dyn BondForces<D>,
     displacement: &Field<D>,
-) -> Vec<Tensor<D>> {
+) -> Vec<StressTensor<D>> {
     let particles = bonds.particles();
-    // what one work item has of them; `None` where bonds have to be visited one by one
+    // sums of one work item; `None` if bonds have to be visited one by one
     let chunk = |chunk: usize| {
         let sums = bonds.gradient_sums(displacement, chunk)?;
         let sites = chunk_range(chunk, bonds.sites());
@@ -253,7 +258,7 @@ pub fn deformation_gradients<const D: usize>(
             [sites.start, sites.end].map(|end| particles.partition_point(|&s| (s as usize) < end));
         Some(particles[from..to].iter().map(|&site| gradient(&sums[site as usize - sites.start])).collect())
     };
-    let chunks: Option<Vec<Vec<Tensor<D>>>> =
+    let chunks: Option<Vec<Vec<StressTensor<D>>>> =
         (0..bonds.sites().div_ceil(CHUNK)).into_par_iter().map(chunk).collect();
     if let Some(chunks) = chunks {
         return chunks.concat();
@@ -276,11 +281,11 @@ pub fn deformation_gradients<const D: usize>(
     particles.par_iter().map(one).collect()
 }
 
-/// 1 + change·shape⁻¹; the identity where there is no such inverse.
-fn gradient<const D: usize>(sums: &GradientSums<D>) -> Tensor<D> {
-    let matrix = |t: &Tensor<D>| nalgebra::SMatrix::<f64, D, D>::from_fn(|a, b| t[a][b]);
+/// Computes 1 + change·shape⁻¹; the identity if there is no inverse.
+fn gradient<const D: usize>(sums: &GradientSums<D>) -> StressTensor<D> {
+    let matrix = |t: &StressTensor<D>| nalgebra::SMatrix::<f64, D, D>::from_fn(|a, b| t[a][b]);
     let shape = matrix(&sums.shape);
-    let mut gradient: Tensor<D> =
+    let mut gradient: StressTensor<D> =
         std::array::from_fn(|a| std::array::from_fn(|b| f64::from(u8::from(a == b))));
     let singular = determinant::<D>(|a, b| shape[(a, b)]).abs() <= 1e-9 * shape.trace().powi(D as i32);
     if let Some(inverse) = shape.try_inverse().filter(|_| !singular) {
@@ -294,11 +299,14 @@ fn gradient<const D: usize>(sums: &GradientSums<D>) -> Tensor<D> {
     gradient
 }
 
-/// Cauchy stress σ = P Fᵀ/J, Eq. (2.32), particle by particle.
-pub fn cauchy<const D: usize>(piola: &[Tensor<D>], gradients: &[Tensor<D>]) -> Vec<Tensor<D>> {
-    let one = |(p, f): (&Tensor<D>, &Tensor<D>)| -> Tensor<D> {
+/// Computes the Cauchy stress σ = P Fᵀ/J, Eq. (2.32), particle by particle.
+pub fn cauchy<const D: usize>(
+    piola: &[StressTensor<D>],
+    gradients: &[StressTensor<D>],
+) -> Vec<StressTensor<D>> {
+    let one = |(p, f): (&StressTensor<D>, &StressTensor<D>)| -> StressTensor<D> {
         let jacobian = determinant::<D>(|a, b| f[a][b]);
-        // a family turned inside out has no Cauchy stress; its nominal stress stands in
+        // an inverted family has no Cauchy stress; its nominal stress replaces it
         if jacobian <= 0.0 {
             return *p;
         }

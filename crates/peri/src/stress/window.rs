@@ -1,14 +1,14 @@
 //! Localisation functions φ of Hardy's stress, Eqs (2.15)–(2.18), averaged over a particle's cell.
 
-use super::{Measure, segment_fraction};
+use super::{StressMethod, segment_fraction};
 use rayon::prelude::*;
 
-/// Standard deviation of the Gaussian window over its radius, at which it is cut off.
+/// Standard deviation of the Gaussian window over its cut-off radius.
 const DEVIATION: f64 = 1.0 / 3.0;
 
 /// Shape of a localisation function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Window {
+pub enum StressWindow {
     /// Eq. (2.29): constant in the ball.
     Ball,
     /// exp(−r²/2s²), s a third of the ball's radius, zero outside.
@@ -19,18 +19,19 @@ pub enum Window {
     Cell,
 }
 
-impl Window {
-    /// The window of a measure that is a sum over bonds with a bond function.
-    pub fn of(measure: Measure) -> Self {
+impl StressWindow {
+    /// Window of a measure that is a sum over bonds with a bond function.
+    pub fn for_measure(measure: StressMethod) -> Self {
         match measure {
-            Measure::Gaussian => Self::Gaussian,
-            Measure::Spline => Self::Spline,
-            Measure::LehoucqSilling => Self::Cell,
+            StressMethod::Gaussian => Self::Gaussian,
+            StressMethod::Spline => Self::Spline,
+            StressMethod::LehoucqSilling => Self::Cell,
             _ => Self::Ball,
         }
     }
 
-    /// φ at a point, over its value at the centre; `radius` in the unit of `x`, the cell's edge for [`Self::Cell`].
+    /// φ at a point, over its value at the centre; `radius` in the unit of `x`, the cell's edge for
+    /// [`Self::Cell`].
     pub fn value<const D: usize>(self, x: [f64; D], radius: f64) -> f64 {
         let q = x.iter().map(|c| c * c).sum::<f64>().sqrt() / radius;
         let inside = match self {
@@ -47,26 +48,26 @@ impl Window {
     }
 }
 
-/// A window averaged over a cell of edge 1, tabulated on a grid finer than the cells. Its values at points one cell apart
-/// have the same sum wherever the points lie: a partition of unity over the lattice.
-pub struct Averaged<const D: usize> {
-    /// Intervals a cell.
+/// A window averaged over a cell of edge 1, tabulated on a grid finer than the cells. Its values at points
+/// one cell apart have the same sum wherever the points lie: a partition of unity over the lattice.
+pub struct AveragedWindow<const D: usize> {
+    /// Intervals per cell.
     fine: usize,
     /// Cells from the centre to the table's ends.
     reach: usize,
-    /// Points a cell at which bond functions look, along the longest axis.
+    /// Points per cell at which bond functions are evaluated, along the longest axis.
     steps: usize,
     values: Vec<f64>,
 }
 
-impl<const D: usize> Averaged<D> {
-    /// The average of a window of `radius` cells.
-    pub fn new(window: Window, radius: f64) -> Self {
-        let radius = if window == Window::Cell { 1.0 } else { radius };
+impl<const D: usize> AveragedWindow<D> {
+    /// Averages a window of `radius` cells.
+    pub fn new(window: StressWindow, radius: f64) -> Self {
+        let radius = if window == StressWindow::Cell { 1.0 } else { radius };
         let reach = (radius + 0.5).ceil() as usize + 1;
         // even, and in solids fewer for long horizons
         let fine = if D == 2 { 16 } else { (48 / reach).clamp(2, 6) & !1 };
-        let steps = if window == Window::Cell { fine } else { 4 };
+        let steps = if window == StressWindow::Cell { fine } else { 4 };
         let side = 2 * reach * fine;
         let place = |i: usize| (i as f64 + 0.5) / fine as f64 - reach as f64;
         let values = (0..side.pow(D as u32))
@@ -80,8 +81,8 @@ impl<const D: usize> Averaged<D> {
         2 * self.reach * self.fine
     }
 
-    /// The averaged window at a point, linear between nodes.
-    pub fn at(&self, x: [f64; D]) -> f64 {
+    /// Averaged window at a point, linear between nodes.
+    pub fn value_at(&self, x: [f64; D]) -> f64 {
         let side = self.side();
         let (mut base, mut part) = (0, [0.0; D]);
         for d in (0..D).rev() {
@@ -105,15 +106,15 @@ impl<const D: usize> Averaged<D> {
             .sum()
     }
 
-    /// Offsets p from which the bond p → p + `offset` meets the window, and the bond function B(p) = ∫₀¹ φ(p + α·offset) dα
-    /// there, over its sum: Σ B = 1.
+    /// Offsets p from which the bond p → p + `offset` meets the window, with the bond function B(p) = ∫₀¹
+    /// φ(p + α·offset) dα there, over its sum: Σ B = 1.
     pub fn bond_function(&self, offset: [i32; D]) -> Vec<([i32; D], f64)> {
         let mut found = self.raw_bond_function(offset);
         normalise(&mut found);
         found
     }
 
-    /// The same as it is: over the window's value at the centre.
+    /// Bond function over the window's value at the centre, not normalised.
     fn raw_bond_function(&self, offset: [i32; D]) -> Vec<([i32; D], f64)> {
         let reach = self.reach as i32;
         let low = offset.map(|o| -reach - o.max(0));
@@ -130,7 +131,7 @@ impl<const D: usize> Averaged<D> {
                 });
                 let along = |k: usize| {
                     let alpha = (k as f64 + 0.5) / steps as f64;
-                    self.at(std::array::from_fn(|d| f64::from(start[d]) + alpha * f64::from(offset[d])))
+                    self.value_at(std::array::from_fn(|d| f64::from(start[d]) + alpha * f64::from(offset[d])))
                 };
                 let sum: f64 = (0..steps).map(along).sum();
                 (sum > 0.0).then_some((start, sum / steps as f64))
@@ -138,7 +139,7 @@ impl<const D: usize> Averaged<D> {
             .collect()
     }
 
-    /// The share of the window's volume in each cell around the centre.
+    /// Share of the window's volume in each cell around the centre.
     pub fn cells(&self) -> Vec<([i32; D], f64)> {
         let (reach, fine) = (self.reach as i32, self.fine);
         let across = (2 * reach + 1) as usize;
@@ -148,7 +149,7 @@ impl<const D: usize> Averaged<D> {
                 let cell: [i32; D] =
                     std::array::from_fn(|d| (index / across.pow(d as u32) % across) as i32 - reach);
                 let part = |t: usize| {
-                    self.at(std::array::from_fn(|d| {
+                    self.value_at(std::array::from_fn(|d| {
                         f64::from(cell[d]) + middle(t / fine.pow(d as u32) % fine)
                     }))
                 };
@@ -161,13 +162,14 @@ impl<const D: usize> Averaged<D> {
     }
 }
 
-/// The mean of a window of `radius` about the origin over the segment from `p` to `q`, Eq. (2.15), over its value at the centre.
-pub fn bond_function<const D: usize>(window: Window, p: [f64; D], q: [f64; D], radius: f64) -> f64 {
+/// Mean of a window of `radius` about the origin over the segment from `p` to `q`, Eq. (2.15), over its value
+/// at the centre.
+pub fn bond_function<const D: usize>(window: StressWindow, p: [f64; D], q: [f64; D], radius: f64) -> f64 {
     let inside = segment_fraction(p, q, radius * radius);
-    if window == Window::Ball || inside == 0.0 {
+    if window == StressWindow::Ball || inside == 0.0 {
         return inside;
     }
-    // the part inside the ball lies about the point nearest its centre, cut off by the ends
+    // the part inside the ball is symmetric about the point nearest its centre, cut off by the ends
     let edge: [f64; D] = std::array::from_fn(|d| q[d] - p[d]);
     let dot = |a: [f64; D], b: [f64; D]| (0..D).map(|d| a[d] * b[d]).sum::<f64>();
     let (length, nearest) = (dot(edge, edge), -dot(p, edge) / dot(edge, edge));
@@ -181,7 +183,7 @@ pub fn bond_function<const D: usize>(window: Window, p: [f64; D], q: [f64; D], r
     let along = |alpha: f64| (alpha - nearest) * unit;
     let square = (foot / (radius * radius)).max(0.0);
     let sum = match window {
-        Window::Spline => {
+        StressWindow::Spline => {
             // the pieces meet at half the radius
             let inner = reach(0.5 * radius);
             let knots = [low, nearest - inner, nearest + inner, high].map(|k| along(k.clamp(low, high)));
@@ -199,8 +201,8 @@ pub fn bond_function<const D: usize>(window: Window, p: [f64; D], q: [f64; D], r
     sum / unit
 }
 
-/// ∫ of the spline over the distance u along a line at the distance √`square` from the centre, 0 at u = 0; lengths over the radius.
-/// With r² = c² + u²: ∫r = ½(u r + c² arsinh(u/c)), ∫r³ = ¼(u r³ + 3 c² ∫r).
+/// ∫ of the spline over the distance u along a line at the distance √`square` from the centre, 0 at u = 0;
+/// lengths over the radius. With r² = c² + u²: ∫r = ½(u r + c² arsinh(u/c)), ∫r³ = ¼(u r³ + 3 c² ∫r).
 fn spline(u: f64, square: f64, inner: bool) -> f64 {
     let r = (square + u * u).sqrt();
     let log = if square > 0.0 { square * (u / square.sqrt()).asinh() } else { 0.0 };
@@ -218,8 +220,8 @@ pub fn normalise<T>(weights: &mut [(T, f64)]) {
     }
 }
 
-/// The average of `fine` samples along every axis. Samples lie between nodes: the cell about node i holds those from
-/// i − fine/2 on; nothing lies beyond the ends.
+/// Averages `fine` samples along every axis. Samples lie between nodes: the cell about node i holds those
+/// from i − fine/2 on; zero beyond the ends.
 fn averaged<const D: usize>(mut values: Vec<f64>, side: usize, fine: usize) -> Vec<f64> {
     for d in 0..D {
         let stride = side.pow(d as u32);
@@ -239,9 +241,11 @@ mod tests {
     use super::*;
     use crate::bonds::Stencil;
 
-    const WINDOWS: [Window; 4] = [Window::Ball, Window::Gaussian, Window::Spline, Window::Cell];
+    const WINDOWS: [StressWindow; 4] =
+        [StressWindow::Ball, StressWindow::Gaussian, StressWindow::Spline, StressWindow::Cell];
 
-    /// Σ_p φ(p + x) over the lattice does not depend on x; without the average over the cell it does, by percents.
+    /// Checks that Σ_p φ(p + x) over the lattice does not depend on x; without the average over the cell it
+    /// does, by several percent.
     fn partition<const D: usize>(ratio: f64) {
         let far = ratio as i32 + 3;
         let side = (2 * far + 1) as usize;
@@ -254,12 +258,12 @@ mod tests {
         };
         let places = [[0.0; D], [0.5; D], std::array::from_fn(|d| 0.137 + 0.31 * d as f64)];
         for window in WINDOWS {
-            let table = Averaged::<D>::new(window, ratio);
-            let [a, b, c] = places.map(|x| sum(x, &|x| table.at(x)));
+            let table = AveragedWindow::<D>::new(window, ratio);
+            let [a, b, c] = places.map(|x| sum(x, &|x| table.value_at(x)));
             // rounding of some thousand additions
             assert!((b / a - 1.0).abs() < 1e-12 && (c / a - 1.0).abs() < 1e-12, "{window:?} {a} {b} {c}");
         }
-        let plain = places.map(|x| sum(x, &|x| Window::Ball.value(x, ratio)));
+        let plain = places.map(|x| sum(x, &|x| StressWindow::Ball.value(x, ratio)));
         assert!(plain.iter().any(|p| (p / plain[0] - 1.0).abs() > 5e-3), "{plain:?}");
     }
 
@@ -273,18 +277,18 @@ mod tests {
         }
     }
 
-    /// So every bond has the same sum of weights before it is divided: that of the window over the cells. Solids of m = 3, 4
-    /// and 6, whose whole fields take long.
+    /// Every bond has the same sum of weights before it is divided: that of the window over the cells. Solids
+    /// of m = 3, 4 and 6, whose whole fields take long.
     #[test]
     fn weights_of_every_bond_sum_to_the_same() {
         for ratio in [3.015, 4.015, 6.015] {
-            let table = Averaged::<3>::new(Window::Ball, ratio);
+            let table = AveragedWindow::<3>::new(StressWindow::Ball, ratio);
             let shares = table.cells();
             assert!((shares.iter().map(|s| s.1).sum::<f64>() - 1.0).abs() < 1e-13);
             let far = ratio as i32 + 3;
             let whole: f64 = (-far..=far)
                 .flat_map(|x| (-far..=far).flat_map(move |y| (-far..=far).map(move |z| [x, y, z])))
-                .map(|p| table.at(p.map(f64::from)))
+                .map(|p| table.value_at(p.map(f64::from)))
                 .sum();
             let stencil = Stencil::<3>::new(ratio);
             let step = if ratio > 4.5 { 29 } else { 7 };
@@ -295,14 +299,15 @@ mod tests {
         }
     }
 
-    /// Windows fall from their centre and vanish outside: (2.16), (2.17); along a bond their mean is that of many points.
+    /// Windows decrease from their centre and vanish outside: (2.16), (2.17); their mean along a bond is that
+    /// of many points.
     #[test]
     fn shapes_and_means_along_bonds() {
         for window in WINDOWS {
             let values: Vec<f64> = (0..40).map(|k| window.value([0.05 * f64::from(k), 0.0], 1.5)).collect();
             assert!(values[0] == 1.0 && values.windows(2).all(|v| v[1] <= v[0]) && values[31] == 0.0);
         }
-        for window in [Window::Ball, Window::Gaussian, Window::Spline] {
+        for window in [StressWindow::Ball, StressWindow::Gaussian, StressWindow::Spline] {
             for (p, q) in [
                 ([-2.0, 0.3], [1.9, -0.4]),
                 ([0.1, 0.2], [0.9, 1.0]),

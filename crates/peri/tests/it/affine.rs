@@ -1,11 +1,11 @@
-//! The full network of chains: the battery of all materials, and closed forms of its moduli and of a dilation.
+//! Full network of chains: the checks of all materials, and closed forms of its moduli and of a dilation.
 
 use crate::materials::battery;
 use evidence::near;
 use peri::bonds::{BodyGeometry, LatticeBonds, VolumeCorrection};
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
-use peri::material::{Affine, Family, Material, Pointwise, Response};
+use peri::material::{Affine, Family, Material, Pointwise, SolverMaterial};
 use polycore::langevin;
 
 #[test]
@@ -16,7 +16,7 @@ fn the_full_network_passes_the_battery() {
     }
 }
 
-/// W of the particle in the middle of a block under a displacement gradient.
+/// Returns W of the particle in the middle of a block under a displacement gradient.
 fn energy(law: Affine, gradient: [[f64; 3]; 3]) -> f64 {
     let body = [Operation::Add(Shape::Box { min: [0.0; 3], max: [7.0; 3] })];
     let bonds =
@@ -38,7 +38,8 @@ fn energy(law: Affine, gradient: [[f64; 3]; 3]) -> f64 {
     law.energy(&family, &material.points()[middle])
 }
 
-/// Small strains have K, and Voigt's mean of both shear moduli of the lattice is μ: it depends on Σŵ(n·n)² = 1 alone.
+/// The bulk modulus at small strains is K, and Voigt's mean of both shear moduli of the lattice is μ: it
+/// depends on Σŵ(n·n)² = 1 only.
 #[test]
 fn small_strains_have_both_moduli() {
     let (bulk, step) = (20.0, 1e-3);
@@ -54,7 +55,7 @@ fn small_strains_have_both_moduli() {
     near("full_network_shear", (2.0 * pure + 3.0 * simple) / 5.0, 1.0, 1e-5);
 }
 
-/// A dilation stretches every chain alike: W = ∫ψ′ − ⅓ψ′(1) ln λ³ + ¼κ(λ⁶ − 1 − 2 ln λ³).
+/// A dilation stretches every chain equally: W = ∫ψ′ − ⅓ψ′(1) ln λ³ + ¼κ(λ⁶ − 1 − 2 ln λ³).
 #[test]
 fn a_dilation_stretches_every_chain() {
     let (links, bulk, stretch) = (25.0_f64, 20.0, 1.4);

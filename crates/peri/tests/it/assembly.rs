@@ -1,9 +1,10 @@
-//! What compilers make of the kernels: inner loops over bonds that keep their sums in registers.
+//! Machine code of the kernels: inner loops over bonds keep their sums in registers.
 
 use std::process::Command;
 
-/// Vectors stored on the stack in each inner loop that evaluates bond laws, of the instructions (address and text) of a function:
-/// no jump or call in it, a packed division, ten packed multiply-adds or more.
+/// Counts the vectors stored on the stack in each inner loop of a function (instructions with address and
+/// text). An inner loop that evaluates bond laws has no jump or call, a packed division, and at least ten
+/// packed multiply-adds.
 fn spills(function: &[(u64, &str)]) -> Vec<usize> {
     let jump = |text: &str| text.starts_with('j') || text.starts_with("call");
     let is_law = |body: &[(u64, &str)]| {
@@ -34,11 +35,11 @@ fn spills(function: &[(u64, &str)]) -> Vec<usize> {
     found
 }
 
-/// With AVX-512 no vector goes to the stack. With AVX2, which has 16 registers, at most four do: the components of ζ until the law is
-/// evaluated, the least and the largest stretch.
+/// No vector is stored on the stack with AVX-512. With AVX2, which has 16 registers, at most four are: the
+/// components of ζ until the law is evaluated, and the smallest and the largest stretch.
 #[test]
 fn inner_loops_do_not_spill() {
-    if !evidence::hosts::there("objdump") {
+    if !evidence::hosts::has_program("objdump") {
         return;
     }
     let program = std::env::current_exe().unwrap();

@@ -1,4 +1,4 @@
-//! Forces balance, turn with the body, vanish in rigid motions, and are the gradient of the bonds' energy.
+//! Forces balance, rotate with the body, vanish in rigid motions, and are the gradient of the bond energy.
 
 use crate::bodies::{
     Body, Built, MODULUS, Random, distance, fit, forces, laws, norm, rms, scatter, stretch_range,
@@ -6,7 +6,7 @@ use crate::bodies::{
 use peri::bonds::{BondForces, Bonds, CloudBonds, VolumeCorrection};
 use peri::potential::{KernelFit, Law};
 
-/// Both paths' forces on particles in input order.
+/// Forces of both paths on particles in input order.
 fn both<const D: usize>(
     built: &mut Built<D>,
     fit: &KernelFit,
@@ -18,7 +18,7 @@ fn both<const D: usize>(
     [("lattice", lattice), ("cloud", forces(&built.cloud, &built.in_cloud, u))]
 }
 
-/// Σ V f and all Σ V (x_a f_b − x_b f_a) over the sums of magnitudes.
+/// Returns Σ V f and all Σ V (x_a f_b − x_b f_a) over the sums of magnitudes.
 fn imbalance<const D: usize>(positions: &[[f64; D]], forces: &[[f64; D]], volumes: &[f64]) -> f64 {
     let mut worst = 0.0_f64;
     let size: f64 = forces.iter().zip(volumes).map(|(f, v)| norm(*f) * v).sum();
@@ -64,7 +64,7 @@ fn forces_and_moments_balance() {
     check_balance([10, 9, 8], 3.015);
 }
 
-/// Scattered points with volumes from 1 to 5: V_I f_I is what balances.
+/// Forces V_I f_I balance on scattered points with volumes from 1 to 5.
 #[test]
 fn unequal_volumes_balance() {
     let mut random = Random(5);
@@ -146,8 +146,8 @@ fn check_objectivity<const D: usize>(cells: [usize; D]) {
         let after = both(&mut built, &fit, &turned);
         for ((path, straight), (_, after)) in straight.into_iter().zip(after) {
             let expected: Vec<[f64; D]> = straight.iter().map(|&f| turn(&by, f)).collect();
-            // u ≈ 5 is rounded to 4e-16: strains of bonds of 0.1 to 1e-14, forces of strains 0.1 to 1e-13, times the
-            // bonds of a particle
+            // u ≈ 5 is rounded to 4e-16: strains of bonds of 0.1 to 1e-14, forces of strains 0.1 to 1e-13,
+            // times the bonds of a particle
             let apart = distance(&expected, &after) / rms(&straight);
             assert!(apart < 1e-11, "{path}, {D}D, {}: {apart:.1e}", law.name());
         }
@@ -216,14 +216,14 @@ fn check_gradient<const D: usize>(cells: [usize; D]) {
             let energy = |d: usize, step: f64| -> f64 {
                 let mut moved = u.clone();
                 moved[particle][d] += step;
-                let of = |p: &&crate::bodies::Pair<D>| {
+                let of = |p: &&crate::bodies::BondPair<D>| {
                     p.weight * p.length * potential.energy(p.deformed(&moved).1)
                 };
                 2.0 * MODULUS * volume * own.iter().map(of).sum::<f64>()
             };
             for d in 0..D {
-                // fourth-order differences: error h⁴ Π⁽⁵⁾ ≈ (1e-3)⁴ times the law's fifth derivative, and 1e-16/1e-3 of
-                // the energy for rounding
+                // fourth-order differences: error h⁴ Π⁽⁵⁾ ≈ (1e-3)⁴ times the law's fifth derivative, and
+                // 1e-16/1e-3 of the energy for rounding
                 let h = 1e-3 * 0.1;
                 let slope = (8.0 * (energy(d, h) - energy(d, -h)) - energy(d, 2.0 * h) + energy(d, -2.0 * h))
                     / (12.0 * h);
@@ -248,7 +248,7 @@ fn forces_are_the_gradient_of_the_energy() {
     check_gradient([8, 8, 7]);
 }
 
-/// The range of stretches the kernels report is the one the bonds have.
+/// The range of stretches that kernels report is that of the bonds.
 #[test]
 fn stretches_are_tracked() {
     fn check<const D: usize>(cells: [usize; D]) {

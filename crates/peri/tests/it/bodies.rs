@@ -1,4 +1,4 @@
-//! One body in both representations, random displacements, and the plain sums of Eqs (2.6) and (2.47) to compare with.
+//! Test bodies on a lattice and as a cloud, random displacements, and reference sums of Eqs (2.6) and (2.47).
 
 use peri::bonds::{BodyGeometry, BondForces, Bonds, CloudBonds, LatticeBonds, VolumeCorrection, force};
 use peri::correction::surface_factors;
@@ -8,10 +8,10 @@ use peri::material::BondMaterial;
 use peri::potential::{BondPotential, KernelFit, Law};
 use peri::solver::{DynamicRelaxation, Loads, Method, State, System};
 
-/// kθ of all bodies here; any value does.
+/// kθ of all bodies; the value is arbitrary.
 pub const MODULUS: f64 = 1.7;
 
-/// A zero-width cut in the plane y = `at` over `from` ≤ x ≤ `to` (and all z).
+/// Cut of zero width in the plane y = `at` over `from` ≤ x ≤ `to` (and all z).
 #[derive(Clone, Copy)]
 pub struct Slit {
     pub at: f64,
@@ -19,7 +19,7 @@ pub struct Slit {
     pub to: f64,
 }
 
-/// What a body is made of.
+/// Specification of a body.
 #[derive(Clone)]
 pub struct Body<const D: usize> {
     pub operations: Vec<Operation<D>>,
@@ -27,11 +27,11 @@ pub struct Body<const D: usize> {
     pub ratio: f64,
     pub volume_correction: VolumeCorrection,
     pub slits: Vec<Slit>,
-    /// C₁₁₁₁ of the energy surface correction, where wanted.
+    /// C₁₁₁₁ of the energy surface correction, if any.
     pub surface: Option<f64>,
 }
 
-/// The same body on a lattice and as a cloud, and where each particle (in input order) is stored.
+/// Body on a lattice and as a cloud, with the site of each particle in input order.
 pub struct Built<const D: usize> {
     pub lattice: LatticeBonds<D>,
     pub cloud: CloudBonds<D>,
@@ -41,7 +41,7 @@ pub struct Built<const D: usize> {
 }
 
 impl<const D: usize> Body<D> {
-    /// A box of cells with its lower corner at the origin and neither hole nor crack.
+    /// Creates a box of cells with its lower corner at the origin, without hole and crack.
     pub fn solid(cells: [usize; D], spacing: f64, ratio: f64) -> Self {
         let max = cells.map(|c| c as f64 * spacing);
         Self {
@@ -54,7 +54,7 @@ impl<const D: usize> Body<D> {
         }
     }
 
-    /// The box with a hole off its middle, two cracks and all corrections.
+    /// Creates a box with an eccentric hole, two cracks and all corrections.
     pub fn damaged(cells: [usize; D], spacing: f64, ratio: f64) -> Self {
         let mut body = Self::solid(cells, spacing, ratio);
         let length = cells.map(|c| c as f64 * spacing);
@@ -110,9 +110,11 @@ impl<const D: usize> Body<D> {
         Built { lattice, cloud, points, on_lattice, in_cloud }
     }
 
-    /// Pairs (I, J), I < J, with their reference bond and weight (volume × surface correction), by comparing all.
-    pub fn pairs(&self, points: &[[f64; D]]) -> Vec<Pair<D>> {
-        // the smallest gap between lattice distances near the horizons used here is far above this rounding margin
+    /// Returns pairs (I, J), I < J, with reference bond and weight (volume × surface correction), by
+    /// comparing all particles.
+    pub fn pairs(&self, points: &[[f64; D]]) -> Vec<BondPair<D>> {
+        // the smallest gap between lattice distances near the horizons used here is far above this rounding
+        // margin
         let square = self.horizon().powi(2) * (1.0 + 1e-12);
         let mut pairs = Vec::new();
         for i in 0..points.len() {
@@ -123,7 +125,7 @@ impl<const D: usize> Body<D> {
                     let part = (self.horizon() + 0.5 * self.spacing - length) / self.spacing;
                     let linear = self.volume_correction == VolumeCorrection::Linear;
                     let weight = if linear { part.clamp(0.0, 1.0) } else { 1.0 };
-                    pairs.push(Pair { i, j, bond, length, weight });
+                    pairs.push(BondPair { i, j, bond, length, weight });
                 }
             }
         }
@@ -133,8 +135,8 @@ impl<const D: usize> Body<D> {
         pairs
     }
 
-    /// Madenci & Oterkus (2014), §4.2, as in `s12_mosurf.py`.
-    fn correct(&self, pairs: &mut [Pair<D>], count: usize, stiffness: f64) {
+    /// Returns the surface correction of Madenci & Oterkus (2014), §4.2, as in `s12_mosurf.py`.
+    fn correct(&self, pairs: &mut [BondPair<D>], count: usize, stiffness: f64) {
         let volume = self.spacing.powi(D as i32);
         let mut energy = vec![[0.0; D]; count];
         for pair in pairs.iter() {
@@ -157,10 +159,10 @@ impl<const D: usize> Body<D> {
         }
     }
 
-    /// Force densities f_I = Σ_J 2kθ t(λ) w V_J ζ/|ζ|, and the sum of the magnitudes in each.
+    /// Returns force densities f_I = Σ_J 2kθ t(λ) w V_J ζ/|ζ|, and the sum of the magnitudes in each.
     pub fn plain_forces(
         &self,
-        pairs: &[Pair<D>],
+        pairs: &[BondPair<D>],
         law: &dyn BondPotential,
         displacement: &[[f64; D]],
     ) -> (Vec<[f64; D]>, Vec<f64>) {
@@ -190,9 +192,9 @@ impl Slit {
     }
 }
 
-/// A bond between two particles.
+/// Bond between two particles.
 #[derive(Clone, Copy)]
-pub struct Pair<const D: usize> {
+pub struct BondPair<const D: usize> {
     pub i: usize,
     pub j: usize,
     pub bond: [f64; D],
@@ -200,16 +202,16 @@ pub struct Pair<const D: usize> {
     pub weight: f64,
 }
 
-impl<const D: usize> Pair<D> {
-    /// ζ and the stretch λ.
+impl<const D: usize> BondPair<D> {
+    /// Returns ζ and the stretch λ.
     pub fn deformed(&self, displacement: &[[f64; D]]) -> ([f64; D], f64) {
         let zeta = std::array::from_fn(|d| self.bond[d] + displacement[self.j][d] - displacement[self.i][d]);
         (zeta, norm(zeta) / self.length)
     }
 }
 
-/// Smallest and largest stretch of all pairs, a little widened.
-pub fn stretch_range<const D: usize>(pairs: &[Pair<D>], displacement: &[[f64; D]]) -> [f64; 2] {
+/// Returns the smallest and largest stretch of all pairs, slightly widened.
+pub fn stretch_range<const D: usize>(pairs: &[BondPair<D>], displacement: &[[f64; D]]) -> [f64; 2] {
     let range = pairs
         .iter()
         .map(|pair| pair.deformed(displacement).1)
@@ -217,7 +219,7 @@ pub fn stretch_range<const D: usize>(pairs: &[Pair<D>], displacement: &[[f64; D]
     [range[0] - 1e-3, range[1] + 1e-3]
 }
 
-/// Forces of every particle in input order; `sites` says where each is stored.
+/// Returns the forces of all particles in input order; `sites` has the site of each.
 pub fn forces<const D: usize>(
     bonds: &dyn Bonds<D>,
     sites: &[usize],
@@ -229,7 +231,7 @@ pub fn forces<const D: usize>(
     sites.iter().map(|&site| result.get(site)).collect()
 }
 
-/// Particle values put into their sites.
+/// Scatters values of particles to their sites.
 pub fn scatter<const D: usize>(count: usize, sites: &[usize], values: &[[f64; D]]) -> Field<D> {
     let mut field = Field::zeros(count);
     for (&site, &value) in sites.iter().zip(values) {
@@ -238,12 +240,12 @@ pub fn scatter<const D: usize>(count: usize, sites: &[usize], values: &[[f64; D]
     field
 }
 
-/// The five laws with the thesis' DENT parameters, unscaled.
+/// Returns the five laws with the DENT parameters of the thesis, unscaled.
 pub fn laws() -> impl Iterator<Item = (Law, Box<dyn BondPotential>)> {
     Law::ALL.into_iter().map(|law| (law, law.build(720.0, 1200.0, false).unwrap()))
 }
 
-/// Relaxes `state` under `loads`, without a look at what happens on the way.
+/// Relaxes `state` under `loads`.
 pub fn relax<const D: usize>(
     solver: &DynamicRelaxation,
     bonds: &mut dyn Bonds<D>,
@@ -257,7 +259,8 @@ pub fn relax<const D: usize>(
     solver.solve(&mut system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
 }
 
-/// Prescribes the components `constrained` (bits) of the particles that `choose` picks at the displacements it gives.
+/// Prescribes the components `constrained` (bits) of the particles that `choose` picks at the displacements
+/// it gives.
 pub fn hold<const D: usize>(
     bonds: &dyn Bonds<D>,
     choose: impl Fn([f64; D]) -> Option<(u8, [f64; D])>,
@@ -273,22 +276,22 @@ pub fn hold<const D: usize>(
     Loads { displacement: Some(displacement), constrained, ..Loads::default() }
 }
 
-/// A fit at the scenes' default bound.
+/// Returns a fit with the default bound of scenes.
 pub fn fit(law: &dyn BondPotential, range: [f64; 2]) -> KernelFit {
     KernelFit::new(law, range, 1e-9).unwrap()
 }
 
-/// Knuth's 64-bit linear congruential generator: the same displacements on every machine.
+/// Linear congruential generator of Knuth, 64 bits: equal displacements on every machine.
 pub struct Random(pub u64);
 
 impl Random {
-    /// Uniform in [−1, 1).
+    /// Returns a uniform number in [−1, 1).
     pub fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 
-    /// One vector per particle, each component within ±`size`.
+    /// Returns a vector per particle with components within ±`size`.
     pub fn vectors<const D: usize>(&mut self, count: usize, size: f64) -> Vec<[f64; D]> {
         (0..count).map(|_| std::array::from_fn(|_| size * self.next())).collect()
     }
@@ -298,13 +301,13 @@ pub fn norm<const D: usize>(vector: [f64; D]) -> f64 {
     vector.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Root mean square of the vectors' lengths.
+/// Returns the root mean square length of vectors.
 pub fn rms<const D: usize>(vectors: &[[f64; D]]) -> f64 {
     let sum: f64 = vectors.iter().flatten().map(|x| x * x).sum();
     (sum / vectors.len() as f64).sqrt()
 }
 
-/// Largest distance between two lists of vectors.
+/// Returns the largest distance between two lists of vectors.
 pub fn distance<const D: usize>(a: &[[f64; D]], b: &[[f64; D]]) -> f64 {
     assert_eq!(a.len(), b.len());
     let pairs = a.iter().zip(b);

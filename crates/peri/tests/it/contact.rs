@@ -1,12 +1,12 @@
-//! Contact: Macek & Silling (2007), doi:10.1016/j.finel.2007.08.012, against plain sums and closed forms; balance,
-//! energy, objectivity; bodies pressed together; no list in any bit.
+//! Contact by Macek & Silling (2007), doi:10.1016/j.finel.2007.08.012, against plain sums and closed forms;
+//! balance, energy, objectivity; bodies pressed together; results independent of the list of pairs.
 
 use crate::bodies::{Body, Built, MODULUS, Random, distance, norm, rms, scatter};
 use peri::bonds::{BodyGeometry, Bonds, CloudBonds, Overstretched, VolumeCorrection};
 use peri::contact::{Contact, SHORT_RANGE};
 use peri::field::{CHUNK, Field};
 
-/// Contact forces on particles in input order, and the energy.
+/// Returns contact forces on particles in input order, and the energy.
 fn contact<const D: usize>(bonds: &dyn Bonds<D>, sites: &[usize], u: &[[f64; D]]) -> (Vec<[f64; D]>, f64) {
     let field = scatter(bonds.sites(), sites, u);
     let mut contact = Contact::short_range(bonds, MODULUS, SHORT_RANGE).unwrap();
@@ -15,10 +15,11 @@ fn contact<const D: usize>(bonds: &dyn Bonds<D>, sites: &[usize], u: &[[f64; D]]
     for (chunk, mut out) in force.chunks_mut().into_iter().enumerate() {
         contact.force(bonds, &field, chunk * CHUNK, &mut out);
     }
-    (sites.iter().map(|&site| force.get(site)).collect(), contact.touching(bonds, &field).energy)
+    (sites.iter().map(|&site| force.get(site)).collect(), contact.summary(bonds, &field).energy)
 }
 
-/// The same by comparing all pairs: volumes and radii given, `bonded` by (I, J), I < J.
+/// Returns contact forces and energy by comparing all pairs, with given volumes and radii; `bonded` by (I,
+/// J), I < J.
 fn plainly<const D: usize>(
     points: &[[f64; D]],
     volumes: &[f64],
@@ -63,7 +64,7 @@ fn two_particles() {
         assert!((force[0][0] + push).abs() <= 1e-14 * stiffness && force[0][1] == 0.0);
         assert!((energy - 0.5 * push * overlap).abs() <= 1e-14 * stiffness, "r = {r}: {energy}");
     }
-    // past each other: pushed on, contact knows distances only
+    // past each other: pushed on, as contact depends on distances only
     let (force, _) = contact(&cloud, &sites, &[[0.0; 2], [-3.0, 0.0]]);
     assert!(force[1][0] < 0.0);
     // bonded: never
@@ -71,7 +72,8 @@ fn two_particles() {
     assert_eq!(contact(&near, &sites, &[[0.0; 2], [-1.0, 0.0]]), (vec![[0.0; 2]; 2], 0.0));
 }
 
-/// In one place (r = 0) the force is κcd/δ along the reference bond, at any distance from home; the other limits are 0.
+/// The force at coincident positions (r = 0) is κcd/δ along the reference bond, at any displacement; the
+/// other limits are 0.
 #[test]
 fn degenerate_states() {
     let points = [[0.0, 0.0, 0.0], [1.2, 0.0, 1.6]];
@@ -111,7 +113,8 @@ fn degenerate_states() {
     assert!(force.iter().flatten().all(|f| f.is_finite()) && energy > 0.0);
 }
 
-/// Large random displacements of a body with a hole and cracks: lattice and cloud against all pairs, in order.
+/// Large random displacements of a body with a hole and cracks: lattice and cloud against all pairs, in
+/// order.
 fn check_plainly<const D: usize>(cells: [usize; D]) {
     let body = Body::damaged(cells, 0.1, 2.015);
     let built = body.build();
@@ -142,7 +145,7 @@ fn lattice_and_cloud_equal_plain_sums() {
     check_plainly([4, 5, 24]);
 }
 
-/// Pairs whose bonds break are taken into a list that stays, and later moves within its skin need no other.
+/// Pairs whose bonds break join the existing list, and later moves within its skin need no new list.
 fn check_parted<const D: usize>(cells: [usize; D]) {
     fn parted<const D: usize>(bonds: &mut dyn Bonds<D>, sites: &[usize], count: usize) {
         let mut random = Random(11);
@@ -167,8 +170,8 @@ fn check_parted<const D: usize>(cells: [usize; D]) {
         for (bond, pair) in list.iter().zip(&pairs) {
             assert_eq!(bonds.bond(bond.site as usize, bond.index).site, pair[1] as usize);
         }
-        bonds.sever(&list);
-        contact.part(bonds, &pairs);
+        bonds.break_bonds(&list);
+        contact.add_broken_pairs(bonds, &pairs);
         let moved: Vec<[f64; D]> =
             u.iter().zip(&step).map(|(u, s)| std::array::from_fn(|d| u[d] + s[d])).collect();
         let field = scatter(bonds.sites(), sites, &moved);
@@ -184,11 +187,11 @@ fn check_parted<const D: usize>(cells: [usize; D]) {
             force
         };
         assert_eq!(forces(&contact), forces(&fresh));
-        assert_eq!(contact.touching(bonds, &field), fresh.touching(bonds, &field));
-        assert!(contact.touching(bonds, &field).pairs > 50);
+        assert_eq!(contact.summary(bonds, &field), fresh.summary(bonds, &field));
+        assert!(contact.summary(bonds, &field).pairs > 50);
         // what is listed is not listed twice
-        contact.part(bonds, &pairs);
-        assert_eq!(contact.touching(bonds, &field), fresh.touching(bonds, &field));
+        contact.add_broken_pairs(bonds, &pairs);
+        assert_eq!(contact.summary(bonds, &field), fresh.summary(bonds, &field));
     }
     let built = Body::damaged(cells, 0.1, 2.015).build();
     let Built { mut lattice, mut cloud, points, on_lattice, in_cloud } = built;
@@ -202,8 +205,8 @@ fn broken_bonds_join_the_list() {
     check_parted([12, 9, 8]);
 }
 
-/// Two blocks that fly at each other, a spacing in five steps, and shake: the list is made where they meet, not all along the way,
-/// and the forces are at any time those of a list made then.
+/// Two blocks approach, a spacing in five steps, and shake: the list is rebuilt where they meet, not during
+/// the approach, and forces always equal those of a new list.
 #[test]
 fn a_list_holds_while_bodies_fly() {
     let block = |low: f64| (0..36).map(move |k| [low + f64::from(k % 6), f64::from(k / 6)]);
@@ -235,7 +238,7 @@ fn a_list_holds_while_bodies_fly() {
         let mut fresh = Contact::short_range(&cloud, MODULUS, SHORT_RANGE).unwrap();
         fresh.rebuild(&cloud, &u);
         assert_eq!(forces(&contact, &u), forces(&fresh, &u), "{step}");
-        assert_eq!(contact.touching(&cloud, &u), fresh.touching(&cloud, &u), "{step}");
+        assert_eq!(contact.summary(&cloud, &u), fresh.summary(&cloud, &u), "{step}");
         let gap = 35.0 - 0.2 * f64::from(step);
         if gap > 8.0 {
             far = contact.rebuilds() - first;
@@ -246,7 +249,7 @@ fn a_list_holds_while_bodies_fly() {
     assert!(contact.rebuilds() - first > far, "none where they met");
 }
 
-/// Scattered points with volumes from 1 to 5 times the least.
+/// Scattered points with volumes from 1 to 5 times the smallest.
 #[test]
 fn unequal_volumes() {
     let mut random = Random(8);
@@ -336,8 +339,8 @@ fn contact_balances_has_an_energy_and_turns() {
     check_balance([9, 8, 7]);
 }
 
-/// Two rigid blocks, one cell apart across a cut, come closer by u: per column, pairs straight across (d = 0.9) and to
-/// either side (d = 0.9√2), as long as the next row (d = 1.35, 2 − u apart) does not touch.
+/// Two rigid blocks, one cell apart across a cut, come closer by u: per column, pairs straight across (d =
+/// 0.9) and to either side (d = 0.9√2), as long as the next row (d = 1.35, 2 − u apart) does not touch.
 #[test]
 fn force_over_penetration_of_rigid_blocks() {
     let columns = 40;

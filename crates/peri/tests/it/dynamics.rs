@@ -6,13 +6,13 @@ use peri::bonds::{BodyGeometry, BondForces, Bonds, force};
 use peri::field::Field;
 use peri::material::BondMaterial;
 use peri::potential::{BondPotential, Law};
-use peri::solver::{Breaking, Loads, Method, Policy, Record, State, System, VelocityVerlet};
-use peri::stress::{BallVolume, Loaded, Measure, Missing, piola_on_lattice};
+use peri::solver::{Breaking, Loads, Method, Policy, State, StepRecord, System, VelocityVerlet};
+use peri::stress::{BallVolume, StressInput, StressMethod, SurfaceCompensation, piola_on_lattice};
 use std::f64::consts::PI;
 
 pub const DENSITY: f64 = 2.3;
 
-/// Runs to the end without a look at what happens on the way.
+/// Runs to the end.
 pub fn run<const D: usize>(
     solver: &VelocityVerlet,
     bonds: &mut dyn Bonds<D>,
@@ -55,7 +55,8 @@ fn one_particle() {
     }
 }
 
-/// A particle that only damping slows: v = v₀(1 − ½cΔt)ⁿ/(1 + ½cΔt)ⁿ, to second order v₀e^(−ct), and what it loses is damped.
+/// A particle slowed by damping only: v = v₀(1 − ½cΔt)ⁿ/(1 + ½cΔt)ⁿ, to second order v₀e^(−ct), and the lost
+/// energy counts as damped.
 #[test]
 fn damping_slows() {
     let law = Law::Linear.build(1.0, 1.0, false).unwrap();
@@ -80,7 +81,7 @@ fn damping_slows() {
     }
 }
 
-/// A body of which every component is held: it follows the ramp, and the supports' work is what it stores.
+/// A body with all components prescribed follows the ramp and stores the work of the supports.
 #[test]
 fn fully_held() {
     let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
@@ -126,7 +127,8 @@ fn two_particles() {
             assert_eq!(state.counts.total_iterations, steps as u64);
             // the sharp critical step is that of the oscillator; differences of forces give it to 1e-9
             assert!((state.motion.limits.critical_step * omega / 2.0 - 1.0).abs() < 1e-8);
-            // and Gershgorin's theorem is sharp here, but for what the law's slope changes within the stretches covered
+            // and Gershgorin's theorem is sharp here, but for what the law's slope changes within the
+            // stretches covered
             assert!(
                 (state.motion.limits.gershgorin_step / state.motion.limits.critical_step - 1.0).abs() < 1e-8
             );
@@ -146,8 +148,8 @@ fn two_particles() {
     }
 }
 
-/// Kinetic + stored + released + damped = work, with ramps, supports, body forces, damping and breaking bonds; the error
-/// falls as Δt² where no bond breaks.
+/// Kinetic + stored + released + damped = work, with ramps, supports, body forces, damping and breaking
+/// bonds; the error falls as Δt² where no bond breaks.
 #[test]
 fn energies_balance() {
     let law = Law::ChainOffset.build(100.0, 1200.0, true).unwrap();
@@ -187,10 +189,11 @@ fn energies_balance() {
         let last = state.history.last().unwrap();
         assert_eq!((last.time, last.factor), (end, 1.0));
         let scale = state.history.iter().map(|r| r.work.abs()).fold(0.0, f64::max);
-        let error = |r: &Record| r.kinetic + r.stored + r.released + r.damped - r.work;
+        let error = |r: &StepRecord| r.kinetic + r.stored + r.released + r.damped - r.work;
         let worst = state.history.iter().map(|r| error(r).abs()).fold(0.0, f64::max) / scale;
         eprintln!(
-            "step {part} of critical, damping {damping}, {} broken: work {:.3e}, kinetic {:.3e}, stored {:.3e}, \
+            "step {part} of critical, damping {damping}, {} broken: work {:.3e}, kinetic {:.3e}, stored \
+             {:.3e}, \
              released {:.3e}, damped {:.3e} J; off by {worst:.1e}",
             last.broken, last.work, last.kinetic, last.stored, last.released, last.damped
         );
@@ -211,11 +214,11 @@ fn energies_balance() {
     }
 }
 
-/// Conserved quantities of a state: momentum, angular momentum about the origin (xy), energies.
+/// Returns conserved quantities of a state: momentum, angular momentum about the origin (xy), energies.
 struct Conserved {
     momentum: [f64; 2],
     spin: f64,
-    /// ½ρ(v² − ¼Δt²a²): with the stored energy, what the method conserves exactly where forces are linear.
+    /// Energy ½ρ(v² − ¼Δt²a²); its sum with the stored energy is exactly conserved for linear forces.
     kinetic: f64,
 }
 
@@ -235,7 +238,7 @@ fn conserved(bonds: &dyn Bonds<2>, state: &State<2>) -> Conserved {
     sum
 }
 
-/// Random velocities without momentum that strain bonds by about `strain`.
+/// Returns random velocities without momentum that strain bonds by about `strain`.
 fn shake(bonds: &dyn Bonds<2>, strain: f64, state: &mut State<2>) {
     let particles = bonds.particles();
     // at the frequency √(kθ…) of a bond the amplitude v/ω is strain·spacing
@@ -248,7 +251,7 @@ fn shake(bonds: &dyn Bonds<2>, strain: f64, state: &mut State<2>) {
     }
 }
 
-/// 1e5 steps of a small body that is shaken: no drift of the energy, momentum or spin.
+/// A shaken small body has no drift of energy, momentum or spin in 1e5 steps.
 #[test]
 fn energy_does_not_drift() {
     let law = Law::ChainOffset.build(100.0, 1200.0, true).unwrap();
@@ -288,8 +291,8 @@ fn energy_does_not_drift() {
         (method, plain, state.work)
     };
     let (method, plain, work) = run(bonds, 0.1, 1e5, 1e-3);
-    // larger strains let it wander, without a trend, by O(Δt²·strain): 1.5e-5 at 0.02. Slope of the line of least squares
-    // times the duration
+    // larger strains let it wander, without a trend, by O(Δt²·strain): 1.5e-5 at 0.02. Slope of the line of
+    // least squares times the duration
     let drift = |values: &[f64]| {
         let (count, mean) = (values.len() as f64, values.iter().sum::<f64>() / values.len() as f64);
         let middle = 0.5 * (count - 1.0);
@@ -311,7 +314,8 @@ fn energy_does_not_drift() {
     }
 }
 
-/// A body turned by 90° in steps of 1° bears no force and no stress; one that spins keeps energy, momentum and spin.
+/// A body rotated by 90° in steps of 1° has no forces and stresses; a spinning one conserves energy, momentum
+/// and spin.
 #[test]
 fn rigid_rotation() {
     let law = Law::ChainOffset.build(100.0, 1200.0, true).unwrap();
@@ -334,8 +338,13 @@ fn rigid_rotation() {
         force(bonds, &u, &mut out);
         let each = bonds.particles().iter().map(|&s| norm(out.get(s as usize)));
         largest = largest.max(each.fold(0.0, f64::max) / stiffness);
-        let loaded = Loaded { displacement: &u, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
-        for measure in [Measure::Hardy, Measure::BallShare, Measure::OnePoint] {
+        let loaded = StressInput {
+            displacement: &u,
+            fit: &fit,
+            modulus: MODULUS,
+            missing: SurfaceCompensation::Bonds,
+        };
+        for measure in [StressMethod::Hardy, StressMethod::BallShare, StressMethod::OnePoint] {
             let piola = piola_on_lattice(bonds, &loaded, measure, BallVolume::Particles);
             let each = piola.iter().flatten().flatten().map(|p| p.abs());
             stress = stress.max(each.fold(0.0, f64::max) / youngs);
@@ -363,7 +372,8 @@ fn rigid_rotation() {
     let energy =
         state.history.iter().map(|r| ((r.kinetic + r.stored) / r.work - 1.0).abs()).fold(0.0, f64::max);
     eprintln!(
-        "one free turn in {} steps: momentum {moved:.1e}, spin {turned:.1e}, energy {energy:.1e}, stretch {:.5}",
+        "one free turn in {} steps: momentum {moved:.1e}, spin {turned:.1e}, energy {energy:.1e}, stretch \
+         {:.5}",
         state.counts.total_iterations,
         state.history.last().unwrap().largest_stretch
     );

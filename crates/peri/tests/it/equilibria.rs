@@ -1,4 +1,5 @@
-//! Loads without an equilibrium: bodies torn by a force, free bodies, and prescribed displacements that press a body through itself.
+//! Loads without equilibrium: bodies torn by a force, free bodies, prescribed displacements that press a body
+//! through itself.
 
 use crate::bodies::{Body, MODULUS, hold};
 use harness::case::Fault;
@@ -9,8 +10,8 @@ use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::BondMaterial;
 use peri::potential::{BondPotential, Law};
 use peri::solver::{
-    Adrift, Breaking, DynamicRelaxation, Lbfgs, Loads, Method, Policy, State, Stops, System, VelocityVerlet,
-    adrift, inverted,
+    Breaking, ContactStops, DynamicRelaxation, Lbfgs, Loads, Method, Policy, State, System, Unsupported,
+    VelocityVerlet, find_unsupported, inverted,
 };
 
 /// A force on some particles, N, spread evenly.
@@ -59,7 +60,8 @@ fn solved(
     (result, state)
 }
 
-/// One bond of the linear law, f = 2·3kθ(λ − 1)V²: the steps below the force at the critical stretch are rows, the next ends the run.
+/// A single linear bond, f = 2·3kθ(λ − 1)V²: steps below the force at the critical stretch are rows, the next
+/// one ends the run.
 #[test]
 fn a_bond_holds_up_to_its_strength() {
     let strength = 6.0 * MODULUS * 0.2 * 0.01 * 0.01;
@@ -82,8 +84,8 @@ fn a_bond_holds_up_to_its_strength() {
     }
 }
 
-/// The strip under a growing force, by both methods and both policies: a peak within a step of that under a growing displacement, then the
-/// error, with the last finished step in the state.
+/// A strip under a growing force, by both methods and both policies: the peak is within a step of that under
+/// a growing displacement; then the error, with the last finished step in the state.
 #[test]
 fn torn_by_a_force() {
     let steps = 24;
@@ -136,7 +138,8 @@ fn torn_by_a_force() {
     }
 }
 
-/// Nothing holds it: refused before any iteration, along the axis that is missing; held along it or balanced, it is solved.
+/// A body without supports along an axis is refused before any iteration; with a support along it or balanced
+/// loads it is solved.
 #[test]
 fn free_bodies_under_forces() {
     for (held, force, missing) in [
@@ -167,7 +170,8 @@ fn free_bodies_under_forces() {
     solved(&mut bonds, &loads, &[1.0], None, &Lbfgs::default()).0.unwrap();
 }
 
-/// Two blocks a gap apart: what bears a force is judged part by part, and contact may hold what presses on something.
+/// Two blocks with a gap: supports are judged for each part, and contact may hold a part that presses on
+/// another.
 #[test]
 fn parts_and_stops() {
     let block = |low: f64| Operation::Add(Shape::Box { min: [0.0, low], max: [8.0, low + 6.0] });
@@ -177,11 +181,11 @@ fn parts_and_stops() {
     let mut down = up.clone();
     push(&bonds, &mut up, [0.0, 2.0], |x| x[1] > 15.0);
     push(&bonds, &mut down, [0.0, -2.0], |x| x[1] > 15.0);
-    let free = Stops::default();
-    let pairs = Stops { pairs: true, ..Stops::default() };
-    let plane = |normal: f64| Stops { normals: vec![[0.0, normal]], ..Stops::default() };
-    let of = |loads: &Loads<2>, stops: &Stops<2>| adrift(&bonds, loads, None, stops, 1e-3);
-    let Some(Adrift { particles, of: all, middle, axis, force }) = of(&up, &free) else { panic!() };
+    let free = ContactStops::default();
+    let pairs = ContactStops { pairs: true, ..ContactStops::default() };
+    let plane = |normal: f64| ContactStops { normals: vec![[0.0, normal]], ..ContactStops::default() };
+    let of = |loads: &Loads<2>, stops: &ContactStops<2>| find_unsupported(&bonds, loads, None, stops, 1e-3);
+    let Some(Unsupported { particles, total: all, middle, axis, force }) = of(&up, &free) else { panic!() };
     assert_eq!((particles, all, axis), (48, 96, "y"));
     assert!(
         (force - 2.0).abs() < 1e-12 && (middle[1] - 15.0).abs() < 1e-12 && (middle[0] - 4.0).abs() < 1e-12
@@ -193,8 +197,8 @@ fn parts_and_stops() {
     );
 }
 
-/// One side moved past the other, in one step or many, of all components or of one; a region turned inside out; and what looks like it
-/// and is not: half the height, a punch through a ring, a part turned by a right angle.
+/// A side moved past the other, in one step or many, with all components or one, and a region turned inside
+/// out are refused; half the height, a punch through a ring, and a part rotated by a right angle are not.
 #[test]
 fn bodies_crushed_through_themselves() {
     let cube = || Body::<3>::solid([6, 6, 10], 0.1, 3.015).build().lattice;

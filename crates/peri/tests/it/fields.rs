@@ -1,4 +1,5 @@
-//! Parameters as fields over the particles: bars of two halves, whose strains and breaks are those of springs in series.
+//! Parameters as fields over the particles: bars of two halves, whose strains and breaks are those of springs
+//! in series.
 
 use crate::bodies::{Body, MODULUS, hold};
 use crate::linear_solid::LinearSolid;
@@ -12,7 +13,7 @@ use peri::solver::{Breaking, Lbfgs, Method, Policy, State, System};
 /// Length of the bar, m.
 const LENGTH: f64 = 9.0;
 
-/// A bar pulled by `strain` along x; its state.
+/// Returns the state of a bar pulled by `strain` along x.
 fn pulled(
     bonds: &mut dyn Bonds<2>,
     material: impl Material<2>,
@@ -32,7 +33,7 @@ fn pulled(
     state
 }
 
-/// Strain along the bar's middle between two places.
+/// Returns the strain along the middle of the bar between two positions.
 fn strain(bonds: &dyn Bonds<2>, state: &State<2>, from: f64, to: f64) -> f64 {
     let at = |x: f64| {
         let near = |&site: &u32| {
@@ -50,7 +51,7 @@ fn right_half(bonds: &dyn Bonds<2>, stiffness: f64) -> Property {
     Property::new(bonds, |_, [x, _]| if x > 0.5 * LENGTH { stiffness } else { 1.0 })
 }
 
-/// A field that says one thing is that number, and leaves no factors to look up.
+/// A uniform field is a number and needs no factors.
 #[test]
 fn a_constant_is_no_field() {
     let built = Body::<2>::solid([9, 7], 0.1, 3.015).build();
@@ -61,7 +62,7 @@ fn a_constant_is_no_field() {
     assert_eq!(field.uniform(), Some(1.0));
 }
 
-/// Two halves of stiffness 1 and 3 carry one force: their strains are as 3 to 1, of bond laws on both paths, and of the
+/// Two halves of stiffness 1 and 3 in series have strains as 3 to 1, with bond laws on both paths and the
 /// state-based solid from outside the crate.
 #[test]
 fn halves_in_series() {
@@ -87,7 +88,7 @@ fn halves_in_series() {
     near("halves_solid", ratio(&built.lattice, &state), 3.0, 0.02);
 }
 
-/// A row of weak particles loses bonds, those that end at them and no others, where it is stretched enough.
+/// A row of weak particles loses the bonds that end at them, and no others.
 #[test]
 fn the_weaker_end_decides() {
     let body = Body::<2>::solid([90, 7], 0.1, 3.015);

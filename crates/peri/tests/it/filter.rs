@@ -1,5 +1,5 @@
-//! The filter of pressures: the battery of all materials, what it leaves as it is, and the roughness at corners of rigid grips as an
-//! independent program found it.
+//! Pressure filter: the checks of all materials, unchanged uniform states, and the roughness at corners of
+//! rigid grips by an independent program.
 
 use crate::materials::battery;
 use evidence::{at_most, near};
@@ -8,11 +8,11 @@ use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
-use peri::material::{EightChain, Material, NonlocalSolid, Pointwise, Response};
+use peri::material::{EightChainSolid, Material, NonlocalSolid, Pointwise, SolverMaterial};
 use peri::solver::{Lbfgs, Loads, Method, State, System};
 
-fn rubber<const D: usize>(space: Space, bulk: f64, filter: bool) -> NonlocalSolid<EightChain<D>> {
-    let network = EightChain::new(space, 1.0, 25.0, bulk).unwrap();
+fn rubber<const D: usize>(space: Space, bulk: f64, filter: bool) -> NonlocalSolid<EightChainSolid<D>> {
+    let network = EightChainSolid::new(space, 1.0, 25.0, bulk).unwrap();
     NonlocalSolid(if filter { network.filtered().unwrap() } else { network })
 }
 
@@ -24,7 +24,7 @@ fn filtered_solids_pass_the_battery() {
         let make = |bonds: &dyn Bonds<3>| rubber(Space::Solid, bulk, true).respond(bonds);
         battery::<3>(&format!("filtered, K/μ = {bulk}"), [4, 4, 3], &make);
     }
-    assert!(EightChain::<2>::new(Space::PlaneStress, 1.0, 25.0, 100.0).unwrap().filtered().is_err());
+    assert!(EightChainSolid::<2>::new(Space::PlaneStress, 1.0, 25.0, 100.0).unwrap().filtered().is_err());
 }
 
 fn strip(length: usize, rows: usize) -> LatticeBonds<2> {
@@ -34,7 +34,7 @@ fn strip(length: usize, rows: usize) -> LatticeBonds<2> {
     LatticeBonds::new(body, 3.015, VolumeCorrection::None, &[]).unwrap()
 }
 
-/// A homogeneous deformation has no neighbours to differ from: forces are those without a filter.
+/// A homogeneous deformation has the forces without a filter.
 #[test]
 fn a_homogeneous_deformation_is_left_as_it_is() {
     let bonds = strip(8, 7);
@@ -62,8 +62,8 @@ fn a_homogeneous_deformation_is_left_as_it_is() {
     at_most("solid_filter_homogeneous", off / most, 1e-11);
 }
 
-/// rms difference of p/μ from the mean of the nearest neighbours, of a strip between rigid grips three layers deep, K/μ = 1000,
-/// stretched by a half in plane strain.
+/// Returns the rms difference of p/μ from the mean of the nearest neighbours, of a strip between rigid grips
+/// three layers deep, K/μ = 1000, stretched by a half in plane strain.
 fn roughness(rows: usize, filter: bool) -> f64 {
     const GRIP: usize = 3;
     let length = rows + 2 * GRIP;
@@ -114,7 +114,7 @@ fn roughness(rows: usize, filter: bool) -> f64 {
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
-/// Its figures have two digits, found with another solver to 1e-4.
+/// The independent results have two digits, from another solver to 1e-4.
 #[test]
 fn pressures_at_grips_become_smoother() {
     for (rows, without, with) in [(16, 2.1, 0.77), (32, 1.4, 0.48), (64, 0.84, 0.29)] {

@@ -1,11 +1,11 @@
-//! The lattice path, the cloud path and a plain loop over all pairs give the same forces.
+//! Forces of the lattice path, the cloud path and a plain loop over all pairs agree.
 
 use crate::bodies::{Body, Random, distance, fit, forces, laws, norm, rms, scatter, stretch_range};
 use peri::bonds::{BodyGeometry, BondDamage, BondForces, Bonds, force};
 use peri::field::Field;
 use peri::potential::{KernelFit, StretchRange};
 
-/// The forces of pieces have the bits of those of work items.
+/// Forces of pieces have the bits of forces of work items.
 fn in_pieces<const D: usize>(bonds: &dyn Bonds<D>, u: &Field<D>) {
     let (mut whole, piece) = (Field::zeros(bonds.sites()), bonds.piece());
     force(bonds, u, &mut whole);
@@ -19,8 +19,8 @@ fn in_pieces<const D: usize>(bonds: &dyn Bonds<D>, u: &Field<D>) {
     }
 }
 
-/// Forces in mixed precision against those in double precision: each bond is wrong by roundings of single precision, and so is
-/// what the kernel sees of stretches.
+/// Forces in mixed precision agree with double precision to the rounding of single precision in each bond,
+/// and so does the range of stretches.
 fn in_mixed_precision<const D: usize>(
     body: &Body<D>,
     fit: &KernelFit,
@@ -59,7 +59,7 @@ fn in_mixed_precision<const D: usize>(
     }
 }
 
-/// Every law on one body: both paths against each other and against the plain loop.
+/// Forces of both paths agree with each other and with a plain loop, for every law on one body.
 fn compare<const D: usize>(body: &Body<D>, size: f64, name: &str) {
     let mut built = body.build();
     let mut copied = body.build().cloud;
@@ -80,19 +80,22 @@ fn compare<const D: usize>(body: &Body<D>, size: f64, name: &str) {
         copied.prepare(&scatter(built.points.len(), &built.in_cloud, &u));
         assert_eq!(in_cloud, forces(&copied, &built.in_cloud, &u), "{name}, {}", law.name());
         let scale = rms(&on_lattice);
-        // sums of up to 200 terms and a law of up to 25 coefficients, each rounded in another order: 1e-12 ≈ 5e3 ε
+        // sums of up to 200 terms and a law of up to 25 coefficients, each rounded in another order: 1e-12 ≈
+        // 5e3 ε
         let apart = distance(&on_lattice, &in_cloud) / scale;
         assert!(apart <= 1e-12, "{name}, {}: paths differ by {apart:.1e} of the rms", law.name());
         let (plain, sizes) = body.plain_forces(&pairs, &*potential, &u);
         in_mixed_precision(body, &fit, &u, &on_lattice, &sizes, &format!("{name}, {}", law.name()));
         for (particle, (found, exact)) in on_lattice.iter().zip(&plain).enumerate() {
             let error = norm::<D>(std::array::from_fn(|d| found[d] - exact[d]));
-            // each bond's force is off by at most the fit's own error, 1e-9 or less; samples may miss its peak by a
-            // tenth, and where q/e is not sampled (|e| < 1e-4) it is off by rounding of T(l) − T(1), 1e-15/1e-4
+            // each bond's force is off by at most the fit's own error, 1e-9 or less; samples may miss its
+            // peak by a tenth, and where q/e is not sampled (|e| < 1e-4) it is off by rounding of T(l) −
+            // T(1), 1e-15/1e-4
             let allowed = (1.1 * fit.max_error + 1e-12) * sizes[particle] + 1e-14 * scale;
             assert!(
                 error <= allowed,
-                "{name}, {}, particle {particle} at {:?}: {found:?} against {exact:?}, off by {:.1e} of {:.1e}",
+                "{name}, {}, particle {particle} at {:?}: {found:?} against {exact:?}, off by {:.1e} of \
+                 {:.1e}",
                 law.name(),
                 built.points[particle],
                 error,
@@ -125,8 +128,8 @@ fn paths_agree_in_space() {
     }
 }
 
-/// What mixed precision costs a body that has moved: single precision knows a displacement of n spacings to n·2⁻²⁴ of them. And a
-/// law over stretches so wide that single precision would miss it stays in double precision.
+/// Errors of mixed precision grow with the displacement: single precision rounds n spacings to n·2⁻²⁴. A law
+/// over a range of stretches that is too wide for single precision stays in double precision.
 #[test]
 fn limits_of_mixed_precision() {
     let built = Body::<3>::solid([9, 8, 7], 0.1, 3.015).build();
@@ -155,7 +158,7 @@ fn limits_of_mixed_precision() {
     assert_eq!(error_at(&mut bonds, [0.1, 3.0], 0.0), 0.0);
 }
 
-/// A law that only the table holds runs the plain loops of both paths.
+/// A law that only a table represents uses the plain loops of both paths.
 #[test]
 fn paths_agree_on_a_tabulated_law() {
     let body = Body::<2>::damaged([15, 14], 0.1, 3.015);
@@ -180,9 +183,9 @@ fn paths_agree_on_a_tabulated_law() {
     assert!(apart <= 1e-7, "{apart:.1e}");
 }
 
-/// Instead of Miri, which cannot run the vector kernels: bodies whose particles touch every edge of the storage, at
-/// sizes that no tile of 16 sites or group of 8 neighbours divides. (By hand, valgrind 3.19 runs this test
-/// without a complaint; it does not know AVX-512, so probably on the 256-bit kernels.)
+/// Bodies whose particles touch every edge of the storage, at sizes that no tile of 16 sites or group of 8
+/// neighbours divides, in place of Miri, which cannot run vector kernels. (Valgrind 3.19 runs this test
+/// without errors, probably on the 256-bit kernels.)
 #[test]
 fn thin_bodies_of_any_length() {
     let law = peri::potential::Law::ChainOffset.build(720.0, 1200.0, false).unwrap();

@@ -1,27 +1,27 @@
-//! Measures whose weights sum to 1: the patch test up to free edges, bonds shared out whole, the balance of momentum, and
-//! the definitions written out here.
+//! Stress measures with weights that sum to 1: patch test up to free edges, complete distribution of bonds,
+//! balance of momentum, and reference definitions.
 
-use crate::bodies::{Body, Built, MODULUS, Pair, Random, fit, norm, scatter, stretch_range};
+use crate::bodies::{Body, BondPair, Built, MODULUS, Random, fit, norm, scatter, stretch_range};
 use peri::bonds::{BodyGeometry, BondDamage, BondForces, Overstretched};
 use peri::geometry::{Operation, Shape};
 use peri::potential::{BondPotential, KernelFit, Law};
-use peri::stress::{BallVolume, Loaded, Measure, Missing, Tensor};
+use peri::stress::{BallVolume, StressInput, StressMethod, StressTensor, SurfaceCompensation};
 use peri::stress::{piola_in_cloud, piola_on_lattice, segment_fraction};
 
-const ALL: [Measure; 6] = [
-    Measure::Hardy,
-    Measure::HardyBonds,
-    Measure::HardyScaled,
-    Measure::Gaussian,
-    Measure::Spline,
-    Measure::LehoucqSilling,
+const ALL: [StressMethod; 6] = [
+    StressMethod::Hardy,
+    StressMethod::HardyBonds,
+    StressMethod::HardyScaled,
+    StressMethod::Gaussian,
+    StressMethod::Spline,
+    StressMethod::LehoucqSilling,
 ];
 
-fn size<const D: usize>(p: &Tensor<D>) -> f64 {
+fn size<const D: usize>(p: &StressTensor<D>) -> f64 {
     p.iter().flatten().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-fn apart<const D: usize>(a: &Tensor<D>, b: &Tensor<D>) -> f64 {
+fn apart<const D: usize>(a: &StressTensor<D>, b: &StressTensor<D>) -> f64 {
     size::<D>(&std::array::from_fn(|i| std::array::from_fn(|j| a[i][j] - b[i][j])))
 }
 
@@ -35,23 +35,23 @@ fn on_lattice<const D: usize>(
     built: &Built<D>,
     fit: &KernelFit,
     u: &[[f64; D]],
-    measure: Measure,
-    missing: Missing,
-) -> Vec<Tensor<D>> {
+    measure: StressMethod,
+    missing: SurfaceCompensation,
+) -> Vec<StressTensor<D>> {
     let field = scatter(built.lattice.sites(), &built.on_lattice, u);
-    let state = Loaded { displacement: &field, fit, modulus: MODULUS, missing };
+    let state = StressInput { displacement: &field, fit, modulus: MODULUS, missing };
     piola_on_lattice(&built.lattice, &state, measure, BallVolume::Particles)
 }
 
-/// A strain without symmetry.
+/// Strain without symmetry.
 fn strained<const D: usize>(points: &[[f64; D]]) -> Vec<[f64; D]> {
     let h = |a: usize, b: usize| 0.01 * (1.0 + 0.7 * a as f64 - 0.9 * b as f64) / (1.0 + (a * b) as f64);
     points.iter().map(|x| std::array::from_fn(|a| (0..D).map(|b| h(a, b) * x[b]).sum())).collect()
 }
 
-/// In a body with a hole every particle, at edges, corners and the hole, has the stress that its own bonds give where none
-/// is missing; the greatest error by `hardy`.
-fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[Measure]) -> f64 {
+/// Every particle of a body with a hole, also at edges and corners, has the stress of a complete family;
+/// returns the largest error of `hardy`.
+fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[StressMethod]) -> f64 {
     let mut body = Body::<D>::solid(cells, 1.0, ratio);
     let far = 2.0 * ratio;
     let centre = cells.map(|c| c as f64 - far - 1.5);
@@ -59,7 +59,7 @@ fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[Measure]) ->
     let built = body.build();
     let u = strained(&built.points);
     let (_, fit) = linear([0.9, 1.1]);
-    let one_point = on_lattice(&built, &fit, &u, Measure::OnePoint, Missing::Bonds);
+    let one_point = on_lattice(&built, &fit, &u, StressMethod::OnePoint, SurfaceCompensation::Bonds);
     let whole = |x: &[f64; D]| {
         (0..D).all(|d| x[d] > ratio && x[d] < cells[d] as f64 - ratio)
             && norm::<D>(std::array::from_fn(|d| x[d] - centre[d])) > ratio + 2.6
@@ -68,9 +68,9 @@ fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[Measure]) ->
     let exact = one_point[inside];
     let mut of_hardy = f64::NAN;
     for &measure in measures {
-        let found = on_lattice(&built, &fit, &u, measure, Missing::Bonds);
+        let found = on_lattice(&built, &fit, &u, measure, SurfaceCompensation::Bonds);
         // looking one cell far, it finds no bond of some types at corners and at the steps of a hole
-        let narrow = measure == Measure::LehoucqSilling;
+        let narrow = measure == StressMethod::LehoucqSilling;
         let by_one_edge = |x: &[f64; D]| {
             let edges = (0..D).filter(|&d| x[d].min(cells[d] as f64 - x[d]) < ratio).count();
             edges < 2 && norm::<D>(std::array::from_fn(|d| x[d] - centre[d])) > ratio + 2.6
@@ -78,20 +78,20 @@ fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[Measure]) ->
         let judged = built.points.iter().zip(&found).filter(|(x, _)| !narrow || by_one_edge(x));
         let worst = judged.map(|(_, p)| apart(p, &exact) / size(&exact)).fold(0.0, f64::max);
         // displacements of 1 are rounded to 1e-16, those of neighbours differ by 1e-2
-        if measure == Measure::Hardy {
+        if measure == StressMethod::Hardy {
             of_hardy = worst;
         }
         assert!(worst < 1e-13, "{D}D, m = {ratio}, {}: {worst:e}", measure.name());
     }
-    // what the old weights miss by: the check can fail
-    let old = on_lattice(&built, &fit, &u, Measure::BallShare, Missing::Bonds)[inside];
+    // errors of the old weights: the check can fail
+    let old = on_lattice(&built, &fit, &u, StressMethod::BallShare, SurfaceCompensation::Bonds)[inside];
     assert!(apart(&old, &exact) > 1e-3 * size(&exact));
     of_hardy
 }
 
 #[test]
 fn any_strain_is_exact_up_to_free_edges() {
-    let mut worst = patch::<3>(3.015, [19; 3], &[Measure::Hardy, Measure::LehoucqSilling]);
+    let mut worst = patch::<3>(3.015, [19; 3], &[StressMethod::Hardy, StressMethod::LehoucqSilling]);
     for ratio in [3.015, 4.015, 6.015, 8.015] {
         let side = (4.0 * ratio) as usize + 8;
         worst = worst.max(patch::<2>(ratio, [side, side + 3], &ALL));
@@ -101,23 +101,24 @@ fn any_strain_is_exact_up_to_free_edges() {
     evidence::at_most("patch test of hardy up to free edges", worst, 1e-13);
 }
 
-/// `patch_test.py`: σ₁₁ in rows 0–3 below an edge along x over that inside, uniform strain of uniaxial stress along x.
+/// Results of `patch_test.py`: σ₁₁ in rows 0–3 below an edge along x over that inside, for the uniform strain
+/// of uniaxial stress along x.
 #[test]
 fn rows_below_a_free_edge() {
     let built = Body::<2>::solid([41, 30], 1.0, 3.015).build();
     let u: Vec<[f64; 2]> = built.points.iter().map(|x| [1e-6 * x[0], -1e-6 / 3.0 * x[1]]).collect();
     let (_, fit) = linear([0.99, 1.01]);
-    let rows = |measure: Measure, missing: Missing| -> Vec<f64> {
+    let rows = |measure: StressMethod, missing: SurfaceCompensation| -> Vec<f64> {
         let found = on_lattice(&built, &fit, &u, measure, missing);
-        let exact = on_lattice(&built, &fit, &u, Measure::OnePoint, missing)[41 * 15 + 20][0][0];
+        let exact = on_lattice(&built, &fit, &u, StressMethod::OnePoint, missing)[41 * 15 + 20][0][0];
         (0..4).map(|row| found[41 * row + 20][0][0] / exact).collect()
     };
     let table = [
-        (Measure::OnePoint, Missing::Bonds, [0.801, 0.956, 1.0, 1.0]),
-        (Measure::BallShare, Missing::Bonds, [0.879, 0.943, 0.949, 0.977]),
-        (Measure::HardyScaled, Missing::Window, [0.897, 0.962, 0.968, 0.995]),
-        (Measure::HardyScaled, Missing::Bonds, [1.0; 4]),
-        (Measure::Hardy, Missing::Bonds, [1.0; 4]),
+        (StressMethod::OnePoint, SurfaceCompensation::Bonds, [0.801, 0.956, 1.0, 1.0]),
+        (StressMethod::BallShare, SurfaceCompensation::Bonds, [0.879, 0.943, 0.949, 0.977]),
+        (StressMethod::HardyScaled, SurfaceCompensation::Window, [0.897, 0.962, 0.968, 0.995]),
+        (StressMethod::HardyScaled, SurfaceCompensation::Bonds, [1.0; 4]),
+        (StressMethod::Hardy, SurfaceCompensation::Bonds, [1.0; 4]),
     ];
     for (measure, missing, expected) in table {
         for (found, expected) in rows(measure, missing).iter().zip(expected) {
@@ -128,12 +129,12 @@ fn rows_below_a_free_edge() {
     // one row marked: it alone is taken by its window
     let mut marked = vec![false; built.lattice.sites()];
     built.on_lattice[..41].iter().for_each(|&site| marked[site] = true);
-    let mixed = rows(Measure::HardyScaled, Missing::WindowAt(&marked));
+    let mixed = rows(StressMethod::HardyScaled, SurfaceCompensation::WindowAt(&marked));
     assert!((mixed[0] - 0.897).abs() < 6e-4 && (mixed[1] - 1.0).abs() < 1e-12, "{mixed:?}");
 }
 
-/// Σ P V over all particles is Σ f ⊗ ξ over all bonds: every bond of an inner particle is shared out whole, and a broken one
-/// leaves exactly its own part, having counted with no force.
+/// Σ P V over all particles is Σ f ⊗ ξ over all bonds: bonds of inner particles are distributed completely,
+/// and a broken bond removes exactly its part.
 #[test]
 fn a_broken_bond_counts_with_no_force() {
     let body = Body::<2>::solid([27, 27], 1.0, 3.015);
@@ -145,11 +146,11 @@ fn a_broken_bond_counts_with_no_force() {
     let pair = pairs.iter().find(|p| p.i == middle && p.length > 2.0).unwrap();
     let (zeta, stretch) = pair.deformed(&u);
     let force = 2.0 * MODULUS * law.tension(stretch) / norm(zeta);
-    let expected: Tensor<2> =
+    let expected: StressTensor<2> =
         std::array::from_fn(|a| std::array::from_fn(|b| force * zeta[a] * pair.bond[b]));
     for measure in ALL {
         let mut broken = body.build();
-        let before = on_lattice(&broken, &fit, &u, measure, Missing::Bonds);
+        let before = on_lattice(&broken, &fit, &u, measure, SurfaceCompensation::Bonds);
         let (i, j) = (broken.on_lattice[pair.i], broken.on_lattice[pair.j]);
         let mut ends = Vec::new();
         for (own, other) in [(i, j), (j, i)] {
@@ -161,8 +162,8 @@ fn a_broken_bond_counts_with_no_force() {
                 }
             });
         }
-        broken.lattice.sever(&ends);
-        let after = on_lattice(&broken, &fit, &u, measure, Missing::Bonds);
+        broken.lattice.break_bonds(&ends);
+        let after = on_lattice(&broken, &fit, &u, measure, SurfaceCompensation::Bonds);
         let mut lost = [[0.0; 2]; 2];
         for (before, after) in before.iter().zip(&after) {
             for a in 0..2 {
@@ -176,33 +177,39 @@ fn a_broken_bond_counts_with_no_force() {
     }
 }
 
-/// A cloud: the same inside a regular one, and in any one the sum over the particles is that over the bonds.
+/// A regular cloud has the stresses of the lattice, and in any cloud the sum over particles is that over
+/// bonds.
 #[test]
 fn clouds_share_bonds_out() {
     let built = Body::<2>::solid([25, 22], 1.0, 3.015).build();
     let (_, fit) = linear([0.5, 2.0]);
     let strained = strained(&built.points);
     let shaken = Random(5).vectors(built.points.len(), 0.1);
-    for measure in [Measure::Hardy, Measure::Gaussian, Measure::Spline] {
-        let of = |u: &[[f64; 2]], measure: Measure| {
+    for measure in [StressMethod::Hardy, StressMethod::Gaussian, StressMethod::Spline] {
+        let of = |u: &[[f64; 2]], measure: StressMethod| {
             let field = scatter(built.cloud.sites(), &built.in_cloud, u);
-            let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
+            let state = StressInput {
+                displacement: &field,
+                fit: &fit,
+                modulus: MODULUS,
+                missing: SurfaceCompensation::Bonds,
+            };
             piola_in_cloud(&built.cloud, &state, measure, BallVolume::Particles)
         };
         let inside = built.in_cloud[25 * 11 + 12];
-        let (found, exact) = (of(&strained, measure)[inside], of(&strained, Measure::OnePoint)[inside]);
+        let (found, exact) = (of(&strained, measure)[inside], of(&strained, StressMethod::OnePoint)[inside]);
         // m = 3: bonds touch balls, whose fractions are rounded to √ε
         assert!(apart(&found, &exact) < 1e-7 * size(&exact), "{measure:?}: {found:?} {exact:?}");
-        let total = |all: Vec<Tensor<2>>| -> Tensor<2> {
+        let total = |all: Vec<StressTensor<2>>| -> StressTensor<2> {
             std::array::from_fn(|a| std::array::from_fn(|b| all.iter().map(|p| p[a][b]).sum()))
         };
-        let (found, exact) = (total(of(&shaken, measure)), total(of(&shaken, Measure::OnePoint)));
+        let (found, exact) = (total(of(&shaken, measure)), total(of(&shaken, StressMethod::OnePoint)));
         assert!(apart(&found, &exact) < 1e-11 * size(&exact), "{measure:?}: {found:?} {exact:?}");
     }
 }
 
-/// Bodies, forces of their bonds, and their displacement, smooth and not uniform.
-fn smooth() -> (Body<2>, Built<2>, Vec<Pair<2>>, Vec<[f64; 2]>) {
+/// Returns bodies, forces of their bonds, and a smooth displacement that is not uniform.
+fn smooth() -> (Body<2>, Built<2>, Vec<BondPair<2>>, Vec<[f64; 2]>) {
     let body = Body::<2>::solid([29, 29], 1.0, 3.015);
     let built = body.build();
     let u = built
@@ -217,16 +224,17 @@ fn smooth() -> (Body<2>, Built<2>, Vec<Pair<2>>, Vec<[f64; 2]>) {
     (body, built, pairs, u)
 }
 
-/// Σ f ⊗ ξ ∫₀¹ φ(X_I + αξ − X) dα over all pairs, the integral by `steps` midpoints: Eqs (2.14), (2.15).
+/// Returns Σ f ⊗ ξ ∫₀¹ φ(X_I + αξ − X) dα over all pairs, the integral by `steps` midpoints: Eqs (2.14),
+/// (2.15).
 fn by_definition(
-    pairs: &[Pair<2>],
+    pairs: &[BondPair<2>],
     points: &[[f64; 2]],
     law: &dyn BondPotential,
     u: &[[f64; 2]],
     at: [f64; 2],
     steps: usize,
     window: &dyn Fn([f64; 2]) -> f64,
-) -> Tensor<2> {
+) -> StressTensor<2> {
     let mut sum = [[0.0; 2]; 2];
     for pair in pairs {
         let p = [points[pair.i][0] - at[0], points[pair.i][1] - at[1]];
@@ -249,14 +257,14 @@ fn by_definition(
     sum
 }
 
-/// A window in the plane.
+/// Window function in the plane.
 type Shape2 = fn([f64; 2]) -> f64;
 
 fn ball(x: [f64; 2]) -> f64 {
     f64::from(u8::from(norm(x) < 3.015)) / (std::f64::consts::PI * 3.015_f64.powi(2))
 }
 
-/// Normal distribution with a third of the horizon, cut off there, where e^(−9/2) of it is left.
+/// Normal distribution with a standard deviation of a third of the horizon, truncated there at e^(−9/2).
 fn gaussian(x: [f64; 2]) -> f64 {
     let variance = (3.015_f64 / 3.0).powi(2);
     let inside = f64::from(u8::from(norm(x) < 3.015));
@@ -275,14 +283,14 @@ fn hat(x: [f64; 2]) -> f64 {
     (1.0 - x[0].abs()).max(0.0) * (1.0 - x[1].abs()).max(0.0)
 }
 
-/// Particle by particle against the definition, the windows averaged over a cell by 16² points here.
+/// Every particle agrees with the definition, with windows averaged over a cell by 16² points.
 #[test]
 fn measures_are_their_definitions() {
     let (_, built, pairs, u) = smooth();
     let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
     let fit = fit(&*law, stretch_range(&pairs, &u));
-    let windows: [(Measure, Shape2); 3] =
-        [(Measure::Hardy, ball), (Measure::Gaussian, gaussian), (Measure::Spline, spline)];
+    let windows: [(StressMethod, Shape2); 3] =
+        [(StressMethod::Hardy, ball), (StressMethod::Gaussian, gaussian), (StressMethod::Spline, spline)];
     let averaged = |window: Shape2, x: [f64; 2]| {
         let shift = |k: usize| (k as f64 + 0.5) / 16.0 - 0.5;
         (0..256).map(|k| window([x[0] + shift(k % 16), x[1] + shift(k / 16)])).sum::<f64>() / 256.0
@@ -290,21 +298,23 @@ fn measures_are_their_definitions() {
     for particle in [29 * 14 + 14, 29 * 12 + 17] {
         let at = built.points[particle];
         for (measure, window) in windows {
-            let found = on_lattice(&built, &fit, &u, measure, Missing::Bonds)[particle];
+            let found = on_lattice(&built, &fit, &u, measure, SurfaceCompensation::Bonds)[particle];
             let exact = by_definition(&pairs, &built.points, &*law, &u, at, 48, &|x| averaged(window, x));
-            // both sample the window at sixteenths of a cell; the ball's rim is observed to about 1e-3 of its area
+            // both sample the window at sixteenths of a cell; the ball's rim is observed to about 1e-3 of its
+            // area
             let bound = 2e-3 * size(&exact);
             assert!(apart(&found, &exact) < bound, "{measure:?}: {found:?} against {exact:?}");
         }
-        let found = on_lattice(&built, &fit, &u, Measure::LehoucqSilling, Missing::Bonds)[particle];
+        let found =
+            on_lattice(&built, &fit, &u, StressMethod::LehoucqSilling, SurfaceCompensation::Bonds)[particle];
         let exact = by_definition(&pairs, &built.points, &*law, &u, at, 960, &hat);
         // midpoint rules of 1/16 a cell on curves of at most second degree in α
         assert!(apart(&found, &exact) < 1e-3 * size(&exact), "{found:?} against {exact:?}");
     }
 }
 
-/// div P is the window's average of the force density: Eqs (2.11), (2.12) for the cell's window of Lehoucq and Silling, and
-/// for the spline.
+/// div P is the average of the force density by the window: Eqs (2.11), (2.12) for the cell's window of
+/// Lehoucq and Silling, and for the spline.
 #[test]
 fn divergence_is_the_average_over_the_window() {
     let (_, built, pairs, u) = smooth();
@@ -337,7 +347,8 @@ fn divergence_is_the_average_over_the_window() {
     }
 }
 
-/// Fields of one body do not depend on what lies in memory beside its rows: a body in a larger box of cells has the same.
+/// Fields do not depend on memory beside the rows of a body: a body in a larger box of cells has equal
+/// fields.
 #[test]
 fn rows_do_not_reach_into_each_other() {
     let (_, fit) = linear([0.5, 2.0]);
@@ -350,7 +361,7 @@ fn rows_do_not_reach_into_each_other() {
         assert_eq!(narrow.points, wide.points);
         let u = Random(11).vectors(narrow.points.len(), 0.1);
         for measure in ALL {
-            let of = |built: &Built<2>| on_lattice(built, &fit, &u, measure, Missing::Bonds);
+            let of = |built: &Built<2>| on_lattice(built, &fit, &u, measure, SurfaceCompensation::Bonds);
             for (a, b) in of(&narrow).iter().zip(&of(&wide)) {
                 assert!(apart(a, b) <= 1e-14 * size(a), "m = {ratio}, {measure:?}: {a:?} {b:?}");
             }
@@ -358,7 +369,7 @@ fn rows_do_not_reach_into_each_other() {
     }
 }
 
-/// Work items have fixed sums: the bits do not depend on threads.
+/// Bits do not depend on threads, because work items have fixed sums.
 #[test]
 fn bits_do_not_depend_on_threads() {
     let body = Body::<2>::damaged([60, 70], 0.1, 3.015);
@@ -367,7 +378,7 @@ fn bits_do_not_depend_on_threads() {
     let (_, fit) = linear([0.5, 2.0]);
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| ALL.map(|measure| on_lattice(&built, &fit, &u, measure, Missing::Bonds)))
+        pool.install(|| ALL.map(|measure| on_lattice(&built, &fit, &u, measure, SurfaceCompensation::Bonds)))
     };
     assert!(with(1) == with(3));
 }

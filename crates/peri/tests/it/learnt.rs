@@ -1,4 +1,4 @@
-//! Laws learnt from data as solids: the battery of all materials, homogeneous deformations, flags, and what is refused.
+//! Learnt laws as solids: checks of all materials, homogeneous deformations, flags, refused laws.
 
 use crate::bodies::{Body, scatter};
 use crate::materials::battery;
@@ -10,9 +10,9 @@ use peri::bonds::Bonds;
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::material::{
-    Correspondence, Deformation, Material, NonlocalSolid, PointLaw, Pointwise, Response, Tensor,
+    BodyTensor, Correspondence, Deformation, Material, NonlocalSolid, PointLaw, Pointwise, SolverMaterial,
 };
-use peri::program::run::{Finished, Peri, run};
+use peri::program::run::{FinishedScene, Peri, run};
 use peri::program::scene::{self, Scene};
 use polycore::constitutive::network::Activation::Softplus;
 use polycore::constitutive::surrogate::{Header, Kind, Softening, Surrogate, Symmetry};
@@ -20,14 +20,15 @@ use polycore::constitutive::{Error, Law, Prediction, Workspace};
 use polycore::tensor::voigt::{self, Voigt, Voigt6x6};
 use std::path::Path;
 
-/// The law of `cases/ch5/learnt-sheet`.
+/// Loads the law of `cases/ch5/learnt-sheet`.
 const LAW: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../cases/ch5/learnt-sheet/law.safetensors");
 
 fn trained() -> Surrogate {
     Surrogate::read(LAW).unwrap()
 }
 
-/// A polyconvex orthotropic energy of random weights, in axes turned about z and by `tilt` about x.
+/// Returns a polyconvex orthotropic energy with random weights, in axes rotated about z and by `tilt` about
+/// x.
 fn orthotropic(tilt: f64) -> Surrogate {
     let turn = nalgebra::Rotation3::from_euler_angles(tilt, 0.0, 0.6);
     let axes = [0, 1, 2].map(|i| [0, 1, 2].map(|j| turn[(j, i)]));
@@ -55,7 +56,7 @@ fn learnt_laws_pass_the_battery() {
     at_most("learnt_stiffness_over_bound", greatest, 2.0);
 }
 
-/// C₃₃ without stress along z, by bisection.
+/// Returns C₃₃ without stress along z, by bisection.
 fn thickness(law: &Surrogate, mut c: Voigt) -> f64 {
     let memory = &mut Workspace::default();
     let (mut low, mut high) = (0.2, 3.0);
@@ -66,12 +67,13 @@ fn thickness(law: &Surrogate, mut c: Voigt) -> f64 {
     c[2]
 }
 
-/// Largest distance of P = FS from the law's own in any particle, over its norm, and the largest force at rest over μV/Δx.
+/// Returns the largest distance of P = FS from that of the law in any particle, over its norm, and the
+/// largest force at rest over μV/Δx.
 fn distance<const D: usize>(
     law: &Surrogate,
     space: Space,
     cells: [usize; D],
-    gradient: Tensor<D>,
+    gradient: BodyTensor<D>,
 ) -> [f64; 2] {
     let built = Body::<D>::damaged(cells, 0.1, 3.015).build();
     let whole = nalgebra::Matrix3::from_fn(|a, b| match a < D && b < D {
@@ -83,7 +85,7 @@ fn distance<const D: usize>(
         c[2] = thickness(law, c);
     }
     let stress = voigt::to_stress(&law.stress(&c, &mut Workspace::default()).unwrap().stress);
-    let expected = gradient * Tensor::<D>::from_fn(|a, b| stress[(a, b)]);
+    let expected = gradient * BodyTensor::<D>::from_fn(|a, b| stress[(a, b)]);
     let mut off = [0.0_f64; 2];
     for (bonds, sites) in [
         (&built.lattice as &dyn Bonds<D>, &built.on_lattice),
@@ -114,8 +116,8 @@ fn distance<const D: usize>(
 #[test]
 fn a_homogeneous_deformation_has_the_stress_of_the_law() {
     let mut off = [0.0_f64; 2];
-    let plane = Tensor::<2>::new(1.21, 0.12, -0.07, 0.94);
-    let space = Tensor::<3>::new(1.2, 0.1, 0.05, -0.06, 0.95, 0.03, 0.02, -0.04, 1.1);
+    let plane = BodyTensor::<2>::new(1.21, 0.12, -0.07, 0.94);
+    let space = BodyTensor::<3>::new(1.2, 0.1, 0.05, -0.06, 0.95, 0.03, 0.02, -0.04, 1.1);
     let mut note = |[stress, force]: [f64; 2]| off = [off[0].max(stress), off[1].max(force)];
     for law in [trained(), orthotropic(0.0)] {
         for kind in [Space::PlaneStrain, Space::PlaneStress] {
@@ -132,7 +134,7 @@ fn a_homogeneous_deformation_has_the_stress_of_the_law() {
 #[test]
 fn what_leaves_the_box_is_flagged() {
     fn outside<const D: usize>(space: Space, stretches: [f64; D]) -> [bool; 3] {
-        let mut displacement_gradient = Tensor::<D>::zeros();
+        let mut displacement_gradient = BodyTensor::<D>::zeros();
         (0..D).for_each(|d| displacement_gradient[(d, d)] = stretches[d] - 1.0);
         let flags = solid(&trained(), space).0.flags(&Deformation { displacement_gradient, residual: 0.0 });
         std::array::from_fn(|d| flags.outside[d])
@@ -152,7 +154,7 @@ fn what_leaves_the_box_is_flagged() {
         .unwrap(),
         Space::PlaneStrain,
     );
-    let displacement_gradient = Tensor::<2>::identity();
+    let displacement_gradient = BodyTensor::<2>::identity();
     assert!(!closed.unwrap().flags(&Deformation { displacement_gradient, residual: 0.0 }).any());
 }
 
@@ -167,14 +169,15 @@ shapes = [{{ add = \"box\", min = [\"0 mm\", \"0 mm\"], max = [\"16 mm\", \"6 mm
     )
 }
 
-fn solve(text: &str, output: &Path) -> Finished {
+fn solve(text: &str, output: &Path) -> FinishedScene {
     let source = Source::new("scene.toml", text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
     let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(output));
     run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The field of a strip whose stretch in step k is 1 + 0.2 k: C₁₁ = 1.96 in step 2 and 2.56 in step 3; the box ends at 2.2219.
+/// The field of a strip whose stretch in step k is 1 + 0.2 k: C₁₁ = 1.96 in step 2 and 2.56 in step 3; the
+/// box ends at 2.2219.
 #[test]
 fn flags_are_a_field_and_a_warning() {
     let folder = tempfile::tempdir().unwrap();
@@ -233,7 +236,8 @@ fn laws_that_no_solid_can_have_are_refused() {
     );
 }
 
-/// S = C₀ : E with a shear modulus of 1 but in one plane, where it is −0.1: stiff in the mean over all directions.
+/// S = C₀ : E with a shear modulus of 1 but in one plane, where it is −0.1: stiff in the mean over all
+/// directions.
 struct Soft;
 
 impl Law for Soft {

@@ -1,4 +1,4 @@
-//! Extreme parameters, bodies and loads: a result, or an error that says what and where.
+//! Extreme parameters, bodies and loads: a result, or an error with its cause and place.
 
 use crate::bodies::{Body, MODULUS, Random, distance, forces, hold, norm, relax, rms};
 use peri::Error;
@@ -12,7 +12,8 @@ use peri::material::BondMaterial;
 use peri::potential::{KernelFit, Law};
 use peri::solver::{DynamicRelaxation, Loads, Method, State};
 
-/// D̂ from 1 to 1e9 and n̄ from 2 to 1e6, every law, strains of a tenth: the fit keeps its bound and the forces follow.
+/// The fit keeps its bound and forces agree for D̂ from 1 to 1e9 and n̄ from 2 to 1e6, every law, at strains
+/// of a tenth.
 #[test]
 fn extreme_chains() {
     let body = Body::<2>::solid([9, 8], 0.125, 3.015);
@@ -57,7 +58,7 @@ fn parameters_out_of_their_domain_are_named() {
     }
 }
 
-/// A range about rest so narrow that no sample has a force to speak of is still fitted.
+/// A range of stretches so narrow that samples have nearly no force is fitted.
 #[test]
 fn narrow_ranges_are_fitted() {
     let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
@@ -70,7 +71,7 @@ fn narrow_ranges_are_fitted() {
     }
 }
 
-/// Scattered points, a negative volume or none, two particles in one place: no panic.
+/// Scattered points, a negative or missing volume, coincident particles: no panic.
 #[test]
 fn clouds_out_of_their_domain_are_refused() {
     let points = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
@@ -123,7 +124,7 @@ fn lattices_out_of_their_domain_are_refused() {
     assert!(matches!(lattice::<2>(&[], 0.1, 1.0), Err(Error::Geometry(_))));
 }
 
-/// Bonds as long as the horizon are bonds on a cloud too, whatever the rounding of positions.
+/// Bonds as long as the horizon exist in a cloud despite rounding of positions.
 #[test]
 fn bonds_as_long_as_the_horizon() {
     for spacing in [0.1, 0.3, 1e-3, 7e-9] {
@@ -191,7 +192,7 @@ fn one_particle_and_two() {
     }
 }
 
-/// A particle that no bond reaches, and a piece that nothing loads.
+/// A particle without bonds, and a piece without loads.
 #[test]
 fn loose_parts_stay_where_they_are_put() {
     let at = |x: f64, cells: f64| Operation::Add(Shape::Box { min: [x, 0.0], max: [x + cells, 8.0] });
@@ -228,7 +229,7 @@ fn loose_parts_stay_where_they_are_put() {
     }
 }
 
-/// The same problem in nanometres and kilometres, pascals and terapascals: the same u/L, the same iterations.
+/// A problem in nanometres and kilometres, pascals and terapascals has equal u/L and iterations.
 #[test]
 fn results_scale_with_length_and_modulus() {
     fn solve<const D: usize>(cells: [usize; D], length: f64, stiffness: f64) -> (Vec<[f64; D]>, u64) {
@@ -324,7 +325,8 @@ fn what_does_not_converge_says_how_far_it_came() {
     assert!(matches!(error, Err(Error::NoEquilibrium { step: 0, torn: false, .. })), "{error:?}");
 }
 
-/// The network law, whose force grows without bound at both ends, squeezed and pulled; the fit follows the stretches.
+/// The network law, whose force grows without bound at both ends, squeezed and pulled; the fit follows the
+/// stretches.
 #[test]
 fn strong_compression_of_the_network_law() {
     let mut built = Body::<2>::solid([20, 20], 0.125, 3.015).build();
@@ -362,8 +364,8 @@ fn strong_compression_of_the_network_law() {
     }
 }
 
-/// One step to four times the length ends where four steps end, though its first stretches lie far outside the range
-/// that the law is first fitted for.
+/// A step to four times the length ends like four steps, although its first stretches lie far outside the
+/// first range of the fit.
 #[test]
 fn a_leap_ends_where_steps_end() {
     let law = Law::ChainOffset.build(100.0, 1200.0, true).unwrap();

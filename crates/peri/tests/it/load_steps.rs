@@ -1,4 +1,4 @@
-//! Load steps that are cut where bonds break, and loads that follow a response which snaps back.
+//! Load steps bisected where bonds break, and loads that follow a snap-back.
 
 use crate::bodies::hold;
 use peri::bonds::{BodyGeometry, LatticeBonds, VolumeCorrection};
@@ -11,7 +11,8 @@ use peri::solver::{Breaking, Lbfgs, Loads, Method, Policy, State, System};
 /// Critical stretch of [`dent`].
 const CRITICAL: f64 = 2.9442;
 
-/// Double-edge-notched tension as in `relaxation.rs`: 80 × 200 × 3 mm, cracks of length `notch`, pulled apart until it breaks.
+/// Double-edge-notched tension as in `relaxation.rs`: 80 × 200 × 3 mm, cracks of length `notch`, pulled apart
+/// until it breaks.
 pub fn dent(spacing: f64, notch: f64) -> (LatticeBonds<2>, Loads<2>, Box<dyn BondPotential>, f64) {
     let (width, height, thickness) = (0.08, 0.2, 3e-3);
     let body =
@@ -29,7 +30,7 @@ pub fn dent(spacing: f64, notch: f64) -> (LatticeBonds<2>, Loads<2>, Box<dyn Bon
     (bonds, loads, law, modulus)
 }
 
-/// The sheet of `notch` torn in `steps`.
+/// Tears the sheet with notches of `notch` in `steps`.
 fn torn(notch: f64, steps: u32, refine: usize, snap_back: bool) -> State<2> {
     let (mut bonds, loads, law, modulus) = dent(4e-3, notch);
     let factors: Vec<f64> = (1..=steps).map(|k| f64::from(k) / f64::from(steps)).collect();
@@ -42,8 +43,8 @@ fn torn(notch: f64, steps: u32, refine: usize, snap_back: bool) -> State<2> {
     state
 }
 
-/// Ten steps, cut to a 64th where bonds would break, against 640: the same rows around the first break, the same peak, the
-/// same number of broken bonds.
+/// Ten steps, bisected to a 64th where bonds break, agree with 640 steps: rows around the first break, peak,
+/// number of broken bonds.
 #[test]
 fn cut_steps_find_what_short_ones_do() {
     let (cut, short) = (torn(0.02, 10, 64, false), torn(0.02, 640, 1, false));
@@ -71,8 +72,8 @@ fn cut_steps_find_what_short_ones_do() {
     );
 }
 
-/// The sheet that snaps back: the peaks of sheets that had longer notches from the start lie on its way, and what breaks releases
-/// the energy of the bonds across the ligament at the critical stretch.
+/// The path of a sheet that snaps back contains the peaks of sheets with longer notches, and broken bonds
+/// release the energy of the bonds across the ligament at the critical stretch.
 #[test]
 fn snap_back_follows_equilibria() {
     let (steps, refine) = (20, 64);
@@ -106,10 +107,12 @@ fn snap_back_follows_equilibria() {
         });
     }
     assert_eq!(state.fracture.broken, crossing.0);
-    // a bond breaks up to 1¼ shortest steps late, at about half of the full load, and its energy grows with the load's square
+    // a bond breaks up to 1¼ shortest steps late, at about half of the full load, and its energy grows with
+    // the load's square
     let beyond = state.fracture.released / crossing.1 - 1.0;
     assert!((0.0..4e-3).contains(&beyond), "{} J of {} J", state.fracture.released, crossing.1);
-    // breaking at a held displacement adds no work: what is damped never falls, but for the trapezoidal rule of an elastic step
+    // breaking at a held displacement adds no work: what is damped never falls, but for the trapezoidal rule
+    // of an elastic step
     let damped: Vec<f64> = state.history.iter().map(|row| row.work - row.stored - row.released).collect();
     let least = damped.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::min);
     assert!(least > -1e-3 * state.work, "{least} J of {} J", state.work);

@@ -2,20 +2,20 @@
 
 use harness::case::{Case, Options, Run};
 use harness::scene::Source;
-use peri::program::run::{Finished, Peri, run};
+use peri::program::run::{FinishedScene, Peri, run};
 use peri::program::scene::Scene;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-fn solve(text: &str, output: &Path) -> Finished {
+fn solve(text: &str, output: &Path) -> FinishedScene {
     let source = Source::new("scene.toml", text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
     let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(output));
     run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn value(finished: &Finished, name: &str) -> f64 {
+fn value(finished: &FinishedScene, name: &str) -> f64 {
     finished.report.scalar(name).unwrap_or_else(|| panic!("no {name} in\n{}", finished.report.table()))
 }
 
@@ -37,7 +37,7 @@ pictures = false
 fields = false
 "#;
 
-/// A body of which every particle turns by θ = 0.3 about the origin: the rotation is 0.3, strains are 0, and so are forces.
+/// A body rotated by θ = 0.3 about the origin has a rotation of 0.3, no strains and no forces.
 #[test]
 fn a_rotation_is_seen_as_one() {
     let directory = tempfile::tempdir().unwrap();
@@ -60,7 +60,7 @@ displacement_field = [\"(cos(0.3) - 1)*x - sin(0.3)*y\", \"sin(0.3)*x + (cos(0.3
     assert!(table.lines().next().unwrap().contains("turn [rad],gauge,end [m]"), "{table}");
 }
 
-/// A homogeneous strain prescribed at the rim reaches the inside (C. Cauchy–Born: a lattice follows it), and marks measure it.
+/// A homogeneous strain prescribed at the rim reaches the inside (Cauchy–Born), and marks measure it.
 #[test]
 fn a_strain_between_marks() {
     let directory = tempfile::tempdir().unwrap();
@@ -77,20 +77,24 @@ displacement_field = [\"0.02*x\", \"-0.01*y\"]\n",
             min[0], min[1], max[0], max[1]
         );
     }
-    scene += "[solver]\ntolerance = 1e-10\n[[probe]]\nname = \"along\"\ntrack = \"strain\"\nfrom = [\"31 mm\", \"1 mm\"]\nto = [\"51 mm\", \"1 mm\"]
-[[probe]]\nname = \"across\"\ntrack = \"strain\"\nfrom = [\"41 mm\", \"-5 mm\"]\nto = [\"41 mm\", \"5 mm\"]\n";
+    scene += "[solver]\ntolerance = 1e-10\n[[probe]]\nname = \"along\"\ntrack = \"strain\"\nfrom = [\"31 \
+        mm\", \"1 mm\"]\nto = [\"51 mm\", \"1 mm\"]
+[[probe]]\nname = \"across\"\ntrack = \"strain\"\nfrom = [\"41 mm\", \"-5 mm\"]\nto = [\"41 mm\", \"5 \
+mm\"]\n";
     let finished = solve(&scene, directory.path());
     assert!((value(&finished, "along") / 0.02 - 1.0).abs() < 1e-8);
     assert!((value(&finished, "across") / -0.01 - 1.0).abs() < 1e-8);
 }
 
-/// Held components follow the factor and its rate: a sheet that is wholly held has the speed d·F′(t).
+/// Prescribed components follow the factor and its rate: a completely prescribed sheet has the speed d·F′(t).
 #[test]
 fn loads_follow_a_factor() {
     let directory = tempfile::tempdir().unwrap();
     let scene = format!(
-        "{SHEET}\n[[boundary]]\nname = \"all\"\nmin = [\"0 mm\", \"-20 mm\"]\nmax = [\"80 mm\", \"20 mm\"]\ndisplacement = [\"2 mm\", \"0 mm\"]
-[solver]\nmethod = \"verlet\"\n[dynamics]\ndensity = \"1 g/cm^3\"\nend_time = \"3 ms\"\nrecords = 3\nfactor = \"sin(pi*t/4e-3)\"
+        "{SHEET}\n[[boundary]]\nname = \"all\"\nmin = [\"0 mm\", \"-20 mm\"]\nmax = [\"80 mm\", \"20 \
+         mm\"]\ndisplacement = [\"2 mm\", \"0 mm\"]
+[solver]\nmethod = \"verlet\"\n[dynamics]\ndensity = \"1 g/cm^3\"\nend_time = \"3 ms\"\nrecords = 3\nfactor \
+= \"sin(pi*t/4e-3)\"
 [[probe]]\nname = \"all\"\ntrack = \"displacement\"\naxis = \"x\"\n"
     );
     let finished = solve(&scene, directory.path());
@@ -104,7 +108,7 @@ fn loads_follow_a_factor() {
     assert!((value(&finished, "all_peak") / 2e-3 - 1.0).abs() < 1e-12);
 }
 
-/// A grid of square cells is the lattice of a box: the same reactions. One of other cells has as much volume.
+/// A grid of square cells has the reactions of the lattice of a box; one of other cells has equal volume.
 #[test]
 fn a_grid_is_a_box() {
     let directory = tempfile::tempdir().unwrap();
@@ -114,7 +118,8 @@ fn a_grid_is_a_box() {
         let from = SHEET.find("spacing").unwrap();
         let to = SHEET.find("[material]").unwrap();
         format!(
-            "{}horizon = \"6.03 mm\"\ngrid = {{ min = [\"0 mm\", \"-20 mm\"], max = [\"80 mm\", \"20 mm\"], cells = {cells} }}\n{}{ends}",
+            "{}horizon = \"6.03 mm\"\ngrid = {{ min = [\"0 mm\", \"-20 mm\"], max = [\"80 mm\", \"20 mm\"], \
+             cells = {cells} }}\n{}{ends}",
             &SHEET[..from],
             &SHEET[to..]
         )
@@ -125,7 +130,7 @@ fn a_grid_is_a_box() {
     assert!((force(&grid("[48, 20]")) / expected - 1.0).abs() < 0.1);
 }
 
-/// A crack that runs through a sheet is seen where it is, and ends at the far edge.
+/// The probe of a crack through a sheet follows its tip to the far edge.
 #[test]
 fn a_tip_runs_through() {
     let directory = tempfile::tempdir().unwrap();
@@ -140,7 +145,7 @@ fn a_tip_runs_through() {
     assert!(!notes.contains("nothing broke") && !notes.contains("warning"), "{notes}");
 }
 
-/// What is most likely not meant is said.
+/// Scenes that are probably not intended give warnings.
 #[test]
 fn what_is_most_likely_not_meant() {
     let directory = tempfile::tempdir().unwrap();
@@ -160,7 +165,8 @@ fn what_is_most_likely_not_meant() {
     );
     let here = torn("critical = { stretch = 600 }", 40);
     assert!(!never.contains("lie on body.cracks") && !never.contains("cuts out"), "{never}");
-    // 20 of the rows at y = 1 mm; of 28 neighbours within 3.015 spacings 6 lie along the crack, fewer at its ends
+    // 20 of the rows at y = 1 mm; of 28 neighbours within 3.015 spacings 6 lie along the crack, fewer at its
+    // ends
     let on = notes(
         &here
             .replace("-1 mm\", \"0 mm\"", "-1 mm\", \"1 mm\"")
@@ -177,7 +183,8 @@ fn what_is_most_likely_not_meant() {
     };
     // bonds end at a slot, unless they are asked for
     let bonded = |height: &str| notes(&slot(height).replace("shapes = [", "bond_gaps = true\nshapes = ["));
-    // rows at ±3 mm are two horizons' worth apart: three spacings, 6 mm of 6.03 mm; at 2.9 mm the rows at ±1 mm go
+    // rows at ±3 mm are two horizons' worth apart: three spacings, 6 mm of 6.03 mm; at 2.9 mm the rows at ±1
+    // mm go
     let narrow = bonded("2.9");
     assert!(
         narrow.contains(
@@ -190,9 +197,12 @@ fn what_is_most_likely_not_meant() {
         (0..200).map(|k| format!("{}e-3,{}e-3,4e-6\n", 2 * (k % 20), 2 * (k / 20))).collect();
     std::fs::write(directory.path().join("points.csv"), format!("x,y,volume\n{points}")).unwrap();
     let cloud = format!(
-        "version = 1\nprogram = \"peri\"\n[body]\nspace = \"plane-stress\"\nthickness = \"1 mm\"\nhorizon = \"6 mm\"\npoints = \"{}\"
-[material]\nyoungs_modulus = \"1 MPa\"\nlaw = \"linear\"\n[[boundary]]\nside = \"x-\"\nlayers = 1\ndisplacement = [\"0 mm\", \"0 mm\"]
-[[boundary]]\nmin = [\"37 mm\", \"-1 mm\"]\nmax = [\"39 mm\", \"30 mm\"]\ndisplacement = [\"1 mm\", \"0 mm\"]\n",
+        "version = 1\nprogram = \"peri\"\n[body]\nspace = \"plane-stress\"\nthickness = \"1 mm\"\nhorizon = \
+         \"6 mm\"\npoints = \"{}\"
+[material]\nyoungs_modulus = \"1 MPa\"\nlaw = \"linear\"\n[[boundary]]\nside = \"x-\"\nlayers = \
+1\ndisplacement = [\"0 mm\", \"0 mm\"]
+[[boundary]]\nmin = [\"37 mm\", \"-1 mm\"]\nmax = [\"39 mm\", \"30 mm\"]\ndisplacement = [\"1 mm\", \"0 \
+mm\"]\n",
         directory.path().join("points.csv").display()
     );
     let output = tempfile::tempdir().unwrap();
@@ -200,7 +210,7 @@ fn what_is_most_likely_not_meant() {
     assert!(volumes.contains("do the volumes (in m³) include the thickness?"), "{volumes}");
 }
 
-/// The table of a study, and how far its peaks are known.
+/// A study prints its table and the resolution of its peaks.
 #[test]
 fn a_study_is_a_table() {
     let directory = tempfile::tempdir().unwrap();
@@ -226,7 +236,7 @@ fn a_study_is_a_table() {
     assert_eq!(Some(peak), finished.outcomes[1].get("peak_load"));
 }
 
-/// A sheet with a crack from its left side to the middle, pulled up by 8 mm.
+/// Runs a sheet with a crack from its left side to the middle, pulled up by 8 mm.
 fn torn(critical: &str, steps: usize) -> String {
     format!(
         r#"version = 1
@@ -277,8 +287,8 @@ fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// The examples of `fields.md`, run as they stand on a file of many steps, read the last one. Needs a Python with h5py and VTK
-/// (`pip install h5py vtk`), named by `POLY_VTK_PYTHON` or found as `python3`; says so and passes where there is none.
+/// The examples of `fields.md` read the last step of a file with many. Needs a Python with h5py and VTK (`pip
+/// install h5py vtk`) from `POLY_VTK_PYTHON`, else `python3`; reported as skipped without one.
 #[test]
 fn examples_of_the_guide_read_the_last_step() {
     let python = std::env::var("POLY_VTK_PYTHON").unwrap_or_else(|_| "python3".into());
@@ -293,7 +303,8 @@ fn examples_of_the_guide_read_the_last_step() {
     let (head, tail) = SHEET.split_once("[output]").unwrap();
     assert!(tail.contains("fields = false"));
     let scene = format!(
-        "{}{fields}[[boundary]]\nside = \"x-\"\ndisplacement = [\"0 mm\", \"0 mm\"]\n[[boundary]]\nside = \"x+\"\ndisplacement = [\"6 mm\", \"0 mm\"]\n[solver]\nsteps = 3\n",
+        "{}{fields}[[boundary]]\nside = \"x-\"\ndisplacement = [\"0 mm\", \"0 mm\"]\n[[boundary]]\nside = \
+         \"x+\"\ndisplacement = [\"6 mm\", \"0 mm\"]\n[solver]\nsteps = 3\n",
         head.replace("\"2 mm\"", "\"5 mm\"")
             .replace("\"0 mm\"", "\"-40 mm\"")
             .replace("\"80 mm\"", "\"40 mm\"")
@@ -326,7 +337,8 @@ fn examples_of_the_guide_read_the_last_step() {
         assert!(fence.contains(&format!("import {module}")));
         if !has(module) {
             eprintln!(
-                "skipped: {python} has no {module} (`pip install {module}`, or name a Python with it in POLY_VTK_PYTHON)"
+                "skipped: {python} has no {module} (`pip install {module}`, or name a Python with it in \
+                 POLY_VTK_PYTHON)"
             );
             continue;
         }

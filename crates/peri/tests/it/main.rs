@@ -1,5 +1,5 @@
-//! Tests of the public interface against plain sums, closed forms and the independent tables of `formulation.md`
-//! (chapter 2), whose scripts wrote `stress_patch.csv` and `stress_surface.csv`.
+//! Tests of the public interface against plain sums, closed forms and the independent tables of
+//! `formulation.md` (chapter 2), whose scripts wrote `stress_patch.csv` and `stress_surface.csv`.
 
 mod affine;
 #[cfg(target_arch = "x86_64")]
@@ -15,6 +15,7 @@ mod fields;
 mod filter;
 mod forces;
 mod friction;
+mod friction_equilibria;
 mod hardy;
 mod homogeneous;
 mod impact;
@@ -38,6 +39,7 @@ mod rotations;
 #[path = "../../examples/rubber_bearing.rs"]
 mod rubber_bearing;
 mod softening;
+mod solid_kernels;
 mod solids;
 mod spectra;
 mod stress;

@@ -1,24 +1,24 @@
-//! One battery for every material: the five bond laws, by their kernels and by plain loops, and a state-based material from
-//! outside of the crate.
+//! Checks for every material: the five bond laws, by their kernels and by plain loops, and a state-based
+//! material from outside the crate.
 
 use crate::bodies::{Body, Built, MODULUS, Random, laws, scatter};
 use crate::linear_solid::{LinearSolid, poisson_ratio};
 use evidence::near;
 use peri::bonds::{BodyGeometry, Bonds, Overstretched};
 use peri::field::Field;
-use peri::material::{BondMaterial, LawCover, Material, Pointwise, Response};
+use peri::material::{BondMaterial, LawCover, Material, Pointwise, SolverMaterial};
 use peri::solver::{
     Breaking, DynamicRelaxation, Lbfgs, Method, Policy, State, Status, System, VelocityVerlet,
 };
 
-/// Makes a material at work in a body.
-pub type Make<'m, const D: usize> = &'m dyn Fn(&dyn Bonds<D>) -> Box<dyn Response<D> + 'm>;
+/// Builds the response of a material in a body.
+pub type Make<'m, const D: usize> = &'m dyn Fn(&dyn Bonds<D>) -> Box<dyn SolverMaterial<D> + 'm>;
 
-/// Bonds, a material at work in them, and where they are.
+/// Body under test: bonds, the response of a material, and positions.
 struct Case<'a, 'm, const D: usize> {
     name: String,
     bonds: &'a mut dyn Bonds<D>,
-    material: Box<dyn Response<D> + 'm>,
+    material: Box<dyn SolverMaterial<D> + 'm>,
     displacement: Field<D>,
 }
 
@@ -30,7 +30,7 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
         Self { name, bonds, material, displacement }
     }
 
-    /// Forces V F, N, of all sites.
+    /// Returns forces V F, N, of all sites.
     fn forces(&mut self, displacement: &Field<D>) -> Field<D> {
         self.material.prepare(self.bonds, displacement);
         let mut force = Field::zeros(self.bonds.sites());
@@ -65,7 +65,7 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
         field.components().iter().flat_map(|c| c.iter()).fold(0.0, |m, x| m.max(x.abs()))
     }
 
-    /// V F = −∂E/∂u by central differences, in some components.
+    /// Checks V F = −∂E/∂u by central differences, in some components.
     fn forces_are_slopes_of_the_energy(&mut self) {
         let at = self.displacement.clone();
         let force = self.forces(&at);
@@ -75,7 +75,8 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
             let [up, down] = [step, -step].map(|by| self.energy(&self.moved(site, axis, by)));
             let slope = (up - down) / (2.0 * step);
             let off = (force.get(site)[axis] + slope).abs() / scale;
-            // truncation (1e-4)²/6 of third derivatives, energies from tables of 1e-9, rounding of E over step·force
+            // truncation (1e-4)²/6 of third derivatives, energies from tables of 1e-9, rounding of E over
+            // step·force
             assert!(
                 off < 2e-6,
                 "{}, site {site}: {:?} against {slope}, {off:.1e}",
@@ -85,7 +86,7 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
         }
     }
 
-    /// Σ V F = 0 and Σ x × V F = 0.
+    /// Checks Σ V F = 0 and Σ x × V F = 0.
     fn momentum_is_conserved(&mut self) {
         let at = self.displacement.clone();
         let force = self.forces(&at);
@@ -107,7 +108,7 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
         assert!(turned < 1e-13 * size * arm, "{}: {turned} of {}", self.name, size * arm);
     }
 
-    /// A rigid rotation after the displacement turns forces and leaves the energy.
+    /// Checks that a rigid rotation after the displacement rotates forces and keeps the energy.
     fn is_objective(&mut self) {
         let (sine, cosine) = 0.7_f64.sin_cos();
         let turn = |x: [f64; D]| {
@@ -133,7 +134,8 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
         }
     }
 
-    /// K ≤ 2 diag(s V): the greatest eigenvalue of diag(sV)^(−½) K diag(sV)^(−½), K by differences of forces.
+    /// Checks K ≤ 2 diag(s V): the largest eigenvalue of diag(sV)^(−½) K diag(sV)^(−½), K by differences of
+    /// forces.
     fn stiffness_is_bounded(&mut self) -> f64 {
         let at = self.displacement.clone();
         self.material.prepare(self.bonds, &at);
@@ -168,7 +170,7 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
         greatest
     }
 
-    /// A particle whose bonds are severed feels nothing, and nothing feels it.
+    /// Checks that a particle without bonds neither has nor exerts forces.
     fn broken_bonds_carry_nothing(&mut self) {
         let sites = self.sites();
         let lone = sites[sites.len() / 2];
@@ -188,7 +190,7 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
             });
         }
         assert!(!list.is_empty());
-        self.bonds.sever(&list);
+        self.bonds.break_bonds(&list);
         let at = self.displacement.clone();
         let before = self.forces(&at);
         let away = self.moved(lone, 0, 0.3 * self.bonds.spacing());
@@ -199,7 +201,7 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
     }
 }
 
-/// Random displacements of a twentieth of a spacing on a stretch of 6 %.
+/// Returns random displacements of a twentieth of a spacing on a stretch of 6 %.
 fn displaced<const D: usize>(built: &Built<D>, spacing: f64) -> Vec<[f64; D]> {
     let random = Random(11).vectors(built.points.len(), 0.05 * spacing);
     let moved = |(x, r): (&[f64; D], [f64; D])| {
@@ -211,7 +213,7 @@ fn displaced<const D: usize>(built: &Built<D>, spacing: f64) -> Vec<[f64; D]> {
     built.points.iter().zip(random).map(moved).collect()
 }
 
-/// The whole battery, on a damaged body, as a lattice and as a cloud; the greatest λ(K)/s V observed.
+/// Runs all checks on a damaged body, as a lattice and as a cloud; returns the largest λ(K)/s V.
 pub fn battery<const D: usize>(name: &str, cells: [usize; D], make: Make<D>) -> f64 {
     let body = Body::damaged(cells, 0.1, 3.015);
     let mut built = body.build();
@@ -229,7 +231,7 @@ pub fn battery<const D: usize>(name: &str, cells: [usize; D], make: Make<D>) -> 
     greatest
 }
 
-/// The checks of the battery, on one body.
+/// Runs all checks on one body.
 pub fn checks<const D: usize>(
     name: String,
     bonds: &mut dyn Bonds<D>,
@@ -270,7 +272,7 @@ fn a_material_from_outside_passes() {
     println!("λmax(K)/s V of the linear solid: {plane:.3} in the plane, {space:.3} in space; the bound is 2");
 }
 
-/// Kernels and plain loops are one material.
+/// Kernels agree with plain loops.
 #[test]
 fn loops_agree_with_kernels() {
     for (law, potential) in laws() {
@@ -292,7 +294,8 @@ fn loops_agree_with_kernels() {
         for d in 0..2 {
             let pairs = found[0].0.components()[d].iter().zip(found[1].0.components()[d]);
             let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / scale;
-            // the fit's bound of 1e-10 on every bond; of laws under stress at rest bonds cancel to a hundredth
+            // the fit's bound of 1e-10 on every bond; of laws under stress at rest bonds cancel to a
+            // hundredth
             assert!(apart < 1e-8, "{}: {apart:.1e}", law.name());
         }
         // tables of energies are within 1e-9 of the largest
@@ -328,8 +331,9 @@ fn the_linear_solid_has_its_bulk_modulus() {
     near("linear_solid_energy_space", density::<3>([5, 5, 4]), exact(3.0), 1e-12 * exact(3.0));
 }
 
-/// What the example prints: Poisson ratios that no bond law has. Along an axis the lattice's sums shear r times as stiffly as the
-/// continuum, r = 2Σ(x² − y²)²/|ξ|² / Σ|ξ|²: (K − rμ)/(K + rμ) up to the free edges, whose families miss a side.
+/// The example has Poisson ratios that no bond law has. Along an axis the shear stiffness of the lattice is r
+/// times that of the continuum, r = 2Σ(x² − y²)²/|ξ|² / Σ|ξ|²: (K − rμ)/(K + rμ) except near free edges,
+/// whose families are incomplete.
 #[test]
 fn the_linear_solid_has_its_poisson_ratio() {
     let stencil = peri::bonds::Stencil::<2>::new(3.015);
@@ -344,7 +348,7 @@ fn the_linear_solid_has_its_poisson_ratio() {
     }
 }
 
-/// How a plate is pulled.
+/// Method by which a plate is pulled.
 #[derive(Clone, Copy)]
 enum Scheme {
     Relaxation,
@@ -352,8 +356,8 @@ enum Scheme {
     Verlet,
 }
 
-/// A plate of the linear solid in two work items, its right grip moved by 2 %, in dynamics within 1 s; `setting` is the tolerance, or
-/// the part of the critical time step.
+/// Pulls a plate of the linear solid in two work items by 2 % at its right grip, in dynamics within 1 s;
+/// `setting` is the tolerance or the fraction of the critical time step.
 fn pulled(method: Scheme, setting: f64, threads: usize) -> State<2> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let body = Body::<2>::solid([70, 50], 0.1, 3.015);
@@ -418,8 +422,8 @@ fn methods_agree_on_a_state_based_material() {
     assert!(coarse < 0.02 && fine < coarse / 6.0, "{coarse} {fine}");
 }
 
-/// A notched plate of the linear solid that tears: broken bonds take the energy that the whole body loses, and a resumed run
-/// from a saved state takes the same way to the last bit.
+/// A tearing notched plate of the linear solid: broken bonds release the energy that the body loses, and a
+/// run resumed from a saved state has equal bits.
 #[test]
 fn a_state_based_material_tears() {
     let mut body = Body::<2>::solid([30, 24], 0.1, 3.015);

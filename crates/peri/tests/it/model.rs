@@ -1,4 +1,4 @@
-//! Models in a few lines are what their parts are by hand.
+//! Models in a few lines agree with models built by hand.
 
 use crate::linear_solid::LinearSolid;
 use peri::Error;
@@ -11,7 +11,7 @@ use peri::potential::{BondPotential, Law};
 use peri::solver::{
     Breaking, DynamicRelaxation, Lbfgs, Loads, Method, Policy, State, Support, System, VelocityVerlet,
 };
-use peri::stress::Measure;
+use peri::stress::StressMethod;
 
 const CRACK: [[f64; 2]; 2] = [[0.0, 20e-3], [8e-3, 20e-3]];
 
@@ -20,7 +20,7 @@ fn sheet() -> Body<2> {
     Body::lattice(shape, 2e-3).plane_stress(1e-3).crack(Cut::segment(CRACK[0], CRACK[1]))
 }
 
-/// The cracked sheet, torn in three steps, by hand.
+/// Tears the cracked sheet in three steps, built by hand.
 fn by_hand() -> (LatticeBonds<2>, State<2>) {
     let body = [Operation::Add(Shape::Box { min: [0.0; 2], max: [24e-3, 40e-3] })];
     let crack = Cut { corner: CRACK[0], edges: [[8e-3, 0.0], [0.0; 2]] };
@@ -64,11 +64,11 @@ fn a_model_is_its_parts() {
     assert!(seen >= 3 && simulation.history().len() == 3);
     let particles = bonds.particles().len();
     assert_eq!(simulation.displacements().count(), particles);
-    let stress = simulation.cauchy(Measure::Hardy).unwrap();
+    let stress = simulation.cauchy(StressMethod::Hardy).unwrap();
     assert!(stress.len() == particles && stress.iter().flatten().flatten().all(|x| x.is_finite()));
 }
 
-/// One method goes on where another one ended: further load steps, then motion.
+/// A method continues the state of another: further load steps, then motion.
 #[test]
 fn a_simulation_goes_on() {
     let model = Model::new(sheet(), Rubber::new(Law::Linear, 1e6));
@@ -86,7 +86,7 @@ fn a_simulation_goes_on() {
     assert_eq!(simulation.history().len(), 2);
 }
 
-/// A material from outside the crate, and a crack that opens as it must.
+/// A crack opens correctly with a material from outside the crate.
 #[test]
 fn any_material() {
     let solid = LinearSolid { bulk: 9e6.into(), shear: 1e6.into() };
@@ -102,7 +102,8 @@ fn any_material() {
     assert!(opening(1e-3) > 3.0 * opening(23e-3), "{} {}", opening(1e-3), opening(23e-3));
 }
 
-/// A law of the caller, whatever its scale, is the named one of the same shape; so is the stretch of a fracture energy.
+/// A law of the caller at any scale equals the named law of its shape, and so does the stretch of a fracture
+/// energy.
 #[test]
 fn a_law_of_the_caller() {
     struct Springs(f64);
@@ -123,7 +124,7 @@ fn a_law_of_the_caller() {
         simulation.solve(Lbfgs::default()).unwrap();
         simulation
     };
-    let (ours, theirs) = (torn(Rubber::of_law(Springs(0.7), 1e6)), torn(Rubber::new(Law::Linear, 1e6)));
+    let (ours, theirs) = (torn(Rubber::with_law(Springs(0.7), 1e6)), torn(Rubber::new(Law::Linear, 1e6)));
     assert!(theirs.state.fracture.broken > 0);
     assert_eq!(ours.bonds.intact(), theirs.bonds.intact());
     let peak = theirs.history().iter().map(|record| record.load.abs()).fold(0.0, f64::max);
@@ -132,7 +133,7 @@ fn a_law_of_the_caller() {
         let allowed = 1e-8 * b.load.abs() + 1e-8 * peak;
         assert!((a.load - b.load).abs() <= allowed, "{} {}", a.load, b.load);
     }
-    let slack = Model::new(sheet(), Rubber::of_law(Springs(0.0), 1e6)).build();
+    let slack = Model::new(sheet(), Rubber::with_law(Springs(0.0), 1e6)).build();
     let message = slack.err().map(|error| error.to_string()).unwrap_or_default();
     assert!(message.starts_with("t′(1) of the bond law: found 0"), "{message}");
 }

@@ -1,12 +1,12 @@
-//! The time step of explicit dynamics of solids: a bound of the greatest frequency at any stretch and with bonds broken, and steps that
-//! follow it through stretching, tearing, crushing and back.
+//! Time step of explicit dynamics of solids: a bound of the largest frequency at any stretch and with broken
+//! bonds, and steps that follow it through stretching, tearing, crushing and back.
 
 use crate::bodies::{Random, hold};
 use evidence::{at_most, within};
 use peri::bonds::{BodyGeometry, BondDamage, Bonds, LatticeBonds, Overstretched, VolumeCorrection};
 use peri::calibrate::Space;
 use peri::geometry::{Cut, Operation, Shape, lattice};
-use peri::material::{Affine, Correspondence, EightChain, Material, NonlocalSolid};
+use peri::material::{Affine, Correspondence, EightChainSolid, Material, NonlocalSolid};
 use peri::solver::{Breaking, Criterion, Loads, Method, Policy, State, Status, System, VelocityVerlet};
 use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric};
 
@@ -19,8 +19,8 @@ fn neo_hooke<const D: usize>(
     NonlocalSolid(Correspondence::new(law, space).unwrap())
 }
 
-fn rubber<const D: usize>(space: Space, bulk: f64) -> NonlocalSolid<EightChain<D>> {
-    NonlocalSolid(EightChain::new(space, 1.0, 25.0, bulk).unwrap())
+fn rubber<const D: usize>(space: Space, bulk: f64) -> NonlocalSolid<EightChainSolid<D>> {
+    NonlocalSolid(EightChainSolid::new(space, 1.0, 25.0, bulk).unwrap())
 }
 
 fn block<const D: usize>(cells: [usize; D]) -> LatticeBonds<D> {
@@ -28,7 +28,7 @@ fn block<const D: usize>(cells: [usize; D]) -> LatticeBonds<D> {
     LatticeBonds::new(lattice(&body, 1.0, 1.0).unwrap(), 3.015, VolumeCorrection::None, &[]).unwrap()
 }
 
-/// A part of the bonds, each from both ends.
+/// Selects a fraction of the bonds, each from both ends.
 fn some<const D: usize>(bonds: &dyn Bonds<D>, part: f64, random: &mut Random) -> Vec<Overstretched> {
     let mut ends = Vec::new();
     for &site in bonds.particles() {
@@ -53,8 +53,8 @@ fn some<const D: usize>(bonds: &dyn Bonds<D>, part: f64, random: &mut Random) ->
     list
 }
 
-/// The bound over ω², which the Lanczos iteration finds to 1 %, at stretches of 1 to 3 with 0, 20 and 50 % of the bonds broken and with
-/// particles displaced at random: least and greatest.
+/// Returns the smallest and the largest bound over ω² (Lanczos iteration to 1 %), at stretches of 1 to 3 with
+/// 0, 20 and 50 % of the bonds broken and random displacements.
 fn tightness<const D: usize, M: Material<D> + 'static>(
     cells: [usize; D],
     material: impl Fn() -> M,
@@ -68,7 +68,7 @@ fn tightness<const D: usize, M: Material<D> + 'static>(
                 let mut random = Random(5);
                 let list = some(&bonds, broken, &mut random);
                 let response = material().respond(&bonds);
-                bonds.sever(&list);
+                bonds.break_bonds(&list);
                 let mut state = State::new(bonds.sites());
                 let lateral = stretch.powf(-across);
                 for &site in bonds.particles() {
@@ -92,8 +92,9 @@ fn tightness<const D: usize, M: Material<D> + 'static>(
     found
 }
 
-/// What steps are made for is 1.3 ω² at least (the margin), and not much more: 16 times only in plane stress of finite K, where the law's own
-/// bound does not follow the thickness, and 40 times for the network, whose bound is that of Gershgorin with the stiffest neighbour.
+/// The bound is at least 1.3 ω² (the margin), and not much more: 16 times in plane stress of finite K, where
+/// the bound of the law ignores the thickness, and 40 times for the network, with Gershgorin's bound by the
+/// stiffest neighbour.
 #[test]
 fn frequencies_are_bounded_at_any_stretch_and_damage() {
     let judge = |name: &str, limit: f64, [least, most]: [f64; 2]| {
@@ -113,7 +114,8 @@ fn frequencies_are_bounded_at_any_stretch_and_damage() {
     judge("network_cube_2", 45.0, tightness(cube, || Affine::new(1.0, 25.0, 5.0 / 3.0).unwrap(), 0.5));
 }
 
-/// Pulls to three times the length within two passes of a wave, holds, and lets go: energies stay closed and the step comes back.
+/// Stretching to three times the length within two wave passes, holding and releasing keeps the energy
+/// balance and restores the step.
 fn pulled<const D: usize, M: Material<D> + 'static>(name: &str, cells: [usize; D], material: M) {
     let mut bonds = block(cells);
     let length = cells[0] as f64;
@@ -142,11 +144,13 @@ fn pulled<const D: usize, M: Material<D> + 'static>(name: &str, cells: [usize; D
     let mut state = State::new(system.bonds.sites());
     solver.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
     let turned = state.history.iter().map(|row| row.work.abs()).fold(0.0, f64::max);
-    let off = |row: &peri::solver::Record| (row.work - row.stored - row.kinetic - row.damped).abs() / turned;
+    let off =
+        |row: &peri::solver::StepRecord| (row.work - row.stored - row.kinetic - row.damped).abs() / turned;
     let worst = state.history.iter().map(off).fold(0.0, f64::max);
     let most = state.history.iter().map(|row| row.largest_stretch).fold(0.0, f64::max);
     println!(
-        "{name}: {} steps, {} forces, {} bounds, {} searches, stretch {most:.2}, energies off by {worst:.1e}, step {:.4} of {:.4} at rest",
+        "{name}: {} steps, {} forces, {} bounds, {} searches, stretch {most:.2}, energies off by \
+         {worst:.1e}, step {:.4} of {:.4} at rest",
         state.counts.total_iterations,
         state.counts.evaluations,
         state.motion.limits.bounds,
@@ -172,7 +176,7 @@ fn steps_follow_stretches_and_come_back() {
     pulled("network", [12, 5, 5], Affine::new(1.0, 25.0, 5.0 / 3.0).unwrap());
 }
 
-/// A notched sheet, torn apart within three passes of a wave without contact: fragments crush and tumble.
+/// Tears a notched sheet within three wave passes without contact, so that fragments are crushed and rotate.
 fn torn(pause: Option<u64>) -> State<2> {
     let build = || {
         let body = [Operation::Add(Shape::Box { min: [0.0; 2], max: [20.0, 26.0] })];
@@ -218,7 +222,8 @@ fn torn_solids_keep_a_stable_step() {
     let last = one.history.last().unwrap();
     let off = (last.work - last.stored - last.kinetic - last.damped - last.released).abs() / last.work;
     println!(
-        "torn: {} steps, {} forces, {} bounds, {} searches, {} broken, energies off by {off:.1e} of {:.3}, step {:.2e} of {:.2e} at rest",
+        "torn: {} steps, {} forces, {} bounds, {} searches, {} broken, energies off by {off:.1e} of {:.3}, \
+         step {:.2e} of {:.2e} at rest",
         one.counts.total_iterations,
         one.counts.evaluations,
         one.motion.limits.bounds,

@@ -1,4 +1,5 @@
-//! Bodies of several parts, slots, cracks of several facets, weak layers: who is bonded to whom, and at which load they part.
+//! Bodies of several parts, slots, cracks of several facets, weak layers: bonds between parts, and loads at
+//! separation.
 
 use harness::case::{Case, Options, Run};
 use harness::output::vtkhdf;
@@ -8,10 +9,10 @@ use peri::bonds::{
 };
 use peri::geometry::{Cut, Gaps, Operation, Shape, lattice};
 use peri::model::Body;
-use peri::program::run::{Finished, Peri, run};
+use peri::program::run::{FinishedScene, Peri, run};
 use peri::program::scene::Scene;
 
-fn solve(text: &str) -> Finished {
+fn solve(text: &str) -> FinishedScene {
     let directory = tempfile::tempdir().unwrap();
     let source =
         Source::new("scene.toml", text.to_owned() + "\n[output]\nfields = false\npictures = false\n");
@@ -20,7 +21,7 @@ fn solve(text: &str) -> Finished {
     run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn value(finished: &Finished, name: &str) -> f64 {
+fn value(finished: &FinishedScene, name: &str) -> f64 {
     finished.report.scalar(name).unwrap_or_else(|| panic!("no {name} in\n{}", finished.report.table()))
 }
 
@@ -40,7 +41,7 @@ fn slot<const D: usize>(min: [f64; D], max: [f64; D]) -> Operation<D> {
     Operation::Cut(Shape::Box { min, max })
 }
 
-/// Bonds of a lattice of spacing 1 in shapes, with and without their gaps.
+/// Returns the bonds of a lattice of spacing 1 in shapes, with and without gaps.
 fn build<const D: usize>(operations: &[Operation<D>]) -> [LatticeBonds<D>; 2] {
     let cells = lattice(operations, 1.0, 1.0).unwrap();
     let gaps = Gaps::of_shapes(operations, &cells, 3.015);
@@ -48,7 +49,7 @@ fn build<const D: usize>(operations: &[Operation<D>]) -> [LatticeBonds<D>; 2] {
     [LatticeBonds::with_gaps(cells, 3.015, VolumeCorrection::None, &[], gaps.as_ref()).unwrap(), whole]
 }
 
-/// Particles of each part.
+/// Counts the particles of each part.
 fn parts<const D: usize>(operations: &[Operation<D>]) -> Vec<usize> {
     let [bonds, whole] = build(operations);
     assert_eq!(fragments(&whole).len(), 1, "all within the horizon");
@@ -57,7 +58,8 @@ fn parts<const D: usize>(operations: &[Operation<D>]) -> Vec<usize> {
     sizes
 }
 
-/// Gaps of one spacing and of a hundredth, round shapes, points and edges of contact, a sleeve around a shaft: counted by hand.
+/// Parts counted by hand: gaps of one spacing and of a hundredth, round shapes, points and edges of contact,
+/// a sleeve around a shaft.
 #[test]
 fn parts_that_do_not_touch() {
     let blocks = |gap: f64| [boxed([0.0; 2], [8.0, 5.0]), boxed([0.0, 5.0 + gap], [8.0, 10.0 + gap])];
@@ -97,7 +99,8 @@ fn parts_that_do_not_touch() {
     assert_eq!(parts(&thin).len(), 1, "joined by a plate that holds no particle");
 }
 
-/// A slot narrower than the horizon severs what a crack along its middle severs; corners and wide holes keep their bonds.
+/// A slot narrower than the horizon severs what a crack along its middle severs; corners and wide holes keep
+/// their bonds.
 #[test]
 fn slots_sever_bonds() {
     let body = boxed([0.0; 2], [16.0, 11.0]);
@@ -143,7 +146,7 @@ fn slots_sever_bonds() {
     assert!(bonds.is_bonded(at(3.5, 4.5), at(4.5, 3.5)), "at the root");
 }
 
-/// The model of the library leaves gaps, too; points that form a lattice have parts, others have where they are asked for.
+/// Models of the library keep gaps; points that form a lattice have parts, other points only on request.
 #[test]
 fn models_and_clouds() {
     let body = || {
@@ -192,8 +195,8 @@ displacement = ["0 mm", "-PRESS mm"]
 steps = 4
 "#;
 
-/// A free block between two plates: no load before both gaps of 1 mm are closed; then that of a body in contact. With bonds across the
-/// gaps it is 0.820 N at 1 mm, as it was without a word.
+/// A free block between two plates has no load before both gaps of 1 mm close, then that of a body in
+/// contact. With bonds across the gaps the load is 0.820 N at 1 mm.
 #[test]
 fn a_block_between_plates_is_pressed_when_gaps_close() {
     let text = BOXES.replace("PRESS", "1");
@@ -213,7 +216,7 @@ fn a_block_between_plates_is_pressed_when_gaps_close() {
     assert!(check(&bonded).contains("1 and 2 are bonded across a gap by"), "{}", check(&bonded));
 }
 
-fn layered(shape: &str, more: &str) -> Finished {
+fn layered(shape: &str, more: &str) -> FinishedScene {
     solve(&format!(
         r#"version = 1
 program = "peri"
@@ -242,14 +245,16 @@ stop_below = 0.02
     ))
 }
 
-/// A strip of 20 mm² with a weak layer breaks there, at E (λ − 1) A = 2.0 N of a stretch of 1.05; without the layer it bears more than
-/// twice that. Layers of one spacing, of a tenth between two columns of particles, two of them, and an oblique stair.
+/// A strip of 20 mm² breaks in its weak layer at E (λ − 1) A = 2.0 N, λ = 1.05; without the layer it carries
+/// more than twice that. Layers of one spacing, of a tenth between two columns of particles, two layers, and
+/// an oblique staircase.
 #[test]
 fn weak_layers_break_at_their_own_strength() {
     let weak = |x: f64, width: f64, stretch: f64| {
         let end = x + width;
         format!(
-            "{{ shape = {{ add = \"box\", min = [\"{x} mm\", \"-5 mm\"], max = [\"{end} mm\", \"5 mm\"] }}, critical = {{ stretch = {stretch} }} }}"
+            "{{ shape = {{ add = \"box\", min = [\"{x} mm\", \"-5 mm\"], max = [\"{end} mm\", \"5 mm\"] }}, \
+             critical = {{ stretch = {stretch} }} }}"
         )
     };
     let layers = [
@@ -277,8 +282,10 @@ space = "solid"
 spacing = "1 mm"
 shapes = [{ add = "box", min = ["-6 mm", "-6 mm", "-9 mm"], max = ["6 mm", "6 mm", "9 mm"] }]
 cracks = [
- { from = ["-7 mm", "-7 mm", "0.13 mm"], to = ["0.5 mm", "-7 mm", "0.71 mm"], and = ["-7 mm", "7 mm", "0.13 mm"] },
- { from = ["0.5 mm", "-7 mm", "0.71 mm"], to = ["7 mm", "-7 mm", "0.29 mm"], and = ["0.5 mm", "7 mm", "CORNER mm"] },
+ { from = ["-7 mm", "-7 mm", "0.13 mm"], to = ["0.5 mm", "-7 mm", "0.71 mm"], and = [
+  "-7 mm", "7 mm", "0.13 mm"] },
+ { from = ["0.5 mm", "-7 mm", "0.71 mm"], to = ["7 mm", "-7 mm", "0.29 mm"], and = [
+  "0.5 mm", "7 mm", "CORNER mm"] },
 ]
 [material]
 youngs_modulus = "2 MPa"
@@ -292,7 +299,8 @@ side = "z+"
 displacement = ["0 mm", "0 mm", "1 mm"]
 "#;
 
-/// Facets whose corners are rounded meet; facets that miss each other by more give a warning. The whole block bears more than 3 N.
+/// Facets whose corners are rounded meet; facets that miss each other by more give a warning. The whole block
+/// bears more than 3 N.
 #[test]
 fn facets_meet() {
     for corner in ["0.71", "0.710001", "0.7099", "0.7105"] {
@@ -306,7 +314,8 @@ fn facets_meet() {
     assert!(told.contains("warning    body.cracks[0] misses body.cracks[1] by"), "{told}");
 }
 
-/// In the plane: ends that meet within a thousandth of the spacing, that miss each other, and that stop before the surface.
+/// Plane cracks with ends that meet within a thousandth of the spacing, that miss each other, and that stop
+/// before the surface.
 #[test]
 fn segments_meet() {
     let strip = |cracks: &str| {
@@ -334,7 +343,8 @@ displacement = ["0 mm", "1 mm"]
     };
     let two = |x: f64, y: f64| {
         strip(&format!(
-            "{{ from = [\"-1 mm\", \"10 mm\"], to = [\"5 mm\", \"10.2 mm\"] }}, {{ from = [\"{x} mm\", \"{y} mm\"], to = [\"11 mm\", \"9.9 mm\"] }}"
+            "{{ from = [\"-1 mm\", \"10 mm\"], to = [\"5 mm\", \"10.2 mm\"] }}, {{ from = [\"{x} mm\", \"{y} \
+             mm\"], to = [\"11 mm\", \"9.9 mm\"] }}"
         ))
     };
     for (x, y) in [(5.0, 10.2), (5.0003, 10.2), (5.0, 10.2003), (4.9997, 10.1997)] {
@@ -351,8 +361,8 @@ displacement = ["0 mm", "1 mm"]
     assert!(!check(&long).contains("warning"), "{}", check(&long));
 }
 
-/// Damage counts what cracks of the scene break: of each particle the part of its bonds that a body without the crack has more, with and
-/// without bonds that may break.
+/// Damage includes bonds that cracks of the scene break: the missing fraction of the bonds of a body without
+/// the crack, with and without breaking bonds.
 #[test]
 fn cracks_are_damage() {
     let body = [boxed([0.0; 2], [10e-3, 20e-3])];
@@ -402,7 +412,8 @@ pictures = false
     }
 }
 
-/// Grips of whole layers change the free length with the spacing; grips of a length that all spacings divide do not.
+/// Grips of whole layers change the free length with the spacing; grips of a length that all spacings divide
+/// do not.
 #[test]
 fn free_lengths_of_a_study() {
     let told = |depth: &str| {
@@ -441,7 +452,8 @@ spacing = ["1 mm", "2 mm"]
     assert!(told("depth = \"5 mm\"").contains("38.0000 mm at 1.0000 mm"), "{}", told("depth = \"5 mm\""));
 }
 
-/// A spacing of a nanometre, or a horizon of millions of spacings: errors that name cells and bytes, before memory is asked for.
+/// A spacing of a nanometre or a horizon of millions of spacings gives an error with cells and bytes before
+/// any allocation.
 #[test]
 fn bodies_larger_than_memory_are_refused() {
     let build = |spacing: f64, ratio: f64| {

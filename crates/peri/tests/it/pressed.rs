@@ -1,4 +1,5 @@
-//! Bodies pressed onto each other, in equilibrium: springs in series, flanks of a crack, no list in any bit.
+//! Bodies pressed together in equilibrium: springs in series, flanks of a crack, results independent of the
+//! list of pairs.
 
 use crate::bodies::{Body, Built, MODULUS, Slit, distance, hold, rms};
 use peri::bonds::{BodyGeometry, Bonds};
@@ -10,7 +11,7 @@ use peri::solver::{
     load_stepping,
 };
 
-/// A solver's run of a body with contact of a given stiffness and skin (in spacings), or none.
+/// Run of a body with contact of a given stiffness and skin (in spacings), or without contact.
 struct Run<'a, const D: usize> {
     bonds: &'a mut dyn Bonds<D>,
     loads: &'a Loads<D>,
@@ -21,7 +22,7 @@ struct Run<'a, const D: usize> {
 }
 
 impl<const D: usize> Run<'_, D> {
-    /// How often the list was made.
+    /// Number of list rebuilds.
     fn solve(
         self,
         method: &mut dyn Equilibrium<D>,
@@ -44,20 +45,20 @@ impl<const D: usize> Run<'_, D> {
     }
 }
 
-/// Dynamic relaxation and L-BFGS.
+/// Returns dynamic relaxation and L-BFGS.
 fn methods<const D: usize>(tolerance: f64) -> [Box<dyn Equilibrium<D>>; 2] {
     let relaxation = DynamicRelaxation { tolerance, max_iterations: 20_000, ..Default::default() };
     let memory = Lbfgs { tolerance, max_iterations: 2000, ..Default::default() };
     [Box::new(RelaxationSolver::new(relaxation)), Box::new(LbfgsSolver::new(memory))]
 }
 
-/// What touches in the last step.
+/// Returns the contacts of the last step.
 fn touching<const D: usize>(state: &State<D>) -> ContactSummary {
     state.history.last().unwrap().contact.unwrap()
 }
 
-/// Two rows of five particles, one above the other, on linear bonds 6kθV²/Δ, pressed by u through the contact spring
-/// κ(6kθ/δ)V² with its gap of a tenth of a spacing: F = (u − 0.1Δ)/Σ 1/k, E = ½F(u − 0.1Δ).
+/// Two rows of five particles, one above the other, on linear bonds 6kθV²/Δ, pressed by u through the contact
+/// spring κ(6kθ/δ)V² with its gap of a tenth of a spacing: F = (u − 0.1Δ)/Σ 1/k, E = ½F(u − 0.1Δ).
 #[test]
 fn springs_in_series() {
     let mut body = Body::<2>::solid([1, 10], 1.0, 1.015);
@@ -105,9 +106,9 @@ fn springs_in_series() {
     }
 }
 
-/// Elastic blocks, separated by a cut, pressed together: no force until the gap of a tenth of a spacing closes, then
-/// both grips feel the same, growing with the approach, and the loads' work is stored. Particles are guided along y: the
-/// rows, which stand face to face, would slip aside, to the left or to the right.
+/// Elastic blocks separated by a cut and pressed together have no force until the gap of a tenth of a spacing
+/// closes; then both grips have equal forces, which grow with the approach, and the work of loads is stored.
+/// Particles are guided along y, because opposite rows would slip sideways.
 #[test]
 fn elastic_blocks_press_each_other() {
     let mut body = Body::<2>::solid([24, 20], 1.0, 3.015);
@@ -175,8 +176,8 @@ fn bits<const D: usize>(state: &State<D>) -> Vec<u64> {
     numbers.map(f64::to_bits).chain([state.counts.total_iterations, state.fracture.broken]).collect()
 }
 
-/// A sheet with a crack of zero width across most of it, pressed upon and sheared by twice as much, so that the flanks
-/// slide over and into each other.
+/// Sheet with a crack of zero width across most of it, compressed and sheared by twice as much, so that the
+/// flanks slide over and into each other.
 fn sheet(cells: usize, down: f64) -> (Built<2>, impl Fn(&dyn Bonds<2>) -> Loads<2>) {
     let n = cells as f64;
     let mut body = Body::<2>::solid([cells, cells], 1.0, 3.015);
@@ -189,7 +190,7 @@ fn sheet(cells: usize, down: f64) -> (Built<2>, impl Fn(&dyn Bonds<2>) -> Loads<
     (body.build(), loads)
 }
 
-/// κ = 0 shows how deeply flanks pass through each other without contact.
+/// κ = 0 records the overlap of flanks without contact.
 #[test]
 fn flanks_do_not_interpenetrate() {
     let factors: Vec<f64> = (1..=10).map(|k| 0.1 * f64::from(k)).collect();
@@ -216,14 +217,14 @@ fn flanks_do_not_interpenetrate() {
                 );
                 touching.overlap
             });
-            // without it flanks pass through each other; with it they overlap by what presses them together over κ:
-            // a strain of 4/24 over 15, some three times that at the crack's ends
+            // without it flanks pass through each other; with it they overlap by what presses them together
+            // over κ: a strain of 4/24 over 15, some three times that at the crack's ends
             assert!(deepest[0] > 0.5 && deepest[1] < 0.25, "{deepest:?}");
         }
     }
 }
 
-/// Threads, the list's skin and a restart in the middle of it all, while bonds break.
+/// Bits do not depend on threads, the skin of the list and a restart, while bonds break.
 #[test]
 fn neither_threads_nor_lists_nor_restarts_change_a_bit() {
     let run = |which: usize, threads: usize, skin: f64, cloud: bool, from: Option<State<2>>, save: u64| {
@@ -263,7 +264,8 @@ fn neither_threads_nor_lists_nor_restarts_change_a_bit() {
     }
 }
 
-/// Where nothing touches, contact changes no bit, a mere look at what does never does, and none is built unless requested.
+/// Contact changes no bit if nothing touches, recording overlaps never does, and contact is not built unless
+/// requested.
 #[test]
 fn contact_without_touch_changes_no_bit() {
     let solve = |which: usize, contact: Option<[f64; 2]>| {

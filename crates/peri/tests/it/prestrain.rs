@@ -6,16 +6,16 @@ use evidence::near;
 use peri::bonds::{BodyGeometry, Bonds, StretchScan};
 use peri::calibrate::modulus_in;
 use peri::field::Field;
-use peri::material::{BondMaterial, Material, Pointwise, Prestrained, Response};
+use peri::material::{BondMaterial, Material, Pointwise, Prestrained, SolverMaterial};
 use peri::potential::LinearBond;
 use peri::solver::{Lbfgs, Loads, Method, State, System};
 
-/// A linear law of E = 1 Pa.
+/// Returns a linear law of E = 1 Pa.
 fn linear<const D: usize>(bonds: &dyn Bonds<D>) -> BondMaterial<'static> {
     BondMaterial::new(LinearBond, modulus_in(bonds, 1.0))
 }
 
-/// −σ of a particle in the middle of a body that is held where it is.
+/// Returns −σ of a particle in the middle of a body that is held in its shape.
 fn held<const D: usize>(cells: [usize; D], strain: [[f64; D]; D]) -> [[f64; D]; D] {
     let built = Body::<D>::solid(cells, 0.1, 3.015).build();
     let bonds: &dyn Bonds<D> = &built.lattice;
@@ -39,7 +39,8 @@ fn held<const D: usize>(cells: [usize; D], strain: [[f64; D]; D]) -> [[f64; D]; 
     stress
 }
 
-/// σ = −C:ε* but for the lattice's own stiffness: 1.025400 and 1.060602 in a sheet (ν = 1/3), 1.098710 and 0.956590 in a solid (ν = 1/4).
+/// σ = −C:ε* with the stiffness of the lattice: 1.025400 and 1.060602 in a sheet (ν = 1/3), 1.098710 and
+/// 0.956590 in a solid (ν = 1/4).
 #[test]
 fn a_held_block() {
     let e = 1e-8;
@@ -86,7 +87,7 @@ fn a_free_body_is_free_of_stress() {
     }
 }
 
-/// What every material satisfies, with a prestrain that varies from particle to particle.
+/// Bonds with a prestrain that varies from particle to particle pass the checks of all materials.
 #[test]
 fn prestrained_bonds_pass() {
     fn strains<const D: usize>(sites: usize) -> Vec<[[f64; D]; D]> {
@@ -107,7 +108,7 @@ fn prestrained_bonds_pass() {
     }
 }
 
-/// A strip of particles of size 1 that rests on its lower corners.
+/// Builds a strip of particles of size 1 that rests on its lower corners.
 fn resting(bonds: &dyn Bonds<2>, right: f64) -> Loads<2> {
     hold(bonds, |[x, y]| match (x, y) {
         (x, y) if x < 1.0 && y < 1.0 => Some((3, [0.0; 2])),
@@ -116,7 +117,7 @@ fn resting(bonds: &dyn Bonds<2>, right: f64) -> Loads<2> {
     })
 }
 
-/// κH/|ε*| of a strip whose upper half shrinks; 1.5 of a beam.
+/// Returns κH/|ε*| of a strip whose upper half shrinks; 1.5 for a beam.
 fn bimetal([nx, ny]: [usize; 2]) -> f64 {
     const SHRINKAGE: f64 = -1e-5;
     let mut built = Body::<2>::solid([nx, ny], 1.0, 3.015).build();
@@ -148,14 +149,15 @@ fn bimetal([nx, ny]: [usize; 2]) -> f64 {
     2.0 * (n * xxy - s2 * y) / (n * s4 - s2 * s2) * top / SHRINKAGE.abs()
 }
 
-/// κH of 0.016005 and 0.015520 for ε* = −1 % in linear theory; displacements of second order are 1e-5 of it here.
+/// Linear theory has κH = 0.016005 and 0.015520 for ε* = −1 %; displacements of second order are 1e-5 of it.
 #[test]
 fn a_bimetal_strip() {
     near("prestrain_bimetal_8", bimetal([60, 8]), 1.600_450_345_685_163, 2e-4);
     near("prestrain_bimetal_16", bimetal([90, 16]), 1.552_044_917_312_378, 2e-4);
 }
 
-/// σ_xx over σ₀ in the rows of the middle of a free strip with the ε* = −S:σ of a stress σ_xx = σ₀(3s² − 1)/2, s from −1 to 1 across it.
+/// Returns σ_xx over σ₀ in the rows of the middle of a free strip with the ε* = −S:σ of a stress σ_xx =
+/// σ₀(3s² − 1)/2, s from −1 to 1 across it.
 fn handed_over([nx, ny]: [usize; 2]) -> Vec<f64> {
     const STRESS: f64 = 1e-5;
     let mut built = Body::<2>::solid([nx, ny], 1.0, 3.015).build();
@@ -193,7 +195,8 @@ fn handed_over([nx, ny]: [usize; 2]) -> Vec<f64> {
     rows.into_iter().map(|(_, stress)| stress).collect()
 }
 
-/// Against a program of its own (docs/reference/print/stress_transfer.py); −0.4965 and 0.8785 of the continuum in the middle and in the outer row.
+/// Stresses agree with an independent program (docs/reference/print/stress_transfer.py); the continuum has
+/// −0.4965 in the middle and 0.8785 in the outer row.
 #[test]
 fn a_stress_is_handed_over() {
     let rows = handed_over([120, 24]);
@@ -210,7 +213,8 @@ fn a_stress_is_handed_over() {
     }
 }
 
-/// A free body with a uniform ε* that is stretched beyond its rest breaks as one without: λ/λ* > λ_c, from both ends.
+/// A free body with a uniform ε* stretched beyond its rest breaks like one without prestrain: λ/λ* > λ_c,
+/// from both ends.
 #[test]
 fn prestrained_bonds_break() {
     let built = Body::<2>::solid([8, 7], 0.1, 3.015).build();

@@ -1,4 +1,4 @@
-//! Dynamic relaxation: the DENT specimen of `dent.py`, work counts, the same bits for any number of threads.
+//! Dynamic relaxation: the DENT specimen of `dent.py`, work counts, equal bits for any number of threads.
 
 use crate::bodies::{Body, hold, relax};
 use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
@@ -10,8 +10,8 @@ use peri::solver::{DynamicRelaxation, Loads, State};
 const THICKNESS: f64 = 3e-3;
 const RATIO: f64 = 3.015;
 
-/// Double-edge-notched tension: 80 × 200 × 3 mm, two cracks of `notch` from the sides, three layers clamped at both ends
-/// and pulled apart by 20 mm; E = 0.6 MPa.
+/// Double-edge-notched tension: 80 × 200 × 3 mm, two cracks of `notch` from the sides, three layers clamped
+/// at both ends and pulled apart by 20 mm; E = 0.6 MPa.
 struct Dent {
     bonds: LatticeBonds<2>,
     loads: Loads<2>,
@@ -27,7 +27,8 @@ impl Dent {
             min: [-width / 2.0, -height / 2.0],
             max: [width / 2.0, height / 2.0],
         })];
-        // a bond through the very tip counts as crossing the crack here and as intact in dent.py: end it just before
+        // a bond through the very tip counts as crossing the crack here and as intact in dent.py: end it just
+        // before
         let crack = |side: f64| Cut {
             corner: [side * (width / 2.0 + 1e-3), 0.0],
             edges: [[-side * (notch + 1e-3 - 1e-9), 0.0], [0.0; 2]],
@@ -50,7 +51,7 @@ impl Dent {
         state
     }
 
-    /// Mean of both grips' reactions, N.
+    /// Returns the mean reaction of both grips, N.
     fn pull(&self, state: &State<2>) -> f64 {
         let volume = self.spacing * self.spacing * THICKNESS;
         let each = self.bonds.particles().iter().map(|&s| {
@@ -71,8 +72,8 @@ fn dent_at_four_millimetres() {
     let pull = dent.pull(&state);
     assert!((pull / 14.069 - 1.0).abs() < 1e-3, "{pull} N");
     eprintln!("dent, dx = 4: {pull:.4} N, {} iterations in 10 steps", state.counts.total_iterations);
-    // formulation.md: 150–195 iterations to 1e-3 and 310–330 to 1e-6 for one elastic step, from half the affine strain
-    // (`s7_adr.py`); from the whole of it, as here, 76 and 139 were measured
+    // formulation.md: 150–195 iterations to 1e-3 and 310–330 to 1e-6 for one elastic step, from half the
+    // affine strain (`s7_adr.py`); from the whole of it, as here, 76 and 139 were measured
     for (tolerance, most) in [(1e-3, 100), (1e-6, 180)] {
         let state = dent.relax(tolerance, &[1.0]);
         let (pull, iterations) = (dent.pull(&state), state.counts.total_iterations);
@@ -98,7 +99,7 @@ fn dent_at_two_millimetres() {
     }
 }
 
-/// Four work items, so that threads have something to mix up; a lattice and a cloud.
+/// Bits do not depend on threads, with four work items, on a lattice and a cloud.
 #[test]
 fn bits_do_not_depend_on_threads() {
     let run = |threads: usize, cloud: bool| {
@@ -126,7 +127,7 @@ fn bits_do_not_depend_on_threads() {
     }
 }
 
-/// A notched sheet pulled by a tenth under every law that is stress-free.
+/// A notched sheet pulled by a tenth, under every stress-free law.
 #[test]
 fn every_stress_free_law_converges() {
     let mut built = Body::<2>::damaged([30, 24], 0.1, RATIO).build();
@@ -151,7 +152,8 @@ fn every_stress_free_law_converges() {
             iterations.push(state.counts.total_iterations);
         }
         eprintln!("{}: {iterations:?} iterations in two steps to 1e-6", law.name());
-        // both paths see the same forces to rounding and so take the same way, but for the last iteration or two
+        // both paths see the same forces to rounding and so take the same way, but for the last iteration or
+        // two
         assert!(iterations[0].abs_diff(iterations[1]) <= 4, "{}: {iterations:?}", law.name());
     }
 }

@@ -1,4 +1,5 @@
-//! Bodies whose reactions vanish: moved by one grip, cut in two, without loads. A residual over reactions alone never converges.
+//! Bodies without reactions: moved by one grip, cut in two, without loads. A residual over reactions alone
+//! would never converge.
 
 use crate::bodies::{Body, MODULUS, hold};
 use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
@@ -11,7 +12,7 @@ use peri::solver::{
 
 const WAY: [f64; 2] = [0.3, 1.0];
 
-/// Both methods.
+/// Returns both methods.
 fn methods(tolerance: f64) -> [(&'static str, Box<dyn Equilibrium<2>>); 2] {
     let max_iterations = 5000;
     let plain = DynamicRelaxation { tolerance, max_iterations, ..Default::default() };
@@ -37,7 +38,7 @@ fn solve(
     load_stepping(method, &mut system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
 }
 
-/// The grip y > 88 mm moved by U along [`WAY`], nothing else held.
+/// Moves the grip y > 88 mm by U along [`WAY`], without other supports.
 fn grip(bonds: &dyn Bonds<2>, far: f64) -> Loads<2> {
     hold(bonds, |x| (x[1] > 0.088).then_some((0b11, WAY.map(|w| far * w))))
 }
@@ -66,8 +67,8 @@ fn a_body_moved_by_one_grip() {
     }
 }
 
-/// From a start in which the grip has torn away from the rest: the answer is as near to a rigid motion as the tolerance
-/// says, where reactions alone as a reference leave it 15 to 36 % away at 1e-3, or never end.
+/// A start with the grip far from the rest ends in a rigid motion to the tolerance; with reactions alone as
+/// reference the error would be 15 to 36 % at 1e-3, or the search would never end.
 #[test]
 fn a_strained_start_comes_to_rest() {
     for (tolerance, most) in [(1e-3, 0.02), (1e-6, 2e-5)] {
@@ -89,7 +90,7 @@ fn a_strained_start_comes_to_rest() {
     }
 }
 
-/// Two halves with a grip each: nothing pulls, and each goes with its own.
+/// Two halves with a grip each follow their grips without forces.
 #[test]
 fn halves_go_with_their_grips() {
     let cut = Cut { corner: [-1.0, 0.052], edges: [[2.0, 0.0], [0.0; 2]] };
@@ -111,7 +112,7 @@ fn halves_go_with_their_grips() {
     }
 }
 
-/// Neither loads nor grips that move: balanced at once.
+/// A body without loads and moving grips is in equilibrium at once.
 #[test]
 fn a_body_at_rest_stays() {
     for (name, mut method) in methods(1e-10) {

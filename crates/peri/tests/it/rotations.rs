@@ -1,4 +1,5 @@
-//! Boundaries that turn along the arc: a twisted bar against the torsion of a neo-Hookean cylinder, bodies that turn as a whole.
+//! Boundaries that rotate along the arc: a twisted bar against torsion of a neo-Hookean cylinder, bodies that
+//! rotate as a whole.
 
 use harness::case::{Case, Options, Run};
 use harness::scene::Source;
@@ -6,12 +7,12 @@ use peri::bonds::stretch_range;
 use peri::geometry::Shape;
 use peri::model::{Body, Model, Rubber};
 use peri::potential::Law;
-use peri::program::run::{Finished, Peri, run};
+use peri::program::run::{FinishedScene, Peri, run};
 use peri::program::scene::Scene;
 use peri::solver::{DynamicRelaxation, Lbfgs, Rotation, VelocityVerlet};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI, TAU};
 
-fn solve(text: &str) -> Finished {
+fn solve(text: &str) -> FinishedScene {
     let directory = tempfile::tempdir().unwrap();
     let source = Source::new("scene.toml", text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
@@ -19,11 +20,11 @@ fn solve(text: &str) -> Finished {
     run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn value(finished: &Finished, name: &str) -> f64 {
+fn value(finished: &FinishedScene, name: &str) -> f64 {
     finished.report.scalar(name).unwrap_or_else(|| panic!("no {name} in\n{}", finished.report.table()))
 }
 
-/// A round bar of 10 mm and 20 mm between its grips.
+/// Round bar of 10 mm with 20 mm between its grips.
 fn bar(turn: &str, steps: usize) -> String {
     format!(
         r#"version = 1
@@ -31,7 +32,8 @@ program = "peri"
 [body]
 space = "solid"
 spacing = "1 mm"
-shapes = [{{ add = "cylinder", centre = ["0 mm", "0 mm", "0 mm"], radius = "5 mm", length = "32 mm", axis = "z" }}]
+shapes = [{{ add = "cylinder", centre = [
+ "0 mm", "0 mm", "0 mm"], radius = "5 mm", length = "32 mm", axis = "z" }}]
 [material.solid]
 law = "eight-chain"
 shear_modulus = "0.4 MPa"
@@ -65,17 +67,19 @@ pictures = false
     )
 }
 
-/// M = μθ′πR⁴/2, exact for a neo-Hookean cylinder of constant length (Rivlin 1948), with the twist θ′ of the bar's middle: 1 % of particles
-/// on a lattice of a tenth of the diameter. θ′ is θ/L of a free length that reaches up to a spacing into each grip, as grips act over a
-/// horizon: at most 0.0206 N m at 60°. With the chord instead of the arc, steps before the last are squeezed; along the arc the largest
-/// stretch of every step is at most that of the last, 1.15.
+/// M = μθ′πR⁴/2, exact for a neo-Hookean cylinder of constant length (Rivlin 1948), with the twist θ′ in the
+/// middle of the bar: to 1 % on a lattice of a tenth of the diameter. θ′ is θ/L of a free length that reaches
+/// up to a spacing into each grip, because grips act over a horizon: at most 0.0206 N m at 60°. Along the arc
+/// the largest stretch of every step is at most that of the last, 1.15; along the chord steps before the last
+/// would be compressed.
 #[test]
 fn a_bar_twisted_along_the_arc() {
     let turn = "rotation = { point = [\"0 mm\", \"0 mm\", \"0 mm\"], axis = [0, 0, 2], angle = \"60 deg\" }";
     let slice = |name: &str, z: f64| {
         let (low, high) = (z - 0.5, z + 0.5);
         format!(
-            "[[probe]]\nname = \"{name}\"\ntrack = \"rotation\"\naxis = \"z\"\nmin = [\"-6 mm\", \"-6 mm\", \"{low} mm\"]\nmax = [\"6 mm\", \"6 mm\", \"{high} mm\"]\n"
+            "[[probe]]\nname = \"{name}\"\ntrack = \"rotation\"\naxis = \"z\"\nmin = [\"-6 mm\", \"-6 mm\", \
+             \"{low} mm\"]\nmax = [\"6 mm\", \"6 mm\", \"{high} mm\"]\n"
         )
     };
     let twisted = solve(&(bar(turn, 4) + &slice("low", -5.5) + &slice("high", 5.5)));
@@ -105,7 +109,7 @@ fn a_bar_twisted_along_the_arc() {
     assert!(history[3].load.abs() < 1e-3 * last.load, "{}", history[3].load);
 }
 
-/// A grip that turns and may move along its axis carries no axial force, and elongates (Poynting).
+/// A rotating grip that is free along its axis has no axial force, and the bar elongates (Poynting).
 #[test]
 fn a_bar_free_along_its_axis() {
     let turn = "rotation = { point = [\"0 mm\", \"0 mm\", \"0 mm\"], axis = [0, 0, 1], angle = \"90 deg\" }
@@ -119,7 +123,8 @@ displacement = [\"0 mm\", \"0 mm\", \"free\"]";
     assert!(value(&free, "end") > 1e-5, "{} m", value(&free, "end"));
 }
 
-/// A body held at a region that turns once round turns with it: no bond is stretched in any step, and it ends where it began.
+/// A body follows a full rotation of a region without stretching any bond in any step, and ends in its
+/// initial position.
 #[test]
 fn a_full_turn_strains_nothing() {
     let sheet = || Body::lattice(Shape::rectangle([0.0; 2], [20e-3, 8e-3]), 1e-3).plane_stress(1e-3);
@@ -152,8 +157,8 @@ fn a_full_turn_strains_nothing() {
     }
 }
 
-/// A ring between a fixed rim and a turned sleeve: M = 4πμ t θ/(1/a² − 1/b²) of small angles, with rims that lie up to a spacing within
-/// the grips.
+/// A ring between a fixed rim and a rotated sleeve: M = 4πμ t θ/(1/a² − 1/b²) at small angles, with rims up
+/// to a spacing inside the grips.
 #[test]
 fn a_bushing_turned_in_its_plane() {
     let (inner, outer, thickness) = (10e-3_f64, 30e-3_f64, 1e-3);
@@ -173,8 +178,8 @@ fn a_bushing_turned_in_its_plane() {
     assert!(least < moment && moment < most, "{moment} N m, {least} to {most}");
 }
 
-/// In motion: the grip is where the factor puts it, and energy is conserved: work = kinetic + stored but for O(Δt²), a quarter of which
-/// half the time step leaves.
+/// Explicit dynamics: the grip follows the factor, and work = kinetic + stored up to O(Δt²), a quarter at
+/// half the time step.
 #[test]
 fn a_strip_swung_by_its_grip() {
     let turn = Rotation { centre: [0.0; 2], axis: [0.0, 0.0, 1.0], angle: FRAC_PI_2 };
@@ -191,7 +196,7 @@ fn a_strip_swung_by_its_grip() {
         // it bends a little while it swings
         let range = stretch_range(&simulation.bonds, &simulation.state.displacement);
         assert!(range.low > -0.2 && range.high < 0.2, "{range:?}");
-        let of = |record: &peri::solver::Record| {
+        let of = |record: &peri::solver::StepRecord| {
             (record.kinetic + record.stored - record.work).abs() / record.work
         };
         simulation.history().iter().map(of).fold(0.0, f64::max)
@@ -200,7 +205,7 @@ fn a_strip_swung_by_its_grip() {
     assert!(coarse < 0.01 && (3.0..5.0).contains(&(coarse / fine)), "{coarse} {fine}");
 }
 
-/// A field of the same turn along the chord gives a warning.
+/// A displacement field of the same rotation along the chord gives a warning.
 #[test]
 fn chords_are_told() {
     let chord = "displacement_field = [\"-0.5*x - 0.866025404*y\", \"0.866025404*x - 0.5*y\", \"0\"]";

@@ -1,18 +1,20 @@
-//! Bonds of solids with a strength and a toughness: forces of softened bonds, strength, energies, resumed runs.
+//! Bonds of solids with a strength and a toughness: forces of softened bonds, strength, energies, resumed
+//! runs.
 
 use crate::bodies::{Body, Random, Slit, hold, scatter};
-use crate::solids::{Plain, displaced, neo_hooke, rubber};
+use crate::solid_kernels::PlainLoops;
+use crate::solids::{displaced, neo_hooke, rubber};
 use evidence::{at_most, near};
 use peri::bonds::{BodyGeometry, Bonds, CloudBonds, Softened, StretchRange};
 use peri::calibrate::Space;
 use peri::critical::bilinear;
 use peri::field::Field;
-use peri::material::{EightChain, Material, NonlocalSolid, Response, energy_at_strength};
+use peri::material::{EightChainSolid, Material, NonlocalSolid, SolverMaterial, energy_at_strength};
 use peri::solver::{
     Bilinear, Breaking, Criterion, Lbfgs, Method, Policy, State, Status, System, VelocityVerlet,
 };
 
-/// Opening a bond to nothing takes Y_c, whatever its strength: ∫Y(−dd) by the trapezoidal rule over κ.
+/// Opening a bond completely takes Y_c at any strength: ∫Y(−dd) by the trapezoidal rule over κ.
 #[test]
 fn a_bond_takes_its_toughness() {
     for ductility in [1.2, 2.0, 4.0, 8.0] {
@@ -27,7 +29,7 @@ fn a_bond_takes_its_toughness() {
     assert_eq!([2.9, 3.1].map(|energy| brittle.integrity(energy)), [1.0, 0.0]);
 }
 
-/// A third of the bonds softened at random, each from both ends.
+/// Softens a third of the bonds at random, each from both ends.
 fn soften<const D: usize>(bonds: &mut dyn Bonds<D>) {
     let mut random = Random(11);
     let mut list: Vec<Softened> = Vec::new();
@@ -53,7 +55,7 @@ fn soften<const D: usize>(bonds: &mut dyn Bonds<D>) {
 }
 
 fn forces<const D: usize>(
-    material: &mut dyn Response<D>,
+    material: &mut dyn SolverMaterial<D>,
     bonds: &dyn Bonds<D>,
     displacement: &Field<D>,
 ) -> Field<D> {
@@ -65,10 +67,11 @@ fn forces<const D: usize>(
     force
 }
 
-/// A way to compute forces: its name, bonds, material and displacement.
-type Path<'a, const D: usize> = (&'a str, &'a dyn Bonds<D>, Box<dyn Response<D>>, Field<D>);
+/// Way to compute forces: name, bonds, material and displacement.
+type Path<'a, const D: usize> = (&'a str, &'a dyn Bonds<D>, Box<dyn SolverMaterial<D>>, Field<D>);
 
-/// At constant integrities forces are slopes of the energy and sum to zero, on lattices by kernels and by plain loops, and in clouds.
+/// Forces at constant integrities are slopes of the energy and sum to zero, on lattices by kernels and by
+/// plain loops, and in clouds.
 fn slopes<const D: usize>(space: Space, cells: [usize; D]) {
     let body = Body::damaged(cells, 1.0, 3.015);
     let mut built = body.build();
@@ -81,7 +84,7 @@ fn slopes<const D: usize>(space: Space, cells: [usize; D]) {
     let (lattice, cloud): (&dyn Bonds<D>, &CloudBonds<D>) = (&built.lattice, &built.cloud);
     let cases: [Path<D>; 3] = [
         ("kernels", lattice, solid().respond(lattice), in_lattice.clone()),
-        ("loops", lattice, Plain(solid()).respond(lattice), in_lattice),
+        ("loops", lattice, PlainLoops(solid()).respond(lattice), in_lattice),
         ("cloud", cloud, solid().respond(cloud), in_cloud),
     ];
     let mut found = Vec::new();
@@ -121,8 +124,8 @@ fn forces_of_softened_bonds_are_slopes() {
     slopes::<3>(Space::Solid, [5, 5, 4]);
 }
 
-/// W at the strength: of small strains σ²/(2E) and in plane strain (1 − ν²)σ²/(2E); of an incompressible neo-Hookean sheet of
-/// nominal stress μ(λ − λ⁻²) it is ½μ(λ² + 2/λ − 3).
+/// W at the strength is σ²/(2E) at small strains, (1 − ν²)σ²/(2E) in plane strain, and ½μ(λ² + 2/λ − 3) of an
+/// incompressible neo-Hookean sheet with nominal stress μ(λ − λ⁻²).
 #[test]
 fn energies_at_a_strength() {
     let (bulk, small) = (5.0 / 3.0, 1e-4);
@@ -133,15 +136,15 @@ fn energies_at_a_strength() {
     let plane = energy_at_strength(&neo_hooke::<2>(Space::PlaneStrain, bulk).0, small).unwrap();
     let exact = 0.5 * (1.0 - poisson * poisson) * small * small / youngs;
     near("energy_at_strength_plane_strain", plane / exact, 1.0, 2e-4);
-    let long = EightChain::<2>::new(Space::PlaneStress, 1.0, 1e9, f64::INFINITY).unwrap();
+    let long = EightChainSolid::<2>::new(Space::PlaneStress, 1.0, 1e9, f64::INFINITY).unwrap();
     let stretch: f64 = 1.8;
     let sheet = energy_at_strength(&long, stretch - stretch.powi(-2)).unwrap();
     near("energy_at_strength_sheet", sheet, 0.5 * (stretch.powi(2) + 2.0 / stretch - 3.0), 1e-6);
     assert!(energy_at_strength(&long, 1e9).is_none());
 }
 
-/// A strip of small strains, 3 grips long, pulled at its ends: peak of the mean stress over the strength. Bonds that end in the
-/// middle row have softened to `weak` beforehand.
+/// Pulls a strip at small strains and returns the peak of the mean stress over the strength. Bonds that end
+/// in the middle row have the integrity `weak` at the start.
 fn strip(rows: usize, ductility: f64, weak: f64) -> f64 {
     let spacing = 1.0 / rows as f64;
     let body = Body::<2>::solid([3 * rows, rows], spacing, 3.015);
@@ -202,13 +205,13 @@ fn a_strip_has_its_strength() {
     }
 }
 
-/// A notched strip torn by explicit dynamics or in equilibria, of rubber at finite strains.
+/// Tears a notched strip of rubber at finite strains by explicit dynamics or in equilibria.
 fn tear(moving: bool, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> State<2> {
     let mut body = Body::<2>::solid([30, 24], 0.1, 3.015);
     body.slits = vec![Slit { at: 1.2, from: -1.0, to: 1.2 }];
     let mut built = body.build();
     let bonds = &mut built.lattice;
-    let solid: NonlocalSolid<EightChain<2>> = rubber(Space::PlaneStrain, 5.0);
+    let solid: NonlocalSolid<EightChainSolid<2>> = rubber(Space::PlaneStrain, 5.0);
     let onset = energy_at_strength(&solid.0, 1.0).unwrap();
     let law = bilinear(bonds, 0.1, onset).unwrap();
     assert!(law.ductility() > 1.5 && law.ductility() < 5.0, "{law:?}");
@@ -243,7 +246,7 @@ fn tear(moving: bool, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> St
     state
 }
 
-/// Energies balance while a strip tears, softening included, and a run resumed from any saved state takes the same way to the last bit.
+/// Energies balance while a strip softens and tears, and a run resumed from any saved state has equal bits.
 #[test]
 fn a_softening_strip_tears() {
     for moving in [true, false] {
@@ -252,7 +255,8 @@ fn a_softening_strip_tears() {
         let last = whole.history.last().unwrap();
         let soft: u64 = saved.iter().map(|state| state.fracture.softened.len() as u64).max().unwrap();
         eprintln!(
-            "moving {moving}: {} broken, up to {soft} softened, {} evaluations, {} states; work {:.4}, stored {:.4}, released {:.4}, kinetic {:.4}",
+            "moving {moving}: {} broken, up to {soft} softened, {} evaluations, {} states; work {:.4}, \
+             stored {:.4}, released {:.4}, kinetic {:.4}",
             last.broken,
             whole.counts.evaluations,
             saved.len(),
@@ -277,8 +281,9 @@ fn a_softening_strip_tears() {
     }
 }
 
-/// In a uniform state every bond of every particle releases Y = W: under several stresses the strength of softening bonds is the surface
-/// W = Y₀. Small strains at ν = 0.4995: an equibiaxial strength of σ_ts/√(2(1 − ν)), and a hydrostatic one of σ_ts/√(3(1 − 2ν)) = 18.3 σ_ts.
+/// Every bond releases Y = W in a uniform state, so that the strength surface of softening bonds under
+/// several stresses is W = Y₀. Small strains at ν = 0.4995: an equibiaxial strength of σ_ts/√(2(1 − ν)), and
+/// a hydrostatic one of σ_ts/√(3(1 − 2ν)) = 18.3 σ_ts.
 #[test]
 fn the_strength_surface_is_one_of_equal_energy() {
     let poisson = 0.4995_f64;

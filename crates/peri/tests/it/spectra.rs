@@ -1,26 +1,29 @@
-//! Spectra and manufactured solutions of solids: modes of free blocks, plane waves in the infinite lattice, and the order of
-//! convergence at finite strains, against an independent program (`docs/reference/correspondence`) and closed forms.
+//! Spectra and manufactured solutions of solids: modes of free blocks, plane waves in the infinite lattice,
+//! and the order of convergence at finite strains, against an independent program
+//! (`docs/reference/correspondence`) and closed forms.
 
 use evidence::{at_most, near};
 use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
-use peri::material::{Correspondence, Deformation, NonlocalSolid, PointLaw, Pointwise, Response, Tensor};
+use peri::material::{
+    BodyTensor, Correspondence, Deformation, NonlocalSolid, PointLaw, Pointwise, SolverMaterial,
+};
 use peri::solver::{Lbfgs, Loads, Method, State, System};
 use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric};
 use std::f64::consts::PI;
 
 pub type NeoHooke<const D: usize> = Correspondence<Compressible<NeoHookean>, D>;
 
-/// W = ½μ(I₁ − 3 − 2 ln J) + ¼κ(J² − 1 − 2 ln J), μ = 1, with the stabilisation a.
+/// Returns W = ½μ(I₁ − 3 − 2 ln J) + ¼κ(J² − 1 − 2 ln J), μ = 1, with the stabilisation a.
 pub fn neo_hooke<const D: usize>(space: Space, bulk: f64, stabilisation: f64) -> NeoHooke<D> {
     let volumetric = Volumetric::Ciarlet { lame: bulk - 2.0 / 3.0 };
     let law = Compressible::new(NeoHookean::new(1.0).unwrap(), volumetric).unwrap();
     Correspondence::stabilised(law, space, stabilisation).unwrap()
 }
 
-/// A block of particles, a spacing apart, from the origin on.
+/// Builds a block of particles from the origin on.
 fn block<const D: usize>(cells: [usize; D], spacing: f64) -> LatticeBonds<D> {
     let max = cells.map(|n| n as f64 * spacing);
     let body = [Operation::Add(Shape::Box { min: [0.0; D], max })];
@@ -28,7 +31,7 @@ fn block<const D: usize>(cells: [usize; D], spacing: f64) -> LatticeBonds<D> {
 }
 
 pub fn forces<const D: usize>(
-    material: &mut dyn Response<D>,
+    material: &mut dyn SolverMaterial<D>,
     bonds: &dyn Bonds<D>,
     displacement: &Field<D>,
 ) -> Field<D> {
@@ -40,7 +43,7 @@ pub fn forces<const D: usize>(
     force
 }
 
-/// Eigenvalues of −∂f/∂u at rest of a free block, ascending.
+/// Returns the eigenvalues of −∂f/∂u at rest of a free block, ascending.
 fn modes<const D: usize>(cells: [usize; D], space: Space, bulk: f64, stabilisation: f64) -> Vec<f64> {
     let bonds = block(cells, 1.0);
     let mut material = Pointwise::new(NonlocalSolid(neo_hooke::<D>(space, bulk, stabilisation)), &bonds);
@@ -70,8 +73,8 @@ fn modes<const D: usize>(cells: [usize; D], space: Space, bulk: f64, stabilisati
     values
 }
 
-/// Rigid motions and no other mode are free, and the softest one has the independent program's frequency: counting modes
-/// would not see those that a weak stabilisation leaves nearly free.
+/// Only rigid motions are free, and the softest mode has the frequency of the independent program, which
+/// detects modes that a weak stabilisation leaves nearly free.
 #[test]
 fn free_blocks_have_rigid_modes_and_no_soft_ones() {
     let judge = |name: &str, values: &[f64], rigid: usize, first: f64| {
@@ -96,8 +99,8 @@ fn free_blocks_have_rigid_modes_and_no_soft_ones() {
     judge("5x4x3", &modes([5, 4, 3], Space::Solid, 5.0 / 3.0, 1.0), 6, 0.425515);
 }
 
-/// ρω² of a plane wave cos(k·(x − x₀)), displaced along `along`, in the infinite lattice: the force at x₀, the middle of a block whose
-/// surface is too far away to matter.
+/// Returns ρω² of a plane wave cos(k·(x − x₀)) with displacements along `along` in the infinite lattice: the
+/// force at x₀, the middle of a block with a distant surface.
 fn symbol<const D: usize>(number: [f64; D], along: usize, bulk: f64, stabilisation: f64) -> f64 {
     // two horizons on either side
     let bonds = block([13; D], 1.0);
@@ -119,14 +122,14 @@ fn symbol<const D: usize>(number: [f64; D], along: usize, bulk: f64, stabilisati
     (force(-1.0, &mut material) - force(1.0, &mut material)) / (2.0 * size)
 }
 
-/// Waves along x of `wave` particles a length.
+/// Returns ρω² of waves along x with `wave` particles per length.
 fn along_x<const D: usize>(wave: f64, along: usize, bulk: f64, stabilisation: f64) -> f64 {
     let number = std::array::from_fn(|d| if d == 0 { 2.0 * PI / wave } else { 0.0 });
     symbol::<D>(number, along, bulk, stabilisation)
 }
 
-/// A checkerboard has no mean deformation: the stabilisation alone resists it, by s Δx² = 1.7269841270 (plane) and 1.6524590164 (space)
-/// times a g.
+/// A checkerboard has no mean deformation, so that only the stabilisation resists it, by s Δx² = 1.7269841270
+/// (plane) and 1.6524590164 (space) times a g.
 #[test]
 fn checkerboards_have_the_stiffness_of_the_stabilisation() {
     for a in [0.1, 1.0, 4.0] {
@@ -136,8 +139,8 @@ fn checkerboards_have_the_stiffness_of_the_stabilisation() {
     }
 }
 
-/// ρω²/(E_w k²) − 1 = −D m₄ k²(1/3 − a g/(4E_w)) for long waves, m₄ = Σωξ₁⁴; and the speed of shear waves of 16 particles a
-/// length.
+/// ρω²/(E_w k²) − 1 = −D m₄ k²(1/3 − a g/(4E_w)) for long waves, m₄ = Σωξ₁⁴; and the speed of shear waves of
+/// 16 particles per length.
 #[test]
 fn waves_have_the_dispersion_of_the_theory() {
     fn coefficient<const D: usize>(along: usize, bulk: f64, a: f64) -> (f64, f64) {
@@ -163,14 +166,14 @@ fn waves_have_the_dispersion_of_the_theory() {
     }
 }
 
-/// y(X): two shears, which keep the volume, and a part that does not.
+/// Returns y(X): two shears, which keep the volume, and a dilation.
 fn manufactured([x, y]: [f64; 2], volume: f64) -> [f64; 2] {
     let first = x + 0.08 * (PI * y + 0.3).sin();
     let second = y + 0.08 * (PI * first - 0.2).sin();
     [first + volume * (2.0 * x + y).sin(), second]
 }
 
-/// ∂f/∂X_k by differences of fourth order.
+/// Returns ∂f/∂X_k by differences of fourth order.
 fn derivative<const N: usize>(
     of: impl Fn([f64; 2]) -> [f64; N],
     at: [f64; 2],
@@ -186,19 +189,19 @@ fn derivative<const N: usize>(
     std::array::from_fn(|i| (8.0 * (b[i] - c[i]) - a[i] + d[i]) / (12.0 * step))
 }
 
-/// Particles over the width of a collar that has the manufactured displacement.
+/// Width in particles of the collar with the manufactured displacement.
 pub const COLLAR: usize = 8;
 
-/// Root mean square errors of u and of K(J − J₀)/μ inside of the collar, n particles over the edge of 1, in the block from the
-/// origin on.
+/// Returns the rms errors of u and of K(J − J₀)/μ inside the collar, with n particles over the edge of 1, in
+/// the block from the origin on.
 pub fn errors(bonds: &mut dyn Bonds<2>, n: usize, bulk: f64, volume: f64) -> [f64; 2] {
     let law = neo_hooke::<2>(Space::PlaneStrain, bulk, 1.0);
     let width = COLLAR as f64 / n as f64;
     let place = |site: usize, bonds: &dyn Bonds<2>| bonds.position(site).map(|x| x - width);
     let piola = |at: [f64; 2]| {
         let columns = [0, 1].map(|k| derivative(|x| manufactured(x, volume), at, k, 1e-3));
-        let gradient = Tensor::<2>::from_fn(|a, b| columns[b][a]);
-        let displacement_gradient = gradient - Tensor::<2>::identity();
+        let gradient = BodyTensor::<2>::from_fn(|a, b| columns[b][a]);
+        let displacement_gradient = gradient - BodyTensor::<2>::identity();
         let stress = law.respond(&Deformation { displacement_gradient, residual: 0.0 }).piola;
         [stress[(0, 0)], stress[(0, 1)], stress[(1, 0)], stress[(1, 1)]]
     };
@@ -245,8 +248,8 @@ pub fn errors(bonds: &mut dyn Bonds<2>, n: usize, bulk: f64, volume: f64) -> [f6
     sums.map(|sum| (sum / inside.len() as f64).sqrt())
 }
 
-/// Second order at finite strains and no locking at K/μ = 1000, in displacement and pressure: the independent program's errors, to
-/// their digits.
+/// Second order at finite strains without locking at K/μ = 1000, in displacement and pressure: equal to the
+/// errors of the independent program.
 #[test]
 fn manufactured_deformations_converge_with_second_order() {
     let table = [

@@ -1,17 +1,19 @@
-//! Stress measures against independent tables (`stress_patch.csv`, `stress_surface.csv`, made by `s3_stress.py`), against
-//! the sum over all bonds written out here, and against the balance of momentum.
+//! Stress measures against independent tables (`stress_patch.csv`, `stress_surface.csv`, made by
+//! `s3_stress.py`), against reference sums over all bonds, and against the balance of momentum.
 
-use crate::bodies::{Body, Built, MODULUS, Pair, Random, fit, norm, scatter, stretch_range};
+use crate::bodies::{Body, BondPair, Built, MODULUS, Random, fit, norm, scatter, stretch_range};
 use peri::bonds::{BodyGeometry, BondForces, LatticeBonds};
 use peri::calibrate::{Space, modulus, poisson_ratio};
 use peri::field::Field;
 use peri::geometry::lattice;
 use peri::potential::{BondPotential, Law};
-use peri::stress::{BallVolume, Loaded, Measure, Missing, Tensor, ball_volume, segment_fraction};
+use peri::stress::{
+    BallVolume, StressInput, StressMethod, StressTensor, SurfaceCompensation, ball_volume, segment_fraction,
+};
 use peri::stress::{cauchy, deformation_gradients, piola_in_cloud, piola_on_lattice};
 
-/// Strain at which tables of the linear theory are compared: the bonds' own nonlinearity is of this order, so 5 of it
-/// is the tolerance on stresses over E ε.
+/// Strain for comparison with tables of linear theory: bonds are nonlinear to this order, so the tolerance on
+/// stresses over E ε is 5 times it.
 const STRAIN: f64 = 1e-6;
 const TOLERANCE: f64 = 5.0 * STRAIN;
 
@@ -19,40 +21,41 @@ fn space(dimension: usize) -> Space {
     if dimension == 2 { Space::PlaneStress } else { Space::Solid }
 }
 
-/// u = ε (x, −νy, −νz): uniaxial stress E ε of the continuum.
+/// Returns u = ε (x, −νy, −νz): uniaxial stress E ε of the continuum.
 fn uniaxial<const D: usize>(points: &[[f64; D]]) -> Vec<[f64; D]> {
     let nu = poisson_ratio(space(D));
     let ratio = |d: usize| if d == 0 { STRAIN } else { -nu * STRAIN };
     points.iter().map(|x| std::array::from_fn(|d| ratio(d) * x[d])).collect()
 }
 
-/// (σ11, σ22)/Eε of the particle at `cell` by both paths, the cloud only where asked.
+/// Returns (σ11, σ22)/Eε of the particle at `cell` by both paths, the cloud on request.
 fn measured<const D: usize>(
     built: &Built<D>,
     ratio: f64,
     particle: usize,
-    measure: Measure,
+    measure: StressMethod,
     ball: BallVolume,
     cloud: bool,
 ) -> Vec<(&'static str, [f64; 2])> {
     let u = uniaxial(&built.points);
     let fit = fit(&*Law::Linear.build(1.0, 1.0, false).unwrap(), [0.9, 1.1]);
     let modulus = modulus(space(D), 1.0, ratio, 1.0);
-    let diagonal = |p: Tensor<D>| [p[0][0] / STRAIN, p[1][1] / STRAIN];
+    let diagonal = |p: StressTensor<D>| [p[0][0] / STRAIN, p[1][1] / STRAIN];
     let field = scatter(built.lattice.sites(), &built.on_lattice, &u);
-    let state = Loaded { displacement: &field, fit: &fit, modulus, missing: Missing::Bonds };
+    let state = StressInput { displacement: &field, fit: &fit, modulus, missing: SurfaceCompensation::Bonds };
     let stress = piola_on_lattice(&built.lattice, &state, measure, ball);
     let mut results = vec![("lattice", diagonal(stress[particle]))];
     if cloud {
         let field = scatter(built.cloud.sites(), &built.in_cloud, &u);
-        let state = Loaded { displacement: &field, fit: &fit, modulus, missing: Missing::Bonds };
+        let state =
+            StressInput { displacement: &field, fit: &fit, modulus, missing: SurfaceCompensation::Bonds };
         let stress = piola_in_cloud(&built.cloud, &state, measure, ball);
         results.push(("cloud", diagonal(stress[built.in_cloud[particle]])));
     }
     results
 }
 
-/// A body that holds everything within twice the horizon of its middle, and the particle there.
+/// Returns a body that contains twice the horizon around its middle, and the particle there.
 fn patch<const D: usize>(ratio: f64) -> (Built<D>, usize) {
     let side = 2 * (2.0 * ratio) as usize + 1;
     let built = Body::<D>::solid([side; D], 1.0, ratio).build();
@@ -78,13 +81,13 @@ fn check_patch<const D: usize>(ratio: f64, cloud: bool) {
     let (built, middle) = patch::<D>(ratio);
     // the whole ball lies in the body: every reading of its volume but the cells' (64 slices in 3D) is exact
     let rows = [
-        (Measure::AsPublished, BallVolume::Whole, [printed, f64::NAN]),
-        (Measure::BallShare, BallVolume::Whole, [hardy, hardy_22]),
-        (Measure::BallShare, BallVolume::Particles, [hardy, hardy_22]),
-        (Measure::OnePoint, BallVolume::Particles, [one_point, one_point_22]),
+        (StressMethod::AsPublished, BallVolume::Whole, [printed, f64::NAN]),
+        (StressMethod::BallShare, BallVolume::Whole, [hardy, hardy_22]),
+        (StressMethod::BallShare, BallVolume::Particles, [hardy, hardy_22]),
+        (StressMethod::OnePoint, BallVolume::Particles, [one_point, one_point_22]),
     ];
     for (measure, ball, expected) in rows {
-        if ball == BallVolume::Particles && measure == Measure::BallShare && !cloud {
+        if ball == BallVolume::Particles && measure == StressMethod::BallShare && !cloud {
             continue; // long, and the same sums as over the whole ball
         }
         for (path, found) in measured(&built, ratio, middle, measure, ball, cloud) {
@@ -97,7 +100,7 @@ fn check_patch<const D: usize>(ratio: f64, cloud: bool) {
             }
             if (D, ratio, ball) == (2, 3.015, BallVolume::Whole) {
                 match measure {
-                    Measure::AsPublished => {
+                    StressMethod::AsPublished => {
                         evidence::near(
                             "patch test, m = 3, share of the stress as printed",
                             found[0],
@@ -131,15 +134,15 @@ fn patch_test_in_space() {
     check_patch::<3>(4.015, false);
 }
 
-/// m = 6.015 in space: the whole field takes minutes, so the middle's sum is written out with the library's bond
-/// function; the one-point measure costs little and runs.
+/// m = 6.015 in space: the whole field would take minutes, so the sum of the middle uses the bond function of
+/// the library; the one-point measure is cheap and runs.
 #[test]
 fn patch_test_in_space_at_a_large_horizon() {
     let ratio = 6.015;
     let built = Body::<3>::solid([13; 3], 1.0, ratio).build();
     let middle = built.points.len() / 2;
     let expected = PATCH[6].2;
-    for (path, found) in measured(&built, ratio, middle, Measure::OnePoint, BallVolume::Whole, true) {
+    for (path, found) in measured(&built, ratio, middle, StressMethod::OnePoint, BallVolume::Whole, true) {
         assert!((found[0] - expected[2]).abs() < TOLERANCE, "{path}: {found:?}");
         assert!((found[1] - expected[4]).abs() < TOLERANCE, "{path}: {found:?}");
     }
@@ -169,7 +172,8 @@ fn patch_test_in_space_at_a_large_horizon() {
     }
 }
 
-/// Below a free surface, rows from 0: hardy over the whole ball, hardy over the ball inside the body, one-point.
+/// Returns stresses in rows below a free surface: hardy over the whole ball, hardy over the ball inside the
+/// body, one-point.
 fn check_surface<const D: usize>(ratio: f64, depth: usize, cells_tolerance: f64, rows: &[[f64; 3]]) {
     let width = 2 * (2.0 * ratio) as usize + 1;
     let mut cells = [width; D];
@@ -181,9 +185,9 @@ fn check_surface<const D: usize>(ratio: f64, depth: usize, cells_tolerance: f64,
             std::array::from_fn(|d| if d == 1 { cells[1] as f64 - 0.5 - row as f64 } else { middle });
         let particle = built.points.iter().position(|x| *x == at).unwrap();
         let balls = [
-            (Measure::BallShare, BallVolume::Whole, TOLERANCE),
-            (Measure::BallShare, BallVolume::Cells, TOLERANCE + cells_tolerance),
-            (Measure::OnePoint, BallVolume::Whole, TOLERANCE),
+            (StressMethod::BallShare, BallVolume::Whole, TOLERANCE),
+            (StressMethod::BallShare, BallVolume::Cells, TOLERANCE + cells_tolerance),
+            (StressMethod::OnePoint, BallVolume::Whole, TOLERANCE),
         ];
         for ((measure, ball, tolerance), e) in balls.into_iter().zip(expected) {
             // a cloud has no cells
@@ -200,8 +204,8 @@ fn check_surface<const D: usize>(ratio: f64, depth: usize, cells_tolerance: f64,
     }
 }
 
-/// Columns C_Om, C_Omin and D of `stress_surface.csv`; formulation.md prints 0.57 0.78 0.96 1.02, 0.94 0.97 1.00 1.02 and
-/// 0.84 1.00 1.04 1.04.
+/// Columns C_Om, C_Omin and D of `stress_surface.csv`; formulation.md prints 0.57 0.78 0.96 1.02, 0.94 0.97
+/// 1.00 1.02 and 0.84 1.00 1.04 1.04.
 #[test]
 fn free_surface_in_the_plane() {
     let rows = [
@@ -229,7 +233,8 @@ fn free_surface_in_space() {
     check_surface::<3>(3.015, 7, 1e-4, &rows);
 }
 
-/// The ball's volume inside the body by its share of particles: the same on both paths, in bodies of any thickness.
+/// The volume of the ball inside the body, by its share of particles, is equal on both paths, in bodies of
+/// any thickness.
 #[test]
 fn ball_inside_thin_bodies() {
     for width in [1, 3, 6, 20] {
@@ -238,11 +243,17 @@ fn ball_inside_thin_bodies() {
             // half way along, at the edge and in the middle
             for row in [0, width / 2] {
                 let particle = 15 + 30 * row;
-                let found =
-                    measured(&built, ratio * 0.1, particle, Measure::BallShare, BallVolume::Particles, true);
+                let found = measured(
+                    &built,
+                    ratio * 0.1,
+                    particle,
+                    StressMethod::BallShare,
+                    BallVolume::Particles,
+                    true,
+                );
                 let [(_, lattice), (_, cloud)] = found[..] else { panic!("two paths") };
-                // roundings of the same sums, in units of Eε ≈ 1; at ratio 3 a particle lies on the ball's surface and
-                // bonds touch it, whose fraction is rounded to √ε
+                // roundings of the same sums, in units of Eε ≈ 1; at ratio 3 a particle lies on the ball's
+                // surface and bonds touch it, whose fraction is rounded to √ε
                 assert!(
                     (lattice[0] - cloud[0]).abs() < 1e-7,
                     "width {width}, m = {ratio}, row {row}: {lattice:?} {cloud:?}"
@@ -252,15 +263,16 @@ fn ball_inside_thin_bodies() {
     }
 }
 
-/// P by definition: over all pairs, force ⊗ ξ × fraction of the bond inside the ball about `at`, over the ball's volume.
+/// Returns P by definition: over all pairs, force ⊗ ξ × fraction of the bond inside the ball about `at`, over
+/// the ball's volume.
 fn hardy_sum<const D: usize>(
     body: &Body<D>,
     points: &[[f64; D]],
-    pairs: &[Pair<D>],
+    pairs: &[BondPair<D>],
     law: &dyn BondPotential,
     u: &[[f64; D]],
     at: [f64; D],
-) -> Tensor<D> {
+) -> StressTensor<D> {
     let volume = body.spacing.powi(D as i32);
     let mut sum = [[0.0; D]; D];
     for pair in pairs {
@@ -280,8 +292,9 @@ fn hardy_sum<const D: usize>(
     sum.map(|row| row.map(|x| x / ball_volume(D, body.horizon())))
 }
 
-/// Random displacements, a hole, cracks and all corrections: particle by particle against the definition. The spacing is
-/// no power of two, so that both ends of a bond often lie at distances from the ball's centre that are equal up to rounding.
+/// Every particle agrees with the definition, with random displacements, a hole, cracks and all corrections.
+/// The spacing is no power of two, so that both ends of a bond often have equal distances from the centre of
+/// the ball up to rounding.
 fn check_definition<const D: usize>(cells: [usize; D], ratio: f64) {
     let body = Body::damaged(cells, 0.1, ratio);
     let built = body.build();
@@ -290,12 +303,22 @@ fn check_definition<const D: usize>(cells: [usize; D], ratio: f64) {
     let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
     let fit = fit(&*law, stretch_range(&pairs, &u));
     let field = scatter(built.lattice.sites(), &built.on_lattice, &u);
-    let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
-    let on_lattice = piola_on_lattice(&built.lattice, &state, Measure::BallShare, BallVolume::Whole);
+    let state = StressInput {
+        displacement: &field,
+        fit: &fit,
+        modulus: MODULUS,
+        missing: SurfaceCompensation::Bonds,
+    };
+    let on_lattice = piola_on_lattice(&built.lattice, &state, StressMethod::BallShare, BallVolume::Whole);
     let field = scatter(built.cloud.sites(), &built.in_cloud, &u);
-    let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
-    let in_cloud = piola_in_cloud(&built.cloud, &state, Measure::BallShare, BallVolume::Whole);
-    let size = |p: &Tensor<D>| p.iter().flatten().map(|x| x * x).sum::<f64>().sqrt();
+    let state = StressInput {
+        displacement: &field,
+        fit: &fit,
+        modulus: MODULUS,
+        missing: SurfaceCompensation::Bonds,
+    };
+    let in_cloud = piola_in_cloud(&built.cloud, &state, StressMethod::BallShare, BallVolume::Whole);
+    let size = |p: &StressTensor<D>| p.iter().flatten().map(|x| x * x).sum::<f64>().sqrt();
     let scale = on_lattice.iter().map(size).fold(0.0, f64::max);
     let step = if D == 2 { 1 } else { 5 };
     for particle in (0..u.len()).step_by(step) {
@@ -303,9 +326,10 @@ fn check_definition<const D: usize>(cells: [usize; D], ratio: f64) {
         for (path, found) in
             [("lattice", on_lattice[particle]), ("cloud", in_cloud[built.in_cloud[particle]])]
         {
-            let apart: Tensor<D> =
+            let apart: StressTensor<D> =
                 std::array::from_fn(|a| std::array::from_fn(|b| found[a][b] - exact[a][b]));
-            // the fit's 1e-9 on some hundred bonds of either sign; a bond that only touches the ball, by √ε in its fraction
+            // the fit's 1e-9 on some hundred bonds of either sign; a bond that only touches the ball, by √ε
+            // in its fraction
             assert!(
                 size(&apart) < 1e-7 * scale,
                 "{path}, {D}D, m = {ratio}, at {:?}: {found:?} against {exact:?}",
@@ -323,8 +347,8 @@ fn hardy_is_the_sum_over_all_crossing_bonds() {
     check_definition([3, 4, 27], 3.015);
 }
 
-/// div P(hardy) is the ball's average of the force density (formulation.md: to 1e-7 where the loads vary smoothly; asked
-/// here to 1e-5), for the field of `s3_stress.py`, at points off the lattice and at a particle.
+/// div P(hardy) is the average of the force density over the ball (to 1e-7 for smooth loads, tested to 1e-5),
+/// for the field of `s3_stress.py`, at points off the lattice and at a particle.
 #[test]
 fn divergence_is_the_average_force() {
     let body = Body::<2>::solid([29, 29], 1.0, 3.015);
@@ -368,7 +392,8 @@ fn divergence_is_the_average_force() {
     evidence::at_most("divergence of the stress by ball-share against the average force", worst, 1e-5);
 }
 
-/// The lattice sums deformation gradients by vectors, a cloud bond by bond: bodies with a hole, cracks and a volume correction.
+/// Deformation gradients of the lattice (by vectors) and of a cloud (by bonds) agree, with a hole, cracks and
+/// a volume correction.
 #[test]
 fn deformation_gradients_of_torn_bodies() {
     fn check<const D: usize>(cells: [usize; D]) {
@@ -391,12 +416,13 @@ fn deformation_gradients_of_torn_bodies() {
     check([5, 30, 4]);
 }
 
-/// Cauchy stress and deformation gradient of a large homogeneous strain: F as imposed, σ = P Fᵀ/J symmetric inside.
+/// Cauchy stress and deformation gradient of a large homogeneous strain: F as imposed, σ = P Fᵀ/J symmetric
+/// inside.
 #[test]
 fn cauchy_stress_of_a_homogeneous_strain() {
     fn check<const D: usize>(cells: [usize; D]) {
         let built = Body::<D>::solid(cells, 0.1, 3.015).build();
-        let h: Tensor<D> =
+        let h: StressTensor<D> =
             std::array::from_fn(|a| std::array::from_fn(|b| 0.2 - 0.13 * a as f64 + 0.07 * b as f64));
         let u: Vec<[f64; D]> = built
             .points
@@ -406,7 +432,12 @@ fn cauchy_stress_of_a_homogeneous_strain() {
         let field: Field<D> = scatter(built.lattice.sites(), &built.on_lattice, &u);
         let law = Law::ChainAffine.build(720.0, 1200.0, true).unwrap();
         let fit = fit(&*law, [0.5, 2.0]);
-        let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
+        let state = StressInput {
+            displacement: &field,
+            fit: &fit,
+            modulus: MODULUS,
+            missing: SurfaceCompensation::Bonds,
+        };
         let gradients = deformation_gradients::<D>(&built.lattice, &field);
         for f in &gradients {
             for a in 0..D {
@@ -416,7 +447,7 @@ fn cauchy_stress_of_a_homogeneous_strain() {
                 }
             }
         }
-        let nominal = piola_on_lattice(&built.lattice, &state, Measure::OnePoint, BallVolume::Whole);
+        let nominal = piola_on_lattice(&built.lattice, &state, StressMethod::OnePoint, BallVolume::Whole);
         let sigma = cauchy(&nominal, &gradients);
         for s in &sigma {
             for a in 0..D {

@@ -8,9 +8,11 @@ use peri::correction::surface_factors;
 use peri::geometry::{Operation, Shape, lattice};
 use peri::potential::Law;
 use peri::solver::{DynamicRelaxation, Loads, State, Support};
-use peri::stress::{BallVolume, Loaded, Measure, Missing, Tensor, piola_on_lattice};
+use peri::stress::{
+    BallVolume, StressInput, StressMethod, StressTensor, SurfaceCompensation, piola_on_lattice,
+};
 
-/// E ε/σ between (±400, 300) mm, and the largest σ11/σ beside the hole: hardy, one-point.
+/// Returns E ε/σ between (±400, 300) mm, and the largest σ11/σ beside the hole: hardy, one-point.
 fn plate(spacing: f64, volume: VolumeCorrection, surface: bool) -> [f64; 3] {
     let (half, ratio, thickness) = (0.5, 3.015, 0.01);
     let body = [
@@ -47,8 +49,13 @@ fn plate(spacing: f64, volume: VolumeCorrection, surface: bool) -> [f64; 3] {
     let length = bonds.position(right)[0] - bonds.position(left)[0];
     let strain = (state.displacement.get(right)[0] - state.displacement.get(left)[0]) / length;
     let fit = fit(&*law, state.stretches.fitted);
-    let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus, missing: Missing::Bonds };
-    let largest = |tensors: Vec<Tensor<2>>| {
+    let loaded = StressInput {
+        displacement: &state.displacement,
+        fit: &fit,
+        modulus,
+        missing: SurfaceCompensation::Bonds,
+    };
+    let largest = |tensors: Vec<StressTensor<2>>| {
         // the two columns beside the axis, averaged row by row
         let mut rows = std::collections::BTreeMap::<i64, f64>::new();
         for (&site, p) in sites.iter().zip(&tensors) {
@@ -59,18 +66,20 @@ fn plate(spacing: f64, volume: VolumeCorrection, surface: bool) -> [f64; 3] {
         }
         rows.values().copied().fold(0.0, f64::max)
     };
-    let hardy = largest(piola_on_lattice(&bonds, &loaded, Measure::BallShare, BallVolume::Particles));
-    let one_point = largest(piola_on_lattice(&bonds, &loaded, Measure::OnePoint, BallVolume::Particles));
+    let hardy = largest(piola_on_lattice(&bonds, &loaded, StressMethod::BallShare, BallVolume::Particles));
+    let one_point = largest(piola_on_lattice(&bonds, &loaded, StressMethod::OnePoint, BallVolume::Particles));
     eprintln!(
-        "dx = {spacing}, {volume:?}, surface {surface}: strain {:.4}, hardy {hardy:.3}, one-point {one_point:.3}, {} its",
+        "dx = {spacing}, {volume:?}, surface {surface}: strain {:.4}, hardy {hardy:.3}, one-point \
+         {one_point:.3}, {} its",
         strain / stress,
         state.counts.total_iterations
     );
     [strain / stress, hardy, one_point]
 }
 
-/// formulation.md: the correction takes the global modulus' error from 20.6 % to 3.4 %, volume factor on (as printed:
-/// ± 0.001); hardy 2.47 and one-point 2.64 at dx = 5 with the surface correction, volume factor off (± 1 %).
+/// The correction reduces the error of the global modulus from 20.6 % to 3.4 %, with volume factor (printed
+/// digits: ± 0.001); hardy 2.47 and one-point 2.64 at dx = 5 with the surface correction, volume factor off
+/// (± 1 %).
 #[test]
 fn correction_on_the_plate() {
     let [strain, ..] = plate(0.005, VolumeCorrection::Linear, false);
@@ -85,7 +94,7 @@ fn correction_on_the_plate() {
     );
 }
 
-/// formulation.md's table of the plate, dx = 10, nothing corrected: ± 1 %.
+/// Table of the plate, dx = 10, without corrections: ± 1 %.
 #[test]
 fn plate_without_corrections() {
     let [_, hardy, one_point] = plate(0.01, VolumeCorrection::None, false);

@@ -1,5 +1,5 @@
-//! Fracture energies of bond laws: the lattice's bonds across a cut, against the sums of formulation-tearing.md (its tables and
-//! `fit.py`), the critical stretches of both conventions, the area of new cracks, and bonds that soften.
+//! Fracture energies of bond laws: bonds of the lattice across a cut, against independent sums, critical
+//! stretches of both conventions, the area of new cracks, and softening bonds.
 
 use evidence::near;
 use harness::scene::Source;
@@ -32,7 +32,7 @@ fn block(ratio: f64, layers: f64) -> LatticeBonds<3> {
     LatticeBonds::new(built, ratio, VolumeCorrection::None, &[]).unwrap()
 }
 
-/// N, κ and S of the tables of sections 1 and 2 (S of corrections: c over κ), to their printed digits.
+/// N, κ and S agree with the printed digits of independent tables (S of corrections: c over κ).
 #[test]
 fn bonds_across_a_cut() {
     use VolumeCorrection::{Linear, None as Full};
@@ -73,7 +73,7 @@ fn bonds_across_a_cut() {
     assert!(!thin.whole && thin.bonds < 122.0 && thin.bonds > 80.0, "{thin:?}");
 }
 
-/// A cloud of the same points has the same sums, its surface particles left out.
+/// A cloud of the same points has equal sums without its surface particles.
 #[test]
 fn a_cloud_has_its_inner_particles() {
     let own = sheet(3.015, VolumeCorrection::None);
@@ -100,8 +100,9 @@ fn context<'a>(law: &'a dyn BondPotential, bonds: &LatticeBonds<2>, youngs: f64)
     }
 }
 
-/// Of a linear law λ_c − 1 goes with √G: by `bonds` it is that of Silling and Askari (√(4πG/(9Eδ)) in plane stress), by
-/// `tearing` √c times smaller; by `softening` the energy is e_f times that up to the onset.
+/// The critical λ_c − 1 of a linear law is proportional to √G: by `bonds` it is that of Silling and Askari
+/// (√(4πG/(9Eδ)) in plane stress), by `tearing` √c times smaller; by `softening` the energy is e_f times that
+/// up to the onset.
 #[test]
 fn critical_stretches_of_the_conventions() {
     let law = Law::Linear.build(0.0, 0.0, false).unwrap();
@@ -122,7 +123,7 @@ fn critical_stretches_of_the_conventions() {
     near("softening_energy", fracture_energy(&context, Convention::Softening, end) / 80.0, 1.0, 1e-9);
 }
 
-/// By `bonds` the critical stretch has the bits that it had before there were conventions (pure-shear-bond-law.toml of the inputs, run by that build).
+/// The critical stretch by `bonds` keeps the bits of versions without conventions.
 #[test]
 fn bonds_are_what_they_were() {
     let law = Law::Linear.build(0.0, 0.0, false).unwrap();
@@ -137,7 +138,8 @@ fn bonds_are_what_they_were() {
     assert_eq!(critical.resolve(&context).unwrap().to_bits(), 1.030_433_718_334_635_7_f64.to_bits());
 }
 
-/// t = d φ′ of a softened bond, from its energy by finite differences; 0 at λ_f; whole up to λ₀.
+/// The tension t = d φ′ of a softened bond follows from its energy by finite differences: 0 at λ_f, undamaged
+/// up to λ₀.
 #[test]
 fn softened_bonds() {
     let law = Law::ChainOffset.build(50.0, 1200.0, false).unwrap();
@@ -151,7 +153,8 @@ fn softened_bonds() {
     assert_eq!([integrity(onset(end) - 1e-12, end), integrity(end, end)], [1.0, 0.0]);
 }
 
-/// Forces of a body with soft bonds are slopes of its energy, in the kernels of a lattice and of a cloud, and sum to zero.
+/// Forces of a body with softening bonds are slopes of its energy, in the kernels of a lattice and of a
+/// cloud, and sum to zero.
 #[test]
 fn forces_of_soft_bonds_are_slopes() {
     let lattice = sheet(3.015, VolumeCorrection::None);
@@ -214,11 +217,11 @@ fn part<const D: usize>(bonds: &mut dyn Bonds<D>, n: [f64; D], at: f64) {
             }
         });
     }
-    bonds.sever(&list);
+    bonds.break_bonds(&list);
 }
 
-/// The area of a plane crack through a body: along an axis all but the half diagonals that miss at both ends, at 45° and in
-/// space to 3 %; of single bonds that break none.
+/// The area of a plane crack through a body is exact along an axis except for missing half diagonals at both
+/// ends, and to 3 % at 45° and in space; single broken bonds have none.
 #[test]
 fn areas_of_cracks() {
     let columns = 40.0;
@@ -235,11 +238,11 @@ fn areas_of_cracks() {
     let mut bonds = built();
     let crossing = Crossing::new::<2>(&bonds, None);
     let area = CrackArea::new::<2>(&bonds, &crossing);
-    assert_eq!(area.of::<2>(&bonds), 0.0);
+    assert_eq!(area.area::<2>(&bonds), 0.0);
     part(&mut bonds, [0.0, 1.0], 8.0);
     let diagonal = 2.0 / 2f64.sqrt();
     let exact = 0.5 * (columns + (columns - 1.0) * diagonal) / (1.0 + diagonal);
-    near("crack_area_axis", area.of::<2>(&bonds), exact, 1e-12);
+    near("crack_area_axis", area.area::<2>(&bonds), exact, 1e-12);
     // some bonds beside a crack are none
     let mut beside = built();
     let mut list = Vec::new();
@@ -256,8 +259,8 @@ fn areas_of_cracks() {
             }));
         }
     });
-    beside.sever(&list);
-    assert_eq!(area.of::<2>(&beside), 0.0);
+    beside.break_bonds(&list);
+    assert_eq!(area.area::<2>(&beside), 0.0);
     // a lattice turned by 45°, as a cloud
     let turned = 0.5_f64.sqrt();
     let grid = (-40..40).flat_map(|i| (-40..40).map(move |j| [f64::from(i), f64::from(j) + 0.5]));
@@ -269,18 +272,18 @@ fn areas_of_cracks() {
     let mut cloud = CloudBonds::new(&points, &volumes, 0.5, 3.015, VolumeCorrection::None, &[]).unwrap();
     let area = CrackArea::new::<2>(&cloud, &Crossing::new::<2>(&cloud, None));
     part(&mut cloud, [0.0, 1.0], 8.0);
-    near("crack_area_45_degrees", area.of::<2>(&cloud) / 20.0, 1.0, 0.03);
+    near("crack_area_45_degrees", area.area::<2>(&cloud) / 20.0, 1.0, 0.03);
     let mut solid = block(2.015, 7.0);
     let area = CrackArea::new::<3>(&solid, &Crossing::new::<3>(&solid, None));
     part(&mut solid, [0.0, 1.0, 0.0], 3.0);
     // of 7 × 7 cells the diagonals at the rim are missing
     let (d, e) = (4.0 / 2f64.sqrt(), 4.0 / 3f64.sqrt());
     let exact = (49.0 + d * 42.0 + e * 36.0) / (1.0 + d + e);
-    near("crack_area_solid", area.of::<3>(&solid), exact, 1e-12);
+    near("crack_area_solid", area.area::<3>(&solid), exact, 1e-12);
 }
 
-/// What `peri check` says of a scene.
-fn told(text: &str, folder: &Path) -> String {
+/// Returns the output of `peri check`.
+fn check_output(text: &str, folder: &Path) -> String {
     let source = Source::new(folder.join("scene.toml"), text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
     explanation(&source, &scene, false).unwrap_or_else(|error| panic!("{error}")).join("\n")
@@ -306,11 +309,11 @@ side = "y+"
 displacement = ["0 mm", "0.4 mm"]
 "#;
 
-/// Each warning where its cause is, none in a scene that has no cause, and none by `bonds`.
+/// Each cause gives its warning; a scene without causes, and `bonds`, give none.
 #[test]
 fn causes_of_other_energies_are_named() {
     let directory = tempfile::tempdir().unwrap();
-    let told = |text: &str| told(text, directory.path());
+    let told = |text: &str| check_output(text, directory.path());
     let fine = told(STRIP);
     assert!(!fine.contains("warning"), "{fine}");
     assert!(fine.contains("2 J/m² by `tearing`, 1.37805 J/m² by `bonds`; c = 1.4513"), "{fine}");
@@ -327,8 +330,16 @@ fn causes_of_other_energies_are_named() {
     let slab = STRIP
         .replace("plane-stress", "solid")
         .replace("thickness = \"1 mm\"\n", "")
-        .replace("\"-12 mm\"], max = [\"80 mm\", \"12 mm\"]", "\"-12 mm\", \"0 mm\"], max = [\"80 mm\", \"12 mm\", \"6 mm\"]")
-        .replace("from = [\"-1 mm\", \"0 mm\"], to = [\"40 mm\", \"0 mm\"]", "from = [\"-1 mm\", \"0 mm\", \"-1 mm\"], to = [\"40 mm\", \"0 mm\", \"-1 mm\"], and = [\"-1 mm\", \"0 mm\", \"7 mm\"]")
+        .replace(
+            "\"-12 mm\"], max = [\"80 mm\", \"12 mm\"]",
+            "\"-12 mm\", \"0 mm\"], max = [\"80 mm\", \"12 \
+            mm\", \"6 mm\"]",
+        )
+        .replace(
+            "from = [\"-1 mm\", \"0 mm\"], to = [\"40 mm\", \"0 mm\"]",
+            "from = [\"-1 mm\", \"0 mm\", \
+            \"-1 mm\"], to = [\"40 mm\", \"0 mm\", \"-1 mm\"], and = [\"-1 mm\", \"0 mm\", \"7 mm\"]",
+        )
         .replace("[\"0 mm\", \"0 mm\"]", "[\"0 mm\", \"0 mm\", \"free\"]")
         .replace("[\"0 mm\", \"0.4 mm\"]", "[\"0 mm\", \"0.4 mm\", \"free\"]");
     for (scene, cause) in [

@@ -1,4 +1,4 @@
-//! The critical time step, steps beyond it, and the same bits on any threads and after any restart.
+//! Critical time step, larger steps, and equal bits on any threads and after any restart.
 
 use crate::bodies::{Body, hold};
 use crate::dynamics::{DENSITY, once, run};
@@ -9,7 +9,7 @@ use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{Breaking, Loads, Method, Policy, State, StepLimits, System, VelocityVerlet};
 
-/// Steps beyond the critical one are refused by name, with the exit code of bad input.
+/// Steps beyond the critical one are refused with the exit code of bad input.
 #[test]
 fn steps_beyond_the_critical_are_refused() {
     let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
@@ -20,7 +20,8 @@ fn steps_beyond_the_critical_are_refused() {
     run(&solver, bonds, &*law, &Loads::default(), &mut state).unwrap();
     let StepLimits { critical_step, gershgorin_step, covered_step, .. } = state.motion.limits;
     eprintln!(
-        "critical step {critical_step:.4e}, all stretches {covered_step:.4e}, Gershgorin {gershgorin_step:.4e} s, {} forces",
+        "critical step {critical_step:.4e}, all stretches {covered_step:.4e}, Gershgorin \
+         {gershgorin_step:.4e} s, {} forces",
         state.counts.evaluations
     );
     assert!(gershgorin_step <= covered_step && covered_step <= critical_step);
@@ -50,8 +51,9 @@ fn steps_beyond_the_critical_are_refused() {
     assert!(matches!(error, Error::NotFinite { quantity: "velocity", .. }), "{error}");
 }
 
-/// A block of the `chain-affine` law, which stiffens without bound, crushed between its ends: at a fixed step just below what is
-/// critical at rest the growth is named before anything is infinite; the automatic step follows the stiffening.
+/// A block of the `chain-affine` law, which stiffens without bound, crushed between its ends: a fixed step
+/// just below the critical one at rest is reported as unstable before any value is infinite; the automatic
+/// step follows the stiffening.
 #[test]
 fn stiffening_beyond_the_step_is_named() {
     let law = Law::ChainAffine.build(100.0, 1200.0, true).unwrap();
@@ -89,7 +91,7 @@ fn stiffening_beyond_the_step_is_named() {
     }
 }
 
-/// A notched sheet torn apart; `pause` interrupts after so many steps.
+/// Tears a notched sheet; `pause` interrupts after a number of steps.
 fn tear(cloud: bool, pause: Option<u64>) -> State<2> {
     let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     // four work items, so that threads have something to mix up

@@ -6,12 +6,15 @@ use evidence::at_most;
 use peri::bonds::Bonds;
 use peri::calibrate::Space;
 use peri::field::Field;
-use peri::material::{Deformation, NonlocalSolid, PointLaw, Pointwise, Response, Tensor, surface_load};
+use peri::material::{
+    BodyTensor, Deformation, NonlocalSolid, PointLaw, Pointwise, SolverMaterial, surface_load,
+};
 
-/// A homogeneous deformation of a body with a hole and cracks, on a lattice and as a cloud: the surface load of its stress leaves no
-/// particle out of balance, the area vectors sum to 0, and Σ h⊗X is the volume (Gauss).
+/// The surface load of the stress of a homogeneous deformation balances every particle of a body with a hole
+/// and cracks, on a lattice and as a cloud; the area vectors sum to 0, and Σ h⊗X is the volume (Gauss).
 fn judge<L: PointLaw<D>, const D: usize>(name: &str, bonds: &dyn Bonds<D>, solid: NonlocalSolid<L>) {
-    let gradient = Tensor::<D>::from_fn(|a, b| [[0.3, -0.1, 0.05], [0.2, -0.2, 0.1], [0.0, 0.15, 0.1]][a][b]);
+    let gradient =
+        BodyTensor::<D>::from_fn(|a, b| [[0.3, -0.1, 0.05], [0.2, -0.2, 0.1], [0.0, 0.15, 0.1]][a][b]);
     let stress = solid.0.respond(&Deformation { displacement_gradient: gradient, residual: 0.0 }).piola;
     let load = surface_load(bonds, stress);
     let mut displacement = Field::zeros(bonds.sites());
@@ -27,9 +30,9 @@ fn judge<L: PointLaw<D>, const D: usize>(name: &str, bonds: &dyn Bonds<D>, solid
     for (chunk, mut part) in force.chunks_mut().into_iter().enumerate() {
         material.force(bonds, &displacement, chunk, &mut part, None);
     }
-    let area = surface_load(bonds, Tensor::<D>::identity());
+    let area = surface_load(bonds, BodyTensor::<D>::identity());
     let (mut off, mut most, mut sum, mut volume) = (0.0_f64, 0.0_f64, [0.0; D], 0.0);
-    let mut moment = Tensor::<D>::zeros();
+    let mut moment = BodyTensor::<D>::zeros();
     for &site in bonds.particles() {
         let site = site as usize;
         let (inner, outer, h) = (force.get(site), load.get(site), area.get(site));
@@ -43,7 +46,7 @@ fn judge<L: PointLaw<D>, const D: usize>(name: &str, bonds: &dyn Bonds<D>, solid
             }
         }
     }
-    let gauss = (moment / volume - Tensor::identity()).norm();
+    let gauss = (moment / volume - BodyTensor::identity()).norm();
     at_most(&format!("traction_balance_{name}"), off / most, 1e-12);
     at_most(&format!("traction_gauss_{name}"), gauss, 1e-12);
     at_most(&format!("traction_sum_{name}"), sum.iter().fold(0.0, |most: f64, x| most.max(x.abs())), 1e-10);

@@ -1,4 +1,4 @@
-//! Waves and running cracks: the lattice's dispersion, the bar's speed √(E/ρ), the Rayleigh speed.
+//! Waves and running cracks: dispersion of the lattice, wave speed √(E/ρ) of a bar, Rayleigh speed.
 
 use crate::bodies::{Body, MODULUS, Slit, hold, relax};
 use crate::dynamics::{DENSITY, once, run};
@@ -8,14 +8,15 @@ use peri::potential::Law;
 use peri::solver::{Breaking, DynamicRelaxation, Loads, Method, Policy, State, System, VelocityVerlet};
 use std::f64::consts::PI;
 
-/// ω² = (12kθV/ρ) Σ_k (1 − cos qkΔx)/(kΔx), k = 1 … m: linear bonds along a row of particles, of any amplitude.
+/// ω² = (12kθV/ρ) Σ_k (1 − cos qkΔx)/(kΔx), k = 1 … m: linear bonds along a row of particles, of any
+/// amplitude.
 fn chain_frequency(q: f64, spacing: f64, volume: f64) -> f64 {
     let each = |k: i32| (1.0 - (q * f64::from(k) * spacing).cos()) / (f64::from(k) * spacing);
     (12.0 * MODULUS * volume / DENSITY * (1..=3).map(each).sum::<f64>()).sqrt()
 }
 
-/// A Gaussian at rest in the middle of a long row splits in two: against the lattice's own dispersion for all wave numbers
-/// at once, and against d'Alembert's solution with the chain's modulus.
+/// A Gaussian at rest in the middle of a long row splits in two: in agreement with the dispersion of the
+/// lattice for all wave numbers, and with d'Alembert's solution with the modulus of the chain.
 #[test]
 fn waves_in_a_chain() {
     let law = Law::Linear.build(1.0, 1.0, false).unwrap();
@@ -82,8 +83,8 @@ fn waves_in_a_chain() {
     assert!(errors.iter().all(|e| (0.994..1.0001).contains(&e.2)), "{errors:?}");
 }
 
-/// A thin bar in plane stress: the wave runs with √(E/ρ), E the static modulus of the same bar, and with the material's E
-/// but for the bonds that its surfaces lack.
+/// The wave in a thin bar in plane stress has the speed √(E/ρ) with the static modulus E of the bar, which is
+/// that of the material except for missing bonds at surfaces.
 #[test]
 fn wave_in_a_thin_bar() {
     let law = Law::Linear.build(1.0, 1.0, false).unwrap();
@@ -118,7 +119,8 @@ fn wave_in_a_thin_bar() {
         let strain = (mean[1][0] / mean[1][1] - mean[0][0] / mean[0][1]) / 0.3;
         let modulus = pull / (height * strain);
 
-        // a pulse of eight heights, released at rest in the middle; its right half after a flight of 20 heights
+        // a pulse of eight heights, released at rest in the middle; its right half after a flight of 20
+        // heights
         let mut long = bar(80 * rows);
         let width = 8.0 * height;
         let mut state = State::new(long.sites());
@@ -130,7 +132,8 @@ fn wave_in_a_thin_bar() {
         let time = 2.0 / speed;
         let solver = VelocityVerlet { safety: 0.5, records: 1, ..VelocityVerlet::new(DENSITY, time) };
         run(&solver, &mut long, &*law, &Loads::default(), &mut state).unwrap();
-        // first moment of the strain energy's root |u′|: rather of u² on the right, whose centre is the pulse's
+        // first moment of the strain energy's root |u′|: rather of u² on the right, whose centre is the
+        // pulse's
         let (mut top, mut bottom) = (0.0, 0.0);
         for &site in long.particles() {
             let x = long.position(site as usize)[0] - 4.0;
@@ -153,8 +156,8 @@ fn wave_in_a_thin_bar() {
         assert!(own.abs() < 1.5e-3, "{own}");
         speeds.push(1.0 + material);
     }
-    // the bonds that surfaces lack are a part δ/h: first order; what is left is the lattice's E₁₀₀ = 1.0486 E of
-    // formulation.md, √ of it
+    // the bonds that surfaces lack are a part δ/h: first order; what is left is the lattice's E₁₀₀ = 1.0486 E
+    // of formulation.md, √ of it
     let order = ((speeds[1] - speeds[0]) / (speeds[2] - speeds[1])).log2();
     let limit = speeds[2] + (speeds[2] - speeds[1]) / (order.exp2() - 1.0);
     eprintln!("order {order:.2} in the spacing, limit {limit:.4} of √(E/ρ)");
@@ -162,8 +165,8 @@ fn wave_in_a_thin_bar() {
     assert!((limit / 1.0486_f64.sqrt() - 1.0).abs() < 2e-3, "{limit}");
 }
 
-/// A strip stretched by ε between its long edges, with a notch: the energy ½C₁₁ε²H of a column ahead of the crack is
-/// `drive` times the fracture energy. The speed of the tip over the Rayleigh speed.
+/// Returns the speed of a crack tip over the Rayleigh speed, in a notched strip stretched by ε between its
+/// long edges: the energy ½C₁₁ε²H of a column ahead of the crack is `drive` times the fracture energy.
 fn crack_speed(rows: usize, drive: f64, law: Law) -> f64 {
     let (height, ratio, stretch) = (1.0, 3.015, 0.01);
     let spacing = height / rows as f64;
@@ -224,7 +227,8 @@ fn crack_speed(rows: usize, drive: f64, law: Law) -> f64 {
     let off = (last.kinetic + last.stored + last.released - last.work) / last.work;
     let took = last.released / (toughness * (tips.last().map_or(0.0, |t| t[1]) - 1.0));
     eprintln!(
-        "{rows} rows: {speed:.3} c_R, in parts {parts:.3?}; {} broken, {} steps, {} forces, strain {:.3} of critical; \
+        "{rows} rows: {speed:.3} c_R, in parts {parts:.3?}; {} broken, {} steps, {} forces, strain {:.3} of \
+         critical; \
          released {took:.2} G a length, energies off by {off:.1e}",
         state.fracture.broken,
         state.counts.total_iterations,
@@ -238,8 +242,8 @@ fn crack_speed(rows: usize, drive: f64, law: Law) -> f64 {
     speed
 }
 
-/// A mode-I crack runs steadily, between 0.4 and 1.0 of the Rayleigh speed, and nearly as fast on a finer lattice. From
-/// drives of about 3 on it branches, as peridynamic cracks do, and below 1.5 it runs slower than 0.4.
+/// A mode-I crack runs steadily, between 0.4 and 1.0 of the Rayleigh speed, and nearly as fast on a finer
+/// lattice. It branches above drives of about 3 and runs slower than 0.4 below 1.5.
 #[test]
 fn crack_speed_below_rayleigh() {
     let speeds = [(40, Law::Linear), (60, Law::ChainOffset)].map(|(rows, law)| crack_speed(rows, 2.5, law));

@@ -1,4 +1,4 @@
-//! Work and memory: counts that closed forms give, and bytes.
+//! Work and memory: counts by closed forms, and bytes.
 
 use crate::bodies::{Body, hold, relax};
 use peri::bonds::{BodyGeometry, BondDamage, Bonds, LatticeBonds, Stencil};
@@ -28,7 +28,7 @@ fn boxed<const D: usize>(cells: [usize; D], ratio: f64) -> LatticeBonds<D> {
     LatticeBonds::new(lattice(&body, 1.0, 1.0).unwrap(), ratio, Default::default(), &[]).unwrap()
 }
 
-/// An offset o fits (n − |o₁|)(n − |o₂|)… times into a box.
+/// Counts bonds of a box: an offset o fits (n − |o₁|)(n − |o₂|)… times.
 #[test]
 fn bonds_of_a_box() {
     fn check<const D: usize>(cells: [usize; D], ratio: f64) {
@@ -49,7 +49,7 @@ fn bonds_of_a_box() {
     check([1, 5, 3], 4.015);
 }
 
-/// A bar takes as much room and as many vectors of particles along any axis: its own axis is that along which it is stored.
+/// A bar needs equal memory and vectors of particles along any axis, because it is stored along its own.
 #[test]
 fn bars_are_stored_along_their_axis() {
     fn check<const D: usize>(bars: [[usize; D]; D]) {
@@ -81,7 +81,7 @@ fn bars_are_stored_along_their_axis() {
     check([[60, 5, 5], [5, 60, 5], [5, 5, 60]]);
 }
 
-/// 200 bytes per particle: displacement, velocity and force (3D doubles), the mass, and what the bonds hold.
+/// A particle needs at most 200 bytes: displacement, velocity and force (3D doubles), mass and bonds.
 #[test]
 fn bytes_per_particle() {
     fn check<const D: usize>(cells: [usize; D], most: f64) {
@@ -91,14 +91,15 @@ fn bytes_per_particle() {
         eprintln!("{D}D {cells:?}: {each:.1} bytes per particle");
         assert!(each <= most, "{D}D: {each}");
     }
-    // without padding: 8 bytes of bond bits per 64 bonds, 4 of the particle list, 8(3D + 1) of fields: 68 and 100; with
-    // the rows' padding (6 of 300, (6 of 46)²) and the guards 1.02·68 and 1.5·100
+    // without padding: 8 bytes of bond bits per 64 bonds, 4 of the particle list, 8(3D + 1) of fields: 68 and
+    // 100; with the rows' padding (6 of 300, (6 of 46)²) and the guards 1.02·68 and 1.5·100
     check([300, 300], 72.0);
     check([46, 46, 46], 150.0);
     check([100, 100, 100], 130.0);
 }
 
-/// One force evaluation an iteration and one a step, where balance is found; the stretches of its start and its end take no forces.
+/// A converged step takes one force evaluation per iteration and one more; stretches at its start and end
+/// need none.
 #[test]
 fn force_evaluations() {
     let mut built = Body::<2>::damaged([24, 20], 0.1, 3.015).build();

@@ -7,22 +7,23 @@ use polycore::Error;
 use polycore::file::atomic_write;
 
 use super::material::{BULK_RATIO, unusable};
-use super::set::Set;
+use super::table_fits::TableFits;
 
-/// Files by units: their name, what they say of it, and the host's unit of stress, Pa.
+/// Files by system of units: name, description, and the host's unit of stress, Pa.
 const FILES: [(&str, &str, f64); 2] =
     [("materials_mm.inp", "mm, N, MPa", 1e6), ("materials_si.inp", "m, N, Pa", 1.0)];
 
-/// `materials_mm.inp` and `materials_si.inp`: a card of every fit.
+/// Writes `materials_mm.inp` and `materials_si.inp` with a card of every fit.
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write(directory: &Path, all: &[Set]) -> Result<(), Error> {
+pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
     for (name, units, pascals) in FILES {
         atomic_write(directory.join(name), |file| {
             writeln!(
                 file,
-                "** units {units}; K is {BULK_RATIO} times the shear modulus: tests at constant volume do not determine it"
+                "** units {units}; K is {BULK_RATIO} times the shear modulus: tests at constant volume do \
+                 not determine it"
             )?;
             for set in all {
                 for fit in set.fits.iter().filter(|fit| unusable(fit).is_none()) {
@@ -45,8 +46,8 @@ pub fn write(directory: &Path, all: &[Set]) -> Result<(), Error> {
     Ok(())
 }
 
-/// The card of a law with its parameters and bulk modulus, stresses in the host's unit: *HYPERELASTIC where hosts have the law, with
-/// D₁ = 2/K, or the user material of crate `umat`.
+/// Formats the card of a law with its parameters and bulk modulus, stresses in the host's unit: *HYPERELASTIC
+/// if hosts have the law, with D₁ = 2/K, or the user material of crate `umat`.
 fn card(key: &str, parameters: &[f64], bulk: f64) -> String {
     let name = key.to_uppercase().replace('-', "_");
     let compliance = 2.0 / bulk;
@@ -71,7 +72,8 @@ fn card(key: &str, parameters: &[f64], bulk: f64) -> String {
             let numbers = std::iter::once(bulk).chain(parameters.iter().copied()).collect::<Vec<_>>();
             let constants = numbers.len();
             return format!(
-                "** of crate umat; in CalculiX NAME=USER_{name}\n*MATERIAL, NAME={name}\n*USER MATERIAL, CONSTANTS={constants}\n{}",
+                "** of crate umat; in CalculiX NAME=USER_{name}\n*MATERIAL, NAME={name}\n*USER MATERIAL, \
+                 CONSTANTS={constants}\n{}",
                 lines(&numbers)
             );
         }
@@ -79,7 +81,7 @@ fn card(key: &str, parameters: &[f64], bulk: f64) -> String {
     format!("*MATERIAL, NAME={name}\n*HYPERELASTIC, {kind}\n{}", lines(&numbers))
 }
 
-/// Eight numbers a line.
+/// Formats eight numbers per line.
 fn lines(numbers: &[f64]) -> String {
     let row = |row: &[f64]| row.iter().map(|x| format!("{x:.6e}")).collect::<Vec<_>>().join(", ") + "\n";
     numbers.chunks(8).map(row).collect()
@@ -107,19 +109,21 @@ mod tests {
             (
                 "ogden-2",
                 &[0.4, 2.0, 0.1, -1.5],
-                "*HYPERELASTIC, OGDEN, N=2\n4.000000e-1, 2.000000e0, 1.000000e-1, -1.500000e0, 5.000000e-2, 0.000000e0\n",
+                "*HYPERELASTIC, OGDEN, N=2\n4.000000e-1, 2.000000e0, 1.000000e-1, -1.500000e0, 5.000000e-2, \
+                 0.000000e0\n",
             ),
             (
                 "yeoh",
                 &[0.2, 0.002, 5e-5],
-                "*HYPERELASTIC, YEOH\n2.000000e-1, 2.000000e-3, 5.000000e-5, 5.000000e-2, 0.000000e0, 0.000000e0\n",
+                "*HYPERELASTIC, YEOH\n2.000000e-1, 2.000000e-3, 5.000000e-5, 5.000000e-2, 0.000000e0, \
+                 0.000000e0\n",
             ),
             ("gent", &[0.3, 75.0], "*USER MATERIAL, CONSTANTS=3\n4.000000e1, 3.000000e-1, 7.500000e1\n"),
         ] {
             let found = card(key, parameters, 40.0);
             assert!(found.ends_with(expected), "{found}");
         }
-        // a name of twelve numbers still has eight a line
+        // a name of twelve numbers still has eight per line
         assert!(
             MODELS
                 .iter()

@@ -1,20 +1,20 @@
-//! Pictures of fits: curves over the data for each kind of test in a table, and model against measurement.
+//! Pictures of fits: curves over the data for each test of a table, and model against measurement.
 
 use std::path::Path;
 
 use harness::output::picture::{LinePlot, Series};
 use polycore::Error;
-use polycore::constitutive::hyperelastic::data::{Mode, State, Table};
+use polycore::constitutive::hyperelastic::data::{Mode, TestData, TestState};
 use polycore::constitutive::hyperelastic::fit::{self, Fit};
-use polycore::constitutive::hyperelastic::{Hyperelastic, Kind, homogeneous};
+use polycore::constitutive::hyperelastic::{Hyperelastic, ModelKind, homogeneous};
 
 use super::MPA;
 
-/// A kind of homogeneous test that may be found among general biaxial states.
+/// Homogeneous test that may occur among general biaxial states.
 struct Test {
     key: &'static str,
     title: &'static str,
-    holds: fn(&State) -> bool,
+    holds: fn(&TestState) -> bool,
     nominal: fn(&dyn Hyperelastic, f64) -> Result<f64, polycore::constitutive::Error>,
 }
 
@@ -48,23 +48,23 @@ const TESTS: [Test; 3] = [
     },
 ];
 
-/// Points of a drawn curve.
+/// Number of points of a curve.
 const POINTS: usize = 200;
 
-/// The thesis' two categories have pictures of their own: together they would be more curves than colours.
-const KINDS: [(Kind, &str); 2] =
-    [(Kind::Phenomenological, "phenomenological"), (Kind::Micromechanical, "chains")];
+/// Categories of the thesis, each with its own pictures: together they would be more curves than colours.
+const KINDS: [(ModelKind, &str); 2] =
+    [(ModelKind::Phenomenological, "phenomenological"), (ModelKind::Micromechanical, "chains")];
 
-/// `<data>_<test>_<kind>.png` for every kind of test with at least three states, and `<data>_parity_<kind>.png` for
-/// biaxial tables.
-pub fn pictures(directory: &Path, name: &str, table: &Table, fits: &[Fit]) -> Result<(), Error> {
+/// Draws `<data>_<test>_<kind>.png` for every test with at least three states, and
+/// `<data>_parity_<kind>.png` for biaxial tables.
+pub fn pictures(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) -> Result<(), Error> {
     for (kind, suffix) in KINDS {
         let fits: Vec<&Fit> = fits.iter().filter(|fit| fit.model.kind == kind).collect();
         if fits.is_empty() {
             continue;
         }
         for test in &TESTS {
-            let states: Vec<&State> = table.states.iter().filter(|state| (test.holds)(state)).collect();
+            let states: Vec<&TestState> = table.states.iter().filter(|state| (test.holds)(state)).collect();
             if states.len() >= 3 {
                 let path = directory.join(format!("{name}_{}_{suffix}.png", test.key));
                 curves(name, test, &states, &fits).write(path)?;
@@ -77,8 +77,8 @@ pub fn pictures(directory: &Path, name: &str, table: &Table, fits: &[Fit]) -> Re
     Ok(())
 }
 
-/// Nominal stress over stretch.
-fn curves(name: &str, test: &Test, states: &[&State], fits: &[&Fit]) -> LinePlot {
+/// Draws nominal stress over stretch.
+fn curves(name: &str, test: &Test, states: &[&TestState], fits: &[&Fit]) -> LinePlot {
     let x: Vec<f64> = states.iter().map(|state| state.stretches[0]).collect();
     let y: Vec<f64> = states.iter().map(|state| state.nominal[0] / MPA).collect();
     let [low, high] = span(&x, 1.0).map(|l| 1.0 + 1.03 * (l - 1.0)).map(|l| l.max(0.01));
@@ -90,7 +90,7 @@ fn curves(name: &str, test: &Test, states: &[&State], fits: &[&Fit]) -> LinePlot
         .y_range(least, most)
         .series(Series::markers("measured", &x, &y));
     for fit in fits {
-        // beyond locking a curve just ends
+        // beyond locking a curve ends
         let nominal: Vec<f64> = stretches
             .iter()
             .map(|l| (test.nominal)(&fit.law, *l).map_or(f64::NAN, |nominal| nominal / MPA))
@@ -100,8 +100,8 @@ fn curves(name: &str, test: &Test, states: &[&State], fits: &[&Fit]) -> LinePlot
     plot
 }
 
-/// Every stress of the table, model over measurement.
-fn parity(name: &str, table: &Table, fits: &[&Fit]) -> Result<LinePlot, Error> {
+/// Draws every stress of the table, model over measurement.
+fn parity(name: &str, table: &TestData, fits: &[&Fit]) -> Result<LinePlot, Error> {
     let measured: Vec<f64> = table
         .states
         .iter()
@@ -123,7 +123,7 @@ fn parity(name: &str, table: &Table, fits: &[&Fit]) -> Result<LinePlot, Error> {
     Ok(plot)
 }
 
-/// Least and largest of some values and of that at rest.
+/// Least and largest of some values, the value at rest included.
 fn span(values: &[f64], rest: f64) -> [f64; 2] {
     values.iter().fold([rest, rest], |[low, high], value| [value.min(low), value.max(high)])
 }

@@ -7,17 +7,17 @@ use polycore::units::Stress;
 
 use super::MPA;
 
-/// `polycore exact eight-chain "0.27 MPa" 25 --to 4`
+/// Arguments of `polycore exact eight-chain "0.27 MPa" 25 --to 4`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// The law: neo-hookean, mooney-rivlin, gent, ogden-1, ogden-2, ogden-3, three-chain, eight-chain, …
+    /// Law: neo-hookean, mooney-rivlin, gent, ogden-1, ogden-2, ogden-3, three-chain, eight-chain, …
     law: String,
-    /// Its parameters in order, stresses with their unit ("0.27 MPa"); μ of Ogden in Abaqus' convention.
+    /// Parameters in order, stresses with their unit ("0.27 MPa"); μ of Ogden in Abaqus' convention.
     #[arg(required = true, allow_negative_numbers = true)]
     parameters: Vec<String>,
-    /// The test.
+    /// Test.
     #[arg(long, value_enum, default_value = "uniaxial")]
-    mode: Mode,
+    mode: StretchMode,
     /// First stretch.
     #[arg(long, default_value_t = 1.0)]
     from: f64,
@@ -30,13 +30,13 @@ pub struct Arguments {
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
-enum Mode {
+enum StretchMode {
     Uniaxial,
     Equibiaxial,
     PureShear,
 }
 
-/// CSV text.
+/// Computes the table as CSV text.
 pub fn table(arguments: &Arguments) -> Result<String, String> {
     let law = law(arguments)?;
     let mut text = String::from("stretch_1,stretch_2,nominal_1_MPa,nominal_2_MPa\n");
@@ -44,12 +44,12 @@ pub fn table(arguments: &Arguments) -> Result<String, String> {
         let share = f64::from(i) / f64::from(arguments.points.max(2) - 1);
         let l = arguments.from + share * (arguments.to - arguments.from);
         let other = match arguments.mode {
-            Mode::Uniaxial => l.recip().sqrt(),
-            Mode::Equibiaxial => l,
-            Mode::PureShear => 1.0,
+            StretchMode::Uniaxial => l.recip().sqrt(),
+            StretchMode::Equibiaxial => l,
+            StretchMode::PureShear => 1.0,
         };
         let mut nominal = homogeneous::biaxial(&law, l, other).map_err(|error| error.to_string())?;
-        if matches!(arguments.mode, Mode::Uniaxial) {
+        if matches!(arguments.mode, StretchMode::Uniaxial) {
             nominal[1] = 0.0; // but for the rounding of λ^{−1/2}
         }
         let _ = writeln!(text, "{l},{other},{},{}", nominal[0] / MPA, nominal[1] / MPA);

@@ -1,4 +1,4 @@
-//! Runs the fits and trials of a case and writes what they give.
+//! Runs the fits and trials of a case and writes the results.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -8,31 +8,34 @@ use harness::output;
 use harness::report::{Phases, Report};
 use polycore::Error;
 use polycore::constitutive;
-use polycore::constitutive::hyperelastic::data::{Mode, State, Table};
-use polycore::constitutive::hyperelastic::fit::{Agreement, Fit, Fitted, Standing, fit_until};
+use polycore::constitutive::hyperelastic::data::{Mode, TestData, TestState};
+use polycore::constitutive::hyperelastic::fit::{
+    Agreement, Fit, FittedParameter, Identifiability, fit_until,
+};
 use polycore::constitutive::hyperelastic::{Hyperelastic, homogeneous, stability};
 
 use super::MPA;
 use super::material::{DIGITS, digits};
 use super::quantities as q;
-use super::scene::{Case, DataSet};
-use super::set::{Set, unit_of};
+use super::scene::{DataSet, FitCase};
+use super::table_fits::{TableFits, unit_of};
 use super::{card, draw, material, trials};
 
-/// Fits every law to every table, writes tables and pictures. A law that cannot be fitted is named; the others are kept. Where it is
-/// stopped, what is done is written.
-pub fn run(case: &Case, run: &mut Run) -> Result<Finished, Error> {
+/// Fits every law to every table; writes tables and pictures. A law that cannot be fitted is reported, the
+/// others are kept. If the run is stopped, finished fits are written.
+pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     let (directory, quick) = (run.options.output, run.options.quick);
     run.begin()?;
     let mut report = Report::new("polycore", env!("CARGO_PKG_VERSION"), &case.source.text);
     let mut phases = Phases::new();
-    let mut all: Vec<Set> = Vec::new();
+    let mut all: Vec<TableFits> = Vec::new();
     let total = (case.data.len() * case.laws.len()).max(1) as f64;
     let mut done = 0.0;
     let mut stopped = false;
     for DataSet { name, table, read } in &case.data {
         phases.start("fit");
-        let mut set = Set { name, table, read, fits: Vec::new(), failed: Vec::new(), crossed: Vec::new() };
+        let mut set =
+            TableFits { name, table, read, fits: Vec::new(), failed: Vec::new(), crossed: Vec::new() };
         for model in &case.laws {
             run.show(done / total, &|| format!("fit {name}  {}", model.key));
             match fit_until(model, table, run.options.interrupted) {
@@ -47,10 +50,10 @@ pub fn run(case: &Case, run: &mut Run) -> Result<Finished, Error> {
         }
         phases.start("output");
         for fit in &set.fits {
-            record(&mut report, name, table, fit)?;
+            record_fit(&mut report, name, table, fit)?;
             for other in case.data.iter().filter(|other| case.cross && other.name != *name) {
                 let key = format!("{name}.{}.{}", fit.model.key, other.name);
-                let found = judge_on(&mut report, &key, &fit.law, &other.table)?;
+                let found = record_cross(&mut report, &key, &fit.law, &other.table)?;
                 set.crossed.push((fit.model.key, &other.name, found));
             }
         }
@@ -93,22 +96,25 @@ pub fn run(case: &Case, run: &mut Run) -> Result<Finished, Error> {
     for name in &report.non_finite {
         let _ = writeln!(text, "FAIL  {name} is not finite");
     }
-    Ok(Finished { report, text })
+    let mut finished = Finished::new(report, text);
+    finished.table = (!all.is_empty()).then(|| errors(case, &all));
+    Ok(finished.with_notes(&remarks(&all)))
 }
 
-/// In the unit of the tables: a stress in MPa, numbers as they are.
+/// Converts a value to the unit of the tables: stresses to MPa, numbers unchanged.
 fn scaled(value: f64, unit: &str) -> (f64, &'static str) {
     if unit == "Pa" { (value / MPA, "MPa") } else { (value, "") }
 }
 
-/// rms, mean absolute error and R² of a law on another table than that of its fit; where it locks, how often.
-fn judge_on(
+/// Records rms, mean absolute error and R² of a law on another table than that of its fit; if it locks there,
+/// how often.
+fn record_cross(
     report: &mut Report,
     key: &str,
     law: &dyn Hyperelastic,
-    table: &Table,
+    table: &TestData,
 ) -> Result<Option<Agreement>, Error> {
-    let locks = |state: &&State| {
+    let locks = |state: &&TestState| {
         let [a, b] = state.stretches;
         matches!(homogeneous::biaxial(law, a, b), Err(constitutive::Error::Locked { .. }))
     };
@@ -117,12 +123,12 @@ fn judge_on(
     if locked > 0 {
         return Ok(None);
     }
-    let found = Agreement::of(law, table)?;
-    agree(report, key, &found);
+    let found = Agreement::new(law, table)?;
+    record_agreement(report, key, &found);
     Ok(Some(found))
 }
 
-fn agree(report: &mut Report, key: &str, found: &Agreement) {
+fn record_agreement(report: &mut Report, key: &str, found: &Agreement) {
     report.value(q::RMS.of(&[key]), found.rms / MPA);
     report.value(q::MAE.of(&[key]), found.mae / MPA);
     if let Some(r2) = found.r2 {
@@ -130,7 +136,7 @@ fn agree(report: &mut Report, key: &str, found: &Agreement) {
     }
 }
 
-fn record(report: &mut Report, data: &str, table: &Table, fit: &Fit) -> Result<(), Error> {
+fn record_fit(report: &mut Report, data: &str, table: &TestData, fit: &Fit) -> Result<(), Error> {
     let key = format!("{data}.{}", fit.model.key);
     report.value(q::SHEAR_MODULUS.of(&[&key]), fit.law.shear_modulus() / MPA);
     for parameter in &fit.parameters {
@@ -141,24 +147,25 @@ fn record(report: &mut Report, data: &str, table: &Table, fit: &Fit) -> Result<(
             report.value(quantity, scaled(error, parameter.unit).0);
         }
     }
-    agree(report, &key, &Agreement::of(&fit.law, table)?);
-    report.value(q::STABLE.of(&[&key]), f64::from(u8::from(unstable(fit, table).is_none())));
+    record_agreement(report, &key, &Agreement::new(&fit.law, table)?);
+    report.value(q::STABLE.of(&[&key]), f64::from(u8::from(find_instability(fit, table).is_none())));
     report.work(&format!("{key}.evaluations"), fit.iterations as u64);
     report.work(&format!("{key}.starts"), fit.starts.0 as u64);
     report.work(&format!("{key}.starts_that_agree"), fit.starts.1 as u64);
     Ok(())
 }
 
-/// Where a law first is unstable over the stretches of a table: the test and its stretch.
-fn unstable(fit: &Fit, table: &Table) -> Option<(Mode, f64)> {
+/// Finds the test and the stretch at which a law first becomes unstable, within the stretches of a table.
+fn find_instability(fit: &Fit, table: &TestData) -> Option<(Mode, f64)> {
     let ends = stability::range(table);
     let all = Mode::TESTS.into_iter().flat_map(|mode| ends.map(|end| (mode, end)));
     all.filter(|(_, end)| *end != 1.0)
         .find_map(|(mode, end)| stability::unstable_from(&fit.law, mode, end).map(|stretch| (mode, stretch)))
 }
 
-/// `fits.csv`: one line for each number, with its standard error where the data determine it; stresses of a table in one unit.
-fn write_fits(directory: &Path, all: &[Set]) -> Result<(), Error> {
+/// Writes `fits.csv`: one line for each number, with its standard error if the data determine it; stresses of
+/// a table in one unit.
+fn write_fits(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
     let mut text = String::from("data,law,quantity,value,standard_error,unit\n");
     for set in all {
         let (in_unit, pascals) = set.unit();
@@ -170,7 +177,7 @@ fn write_fits(directory: &Path, all: &[Set]) -> Result<(), Error> {
                 let _ = writeln!(text, "{data},{law},{quantity},{value},{error},{shown}");
             };
             line("rms", fit.rms, None, "Pa");
-            if let Some(r2) = Agreement::of(&fit.law, set.table)?.r2 {
+            if let Some(r2) = Agreement::new(&fit.law, set.table)?.r2 {
                 line("r2", r2, None, "");
             }
             for (_, other, found) in set.crossed.iter().filter(|crossed| crossed.0 == fit.model.key) {
@@ -178,7 +185,8 @@ fn write_fits(directory: &Path, all: &[Set]) -> Result<(), Error> {
                     line(&format!("r2.{other}"), r2, None, "");
                 }
             }
-            for parameter in fit.parameters.iter().filter(|parameter| parameter.standing != Standing::Absent)
+            for parameter in
+                fit.parameters.iter().filter(|parameter| parameter.identifiability != Identifiability::Absent)
             {
                 line(parameter.name, parameter.value, parameter.standard_error, parameter.unit);
             }
@@ -192,13 +200,13 @@ fn write_fits(directory: &Path, all: &[Set]) -> Result<(), Error> {
     })
 }
 
-/// `<data>_<law>_posterior.csv`: draws of the parameters, for `sweep --sample`.
+/// Writes `<data>_<law>_posterior.csv`: draws of the parameters, for `sweep --sample`.
 fn write_draws(directory: &Path, name: &str, fit: &Fit) -> Result<(), Error> {
     if fit.draws.is_empty() {
         return Ok(());
     }
-    let unit = |parameter: &Fitted| scaled(0.0, parameter.unit).1;
-    let column = |(i, parameter): (usize, &Fitted)| {
+    let unit = |parameter: &FittedParameter| scaled(0.0, parameter.unit).1;
+    let column = |(i, parameter): (usize, &FittedParameter)| {
         fit.draws.iter().map(|draw| scaled(draw[i], parameter.unit).0).collect()
     };
     let lists: Vec<Vec<f64>> = fit.parameters.iter().enumerate().map(column).collect();
@@ -207,8 +215,8 @@ fn write_draws(directory: &Path, name: &str, fit: &Fit) -> Result<(), Error> {
     output::csv::write(directory.join(format!("{name}_{}_posterior.csv", fit.model.key)), &columns)
 }
 
-/// `<data>_states.csv`: the measured states, and beside them what every law makes of them.
-fn write_states(directory: &Path, name: &str, table: &Table, fits: &[Fit]) -> Result<(), Error> {
+/// Writes `<data>_states.csv`: the measured states, and beside them the predictions of every law.
+fn write_states(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) -> Result<(), Error> {
     let mut columns: Vec<(String, &str, Vec<f64>)> = Vec::new();
     for i in [0, 1] {
         let stretches = table.states.iter().map(|state| state.stretches[i]).collect();
@@ -233,29 +241,15 @@ fn write_states(directory: &Path, name: &str, table: &Table, fits: &[Fit]) -> Re
     output::csv::write(directory.join(format!("{name}_states.csv")), &columns)
 }
 
-/// How tables were read, rms by law and table, verdicts, the parameters, a block for `peri`, trials, then the expectations.
-fn summary(case: &Case, all: &[Set], report: &Report) -> String {
+/// Summary of a run: layout of the files, rms by law and table, verdicts, parameters, a material block for
+/// `peri`, trials, then the expectations.
+fn summary(case: &FitCase, all: &[TableFits], report: &Report) -> String {
     let mut text = format!("{}\n", case.title);
     for set in all {
         set.read.iter().for_each(|line| text += &format!("{}: {line}\n", set.name));
     }
     if !all.is_empty() {
-        text += "rms of the nominal stress, over the measured stresses (their number in brackets); k: parameters\n";
-        let _ = write!(text, "{:<22}{:>4}", "law", "k");
-        for set in all {
-            let head = format!("{} ({}), {}", set.name, set.table.measurements(), set.unit().0);
-            let _ = write!(text, "{head:>24}");
-        }
-        text.push('\n');
-        for model in &case.laws {
-            let _ = write!(text, "{:<22}{:>4}", model.key, model.parameters.len());
-            for set in all {
-                let fit = set.fits.iter().find(|fit| fit.model.key == model.key);
-                let rms = fit.map(|fit| digits(fit.rms / set.unit().1, 5));
-                let _ = write!(text, "{:>24}", rms.unwrap_or_else(|| "failed".to_owned()));
-            }
-            text.push('\n');
-        }
+        text += &errors(case, all);
     }
     for set in all {
         for (law, why) in &set.failed {
@@ -264,13 +258,9 @@ fn summary(case: &Case, all: &[Set], report: &Report) -> String {
     }
     for set in all {
         text += &verdicts(set);
-        let _ = writeln!(
-            text,
-            "parameters on {} (± standard error, - where the data do not determine it)",
-            set.name
-        );
+        let _ = writeln!(text, "parameters on {} (± standard error, if the data determine it)", set.name);
         for fit in &set.fits {
-            let list: Vec<String> = fit.parameters.iter().map(shown).collect();
+            let list: Vec<String> = fit.parameters.iter().map(format_parameter).collect();
             let _ = writeln!(text, "  {:<22}{}", fit.model.key, list.join(", "));
         }
         text += &material::best(set.name, &set.fits);
@@ -289,15 +279,50 @@ fn summary(case: &Case, all: &[Set], report: &Report) -> String {
     text
 }
 
-/// R² in the own and in other tables below which a law is not to be used there.
-const SAFE: f64 = 0.9;
+/// Returns the table of the errors of all laws on all tables.
+fn errors(case: &FitCase, all: &[TableFits]) -> String {
+    let mut text =
+        "rms of the nominal stress, over the measured stresses (their number in brackets); k: parameters\n"
+            .to_owned();
+    let _ = write!(text, "{:<22}{:>4}", "law", "k");
+    for set in all {
+        let head = format!("{} ({}), {}", set.name, set.table.measurements(), set.unit().0);
+        let _ = write!(text, "{head:>24}");
+    }
+    text.push('\n');
+    for model in &case.laws {
+        let _ = write!(text, "{:<22}{:>4}", model.key, model.parameters.len());
+        for set in all {
+            let fit = set.fits.iter().find(|fit| fit.model.key == model.key);
+            let rms = fit.map(|fit| digits(fit.rms / set.unit().1, 5));
+            let _ = write!(text, "{:>24}", rms.unwrap_or_else(|| "failed".to_owned()));
+        }
+        text.push('\n');
+    }
+    text
+}
 
-/// R² of each law in its table and in the others, whether it may be used there, and where it is unstable.
-fn verdicts(set: &Set) -> String {
+/// Returns the laws that failed and the block of the best law, by table.
+fn remarks(all: &[TableFits]) -> String {
+    let mut text = String::new();
+    for set in all {
+        for (law, why) in &set.failed {
+            let _ = writeln!(text, "failed  {law} on {}: {why}", set.name);
+        }
+        text += &material::best(set.name, &set.fits);
+    }
+    text
+}
+
+/// R² in the own and in other tables below which a law is unsafe there.
+const SAFE_R2: f64 = 0.9;
+
+/// Lists R² of each law in its table and in the others, whether it is safe there, and where it is unstable.
+fn verdicts(set: &TableFits) -> String {
     let [low, high] = stability::range(set.table);
     let mut text = format!(
-        "R² of laws fitted to {}; stability (Drucker) in uniaxial, equibiaxial and pure shear tests at stretches {low:.3} to \
-         {high:.3}\n",
+        "R² of laws fitted to {}; stability (Drucker) in uniaxial, equibiaxial and pure shear tests at \
+         stretches {low:.3} to {high:.3}\n",
         set.name
     );
     for fit in &set.fits {
@@ -307,7 +332,7 @@ fn verdicts(set: &Set) -> String {
             Some(r2) => format!("{r2:.0e}"),
             None => "-".to_owned(),
         };
-        let own = Agreement::of(&fit.law, set.table).ok().and_then(|found| found.r2);
+        let own = Agreement::new(&fit.law, set.table).ok().and_then(|found| found.r2);
         let _ = write!(text, "  {key:<22}{}", shown(own));
         let crossed: Vec<_> = set.crossed.iter().filter(|crossed| crossed.0 == key).collect();
         for (_, other, found) in &crossed {
@@ -315,13 +340,13 @@ fn verdicts(set: &Set) -> String {
             let _ = write!(text, ", {other} {r2}");
         }
         let bad =
-            |found: &Option<Agreement>| !found.is_some_and(|found| found.r2.is_none_or(|r2| r2 >= SAFE));
+            |found: &Option<Agreement>| !found.is_some_and(|found| found.r2.is_none_or(|r2| r2 >= SAFE_R2));
         if !crossed.is_empty() {
             let unsafe_there = crossed.iter().any(|(_, _, found)| bad(found));
             let verdict = if unsafe_there { "unsafe outside" } else { "safe outside" };
             let _ = write!(text, "; {verdict} {}", set.name);
         }
-        match unstable(fit, set.table) {
+        match find_instability(fit, set.table) {
             Some((mode, stretch)) => {
                 let _ =
                     writeln!(text, "; unstable in {} tests from the stretch {stretch:.3} on", mode.name());
@@ -332,18 +357,18 @@ fn verdicts(set: &Set) -> String {
     text
 }
 
-/// `links 25.46 ± 0.13`.
-fn shown(parameter: &Fitted) -> String {
+/// Formats a parameter: `links 25.46 ± 0.13`; without a standard error only its value.
+fn format_parameter(parameter: &FittedParameter) -> String {
     let name = parameter.name;
     let (unit, scale) = if parameter.unit == "Pa" { unit_of(parameter.value) } else { ("", 1.0) };
     let number = |value: f64| digits(value / scale, 6);
-    match parameter.standing {
-        Standing::Absent => format!("{name} absent"),
-        Standing::Undetermined => format!("{name} not determined"),
-        Standing::Determined => {
-            let error = parameter.standard_error.map(|error| digits(error / scale, 2));
-            let error = error.unwrap_or_else(|| "-".to_owned());
-            format!("{name} {} ± {error} {unit}", number(parameter.value)).trim_end().to_owned()
+    match parameter.identifiability {
+        Identifiability::Absent => format!("{name} absent"),
+        Identifiability::Undetermined => format!("{name} not determined"),
+        Identifiability::Determined => {
+            let error = parameter.standard_error.map(|error| format!(" ± {}", digits(error / scale, 2)));
+            let error = error.unwrap_or_default();
+            format!("{name} {}{error} {unit}", number(parameter.value)).trim_end().to_owned()
         }
     }
 }

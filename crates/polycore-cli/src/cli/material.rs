@@ -1,26 +1,26 @@
-//! What a scene of `peri` takes of a fitted law.
+//! Material blocks for scenes of `peri`, from fitted laws.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
 
 use polycore::Error;
-use polycore::constitutive::hyperelastic::fit::{Fit, Fitted, Standing};
+use polycore::constitutive::hyperelastic::fit::{Fit, FittedParameter, Identifiability};
 use polycore::file::atomic_write;
 
-use super::set::{Set, unit_of};
+use super::table_fits::{TableFits, unit_of};
 
-/// Laws of which the printed block is taken before others.
+/// Laws whose block is printed in preference to others.
 const EIGHT_CHAINS: &str = "eight-chain";
 
-/// Bulk over shear modulus: nearly incompressible. Tests at constant volume do not determine it.
+/// Ratio of bulk to shear modulus: nearly incompressible. Tests at constant volume do not determine it.
 pub const BULK_RATIO: f64 = 100.0;
 
-/// Standard errors to either side of a value that hold 95 % of a normal distribution.
+/// Number of standard errors to either side of a value that hold 95 % of a normal distribution.
 const HALF_WIDTH: f64 = 1.96;
 
-/// `[material.solid]` of `peri` for a fitted law: the law itself, with its intervals of confidence. Of a law that the data do not
-/// determine, in comments, what to take.
+/// Formats `[material.solid]` of `peri` for a fitted law, with its confidence intervals. For a law that the
+/// data do not determine it is a comment with advice.
 fn block(fit: &Fit) -> String {
     let rms = stress(fit.rms, 5);
     if let Some(why) = unusable(fit) {
@@ -51,35 +51,35 @@ fn block(fit: &Fit) -> String {
                 writeln!(text, " # ± {:.2e} {unit}, 95 %", error / scale)
             }
             Some(error) => writeln!(text, " # ± {error:.2e}, 95 %"),
-            None => writeln!(text, " # its error is not determined by the data"),
+            None => writeln!(text, " # the data do not determine its error"),
         };
     }
     text
 }
 
-/// Why a fitted law is no material to use, and what to take.
+/// Returns the reason for which a fitted law is no usable material, with advice.
 pub fn unusable(fit: &Fit) -> Option<String> {
-    let names = |standing| -> Vec<&str> {
-        let those = fit.parameters.iter().filter(|parameter| parameter.standing == standing);
+    let names = |verdict: Identifiability| -> Vec<&str> {
+        let those = fit.parameters.iter().filter(|parameter| parameter.identifiability == verdict);
         those.map(|parameter| parameter.name).collect()
     };
-    let (absent, open) = (names(Standing::Absent), names(Standing::Undetermined));
+    let (absent, open) = (names(Identifiability::Absent), names(Identifiability::Undetermined));
     if !absent.is_empty() {
-        return Some(format!("without {} it is a law of fewer parameters: take that", absent.join(", ")));
+        return Some(format!(
+            "without {} it is a law with fewer parameters: use that law",
+            absent.join(", ")
+        ));
     }
     (!open.is_empty()).then(|| {
-        format!(
-            "the data do not determine {}, its values are as good as infinite: take `neo-hookean`",
-            open.join(", ")
-        )
+        format!("the data do not determine {}, which may be infinite: use `neo-hookean`", open.join(", "))
     })
 }
 
-/// The block of the eight-chain law with the least rms; without such a one, of the best law. Laws of which every parameter is known to
-/// half of its size come first.
+/// Formats the block of the eight-chain law with the least rms or, without such a law, of the best law. Laws
+/// whose parameters are all known to half of their size come first.
 pub fn best(data: &str, fits: &[Fit]) -> String {
     let known = |fit: &Fit| {
-        let sure = |parameter: &Fitted| {
+        let sure = |parameter: &FittedParameter| {
             parameter.standard_error.is_some_and(|error| HALF_WIDTH * error < parameter.value.abs())
         };
         fit.parameters.iter().all(sure)
@@ -93,10 +93,10 @@ pub fn best(data: &str, fits: &[Fit]) -> String {
     best.map_or_else(String::new, |fit| format!("for a scene of peri, from {data}:\n{}", block(fit)))
 }
 
-/// `materials.toml`: the block of every fit, under comments.
-pub fn write(directory: &Path, all: &[Set]) -> Result<(), Error> {
+/// Writes `materials.toml`: the block of every fit, under comments.
+pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
     atomic_write(directory.join("materials.toml"), |file| {
-        writeln!(file, "# Take one block: docs/guide/src/how-to/fit.md says what it can and cannot do.")?;
+        writeln!(file, "# Use one block; docs/guide/src/how-to/fit.md describes its limits.")?;
         for set in all {
             for fit in &set.fits {
                 write!(file, "\n# fitted to {}\n{}", set.name, block(fit))?;
@@ -106,16 +106,16 @@ pub fn write(directory: &Path, all: &[Set]) -> Result<(), Error> {
     })
 }
 
-/// Significant digits of parameters.
+/// Number of significant digits of parameters.
 pub const DIGITS: usize = 7;
 
-/// With its unit.
+/// Formats a stress with its unit.
 pub fn stress(value: f64, significant: usize) -> String {
     let (unit, scale) = unit_of(value);
     format!("{} {unit}", digits(value / scale, significant))
 }
 
-/// A number with so many significant digits.
+/// Formats a number with so many significant digits.
 pub fn digits(value: f64, significant: usize) -> String {
     let exponent = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
     let after = significant as i32 - 1 - exponent;

@@ -1,17 +1,20 @@
-//! The scalars that reports of `polycore` can have.
+//! Scalars in reports of `polycore`.
 
 harness::quantities! {
-    /// Of fits, `{fit}` = DATA.LAW or, of a fit on other data, DATA.LAW.OTHER; of trials, `{trial}`.
+    /// Quantities of fits, `{fit}` = DATA.LAW or, for a fit judged on other data, DATA.LAW.OTHER; and of
+    /// trials, `{trial}`.
     pub ALL:
     RMS = "{fit}.rms", "MPa", "root mean square of model − measurement";
     MAE = "{fit}.mae", "MPa", "mean of |model − measurement|";
-    R2 = "{fit}.r2", "", "1 − Σr²/Σ(P − P̄)²";
-    LOCKED = "{fit}.locked", "", "with `cross`: states of the other data beyond the locking stretch of the law, at which it has no stress; if there are any, there are no other numbers";
-    STABLE = "{fit}.stable", "", "1 if the law is stable (Drucker) in uniaxial, equibiaxial and pure shear tests over the stretches of its data, else 0";
-    FAILED = "{fit}.failed", "", "1 of a law that could not be fitted; it has no other values";
+    R2 = "{fit}.r2", "", "coefficient of determination 1 − Σr²/Σ(P − P̄)²";
+    LOCKED = "{fit}.locked", "", "with `cross`: number of states of the other data beyond the locking \
+                                  stretch of the law; if there are any, other values are missing";
+    STABLE = "{fit}.stable", "", "1 if the law is stable (Drucker) in uniaxial, equibiaxial and pure shear \
+                                  tests over the stretches of its data, else 0";
+    FAILED = "{fit}.failed", "", "1 if the law could not be fitted; other values are missing";
     SHEAR_MODULUS = "{fit}.shear_modulus", "MPa", "shear modulus at rest";
-    PARAMETER = "{fit}.{parameter}", "*", "a parameter of the fitted law, stresses in MPa";
-    STANDARD_ERROR = "{fit}.{parameter}.standard_error", "*", "its standard error";
+    PARAMETER = "{fit}.{parameter}", "*", "parameter of the fitted law, stresses in MPa";
+    STANDARD_ERROR = "{fit}.{parameter}.standard_error", "*", "standard error of the parameter";
     REFUSED = "{trial}.refused", "", "1 if a trial was refused with the message of its scene, else 0";
     NOMINAL = "{trial}.nominal", "MPa", "P₁ of a trial with `parameters`";
     ENERGY = "{trial}.energy", "MJ/m³", "W of a trial with `parameters`";

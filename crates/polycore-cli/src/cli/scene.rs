@@ -1,42 +1,42 @@
-//! The scene of fits and trials: which laws, which data, trials, expectations.
+//! Scenes of fits and trials: laws, data, trials, expectations.
 
 use std::fmt::Write;
 use std::path::PathBuf;
 
 use harness::report::Expect;
 use harness::scene::{SceneError, Source};
-use polycore::constitutive::hyperelastic::data::{Mode, Table};
+use polycore::constitutive::hyperelastic::data::{Mode, TestData};
 use polycore::constitutive::hyperelastic::fit::neo_hookean_modulus;
 use polycore::constitutive::hyperelastic::{
-    self, MODELS, Meaning, ModelDescriptor, StrainMeasure, StressMeasure,
+    self, MODELS, ModelDescriptor, StrainMeasure, TestFormat, TestStressMeasure,
 };
 use serde::Deserialize;
 
 use super::quantities as q;
-use super::trials::Trial;
+use super::trials::FitTrial;
 
-/// The file as written.
+/// Scene as written in the file.
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Scene {
     /// Checked by its type only.
     #[serde(rename = "program")]
     _program: Program,
-    /// One line for tables and pictures.
+    /// Title for tables and pictures, one line.
     #[serde(default)]
     title: String,
     /// Fits.
     #[serde(default)]
-    fit: Fit,
-    /// Laws at single states and fits to a few, with their expected behaviour.
+    fit: FitSettings,
+    /// Laws at single states and fits to a few states, with their expected behaviour.
     #[serde(default)]
-    trial: Vec<Trial>,
+    trial: Vec<FitTrial>,
     /// Expected results.
     #[serde(default)]
     expect: Vec<Expect>,
 }
 
-/// The program that runs these scenes; `cargo xtask validate` chooses by it.
+/// Program that runs these scenes; `cargo xtask validate` selects by it.
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 enum Program {
@@ -46,70 +46,70 @@ enum Program {
 /// Laws and data to fit.
 #[derive(Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct Fit {
-    /// Names of laws; all of them if not given.
+struct FitSettings {
+    /// Names of laws; all laws if not given.
     laws: Option<Vec<String>>,
-    /// Whether a law fitted to one table is judged on the others, too.
+    /// Judge a law fitted to one table on the other tables, too.
     #[serde(default)]
     cross: bool,
     /// Tables of measurements.
     #[serde(default)]
-    data: Vec<Data>,
+    data: Vec<TestTableSpec>,
 }
 
-/// A table of homogeneous states.
+/// Table of homogeneous states.
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct Data {
-    /// Its name in the report.
+struct TestTableSpec {
+    /// Name in the report.
     name: String,
-    /// The CSV file, relative to the scene.
+    /// CSV file, relative to the scene.
     file: PathBuf,
-    /// Only the states of this test; of a table without a column of tests, the test of all its states.
+    /// Test whose states are used; for a table without a column of tests, the test of all states.
     mode: Option<Mode>,
-    /// Measure of the strain where its heading leaves it open.
+    /// Measure of the strain, if its heading does not name it.
     strain: Option<StrainMeasure>,
-    /// Measure of the stress where its heading leaves it open.
-    stress: Option<StressMeasure>,
+    /// Measure of the stress, if its heading does not name it.
+    stress: Option<TestStressMeasure>,
     /// Unit of a stress whose heading has none: `MPa`.
     stress_unit: Option<String>,
-    /// Heading of the strain, of several.
+    /// Heading of the strain, if there are several.
     strain_column: Option<String>,
-    /// Heading of the stress, of several.
+    /// Heading of the stress, if there are several.
     stress_column: Option<String>,
 }
 
-/// A table to be fitted.
+/// Table to be fitted.
 pub struct DataSet {
     pub name: String,
-    pub table: Table,
-    /// How its file was understood, and what was left out of it, a line each.
+    pub table: TestData,
+    /// Layout of the file, and the rows left out, one line each.
     pub read: Vec<String>,
 }
 
-/// The JSON Schema of scenes.
+/// JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
     harness::scene::schema("polycore", &[q::ALL], |generator| vec![generator.subschema_for::<Scene>()])
 }
 
-/// A scene that was checked, with its data.
-pub struct Case {
+/// Checked scene with its data.
+pub struct FitCase {
     pub source: Source,
     pub title: String,
     pub laws: Vec<&'static ModelDescriptor>,
     pub cross: bool,
     pub data: Vec<DataSet>,
-    pub trials: Vec<Trial>,
+    pub trials: Vec<FitTrial>,
     pub expect: Vec<Expect>,
 }
 
-impl Case {
+impl FitCase {
     /// Parses and checks a scene and the tables that it names.
     pub fn parse(source: &Source) -> Result<Self, SceneError> {
         let Scene { _program: Program::Polycore, title, fit, trial, expect } = source.parse()?;
         let laws = match &fit.laws {
             None => MODELS.iter().collect(),
-            Some(names) => selected(source, names)?,
+            Some(names) => select_laws(source, names)?,
         };
         let mut data: Vec<DataSet> = Vec::new();
         for (i, entry) in fit.data.into_iter().enumerate() {
@@ -126,7 +126,7 @@ impl Case {
                     "another name",
                 ));
             }
-            let meaning = Meaning {
+            let format = TestFormat {
                 mode: entry.mode,
                 strain: entry.strain,
                 stress: entry.stress,
@@ -134,13 +134,13 @@ impl Case {
                 strain_column: entry.strain_column,
                 stress_column: entry.stress_column,
             };
-            let reading = Table::read_as(source.file(&entry.file), &meaning)
+            let reading = TestData::read_as(source.file(&entry.file), &format)
                 .map_err(|error| source.refused(&key("file"), error))?;
-            let read = [vec![reading.understood], reading.notes].concat();
+            let read = [vec![reading.description], reading.notes].concat();
             let mut table = reading.table;
             if let Some(mode) = entry.mode {
-                table = table.of(mode).map_err(|error| {
-                    source.error(&key("mode"), error, "a test of which the table has a stress")
+                table = table.select(mode).map_err(|error| {
+                    source.error(&key("mode"), error, "a test with a stress in the table")
                 })?;
             }
             neo_hookean_modulus(&table).map_err(|error| source.refused(&key("file"), error))?;
@@ -167,7 +167,7 @@ impl Case {
         Ok(case)
     }
 
-    /// What a run will do, in lines.
+    /// Describes what a run will do, in lines.
     pub fn plan(&self) -> String {
         let mut text = format!("{}: {}\n", self.source.path.display(), self.title);
         for DataSet { name, table, read } in &self.data {
@@ -183,8 +183,8 @@ impl Case {
         }
         let _ = writeln!(
             text,
-            "{} fits, {} trials, {} expectations; writes fits.csv, <data>_states.csv, materials.toml, pictures (not with \
-             --quick), report.json",
+            "{} fits, {} trials, {} expectations; writes fits.csv, <data>_states.csv, materials.toml, \
+             pictures (not with --quick), report.json",
             self.laws.len() * self.data.len(),
             self.trials.len(),
             self.expect.len()
@@ -192,7 +192,7 @@ impl Case {
         text
     }
 
-    /// Names of all scalars that the report will have.
+    /// Lists the names of all scalars of the report.
     fn quantities(&self) -> Vec<String> {
         let mut names = Vec::new();
         for DataSet { name: data, .. } in &self.data {
@@ -227,7 +227,7 @@ impl Case {
     }
 }
 
-fn selected(source: &Source, names: &[String]) -> Result<Vec<&'static ModelDescriptor>, SceneError> {
+fn select_laws(source: &Source, names: &[String]) -> Result<Vec<&'static ModelDescriptor>, SceneError> {
     let mut laws: Vec<&'static ModelDescriptor> = Vec::new();
     for (i, name) in names.iter().enumerate() {
         let all = || MODELS.iter().map(|model| model.key).collect::<Vec<_>>().join(", ");
@@ -242,31 +242,32 @@ fn selected(source: &Source, names: &[String]) -> Result<Vec<&'static ModelDescr
         laws.push(model);
     }
     if laws.is_empty() {
-        return Err(source.error("fit.laws", "no law", "at least one, or no key `laws` for all"));
+        return Err(source.error("fit.laws", "no law", "at least one law; leave out `laws` to fit all"));
     }
     Ok(laws)
 }
 
-/// What to take for a law of another name, or for what no law here is.
+/// Returns advice for an unknown name of a law, or for a property that no law here models.
 fn advice(name: &str) -> Option<&'static str> {
     let plain: String = name.to_lowercase().chars().filter(char::is_ascii_alphanumeric).collect();
     Some(match plain.as_str() {
-        "arrudaboyce" | "8chain" => "`eight-chain`: that is Arruda and Boyce's law",
-        "ogden" => "`ogden-1`, `ogden-2` or `ogden-3`: by the number of terms",
-        "mooney" | "polynomial" | "polynomial1" => "`mooney-rivlin`: the polynomial of first order",
+        "arrudaboyce" | "8chain" => "`eight-chain`, the law of Arruda and Boyce",
+        "ogden" => "`ogden-1`, `ogden-2` or `ogden-3`, by the number of terms",
+        "mooney" | "polynomial" | "polynomial1" => "`mooney-rivlin`, the polynomial of first order",
         "reducedpolynomial" | "reducedpolynomial3" | "polynomial3" | "yeoh3" => {
-            "`yeoh`: the reduced polynomial of third order"
+            "`yeoh`, the reduced polynomial of third order"
         }
-        "biderman" => "`yeoh`: of I1 alone",
+        "biderman" => "`yeoh`, a polynomial in I1 alone",
         "neohooke" | "neohookean" | "neo" => "`neo-hookean`",
-        "marlow" | "vanderwaals" | "extendedtube" => "`eight-chain-root-i2`, the nearest by its behaviour",
+        "marlow" | "vanderwaals" | "extendedtube" => "`eight-chain-root-i2`, which behaves most similarly",
         "prony" | "viscoelastic" | "maxwell" | "creep" => {
-            "an elastic law: rates and relaxation are not modelled; fit the curve of the slowest test"
+            "an elastic law; rates and relaxation are not modelled, so fit the curve of the slowest test"
         }
         "poissonratio" | "nu" => {
-            "nothing: the rubber of a fit is incompressible; compressibility is `bulk_modulus` in a scene of peri"
+            "no such parameter: the rubber of a fit is incompressible; compressibility is `bulk_modulus` in \
+             a scene of peri"
         }
-        "hyperfoam" | "ogdenfoam" | "blatzko" => "an incompressible law: foams are not among them",
+        "hyperfoam" | "ogdenfoam" | "blatzko" => "an incompressible law; foams are not modelled",
         _ => return None,
     })
 }

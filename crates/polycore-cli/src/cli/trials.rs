@@ -4,7 +4,7 @@ use harness::report::{self, Judgement, Quantity, Report};
 use harness::scene::{SceneError, Source};
 use polycore::Error;
 use polycore::constitutive;
-use polycore::constitutive::hyperelastic::data::{Mode, State, Table};
+use polycore::constitutive::hyperelastic::data::{Mode, TestData, TestState};
 use polycore::constitutive::hyperelastic::fit::fit;
 use polycore::constitutive::hyperelastic::{
     self, Compressible, Hyperelastic, Volumetric, homogeneous, model, plane_stress,
@@ -15,42 +15,42 @@ use serde::Deserialize;
 
 use super::{MPA, quantities as q};
 
-/// One trial: with `parameters` a law is evaluated at a `stretch`, with `data` it is fitted.
+/// Trial: with `parameters` a law is evaluated at a `stretch`, with `data` it is fitted.
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Trial {
-    /// Its name in the report.
+pub struct FitTrial {
+    /// Name in the report.
     name: String,
     /// Expected behaviour, in words.
     description: String,
-    /// The law's name.
+    /// Name of the law.
     law: String,
-    /// Its parameters, in their order.
-    parameters: Option<Vec<Number>>,
-    /// The test.
+    /// Parameters, in the order of the law.
+    parameters: Option<Vec<ParameterValue>>,
+    /// Test.
     #[serde(default = "uniaxial")]
     mode: Mode,
     /// First stretch.
     stretch: Option<f64>,
-    /// λ of Lamé of a quadratic volumetric term, with the incompressible law's stress where it is not given.
+    /// Lamé's λ of a quadratic volumetric term; without it, the stress of the incompressible law.
     bulk: Option<Stress>,
-    /// λ₁ and P₁ of states in that mode.
+    /// Pairs of λ₁ and P₁, states of the test.
     data: Option<Vec<(f64, Stress)>>,
     /// Part of the expected error message.
     refused: Option<String>,
 }
 
-/// A parameter: a stress with its unit, or a number.
+/// Parameter: a stress with its unit, or a number.
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(untagged)]
-enum Number {
-    /// With its unit.
+enum ParameterValue {
+    /// Stress with its unit.
     Stress(Stress),
-    /// Without.
+    /// Number without a unit.
     Plain(f64),
 }
 
-impl Number {
+impl ParameterValue {
     fn si(&self) -> f64 {
         match self {
             Self::Stress(stress) => stress.si(),
@@ -64,13 +64,13 @@ fn uniaxial() -> Mode {
 }
 
 /// Result of a trial.
-enum Seen {
+enum TrialResult {
     Stress { nominal: f64, energy: f64 },
     Fit(Box<hyperelastic::fit::Fit>),
 }
 
-impl Trial {
-    /// Names of the scalars that it may have.
+impl FitTrial {
+    /// Names of the scalars that the trial may have.
     pub fn quantities(&self) -> Vec<String> {
         let parameters = model(&self.law).map_or(&[][..], |model| model.parameters);
         let fixed = [q::NOMINAL, q::ENERGY, q::REFUSED, q::RMS, q::SHEAR_MODULUS];
@@ -79,37 +79,37 @@ impl Trial {
         fixed.chain(own).map(|quantity| quantity.name).collect()
     }
 
-    fn attempt(&self) -> Result<Seen, constitutive::Error> {
+    fn evaluate(&self) -> Result<TrialResult, constitutive::Error> {
         let model = model(&self.law)?;
         if let Some(data) = &self.data {
-            let state = |(stretch, nominal): &(f64, Stress)| State {
+            let state = |(stretch, nominal): &(f64, Stress)| TestState {
                 mode: self.mode,
                 stretches: [*stretch, self.mode.second_stretch(*stretch)],
                 nominal: [nominal.si(), 0.0],
             };
-            let table = Table { source: String::new(), states: data.iter().map(state).collect() };
-            return Ok(Seen::Fit(Box::new(fit(model, &table)?)));
+            let table = TestData { source: String::new(), states: data.iter().map(state).collect() };
+            return Ok(TrialResult::Fit(Box::new(fit(model, &table)?)));
         }
-        let values: Vec<f64> = self.parameters.iter().flatten().map(Number::si).collect();
+        let values: Vec<f64> = self.parameters.iter().flatten().map(ParameterValue::si).collect();
         let law = model.law(&values)?;
         let first = self.stretch.unwrap_or(1.0);
         let second = self.mode.second_stretch(first);
         let Some(bulk) = self.bulk else {
             let nominal = homogeneous::biaxial(&law, first, second)?[0];
             let stretches = homogeneous::incompressible(first, second)?;
-            return Ok(Seen::Stress { nominal, energy: law.energy_at(stretches)? });
+            return Ok(TrialResult::Stress { nominal, energy: law.energy_at(stretches)? });
         };
         let law = Compressible::new(law, Volumetric::Quadratic { lame: bulk.si() })?;
         let state = plane_stress(&law, &Tensor2::new(first, 0.0, 0.0, second))?;
-        Ok(Seen::Stress { nominal: first * state.stress[0], energy: law.energy(&state.deformation)? })
+        Ok(TrialResult::Stress { nominal: first * state.stress[0], energy: law.energy(&state.deformation)? })
     }
 }
 
-/// Rules of the list.
+/// Checks the rules of the list.
 ///
 /// # Errors
-/// What is wrong and where.
-pub fn check(source: &Source, trials: &[Trial]) -> Result<(), SceneError> {
+/// The rule that is broken, and its place.
+pub fn check(source: &Source, trials: &[FitTrial]) -> Result<(), SceneError> {
     for (i, trial) in trials.iter().enumerate() {
         let key = |field: &str| format!("trial[{i}].{field}");
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
@@ -131,34 +131,44 @@ pub fn check(source: &Source, trials: &[Trial]) -> Result<(), SceneError> {
             let all: Vec<&str> = hyperelastic::MODELS.iter().map(|model| model.key).collect();
             return Err(source.error(&key("law"), format!("`{}`", trial.law), all.join(", ")));
         };
-        if trial.data.is_some() == trial.parameters.is_some() {
-            let found = if trial.data.is_some() { "`data` together with `parameters`" } else { "neither" };
-            return Err(source.error(&key("law"), found, "`parameters` and `stretch`, or `data` to fit"));
+        match (&trial.data, &trial.parameters) {
+            (Some(_), Some(_)) => {
+                let why = "a law is either evaluated with `parameters` or fitted to `data`";
+                return Err(source.conflict(&key("data"), "parameters", why));
+            }
+            (None, None) => {
+                let why = "needed with `stretch` to evaluate the law, or `data` to fit it";
+                return Err(source.missing(&key("parameters"), why));
+            }
+            _ => {}
         }
-        if trial.data.is_some() && (trial.stretch.is_some() || trial.bulk.is_some()) {
-            let found = "`stretch` or `bulk` together with `data`";
-            return Err(source.error(&key("data"), found, "`data` alone: the law is fitted"));
+        for (name, is_given) in [("stretch", trial.stretch.is_some()), ("bulk", trial.bulk.is_some())] {
+            if trial.data.is_some() && is_given {
+                let why = "the law is fitted to `data`; remove it, or give `parameters` instead of `data`";
+                return Err(source.unexpected(&key(name), why));
+            }
         }
         let Some(parameters) = &trial.parameters else { continue };
         if parameters.len() != model.parameters.len() {
             let names: Vec<_> = model.parameters.iter().map(|parameter| parameter.name).collect();
             return Err(source.error(
                 &key("parameters"),
-                format!("{} of them", parameters.len()),
+                format!("{} parameters", parameters.len()),
                 names.join(", "),
             ));
         }
         for (given, parameter) in parameters.iter().zip(model.parameters) {
-            if matches!(given, Number::Stress(_)) != (parameter.unit == "Pa") {
+            if matches!(given, ParameterValue::Stress(_)) != (parameter.unit == "Pa") {
                 let (found, allowed) = match parameter.unit {
                     "Pa" => (format!("`{}` without a unit", parameter.name), "a stress, as \"0.3 MPa\""),
-                    _ => (format!("`{}` with a unit", parameter.name), "a number without unit"),
+                    _ => (format!("`{}` with a unit", parameter.name), "a number without a unit"),
                 };
                 return Err(source.error(&key("parameters"), found, allowed));
             }
         }
         if trial.stretch.is_none() {
-            return Err(source.error(&key("parameters"), "no `stretch` beside it", "`stretch = 2.0`"));
+            let why = "needed with `parameters` to evaluate the law, e.g. `stretch = 2.0`";
+            return Err(source.missing(&key("stretch"), why));
         }
     }
     Ok(())
@@ -168,11 +178,11 @@ pub fn check(source: &Source, trials: &[Trial]) -> Result<(), SceneError> {
 ///
 /// # Errors
 /// Unexpected failures.
-pub fn run(trial: &Trial, report: &mut Report) -> Result<(), Error> {
+pub fn run(trial: &FitTrial, report: &mut Report) -> Result<(), Error> {
     let of = |quantity: Quantity| quantity.of(&[&trial.name]);
-    let seen = trial.attempt();
+    let result = trial.evaluate();
     let mut passed = true;
-    let text = match (seen, &trial.refused) {
+    let text = match (result, &trial.refused) {
         (Err(error), Some(part)) => {
             let error = error.to_string();
             passed = error.contains(part.as_str());
@@ -180,18 +190,18 @@ pub fn run(trial: &Trial, report: &mut Report) -> Result<(), Error> {
             format!("refused: {error}")
         }
         (Err(error), None) => return Err(error.into()),
-        (Ok(seen), refused) => {
+        (Ok(result), refused) => {
             if refused.is_some() {
                 passed = false;
                 report.value(of(q::REFUSED), 0.0);
             }
-            match seen {
-                Seen::Stress { nominal, energy } => {
+            match result {
+                TrialResult::Stress { nominal, energy } => {
                     report.value(of(q::NOMINAL), nominal / MPA);
                     report.value(of(q::ENERGY), energy / MPA);
                     format!("P = {:e} MPa, W = {:e} MJ/m³", nominal / MPA, energy / MPA)
                 }
-                Seen::Fit(fit) => {
+                TrialResult::Fit(fit) => {
                     report.value(of(q::RMS), fit.rms / MPA);
                     report.value(of(q::SHEAR_MODULUS), fit.law.shear_modulus() / MPA);
                     for parameter in &fit.parameters {
@@ -209,13 +219,13 @@ pub fn run(trial: &Trial, report: &mut Report) -> Result<(), Error> {
     Ok(())
 }
 
-/// A trial fails with any expectation on it.
-pub fn judge(trials: &[Trial], report: &mut Report) {
-    for (trial, seen) in trials.iter().zip(&mut report.trials) {
+/// Marks a trial as failed if any expectation on it fails.
+pub fn judge(trials: &[FitTrial], report: &mut Report) {
+    for (trial, result) in trials.iter().zip(&mut report.trials) {
         let own = trial.quantities();
         let fails = |judged: &&Judgement| {
             !judged.pass && judged.expect.names().any(|name| own.iter().any(|o| o == name))
         };
-        seen.passed &= !report.expect.iter().any(|judged| fails(&judged));
+        result.passed &= !report.expect.iter().any(|judged| fails(&judged));
     }
 }

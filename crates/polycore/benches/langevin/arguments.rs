@@ -1,4 +1,4 @@
-//! What inverse Langevin functions are measured on; `cargo xtask bench langevin` takes it, too.
+//! Arguments of the benchmark of inverse Langevin functions, shared with `cargo xtask bench langevin`.
 
 /// A row that stays in the first-level cache.
 pub const ROW: usize = 1024;

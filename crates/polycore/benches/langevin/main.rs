@@ -1,4 +1,5 @@
-//! `cargo bench -p polycore`: nanoseconds of every inverse Langevin function, as `cargo xtask bench langevin` measures them.
+//! `cargo bench -p polycore`: nanoseconds of every inverse Langevin function, as `cargo xtask bench langevin`
+//! measures them.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use polycore::langevin::Inverse;

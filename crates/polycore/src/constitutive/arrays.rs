@@ -1,32 +1,32 @@
-//! Laws at many points, and data of fits, as arrays (feature `ndarray`): views go in, arrays come out.
+//! Laws and fits on arrays (feature `ndarray`): array views as input, arrays as output.
 
-use super::hyperelastic::data::{Mode, State, Table};
+use super::hyperelastic::data::{Mode, TestData, TestState};
 use super::law::same_length;
 use super::{Error, Flags, Law, Prediction, Workspace};
 use crate::tensor::Voigt;
 use ndarray::{Array1, Array2, Array3, ArrayView1, ArrayView2};
 
-/// What a law predicts at N points.
+/// Predictions of a law at N points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Predictions {
     /// S, (N, 6), Pa.
     pub stress: Array2<f64>,
     /// ℂ = 2 ∂S/∂C, (N, 6, 6), Pa; if requested.
     pub tangent: Option<Array3<f64>>,
-    /// W, (N), J/m³; none of a law that has no energy.
+    /// W, (N), J/m³; `None` for a law without an energy.
     pub energy: Option<Array1<f64>>,
-    /// Spread of an ensemble, (N), Pa; 0 of other laws.
+    /// Spread of an ensemble, (N), Pa; 0 for other laws.
     pub spread: Array1<f64>,
-    /// Standard deviation of each component of S over an ensemble, (N, 6), Pa; 0 of other laws.
+    /// Standard deviation of each component of S over an ensemble, (N, 6), Pa; 0 for other laws.
     pub deviation: Array2<f64>,
     /// Reasons for uncertainty, (N).
     pub flags: Array1<Flags>,
 }
 
-/// S, and ℂ if `tangent`, at each row of C, (N, 6), in the order 11, 22, 33, 12, 13, 23.
+/// Computes S, and ℂ if `tangent`, at each row of C, (N, 6), in the order 11, 22, 33, 12, 13, 23.
 ///
 /// # Errors
-/// [`Error::Invalid`] for another number of columns; what the law refuses.
+/// [`Error::Invalid`] for another number of columns; errors of the law.
 pub fn predict(law: &dyn Law, c: ArrayView2<'_, f64>, tangent: bool) -> Result<Predictions, Error> {
     let points = rows(c, "C")?;
     let mut all = vec![Prediction::default(); points.len()];
@@ -53,7 +53,7 @@ pub fn predict(law: &dyn Law, c: ArrayView2<'_, f64>, tangent: bool) -> Result<P
     })
 }
 
-/// Voigt vectors of an array (N, 6); `name` is what a message calls it.
+/// Converts an array (N, 6) to Voigt vectors; `name` appears in messages.
 ///
 /// # Errors
 /// [`Error::Invalid`] for another number of columns.
@@ -64,13 +64,13 @@ pub fn rows(array: ArrayView2<'_, f64>, name: &'static str) -> Result<Vec<Voigt>
     Ok(array.rows().into_iter().map(|row| Voigt::from_fn(|a, _| row[a])).collect())
 }
 
-impl Table {
-    /// Stretches, (N), and nominal stresses, (N) in Pa, of a test that one stretch describes; a stress of exactly 0 is a
-    /// condition, not a measurement.
+impl TestData {
+    /// Creates test data from stretches, (N), and nominal stresses, (N) in Pa, of a test that one stretch
+    /// describes; a stress of exactly 0 is a condition, not a measurement.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for arrays of two lengths; [`Error::Deformation`] for a stretch that is not positive;
-    /// [`Error::Data`] where no stress was measured.
+    /// [`Error::Invalid`] for arrays of two lengths; [`Error::Deformation`] for a stretch that is not
+    /// positive; [`Error::Data`] if no stress was measured.
     pub fn from_arrays(
         mode: Mode,
         stretch: ArrayView1<'_, f64>,
@@ -79,11 +79,11 @@ impl Table {
         same_length(stretch.len(), nominal.len())?;
         let state = |(&stretch, &nominal): (&f64, &f64)| {
             let stretches = [stretch, mode.second_stretch(stretch)];
-            let state = State { mode, stretches, nominal: [nominal, 0.0] };
+            let state = TestState { mode, stretches, nominal: [nominal, 0.0] };
             state.principal_stretches().map(|_| state)
         };
         let states = stretch.iter().zip(nominal).map(state).collect::<Result<_, Error>>()?;
-        Self { source: String::new(), states }.of(mode)
+        Self { source: String::new(), states }.select(mode)
     }
 }
 
@@ -130,12 +130,12 @@ mod tests {
             (Mode::Equibiaxial, homogeneous::equibiaxial),
         ] {
             let nominal = stretch.mapv(|stretch| of(&law, stretch).unwrap());
-            let table = Table::from_arrays(mode, stretch.view(), nominal.view()).unwrap();
+            let table = TestData::from_arrays(mode, stretch.view(), nominal.view()).unwrap();
             let fitted = fit::fit(model("neo-hookean").unwrap(), &table).unwrap();
             assert!((fitted.parameters[0].value / 3e5 - 1.0).abs() < 1e-9);
-            assert!(Table::from_arrays(mode, stretch.view(), nominal.slice(s![1..])).is_err());
-            assert!(Table::from_arrays(mode, (-&stretch).view(), nominal.view()).is_err());
-            assert!(Table::from_arrays(mode, stretch.slice(s![..1]), nominal.slice(s![..1])).is_err());
+            assert!(TestData::from_arrays(mode, stretch.view(), nominal.slice(s![1..])).is_err());
+            assert!(TestData::from_arrays(mode, (-&stretch).view(), nominal.view()).is_err());
+            assert!(TestData::from_arrays(mode, stretch.slice(s![..1]), nominal.slice(s![..1])).is_err());
         }
     }
 }

@@ -1,13 +1,13 @@
-//! What laws refuse.
+//! Errors of constitutive laws, their fits, tables and files.
 
 use crate::tensor;
 use std::path::PathBuf;
 
-/// What a law, a fit, a table or a file of a model refuses.
+/// Error of a law, a fit, a table of test data or a model file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A material parameter outside its domain.
+    /// Material parameter outside its domain.
     #[error("{law}: {parameter} = {value} is outside {allowed}")]
     Parameter {
         /// The law.
@@ -16,7 +16,7 @@ pub enum Error {
         parameter: String,
         /// The value given.
         value: f64,
-        /// Where it may lie.
+        /// Allowed range.
         allowed: &'static str,
     },
     /// The chains are fully extended: energy and stress are infinite from here on.
@@ -24,9 +24,9 @@ pub enum Error {
     Locked {
         /// The law.
         law: &'static str,
-        /// What has grown too large.
+        /// Quantity that reached its limit.
         quantity: &'static str,
-        /// Its value.
+        /// Value of the quantity.
         value: f64,
         /// The limit.
         limit: f64,
@@ -45,8 +45,8 @@ pub enum Error {
         /// The law.
         law: String,
     },
-    /// No law of that name.
-    #[error("there is no hyperelastic law `{name}`")]
+    /// Unknown name of a law.
+    #[error("unknown hyperelastic law `{name}`")]
     UnknownLaw {
         /// The name requested.
         name: String,
@@ -54,7 +54,7 @@ pub enum Error {
     /// An iteration did not converge.
     #[error("{iteration} did not converge in {steps} steps (residual {residual:e})")]
     NoConvergence {
-        /// Which one.
+        /// Name of the iteration.
         iteration: &'static str,
         /// Steps done.
         steps: usize,
@@ -64,35 +64,35 @@ pub enum Error {
     /// A fit was stopped on request.
     #[error("stopped on request")]
     Stopped,
-    /// Data that no law can be fitted to.
+    /// Data to which no law can be fitted.
     #[error("{what}: {reason}")]
     Data {
         /// The file, table or row.
         what: String,
-        /// What is wrong with it.
+        /// Defect of the data.
         reason: String,
     },
-    /// A C that is no deformation, or a part of a model that does not fit the others.
+    /// Invalid C, or a part of a model that does not fit the others.
     #[error("{name}: found {found}; allowed: {allowed}")]
     Invalid {
-        /// What.
+        /// Name of the quantity.
         name: &'static str,
         /// The value found.
         found: String,
-        /// What is allowed.
+        /// Allowed values.
         allowed: String,
     },
-    /// A file that holds no model.
+    /// File without a valid model.
     #[error("{}: found {found}; allowed: {allowed}", path.display())]
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Defect of the content.
         found: String,
-        /// What it should be.
+        /// Expected content.
         allowed: String,
     },
-    /// The deformation is not admissible.
+    /// Inadmissible deformation.
     #[error(transparent)]
     Deformation(#[from] tensor::Error),
 }

@@ -1,10 +1,11 @@
-//! Hyperelastic laws of Chapter 1: energy, stresses, consistent tangent, homogeneous responses, and fits to data.
+//! Hyperelastic laws of Chapter 1: energy, stresses, consistent tangent, homogeneous responses, and fits to
+//! data.
 //!
-//! A law is isotropic: its energy per unit reference volume is a symmetric function W(λ₁, λ₂, λ₃) of the principal
-//! stretches, zero at rest. It implements [`Hyperelastic`] in principal values; everything in three dimensions is
-//! provided from there. The incompressible laws leave the pressure open: what they return as stress is the part that W
-//! determines, S = 2 ∂W/∂C. [`Compressible`] adds the volumetric terms of (1.19), (1.21), (1.23), and
-//! [`homogeneous`] eliminates the pressure in tension tests.
+//! A law is isotropic: its energy per unit reference volume is a symmetric function W(λ₁, λ₂, λ₃) of the
+//! principal stretches, zero at rest. It implements [`Hyperelastic`] in principal values; everything in three
+//! dimensions is provided from there. The incompressible laws leave the pressure open: what they return as
+//! stress is the part that W determines, S = 2 ∂W/∂C. [`Compressible`] adds the volumetric terms of (1.19),
+//! (1.21), (1.23), and [`homogeneous`] eliminates the pressure in tension tests.
 //!
 //! ```
 //! use polycore::constitutive::hyperelastic::{EightChain, Hyperelastic, homogeneous};
@@ -45,9 +46,9 @@ mod yeoh;
 
 pub use chain::{EightChain, EightChainRootI2, ThreeChain};
 #[cfg(feature = "tables")]
-pub use columns::{StrainMeasure, StressMeasure};
+pub use columns::{StrainMeasure, TestStressMeasure};
 pub use compressible::{Compressible, Coupling, Volumetric};
-pub use descriptor::{Domain, Kind, ModelDescriptor, Parameter};
+pub use descriptor::{Domain, ModelDescriptor, ModelKind, Parameter};
 pub use gent::Gent;
 pub use homogeneous::{PlaneStress, plane_stress};
 pub use models::{MODELS, all, model};
@@ -55,12 +56,12 @@ pub use ogden::{Ogden, OgdenConvention};
 pub use polynomial::{MooneyRivlin, NeoHookean};
 pub use principal::PrincipalResponse;
 #[cfg(feature = "tables")]
-pub use table::{Meaning, Reading};
+pub use table::{ImportedTest, TestFormat};
 pub use yeoh::Yeoh;
 
 /// An isotropic hyperelastic law. Stresses and moduli in Pa, energies in J/m³.
 pub trait Hyperelastic: Send + Sync {
-    /// The law's name, for tables and messages.
+    /// Name of the law, for tables and messages.
     fn name(&self) -> String;
 
     /// Names and values of the parameters, in the order of the constructor.
@@ -72,7 +73,8 @@ pub trait Hyperelastic: Send + Sync {
     /// W(λ₁, λ₂, λ₃) with W(1, 1, 1) = 0.
     ///
     /// # Errors
-    /// [`Error::Locked`] at or beyond a locking stretch, [`Error::Overflow`] where W leaves the range of `f64`.
+    /// [`Error::Locked`] at or beyond a locking stretch, [`Error::Overflow`] where W leaves the range of
+    /// `f64`.
     fn energy_at(&self, stretches: [f64; 3]) -> Result<f64, Error>;
 
     /// Stress and tangent in the principal frame.
@@ -81,7 +83,7 @@ pub trait Hyperelastic: Send + Sync {
     /// As [`Hyperelastic::energy_at`].
     fn response_at(&self, stretches: [f64; 3]) -> Result<PrincipalResponse, Error>;
 
-    /// The factor g of −g ln J in the compressible form that the thesis prints, if it prints one.
+    /// Factor g of −g ln J in the compressible form of the thesis; `None` if the thesis has none.
     fn published_coupling(&self) -> Option<f64> {
         None
     }
@@ -164,7 +166,7 @@ fn principal<L: Hyperelastic + ?Sized>(
     Ok((frame, response))
 }
 
-/// `value` if it satisfies the rule, the error otherwise.
+/// Returns `value` if it satisfies the rule, the error otherwise.
 fn parameter(
     law: &'static str,
     parameter: &str,
@@ -183,7 +185,7 @@ fn positive(law: &'static str, name: &str, value: f64) -> Result<f64, Error> {
     parameter(law, name, value, value > 0.0, "(0, ∞)")
 }
 
-/// An energy that left the range of `f64` becomes an error.
+/// Returns an error if an energy left the range of `f64`.
 fn finite(law: &'static str, stretches: [f64; 3], energy: f64) -> Result<f64, Error> {
     check_stretches(&stretches)?;
     if energy.is_finite() { Ok(energy) } else { Err(Error::Overflow { law, stretches }) }

@@ -6,31 +6,31 @@ use crate::tensor::{DeformationGradient, Voigt, Voigt6x6, voigt};
 use nalgebra::{SMatrix, SVector, Scalar};
 use std::any::Any;
 
-/// A law of an elastic solid, C → (W, S, ℂ), objective since it is a function of C = FᵀF alone.
+/// Law of an elastic solid, C → (W, S, ℂ), objective since it is a function of C = FᵀF alone.
 ///
-/// Voigt vectors and tangents follow [`crate::tensor::voigt`]; Pa and J/m³. A law may have no energy (a stress learnt
-/// as a function of C has none), and S(1) need not vanish: incompressible laws leave the pressure open, and return as S the
-/// part that W determines.
+/// Voigt vectors and tangents follow [`crate::tensor::voigt`]; Pa and J/m³. A law may have no energy (a
+/// stress learnt as a function of C has none), and S(1) need not vanish: incompressible laws leave the
+/// pressure open, and return as S the part that W determines.
 pub trait Law: Send + Sync {
-    /// Its name, for tables and messages.
+    /// Name of the law, for tables and messages.
     fn name(&self) -> String;
 
-    /// W and S at C. Allocates nothing once `memory` has served the same law.
+    /// Computes W and S at C. Allocates nothing once `memory` has served the same law.
     ///
     /// # Errors
-    /// A C that is not positive definite, or where the law has no finite stress.
+    /// A C that is not positive definite, or without a finite stress.
     fn stress(&self, c: &Voigt, memory: &mut Workspace) -> Result<Prediction, Error>;
 
-    /// W, S and ℂ = 2 ∂S/∂C at C. Allocates nothing once `memory` has served the same law.
+    /// Computes W, S and ℂ = 2 ∂S/∂C at C. Allocates nothing once `memory` has served the same law.
     ///
     /// # Errors
     /// As [`Law::stress`].
     fn tangent(&self, c: &Voigt, memory: &mut Workspace) -> Result<Prediction, Error>;
 
-    /// W and S at each C, to the same bits as one by one.
+    /// Computes W and S at each C, with the same bits as one by one.
     ///
     /// # Errors
-    /// As [`Law::stress`]; another number of predictions than of C.
+    /// As [`Law::stress`]; unequal numbers of predictions and of C.
     fn stresses(
         &self,
         c: &[Voigt],
@@ -44,7 +44,7 @@ pub trait Law: Send + Sync {
         Ok(())
     }
 
-    /// σ = FSFᵀ/J at F = `deformation`, with the prediction at C = FᵀF that it comes from.
+    /// Computes σ = FSFᵀ/J at F = `deformation`, with the prediction at C = FᵀF.
     ///
     /// # Errors
     /// As [`Law::stress`].
@@ -54,11 +54,12 @@ pub trait Law: Send + Sync {
         memory: &mut Workspace,
     ) -> Result<(Voigt, Prediction), Error> {
         let prediction = self.stress(&voigt::from_stress(&deformation.right_cauchy_green()), memory)?;
-        Ok((voigt::cauchy_of_material(deformation, &prediction.stress), prediction))
+        Ok((voigt::cauchy_from_material(deformation, &prediction.stress), prediction))
     }
 
-    /// Bulk and shear modulus of the tangent at C = 1, of a law without stress there: Voigt's averages over all
-    /// directions (Proc. of Hill 1952, doi:10.1088/0370-1298/65/5/307, Eq. 4–5), exact for an isotropic law.
+    /// Bulk and shear modulus of the tangent at C = 1, for a law without stress there: Voigt's averages over
+    /// all directions (Proc. of Hill 1952, doi:10.1088/0370-1298/65/5/307, Eq. 4–5), exact for an
+    /// isotropic law.
     ///
     /// # Errors
     /// As [`Law::stress`].
@@ -83,31 +84,33 @@ pub struct Moduli {
     pub shear: f64,
 }
 
-/// What a law predicts at a C, and how uncertain that is.
+/// Prediction of a law at a C, with its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Prediction<T: Scalar = f64> {
     /// S (3.3), Pa.
     pub stress: SVector<T, 6>,
-    /// ℂ = 2 ∂S/∂C, Pa, in the Voigt order without factors (dS = ℂ dE with doubled shear strains); if requested.
+    /// ℂ = 2 ∂S/∂C, Pa, in the Voigt order without factors (dS = ℂ dE with doubled shear strains); if
+    /// requested.
     pub tangent: Option<SMatrix<T, 6, 6>>,
-    /// W, J/m³; none of a law that has no energy.
+    /// W, J/m³; `None` for a law without an energy.
     pub energy: Option<T>,
-    /// Root mean square over the members of an ensemble of the norm of their distance from the mean, Pa; 0 for one. It is
-    /// the norm of `deviation`: √Σₐ sₐ².
+    /// Root mean square over the members of an ensemble of the norm of their distance from the mean, Pa; 0
+    /// for a single model. It is the norm of `deviation`: √Σₐ sₐ².
     pub spread: T,
-    /// Standard deviation over the M members of each component of S, sₐ = √(Σₘ (Sₐᵐ − Sₐ)²/M), Pa, in the order of
-    /// `stress`; 0 for one member. It belongs to these axes: in others it needs the members' covariance.
+    /// Standard deviation over the M members of each component of S, sₐ = √(Σₘ (Sₐᵐ − Sₐ)²/M), Pa, in the
+    /// order of `stress`; 0 for one member. It belongs to these axes: in others it needs the members'
+    /// covariance.
     pub deviation: SVector<T, 6>,
-    /// Reasons for uncertainty; none of a law in closed form.
+    /// Reasons for uncertainty; none for a law in closed form.
     pub flags: Flags,
 }
 
-/// Why a prediction is uncertain.
+/// Reasons for which a prediction is uncertain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Flags {
     /// Components of C outside the box of the training data.
     pub outside: [bool; 6],
-    /// Of those, the ones that never changed in the training data: shear that was never seen, for example.
+    /// Components outside the range that never changed in the training data, e.g. a shear without any data.
     pub unseen: [bool; 6],
     /// Farther from the representatives of the training strains than any training row: in a gap of the box.
     pub far: bool,
@@ -116,19 +119,19 @@ pub struct Flags {
 }
 
 impl Flags {
-    /// Whether there is any.
+    /// Returns true if any flag is set.
     pub fn any(&self) -> bool {
         self.outside.contains(&true) || self.far || self.spread
     }
 }
 
-/// Memory in which a law works, kept between its evaluations so that they need not allocate. Keep one for each law and
-/// thread: whatever another law left there is dropped.
+/// Scratch memory of a law, kept between its evaluations so that they need not allocate. Keep one for each
+/// law and thread: content of another law is dropped.
 #[derive(Debug, Default)]
 pub struct Workspace(Option<Box<dyn Any + Send>>);
 
 impl Workspace {
-    /// Works with the `M` that is kept here, a new one at first.
+    /// Calls `work` with the stored `M`, a new one at first.
     #[inline]
     pub fn with<M: Default + Send + 'static, R>(&mut self, work: impl FnOnce(&mut M) -> R) -> R {
         let kept = self.0.take().and_then(|kept| kept.downcast::<M>().ok());
@@ -146,7 +149,7 @@ pub(super) fn same_length(points: usize, predictions: usize) -> Result<(), Error
     Err(Error::invalid("predictions", predictions, format!("{points}, one for each C")))
 }
 
-/// The laws of Chapter 1, at the principal stretches and directions of C.
+/// Laws of Chapter 1, at the principal stretches and directions of C.
 impl<L: Hyperelastic + ?Sized> Law for L {
     fn name(&self) -> String {
         Hyperelastic::name(self)
@@ -162,7 +165,7 @@ impl<L: Hyperelastic + ?Sized> Law for L {
 }
 
 fn isotropic<L: Hyperelastic + ?Sized>(law: &L, c: &Voigt, tangent: bool) -> Result<Prediction, Error> {
-    let frame = DeformationGradient::of_right_cauchy_green(c)?.principal_frame();
+    let frame = DeformationGradient::from_right_cauchy_green(c)?.principal_frame();
     let response = law.response_at(frame.stretches)?;
     let turned = || -> Voigt6x6 { voigt::transform_tangent(&response.tangent(), &frame.referential) };
     Ok(Prediction {

@@ -1,4 +1,5 @@
-//! Fully connected networks without a framework: value, Jacobian, gradient and second derivatives, in f64 or f32.
+//! Fully connected networks without a framework: value, Jacobian, gradient and second derivatives, in f64 or
+//! f32.
 
 use crate::constitutive::Error;
 use crate::random::SplitMix64;
@@ -15,27 +16,27 @@ pub use activation::Activation;
 pub use pass::Tape;
 pub use real::Real;
 
-use packed::Packed;
-use pass::Want;
+use packed::PackedMatrix;
+use pass::PassOutput;
 
-/// Most inputs of a network whose derivatives are requested: the lanes of one row of a Jacobian.
+/// Largest number of inputs of a network with derivatives: the lanes of one row of a Jacobian.
 pub const LANES: usize = 8;
 
-/// Most neurons in a layer: a file that claims more is damaged.
+/// Largest number of neurons in a layer: a file with more is damaged.
 pub const MOST_NEURONS: usize = 1 << 16;
 
-/// Widths from input to output, and what each layer after the input does.
+/// Widths from input to output, and the activation of each layer after the input.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Architecture {
     /// Neurons of each layer, the inputs first.
     pub widths: Vec<usize>,
-    /// One for each layer after the input.
+    /// Activation of each layer after the input.
     pub activations: Vec<Activation>,
 }
 
 impl Architecture {
-    /// The networks of Table 3.4, from 1 to 4: six inputs, six linear outputs.
+    /// Returns network 1 to 4 of Table 3.4: six inputs, six linear outputs.
     ///
     /// # Errors
     /// [`Error::Invalid`] for another number.
@@ -51,7 +52,7 @@ impl Architecture {
         Ok(Self::new(6, hidden, 6))
     }
 
-    /// Hidden layers between inputs and linear outputs.
+    /// Creates hidden layers between inputs and linear outputs.
     pub fn new(inputs: usize, hidden: &[(usize, Activation)], outputs: usize) -> Self {
         let mut widths = vec![inputs];
         widths.extend(hidden.iter().map(|(width, _)| *width));
@@ -61,11 +62,13 @@ impl Architecture {
         Self { widths, activations }
     }
 
-    /// Weights and biases.
+    /// Number of weights and biases.
     pub fn parameters(&self) -> usize {
         self.widths.windows(2).map(|pair| (pair[0] + 1) * pair[1]).sum()
     }
 
+    /// Checks the widths and activations.
+    ///
     /// # Errors
     /// [`Error::Invalid`] for no layer, an empty or absurdly wide one, or another number of activations.
     pub fn check(&self) -> Result<(), Error> {
@@ -81,28 +84,28 @@ impl Architecture {
     }
 }
 
-/// One layer: activation(W x + b).
+/// Layer of a network: activation(W x + b).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layer<T> {
     /// W, (outputs, inputs), row by row.
     pub weights: Vec<T>,
     /// b, (outputs).
     pub bias: Vec<T>,
-    /// What follows the sum.
+    /// Activation applied to the sum.
     pub activation: Activation,
 }
 
-/// A multilayer perceptron (3.9).
+/// Multilayer perceptron (3.9).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network<T> {
     architecture: Architecture,
     layers: Vec<Layer<T>>,
-    packed: Vec<Packed<T>>,
-    transposed: Vec<Packed<T>>,
+    packed: Vec<PackedMatrix<T>>,
+    transposed: Vec<PackedMatrix<T>>,
 }
 
 impl<T: Real> Network<T> {
-    /// A network of these layers.
+    /// Creates a network of these layers.
     ///
     /// # Errors
     /// [`Error::Invalid`] for sizes that do not fit the architecture, or a weight that is not finite.
@@ -132,13 +135,14 @@ impl<T: Real> Network<T> {
 
     fn packed(architecture: Architecture, layers: Vec<Layer<T>>) -> Self {
         let pairs = || architecture.widths.windows(2).zip(&layers);
-        let packed = pairs().map(|(w, layer)| Packed::new(w[0], &layer.weights, &layer.bias)).collect();
-        let transposed = pairs().map(|(w, layer)| Packed::transposed(w[0], w[1], &layer.weights)).collect();
+        let packed = pairs().map(|(w, layer)| PackedMatrix::new(w[0], &layer.weights, &layer.bias)).collect();
+        let transposed =
+            pairs().map(|(w, layer)| PackedMatrix::transposed(w[0], w[1], &layer.weights)).collect();
         Self { architecture, layers, packed, transposed }
     }
 
-    /// Glorot's uniform weights, ±√(6/(inputs + outputs)), and no bias, as Keras begins; the same seed gives the same
-    /// network.
+    /// Creates a network with Glorot's uniform weights, ±√(6/(inputs + outputs)), and no bias, as Keras does;
+    /// the same seed gives the same network.
     ///
     /// # Errors
     /// [`Architecture::check`].
@@ -156,17 +160,17 @@ impl<T: Real> Network<T> {
         Self::new(architecture, layers)
     }
 
-    /// Its widths and activations.
+    /// Widths and activations.
     pub fn architecture(&self) -> &Architecture {
         &self.architecture
     }
 
-    /// Its layers from the input on.
+    /// Layers from the input on.
     pub fn layers(&self) -> &[Layer<T>] {
         &self.layers
     }
 
-    /// The same network in another precision.
+    /// Converts the network to another precision.
     pub fn convert<U: Real>(&self) -> Network<U> {
         let list = |values: &[T]| values.iter().map(|value| U::from_f64(value.to_f64())).collect();
         let layer = |layer: &Layer<T>| Layer {
@@ -177,25 +181,26 @@ impl<T: Real> Network<T> {
         Network::packed(self.architecture.clone(), self.layers.iter().map(layer).collect())
     }
 
-    /// The outputs at `input`; surplus inputs are not read, missing ones count as 0.
+    /// Computes the outputs at `input`; surplus inputs are not read, missing ones count as 0.
     pub fn forward<'t>(&self, input: &[T], tape: &'t mut Tape<T>) -> &'t [T] {
         tape.fit(self);
         tape.set_input(0, input);
-        pass::run(self, Want::Points { count: 1, gradients: false }, tape);
+        pass::run(self, PassOutput::Points { count: 1, gradients: false }, tape);
         tape.output(0)
     }
 
-    /// Outputs and their derivatives, ∂y/∂x_b in list b (forward mode; inputs up to [`LANES`], further ones are left out).
+    /// Outputs and their derivatives, ∂y/∂x_b in list b (forward mode; inputs up to [`LANES`], further ones
+    /// are left out).
     pub fn jacobian<'t>(&self, input: &[T], tape: &'t mut Tape<T>) -> (&'t [T], [&'t [T]; LANES]) {
         let inputs = self.architecture.widths[0];
         tape.fit(self);
         tape.set_input(0, input);
         let mut slopes: [&[T]; LANES] = [&[]; LANES];
         if inputs > LANES {
-            pass::run(self, Want::Points { count: 1, gradients: false }, tape);
+            pass::run(self, PassOutput::Points { count: 1, gradients: false }, tape);
             return (tape.output(0), slopes);
         }
-        pass::run(self, Want::Slopes, tape);
+        pass::run(self, PassOutput::Slopes, tape);
         let tape = &*tape;
         for (b, slope) in slopes.iter_mut().enumerate().take(inputs) {
             *slope = tape.output(b + 1);
@@ -203,7 +208,8 @@ impl<T: Real> Network<T> {
         (tape.output(0), slopes)
     }
 
-    /// Value, gradient and second derivatives of the first output by the inputs (up to [`LANES`], all 0 for more).
+    /// Value, gradient and second derivatives of the first output by the inputs (up to [`LANES`], all 0 for
+    /// more).
     ///
     /// With the sums a of each layer and the adjoints g = ∂out/∂y of its activations y = σ(a):
     /// gradient by reverse mode, H = Σ g σ″(a) (∂a/∂x)(∂a/∂x)ᵀ over all neurons.
@@ -217,7 +223,7 @@ impl<T: Real> Network<T> {
         if self.architecture.widths[0] > LANES {
             return (self.forward(input, tape)[0], [T::ZERO; LANES], [[T::ZERO; LANES]; LANES]);
         }
-        let hessian = pass::run(self, Want::Curvature, tape);
+        let hessian = pass::run(self, PassOutput::Curvature, tape);
         let (value, gradient) = first_output(tape, 0);
         (value, gradient, hessian)
     }
@@ -226,11 +232,12 @@ impl<T: Real> Network<T> {
     pub fn gradient(&self, input: &[T], tape: &mut Tape<T>) -> (T, [T; LANES]) {
         tape.fit(self);
         tape.set_input(0, input);
-        pass::run(self, Want::Points { count: 1, gradients: true }, tape);
+        pass::run(self, PassOutput::Points { count: 1, gradients: true }, tape);
         first_output(tape, 0)
     }
 
-    /// Outputs at up to [`BATCH`] points side by side, to the same bits as one by one; `outputs` is called with each.
+    /// Outputs at up to [`BATCH`] points side by side, to the same bits as one by one; `outputs` is called
+    /// with each.
     pub(crate) fn forward_batch(
         &self,
         inputs: &[[T; LANES]],
@@ -243,7 +250,8 @@ impl<T: Real> Network<T> {
         }
     }
 
-    /// Value and gradient of the first output at up to [`BATCH`] points side by side, to the same bits as one by one.
+    /// Value and gradient of the first output at up to [`BATCH`] points side by side, to the same bits as one
+    /// by one.
     pub(crate) fn gradient_batch(
         &self,
         inputs: &[[T; LANES]],
@@ -263,7 +271,7 @@ impl<T: Real> Network<T> {
         for (point, input) in inputs.iter().enumerate().take(count) {
             tape.set_input(point, input);
         }
-        pass::run(self, Want::Points { count, gradients }, tape);
+        pass::run(self, PassOutput::Points { count, gradients }, tape);
         count
     }
 }
@@ -316,7 +324,8 @@ mod tests {
         assert_eq!(gradient[2..], [0.0; 6]);
     }
 
-    /// Widths around panels and vectors, all activations, against plain sums in f64: 1e-14 is some roundings a layer.
+    /// Widths around panels and vectors, all activations, against plain sums in f64: 1e-14 is some roundings
+    /// a layer.
     #[test]
     fn kernels_give_what_plain_loops_give() {
         for (width, inputs) in [(1, 3), (7, 6), (16, 1), (17, 5), (40, 7), (97, 8), (224, 4)] {
@@ -332,7 +341,7 @@ mod tests {
                     let (mut next, mut next_slopes) = (Vec::new(), Vec::new());
                     for (row, bias) in layer.weights.chunks(values.len()).zip(&layer.bias) {
                         let sum: f64 = row.iter().zip(&values).map(|(w, y)| w * y).sum();
-                        let [value, first, _] = layer.activation.at(sum + bias);
+                        let [value, first, _] = layer.activation.derivatives(sum + bias);
                         next.push(value);
                         let slope = |b: usize| row.iter().zip(&slopes).map(|(w, s)| w * s[b]).sum::<f64>();
                         next_slopes.push((0..inputs).map(|b| first * slope(b)).collect());

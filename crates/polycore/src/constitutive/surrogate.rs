@@ -33,8 +33,8 @@ pub use super::{Flags, Prediction, Workspace};
 pub use evaluate::Features;
 pub use examples::examples;
 pub use header::{Header, Kind};
-pub use invariants::{Invariants, derivative};
-pub use softening::{History, Softening};
+pub use invariants::{SymmetryInvariants, derivative};
+pub use softening::{Softening, SofteningHistory};
 pub use support::Support;
 pub use symmetry::{Monomial, StressAtRest, Symmetry};
 
@@ -44,10 +44,10 @@ use crate::tensor::{Voigt, Voigt6x6};
 use nalgebra::SVector;
 use support::Nearest;
 
-/// A difference from a component that never changed in the training data that counts as rounding: ten times that of f32.
-pub const UNSEEN: f64 = 1e-6;
+/// Tolerance for components that never changed in the training data: ten times the rounding of f32.
+pub const CONSTANT_TOLERANCE: f64 = 1e-6;
 
-/// A law C → S in one of two precisions.
+/// Law C → S in one of two precisions.
 #[derive(Debug, Clone)]
 pub struct Surrogate<T: Real = f64> {
     header: Header,
@@ -59,21 +59,21 @@ pub struct Surrogate<T: Real = f64> {
     /// C → material axes, row by row; none for the axes of the data.
     turn: Option<[[T; 6]; 6]>,
     nearest: Option<Nearest<T>>,
-    /// Of each member of an energy, so that W(I) = 0 and S(I) = 0.
-    rest: Vec<Rest<T>>,
+    /// Terms of each member of an energy such that W(I) = 0 and S(I) = 0.
+    rest: Vec<RestTerm<T>>,
 }
 
-/// What is kept between evaluations.
+/// Scratch kept between evaluations.
 #[derive(Default)]
-struct Memory<T> {
+struct SurrogateScratch<T> {
     tape: Tape<T>,
-    /// Of each member (and in a batch of each point of it) energy and ∂W/∂c, or S.
+    /// Energy and ∂W/∂c, or S, of each member (and in a batch of each point of it).
     parts: Vec<(T, [T; 6])>,
 }
 
-/// What is taken from a member's energy: its value at I and a function that is linear in c or in the invariants.
+/// Terms subtracted from a member's energy: its value at I, and a function linear in c or in the invariants.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Rest<T> {
+pub struct RestTerm<T> {
     /// W at I.
     pub value: T,
     /// −∂/∂c.
@@ -84,31 +84,33 @@ pub struct Rest<T> {
     pub at: [T; LANES],
 }
 
-/// The numbers of a model beside its weights, in the form in which it is evaluated: what exporters write.
+/// Numbers of a model beside its weights, in the form used by evaluation and exporters.
 #[derive(Debug, Clone, Copy)]
 pub struct Coefficients<'a, T> {
-    /// Taken from each input.
+    /// Mean of each input, subtracted first.
     pub mean: &'a [T],
-    /// What each input is then multiplied with; 0 for one without variance.
+    /// Factor of each input, applied after `mean` is subtracted; 0 for one without variance.
     pub inverse: &'a [T],
     /// Added to the outputs of an `ann`.
     pub output_mean: &'a [T],
-    /// What the outputs are multiplied with before.
+    /// Factor of the outputs, applied before `output_mean` is added.
     pub output: &'a [T],
-    /// From C to the material axes, row by row; none for the axes of the data.
+    /// Transformation of C to the material axes, row by row; `None` for the axes of the data.
     pub turn: Option<&'a [[T; 6]; 6]>,
-    /// Of each member of an energy.
-    pub rest: &'a [Rest<T>],
-    /// Distance in standard deviations beyond which a C is far from all representatives of the training strains.
+    /// Terms of each member of an energy.
+    pub rest: &'a [RestTerm<T>],
+    /// Distance in standard deviations beyond which a C is far from all representatives of the training
+    /// strains.
     pub farthest: Option<f64>,
 }
 
 impl<T: Real + nalgebra::Scalar> Surrogate<T> {
-    /// A law from its header and the networks of its members.
+    /// Builds a law from its header and the networks of its members.
     ///
     /// # Errors
-    /// [`Header::check`]; [`Error::Invalid`] for another number of networks or another architecture, axes that are
-    /// not orthonormal, or a negative weight where a polyconvex energy must have none ([`Kind::non_negative`]).
+    /// [`Header::check`]; [`Error::Invalid`] for another number of networks or another architecture, axes
+    /// that are not orthonormal, or a negative weight where a polyconvex energy must have none
+    /// ([`Kind::non_negative`]).
     pub fn new(header: Header, members: Vec<Network<T>>) -> Result<Self, Error> {
         header.check()?;
         if members.len() != header.members {
@@ -158,7 +160,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
             rest: Vec::new(),
         };
         if let Some(invariants) = law.header.kind.invariants() {
-            law.rest = vec![Rest::default(); law.members.len()];
+            law.rest = vec![RestTerm::default(); law.members.len()];
             for m in 0..law.members.len() {
                 law.rest[m] = law.rest_of(m, invariants);
             }
@@ -166,8 +168,9 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         Ok(law)
     }
 
-    /// A law with random weights ([`Network::random`], seeds `seed`, `seed` + 1, …). Where [`Kind::non_negative`] asks for
-    /// it they are |w|/√n with n inputs: a sum of n numbers of one sign is √n times as large as one of both signs.
+    /// Creates a law with random weights ([`Network::random`], seeds `seed`, `seed` + 1, …). Weights that
+    /// [`Kind::non_negative`] restricts are |w|/√n with n inputs: a sum of n numbers of one sign is √n times
+    /// as large as one of both signs.
     ///
     /// # Errors
     /// Those of [`Surrogate::new`].
@@ -191,14 +194,14 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         Self::new(header, members)
     }
 
-    /// The correction of member m. Of a polyconvex energy it is polyconvex itself: with S(I) = Σ sᵢ aᵢ⊗aᵢ in the material
-    /// axes, add ½|sᵢ| (aᵢ·Caᵢ − 1) for sᵢ < 0 and ½sᵢ (aᵢ·cof C aᵢ − 1) − sᵢ(J − 1) for sᵢ > 0, since
-    /// 2 ∂(aᵢ·cof C aᵢ)/∂C = 2(1 − aᵢ⊗aᵢ) and 2 ∂J/∂C = 1 at I (after Linden et al. 2023,
+    /// Computes the correction of member m. For a polyconvex energy it is polyconvex itself: with S(I) = Σ sᵢ
+    /// aᵢ⊗aᵢ in the material axes, add ½|sᵢ| (aᵢ·Caᵢ − 1) for sᵢ < 0 and ½sᵢ (aᵢ·cof C aᵢ − 1) − sᵢ(J − 1)
+    /// for sᵢ > 0, since 2 ∂(aᵢ·cof C aᵢ)/∂C = 2(1 − aᵢ⊗aᵢ) and 2 ∂J/∂C = 1 at I (after Linden et al. 2023,
     /// <https://doi.org/10.1016/j.jmps.2023.105363>).
-    fn rest_of(&self, m: usize, invariants: Invariants) -> Rest<T> {
+    fn rest_of(&self, m: usize, invariants: SymmetryInvariants) -> RestTerm<T> {
         let mut tape = Tape::default();
         let identity = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0].map(T::from_f64);
-        let mut rest = Rest::default();
+        let mut rest = RestTerm::default();
         invariants.values(&identity, &mut rest.at);
         if let Kind::Energy { symmetry, polyconvex: true, .. } = self.header.kind {
             let last = invariants.count() - 1;
@@ -232,14 +235,14 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
                 }
             }
         }
-        // what is left: all of it, or rounding
+        // the remainder: all of it, or rounding
         let raw = self.member(m, &identity, &rest, false, &mut tape);
         rest.value = raw.energy;
         rest.slope = raw.first;
         rest
     }
 
-    /// Everything but the weights.
+    /// Metadata of the model: everything but the weights.
     pub fn header(&self) -> &Header {
         &self.header
     }
@@ -249,7 +252,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         &self.members
     }
 
-    /// The same law in another precision.
+    /// Converts the law to another precision.
     ///
     /// # Errors
     /// Weights beyond the range of f32.
@@ -262,7 +265,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         Surrogate::new(self.header.clone(), members)
     }
 
-    /// The numbers beside the weights.
+    /// Numbers beside the weights.
     pub fn coefficients(&self) -> Coefficients<'_, T> {
         Coefficients {
             mean: &self.mean,
@@ -275,13 +278,13 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         }
     }
 
-    /// Which components of C leave the training data; for the spread see [`Surrogate::stress`].
+    /// Flags components of C outside the training data; for the spread see [`Surrogate::stress`].
     pub fn flags(&self, c: &SVector<T, 6>) -> Flags {
         let mut flags = Flags::default();
         for (a, [low, high]) in self.header.training_box.iter().enumerate() {
             let value = c[a].to_f64();
-            // what never changed may differ by rounding; NaN is outside
-            let slack = if low == high { UNSEEN } else { 0.0 };
+            // components that never changed may differ by rounding; NaN is outside
+            let slack = if low == high { CONSTANT_TOLERANCE } else { 0.0 };
             flags.outside[a] = !(value >= low - slack && value <= high + slack);
             flags.unseen[a] = flags.outside[a] && low == high;
         }
@@ -291,7 +294,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         flags
     }
 
-    /// S, the tangent 2 ∂S/∂C and their uncertainty at C, in memory of its own: for single points.
+    /// Computes S, the tangent 2 ∂S/∂C and their uncertainty at C, with new memory: for single points.
     ///
     /// # Errors
     /// Those of [`Surrogate::tangent`].
@@ -299,7 +302,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         self.tangent(c, &mut Workspace::default())
     }
 
-    /// S at C with its uncertainty.
+    /// Computes S at C with its uncertainty.
     ///
     /// # Errors
     /// Those of [`Surrogate::tangent`].
@@ -307,20 +310,20 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         memory.with(|memory| self.evaluate(c, false, memory))
     }
 
-    /// S and the tangent 2 ∂S/∂C at C with their uncertainty.
+    /// Computes S and the tangent 2 ∂S/∂C at C with their uncertainty.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for a C that is not finite or not positive definite, and for a result that is not finite (a C
-    /// so far away that the networks overflow).
+    /// [`Error::Invalid`] for a C that is not finite or not positive definite, and for a result that is not
+    /// finite (a C so far away that the networks overflow).
     pub fn tangent(&self, c: &SVector<T, 6>, memory: &mut Workspace) -> Result<Prediction<T>, Error> {
         memory.with(|memory| self.evaluate(c, true, memory))
     }
 }
 
 impl Surrogate<f64> {
-    /// The same model, which flags predictions where its members disagree by more than at any of these strains, those of
-    /// its training: as box and distance, a spread is uncertain beyond all that the training rows have. No limit for a
-    /// single member, or for members that agree everywhere.
+    /// Sets the limit of the spread: the model flags predictions whose spread exceeds that at all of these
+    /// strains, those of its training. There is no limit for a single member, or for members that agree
+    /// everywhere.
     ///
     /// # Errors
     /// Those of [`Surrogate::stress`].
@@ -369,8 +372,8 @@ fn product<T: Real>(row: &[T; 6], c: &[T; 6]) -> T {
     sum
 }
 
-/// Tᵀ g and Tᵀ H T: derivatives by c from those by T c.
-fn back<T: Real>(turn: &[[T; 6]; 6], g: &[T; 6], h: &[[T; 6]; 6]) -> ([T; 6], [[T; 6]; 6]) {
+/// Tᵀ g and Tᵀ H T: derivatives with respect to c from those with respect to T c.
+fn to_data_axes<T: Real>(turn: &[[T; 6]; 6], g: &[T; 6], h: &[[T; 6]; 6]) -> ([T; 6], [[T; 6]; 6]) {
     let (mut first, mut half, mut second) = ([T::ZERO; 6], [[T::ZERO; 6]; 6], [[T::ZERO; 6]; 6]);
     for k in 0..6 {
         for a in 0..6 {

@@ -1,4 +1,4 @@
-//! What every law must keep, measured on any [`Law`]: one battery of tests for all of them, and for yours.
+//! Checks of the properties that every law must have, for any [`Law`], including your own.
 
 use super::law::IDENTITY;
 use super::{Error, Law, Prediction, Workspace};
@@ -9,25 +9,27 @@ use nalgebra::{SVector, Vector3};
 /// Step of the central differences: truncation h² ~ 1e-10 and rounding ε/h ~ 2e-11 of the law's own size.
 const STEP: f64 = 1e-5;
 
-/// Deviations of a law from what it must keep, each the largest over some deformations. A deviation of stress or tangent is
-/// relative to the law's size there: the largest component of S and ℂ, and |W|.
+/// Deviations of a law from the properties that every law must have, each the largest over some deformations.
+/// A deviation of stress or tangent is relative to the law's size there: the largest component of S and ℂ,
+/// and |W|.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Deviations {
-    /// Of S from 2 ∂W/∂C by central differences; none of a law without an energy.
+    /// Deviation of S from 2 ∂W/∂C by central differences; `None` for a law without an energy.
     pub stress: Option<f64>,
-    /// Of ℂ from 2 ∂S/∂C by central differences.
+    /// Deviation of ℂ from 2 ∂S/∂C by central differences.
     pub tangent: f64,
-    /// Of ℂ from its transpose: 0 for a law that has an energy.
+    /// Deviation of ℂ from its transpose: 0 for a law that has an energy.
     pub asymmetry: f64,
     /// ‖σ(QF) − Qσ(F)Qᵀ‖ for a rotation Q.
     pub objectivity: f64,
-    /// Of a stress alone from the stress with its tangent, and of a list from single points: 0, the same bits.
+    /// Deviation of a stress alone from the stress with its tangent, and of a list from single points: 0, the
+    /// same bits.
     pub bits: f64,
-    /// |W(1)| over the size there; none of a law without an energy.
+    /// |W(1)| over the size there; `None` for a law without an energy.
     pub energy_at_rest: Option<f64>,
-    /// Of S(1) from zero.
+    /// Deviation of S(1) from zero.
     pub stress_at_rest: f64,
-    /// Of S(1) from a pressure: 0 for an isotropic law, also where the pressure is left open.
+    /// Deviation of S(1) from a pressure: 0 for an isotropic law, also if the pressure is left open.
     pub shear_at_rest: f64,
 }
 
@@ -35,8 +37,8 @@ impl Deviations {
     /// Measures a law at some deformations and at rest.
     ///
     /// # Errors
-    /// What the law refuses at one of them, or a step of 1e-5 beside it.
-    pub fn of(law: &dyn Law, deformations: &[DeformationGradient]) -> Result<Self, Error> {
+    /// Errors of the law at one of them, or a step of 1e-5 beside it.
+    pub fn measure(law: &dyn Law, deformations: &[DeformationGradient]) -> Result<Self, Error> {
         let mut memory = Workspace::default();
         let mut all = Self::default();
         let rotation = nalgebra::Rotation3::from_euler_angles(0.3, -1.1, 2.0).into_inner();
@@ -51,7 +53,7 @@ impl Deviations {
         let mut list = vec![Prediction::default(); points.len()];
         law.stresses(&points, &mut memory, &mut list)?;
         for ((f, c), listed) in deformations.iter().zip(&points).zip(&list) {
-            let size = all.at(law, c, listed, &mut memory)?;
+            let size = all.measure_at(law, c, listed, &mut memory)?;
             let turned = DeformationGradient::new(rotation * f.matrix())?;
             let (own, _) = law.cauchy_stress(f, &mut memory)?;
             let (other, _) = law.cauchy_stress(&turned, &mut memory)?;
@@ -61,8 +63,8 @@ impl Deviations {
         Ok(all)
     }
 
-    /// At one C; returns the law's size there.
-    fn at(
+    /// Measures the law at one C; returns its size there.
+    fn measure_at(
         &mut self,
         law: &dyn Law,
         c: &Voigt,
@@ -98,12 +100,17 @@ impl Deviations {
     }
 }
 
-/// At how many of `count` random deformations and directions waves have no real speed: the law has lost its ellipticity
-/// there, (m ⊗ N) : ∂P/∂F : (m ⊗ N) < 0 beyond rounding. Strains go up to several hundred per cent.
+/// Counts, among `count` random deformations and directions, the states without a real wave speed: the law
+/// has lost its ellipticity there, (m ⊗ N) : ∂P/∂F : (m ⊗ N) < 0 beyond rounding. Strains go up to several
+/// hundred per cent.
 ///
 /// # Errors
-/// What the law refuses.
-pub fn lost_waves(law: &dyn Law, count: usize, random: &mut SplitMix64) -> Result<usize, Error> {
+/// Errors of the law.
+pub fn count_ellipticity_losses(
+    law: &dyn Law,
+    count: usize,
+    random: &mut SplitMix64,
+) -> Result<usize, Error> {
     let mut memory = Workspace::default();
     let mut lost = 0;
     for _ in 0..count {
@@ -126,8 +133,8 @@ pub fn lost_waves(law: &dyn Law, count: usize, random: &mut SplitMix64) -> Resul
     Ok(lost)
 }
 
-/// Deformations for tests, far from the locking of rubber: at rest, small, sheared, with two and three equal stretches, and
-/// general ones.
+/// Deformations for tests, far from the locking of rubber: rest, small strain, shear, two and three equal
+/// stretches, and general ones.
 pub fn deformations() -> Vec<DeformationGradient> {
     let q: Tensor = nalgebra::Rotation3::from_euler_angles(0.3, -1.1, 2.0).into_inner();
     let half = 0.5_f64.sqrt();
@@ -150,7 +157,7 @@ fn size(found: &Prediction) -> f64 {
     found.stress.amax().max(tangent).max(found.energy.unwrap_or(0.0).abs()).max(f64::MIN_POSITIVE)
 }
 
-/// The larger one; NaN stays.
+/// Updates a maximum; keeps NaN.
 fn raise(largest: &mut f64, value: f64) {
     if value.is_nan() || value > *largest {
         *largest = value;
@@ -177,7 +184,7 @@ mod tests {
         let laws = hyperelastic::all().unwrap();
         let mut stress_free = 0;
         for law in &laws {
-            let found = Deviations::of(law, &deformations()).unwrap();
+            let found = Deviations::measure(law, &deformations()).unwrap();
             let name = hyperelastic::Hyperelastic::name(law);
             check(&name, &found);
             assert!(found.stress.is_some() && found.shear_at_rest < 1e-15, "{name}: {found:?}");
@@ -198,7 +205,7 @@ mod tests {
     #[test]
     fn every_kind_of_learnt_model() {
         for (name, model) in crate::constitutive::surrogate::examples().unwrap() {
-            let found = Deviations::of(&model, &deformations()).unwrap();
+            let found = Deviations::measure(&model, &deformations()).unwrap();
             check(&name, &found);
             match found.stress {
                 Some(_) => {
@@ -209,7 +216,7 @@ mod tests {
         }
     }
 
-    /// A law with a slip is found out: a tangent, a stress, a frame.
+    /// Errors in a law are detected: a tangent, a stress, a frame.
     #[test]
     fn slips_are_measured() {
         struct Slip(usize);
@@ -221,7 +228,7 @@ mod tests {
                 Ok(Prediction { tangent: None, ..self.tangent(c, memory)? })
             }
             fn tangent(&self, c: &Voigt, _: &mut Workspace) -> Result<Prediction, Error> {
-                let e = voigt::strain_of_right_cauchy_green(c);
+                let e = voigt::strain_from_right_cauchy_green(c);
                 let mut tangent = Voigt6x6::from_diagonal(&Voigt::new(1.0, 1.0, 1.0, 0.5, 0.5, 0.5));
                 let mut stress = tangent * e;
                 let energy = Some(0.5 * stress.dot(&e));
@@ -234,7 +241,7 @@ mod tests {
                 Ok(Prediction { stress, tangent: Some(tangent), energy, ..Prediction::default() })
             }
         }
-        let of = |slip| Deviations::of(&Slip(slip), &deformations()).unwrap();
+        let of = |slip| Deviations::measure(&Slip(slip), &deformations()).unwrap();
         check("none", &of(0));
         assert!(of(1).tangent > 0.1 && of(2).stress.unwrap() > 0.1 && of(2).tangent > 0.1);
         assert!(of(3).asymmetry > 1e-4);

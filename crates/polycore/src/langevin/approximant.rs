@@ -4,8 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::inverse;
 
-/// Ways to compute 𝓛⁻¹. All are odd; in formulas x is |x| and c = 1 − |x|, kept apart so that no digits are lost
-/// near locking. Howard 2020 (doi:10.1007/s00397-020-01195-8) is left out: its formula could not be checked here.
+/// Ways to compute 𝓛⁻¹. All are odd; in formulas x is |x| and c = 1 − |x|, kept apart so that no digits are
+/// lost near locking. Howard 2020 (doi:10.1007/s00397-020-01195-8) is left out: its formula could not be
+/// checked here.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -75,7 +76,7 @@ impl Inverse {
         }
     }
 
-    /// Where it was published: a DOI, or the work where there is none.
+    /// Publication: a DOI, or the work if it has none.
     pub const fn source(self) -> &'static str {
         match self {
             Self::Exact => "this crate",
@@ -144,18 +145,18 @@ impl Inverse {
     /// 𝓛⁻¹ of a row, branching on the choice once; as many numbers as the shorter slice has.
     pub fn fill(self, x: &[f64], beta: &mut [f64]) {
         match self {
-            Self::Exact => each(x, beta, inverse),
-            Self::Cohen => each(x, beta, |x| signed(x, cohen)),
-            Self::Treloar => each(x, beta, |x| signed(x, treloar)),
-            Self::Puso => each(x, beta, |x| signed(x, puso)),
-            Self::Bergstrom => each(x, beta, |x| signed(x, bergstrom)),
-            Self::Nguessong => each(x, beta, |x| signed(x, nguessong)),
-            Self::Darabi => each(x, beta, |x| signed(x, darabi)),
-            Self::Jedynak2015 => each(x, beta, |x| signed(x, jedynak_2015)),
-            Self::Kroger => each(x, beta, |x| signed(x, kroger)),
-            Self::Petrosyan => each(x, beta, |x| signed(x, petrosyan)),
-            Self::Jedynak2017 => each(x, beta, |x| signed(x, jedynak_2017)),
-            Self::Jedynak2019 => each(x, beta, |x| signed(x, jedynak_2019)),
+            Self::Exact => fill(x, beta, inverse),
+            Self::Cohen => fill(x, beta, |x| signed(x, cohen)),
+            Self::Treloar => fill(x, beta, |x| signed(x, treloar)),
+            Self::Puso => fill(x, beta, |x| signed(x, puso)),
+            Self::Bergstrom => fill(x, beta, |x| signed(x, bergstrom)),
+            Self::Nguessong => fill(x, beta, |x| signed(x, nguessong)),
+            Self::Darabi => fill(x, beta, |x| signed(x, darabi)),
+            Self::Jedynak2015 => fill(x, beta, |x| signed(x, jedynak_2015)),
+            Self::Kroger => fill(x, beta, |x| signed(x, kroger)),
+            Self::Petrosyan => fill(x, beta, |x| signed(x, petrosyan)),
+            Self::Jedynak2017 => fill(x, beta, |x| signed(x, jedynak_2017)),
+            Self::Jedynak2019 => fill(x, beta, |x| signed(x, jedynak_2019)),
         }
     }
 
@@ -183,7 +184,7 @@ impl Inverse {
 }
 
 #[inline(always)]
-fn each(x: &[f64], beta: &mut [f64], formula: impl Fn(f64) -> f64) {
+fn fill(x: &[f64], beta: &mut [f64], formula: impl Fn(f64) -> f64) {
     for (beta, &x) in beta.iter_mut().zip(x) {
         *beta = formula(x);
     }
@@ -314,7 +315,8 @@ mod tests {
             let found = 100.0 * largest_error(choice);
             assert!((found - percent).abs() <= unit, "{}: {found} %, published {printed} %", choice.name());
         }
-        // no figure in the literature known to us: ours, as a record. Treloar's form has no pole: 100 % at x = 1
+        // no figure in the literature known to us: ours, as a record. Treloar's form has no pole: 100 % at x
+        // = 1
         assert!((largest_error(Inverse::Puso) - 0.046_125).abs() < 1e-5);
         assert!((largest_error(Inverse::Treloar) - 1.0).abs() < 1e-9);
         assert_eq!(largest_error(Inverse::Exact), 0.0);

@@ -1,8 +1,8 @@
 //! 𝓛⁻¹ to the accuracy of the arithmetic, without iteration: polynomials of a smooth remainder.
 //!
 //! |x| < 1/2: 𝓛⁻¹ = 3x + x³P(x²). Beyond: 𝓛⁻¹ = 1/(c + Q(c)), where Q = 2/(e^{2β} − 1) is below rounding for
-//! c < 3/64 and piecewise polynomial in c else. What the polynomials give is at most a sixth of the sum, so that
-//! their rounding hardly counts.
+//! c < 3/64 and piecewise polynomial in c else. What the polynomials give is at most a sixth of the sum, so
+//! that their rounding hardly counts.
 
 use super::polynomial;
 use super::table::{NEAR_ONE, NEAR_ZERO};
@@ -34,7 +34,8 @@ pub fn inverse(x: f64) -> f64 {
 
 /// 𝓛⁻¹(1 − c), within 1.6 ulp of the given c ∈ (0, 1]: nothing is lost near locking, where 𝓛⁻¹ → 1/c.
 ///
-/// The magnitude for x of either sign, with c = 1 − |x|. ∞ at c = 0 (and where 1/c overflows), NaN outside [0, 1].
+/// The magnitude for x of either sign, with c = 1 − |x|. ∞ at c = 0 (and where 1/c overflows), NaN outside
+/// [0, 1].
 ///
 /// ```
 /// assert_eq!(polycore::langevin::inverse_from_complement(1e-200), 1e200);

@@ -1,7 +1,7 @@
 //! Bisection.
 
-/// Halves [low, high] by whether `is_below` holds in the middle, `steps` times or until no number lies between; the condition holds
-/// below some place and not above. `low` may be greater than `high`.
+/// Bisects [low, high] by the condition `is_below` in the middle, `steps` times or until no number lies
+/// between; the condition holds below some place and not above. `low` may be greater than `high`.
 pub fn bisect(mut low: f64, mut high: f64, steps: usize, mut is_below: impl FnMut(f64) -> bool) -> [f64; 2] {
     for _ in 0..steps {
         let middle = 0.5 * (low + high);
@@ -13,7 +13,7 @@ pub fn bisect(mut low: f64, mut high: f64, steps: usize, mut is_below: impl FnMu
     [low, high]
 }
 
-/// The middle of [`bisect`].
+/// Middle of the interval of [`bisect`].
 pub fn bisected(low: f64, high: f64, steps: usize, is_below: impl FnMut(f64) -> bool) -> f64 {
     let [low, high] = bisect(low, high, steps, is_below);
     0.5 * (low + high)

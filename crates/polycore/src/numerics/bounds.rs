@@ -1,11 +1,11 @@
-//! Ends of numbers and boxes around points. NaN is passed over.
+//! Ranges of numbers and boxes around points. NaN is ignored.
 
-/// The least and the greatest number; [∞, −∞] of none.
+/// Least and greatest number; [∞, −∞] for none.
 pub fn range(numbers: impl IntoIterator<Item = f64>) -> [f64; 2] {
     numbers.into_iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
 }
 
-/// The lower and the upper corner of the box around points.
+/// Lower and upper corner of the box around points.
 pub fn bounds<const D: usize>(points: impl IntoIterator<Item = [f64; D]>) -> [[f64; D]; 2] {
     let (mut low, mut high) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
     for point in points {

@@ -1,5 +1,5 @@
-//! Supernodal Cholesky factors of a sparse symmetric positive definite matrix, by faer: one symbolic analysis for each pattern. Always on
-//! one thread, so that the factors have the same bits wherever they are made.
+//! Supernodal Cholesky factors of a sparse symmetric positive definite matrix, by faer: one symbolic analysis
+//! for each pattern. Always on one thread, so that the factors have the same bits wherever they are made.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
@@ -14,7 +14,7 @@ use faer::{Conj, MatMut, Par, Side};
 /// Places of the entries of an upper triangle: column by column, rows ascending.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Pattern {
-    /// Where each column starts, and the number of entries.
+    /// Start of each column, and the number of entries.
     pub starts: Vec<usize>,
     /// Row of each entry.
     pub rows: Vec<usize>,
@@ -45,7 +45,7 @@ pub struct Cholesky {
 }
 
 impl Cholesky {
-    /// Analyses a pattern, in the order of elimination that its rows are in; `None` where memory does not suffice.
+    /// Analyses a pattern, in the order of elimination of its rows; `None` if memory does not suffice.
     pub fn analyse(pattern: Pattern) -> Option<Self> {
         let parameters = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
@@ -63,8 +63,8 @@ impl Cholesky {
         &self.pattern
     }
 
-    /// Computes the factors of the matrix with `entries` in the places of the pattern; false where it is not positive definite to working
-    /// precision, or memory does not suffice.
+    /// Computes the factors of the matrix with `entries` in the places of the pattern; false if it is not
+    /// positive definite to working precision, or memory does not suffice.
     pub fn factor(&self, entries: &[f64], factors: &mut Vec<f64>) -> bool {
         let parameters = Default::default();
         let needed = self.symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, parameters);

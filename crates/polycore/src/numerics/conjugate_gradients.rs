@@ -3,12 +3,13 @@
 use nalgebra::SVector;
 use rayon::prelude::*;
 
-/// Vectors of a work item.
+/// Number of vectors of a work item.
 const ITEM: usize = 4096;
 
-/// Solves A x = r from x = 0 for a symmetric positive definite A; returns x and the number of iterations, `most` at most. `residual`
-/// becomes r − A x; before each iteration `reached` looks at it. `product` computes A p, `precondition` an approximation of A⁻¹ r, both
-/// into their second argument; `dot` adds in an order of its own.
+/// Solves A x = r from x = 0 for a symmetric positive definite A; returns x and the number of iterations, at
+/// most `most`. `residual` becomes r − A x; `reached` checks it before each iteration. `product` computes A
+/// p, `precondition` an approximation of A⁻¹ r, both into their second argument; `dot` defines the order of
+/// its sum.
 pub fn conjugate_gradients<const D: usize>(
     residual: &mut [SVector<f64, D>],
     most: usize,
@@ -26,17 +27,17 @@ pub fn conjugate_gradients<const D: usize>(
         }
         precondition(residual, &mut conditioned);
         let square = dot(residual, &conditioned);
-        each(&mut direction, &conditioned, |direction, own| *own + *direction * (square / before));
+        for_each_chunk(&mut direction, &conditioned, |direction, own| *own + *direction * (square / before));
         before = square;
         product(&direction, &mut image);
         let length = square / dot(&direction, &image);
-        each(&mut solution, &direction, |solution, direction| *solution + direction * length);
-        each(residual, &image, |residual, image| *residual - image * length);
+        for_each_chunk(&mut solution, &direction, |solution, direction| *solution + direction * length);
+        for_each_chunk(residual, &image, |residual, image| *residual - image * length);
     }
     (solution, most)
 }
 
-fn each<T: Copy + Send + Sync>(out: &mut [T], of: &[T], value: impl Fn(&T, &T) -> T + Sync) {
+fn for_each_chunk<T: Copy + Send + Sync>(out: &mut [T], of: &[T], value: impl Fn(&T, &T) -> T + Sync) {
     out.par_chunks_mut(ITEM).zip(of.par_chunks(ITEM)).for_each(|(out, of)| {
         out.iter_mut().zip(of).for_each(|(out, of)| *out = value(out, of));
     });

@@ -1,6 +1,6 @@
 //! Counting sort (Knuth, The Art of Computer Programming 3, 5.2).
 
-/// Items in numbered groups, in each group in the order in which they came; fewer than 2³² in all.
+/// Items in numbered groups; each group keeps the order of input. Fewer than 2³² items in all.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Groups<T> {
     starts: Vec<u32>,
@@ -34,12 +34,12 @@ impl<T: Copy> Groups<T> {
     }
 
     /// Items of a group.
-    pub fn of(&self, group: usize) -> &[T] {
-        self.between(group, group)
+    pub fn group(&self, group: usize) -> &[T] {
+        self.groups(group, group)
     }
 
-    /// Items of groups that follow each other, from the first to the last.
-    pub fn between(&self, first: usize, last: usize) -> &[T] {
+    /// Items of consecutive groups, from the first to the last.
+    pub fn groups(&self, first: usize, last: usize) -> &[T] {
         &self.items[self.starts[first] as usize..self.starts[last + 1] as usize]
     }
 }
@@ -52,8 +52,8 @@ mod tests {
     #[test]
     fn remainders() {
         let groups = Groups::new(4, (0..10).map(|k| (k % 3, k)));
-        assert_eq!((groups.of(0), groups.of(2)), (&[0, 3, 6, 9][..], &[2, 5, 8][..]));
-        assert_eq!((groups.of(3).len(), groups.between(1, 3).len(), groups.count()), (0, 6, 4));
+        assert_eq!((groups.group(0), groups.group(2)), (&[0, 3, 6, 9][..], &[2, 5, 8][..]));
+        assert_eq!((groups.group(3).len(), groups.groups(1, 3).len(), groups.count()), (0, 6, 4));
         assert!(Groups::<u32>::new(0, std::iter::empty()).items().is_empty());
     }
 }

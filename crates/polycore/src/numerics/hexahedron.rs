@@ -1,4 +1,5 @@
-//! The trilinear hexahedron: N_a = ∏_d ½(1 + ξ_d ξ_ad) of the corners a at natural coordinates ξ from −1 to 1.
+//! The trilinear hexahedron: N_a = ∏_d ½(1 + ξ_d ξ_ad) of the corners a at natural coordinates ξ from −1 to
+//! 1.
 
 /// Corners in natural coordinates, in the order of Abaqus and VTK.
 pub const CORNERS: [[f64; 3]; 8] = [

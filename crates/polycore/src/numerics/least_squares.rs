@@ -1,37 +1,38 @@
-//! Least squares of functions that are not linear.
+//! Nonlinear least squares.
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, Owned};
 
-/// A minimum, or where the search ended.
+/// Minimum, or the point where the search ended.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Found {
+pub struct Optimum {
     /// Parameters.
     pub at: DVector<f64>,
     /// ½Σr².
     pub objective: f64,
 }
 
-/// Minimises ½Σr² from `start` by the Levenberg–Marquardt method of MINPACK (Moré 1978, doi:10.1007/BFb0067700), with at most
-/// `patience`·(n + 1) evaluations of residuals in n parameters. A `None` of residuals or of their Jacobian ends the search.
+/// Minimises ½Σr² from `start` by the Levenberg–Marquardt method of MINPACK (Moré 1978,
+/// doi:10.1007/BFb0067700), with at most `patience`·(n + 1) evaluations of residuals in n parameters. A
+/// `None` of residuals or of their Jacobian ends the search.
 pub fn levenberg_marquardt(
     start: DVector<f64>,
     patience: usize,
     residuals: impl Fn(&DVector<f64>) -> Option<DVector<f64>>,
     jacobian: impl Fn(&DVector<f64>) -> Option<DMatrix<f64>>,
-) -> Found {
-    let problem = Problem { at: start, residuals, jacobian };
+) -> Optimum {
+    let problem = ResidualFunction { at: start, residuals, jacobian };
     let (problem, report) = LevenbergMarquardt::new().with_patience(patience).minimize(problem);
-    Found { at: problem.at, objective: report.objective_function }
+    Optimum { at: problem.at, objective: report.objective_function }
 }
 
-struct Problem<R, J> {
+struct ResidualFunction<R, J> {
     at: DVector<f64>,
     residuals: R,
     jacobian: J,
 }
 
-impl<R, J> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<R, J>
+impl<R, J> LeastSquaresProblem<f64, Dyn, Dyn> for ResidualFunction<R, J>
 where
     R: Fn(&DVector<f64>) -> Option<DVector<f64>>,
     J: Fn(&DVector<f64>) -> Option<DMatrix<f64>>,

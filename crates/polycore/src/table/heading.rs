@@ -2,20 +2,20 @@
 
 use crate::units::is_unit;
 
-/// The heading of a column.
+/// Heading of a column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Heading {
-    /// As it stands in the file.
+    /// Text of the heading in the file.
     pub text: String,
-    /// Without its unit.
+    /// Name without the unit.
     pub name: String,
-    /// The name in small letters, words apart by one blank.
+    /// Name in small letters, words separated by one blank.
     pub plain: String,
-    /// Unit, of the heading or of the row below it; empty brackets and dashes are the unit 1, the empty text.
+    /// Unit of the heading or of the row below it; empty brackets and dashes are the unit 1, the empty text.
     pub unit: Option<String>,
 }
 
-/// Headings, with the row of units if there is one.
+/// Builds the headings, with the row of units if there is one.
 pub(super) fn read(texts: &[String], units: &[String]) -> Vec<Heading> {
     let below = |i: usize| units.get(i).map(String::as_str).filter(|unit| !unit.is_empty());
     let heading = |(i, text): (usize, &String)| {
@@ -26,13 +26,13 @@ pub(super) fn read(texts: &[String], units: &[String]) -> Vec<Heading> {
     texts.iter().enumerate().map(heading).collect()
 }
 
-/// Name and unit of `name [unit]`, `name (unit)`, `name/unit`.
+/// Splits `name [unit]`, `name (unit)`, `name/unit` into name and unit.
 fn split(text: &str) -> (&str, Option<&str>) {
     let text = text.trim();
     if let Some((name, unit)) = text.strip_suffix(']').and_then(|text| text.rsplit_once('[')) {
         return (name.trim_end_matches(['/', ' ']), Some(bare(unit)));
     }
-    // from the left, so that of `DSC/(mW/mg)` the whole bracket is the unit
+    // from the left, so that in `DSC/(mW/mg)` the whole bracket is the unit
     for (at, sign) in text.char_indices().filter(|(at, sign)| *at > 0 && matches!(sign, '/' | '(' | ',')) {
         let (name, rest) = (text[..at].trim(), text[at..].trim());
         let unit = match sign {
@@ -48,7 +48,7 @@ fn split(text: &str) -> (&str, Option<&str>) {
     (text, None)
 }
 
-/// A unit without its brackets; nothing where it says that there is none.
+/// Removes the brackets of a unit; empty if it says that there is none.
 pub(super) fn bare(unit: &str) -> &str {
     let unit = unit.trim();
     let pairs = [('[', ']'), ('(', ')'), ('<', '>'), ('{', '}')];
@@ -59,7 +59,7 @@ pub(super) fn bare(unit: &str) -> &str {
     }
 }
 
-/// A unit as [`crate::units`] knows it, of the ways in which laboratories write it.
+/// Converts a unit as laboratories write it to the grammar of [`crate::units`].
 pub fn plain_unit(unit: &str) -> String {
     let unit = bare(unit).replace(['º', '˚'], "°").replace("° C", "°C").replace('\u{a0}', " ");
     let same = match unit.to_lowercase().as_str() {
@@ -90,7 +90,7 @@ pub fn plain_unit(unit: &str) -> String {
     text
 }
 
-/// Small letters and digits, words apart by one blank.
+/// Reduces a name to small letters and digits, words separated by one blank.
 pub fn plainly(name: &str) -> String {
     let lower = name.to_lowercase();
     let words = lower.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());

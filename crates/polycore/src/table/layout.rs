@@ -1,26 +1,26 @@
-//! How a text is a table: separator, decimal sign, headings.
+//! Layout of a table: separator, decimal sign, headings.
 
 use super::heading::plain_unit;
 use crate::units::is_unit;
 use std::fmt;
 
-/// Lines that are looked at before the first is read.
+/// Number of lines from which the layout is detected.
 const SAMPLE: usize = 1000;
 
-/// What stands between cells.
+/// Separator of cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Separator {
-    /// One character.
+    /// Single character.
     Sign(char),
     /// Blanks and tabs, any number of them.
     Blanks,
 }
 
-/// In the order in which they are taken where both would do.
+/// Separators in order of preference.
 const SEPARATORS: [Separator; 4] =
     [Separator::Sign('\t'), Separator::Sign(';'), Separator::Sign(','), Separator::Blanks];
 
-/// What stands before the decimals.
+/// Decimal sign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Decimal {
     /// 0.5
@@ -29,12 +29,12 @@ pub enum Decimal {
     Comma,
 }
 
-/// How a table is written.
+/// Layout of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
-    /// Between cells.
+    /// Separator of cells.
     pub separator: Separator,
-    /// Before decimals.
+    /// Decimal sign.
     pub decimal: Decimal,
     /// Encoding of the file.
     pub encoding: &'static str,
@@ -44,7 +44,7 @@ pub struct Layout {
     pub unit_line: Option<usize>,
 }
 
-/// The cells of the headings and units, and the least number of cells of a row.
+/// Cells of the headings and units, and the least number of cells of a row.
 pub(super) struct Heads {
     pub texts: Vec<String>,
     pub units: Vec<String>,
@@ -65,7 +65,7 @@ impl fmt::Display for Layout {
 }
 
 impl Separator {
-    /// The cells of a line, without the blanks around them.
+    /// Splits a line into cells, without the blanks around them.
     pub(super) fn record(self, line: &str) -> csv::StringRecord {
         match self {
             Self::Blanks => line.split_whitespace().collect(),
@@ -83,7 +83,8 @@ impl Separator {
         }
     }
 
-    /// Headings in which a name is several words, as many as there are cells in a row if that can be.
+    /// Splits a line of headings whose names may be several words, into as many as a row has cells if
+    /// possible.
     fn headings(self, line: &str, width: usize) -> Vec<String> {
         let cells: Vec<String> = self.record(line).iter().map(str::to_owned).collect();
         if self != Self::Blanks || cells.len() == width {
@@ -102,7 +103,8 @@ impl Separator {
         [joined, apart].into_iter().find(|found| found.len() == width).unwrap_or(cells)
     }
 
-    /// Cells that are numbers, less those of several numbers in which another separator stands, twice, or a blank.
+    /// Number of cells that are numbers, less twice those of several numbers that contain another separator
+    /// or a blank.
     fn score(self, lines: &[(usize, &str)]) -> i64 {
         let digit = |text: &str, end: bool| {
             let letter = if end { text.chars().next_back() } else { text.chars().next() };
@@ -135,8 +137,8 @@ impl Separator {
 }
 
 impl Decimal {
-    /// The number that a cell is: digits with one decimal sign, separators of thousands only where that is certain (both
-    /// signs occur, in groups of three), an exponent.
+    /// Parses a cell: digits with one decimal sign, separators of thousands only if unambiguous (both signs
+    /// occur, in groups of three), an exponent.
     pub fn number(self, text: &str) -> Option<f64> {
         let start = text.trim_start_matches(['+', '-', '−']);
         if !start.starts_with(|c: char| c.is_ascii_digit() || c == '.' || c == ',') {
@@ -170,21 +172,21 @@ fn is_number(cell: &str) -> bool {
     Decimal::Point.number(cell).or_else(|| Decimal::Comma.number(cell)).is_some()
 }
 
-/// Whether a line is a remark wherever it stands.
+/// Returns true if a line is a remark wherever it stands.
 pub(super) fn is_comment(line: &str) -> bool {
     let line = line.trim_start();
     let percent = line.strip_prefix('%').is_some_and(|rest| rest.trim_start_matches('%').starts_with(' '));
     line.starts_with('#') || line.starts_with("//") || percent
 }
 
-/// A remark without its mark.
+/// Removes the mark of a remark.
 fn uncommented(line: &str) -> &str {
     line.trim_start().trim_start_matches(['#', '%', '/']).trim()
 }
 
 impl Layout {
-    /// The layout of a text; a row that stands where headings should, if there are none.
-    pub(super) fn of(lines: &[&str]) -> Result<(Self, Heads), (usize, String)> {
+    /// Detects the layout of a text; returns the row that stands in place of headings if there are none.
+    pub(super) fn detect(lines: &[&str]) -> Result<(Self, Heads), (usize, String)> {
         let written = |(_, line): &(usize, &str)| !line.trim().is_empty() && !is_comment(line);
         let numbered = || lines.iter().copied().enumerate();
         let mut sample: Vec<(usize, &str)> = numbered().filter(written).take(SAMPLE).collect();
@@ -209,7 +211,7 @@ impl Layout {
         let pattern = |row: &csv::StringRecord| row.iter().map(is_number).collect::<Vec<bool>>();
         let patterns: Vec<Vec<bool>> = rows.iter().map(pattern).collect();
         let numeric = |i: usize| patterns[i].contains(&true);
-        // rows from here on that look alike
+        // rows from here on with the same pattern
         let run = |from: usize| {
             patterns[from..].iter().take_while(|row| row.contains(&true) && **row == patterns[from]).count()
         };
@@ -243,7 +245,7 @@ impl Layout {
                     (None, Some(row)) => {
                         return Err((sample[row].0 + 1, rows[row].iter().collect::<Vec<_>>().join(", ")));
                     }
-                    (None, None) => return Err((0, "nothing".to_owned())),
+                    (None, None) => return Err((0, "an empty file".to_owned())),
                 }
             }
         };
@@ -257,7 +259,7 @@ impl Layout {
         Ok((layout, Heads::new(texts, units.unwrap_or_default())))
     }
 
-    /// Why a row may have too many cells.
+    /// Hint for a row with too many cells.
     pub(super) fn hint(&self, row: &csv::StringRecord, width: usize) -> &'static str {
         let commas = self.separator == Separator::Sign(',') && row.len() == 2 * width;
         if commas { "; a decimal comma cannot stand beside the separator `,`: export with `;`" } else { "" }
@@ -265,21 +267,23 @@ impl Layout {
 }
 
 impl Heads {
-    /// Columns without a name at the end need not be in every row.
+    /// Creates the headings; columns without a name at the end need not be in every row.
     fn new(texts: Vec<String>, units: Vec<String>) -> Self {
         let least = texts.iter().rposition(|text| !text.is_empty()).map_or(0, |last| last + 1);
         Self { texts, units, least }
     }
 }
 
-/// Whether a row is one of units: every cell that is not blank is one, and one of them is more than a dash.
+/// Returns true for a row of units: every cell that is not blank is one, and at least one is more than a
+/// dash.
 fn is_units(row: &csv::StringRecord) -> bool {
     let real = row.iter().any(|cell| is_unit(&plain_unit(cell)));
     let unit = |cell: &str| plain_unit(cell).is_empty() || is_unit(&plain_unit(cell));
     real && row.iter().all(unit)
 }
 
-/// Units below headings; between blanks, where some have none, each belongs to the heading that ends next to it.
+/// Assigns units to the headings above them; if some headings have none, each unit belongs to the heading
+/// that ends next to it.
 fn aligned(separator: Separator, names: &str, units: &str, width: usize) -> Vec<String> {
     let cells: Vec<String> = separator.record(units).iter().map(str::to_owned).collect();
     if separator != Separator::Blanks || cells.len() == width {
@@ -301,7 +305,8 @@ fn aligned(separator: Separator, names: &str, units: &str, width: usize) -> Vec<
     found
 }
 
-/// Headings in the last remark above a row that has as many cells (`##Temp./°C;Time/min`, `# strain stress`), and its line.
+/// Finds headings in the last remark above a row that has as many cells (`##Temp./°C;Time/min`,
+/// `# strain stress`), and its line.
 fn headed_by_remark(
     separator: Separator,
     lines: &[&str],

@@ -10,12 +10,13 @@ fn refused(text: &str) -> String {
         Err(error) => return error.to_string(),
         Ok(table) => table,
     };
-    let values = table.one(&["strain"]).and_then(|i| table.column::<RatioDimension>(i, None));
-    let other = table.one(&["stress"]).and_then(|i| table.column::<StressDimension>(i, None));
+    let values = table.require_column(&["strain"]).and_then(|i| table.column::<RatioDimension>(i, None));
+    let other = table.require_column(&["stress"]).and_then(|i| table.column::<StressDimension>(i, None));
     values.and(other).expect_err(text).to_string()
 }
 
-/// Strain (as a fraction) and stress (Pa) of files in the ways of testing machines and of people: the numbers are the same.
+/// Strain (as a fraction) and stress (Pa) in files of testing machines and of people: the numbers are the
+/// same.
 #[test]
 fn ways_to_write_a_table() {
     for (text, how) in [
@@ -30,12 +31,16 @@ fn ways_to_write_a_table() {
         ("Stress,Note,Strain\nMPa,,%\n0.5,a,12.5\n1.5,,25\n", "headings in line 1, units in line 2"),
         // testXpert: metadata, quotes, a row of units
         (
-            "\"Prüfer\";\"M. Weiß\"\n\"Dicke\";\"2,01\";\"mm\"\n\n\"Strain\";\"Stress\"\n\"%\";\"N/mm²\"\n\"12,5\";\"0,5\"\n\"25\";\"1,5\"\n",
+            "\"Prüfer\";\"M. \
+             Weiß\"\n\"Dicke\";\"2,01\";\"mm\"\n\n\"Strain\";\"Stress\"\n\
+             \"%\";\"N/mm²\"\n\"12,5\";\"0,5\"\n\"25\";\"1,5\"\n",
             "decimal comma, UTF-8, headings in line 4, units in line 5",
         ),
         // Bluehill: quoted numbers with thousands, units in brackets below
         (
-            "Specimen label,A 12\nTemperature,23\n\nStrain,Stress\n(mm/mm),(Pa)\n\"0.125\",\"500,000.0\"\n\"0.25\",\"1,500,000.0\"\n",
+            "Specimen label,A \
+             12\nTemperature,23\n\nStrain,Stress\n\
+             (mm/mm),(Pa)\n\"0.125\",\"500,000.0\"\n\"0.25\",\"1,500,000.0\"\n",
             "separator `,`, decimal point, UTF-8, headings in line 4, units in line 5",
         ),
         ("strain    stress (MPa)\n0.125   0.5\n0.25    1.5\n", "separated by blanks, decimal point"),
@@ -48,10 +53,11 @@ fn ways_to_write_a_table() {
         ("strain [-],stress [MPa]\n1.25E-1,5e-1\n+.25,1.5\n", "decimal point"),
     ] {
         let table = parse(text);
-        let [strain, stress] = [table.one(&["strain"]).unwrap(), table.one(&["stress"]).unwrap()];
+        let [strain, stress] =
+            [table.require_column(&["strain"]).unwrap(), table.require_column(&["stress"]).unwrap()];
         assert_eq!(table.column::<RatioDimension>(strain, Some("")).unwrap(), [0.125, 0.25], "{text}");
         assert_eq!(table.column::<StressDimension>(stress, None).unwrap(), [0.5e6, 1.5e6], "{text}");
-        let said = table.understood(&[strain, stress]);
+        let said = table.describe(&[strain, stress]);
         assert!(said.contains(how), "{said}\n{text}");
     }
 }
@@ -73,7 +79,7 @@ fn encodings() {
     ] {
         let table = Table::parse("t.csv", bytes).unwrap();
         assert_eq!(table.layout().encoding, name);
-        let column = table.one(&["temp"]).unwrap();
+        let column = table.require_column(&["temp"]).unwrap();
         assert_eq!(table.column::<TemperatureDimension>(column, None).unwrap(), [293.65], "{name}");
     }
     for (bytes, part) in [
@@ -89,13 +95,18 @@ fn encodings() {
 /// Mettler STARe: between blanks, units right-aligned below some of the headings.
 #[test]
 fn units_below_headings_between_blanks() {
-    let text = "Curve Name:\n  !&PA12 cooling\nCurve Values:\n     Index             t            Ts         Value\n\
-                \x20                   [s]          [°C]          [mW]\n         0             0       200.012        -0.123\n\
+    let text = "Curve Name:\n  !&PA12 cooling\nCurve Values:\n\
+                \x20    Index             t            Ts         Value\n\
+                \x20                   [s]          [°C]          [mW]\n\
+                \x20        0             0       200.012        -0.123\n\
                 \x20        1            60       199.012        -0.125\n";
     let table = parse(text);
     let units: Vec<_> = table.headings.iter().map(|heading| heading.unit.as_deref()).collect();
     assert_eq!(units, [None, Some("s"), Some("°C"), Some("mW")]);
-    assert_eq!(table.column::<TimeDimension>(table.one(&["time", "t"]).unwrap(), None).unwrap(), [0.0, 60.0]);
+    assert_eq!(
+        table.column::<TimeDimension>(table.require_column(&["time", "t"]).unwrap(), None).unwrap(),
+        [0.0, 60.0]
+    );
     assert_eq!((table.line(1), table.layout().heading_line), (7, 4));
 }
 
@@ -139,7 +150,7 @@ fn refusals_say_how_the_table_was_understood() {
         ("strain,stress\n0.1,1\n", ["t.csv:1: unit of column 2, `stress`", "has no unit"]),
         ("strain,stress [kg]\n0.1,1\n", ["unit of column 2", "a stress is needed"]),
         ("0.1,1\n0.2,2\n", ["t.csv:1: headings: found \"0.1, 1\"", "a line of headings"]),
-        ("", ["headings: found \"nothing\"", "a line of headings"]),
+        ("", ["headings: found \"an empty file\"", "a line of headings"]),
         (
             "strain,strain,stress [MPa]\n1,1,1\n",
             ["found \"strain,strain,stress [MPa]\"", "one column `strain"],
@@ -152,7 +163,7 @@ fn refusals_say_how_the_table_was_understood() {
     }
 }
 
-/// 50,000 rows: time grows as their number, not with the square.
+/// 50,000 rows: time grows with their number, not with the square.
 #[test]
 fn many_rows() {
     let mut text = String::from("time [s];value;note\n");

@@ -1,6 +1,6 @@
-//! From bytes to lines.
+//! Decoding of bytes to lines.
 
-/// The text and the name of its encoding; where it is no text, what it is and what to do.
+/// Decodes a text and names its encoding; otherwise returns what the file is and what to do.
 pub(super) fn decode(bytes: Vec<u8>) -> Result<(String, &'static str), [&'static str; 2]> {
     const EXPORT: &str = "a text: export the sheet as CSV";
     if bytes.starts_with(b"PK\x03\x04") {
@@ -27,7 +27,7 @@ pub(super) fn decode(bytes: Vec<u8>) -> Result<(String, &'static str), [&'static
     utf8(bytes, "UTF-8")
 }
 
-/// UTF-8, or else Latin-1, of which every byte is a character.
+/// Decodes UTF-8, or else Latin-1, in which every byte is a character.
 fn utf8(bytes: Vec<u8>, name: &'static str) -> Result<(String, &'static str), [&'static str; 2]> {
     match String::from_utf8(bytes) {
         Ok(text) => Ok((text, name)),
@@ -38,7 +38,7 @@ fn utf8(bytes: Vec<u8>, name: &'static str) -> Result<(String, &'static str), [&
     }
 }
 
-/// Lines that end in LF, CR LF or CR alone.
+/// Splits lines that end in LF, CR LF or CR alone.
 pub(super) fn lines(text: &str) -> Vec<&str> {
     let old = !text.contains('\n') && text.contains('\r');
     if old { text.split('\r').collect() } else { text.lines().collect() }

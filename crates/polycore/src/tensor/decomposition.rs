@@ -1,4 +1,5 @@
-//! Determinant, adjugate and principal decomposition of a 3×3 matrix, each accurate where the textbook form cancels.
+//! Determinant, adjugate and principal decomposition of a 3×3 matrix, each accurate where the textbook form
+//! cancels.
 
 use super::Tensor;
 
@@ -60,8 +61,8 @@ pub(super) fn adjugate(a: &Tensor) -> Tensor {
 }
 
 /// F = Σ λᵢ nᵢ ⊗ Nᵢ by one-sided Jacobi rotations of the triangular factor of a pivoted QR decomposition
-/// (Drmač & Veselić, doi:10.1137/050639193): errors scale with the condition of F after scaling of its rows and
-/// columns, so strongly graded F (diag(1e8, 1, 1e-8)) keep every digit.
+/// (Drmač & Veselić, doi:10.1137/050639193): errors scale with the condition of F after scaling of its rows
+/// and columns, so strongly graded F (diag(1e8, 1, 1e-8)) keep every digit.
 pub(super) fn principal_frame(f: &Tensor) -> PrincipalFrame {
     // rows in decreasing size make the pivoted factorisation row-wise stable
     let mut rows = [0, 1, 2];
@@ -97,7 +98,8 @@ pub(super) fn principal_frame(f: &Tensor) -> PrincipalFrame {
 /// Three columns need about five sweeps; convergence is quadratic.
 const MAX_SWEEPS: usize = 30;
 
-/// One Jacobi rotation of columns i and j; false if they were orthogonal to working precision.
+/// Applies one Jacobi rotation of columns i and j; returns false if they were orthogonal to working
+/// precision.
 fn orthogonalise(columns: &mut Tensor, rotation: &mut Tensor, i: usize, j: usize) -> bool {
     let (x, y) = (columns.column(i).into_owned(), columns.column(j).into_owned());
     let (a, b, c) = (x.norm(), y.norm(), x.dot(&y));
@@ -137,7 +139,8 @@ fn add_doubled(x: (f64, f64), y: (f64, f64)) -> (f64, f64) {
     (high, e - (high - s))
 }
 
-/// ab − cd within 1.5 ulp (Kahan's algorithm; Jeannerod, Louvet & Muller, doi:10.1090/S0025-5718-2013-02679-8).
+/// ab − cd within 1.5 ulp (Kahan's algorithm; Jeannerod, Louvet & Muller,
+/// doi:10.1090/S0025-5718-2013-02679-8).
 fn difference_of_products(a: f64, b: f64, c: f64, d: f64) -> f64 {
     let p = c * d;
     let error = (-c).mul_add(d, p);

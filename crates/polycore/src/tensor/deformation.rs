@@ -1,4 +1,4 @@
-//! The deformation gradient and what follows from it.
+//! The deformation gradient and quantities derived from it.
 
 use super::decomposition::{adjugate, determinant, principal_frame};
 use super::{Error, PrincipalFrame, Tensor, Tensor2, Voigt};
@@ -59,11 +59,12 @@ impl DeformationGradient {
         Self::new(Tensor::from_diagonal(&stretches.into()))
     }
 
-    /// The upper triangular F with FᵀF = C (3.2), Cholesky's: one of the F of this C, which differ by a rotation.
+    /// Upper triangular F with FᵀF = C (3.2), by Cholesky: one of the F of this C, which differ by a
+    /// rotation.
     ///
     /// # Errors
     /// [`Error::NotPositiveDefinite`].
-    pub fn of_right_cauchy_green(c: &Voigt) -> Result<Self, Error> {
+    pub fn from_right_cauchy_green(c: &Voigt) -> Result<Self, Error> {
         let first = c[0].sqrt();
         let (f12, f13) = (c[3] / first, c[4] / first);
         let second = (c[1] - f12 * f12).sqrt();
@@ -85,7 +86,7 @@ impl DeformationGradient {
         Self::new(embed(in_plane, 1.0))
     }
 
-    /// Plane stress with a thickness stretch λ₃ that is known; [`crate::constitutive::hyperelastic::plane_stress`]
+    /// Plane stress with a known thickness stretch λ₃; [`crate::constitutive::hyperelastic::plane_stress`]
     /// finds the one that makes S₃₃ vanish.
     ///
     /// # Errors
@@ -169,7 +170,7 @@ impl DeformationGradient {
 
 impl Invariants {
     /// (1.10)–(1.12): I₁ = Σλᵢ², I₂ = Σλᵢ²λⱼ² (i < j), I₃ = Πλᵢ².
-    pub fn of_stretches(stretches: [f64; 3]) -> Self {
+    pub fn from_stretches(stretches: [f64; 3]) -> Self {
         let [a, b, c] = stretches.map(|l| l * l);
         Self { first: a + b + c, second: a * b + b * c + c * a, third: a * b * c }
     }
@@ -223,7 +224,8 @@ mod tests {
         }
     }
 
-    /// Simple shear γ: λ = √(1 + γ²/4) ± γ/2 and 1, J = 1, I₁ = I₂ = 3 + γ². At γ = 1e8 the stretches are 1e±8.
+    /// Simple shear γ: λ = √(1 + γ²/4) ± γ/2 and 1, J = 1, I₁ = I₂ = 3 + γ². At γ = 1e8 the stretches are
+    /// 1e±8.
     #[test]
     fn simple_shear_in_closed_form() {
         for gamma in [0.0, 1e-9, 1e-3, 0.5, 3.0, 1e4, 1e8] {
@@ -287,7 +289,8 @@ mod tests {
         }
     }
 
-    /// Subtracting the first row leaves diag(ε, ε): det = ε² exactly, of which the plain expansion keeps nothing.
+    /// Subtracting the first row leaves diag(ε, ε): det = ε² exactly, of which the plain expansion keeps
+    /// nothing.
     #[test]
     fn near_singular_determinants_have_the_right_sign() {
         let tiny = f64::EPSILON;
@@ -320,7 +323,7 @@ mod tests {
     fn a_deformation_of_its_right_cauchy_green_tensor() {
         let matrix = Tensor::new(1.3, 0.4, -0.2, 0.1, 0.8, 0.3, -0.3, 0.2, 1.7);
         let c = DeformationGradient::new(matrix).unwrap().right_cauchy_green();
-        let f = DeformationGradient::of_right_cauchy_green(&voigt::from_stress(&c)).unwrap();
+        let f = DeformationGradient::from_right_cauchy_green(&voigt::from_stress(&c)).unwrap();
         assert!((f.right_cauchy_green() - c).amax() < 1e-15 * 4.0, "some roundings of numbers up to 3");
         for bad in [
             Voigt::new(1.0, 1.0, 1.0, 1.0, 0.0, 0.0),
@@ -329,7 +332,7 @@ mod tests {
             Voigt::new(0.0, 1.0, 1.0, 0.0, 0.0, 0.0),
             Voigt::new(1.0, f64::INFINITY, 1.0, 0.0, 0.0, 0.0),
         ] {
-            let refused = DeformationGradient::of_right_cauchy_green(&bad);
+            let refused = DeformationGradient::from_right_cauchy_green(&bad);
             assert!(matches!(refused, Err(Error::NotPositiveDefinite { .. })), "{bad}");
         }
     }
@@ -370,8 +373,8 @@ mod tests {
         assert!(relative(invariants.first, c.trace()) < 1e-15);
         assert!(relative(invariants.second, 0.5 * (c.trace().powi(2) - (c * c).trace())) < 1e-14);
         assert!(relative(invariants.third, c.determinant()) < 1e-14);
-        let of_stretches = Invariants::of_stretches(f.principal_stretches());
-        assert!(relative(of_stretches.second, invariants.second) < 1e-14);
+        let from_stretches = Invariants::from_stretches(f.principal_stretches());
+        assert!(relative(from_stretches.second, invariants.second) < 1e-14);
         let isochoric = f.isochoric();
         assert!((determinant(isochoric.matrix()) - 1.0).abs() < 1e-15);
         assert!(relative(invariants.isochoric().first, isochoric.invariants().first) < 1e-15);

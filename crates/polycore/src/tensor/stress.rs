@@ -1,4 +1,4 @@
-//! Push and pull between the stress measures.
+//! Conversions between stress measures.
 
 use super::{DeformationGradient, Tensor};
 
@@ -28,7 +28,8 @@ pub fn von_mises([x, y, z, first, second, third]: [f64; 6]) -> f64 {
 }
 
 impl DeformationGradient {
-    /// Rewrites a stress from one measure in another. Same unit in and out; a measure into itself is returned as it is.
+    /// Converts a stress from one measure to another, in the same unit. A conversion of a measure to itself
+    /// changes nothing.
     pub fn convert_stress(&self, stress: &Tensor, from: StressMeasure, to: StressMeasure) -> Tensor {
         use StressMeasure::{Cauchy, FirstPiolaKirchhoff, Kirchhoff, SecondPiolaKirchhoff};
         let f = self.matrix();
@@ -37,7 +38,7 @@ impl DeformationGradient {
             | (SecondPiolaKirchhoff, SecondPiolaKirchhoff)
             | (Kirchhoff, Kirchhoff)
             | (Cauchy, Cauchy) => *stress,
-            // the direct ways, so that PK1 ↔ PK2 does not pass through τ and lose digits
+            // direct conversions, so that PK1 ↔ PK2 does not pass through τ and lose digits
             (SecondPiolaKirchhoff, FirstPiolaKirchhoff) => f * stress,
             (FirstPiolaKirchhoff, SecondPiolaKirchhoff) => self.inverse() * stress,
             (FirstPiolaKirchhoff, Kirchhoff) => stress * f.transpose(),

@@ -3,10 +3,10 @@
 //! The factor-2 rules:
 //! - **stress** has no factor: [S₁₁, S₂₂, S₃₃, S₁₂, S₁₃, S₂₃];
 //! - **strain** doubles its shear: [E₁₁, E₂₂, E₃₃, 2E₁₂, 2E₁₃, 2E₂₃], so that stress · strain = S : E;
-//! - **C** has no factor: [C₁₁, C₂₂, C₃₃, C₁₂, C₁₃, C₂₃] (3.2). For an energy written as a function of these six
-//!   numbers, with C₁₂ counted once, S₁₁ = 2 ∂W/∂C₁₁ but S₁₂ = ∂W/∂C₁₂ ([`stress_from_energy_gradient`]);
-//! - a **tangent** D has the components ℂ_ijkl without factor, ℂ = 2 ∂S/∂C = ∂S/∂E, and dS = D · dE in the vectors
-//!   above. Hence ∂S/∂C₁₁ = ½ D column 1, but ∂S/∂C₁₂ = D column 4.
+//! - **C** has no factor: [C₁₁, C₂₂, C₃₃, C₁₂, C₁₃, C₂₃] (3.2). For an energy written as a function of these
+//!   six numbers, with C₁₂ counted once, S₁₁ = 2 ∂W/∂C₁₁ but S₁₂ = ∂W/∂C₁₂ ([`stress_from_energy_gradient`]);
+//! - a **tangent** D has the components ℂ_ijkl without factor, ℂ = 2 ∂S/∂C = ∂S/∂E, and dS = D · dE in the
+//!   vectors above. Hence ∂S/∂C₁₁ = ½ D column 1, but ∂S/∂C₁₂ = D column 4.
 
 use super::{DeformationGradient, StressMeasure, Tensor};
 use nalgebra::{Matrix6, SMatrix, Vector6};
@@ -42,7 +42,7 @@ pub fn to_strain(strain: &Voigt) -> Tensor {
 }
 
 /// E = ½(C − 1) as a strain vector from C as in (3.2): [(C₁₁ − 1)/2, …, C₁₂, C₁₃, C₂₃].
-pub fn strain_of_right_cauchy_green(c: &Voigt) -> Voigt {
+pub fn strain_from_right_cauchy_green(c: &Voigt) -> Voigt {
     Voigt::from_fn(|a, _| if a < 3 { 0.5 * (c[a] - 1.0) } else { c[a] })
 }
 
@@ -75,27 +75,28 @@ pub fn transform_tangent(tangent: &Voigt6x6, a: &Tensor) -> Voigt6x6 {
     t * tangent * t.transpose()
 }
 
-/// The spatial tangent c_ijkl = J⁻¹ F_iI F_jJ F_kK F_lL ℂ_IJKL: the Truesdell rate of σ over the rate of deformation.
+/// The spatial tangent c_ijkl = J⁻¹ F_iI F_jJ F_kK F_lL ℂ_IJKL: the Truesdell rate of σ over the rate of
+/// deformation.
 pub fn spatial_tangent(deformation: &DeformationGradient, material_tangent: &Voigt6x6) -> Voigt6x6 {
     transform_tangent(material_tangent, deformation.matrix()) / deformation.jacobian()
 }
 
 /// σ = F S Fᵀ / J of a second Piola–Kirchhoff stress S (3.6).
-pub fn cauchy_of_material(deformation: &DeformationGradient, second_piola_kirchhoff: &Voigt) -> Voigt {
+pub fn cauchy_from_material(deformation: &DeformationGradient, second_piola_kirchhoff: &Voigt) -> Voigt {
     use StressMeasure::{Cauchy, SecondPiolaKirchhoff};
     let s = to_stress(second_piola_kirchhoff);
     from_stress(&deformation.convert_stress(&s, SecondPiolaKirchhoff, Cauchy))
 }
 
-/// What Abaqus' UMAT asks for (DDSDDE at finite strain): the tangent of the Jaumann rate of the Kirchhoff stress over J,
-/// F_iI F_jJ F_kK F_lL ℂ_IJKL / J + ½(σ_ik δ_jl + σ_jk δ_il + σ_il δ_jk + σ_jl δ_ik), in the unit of ℂ, from S and
-/// ℂ = 2 ∂S/∂C (Sun, Chaikof & Levenston 2008, <https://doi.org/10.1115/1.2979872>).
+/// Tangent of the Jaumann rate of the Kirchhoff stress over J, as Abaqus' UMAT needs it (DDSDDE at finite
+/// strain): F_iI F_jJ F_kK F_lL ℂ_IJKL / J + ½(σ_ik δ_jl + σ_jk δ_il + σ_il δ_jk + σ_jl δ_ik), in the unit of
+/// ℂ, from S and ℂ = 2 ∂S/∂C (Sun, Chaikof & Levenston 2008, <https://doi.org/10.1115/1.2979872>).
 pub fn jaumann_tangent(
     deformation: &DeformationGradient,
     second_piola_kirchhoff: &Voigt,
     tangent: &Voigt6x6,
 ) -> Voigt6x6 {
-    let sigma = to_stress(&cauchy_of_material(deformation, second_piola_kirchhoff));
+    let sigma = to_stress(&cauchy_from_material(deformation, second_piola_kirchhoff));
     let delta = |i: usize, j: usize| f64::from(u8::from(i == j));
     let rate = Voigt6x6::from_fn(|a, b| {
         let ((i, j), (k, l)) = (PAIRS[a], PAIRS[b]);
@@ -105,8 +106,8 @@ pub fn jaumann_tangent(
     spatial_tangent(deformation, tangent) + rate
 }
 
-/// 𝔸 = ∂P/∂F, 𝔸_iJkL = F_iI F_kK ℂ_IJKL + δ_ik S_JL, in the unit of ℂ, from S and ℂ = 2 ∂S/∂C. Row 3i + J, column
-/// 3k + L.
+/// 𝔸 = ∂P/∂F, 𝔸_iJkL = F_iI F_kK ℂ_IJKL + δ_ik S_JL, in the unit of ℂ, from S and ℂ = 2 ∂S/∂C. Row 3i + J,
+/// column 3k + L.
 pub fn nominal_tangent(
     deformation: &DeformationGradient,
     second_piola_kirchhoff: &Voigt,
@@ -164,7 +165,7 @@ mod tests {
         assert_eq!(component(&tangent, 0, 1, 1, 0), 1.0);
         // dS = D dE, with E = ½(C − 1)
         let zero = Voigt::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0);
-        let stress = tangent * strain_of_right_cauchy_green(&c);
+        let stress = tangent * strain_from_right_cauchy_green(&c);
         assert_eq!(stress, c - zero);
     }
 

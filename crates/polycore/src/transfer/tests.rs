@@ -57,7 +57,7 @@ fn cells_to_particles() {
     );
 }
 
-/// A box beside a cell that it touches but for rounding has no part of it.
+/// A box that touches a cell, up to rounding, has no intersection with it.
 #[test]
 fn boxes_that_touch() {
     let (points, cells) = brick([3, 1, 1], |[x, y, z]| [1e-4 * (0.1 + 0.2) * x, 1e-3 * y, 1e-3 * z]);
@@ -90,7 +90,7 @@ fn nodes_to_particles() {
         let middle = std::array::from_fn(|d| 0.5 * (b.min[d] + b.max[d]));
         assert!((mean - linear(middle)).abs() < 1e-14, "{mean}");
     }
-    // the lumped projection keeps what the boxes have
+    // the lumped projection conserves the integral over the boxes
     let back: Vec<f64> = overlap.to_nodes(&means).unwrap().into_iter().flatten().collect();
     let sum: f64 = means.iter().zip(&boxes).map(|(mean, b)| mean * b.volume()).sum();
     let [_, kept] = integral(&points, &cells, &back).unwrap();
@@ -111,13 +111,14 @@ fn general_hexahedra() {
     let field: Vec<f64> = points.iter().map(|p| 1.0 + p[0] * p[1] - p[2]).collect();
     let [volume, exact] = integral(&points, &cells, &field).unwrap();
     let means = overlap.from_nodes(&field).unwrap();
-    let sum: f64 = means.iter().enumerate().filter_map(|(k, mean)| Some((*mean)? * overlap.covered(k))).sum();
-    let covered: f64 = (0..boxes.len()).map(|k| overlap.covered(k)).sum();
+    let sum: f64 =
+        means.iter().enumerate().filter_map(|(k, mean)| Some((*mean)? * overlap.covered_volume(k))).sum();
+    let covered: f64 = (0..boxes.len()).map(|k| overlap.covered_volume(k)).sum();
     assert!((covered - volume).abs() < 1e-12 * volume, "{covered} {volume}");
     assert!((sum - exact).abs() < 1e-12 * volume, "{sum} {exact}");
     // a box in the middle is full
     let middle = boxes.iter().position(|b| b.min == [2.0, 1.0, 1.0]).unwrap();
-    let full = overlap.covered(middle) / 0.125;
+    let full = overlap.covered_volume(middle) / 0.125;
     assert!((full - 1.0).abs() < 0.15, "{full}");
 }
 
@@ -129,7 +130,7 @@ fn what_does_not_fit() {
         |points: &[[f64; 3]], boxes: &[Cuboid]| Overlap::new(points, &cells, boxes).unwrap_err().to_string();
     assert!(told(&points, &[Cuboid { min: [0.0; 3], max: [1.0, 0.0, 1.0] }]).contains("without volume"));
     let far = Overlap::new(&points, &cells, &[Cuboid { min: [2.0; 3], max: [3.0; 3] }]).unwrap();
-    assert_eq!((far.from_cells(&[1.0]).unwrap(), far.covered(0)), (vec![None], 0.0));
+    assert_eq!((far.from_cells(&[1.0]).unwrap(), far.covered_volume(0)), (vec![None], 0.0));
     assert!(Overlap::new(&points, &cells, &[]).unwrap().from_cells(&[1.0]).unwrap().is_empty());
     let turned: Vec<[f64; 3]> = points.iter().map(|&[x, y, z]| [1.0 - x - 0.1 * y, y, z]).collect();
     assert!(told(&turned, &unit).contains("turned inside out"));

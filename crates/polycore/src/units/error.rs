@@ -1,11 +1,11 @@
-//! Why a text is not a quantity.
+//! Errors of reading quantities.
 
 use super::{Dimension, Exponents, name_of};
 
-/// A text that is not the quantity a scene asks for.
+/// Error of a text that is not the required quantity.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum UnitError {
-    /// Nothing there.
+    /// Empty text.
     #[error("empty; a number with a unit is needed")]
     Empty,
     /// The text does not begin with a number.
@@ -21,13 +21,14 @@ pub enum UnitError {
     Bare {
         /// The whole text.
         text: String,
-        /// What is needed, with its article.
+        /// Quantity needed, with its article.
         name: &'static str,
         /// A valid input.
         example: &'static str,
     },
     /// A symbol that is not in the table.
-    #[error("unknown unit `{unit}` in `{text}`{}", suggestion.as_ref().map(|s| format!("; did you mean `{s}`?")).unwrap_or_default())]
+    #[error("unknown unit `{unit}` in `{text}`{}", suggestion.as_ref().map(|s| format!("; did you mean \
+        `{s}`?")).unwrap_or_default())]
     Unknown {
         /// The symbol.
         unit: String,
@@ -41,7 +42,7 @@ pub enum UnitError {
     Grammar {
         /// The whole text.
         text: String,
-        /// What is wrong.
+        /// Defect of the unit.
         problem: String,
     },
     /// Another dimension than the one needed.
@@ -49,9 +50,9 @@ pub enum UnitError {
     Dimension {
         /// The whole text.
         text: String,
-        /// What was found, with its article.
+        /// Quantity found, with its article.
         found: String,
-        /// What is needed, with its article.
+        /// Quantity needed, with its article.
         needed: &'static str,
         /// A valid input.
         example: &'static str,
@@ -69,7 +70,7 @@ pub enum UnitError {
     Range {
         /// The whole text.
         text: String,
-        /// What is wrong.
+        /// Defect of the number.
         problem: &'static str,
     },
 }

@@ -9,12 +9,12 @@
 
 use super::{Exponents, UnitError, table};
 
-/// No physical unit needs more; keeps exponents far from overflow.
+/// Largest power of a unit; keeps exponents far from overflow.
 const LARGEST_POWER: i32 = 12;
-/// Brackets inside brackets.
-const DEEPEST: usize = 8;
-/// A unit is a few symbols; longer texts are not units.
-const LONGEST: usize = 200;
+/// Deepest nesting of brackets.
+const DEEPEST_NESTING: usize = 8;
+/// Longest text of a unit, characters.
+const LONGEST_UNIT: usize = 200;
 
 /// Splits `2e-3 N/mm^2` into the number and the trimmed rest.
 pub(super) fn split_number(text: &str) -> Result<(f64, &str), UnitError> {
@@ -60,11 +60,11 @@ pub(super) fn split_number(text: &str) -> Result<(f64, &str), UnitError> {
 /// Numerator and denominator factors to SI, and the dimension, of a unit expression. Kept apart because
 /// powers of ten are exact where their inverses are not. An empty text is the unit 1.
 pub(super) fn unit(unit: &str, whole: &str) -> Result<(f64, f64, Exponents), UnitError> {
-    let mut reader = Reader { rest: unit, whole, depth: 0 };
+    let mut reader = UnitParser { rest: unit, whole, depth: 0 };
     if unit.is_empty() {
         return Ok((1.0, 1.0, [0; 8]));
     }
-    if unit.len() > LONGEST {
+    if unit.len() > LONGEST_UNIT {
         return Err(reader.problem("too long"));
     }
     let value = reader.expression()?;
@@ -75,21 +75,21 @@ pub(super) fn unit(unit: &str, whole: &str) -> Result<(f64, f64, Exponents), Uni
 }
 
 #[derive(Clone, Copy)]
-struct Value {
+struct UnitValue {
     numerator: f64,
     denominator: f64,
     exponents: Exponents,
 }
 
-struct Reader<'a> {
+struct UnitParser<'a> {
     rest: &'a str,
     whole: &'a str,
     depth: usize,
 }
 
-impl Reader<'_> {
-    fn expression(&mut self) -> Result<Value, UnitError> {
-        let mut value = Value { numerator: 1.0, denominator: 1.0, exponents: [0; 8] };
+impl UnitParser<'_> {
+    fn expression(&mut self) -> Result<UnitValue, UnitError> {
+        let mut value = UnitValue { numerator: 1.0, denominator: 1.0, exponents: [0; 8] };
         let mut divided = self.peek() == Some('/');
         if !divided {
             value = self.factor()?;
@@ -119,11 +119,11 @@ impl Reader<'_> {
         }
     }
 
-    fn factor(&mut self) -> Result<Value, UnitError> {
+    fn factor(&mut self) -> Result<UnitValue, UnitError> {
         let base = match self.peek() {
             Some('(') => {
                 self.depth += 1;
-                if self.depth > DEEPEST {
+                if self.depth > DEEPEST_NESTING {
                     return Err(self.problem("too many brackets"));
                 }
                 self.advance();
@@ -137,7 +137,7 @@ impl Reader<'_> {
             }
             Some('1') => {
                 self.advance();
-                Value { numerator: 1.0, denominator: 1.0, exponents: [0; 8] }
+                UnitValue { numerator: 1.0, denominator: 1.0, exponents: [0; 8] }
             }
             Some(c) if is_symbol(c) => self.symbol()?,
             Some(c) => return Err(self.problem(format!("unexpected `{c}`"))),
@@ -146,13 +146,13 @@ impl Reader<'_> {
         match self.power()? {
             1 => Ok(base),
             power => {
-                let one = Value { numerator: 1.0, denominator: 1.0, exponents: [0; 8] };
+                let one = UnitValue { numerator: 1.0, denominator: 1.0, exponents: [0; 8] };
                 self.multiply(one, base, power)
             }
         }
     }
 
-    fn symbol(&mut self) -> Result<Value, UnitError> {
+    fn symbol(&mut self) -> Result<UnitValue, UnitError> {
         let end = self.rest.find(|c| !is_symbol(c)).unwrap_or(self.rest.len());
         let (word, rest) = self.rest.split_at(end);
         if table::affine(word).is_some() {
@@ -163,7 +163,7 @@ impl Reader<'_> {
             return Err(UnitError::Unknown { unit: word.into(), text: self.whole.trim().into(), suggestion });
         };
         self.rest = rest;
-        Ok(Value { numerator, denominator, exponents })
+        Ok(UnitValue { numerator, denominator, exponents })
     }
 
     /// The power after a symbol or bracket; 1 if there is none.
@@ -182,7 +182,7 @@ impl Reader<'_> {
             ascii = self.rest[..end].chars().map(translate).collect();
             self.rest = &self.rest[end..];
             if ascii.is_empty() {
-                // `mm2`: the digit sticks to the symbol
+                // `mm2`: the digit follows the symbol directly
                 if let Some(digit) = self.rest.chars().next().filter(char::is_ascii_digit) {
                     return Err(self.problem(format!("write powers with `^`, as in `^{digit}`")));
                 }
@@ -192,12 +192,13 @@ impl Reader<'_> {
         match ascii.parse::<i32>() {
             Ok(power) if power != 0 && power.abs() <= LARGEST_POWER => Ok(power),
             _ => Err(self.problem(format!(
-                "a power is a whole number from -{LARGEST_POWER} to {LARGEST_POWER} but not 0, found `{ascii}`"
+                "a power is a whole number from -{LARGEST_POWER} to {LARGEST_POWER} but not 0, found \
+                 `{ascii}`"
             ))),
         }
     }
 
-    fn multiply(&self, a: Value, b: Value, power: i32) -> Result<Value, UnitError> {
+    fn multiply(&self, a: UnitValue, b: UnitValue, power: i32) -> Result<UnitValue, UnitError> {
         let (up, down) = if power > 0 { (b.numerator, b.denominator) } else { (b.denominator, b.numerator) };
         let size = power.abs();
         let mut exponents = a.exponents;
@@ -208,7 +209,7 @@ impl Reader<'_> {
             }
             *sum = wide as i8;
         }
-        Ok(Value {
+        Ok(UnitValue {
             numerator: a.numerator * up.powi(size),
             denominator: a.denominator * down.powi(size),
             exponents,

@@ -1,26 +1,27 @@
-//! The table of unit symbols: `uom`'s, restricted to single words.
+//! Table of unit symbols: those of `uom` that are single words.
 
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
-use super::{Exponents, of};
+use super::{Exponents, exponents};
 
-type Table = HashMap<&'static str, ([f64; 2], Exponents)>;
+type UnitTable = HashMap<&'static str, ([f64; 2], Exponents)>;
 
-/// Longer symbols are historical curiosities (`libra`, `congius`) that would only spoil the suggestions.
+/// Longest symbol; longer ones are historical (`libra`, `congius`) and would only spoil the suggestions.
 const LONGEST_SYMBOL: usize = 4;
 
-static TABLE: LazyLock<Table> = LazyLock::new(|| {
-    let mut table = Table::new();
+static TABLE: LazyLock<UnitTable> = LazyLock::new(|| {
+    let mut table = UnitTable::new();
     macro_rules! add {
         ($($quantity:ident, $type:ident, $exponents:expr;)+) => {$(
             for unit in uom::si::$quantity::units() {
                 let symbol = unit.abbreviation();
-                let word = !symbol.is_empty() && symbol.chars().all(|c| c.is_alphabetic() || "°%‰".contains(c));
+                let in_word = |c: char| c.is_alphabetic() || "°%‰".contains(c);
+                let word = !symbol.is_empty() && symbol.chars().all(in_word);
                 if !word || symbol.chars().count() > LONGEST_SYMBOL || affine(symbol).is_some() {
                     continue;
                 }
-                // uom gives factors only through its types; its parser is the enumerable way to them
+                // uom gives factors only through its types; its parser makes them enumerable
                 if let Ok(one) = format!("1 {symbol}").parse::<uom::si::f64::$type>() {
                     table.entry(symbol).or_insert((fraction(one.value), $exponents));
                 }
@@ -28,19 +29,19 @@ static TABLE: LazyLock<Table> = LazyLock::new(|| {
         )+};
     }
     add! {
-        ratio, Ratio, of!(ratio);
-        length, Length, of!(length);
-        mass, Mass, of!(mass);
-        time, Time, of!(time);
-        temperature_interval, TemperatureInterval, of!(temperature_interval);
-        amount_of_substance, AmountOfSubstance, of!(amount_of_substance);
-        electric_current, ElectricCurrent, of!(electric_current);
-        force, Force, of!(force);
-        pressure, Pressure, of!(pressure);
-        energy, Energy, of!(energy);
-        power, Power, of!(power);
-        frequency, Frequency, of!(frequency);
-        volume, Volume, of!(volume);
+        ratio, Ratio, exponents!(ratio);
+        length, Length, exponents!(length);
+        mass, Mass, exponents!(mass);
+        time, Time, exponents!(time);
+        temperature_interval, TemperatureInterval, exponents!(temperature_interval);
+        amount_of_substance, AmountOfSubstance, exponents!(amount_of_substance);
+        electric_current, ElectricCurrent, exponents!(electric_current);
+        force, Force, exponents!(force);
+        pressure, Pressure, exponents!(pressure);
+        energy, Energy, exponents!(energy);
+        power, Power, exponents!(power);
+        frequency, Frequency, exponents!(frequency);
+        volume, Volume, exponents!(volume);
         angle, Angle, [0, 0, 0, 0, 0, 0, 0, 1];
     }
     let aliases = [
@@ -57,7 +58,7 @@ static TABLE: LazyLock<Table> = LazyLock::new(|| {
             table.entry(alias).or_insert(entry);
         }
     }
-    // ab initio programs tell pressures in it
+    // ab initio programs print pressures in kbar
     if let Some(&([bar, one], exponents)) = table.get("bar") {
         table.entry("kbar").or_insert(([1000.0 * bar, one], exponents));
     }
@@ -72,8 +73,8 @@ fn fraction(factor: f64) -> [f64; 2] {
     if exact { [1.0, inverse] } else { [factor, 1.0] }
 }
 
-/// Factor to SI (numerator, denominator) and dimension of one symbol; `um`, `μm` (Greek) and `µm` (micro sign)
-/// are the same.
+/// Factor to SI (numerator, denominator) and dimension of one symbol; `um`, `μm` (Greek) and `µm` (micro
+/// sign) are the same.
 pub(super) fn symbol(text: &str) -> Option<([f64; 2], Exponents)> {
     let direct = TABLE.get(text);
     let micro = || text.strip_prefix(['u', 'μ']).and_then(|rest| TABLE.get(format!("µ{rest}").as_str()));
@@ -91,8 +92,8 @@ pub(super) fn affine(unit: &str) -> Option<(f64, f64)> {
 
 /// The nearest known symbol, for "did you mean".
 pub(super) fn nearest(text: &str) -> Option<String> {
-    const OFTEN: &str = "m mm cm km nm µm kg g mg t s ms min h d K degC N kN mN MN Pa kPa MPa GPa bar kbar atm J kJ mJ MJ W mW kW \
-                         Hz kHz L mL rad deg % mol A cal eV";
+    const COMMON_UNITS: &str = "m mm cm km nm µm kg g mg t s ms min h d K degC N kN mN MN Pa kPa MPa GPa bar \
+                         kbar atm J kJ mJ MJ W mW kW Hz kHz L mL rad deg % mol A cal eV";
     let names = [
         ("celsius", "degC"),
         ("kelvin", "K"),
@@ -144,7 +145,7 @@ pub(super) fn nearest(text: &str) -> Option<String> {
     if let Some((_, symbol)) = names.iter().find(|(name, _)| *name == lower || *name == singular) {
         return Some((*symbol).to_owned());
     }
-    let candidates = OFTEN.split_whitespace();
+    let candidates = COMMON_UNITS.split_whitespace();
     if let Some(same) = candidates.clone().find(|c| c.to_lowercase() == lower) {
         return Some(same.to_owned());
     }

@@ -1,17 +1,21 @@
-//! Rows of points against single points.
+//! Rows of points agree with single points.
 
 use super::*;
-use crate::kinetics::{Constants, Kinetics};
+use crate::kinetics::{KineticConstants, Kinetics};
 use crate::melting::Melting;
 
-/// Against [`Crystallization::advance`] and α point by point: cold, hot, long and short increments, z from none to long crystallized.
+/// Rows agree with [`Crystallization::advance`] and α point by point: cold, hot, long and short increments, z
+/// from 0 to fully crystallized.
 #[test]
-fn rows_are_points() {
+fn rows_agree_with_single_points() {
     for (constants, melting) in [
-        (Constants::TABLE_4_1_COLUMN_1, Some(Melting::PA12)),
-        (Constants::TABLE_4_1_COLUMN_2, None),
-        (Constants { avrami_exponent: 1.0, ..Constants::TABLE_4_1_COLUMN_1 }, Some(Melting::PA12)),
-        (Constants { avrami_exponent: 10.0, ..Constants::APPENDIX_B }, Some(Melting::PA12)),
+        (KineticConstants::TABLE_4_1_COLUMN_1, Some(Melting::PA12)),
+        (KineticConstants::TABLE_4_1_COLUMN_2, None),
+        (
+            KineticConstants { avrami_exponent: 1.0, ..KineticConstants::TABLE_4_1_COLUMN_1 },
+            Some(Melting::PA12),
+        ),
+        (KineticConstants { avrami_exponent: 10.0, ..KineticConstants::APPENDIX_B }, Some(Melting::PA12)),
     ] {
         let law = Crystallization { kinetics: Kinetics::new(constants).unwrap(), melting };
         let (mut start, mut end) = (Vec::new(), Vec::new());
@@ -54,7 +58,7 @@ fn rows_are_points() {
                 end[k]
             );
         }
-        // the wish of points of one z each
+        // the step suggestion, for points of one z each
         for (begin, finish) in [(420.0, 419.0), (400.0, 401.0), (300.0, 300.0), (440.0, 442.0)] {
             for before in states {
                 let increments = Increments { start: &[begin], end: &[finish], dt: 0.5 };
@@ -62,11 +66,11 @@ fn rows_are_points() {
                 let wish = law.advance_all(increments, &[0], &mut own, &mut scratch);
                 let degree = |z| law.kinetics.degree(z);
                 let change = (degree(own[0]) - degree(before)).abs();
-                let exact = (change > 0.0).then(|| (LARGEST_CHANGE / change).clamp(0.1, LONGEST));
+                let exact = (change > 0.0).then(|| (LARGEST_CHANGE / change).clamp(0.1, MAX_STEP_RATIO));
                 assert!(
                     match (wish, exact) {
                         (Some(wish), Some(exact)) => (wish / exact - 1.0).abs() < 1e-12,
-                        // a change of one rounding, or none
+                        // a change of one rounding error, or zero
                         (wish, exact) => wish == exact || change < 1e-15,
                     },
                     "{begin} {before:e}: {wish:?} {exact:?}"
@@ -76,11 +80,12 @@ fn rows_are_points() {
     }
 }
 
-/// Increments that are not finite, after others in pieces and in a shorter item: z tells of them, and others do not notice.
+/// Increments that are not finite give NaN and leave other points unchanged, also after pieces and in a
+/// shorter item.
 #[test]
 fn increments_that_are_not_finite() {
     for melting in [Some(Melting::PA12), None] {
-        let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap();
+        let kinetics = Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1).unwrap();
         let law = Crystallization { kinetics, melting };
         let mut scratch = Scratch::default();
         let mut advance = |start: &[f64], end: &[f64]| {

@@ -8,9 +8,9 @@ use crate::file::line_error;
 /// A keyword line with its parameters.
 #[derive(Debug)]
 pub(super) struct Card {
-    /// In upper case, single spaces inside.
+    /// Keyword in upper case, with single spaces.
     pub keyword: String,
-    /// Names in upper case, values as written.
+    /// Parameters: names in upper case, values as written.
     parameters: Vec<(String, String)>,
     pub line: usize,
 }
@@ -23,24 +23,24 @@ impl Card {
 }
 
 /// A data line.
-pub(super) struct Row<'a> {
+pub(super) struct DataLine<'a> {
     path: &'a Path,
     text: String,
     pub line: usize,
 }
 
-impl Row<'_> {
+impl DataLine<'_> {
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// Values between commas; an empty one at the end does not count.
+    /// Values between commas, without an empty last one.
     pub fn words(&self) -> Vec<&str> {
         let text = self.text.strip_suffix(',').unwrap_or(&self.text);
         text.split(',').map(str::trim).collect()
     }
 
-    /// Whether the line ends with a comma.
+    /// Returns true if the line ends with a comma.
     pub fn is_open(&self) -> bool {
         self.text.ends_with(',')
     }
@@ -49,10 +49,10 @@ impl Row<'_> {
         word.parse().map_err(|_| self.error(what, word, "a whole number, 0 or more"))
     }
 
-    /// A finite number; the exponent may be a `D`.
+    /// Parses a finite number; the exponent may be written with `D`.
     pub fn number(&self, word: &str, what: &str) -> Result<f64, Error> {
         let number = word.parse().or_else(|_| word.replace(['D', 'd'], "e").parse());
-        // an empty place is zero
+        // an empty value is zero
         let number = if word.is_empty() { Ok(0.0) } else { number };
         match number {
             Ok(number) if f64::is_finite(number) => Ok(number),
@@ -65,28 +65,28 @@ impl Row<'_> {
     }
 }
 
-/// A file that is being read.
-struct Open {
+/// A file being read.
+struct OpenFile {
     path: PathBuf,
     bytes: Vec<u8>,
     at: usize,
     line: usize,
 }
 
-/// The file, card by card, with those that it includes. Lines are counted through all of them.
+/// Reader of a file and its includes, card by card. Lines are counted through all files.
 pub(super) struct Cards<'a> {
     path: &'a Path,
-    files: Vec<Open>,
+    files: Vec<OpenFile>,
     line: usize,
-    /// From which line on which file is read, and the line there.
+    /// First line of each section, its file, and the line in that file.
     parts: Vec<(usize, PathBuf, usize)>,
-    /// Bytes of all files.
+    /// Total size of all files, bytes.
     pub bytes: usize,
     fault: Option<Error>,
 }
 
-/// Files that include each other.
-const DEPTH: usize = 10;
+/// Largest depth of includes.
+const MAX_DEPTH: usize = 10;
 
 impl<'a> Cards<'a> {
     pub fn new(path: &'a Path, bytes: &[u8]) -> Self {
@@ -98,10 +98,10 @@ impl<'a> Cards<'a> {
     fn open(&mut self, path: PathBuf, bytes: Vec<u8>) {
         self.bytes += bytes.len();
         self.parts.push((self.line, path.clone(), 0));
-        self.files.push(Open { path, bytes, at: 0, line: 0 });
+        self.files.push(OpenFile { path, bytes, at: 0, line: 0 });
     }
 
-    /// Files that were included.
+    /// Number of included files.
     pub fn included(&self) -> usize {
         let mut files: Vec<&PathBuf> = self.parts.iter().map(|part| &part.1).collect();
         files.sort_unstable();
@@ -109,7 +109,7 @@ impl<'a> Cards<'a> {
         files.len() - 1
     }
 
-    /// An error with the file and the line there.
+    /// Converts the line of an error to its file and line there.
     pub fn placed(&self, error: Error) -> Error {
         match error {
             Error::File { line, what, found, allowed, .. } => {
@@ -123,20 +123,20 @@ impl<'a> Cards<'a> {
         }
     }
 
-    /// The next keyword line; data lines before it are passed over. A parameter list that ends with a comma goes on in
+    /// Reads the next keyword line, skipping data lines. A parameter list that ends with a comma continues in
     /// the next line.
     pub fn next(&mut self) -> Result<Option<Card>, Error> {
         while let Some((text, line, end)) = self.peek() {
             self.move_to(line, end);
             let Some(text) = text.strip_prefix('*') else { continue };
-            let text = self.whole(text);
+            let text = self.with_continuation(text);
             return card(self.path, &text, line).map(Some);
         }
         self.fault.take().map_or(Ok(None), Err)
     }
 
-    /// A keyword line with those that continue it.
-    fn whole(&mut self, text: &str) -> String {
+    /// Reads the continuation of a keyword line.
+    fn with_continuation(&mut self, text: &str) -> String {
         let mut text = text.to_owned();
         while text.ends_with(',') {
             let Some((more, line, end)) = self.line_ahead() else { break };
@@ -149,21 +149,21 @@ impl<'a> Cards<'a> {
         text
     }
 
-    /// The next data line before the next keyword.
-    pub fn row(&mut self) -> Option<Row<'a>> {
+    /// Reads the next data line before the next keyword.
+    pub fn row(&mut self) -> Option<DataLine<'a>> {
         let (text, line, end) = self.peek()?;
         if text.starts_with('*') {
             return None;
         }
         self.move_to(line, end);
-        Some(Row { path: self.path, text, line })
+        Some(DataLine { path: self.path, text, line })
     }
 
-    /// The next line of any file that says something else than to include another, see [`Self::line_ahead`].
+    /// Returns the next line of any file that is not an include, see [`Self::line_ahead`].
     fn peek(&mut self) -> Option<(String, usize, usize)> {
         loop {
             let Some((text, line, end)) = self.line_ahead() else {
-                // back to the file that included this one
+                // return to the including file
                 if self.files.len() < 2 || self.fault.is_some() {
                     return None;
                 }
@@ -177,7 +177,7 @@ impl<'a> Cards<'a> {
                 return Some((text, line, end));
             }
             self.move_to(line, end);
-            let text = self.whole(text.strip_prefix('*')?);
+            let text = self.with_continuation(text.strip_prefix('*')?);
             if let Err(error) = self.include(&text, line) {
                 self.fault = Some(error);
                 return None;
@@ -193,7 +193,7 @@ impl<'a> Cards<'a> {
         if name.is_empty() {
             return wrong("file that is included", "", "*INCLUDE, INPUT=FILE");
         }
-        if self.files.len() > DEPTH {
+        if self.files.len() > MAX_DEPTH {
             return wrong("files in each other", name, "10: does one include itself?");
         }
         let path =
@@ -208,7 +208,7 @@ impl<'a> Cards<'a> {
         Ok(())
     }
 
-    /// The next line of this file that is neither empty nor a comment, its number, and where it ends.
+    /// Returns the next line of this file that is neither empty nor a comment, its number, and its end.
     fn line_ahead(&mut self) -> Option<(String, usize, usize)> {
         loop {
             let file = self.files.last()?;
@@ -231,7 +231,7 @@ impl<'a> Cards<'a> {
     }
 }
 
-/// A keyword with its parameters, after the `*`.
+/// Parses a keyword with its parameters, after the `*`.
 fn card(path: &Path, text: &str, line: usize) -> Result<Card, Error> {
     let mut parts = text.split(',').map(str::trim);
     let words: Vec<&str> = parts.next().unwrap_or("").split_whitespace().collect();

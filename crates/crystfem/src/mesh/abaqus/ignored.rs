@@ -1,11 +1,11 @@
-//! Keywords that say nothing about the mesh, with the keys of a scene that mean the same.
+//! Keywords without effect on the mesh, with the equivalent scene keys.
 
 use std::collections::BTreeMap;
 
 use super::cards::{Card, Cards};
 
-/// What a scene says instead.
-const INSTEAD: [(&str, &[&str]); 14] = [
+/// Scene keys and the keywords they replace.
+const REPLACEMENTS: [(&str, &[&str]); 14] = [
     ("`density` of [materials.NAME]", &["DENSITY"]),
     ("`conductivity` of [materials.NAME]", &["CONDUCTIVITY"]),
     ("`specific_heat` of [materials.NAME]", &["SPECIFIC HEAT"]),
@@ -22,16 +22,16 @@ const INSTEAD: [(&str, &[&str]); 14] = [
     ("[mechanics]", &["ELASTIC", "EXPANSION", "PLASTIC", "VISCOELASTIC"]),
 ];
 
-/// Keywords that join parts which share no nodes.
+/// Keywords that join parts without shared nodes.
 const JOINING: [&str; 7] =
     ["TIE", "CONTACT PAIR", "CONTACT", "EQUATION", "MPC", "GAP CONDUCTANCE", "EMBEDDED ELEMENT"];
 
-/// Keywords with their number, the first line and what it says.
+/// Counts of ignored keywords, with the first line and its content.
 #[derive(Default)]
 pub(super) struct Ignored(BTreeMap<String, (usize, usize, String)>);
 
 impl Ignored {
-    /// Passes over a keyword; its first data line is kept for the note.
+    /// Skips a keyword; keeps its first data line for the note.
     pub fn add(&mut self, card: &Card, cards: &mut Cards) {
         let entry = self.0.entry(card.keyword.clone()).or_insert((0, card.line, String::new()));
         if entry.0 == 0 {
@@ -43,11 +43,11 @@ impl Ignored {
         entry.0 += 1;
     }
 
-    /// One line each of those with a meaning here, one for the rest.
-    pub fn tell(self, notes: &mut Vec<String>) {
+    /// Writes a note for each keyword with an equivalent, and one for the rest.
+    pub fn write_notes(self, notes: &mut Vec<String>) {
         let mut rest = Vec::new();
         for (keyword, (count, line, said)) in self.0 {
-            let instead = INSTEAD.iter().find(|(_, all)| all.contains(&keyword.as_str()));
+            let instead = REPLACEMENTS.iter().find(|(_, all)| all.contains(&keyword.as_str()));
             let why = match instead {
                 Some((instead, _)) => format!("the deck has no units; give {instead}"),
                 None if JOINING.contains(&keyword.as_str()) => {

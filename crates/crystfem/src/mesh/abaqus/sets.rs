@@ -1,15 +1,15 @@
-//! Sets and surfaces of an input file, by their members.
+//! Sets and surfaces of an input file, resolved to their members.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::error::Error;
 use crate::file::line_error;
-use crate::mesh::file_mesh::{Content, Labels};
-use crate::mesh::surface::Surface;
-use crate::mesh::{Cell, Face, Mesh, Shape};
+use crate::mesh::file_mesh::{FileContent, Labels};
+use crate::mesh::surface::OuterSurface;
+use crate::mesh::{Cell, ElementShape, Face, Mesh};
 
-/// What a set is of.
+/// Kind of a set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SetKind {
     Nodes,
@@ -20,25 +20,25 @@ pub(super) enum SetKind {
     Faces,
 }
 
-/// One data line of a set.
+/// A data line of a set.
 #[derive(Debug)]
-pub(super) enum Entry {
+pub(super) enum SetEntry {
     Label(u64),
     Range([u64; 3]),
     Set(String),
-    /// A number or set of elements and a side, or `None`: those outside.
-    Side(Box<Entry>, Option<u8>),
+    /// A label or set of elements and a side, or `None` for outer sides.
+    Side(Box<SetEntry>, Option<u8>),
 }
 
-/// A set as the file gives it.
+/// A set as written in the file.
 #[derive(Debug)]
-pub(super) struct Set {
+pub(super) struct FileSet {
     pub name: String,
-    pub of: SetKind,
-    pub entries: Vec<(usize, Entry)>,
+    pub kind: SetKind,
+    pub entries: Vec<(usize, SetEntry)>,
 }
 
-impl Entry {
+impl SetEntry {
     pub fn parse(word: &str) -> Self {
         // Abaqus writes INSTANCE.SET for sets of a part
         let name = || word.rsplit('.').next().unwrap_or(word).trim_matches('"').to_owned();
@@ -46,29 +46,30 @@ impl Entry {
     }
 }
 
-/// Sets by their members, once all are known.
+/// Resolves sets to their members, once all are known.
 pub(super) struct Resolver<'a> {
     pub path: &'a Path,
     pub nodes: &'a Labels,
     pub elements: &'a Labels,
-    /// Members that may still be visited, in proportion to the file: sets of sets and of ranges cannot run away.
+    /// Limit on further members, in proportion to the file, so that nested sets and ranges cannot grow
+    /// without bound.
     pub budget: usize,
 }
 
 impl Resolver<'_> {
-    /// Names what the file names.
+    /// Resolves all sets into `content`.
     ///
     /// # Errors
-    /// Members that do not exist or are too many.
-    pub fn resolve(&mut self, sets: Vec<Set>, content: &mut Content) -> Result<(), Error> {
-        // names in upper case, with the letters of their first use
+    /// [`Error::File`] for members that do not exist or are too many.
+    pub fn resolve(&mut self, sets: Vec<FileSet>, content: &mut FileContent) -> Result<(), Error> {
+        // names in upper case, with the letter case of their first use
         let mut node_sets: BTreeMap<String, (String, Vec<u32>)> = BTreeMap::new();
         let mut element_sets: BTreeMap<String, (String, Vec<u32>)> = BTreeMap::new();
         let mut faces: BTreeMap<String, (String, Vec<Face>)> = BTreeMap::new();
         let mut outer = None;
         for set in sets {
             let key = set.name.to_uppercase();
-            match set.of {
+            match set.kind {
                 SetKind::Nodes => {
                     let mut members = Vec::new();
                     for (line, entry) in &set.entries {
@@ -89,8 +90,8 @@ impl Resolver<'_> {
                         self.members(*line, entry, self.elements, &element_sets, "element", &mut members)?;
                     }
                     self.count_work(set.entries.first().map_or(0, |entry| entry.0), 8 * members.len())?;
-                    let of = members.iter().map(|place| &content.elements[*place as usize]);
-                    let nodes = of
+                    let elements = members.iter().map(|place| &content.elements[*place as usize]);
+                    let nodes = elements
                         .flat_map(|element| content.nodes_of(element))
                         .filter_map(|label| self.nodes.get(*label))
                         .collect();
@@ -99,9 +100,9 @@ impl Resolver<'_> {
                 SetKind::Faces => {
                     let mut found = Vec::new();
                     for (line, entry) in &set.entries {
-                        let Entry::Side(of, side) = entry else { continue };
+                        let SetEntry::Side(entry, side) = entry else { continue };
                         let mut members = Vec::new();
-                        self.members(*line, of, self.elements, &element_sets, "element", &mut members)?;
+                        self.members(*line, entry, self.elements, &element_sets, "element", &mut members)?;
                         self.sides(*line, &members, *side, content, &mut outer, &mut found)?;
                     }
                     faces.entry(key).or_insert((set.name, Vec::new())).1.append(&mut found);
@@ -127,30 +128,30 @@ impl Resolver<'_> {
         }
     }
 
-    /// Positions of the members of an entry.
+    /// Collects the indices of the members of an entry.
     fn members(
         &mut self,
         line: usize,
-        entry: &Entry,
+        entry: &SetEntry,
         labels: &Labels,
         sets: &BTreeMap<String, (String, Vec<u32>)>,
         kind: &str,
         members: &mut Vec<u32>,
     ) -> Result<(), Error> {
         match entry {
-            Entry::Label(label) => {
+            SetEntry::Label(label) => {
                 self.count_work(line, 1)?;
                 members.push(labels.get(*label).ok_or_else(|| {
                     line_error(self.path, line, format!("member of a set of {kind}s"), label, "existing ones")
                 })?);
             }
-            Entry::Range([first, last, step]) => {
+            SetEntry::Range([first, last, step]) => {
                 let inside = labels.range(*first, *last);
                 self.count_work(line, inside.len().saturating_add(1))?;
                 let on = inside.iter().filter(|entry| (entry.0 - first).is_multiple_of(*step));
                 members.extend(on.map(|entry| entry.1));
             }
-            Entry::Set(name) => {
+            SetEntry::Set(name) => {
                 let Some((_, set)) = sets.get(&name.to_uppercase()) else {
                     let mut names: Vec<&str> = sets.values().take(20).map(|set| set.0.as_str()).collect();
                     if names.is_empty() {
@@ -162,26 +163,26 @@ impl Resolver<'_> {
                 self.count_work(line, set.len().saturating_add(1))?;
                 members.extend_from_slice(set);
             }
-            Entry::Side(of, _) => self.members(line, of, labels, sets, kind, members)?,
+            SetEntry::Side(entry, _) => self.members(line, entry, labels, sets, kind, members)?,
         }
         Ok(())
     }
 
-    /// Sides of elements; without a side those that no other element shares.
+    /// Collects sides of elements; outer sides if none is given.
     fn sides(
         &mut self,
         line: usize,
         members: &[u32],
         side: Option<u8>,
-        content: &Content,
+        content: &FileContent,
         outer: &mut Option<BTreeMap<u32, Vec<u8>>>,
         found: &mut Vec<Face>,
     ) -> Result<(), Error> {
         self.count_work(line, 6 * members.len())?;
         for place in members {
             let element = &content.elements[*place as usize];
-            // shells and lines have no sides of their own
-            let sides = element.kind.solid().map_or(0, Shape::side_count);
+            // shells and lines have no sides
+            let sides = element.kind.solid().map_or(0, ElementShape::side_count);
             match side {
                 Some(side) if side < sides => found.push(Face { element: *place, side }),
                 Some(side) => {
@@ -206,23 +207,23 @@ impl Resolver<'_> {
     }
 }
 
-/// Sides of solid elements that no other shares, by the element's position.
-fn outer_sides(content: &Content, nodes: &Labels) -> Result<BTreeMap<u32, Vec<u8>>, Error> {
+/// Returns the sides of solid elements that no other shares, by the element's index.
+fn outer_sides(content: &FileContent, nodes: &Labels) -> Result<BTreeMap<u32, Vec<u8>>, Error> {
     let mut mesh = Mesh { points: vec![[0.0; 3]; content.nodes.len()], ..Mesh::default() };
     let mut places = [const { Vec::new() }; 3];
     for (place, element) in (0u32..).zip(&content.elements) {
         let Some(shape) = element.kind.solid() else { continue };
-        // nodes that do not exist are named when the mesh is made
+        // missing nodes are reported when the mesh is made
         let own: Vec<u32> = content.nodes_of(element).iter().filter_map(|label| nodes.get(*label)).collect();
         if own.len() < shape.nodes() {
             continue;
         }
         match shape {
-            Shape::Hexahedron => {
+            ElementShape::Hexahedron => {
                 mesh.hexahedra.extend(own.first_chunk::<8>());
                 places[0].push(place);
             }
-            Shape::Tetrahedron => {
+            ElementShape::Tetrahedron => {
                 mesh.tetrahedra.extend(own.first_chunk::<4>());
                 places[1].push(place);
             }
@@ -234,7 +235,7 @@ fn outer_sides(content: &Content, nodes: &Labels) -> Result<BTreeMap<u32, Vec<u8
     }
     let places = places.concat();
     let mut outer: BTreeMap<u32, Vec<u8>> = BTreeMap::new();
-    for face in Surface::of_all(&mesh)?.faces() {
+    for face in OuterSurface::of_all(&mesh)?.faces() {
         outer.entry(places[face.element as usize]).or_default().push(face.side);
     }
     Ok(outer)

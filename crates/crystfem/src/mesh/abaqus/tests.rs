@@ -1,7 +1,7 @@
 use super::*;
 use crate::mesh::Face;
 use crate::mesh::surface::area;
-use crate::mesh::{Bar, Block, Grid, Mesh, Split, Substrate};
+use crate::mesh::{Bar, Block, CellSplit, Grid, Mesh, Substrate};
 
 fn fixture(name: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
@@ -16,7 +16,7 @@ fn refused(text: &str, words: &[&str]) {
     assert!(words.iter().all(|word| error.contains(word)), "{error}");
 }
 
-/// Two boxes of 3 × 1 × 1, one on the other, written by Gmsh 4.15, groups of surfaces as plane elements.
+/// Two stacked boxes of 3 × 1 × 1, written by Gmsh 4.15, with groups of surfaces as plane elements.
 #[test]
 fn meshes_written_by_gmsh() {
     for name in ["hexes.inp", "tets.inp"] {
@@ -44,7 +44,7 @@ fn a_mesh_written_by_meshio() {
 }
 
 #[test]
-fn what_is_written_is_read_back() {
+fn written_meshes_are_read_back() {
     let bar = Bar {
         size: [0.02, 0.004],
         layers: 2,
@@ -52,14 +52,14 @@ fn what_is_written_is_read_back() {
         elements_per_layer: 1,
         element_size: 2e-3,
         substrate: Some(Substrate { size: [0.03, 0.01], thickness: 1e-3, growth: 1.7 }),
-        cells: Split::Hexahedra,
+        cells: CellSplit::Hexahedra,
     };
     let block = Block { name: "brick".into(), lower: [0.0; 3], upper: [1.0; 3] };
     let grid = Grid::uniform([0.0; 3], [1.0; 3], [3, 2, 2]).unwrap();
     let mut both = Grid::uniform([0.0; 3], [1.0; 3], [1, 1, 1]).unwrap().mesh("brick").unwrap();
     both.points.push([5.0 / 3.0, 0.5, 0.5]);
     both.tetrahedra.extend([[1, 3, 5, 8], [3, 7, 5, 8]]);
-    for mesh in [bar.mesh().unwrap(), grid.blocks(&[block], Split::FiveTetrahedra).unwrap(), both] {
+    for mesh in [bar.mesh().unwrap(), grid.blocks(&[block], CellSplit::FiveTetrahedra).unwrap(), both] {
         for diffusive in [false, true] {
             let mut text = Vec::new();
             write(&mesh, diffusive, &mut text).unwrap();
@@ -74,16 +74,17 @@ fn what_is_written_is_read_back() {
     }
 }
 
-const BRICK: &str = "*Heading\nby hand\n** a comment\n*Part, name=P\n*Node, nset=All\n1, 0., 0., 0.\n2, 1.0D0\n3, 1., 1.\n\
-     4, 0, 1\n5, 0,0,1\n6, 1,0,1\n7, 1,1,1\n8, 0,1,1\n\n*ELEMENT, TYPE=dc3d8,\n ELSET=Bricks\n\
-     10, 1, 2, 3, 4,\n 5, 6, 7, 8\n*End Part\n*Assembly\n*Instance, name=I, part=P\n*End Instance\n\
-     *Nset, nset=low, generate\n1, 4\n*nset, NSET=LOW\n5,\n*Nset, nset=odd, generate\n1, 100000000000, 2\n\
-     *Nset, nset=mixed\nlow, 8\n*Nset, nset=of, elset=bricks\n*Elset, elset=again, instance=I\nBRICKS, 10\n\
-     *Surface, type=ELEMENT, name=top\nI.again, S2\n*Surface, name=skin\n10,\n*Surface, name=dots, type=node\nodd\n\
-     *Material, name=PA12\n*Conductivity\n0.25\n*Step\n*Heat transfer\n*End Step\n";
+const BRICK: &str = "*Heading\nby hand\n** a comment\n*Part, name=P\n*Node, nset=All\n1, 0., 0., 0.\n\
+    2, 1.0D0\n3, 1., 1.\n4, 0, 1\n5, 0,0,1\n6, 1,0,1\n7, 1,1,1\n8, 0,1,1\n\n\
+    *ELEMENT, TYPE=dc3d8,\n ELSET=Bricks\n10, 1, 2, 3, 4,\n 5, 6, 7, 8\n*End Part\n*Assembly\n\
+    *Instance, name=I, part=P\n*End Instance\n*Nset, nset=low, generate\n1, 4\n*nset, NSET=LOW\n5,\n\
+    *Nset, nset=odd, generate\n1, 100000000000, 2\n*Nset, nset=mixed\nlow, 8\n*Nset, nset=of, elset=bricks\n\
+    *Elset, elset=again, instance=I\nBRICKS, 10\n*Surface, type=ELEMENT, name=top\nI.again, S2\n\
+    *Surface, name=skin\n10,\n*Surface, name=dots, type=node\nodd\n*Material, name=PA12\n*Conductivity\n\
+    0.25\n*Step\n*Heat transfer\n*End Step\n";
 
 #[test]
-fn all_that_is_understood() {
+fn supported_keywords_are_read() {
     let read = parsed(BRICK);
     let mesh = &read.mesh;
     assert!((read.quality.volume - 1.0).abs() < 1e-15);
@@ -101,7 +102,8 @@ fn all_that_is_understood() {
     assert_eq!(
         read.notes,
         [
-            "*CONDUCTIVITY (line 41, `0.25`) is NOT used: the deck has no units; give `conductivity` of [materials.NAME]",
+            "*CONDUCTIVITY (line 41, `0.25`) is NOT used: the deck has no units; give `conductivity` of \
+             [materials.NAME]",
             "*HEAT TRANSFER (line 44) is NOT used: the deck has no units; give [time]",
             "*MATERIAL (line 40, `PA12`) is NOT used: the deck has no units; give [materials.NAME]",
             "keywords not used: *END STEP (1), *STEP (1)",
@@ -110,7 +112,7 @@ fn all_that_is_understood() {
 }
 
 #[test]
-fn what_is_wrong_is_named_with_its_line() {
+fn errors_name_the_line() {
     let with = |from: &str, to: &str| {
         assert!(BRICK.contains(from), "{from}");
         BRICK.replace(from, to)
@@ -168,13 +170,13 @@ fn what_is_wrong_is_named_with_its_line() {
 
 #[test]
 fn sets_cannot_multiply_beyond_the_file() {
-    // each set twice the one before: 2⁶⁰ members without a bound
+    // each set doubles the one before: 2⁶⁰ members without a bound
     let doubling: String = (0..60).map(|k| format!("*NSET,NSET=s{}\ns{k},s{k}\n", k + 1)).collect();
     refused(&format!("{BRICK}*NSET,NSET=s0\n1\n{doubling}"), &["members of sets"]);
 }
 
-/// One element of each type in the order of nodes and sides of the Abaqus manual (28.1.4, three-dimensional solids), with
-/// nodes on edges where that order has them: a wrong one would fold the element.
+/// Elements of all types, one each, in the order of nodes and sides of the Abaqus manual (28.1.4,
+/// three-dimensional solids), with mid-edge nodes in that order: a wrong one would fold the element.
 #[test]
 fn elements_of_all_types() {
     let places: [[f64; 3]; 8] = [
@@ -231,7 +233,7 @@ fn elements_of_all_types() {
             assert!(nodes.iter().all(|node| read.mesh.points[*node as usize][axis] == at), "{kind} {side}");
         }
         assert_eq!(read.mesh.surfaces["skin"].len(), usize::from(read.mesh.side_count(0)));
-        // two nodes of an edge exchanged: folded, and named
+        // two nodes of an edge exchanged: folded, and reported
         if !edges.is_empty() {
             let folded =
                 text.replace("*ELEMENT", "*NODE\n900, -9., 0., 0.\n*ELEMENT").replace("\n7, 1,", "\n7, 900,");
@@ -256,23 +258,25 @@ fn orders_do_not_mix() {
     assert!(error.contains("elements 0 and 1 have the corners of one face and different nodes"), "{error}");
 }
 
-/// Lists keywords with a meaning here one by one, with their number and first values.
+/// Lists keywords with an equivalent one by one, with their count and first values.
 #[test]
-fn what_is_not_used_says_what_to_give_instead() {
-    let more = "*Tie, name=glue\na, b\n*Dflux\nBricks, BF, 1.\n*DFLUX, amplitude=RAMP\nagain, BF, 2.\n*initial conditions, type=temperature\nAll, 20.\n\
-                *Node File\nNT\n*NODE FILE\nNT\n";
+fn unused_keywords_name_their_scene_keys() {
+    let more = "*Tie, name=glue\na, b\n*Dflux\nBricks, BF, 1.\n*DFLUX, amplitude=RAMP\nagain, BF, 2.\n\
+        *initial conditions, type=temperature\nAll, 20.\n*Node File\nNT\n*NODE FILE\nNT\n";
     let notes = parsed(&format!("{BRICK}{more}")).notes;
     for told in [
         "*TIE (line 46, `glue`) is NOT used: heat passes only between elements that share nodes",
-        "*DFLUX (line 48, `Bricks, BF, 1.`, 2 times) is NOT used: the deck has no units; give `flux` of [[boundary]], or `power`",
-        "*INITIAL CONDITIONS (line 52, `All, 20.`) is NOT used: the deck has no units; give `temperature` of [[region]]",
+        "*DFLUX (line 48, `Bricks, BF, 1.`, 2 times) is NOT used: the deck has no units; give `flux` of \
+         [[boundary]], or `power`",
+        "*INITIAL CONDITIONS (line 52, `All, 20.`) is NOT used: the deck has no units; give `temperature` \
+         of [[region]]",
         "keywords not used: *END STEP (1), *NODE FILE (2), *STEP (1)",
     ] {
         assert!(notes.iter().any(|note| note.starts_with(told)), "{told}: {notes:#?}");
     }
 }
 
-/// An instance is moved, then turned about a line.
+/// An instance is translated, then rotated about a line.
 #[test]
 fn instances_are_placed() {
     let with = |lines: &str| BRICK.replace("*End Instance", &format!("{lines}\n*End Instance"));
@@ -289,7 +293,7 @@ fn instances_are_placed() {
     }
 }
 
-/// Files in files, with data lines alone or keywords, and errors at their lines.
+/// Includes work for nested files, with data lines alone or keywords, and errors point to their lines.
 #[test]
 fn files_are_included() {
     let directory = tempfile::tempdir().unwrap();
@@ -301,7 +305,8 @@ fn files_are_included() {
     write("sub/rows.inp", "1,1,2,3,4\n");
     write("bad.txt", "1,0,0,0\n\n2,1,x,0\n");
     write("again.inp", "*INCLUDE, INPUT=again.inp\n");
-    let deck = "*NODE, NSET=N\n*INCLUDE, INPUT=nodes.txt\n4,0,0,1\n*Include,\n input=sub\\elements.inp\n*NSET, NSET=low\n1,2,3\n";
+    let deck = "*NODE, NSET=N\n*INCLUDE, INPUT=nodes.txt\n4,0,0,1\n*Include,\n input=sub\\elements.inp\n\
+        *NSET, NSET=low\n1,2,3\n";
     let read_from = |text: &str| {
         write("deck.inp", text);
         read(&at("deck.inp"), 1.0)

@@ -1,18 +1,19 @@
-//! Writes a mesh as CalculiX and Abaqus read it.
+//! Writes a mesh in the format of CalculiX and Abaqus.
 
 use std::io::{self, Write};
 
 use crate::mesh::Mesh;
 
-/// CalculiX reads the first twenty letters of a number.
+/// Width of a number in characters; CalculiX reads the first twenty.
 const WIDTH: usize = 20;
 
-/// Writes nodes, elements, sets and surfaces, numbers counted from 1, coordinates to the last bit where twenty letters
-/// hold it and to 1e-12 elsewhere. `diffusive` elements are DC3D8, DC3D4, … (Abaqus), otherwise C3D8, C3D4, … (CalculiX takes both,
-/// structural ones for `*HEAT TRANSFER` too). Names with spaces or commas are written with underscores.
+/// Writes nodes, elements, sets and surfaces, numbered from 1. Coordinates keep all bits if twenty characters
+/// suffice, otherwise 1e-12. `diffusive` elements are DC3D8, DC3D4, … (Abaqus), others C3D8, C3D4, …
+/// (CalculiX accepts both, structural ones for `*HEAT TRANSFER` too). Spaces and commas in names become
+/// underscores.
 ///
 /// # Errors
-/// Of the writer.
+/// Errors of the writer.
 pub fn write(mesh: &Mesh, diffusive: bool, to: &mut impl Write) -> io::Result<()> {
     writeln!(to, "*NODE")?;
     for (number, [x, y, z]) in (1u32..).zip(&mesh.points) {
@@ -63,7 +64,7 @@ pub fn write(mesh: &Mesh, diffusive: bool, to: &mut impl Write) -> io::Result<()
     Ok(())
 }
 
-/// A number in at most [`WIDTH`] letters.
+/// Formats a number in at most [`WIDTH`] characters.
 fn coordinate(x: f64) -> String {
     let short = format!("{x:e}");
     let plain = format!("{x}").replacen("0.", ".", usize::from(x.abs() < 1.0));
@@ -72,7 +73,7 @@ fn coordinate(x: f64) -> String {
     all.min_by_key(|text| text.len().saturating_sub(WIDTH)).unwrap_or_default()
 }
 
-/// Twelve to a line: CalculiX takes sixteen.
+/// Writes twelve numbers a line; CalculiX accepts sixteen.
 fn numbers(set: &[u32], to: &mut impl Write) -> io::Result<()> {
     for line in set.chunks(12) {
         let words: Vec<String> = line.iter().map(|number| (number + 1).to_string()).collect();

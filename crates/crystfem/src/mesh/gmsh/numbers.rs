@@ -1,15 +1,15 @@
-//! Numbers of an MSH file: words of text or bytes, in the same order.
+//! Numbers of an MSH file, as text or binary, in the same order.
 
 use std::path::Path;
 
 use crate::error::Error;
 use crate::file::line_error;
 
-/// How numbers are written.
+/// Encoding of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Form {
+enum NumberEncoding {
     Text,
-    /// Bytes per size, and whether the least byte comes first.
+    /// Bytes per size, and true for little-endian order.
     Binary {
         width: usize,
         little: bool,
@@ -27,21 +27,21 @@ pub(super) enum Version {
     FourOne,
 }
 
-/// A place in the file.
+/// Reader of numbers.
 pub(super) struct Numbers<'a> {
     path: &'a Path,
     bytes: &'a [u8],
     at: usize,
-    /// Line of what was read last; among binary numbers that of the text before them.
+    /// Line of the last text; for binary numbers that of the text before them.
     line: usize,
-    /// Bytes in which ends of lines are counted already.
+    /// Number of bytes whose line ends are counted already.
     counted: usize,
-    form: Form,
+    form: NumberEncoding,
 }
 
 impl<'a> Numbers<'a> {
     pub fn new(path: &'a Path, bytes: &'a [u8]) -> Self {
-        Self { path, bytes, at: 0, line: 1, counted: 0, form: Form::Text }
+        Self { path, bytes, at: 0, line: 1, counted: 0, form: NumberEncoding::Text }
     }
 
     pub fn line(&self) -> u32 {
@@ -50,16 +50,17 @@ impl<'a> Numbers<'a> {
 
     pub fn error(&self, what: &str, found: impl ToString, allowed: impl Into<String>) -> Error {
         let what = match self.form {
-            Form::Text => what.to_owned(),
-            Form::Binary { .. } => format!("{what}, byte {}", self.at),
+            NumberEncoding::Text => what.to_owned(),
+            NumberEncoding::Binary { .. } => format!("{what}, byte {}", self.at),
         };
         line_error(self.path, self.line, what, found, allowed)
     }
 
-    /// `$MeshFormat`: a version, 0 or 1 (binary), bytes of a size; in binary the number 1 in the file's byte order.
+    /// Reads `$MeshFormat`: a version, 0 or 1 (binary), bytes per size; in binary also the number 1 in the
+    /// file's byte order.
     pub fn header(&mut self) -> Result<Version, Error> {
         let mut line = self.text_line();
-        // comments may stand before it
+        // comments may precede it
         while line.trim().is_empty() && self.at < self.bytes.len() || line.trim() == "$Comments" {
             if line.trim() == "$Comments" {
                 self.skip("Comments")?;
@@ -95,13 +96,13 @@ impl<'a> Numbers<'a> {
                 [0, 0, 0, 1] => false,
                 _ => return Err(self.error("the number 1", format!("{one:?}"), "1 in either byte order")),
             };
-            self.form = Form::Binary { width, little };
+            self.form = NumberEncoding::Binary { width, little };
         }
         self.end("MeshFormat")?;
         Ok(version)
     }
 
-    /// The name after the next `$`; `None` at the end of the file.
+    /// Reads the name after the next `$`; `None` at the end of the file.
     pub fn section(&mut self) -> Result<Option<String>, Error> {
         loop {
             if self.at >= self.bytes.len() {
@@ -118,7 +119,7 @@ impl<'a> Numbers<'a> {
         }
     }
 
-    /// The end of a section, after its numbers.
+    /// Reads the end of a section, after its numbers.
     pub fn end(&mut self, section: &str) -> Result<(), Error> {
         let expected = format!("$End{section}");
         loop {
@@ -134,11 +135,11 @@ impl<'a> Numbers<'a> {
         }
     }
 
-    /// Passes over a section that is not used.
+    /// Skips an unused section.
     pub fn skip(&mut self, section: &str) -> Result<(), Error> {
         let end = format!("$End{section}");
         while self.at < self.bytes.len() {
-            // binary numbers may hold ends of lines, and stand right before the keyword
+            // binary numbers may contain line ends, and directly precede the keyword
             if self.text_line().trim_end().ends_with(&end) {
                 return Ok(());
             }
@@ -146,7 +147,7 @@ impl<'a> Numbers<'a> {
         Err(self.error("section", "end of file", end))
     }
 
-    /// The rest of a line, as text; empty at the end of the file.
+    /// Reads the rest of a line as text; empty at the end of the file.
     pub fn text_line(&mut self) -> String {
         self.count_lines();
         let rest = &self.bytes[self.at..];
@@ -155,44 +156,44 @@ impl<'a> Numbers<'a> {
         String::from_utf8_lossy(&rest[..length]).into_owned()
     }
 
-    /// A signed number of four bytes in binary.
+    /// Reads a signed number, four bytes in binary.
     pub fn int(&mut self, what: &str) -> Result<i64, Error> {
         match self.form {
-            Form::Text => {
+            NumberEncoding::Text => {
                 let word = self.word();
                 word.parse().map_err(|_| self.error(what, word, "a whole number"))
             }
-            Form::Binary { little, .. } => {
+            NumberEncoding::Binary { little, .. } => {
                 let bytes = self.take::<4>(what)?;
                 Ok(i64::from(if little { i32::from_le_bytes(bytes) } else { i32::from_be_bytes(bytes) }))
             }
         }
     }
 
-    /// A count or a tag of nodes and elements.
+    /// Reads a count, or a tag of nodes and elements.
     pub fn size(&mut self, what: &str) -> Result<u64, Error> {
         match self.form {
-            Form::Text => {
+            NumberEncoding::Text => {
                 let word = self.word();
                 word.parse().map_err(|_| self.error(what, word, "a whole number, 0 or more"))
             }
-            Form::Binary { width: 4, little } => {
+            NumberEncoding::Binary { width: 4, little } => {
                 let bytes = self.take::<4>(what)?;
                 Ok(u64::from(if little { u32::from_le_bytes(bytes) } else { u32::from_be_bytes(bytes) }))
             }
-            Form::Binary { little, .. } => {
+            NumberEncoding::Binary { little, .. } => {
                 let bytes = self.take::<8>(what)?;
                 Ok(if little { u64::from_le_bytes(bytes) } else { u64::from_be_bytes(bytes) })
             }
         }
     }
 
-    /// Whether numbers are bytes.
+    /// Returns true for binary numbers.
     pub fn is_binary(&self) -> bool {
-        self.form != Form::Text
+        self.form != NumberEncoding::Text
     }
 
-    /// The four counts that `$Nodes` and `$Elements` begin with.
+    /// Reads the four counts at the start of `$Nodes` and `$Elements`.
     pub fn four_sizes(&mut self) -> Result<[u64; 4], Error> {
         let mut sizes = [0; 4];
         for (size, what) in
@@ -205,18 +206,18 @@ impl<'a> Numbers<'a> {
 
     pub fn double(&mut self, what: &str) -> Result<f64, Error> {
         match self.form {
-            Form::Text => {
+            NumberEncoding::Text => {
                 let word = self.word();
                 word.parse().map_err(|_| self.error(what, word, "a number"))
             }
-            Form::Binary { little, .. } => {
+            NumberEncoding::Binary { little, .. } => {
                 let bytes = self.take::<8>(what)?;
                 Ok(if little { f64::from_le_bytes(bytes) } else { f64::from_be_bytes(bytes) })
             }
         }
     }
 
-    /// The next word of text; empty at the end of the file.
+    /// Reads the next word of text; empty at the end of the file.
     fn word(&mut self) -> &'a str {
         while self.bytes.get(self.at).is_some_and(u8::is_ascii_whitespace) {
             self.at += 1;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::mesh::surface::{Surface, area};
+use crate::mesh::surface::{OuterSurface, area};
 
 fn fixture(name: &str) -> (std::path::PathBuf, Vec<u8>) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name);
@@ -12,7 +12,7 @@ fn refused(text: &str, words: &[&str]) {
     assert!(words.iter().all(|word| error.contains(word)), "{error}");
 }
 
-/// Two boxes of 3 × 1 × 1, one on the other, meshed by Gmsh 4.15 and saved as 4.1, 4.0 and 2.2.
+/// Two stacked boxes of 3 × 1 × 1, meshed by Gmsh 4.15 and saved as 4.1, 4.0 and 2.2.
 #[test]
 fn meshes_written_by_gmsh() {
     for name in [
@@ -46,7 +46,7 @@ fn meshes_written_by_gmsh() {
         // the curve from the origin upwards
         assert_eq!(mesh.node_sets["edge"].len(), if name.starts_with('h') { 3 } else { 4 }, "{name}");
         assert_eq!(read.notes, Vec::<String>::new());
-        let outer = Surface::of_all(mesh).unwrap();
+        let outer = OuterSurface::of_all(mesh).unwrap();
         let total: f64 = outer.faces().map(|face| area(mesh, face)).sum();
         assert!((total / 22e-6 - 1.0).abs() < 1e-12);
     }
@@ -73,7 +73,7 @@ fn a_mesh_written_by_meshio() {
     assert!((read.quality.volume - 1.0).abs() < 1e-15 && read.notes.is_empty());
 }
 
-/// [`TETRAHEDRON`] in bytes: either order, sizes of 4 and of 8 bytes.
+/// [`TETRAHEDRON`] in binary: either byte order, sizes of 4 and of 8 bytes.
 #[test]
 fn bytes_in_either_order_and_width() {
     let text = parse(Path::new("a.msh"), TETRAHEDRON.as_bytes(), 1.0).unwrap();
@@ -124,7 +124,7 @@ const TETRAHEDRON: &str = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Comments\nby h
      $Elements\n1 1 1 1\n3 7 4 1\n11 1 2 3 4\n$EndElements\n";
 
 #[test]
-fn what_is_not_used_is_noted() {
+fn unused_input_is_noted() {
     let read = parse(Path::new("a.msh"), TETRAHEDRON.as_bytes(), 1.0).unwrap();
     assert_eq!(read.mesh.element_sets["physical-9"], [0]);
     assert_eq!((read.node_labels, read.element_labels), (vec![1, 2, 3, 4], vec![11]));
@@ -140,7 +140,7 @@ fn what_is_not_used_is_noted() {
 }
 
 #[test]
-fn what_is_wrong_is_named_with_its_line() {
+fn errors_name_the_line() {
     let with = |from: &str, to: &str| {
         assert!(TETRAHEDRON.contains(from));
         TETRAHEDRON.replace(from, to)
@@ -181,8 +181,8 @@ fn groups_cannot_multiply_beyond_the_file() {
     refused(&text, &["members of physical groups"]);
 }
 
-/// A quarter of a ring, radii 1 and 2, height 1, one element high, of second order on curved edges; written by Gmsh 4.15 in
-/// both formats, whose orders of nodes differ.
+/// A quarter of a ring, radii 1 and 2, height 1, one element high, with curved second-order edges; written by
+/// Gmsh 4.15 in both formats, which differ in node order.
 #[test]
 fn second_order_meshes_written_by_gmsh() {
     for (name, count) in [("second_hexes", 3), ("second_wedges", 6), ("second_tets", 18)] {
@@ -198,7 +198,7 @@ fn second_order_meshes_written_by_gmsh() {
                 let total: f64 = mesh.surfaces[surface].iter().map(|face| area(mesh, *face)).sum();
                 assert!((total / exact - 1.0).abs() < 1e-3, "{name} {surface} {total}");
             }
-            // nodes on the middles of edges lie near them
+            // mid-edge nodes lie near the middles
             for cell in &mesh.others {
                 let nodes = cell.nodes();
                 for (&[p, q], middle) in cell.shape.edges().iter().zip(&nodes[cell.shape.corners()..]) {
@@ -209,7 +209,7 @@ fn second_order_meshes_written_by_gmsh() {
             }
         }
         assert!((msh.quality.volume / inp.quality.volume - 1.0).abs() < 1e-12);
-        // the same nodes at the same places in each element
+        // the same nodes at the same positions in each element
         for (a, b) in msh.mesh.others.iter().zip(&inp.mesh.others) {
             for (a, b) in a.nodes().iter().zip(b.nodes()) {
                 assert!((msh.mesh.point(*a) - inp.mesh.point(*b)).norm() < 1e-12, "{name}");
@@ -224,19 +224,20 @@ fn second_order_meshes_written_by_gmsh() {
     }
 }
 
-/// The two boxes of complete second order: 27 nodes of each hexahedron, 20 are kept.
+/// Hexahedra of complete second order, in the two boxes, keep 20 of their 27 nodes.
 #[test]
 fn complete_second_order_is_reduced() {
     let read = read(&fixture("hexes27.msh").0, 1e-3).unwrap();
     assert!(read.mesh.others.len() == 16 && read.mesh.is_second_order());
     assert!((read.quality.volume / 6e-9 - 1.0).abs() < 1e-12);
     assert!(read.notes[0].contains("16 elements of complete second order"), "{:?}", read.notes);
-    // faces of their surfaces are found, by nodes that are kept
+    // faces of their surfaces are found by the kept nodes
     let total: f64 = read.mesh.surfaces["bottom"].iter().map(|face| area(&read.mesh, *face)).sum();
     assert!((total / 3e-6 - 1.0).abs() < 1e-12);
 }
 
-/// One tetrahedron in all versions, by hand: parametric nodes, several groups, no groups, comments, negative tags.
+/// A tetrahedron in all versions, by hand: parametric nodes, several groups, no groups, comments, negative
+/// tags.
 #[test]
 fn versions_by_hand() {
     let points = ["0 0 0", "1 0 0", "0 1 0", "0 0 1"];
@@ -250,8 +251,9 @@ fn versions_by_hand() {
     let four = |head: &str, physical: &str, parametric: &str, more: &str| {
         let box_of = "0 0 0 1 1 1";
         format!(
-            "{head}$MeshFormat\n4 0 8\n$EndMeshFormat\n{names}$Entities\n0 0 0 1\n7 {box_of} {physical} 0\n$EndEntities\n$Nodes\n1 4\n\
-             7 3 {parametric} 4\n{}$EndNodes\n$Elements\n1 1\n7 3 4 1\n1 1 2 3 4\n$EndElements\n",
+            "{head}$MeshFormat\n4 0 8\n$EndMeshFormat\n{names}$Entities\n0 0 0 1\n7 {box_of} {physical} 0\n\
+             $EndEntities\n$Nodes\n1 4\n7 3 {parametric} 4\n{}$EndNodes\n$Elements\n1 1\n7 3 4 1\n\
+             1 1 2 3 4\n$EndElements\n",
             numbered(more)
         )
     };

@@ -1,4 +1,4 @@
-//! When a bead covers the centres of elements.
+//! Times at which a bead covers the centres of elements.
 
 use polycore::numerics::bounds;
 use std::collections::BTreeMap;
@@ -9,7 +9,7 @@ use super::{Move, ToolPath};
 use crate::error::Error;
 use crate::mesh::Mesh;
 
-/// Cross-section of what is laid down: below the nozzle, to both sides of its path, round at the ends.
+/// Cross-section of a bead: below the nozzle, to both sides of its path, with round ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bead {
     /// Width, m.
@@ -18,22 +18,22 @@ pub struct Bead {
     pub height: f64,
 }
 
-/// When elements are covered: when the nozzle is nearest to the centre of an element, in the first move whose bead holds
-/// that centre.
+/// Times at which elements are covered: when the nozzle is nearest to the centre of an element, in the first
+/// move whose bead contains that centre.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Activation {
-    /// Time of each element of the mesh, s: −∞ for those not requested, +∞ for those never covered.
+pub struct ActivationTimes {
+    /// Time of each element of the mesh, s: −∞ if not requested, +∞ if never covered.
     pub times: Vec<f64>,
     /// Elements never covered, ascending.
     pub missed: Vec<u32>,
-    /// Heights z of printing moves, each with the end of the last one there, s.
+    /// Heights z of printing moves, with the end time of the last one at each, s.
     levels: Vec<(f64, f64)>,
     height: f64,
 }
 
-impl Activation {
-    /// Gives elements never covered the time at which the last bead at their height was finished, as if gaps between beads
-    /// were filled. Those with no bead at their height remain missed; their number comes back.
+impl ActivationTimes {
+    /// Assigns elements never covered the end time of the last bead at their height, as if gaps between beads
+    /// were filled. Returns the number of elements without a bead at their height, which remain missed.
     pub fn fill(&mut self, mesh: &Mesh) -> usize {
         let (levels, height) = (&self.levels, self.height);
         let times = &mut self.times;
@@ -51,13 +51,13 @@ impl Activation {
     }
 }
 
-/// Greatest place, m, and time, s, of a move: beyond any printer, and its square far from overflow.
-const FAR: f64 = 1e12;
+/// Largest position, m, and time, s, of a move: beyond any printer, and with a square far from overflow.
+const LARGEST_COORDINATE: f64 = 1e12;
 
-/// Cells over the elements' extent along each axis, at most.
-const CELLS: f64 = 512.0;
+/// Largest number of cells along each axis.
+const MAX_CELLS: f64 = 512.0;
 
-/// Centres of elements, sorted by the cell of a grid over x and y that they are in, then by z.
+/// Centres of elements, sorted by cell of a grid over x and y, then by z.
 struct Centres {
     lower: [f64; 2],
     upper: [f64; 2],
@@ -71,7 +71,7 @@ impl Centres {
     fn new(mesh: &Mesh, elements: &[u32], width: f64) -> Self {
         let centres: Vec<[f64; 3]> = elements.iter().map(|element| mesh.centre(*element)).collect();
         let [lower, upper] = bounds(centres.iter().map(|centre| [centre[0], centre[1]]));
-        let size = width.max((upper[0] - lower[0]).max(upper[1] - lower[1]) / CELLS);
+        let size = width.max((upper[0] - lower[0]).max(upper[1] - lower[1]) / MAX_CELLS);
         let rows = ((upper[1] - lower[1]) / size) as u64 + 1;
         let mut all = Self { lower, upper, size, rows, sorted: Vec::new(), places: Vec::new() };
         all.sorted = (0..).zip(&centres).map(|(k, c)| (all.cell([c[0], c[1]]), c[2], k)).collect();
@@ -80,7 +80,7 @@ impl Centres {
         all
     }
 
-    /// Column and row of a place, those outside moved to the border.
+    /// Column and row of a position, clamped to the grid.
     fn index(&self, place: [f64; 2]) -> [u64; 2] {
         // a cast saturates, so nothing below zero remains
         [0, 1].map(|d| ((place[d].min(self.upper[d]) - self.lower[d]) / self.size) as u64)
@@ -91,7 +91,7 @@ impl Centres {
         column * self.rows + row
     }
 
-    /// Centres with z in (low, high] in a cell: as numbers of `places`, with their z.
+    /// Centres with z in (low, high] in a cell, as indices of `places`, with their z.
     fn in_cell(&self, cell: u64, [low, high]: [f64; 2]) -> impl Iterator<Item = (f64, usize)> + '_ {
         let first =
             self.sorted.partition_point(|entry| entry.0 < cell || (entry.0 == cell && entry.1 <= low));
@@ -105,7 +105,7 @@ pub(super) fn activation(
     mesh: &Mesh,
     elements: &[u32],
     bead: Bead,
-) -> Result<Activation, Error> {
+) -> Result<ActivationTimes, Error> {
     for (name, found) in [("width of the bead", bead.width), ("height of the bead", bead.height)] {
         if !(found > 0.0 && found.is_finite()) {
             return Err(Error::Parameter { name, found, allowed: "positive and finite, m".into() });
@@ -121,9 +121,10 @@ pub(super) fn activation(
     let values = |one: &Move| {
         [one.from[0], one.from[1], one.from[2], one.to[0], one.to[1], one.to[2], one.start, one.end]
     };
-    if let Some(value) = path.moves.iter().flat_map(values).find(|value| value.is_nan() || value.abs() > FAR)
+    if let Some(value) =
+        path.moves.iter().flat_map(values).find(|value| value.is_nan() || value.abs() > LARGEST_COORDINATE)
     {
-        let allowed = format!("places and times up to {FAR:e} m and s");
+        let allowed = format!("places and times up to {LARGEST_COORDINATE:e} m and s");
         return Err(Error::Parameter { name: "move of the path", found: value, allowed });
     }
     let mut earliest = vec![f64::INFINITY; elements.len()];
@@ -133,7 +134,7 @@ pub(super) fn activation(
         let z = one.to[2];
         let level = levels.entry(z.to_bits()).or_insert((z, one.end));
         level.1 = level.1.max(one.end);
-        lay(one, &centres, bead, &mut earliest);
+        cover(one, &centres, bead, &mut earliest);
     }
     let mut levels: Vec<(f64, f64)> = levels.into_values().collect();
     levels.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
@@ -142,18 +143,18 @@ pub(super) fn activation(
         times[*element as usize] = *time;
     }
     let missed = (0u32..).zip(&times).filter(|(_, time)| **time == f64::INFINITY).map(|(element, _)| element);
-    Ok(Activation { missed: missed.collect(), times, levels, height: bead.height })
+    Ok(ActivationTimes { missed: missed.collect(), times, levels, height: bead.height })
 }
 
-/// Covers centres by one move.
-fn lay(one: &Move, centres: &Centres, bead: Bead, earliest: &mut [f64]) {
+/// Covers centres by a move.
+fn cover(one: &Move, centres: &Centres, bead: Bead, earliest: &mut [f64]) {
     let radius = 0.5 * bead.width;
     let from = Vector2::new(one.from[0], one.from[1]);
     let along = Vector2::new(one.to[0], one.to[1]) - from;
     let square = along.norm_squared();
     let Some([first, last]) = clip(from, along, centres, radius) else { return };
-    // pieces no longer than four cells, so that the boxes around slanted ones hold few centres
-    let pieces = ((last - first) * square.sqrt() / (4.0 * centres.size)).ceil().clamp(1.0, CELLS) as u32;
+    // pieces no longer than four cells, so that the boxes around slanted ones contain few centres
+    let pieces = ((last - first) * square.sqrt() / (4.0 * centres.size)).ceil().clamp(1.0, MAX_CELLS) as u32;
     let rise = one.to[2] - one.from[2];
     for piece in 0..pieces {
         let share = |k: u32| first + (last - first) * (f64::from(k) / f64::from(pieces));
@@ -178,7 +179,7 @@ fn lay(one: &Move, centres: &Centres, bead: Bead, earliest: &mut [f64]) {
     }
 }
 
-/// The part of a move within reach of the centres, as shares of it; `None` where there is none.
+/// Clips a move to the reach of the centres, as fractions of it; `None` if outside.
 fn clip(from: Vector2<f64>, along: Vector2<f64>, centres: &Centres, radius: f64) -> Option<[f64; 2]> {
     let (mut first, mut last) = (0.0f64, 1.0f64);
     for d in 0..2 {

@@ -2,23 +2,23 @@
 
 use super::{Move, ToolPath, error};
 use crate::error::Error;
-use crate::table::{Column, read_with_lines};
+use crate::table::{TableColumn, read_with_lines};
 use polycore::units::dimension::{LengthDimension, RatioDimension, TimeDimension};
 use std::path::Path;
 
-/// Reads a path from a CSV table with columns `time [unit]` (not descending), `x [unit]`, `y [unit]`, `z [unit]`, in s and m
-/// where a heading has no unit, and `print`: not 0 where the move that ends there lays material down.
+/// Reads a path from a CSV table with columns `time [unit]` (not descending), `x [unit]`, `y [unit]`, `z
+/// [unit]`, by default in s and m, and `print`: nonzero if the move that ends there deposits material.
 ///
 /// # Errors
-/// As [`crate::table::read`]; times that descend.
+/// Errors of [`crate::table::read`]; [`Error::File`] for times that descend.
 pub fn read_csv(path: &Path) -> Result<ToolPath, Error> {
-    let length = |name| Column::of::<LengthDimension>(name).or_unit("m");
+    let length = |name| TableColumn::new::<LengthDimension>(name).or_unit("m");
     let columns = [
-        Column::of::<TimeDimension>("time").or_unit("s"),
+        TableColumn::new::<TimeDimension>("time").or_unit("s"),
         length("x"),
         length("y"),
         length("z"),
-        Column::of::<RatioDimension>("print"),
+        TableColumn::new::<RatioDimension>("print"),
     ];
     let ([time, x, y, z, print], lines) = read_with_lines(path, columns)?;
     let mut moves = Vec::with_capacity(time.len());

@@ -1,4 +1,4 @@
-//! Files as slicers write them for several firmwares, in snippets of our own.
+//! Tests of G-code dialects of slicers and firmwares, in own snippets.
 
 use super::*;
 use std::f64::consts::PI;
@@ -7,7 +7,7 @@ fn parsed(text: &str) -> ToolPath {
     parse(Path::new("a.gcode"), text.as_bytes()).unwrap()
 }
 
-/// Millimetres of filament for 0.1 mm² over 10 mm.
+/// Length of filament for 0.1 mm² over 10 mm, mm.
 fn line() -> f64 {
     0.1 * 10.0 / (0.25 * PI * 1.75f64.powi(2))
 }
@@ -26,7 +26,8 @@ fn extruders_keep_their_mode() {
         ("no M82 or M83, relative", "G91\nG1 F600 X10 E1\nG1 X10 E1\n", 2.0),
         (
             "Klipper, a macro that keeps the state",
-            "M82\nG90\nG1 F600 X10 E1\nSAVE_GCODE_STATE NAME=a\nG91\nM83\nG1 E-1\nRESTORE_GCODE_STATE NAME=a\nG1 X0 E2\n",
+            "M82\nG90\nG1 F600 X10 E1\nSAVE_GCODE_STATE NAME=a\nG91\nM83\nG1 E-1\n\
+             RESTORE_GCODE_STATE NAME=a\nG1 X0 E2\n",
             2.0,
         ),
         ("RepRapFirmware, G92", "M83\nG92 E0\nG1 F600 X10 E1\nG92 E5\nG1 X0 E1\n", 2.0),
@@ -47,30 +48,33 @@ fn extruders_keep_their_mode() {
 fn beads_lie_on_what_is_below() {
     let e = line();
     let prusa = format!(
-        "M83\n;TYPE:Custom\nG1 Z.25 F600\nG1 X10 Y-9 E{e}\n;LAYER_CHANGE\n;Z:0.3\n;HEIGHT:0.3\nG1 Z.3\n;TYPE:Perimeter\n\
-         G1 X0 Y0\nG1 X10 E{e}\n;LAYER_CHANGE\n;Z:0.5\n;HEIGHT:0.2\nG1 Z.5\nG1 X0 E{e}\n;TYPE:Bridge infill\n;HEIGHT:0.4\nG1 Y5\n\
-         G1 X10 E{e}\n;TYPE:Custom\nG0 X0 Y-9 Z.25\nG1 X10 E{e}\n"
+        "M83\n;TYPE:Custom\nG1 Z.25 F600\nG1 X10 Y-9 E{e}\n;LAYER_CHANGE\n;Z:0.3\n;HEIGHT:0.3\nG1 Z.3\n\
+         ;TYPE:Perimeter\nG1 X0 Y0\nG1 X10 E{e}\n;LAYER_CHANGE\n;Z:0.5\n;HEIGHT:0.2\nG1 Z.5\nG1 X0 E{e}\n\
+         ;TYPE:Bridge infill\n;HEIGHT:0.4\nG1 Y5\nG1 X10 E{e}\n;TYPE:Custom\nG0 X0 Y-9 Z.25\nG1 X10 E{e}\n"
     );
     let cura = format!(
-        "M83\nG1 X0.1 Y20 Z0.3 F600\nG1 X10 E{e}\n;LAYER_COUNT:2\n;LAYER:0\n;TYPE:WALL-OUTER\nG0 X0 Y0 Z0.2\nG1 X10 E{e}\n\
-         ;LAYER:1\nG0 X0 Y0 Z0.35\nG1 X10 E{e}\n"
+        "M83\nG1 X0.1 Y20 Z0.3 F600\nG1 X10 E{e}\n;LAYER_COUNT:2\n;LAYER:0\n;TYPE:WALL-OUTER\n\
+         G0 X0 Y0 Z0.2\nG1 X10 E{e}\n;LAYER:1\nG0 X0 Y0 Z0.35\nG1 X10 E{e}\n"
     );
     let bambu = format!(
-        "M83\n; FEATURE: Custom\nG1 X0 Y20 Z0.28 F600\nG1 X10 E{e}\n; CHANGE_LAYER\n; Z_HEIGHT: 0.2\n; LAYER_HEIGHT: 0.2\n; FEATURE: Outer wall\n\
-         G1 X0 Y0 Z0.2\nG1 X10 E{e}\n; CHANGE_LAYER\n; Z_HEIGHT: 0.36\n; LAYER_HEIGHT: 0.16\nG1 Z0.36\nG1 X0 E{e}\n"
+        "M83\n; FEATURE: Custom\nG1 X0 Y20 Z0.28 F600\nG1 X10 E{e}\n; CHANGE_LAYER\n; Z_HEIGHT: 0.2\n\
+         ; LAYER_HEIGHT: 0.2\n; FEATURE: Outer wall\nG1 X0 Y0 Z0.2\nG1 X10 E{e}\n; CHANGE_LAYER\n\
+         ; Z_HEIGHT: 0.36\n; LAYER_HEIGHT: 0.16\nG1 Z0.36\nG1 X0 E{e}\n"
     );
-    // a support with a layer of its own between, and a first layer that crosses a purge line
+    // a support with its own intermediate layer, and a first layer that crosses a purge line
     let klipper = format!(
-        "M83\nG1 F600 X0 Y5 Z.2\nG1 X10 E{e}\nG0 X5 Y0 Z.3\nG1 Y10 E{e}\nG0 X0 Y20 Z.15\nG1 X10 E{e}\nG0 X0 Y20 Z.3\nG1 X10 E{e}\n\
-         G0 X0 Y30 Z.3\nG1 X10 E{e}\nG0 X0 Y30 Z.5\nG1 X10 E{e}\n"
+        "M83\nG1 F600 X0 Y5 Z.2\nG1 X10 E{e}\nG0 X5 Y0 Z.3\nG1 Y10 E{e}\nG0 X0 Y20 Z.15\nG1 X10 E{e}\n\
+         G0 X0 Y20 Z.3\nG1 X10 E{e}\nG0 X0 Y30 Z.3\nG1 X10 E{e}\nG0 X0 Y30 Z.5\nG1 X10 E{e}\n"
     );
-    // the second layer hangs over the bed beside what it lies on; sparse lines cross lines
+    // the second layer overhangs the bed beside its support; sparse lines cross lines
     let over = format!(
-        "M83\nG1 F600 X0 Y0 Z.2\nG1 X10 E{e}\nG0 X0 Y0 Z.4\nG1 X10 E{e}\nG0 X0 Y3\nG1 X10 E{e}\nG0 X0 Y0 Z.6\nG1 X10 E{e}\nG0 X5 Y-5\nG1 Y5 E{e}\n"
+        "M83\nG1 F600 X0 Y0 Z.2\nG1 X10 E{e}\nG0 X0 Y0 Z.4\nG1 X10 E{e}\nG0 X0 Y3\nG1 X10 E{e}\n\
+         G0 X0 Y0 Z.6\nG1 X10 E{e}\nG0 X5 Y-5\nG1 Y5 E{e}\n"
     );
-    // two objects, one after the other
+    // two objects, printed one after the other
     let sequential = format!(
-        "M83\nG1 F600 X0 Y0 Z.2\nG1 X10 E{e}\nG0 X0 Y0 Z.4\nG1 X10 E{e}\nG0 X0 Y50 Z.3\nG1 X10 E{e}\nG0 X0 Y50 Z.5\nG1 X10 E{e}\n"
+        "M83\nG1 F600 X0 Y0 Z.2\nG1 X10 E{e}\nG0 X0 Y0 Z.4\nG1 X10 E{e}\nG0 X0 Y50 Z.3\nG1 X10 E{e}\n\
+         G0 X0 Y50 Z.5\nG1 X10 E{e}\n"
     );
     let thin = format!(
         "M83\nG1 F600 X0 Y9 Z.3\nG1 X10 E{}\nG0 X0 Y0 Z.2\nG1 X10 E{e}\nG0 X0 Y0 Z.4\nG1 X10 E{e}\n",
@@ -92,7 +96,7 @@ fn beads_lie_on_what_is_below() {
     assert_eq!(parsed(&prusa).heights(1.75e-3, Some(1e-4)), [1e-4; 5]);
 }
 
-/// A square of 10 mm: a flat ring, then five turns that rise by 0.2 mm each.
+/// A square of 10 mm: a flat ring, then five turns that each rise by 0.2 mm.
 #[test]
 fn vases_rise_by_a_turn() {
     let e = line();
@@ -105,12 +109,12 @@ fn vases_rise_by_a_turn() {
     }
     let heights = parsed(&text).heights(1.75e-3, None);
     assert!(heights[..4].iter().all(|height| (1e3 * height - 0.2).abs() < 1e-9), "{heights:?}");
-    // the first turn begins as a wedge on what is flat
+    // the first turn begins as a wedge on the flat ring
     assert!(heights[4..8].iter().all(|height| (1e3 * height - 0.2).abs() < 0.02), "{heights:?}");
     assert!(heights[8..].iter().all(|height| (1e3 * height - 0.2).abs() < 2e-3), "{heights:?}");
 }
 
-/// The nozzle's temperatures, and the fan.
+/// Nozzle temperatures and fan speeds.
 #[test]
 fn tools_and_fans() {
     let settings = |text: &str, of: Setting| -> Vec<f64> {
@@ -149,7 +153,8 @@ fn tools_and_fans() {
         (
             "Klipper, heaters by name",
             format!(
-                "SET_HEATER_TEMPERATURE HEATER=extruder TARGET=220\n{go}SET_HEATER_TEMPERATURE HEATER=extruder1 TARGET=200\n"
+                "SET_HEATER_TEMPERATURE HEATER=extruder TARGET=220\n\
+                 {go}SET_HEATER_TEMPERATURE HEATER=extruder1 TARGET=200\n"
             ),
             vec![220.0],
         ),
@@ -175,7 +180,7 @@ fn tools_and_fans() {
     assert_eq!(tools.tools(), [0, 1]);
 }
 
-/// What is left out by a name, in marks of printing moves that stay.
+/// Features are removed by name, with the number of printing moves removed.
 #[test]
 fn features_have_one_name() {
     let file = |features: &[&str]| {
@@ -207,9 +212,9 @@ fn features_have_one_name() {
         ("OrcaSlicer", &orca, "walls", None),
     ] {
         let mut path = parsed(text);
-        let all = path.printing().count();
-        assert_eq!(path.without(name), count, "{dialect} {name}");
-        assert_eq!(all - path.printing().count(), count.unwrap_or(0), "{dialect} {name}");
+        let all = path.printing_moves().count();
+        assert_eq!(path.remove_feature(name), count, "{dialect} {name}");
+        assert_eq!(all - path.printing_moves().count(), count.unwrap_or(0), "{dialect} {name}");
     }
     let shares = parsed(&cura);
     let shares = shares.shares();
@@ -217,7 +222,7 @@ fn features_have_one_name() {
     assert!((shares.iter().map(|share| share.1).sum::<f64>() - 1.0).abs() < 1e-12);
 }
 
-/// Volumes of what is extruded, mm³.
+/// Volumes of extrusion, mm³.
 #[test]
 fn extrusion_by_volume() {
     for (dialect, text, volume) in [
@@ -242,12 +247,13 @@ fn extrusion_by_volume() {
         ),
     ] {
         let path = parsed(text);
-        let found: f64 = path.printing().map(|one| 1e9 * one.volume(path.filament.unwrap_or(FILAMENT))).sum();
+        let found: f64 =
+            path.printing_moves().map(|one| 1e9 * one.volume(path.filament.unwrap_or(FILAMENT))).sum();
         assert!((found - volume).abs() < 1e-9, "{dialect}: {found} {volume}");
     }
 }
 
-/// What is no text of G-code is refused by its kind; what no firmware moves by is skipped.
+/// Files other than G-code text are refused by kind; unknown commands are skipped.
 #[test]
 fn files_of_other_kinds() {
     let refused = |bytes: &[u8]| parse(Path::new("a.gcode"), bytes).unwrap_err().to_string();
@@ -262,7 +268,8 @@ fn files_of_other_kinds() {
     assert!(refused(b"GCDE\x01").contains("export it from the slicer as text"));
     for text in [
         "\u{feff}%\nN1 G21*33\nN2 G1 X10 F600 E1*5\nM117 Hi; there\n%\n",
-        "EXCLUDE_OBJECT_DEFINE NAME=a CENTER=1,2 POLYGON=[[1,2]]\nGET_POSITION\nG29 P1 A?\n/G1 X5\n@pause\ng1x10f600e1\n",
+        "EXCLUDE_OBJECT_DEFINE NAME=a CENTER=1,2 POLYGON=[[1,2]]\nGET_POSITION\nG29 P1 A?\n/G1 X5\n@pause\n\
+         g1x10f600e1\n",
         "(Cura) G1 (to) X10 F600 E1\r\nM84 X Y E\r\nG5\r\n",
         "G1 X10 F600 E1\rM84\rM300\r",
     ] {
@@ -275,14 +282,15 @@ fn files_of_other_kinds() {
             .contains("START_PRINT (2), M73 (1)")
     );
     let mut loose = parsed("M83\nG1 X10 E1 F600\nG0 X0 Z15\nG1 X8 Z.2 E1\nG1 X18 E8\n");
-    let (count, line, share) = loose.without_loose().unwrap();
-    assert!(count == 2 && line == 2 && (share - 0.2).abs() < 1e-12 && loose.printing().count() == 1);
+    let (count, line, share) = loose.remove_loose().unwrap();
+    assert!(count == 2 && line == 2 && (share - 0.2).abs() < 1e-12 && loose.printing_moves().count() == 1);
 }
 
-/// Times by limits that the file states, against closed forms: from rest to rest with jerk and acceleration.
+/// Times with limits stated in the file agree with closed forms: from rest to rest with jerk and
+/// acceleration.
 #[test]
 fn limits_of_the_file() {
-    let time = |text: &str| parsed(text).as_stated().duration();
+    let time = |text: &str| parsed(text).with_stated_limits().duration();
     // both ends at jerk speed j: L/v + (v − j)²/(v a)
     let with_jerk = |length: f64, v: f64, a: f64, j: f64| length / v + (v - j).powi(2) / (v * a);
     let one = "G1 X100 F3000\n";
@@ -326,37 +334,39 @@ fn limits_of_the_file() {
         assert!((found - end).abs() < 1e-9, "{dialect}: {found} {end}");
     }
     assert_eq!(parsed(one).describe_limits(), None);
-    // a corner of 90° at jerk speed: as two moves that each end at 10 mm/s, but for the last
+    // a corner of 90° at jerk speed: two moves that each end at 10 mm/s, except the last
     let corner = time("M204 S500\nM205 X10 Y10\nG1 X100 F3000\nG1 Y100\n");
     let halves = with_jerk(100.0, 50.0, 500.0, 10.0)
         + ends_at_rest(with_jerk(100.0, 50.0, 500.0, 10.0), 50.0, 500.0, 10.0);
     assert!((corner - halves).abs() < 1e-9, "{corner} {halves}");
-    // a retraction between stops the nozzle, and takes its own time
+    // a retraction between moves stops the nozzle, and takes time itself
     let through = time("M83\nM204 S500 T500\nM205 X10 E10\nG1 X50 F3000\nG1 X100\n");
     let stopped = time("M83\nM204 S500 T500\nM205 X10 E10\nG1 X50 F3000\nG1 E-1 F3000\nG1 X100 F3000\n");
     assert!(stopped > through + 0.1, "{through} {stopped}");
-    // commands move with the moves
-    let path = parsed("M204 S500\nG1 X100 F3000\nG4 S3\nM104 S200\nG1 X0\n").as_stated();
+    // commands shift with the moves
+    let path = parsed("M204 S500\nG1 X100 F3000\nG4 S3\nM104 S200\nG1 X0\n").with_stated_limits();
     assert!((path.commands[0].time - path.moves[1].start).abs() < 1e-9);
 }
 
-/// What a ramp from v down to rest takes more than one down to j.
+/// Extra time of a ramp from v to rest over one to j.
 fn ends_at_rest(time: f64, v: f64, a: f64, j: f64) -> f64 {
     time + (v * v - (v - j).powi(2)) / (2.0 * a * v)
 }
 
-/// A square of one wall as PrusaSlicer writes it for a MINI: fifteen layers with retractions, wipes and lifts, which it
-/// estimates at 67 s.
+/// A square of one wall as written by PrusaSlicer for a MINI: fifteen layers with retractions, wipes and
+/// lifts; estimated at 67 s.
 #[test]
 fn time_of_prusa_slicer() {
-    let mut text = "M201 X1250 Y1250 Z400 E5000\nM203 X180 Y180 Z12 E80\nM204 P1250 R1250 T1250\nM205 X8 Y8 Z2 E10\nM83\n\
-        G1 Y-2 X179 F2400\nG1 Z3 F720\nG1 X170 F1000\nG1 Z0.2 F720\nG1 X110 E8 F900\nG1 X40 E10 F700\nG1 E-3.2 F4200\nG1 Z.4 F10800\n"
+    let mut text = "M201 X1250 Y1250 Z400 E5000\nM203 X180 Y180 Z12 E80\nM204 P1250 R1250 T1250\n\
+        M205 X8 Y8 Z2 E10\nM83\nG1 Y-2 X179 F2400\nG1 Z3 F720\nG1 X170 F1000\nG1 Z0.2 F720\n\
+        G1 X110 E8 F900\nG1 X40 E10 F700\nG1 E-3.2 F4200\nG1 Z.4 F10800\n"
         .to_owned();
     for layer in 1..=15 {
         let (z, low, high) = (0.2 * f64::from(layer), 82.725, 97.275);
         if layer > 1 {
             text += &format!(
-                "G1 E-2.24 F4200\nG1 F8640 X84.7 Y82.777 E-.912\nG1 E-.048 F4200\nG1 Z{z:.1} F10800\nG1 Z{:.1}\n",
+                "G1 E-2.24 F4200\nG1 F8640 X84.7 Y82.777 E-.912\nG1 E-.048 F4200\nG1 Z{z:.1} F10800\n\
+                 G1 Z{:.1}\n",
                 z + 0.2
             );
         }
@@ -369,16 +379,17 @@ fn time_of_prusa_slicer() {
         }
         text += "M204 S1250\n";
     }
-    text += "G1 E-2.24 F4200\nG1 F8640 X84.7 Y82.777 E-.912\nG1 E-.048 F4200\nG1 Z3.2 F10800\nG1 E-1 F2100\nG1 Z5 F720\nG1 X178 Y178 F4200\nG1 Z33 F720\n";
+    text += "G1 E-2.24 F4200\nG1 F8640 X84.7 Y82.777 E-.912\nG1 E-.048 F4200\nG1 Z3.2 F10800\nG1 E-1 F2100\n\
+        G1 Z5 F720\nG1 X178 Y178 F4200\nG1 Z33 F720\n";
     let path = parsed(&text);
-    let found = path.clone().as_stated().duration();
+    let found = path.clone().with_stated_limits().duration();
     assert!((found / 67.0 - 1.0).abs() < 0.01, "{found}");
     assert!(path.duration() < 0.94 * 67.0, "{}", path.duration());
 }
 
 #[test]
 fn estimates_are_compared() {
-    let told = |text: &str| parsed(text).compared("at F").unwrap();
+    let told = |text: &str| parsed(text).compare_estimate("at F").unwrap();
     let go = "G1 X100 F600\n";
     assert!(told(&format!("{go};TIME:10\n")).ends_with("and 10 s as its slicer estimates (+0.0 %)"));
     let off = told(&format!("{go}; estimated printing time (normal mode) = 12s\n"));
@@ -390,11 +401,17 @@ fn estimates_are_compared() {
         bambu.starts_with("from the first layer on the path takes 10 s at F") && bambu.contains("+0.0 %"),
         "{bambu}"
     );
-    assert_eq!(parsed(go).compared("at F"), None);
+    assert_eq!(parsed(go).compare_estimate("at F"), None);
     let lines = parsed(&format!(
         "M83\n{go};LAYER_CHANGE\n;TYPE:Perimeter\nG1 X0 E1\n;TYPE:Solid infill\nG1 X10 E3\n"
     ))
     .summary(1.75e-3);
-    assert!(lines[0].starts_with("the file prints 1 marked layer, middle lines from (0, 0, 0) mm to (100, 0, 0) mm, 9.621 mm³ of 4.0 mm"), "{lines:?}");
+    assert!(
+        lines[0].starts_with(
+            "the file prints 1 marked layer, centrelines from (0, 0, 0) mm to (100, \
+        0, 0) mm, 9.621 mm³ of 4.0 mm"
+        ),
+        "{lines:?}"
+    );
     assert_eq!(lines[1], "by feature: `Solid infill` 75.0 %, `Perimeter` 25.0 %");
 }

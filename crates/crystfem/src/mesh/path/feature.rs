@@ -1,11 +1,11 @@
-//! What a bead is for: names of slicers, made one.
+//! Features of beads: names of slicers, unified.
 
 use super::{Move, ToolPath};
 
-/// What is laid before the first layer, where a file marks layers.
-pub(super) const BEFORE: &str = "before the first layer";
+/// Feature of moves before the first layer, in files with layer marks.
+pub(super) const BEFORE_FIRST_LAYER: &str = "before the first layer";
 
-/// Names under which beads can be left out, whatever a slicer calls them.
+/// Unified feature names, by which beads can be removed for any slicer.
 pub const FAMILIES: [&str; 20] = [
     "skirt",
     "brim",
@@ -29,14 +29,14 @@ pub const FAMILIES: [&str; 20] = [
     "mixed",
 ];
 
-/// A name in small letters, with dashes: `Skirt/Brim` as `skirt-brim`.
+/// Converts a name to lower case with dashes: `Skirt/Brim` to `skirt-brim`.
 pub(super) fn plain(name: &str) -> String {
     let lower = name.to_lowercase();
     let words = lower.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
     words.collect::<Vec<_>>().join("-")
 }
 
-/// The families of a plain name of PrusaSlicer, SuperSlicer, OrcaSlicer, Bambu Studio, Cura, Simplify3D or
+/// Unified names of a plain name of PrusaSlicer, SuperSlicer, OrcaSlicer, Bambu Studio, Cura, Simplify3D or
 /// ideaMaker.
 fn families(plain: &str) -> &'static [&'static str] {
     match plain {
@@ -70,8 +70,8 @@ fn families(plain: &str) -> &'static [&'static str] {
     }
 }
 
-/// Whether a feature of a file goes by a name.
-fn goes_by(feature: &str, name: &str) -> bool {
+/// Returns true if a feature of a file matches a name.
+fn has_name(feature: &str, name: &str) -> bool {
     let (own, asked) = (plain(feature), plain(name));
     let asked = match asked.as_str() {
         "prime-tower" => "wipe-tower",
@@ -82,22 +82,21 @@ fn goes_by(feature: &str, name: &str) -> bool {
     own == asked || families(&own).contains(&asked)
 }
 
-/// Whether a feature is no part of a body, but what a printer's own code lays.
+/// Returns true if a feature is not part of the body, but purged by the printer's own code.
 pub(super) fn is_purge(feature: &str) -> bool {
     families(&plain(feature)).contains(&"purge")
 }
 
 impl ToolPath {
-    /// The name of what a move lays, as the file has it; empty where it has none.
+    /// Feature of a move, as named in the file; empty if unnamed.
     pub fn feature(&self, one: &Move) -> &str {
         self.features.get(usize::from(one.feature)).map_or("", String::as_str)
     }
 
-    /// Features that are laid, with the share of each in the filament fed, largest first; `""` of what has no
-    /// name.
+    /// Printed features with their fractions of the filament fed, largest first; `""` for unnamed ones.
     pub fn shares(&self) -> Vec<(&str, f64)> {
         let mut fed = vec![0.0; self.features.len().max(1)];
-        for one in self.printing() {
+        for one in self.printing_moves() {
             if let Some(sum) = fed.get_mut(usize::from(one.feature)) {
                 *sum += one.fed;
             }
@@ -110,11 +109,11 @@ impl ToolPath {
         shares
     }
 
-    /// The same path without beads of a name (one of [`FAMILIES`], or as the file has it): their moves lay
-    /// nothing down. Also how many that are; `None` for a name that is neither.
-    pub fn without(&mut self, name: &str) -> Option<usize> {
-        let hit: Vec<bool> = self.features.iter().map(|feature| goes_by(feature, name)).collect();
-        let known = hit.contains(&true) || FAMILIES.iter().any(|family| goes_by(family, name));
+    /// Turns beads of a feature (one of [`FAMILIES`], or a name of the file) into travel moves. Returns their
+    /// number; `None` for an unknown name.
+    pub fn remove_feature(&mut self, name: &str) -> Option<usize> {
+        let hit: Vec<bool> = self.features.iter().map(|feature| has_name(feature, name)).collect();
+        let known = hit.contains(&true) || FAMILIES.iter().any(|family| has_name(family, name));
         let mut count = 0;
         for one in self.moves.iter_mut().filter(|one| one.prints) {
             if hit.get(usize::from(one.feature)) == Some(&true) {

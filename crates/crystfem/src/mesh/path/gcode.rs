@@ -1,50 +1,49 @@
-//! A reader of G-code.
+//! Reader of G-code.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use super::comments::Comments;
 use super::limits::Limits;
-use super::line::{self, Command as Line, Words};
-use super::printer::{Printer, With};
-use super::remark::Remarks;
-use super::{Command, Setting, ToolPath, error, told};
+use super::line::{self, GcodeCommand, Words};
+use super::printer::{MoveAttributes, Printer};
+use super::{Command, Setting, ToolPath, error, list_counts};
 use crate::error::Error;
 
 /// 0 °C, K.
 pub(super) const CELSIUS: f64 = 273.15;
-/// Tools above this are none: firmwares use such numbers for other things.
-const MOST_TOOLS: f64 = 63.0;
+/// Largest tool number: firmwares use larger ones for other purposes.
+const MAX_TOOLS: f64 = 63.0;
 
-/// Reads a G-code file as slicers write it for Marlin, Klipper and RepRapFirmware: G0 and G1 with X, Y, Z, E,
-/// F, also without the command in a line of words alone; arcs G2 and G3 in the XY plane with I and J or R, in
-/// chords that are 0.01 mm from the arc at most; G4 (wait), G20 and G21 (inch, mm), G28 (home), G90 and G91,
-/// M82 and M83 (absolute, relative; once M82 or M83 has come, G90 and G91 leave E alone), G92 (here is …),
-/// M200 (E is a volume), tools (T), M104 and M109 of the selected tool or that of T, G10 with P and S
-/// likewise, M140 and M190 (temperatures; how long it is waited for them is not known), M106 and M107 of the
-/// part's fan; limits of the machine (M201 to M205, M566, SET_VELOCITY_LIMIT), which [`ToolPath::as_stated`]
-/// applies; SAVE_GCODE_STATE and RESTORE_GCODE_STATE; features, heights and layers in comments. A move lays
-/// material down if E grows along it and it goes across. Velocity is F all along a move. Other commands are
-/// passed over and counted in a note.
+/// Reads a G-code file for Marlin, Klipper or RepRapFirmware: G0 and G1 with X, Y, Z, E, F, also without the
+/// command in a line of words alone; arcs G2 and G3 in the XY plane with I and J or R, as chords within 0.01
+/// mm of the arc; G4 (dwell), G20 and G21 (inch, mm), G28 (home), G90 and G91, M82 and M83 (absolute,
+/// relative; after M82 or M83, G90 and G91 do not affect E), G92 (set position), M200 (E is a volume), tools
+/// (T), M104 and M109 of the selected tool or that of T, G10 with P and S likewise, M140 and M190
+/// (temperatures; the waiting time is unknown), M106 and M107 of the part fan; machine limits (M201 to M205,
+/// M566, SET_VELOCITY_LIMIT), which [`ToolPath::with_stated_limits`] applies; SAVE_GCODE_STATE and
+/// RESTORE_GCODE_STATE; features, heights and layers in comments. A move deposits material if E increases
+/// along it and it moves horizontally. Velocity is F all along a move. Other commands are skipped and counted
+/// in a note.
 ///
 /// # Errors
-/// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line for binary files and
-/// archives, words of moves that are no numbers, a move before any F, an F that is not positive, arcs without
-/// a centre or radius that fits, other curves (G5), other planes (G18, G19), and temperatures below absolute
-/// zero.
+/// [`Error::Shared`] if the file cannot be read; [`Error::File`] with the line for binary files and archives,
+/// words of moves that are not numbers, a move before any F, an F that is not positive, arcs without a valid
+/// centre or radius, other curves (G5), other planes (G18, G19), and temperatures below absolute zero.
 pub fn read_gcode(path: &Path) -> Result<ToolPath, Error> {
     parse(path, &crate::file::read_bytes(path)?)
 }
 
-/// [`read_gcode`], of bytes; `path` is for messages only.
+/// Reads G-code from bytes; `path` is for messages only.
 ///
 /// # Errors
-/// See [`read_gcode`].
+/// Errors of [`read_gcode`].
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<ToolPath, Error> {
     let bytes = text_of(path, bytes)?;
     let end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
     let lines = || (1..).zip(bytes.split(|byte| *byte == end));
     let mut limits = Limits::default();
-    let mut first = Remarks::new(false);
+    let mut first = Comments::new(false);
     for (_, text) in lines().filter(|(_, text)| text.contains(&b';')) {
         let text = String::from_utf8_lossy(text);
         if let (_, Some(comment)) = line::split(text.trim_end()) {
@@ -54,14 +53,14 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<ToolPath, Error> {
     if first.limits_ignored {
         limits = Limits::default();
     }
-    let mut reader = Reader::new(path, first, limits);
+    let mut reader = GcodeReader::new(path, first, limits);
     for (line, text) in lines() {
         reader.line(line, &String::from_utf8_lossy(text))?;
     }
     reader.finish()
 }
 
-/// Without a byte order mark.
+/// Returns the text without a byte order mark.
 fn text_of<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a [u8], Error> {
     let refused = |found: &str, allowed: &str| Err(error(path, 1, "file", found, allowed));
     let start = &bytes[..bytes.len().min(512)];
@@ -79,32 +78,32 @@ fn text_of<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a [u8], Error> {
     }
 }
 
-/// What is read so far.
-struct Reader<'a> {
+/// State of the reader.
+struct GcodeReader<'a> {
     path: &'a Path,
     printer: Printer,
-    remarks: Remarks,
+    remarks: Comments,
     tool_path: ToolPath,
     limits: Limits,
-    /// Commands passed over.
+    /// Counts of skipped commands.
     skipped: BTreeMap<String, usize>,
-    /// Temperatures of tools that have been set one.
+    /// Temperatures of tools that have been set.
     hot: BTreeMap<u16, f64>,
-    /// The last of G0 to G3.
+    /// Last motion command, G0 to G3.
     motion: Option<f64>,
-    /// Lines that repeat it.
+    /// Number of lines that repeat it.
     repeated: usize,
-    /// Whether the machine stands.
+    /// True while the machine stands.
     stopped: bool,
-    /// A factor of flow or velocity that is not 100 %.
+    /// Factors of flow or velocity other than 100 %.
     factors: Vec<String>,
-    /// What a change of filament takes, s.
+    /// Duration of a filament change, s.
     change: f64,
 }
 
-impl<'a> Reader<'a> {
-    fn new(path: &'a Path, first: Remarks, limits: Limits) -> Self {
-        let mut remarks = Remarks::new(first.layers > 0);
+impl<'a> GcodeReader<'a> {
+    fn new(path: &'a Path, first: Comments, limits: Limits) -> Self {
+        let mut remarks = Comments::new(first.layers > 0);
         let mut first_volume = None;
         (remarks.estimate, remarks.filaments) = (first.estimate, first.filaments);
         (remarks.bambu, remarks.per_minute) = (first.bambu, first.per_minute);
@@ -112,7 +111,7 @@ impl<'a> Reader<'a> {
         let mut printer = Printer::new();
         if remarks.volumetric {
             let diameter = remarks.filaments.first().copied().unwrap_or(super::FILAMENT);
-            printer.volumetric = (0..=MOST_TOOLS as u16).map(|tool| (tool, diameter)).collect();
+            printer.volumetric = (0..=MAX_TOOLS as u16).map(|tool| (tool, diameter)).collect();
             first_volume = Some(diameter);
         }
         Self {
@@ -135,8 +134,10 @@ impl<'a> Reader<'a> {
         let (code, comment) = line::split(text.trim_end());
         for command in line::commands(&code) {
             match command {
-                Line::Code(letter, number, words) => self.code(line, &code, letter, number, &words)?,
-                Line::Again(words) => match self.motion {
+                GcodeCommand::Code(letter, number, words) => {
+                    self.code(line, &code, letter, number, &words)?
+                }
+                GcodeCommand::Again(words) => match self.motion {
                     Some(motion) => {
                         self.repeated += 1;
                         self.run_command(line, &code, motion, &words)?;
@@ -144,7 +145,7 @@ impl<'a> Reader<'a> {
                     None if words.wrong.is_some() => return Err(self.wrong(line, &words)),
                     None => self.skip("words without a command"),
                 },
-                Line::Named(name, rest) => self.named(name, rest),
+                GcodeCommand::Named(name, rest) => self.named(name, rest),
             }
         }
         if let Some(comment) = comment {
@@ -172,7 +173,7 @@ impl<'a> Reader<'a> {
         }
         self.motion = Some(code);
         let arc = [None, None, Some(-1.0), Some(1.0)][code as usize];
-        let with = With {
+        let with = MoveAttributes {
             height: self.remarks.height(),
             feature: self.remarks.feature,
             limits: (self.tool_path.limits.len() - 1) as u32,
@@ -245,7 +246,7 @@ impl<'a> Reader<'a> {
                     self.factors.push(factor);
                 }
             }
-            _ if letter == 'T' && number.fract() == 0.0 && (0.0..=MOST_TOOLS).contains(&number) => {
+            _ if letter == 'T' && number.fract() == 0.0 && (0.0..=MAX_TOOLS).contains(&number) => {
                 self.select(number as u16);
             }
             _ => self.skip(&code),
@@ -277,14 +278,14 @@ impl<'a> Reader<'a> {
         self.tool_path.commands.push(Command { time: self.printer.time, setting, value });
     }
 
-    /// `tool`: of a nozzle, and which where the command says so.
+    /// Sets a temperature; `tool` is `Some` for a nozzle, with the tool if the command states it.
     fn heat(&mut self, line: usize, celsius: f64, tool: Option<Option<f64>>) -> Result<(), Error> {
         if celsius < -CELSIUS {
             return Err(error(self.path, line, "temperature", celsius, "-273.15 °C or above"));
         }
         let value = celsius + CELSIUS;
         let Some(tool) = tool else {
-            // off: how it cools is the schedule's
+            // off: the schedule sets how it cools
             self.set(if celsius == 0.0 { Setting::BedOff } else { Setting::Bed }, value);
             return Ok(());
         };
@@ -293,7 +294,7 @@ impl<'a> Reader<'a> {
             return Ok(());
         }
         let own = self.printer.tool;
-        let tool = tool.filter(|tool| (0.0..=MOST_TOOLS).contains(tool)).map_or(own, |tool| tool as u16);
+        let tool = tool.filter(|tool| (0.0..=MAX_TOOLS).contains(tool)).map_or(own, |tool| tool as u16);
         self.hot.insert(tool, value);
         if tool == own {
             self.set(Setting::Nozzle, value);
@@ -310,7 +311,7 @@ impl<'a> Reader<'a> {
         }
         let speed = match words.value('S') {
             _ if code == "M107" => 0.0,
-            // RepRapFirmware writes a share
+            // RepRapFirmware writes a fraction
             Some(share) if share > 0.0 && share < 1.0 => share,
             Some(number) => number / 255.0,
             None => 1.0,
@@ -318,9 +319,9 @@ impl<'a> Reader<'a> {
         self.set(Setting::Fan, speed.clamp(0.0, 1.0));
     }
 
-    /// M200: D is the diameter, 0 ends it; S0 too.
+    /// Handles M200: D is the diameter; D0 or S0 ends it.
     fn volumetric(&mut self, words: &Words) {
-        let tool = words.value('T').map_or(self.printer.tool, |tool| tool.clamp(0.0, MOST_TOOLS) as u16);
+        let tool = words.value('T').map_or(self.printer.tool, |tool| tool.clamp(0.0, MAX_TOOLS) as u16);
         let diameter = words.value('D').map(|d| d * self.printer.unit);
         let known = || self.remarks.filaments.get(usize::from(tool)).copied().unwrap_or(super::FILAMENT);
         if words.value('S') == Some(0.0) || diameter == Some(0.0) {
@@ -344,7 +345,7 @@ impl<'a> Reader<'a> {
                 let extruder = line::keys(rest).find(|(key, _)| key == "EXTRUDER").map(|(_, value)| value);
                 let number = extruder.and_then(|name| name.strip_prefix("extruder"));
                 match number.map(|digits| if digits.is_empty() { Ok(0) } else { digits.parse::<u16>() }) {
-                    Some(Ok(tool)) if f64::from(tool) <= MOST_TOOLS => self.select(tool),
+                    Some(Ok(tool)) if f64::from(tool) <= MAX_TOOLS => self.select(tool),
                     _ => self.skip(&upper),
                 }
             }
@@ -357,7 +358,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Klipper's heaters by name; 0 is off.
+    /// Handles Klipper's heaters by name; 0 is off.
     fn heater(&mut self, rest: &str) {
         let of = |name: &str| line::keys(rest).find(|(key, _)| key == name).map(|(_, value)| value);
         let celsius = of("TARGET").map_or(Some(0.0), |text| text.parse::<f64>().ok());
@@ -376,7 +377,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// A macro that starts a print, with the temperatures that it is given.
+    /// Handles a macro that starts a print, with its temperatures.
     fn begin(&mut self, name: &str, rest: &str) {
         for (key, value) in line::keys(rest) {
             let Some(celsius) = value.parse::<f64>().ok().filter(|found| *found > 20.0 && *found < 600.0)
@@ -410,7 +411,7 @@ impl<'a> Reader<'a> {
         path.rest = printer.time - path.moves.last().map_or(0.0, |last| last.end);
         (path.features, path.layers) = (remarks.features, remarks.layers);
         path.estimate = remarks.estimate.map(|known| known.1);
-        // of the whole file; some slicers leave out what comes before the first layer
+        // estimate of the whole file; some slicers exclude moves before the first layer
         if remarks.estimate.is_none_or(|known| known.0 > 0) {
             path.first = 0;
         }
@@ -431,7 +432,8 @@ impl<'a> Reader<'a> {
                 "relative, as the axes"
             };
             path.notes.push(format!(
-                "{doubtful} moves feed between G91 and G90 without M83, the first in line {line}: E is read as {read} (firmwares differ)"
+                "{doubtful} moves feed between G91 and G90 without M83, the first in line {line}: E is read \
+                 as {read} (firmwares differ)"
             ));
         }
         if self.repeated > 0 {
@@ -444,7 +446,7 @@ impl<'a> Reader<'a> {
             ));
         }
         if !self.skipped.is_empty() {
-            path.notes.push(format!("commands not used: {}", told(&mut self.skipped)));
+            path.notes.push(format!("commands not used: {}", list_counts(&mut self.skipped)));
         }
         Ok(path)
     }

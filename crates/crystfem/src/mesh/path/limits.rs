@@ -1,18 +1,17 @@
-//! Limits of a machine that a file states (M201 to M205, M566, SET_VELOCITY_LIMIT, settings in comments), and
-//! what a move takes with them.
+//! Machine limits stated in a file (M201 to M205, M566, SET_VELOCITY_LIMIT, settings in comments), and ramps
+//! of moves with them.
 
 use super::line::{Words, keys};
 
 const AXES: [char; 4] = ['X', 'Y', 'Z', 'E'];
-/// Steps of velocity where a file states accelerations alone, m/s: defaults of Marlin.
+/// Default jerks of Marlin, for files that state accelerations alone, m/s.
 const JERK: [f64; 4] = [10e-3, 10e-3, 0.4e-3, 5e-3];
-/// Klipper's, of all corners, m/s.
+/// Default square corner velocity of Klipper, m/s.
 const SQUARE_CORNER: f64 = 5e-3;
-/// M203 above this is per minute, mm/s: no such printer moves so fast.
-const FAST: f64 = 2000.0;
+/// Largest plausible M203 in mm/s; larger values are per minute.
+const MAX_MILLIMETRES_PER_SECOND: f64 = 2000.0;
 
-/// A straight motion: how long it is, m, how fast, m/s, how it gets there, m/s², and with which velocity it
-/// may begin.
+/// Limits of a straight motion: length, m, velocity, m/s, acceleration, m/s², and entry velocity.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ramp {
     pub length: f64,
@@ -21,19 +20,19 @@ pub(super) struct Ramp {
     pub enter: f64,
 }
 
-/// Limits in SI units, by axis X, Y, Z, E.
+/// Machine limits in SI units, by axis X, Y, Z, E.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Limits {
     acceleration: [f64; 4],
     velocity: [f64; 4],
-    /// Of printing moves, other moves, filament alone.
+    /// Accelerations of printing, travel and feed-only moves.
     by_kind: [f64; 3],
     jerk: [f64; 4],
-    /// Of a junction, m; then no jerk.
+    /// Junction deviation, m, which replaces jerk.
     deviation: Option<f64>,
-    /// Whether a command or comment stated something of this.
+    /// True once a command or comment has stated a limit.
     pub stated: bool,
-    /// Whether accelerations are limited.
+    /// True if accelerations are limited.
     pub accelerates: bool,
 }
 
@@ -53,11 +52,12 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// Takes in M201, M203, M204, M205 or M566; `per_minute`: as RepRapFirmware has velocities.
+    /// Applies M201, M203, M204, M205 or M566; `per_minute` for the units of RepRapFirmware.
     pub fn command(&mut self, code: &str, words: &Words, per_minute: bool) {
         let positive =
             |letter: char| words.value(letter).filter(|found| *found > 0.0).map(|found| 1e-3 * found);
-        let minutes = |all: &[f64; 4]| per_minute || all.iter().any(|v| *v > 1e-3 * FAST);
+        let minutes =
+            |all: &[f64; 4]| per_minute || all.iter().any(|v| *v > 1e-3 * MAX_MILLIMETRES_PER_SECOND);
         let mut of_axes = AXES.map(|axis| positive(axis).unwrap_or(0.0));
         self.stated = true;
         match code {
@@ -82,18 +82,18 @@ impl Limits {
                 set(&mut self.jerk, of_axes);
                 if of_axes[0] > 0.0 {
                     self.deviation = None;
-                    // one value for both, as old firmwares have it
+                    // one value for both, in old firmwares
                     self.jerk[1] = if of_axes[1] > 0.0 { of_axes[1] } else { of_axes[0] };
                 }
                 self.deviation = positive('J').or(self.deviation);
             }
-            // mm/min always
+            // always in mm/min
             _ => set(&mut self.jerk, of_axes.map(|v| v / 60.0)),
         }
         self.update();
     }
 
-    /// Takes in Klipper's SET_VELOCITY_LIMIT.
+    /// Applies Klipper's SET_VELOCITY_LIMIT.
     pub fn velocity_limit(&mut self, rest: &str) {
         if !self.accelerates && self.jerk == JERK {
             self.jerk = [SQUARE_CORNER, SQUARE_CORNER, SQUARE_CORNER, 1e-3];
@@ -113,7 +113,7 @@ impl Limits {
         self.update();
     }
 
-    /// Takes in a setting that a slicer writes in a comment, `machine_max_jerk_x`.
+    /// Applies a slicer's setting in a comment, such as `machine_max_jerk_x`.
     pub fn setting(&mut self, key: &str, found: f64) {
         let Some((what, of)) = key.trim_start_matches("machine_max_").rsplit_once('_') else { return };
         if found.is_nan() || found <= 0.0 {
@@ -139,7 +139,7 @@ impl Limits {
         self.accelerates = self.acceleration[..2].iter().chain(&self.by_kind).any(|a| a.is_finite());
     }
 
-    /// One line of what they are.
+    /// Describes the limits in a line.
     pub fn describe(&self) -> String {
         let list = |all: &[f64]| {
             let values =
@@ -161,7 +161,8 @@ impl Limits {
         )
     }
 
-    /// What a motion along `delta` (X, Y, Z, E, m) at F = `velocity`, m/s, can do; `None` of no length.
+    /// Returns the ramp of a motion along `delta` (X, Y, Z, E, m) at F = `velocity`, m/s, and its direction;
+    /// `None` if the length is 0.
     pub fn ramp(&self, delta: [f64; 4], velocity: f64) -> Option<(Ramp, [f64; 4])> {
         let across = delta[..3].iter().map(|x| x * x).sum::<f64>().sqrt();
         let length = if across > 0.0 { across } else { delta[3].abs() };
@@ -187,7 +188,7 @@ impl Limits {
         Some((Ramp { length, velocity: top, acceleration, enter: 0.0 }, along))
     }
 
-    /// Velocity that a motion begins with from rest.
+    /// Largest entry velocity of a motion from rest.
     fn safe(&self, ramp: &Ramp, along: [f64; 4]) -> f64 {
         let of = |axis: usize| match along[axis].abs() * ramp.velocity {
             v if v > self.jerk[axis] => ramp.velocity * self.jerk[axis] / v,
@@ -196,8 +197,8 @@ impl Limits {
         (0..4).map(of).fold(ramp.velocity, f64::min)
     }
 
-    /// Velocity at which one motion may become the next, by the steps of velocity of its axes (a reversal
-    /// counts once), or by the deviation from the corner: v² = a δ sin(θ/2)/(1 − sin(θ/2)).
+    /// Largest velocity from one motion to the next, by the jerks of the axes (a reversal counts once), or by
+    /// junction deviation: v² = a δ sin(θ/2)/(1 − sin(θ/2)).
     pub fn corner(&self, before: Option<(&Ramp, [f64; 4])>, after: (&Ramp, [f64; 4])) -> f64 {
         let (next, to) = after;
         let Some((last, from)) = before else { return self.deviation.map_or(self.safe(next, to), |_| 0.0) };
@@ -218,12 +219,12 @@ impl Limits {
         }
         let corner = even * factor;
         let (first, second) = (self.safe(last, from), self.safe(next, to));
-        // to stop and go is as fast
+        // stopping and starting is as fast
         if first > 0.99 * corner && second > 0.99 * corner { second.min(even) } else { corner }
     }
 }
 
-/// Sets what is above 0.
+/// Sets the values above 0.
 fn set(all: &mut [f64; 4], found: [f64; 4]) {
     for (own, found) in all.iter_mut().zip(found) {
         if found > 0.0 {

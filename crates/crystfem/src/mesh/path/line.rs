@@ -2,31 +2,31 @@
 
 /// A command: `G1 X10`, or by name (`START_PRINT BED=60`).
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Command<'a> {
-    /// A letter and a number, and the words after it.
+pub(super) enum GcodeCommand<'a> {
+    /// Letter, number, and the words after them.
     Code(char, f64, Words),
-    /// Words alone: the last move again.
+    /// Words alone, which repeat the last move.
     Again(Words),
-    /// Anything else: its first word, and what follows.
+    /// Any other command: its first word, and the rest.
     Named(&'a str, &'a str),
 }
 
-/// Letters and their numbers.
+/// Letters with their numbers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Words {
     all: Vec<(char, f64)>,
-    /// What is no word, and ends them.
+    /// First invalid text, which ends the words.
     pub wrong: Option<String>,
 }
 
 impl Words {
-    /// The number of a letter; of several the last.
+    /// Number of a letter; the last if repeated.
     pub fn value(&self, letter: char) -> Option<f64> {
         self.all.iter().rev().find(|word| word.0 == letter).map(|word| word.1)
     }
 }
 
-/// A line without its comments in parentheses, its checksum and its comment, and the comment after `;`.
+/// Splits off the comment after `;`, and removes comments in parentheses and the checksum.
 pub(super) fn split(text: &str) -> (String, Option<&str>) {
     let mut depth = 0;
     let mut code = String::new();
@@ -44,8 +44,8 @@ pub(super) fn split(text: &str) -> (String, Option<&str>) {
     (code, comment)
 }
 
-/// The commands of a line without comments: one, or several that begin with G or M after a G.
-pub(super) fn commands(code: &str) -> Vec<Command<'_>> {
+/// Splits a line without comments into commands: one, or several that begin with G or M after a G.
+pub(super) fn commands(code: &str) -> Vec<GcodeCommand<'_>> {
     let code = without_number(code.trim());
     let Some(first) = code.chars().next().filter(|first| *first != '%') else { return Vec::new() };
     let head = code.find(|c: char| !(c.is_ascii_alphanumeric() || "_.".contains(c))).unwrap_or(code.len());
@@ -53,38 +53,38 @@ pub(super) fn commands(code: &str) -> Vec<Command<'_>> {
     let number = after.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
     if !first.is_ascii_alphabetic() || !number || code[..head].contains('_') {
         let end = code.find(char::is_whitespace).unwrap_or(code.len());
-        return vec![Command::Named(&code[..end], code[end..].trim())];
+        return vec![GcodeCommand::Named(&code[..end], code[end..].trim())];
     }
     let words = words(code);
     let upper = first.to_ascii_uppercase();
     if "XYZEFIJR".contains(upper) {
-        return vec![Command::Again(words)];
+        return vec![GcodeCommand::Again(words)];
     }
-    let mut all: Vec<Command> = Vec::new();
+    let mut all: Vec<GcodeCommand> = Vec::new();
     for (letter, number) in words.all {
         match all.last_mut() {
-            // a parameter M or G exists of no G code
-            Some(Command::Code('G', _, own)) if !"GM".contains(letter) => own.all.push((letter, number)),
-            Some(Command::Code(of, _, own)) if *of != 'G' => own.all.push((letter, number)),
-            _ => all.push(Command::Code(letter, number, Words::default())),
+            // no G code has a parameter M or G
+            Some(GcodeCommand::Code('G', _, own)) if !"GM".contains(letter) => own.all.push((letter, number)),
+            Some(GcodeCommand::Code(of, _, own)) if *of != 'G' => own.all.push((letter, number)),
+            _ => all.push(GcodeCommand::Code(letter, number, Words::default())),
         }
     }
     match all.last_mut() {
-        Some(Command::Code(_, _, own)) => own.wrong = words.wrong,
-        // the number itself is none
-        _ => return vec![Command::Again(Words { all: Vec::new(), wrong: words.wrong })],
+        Some(GcodeCommand::Code(_, _, own)) => own.wrong = words.wrong,
+        // the number itself is invalid
+        _ => return vec![GcodeCommand::Again(Words { all: Vec::new(), wrong: words.wrong })],
     }
     all
 }
 
-/// Without a line number `N10`.
+/// Removes a line number `N10`.
 fn without_number(code: &str) -> &str {
     let Some(rest) = code.strip_prefix(['N', 'n']) else { return code };
     let digits = rest.trim_start().trim_start_matches(|c: char| c.is_ascii_digit());
     if digits.len() < rest.trim_start().len() { digits.trim_start() } else { code }
 }
 
-/// Letters and their numbers, spaced or not; 0 for a letter alone (`G28 X`).
+/// Parses letters with their numbers, with or without spaces; 0 for a letter alone (`G28 X`).
 fn words(text: &str) -> Words {
     let mut words = Words::default();
     let mut rest = text;
@@ -106,7 +106,7 @@ fn words(text: &str) -> Words {
     words
 }
 
-/// `KEY=VALUE` words of a macro, keys in capitals.
+/// Parses `KEY=VALUE` words of a macro, with keys in upper case.
 pub(super) fn keys(rest: &str) -> impl Iterator<Item = (String, &str)> {
     rest.split_whitespace()
         .filter_map(|word| word.split_once('='))
@@ -121,10 +121,10 @@ mod tests {
     fn lines_of_every_dialect() {
         let told = |text: &str| -> Vec<String> {
             let (code, _) = split(text);
-            let one = |command: &Command| match command {
-                Command::Code(letter, number, words) => format!("{letter}{number} {:?}", words.all),
-                Command::Again(words) => format!("again {:?} {:?}", words.all, words.wrong),
-                Command::Named(name, rest) => format!("{name} | {rest}"),
+            let one = |command: &GcodeCommand| match command {
+                GcodeCommand::Code(letter, number, words) => format!("{letter}{number} {:?}", words.all),
+                GcodeCommand::Again(words) => format!("again {:?} {:?}", words.all, words.wrong),
+                GcodeCommand::Named(name, rest) => format!("{name} | {rest}"),
             };
             commands(&code).iter().map(one).collect()
         };

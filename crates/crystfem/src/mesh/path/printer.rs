@@ -1,20 +1,20 @@
-//! The state of a printer, and what its moves and arcs do to it.
+//! State of a printer, and its changes by moves and arcs.
 
-use super::{Motion, Move};
+use super::{MachineMotion, Move};
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
-/// Distance of chords from their arc at most, m.
-const CHORD: f64 = 1e-5;
-/// Chords of an arc at most.
-const MOST_CHORDS: f64 = 1e6;
-/// By how much the end of an arc may miss its circle: part of the radius, and m (digits of files).
-const MISS: (f64, f64) = (1e-2, 2e-5);
+/// Largest distance of chords from their arc, m.
+const CHORD_ERROR: f64 = 1e-5;
+/// Limit on chords of an arc.
+const MAX_CHORDS: f64 = 1e6;
+/// Largest distance of an arc's end from its circle: as a fraction of the radius, and m (digits of files).
+const ARC_TOLERANCE: (f64, f64) = (1e-2, 2e-5);
 
-/// What of a move cannot be.
+/// Invalid word of a move.
 pub(super) struct MoveError {
     pub what: &'static str,
-    /// `None`: the whole line.
+    /// Value found; `None` for the whole line.
     found: Option<f64>,
     pub allowed: String,
 }
@@ -25,36 +25,36 @@ impl MoveError {
     }
 }
 
-/// State of the printer; places in m as the printer counts them, with what G92 has added.
+/// State of the printer; positions in m in machine coordinates.
 #[derive(Debug, Default)]
 pub(super) struct Printer {
-    /// Metres per unit.
+    /// Length unit, m.
     pub unit: f64,
     place: [f64; 3],
-    /// Names of places minus places.
+    /// Offset of G92: stated minus machine position.
     offset: [f64; 3],
-    /// Filament fed, as named, in units of the file.
+    /// Filament fed, as stated, in units of the file.
     feed: f64,
     pub relative: bool,
-    /// Since M82 or M83, which alone rule then; before them E goes with the axes.
+    /// E mode after M82 or M83; before them E follows G90 and G91.
     pub relative_feed: Option<bool>,
-    /// m/s; 0 before the first F.
+    /// Velocity, m/s; 0 before the first F.
     velocity: f64,
     pub time: f64,
-    /// The selected tool.
+    /// Selected tool.
     pub tool: u16,
     /// Diameters of filament, m, of tools whose E is a volume (M200).
     pub volumetric: BTreeMap<u16, f64>,
-    /// Moves that feed between G91 and G90 without M83, which firmwares read in two ways, and the line of the
-    /// first.
+    /// Number of moves that feed between G91 and G90 without M83, which firmwares interpret differently, and
+    /// the line of the first.
     pub doubtful: (usize, u32),
-    /// States that SAVE_GCODE_STATE kept, by name.
-    saved: BTreeMap<String, Saved>,
+    /// States saved by SAVE_GCODE_STATE, by name.
+    saved: BTreeMap<String, SavedState>,
 }
 
-/// Modes, velocity and names of places, as [`Printer`] has them.
+/// Saved modes, velocity and offsets of a [`Printer`].
 #[derive(Clone, Copy, Debug)]
-struct Saved {
+struct SavedState {
     relative: bool,
     relative_feed: Option<bool>,
     velocity: f64,
@@ -62,31 +62,31 @@ struct Saved {
     feed: f64,
 }
 
-/// What comes with each move.
+/// Attributes of a move.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct With {
+pub(super) struct MoveAttributes {
     pub height: f64,
     pub feature: u16,
     pub limits: u32,
     pub line: u32,
-    /// Whether the machine stood before it.
+    /// True if the machine stood before it.
     pub stop: bool,
 }
 
 impl Printer {
-    /// At the origin, in millimetres.
+    /// Returns a printer at the origin, in millimetres.
     pub fn new() -> Self {
         Self { unit: 1e-3, ..Self::default() }
     }
 
-    /// Adds a move, or the chords of an arc that turns by the sign of `arc`; none where the nozzle stays.
+    /// Adds a move, or the chords of an arc that turns by the sign of `arc`; no move if the nozzle stays.
     pub fn apply(
         &mut self,
         value: impl Fn(char) -> Option<f64>,
         arc: Option<f64>,
-        with: With,
+        with: MoveAttributes,
         moves: &mut Vec<Move>,
-        motions: &mut Vec<Motion>,
+        motions: &mut Vec<MachineMotion>,
     ) -> Result<(), MoveError> {
         let velocity = |found| MoveError {
             what: "velocity F",
@@ -94,7 +94,7 @@ impl Printer {
             allowed: "positive and finite, before or in the first move".into(),
         };
         if let Some(feed) = value('F') {
-            // per minute; of 0 firmwares keep the one before
+            // per minute; firmwares ignore 0
             if feed != 0.0 {
                 self.velocity = feed * self.unit / 60.0;
             }
@@ -132,7 +132,7 @@ impl Printer {
                 (length, vec![self.place])
             }
         };
-        // filament alone takes its time too
+        // feed-only motions take time too
         let way = if length > 0.0 { length } else { fed.abs() };
         if way == 0.0 {
             return Ok(());
@@ -142,7 +142,7 @@ impl Printer {
         }
         let start = self.time;
         self.time += way / self.velocity;
-        let mut motion = Motion {
+        let mut motion = MachineMotion {
             delta: [0.0, 0.0, 0.0, fed],
             start,
             end: self.time,
@@ -153,7 +153,7 @@ impl Printer {
             motions.push(motion);
             return Ok(());
         }
-        // filament that comes while the nozzle goes up or down alone fills it again after a retraction
+        // filament fed during a vertical move alone refills the nozzle after a retraction
         let across = arc.is_some() || self.place[0] != from[0] || self.place[1] != from[1];
         let count = places.len() as f64;
         let mut before = (from, start);
@@ -165,7 +165,7 @@ impl Printer {
             };
             let (prints, fed) = (fed > 0.0 && across, fed / count);
             let (from, start) = before;
-            let With { height, feature, line, .. } = with;
+            let MoveAttributes { height, feature, line, .. } = with;
             moves.push(Move { from, to, start, end, prints, fed, height, feature, tool: self.tool, line });
             motion.delta = [to[0] - from[0], to[1] - from[1], to[2] - from[2], fed];
             (motion.start, motion.end) = (start, end);
@@ -176,8 +176,8 @@ impl Printer {
         Ok(())
     }
 
-    /// Length of an arc in the XY plane from a place to the present one, and the ends of its chords, of equal angles: the same
-    /// XY is a full circle; z rises evenly.
+    /// Computes the length of an arc in the XY plane from a position to the present one, and the ends of its
+    /// chords of equal angle; equal XY is a full circle; z rises linearly.
     fn arc(
         &self,
         from: [f64; 3],
@@ -201,12 +201,12 @@ impl Printer {
             (None, None, Some(radius)) => {
                 let own = radius.abs() * self.unit;
                 // half a digit of the file
-                if own < 0.5 * way - MISS.1 {
+                if own < 0.5 * way - ARC_TOLERANCE.1 {
                     let allowed = format!("{} or more in size", 0.5 * way / self.unit);
                     return Err(MoveError { what: "radius of an arc", found: Some(radius), allowed });
                 }
                 let height = (own * own - 0.25 * way * way).max(0.0).sqrt() / way;
-                // a negative radius is the longer way round
+                // a negative radius selects the longer arc
                 let side = turn * radius.signum();
                 [
                     from[0] + 0.5 * across[0] - side * height * across[1],
@@ -218,7 +218,7 @@ impl Printer {
         let radius = |place: [f64; 3]| (place[0] - centre[0]).hypot(place[1] - centre[1]);
         let angle = |place: [f64; 3]| (place[1] - centre[1]).atan2(place[0] - centre[0]);
         let (first, last) = (radius(from), radius(to));
-        if (first - last).abs() > MISS.0 * first + MISS.1 {
+        if (first - last).abs() > ARC_TOLERANCE.0 * first + ARC_TOLERANCE.1 {
             let [first, last] = [first, last].map(|radius| (1e9 * radius).round() / 1e9 / self.unit);
             let allowed = format!("as far as its start, {first} from its centre");
             return Err(MoveError {
@@ -235,8 +235,8 @@ impl Printer {
             sweep = TAU;
         }
         // sagitta r (1 − cos(φ/2))
-        let most = 2.0 * (1.0 - CHORD / first).clamp(-1.0, 1.0).acos();
-        let count = (sweep / most).ceil().clamp(1.0, MOST_CHORDS) as u32;
+        let most = 2.0 * (1.0 - CHORD_ERROR / first).clamp(-1.0, 1.0).acos();
+        let count = (sweep / most).ceil().clamp(1.0, MAX_CHORDS) as u32;
         let begin = angle(from);
         let places = (1..=count).map(|k| {
             if k == count {
@@ -249,7 +249,7 @@ impl Printer {
         Ok(((0.5 * (first + last) * sweep).hypot(up), places.collect()))
     }
 
-    /// To zero along the axes named, or along all.
+    /// Homes the named axes, or all.
     pub fn home(&mut self, value: impl Fn(char) -> Option<f64>) {
         let named = ['X', 'Y', 'Z'].map(|letter| value(letter).is_some());
         for d in 0..3 {
@@ -260,7 +260,7 @@ impl Printer {
         }
     }
 
-    /// G92: the place keeps, its name changes.
+    /// Handles G92: sets the stated position without motion.
     pub fn rename(&mut self, value: impl Fn(char) -> Option<f64>) {
         for (d, letter) in ['X', 'Y', 'Z'].into_iter().enumerate() {
             if let Some(number) = value(letter) {
@@ -277,14 +277,14 @@ impl Printer {
         }
     }
 
-    /// Keeps modes, velocity and names of places under a name, as Klipper does.
+    /// Saves modes, velocity and offsets under a name, like Klipper.
     pub fn save(&mut self, name: &str) {
         let Self { relative, relative_feed, velocity, offset, feed, .. } = *self;
-        let state = Saved { relative, relative_feed, velocity, offset, feed };
+        let state = SavedState { relative, relative_feed, velocity, offset, feed };
         self.saved.insert(name.to_owned(), state);
     }
 
-    /// Takes them back; places stay where they are.
+    /// Restores them; the position stays.
     pub fn restore(&mut self, name: &str) {
         if let Some(saved) = self.saved.get(name).copied() {
             (self.relative, self.relative_feed) = (saved.relative, saved.relative_feed);

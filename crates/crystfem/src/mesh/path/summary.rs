@@ -1,32 +1,34 @@
-//! What a file prints, in lines for who wrote it.
+//! Summary of a printed file for its author.
 
 use super::ToolPath;
 use polycore::numerics::bounds;
 
-/// A printing move that falls by more than this, and more steeply, lays nothing on anything, m.
-const FALL: f64 = 1e-3;
-const STEEP: f64 = 0.2;
-/// Features that are listed.
-const LISTED: usize = 12;
+/// Drop of a printing move, m, above which it may print into the air.
+const LOOSE_DROP: f64 = 1e-3;
+/// Slope of such a drop.
+const LOOSE_SLOPE: f64 = 0.2;
+/// Largest number of listed features.
+const MAX_LISTED: usize = 12;
 
 impl ToolPath {
-    /// Tools that lay something, ascending.
+    /// Tools that print, ascending.
     pub fn tools(&self) -> Vec<u16> {
-        let mut tools: Vec<u16> = self.printing().map(|one| one.tool).collect();
+        let mut tools: Vec<u16> = self.printing_moves().map(|one| one.tool).collect();
         tools.sort_unstable();
         tools.dedup();
         tools
     }
 
-    /// The same path without what has no room above the bed (z ≤ 0) or falls through the air, as the purges
-    /// of some printers do: how many moves, the line of the first, and the share of the filament.
-    pub fn without_loose(&mut self) -> Option<(usize, u32, f64)> {
+    /// Turns beads without room above the bed (z ≤ 0) or falling through the air, as in purges of some
+    /// printers, into travel moves. Returns their number, the line of the first, and their fraction of the
+    /// filament.
+    pub fn remove_loose(&mut self) -> Option<(usize, u32, f64)> {
         let whole = self.fed();
         let (mut count, mut line, mut fed) = (0, 0, 0.0);
         for one in self.moves.iter_mut().filter(|one| one.prints && one.fed > 0.0) {
             let across = (one.to[0] - one.from[0]).hypot(one.to[1] - one.from[1]);
             let fall = one.from[2] - one.to[2];
-            if one.to[2].max(one.from[2]) <= 0.0 || (fall > FALL && fall > STEEP * across) {
+            if one.to[2].max(one.from[2]) <= 0.0 || (fall > LOOSE_DROP && fall > LOOSE_SLOPE * across) {
                 line = if count == 0 { one.line } else { line };
                 count += 1;
                 fed += one.fed;
@@ -36,19 +38,20 @@ impl ToolPath {
         (count > 0).then(|| (count, line, fed / whole))
     }
 
-    /// Layers, box, filament, volume and time of what is printed, and the share of each feature in its
-    /// volume. `filament`: its diameter, m.
+    /// Layers, bounding box, filament, volume and time of the print, and the volume fraction of each feature.
+    /// `filament` is the diameter, m.
     pub fn summary(&self, filament: f64) -> Vec<String> {
-        let ends = || self.printing().flat_map(|one| [one.from, one.to]);
+        let ends = || self.printing_moves().flat_map(|one| [one.from, one.to]);
         let [low, high] = bounds(ends());
         let place = |at: [f64; 3]| {
             let [x, y, z] = at.map(|x| (1e6 * x).round() / 1e3);
             format!("({x}, {y}, {z}) mm")
         };
         let layers = if self.layers > 0 { self.layers } else { self.levels().len() };
-        let volume: f64 = self.printing().map(|one| one.volume(filament)).sum();
+        let volume: f64 = self.printing_moves().map(|one| one.volume(filament)).sum();
         let mut lines = vec![format!(
-            "the file prints {layers} {}, middle lines from {} to {}, {:.3} mm³ of {:.1} mm of filament, in {}",
+            "the file prints {layers} {}, centrelines from {} to {}, {:.3} mm³ of {:.1} mm of filament, in \
+             {}",
             match (self.layers > 0, layers) {
                 (true, 1) => "marked layer",
                 (true, _) => "marked layers",
@@ -65,18 +68,20 @@ impl ToolPath {
         if shares.iter().any(|(name, _)| !name.is_empty()) {
             let name =
                 |name: &str| if name.is_empty() { "without a name".to_owned() } else { format!("`{name}`") };
-            let list =
-                shares.iter().take(LISTED).map(|(of, share)| format!("{} {:.1} %", name(of), 100.0 * share));
-            let more = shares.len().saturating_sub(LISTED);
+            let list = shares
+                .iter()
+                .take(MAX_LISTED)
+                .map(|(of, share)| format!("{} {:.1} %", name(of), 100.0 * share));
+            let more = shares.len().saturating_sub(MAX_LISTED);
             let more = if more > 0 { format!(", {more} more") } else { String::new() };
             lines.push(format!("by feature: {}{more}", list.collect::<Vec<_>>().join(", ")));
         }
         lines
     }
 
-    /// How the duration compares with the slicer's estimate, where the file has one; what it was computed
-    /// with. An estimate that differs by more than a twentieth says what to do.
-    pub fn compared(&self, with: &str) -> Option<String> {
+    /// Compares the duration, computed as described by `with`, with the slicer's estimate, if present. An
+    /// estimate that differs by more than a twentieth comes with advice.
+    pub fn compare_estimate(&self, with: &str) -> Option<String> {
         let estimate = self.estimate?;
         let start = self.moves.get(self.first).map_or(0.0, |one| one.start);
         let own = self.duration() - start;
@@ -92,7 +97,7 @@ impl ToolPath {
     }
 }
 
-/// A duration to read: `1 h 2 min 3.5 s`.
+/// Formats a duration: `1 h 2 min 3.5 s`.
 pub(super) fn clock(seconds: f64) -> String {
     let (hours, minutes) = ((seconds / 3600.0).floor(), (seconds % 3600.0 / 60.0).floor());
     let rest = (10.0 * (seconds - 3600.0 * hours - 60.0 * minutes)).round() / 10.0;

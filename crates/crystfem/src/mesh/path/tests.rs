@@ -10,8 +10,8 @@ fn refused(text: &str, words: &[&str]) {
     assert!(words.iter().all(|word| error.contains(word)), "{error}");
 }
 
-/// A plate of 20 × 10 × 2 elements of 0.5 mm, 0.2 mm high, and lines along x at the rows' middles, there and back,
-/// 10 mm/s.
+/// Returns a plate of 20 × 10 × 2 elements of 0.5 mm, 0.2 mm high, and alternating lines along x at the
+/// centres of the rows, 10 mm/s.
 fn plate() -> (Mesh, ToolPath) {
     let mesh = Grid::uniform([0.0; 3], [0.01, 0.005, 4e-4], [20, 10, 2]).unwrap().mesh("plate").unwrap();
     let mut text = "G21\nG90\nM83\nG0 X0 Y0.25 Z0.2 F600\n".to_owned();
@@ -33,7 +33,7 @@ fn plate() -> (Mesh, ToolPath) {
 fn elements_appear_as_the_nozzle_passes() {
     let (mesh, path) = plate();
     let all: Vec<u32> = (0..400).collect();
-    let activation = path.activation(&mesh, &all, Bead { width: 5e-4, height: 2e-4 }).unwrap();
+    let activation = path.activation_times(&mesh, &all, Bead { width: 5e-4, height: 2e-4 }).unwrap();
     assert!(activation.missed.is_empty());
     let begin = path.moves.iter().find(|one| one.prints).unwrap().start;
     // a row lasts 1 s and the step to the next 0.05 s; centres lie at 0.25 mm, 0.75 mm, …
@@ -55,8 +55,8 @@ fn elements_appear_as_the_nozzle_passes() {
 }
 
 #[test]
-fn every_centre_is_found_that_a_search_of_all_finds() {
-    // slanted, rising, standing and far moves, beside a double loop over moves and elements
+fn activation_agrees_with_an_exhaustive_search() {
+    // slanted, rising, standing and distant moves against a double loop over moves and elements
     let mesh = Grid::uniform([0.0; 3], [0.01, 0.007, 0.002], [23, 17, 5]).unwrap().mesh("plate").unwrap();
     let line = |from: [f64; 3], to: [f64; 3], start: f64| Move {
         from,
@@ -76,7 +76,7 @@ fn every_centre_is_found_that_a_search_of_all_finds() {
     let path = ToolPath { moves, ..ToolPath::default() };
     let bead = Bead { width: 1.3e-3, height: 5e-4 };
     let all: Vec<u32> = (0..mesh.element_count() as u32).collect();
-    let activation = path.activation(&mesh, &all, bead).unwrap();
+    let activation = path.activation_times(&mesh, &all, bead).unwrap();
     for element in all {
         let [x, y, z] = mesh.centre(element);
         let mut first = f64::INFINITY;
@@ -105,7 +105,7 @@ fn a_raster_fills_its_bar() {
     // ten lines of 1 s and nine steps of 0.05 s
     let path = ToolPath::raster(area, bead, 2, 0.01, 12.0).unwrap();
     assert_eq!(path.moves.len(), 20 + 19);
-    let activation = path.activation(&mesh, &all, bead).unwrap();
+    let activation = path.activation_times(&mesh, &all, bead).unwrap();
     assert!(activation.missed.is_empty());
     for (element, time) in activation.times.iter().enumerate() {
         let (column, row, layer) = (element % 20, element / 20 % 10, element / 200);
@@ -130,7 +130,7 @@ fn gaps_can_be_filled() {
         .map(|one| Move { prints: one.prints && one.to[0] > one.from[0] && one.to[2] < 3e-4, ..one })
         .collect();
     let path = ToolPath { moves, ..ToolPath::default() };
-    let mut activation = path.activation(&mesh, &all, Bead { width: 5e-4, height: 2e-4 }).unwrap();
+    let mut activation = path.activation_times(&mesh, &all, Bead { width: 5e-4, height: 2e-4 }).unwrap();
     assert_eq!(activation.missed.len(), 300);
     // the second layer was never printed
     assert_eq!(activation.fill(&mesh), 200);
@@ -141,8 +141,9 @@ fn gaps_can_be_filled() {
 
 #[test]
 fn codes_and_their_forms() {
-    let text = "; a comment\nN10 G21 ; mm*\nM104 S220\nM117 Printing... (1/2)\nG28\nG92 E0\nG1 F1200\nG1X10Y0E1\n\
-                g1 x10 y20 e1.5 (two) f600\nG4 P500\nG91\nG1 Z0.2 F60\nG90\nG92 X0 E0\nG1 X5 E1 F300*71\nG1 E0\nG1 E2\nG20\nG0 X1\n";
+    let text = "; a comment\nN10 G21 ; mm*\nM104 S220\nM117 Printing... (1/2)\nG28\nG92 E0\nG1 F1200\n\
+        G1X10Y0E1\ng1 x10 y20 e1.5 (two) f600\nG4 P500\nG91\nG1 Z0.2 F60\nG90\nG92 X0 E0\nG1 X5 E1 F300*71\n\
+        G1 E0\nG1 E2\nG20\nG0 X1\n";
     let path = parsed(text);
     let places: Vec<[f64; 3]> = path.moves.iter().map(|one| one.to).collect();
     let exact = [
@@ -163,13 +164,13 @@ fn codes_and_their_forms() {
     }
     assert_eq!(path.notes, ["commands not used: M117 (1)"]);
     assert_eq!(path.commands, [Command { time: 0.0, setting: Setting::Nozzle, value: 220.0 + 273.15 }]);
-    let moved = path.clone().shifted([1.0, 0.0, 0.0]);
+    let moved = path.clone().translated([1.0, 0.0, 0.0]);
     assert_eq!(moved.moves[0].from, [1.0, 0.0, 0.0]);
     assert_eq!(moved.duration(), path.duration());
 }
 
 #[test]
-fn what_is_wrong_is_named_with_its_line() {
+fn errors_name_the_line() {
     refused("G21\nG1 X1\n", &["a.gcode:2: velocity F: found \"0\""]);
     refused("G1 X1 F-5\n", &["a.gcode:1: velocity F: found \"-5\""]);
     refused(
@@ -185,17 +186,19 @@ fn what_is_wrong_is_named_with_its_line() {
     refused("G1 X1.2.3 F100\n", &["a.gcode:1: word: found \"X1.2.3 F100\""]);
     refused("G1 X?\n", &["a.gcode:1: word: found \"?\""]);
     let (mesh, path) = plate();
-    let text = |result: Result<Activation, Error>| result.unwrap_err().to_string();
+    let text = |result: Result<ActivationTimes, Error>| result.unwrap_err().to_string();
     assert!(
-        text(path.activation(&mesh, &[0], Bead { width: 0.0, height: 1.0 }))
+        text(path.activation_times(&mesh, &[0], Bead { width: 0.0, height: 1.0 }))
             .contains("width of the bead: found 0")
     );
     let bead = Bead { width: 5e-4, height: 2e-4 };
-    assert!(text(path.activation(&mesh, &[400], bead)).contains("element: found 400; allowed: below 400"));
-    assert!(text(ToolPath::default().activation(&mesh, &[0], bead)).contains("prints nothing"));
+    assert!(
+        text(path.activation_times(&mesh, &[400], bead)).contains("element: found 400; allowed: below 400")
+    );
+    assert!(text(ToolPath::default().activation_times(&mesh, &[0], bead)).contains("prints nothing"));
     let mut bad = path.clone();
     bad.moves[3].to[1] = f64::NAN;
-    assert!(text(bad.activation(&mesh, &[0], bead)).contains("move of the path: found NaN"));
+    assert!(text(bad.activation_times(&mesh, &[0], bead)).contains("move of the path: found NaN"));
 }
 
 #[test]
@@ -222,9 +225,10 @@ fn a_table_of_moves() {
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
-/// Two lines of 10 mm along x over a brick that one of them misses by half of its length, the other wholly.
+/// A path of two lines of 10 mm along x over a brick: one misses it by half of its length, the other
+/// entirely.
 #[test]
-fn where_a_path_lies() {
+fn fraction_outside_and_centring() {
     let (mesh, _) = plate();
     let all: Vec<u32> = (0..400).collect();
     let bead = Bead { width: 5e-4, height: 2e-4 };
@@ -238,20 +242,20 @@ fn where_a_path_lies() {
     };
     let path =
         ToolPath { moves: vec![line([0.005, 0.0025], 0.0), line([0.1, 0.0025], 1.0)], ..ToolPath::default() };
-    assert!((path.outside(&mesh, &all, bead) - 0.75).abs() < 1e-12);
+    assert!((path.fraction_outside(&mesh, &all, bead) - 0.75).abs() < 1e-12);
     assert_eq!(path.bounds(bead), Some([[0.005, 0.0025, 0.0], [0.11, 0.0025, 2e-4]]));
     // over the whole bed and one more: nothing above the brick, nothing below it
     for z in [-1e-3, 1e-2] {
-        assert_eq!(path.clone().shifted([0.0, 0.0, z]).outside(&mesh, &all, bead), 1.0);
+        assert_eq!(path.clone().translated([0.0, 0.0, z]).fraction_outside(&mesh, &all, bead), 1.0);
     }
     let one =
         ToolPath { moves: vec![line([0.1, 0.3], 0.0)], ..ToolPath::default() }.centred(&mesh, &all, bead);
-    assert!(one.outside(&mesh, &all, bead) == 0.0 && (one.moves[0].from[1] - 0.0025).abs() < 1e-15);
+    assert!(one.fraction_outside(&mesh, &all, bead) == 0.0 && (one.moves[0].from[1] - 0.0025).abs() < 1e-15);
     assert_eq!(ToolPath::default().bounds(bead), None);
 }
 
-/// The arcs of tinyg's test: 270° clockwise and 90° anticlockwise of radius 10, a full circle of 20, a half one by R; exact
-/// lengths, chords within 0.01 mm, and filament along them.
+/// Arcs of tinyg's test, 270° clockwise and 90° anticlockwise of radius 10, a full circle of 20, a half
+/// circle by R, have exact lengths, chords within 0.01 mm, and filament along them.
 #[test]
 fn arcs_have_their_lengths() {
     let path = parsed(
@@ -287,39 +291,40 @@ fn arcs_have_their_lengths() {
     assert!((middle[1] + 0.0254).abs() < 1e-4 && (middle[2] - 0.0127).abs() < 4e-4, "{middle:?}");
 }
 
-/// From rest to rest: L/v + v/a where the velocity is reached, 2√(L/a) where not; through a corner of 90° at jerk speed.
+/// Times from rest to rest: L/v + v/a if the velocity is reached, otherwise 2√(L/a); through a corner of 90°
+/// at jerk speed.
 #[test]
 fn accelerations_take_their_time() {
-    let time = |text: &str| parsed(text).accelerated(0.5, 0.008).unwrap().duration();
+    let time = |text: &str| parsed(text).with_acceleration(0.5, 0.008).unwrap().duration();
     assert!((time("G1 X100 F3000\n") - (2.0 + 0.1)).abs() < 1e-12);
     assert!((time("G1 X2 F6000\n") - 2.0 * (0.002f64 / 0.5).sqrt()).abs() < 1e-12);
     // straight on as one move
     assert!((time("G1 X60 F3000\nG1 X100\n") - 2.1).abs() < 1e-12);
-    // from 50 mm/s down to 8 at the corner: twice (50 + 42)/500 s and what is left at 50 mm/s
+    // from 50 mm/s down to 8 at the corner: twice (50 + 42)/500 s and the remainder at 50 mm/s
     let ramp = (2.5e-3 - 0.64e-4 / 1.0 + 2.5e-3) / (2.0 * 0.5);
     let exact = 2.0 * ((0.05 + 0.042) / 0.5 + (0.1 - ramp) / 0.05);
     let found = time("G1 X100 F3000\nG1 Y100\n");
     assert!((found - exact).abs() < 1e-12, "{found} {exact}");
-    // a wait keeps its time, and the command after it moves with it
-    let path = parsed("G1 X100 F3000\nG4 S3\nM104 S200\nG1 Y100\n").accelerated(0.5, 0.008).unwrap();
+    // a dwell keeps its duration, and the command after it shifts with it
+    let path = parsed("G1 X100 F3000\nG4 S3\nM104 S200\nG1 Y100\n").with_acceleration(0.5, 0.008).unwrap();
     assert!((path.duration() - exact - 3.0).abs() < 1e-12);
     assert!((path.commands[0].time - path.moves[1].start).abs() < 1e-12);
-    assert!(parsed("G1 X1 F60\n").accelerated(0.0, 1.0).is_err());
+    assert!(parsed("G1 X1 F60\n").with_acceleration(0.0, 1.0).is_err());
 }
 
-/// cube.gcode of the formulation: the first line's bead is 0.449985 mm wide; widths of a bead from its filament.
+/// Bead widths follow from filament; cube.gcode of the formulation: the first bead is 0.449985 mm wide.
 #[test]
 fn beads_come_from_filament() {
     let path = parsed("M83\nG1 F600 Z0.25\nG1 X10 E0.4\nG1 Z0.5\nG1 X0 E0.4\nM106 S127.5\nG1 E-1\n");
     let area = 0.4 * std::f64::consts::PI * 1.75f64.powi(2) / 4.0 / 10.0;
-    let printed: Vec<&Move> = path.printing().collect();
+    let printed: Vec<&Move> = path.printing_moves().collect();
     assert!((1e6 * printed[0].area(1.75e-3) - area).abs() < 1e-12);
     assert!((path.fed() - 0.8e-3).abs() < 1e-15);
     let levels = path.levels();
     assert!(levels.len() == 2 && (levels[1] - 5e-4).abs() < 1e-15);
     assert!(path.heights(1.75e-3, None).iter().all(|height| (height - 2.5e-4).abs() < 1e-15));
     let width = stadium_width(1e-6 * area, 2.5e-4);
-    // its area back: rectangle and circle
+    // the area is recovered: rectangle and circle
     let (h, w) = (2.5e-4, width);
     assert!((h * (w - h) + 0.25 * std::f64::consts::PI * h * h - 1e-6 * area).abs() < 1e-18);
     assert_eq!(path.setting(Setting::Fan), [(path.moves[3].end, 0.5)]);
@@ -327,12 +332,12 @@ fn beads_come_from_filament() {
         parsed("M140 S60\nM190 S60\nG1 X10 F600\nM140 S55\nM140 S50\nG1 X0\nM140 S0\n").setting(Setting::Bed);
     assert_eq!(bed[..2], [(0.0, 333.15), (1.0, 323.15)]);
     assert!(bed.len() == 3 && bed[2].0 == 2.0 && bed[2].1.is_nan());
-    // filament alone is time without a move: 1 mm at 10 mm/s
+    // feeding takes time without a move: 1 mm at 10 mm/s
     assert!((path.rest - 0.1).abs() < 1e-12);
 }
 
-/// Files as slicers write them, with figures of a reader of our own in Python (formulation-print.md, part E):
-/// filament of printing moves, time at F with waits, and with 500 mm/s² and a jerk of 8 mm/s.
+/// Slicer files agree with an own reader in Python (formulation-print.md, part E): filament of printing
+/// moves, time at F with dwells, and with 500 mm/s² and a jerk of 8 mm/s.
 #[test]
 fn files_of_slicers() {
     // Zugstab_small.gcode is a file of PeriLab (BSD-3-Clause, see its head); the others are not ours to copy
@@ -351,7 +356,7 @@ fn files_of_slicers() {
         let path = read_gcode(&path).unwrap();
         assert!((1e3 * path.fed() - fed).abs() < 5e-5, "{file}: {}", path.fed());
         assert!((path.duration() - wait - even).abs() < 5.1e-3, "{file}: {}", path.duration());
-        let planned = path.clone().accelerated(0.5, 8e-3).unwrap();
+        let planned = path.clone().with_acceleration(0.5, 8e-3).unwrap();
         assert!((planned.duration() - wait - limited).abs() < 5.1e-3, "{file}: {}", planned.duration());
         assert!((path.setting(Setting::Bed)[0].1 - 273.15 - bed).abs() < 1e-9, "{file}");
     }

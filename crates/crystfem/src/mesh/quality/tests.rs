@@ -1,5 +1,5 @@
 use super::*;
-use crate::mesh::{Grid, Split};
+use crate::mesh::{CellSplit, Grid};
 
 fn brick() -> Mesh {
     Grid::uniform([0.0; 3], [1.0; 3], [2, 2, 2]).unwrap().mesh("brick").unwrap()
@@ -43,14 +43,14 @@ fn the_volume_of_a_hexahedron_between_warped_sides() {
 }
 
 #[test]
-fn inverted_elements_and_slivers_are_named_with_their_place() {
+fn inverted_elements_and_slivers_are_refused() {
     let mut mesh = brick();
     mesh.hexahedra[5].swap(0, 6);
     refused(
         &mesh,
         &["hexahedron 5 at (7.500000e-1, 2.500000e-1, 7.500000e-1) m", "inverted", "allowed: above 0"],
     );
-    // only one corner pushed through: the Gauss points do not see it
+    // only one corner inverted: Gauss points do not detect it
     let mut mesh = brick();
     mesh.points[0] = [0.26, 0.26, 0.26];
     refused(&mesh, &["hexahedron 0 at", "inverted"]);
@@ -67,7 +67,7 @@ fn inverted_elements_and_slivers_are_named_with_their_place() {
 }
 
 #[test]
-fn numbers_that_are_wrong_are_named() {
+fn invalid_node_numbers_are_refused() {
     refused(&Mesh::default(), &["no hexahedra, tetrahedra or wedges"]);
     let mut mesh = brick();
     mesh.points[3][1] = f64::INFINITY;
@@ -86,7 +86,7 @@ fn numbers_that_are_wrong_are_named() {
 }
 
 #[test]
-fn sets_that_are_wrong_are_named() {
+fn invalid_sets_are_refused() {
     let with = |set: Vec<u32>| {
         let mut mesh = brick();
         mesh.element_sets.insert("hot".into(), set);
@@ -106,8 +106,8 @@ fn sets_that_are_wrong_are_named() {
 }
 
 #[test]
-fn what_should_be_looked_at_is_noted() {
-    // the upper half on nodes of its own: 9 doubled nodes, 2 parts
+fn doubtful_meshes_get_notes() {
+    // the upper half with its own nodes: 9 duplicate nodes, 2 parts
     let mut mesh = brick();
     let copies: Vec<[f64; 3]> = mesh.points[9..18].to_vec();
     mesh.points.extend(copies);
@@ -128,7 +128,7 @@ fn what_should_be_looked_at_is_noted() {
 }
 
 #[test]
-fn a_tetrahedron_at_half_a_side_is_noted() {
+fn half_faces_are_noted() {
     let mut mesh = Grid::uniform([0.0; 3], [1.0; 3], [1, 1, 1]).unwrap().mesh("brick").unwrap();
     mesh.points.push([0.3, 0.3, 2.0]);
     mesh.tetrahedra.push([4, 5, 7, 8]);
@@ -139,7 +139,7 @@ fn a_tetrahedron_at_half_a_side_is_noted() {
 fn a_large_mesh_of_tetrahedra_passes() {
     let grid = Grid::uniform([0.0; 3], [1.0; 3], [12, 12, 12]).unwrap();
     let block = crate::mesh::Block { name: "brick".into(), lower: [0.0; 3], upper: [1.0; 3] };
-    let mesh = grid.blocks(&[block], Split::SixTetrahedra).unwrap();
+    let mesh = grid.blocks(&[block], CellSplit::SixTetrahedra).unwrap();
     let quality = check(&mesh, None).unwrap();
     // more than one work item
     assert!(mesh.element_count() > 2 * 4096 && quality.notes.is_empty());

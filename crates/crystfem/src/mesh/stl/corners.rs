@@ -1,15 +1,15 @@
-//! Corners of the triangles of an STL file, text or bytes.
+//! Corners of the triangles of an STL file, text or binary.
 
 use std::path::Path;
 
 use crate::error::Error;
 use crate::file::line_error;
 
-/// Three of each triangle, and what was passed over.
+/// Three corners of each triangle, and a note on ignored bytes.
 pub(super) type Corners = (Vec<[f32; 3]>, Option<String>);
 
-/// Reads either form: bytes where the number of triangles that bytes 81 to 84 announce fits into the file (as text these four are
-/// above half a milliard), whatever the header says.
+/// Reads either encoding: binary if the number of triangles in bytes 81 to 84 fits the file (as text these
+/// four exceed 5e8), with any header.
 ///
 /// # Errors
 /// [`Error::File`] with the line of text, or the sizes in bytes.
@@ -17,7 +17,8 @@ pub(super) fn corners(path: &Path, bytes: &[u8]) -> Result<Corners, Error> {
     let announced = bytes.get(80..84).and_then(|four| four.try_into().ok()).map(u32::from_le_bytes);
     let needed = announced.map(|count| 84 + 50 * u64::from(count)).filter(|needed| *needed > 84);
     if let Some(needed) = needed.filter(|needed| *needed <= bytes.len() as u64) {
-        let list: Vec<[f32; 3]> = bytes[84..needed as usize].chunks_exact(50).flat_map(of_triangle).collect();
+        let list: Vec<[f32; 3]> =
+            bytes[84..needed as usize].chunks_exact(50).flat_map(triangle_corners).collect();
         if let Some(wrong) = list.iter().position(|corner| corner.iter().any(|x| !x.is_finite())) {
             let found = format!("{:?} in triangle {}", list[wrong], wrong / 3 + 1);
             return Err(line_error(path, 1, "corner of a triangle", found, "finite numbers"));
@@ -28,7 +29,7 @@ pub(super) fn corners(path: &Path, bytes: &[u8]) -> Result<Corners, Error> {
     }
     let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let word = start.trim_ascii_start().get(..5).unwrap_or(b"");
-    // four letters of text are a count of 0x09090909 at least
+    // four characters of text are a count of at least 0x09090909
     let is_text = announced.is_none_or(|count| count >= 0x0909_0909);
     if !word.eq_ignore_ascii_case(b"solid") || !is_text {
         let found = match announced {
@@ -43,12 +44,12 @@ pub(super) fn corners(path: &Path, bytes: &[u8]) -> Result<Corners, Error> {
 }
 
 /// Corners of a binary triangle, after its normal.
-fn of_triangle(bytes: &[u8]) -> [[f32; 3]; 3] {
+fn triangle_corners(bytes: &[u8]) -> [[f32; 3]; 3] {
     let number = |k: usize| bytes[4 * k..].first_chunk().map_or(f32::NAN, |four| f32::from_le_bytes(*four));
     [3, 6, 9].map(|k| [number(k), number(k + 1), number(k + 2)])
 }
 
-/// Words in any case, lines as they come: one or many words on each.
+/// Parses text with keywords in upper or lower case, and any number of words a line.
 fn text(path: &Path, bytes: &[u8]) -> Result<Vec<[f32; 3]>, Error> {
     // old programs end lines with a carriage return alone
     let end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
@@ -74,7 +75,7 @@ fn text(path: &Path, bytes: &[u8]) -> Result<Vec<[f32; 3]>, Error> {
                     corners.push(corner);
                 }
                 "facet" => begun = corners.len(),
-                // a normal is not used, and some programs write nan; a name may be any words
+                // normals are ignored, and some programs write nan; a name may be any words
                 "normal" => _ = (words.next(), words.next(), words.next()),
                 "solid" | "endsolid" => break,
                 "endfacet" if corners.len() != begun + 3 => {

@@ -1,6 +1,6 @@
-//! Shells of a surface: whether they are closed, and which side of each is outside.
+//! Shells of a surface: closure and orientation.
 
-use polycore::numerics::{Sets, bounds};
+use polycore::numerics::{DisjointSets, bounds};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
@@ -8,33 +8,35 @@ use super::crossing;
 use crate::error::Error;
 use nalgebra::Vector3;
 
-/// By how much a point that tells where a shell is lies inside its box, in parts of it: not on another shell's edges.
-const INWARDS: f64 = 1.37e-4;
+/// Depth inside a shell's box, as a fraction of it, of the points that locate the shell: off the edges of
+/// other shells.
+const INSET: f64 = 1.37e-4;
 
-/// Corners closer than this part of the largest extent are one.
-const WELD: f64 = 1e-6;
+/// Distance of corners to merge, over the largest extent.
+const MERGE_DISTANCE: f64 = 1e-6;
 
-/// Times that triangles are split, and open edges times their corners that are looked at.
-const ROUNDS: usize = 30;
-const MOST_PAIRS: usize = 100_000_000;
+/// Limit on passes of splitting.
+const MAX_SPLITS: usize = 30;
+const MAX_PAIRS: usize = 100_000_000;
 
-/// A shell: triangles joined by edges.
+/// A shell: triangles connected by edges.
 pub(super) struct Shell {
     triangles: Vec<u32>,
     bounds: [[f64; 3]; 2],
-    /// Six times its signed volume, m³.
+    /// Six times the signed volume, m³.
     six: f64,
 }
 
-/// The number of each point after points closer than [`WELD`] became one, the first of them.
+/// Merges points closer than [`MERGE_DISTANCE`]; returns the index of each after merging into the first of
+/// them.
 pub(super) fn weld(points: &[[f64; 3]]) -> Vec<u32> {
     let [low, high] = bounds(points.iter().copied());
     let size = (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
-    let near = WELD * size;
+    let near = MERGE_DISTANCE * size;
     if !(near > 0.0 && near.is_finite()) {
         return (0..points.len() as u32).collect();
     }
-    // cells twice as large: those near a point are its own and its neighbour on the nearer side
+    // cells twice as large: points near a point are in its own cell and its neighbour on the nearer side
     let mut cells: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
     let mut first = Vec::with_capacity(points.len());
     for (number, point) in (0_u32..).zip(points) {
@@ -62,11 +64,12 @@ pub(super) fn weld(points: &[[f64; 3]]) -> Vec<u32> {
     first
 }
 
-/// The shells of a closed surface: along every edge as many triangles pass one way as the other. Two bodies may share an edge, or a
-/// face. Triangles that are there twice are left out if the surface is not closed with them.
+/// Returns the shells of a closed surface, whose edges have as many triangles in one direction as in the
+/// other. Two bodies may share an edge, or a face. Duplicate triangles are removed if the surface is not
+/// closed with them.
 ///
 /// # Errors
-/// [`Error::Mesh`] with the edges that are not so.
+/// [`Error::Mesh`] with the open edges.
 pub(super) fn shells(
     path: &Path,
     points: &[[f64; 3]],
@@ -84,7 +87,7 @@ pub(super) fn shells(
         });
         let doubled = before - triangles.len();
         if doubled > 0 {
-            notes.push(format!("{doubled} triangles that are there twice are left out"));
+            notes.push(format!("{doubled} duplicate triangles are left out"));
             edges = self::edges(triangles);
         }
     }
@@ -95,7 +98,7 @@ pub(super) fn shells(
         }
     }
     closed(path, points, &edges)?;
-    let mut joined = Sets::new(triangles.len());
+    let mut joined = DisjointSets::new(triangles.len());
     for (k, &[a, b, c]) in (0_u32..).zip(&*triangles) {
         for [p, q] in [[a, b], [b, c], [c, a]] {
             joined.join(k, edges.get(&[p.min(q), p.max(q)]).map_or(k, |edge| edge.1));
@@ -121,7 +124,7 @@ pub(super) fn shells(
     Ok(shells)
 }
 
-/// Of each edge, lower corner first: how often it is passed either way, and its first triangle.
+/// Edges, lower corner first: the number of passes in either direction, and the first triangle.
 type Edges = HashMap<[u32; 2], ([u32; 2], u32)>;
 
 fn edges(triangles: &[[u32; 3]]) -> Edges {
@@ -138,20 +141,20 @@ fn is_closed(edges: &Edges) -> bool {
     edges.values().all(|(count, _)| count[0] == count[1])
 }
 
-/// Splits triangles at corners of others that lie on their edges, where the surface is open; how many.
+/// Splits triangles at corners of others on their edges, where the surface is open; returns their number.
 fn split(points: &[[f64; 3]], triangles: &mut Vec<[u32; 3]>, edges: &mut Edges) -> usize {
     let [low, high] = bounds(points.iter().copied());
-    let near = WELD * (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
+    let near = MERGE_DISTANCE * (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
     let at = |n: u32| Vector3::from(points[n as usize]);
     let before = triangles.len();
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_SPLITS {
         let mut open: Vec<[u32; 2]> =
             edges.iter().filter(|(_, (count, _))| count[0] != count[1]).map(|(ends, _)| *ends).collect();
         open.sort_unstable();
         let mut corners = open.as_flattened().to_vec();
         corners.sort_unstable();
         corners.dedup();
-        if open.len() * corners.len() > MOST_PAIRS {
+        if open.len() * corners.len() > MAX_PAIRS {
             break;
         }
         let on = |&[p, q]: &[u32; 2]| {
@@ -183,7 +186,7 @@ fn split(points: &[[f64; 3]], triangles: &mut Vec<[u32; 3]>, edges: &mut Edges) 
     triangles.len() - before
 }
 
-/// Every edge is passed as often one way as the other.
+/// Checks that every edge is passed equally often in both directions.
 fn closed(path: &Path, points: &[[f64; 3]], edges: &Edges) -> Result<(), Error> {
     let unequal = edges.iter().filter(|(_, (count, _))| count[0] != count[1]);
     let mut wrong: Vec<([u32; 2], [u32; 2])> = unequal.map(|(ends, (count, _))| (*ends, *count)).collect();
@@ -195,14 +198,15 @@ fn closed(path: &Path, points: &[[f64; 3]], edges: &Edges) -> Result<(), Error> 
     let turned = count(&|a, b| a + b == 2);
     let [p, q] = ends.map(|node| points[node as usize].map(|x| (1e9 * x).round() / 1e6));
     Err(Error::Mesh(format!(
-        "{}: not a closed surface: {open} edges of one triangle, {many} of more than two, {turned} of two that \
-         face opposite ways, the first from {p:?} to {q:?} mm; allowed: 0 (repair it where it was drawn)",
+        "{}: not a closed surface: {open} edges of one triangle, {many} of more than two, {turned} of two \
+         that face opposite ways, the first from {p:?} to {q:?} mm; allowed: 0 (repair it where it was \
+         drawn)",
         path.display()
     )))
 }
 
-/// Turns what is inside out: all, where the shells together have no volume otherwise, then shells that leave a place inside or
-/// outside of them that none surrounds. What faces inwards inside another shell is a cavity. Returns the volume, m³.
+/// Orients the shells: flips all if their total volume is negative, then shells that are inverted and not
+/// surrounded by another. An inward-facing shell inside another is a cavity. Returns the volume, m³.
 pub(super) fn orient(
     points: &[[f64; 3]],
     triangles: &mut [[u32; 3]],
@@ -251,7 +255,7 @@ pub(super) fn orient(
     shells.iter().map(|shell| shell.six).sum::<f64>() / 6.0
 }
 
-/// The ends of a shell along each axis, a little inside its box.
+/// Extreme points of a shell along each axis, slightly inside its box.
 fn extremes(shell: &Shell, points: &[[f64; 3]], triangles: &[[u32; 3]]) -> [[f64; 3]; 6] {
     let [low, high] = shell.bounds;
     let corners = || shell.triangles.iter().flat_map(|&n| triangles[n as usize]).map(|n| points[n as usize]);
@@ -260,7 +264,7 @@ fn extremes(shell: &Shell, points: &[[f64; 3]], triangles: &[[u32; 3]]) -> [[f64
         let at = corners().find(|at| at[d] == end[d]).unwrap_or(low);
         std::array::from_fn(|e| {
             let middle = 0.5 * (low[e] + high[e]);
-            at[e] + INWARDS * (1.0 + 0.3 * e as f64) * (middle - at[e])
+            at[e] + INSET * (1.0 + 0.3 * e as f64) * (middle - at[e])
         })
     })
 }

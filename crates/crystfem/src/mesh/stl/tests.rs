@@ -1,4 +1,4 @@
-//! Surfaces as programs write them, and the cells inside.
+//! Tests of surfaces in the formats of common programs, and of the cells inside.
 
 use super::*;
 use nalgebra::Vector3;
@@ -7,7 +7,7 @@ fn parsed(bytes: &[u8]) -> Result<Stl, Error> {
     parse(Path::new("a.stl"), bytes, 1e-3)
 }
 
-/// Triangles of a box.
+/// Returns the triangles of a box.
 fn brick(size: [f32; 3]) -> Vec<[[f32; 3]; 3]> {
     let corner = |k: usize| [0, 1, 2].map(|d| if k >> d & 1 == 1 { size[d] } else { 0.0 });
     let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
@@ -23,7 +23,7 @@ fn ascii(triangles: &[[[f32; 3]; 3]]) -> String {
 }
 
 fn binary(triangles: &[[[f32; 3]; 3]]) -> Vec<u8> {
-    // the word of a text at the beginning, as some programs write it
+    // begins with the keyword of text, as some programs write it
     let mut bytes = b"solid but binary".to_vec();
     bytes.resize(80, b' ');
     bytes.extend((triangles.len() as u32).to_le_bytes());
@@ -35,7 +35,7 @@ fn binary(triangles: &[[[f32; 3]; 3]]) -> Vec<u8> {
     bytes
 }
 
-/// A sphere of radius 5 about (5, 5, 5) by splitting an octahedron five times.
+/// Returns a sphere of radius 5 about (5, 5, 5) by splitting an octahedron five times.
 fn sphere() -> Vec<[[f32; 3]; 3]> {
     let unit = |d: usize, s: f64| Vector3::from([0, 1, 2].map(|e| if e == d { s } else { 0.0 }));
     let mut all = Vec::new();
@@ -61,7 +61,7 @@ fn text_and_bytes_are_one_surface() {
     assert_eq!(text, bytes);
     assert_eq!((text.points.len(), text.triangles.len(), text.notes.len()), (8, 12, 0));
     assert!((text.volume - 6e-9).abs() < 1e-22);
-    // inside out
+    // inverted
     let turned: Vec<_> = triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
     let turned = parsed(&binary(&turned)).unwrap();
     assert!((turned.volume - 6e-9).abs() < 1e-22 && turned.notes[0].contains("turned"));
@@ -73,12 +73,12 @@ fn a_box_fills_its_cells() {
     let voxels = stl.voxels([5e-4; 3], 0.5).unwrap().0;
     assert_eq!(voxels.mesh.element_count(), 6 * 4 * 2);
     assert!((voxels.ratio - 1.0).abs() < 1e-6 && voxels.fill.iter().all(|fill| (fill - 1.0).abs() < 1e-6));
-    // cells that the box fills in part: 3 = 4 × 0.8 − 0.2
+    // partly filled cells: 3 = 4 × 0.8 − 0.2
     let voxels = stl.voxels([8e-4, 5e-4, 4e-4], 0.1).unwrap().0;
     assert_eq!(voxels.mesh.element_count(), 4 * 4 * 3);
     assert!((voxels.fill.iter().sum::<f64>() * 1.6e-10 / 6e-9 - 1.0).abs() < 1e-12);
     assert!((voxels.fill[3] - 0.75).abs() < 1e-6 && (voxels.fill[47] - 0.375).abs() < 1e-6);
-    assert!((voxels.ratio - 7.68 / 6.0).abs() < 1e-6 && !voxels.may_be_full());
+    assert!((voxels.ratio - 7.68 / 6.0).abs() < 1e-6 && !voxels.can_be_full());
 }
 
 #[test]
@@ -88,7 +88,7 @@ fn a_sphere_has_its_volume() {
     // chords of 90°/32
     assert!((stl.volume / exact - 1.0).abs() < 2e-3, "{}", stl.volume / exact);
     let full = stl.voxels([5e-4; 3], 0.5).unwrap().0;
-    assert!((full.ratio - 1.0).abs() < 0.01 && full.may_be_full(), "{}", full.ratio);
+    assert!((full.ratio - 1.0).abs() < 0.01 && full.can_be_full(), "{}", full.ratio);
     let parts = stl.voxels([1e-3; 3], 0.0).unwrap().0;
     assert!((parts.fill.iter().sum::<f64>() * 1e-9 / stl.volume - 1.0).abs() < 1e-12);
     // rays alone miss little of it
@@ -100,14 +100,14 @@ fn a_sphere_has_its_volume() {
     assert!(inner.into_iter().all(|e| parts.fill[e as usize] > 0.998));
 }
 
-/// A box with its corners, outward or inward.
+/// Returns a box between two corners, outward or inward.
 fn shell(low: [f32; 3], high: [f32; 3], outward: bool) -> Vec<[[f32; 3]; 3]> {
     let moved = brick([0, 1, 2].map(|d| high[d] - low[d]));
     let place = |at: [f32; 3]| [0, 1, 2].map(|d| low[d] + at[d]);
     moved.into_iter().map(|[a, b, c]| if outward { [a, b, c] } else { [a, c, b] }.map(place)).collect()
 }
 
-/// Shells as programs write them, mm, and the volume that slicers make of them, mm³.
+/// Shells in mm, with their volume according to slicers, mm³.
 #[test]
 fn shells_are_united_as_slicers_do() {
     let whole = |outward| shell([0.0; 3], [10.0; 3], outward);
@@ -141,10 +141,10 @@ fn shells_are_united_as_slicers_do() {
         ("a common edge", vec![whole(true), shell([10.0, 10.0, 0.0], [20.0, 20.0, 10.0], true)], 2000.0, ""),
         ("a common corner", vec![whole(true), shell([10.0; 3], [20.0; 3], true)], 2000.0, "2 shells"),
         (
-            "a triangle there twice",
+            "a duplicate triangle",
             vec![whole(true), whole(true)[..1].to_vec()],
             1000.0,
-            "1 triangles that are",
+            "1 duplicate triangles",
         ),
         (
             "crossing bars",
@@ -161,7 +161,7 @@ fn shells_are_united_as_slicers_do() {
         let stl = parsed(&binary(&shells.concat())).unwrap_or_else(|error| panic!("{name}: {error}"));
         let (voxels, notes) = stl.voxels([1e-3; 3], 0.1).unwrap();
         let notes = [stl.notes, notes].concat().join("; ");
-        // cells as large as the parts are: rays are exact
+        // cells as large as the parts: rays are exact
         assert!(
             (voxels.volume * 1e9 / volume - 1.0).abs() < 1e-6,
             "{name}: {} mm³, {notes}",
@@ -170,14 +170,14 @@ fn shells_are_united_as_slicers_do() {
         assert!((voxels.ratio - 1.0).abs() < 1e-6, "{name}: {}", voxels.ratio);
         assert!(notes.contains(note), "{name}: {notes}");
     }
-    // what faces inwards and reaches out of the others is no cavity
+    // an inward-facing shell that extends outside the others is no cavity
     let through = shell([4.0, 4.0, -1.0], [6.0, 6.0, 11.0], false);
     let stl = parsed(&binary(&[whole(true), through].concat())).unwrap();
     assert!(stl.notes[0].contains("1 of 2 shells are inside out"), "{:?}", stl.notes);
     assert!((stl.voxels([1e-3; 3], 0.1).unwrap().0.volume * 1e9 - 1008.0).abs() < 1e-3);
 }
 
-/// Two spheres, the middle of one on the other: what they have in common counts once.
+/// Two spheres, each centre on the other: their common volume counts once.
 #[test]
 fn overlapping_spheres_have_the_volume_of_their_union() {
     let moved = |by: f32| sphere().into_iter().map(move |t| t.map(|[x, y, z]| [x + by, y, z]));
@@ -190,7 +190,7 @@ fn overlapping_spheres_have_the_volume_of_their_union() {
     assert!(notes[0].contains("overlap"), "{notes:?}");
 }
 
-/// Corners that ought to be one: exact volume, a note.
+/// Corners within the tolerance are merged: exact volume, a note.
 #[test]
 fn corners_are_welded_at_a_tolerance_of_the_size() {
     let noisy = |by: f32| {
@@ -215,7 +215,7 @@ fn corners_are_welded_at_a_tolerance_of_the_size() {
     assert!(stl.notes.iter().any(|note| note.contains("1 of them smaller")), "{:?}", stl.notes);
 }
 
-/// Corners of triangles on edges of others, one and three on an edge: the surface is closed all the same; a hole is not.
+/// Corners on edges of other triangles, one and three on an edge, close a surface; a hole does not.
 #[test]
 fn corners_on_edges_of_others_close_a_surface() {
     let [a, c, d] = [[0.0, 0.0, 10.0], [10.0, 10.0, 10.0], [0.0, 10.0, 10.0]];
@@ -238,7 +238,7 @@ fn corners_on_edges_of_others_close_a_surface() {
     }
 }
 
-/// Forms of text and bytes that programs write.
+/// Variants of text and binary files are read.
 #[test]
 fn files_as_programs_write_them() {
     let triangles = brick([3.0, 2.0, 1.0]);
@@ -281,7 +281,7 @@ fn files_as_programs_write_them() {
     }
 }
 
-/// Cut anywhere and with any byte changed: an error, or a surface whose cells can be found.
+/// Truncated or altered files give an error, or a surface with cells.
 #[test]
 fn damaged_files_are_errors_or_surfaces() {
     let shells = [brick([3.0, 2.0, 1.0]), shell([1.0; 3], [2.0, 3.0, 4.0], true)].concat();
@@ -295,7 +295,7 @@ fn damaged_files_are_errors_or_surfaces() {
                     let [low, high] = stl.bounds();
                     let size = (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
                     assert!(size > 0.0 && stl.volume > 0.0);
-                    // cells that are too many are refused
+                    // too many cells are refused
                     _ = stl.voxels([size / 4.0; 3], 0.1);
                 }
             }
@@ -304,7 +304,7 @@ fn damaged_files_are_errors_or_surfaces() {
 }
 
 #[test]
-fn what_is_wrong_is_named() {
+fn errors_name_the_defect() {
     let triangles = brick([3.0, 2.0, 1.0]);
     let refused = |bytes: &[u8], words: &[&str]| {
         let text = parsed(bytes).unwrap_err().to_string();

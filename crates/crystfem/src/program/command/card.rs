@@ -1,9 +1,9 @@
-//! `crystfem card`: the thermal materials of a scene as cards of other programs.
+//! `crystfem card`: exports the thermal materials of a scene as material cards.
 
-use crate::material::{CONSTANT_NAMES, Polymer, Property};
-use crate::program::run::Failure;
-use crate::program::scene::{Kind, Law, MaterialSpec, PartScene, PointScene, kind};
-use harness::scene::{SceneError, Source};
+use crate::error::Error;
+use crate::material::{CONSTANT_NAMES, Polymer, ThermalProperty};
+use crate::program::scene::{Law, MaterialSpec, PartScene, PointScene, SceneKind, kind};
+use harness::scene::{Failure, SceneError, Source};
 use polycore::file::atomic_write;
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -12,24 +12,24 @@ use std::path::PathBuf;
 /// Options of `crystfem card`.
 #[derive(clap::Args)]
 pub struct Options {
-    /// The scene whose materials are written.
+    /// Scene with the materials.
     scene: PathBuf,
-    /// The program that reads them.
-    #[arg(long, value_enum, default_value_t = Host::Abaqus)]
-    host: Host,
-    /// Units of that program.
+    /// Program that reads the cards.
+    #[arg(long, value_enum, default_value_t = CardHost::Abaqus)]
+    host: CardHost,
+    /// Units of the cards.
     #[arg(long, value_enum, default_value_t = Units::Si)]
     units: Units,
     /// Write temperatures in °C instead of K.
     #[arg(long)]
     celsius: bool,
-    /// Folder of the cards, NAME.inp, one for each material.
+    /// Folder of the cards; each material gets NAME.inp.
     #[arg(long, short, default_value = "cards")]
     output: PathBuf,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Host {
+enum CardHost {
     Abaqus,
     Calculix,
 }
@@ -43,7 +43,7 @@ enum Units {
 }
 
 impl Units {
-    /// The host's numbers of 1 J/kg and of 1 kg/m³; 1 W/(m K) is 1 in both.
+    /// Returns 1 J/kg and 1 kg/m³ in these units; 1 W/(m K) is 1 in both systems.
     fn factors(self) -> [f64; 2] {
         match self {
             Self::Si => [1.0, 1.0],
@@ -59,20 +59,20 @@ impl Units {
     }
 }
 
-/// Writes the cards and says where.
+/// Writes the cards and prints their paths.
 ///
 /// # Errors
-/// A scene without materials, materials that have no card, and files that cannot be written.
-pub fn write(options: &Options) -> Result<bool, Failure> {
+/// Returns an error for a scene without materials, a material without a card, or an unwritable file.
+pub fn write(options: &Options) -> Result<bool, Failure<Error>> {
     let source = Source::read(&options.scene)?;
     let mut written = Vec::new();
     for (name, spec, key) in materials(&source)? {
         let name = if name.is_empty() { "material".to_owned() } else { name };
-        let (deck, rest) = card(options, &source, &name, &spec, &key)?;
+        let (deck, constants) = card(options, &source, &name, &spec, &key)?;
         written.push((format!("{name}.inp"), deck));
-        written.extend(rest.map(|rest| (format!("{}.umatht", host_name(&name).to_lowercase()), rest)));
+        written.extend(constants.map(|text| (format!("{}.umatht", host_name(&name).to_lowercase()), text)));
     }
-    std::fs::create_dir_all(&options.output).map_err(polycore::Error::io("create", &options.output))?;
+    std::fs::create_dir_all(&options.output).map_err(polycore::Error::from_io("create", &options.output))?;
     for (file, text) in written {
         let path = options.output.join(file);
         atomic_write(&path, |out| out.write_all(text.as_bytes()))?;
@@ -81,35 +81,36 @@ pub fn write(options: &Options) -> Result<bool, Failure> {
     Ok(true)
 }
 
-/// Names, blocks, and where they stand.
-fn materials(source: &Source) -> Result<Vec<(String, MaterialSpec, String)>, Failure> {
+/// Returns name, block and key of each material.
+fn materials(source: &Source) -> Result<Vec<(String, MaterialSpec, String)>, Failure<Error>> {
     match kind(source)? {
-        Kind::Part => {
+        SceneKind::Part => {
             let scene: PartScene = source.parse()?;
-            let of = |(name, spec): (String, MaterialSpec)| {
+            let located = |(name, spec): (String, MaterialSpec)| {
                 let key = format!("materials.{name}");
                 (name, spec, key)
             };
-            Ok(scene.materials.into_iter().map(of).collect())
+            Ok(scene.materials.into_iter().map(located).collect())
         }
-        Kind::Point => {
+        SceneKind::Point => {
             let scene: PointScene = source.parse()?;
             let all = scene.materials(source)?;
             Ok(all.into_iter().map(|(name, spec, key)| (name, spec.clone(), key)).collect())
         }
-        Kind::Fit => {
-            let allowed = "a scene with `[material]` or `[materials]`: enter the fitted constants, which the run writes as a block";
-            Err(source.error("fit", "a scene of fits, which has no material", allowed).into())
+        SceneKind::Fit => {
+            let allowed = "a scene with `[material]` or `[materials]`: the run writes the fitted constants \
+                as a block for it";
+            Err(source.error("fit", "a fit scene, which has no material", allowed).into())
         }
     }
 }
 
-/// Returns a name as hosts have it: capitals, no blanks.
+/// Converts a name to capitals, digits and underscores.
 fn host_name(name: &str) -> String {
     name.to_uppercase().chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
 }
 
-/// The cards of a material, and the file of constants that CalculiX has no room for.
+/// Returns the card of a material, and for CalculiX the file of the constants that do not fit the card.
 fn card(
     options: &Options,
     source: &Source,
@@ -127,8 +128,8 @@ fn card(
     );
     let density = format!("*DENSITY\n{}\n", digits(density * spec.density.si()));
     if spec.conductivity_factors.is_some() || spec.powder.is_some() || spec.law == Law::AsPublished {
-        let found = "a material with directions, of powder, or `as-published`";
-        return Err(source.error(key, found, "an isotropic conductor or polymer: others have no card"));
+        let found = "an anisotropic, powder or `as-published` material";
+        return Err(source.error(key, found, "an isotropic conductor or polymer (others have no card)"));
     }
     if spec.law == Law::Conductor {
         let [conductivity, capacity] = spec.properties(source, key)?;
@@ -139,13 +140,13 @@ fn card(
     }
     let polymer = spec.polymer(source, key)?;
     let constants = constants(&polymer, options).ok_or_else(|| {
-        let allowed = "constants: the subroutine has no tables over temperature";
-        source.error(key, "`conductivity` or `specific_heat` over temperature", allowed)
+        let allowed = "constants, because the subroutine takes no temperature tables";
+        source.error(key, "a temperature table for `conductivity` or `specific_heat`", allowed)
     })?;
     let capacity = constants[1];
     let (listed, rest) = match options.host {
-        Host::Abaqus => (constants, None),
-        Host::Calculix => {
+        CardHost::Abaqus => (constants, None),
+        CardHost::Calculix => {
             let rest = CONSTANT_NAMES
                 .iter()
                 .zip(&constants[6..])
@@ -160,18 +161,18 @@ fn card(
         let _ = writeln!(text, "{}", row.join(", "));
     }
     text += &density;
-    if options.host == Host::Calculix {
+    if options.host == CardHost::Calculix {
         let _ = writeln!(text, "*SPECIFIC HEAT\n{}", digits(capacity));
     }
-    // CalculiX takes latent heat as a load, from a fourth state variable
-    let states = if options.host == Host::Calculix && polymer.latent_heat.is_some() { 4 } else { 3 };
+    // CalculiX takes latent heat as a load, computed from a fourth state variable
+    let states = if options.host == CardHost::Calculix && polymer.latent_heat.is_some() { 4 } else { 3 };
     let _ = writeln!(text, "*DEPVAR\n{states}");
     Ok((text, rest))
 }
 
-/// The fifteen constants of UMATHT in the host's units; none with properties over temperature.
+/// Returns the fifteen UMATHT constants in the host's units, or `None` for temperature-dependent properties.
 fn constants(polymer: &Polymer, options: &Options) -> Option<Vec<f64>> {
-    let (Property::Constant(conductivity), Property::Constant(capacity)) =
+    let (ThermalProperty::Constant(conductivity), ThermalProperty::Constant(capacity)) =
         (&polymer.conductivity, &polymer.specific_heat)
     else {
         return None;
@@ -179,23 +180,23 @@ fn constants(polymer: &Polymer, options: &Options) -> Option<Vec<f64>> {
     let heat = options.units.factors()[0];
     let latent = polymer.latent_heat.unwrap_or(0.0) * polymer.ultimate_crystallinity;
     let zero = if options.celsius { 273.15 } else { 0.0 };
-    let host = if options.host == Host::Calculix { 1.0 } else { 0.0 };
+    let host = if options.host == CardHost::Calculix { 1.0 } else { 0.0 };
     let mut all = vec![*conductivity, heat * capacity, heat * latent, 0.0, zero, host];
     all.extend(polymer.growth_and_melting());
     Some(all)
 }
 
-/// A number without the noise of its last digits.
+/// Formats a number to 12 digits, without rounding noise.
 fn digits(number: f64) -> String {
     let short: f64 = format!("{number:.11e}").parse().unwrap_or(number);
     format!("{short:?}")
 }
 
-/// A value, or rows of a value and its temperature.
-fn lines(property: &Property, factor: f64, zero: f64) -> String {
+/// Formats a constant, or one row of value and temperature per table entry.
+fn lines(property: &ThermalProperty, factor: f64, zero: f64) -> String {
     match property {
-        Property::Constant(value) => digits(factor * value) + "\n",
-        Property::Table(table) => table
+        ThermalProperty::Constant(value) => digits(factor * value) + "\n",
+        ThermalProperty::Table(table) => table
             .rows()
             .map(|[temperature, value]| {
                 format!("{}, {}\n", digits(factor * value), digits(temperature - zero))
@@ -216,7 +217,8 @@ law = "semicrystalline"
 density = "905 kg/m^3"
 conductivity = "0.2 W/(m K)"
 specific_heat = "1900 J/(kg K)"
-kinetics = { growth_rate = "5.3e6 1/s", nucleation = "3.3e5 K^2", equilibrium_melting = "458.2 K", frozen = "231.2 K", avrami_exponent = 3.0 }
+ kinetics = { growth_rate = "5.3e6 1/s", nucleation = "3.3e5 K^2", equilibrium_melting = "458.2 K",
+  frozen = "231.2 K", avrami_exponent = 3.0 }
 melting = { sharpness = "0.965 1/K", shape = 8.584, peak = "438 K" }
 crystallinity = 0.5
 latent_heat = "200 J/g"
@@ -231,7 +233,7 @@ start = "180 degC"
 legs = [{ hold = "1 s" }]
 "#;
 
-    fn cards(host: Host, units: Units, celsius: bool) -> Vec<(String, Option<String>)> {
+    fn cards(host: CardHost, units: Units, celsius: bool) -> Vec<(String, Option<String>)> {
         let options = Options { scene: "s.toml".into(), host, units, celsius, output: "cards".into() };
         let source = Source::new("s.toml", SCENE);
         let all = materials(&source).unwrap();
@@ -239,8 +241,10 @@ legs = [{ hold = "1 s" }]
     }
 
     #[test]
-    fn units_are_those_of_the_host() {
-        let [(glass, none), (pp, nothing)] = &cards(Host::Abaqus, Units::Mm, true)[..] else { panic!("two") };
+    fn cards_use_units_of_the_host() {
+        let [(glass, none), (pp, nothing)] = &cards(CardHost::Abaqus, Units::Mm, true)[..] else {
+            panic!("two")
+        };
         assert!(none.is_none() && nothing.is_none());
         let expected = "*CONDUCTIVITY\n1.0, 0.0\n1.2, 100.0\n*SPECIFIC HEAT\n800000000.0\n*DENSITY\n2.5e-9\n";
         assert!(glass.ends_with(expected), "{glass}");
@@ -250,12 +254,13 @@ legs = [{ hold = "1 s" }]
         assert!(pp.ends_with(expected), "{pp}");
     }
 
-    /// Six constants, the other nine in a file, c by its own card, a fourth state for the latent heat.
+    /// CalculiX: six constants, nine in a file, a card for c and a fourth state variable for latent heat.
     #[test]
-    fn calculix_takes_six_constants() {
-        let all = cards(Host::Calculix, Units::Si, false);
+    fn calculix_card_has_six_constants() {
+        let all = cards(CardHost::Calculix, Units::Si, false);
         let (deck, Some(file)) = &all[1] else { panic!("a file") };
-        let expected = "CONSTANTS=6\n0.2, 1900.0, 100000.0, 3.0, 0.0, 1.0\n*DENSITY\n905.0\n*SPECIFIC HEAT\n1900.0\n*DEPVAR\n4\n";
+        let expected = "CONSTANTS=6\n0.2, 1900.0, 100000.0, 3.0, 0.0, 1.0\n*DENSITY\n905.0\n\
+                        *SPECIFIC HEAT\n1900.0\n*DEPVAR\n4\n";
         assert!(deck.ends_with(expected), "{deck}");
         assert_eq!(file.lines().filter(|line| line.contains(" = ")).count(), 9);
         assert!(file.contains("melting_peak = 438.0\n"), "{file}");

@@ -1,52 +1,52 @@
-//! Pictures of a part at some times, and of all of them as an animation: sections through its middle, and as it looks from
-//! outside.
+//! Pictures of a part at selected times, and animations: sections through its middle and views from outside.
 
-use super::celsius::{TEMPERATURE, of_kelvin};
-use super::outside::{Frame, Outside};
-use super::section::Section;
+use super::celsius::{TEMPERATURE, to_celsius};
+use super::part_skin::{PartSkin, SolidFrame};
+use super::section::MeshSection;
 use crate::error::Error;
 use crate::mesh::Mesh;
-use crate::program::scene::{PartScene, Task};
+use crate::program::scene::{PartScene, PartTask};
 use crate::simulation::Simulation;
 use harness::observe::{Observer, Outputs};
 use harness::output::picture::{ColorMap, Skin, Solids, Stage, Strip, Strips};
 use harness::output::vtkhdf::{self, Series};
 use std::path::Path;
 
-/// Name of the file of fields.
+/// Name of the field file.
 pub const FIELDS: &str = "fields.vtkhdf";
 
-/// Frames of an animation at most, and how long each is shown, s.
-const FRAMES: usize = 60;
-const SHOWN: f64 = 0.12;
+/// Largest number of animation frames.
+const MOST_FRAMES: usize = 60;
+/// Time for which each frame is shown, s.
+const FRAME_TIME: f64 = 0.12;
 
-/// Frames of a full turn.
-const TURN: usize = 36;
+/// Frames of a full turn of the turntable.
+const TURNTABLE_FRAMES: usize = 36;
 
-/// Where values come from, frame by frame.
-struct Frames<'a> {
+/// Field values of each frame.
+struct AnimationFrames<'a> {
     mesh: &'a Mesh,
-    /// The field beside the temperature.
+    /// Field shown beside the temperature.
     field: Option<&'static str>,
-    from: Origin<'a>,
+    from: FrameSource<'a>,
 }
 
-enum Origin<'a> {
-    /// All fields were written.
+enum FrameSource<'a> {
+    /// Field file of the run.
     File(Series),
-    /// Only the end is there.
+    /// Final state, if no fields were written.
     End(&'a Simulation),
 }
 
-/// Pictures of the process.
-pub struct Animation<'a> {
-    /// The scene.
+/// Observer that draws the printing process.
+pub struct AnimationObserver<'a> {
+    /// Scene of the run.
     pub scene: &'a PartScene,
-    /// What is printed when.
-    pub task: &'a Task,
+    /// Mesh, births and layers.
+    pub task: &'a PartTask,
 }
 
-impl Observer<Simulation, Error> for Animation<'_> {
+impl Observer<Simulation, Error> for AnimationObserver<'_> {
     fn draw(&self, simulation: &Simulation, to: &Outputs) -> Result<(), Error> {
         let path = to.folder.join(FIELDS);
         let path = Some(path.as_path()).filter(|_| self.scene.output.fields);
@@ -54,11 +54,12 @@ impl Observer<Simulation, Error> for Animation<'_> {
     }
 }
 
-/// sections.png, solid.png: stages beside one another, temperature and crystallinity; process.png, process_solid.png: all
-/// frames, animated; turntable.png: the end from all sides. A field has one range in all of them.
+/// Draws sections.png and solid.png (stages side by side, temperature and crystallinity), process.png and
+/// process_solid.png (all frames, animated), and turntable.png (the end, turning). All use one color range
+/// per field.
 fn draw(
     scene: &PartScene,
-    task: &Task,
+    task: &PartTask,
     simulation: &Simulation,
     fields: Option<&Path>,
     output: &Path,
@@ -67,13 +68,13 @@ fn draw(
     let names = simulation.field_names();
     let field = names.iter().copied().find(|name| *name == "crystallinity").or(names.first().copied());
     let from = match fields {
-        Some(path) => Origin::File(vtkhdf::read(path)?),
-        None => Origin::End(simulation),
+        Some(path) => FrameSource::File(vtkhdf::read(path)?),
+        None => FrameSource::End(simulation),
     };
-    let frames = Frames { mesh, field, from };
+    let frames = AnimationFrames { mesh, field, from };
     let count = frames.count();
-    // all frames, or as many as an animation may have, the last among them
-    let every = count.div_ceil(FRAMES);
+    // all frames, or an evenly thinned set that includes the last one
+    let every = count.div_ceil(MOST_FRAMES);
     let shown: Vec<usize> = (0..count).rev().step_by(every).collect::<Vec<_>>().into_iter().rev().collect();
     let births: Vec<f64> = task.problem.births.iter().map(|birth| birth.time).collect();
     let stages = stages(&births, &frames.times(), scene.output.stages);
@@ -87,7 +88,7 @@ fn draw(
         widen(&mut ranges, &frames.read(frame)?, &printed);
     }
     let columns = frames.columns(&ranges);
-    if let Some(section) = Section::through_the_middle(mesh, &task.printed) {
+    if let Some(section) = MeshSection::through_the_middle(mesh, &task.printed) {
         let strips = Strips {
             title: scene.title.clone(),
             samples: section.samples,
@@ -100,7 +101,7 @@ fn draw(
         let stage = |frame: usize| Ok(frames.section(&section, frames.read(frame)?));
         if count > 1 {
             let path = output.join("process.png");
-            strips.animate(path, shown.len(), SHOWN, |k| stage(shown[k]).map_err(polycore_error))?;
+            strips.animate(path, shown.len(), FRAME_TIME, |k| stage(shown[k]).map_err(polycore_error))?;
         }
         let stages = stages.iter().map(|&frame| stage(frame)).collect::<Result<Vec<_>, Error>>()?;
         strips.write(output.join("sections.png"), &stages)?;
@@ -110,16 +111,16 @@ fn draw(
     let view = solid.view();
     let solids =
         Solids { title: scene.title.clone(), bounds, unit: ("mm".into(), 1e-3), view, fields: columns };
-    let outside = Outside::new(mesh, &task.printed, solid.plane(bounds))?;
+    let outside = PartSkin::new(mesh, &task.printed, solid.plane(bounds))?;
     let stage = |frame: usize| -> Result<(String, Skin), polycore::Error> {
         frames.read(frame).map(|frame| outside.skin(frame)).map_err(polycore_error)
     };
     solids.write(output.join("solid.png"), stages.len(), |k| stage(stages[k]))?;
     if count > 1 {
-        solids.animate(output.join("process_solid.png"), shown.len(), SHOWN, |k| stage(shown[k]))?;
+        solids.animate(output.join("process_solid.png"), shown.len(), FRAME_TIME, |k| stage(shown[k]))?;
     }
     if solid.turntable {
-        solids.turn(output.join("turntable.png"), TURN, SHOWN, &stage(count - 1)?)?;
+        solids.turn(output.join("turntable.png"), TURNTABLE_FRAMES, FRAME_TIME, &stage(count - 1)?)?;
     }
     Ok(())
 }
@@ -131,7 +132,8 @@ fn polycore_error(error: Error) -> polycore::Error {
     }
 }
 
-/// Frames to show: the first after some births, which shows fresh material while it is hot, then evenly to the end.
+/// Returns the frames to show: the first after some births, while the new material is hot, then evenly spaced
+/// ones to the end.
 fn stages(births: &[f64], times: &[f64], wanted: usize) -> Vec<usize> {
     let last = times.len() - 1;
     let hot = births.len().min(wanted - 1);
@@ -141,13 +143,13 @@ fn stages(births: &[f64], times: &[f64], wanted: usize) -> Vec<usize> {
     let (begin, rest) = (frames.last().copied().unwrap_or(0), wanted - hot);
     frames.extend((1..=rest).map(|k| begin + k * (last - begin) / rest));
     frames.dedup();
-    // nothing has happened yet in the very first frame
+    // the first frame shows the initial state only
     frames.retain(|&frame| frame > 0 || last == 0);
     frames
 }
 
-/// Takes the values of a frame at some nodes into the ranges of its fields.
-fn widen(ranges: &mut [[f64; 2]], frame: &Frame, nodes: &[u32]) {
+/// Extends the range of each field by the values of a frame at `nodes`.
+fn widen(ranges: &mut [[f64; 2]], frame: &SolidFrame, nodes: &[u32]) {
     for (values, [low, high]) in frame.values.iter().zip(ranges) {
         let there = nodes.iter().filter_map(|&node| values.get(node as usize));
         for &value in there.filter(|value| value.is_finite()) {
@@ -156,32 +158,33 @@ fn widen(ranges: &mut [[f64; 2]], frame: &Frame, nodes: &[u32]) {
     }
 }
 
-impl Frames<'_> {
+impl AnimationFrames<'_> {
     fn count(&self) -> usize {
         match &self.from {
-            Origin::File(series) => series.len().max(1),
-            Origin::End(_) => 1,
+            FrameSource::File(series) => series.len().max(1),
+            FrameSource::End(_) => 1,
         }
     }
 
     fn times(&self) -> Vec<f64> {
         match &self.from {
-            Origin::File(series) if !series.times().is_empty() => series.times().to_vec(),
-            Origin::File(_) => vec![0.0],
-            Origin::End(simulation) => vec![simulation.time()],
+            FrameSource::File(series) if !series.times().is_empty() => series.times().to_vec(),
+            FrameSource::File(_) => vec![0.0],
+            FrameSource::End(simulation) => vec![simulation.time()],
         }
     }
 
-    fn read(&self, frame: usize) -> Result<Frame, Error> {
+    /// Reads the temperature and the second field of a frame.
+    fn read(&self, frame: usize) -> Result<SolidFrame, Error> {
         let (time, values, exists): (f64, Vec<Vec<f64>>, Vec<bool>) = match &self.from {
-            Origin::File(series) => {
+            FrameSource::File(series) => {
                 let names = std::iter::once(TEMPERATURE).chain(self.field);
                 let all = names.map(|name| series.data(frame, name)).collect::<Result<_, _>>()?;
                 let exists = series.cell_data(frame, "exists")?;
                 (series.times()[frame], all, exists.iter().map(|&there| there == 1.0).collect())
             }
-            Origin::End(simulation) => {
-                let temperature = of_kelvin(&simulation.temperatures(f64::NAN));
+            FrameSource::End(simulation) => {
+                let temperature = to_celsius(&simulation.temperatures(f64::NAN));
                 let or_nan = |x: Option<f64>| x.unwrap_or(f64::NAN);
                 let field = self.field.map(|name| simulation.field(name).into_iter().map(or_nan).collect());
                 let elements = 0..self.mesh.element_count() as u32;
@@ -189,10 +192,10 @@ impl Frames<'_> {
                 (simulation.time(), std::iter::once(temperature).chain(field).collect(), exists)
             }
         };
-        Ok(Frame { title: format!("t = {} s", (time * 100.0).round() / 100.0), values, exists })
+        Ok(SolidFrame { title: format!("t = {} s", (time * 100.0).round() / 100.0), values, exists })
     }
 
-    fn section(&self, section: &Section, frame: Frame) -> Stage {
+    fn section(&self, section: &MeshSection, frame: SolidFrame) -> Stage {
         let there = |element: u32| frame.exists.get(element as usize) == Some(&true);
         let values = frame.values.iter().map(|field| section.values(self.mesh, field, &there)).collect();
         (frame.title, values)
@@ -207,7 +210,7 @@ impl Frames<'_> {
         };
         let labels = [("T [°C]", ColorMap::Inferno), (label, ColorMap::Viridis)];
         let column = |(k, ((label, colors), &[low, high])): (usize, ((&str, ColorMap), &[f64; 2]))| {
-            // a field that is the same everywhere still needs a bar, and crystallinity begins at 0
+            // a uniform field still needs a color bar; crystallinity starts at 0
             let low = if k == 0 { low } else { low.min(0.0) };
             let range = if high > low { (low, high) } else { (low.min(0.0), low.max(0.0) + 1.0) };
             let range = if range.0.is_finite() && range.1.is_finite() { range } else { (0.0, 1.0) };

@@ -1,6 +1,6 @@
-//! Healing of interfaces.
+//! Healing of interfaces between layers and beads.
 
-use super::outside::{Frame, Outside};
+use super::part_skin::{PartSkin, SolidFrame};
 use crate::coupling::{HealingCoupling, HealingSettings};
 use crate::error::Error;
 use crate::program::quantities as q;
@@ -10,25 +10,25 @@ use harness::observe::{Fields, Observer, Outputs, Place, Scalars};
 use harness::output::picture::{ColorMap, Solids, Strip};
 use std::path::Path;
 
-/// The healing of the interfaces of a part.
-pub struct Interfaces<'a> {
+/// Observer of the degree of healing of all interfaces.
+pub struct HealingObserver<'a> {
     scene: &'a PartScene,
     coupling: HealingCoupling,
 }
 
-impl<'a> Interfaces<'a> {
-    /// Watches interfaces, none of which is healed.
+impl<'a> HealingObserver<'a> {
+    /// Creates the observer, with unhealed interfaces.
     pub fn new(scene: &'a PartScene, settings: &HealingSettings) -> Self {
         Self { scene, coupling: HealingCoupling::new(settings.clone()) }
     }
 
-    /// Strength of a healed interface, MPa.
+    /// Returns the strength of a fully healed interface, MPa.
     fn strength(&self) -> Option<f64> {
         self.coupling.settings().strength.map(|strength| 1e-6 * strength)
     }
 }
 
-impl Observer<Simulation, Error> for Interfaces<'_> {
+impl Observer<Simulation, Error> for HealingObserver<'_> {
     fn scalars(&self, to: &mut Scalars<Simulation>) {
         let of = |scale: f64, which: usize| {
             move |_: &Simulation| Some(self.coupling.least_and_mean(scale)?[which])
@@ -73,10 +73,10 @@ impl Observer<Simulation, Error> for Interfaces<'_> {
     }
 }
 
-/// healing.png: D_h of the part at the end, at each node the least of the elements around it, and the strength where the scene gives it.
+/// Draws healing.png: D_h at the end (at each node the smallest of its elements) and, if given, the strength.
 ///
 /// # Errors
-/// A picture that cannot be written.
+/// Returns an error if the picture cannot be written.
 fn draw(
     healing: &HealingCoupling,
     scene: &PartScene,
@@ -90,7 +90,7 @@ fn draw(
     let mut least = vec![f64::NAN; mesh.points.len()];
     for &element in &own {
         for &node in mesh.nodes(element) {
-            // the least of a number and NaN is the number
+            // `f64::min` ignores NaN
             least[node as usize] = least[node as usize].min(degrees[element as usize]);
         }
     }
@@ -103,10 +103,10 @@ fn draw(
     }
     let view = scene.output.solid.view();
     let solids = Solids { title: scene.title.clone(), bounds, unit: ("mm".into(), 1e-3), view, fields };
-    let outside = Outside::new(mesh, &own, scene.output.solid.plane(bounds))?;
+    let outside = PartSkin::new(mesh, &own, scene.output.solid.plane(bounds))?;
     let title = format!("t = {} s", (simulation.time() * 100.0).round() / 100.0);
     let exists = degrees.iter().map(|degree| degree.is_finite()).collect();
-    let (title, skin) = outside.skin(Frame { title, values, exists });
+    let (title, skin) = outside.skin(SolidFrame { title, values, exists });
     solids.write(output.join("healing.png"), 1, |_| Ok((title.clone(), skin.clone())))?;
     Ok(())
 }

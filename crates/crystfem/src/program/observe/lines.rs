@@ -1,27 +1,28 @@
-//! Temperature and fields along lines through a mesh, at the end of a run.
+//! Temperature and fields along lines through the mesh at the end of a run.
 
 use super::celsius::CELSIUS;
 use crate::error::Error;
-use crate::mesh::Place;
-use crate::program::scene::{PartScene, Task};
+use crate::mesh::LocatedPoint;
+use crate::program::scene::{PartScene, PartTask};
 use crate::simulation::Simulation;
 use harness::observe::{Observer, Outputs};
 
-/// The lines of a scene.
-pub struct Lines<'a> {
-    /// The scene.
+/// Observer that writes the fields along the lines of a scene.
+pub struct LineObserver<'a> {
+    /// Scene of the run.
     pub scene: &'a PartScene,
-    /// Where the points of its lines are.
-    pub task: &'a Task,
+    /// Locations of the line points in the mesh.
+    pub task: &'a PartTask,
 }
 
-impl Observer<Simulation, Error> for Lines<'_> {
-    /// Writes `line_NAME.csv` of every line: values by the shape functions of the element around each point, empty cells outside of
-    /// the elements that exist.
+impl Observer<Simulation, Error> for LineObserver<'_> {
+    /// Writes `line_NAME.csv` for each line: values interpolated in the element of each point, NaN outside
+    /// the existing elements.
     fn write(&self, simulation: &Simulation, to: &Outputs) -> Result<(), Error> {
         let names = simulation.field_names();
         for (line, places) in self.scene.output.line.iter().zip(&self.task.lines) {
-            let exists = |place: &&Place| place.elements().iter().any(|&element| simulation.is_born(element));
+            let exists =
+                |place: &&LocatedPoint| place.elements().iter().any(|&element| simulation.is_born(element));
             let along = |value: &dyn Fn(u32) -> Option<f64>| -> Vec<f64> {
                 let there = places.iter().map(|place| place.as_ref().filter(exists));
                 there.map(|place| place.and_then(|place| place.value(value)).unwrap_or(f64::NAN)).collect()

@@ -1,10 +1,10 @@
-//! Places whose temperature and state are recorded in every step of a part's run.
+//! Probes: places whose temperature and material state are recorded in each step.
 
 use super::celsius::CELSIUS;
 use crate::error::Error;
-use crate::mesh::Place;
+use crate::mesh::LocatedPoint;
 use crate::program::quantities as q;
-use crate::program::scene::{PartScene, ProbeSpec, Task};
+use crate::program::scene::{PartScene, PartTask, ProbeSpec};
 use crate::simulation::Simulation;
 use harness::observe::{Observer, Outputs, Scalars};
 use harness::output::csv;
@@ -12,24 +12,24 @@ use harness::output::picture::{LinePlot, Series};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Rows of a probe that are drawn at most.
-const ROWS: usize = 4000;
+/// Largest number of drawn rows per probe.
+const MOST_ROWS: usize = 4000;
 
-/// A place and what was recorded there since it exists.
+/// A place, and the values recorded there since it exists.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Probe {
+pub struct ProbeRecord {
     name: String,
-    place: Place,
+    place: LocatedPoint,
     time: Vec<f64>,
     /// °C.
     temperature: Vec<f64>,
-    /// Of each quantity of the materials.
+    /// Values of each material field.
     fields: Vec<Vec<f64>>,
 }
 
-impl Probe {
-    /// At a place, of which nothing is recorded yet.
-    pub fn new(spec: &ProbeSpec, place: &Place, fields: usize) -> Self {
+impl ProbeRecord {
+    /// Creates an empty record at a place.
+    pub fn new(spec: &ProbeSpec, place: &LocatedPoint, fields: usize) -> Self {
         Self {
             name: spec.name.clone(),
             place: place.clone(),
@@ -39,13 +39,13 @@ impl Probe {
         }
     }
 
-    /// Its name.
+    /// Returns the name.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Temperature, °C, and a field at a time, linear between rows; `None` where it was not there.
-    pub fn at(&self, time: f64, field: usize) -> Option<[f64; 2]> {
+    /// Returns temperature, °C, and a field at a time, interpolated between rows; `None` outside the record.
+    pub fn value_at(&self, time: f64, field: usize) -> Option<[f64; 2]> {
         let after = self.time.partition_point(|&row| row < time).max(1);
         let (from, to) = (*self.time.get(after - 1)?, *self.time.get(after)?);
         let share = (time - from) / (to - from);
@@ -60,17 +60,21 @@ impl Probe {
         self.time.last().copied()
     }
 
-    /// Whether an element that holds the place is there.
+    /// Tells if an element that contains the place exists.
     fn exists(&self, simulation: &Simulation) -> bool {
         self.place.elements().iter().any(|&element| simulation.is_born(element))
     }
 }
 
-/// Adds a row to every probe whose place exists; NaN stands for a quantity that no material there has.
+/// Adds a row to each probe that exists; NaN for a field that no material there has.
 ///
 /// # Errors
-/// [`Error::NotFinite`] of a value at a probe.
-pub fn record(probes: &mut [Probe], simulation: &Simulation, names: &[&'static str]) -> Result<(), Error> {
+/// Returns [`Error::NotFinite`] for a non-finite value.
+pub fn record(
+    probes: &mut [ProbeRecord],
+    simulation: &Simulation,
+    names: &[&'static str],
+) -> Result<(), Error> {
     if !probes.iter().any(|probe| probe.exists(simulation)) {
         return Ok(());
     }
@@ -84,9 +88,9 @@ pub fn record(probes: &mut [Probe], simulation: &Simulation, names: &[&'static s
         if probe.last() == Some(time) {
             continue;
         }
-        let of =
+        let value =
             |field: &Vec<Option<f64>>| probe.place.value(|node| field[nodes.binary_search(&node).ok()?]);
-        let values: Vec<Option<f64>> = fields.iter().map(of).collect();
+        let values: Vec<Option<f64>> = fields.iter().map(value).collect();
         let all = std::iter::once(("temperature", Some(temperature)))
             .chain(names.iter().copied().zip(values.iter().copied()));
         for (quantity, value) in all {
@@ -104,34 +108,34 @@ pub fn record(probes: &mut [Probe], simulation: &Simulation, names: &[&'static s
     Ok(())
 }
 
-/// The probes of a scene.
-pub struct Probes<'a> {
+/// Observer that records the probes of a scene.
+pub struct ProbeObserver<'a> {
     scene: &'a PartScene,
-    task: &'a Task,
+    task: &'a PartTask,
     names: Vec<&'static str>,
-    probes: Vec<Probe>,
+    probes: Vec<ProbeRecord>,
 }
 
-impl<'a> Probes<'a> {
-    /// Probes of which nothing is recorded yet.
-    pub fn new(scene: &'a PartScene, task: &'a Task) -> Self {
+impl<'a> ProbeObserver<'a> {
+    /// Creates empty records.
+    pub fn new(scene: &'a PartScene, task: &'a PartTask) -> Self {
         let names = task.problem.field_names();
         let probes = scene.probe.iter().zip(&task.probes);
-        let probes = probes.map(|(spec, place)| Probe::new(spec, place, names.len())).collect();
+        let probes = probes.map(|(spec, place)| ProbeRecord::new(spec, place, names.len())).collect();
         Self { scene, task, names, probes }
     }
 
-    /// Effects of births on a probe that is there: NAME.jump_at_birth_N, by how much the temperature rises after the N-th birth before
-    /// the next one, K, and of each field FIELD_at_birth_N, its value just before, and FIELD_lost_at_birth_N, by how
-    /// much it falls below that.
-    fn births(&self, probe: &Probe, to: &mut Scalars<Simulation>) {
+    /// Adds the effects of births on a probe: NAME.jump_at_birth_N, the rise of the temperature between the
+    /// N-th birth and the next, K; for each field FIELD_at_birth_N, its value just before, and
+    /// FIELD_lost_at_birth_N, its largest drop afterwards.
+    fn births(&self, probe: &ProbeRecord, to: &mut Scalars<Simulation>) {
         let births = &self.task.problem.births;
         for (number, birth) in (1..).zip(births) {
-            // a row at the time of a birth shows what was before it
+            // a row at the time of a birth shows the state before it
             let first = probe.time.partition_point(|&time| time <= birth.time);
             let next = births.get(number).map_or(f64::INFINITY, |next| next.time);
             let last = probe.time.partition_point(|&time| time <= next);
-            // the row at which the probe itself was born says nothing
+            // skip the row at which the probe itself is born
             let seen = first > 0 && last > first && probe.time[0] < birth.time;
             let before = |values: &[f64]| Some(values[first - 1]).filter(|value| !value.is_nan());
             let after = |values: &[f64], pick: fn(f64, f64) -> f64| {
@@ -150,12 +154,12 @@ impl<'a> Probes<'a> {
     }
 }
 
-impl Observer<Simulation, Error> for Probes<'_> {
+impl Observer<Simulation, Error> for ProbeObserver<'_> {
     fn scalars(&self, to: &mut Scalars<Simulation>) {
         for probe in &self.probes {
             let name = probe.name.as_str();
             to.add(q::DISTANCE.of(&[name]), |_| probe.place.distance());
-            // `record` has refused all others: no material there has it
+            // `record` has refused other non-finite values: NaN means that no material there has the field
             let last = |values: &[f64]| values.last().copied().filter(|last| !last.is_nan());
             let at = q::AT_PROBE.of(&[name, "temperature"]).in_unit("degC");
             to.add_if(at, |_| last(&probe.temperature));
@@ -200,8 +204,13 @@ impl Observer<Simulation, Error> for Probes<'_> {
     }
 }
 
-/// Temperatures and fields of all probes over time.
-fn draw(probes: &[Probe], names: &[&'static str], scene: &PartScene, output: &Path) -> Result<(), Error> {
+/// Draws temperatures and fields of all probes over time.
+fn draw(
+    probes: &[ProbeRecord],
+    names: &[&'static str],
+    scene: &PartScene,
+    output: &Path,
+) -> Result<(), Error> {
     let quantities =
         std::iter::once(("temperature", "T [°C]")).chain(names.iter().map(|name| (*name, *name)));
     for (index, (name, label)) in quantities.enumerate() {
@@ -210,7 +219,7 @@ fn draw(probes: &[Probe], names: &[&'static str], scene: &PartScene, output: &Pa
         for probe in probes.iter().filter(|probe| probe.time.len() > 1) {
             let values = if index == 0 { &probe.temperature } else { &probe.fields[index - 1] };
             if values.iter().any(|x| x.is_finite()) {
-                let every = values.len().div_ceil(ROWS);
+                let every = values.len().div_ceil(MOST_ROWS);
                 let thinned = |list: &[f64]| -> Vec<f64> { list.iter().copied().step_by(every).collect() };
                 plot = plot.series(Series::line(&probe.name, &thinned(&probe.time), &thinned(values)));
                 drawn = true;

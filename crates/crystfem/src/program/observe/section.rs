@@ -1,4 +1,4 @@
-//! A section through a mesh, sampled on a regular raster for pictures.
+//! MeshSection through a mesh, sampled on a regular grid for pictures.
 
 use crate::mesh::Mesh;
 
@@ -6,22 +6,21 @@ use crate::mesh::Mesh;
 const SAMPLES: f64 = 560.0;
 
 /// Samples in the plane y = middle, on a grid along x and z.
-pub struct Section {
-    /// Samples across and up.
+pub struct MeshSection {
+    /// Number of samples along x and z.
     pub samples: [usize; 2],
     /// Lower left corner (x, z), m.
     pub low: [f64; 2],
-    /// Distance of neighbouring samples, m.
+    /// Distance between neighbouring samples, m.
     pub spacing: f64,
-    /// Sample and element; `shapes` has the shape functions of its nodes there.
+    /// Sample and element of each sample inside the mesh.
     inside: Vec<(usize, u32)>,
-    /// Those of one sample after those of another.
+    /// Shape functions of the nodes, sample by sample.
     shapes: Vec<f64>,
 }
 
-impl Section {
-    /// Through the middle of some elements along y, which cuts each as it is: a sample in none stays empty. `None` where there
-    /// is nothing to cut.
+impl MeshSection {
+    /// Samples the section through the middle of some elements along y. Returns `None` for an empty set.
     pub fn through_the_middle(mesh: &Mesh, elements: &[u32]) -> Option<Self> {
         let [low, high] = mesh.bounds_of(elements)?;
         let longest = (high[0] - low[0]).max(high[2] - low[2]);
@@ -29,7 +28,7 @@ impl Section {
             return None;
         }
         let spacing = longest / SAMPLES;
-        // those whose middle lies inside
+        // samples whose center lies inside
         let count = |d: usize| ((high[d] - low[d]) / spacing - 0.5).ceil().max(1.0) as usize;
         let samples = [count(0), count(2)];
         let middle = 0.5 * (low[1] + high[1]);
@@ -68,7 +67,7 @@ impl Section {
             if !exists(*element) {
                 continue;
             }
-            // a node that does not exist is NaN, and has no part in a sample on the far side
+            // a nonexistent node is NaN, but has no weight in a sample on the far side
             let parts = mesh.nodes(*element).iter().zip(shapes).filter(|(_, shape)| **shape != 0.0);
             let at = |node: u32| field.get(node as usize).copied().unwrap_or(f64::NAN);
             values[*sample] = parts.map(|(&node, shape)| shape * at(node)).sum();
@@ -80,15 +79,15 @@ impl Section {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{Block, Grid, Split};
+    use crate::mesh::{Block, CellSplit, Grid};
 
-    /// A trilinear field comes back at every sample, and nothing where nothing is.
+    /// A trilinear field is reproduced at each sample; nonexistent elements give NaN.
     #[test]
     fn sections_interpolate() {
         let mesh = Grid::uniform([0.0; 3], [3.0, 2.0, 1.0], [6, 3, 2]).unwrap().mesh("brick").unwrap();
         let field: Vec<f64> = mesh.points.iter().map(|[x, y, z]| 1.0 + 2.0 * x - y + 3.0 * x * z).collect();
         let all: Vec<u32> = (0..36).collect();
-        let section = Section::through_the_middle(&mesh, &all).unwrap();
+        let section = MeshSection::through_the_middle(&mesh, &all).unwrap();
         let [across, up] = section.samples;
         assert_eq!((across, up), (560, 187));
         let place = |k: usize| {
@@ -103,25 +102,26 @@ mod tests {
         for (k, value) in section.values(&mesh, &field, &lower).iter().enumerate() {
             assert_eq!(value.is_nan(), place(k)[1] > 0.5, "{k}");
         }
-        assert!(Section::through_the_middle(&mesh, &[]).is_none());
+        assert!(MeshSection::through_the_middle(&mesh, &[]).is_none());
     }
 
-    /// A tetrahedron fills the triangle in which the plane cuts it, and not its box; a brick of them all of it.
+    /// A tetrahedron fills the triangle of its section, not its bounding box; a brick of tetrahedra fills the
+    /// whole section.
     #[test]
     fn tetrahedra_are_cut() {
         let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let one = Mesh { points, tetrahedra: vec![[0, 1, 2, 3]], ..Mesh::default() };
-        let section = Section::through_the_middle(&one, &[0]).unwrap();
+        let section = MeshSection::through_the_middle(&one, &[0]).unwrap();
         let filled =
             section.values(&one, &[1.0; 4], &|_| true).iter().filter(|value| !value.is_nan()).count();
         let share = filled as f64 / (section.samples[0] * section.samples[1]) as f64;
-        // legs of a half: an eighth of the square
+        // legs of 1/2: an eighth of the square
         assert!((share - 0.125).abs() < 2e-3, "{share}");
         let block = Block { name: "brick".into(), lower: [0.0; 3], upper: [3.0, 2.0, 1.0] };
         let grid = Grid::uniform([0.0; 3], [3.0, 2.0, 1.0], [5, 3, 2]).unwrap();
-        let mesh = grid.blocks(&[block], Split::FiveTetrahedra).unwrap();
+        let mesh = grid.blocks(&[block], CellSplit::FiveTetrahedra).unwrap();
         let all: Vec<u32> = (0..mesh.element_count() as u32).collect();
-        let section = Section::through_the_middle(&mesh, &all).unwrap();
+        let section = MeshSection::through_the_middle(&mesh, &all).unwrap();
         let field: Vec<f64> = mesh.points.iter().map(|[x, y, z]| 1.0 + 2.0 * x - y + 3.0 * z).collect();
         for (k, value) in section.values(&mesh, &field, &|_| true).iter().enumerate() {
             let at = |index: usize, d: usize| section.low[d] + (index as f64 + 0.5) * section.spacing;

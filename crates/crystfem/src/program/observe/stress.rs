@@ -1,24 +1,24 @@
 //! Stress and warpage.
 
-use super::warped;
+use super::warpage_picture;
 use crate::coupling::StressCoupling;
 use crate::error::Error;
 use crate::program::quantities as q;
-use crate::program::scene::{Mechanics, PartScene, Task};
+use crate::program::scene::{Mechanics, PartScene, PartTask};
 use crate::simulation::Simulation;
 use harness::observe::{Fields, Observer, Outputs, Place, Scalars};
 
-/// The coupling of heat to stress, allocated at the first step.
-pub struct Stress<'a> {
+/// Observer that couples the stress to the temperatures; the coupling is allocated at the first step.
+pub struct StressObserver<'a> {
     scene: &'a PartScene,
-    task: &'a Task,
+    task: &'a PartTask,
     mechanics: &'a Mechanics,
     coupling: Option<StressCoupling<'a>>,
 }
 
-impl<'a> Stress<'a> {
-    /// Watches the stress of a part.
-    pub fn new(scene: &'a PartScene, task: &'a Task, mechanics: &'a Mechanics) -> Self {
+impl<'a> StressObserver<'a> {
+    /// Creates the observer.
+    pub fn new(scene: &'a PartScene, task: &'a PartTask, mechanics: &'a Mechanics) -> Self {
         Self { scene, task, mechanics, coupling: None }
     }
 
@@ -30,29 +30,29 @@ impl<'a> Stress<'a> {
         Ok(self.coupling.insert(coupling))
     }
 
-    /// A value of the coupling; NaN before the first step.
-    fn of(&self, value: impl Fn(&StressCoupling<'a>) -> f64) -> f64 {
+    /// Returns a value of the coupling; NaN before the first step.
+    fn value(&self, value: impl Fn(&StressCoupling<'a>) -> f64) -> f64 {
         self.coupling.as_ref().map_or(f64::NAN, value)
     }
 }
 
-impl<'a> Observer<Simulation, Error> for Stress<'a> {
+impl<'a> Observer<Simulation, Error> for StressObserver<'a> {
     fn scalars(&self, to: &mut Scalars<Simulation>) {
-        to.add(q::WARPAGE, |_| self.of(StressCoupling::warpage));
-        to.add(q::MISES_ON_BED, |_| self.of(StressCoupling::mises_on_bed));
-        to.add(q::MISES, |_| self.of(StressCoupling::largest_mises));
+        to.add(q::WARPAGE, |_| self.value(StressCoupling::warpage));
+        to.add(q::MISES_ON_BED, |_| self.value(StressCoupling::mises_on_bed));
+        to.add(q::MISES, |_| self.value(StressCoupling::largest_mises));
         let strength = self.mechanics.settings.law.strength;
         if strength.is_finite() {
             let most = |stress: &StressCoupling<'a>| stress.mises_on_bed().max(stress.largest_mises());
-            to.add(q::MISES_OVER_STRENGTH, |_| self.of(most) / strength);
+            to.add(q::MISES_OVER_STRENGTH, |_| self.value(most) / strength);
         }
-        to.add(q::LARGEST_ROTATION, |_| self.of(StressCoupling::largest_rotation));
-        to.add(q::STRESS_WORK, |_| self.of(|stress| stress.energy_balance().energies.work));
-        to.add(q::STRESS_STORED, |_| self.of(|stress| stress.energy_balance().energies.stored));
-        to.add(q::STRESS_LOST, |_| self.of(|stress| stress.energy_balance().energies.lost()));
-        to.add(q::STRESS_HARDENING, |_| self.of(|stress| stress.energy_balance().energies.softening));
-        to.add(q::WORST_STRESS_BALANCE, |_| self.of(|stress| stress.energy_balance().worst));
-        to.add(q::LARGEST_DISPLACEMENT, |_| self.of(StressCoupling::largest_displacement));
+        to.add(q::LARGEST_ROTATION, |_| self.value(StressCoupling::largest_rotation));
+        to.add(q::STRESS_WORK, |_| self.value(|stress| stress.energy_balance().energies.work));
+        to.add(q::STRESS_STORED, |_| self.value(|stress| stress.energy_balance().energies.stored));
+        to.add(q::STRESS_LOST, |_| self.value(|stress| stress.energy_balance().energies.lost()));
+        to.add(q::STRESS_HARDENING, |_| self.value(|stress| stress.energy_balance().energies.softening));
+        to.add(q::WORST_STRESS_BALANCE, |_| self.value(|stress| stress.energy_balance().worst));
+        to.add(q::LARGEST_DISPLACEMENT, |_| self.value(StressCoupling::largest_displacement));
         let moved = self.coupling.as_ref().map(StressCoupling::displacement);
         for (probe, place) in self.scene.probe.iter().zip(&self.task.probes) {
             for (d, axis) in ["x", "y", "z"].into_iter().enumerate() {
@@ -65,12 +65,12 @@ impl<'a> Observer<Simulation, Error> for Stress<'a> {
     }
 
     fn fields(&self, to: &mut Fields<Simulation>) {
-        let of = |values: fn(&StressCoupling<'a>) -> Vec<f64>| {
+        let field = |values: fn(&StressCoupling<'a>) -> Vec<f64>| {
             move |_: &Simulation| self.coupling.as_ref().map(values).unwrap_or_default()
         };
-        to.add("displacement_m", 3, Place::Points, of(StressCoupling::displacement));
-        to.add("mises_Pa", 1, Place::Cells, of(StressCoupling::mises));
-        to.add("residual_stress_Pa", 6, Place::Cells, of(StressCoupling::stresses));
+        to.add("displacement_m", 3, Place::Points, field(StressCoupling::displacement));
+        to.add("mises_Pa", 1, Place::Cells, field(StressCoupling::mises));
+        to.add("residual_stress_Pa", 6, Place::Cells, field(StressCoupling::stresses));
     }
 
     fn see(&mut self, simulation: &Simulation) -> Result<(), Error> {
@@ -87,8 +87,10 @@ impl<'a> Observer<Simulation, Error> for Stress<'a> {
     }
 
     fn draw(&self, _: &Simulation, to: &Outputs) -> Result<(), Error> {
-        let drawn =
-            self.coupling.as_ref().map(|stress| warped::draw(self.scene, self.task, stress, to.folder));
+        let drawn = self
+            .coupling
+            .as_ref()
+            .map(|stress| warpage_picture::draw(self.scene, self.task, stress, to.folder));
         drawn.unwrap_or(Ok(()))
     }
 

@@ -1,47 +1,47 @@
-//! Temperature, quantities of the materials, and energies.
+//! Temperature, material fields and energies.
 
-use super::celsius::{CELSIUS, TEMPERATURE, of_kelvin};
+use super::celsius::{CELSIUS, TEMPERATURE, to_celsius};
 use super::or_nan;
 use crate::error::Error;
 use crate::program::quantities as q;
-use crate::program::scene::Task;
+use crate::program::scene::PartTask;
 use crate::simulation::{Simulation, Statistics};
 use harness::observe::{Fields, Observer, Place, Scalars};
 use harness::report::Quantity;
 
-/// Fields of the heat problem, their statistics by layer, and the energy balance.
-pub struct Thermal<'a> {
-    task: &'a Task,
-    /// The temperature, °C, and the quantities of the materials.
+/// Observer of the heat problem: fields, statistics by layer, and energy balance.
+pub struct ThermalObserver<'a> {
+    task: &'a PartTask,
+    /// Names: the temperature, °C, and the material fields.
     names: Vec<&'static str>,
-    /// Statistics of the whole part and of each layer, name by name; `None` where nothing exists.
+    /// Statistics of the whole part and of each layer, name by name; `None` for nonexistent layers.
     statistics: Vec<Option<Statistics>>,
 }
 
-impl<'a> Thermal<'a> {
-    /// Watches the run of a task.
-    pub fn new(task: &'a Task) -> Self {
+impl<'a> ThermalObserver<'a> {
+    /// Creates the observer.
+    pub fn new(task: &'a PartTask) -> Self {
         let names = std::iter::once("temperature").chain(task.problem.field_names()).collect();
         Self { task, names, statistics: Vec::new() }
     }
 
-    /// Prefix of the values of the whole part and of each layer, with its elements.
+    /// Returns prefix and elements of the whole part and of each layer.
     fn pieces(&self) -> impl Iterator<Item = (String, &Vec<u32>)> {
         let layers = (1..).zip(&self.task.layers).map(|(k, elements)| (format!("layer-{k}."), elements));
         std::iter::once((String::new(), &self.task.printed)).chain(layers)
     }
 
-    /// Volume of what exists, m³, as the materials have it: of each element the part that is filled.
+    /// Computes the volume of the existing elements, m³, each scaled by its filled fraction.
     fn printed_volume(&self, simulation: &Simulation) -> f64 {
         let mesh = &self.task.problem.mesh;
         let parts = self.task.filling.as_ref().and_then(|filling| filling.parts.as_ref());
-        let of = |element: u32| parts.map_or(1.0, |(values, of)| values[of[element as usize]]);
+        let fraction = |element: u32| parts.map_or(1.0, |(values, index)| values[index[element as usize]]);
         let born = (0..mesh.element_count() as u32).filter(|&element| simulation.is_born(element));
-        born.map(|element| of(element) * mesh.volume(element)).sum()
+        born.map(|element| fraction(element) * mesh.volume(element)).sum()
     }
 }
 
-impl Observer<Simulation, Error> for Thermal<'_> {
+impl Observer<Simulation, Error> for ThermalObserver<'_> {
     fn scalars(&self, to: &mut Scalars<Simulation>) {
         to.add(q::STORED_ENERGY, |s| s.state().ledger.stored);
         to.add(q::EXCHANGED_ENERGY, |s| s.state().ledger.exchange.total());
@@ -63,16 +63,16 @@ impl Observer<Simulation, Error> for Thermal<'_> {
         for (column, (prefix, name)) in columns.enumerate() {
             let statistics = self.statistics.get(column).copied().flatten();
             let [unit, spread] = if name == "temperature" { ["degC", "K"] } else { [""; 2] };
-            let of = |quantity: Quantity, unit: &str| quantity.of(&[&prefix, name]).in_unit(unit);
-            to.add_if(of(q::MEAN, unit), |_| Some(statistics?.mean));
-            to.add_if(of(q::LEAST, unit), |_| Some(statistics?.least));
-            to.add_if(of(q::LARGEST, unit), |_| Some(statistics?.largest));
-            to.add_if(of(q::DEVIATION, spread), |_| Some(statistics?.deviation));
+            let column = |quantity: Quantity, unit: &str| quantity.of(&[&prefix, name]).in_unit(unit);
+            to.add_if(column(q::MEAN, unit), |_| Some(statistics?.mean));
+            to.add_if(column(q::LEAST, unit), |_| Some(statistics?.least));
+            to.add_if(column(q::LARGEST, unit), |_| Some(statistics?.largest));
+            to.add_if(column(q::DEVIATION, spread), |_| Some(statistics?.deviation));
         }
     }
 
     fn fields(&self, to: &mut Fields<Simulation>) {
-        to.add(TEMPERATURE, 1, Place::Points, |s| of_kelvin(&s.temperatures(f64::NAN)));
+        to.add(TEMPERATURE, 1, Place::Points, |s| to_celsius(&s.temperatures(f64::NAN)));
         for name in &self.names[1..] {
             to.add(*name, 1, Place::Points, |s| or_nan(s.field(name)));
         }
@@ -87,11 +87,11 @@ impl Observer<Simulation, Error> for Thermal<'_> {
         let celsius = |node| simulation.temperature(node).map(|kelvin| kelvin - CELSIUS);
         let mut values = vec![nodes.map(celsius).collect::<Vec<_>>()];
         values.extend(self.names[1..].iter().map(|name| simulation.field(name)));
-        let of_piece = |(_, elements): (String, &Vec<u32>)| {
+        let statistics = |(_, elements): (String, &Vec<u32>)| {
             let volumes = simulation.volumes(elements);
             values.iter().map(|values| Statistics::new(values, &volumes)).collect::<Vec<_>>()
         };
-        self.statistics = self.pieces().flat_map(of_piece).collect();
+        self.statistics = self.pieces().flat_map(statistics).collect();
         Ok(())
     }
 

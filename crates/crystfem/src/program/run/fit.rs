@@ -1,48 +1,54 @@
-//! Fits of measurements: constants with their intervals, tables, pictures.
+//! Fits to measurements: constants with intervals, tables and pictures.
 
-use super::Failure;
 use super::{fit_part, heat_flow};
 use crate::error::Error;
-use crate::fit::{Fit, Known, MeasuredPeak, avrami, nakamura, ozawa};
-use crate::program::observe::celsius::{CELSIUS, of_kelvin};
+use crate::fit::{FixedConstants, KineticFit, MeasuredPeak, avrami, nakamura, ozawa};
+use crate::program::observe::celsius::{CELSIUS, to_celsius};
 use crate::program::quantities as q;
 use crate::program::scene::{FitLaw, FitScene, FitSpec, Job};
 use harness::case::Finished;
 use harness::output::csv;
 use harness::output::picture::{LinePlot, Series};
 use harness::report::{Phases, Quantity, Report};
-use harness::scene::{SceneError, Source};
+use harness::scene::{Failure, SceneError, Source};
 use polycore::file::atomic_write;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
 
-/// A finished fit and the abscissae of its measurements, series by series.
-struct Done {
+/// A finished fit, with the abscissae of its measurements for each series.
+struct FinishedFit {
     name: String,
-    fit: Fit,
+    fit: KineticFit,
     abscissa: (&'static str, &'static str),
     series: Vec<(String, Vec<f64>, Vec<f64>)>,
-    /// What was known of the kinetics, of `nakamura`.
-    known: Option<Known>,
+    /// Prescribed constants of the kinetics, for `nakamura`.
+    known: Option<FixedConstants>,
 }
 
-impl Done {
-    /// The fitted kinetics as a key of a material of a scene.
+impl FinishedFit {
+    /// Returns the fitted kinetics as a key of a material block.
     fn block(&self) -> Option<String> {
-        let Known { equilibrium_melting, frozen, activation_energy } = self.known?;
-        let of = |name: &str| self.fit.estimates.iter().find(|one| one.name == name).map(|one| one.value);
-        let [rate, nucleation, n] = ["growth_rate", "nucleation", "avrami_exponent"].map(of);
+        let FixedConstants { equilibrium_melting, frozen, activation_energy } = self.known?;
+        let estimate = |name: &str| {
+            self.fit.estimates.iter().find(|estimate| estimate.name == name).map(|estimate| estimate.value)
+        };
+        let [rate, nucleation, n] = ["growth_rate", "nucleation", "avrami_exponent"].map(estimate);
         Some(format!(
-            "kinetics = {{ growth_rate = \"{:.6e} 1/s\", nucleation = \"{:.6e} K^2\", activation_energy = \"{activation_energy} J/mol\", \
-             equilibrium_melting = \"{equilibrium_melting} K\", frozen = \"{frozen} K\", avrami_exponent = {:.5} }}\n",
+            "kinetics = {{ growth_rate = \"{:.6e} 1/s\", nucleation = \"{:.6e} K^2\", activation_energy = \
+             \"{activation_energy} J/mol\", equilibrium_melting = \"{equilibrium_melting} K\", frozen = \
+             \"{frozen} K\", avrami_exponent = {:.5} }}\n",
             rate?, nucleation?, n?
         ))
     }
 }
 
 /// Runs every fit.
-pub fn run(source: &Source, scene: &FitScene, run: &mut harness::case::Run) -> Result<Finished, Failure> {
+pub fn run(
+    source: &Source,
+    scene: &FitScene,
+    run: &mut harness::case::Run,
+) -> Result<Finished, Failure<Error>> {
     let (output, quick) = (run.options.output, run.options.quick);
     let jobs = scene.jobs(source)?;
     run.begin()?;
@@ -52,12 +58,12 @@ pub fn run(source: &Source, scene: &FitScene, run: &mut harness::case::Run) -> R
     for (index, (spec, (job, peaks))) in scene.fit.iter().zip(jobs).enumerate() {
         phases.start("fit");
         let fits = solve(spec, job, run);
-        // data that say nothing are a fault of the scene, which names them
+        // data that do not determine the constants are an error of the scene, at their key
         let fits = fits.map_err(|failure| match failure {
             Failure::Run(Error::Data { what, reason }) => {
                 let single = spec.law == FitLaw::Nakamura && spec.data.len() == 1;
                 let hint = if single {
-                    "; one cooling rate gives K0 and K_G together only: add runs at others"
+                    "; one cooling rate cannot separate K0 from K_G: add runs at other rates"
                 } else {
                     ""
                 };
@@ -70,30 +76,31 @@ pub fn run(source: &Source, scene: &FitScene, run: &mut harness::case::Run) -> R
         heat_flow::write(output, &spec.name, &peaks, scene.output.pictures)?;
     }
     phases.start("write");
-    for one in &done {
-        record(&mut report, one);
-        write(output, one)?;
-        write_draws(output, one)?;
+    for fit in &done {
+        record(&mut report, fit);
+        write(output, fit)?;
+        write_draws(output, fit)?;
         if scene.output.pictures {
-            draw(output, one)?;
+            draw(output, fit)?;
         }
     }
     write_estimates(output, &done)?;
     phases.stop();
     report.phases(&phases).threads(1).judge(&scene.expect, quick);
-    let mut text = report.table();
-    for (one, block) in done.iter().filter_map(|one| Some((one, one.block()?))) {
-        let path = output.join(format!("{}_kinetics.toml", one.name));
+    let mut notes = String::new();
+    for (fit, block) in done.iter().filter_map(|fit| Some((fit, fit.block()?))) {
+        let path = output.join(format!("{}_kinetics.toml", fit.name));
         atomic_write(&path, |file| file.write_all(block.as_bytes()))?;
-        text += &format!("for a material of a scene, {}:\n  {block}", path.display());
+        notes += &format!("for the material block of a scene, {}:\n  {block}", path.display());
     }
-    Ok(Finished { report, text })
+    let text = report.table() + &notes;
+    Ok(Finished::new(report, text).with_notes(&notes))
 }
 
-/// What a scene will fit.
+/// Describes the fits of a scene, line by line.
 ///
 /// # Errors
-/// A fault of the scene or of its data.
+/// Returns an error for an invalid scene or invalid data.
 pub fn explain(source: &Source, scene: &FitScene) -> Result<Vec<String>, SceneError> {
     let jobs = scene.jobs(source)?;
     let line = |(spec, (job, peaks)): (&FitSpec, &(Job, Vec<MeasuredPeak>))| {
@@ -112,39 +119,39 @@ pub fn explain(source: &Source, scene: &FitScene) -> Result<Vec<String>, SceneEr
             }
             Job::Part(part) => {
                 let (rows, file) = (part.degrees().len(), part.source.path.display());
-                format!("K0 and K_G from {rows} measurements in {file}, which runs for each trial")
+                format!("K0 and K_G from {rows} measurements; each trial runs {file}")
             }
         };
         let heat = |found: &MeasuredPeak| format!("{:.4} J/g", found.peak.enthalpy / 1e3);
         let heats: Vec<String> = peaks.iter().map(heat).collect();
-        let of = if heats.is_empty() { String::new() } else { format!("; peaks of {}", heats.join(", ")) };
-        format!("fit {}: {:?}, {what}{of}", spec.name, spec.law)
+        let peaks = if heats.is_empty() { String::new() } else { format!("; peaks of {}", heats.join(", ")) };
+        format!("fit {}: {:?}, {what}{peaks}", spec.name, spec.law)
     };
-    Ok(read(source, scene).chain(scene.fit.iter().zip(&jobs).map(line)).collect())
+    Ok(describe_tables(source, scene).chain(scene.fit.iter().zip(&jobs).map(line)).collect())
 }
 
-/// How the tables of a scene are understood, a line each.
-pub fn read<'a>(source: &'a Source, scene: &'a FitScene) -> impl Iterator<Item = String> + 'a {
+/// Describes how each table of a scene was read, a line per table.
+pub fn describe_tables<'a>(source: &'a Source, scene: &'a FitScene) -> impl Iterator<Item = String> + 'a {
     let tables = scene.fit.iter().flat_map(|spec| &spec.data);
-    tables.filter_map(|data| crate::table::understood(&source.file(&data.file)))
+    tables.filter_map(|data| crate::table::describe_format(&source.file(&data.file)))
 }
 
-fn solve(spec: &FitSpec, job: Job, run: &mut harness::case::Run) -> Result<Vec<Done>, Failure> {
+fn solve(spec: &FitSpec, job: Job, run: &mut harness::case::Run) -> Result<Vec<FinishedFit>, Failure<Error>> {
     let name = &spec.name;
     match job {
         Job::Avrami(times, degrees) => {
             let fit = avrami(&times, &degrees)?;
             let series = vec![("measured".to_owned(), times, degrees)];
-            Ok(vec![Done { name: name.clone(), fit, abscissa: ("time", "s"), series, known: None }])
+            Ok(vec![FinishedFit { name: name.clone(), fit, abscissa: ("time", "s"), series, known: None }])
         }
         Job::Nakamura(runs, known) => {
             let fit = nakamura(&runs, &known)?;
             let series = runs
                 .into_iter()
                 .zip(&spec.data)
-                .map(|(run, data)| (stem(&data.file), of_kelvin(&run.temperatures), run.degrees))
+                .map(|(run, data)| (stem(&data.file), to_celsius(&run.temperatures), run.degrees))
                 .collect();
-            Ok(vec![Done {
+            Ok(vec![FinishedFit {
                 name: name.clone(),
                 fit,
                 abscissa: ("temperature", "degC"),
@@ -161,7 +168,7 @@ fn solve(spec: &FitSpec, job: Job, run: &mut harness::case::Run) -> Result<Vec<D
             let curves = part.curves.into_iter().zip(&spec.data);
             let series =
                 curves.map(|((_, times, degrees), data)| (stem(&data.file), times, degrees)).collect();
-            Ok(vec![Done { name: name.clone(), fit, abscissa: ("time", "s"), series, known: None }])
+            Ok(vec![FinishedFit { name: name.clone(), fit, abscissa: ("time", "s"), series, known: None }])
         }
         Job::Ozawa(coolings, temperatures) => {
             let mut all = Vec::new();
@@ -171,36 +178,36 @@ fn solve(spec: &FitSpec, job: Job, run: &mut harness::case::Run) -> Result<Vec<D
                 let rates: Vec<f64> = rates.iter().map(|q| q * 60.0).collect();
                 let name = format!("{name}.{}_degC", ((temperature - CELSIUS) * 100.0).round() / 100.0);
                 let series = vec![("measured".to_owned(), rates, degrees)];
-                all.push(Done { name, fit, abscissa: ("cooling_rate", "K/min"), series, known: None });
+                all.push(FinishedFit { name, fit, abscissa: ("cooling_rate", "K/min"), series, known: None });
             }
             Ok(all)
         }
     }
 }
 
-/// A file's name without folder and extension.
+/// Returns the name of a file without folder and extension.
 fn stem(file: &Path) -> String {
     file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-fn record(report: &mut Report, done: &Done) {
-    let Done { name, fit, .. } = done;
+fn record(report: &mut Report, done: &FinishedFit) {
+    let FinishedFit { name, fit, .. } = done;
     for estimate in &fit.estimates {
-        let of = |quantity: Quantity| quantity.of(&[name, estimate.name]).in_unit(&estimate.unit);
-        report.value(of(q::CONSTANT), estimate.value);
-        report.value(of(q::STANDARD_ERROR), estimate.standard_error);
-        report.value(of(q::LOWER), estimate.interval[0]);
-        report.value(of(q::UPPER), estimate.interval[1]);
+        let value = |quantity: Quantity| quantity.of(&[name, estimate.name]).in_unit(&estimate.unit);
+        report.value(value(q::CONSTANT), estimate.value);
+        report.value(value(q::STANDARD_ERROR), estimate.standard_error);
+        report.value(value(q::LOWER), estimate.interval[0]);
+        report.value(value(q::UPPER), estimate.interval[1]);
     }
     report.value(q::FIT_RMS.of(&[name]), fit.rms);
     report.work(&format!("{name}.measurements"), fit.measurements as u64);
     report.work(&format!("{name}.evaluations"), fit.evaluations as u64);
 }
 
-/// estimates.csv: a line for each constant.
-fn write_estimates(output: &Path, all: &[Done]) -> Result<(), polycore::Error> {
+/// Writes estimates.csv: one row per constant.
+fn write_estimates(output: &Path, all: &[FinishedFit]) -> Result<(), polycore::Error> {
     let mut text = String::from("fit,constant,value,standard_error,lower_95,upper_95,unit\n");
-    for Done { name, fit, .. } in all {
+    for FinishedFit { name, fit, .. } in all {
         for e in &fit.estimates {
             let [lower, upper] = e.interval;
             let numbers = format!("{:?},{:?},{lower:?},{upper:?}", e.value, e.standard_error);
@@ -210,8 +217,8 @@ fn write_estimates(output: &Path, all: &[Done]) -> Result<(), polycore::Error> {
     atomic_write(output.join("estimates.csv"), |file| file.write_all(text.as_bytes()))
 }
 
-/// NAME.csv: measurements beside the model.
-fn write(output: &Path, done: &Done) -> Result<(), polycore::Error> {
+/// Writes NAME.csv: measurements and model.
+fn write(output: &Path, done: &FinishedFit) -> Result<(), polycore::Error> {
     let mut columns = [Vec::new(), Vec::new(), Vec::new()];
     for (index, (_, x, data)) in done.series.iter().enumerate() {
         columns[0].extend(std::iter::repeat_n((index + 1) as f64, x.len()));
@@ -225,8 +232,8 @@ fn write(output: &Path, done: &Done) -> Result<(), polycore::Error> {
     csv::write(output.join(format!("{}.csv", done.name)), &columns)
 }
 
-/// NAME_posterior.csv: draws of the constants, for `sweep --sample`.
-fn write_draws(output: &Path, done: &Done) -> Result<(), polycore::Error> {
+/// Writes NAME_posterior.csv: draws of the constants, for `sweep --sample`.
+fn write_draws(output: &Path, done: &FinishedFit) -> Result<(), polycore::Error> {
     let fit = &done.fit;
     if fit.draws.is_empty() {
         return Ok(());
@@ -237,13 +244,13 @@ fn write_draws(output: &Path, done: &Done) -> Result<(), polycore::Error> {
         .estimates
         .iter()
         .zip(&lists)
-        .map(|(one, list)| (one.name, one.unit.as_str(), &list[..]))
+        .map(|(estimate, list)| (estimate.name, estimate.unit.as_str(), &list[..]))
         .collect();
     csv::write(output.join(format!("{}_posterior.csv", done.name)), &columns)
 }
 
-/// NAME.png: measurements as markers, the model dashed.
-fn draw(output: &Path, done: &Done) -> Result<(), polycore::Error> {
+/// Draws NAME.png: measurements as markers, the model as a dashed line.
+fn draw(output: &Path, done: &FinishedFit) -> Result<(), polycore::Error> {
     let unit = done.abscissa.1.replace("degC", "°C");
     let axis = format!("{} ({unit})", done.abscissa.0.replace('_', " "));
     let mut plot = LinePlot::new(&done.name).axes(&axis, "relative crystallinity α").size(800.0, 460.0);
@@ -257,7 +264,7 @@ fn draw(output: &Path, done: &Done) -> Result<(), polycore::Error> {
             curve[0].push(x[index]);
             curve[1].push(model[index]);
         }
-        // a NaN ends the line of one run
+        // NaN separates the lines of the runs
         curve.iter_mut().for_each(|values| values.push(f64::NAN));
         plot = plot.series(Series::markers(name, x, data));
     }

@@ -1,24 +1,24 @@
-//! The model of a fit of a part: one simulation for each trial of its constants.
+//! Model for fits to measurements in a part: one simulation per trial of the constants.
 
-use super::Failure;
 use crate::error::Error;
-use crate::fit::{self, Fit};
-use crate::kinetics::Constants;
+use crate::fit::{self, KineticFit};
+use crate::kinetics::KineticConstants;
 use crate::program::observe::celsius::CELSIUS;
-use crate::program::observe::{Probe, record};
+use crate::program::observe::{ProbeRecord, record};
 use crate::program::scene::PartFit;
 use crate::simulation::Simulation;
+use harness::scene::Failure;
 use std::cell::RefCell;
 
-/// Fits the constants; `show` hears of each trial, and may end the fit.
+/// Fits the constants. `show` is called before each trial; its error ends the fit.
 pub fn solve(
     job: &PartFit,
     show: &mut dyn FnMut(usize) -> Result<(), polycore::Error>,
-) -> Result<Fit, Failure> {
-    // a first trial whose failure is the scene's has its own error
+) -> Result<KineticFit, Failure<Error>> {
+    // report an invalid scene by its own error, before the fit starts
     trial(job, &job.constants)?;
     let (state, stopped) = (RefCell::new((0, show)), RefCell::new(None));
-    let model = |constants: &Constants| -> Option<Vec<[f64; 2]>> {
+    let model = |constants: &KineticConstants| -> Option<Vec<[f64; 2]>> {
         let (count, show) = &mut *state.borrow_mut();
         *count += 1;
         if stopped.borrow().is_some() {
@@ -30,32 +30,36 @@ pub fn solve(
         }
         trial(job, constants).ok()
     };
-    let found = fit::part(&model, &job.degrees(), &job.constants);
+    let found = fit::fit_in_part(&model, &job.degrees(), &job.constants);
     match stopped.into_inner() {
         Some(error) => Err(Error::from(error).into()),
         None => Ok(found?),
     }
 }
 
-/// Temperature, K, and α at each measurement of a part with such constants.
-fn trial(job: &PartFit, constants: &Constants) -> Result<Vec<[f64; 2]>, Failure> {
-    let scene = job.with(constants);
+/// Returns temperature, K, and α at each measurement, computed with some constants.
+fn trial(job: &PartFit, constants: &KineticConstants) -> Result<Vec<[f64; 2]>, Failure<Error>> {
+    let scene = job.with_constants(constants);
     let task = scene.task(&job.source, scene.mesh.build(&job.source)?)?;
     let mut simulation = Simulation::new(std::sync::Arc::clone(&task.problem), task.settings)?;
     let names = simulation.field_names();
     let fields = names.len();
     let field = names.iter().position(|name| *name == "alpha").unwrap_or(0);
-    let mut probes: Vec<Probe> =
-        scene.probe.iter().zip(&task.probes).map(|(spec, place)| Probe::new(spec, place, fields)).collect();
+    let mut probes: Vec<ProbeRecord> = scene
+        .probe
+        .iter()
+        .zip(&task.probes)
+        .map(|(spec, place)| ProbeRecord::new(spec, place, fields))
+        .collect();
     record(&mut probes, &simulation, &names)?;
     simulation.observe(task.end, |simulation| record(&mut probes, simulation, &names))?;
     let mut rows = Vec::new();
     for (probe, times, _) in &job.curves {
         let probe = &probes[*probe];
         for &time in times {
-            let Some([temperature, degree]) = probe.at(time, field) else {
+            let Some([temperature, degree]) = probe.value_at(time, field) else {
                 let reason = format!(
-                    "probe `{}` is not there at {time} s; the part ends at {} s",
+                    "probe `{}` has no value at {time} s; the run of the part ends at {} s",
                     probe.name(),
                     task.end
                 );

@@ -1,7 +1,7 @@
-//! Peaks of heat flows: enthalpies, tables, pictures.
+//! Peaks of heat flow: enthalpies, tables and pictures.
 
 use crate::fit::MeasuredPeak;
-use crate::program::observe::celsius::of_kelvin;
+use crate::program::observe::celsius::to_celsius;
 use crate::program::quantities as q;
 use crate::program::scene::FitSpec;
 use harness::output::csv;
@@ -9,7 +9,7 @@ use harness::output::picture::{LinePlot, Series};
 use harness::report::Report;
 use std::path::Path;
 
-/// Enthalpies and degrees of crystallinity of a fit's files.
+/// Reports enthalpy and degree of crystallinity for each file of a fit.
 pub fn record(report: &mut Report, spec: &FitSpec, peaks: &[MeasuredPeak]) {
     let perfect = spec.heat_flow.as_ref().and_then(|flow| flow.latent_heat);
     for (index, MeasuredPeak { peak, .. }) in peaks.iter().enumerate() {
@@ -21,7 +21,7 @@ pub fn record(report: &mut Report, spec: &FitSpec, peaks: &[MeasuredPeak]) {
     }
 }
 
-/// NAME-heat-flow.csv and .png: heat given off, its baseline and α; nothing without peaks.
+/// Writes NAME-heat-flow.csv and .png: released heat, baseline and α. Does nothing without peaks.
 pub fn write(
     output: &Path,
     name: &str,
@@ -41,17 +41,17 @@ pub fn write(
         columns.push(("temperature", "degC", Vec::new()));
     }
     let axis = if cooling { "temperature (°C)" } else { "time (s)" };
-    let mut plot = LinePlot::new(name).axes(axis, "heat given off (W/g)").size(800.0, 460.0);
+    let mut plot = LinePlot::new(name).axes(axis, "released heat (W/g)").size(800.0, 460.0);
     let mut under = [Vec::new(), Vec::new()];
     for (index, MeasuredPeak { peak, temperatures, .. }) in peaks.iter().enumerate() {
         let per_gram = |flows: &[f64]| flows.iter().map(|q| q / 1e3).collect::<Vec<f64>>();
         let [flows, baseline] = [per_gram(&peak.flows), per_gram(&peak.baseline)];
-        let celsius = of_kelvin(temperatures);
+        let celsius = to_celsius(temperatures);
         let x = if cooling { &celsius } else { &peak.times };
         plot = plot.series(Series::line(&format!("run {}", index + 1), x, &flows));
         under[0].extend(x);
         under[1].extend(&baseline);
-        // a NaN ends the line of one run
+        // NaN separates the lines of the runs
         under.iter_mut().for_each(|values| values.push(f64::NAN));
         let run = vec![(index + 1) as f64; x.len()];
         let all = [run, peak.times.clone(), flows, baseline, peak.degrees.clone(), celsius];

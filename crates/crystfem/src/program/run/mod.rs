@@ -1,4 +1,4 @@
-//! Whole scenes: run, compared, drawn and judged.
+//! Runs whole scenes: solves, compares, draws and judges.
 
 mod draw;
 mod explain;
@@ -15,27 +15,26 @@ pub use program::Crystfem;
 
 use crate::error::Error;
 use crate::program::quantities;
-use crate::program::scene::{self, FitScene, Kind, PartScene, PointScene};
+use crate::program::scene::{self, FitScene, PartScene, PointScene, SceneKind};
 use harness::case::{Finished, Run, check_expectations};
-use harness::scene::{SceneError, Source};
+use harness::scene::{Failure, SceneError, Source};
 
-/// What stops a run: a fault in the scene, or one met on the way.
-pub type Failure = harness::scene::Failure<Error>;
-
-/// Runs a scene of any kind, all but `report.json`, which [`Run::finish`] writes.
+/// Runs a scene of any kind; [`Run::finish`] writes `report.json`.
 ///
 /// # Errors
-/// [`Failure`].
-pub fn run(source: &Source, run: &mut Run) -> Result<Finished, Failure> {
+/// Returns a [`Failure`] for an invalid scene or a failed run.
+pub fn run(source: &Source, run: &mut Run) -> Result<Finished, Failure<Error>> {
     match scene::kind(source)? {
-        Kind::Point => self::point::run(source, &points(source)?, run).map(Finished::from),
-        Kind::Fit => {
+        SceneKind::Point => self::point::run(source, &points(source)?, run).map(Finished::from),
+        SceneKind::Fit => {
             let scene = fits(source)?;
-            let Finished { text, report } = self::fit::run(source, &scene, run)?;
-            let read: String = self::fit::read(source, &scene).map(|line| line + "\n").collect();
-            Ok(Finished { text: read + &text, report })
+            let mut finished = self::fit::run(source, &scene, run)?;
+            let read: Vec<String> = self::fit::describe_tables(source, &scene).collect();
+            finished.text = read.iter().map(|line| format!("{line}\n")).collect::<String>() + &finished.text;
+            finished.notes.splice(0..0, read);
+            Ok(finished)
         }
-        Kind::Part => {
+        SceneKind::Part => {
             let scene = source.parse::<PartScene>()?;
             match scene.study.is_empty() {
                 true => self::part::run(source, &scene, run),
@@ -47,25 +46,25 @@ pub fn run(source: &Source, run: &mut Run) -> Result<Finished, Failure> {
 
 fn points(source: &Source) -> Result<PointScene, SceneError> {
     let scene = source.parse::<PointScene>()?;
-    check_expectations(source, &scene.expect, &[quantities::OF_POINTS])?;
+    check_expectations(source, &scene.expect, &[quantities::POINT_QUANTITIES])?;
     Ok(scene)
 }
 
 fn fits(source: &Source) -> Result<FitScene, SceneError> {
     let scene = source.parse::<FitScene>()?;
-    check_expectations(source, &scene.expect, &[quantities::OF_FITS])?;
+    check_expectations(source, &scene.expect, &[quantities::FIT_QUANTITIES])?;
     Ok(scene)
 }
 
-/// What a scene of any kind builds and leaves out, in lines; `quick`: as a run without what is marked `quick = false`.
+/// Describes a scene of any kind, line by line. `quick` skips the parts marked `quick = false`.
 ///
 /// # Errors
-/// A fault of the scene.
-pub fn explain(source: &Source, quick: bool) -> Result<Vec<String>, Failure> {
+/// Returns an error for an invalid scene.
+pub fn explain(source: &Source, quick: bool) -> Result<Vec<String>, Failure<Error>> {
     match scene::kind(source)? {
-        Kind::Point => Ok(self::point::explain(source, &points(source)?, quick)?),
-        Kind::Fit => Ok(self::fit::explain(source, &fits(source)?)?),
-        Kind::Part => {
+        SceneKind::Point => Ok(self::point::explain(source, &points(source)?, quick)?),
+        SceneKind::Fit => Ok(self::fit::explain(source, &fits(source)?)?),
+        SceneKind::Part => {
             let scene = source.parse::<PartScene>()?;
             match scene.study.is_empty() {
                 true => self::part::explain(source, &scene),

@@ -1,39 +1,44 @@
-//! A body in time: solved, recorded, drawn and judged.
+//! Run of a part scene: solves, records, draws and judges.
 
-use super::Failure;
 use crate::error::Error;
-use crate::ledger::Record;
+use crate::ledger::StepBalance;
 use crate::mesh::Mesh;
-use crate::program::observe::celsius::{TEMPERATURE, of_kelvin};
-use crate::program::observe::{FIELDS, Observers, observers};
+use crate::program::observe::celsius::{TEMPERATURE, to_celsius};
+use crate::program::observe::{FIELDS, PartObservers, observers};
 use crate::program::quantities as q;
-use crate::program::scene::{PartScene, Task};
+use crate::program::scene::{PartScene, PartTask};
 use crate::simulation::{Simulation, State};
 use harness::case::{Finished, Run, STATISTICS, Step, StepField};
 use harness::observe::{Outputs, Place};
 use harness::output::vtkhdf::{Cells, Data, MeshSeries};
 use harness::report::{Phases, Report, Value};
-use harness::scene::Source;
+use harness::scene::{Failure, Source};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// Runs the scene of a body, or resumes it.
-pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished, Failure> {
+/// Runs or resumes a part scene.
+pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished, Failure<Error>> {
     scene.check(source)?;
-    let report = one(source, scene, false, run)?;
-    // what each layer ends with, and does to each probe, is more than a screen holds
-    let of_layer = |name: &str| {
+    let report = run_scene(source, scene, false, run)?;
+    // values of layers and births would fill the screen: they are in the report only
+    let is_layer = |name: &str| {
         let rest = name.strip_prefix("layer-").and_then(|rest| rest.split_once('.'));
         rest.is_some_and(|(_, quantity)| STATISTICS.iter().any(|statistic| quantity.starts_with(statistic)))
     };
-    let mut text = report.table_of(|name| !of_layer(name) && !name.contains("at_birth_"));
-    text += &warnings(&report);
-    text += &scene.cut_steps().map_or(String::new(), |cut| format!("warning: {cut}\n"));
-    Ok(Finished { text, report })
+    let mut text = report.table_of(|name| !is_layer(name) && !name.contains("at_birth_"));
+    let cut = scene.cut_steps().map_or(String::new(), |cut| format!("warning: {cut}\n"));
+    let notes = warnings(&report) + &cut;
+    text += &notes;
+    Ok(Finished::new(report, text).with_notes(&notes))
 }
 
-/// Runs one scene, or one study of a scene, whose expectations wait for the others.
-pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) -> Result<Report, Failure> {
+/// Runs one scene, or one study of a scene; expectations are judged after all studies.
+pub fn run_scene(
+    source: &Source,
+    scene: &PartScene,
+    is_study: bool,
+    run: &mut Run,
+) -> Result<Report, Failure<Error>> {
     let (output, quick) = (run.options.output, run.options.quick);
     let mut phases = Phases::new();
     phases.start("mesh");
@@ -48,7 +53,7 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
     if run.options.resume {
         run.begin()?;
     }
-    if let Some((written, state, seen)) = run.reached::<Reached>()? {
+    if let Some((written, state, seen)) = run.reached::<PartCheckpoint>()? {
         simulation = Simulation::resume(Arc::clone(&task.problem), task.settings, state)?;
         observers.restore(&seen)?;
         frames = written;
@@ -81,38 +86,40 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
     Ok(report)
 }
 
-/// What the values of a report warn of, a line each: stress that would flow.
+/// Returns a warning for each Mises stress above the strength, a line each.
 pub fn warnings(report: &Report) -> String {
     let mut lines = String::new();
     for (name, value) in &report.values {
         let Value::Scalar { value, .. } = value else { continue };
         if *value > 1.0 && name.rsplit('.').next() == Some(q::MISES_OVER_STRENGTH.name) {
             lines += &format!(
-                "warning: {name} = {value:.3}: the largest Mises stress is above the strength; the material would yield or break there, which is not computed\n"
+                "warning: {name} = {value:.3}: the largest Mises stress exceeds the strength; yielding and \
+                 fracture are not modelled\n"
             );
         }
     }
     lines
 }
 
-/// What a scene builds and leaves out.
+/// Describes a scene, line by line.
 ///
 /// # Errors
-/// A fault of the scene.
-pub fn explain(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failure> {
+/// Returns an error for an invalid scene.
+pub fn explain(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failure<Error>> {
     scene.check(source)?;
-    let (lines, names) = super::explain::one(source, scene)?;
+    let (lines, names) = super::explain::explain_scene(source, scene)?;
     scene.check_expectations(source, &names, &[])?;
     Ok(lines)
 }
 
-/// A time step, as who watches the run sees it: temperatures and the materials' fields at the nodes, NaN where nothing is yet.
-fn seen(simulation: &Simulation, step: &Record, names: &[&'static str]) -> Step {
+/// Returns a time step for callbacks: temperatures and material fields at the nodes, NaN for nonexistent
+/// nodes.
+fn describe_step(simulation: &Simulation, step: &StepBalance, names: &[&'static str]) -> Step {
     let mut fields = vec![StepField {
         name: TEMPERATURE,
         unit: "°C",
         components: 1,
-        data: of_kelvin(&simulation.temperatures(f64::NAN)),
+        data: to_celsius(&simulation.temperatures(f64::NAN)),
     }];
     fields.extend(names.iter().map(|&name| {
         let data = simulation.field(name).into_iter().map(|value| value.unwrap_or(f64::NAN)).collect();
@@ -121,18 +128,18 @@ fn seen(simulation: &Simulation, step: &Record, names: &[&'static str]) -> Step 
     Step { values: vec![("time", "s", simulation.state().time), ("time_step", "s", step.dt)], fields }
 }
 
-/// How far a run is, as its checkpoint holds it: frames of the fields that are written, state, what observers have seen.
-type Reached = (usize, State, Vec<Vec<u8>>);
+/// Content of a checkpoint: number of written frames, state of the simulation, and states of the observers.
+type PartCheckpoint = (usize, State, Vec<Vec<u8>>);
 
-/// Solves to the end, frame by frame; a frame is due at each of their times even where no fields are written.
+/// Solves frame by frame to the end. Steps end at the times of frames even if no fields are written.
 fn solve(
     scene: &PartScene,
-    task: &Task,
+    task: &PartTask,
     simulation: &mut Simulation,
-    (observers, frames): (&mut Observers, &mut usize),
+    (observers, frames): (&mut PartObservers, &mut usize),
     phases: &mut Phases,
     run: &mut Run,
-) -> Result<(), Failure> {
+) -> Result<(), Failure<Error>> {
     let (end, mesh) = (task.end, &task.problem.mesh);
     let every = scene.every(end);
     let last = (end / every - 1e-9).ceil().max(1.0) as usize;
@@ -143,21 +150,21 @@ fn solve(
         (true, frames) => Some(MeshSeries::resume(path, mesh.points.clone(), cells(mesh), frames)?),
     };
     if *frames == 0 {
-        simulation.finite()?;
+        simulation.check_finite()?;
         observers.see(simulation)?;
     }
     let (interrupted, names) = (run.options.interrupted, simulation.field_names());
     while *frames <= last {
         let until = (*frames as f64 * every).min(end);
         let mut result = Ok(());
-        let mut observe = |simulation: &Simulation, step: &Record| -> ControlFlow<()> {
-            result = simulation.finite().and_then(|()| observers.see(simulation));
+        let mut observe = |simulation: &Simulation, step: &StepBalance| -> ControlFlow<()> {
+            result = simulation.check_finite().and_then(|()| observers.see(simulation));
             let state = simulation.state();
             run.show(state.time / end, &|| {
                 let (time, dt, equations) = (state.time, step.dt, state.temperature.len());
                 format!("t = {time:.4} of {end:.4} s  step {dt:.3e} s  {equations} equations")
             });
-            run.step(|| seen(simulation, step, &names));
+            run.step(|| describe_step(simulation, step, &names));
             if result.is_ok() {
                 result = run.pause(|| Some((*frames, state, observers.save()))).map_err(Error::from);
             }
@@ -166,7 +173,7 @@ fn solve(
         let flow = simulation.advance_unless(interrupted, until, &mut observe)?;
         result?;
         if flow.is_break() {
-            // within a step
+            // interrupted within a step
             run.pause(|| Some((*frames, simulation.state(), observers.save()))).map_err(Error::from)?;
         }
         if *frames == last {
@@ -183,14 +190,14 @@ fn solve(
     Ok(())
 }
 
-/// Writes a frame: what does not exist yet is NaN, and 0 in `exists`.
-fn write(simulation: &Simulation, observers: &Observers, series: &mut MeshSeries) -> Result<(), Error> {
+/// Writes a frame. Nonexistent elements have NaN values and 0 in `exists`.
+fn write(simulation: &Simulation, observers: &PartObservers, series: &mut MeshSeries) -> Result<(), Error> {
     let fields = observers.fields(simulation);
-    let at = |place: Place| -> Vec<Data> {
+    let data = |place: Place| -> Vec<Data> {
         let own = fields.iter().filter(|field| field.place == place);
         own.map(|field| (field.name.as_str(), field.components, field.values.as_slice())).collect()
     };
-    Ok(series.step(simulation.time(), &at(Place::Points), &at(Place::Cells))?)
+    Ok(series.step(simulation.time(), &data(Place::Points), &data(Place::Cells))?)
 }
 
 fn cells(mesh: &Mesh) -> Cells {

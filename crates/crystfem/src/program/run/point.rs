@@ -1,23 +1,26 @@
-//! The material alone: curves, events, pictures.
+//! Run of a point scene: curves, events and pictures of the material alone.
 
-use super::Failure;
-use super::draw::{self, Run};
+use super::draw::{self, PointRun};
 use crate::error::Error;
-use crate::point::{Course, Curves, Drive, Event, Stepping};
+use crate::point::{CurveEvent, Curves, Drive, PointProcess, Stepping};
 use crate::program::observe::celsius::CELSIUS;
 use crate::program::quantities as q;
 use crate::program::scene::{NodesSpec, PointScene};
 use harness::output::csv;
 use harness::report::{Phases, Quantity, Report};
-use harness::scene::{SceneError, Source};
+use harness::scene::{Failure, SceneError, Source};
 use polycore::numerics::range;
 use std::path::Path;
 
-/// Relative crystallinities whose temperature and time are values of the report.
+/// Relative crystallinities at which temperature and time are reported.
 const DEGREES: [f64; 3] = [0.01, 0.5, 0.99];
 
-/// Runs every point with every of its materials.
-pub fn run(source: &Source, scene: &PointScene, run: &mut harness::case::Run) -> Result<Report, Failure> {
+/// Runs each point with each of its materials.
+pub fn run(
+    source: &Source,
+    scene: &PointScene,
+    run: &mut harness::case::Run,
+) -> Result<Report, Failure<Error>> {
     let (output, quick) = (run.options.output, run.options.quick);
     let materials = scene.materials(source)?;
     let mut built = Vec::new();
@@ -26,7 +29,7 @@ pub fn run(source: &Source, scene: &PointScene, run: &mut harness::case::Run) ->
     }
     let courses = scene.courses(source)?;
     let thermal = scene.nodes.iter().enumerate().filter(|(_, nodes)| !quick || nodes.quick);
-    thermal.map(|(index, nodes)| opened(source, index, nodes)).collect::<Result<Vec<_>, _>>()?;
+    thermal.map(|(index, nodes)| explain_nodes(source, index, nodes)).collect::<Result<Vec<_>, _>>()?;
     run.begin()?;
     let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
     let (mut phases, mut runs) = (Phases::new(), Vec::new());
@@ -41,7 +44,7 @@ pub fn run(source: &Source, scene: &PointScene, run: &mut harness::case::Run) ->
             let name = [point.name.as_str(), material_name].join(".");
             let name = name.trim_end_matches('.').to_owned();
             phases.start("integrate");
-            let course = Course { material: &**material, drive: drive.clone(), stepping };
+            let course = PointProcess { material: &**material, drive: drive.clone(), stepping };
             let curves = course.run()?;
             let broken = non_finite(&course, &curves);
             match broken.first() {
@@ -57,13 +60,14 @@ pub fn run(source: &Source, scene: &PointScene, run: &mut harness::case::Run) ->
             record(&mut report, &name, &course, &curves)?;
             phases.start("write");
             write(output, &name, &course, &curves)?;
-            runs.push(Run { name, fields: material.field_names(), curves });
+            runs.push(PointRun { name, fields: material.field_names(), curves });
         }
     }
     for nodes in scene.nodes.iter().filter(|nodes| !quick || nodes.quick) {
         phases.start("integrate");
-        let own = |(name, ..): &&(&str, _, _)| nodes.material.as_deref().is_none_or(|own| own == *name);
-        if let Some((.., material)) = built.iter().find(own) {
+        let matches =
+            |(name, ..): &&(&str, _, _)| nodes.material.as_deref().is_none_or(|given| given == *name);
+        if let Some((.., material)) = built.iter().find(matches) {
             let path = source.file(&nodes.file);
             super::nodes::run(nodes, &nodes.name, &path, &**material, output, &mut report)?;
         }
@@ -72,12 +76,12 @@ pub fn run(source: &Source, scene: &PointScene, run: &mut harness::case::Run) ->
     if scene.output.pictures {
         phases.start("draw");
         if !runs.is_empty() {
-            draw::curves(&scene.title, &runs, output)?;
+            draw::draw_curves(&scene.title, &runs, output)?;
         }
         for (name, spec, key) in &materials {
             if spec.law == crate::program::scene::Law::Semicrystalline {
                 let material = spec.semicrystalline(source, key)?;
-                draw::laws(name, &material, output)?;
+                draw::draw_laws(name, &material, output)?;
             }
         }
     }
@@ -86,10 +90,10 @@ pub fn run(source: &Source, scene: &PointScene, run: &mut harness::case::Run) ->
     Ok(report)
 }
 
-/// What a scene builds and leaves out.
+/// Describes a scene, line by line.
 ///
 /// # Errors
-/// A fault of the scene.
+/// Returns an error for an invalid scene.
 pub fn explain(source: &Source, scene: &PointScene, quick: bool) -> Result<Vec<String>, SceneError> {
     let mut lines = Vec::new();
     for (name, spec, key) in scene.materials(source)? {
@@ -105,16 +109,16 @@ pub fn explain(source: &Source, scene: &PointScene, quick: bool) -> Result<Vec<S
         let drive = match drive {
             Drive::Prescribed(history) => {
                 let [from, to] = history.span();
-                let jumps = history.segments().filter(|one| one.times[0] == one.times[1]).count();
-                let mut told = format!(
+                let jumps = history.segments().filter(|segment| segment.times[0] == segment.times[1]).count();
+                let mut text = format!(
                     "prescribed temperature, {} segments, {} s",
                     history.segments().count(),
                     to - from
                 );
                 if jumps > 0 {
-                    told += &format!(", {jumps} of them jumps (neither `rate` nor `duration`)");
+                    text += &format!(", {jumps} of them jumps (without `rate` and `duration`)");
                 }
-                told
+                text
             }
             Drive::Lumped { exchange: None, duration, .. } => format!("adiabatic, {duration} s"),
             Drive::Lumped { exchange: Some([ambient, constant]), duration, .. } => {
@@ -131,19 +135,19 @@ pub fn explain(source: &Source, scene: &PointScene, quick: bool) -> Result<Vec<S
         lines.push(format!("point {}: {drive}; {steps}", point.name));
     }
     for (index, nodes) in scene.nodes.iter().enumerate().filter(|(_, nodes)| !quick || nodes.quick) {
-        lines.push(format!("nodes {}: {}", nodes.name, opened(source, index, nodes)?));
+        lines.push(format!("nodes {}: {}", nodes.name, explain_nodes(source, index, nodes)?));
     }
     Ok(lines)
 }
 
-/// What the file of a thermal analysis holds.
-fn opened(source: &Source, index: usize, nodes: &NodesSpec) -> Result<String, SceneError> {
-    let told = super::nodes::explain(nodes, &source.file(&nodes.file));
-    told.map_err(|error| source.refused(&format!("nodes[{index}].file"), &error))
+/// Describes the file of a thermal analysis.
+fn explain_nodes(source: &Source, index: usize, nodes: &NodesSpec) -> Result<String, SceneError> {
+    let text = super::nodes::explain(nodes, &source.file(&nodes.file));
+    text.map_err(|error| source.refused(&format!("nodes[{index}].file"), &error))
 }
 
-/// Rows with a value that is not finite: its name and the time.
-fn non_finite(course: &Course, curves: &Curves) -> Vec<(&'static str, f64)> {
+/// Returns name and time of the first non-finite value in each row.
+fn non_finite(course: &PointProcess, curves: &Curves) -> Vec<(&'static str, f64)> {
     let names = course.material.field_names();
     let wrong = |row: usize| {
         let fields = names.iter().copied().zip(curves.fields[row].iter().copied());
@@ -157,20 +161,20 @@ fn non_finite(course: &Course, curves: &Curves) -> Vec<(&'static str, f64)> {
     (0..curves.time.len()).filter_map(|row| Some((wrong(row)?, curves.time[row]))).collect()
 }
 
-/// The scalars of a run, of a point that must leave the finite numbers those of its finite rows; temperatures in °C as the thesis has them.
-fn record(report: &mut Report, name: &str, course: &Course, curves: &Curves) -> Result<(), Error> {
+/// Reports the scalars of a run (its finite rows only); temperatures in °C, as in the thesis.
+fn record(report: &mut Report, name: &str, course: &PointProcess, curves: &Curves) -> Result<(), Error> {
     let rows = curves.time.len();
     let last = rows - 1;
-    let named = |quantity: &str| format!("{name}.{quantity}");
-    report.work(&named("steps"), last as u64).work(&named("rejected"), curves.rejected as u64);
+    let key = |quantity: &str| format!("{name}.{quantity}");
+    report.work(&key("steps"), last as u64).work(&key("rejected"), curves.rejected as u64);
     let span = |values: &[f64]| range(values.iter().copied());
-    let of = |quantity: Quantity| quantity.of(&[name]);
+    let named = |quantity: Quantity| quantity.of(&[name]);
     let [coldest, hottest] = span(&curves.temperature);
-    report.value(of(q::COLDEST), coldest - CELSIUS);
-    report.value(of(q::HOTTEST), hottest - CELSIUS);
-    report.value(of(q::FINAL_TEMPERATURE), curves.temperature[last] - CELSIUS);
-    report.value(of(q::TEMPERATURE_RISE), curves.temperature[last] - curves.temperature[0]);
-    report.value(of(q::ENERGY_CHANGE), curves.energy[last] - curves.energy[0]);
+    report.value(named(q::COLDEST), coldest - CELSIUS);
+    report.value(named(q::HOTTEST), hottest - CELSIUS);
+    report.value(named(q::FINAL_TEMPERATURE), curves.temperature[last] - CELSIUS);
+    report.value(named(q::TEMPERATURE_RISE), curves.temperature[last] - curves.temperature[0]);
+    report.value(named(q::ENERGY_CHANGE), curves.energy[last] - curves.energy[0]);
     for (index, field) in course.material.field_names().iter().enumerate() {
         let values: Vec<f64> = curves.fields.iter().map(|f| f[index]).filter(|x| x.is_finite()).collect();
         let [least, most] = span(&values);
@@ -183,7 +187,7 @@ fn record(report: &mut Report, name: &str, course: &Course, curves: &Curves) -> 
             report.value(q::FIRST_STEP.of(&[name, field]), curves.fields[1][index]);
         }
     }
-    let mut event = |what: &str, event: Event| {
+    let mut event = |what: &str, event: CurveEvent| {
         report.value(q::TEMPERATURE_AT.of(&[name, what]), event.temperature - CELSIUS);
         report.value(q::TIME_TO.of(&[name, what]), event.time - curves.time[0]);
         event
@@ -200,16 +204,16 @@ fn record(report: &mut Report, name: &str, course: &Course, curves: &Curves) -> 
     Ok(())
 }
 
-/// Shifts of temperature and of time between two materials, at all points that have both.
+/// Reports shifts of temperature and time between two materials, at each point with both.
 fn compare(report: &mut Report, scene: &PointScene) {
     for pair in &scene.compare {
         for point in &scene.point {
             for degree in DEGREES {
-                let of = |quantity: Quantity, material: &str| {
-                    let own = format!("{}.{material}", point.name);
-                    report.scalar(&quantity.of(&[&own, &degree.to_string()]).name)
+                let value = |quantity: Quantity, material: &str| {
+                    let key = format!("{}.{material}", point.name);
+                    report.scalar(&quantity.of(&[&key, &degree.to_string()]).name)
                 };
-                let both = |quantity| Some([of(quantity, &pair.material)?, of(quantity, &pair.with)?]);
+                let both = |quantity| Some([value(quantity, &pair.material)?, value(quantity, &pair.with)?]);
                 let (temperatures, times) = (both(q::TEMPERATURE_AT), both(q::TIME_TO));
                 if let (Some([a, b]), Some([c, d])) = (temperatures, times) {
                     report.value(q::SHIFT_AT.of(&[&point.name, &degree.to_string()]), a - b);
@@ -220,8 +224,8 @@ fn compare(report: &mut Report, scene: &PointScene) {
     }
 }
 
-/// NAME.csv: every row.
-fn write(output: &Path, name: &str, course: &Course, curves: &Curves) -> Result<(), polycore::Error> {
+/// Writes NAME.csv with all rows.
+fn write(output: &Path, name: &str, course: &PointProcess, curves: &Curves) -> Result<(), polycore::Error> {
     let celsius: Vec<f64> = curves.temperature.iter().map(|t| t - CELSIUS).collect();
     let mut columns: Vec<(&str, &str, Vec<f64>)> =
         vec![("time", "s", curves.time.clone()), ("temperature", "degC", celsius)];

@@ -2,7 +2,7 @@
 
 use super::{explain, run};
 use crate::error::Error;
-use crate::program::scene::{self, Kind};
+use crate::program::scene::{self, SceneKind};
 use harness::case::{Case, Fault, Finished, Program, Run};
 use harness::scene::{Failure, Source};
 
@@ -14,12 +14,12 @@ impl Case for Crystfem {
         name: "crystfem",
         version: env!("CARGO_PKG_VERSION"),
         about: "Heat conduction and crystallization of semicrystalline polymers printed layer by layer",
-        examples: "  crystfem check cases/ch4/printed-bar/case.toml    what it builds and leaves out
-  crystfem run cases/ch4/printed-bar/case.toml      print the bar, draw, judge; results in out/printed-bar
-  crystfem run cases/ch4/cooling-rates/case.toml    the material alone
+        examples: "  crystfem check cases/ch4/printed-bar/case.toml    describe what it builds
+  crystfem run cases/ch4/printed-bar/case.toml      print the bar; results in out/printed-bar
+  crystfem run cases/ch4/cooling-rates/case.toml    run the material alone
   crystfem resume out/printed-bar                   continue an interrupted run
   crystfem sweep cases/ch4/printed-bar/case.toml --vary print.layer_time=10s,20s,40s
-  crystfem schema > crystfem.schema.json            for editors",
+  crystfem schema > crystfem.schema.json            write the schema for editors",
         magic: b"part-ck7",
         columns: &[],
     };
@@ -29,13 +29,13 @@ impl Case for Crystfem {
         explain(source, quick)
     }
 
-    fn solve(source: &Source, own: &mut Run) -> Result<Finished, Failure<Error>> {
-        run(source, own)
+    fn solve(source: &Source, case: &mut Run) -> Result<Finished, Failure<Error>> {
+        run(source, case)
     }
 
     fn bulky(source: &Source) -> &'static [&'static str] {
         match scene::kind(source) {
-            Ok(Kind::Part) => &["output.pictures", "output.fields"],
+            Ok(SceneKind::Part) => &["output.pictures", "output.fields"],
             _ => &[],
         }
     }

@@ -1,6 +1,6 @@
-//! The studies of a scene: each in a folder of its own, compared and judged together.
+//! Studies of a scene: each runs in its own folder; all are compared and judged together.
 
-use super::{Failure, part};
+use super::part;
 use crate::error::Error;
 use crate::program::observe::observers;
 use crate::program::quantities as q;
@@ -9,41 +9,41 @@ use harness::case::{Fault, Finished, Row, Rows, Run};
 use harness::output::csv;
 use harness::output::picture::{LinePlot, Series};
 use harness::report::{Named, Phases, Report, Trial, Value};
-use harness::scene::{SceneError, Source};
+use harness::scene::{Failure, SceneError, Source};
 use harness::study::{self, SuiteRow, Variant};
 use polycore::file::atomic_write;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Points of a curve that are drawn at most.
+/// Largest number of drawn points per curve.
 const POINTS: usize = 4000;
 
-/// Runs every study, or resumes with the remaining ones.
-pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished, Failure> {
+/// Runs all studies, or resumes with the remaining ones.
+pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished, Failure<Error>> {
     let (output, quick) = (run.options.output, run.options.quick);
     let studies = scene.variants(source, quick)?;
-    // every problem is built once before anything is computed or written: faults show at once
+    // build every problem before anything is computed or written, so that errors appear at once
     if run.options.resume {
         run.begin()?;
     } else {
         let mut names = Vec::new();
         for study in studies.iter().filter(|study| study.expect_error.is_none()) {
-            let scene = PartScene::of_variant(study)?;
+            let scene = PartScene::from_variant(study)?;
             let task = scene.task(&study.source, scene.mesh.build(&study.source)?)?;
-            names.extend(of_study(&study.name, observers(&scene, &task).names()));
+            names.extend(prefix_names(&study.name, observers(&scene, &task).names()));
         }
         check_expectations(source, scene, &studies, names)?;
         run.begin()?;
+        // results of an earlier run must not pass for this one
         for study in &studies {
-            // what an earlier run has left does not pass for this one's
             drop(harness::case::prepare_run(output.join(&study.name))?);
         }
     }
     let names: Vec<String> = studies.iter().map(|study| study.name.clone()).collect();
     let refusals = study::solve(run, NAMING, &names, 1, |index, own| {
         let Variant { name, source, expect_error, .. } = &studies[index];
-        let outcome = PartScene::of_variant(&studies[index]).map_err(Failure::from).and_then(|scene| {
-            let report = part::one(source, &scene, true, own)?;
+        let outcome = PartScene::from_variant(&studies[index]).map_err(Failure::from).and_then(|scene| {
+            let report = part::run_scene(source, &scene, true, own)?;
             Ok(own.finish(&report)?)
         });
         match study::expected(outcome, expect_error.as_deref()) {
@@ -72,25 +72,26 @@ pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished
     }
     phases.stop();
     report.phases(&phases).threads(rayon::current_num_threads()).judge(&scene.expect, quick);
-    // of a study that must fail and does not there need be no expectation
+    // a study that must fail, but does not, fails the scene even without an expectation
     let mut survivors = String::new();
     for study in studies.iter().filter(|study| study.expect_error.is_some()) {
         if report.scalar(&q::FAILED_AS_EXPECTED.of(&[&study.name]).name) == Some(0.0) {
             report.passed = false;
-            survivors += &format!("FAIL  study {} did not fail\n", study.name);
+            survivors += &format!("FAIL  study {} succeeded, but must fail\n", study.name);
         }
     }
     table(&report, &studies, &rows, output)?;
-    let text = rows.text() + &report.verdict() + &survivors + &part::warnings(&report);
-    Ok(Finished { text, report })
+    let notes = survivors + &part::warnings(&report);
+    let text = rows.text() + &report.verdict() + &notes;
+    Ok(Finished::new(report, text).with_notes(&notes))
 }
 
-fn of_study(study: &str, quantities: Vec<Named>) -> impl Iterator<Item = Named> {
-    let of = move |quantity: Named| Named { name: NAMING.value(study, &quantity.name), ..quantity };
-    quantities.into_iter().map(of)
+fn prefix_names(study: &str, quantities: Vec<Named>) -> impl Iterator<Item = Named> {
+    let prefixed = move |quantity: Named| Named { name: NAMING.value(study, &quantity.name), ..quantity };
+    quantities.into_iter().map(prefixed)
 }
 
-/// Refuses expectations of quantities that neither the studies report, `names`, nor what compares them.
+/// Refuses expectations of quantities that neither the studies (`names`) nor their comparisons report.
 fn check_expectations(
     source: &Source,
     scene: &PartScene,
@@ -106,7 +107,7 @@ fn check_expectations(
     scene.check_expectations(source, &names, &absent.into_iter().filter(is_absent).collect::<Vec<_>>())
 }
 
-/// All values, with the study's name before each.
+/// Collects all values, prefixed by the name of their study.
 fn together(source: &Source, scene: &PartScene, studies: &[Variant], rows: &Rows) -> Report {
     let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
     for (study, Row { name, outcome, .. }) in studies.iter().zip(&rows.rows) {
@@ -130,7 +131,7 @@ fn together(source: &Source, scene: &PartScene, studies: &[Variant], rows: &Rows
     report
 }
 
-/// suite.md and suite.json: each study, its expected and observed behaviour, and its cost.
+/// Writes suite.md and suite.json: expected and observed behaviour and cost of each study.
 fn table(report: &Report, studies: &[Variant], rows: &Rows, output: &Path) -> Result<(), polycore::Error> {
     let observed = |own: &Report| {
         let value = |name: &str| own.scalar(name).unwrap_or(f64::NAN);
@@ -159,22 +160,23 @@ fn table(report: &Report, studies: &[Variant], rows: &Rows, output: &Path) -> Re
     let json = |(Trial { what, description, observed, iterations, passed }, row): (&Trial, &SuiteRow)| {
         let seconds = row.seconds;
         serde_json::json!({
-            "case": what, "description": description, "observed": observed, "pass": passed, "steps": iterations, "seconds": seconds,
+             "case": what, "description": description, "observed": observed, "pass": passed,
+                        "steps": iterations, "seconds": seconds,
         })
     };
     let list: Vec<serde_json::Value> = trials.iter().zip(&suite).map(json).collect();
     atomic_write(output.join("suite.json"), |file| Ok(serde_json::to_writer_pretty(file, &list)?))
 }
 
-/// probe_NAME_QUANTITY.png: what a probe of the same name saw in each study.
+/// Draws probe_NAME_QUANTITY.png: records of the probes with this name in all studies.
 fn compare(scene: &PartScene, rows: &Rows, output: &Path) -> Result<(), polycore::Error> {
-    /// Curves by probe and heading.
+    /// Curves by probe name and column heading.
     type Curves = BTreeMap<(String, String), Vec<Series>>;
     let mut curves = Curves::new();
     for row in rows.rows.iter().filter(|row| row.outcome.is_ok()) {
-        // what is there, study by study: a study may have probes of its own
+        // a study may have its own probes
         let folder = output.join(&row.name);
-        let entries = std::fs::read_dir(&folder).map_err(polycore::Error::io("read", &folder))?;
+        let entries = std::fs::read_dir(&folder).map_err(polycore::Error::from_io("read", &folder))?;
         let names = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok());
         for file in names.filter(|name| name.starts_with("probe_") && name.ends_with(".csv")) {
             let columns = csv::read(folder.join(&file))?;
@@ -201,11 +203,11 @@ fn compare(scene: &PartScene, rows: &Rows, output: &Path) -> Result<(), polycore
     Ok(())
 }
 
-/// What each study builds and leaves out.
+/// Describes each study, line by line.
 ///
 /// # Errors
-/// A fault of the scene.
-pub fn explain(source: &Source, scene: &PartScene, quick: bool) -> Result<Vec<String>, Failure> {
+/// Returns an error for an invalid scene.
+pub fn explain(source: &Source, scene: &PartScene, quick: bool) -> Result<Vec<String>, Failure<Error>> {
     let (mut lines, mut names) = (Vec::new(), Vec::new());
     let studies = scene.variants(source, quick)?;
     for study in &studies {
@@ -214,8 +216,9 @@ pub fn explain(source: &Source, scene: &PartScene, quick: bool) -> Result<Vec<St
             lines.push(format!("  expects    an error that contains `{error}`"));
             continue;
         }
-        let (own, quantities) = super::explain::one(&study.source, &PartScene::of_variant(study)?)?;
-        names.extend(of_study(&study.name, quantities));
+        let (own, quantities) =
+            super::explain::explain_scene(&study.source, &PartScene::from_variant(study)?)?;
+        names.extend(prefix_names(&study.name, quantities));
         lines.extend(own.iter().map(|line| format!("  {line}")));
     }
     check_expectations(source, scene, &studies, names)?;

@@ -1,55 +1,55 @@
-//! The scene of a fit.
+//! Scene of fits.
 
-use super::fault::located_in;
 use super::fit_part::PartFit;
 use super::fit_spec::{FitLaw, FitSpec, alpha, table, temperature, time};
+use super::locate_error::located_in;
 use super::material::KINETICS_KEYS;
-use super::{OutputSpec, Program, check_name};
-use crate::fit::{Cooling, Known, MeasuredPeak, Run};
-use crate::kinetics::{Constants, Kinetics};
+use super::{PictureOutput, Program, check_name};
+use crate::fit::{Cooling, FixedConstants, MeasuredPeak, Run};
+use crate::kinetics::{KineticConstants, Kinetics};
 use harness::report::Expect;
 use harness::scene::{SceneError, Source};
 use serde::Deserialize;
 
-/// A whole scene.
+/// A scene of fits.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FitScene {
-    /// The program that runs it: `crystfem`.
+    /// Program of the scene: `crystfem`.
     pub program: Program,
-    /// One line for tables and pictures.
+    /// Title for tables and pictures.
     #[serde(default)]
     pub title: String,
     /// The fits.
     pub fit: Vec<FitSpec>,
     /// Files to write.
     #[serde(default)]
-    pub output: OutputSpec,
+    pub output: PictureOutput,
     /// Expected results.
     #[serde(default)]
     pub expect: Vec<Expect>,
 }
 
-/// A fit with its data, checked.
+/// A checked fit with its data.
 pub enum Job {
     /// Times, s, and α.
     Avrami(Vec<f64>, Vec<f64>),
-    /// Cooling curves, and where to compare them, K.
+    /// Cooling curves, and the temperatures at which they are compared, K.
     Ozawa(Vec<Cooling>, Vec<f64>),
-    /// Runs, and what is known.
-    Nakamura(Vec<Run>, Known),
-    /// A part, and what was measured in it.
+    /// Runs, and prescribed constants.
+    Nakamura(Vec<Run>, FixedConstants),
+    /// A part, and the measurements in it.
     Part(Box<PartFit>),
 }
 
 impl FitScene {
-    /// All fits with their data, and the peaks of those that come from heat flows.
+    /// Reads the data of all fits, and the peaks of those from heat flows.
     ///
     /// # Errors
-    /// A [`SceneError`] that names the key, the value found and what is allowed; for data, file, line and column.
+    /// Returns a [`SceneError`] with key, value and allowed values; for data with file, line and column.
     pub fn jobs(&self, source: &Source) -> Result<Vec<(Job, Vec<MeasuredPeak>)>, SceneError> {
         if self.fit.is_empty() {
-            return Err(source.error("fit", "nothing", "at least one [[fit]]"));
+            return Err(source.missing("fit", "a fit scene needs at least one [[fit]]"));
         }
         let mut jobs = Vec::new();
         for (index, fit) in self.fit.iter().enumerate() {
@@ -58,8 +58,8 @@ impl FitScene {
             if self.fit[..index].iter().any(|other| other.name == fit.name) {
                 return Err(source.error(
                     &key("name"),
-                    format!("`{}` a second time", fit.name),
-                    "another name",
+                    format!("`{}` twice", fit.name),
+                    "a different name for each fit",
                 ));
             }
             let tables = |other: &&FitSpec| {
@@ -69,8 +69,8 @@ impl FitScene {
                 self.fit.iter().find(tables).map(|other| format!("the heat flow of `{}`", other.name));
             let taken = taken.or_else(|| (fit.name == "estimates").then(|| "all estimates".to_owned()));
             if let Some(taken) = taken {
-                let found = format!("`{0}`, but {0}.csv has {taken}", fit.name);
-                return Err(source.error(&key("name"), found, "another name"));
+                let found = format!("`{0}`, but {0}.csv holds {taken}", fit.name);
+                return Err(source.error(&key("name"), found, "a different name"));
             }
             fit.check_keys(source, &key)?;
             fit.check_heat_flow(source, &key)?;
@@ -99,8 +99,8 @@ impl FitSpec {
         for (name, given, law) in foreign {
             if given && law != self.law {
                 let law = format!("{law:?}").to_lowercase();
-                let found = format!("`{name}` of another law");
-                return Err(source.error(&key(name), found, format!("nothing, or `law = \"{law}\"`")));
+                let why = format!("it belongs to `law = \"{law}\"`; remove it or change the law");
+                return Err(source.unexpected(&key(name), why));
             }
         }
         let rows = self.data.len();
@@ -109,29 +109,32 @@ impl FitSpec {
             return Err(source.error(&key("data"), format!("{rows} files"), format!("at least {needed}")));
         }
         if self.law == FitLaw::Avrami && rows > 1 {
-            return Err(source.error(
-                &key("data[1]"),
-                "a second file",
-                "one: another temperature is another [[fit]]",
-            ));
+            return Err(source.error(&key("data[1]"), "2 files", "1 file (use one [[fit]] per temperature)"));
         }
         if self.law == Part && self.heat_flow.is_some() {
-            return Err(source.error(&key("heat_flow"), "`heat_flow` of a part", "nothing"));
+            let why = "fits of a part use α, not heat flow; remove it";
+            return Err(source.unexpected(&key("heat_flow"), why));
         }
         for (i, data) in self.data.iter().enumerate() {
             if self.law != Part && data.probe.is_some() {
                 let at = key(&format!("data[{i}].probe"));
-                return Err(source.error(&at, "`probe` of another law", "nothing, or `law = \"part\"`"));
+                return Err(
+                    source.unexpected(&at, "it belongs to `law = \"part\"`; remove it or change the law")
+                );
             }
             let at = key(&format!("data[{i}].rate"));
             match (self.law, data.rate.map(|rate| rate.si())) {
-                (Part, Some(_)) => return Err(source.error(&at, "`rate` of a part", "nothing")),
-                (FitLaw::Avrami, Some(_)) => {
-                    return Err(source.error(&at, "`rate` of an isothermal run", "nothing"));
+                (Part, Some(_)) => {
+                    return Err(source.unexpected(&at, "the part determines the cooling; remove it"));
                 }
-                (Ozawa, None) => return Err(source.error(&at, "nothing", "`rate`: a cooling rate")),
+                (FitLaw::Avrami, Some(_)) => {
+                    return Err(source.unexpected(&at, "Avrami's law fits isothermal runs; remove it"));
+                }
+                (Ozawa, None) => {
+                    return Err(source.missing(&at, "Ozawa's law needs the cooling rate of each run"));
+                }
                 (_, Some(rate)) if !(rate > 0.0 && rate.is_finite()) => {
-                    return Err(source.error(&at, format!("{rate} K/s"), "above 0: a cooling rate"));
+                    return Err(source.error(&at, format!("{rate} K/s"), "a cooling rate above 0"));
                 }
                 _ => {}
             }
@@ -139,7 +142,7 @@ impl FitSpec {
         Ok(())
     }
 
-    /// The job, of the peaks where there are any and else of tables of α.
+    /// Reads the data of a fit, from the peaks of its heat flows if it has any, else from tables of α.
     fn job(
         &self,
         source: &Source,
@@ -158,8 +161,8 @@ impl FitSpec {
             }
             FitLaw::Ozawa => {
                 if self.temperatures.is_empty() {
-                    let allowed = "at least one temperature at which the rates are compared";
-                    return Err(source.error(&key("temperatures"), "nothing", allowed));
+                    let why = "Ozawa's law needs at least one temperature at which it compares the rates";
+                    return Err(source.missing(&key("temperatures"), why));
                 }
                 let mut coolings = Vec::new();
                 for (i, data) in self.data.iter().enumerate() {
@@ -184,7 +187,7 @@ impl FitSpec {
                                 None => table(source, &at, &data.file, [temperature(), alpha()])?,
                             };
                             let run = Run::cooling(rate.si(), temperatures, degrees, &known);
-                            run.map_err(|error| source.error(&at, error, "temperatures that fall"))?
+                            run.map_err(|error| source.error(&at, error, "decreasing temperatures"))?
                         }
                         (None, Some(found)) => found.run(),
                         (None, None) => {
@@ -196,34 +199,33 @@ impl FitSpec {
                 }
                 Ok(Job::Nakamura(runs, known))
             }
-            FitLaw::Part => Ok(Job::Part(Box::new(self.part(source, key)?))),
+            FitLaw::Part => Ok(Job::Part(Box::new(self.read_part(source, key)?))),
         }
     }
 
-    fn known(&self, source: &Source, key: &dyn Fn(&str) -> String) -> Result<Known, SceneError> {
+    fn known(&self, source: &Source, key: &dyn Fn(&str) -> String) -> Result<FixedConstants, SceneError> {
         let Some(melting) = self.equilibrium_melting else {
-            let allowed = "`equilibrium_melting`: the temperature T₀, e.g. by a Hoffman–Weeks plot";
-            return Err(source.error(&key("equilibrium_melting"), "nothing", allowed));
+            let why = "Nakamura's law needs the temperature T₀, e.g. from a Hoffman–Weeks plot";
+            return Err(source.missing(&key("equilibrium_melting"), why));
         };
         let frozen = match (self.frozen, self.glass_transition) {
             (Some(frozen), None) => frozen.si(),
             (None, Some(glass)) => glass.si() - 30.0,
             (None, None) => {
-                let allowed = "`frozen`, or `glass_transition` for T∞ = T_g − 30 K";
-                return Err(source.error(&key("frozen"), "nothing", allowed));
+                let why = "Nakamura's law needs `frozen`, or `glass_transition` for T∞ = T_g − 30 K";
+                return Err(source.missing(&key("frozen"), why));
             }
             (Some(_), Some(_)) => {
-                let found = "`glass_transition` together with `frozen`";
-                return Err(source.error(&key("glass_transition"), found, "one of them"));
+                return Err(source.conflict(&key("glass_transition"), &key("frozen"), "keep one of them"));
             }
         };
-        let example = Constants::TABLE_4_1_COLUMN_1;
-        let known = Known {
+        let example = KineticConstants::TABLE_4_1_COLUMN_1;
+        let known = FixedConstants {
             equilibrium_melting: melting.si(),
             frozen,
             activation_energy: self.activation_energy.map_or(example.activation_energy, |u| u.si()),
         };
-        let trial = Constants {
+        let trial = KineticConstants {
             equilibrium_melting: known.equilibrium_melting,
             frozen: known.frozen,
             activation_energy: known.activation_energy,

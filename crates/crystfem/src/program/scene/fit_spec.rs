@@ -1,8 +1,8 @@
-//! What a scene of a fit says.
+//! Keys of a fit scene.
 
-use super::fault::located;
+use super::locate_error::located;
 use crate::fit::{Baseline, DEGREES};
-use crate::table::{Column, read};
+use crate::table::{TableColumn, read};
 use harness::scene::{SceneError, Source};
 use polycore::units::dimension::{RatioDimension, TemperatureDimension, TimeDimension};
 use polycore::units::{Mass, MolarEnergy, SpecificEnergy, Temperature, TemperatureRate, Time};
@@ -14,95 +14,99 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FitLaw {
-    /// Eq. (4.2), from one isothermal run: columns `time` and `alpha`.
+    /// Avrami's law, Eq. (4.2), from one isothermal run: columns `time` and `alpha`.
     Avrami,
-    /// Eq. (4.3), at each of `temperatures`, from runs at constant cooling rates: columns `temperature` and `alpha`.
+    /// Ozawa's law, Eq. (4.3), at each of `temperatures`, from runs at constant cooling rates: columns
+    /// `temperature` and `alpha`.
     Ozawa,
-    /// Eqs (4.4) to (4.7): K₀, K_G and n, from runs at constant cooling rates (`rate`; columns `temperature` and `alpha`) or
-    /// along any histories that begin in the melt (columns `time`, `temperature` and `alpha`).
+    /// Nakamura's law, Eqs (4.4) to (4.7): K₀, K_G and n, from runs at constant cooling rates (`rate`;
+    /// columns `temperature` and `alpha`) or along any histories that begin in the melt (columns `time`,
+    /// `temperature` and `alpha`).
     Nakamura,
-    /// K₀ and K_G of a part's material, from α at its probes (columns `time` and `alpha`): each trial runs the part.
+    /// K₀ and K_G of the material of a part, from α at its probes (columns `time` and `alpha`); each trial
+    /// runs the part.
     Part,
 }
 
-/// One fit.
+/// A fit.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FitSpec {
-    /// Its name: the values are `NAME.half_time`, `NAME.half_time.lower` …
+    /// Name of the fit, prefix of its values: `NAME.half_time`, `NAME.half_time.lower`, ….
     pub name: String,
-    /// Law.
+    /// Law to fit.
     pub law: FitLaw,
-    /// Measurements.
+    /// Files of measurements.
     pub data: Vec<DataSpec>,
-    /// The files have raw heat flow of a calorimeter: columns `time` and `heat_flow` in place of `alpha`.
+    /// Settings for files with the raw heat flow of a calorimeter: columns `time` and `heat_flow` instead of
+    /// `alpha`.
     pub heat_flow: Option<HeatFlowSpec>,
-    /// Where rates are compared, of `ozawa`.
+    /// Temperatures at which `ozawa` compares the cooling rates.
     #[serde(default)]
     pub temperatures: Vec<Temperature>,
-    /// Equilibrium melting temperature T₀, of `nakamura`.
+    /// Equilibrium melting temperature T₀, for `nakamura`.
     pub equilibrium_melting: Option<Temperature>,
-    /// Temperature T∞ of frozen chains, of `nakamura`.
+    /// Temperature T∞ of frozen chains, for `nakamura`.
     pub frozen: Option<Temperature>,
-    /// Glass transition T_g, of `nakamura`, instead of `frozen`: T∞ = T_g − 30 K.
+    /// Glass transition T_g, for `nakamura`, instead of `frozen`: T∞ = T_g − 30 K.
     pub glass_transition: Option<Temperature>,
-    /// Activation energy U, of `nakamura`; default 6270 J/mol.
+    /// Activation energy U, for `nakamura`; default 6270 J/mol.
     pub activation_energy: Option<MolarEnergy>,
-    /// Scene of a part, relative to this scene, of `part`: its constants are the first trial.
+    /// Scene of the part, relative to this scene, for `part`; its constants are the first trial.
     pub part: Option<PathBuf>,
-    /// The material of the part whose constants are fitted, of `part`; default the only one that crystallizes.
+    /// Material of the part whose constants are fitted, for `part`; default: the only one that crystallizes.
     pub material: Option<String>,
 }
 
-/// A table of measurements.
+/// A file of measurements.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DataSpec {
     /// CSV file, relative to the scene.
     pub file: PathBuf,
-    /// The probe of the part where it was measured, of `part`.
+    /// Probe of the part at the place of the measurement, for `part`.
     pub probe: Option<String>,
     /// Cooling rate.
     pub rate: Option<TemperatureRate>,
-    /// Mass of the sample, of heat flow in W.
+    /// Mass of the sample, for heat flows in W.
     pub mass: Option<Mass>,
-    /// Where the integration of the heat flow begins, a time or a temperature; default the first row.
+    /// Start of the integration of the heat flow, a time or a temperature; default: the first row.
     #[schemars(with = "Option<String>")]
     pub from: Option<Limit>,
-    /// Where it ends; default the last row.
+    /// End of the integration; default: the last row.
     #[schemars(with = "Option<String>")]
     pub to: Option<Limit>,
 }
 
-/// How the heat flows of a fit are to be read.
+/// Interpretation of the heat flows of a fit.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HeatFlowSpec {
-    /// Where exothermal peaks point.
+    /// Direction of exothermal peaks.
     pub exothermal: Direction,
-    /// What is subtracted.
+    /// Baseline that is subtracted.
     #[serde(default)]
     pub baseline: Baseline,
-    /// Heat of fusion of the perfect crystal: gives the degree of crystallinity.
+    /// Heat of fusion of the perfect crystal, for the degree of crystallinity.
     pub latent_heat: Option<SpecificEnergy>,
 }
 
-/// Direction of a peak.
+/// Direction of exothermal peaks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Direction {
-    /// Positive values are heat given off.
+    /// Positive values are released heat.
     Up,
-    /// Positive values are heat taken up.
+    /// Positive values are absorbed heat.
     Down,
 }
 
-/// A limit of integration.
+/// Limit of the integration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Limit {
-    /// The time.
+    /// A time.
     Time(Time),
-    /// Where this temperature is passed on cooling.
+    /// Time at which the cooling passes this temperature.
     Temperature(Temperature),
 }
 
@@ -118,25 +122,25 @@ impl<'de> Deserialize<'de> for Limit {
     }
 }
 
-pub(super) fn time() -> Column {
-    Column::of::<TimeDimension>("time")
+pub(super) fn time() -> TableColumn {
+    TableColumn::new::<TimeDimension>("time")
 }
 
-pub(super) fn temperature() -> Column {
-    Column::of::<TemperatureDimension>("temperature")
+pub(super) fn temperature() -> TableColumn {
+    TableColumn::new::<TemperatureDimension>("temperature")
 }
 
-/// Column of α.
-pub(super) fn alpha() -> Column {
-    Column::of::<RatioDimension>("alpha").within(DEGREES[0], DEGREES[1])
+/// Column of α, from 0 to 1.
+pub(super) fn alpha() -> TableColumn {
+    TableColumn::new::<RatioDimension>("alpha").within(DEGREES[0], DEGREES[1])
 }
 
-/// Reads a table beside the scene.
+/// Reads a CSV file at a path relative to the scene.
 pub(super) fn table<const N: usize>(
     source: &Source,
     key: &str,
     file: &Path,
-    columns: [Column; N],
+    columns: [TableColumn; N],
 ) -> Result<[Vec<f64>; N], SceneError> {
     read(&source.file(file), columns).map_err(|error| located(source, key, &error))
 }

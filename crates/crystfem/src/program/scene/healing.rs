@@ -1,7 +1,7 @@
-//! Healing of interfaces: of which material, how fast.
+//! Healing of interfaces between layers and beads.
 
 use super::PartScene;
-use super::fault::located_in;
+use super::locate_error::located_in;
 use crate::coupling::HealingSettings;
 use crate::error::Error;
 use crate::healing::{Glass, Healing};
@@ -11,7 +11,7 @@ use harness::scene::{SceneError, Source};
 use polycore::units::{MolarEnergy, Stress, Temperature, TemperatureDifference, Time};
 use serde::Deserialize;
 
-/// Where its constants stand.
+/// Parameters of the law and their keys.
 const KEYS: [(&str, &str); 6] = [
     ("relaxation time of healing, s", "time"),
     ("temperature of healing, K", "temperature"),
@@ -20,48 +20,50 @@ const KEYS: [(&str, &str); 6] = [
     ("C1 of WLF", "wlf"),
     ("C2 of WLF, K", "wlf"),
 ];
-/// T∞ of the kinetics is that much below T_g, K (Hoffman).
+/// Distance of T∞ in the kinetics below T_g, K (Hoffman).
 const FROZEN: f64 = 30.0;
 
-/// How interfaces between what was printed at different times heal.
+/// Healing of interfaces between material printed at different times.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HealingSpec {
-    /// The printed material; it must be semicrystalline.
+    /// Printed material; it must be semicrystalline.
     pub material: String,
-    /// Relaxation time of chains at `temperature`; nobody has published it of PA12.
+    /// Relaxation time of chains at `temperature`. No value for PA12 has been published.
     pub time: Time,
-    /// See `time`.
+    /// Temperature of this relaxation time.
     pub temperature: Temperature,
-    /// Activation energy of this time in the melt.
+    /// Activation energy of the relaxation time in the melt.
     pub energy: MolarEnergy,
-    /// How `time` grows towards the glass: `wlf`, the default, or `arrhenius`, as in the melt.
+    /// Increase of the relaxation time towards the glass transition: `wlf` (default), or `arrhenius` as in
+    /// the melt.
     #[serde(default)]
-    pub shift: Shift,
-    /// Glass transition, at and below which nothing heals; default T∞ + 30 K of the material's kinetics.
+    pub shift: ShiftLaw,
+    /// Glass transition, at and below which nothing heals; default: T∞ + 30 K from the kinetics of the
+    /// material.
     pub glass_transition: Option<Temperature>,
-    /// C₁ and C₂ of Williams, Landel and Ferry about it; default 17.44 and 51.6 K.
+    /// Constants C₁ and C₂ of the WLF equation at the glass transition; default 17.44 and 51.6 K.
     pub wlf: Option<(f64, TemperatureDifference)>,
-    /// Tensile strength of the material: the strength of interfaces is D_h times it.
+    /// Tensile strength of the material. The strength of an interface is D_h times this.
     pub strength: Option<Stress>,
 }
 
-/// How the relaxation time grows towards the glass.
+/// Increase of the relaxation time towards the glass transition.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Shift {
-    /// As Williams, Landel and Ferry have it.
+pub enum ShiftLaw {
+    /// Williams, Landel and Ferry.
     #[default]
     Wlf,
-    /// As in the melt, at any temperature.
+    /// Arrhenius' law of the melt, at any temperature.
     Arrhenius,
 }
 
 impl HealingSpec {
-    /// The law, of a material whose glass transition is about `transition`, K.
+    /// Creates the law for a material with the default glass transition `transition`, K.
     fn law(&self, transition: f64) -> Result<Healing, Error> {
         let law = Healing::new(self.time.si(), self.temperature.si(), self.energy.si())?;
-        if self.shift == Shift::Arrhenius {
+        if self.shift == ShiftLaw::Arrhenius {
             return Ok(law);
         }
         let mut glass = Glass::universal(self.glass_transition.map_or(transition, |given| given.si()));
@@ -73,10 +75,10 @@ impl HealingSpec {
 }
 
 impl PartScene {
-    /// The interfaces of a scene, where it asks for their healing; `births` are those of its print.
+    /// Returns the interfaces that heal, if the scene has `[healing]`; `births` belong to its print.
     ///
     /// # Errors
-    /// A [`SceneError`] for another material, constants out of their domain, and a part without interfaces.
+    /// Returns a [`SceneError`] for another material, invalid constants, and a part without interfaces.
     pub(super) fn interfaces(
         &self,
         source: &Source,
@@ -91,7 +93,7 @@ impl PartScene {
         };
         let material = &self.materials[&spec.material];
         if material.kinetics.is_none() {
-            let found = format!("`{}`, which does not crystallize", spec.material);
+            let found = format!("`{}`, a material that does not crystallize", spec.material);
             return Err(source.error("healing.material", found, "a semicrystalline material"));
         }
         let kinetics = material.constants(source, &format!("materials.{}", spec.material))?;

@@ -1,11 +1,13 @@
-//! The material block of a scene.
+//! Material block of a scene.
 
-use super::either::{self, TextOrTable};
-use super::fault::{located, located_in};
+use super::locate_error::{located, located_in};
 use super::powder::PowderSpec;
+use super::text_or_table::{self, TextOrTable};
 use crate::error::Error;
-use crate::kinetics::{Constants, Kinetics};
-use crate::material::{AsPublished, Conductor, Polymer, Property, Semicrystalline, Sign, ThermalMaterial};
+use crate::kinetics::{KineticConstants, Kinetics};
+use crate::material::{
+    Conductor, Polymer, PublishedSubroutine, Semicrystalline, Sign, ThermalMaterial, ThermalProperty,
+};
 use crate::melting::Melting;
 use harness::scene::{SceneError, Source};
 use polycore::units::dimension::{ConductivityDimension, SpecificHeatDimension};
@@ -15,15 +17,15 @@ use polycore::units::{
 };
 use serde::{Deserialize, Deserializer};
 
-/// Laws of heat and crystallization.
+/// Material laws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Law {
-    /// [`Conductor`].
+    /// Heat conduction only, see [`Conductor`].
     Conductor,
-    /// [`Semicrystalline`].
+    /// Heat conduction with crystallization, see [`Semicrystalline`].
     Semicrystalline,
-    /// [`AsPublished`]: Appendix B as coded.
+    /// Appendix B as coded, see [`PublishedSubroutine`].
     AsPublished,
 }
 
@@ -36,14 +38,14 @@ pub enum Law {
 /// conductivity = "0.25 W/(m K)"
 /// specific_heat = { temperature = ["20 degC", "200 degC"], value = ["1500 J/(kg K)", "2600 J/(kg K)"] }
 /// kinetics = "table-4.1-column-1"
-/// melting = "pa12"          # without it crystals never melt
+/// melting = "pa12"          # default: crystals never melt
 /// crystallinity = 0.25
-/// latent_heat = "209 J/g"   # without it heat and crystallinity are uncoupled
+/// latent_heat = "209 J/g"   # default: crystallinity does not affect the temperature
 /// ```
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialSpec {
-    /// Law.
+    /// Law of the material.
     pub law: Law,
     /// Density ρ.
     pub density: Density,
@@ -53,25 +55,25 @@ pub struct MaterialSpec {
     pub conductivity_factors: Option<[f64; 3]>,
     /// Specific heat c.
     pub specific_heat: PropertySpec<SpecificHeatDimension>,
-    /// Fresh material is powder, of `conductor` and `semicrystalline`.
+    /// Powder properties of new material, for `conductor` and `semicrystalline`.
     pub powder: Option<PowderSpec>,
-    /// Kinetics, of `semicrystalline`.
+    /// Kinetics, for `semicrystalline`.
     pub kinetics: Option<KineticsSpec>,
-    /// Melting, of `semicrystalline`.
+    /// Melting, for `semicrystalline`.
     pub melting: Option<MeltingSpec>,
-    /// Ultimate crystallinity X∞, of `semicrystalline`.
+    /// Ultimate crystallinity X∞, for `semicrystalline`.
     pub crystallinity: Option<Ratio>,
-    /// Heat of fusion of crystal ΔH, of `semicrystalline`.
+    /// Heat of fusion of the crystal ΔH, for `semicrystalline`.
     pub latent_heat: Option<SpecificEnergy>,
-    /// Relative crystallinity α of fresh material, of `semicrystalline`; default 0.
+    /// Relative crystallinity α of new material, for `semicrystalline`; default 0.
     pub initial_alpha: Option<Ratio>,
-    /// Which sign of the increment crystallizes, of `as-published`; default as published.
+    /// Sign of the temperature increment that crystallizes, for `as-published`; default as published.
     pub sign: Option<SignSpec>,
-    /// Whether K = 0 outside (T∞, T₀), of `as-published`; default no, as published.
+    /// Sets K = 0 outside (T∞, T₀), for `as-published`; default false, as published.
     pub guarded: Option<bool>,
 }
 
-/// See [`Sign`].
+/// Sign of the temperature increment that crystallizes, see [`Sign`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SignSpec {
@@ -84,32 +86,32 @@ pub enum SignSpec {
 /// A constant (`"0.25 W/(m K)"`) or a table (`{ temperature = […], value = […] }`).
 #[derive(Clone, Debug)]
 pub enum PropertySpec<D> {
-    /// The same at every temperature.
+    /// Constant over temperature.
     Constant(Quantity<D>),
-    /// Linear between these, constant beyond.
+    /// Table over temperature: linear between its rows, constant beyond.
     Table(TableSpec<D>),
 }
 
-/// A table of a property.
+/// Table of a property.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, bound = "D: Dimension")]
 pub struct TableSpec<D> {
-    /// Increasing temperatures.
+    /// Temperatures, increasing.
     pub temperature: Vec<Temperature>,
-    /// A value for each.
+    /// Value at each temperature.
     pub value: Vec<Quantity<D>>,
 }
 
-/// Constants by name (`"table-4.1-column-1"`) or one by one.
+/// Kinetics by name (`"table-4.1-column-1"`) or by their constants.
 #[derive(Clone, Debug)]
 pub enum KineticsSpec {
-    /// Of the thesis.
-    Named(Constants),
-    /// One by one.
+    /// Constants of the thesis.
+    Named(KineticConstants),
+    /// Constants of the scene.
     Given(GivenKinetics),
 }
 
-/// The constants of Eq. (4.7).
+/// Constants of Eq. (4.7).
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GivenKinetics {
@@ -121,24 +123,24 @@ pub struct GivenKinetics {
     pub activation_energy: Option<MolarEnergy>,
     /// Equilibrium melting temperature T₀.
     pub equilibrium_melting: Temperature,
-    /// Temperature T∞ of frozen chains; or `glass_transition`.
+    /// Temperature T∞ of frozen chains.
     pub frozen: Option<Temperature>,
-    /// Glass transition T_g: T∞ = T_g − 30 K.
+    /// Glass transition T_g, instead of `frozen`: T∞ = T_g − 30 K.
     pub glass_transition: Option<Temperature>,
     /// Avrami exponent n.
     pub avrami_exponent: f64,
 }
 
-/// Constants by name (`"pa12"`) or one by one.
+/// Melting by name (`"pa12"`) or by its constants.
 #[derive(Clone, Debug)]
 pub enum MeltingSpec {
-    /// Of the thesis.
+    /// Constants of the thesis.
     Named(Melting),
-    /// One by one.
+    /// Constants of the scene.
     Given(GivenMelting),
 }
 
-/// The constants of Eq. (4.8).
+/// Constants of Eq. (4.8).
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GivenMelting {
@@ -151,13 +153,13 @@ pub struct GivenMelting {
 }
 
 const KINETICS_NAMES: [&str; 3] = ["table-4.1-column-1", "table-4.1-column-2", "appendix-b"];
-const KINETICS: [(&str, Constants); 3] = [
-    (KINETICS_NAMES[0], Constants::TABLE_4_1_COLUMN_1),
-    (KINETICS_NAMES[1], Constants::TABLE_4_1_COLUMN_2),
-    (KINETICS_NAMES[2], Constants::APPENDIX_B),
+const KINETICS: [(&str, KineticConstants); 3] = [
+    (KINETICS_NAMES[0], KineticConstants::TABLE_4_1_COLUMN_1),
+    (KINETICS_NAMES[1], KineticConstants::TABLE_4_1_COLUMN_2),
+    (KINETICS_NAMES[2], KineticConstants::APPENDIX_B),
 ];
 
-/// Where parameters of the kinetics stand in their block.
+/// Parameters of the kinetics and their keys.
 pub(super) const KINETICS_KEYS: [(&str, &str); 6] = [
     ("growth rate constant K0, 1/s", "growth_rate"),
     ("nucleation constant K_G, K²", "nucleation"),
@@ -166,7 +168,7 @@ pub(super) const KINETICS_KEYS: [(&str, &str); 6] = [
     ("equilibrium melting temperature, K", "equilibrium_melting"),
     ("Avrami exponent n", "avrami_exponent"),
 ];
-/// Where parameters of melting stand in their block.
+/// Parameters of melting and their keys.
 const MELTING_KEYS: [(&str, &str); 3] = [
     ("sharpness of melting k_m, 1/K", "sharpness"),
     ("shape of melting d", "shape"),
@@ -174,10 +176,10 @@ const MELTING_KEYS: [(&str, &str); 3] = [
 ];
 
 impl MaterialSpec {
-    /// The material; `key` is where the block stands, e.g. `material`.
+    /// Builds the material of the block at `key`, e.g. `material`.
     ///
     /// # Errors
-    /// A [`SceneError`] for keys that the law does not have or lacks, and for constants out of their domain.
+    /// Returns a [`SceneError`] for missing keys, keys of another law, and invalid constants.
     pub fn build(&self, source: &Source, key: &str) -> Result<Box<dyn ThermalMaterial>, SceneError> {
         self.check_keys(source, key)?;
         Ok(match self.law {
@@ -187,10 +189,14 @@ impl MaterialSpec {
             }
             Law::AsPublished => {
                 let sign = match self.sign {
-                    Some(SignSpec::Mended) => Sign::Mended,
+                    Some(SignSpec::Mended) => Sign::Corrected,
                     _ => Sign::AsPublished,
                 };
-                Box::new(AsPublished::new(self.conductor(source, key)?, sign, self.guarded.unwrap_or(false)))
+                Box::new(PublishedSubroutine::new(
+                    self.conductor(source, key)?,
+                    sign,
+                    self.guarded.unwrap_or(false),
+                ))
             }
         })
     }
@@ -207,31 +213,23 @@ impl MaterialSpec {
             let at = format!("{key}.{name}");
             match self.law {
                 Law::Semicrystalline if needed && !given => {
-                    return Err(source.error(
-                        &at,
-                        "nothing",
-                        format!("`{name}`: a semicrystalline material needs it"),
-                    ));
+                    return Err(source.missing(&at, "a semicrystalline material needs it"));
                 }
                 Law::Conductor | Law::AsPublished if given => {
-                    let found = format!("`{name}` of a material that has none");
-                    return Err(source.error(&at, found, "nothing, or `law = \"semicrystalline\"`"));
+                    let why = "it belongs to `law = \"semicrystalline\"`; remove it or change the law";
+                    return Err(source.unexpected(&at, why));
                 }
                 _ => {}
             }
         }
         if self.powder.is_some() && self.law == Law::AsPublished {
-            let allowed = "nothing: the published subroutine has one conductivity";
-            return Err(source.error(&format!("{key}.powder"), "`powder` of `as-published`", allowed));
+            let why = "the published subroutine has no powder; remove it";
+            return Err(source.unexpected(&format!("{key}.powder"), why));
         }
         for (name, given) in [("sign", self.sign.is_some()), ("guarded", self.guarded.is_some())] {
             if given && self.law != Law::AsPublished {
-                let found = format!("`{name}` of another law");
-                return Err(source.error(
-                    &format!("{key}.{name}"),
-                    found,
-                    "nothing, or `law = \"as-published\"`",
-                ));
+                let why = "it belongs to `law = \"as-published\"`; remove it or change the law";
+                return Err(source.unexpected(&format!("{key}.{name}"), why));
             }
         }
         Ok(())
@@ -240,33 +238,33 @@ impl MaterialSpec {
     fn conductor(&self, source: &Source, key: &str) -> Result<Conductor, SceneError> {
         let [conductivity, heat] = self.properties(source, key)?;
         let conductor = Conductor::new(self.density.si(), conductivity, heat);
-        let conductor = at(source, &format!("{key}.density"), conductor)?;
+        let conductor = locate(source, &format!("{key}.density"), conductor)?;
         let factors = format!("{key}.conductivity_factors");
-        at(source, &factors, conductor.with_directions(self.conductivity_factors.unwrap_or([1.0; 3])))
+        locate(source, &factors, conductor.with_directions(self.conductivity_factors.unwrap_or([1.0; 3])))
     }
 
-    /// Conductivity and specific heat.
-    pub(crate) fn properties(&self, source: &Source, key: &str) -> Result<[Property; 2], SceneError> {
-        let of = |name: &str| format!("{key}.{name}");
+    /// Returns conductivity and specific heat.
+    pub(crate) fn properties(&self, source: &Source, key: &str) -> Result<[ThermalProperty; 2], SceneError> {
+        let path = |name: &str| format!("{key}.{name}");
         Ok([
-            self.conductivity.build(source, &of("conductivity"), "conductivity, W/(m K)")?,
-            self.specific_heat.build(source, &of("specific_heat"), "specific heat, J/(kg K)")?,
+            self.conductivity.build(source, &path("conductivity"), "conductivity, W/(m K)")?,
+            self.specific_heat.build(source, &path("specific_heat"), "specific heat, J/(kg K)")?,
         ])
     }
 
-    /// The constants of the kinetics of a `semicrystalline` block.
+    /// Returns the constants of the kinetics.
     ///
     /// # Errors
-    /// A [`SceneError`] where some are missing or given twice.
-    pub(super) fn constants(&self, source: &Source, key: &str) -> Result<Constants, SceneError> {
+    /// Returns a [`SceneError`] for missing, or conflicting constants.
+    pub(super) fn constants(&self, source: &Source, key: &str) -> Result<KineticConstants, SceneError> {
         match &self.kinetics {
             Some(KineticsSpec::Named(constants)) => Ok(*constants),
             Some(KineticsSpec::Given(given)) => given.constants(source, key),
-            None => Err(source.error(&format!("{key}.kinetics"), "nothing", "kinetics")),
+            None => Err(source.missing(&format!("{key}.kinetics"), "a semicrystalline material needs it")),
         }
     }
 
-    /// The constants of a `semicrystalline` block.
+    /// Returns the constants of a `semicrystalline` material.
     ///
     /// # Errors
     /// As [`MaterialSpec::build`].
@@ -283,7 +281,8 @@ impl MaterialSpec {
             None => None,
         };
         let property = |name: &str| format!("{key}.{name}");
-        // density and factors are checked here with the properties, so that the rest speaks of crystals
+        // checks density, conductivity factors and properties first, so that later errors are those of
+        // crystallinity
         self.conductor(source, key)?;
         let [conductivity, specific_heat] = self.properties(source, key)?;
         let kinetics = Kinetics::new(constants)
@@ -300,7 +299,7 @@ impl MaterialSpec {
         })
     }
 
-    /// The material of a `semicrystalline` block.
+    /// Builds a `semicrystalline` material.
     ///
     /// # Errors
     /// As [`MaterialSpec::build`].
@@ -319,25 +318,22 @@ impl MaterialSpec {
 }
 
 impl GivenKinetics {
-    fn constants(&self, source: &Source, key: &str) -> Result<Constants, SceneError> {
+    fn constants(&self, source: &Source, key: &str) -> Result<KineticConstants, SceneError> {
         let frozen = match (self.frozen, self.glass_transition) {
             (Some(frozen), None) => frozen.si(),
             (None, Some(glass)) => glass.si() - 30.0,
             (None, None) => {
                 let at = format!("{key}.kinetics.frozen");
-                return Err(source.error(
-                    &at,
-                    "nothing",
-                    "`frozen`, or `glass_transition` for T∞ = T_g − 30 K",
-                ));
+                return Err(source.missing(&at, "write `frozen`, or `glass_transition` for T∞ = T_g − 30 K"));
             }
             (Some(_), Some(_)) => {
                 let at = format!("{key}.kinetics.glass_transition");
-                return Err(source.error(&at, "`glass_transition` together with `frozen`", "one of them"));
+                let frozen = format!("{key}.kinetics.frozen");
+                return Err(source.conflict(&at, &frozen, "keep one of them"));
             }
         };
-        let energy = Constants::TABLE_4_1_COLUMN_1.activation_energy;
-        Ok(Constants {
+        let energy = KineticConstants::TABLE_4_1_COLUMN_1.activation_energy;
+        Ok(KineticConstants {
             growth_rate: self.growth_rate.si(),
             nucleation: self.nucleation.si(),
             activation_energy: self.activation_energy.map_or(energy, Quantity::si),
@@ -349,23 +345,23 @@ impl GivenKinetics {
 }
 
 impl<D: Dimension + Copy> PropertySpec<D> {
-    fn build(&self, source: &Source, key: &str, name: &'static str) -> Result<Property, SceneError> {
+    fn build(&self, source: &Source, key: &str, name: &'static str) -> Result<ThermalProperty, SceneError> {
         match self {
-            Self::Constant(value) => at(source, key, Property::constant(name, value.si())),
+            Self::Constant(value) => locate(source, key, ThermalProperty::constant(name, value.si())),
             Self::Table(table) => {
                 let temperatures = table.temperature.iter().map(|t| t.si()).collect();
                 let values = table.value.iter().map(|v| v.si()).collect();
                 let keys =
                     [(name, "value"), ("number of values", "value"), ("temperature, K", "temperature")];
-                Property::table(name, temperatures, values)
+                ThermalProperty::table(name, temperatures, values)
                     .map_err(|error| located_in(source, key, &keys, &error))
             }
         }
     }
 }
 
-/// Puts a parameter's error at its place in the scene.
-fn at<T>(source: &Source, key: &str, result: Result<T, Error>) -> Result<T, SceneError> {
+/// Locates the error of a parameter at its key in the scene.
+fn locate<T>(source: &Source, key: &str, result: Result<T, Error>) -> Result<T, SceneError> {
     result.map_err(|error| located(source, key, &error))
 }
 
@@ -433,12 +429,15 @@ impl<D: Dimension> schemars::JsonSchema for PropertySpec<D> {
         let constant = generator.subschema_for::<Quantity<D>>();
         let temperature = generator.subschema_for::<Temperature>();
         schemars::json_schema!({
-            "description": "a constant, or a table: linear between its temperatures, constant beyond",
+            "description": "constant, or table over temperature: linear between its rows, constant beyond",
             "anyOf": [constant, {
                 "type": "object",
                 "properties": {
-                    "temperature": { "type": "array", "items": temperature, "description": "Increasing temperatures." },
-                    "value": { "type": "array", "items": constant, "description": "A value for each." },
+                     "temperature": {
+                                            "type": "array", "items": temperature, "description": "Temperatures, increasing.",
+                                        },
+                    "value": { "type": "array", "items": constant, "description": "Value at each \
+                        temperature." },
                 },
                 "required": ["temperature", "value"],
                 "additionalProperties": false,
@@ -455,7 +454,7 @@ impl schemars::JsonSchema for KineticsSpec {
     fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
         let given = generator.subschema_for::<GivenKinetics>();
         schemars::json_schema!({
-            "description": "constants by name, or one by one",
+            "description": "name of published constants, or the constants",
             "anyOf": [{ "enum": KINETICS_NAMES }, given],
         })
     }
@@ -469,7 +468,7 @@ impl schemars::JsonSchema for MeltingSpec {
     fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
         let given = generator.subschema_for::<GivenMelting>();
         schemars::json_schema!({
-            "description": "constants by name, or one by one",
+            "description": "name of published constants, or the constants",
             "anyOf": [{ "const": "pa12" }, given],
         })
     }
@@ -477,18 +476,18 @@ impl schemars::JsonSchema for MeltingSpec {
 
 impl<'de, D: Dimension> Deserialize<'de> for PropertySpec<D> {
     fn deserialize<De: Deserializer<'de>>(deserializer: De) -> Result<Self, De::Error> {
-        either::deserialize(deserializer)
+        text_or_table::deserialize(deserializer)
     }
 }
 
 impl<'de> Deserialize<'de> for KineticsSpec {
     fn deserialize<De: Deserializer<'de>>(deserializer: De) -> Result<Self, De::Error> {
-        either::deserialize(deserializer)
+        text_or_table::deserialize(deserializer)
     }
 }
 
 impl<'de> Deserialize<'de> for MeltingSpec {
     fn deserialize<De: Deserializer<'de>>(deserializer: De) -> Result<Self, De::Error> {
-        either::deserialize(deserializer)
+        text_or_table::deserialize(deserializer)
     }
 }

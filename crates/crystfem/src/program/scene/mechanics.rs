@@ -1,9 +1,9 @@
-//! Stress of a part: which elements, which bed, how often.
+//! Stress of a part: its elements, its bed and the interval between solutions.
 
 use super::PartScene;
-use super::fault::located;
+use super::locate_error::located;
 use crate::coupling::{STRAIN_STEP, StressSettings, loose_elements};
-use crate::mechanics::{SolidifyingMaxwell, is_known, key};
+use crate::mechanics::{SolidifyingMaxwell, is_supported, key};
 use crate::mesh::Mesh;
 use crate::mesh::path::ToolPath;
 use harness::scene::{SceneError, Source};
@@ -11,30 +11,26 @@ use polycore::units::{PerTemperature, Ratio, Stress};
 use serde::Deserialize;
 use std::collections::HashSet;
 
-/// Bytes of the matrices of a hexahedron, and of tetrahedra of 4 and 10 nodes.
-const HEXAHEDRON: f64 = 26e3;
-const TETRAHEDRON: [f64; 2] = [2e3, 10e3];
+/// Matrix bytes per hexahedron, and per tetrahedron of 4 and 10 nodes.
+const HEXAHEDRON_BYTES: f64 = 26e3;
+const TETRAHEDRON_BYTES: [f64; 2] = [2e3, 10e3];
 
-/// Stress and warpage beside the heat: what happens to the shape does not act back on temperatures.
+/// Stress and warpage, computed from the temperatures; deformation does not affect the heat.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MechanicsSpec {
-    /// The material whose elements bear stress; with `pa12` it must be semicrystalline.
+    /// Material whose elements bear stress; with `pa12` it must be semicrystalline.
     pub material: String,
-    /// Its mechanical constants.
+    /// Mechanical constants.
     pub law: MechanicsLaw,
-    /// A surface of the mesh or a side, whose nodes are held while the part is printed; default: the nodes that the part shares with other
-    /// materials.
+    /// Surface or side of the mesh whose nodes are fixed during printing; default: the nodes that the part
+    /// shares with other materials.
     pub bed: Option<String>,
-    /// Whether the part is taken off the bed at the end; default true.
-    #[serde(default = "yes")]
+    /// Releases the part from the bed at the end; default true.
+    #[serde(default = "super::default_true")]
     pub release: bool,
-    /// Largest change of the linear free strain in any element between two solutions; default 2e-4.
+    /// Largest change of the linear free strain of an element between two solutions; default 2e-4.
     pub strain_step: Option<f64>,
-}
-
-fn yes() -> bool {
-    true
 }
 
 /// Mechanical constants.
@@ -43,11 +39,11 @@ fn yes() -> bool {
 pub enum MechanicsLaw {
     /// PA12, with assumed constants: see the guide, *Stress of prints*.
     Pa12,
-    /// Elastic, with thermal expansion; of any material.
+    /// Elastic, with thermal expansion, for any material.
     Elastic(ElasticSpec),
 }
 
-/// σ = C:(ε − α ΔT 1).
+/// Linear thermoelasticity, σ = C:(ε − α ΔT 1).
 #[derive(Clone, Debug, PartialEq, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ElasticSpec {
@@ -62,8 +58,8 @@ pub struct ElasticSpec {
 }
 
 impl MechanicsLaw {
-    /// The law of a material with these crystals at α = 1.
-    fn solve(&self, source: &Source, crystallinity: f64) -> Result<SolidifyingMaxwell, SceneError> {
+    /// Returns the law of a material with this ultimate crystallinity.
+    fn build(&self, source: &Source, crystallinity: f64) -> Result<SolidifyingMaxwell, SceneError> {
         let Self::Elastic(spec) = self else {
             return Ok(SolidifyingMaxwell::pa12().with_crystallinity(crystallinity));
         };
@@ -88,24 +84,24 @@ impl MechanicsLaw {
     }
 }
 
-/// Stress beside the heat, and what it needs.
+/// Stress settings of a part, and their cost.
 pub struct Mechanics {
-    /// The part that bears stress.
+    /// Settings of the stress solution.
     pub settings: StressSettings,
-    /// Numbers of elements that bear stress, and of shapes of all elements.
+    /// Number of elements that bear stress, and of different element shapes.
     pub counts: [usize; 2],
-    /// Bytes of the matrices of all shapes.
+    /// Matrix bytes of all shapes.
     pub matrices: f64,
-    /// Whether all that bears stress are tetrahedra of 4 nodes, which are too stiff.
+    /// True if all stressed elements are 4-node tetrahedra, which are too stiff.
     pub stiff: bool,
 }
 
 impl PartScene {
-    /// The mechanics of a scene on a mesh, where it has any; `material_of` are the materials of elements by their place in the scene, and `absent`
-    /// elements are never printed; `path` is that of a mesh of one.
+    /// Returns the mechanics of a scene that has `[mechanics]`. `material_of` holds the material index of
+    /// each element, `absent` the elements that are never printed, `path` the tool path of a `[mesh.path]`.
     ///
     /// # Errors
-    /// A [`SceneError`] for unknown names, elements that are neither hexahedra of first order nor tetrahedra, and a part that nothing holds.
+    /// Returns a [`SceneError`] for unknown names, unsupported element types, and a part that is not fixed.
     pub(super) fn mechanics(
         &self,
         source: &Source,
@@ -121,7 +117,7 @@ impl PartScene {
         };
         let material = &self.materials[&spec.material];
         if spec.law == MechanicsLaw::Pa12 && material.kinetics.is_none() {
-            let found = format!("`{}`, which does not crystallize", spec.material);
+            let found = format!("`{}`, a material that does not crystallize", spec.material);
             return Err(source.error("mechanics.material", found, "a semicrystalline material"));
         }
         let strain_step = spec.strain_step.unwrap_or(STRAIN_STEP);
@@ -132,33 +128,33 @@ impl PartScene {
             material_of.iter().map(|&material| usize::from(material) == index).collect();
         absent.iter().for_each(|&element| bears[element as usize] = false);
         let all = || (0..mesh.element_count() as u32).map(|element| mesh.nodes(element));
-        let others = all().filter(|nodes| !is_known(nodes.len())).count();
+        let others = all().filter(|nodes| !is_supported(nodes.len())).count();
         if others > 0 {
-            let found = format!("a mesh with {others} wedges, or hexahedra of second order");
-            let allowed = "hexahedra of 8 nodes, tetrahedra of 4 or 10 (tetrahedra fill any shape: \
-                           `cells` of a bar or brick, any mesher)";
+            let found = format!("a mesh with {others} wedges or second-order hexahedra");
+            let allowed = "8-node hexahedra, 4- or 10-node tetrahedra (meshers produce tetrahedra for any \
+                shape; so does `cells` of a bar or brick)";
             return Err(source.error("mechanics", found, allowed));
         }
         let share = |given: Option<Ratio>| given.map_or(0.0, |ratio| ratio.si());
-        let law = spec.law.solve(source, share(material.crystallinity))?;
+        let law = spec.law.build(source, share(material.crystallinity))?;
         let settings = StressSettings::new(mesh, law, bears, spec.bed.as_deref())
             .map_err(|error| located(source, "mechanics.bed", &error))?;
         let StressSettings { bears, bed, .. } = &settings;
         if bed.len() < 3 {
             let found = format!("{} nodes of the part on the bed", bed.len());
-            let allowed = "at least 3: a surface of the part, or another material below it";
+            let allowed = "at least 3 (use a surface of the part, or another material below it)";
             return Err(source.error("mechanics.bed", found, allowed));
         }
         let loose = loose_elements(mesh, bears, bed);
         if loose > 0 {
-            let found = format!("{loose} elements that nothing connects with the bed");
-            let mut allowed = "a part that hangs together and touches the bed".to_owned();
+            let found = format!("{loose} elements that are not connected to the bed");
+            let mut allowed = "a connected part that touches the bed".to_owned();
             if let Some(path) = path {
                 let names: Vec<&str> =
                     path.shares().iter().map(|share| share.0).filter(|name| !name.is_empty()).collect();
-                allowed += "; `mesh.path.leave_out` takes skirts, brims and purge lines out of it";
+                allowed += "; `mesh.path.leave_out` removes skirts, brims and purge lines";
                 allowed += &format!(
-                    " (the file names {})",
+                    " (features of the file: {})",
                     if names.is_empty() { "none".into() } else { names.join(", ") }
                 );
             }
@@ -170,9 +166,9 @@ impl PartScene {
             all().map(|nodes| (nodes.len(), key(&places(nodes)))).collect();
         let counts = [bears.iter().filter(|bears| **bears).count(), shapes.len()];
         // K̂ and gradients
-        let matrices = shapes
-            .iter()
-            .map(|(nodes, _)| if *nodes == 8 { HEXAHEDRON } else { TETRAHEDRON[usize::from(*nodes > 4)] });
+        let matrices = shapes.iter().map(|(nodes, _)| {
+            if *nodes == 8 { HEXAHEDRON_BYTES } else { TETRAHEDRON_BYTES[usize::from(*nodes > 4)] }
+        });
         let matrices = matrices.sum();
         let stiff = all().zip(bears).all(|(nodes, bears)| nodes.len() == 4 || !bears);
         let settings = StressSettings {

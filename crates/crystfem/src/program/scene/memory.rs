@@ -1,7 +1,8 @@
-//! Memory that the run of a part needs: as far as the mesh determines it before it is made, and the whole before a step is taken.
+//! Memory of a part's run: a bound from the mesh settings before meshing, and the total before the first
+//! step.
 //!
-//! Counted are the arrays that live at once, in bytes; the test `memory` of the workspace compares the sum with what whole
-//! runs take.
+//! Counts the bytes of arrays that are alive at the same time. The workspace test `memory` compares the sum
+//! with measured peaks.
 
 use super::{Mechanics, PartScene};
 use crate::simulation::Simulation;
@@ -11,51 +12,51 @@ use polycore::memory::{available, gib};
 
 /// Threads and tables.
 const ALWAYS: f64 = 20e6;
-/// Canvases and letters of pictures, and what each stage adds to them.
+/// Drawing surfaces and fonts, and each stage of a picture.
 const PICTURES: f64 = 40e6;
 const STAGE: f64 = 12e6;
-/// A node: its place, equation, a dozen vectors of a step and its solver, a checkpoint; an element: its nodes, its sets,
-/// outer faces while they are sought. The mesh is there once.
+/// Mesh data per node (position, equation, about twelve vectors of step and solver, checkpoint) and per
+/// element (nodes, sets, outer faces during their search).
 const NODE: f64 = 290.0;
 const ELEMENT: f64 = 115.0;
-/// A node with adaptive steps: rates of all stages, what is known before one, the estimate of its error.
+/// Adaptive steps, per node: rates of all stages, previous state, error estimate.
 const ADAPTIVE: f64 = 40.0;
-/// An element that is printed: births, layers, equations that are rebuilt.
+/// Printing, per element: births, layers, rebuilt equations.
 const PRINTED: f64 = 300.0;
-/// An element that bears stress: six branches and the stress at eight Gauss points, a copy of them and its bytes while a checkpoint is written; what it does
-/// in a step. Motions, blocks and vectors of the solver at a node.
+/// Stress, per element: six branches and the stress at eight Gauss points, their copies during a step and a
+/// checkpoint; per node: displacements, blocks and solver vectors.
 const STRESSED: f64 = 3.0 * 7.0 * 8.0 * 48.0 + 1800.0;
 const STRESSED_NODE: f64 = 450.0;
-/// Nodes of a group of the coarse level, six unknowns each.
+/// Nodes per group of the coarse level, which has six unknowns per group.
 const GROUP: f64 = 64.0;
-/// A stored entry of the conduction matrix, while it is sorted.
+/// Entry of the conduction matrix during sorting.
 const ENTRY: f64 = 40.0;
-/// A material point: birth and material, both also while points move at a birth. Its mass, where it is stored. Each of its numbers: as it is,
-/// while points move, in a checkpoint; and new, where it is not in its own place.
+/// Material point: birth and material (twice during a birth); stored mass; each state variable (value, copy
+/// during a birth, checkpoint), and its new value if stored separately.
 const POINT: f64 = 24.0;
 const MASS: f64 = 8.0 * 2.0;
 const STATE: f64 = 8.0 * 4.0;
 const NEW: f64 = 8.0;
-/// A point in an element has a place of its own, gradients, and a share of its element's matrix.
+/// Point inside an element: position, gradients, and its share of the element matrix.
 const POINT_IN_ELEMENT: f64 = 400.0;
-/// An entry of factors: number, place, and its part of the front while they are made.
+/// Entry of the factors: value, index, and its part of the front during factorization.
 const FACTOR: f64 = 16.0;
-/// Fields in a file and in pictures: nodes and cells, and each field as it is computed, packed, and read again.
+/// Field output: per node, per element, and per value of a field (computed, packed, read back).
 const WRITTEN_NODE: f64 = 100.0;
 const WRITTEN_ELEMENT: f64 = 80.0;
 const FIELD: f64 = 64.0;
-/// A point of a line: its element's nodes with their weights, the elements around it, its place; a number of a table.
+/// Point of a line: element nodes and weights, neighbouring elements, position; value of a table.
 const LINE_POINT: f64 = 24.0 + 2.0 * 56.0 + 8.0 * 16.0 + 32.0 + 24.0;
 const CELL: f64 = 8.0;
-/// Most fixed steps, and most times at which fields are written.
+/// Largest number of fixed steps, and of output times.
 const MOST_STEPS: f64 = 1e9;
 const MOST_FRAMES: f64 = 1e5;
 
-/// Refuses a structured mesh of so many cells along each axis, with so many elements each, before anything of it is
-/// allocated.
+/// Refuses a structured mesh that needs too much memory, before allocation: `cells` along each axis, `each`
+/// elements per cell.
 ///
 /// # Errors
-/// What is needed and what there is, at `key`.
+/// Returns needed and available memory, at `key`.
 pub(super) fn refuse_mesh(
     source: &Source,
     key: &str,
@@ -67,10 +68,10 @@ pub(super) fn refuse_mesh(
     refuse(source, key, &format!("{nodes:.3e} nodes"), needed)
 }
 
-/// Refuses more steps and fields than any run takes.
+/// Refuses too many steps or output times.
 ///
 /// # Errors
-/// Their number, at the key that makes them so many.
+/// Returns their number, at the key that determines it.
 pub(super) fn refuse_times(source: &Source, scene: &PartScene, end: f64) -> Result<(), SceneError> {
     let counted = [
         ("time.step", scene.time.step, "steps", MOST_STEPS),
@@ -89,11 +90,11 @@ pub(super) fn refuse_times(source: &Source, scene: &PartScene, end: f64) -> Resu
     Ok(())
 }
 
-/// Faces of an element, and up to three interfaces with their states and nodes.
+/// Healing, per element: faces, and up to three interfaces with states and nodes.
 const HEALED: f64 = 600.0;
 
 impl PartScene {
-    /// Bytes that a run up to `end` needs at most, of all that is printed.
+    /// Returns the bytes that a run up to `end` needs at most, with all elements printed.
     pub fn memory(&self, simulation: &Simulation, mechanics: Option<&Mechanics>, end: f64) -> f64 {
         let (mesh, system) = (&simulation.problem().mesh, &simulation.system);
         let (nodes, elements) = (mesh.points.len() as f64, mesh.element_count() as f64);
@@ -111,7 +112,7 @@ impl PartScene {
         if let Some(mechanics) = mechanics {
             let bearing = mechanics.counts[0] as f64;
             bytes += bearing * STRESSED + mechanics.matrices + nodes * STRESSED_NODE;
-            // a band as wide as the section of a compact body
+            // band as wide as the section of a compact body
             let groups = nodes / GROUP + 1.0;
             bytes += 36.0 * groups * (groups.powf(2.0 / 3.0) + 2.0 * groups.cbrt() + 2.0) * 8.0;
             if self.output.fields {
@@ -134,19 +135,19 @@ impl PartScene {
         if self.output.fields || self.output.pictures {
             bytes += nodes * (WRITTEN_NODE + fields * FIELD) + elements * WRITTEN_ELEMENT;
         }
-        // the places of all lines, and one table at a time: arc length, position twice, fields
+        // positions of all lines, and one table at a time: arc length, position twice, fields
         let points = |line: &LineSpec| line.points as f64;
         bytes += LINE_POINT * self.output.line.iter().map(points).sum::<f64>();
         bytes += CELL * (7.0 + fields) * self.output.line.iter().map(points).fold(0.0, f64::max);
-        // a row for each step in a list that grows, and a checkpoint of it
+        // one row per step in a growing list, and its checkpoint
         let Steps::Fixed { dt } = simulation.settings.steps else { return bytes };
         bytes + 4.0 * 8.0 * (end / dt) * (1.0 + fields) * self.probe.len() as f64
     }
 
-    /// Refuses a run that does not fit before it takes a step.
+    /// Refuses a run that does not fit into memory, before its first step.
     ///
     /// # Errors
-    /// What is needed and what there is.
+    /// Returns needed and available memory.
     pub fn refuse_too_large(
         &self,
         source: &Source,

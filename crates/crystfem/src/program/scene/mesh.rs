@@ -1,16 +1,16 @@
-//! The mesh block of a scene.
+//! Mesh block of a scene.
 
-use super::fault::{located, located_in};
+use super::locate_error::{located, located_in};
 use super::memory;
-use super::voxels::{BuiltMesh, PRINTED, PathSpec, StlSpec, box_of};
+use super::voxels::{BuiltMesh, PRINTED_SIZES, PathSpec, StlSpec, box_of};
 use crate::error::Error;
-use crate::mesh::{Bar, Block, Grid, Mesh, Split, Substrate, Tube, quality, read};
+use crate::mesh::{Bar, Block, CellSplit, Grid, Mesh, Substrate, Tube, quality, read};
 use harness::scene::{SceneError, Source};
 use polycore::units::{Angle, Length};
 use serde::Deserialize;
 use std::path::PathBuf;
 
-/// Where parameters of a bar stand in its block.
+/// Parameters of a bar and their keys.
 const BAR_KEYS: [(&str, &str); 9] = [
     ("extent of the bar", "size"),
     ("layers", "layers"),
@@ -23,10 +23,10 @@ const BAR_KEYS: [(&str, &str); 9] = [
     ("growth of elements", "substrate.growth"),
 ];
 
-/// A part larger than this is none that is printed, m: the unit of its file is missing.
-const LARGE: f64 = 2.0;
+/// A larger part, m, suggests that the unit of its file is missing.
+const SUSPICIOUS_SIZE: f64 = 2.0;
 
-/// Where parameters of a tube stand in its block.
+/// Parameters of a tube and their keys.
 const TUBE_KEYS: [(&str, &str); 6] = [
     ("radius of the bore", "radii"),
     ("outer radius", "radii"),
@@ -36,7 +36,8 @@ const TUBE_KEYS: [(&str, &str); 6] = [
     ("elements along an axis", "elements"),
 ];
 
-/// One of a printed bar, a brick, a sector of a tube, what a G-code file prints, the inside of an STL surface, and a file.
+/// A mesh: one of a printed bar, a brick, a sector of a tube, a G-code file, the inside of an STL surface,
+/// and a mesh file.
 ///
 /// ```toml
 /// [mesh.bar]
@@ -50,25 +51,26 @@ const TUBE_KEYS: [(&str, &str); 6] = [
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshSpec {
-    /// A bar in layers, with or without a substrate.
+    /// Bar in layers, with or without a substrate.
     pub bar: Option<BarSpec>,
-    /// A box of equal elements.
+    /// Box of equal elements.
     pub brick: Option<BrickSpec>,
-    /// A sector of a hollow cylinder.
+    /// Sector of a hollow cylinder.
     pub tube: Option<TubeSpec>,
-    /// The cells that a G-code file fills, printed along it.
+    /// Cells that the beads of a G-code file fill, printed along its path.
     pub path: Option<PathSpec>,
-    /// The cells inside an STL surface.
+    /// Cells inside an STL surface.
     pub stl: Option<StlSpec>,
-    /// A Gmsh `.msh` (2 or 4) or an Abaqus or CalculiX `.inp`.
+    /// Mesh file: Gmsh `.msh` (2 or 4), or Abaqus or CalculiX `.inp`.
     pub file: Option<PathBuf>,
     /// Length of one unit of the file; default 1 m.
     pub unit: Option<Length>,
-    /// Order of the shape functions: 2 puts a node on the middle of each edge; default: as the mesh is.
+    /// Order of the shape functions; 2 adds a node in the middle of each edge; default: the order of the
+    /// mesh.
     pub order: Option<u8>,
 }
 
-/// See [`Bar`].
+/// A printed bar, see [`Bar`].
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BarSpec {
@@ -80,16 +82,16 @@ pub struct BarSpec {
     pub layer_height: Length,
     /// Elements through a layer; default 1.
     pub elements_per_layer: Option<usize>,
-    /// Greatest element along x and y.
+    /// Largest element along x and y.
     pub element_size: Length,
-    /// The substrate.
+    /// Substrate below the bar.
     pub substrate: Option<SubstrateSpec>,
     /// Element type of the grid's cells; default hexahedra.
     #[serde(default)]
-    pub cells: Split,
+    pub cells: CellSplit,
 }
 
-/// See [`Substrate`].
+/// Substrate of a bar, see [`Substrate`].
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SubstrateSpec {
@@ -97,7 +99,7 @@ pub struct SubstrateSpec {
     pub size: [Length; 2],
     /// Thickness.
     pub thickness: Length,
-    /// Growth of elements away from the bar; default 1.5.
+    /// Growth ratio of elements away from the bar; default 1.5.
     pub growth: Option<f64>,
 }
 
@@ -105,41 +107,41 @@ pub struct SubstrateSpec {
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BrickSpec {
-    /// Extents.
+    /// Extents along x, y and z.
     pub size: [Length; 3],
-    /// Elements along each axis; tetrahedra or wedges fill each of these cells.
+    /// Elements along each axis; tetrahedra or wedges subdivide each of these cells.
     pub elements: [usize; 3],
     /// Element type; default hexahedra.
     #[serde(default)]
-    pub cells: Split,
+    pub cells: CellSplit,
 }
 
-/// See [`Tube`].
+/// Sector of a tube, see [`Tube`].
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TubeSpec {
-    /// Radii of the bore and of the outside.
+    /// Radii of the bore and of the outer surface.
     pub radii: [Length; 2],
-    /// Angle of the sector, from y = 0 on.
+    /// Angle of the sector, starting at y = 0.
     pub angle: Angle,
     /// Length along z.
     pub length: Length,
-    /// Elements along the radius, around, and along z.
+    /// Elements along the radius, around the axis, and along z.
     pub elements: [usize; 3],
 }
 
 impl MeshSpec {
-    /// The mesh, checked.
+    /// Builds and checks the mesh.
     ///
     /// # Errors
-    /// A [`SceneError`] for none or several of the alternatives, and for what the mesh refuses.
+    /// Returns a [`SceneError`] for no or several kinds of mesh, and for invalid meshes.
     pub fn build(&self, source: &Source) -> Result<BuiltMesh, SceneError> {
         let mut built = self.first_order(source)?;
         match self.order {
             None | Some(1) => {}
             Some(2) if built.filling.is_none() => built.mesh = built.mesh.second_order(),
             Some(order) => {
-                return Err(source.error("mesh.order", order, "1, or 2 of a bar, brick, tube or file"));
+                return Err(source.error("mesh.order", order, "1, or 2 for a bar, brick, tube or file"));
             }
         }
         Ok(built)
@@ -151,11 +153,14 @@ impl MeshSpec {
         let kinds = structured.into_iter().chain(from_files);
         let given = kinds.filter(|&x| x).count();
         if given != 1 {
-            let found = if given == 0 { "nothing".to_owned() } else { format!("{given} meshes") };
-            return Err(source.error("mesh", found, "one of `bar`, `brick`, `tube`, `path`, `stl`, `file`"));
+            let one = "one of `bar`, `brick`, `tube`, `path`, `stl`, `file`";
+            return Err(match given {
+                0 => source.missing("mesh", format!("the scene needs {one}")),
+                _ => source.error("mesh", format!("{given} kinds of mesh"), one),
+            });
         }
         if self.unit.is_some() && self.file.is_none() {
-            return Err(source.error("mesh.unit", "a unit without a file", "nothing"));
+            return Err(source.unexpected("mesh.unit", "only `mesh.file` has a unit here; remove it"));
         }
         if let Some(path) = &self.path {
             return path.build(source);
@@ -188,7 +193,7 @@ impl MeshSpec {
             notes = found.notes;
             if let Some(suspicion) = self.without_unit(source, &found.mesh) {
                 let [low, high] = found.mesh.bounds().unwrap_or_default();
-                if (0..3).any(|d| high[d] - low[d] > PRINTED[1]) {
+                if (0..3).any(|d| high[d] - low[d] > PRINTED_SIZES[1]) {
                     return Err(suspicion);
                 }
                 notes.push(suspicion.message().to_owned());
@@ -204,17 +209,18 @@ impl MeshSpec {
 }
 
 impl MeshSpec {
-    /// Of a mesh of a file without `unit` that is metres large: that the unit may be missing.
+    /// Returns an error for a mesh file without `unit` whose part is metres large.
     pub(super) fn without_unit(&self, source: &Source, mesh: &Mesh) -> Option<SceneError> {
         let [low, high] = mesh.bounds().filter(|_| self.file.is_some() && self.unit.is_none())?;
         let [x, y, z] = [0, 1, 2].map(|d| ((high[d] - low[d]) * 1e6).round() / 1e6);
-        let found = format!("nothing, and with the file's unit as 1 m the part is {x} × {y} × {z} m");
-        let allowed = "`unit`, e.g. \"1 mm\"; or `unit = \"1 m\"` where it is so large";
-        (x.max(y).max(z) > LARGE).then(|| source.error("mesh.unit", found, allowed))
+        let why = format!(
+            "in metres the part is {x} × {y} × {z} m; write e.g. \"1 mm\", or \"1 m\" if it is so large"
+        );
+        (x.max(y).max(z) > SUSPICIOUS_SIZE).then(|| source.missing("mesh.unit", why))
     }
 
-    /// Cells along each axis of a bar, brick or tube, before anything of it is allocated: they may be too many. None of
-    /// a file.
+    /// Returns the number of cells along each axis of a bar, brick or tube before allocation; zeros for a
+    /// file.
     ///
     /// # Errors
     /// As [`MeshSpec::build`].

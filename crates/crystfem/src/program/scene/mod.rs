@@ -1,26 +1,26 @@
-//! Scenes, as written in TOML. Only what a scene names is built.
+//! TOML scenes of `crystfem`. Only what a scene names is built.
 
-mod either;
-mod fault;
-mod file;
 mod fit;
 mod fit_part;
 mod fit_spec;
+mod gcode_file;
+mod gcode_setting;
 mod healing;
 mod heat_flow;
+mod locate_error;
 mod material;
 mod mechanics;
 mod memory;
 mod mesh;
 mod part;
-mod places;
 mod point;
 mod powder;
-mod print;
+mod printing;
 mod problem;
 mod schedule;
-mod setting;
+mod selection;
 mod study;
+mod text_or_table;
 mod voxels;
 
 pub use fit::{FitScene, Job};
@@ -31,10 +31,10 @@ pub use material::{KineticsSpec, Law, MaterialSpec, MeltingSpec, PropertySpec, S
 pub use mechanics::{Mechanics, MechanicsLaw, MechanicsSpec};
 pub use mesh::{BarSpec, BrickSpec, MeshSpec, SubstrateSpec, TubeSpec};
 pub use part::{BoundarySpec, PartOutput, PartScene, PrintSpec, ProbeSpec, RegionSpec, SourceSpec, TimeSpec};
-pub(crate) use places::millimetres;
 pub use point::{CompareSpec, ExchangeSpec, LegSpec, NodesSpec, PointScene, PointSpec};
-pub use problem::Task;
+pub use problem::PartTask;
 pub use schedule::{ScheduleSpec, TimesSpec};
+pub(crate) use selection::millimetres;
 pub use study::{NAMING, StudySpec};
 pub use voxels::{BuiltMesh, Filling, PathSpec, StlSpec};
 
@@ -44,40 +44,45 @@ use harness::scene::{SceneError, Source};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
-/// The only program that runs these scenes.
+/// Program of these scenes.
 #[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Program {
-    /// This crate.
+    /// `crystfem`.
     Crystfem,
 }
 
-/// Files to write beside the report.
+/// Output of a point or fit scene beside the report.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct OutputSpec {
-    /// Pictures (PNG).
+pub struct PictureOutput {
+    /// Draws pictures (PNG); default true.
     pub pictures: bool,
 }
 
-impl Default for OutputSpec {
+impl Default for PictureOutput {
     fn default() -> Self {
         Self { pictures: true }
     }
 }
 
-/// The task of a scene.
+/// Default of keys that are true unless a scene sets them.
+fn default_true() -> bool {
+    true
+}
+
+/// Kind of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// The material alone: `[[point]]`, `[[nodes]]`.
+pub enum SceneKind {
+    /// Material alone: `[[point]]`, `[[nodes]]`.
     Point,
-    /// A body in time: `[mesh]`.
+    /// Part over time: `[mesh]`.
     Part,
-    /// Constants from measurements: `[[fit]]`.
+    /// Fit of constants to measurements: `[[fit]]`.
     Fit,
 }
 
-/// The JSON Schema of scenes.
+/// Returns the JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
     harness::scene::schema("crystfem", crate::program::quantities::ALL, |generator| {
         vec![
@@ -88,14 +93,14 @@ pub fn schema() -> serde_json::Value {
     })
 }
 
-/// Determines the task of a scene from its blocks.
+/// Determines the kind of a scene from its blocks.
 ///
 /// # Errors
-/// What is no scene at all, another program, and a scene without any such block.
-pub fn kind(source: &Source) -> Result<Kind, SceneError> {
-    /// What tells kinds apart; the rest is read later.
+/// Returns an error for invalid TOML, another program, and a scene without any of the blocks.
+pub fn kind(source: &Source) -> Result<SceneKind, SceneError> {
+    /// Blocks that determine the kind.
     #[derive(Deserialize)]
-    struct Outline {
+    struct SceneBlocks {
         #[serde(rename = "program")]
         _program: Program,
         point: Option<IgnoredAny>,
@@ -103,22 +108,21 @@ pub fn kind(source: &Source) -> Result<Kind, SceneError> {
         fit: Option<IgnoredAny>,
         mesh: Option<IgnoredAny>,
     }
-    let outline: Outline = source.parse()?;
+    let outline: SceneBlocks = source.parse()?;
     let tasks = [
-        (Kind::Point, "point", outline.point.is_some() || outline.nodes.is_some()),
-        (Kind::Fit, "fit", outline.fit.is_some()),
-        (Kind::Part, "mesh", outline.mesh.is_some()),
+        (SceneKind::Point, "point", outline.point.is_some() || outline.nodes.is_some()),
+        (SceneKind::Fit, "fit", outline.fit.is_some()),
+        (SceneKind::Part, "mesh", outline.mesh.is_some()),
     ];
     let mut asked = tasks.iter().filter(|(_, _, given)| *given);
     match (asked.next(), asked.next()) {
         (Some((kind, ..)), None) => Ok(*kind),
         (Some((_, first, _)), Some((_, second, _))) => {
-            let found = format!("`{second}` together with `{first}`");
-            Err(source.error(second, found, "one of them: a scene does one thing"))
+            Err(source.conflict(second, first, "a scene has one task; remove one of them"))
         }
         (None, _) => {
-            let allowed = "a block `[[point]]`, `[[nodes]]`, `[[fit]]` or `[mesh]`";
-            Err(source.error("program", "a scene without a task", allowed))
+            let why = "the scene needs a block `[mesh]`, `[[point]]`, `[[nodes]]` or `[[fit]]`";
+            Err(source.missing("mesh", why))
         }
     }
 }

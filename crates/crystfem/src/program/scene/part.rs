@@ -1,4 +1,4 @@
-//! The scene of a body in time: mesh, materials, layers, what acts on it.
+//! Scene of a part over time: mesh, materials, printing, conditions.
 
 use super::{
     HealingSpec, MaterialSpec, MechanicsSpec, MeshSpec, Program, ScheduleSpec, StudySpec, check_name,
@@ -17,27 +17,27 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// A whole scene.
+/// A scene of a part.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PartScene {
-    /// The program that runs it: `crystfem`.
+    /// Program of the scene: `crystfem`.
     pub program: Program,
-    /// One line for tables and pictures.
+    /// Title for tables and pictures.
     #[serde(default)]
     pub title: String,
-    /// The mesh.
+    /// Mesh of the part.
     pub mesh: MeshSpec,
-    /// The materials, by name.
+    /// Materials by name.
     pub materials: BTreeMap<String, MaterialSpec>,
     /// Elements of each material.
     pub region: Vec<RegionSpec>,
-    /// Layers that appear one after another; without it everything exists from the start.
+    /// Printing: elements that are added during the run; default: all exist from the start.
     pub print: Option<PrintSpec>,
-    /// Conditions on surfaces.
+    /// Boundary conditions.
     #[serde(default)]
     pub boundary: Vec<BoundarySpec>,
-    /// Heat released in a volume.
+    /// Heat sources in volumes.
     #[serde(default)]
     pub source: Vec<SourceSpec>,
     /// Stress and warpage.
@@ -47,19 +47,19 @@ pub struct PartScene {
     /// Times and steps.
     #[serde(default)]
     pub time: TimeSpec,
-    /// Places whose temperature and state are recorded in every step.
+    /// Places whose temperature and state are recorded in each step.
     #[serde(default)]
     pub probe: Vec<ProbeSpec>,
     /// Files to write.
     #[serde(default)]
     pub output: PartOutput,
-    /// Variants to run instead of the scene itself.
+    /// Variants that run instead of the scene itself.
     #[serde(default)]
     pub study: Vec<StudySpec>,
-    /// Limits and orders of quantities over studies.
+    /// Limits and convergence orders of quantities over studies.
     #[serde(default)]
     pub convergence: Vec<Convergence>,
-    /// Error against run time over studies.
+    /// Plots of error against run time over studies.
     #[serde(default)]
     pub error_against_time: Vec<ErrorAgainstTime>,
     /// Expected results.
@@ -71,73 +71,74 @@ pub struct PartScene {
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RegionSpec {
-    /// An element set of the mesh; default: all.
+    /// Element set of the mesh; default: all elements.
     pub elements: Option<String>,
-    /// Name of its material.
+    /// Name of the material.
     pub material: String,
-    /// Temperature at the start, of what exists then.
+    /// Temperature at the start.
     pub temperature: Temperature,
 }
 
-/// Elements that appear during the run: in layers, or along a path.
+/// Elements that are added during the run, in layers or along a path.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PrintSpec {
-    /// Temperature of new material at its birth; default: that of the nozzle in the G-code file.
+    /// Temperature of new material; default: that of the nozzle in the G-code file.
     pub temperature: Option<ScheduleSpec<TemperatureDimension>>,
-    /// Element sets `PREFIX1`, `PREFIX2`, …; default `layer-`.
+    /// Prefix of the element sets of the layers, `PREFIX1`, `PREFIX2`, …; default `layer-`.
     pub layers: Option<String>,
-    /// Or an element set cut into layers of `layer_height`, or printed along a `path`.
+    /// Element set that is cut into layers of `layer_height`, or printed along `path`, instead of `layers`.
     pub elements: Option<String>,
     /// Height of these layers.
     pub layer_height: Option<Length>,
-    /// Time from one layer to the next.
+    /// Time between layers.
     pub layer_time: Option<Time>,
-    /// When the first layer, or the path, begins; default 0.
+    /// Start time of the first layer or of the path; default 0.
     pub start: Option<Time>,
-    /// G-code (`.gcode`, `.g`, `.nc`) or a CSV table (`time [s]`, `x [mm]`, `y [mm]`, `z [mm]`, `print`).
+    /// Tool path: G-code (`.gcode`, `.g`, `.nc`) or a CSV table (`time [s]`, `x [mm]`, `y [mm]`, `z [mm]`,
+    /// `print`).
     pub path: Option<PathBuf>,
     /// Width of the bead.
     pub bead_width: Option<Length>,
-    /// Its height.
+    /// Height of the bead.
     pub bead_height: Option<Length>,
-    /// Whether the middle of what the path lays down is put over the middle of `elements`, in x and y.
+    /// Centers the beads of the path on `elements`, in x and y.
     #[serde(default)]
     pub centre: bool,
-    /// Shifts the path.
+    /// Shift of the path.
     pub offset: Option<[Length; 3]>,
-    /// Whether gaps between beads are filled, when the last bead at their height is finished; otherwise what no bead covers
-    /// is not printed.
+    /// Fills gaps between beads when the last bead at their height is finished. By default elements that no
+    /// bead covers are left out.
     #[serde(default)]
     pub fill: bool,
-    /// Diameter of the filament, for the volume that G-code extrudes; default: as the file states it, or 1.75
-    /// mm.
+    /// Filament diameter, for the volume that G-code extrudes; default: that of the file, or 1.75 mm.
     pub filament: Option<Length>,
-    /// Features of G-code that print nothing of the part, as of `mesh.path`.
+    /// Slicer features that are left out of the part, as in `mesh.path`.
     #[serde(default)]
     pub leave_out: Vec<String>,
-    /// Limit of acceleration along G-code, for times; default: as the file states, or none: velocity is F.
+    /// Acceleration limit along G-code, for the times; default: that of the file, or none (velocity is F).
     pub acceleration: Option<Acceleration>,
-    /// Step of velocity at corners, with `acceleration`.
+    /// Jump of velocity at corners, with `acceleration`.
     pub jerk: Option<Speed>,
-    /// Elements that the nozzle passes within one window appear together; default: a hundredth of the path's duration.
+    /// Time window: elements that the nozzle passes within one window are added together; default: 1 % of the
+    /// duration of the path.
     pub window: Option<Time>,
 }
 
-/// A condition on a surface: one of a temperature, a flux, or a film and radiation.
+/// Condition on a surface: a temperature, a flux, or convection and radiation.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BoundarySpec {
-    /// `outer` (the current outer surface), a surface of the mesh, an element set, a node set (a temperature acts on its nodes, else its
-    /// outer faces count), or a side of the box around the mesh:
-    /// `left`, `right`, `front`, `back`, `bottom`, `top`.
+    /// Surface: `outer` (the current outer surface), a surface of the mesh, an element set (its outer faces),
+    /// a node set (for a temperature), or a side of the bounding box: `left`, `right`, `front`, `back`,
+    /// `bottom`, `top`.
     pub surface: String,
-    /// Surfaces that are left out of `outer`.
+    /// Surfaces that are excluded from `outer`.
     #[serde(default)]
     pub except: Vec<String>,
-    /// Lower corner of a box: only faces of the surface whose middle lies in it count; default: no bound.
+    /// Lower corner of a box that limits the surface to faces whose centers lie inside; default: no limit.
     pub min: Option<[Length; 3]>,
-    /// Its upper corner.
+    /// Upper corner of this box.
     pub max: Option<[Length; 3]>,
     /// Prescribed temperature.
     pub temperature: Option<ScheduleSpec<TemperatureDimension>>,
@@ -147,7 +148,7 @@ pub struct BoundarySpec {
     pub film: Option<ScheduleSpec<HeatTransferDimension>>,
     /// Emissivity ε.
     pub emissivity: Option<f64>,
-    /// Temperature of the surroundings, for film and radiation.
+    /// Temperature of the surroundings, for convection and radiation.
     pub ambient: Option<ScheduleSpec<TemperatureDimension>>,
 }
 
@@ -155,25 +156,25 @@ pub struct BoundarySpec {
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SourceSpec {
-    /// An element set of the mesh; default: all.
+    /// Element set of the mesh; default: all elements.
     pub elements: Option<String>,
     /// Heat per volume.
     pub power: ScheduleSpec<PowerDensityDimension>,
 }
 
-/// Times and steps: of one length, or adaptive.
+/// End time, and fixed or adaptive steps.
 #[derive(Clone, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TimeSpec {
-    /// End; default: one layer time after the last layer, or when the path ends and one window after its last birth.
+    /// End time; default: one layer time after the last layer, or one window after the last birth of a path.
     pub end: Option<Time>,
     /// Time integrator.
     pub scheme: Scheme,
-    /// Steps of this length; default: adaptive.
+    /// Length of fixed steps; default: adaptive steps.
     pub step: Option<Time>,
     /// Largest temporal error in a step; default 0.1 K.
     pub tolerance: Option<TemperatureDifference>,
-    /// First step, and first after a birth; default: a millionth of the end.
+    /// First step, also after each birth; default: a millionth of the end time.
     pub first_step: Option<Time>,
     /// Longest step; default: none.
     pub longest_step: Option<Time>,
@@ -181,35 +182,36 @@ pub struct TimeSpec {
     pub capacity: Capacity,
     /// Linear solver.
     pub solver: LinearSolver,
-    /// Rms error of linear solves; default 1e-7 K.
+    /// Largest rms error of linear solves; default 1e-7 K.
     pub solver_tolerance: Option<TemperatureDifference>,
 }
 
-/// A place in the mesh; values there are interpolated between the nodes of its element.
+/// Place in the mesh at which values are interpolated from the nodes of its element.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeSpec {
-    /// Its name: values are `NAME.temperature` and so on.
+    /// Name of the probe, prefix of its values: `NAME.temperature`, ….
     pub name: String,
-    /// Where: in the mesh, or no further outside than half an element.
+    /// Coordinates, in the mesh or at most half an element outside.
     pub at: [Length; 3],
 }
 
-/// Files beside the report.
+/// Output beside the report.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PartOutput {
-    /// Pictures (PNG).
+    /// Draws pictures (PNG); default true.
     pub pictures: bool,
-    /// Fields as VTKHDF.
+    /// Writes fields as VTKHDF; default true.
     pub fields: bool,
-    /// Time between fields; default: a fiftieth of the whole.
+    /// Time between field outputs; default: a fiftieth of the run.
     pub every: Option<Time>,
-    /// Pictures of so many stages.
+    /// Number of stages in pictures; default 5.
     pub stages: usize,
-    /// How pictures show the body from outside.
+    /// View of the part in pictures.
     pub solid: SolidSpec,
-    /// Factor on the displacements of `warped.png`, with `[mechanics]`; default: one that makes them well seen.
+    /// Magnification of displacements in `warped.png`, with `[mechanics]`; default: chosen from the
+    /// displacements.
     pub magnify: Option<f64>,
     /// Lines along which temperature and fields are written at the end.
     pub line: Vec<LineSpec>,
@@ -222,11 +224,11 @@ impl Default for PartOutput {
     }
 }
 
-/// Fields written unless the scene says how often.
+/// Default number of field outputs.
 const FRAMES: f64 = 50.0;
 
 impl PartScene {
-    /// Time between fields of a run to `end`, s; fixed steps are not cut unless the scene says so.
+    /// Returns the time between field outputs of a run to `end`, s. By default, fixed steps are not cut.
     pub fn every(&self, end: f64) -> f64 {
         let frame = end / FRAMES;
         match (self.output.every, self.time.step.map(|step| step.si())) {
@@ -236,26 +238,29 @@ impl PartScene {
         }
     }
 
-    /// What is to be said where the times of fields cut fixed steps.
+    /// Returns a note if field outputs cut fixed steps.
     pub fn cut_steps(&self) -> Option<String> {
         let [step, every] = [self.time.step?.si(), self.output.every?.si()];
         let count = every / step;
         let cuts = (count - count.round()).abs() > 1e-9 * count || count < 0.5;
         cuts.then(|| {
-            format!("steps of {step} s end at the times of fields, too: `output.every` of {every} s is no multiple of `time.step`")
+            format!(
+                "`output.every` of {every} s is no multiple of `time.step` = {step} s: some steps are \
+                 shortened"
+            )
         })
     }
 
-    /// Checks what can be judged without a mesh.
+    /// Checks everything that does not need the mesh.
     ///
     /// # Errors
-    /// A [`SceneError`] that names the key, the value found and what is allowed.
+    /// Returns a [`SceneError`] with key, value and allowed values.
     pub fn check(&self, source: &Source) -> Result<(), SceneError> {
         for name in self.materials.keys() {
             check_name(source, &format!("materials.{name}"), name)?;
         }
         if self.region.is_empty() {
-            return Err(source.error("region", "nothing", "at least one [[region]]"));
+            return Err(source.missing("region", "the scene needs at least one [[region]]"));
         }
         for (index, region) in self.region.iter().enumerate() {
             if !self.materials.contains_key(&region.material) {
@@ -271,13 +276,17 @@ impl PartScene {
             let key = format!("probe[{index}].name");
             check_name(source, &key, &probe.name)?;
             if self.probe[..index].iter().any(|other| other.name == probe.name) {
-                return Err(source.error(&key, format!("`{}` twice", probe.name), "different names"));
+                return Err(source.error(
+                    &key,
+                    format!("`{}` twice", probe.name),
+                    "a different name for each probe",
+                ));
             }
         }
         if let Some(print) = &self.print {
             print.check(source, self.mesh.path.is_some())?;
         } else if self.time.end.is_none() {
-            return Err(source.error("time.end", "nothing", "a time, or a [print] that ends by itself"));
+            return Err(source.missing("time.end", "a scene without [print] needs an end time"));
         }
         let positive = |key: &str, value: Option<f64>| match value {
             Some(value) if !(value > 0.0 && value.is_finite()) => {
@@ -300,7 +309,8 @@ impl PartScene {
             ] {
                 if given {
                     let key = format!("time.{key}");
-                    return Err(source.error(&key, "a key of adaptive steps", "nothing beside `step`"));
+                    let why = "it belongs to adaptive steps; remove it, or remove `time.step`";
+                    return Err(source.unexpected(&key, why));
                 }
             }
         }
@@ -313,9 +323,10 @@ impl PartScene {
 }
 
 impl BoundarySpec {
-    /// Corners of the box that limits the surface, m.
+    /// Returns the corners of the box that limits the surface, m.
     pub fn corners(&self) -> Option<[[f64; 3]; 2]> {
-        let corner = |of: &Option<[Length; 3]>, none: f64| of.map_or([none; 3], |of| of.map(|x| x.si()));
+        let corner =
+            |given: &Option<[Length; 3]>, default: f64| given.map_or([default; 3], |x| x.map(|x| x.si()));
         let bounded = self.min.is_some() || self.max.is_some();
         bounded.then(|| [corner(&self.min, f64::NEG_INFINITY), corner(&self.max, f64::INFINITY)])
     }
@@ -324,39 +335,40 @@ impl BoundarySpec {
         let exchange = self.film.is_some() || self.emissivity.is_some();
         let given = [self.temperature.is_some(), self.flux.is_some(), exchange];
         if given.iter().filter(|&&given| given).count() != 1 {
-            let allowed = "one of `temperature`, `flux`, and `film` or `emissivity` (or both)";
+            let allowed = "one of `temperature`, `flux`, and `film` with or without `emissivity`";
             return Err(source.error(key, "none or several conditions", allowed));
         }
         if exchange != self.ambient.is_some() {
-            let (found, allowed) = match exchange {
-                true => ("nothing", "a temperature of the surroundings"),
-                false => ("`ambient` of another condition", "nothing"),
-            };
-            return Err(source.error(&format!("{key}.ambient"), found, allowed));
+            let key = format!("{key}.ambient");
+            return Err(match exchange {
+                true => {
+                    source.missing(&key, "convection and radiation need the temperature of the surroundings")
+                }
+                false => source.unexpected(&key, "it belongs to `film` and `emissivity`; remove it"),
+            });
         }
         if self.temperature.is_some() && self.surface == "outer" {
             let key = format!("{key}.surface");
-            let allowed =
-                "a named surface or a side: prescribed temperatures act on nodes, inside as outside";
+            let allowed = "a named surface or a side (prescribed temperatures act on nodes)";
             return Err(source.error(&key, "`outer` with a `temperature`", allowed));
         }
         if !self.except.is_empty() && self.surface != "outer" {
             let key = format!("{key}.except");
-            return Err(source.error(&key, "`except` of another surface", "`surface = \"outer\"`"));
+            return Err(source.unexpected(&key, "it belongs to `surface = \"outer\"`; remove it"));
         }
         Ok(())
     }
 }
 
 impl PrintSpec {
-    /// `of_mesh`: the mesh is that of a path.
+    /// Checks the keys; `of_mesh` is true for a mesh with its own tool path.
     fn check(&self, source: &Source, of_mesh: bool) -> Result<(), SceneError> {
         let along = self.path.is_some();
         if along && of_mesh {
-            return Err(source.error(
+            return Err(source.conflict(
                 "print.path",
-                "a path beside that of the mesh",
-                "nothing: `mesh.path` is printed",
+                "mesh.path",
+                "the part is printed along `mesh.path`; remove it",
             ));
         }
         let layers = self.layers.is_some() || self.elements.is_some() || self.layer_height.is_some();
@@ -374,7 +386,7 @@ impl PrintSpec {
             ] {
                 if given {
                     let key = format!("print.{name}");
-                    return Err(source.error(&key, format!("`{name}` of a mesh of a path"), "nothing"));
+                    return Err(source.unexpected(&key, "`mesh.path` determines it; remove it"));
                 }
             }
             return self.check_numbers(source);
@@ -399,12 +411,12 @@ impl PrintSpec {
         ];
         for (name, given, needed, allowed) in needed {
             let key = format!("print.{name}");
-            let of = if path { "a path" } else { "layers" };
+            let kind = if path { "printing along a path" } else { "printing in layers" };
             if needed && !given {
-                return Err(source.error(&key, "nothing", format!("`{name}`: {of} need it")));
+                return Err(source.missing(&key, format!("{kind} needs it")));
             }
             if given && !allowed {
-                return Err(source.error(&key, format!("`{name}` of {of}"), "nothing"));
+                return Err(source.unexpected(&key, format!("{kind} does not use it; remove it")));
             }
         }
         self.check_numbers(source)

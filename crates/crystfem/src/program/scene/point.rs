@@ -1,9 +1,9 @@
-//! The scene of the material alone, at one point.
+//! Scene of the material alone, at one point.
 
-use super::fault::located;
-use super::{MaterialSpec, OutputSpec, Program, check_name};
+use super::locate_error::located;
+use super::{MaterialSpec, PictureOutput, Program, check_name};
 use crate::error::Error;
-use crate::history::{History, Leg};
+use crate::history::{Leg, TemperatureHistory};
 use crate::point::{Drive, Stepping};
 use harness::report::Expect;
 use harness::scene::{SceneError, Source};
@@ -12,114 +12,113 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// A whole scene.
+/// A scene of points.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PointScene {
-    /// The program that runs it: `crystfem`.
+    /// Program of the scene: `crystfem`.
     pub program: Program,
-    /// One line for tables and pictures.
+    /// Title for tables and pictures.
     #[serde(default)]
     pub title: String,
     /// The material.
     pub material: Option<MaterialSpec>,
-    /// Several, by name, instead.
+    /// Several materials by name, instead of `material`.
     #[serde(default)]
     pub materials: BTreeMap<String, MaterialSpec>,
     /// Temperature histories.
     #[serde(default)]
     pub point: Vec<PointSpec>,
-    /// Temperatures of nodes that another program computed.
+    /// Temperatures of nodes from an analysis by another program.
     #[serde(default)]
     pub nodes: Vec<NodesSpec>,
-    /// Pairs of materials whose events are compared.
+    /// Pairs of materials to compare.
     #[serde(default)]
     pub compare: Vec<CompareSpec>,
     /// Files to write.
     #[serde(default)]
-    pub output: OutputSpec,
+    pub output: PictureOutput,
     /// Expected results.
     #[serde(default)]
     pub expect: Vec<Expect>,
 }
 
-/// Two materials: `POINT.shift_at_0.5` is the temperature of the first less that of the second, and
-/// `POINT.longer_to_0.99` its time over that of the second, less 1.
+/// A pair of materials. `POINT.shift_at_0.5` is the temperature of the first minus that of the second,
+/// `POINT.longer_to_0.99` its time over that of the second, minus 1.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CompareSpec {
     /// Name of the first material.
     pub material: String,
-    /// Name of the second.
+    /// Name of the second material.
     pub with: String,
 }
 
-/// One run: legs or a table of temperatures, or a lumped body that exchanges heat or none.
+/// A point: temperature ramps, a measured temperature history, or a lumped body with or without heat
+/// exchange.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PointSpec {
-    /// Its name: the values are `NAME.alpha`, or `NAME.MATERIAL.alpha` with several materials.
+    /// Name of the point, prefix of its values: `NAME.alpha`, or `NAME.MATERIAL.alpha` with several
+    /// materials.
     pub name: String,
-    /// Names of materials; default: all.
+    /// Names of the materials; default: all.
     pub materials: Option<Vec<String>>,
     /// Temperature at the start.
     pub start: Option<Temperature>,
-    /// Ramps, holds and jumps.
+    /// Ramps, holds and jumps of the temperature.
     #[serde(default)]
     pub legs: Vec<LegSpec>,
     /// Number of repetitions of the legs; default 1.
     pub cycles: Option<usize>,
-    /// CSV file with the columns `time [unit]` and `temperature [unit]`, instead of legs.
+    /// CSV file with the columns `time [unit]` and `temperature [unit]`, instead of `legs`.
     pub history: Option<PathBuf>,
-    /// Surroundings of a lumped body, instead of legs.
+    /// Surroundings of a lumped body, instead of `legs`.
     pub exchange: Option<ExchangeSpec>,
-    /// A lumped body that exchanges no heat, instead of legs.
+    /// Lumped body without heat exchange, instead of `legs`.
     #[serde(default)]
     pub adiabatic: bool,
-    /// Duration, for a lumped body.
+    /// Duration of the run of a lumped body.
     pub duration: Option<Time>,
-    /// Steps of the same time; default: adaptive.
+    /// Length of fixed steps; default: adaptive steps.
     pub time_step: Option<Time>,
-    /// Steps of the same change of temperature; default: adaptive.
+    /// Temperature change in fixed steps; default: adaptive steps.
     pub temperature_step: Option<TemperatureDifference>,
     /// Largest change of α in an adaptive step; default 0.01.
     pub largest_change: Option<Ratio>,
     /// Largest change of temperature in an adaptive step; default 0.5 K.
     pub largest_temperature_change: Option<TemperatureDifference>,
-    /// Whether some value must become non-finite; otherwise the first such value ends the run.
+    /// Requires that a value becomes non-finite; by default a non-finite value ends the run.
     #[serde(default)]
     pub non_finite: bool,
-    /// Part of `--quick` runs.
-    #[serde(default = "yes")]
+    /// Includes the point in `--quick` runs; default true.
+    #[serde(default = "super::default_true")]
     pub quick: bool,
 }
 
-fn yes() -> bool {
-    true
-}
-
-/// The material at every node of a thermal analysis of another program.
+/// Nodes of a thermal analysis from another program, each with the material.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NodesSpec {
-    /// Its name: of `NAME.vtkhdf` and of the values.
+    /// Name of the analysis, of its values and of `NAME.vtkhdf`.
     pub name: String,
-    /// `.frd` of CalculiX (ASCII, with `NT` of all nodes), `.pvd` or `.vtu` of VTK, or Exodus II (`.e`, `.ex2`, `.exo`, `.g`); times in s.
+    /// Results file, times in s: `.frd` of CalculiX (ASCII, `NT` for all nodes), `.pvd` or `.vtu` of VTK, or
+    /// Exodus II (`.e`, `.ex2`, `.exo`, `.g`).
     pub file: PathBuf,
-    /// Name of the temperature in VTK's files and Exodus II; default: the only scalar of nodes.
+    /// Name of the temperature array in VTK and Exodus II files; default: the only nodal scalar.
     pub array: Option<String>,
-    /// Unit of its temperatures.
+    /// Unit of the temperatures in the file.
     pub unit: NodesUnit,
-    /// Temperature of all nodes at t = 0; default: the history begins at the first time of the file.
+    /// Temperature of all nodes at t = 0; default: the history starts at the first time of the file.
     pub start: Option<Temperature>,
     /// Name of the material; default: the only one.
     pub material: Option<String>,
-    /// Part of `--quick` runs.
-    #[serde(default = "yes")]
+    /// Includes the analysis in `--quick` runs; default true.
+    #[serde(default = "super::default_true")]
     pub quick: bool,
 }
 
-/// Units of temperature in a file.
+/// Unit of temperatures in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 pub enum NodesUnit {
     /// Kelvin.
@@ -130,7 +129,7 @@ pub enum NodesUnit {
 }
 
 impl NodesSpec {
-    /// What is added to its temperatures, K.
+    /// Returns the offset of its temperatures from K.
     pub fn zero(&self) -> f64 {
         match self.unit {
             NodesUnit::K => 0.0,
@@ -139,21 +138,21 @@ impl NodesSpec {
     }
 }
 
-/// A ramp (`to` with `rate` or `duration`), a jump (`to` alone) or a hold (`hold`).
+/// Part of a history: a ramp (`to` with `rate` or `duration`), a jump (`to` alone) or a hold (`hold`).
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LegSpec {
     /// Target temperature.
     pub to: Option<Temperature>,
-    /// Rate, above 0 for both heating and cooling.
+    /// Heating or cooling rate, above 0.
     pub rate: Option<TemperatureRate>,
-    /// Duration.
+    /// Duration of the ramp.
     pub duration: Option<Time>,
-    /// Duration at constant temperature.
+    /// Duration of the hold.
     pub hold: Option<Time>,
 }
 
-/// Newton's cooling: dU/dt = −c (T − T_a)/τ.
+/// Newton's law of cooling: dU/dt = −c (T − T_a)/τ.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExchangeSpec {
@@ -164,10 +163,10 @@ pub struct ExchangeSpec {
 }
 
 impl PointScene {
-    /// The materials by name; a single one has the name ``.
+    /// Returns name, block and key of each material; a single material has an empty name.
     ///
     /// # Errors
-    /// A [`SceneError`] for none, for both ways to give them, and for what [`MaterialSpec::build`] refuses.
+    /// Returns a [`SceneError`] for no materials, for both `material` and `materials`, and for invalid names.
     pub fn materials<'a>(
         &'a self,
         source: &Source,
@@ -182,38 +181,41 @@ impl PointScene {
                 }
                 Ok(all)
             }
-            (None, true) => Err(source.error("material", "nothing", "a block `[material]`")),
-            (Some(_), false) => {
-                Err(source.error("materials", "`materials` together with `material`", "one of them"))
-            }
+            (None, true) => Err(source.missing("material", "the scene needs a block `[material]`")),
+            (Some(_), false) => Err(source.conflict("materials", "material", "keep one of them")),
         }
     }
 
-    /// What drives each point and how its time is divided, after a check of all that can be judged without running.
+    /// Returns temperature history and time steps of each point, after checking everything that does not need
+    /// a run.
     ///
     /// # Errors
-    /// A [`SceneError`] that names the key, the value found and what is allowed.
+    /// Returns a [`SceneError`] with key, value and allowed values.
     pub fn courses(&self, source: &Source) -> Result<Vec<(Drive, Stepping)>, SceneError> {
         if self.point.is_empty() && self.nodes.is_empty() {
-            return Err(source.error("point", "nothing", "at least one [[point]] or [[nodes]]"));
+            return Err(source.missing("point", "the scene needs at least one [[point]] or [[nodes]]"));
         }
         for (index, nodes) in self.nodes.iter().enumerate() {
             let key = |field: &str| format!("nodes[{index}].{field}");
             check_name(source, &key("name"), &nodes.name)?;
             let names = self.nodes[..index].iter().map(|other| &other.name);
             if names.chain(self.point.iter().map(|point| &point.name)).any(|name| *name == nodes.name) {
-                let found = format!("`{}` a second time", nodes.name);
-                return Err(source.error(&key("name"), found, "another name"));
+                let found = format!("`{}` twice", nodes.name);
+                return Err(source.error(
+                    &key("name"),
+                    found,
+                    "a different name for each point and analysis",
+                ));
             }
             if !source.file(&nodes.file).is_file() {
                 let found = source.file(&nodes.file).display().to_string();
-                return Err(source.error(&key("file"), found, "a file that is there"));
+                return Err(source.error(&key("file"), found, "an existing file"));
             }
             match &nodes.material {
                 Some(name) => self.check_material(source, &key("material"), name)?,
                 None if self.materials.len() > 1 => {
                     let known: Vec<&str> = self.materials.keys().map(String::as_str).collect();
-                    return Err(source.error(&key("material"), "nothing", known.join(", ")));
+                    return Err(source.missing(&key("material"), format!("name one of {}", known.join(", "))));
                 }
                 None => {}
             }
@@ -230,8 +232,8 @@ impl PointScene {
             if self.point[..index].iter().any(|other| other.name == point.name) {
                 return Err(source.error(
                     &key("name"),
-                    format!("`{}` a second time", point.name),
-                    "another name",
+                    format!("`{}` twice", point.name),
+                    "a different name for each point",
                 ));
             }
             for (i, name) in point.materials.iter().flatten().enumerate() {
@@ -248,7 +250,9 @@ impl PointScene {
         }
         let known: Vec<&str> = self.materials.keys().map(String::as_str).collect();
         if known.is_empty() {
-            return Err(source.error(key, format!("`{name}`"), "nothing: there is only `[material]`"));
+            return Err(
+                source.unexpected(key, "the only material is `[material]`, which has no name; remove it")
+            );
         }
         Err(source.unknown(key, name, &known))
     }
@@ -263,12 +267,12 @@ impl PointSpec {
             ("adiabatic", self.adiabatic),
         ];
         let mut given = ways.iter().filter(|(_, given)| *given).map(|(name, _)| *name);
-        let allowed = "one of `legs`, `history`, `exchange`, `adiabatic`";
+        let ways_text = "one of `legs`, `history`, `exchange`, `adiabatic`";
         let Some(way) = given.next() else {
-            return Err(source.error(&key("legs"), "nothing that drives the temperature", allowed));
+            return Err(source.missing(&key("legs"), format!("write {ways_text}")));
         };
         if let Some(other) = given.next() {
-            return Err(source.error(&key(other), format!("`{other}` together with `{way}`"), allowed));
+            return Err(source.conflict(&key(other), &key(way), format!("keep {ways_text}")));
         }
         let lumped = matches!(way, "exchange" | "adiabatic");
         let needs = [
@@ -278,10 +282,10 @@ impl PointSpec {
         ];
         for (name, given, needed, refused) in needs {
             if needed && !given {
-                return Err(source.error(&key(name), "nothing", format!("`{name}`: `{way}` needs it")));
+                return Err(source.missing(&key(name), format!("`{way}` needs it")));
             }
             if refused && given {
-                return Err(source.error(&key(name), format!("`{name}` together with `{way}`"), "nothing"));
+                return Err(source.conflict(&key(name), &key(way), format!("remove `{name}`")));
             }
         }
         let start = self.start.map_or(0.0, |t| t.si());
@@ -304,7 +308,7 @@ impl PointSpec {
             return Ok(Drive::Lumped { start, exchange, duration });
         }
         if let Some(file) = &self.history {
-            let history = History::read(&source.file(file));
+            let history = TemperatureHistory::read(&source.file(file));
             return history.map(Drive::Prescribed).map_err(|error| located(source, &key("history"), &error));
         }
         let cycles = self.cycles.unwrap_or(1);
@@ -316,7 +320,7 @@ impl PointSpec {
             legs.push(leg.leg(source, &key(&format!("legs[{index}]")))?);
         }
         let legs: Vec<Leg> = std::iter::repeat_n(legs, cycles).flatten().collect();
-        History::from_legs(start, &legs)
+        TemperatureHistory::from_legs(start, &legs)
             .map(Drive::Prescribed)
             .map_err(|error: Error| located(source, &key("legs"), &error))
     }
@@ -339,8 +343,7 @@ impl PointSpec {
         if let (Some((first, _)), Some((second, _))) = (given.next(), given.next())
             && fixed.iter().any(|(name, _)| name == first)
         {
-            let found = format!("`{second}` together with `{first}`");
-            return Err(source.error(&key(second), found, "one of them"));
+            return Err(source.conflict(&key(second), &key(first), "keep one of them"));
         }
         let Stepping::Adaptive { degree, kelvin } = Stepping::default() else {
             return Ok(Stepping::default());
@@ -364,8 +367,8 @@ impl LegSpec {
             ((Some(to), Some(rate), None), None) => Ok(Leg::Rate { to, rate }),
             ((Some(to), None, duration), None) => Ok(Leg::Time { to, duration: duration.unwrap_or(0.0) }),
             _ => {
-                let allowed = "`hold`, or `to` with `rate` or `duration` (or neither: a jump)";
-                Err(source.error(key, "another set of keys", allowed))
+                let allowed = "`hold`, or `to` with `rate` or `duration` (without both: a jump)";
+                Err(source.error(key, "an invalid combination of keys", allowed))
             }
         }
     }

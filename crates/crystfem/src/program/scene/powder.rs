@@ -1,35 +1,35 @@
-//! Powder of a material, as written in TOML.
+//! Powder block of a material.
 
-use super::fault::located_in;
+use super::locate_error::located_in;
 use crate::material::{Powder, ThermalMaterial};
 use harness::scene::{SceneError, Source};
 use polycore::units::Temperature;
 use serde::Deserialize;
 
-/// Where its parameters stand.
+/// Parameters of powder and their keys.
 const KEYS: [(&str, &str); 3] = [
     ("conductivity of powder over that of the solid", "conductivity"),
     ("temperature at which powder begins to consolidate, K", "from"),
     ("temperature at which powder is consolidated, K", "to"),
 ];
 
-/// Powder of a material, see [`Powder`].
+/// Powder properties of new material, see [`Powder`].
 #[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PowderSpec {
-    /// Its conductivity over that of the solid.
+    /// Conductivity of the powder over that of the solid.
     pub conductivity: f64,
-    /// Where it begins to consolidate.
+    /// Temperature at which consolidation begins.
     pub from: Temperature,
-    /// Where it is consolidated.
+    /// Temperature at which consolidation is complete.
     pub to: Temperature,
 }
 
 impl PowderSpec {
-    /// The material, as a powder where its block `key` says so.
+    /// Wraps the material of block `key` as a powder if the block has one.
     ///
     /// # Errors
-    /// Those of [`Powder::new`], located.
+    /// Returns the errors of [`Powder::new`], with their keys.
     pub(super) fn wrap<M: ThermalMaterial + 'static>(
         spec: Option<Self>,
         source: &Source,

@@ -1,16 +1,16 @@
-//! From a scene to a problem of heat conduction.
+//! Builds the heat problem of a part scene.
 
-use super::fault::{located, located_in};
+use super::locate_error::{located, located_in};
 use super::mechanics::Mechanics;
 use super::memory;
 use super::part::{BoundarySpec, PartScene};
-use super::places::{elements, millimetres};
+use super::selection::{elements, millimetres};
 use super::voxels::{BuiltMesh, Filling};
-use crate::boundary::{Condition, Field, Schedule, Source as Heat, Where};
+use crate::boundary::{Condition, FaceSelection, Field, HeatSource, Schedule};
 use crate::coupling::HealingSettings;
 use crate::material::{ThermalMaterial, fill_elements};
-use crate::mesh::surface::Surface;
-use crate::mesh::{Face, Mesh, Place};
+use crate::mesh::surface::OuterSurface;
+use crate::mesh::{Face, LocatedPoint, Mesh};
 use crate::print_plan::PrintPlan;
 use crate::problem::{Problem, initial_temperatures};
 use crate::simulation::Settings;
@@ -19,16 +19,16 @@ use harness::scene::{LineSpec, SceneError, Source};
 use std::collections::HashSet;
 use std::sync::Arc;
 
-/// Temporal error in a step, K, and rms error of solves, K, unless a scene says otherwise.
+/// Default temporal error in a step, K, and default rms error of linear solves, K.
 const TOLERANCE: f64 = 0.1;
-const SOLVES: f64 = 1e-7;
-/// A temperature below which a scene is asked whether it means °C, K.
+const SOLVER_TOLERANCE: f64 = 1e-7;
+/// Temperatures below this, K, are probably °C.
 const COLD: f64 = 200.0;
-/// First step over the end, and smallest over the first.
-const FIRST: f64 = 1e-6;
-const SMALLEST: f64 = 1e-3;
+/// Default first step over the end time, and smallest over first step.
+const FIRST_STEP: f64 = 1e-6;
+const SMALLEST_STEP: f64 = 1e-3;
 
-/// Where parameters of conditions stand in their block.
+/// Parameters of conditions and their keys.
 const CONDITION_KEYS: [(&str, &str); 5] = [
     ("prescribed temperature", "temperature"),
     ("flux", "flux"),
@@ -37,46 +37,46 @@ const CONDITION_KEYS: [(&str, &str); 5] = [
     ("ambient temperature", "ambient"),
 ];
 
-/// What a scene asks to solve.
-pub struct Task {
-    /// The problem.
+/// Problem and settings of a part scene.
+pub struct PartTask {
+    /// Heat problem.
     pub problem: Arc<Problem>,
-    /// How.
+    /// Settings of the solution.
     pub settings: Settings,
-    /// When to end, s.
+    /// End time, s.
     pub end: f64,
-    /// Elements that are printed, ascending; all where nothing is.
+    /// Printed elements, ascending; all elements without printing.
     pub printed: Vec<u32>,
-    /// Elements of each layer, where there are layers.
+    /// Elements of each layer, if there are layers.
     pub layers: Vec<Vec<u32>>,
-    /// Where each probe is.
-    pub probes: Vec<Place>,
-    /// Where the points of each line are; none outside of the mesh.
-    pub lines: Vec<Vec<Option<Place>>>,
-    /// How full elements are, of a mesh of a path or an STL surface.
+    /// Location of each probe.
+    pub probes: Vec<LocatedPoint>,
+    /// Locations of the points of each line; `None` outside the mesh.
+    pub lines: Vec<Vec<Option<LocatedPoint>>>,
+    /// Filled fractions of the elements, for a mesh from a path or an STL surface.
     pub filling: Option<Filling>,
-    /// Stress, where the scene asks for it.
+    /// Settings of the stress, if the scene has `[mechanics]`.
     pub mechanics: Option<Mechanics>,
-    /// Interfaces that heal, where the scene asks for it.
+    /// Interfaces that heal, if the scene has `[healing]`.
     pub interfaces: Option<HealingSettings>,
-    /// What should be looked at.
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
 impl PartScene {
-    /// The problem on a mesh.
+    /// Builds the problem on a mesh.
     ///
     /// # Errors
-    /// A [`SceneError`] for sets and surfaces that the mesh lacks, elements without a material, and for what
-    /// [`Problem::check`] refuses.
-    pub fn task(&self, source: &Source, built: BuiltMesh) -> Result<Task, SceneError> {
+    /// Returns a [`SceneError`] for unknown sets and surfaces, elements without a material, and the errors of
+    /// [`Problem::check`].
+    pub fn task(&self, source: &Source, built: BuiltMesh) -> Result<PartTask, SceneError> {
         let BuiltMesh { mesh, filling, .. } = built;
         let mut notes = Vec::new();
-        let probes = self.places(source, &mesh, &mut notes)?;
+        let probes = self.locate_probes(source, &mesh, &mut notes)?;
         let (mut materials, mut material_of, temperature_of) = self.regions(source, &mesh)?;
         let shown = materials.iter().flat_map(|material| material.field_names().iter().copied());
         let shown: Vec<String> = ["temperature"].into_iter().chain(shown).map(str::to_owned).collect();
-        let lines = self.lines(source, &mesh, &shown)?;
+        let lines = self.locate_lines(source, &mesh, &shown)?;
         let conditions = self.conditions(source, &mesh)?;
         self.note_cold(source, &mut notes)?;
         let mut heats = Vec::new();
@@ -84,9 +84,9 @@ impl PartScene {
             let elements =
                 elements(source, &mesh, &format!("source[{index}].elements"), spec.elements.as_deref())?;
             let power = Field::Uniform(spec.power.build(source, &format!("source[{index}].power"))?);
-            heats.push(Heat { elements, power });
+            heats.push(HeatSource { elements, power });
         }
-        let PrintPlan { births, absent, layers, end: by_itself } = match &self.print {
+        let PrintPlan { births, absent, layers, end: default_end } = match &self.print {
             Some(print) => print.plan(source, &mesh, filling.as_ref(), &mut notes).map_err(|fault| {
                 // a file in millimetres that is read in metres has few layers, or lies far away
                 self.mesh.without_unit(source, &mesh).unwrap_or(fault)
@@ -98,17 +98,18 @@ impl PartScene {
             self.mechanics(source, &mesh, &material_of, &absent, path)?
         };
         let interfaces = self.interfaces(source, &mesh, &material_of, &births)?;
-        let end = self.time.end.map_or(by_itself, |end| end.si());
+        let end = self.time.end.map_or(default_end, |end| end.si());
         memory::refuse_times(source, self, end)?;
         self.note_hot_bed(source, end, &mut notes)?;
         if let Some(last) = births.iter().map(|birth| birth.time).reduce(f64::max).filter(|last| *last >= end)
         {
-            let allowed = format!("after the last birth, at {last} s");
+            let allowed = format!("after the last birth at {last} s");
             return Err(source.error("time.end", format!("{end} s"), allowed));
         }
         for (spec, place) in self.probe.iter().zip(&probes) {
             if place.elements().iter().all(|element| absent.binary_search(element).is_ok()) {
-                notes.push(format!("probe `{}` is where nothing is printed: it records nothing", spec.name));
+                notes
+                    .push(format!("probe `{}` lies where nothing is printed and records nothing", spec.name));
             }
         }
         let mut printed: Vec<u32> = births.iter().flat_map(|birth| birth.elements.iter().copied()).collect();
@@ -137,7 +138,7 @@ impl PartScene {
         };
         problem.check().map_err(|error| located(source, "mesh", &error))?;
         let settings = self.settings(end, problem.shortest_period());
-        Ok(Task {
+        Ok(PartTask {
             problem: Arc::new(problem),
             settings,
             end,
@@ -152,7 +153,7 @@ impl PartScene {
         })
     }
 
-    /// Notes temperatures at which no part is made: numbers in °C that were written as K.
+    /// Notes implausibly cold temperatures: values in °C that are written as K.
     fn note_cold(&self, source: &Source, notes: &mut Vec<String>) -> Result<(), SceneError> {
         let mut written = Vec::new();
         for (index, region) in self.region.iter().enumerate() {
@@ -178,7 +179,7 @@ impl PartScene {
         Ok(())
     }
 
-    /// Notes a bed that its G-code switches off and that is still hot at the end, s.
+    /// Notes a bed that the G-code switches off but that is still hot at the end, s.
     fn note_hot_bed(&self, source: &Source, end: f64, notes: &mut Vec<String>) -> Result<(), SceneError> {
         for (index, boundary) in self.boundary.iter().enumerate() {
             for (name, given) in [("temperature", &boundary.temperature), ("ambient", &boundary.ambient)] {
@@ -187,7 +188,8 @@ impl PartScene {
                 if let Some((off, then)) = given.still_hot(source, &key, end)? {
                     let celsius = then - 273.15;
                     notes.push(format!(
-                        "`{key}`: the file switches the bed off at {off:.1} s, at the end of the run, {end:.1} s, it has {celsius:.1} °C: a later `time.end` lets the part cool"
+                        "`{key}`: the bed is switched off at {off:.1} s and still has {celsius:.1} °C at \
+                          the end of the run, {end:.1} s; a later `time.end` lets the part cool"
                     ));
                 }
             }
@@ -195,26 +197,27 @@ impl PartScene {
         Ok(())
     }
 
-    /// Where each probe lies in the mesh.
-    fn places(
+    /// Locates each probe in the mesh.
+    fn locate_probes(
         &self,
         source: &Source,
         mesh: &Mesh,
         notes: &mut Vec<String>,
-    ) -> Result<Vec<Place>, SceneError> {
+    ) -> Result<Vec<LocatedPoint>, SceneError> {
         let mut places = Vec::new();
         for (index, probe) in self.probe.iter().enumerate() {
             let at = probe.at.map(|x| x.si());
             let Some(place) = mesh.locate(at) else {
                 let [low, high] = mesh.bounds().unwrap_or_default().map(millimetres);
-                let found = format!("{}, outside of the mesh", millimetres(at));
+                let found = format!("{}, outside the mesh", millimetres(at));
                 let allowed = format!("a place in the mesh, which reaches from {low} to {high}");
                 return Err(source.error(&format!("probe[{index}].at"), found, allowed));
             };
             if place.distance() > 0.0 {
                 let (name, distance) = (&probe.name, 1e3 * place.distance());
                 notes.push(format!(
-                    "probe `{name}` lies outside of the mesh: recorded {distance:.4} mm away, in the nearest element"
+                    "probe `{name}` lies {distance:.4} mm outside the mesh: values are those of the nearest \
+                     element"
                 ));
             }
             places.push(place);
@@ -222,13 +225,13 @@ impl PartScene {
         Ok(places)
     }
 
-    /// Where the points of each line lie in the mesh.
-    fn lines(
+    /// Locates the points of each line in the mesh.
+    fn locate_lines(
         &self,
         source: &Source,
         mesh: &Mesh,
         columns: &[String],
-    ) -> Result<Vec<Vec<Option<Place>>>, SceneError> {
+    ) -> Result<Vec<Vec<Option<LocatedPoint>>>, SceneError> {
         LineSpec::check(&self.output.line, source, 3, columns)?;
         let mut lines = Vec::new();
         for (index, line) in self.output.line.iter().enumerate() {
@@ -269,7 +272,7 @@ impl PartScene {
     }
 
     fn conditions(&self, source: &Source, mesh: &Mesh) -> Result<Vec<Condition>, SceneError> {
-        let surface = Surface::of_all(mesh).map_err(|error| located(source, "mesh", &error))?;
+        let surface = OuterSurface::of_all(mesh).map_err(|error| located(source, "mesh", &error))?;
         let faces = |key: &str, name: &str| -> Result<Vec<Face>, SceneError> {
             let region = surface.region(mesh, name);
             region.map(|region| surface.all_in(&region)).map_err(|error| located(source, key, &error))
@@ -286,7 +289,7 @@ impl PartScene {
             for name in &spec.except {
                 except.extend(faces(&format!("{key}.except"), name)?);
             }
-            // nodes without faces
+            // a node set has no faces
             if let (Some(temperature), Some(nodes)) = (&spec.temperature, spec.node_set(mesh)) {
                 let value = Field::Uniform(temperature.build(source, &format!("{key}.temperature"))?);
                 let condition = Condition::Temperature { nodes, value };
@@ -313,11 +316,11 @@ impl PartScene {
                         "a box that contains the centre of a face",
                     ));
                 }
-                Where::Faces(inside)
+                FaceSelection::Faces(inside)
             } else if spec.surface == "outer" {
-                Where::Outer { except }
+                FaceSelection::Outer { except }
             } else {
-                Where::Faces(faces(&format!("{key}.surface"), &spec.surface)?)
+                FaceSelection::Faces(faces(&format!("{key}.surface"), &spec.surface)?)
             };
             for condition in spec.conditions(source, &key, mesh, place)? {
                 condition.check().map_err(|error| located_in(source, &key, &CONDITION_KEYS, &error))?;
@@ -327,18 +330,19 @@ impl PartScene {
         Ok(conditions)
     }
 
-    /// Adaptive steps are an eighth of the shortest period of what swings at most: longer ones would leap over it.
+    /// Returns the solution settings. Adaptive steps are at most 1/8 of the shortest period of the
+    /// conditions.
     fn settings(&self, end: f64, period: Option<f64>) -> Settings {
         let time = &self.time;
         let most = period.map_or(f64::INFINITY, |period| period / 8.0);
         let steps = match time.step {
             Some(step) => Steps::Fixed { dt: step.si() },
             None => {
-                let first = time.first_step.map_or(FIRST * end, |first| first.si()).min(most);
+                let first = time.first_step.map_or(FIRST_STEP * end, |first| first.si()).min(most);
                 Steps::Adaptive {
                     tolerance: time.tolerance.map_or(TOLERANCE, |tolerance| tolerance.si()),
                     first,
-                    smallest: SMALLEST * first,
+                    smallest: SMALLEST_STEP * first,
                     largest: time
                         .longest_step
                         .map_or(f64::INFINITY, |longest| longest.si())
@@ -347,13 +351,13 @@ impl PartScene {
                 }
             }
         };
-        let tolerance = time.solver_tolerance.map_or(SOLVES, |tolerance| tolerance.si());
+        let tolerance = time.solver_tolerance.map_or(SOLVER_TOLERANCE, |tolerance| tolerance.si());
         Settings { scheme: time.scheme, steps, tolerance, solver: time.solver }
     }
 }
 
 impl BoundarySpec {
-    /// Nodes of a set of the mesh, where no surface has its name; in the box where there is one.
+    /// Returns the nodes of a node set, inside the box if there is one; `None` if a surface has this name.
     fn node_set(&self, mesh: &Mesh) -> Option<Vec<u32>> {
         let set = mesh.node_sets.get(&self.surface).filter(|_| !mesh.surfaces.contains_key(&self.surface))?;
         let Some([min, max]) = self.corners() else { return Some(set.clone()) };
@@ -369,28 +373,28 @@ impl BoundarySpec {
         source: &Source,
         key: &str,
         mesh: &Mesh,
-        place: Where,
+        place: FaceSelection,
     ) -> Result<Vec<Condition>, SceneError> {
-        let of = |name: &str| format!("{key}.{name}");
+        let path = |name: &str| format!("{key}.{name}");
         let mut conditions = Vec::new();
         if let Some(temperature) = &self.temperature {
             let nodes = match &place {
-                Where::Faces(faces) => mesh.nodes_of(faces),
-                Where::Outer { .. } => Vec::new(),
+                FaceSelection::Faces(faces) => mesh.nodes_of(faces),
+                FaceSelection::Outer { .. } => Vec::new(),
             };
-            let value = Field::Uniform(temperature.build(source, &of("temperature"))?);
+            let value = Field::Uniform(temperature.build(source, &path("temperature"))?);
             conditions.push(Condition::Temperature { nodes, value });
         }
         if let Some(flux) = &self.flux {
-            let inward = Field::Uniform(flux.build(source, &of("flux"))?);
+            let inward = Field::Uniform(flux.build(source, &path("flux"))?);
             conditions.push(Condition::Flux { surface: place.clone(), inward });
         }
         let ambient = match &self.ambient {
-            Some(ambient) => ambient.build(source, &of("ambient"))?,
+            Some(ambient) => ambient.build(source, &path("ambient"))?,
             None => Schedule::constant(0.0),
         };
         if let Some(film) = &self.film {
-            let coefficient = film.build(source, &of("film"))?;
+            let coefficient = film.build(source, &path("film"))?;
             let (surface, ambient) = (place.clone(), ambient.clone());
             conditions.push(Condition::Film { surface, coefficient, ambient });
         }

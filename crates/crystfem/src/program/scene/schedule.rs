@@ -1,22 +1,22 @@
-//! Values over time: written as a constant, as a table, as a CSV file, or as a swing.
+//! Values over time: a constant, a table, a CSV file, a sine, or a setting of a G-code file.
 
-use super::either::{self, TextOrTable};
-use super::fault::{located, located_in};
+use super::locate_error::{located, located_in};
+use super::text_or_table::{self, TextOrTable};
 use crate::boundary::Schedule;
-use crate::table::{Column, read};
+use crate::table::{TableColumn, read};
 use harness::scene::{SceneError, Source};
 use polycore::units::dimension::TimeDimension;
 use polycore::units::{Dimension, Quantity, Time};
 use serde::{Deserialize, Deserializer};
 use std::path::PathBuf;
 
-/// A constant (`"80 degC"`), a table (`{ time = […], value = […] }`) or a file (`{ file = "chamber.csv" }`): linear
-/// between the given times and constant outside of them; or a swing (`{ low = …, high = …, period = … }`).
+/// A constant (`"80 degC"`), a table (`{ time = […], value = […] }`), a file (`{ file = "chamber.csv" }`), or
+/// a sine (`{ low = …, high = …, period = … }`). Tables are linear between their times and constant outside.
 #[derive(Clone, Debug)]
 pub enum ScheduleSpec<D> {
-    /// The same always.
+    /// Constant value.
     Constant(Quantity<D>),
-    /// Over time.
+    /// Values over time.
     Over(TimesSpec<D>),
 }
 
@@ -24,48 +24,49 @@ pub enum ScheduleSpec<D> {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, bound = "D: Dimension")]
 pub struct TimesSpec<D> {
-    /// Increasing times.
+    /// Times, increasing.
     #[serde(default)]
     pub time: Vec<Time>,
-    /// A value for each.
+    /// Value at each time.
     #[serde(default)]
     pub value: Vec<Quantity<D>>,
-    /// Or a CSV file with the columns `time [unit]` and `value [unit]`.
+    /// CSV file with the columns `time [unit]` and `value [unit]`, instead of `time` and `value`.
     pub file: Option<PathBuf>,
-    /// Or a sine between `low` and `high` that passes their middle upwards at t = 0.
+    /// Lowest value of a sine that passes its mean upwards at t = 0, instead of `time` and `value`.
     pub low: Option<Quantity<D>>,
-    /// See `low`.
+    /// Highest value of the sine.
     pub high: Option<Quantity<D>>,
-    /// Of the sine.
+    /// Period of the sine.
     pub period: Option<Time>,
-    /// Of `file`, where that is G-code: the temperature of its nozzle or bed, or its fan from `low` (off) to `high`.
+    /// Setting of a G-code `file`: temperature of its nozzle or bed, or its fan from `low` (off) to `high`.
     pub of: Option<FileSetting>,
-    /// Of a bed: what it cools towards once it is switched off or set lower; default 25 °C.
+    /// Temperature towards which a bed cools when it is switched off or set lower; default 25 °C.
     pub cools_to: Option<Quantity<D>>,
     /// Time constant of this cooling; default 10 min.
     pub cooling_time: Option<Time>,
 }
 
-/// What a G-code file sets.
+/// Setting of a G-code file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FileSetting {
-    /// M104 and M109.
+    /// Nozzle temperature (M104 and M109).
     Nozzle,
-    /// M140 and M190.
+    /// Bed temperature (M140 and M190).
     Bed,
-    /// M106 and M107.
+    /// Fan speed (M106 and M107).
     Fan,
 }
 
-/// Where parameters of a swing stand in its block.
-const SWING_KEYS: [(&str, &str); 3] = [("low value", "low"), ("high value", "high"), ("period, s", "period")];
+/// Parameters of a sine and their keys.
+const SINE_KEYS: [(&str, &str); 3] = [("low value", "low"), ("high value", "high"), ("period, s", "period")];
 
 impl<D: Dimension + Copy> ScheduleSpec<D> {
-    /// The schedule, in SI units.
+    /// Builds the schedule in SI units.
     ///
     /// # Errors
-    /// Several of table, file and swing, a swing without one of its keys, a table with a gap, times that do not increase, and a file that is no such table.
+    /// Returns a [`SceneError`] for several of table, file and sine, missing values, times that do not
+    /// increase, and unreadable files.
     pub fn build(&self, source: &Source, key: &str) -> Result<Schedule, SceneError> {
         let over = match self {
             Self::Constant(value) => return Ok(Schedule::constant(value.si())),
@@ -73,26 +74,26 @@ impl<D: Dimension + Copy> ScheduleSpec<D> {
         };
         let table = !(over.time.is_empty() && over.value.is_empty());
         if let Some(of) = over.of {
-            return over.of_file(source, key, of, table);
+            return over.gcode_schedule(source, key, of, table);
         }
         if over.cools_to.is_some() || over.cooling_time.is_some() {
             let name = if over.cools_to.is_some() { "cools_to" } else { "cooling_time" };
-            return Err(source.error(
+            return Err(source.unexpected(
                 &format!("{key}.{name}"),
-                "cooling of no bed",
-                "`of = \"bed\"` of a G-code file",
+                "it belongs to `of = \"bed\"` of a G-code file; remove it",
             ));
         }
-        if let Some(swing) = over.swing(source, key, table)? {
+        if let Some(swing) = over.sine(source, key, table)? {
             return Ok(swing);
         }
         let (times, values) = match &over.file {
             Some(_) if table => {
-                return Err(source.error(key, "a file beside a table", "one of them"));
+                let (file, time) = (format!("{key}.file"), format!("{key}.time"));
+                return Err(source.conflict(&file, &time, "keep the file or the table"));
             }
             Some(file) => {
                 let path = source.file(file);
-                let columns = [Column::of::<TimeDimension>("time"), Column::of::<D>("value")];
+                let columns = [TableColumn::new::<TimeDimension>("time"), TableColumn::new::<D>("value")];
                 let [times, values] =
                     read(&path, columns).map_err(|error| located(source, &format!("{key}.file"), &error))?;
                 (times, values)
@@ -110,21 +111,23 @@ impl<D: Dimension + Copy> ScheduleSpec<D> {
 }
 
 impl<D: Dimension + Copy> TimesSpec<D> {
-    /// The swing, where it is one; `table`: there is a table beside it.
-    fn swing(&self, source: &Source, key: &str, table: bool) -> Result<Option<Schedule>, SceneError> {
+    /// Returns the sine, if it is one; `table` tells if there is a table beside it.
+    fn sine(&self, source: &Source, key: &str, table: bool) -> Result<Option<Schedule>, SceneError> {
         if self.low.is_none() && self.high.is_none() && self.period.is_none() {
             return Ok(None);
         }
         if table || self.file.is_some() {
-            return Err(source.error(key, "a sine together with a table or a file", "one of them"));
+            let (low, other) = (format!("{key}.low"), if table { "time" } else { "file" });
+            let why = "keep the sine, or the table or file";
+            return Err(source.conflict(&low, &format!("{key}.{other}"), why));
         }
         let missing =
-            |name: &str| source.error(&format!("{key}.{name}"), "nothing", "`low`, `high` and `period`");
+            |name: &str| source.missing(&format!("{key}.{name}"), "a sine needs `low`, `high` and `period`");
         let low = self.low.ok_or_else(|| missing("low"))?;
         let high = self.high.ok_or_else(|| missing("high"))?;
         let period = self.period.ok_or_else(|| missing("period"))?;
         let swing = Schedule::swing(low.si(), high.si(), period.si());
-        swing.map(Some).map_err(|error| located_in(source, key, &SWING_KEYS, &error))
+        swing.map(Some).map_err(|error| located_in(source, key, &SINE_KEYS, &error))
     }
 }
 
@@ -132,7 +135,8 @@ impl<D: Dimension> TextOrTable for ScheduleSpec<D> {
     type Table = TimesSpec<D>;
 
     fn expected() -> String {
-        let others = "{ time = […], value = […] }, { file = … }, { file = …, of = \"bed\" } or { low = …, high = …, period = … }";
+        let others = "{ time = […], value = […] }, { file = … }, { file = …, of = \"bed\" } or { low = …, \
+            high = …, period = … }";
         format!("{}, e.g. \"{}\", {others}", D::NAME, D::EXAMPLE)
     }
 
@@ -154,27 +158,35 @@ impl<D: Dimension> schemars::JsonSchema for ScheduleSpec<D> {
         let constant = generator.subschema_for::<Quantity<D>>();
         let time = generator.subschema_for::<Time>();
         schemars::json_schema!({
-            "description": "a constant, or values over time: linear between the times, constant outside of them, or a sine",
+             "description": "constant, or values over time: a table (linear between its times, constant \
+                 outside), a file, or a sine",
             "anyOf": [constant, {
                 "type": "object",
                 "properties": {
-                    "time": { "type": "array", "items": time, "description": "Increasing times." },
-                    "value": { "type": "array", "items": constant, "description": "A value for each." },
+                    "time": { "type": "array", "items": time, "description": "Times, increasing." },
+                    "value": { "type": "array", "items": constant, "description": "Value at each time." },
                     "file": {
                         "type": "string",
-                        "description": "Or a CSV file with the columns `time [unit]` and `value [unit]`.",
+                        "description": "CSV file with the columns `time [unit]` and `value [unit]`, instead \
+                            of `time` and `value`.",
                     },
-                    "low": { "anyOf": [constant], "description": "Or a sine from here to `high`, its middle upwards at t = 0." },
-                    "high": { "anyOf": [constant], "description": "Other end of the sine." },
-                    "period": { "anyOf": [time], "description": "Of the sine." },
+                     "low": {
+                                            "anyOf": [constant],
+                                            "description": "Lowest value of a sine that passes its mean \
+                                                upwards at t = 0.",
+                                        },
+                    "high": { "anyOf": [constant], "description": "Highest value of the sine." },
+                    "period": { "anyOf": [time], "description": "Period of the sine." },
                     "of": {
                         "type": "string",
                         "enum": ["nozzle", "bed", "fan"],
-                        "description": "Of a G-code `file`: a temperature that it sets, or its fan from `low` (off) to `high`.",
+                         "description": "Setting of a G-code `file`: temperature of nozzle or bed, or fan \
+                             from `low` (off) to `high`.",
                     },
                     "cools_to": {
                         "anyOf": [constant],
-                        "description": "Of a bed: what it cools towards once it is switched off or set lower; default 25 °C.",
+                         "description": "Temperature towards which a bed cools when switched off or set \
+                             lower; default 25 °C.",
                     },
                     "cooling_time": {
                         "anyOf": [time],
@@ -189,6 +201,6 @@ impl<D: Dimension> schemars::JsonSchema for ScheduleSpec<D> {
 
 impl<'de, D: Dimension> Deserialize<'de> for ScheduleSpec<D> {
     fn deserialize<De: Deserializer<'de>>(deserializer: De) -> Result<Self, De::Error> {
-        either::deserialize(deserializer)
+        text_or_table::deserialize(deserializer)
     }
 }

@@ -1,4 +1,4 @@
-//! Studies of a scene: what each changes, and the scene that comes out.
+//! Studies of a scene: their changes, and the resulting scenes.
 
 use super::PartScene;
 use harness::report::Named;
@@ -6,7 +6,7 @@ use harness::scene::{SceneError, Source};
 use harness::study::{Comparisons, Naming, Study, Variant, variants};
 
 harness::study! {
-    /// A variant of the scene. A block that it names replaces the scene's whole; `set` changes single keys.
+    /// Variant of the scene. Its blocks replace those of the scene as a whole; `set` changes single keys.
     ///
     /// ```toml
     /// [[study]]
@@ -28,11 +28,11 @@ harness::study! {
     lists {}
 }
 
-/// Values of a study are `NAME.mean_alpha` and so on, its files lie in a folder of its name.
+/// Naming of studies: values are `NAME.mean_alpha`, ..., files are in a folder NAME.
 pub const NAMING: Naming = Naming::Folders;
 
 impl PartScene {
-    /// The studies of a run; `quick` leaves out those marked so.
+    /// Returns the studies of a run; `quick` skips those marked `quick = false`.
     ///
     /// # Errors
     /// As [`variants`] and [`Comparisons::check`].
@@ -45,26 +45,26 @@ impl PartScene {
         variants(source, &studies, quick, NAMING, name)
     }
 
-    /// What compares the studies.
+    /// Returns the comparisons of the studies.
     pub fn comparisons(&self) -> Comparisons<'_> {
         Comparisons { convergence: &self.convergence, curves: &self.error_against_time }
     }
 
-    /// The scene of a variant.
+    /// Returns the scene of a variant.
     ///
     /// # Errors
     /// As [`Source::parse`] and [`PartScene::check`].
-    pub fn of_variant(variant: &Variant) -> Result<Self, SceneError> {
+    pub fn from_variant(variant: &Variant) -> Result<Self, SceneError> {
         let scene: Self = variant.source.parse()?;
         scene.check(&variant.source)?;
         Ok(scene)
     }
 
-    /// Refuses an expectation of a quantity that no run of the scene reports; those of studies that are left out of it,
-    /// `absent`, are passed over.
+    /// Refuses an expectation of a quantity that no run of the scene reports; expectations of skipped studies
+    /// (`absent`) are ignored.
     ///
     /// # Errors
-    /// The quantity, and names like it.
+    /// Returns the quantity, with similar names.
     pub fn check_expectations(
         &self,
         source: &Source,

@@ -1,23 +1,23 @@
-//! Meshes of cells that a G-code file or an STL surface fills.
+//! Meshes of cells that are filled by a G-code file or an STL surface.
 
-use super::fault::{located, located_in};
-use super::file;
+use super::gcode_file;
+use super::locate_error::{located, located_in};
 use super::memory;
 use crate::error::Error;
-use crate::mesh::path::{Cells, Deposit, ToolPath, read_gcode};
+use crate::mesh::path::{CellSettings, Deposit, ToolPath, read_gcode};
 use crate::mesh::{Mesh, RATIOS, Voxels, quality, stl};
 use harness::scene::{SceneError, Source};
 use polycore::units::{Acceleration, Length, Speed};
 use serde::Deserialize;
 use std::path::PathBuf;
 
-/// Cells are left out that are filled less: with the part that is filled, and where cells are full.
-const LEAST: [f64; 2] = [0.1, 0.5];
+/// Default smallest filled fraction of a cell: with scaled cells, and with full cells.
+const LEAST_FILLED: [f64; 2] = [0.1, 0.5];
 
-/// Largest sides that printed parts have, m.
-pub(super) const PRINTED: [f64; 2] = [1e-4, 10.0];
+/// Smallest and largest size of a printed part, m.
+pub(super) const PRINTED_SIZES: [f64; 2] = [1e-4, 10.0];
 
-/// Where parameters stand in their block.
+/// Parameters and their keys in the block.
 const KEYS: [(&str, &str); 7] = [
     ("size of a cell", "cell"),
     ("nodes of a structured mesh", "cell"),
@@ -28,7 +28,7 @@ const KEYS: [(&str, &str); 7] = [
     ("jerk", "jerk"),
 ];
 
-/// The cells that the beads of a G-code file fill, printed in the order of its moves.
+/// Cells that the beads of a G-code file fill, printed in the order of its moves.
 ///
 /// ```toml
 /// [mesh.path]
@@ -38,64 +38,61 @@ const KEYS: [(&str, &str); 7] = [
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PathSpec {
-    /// The file: G-code whose moves feed filament.
+    /// G-code file whose moves feed filament.
     pub file: PathBuf,
     /// Edges of a cell.
     pub cell: [Length; 3],
-    /// Diameter of the filament; default: as the file states it, or 1.75 mm.
+    /// Filament diameter; default: that of the file, or 1.75 mm.
     pub filament: Option<Length>,
-    /// Height of all beads; default: as the file tells, or down to what lies below.
+    /// Height of all beads; default: that of the file, or down to the material below.
     pub bead_height: Option<Length>,
-    /// Features that are printed but left out of the part, as the file names them, or by one name for all
-    /// slicers: `skirt`, `brim`, `raft`, `purge`, `support`, `wipe-tower`, ….
+    /// Features that are left out of the part, as the file names them, or by a name for all slicers: `skirt`,
+    /// `brim`, `raft`, `purge`, `support`, `wipe-tower`, ….
     #[serde(default)]
     pub leave_out: Vec<String>,
-    /// Whether ρ and k of an element are scaled by the part of it that is filled, so that the printed mass is that of the file;
-    /// otherwise elements are full.
-    #[serde(default = "yes")]
+    /// Scales ρ and k of each element by its filled fraction, so that the printed mass is that of the file;
+    /// if false, elements are full.
+    #[serde(default = "super::default_true")]
     pub fill: bool,
-    /// Cells filled to less are left out, their volume goes to the others; default 0.1, of full elements 0.5.
+    /// Smallest filled fraction of a cell; the volume of emptier cells goes to the others; default 0.1, or
+    /// 0.5 for full elements.
     pub least: Option<f64>,
-    /// Limit of acceleration, for times; default: as the file states, or none: velocity is F.
+    /// Acceleration limit, for the times; default: that of the file, or none (velocity is F).
     pub acceleration: Option<Acceleration>,
-    /// Step of velocity at corners, with `acceleration`.
+    /// Jump of velocity at corners, with `acceleration`.
     pub jerk: Option<Speed>,
 }
 
-/// The cells inside a closed surface.
+/// Cells inside a closed surface.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StlSpec {
-    /// The file: STL, ASCII or binary.
+    /// STL file, ASCII or binary.
     pub file: PathBuf,
-    /// Length of one unit of the file: the format has none.
+    /// Length of one unit of the file; the format has none.
     pub unit: Length,
     /// Edges of a cell.
     pub cell: [Length; 3],
-    /// As of a path.
-    #[serde(default = "yes")]
+    /// Scales ρ and k of each element by its filled fraction, as in `mesh.path`.
+    #[serde(default = "super::default_true")]
     pub fill: bool,
-    /// As of a path.
+    /// Smallest filled fraction of a cell, as in `mesh.path`.
     pub least: Option<f64>,
 }
 
-fn yes() -> bool {
-    true
-}
-
-/// How full the elements are, and the path that laid them down.
+/// Filled fractions of the elements, and the path that printed them.
 pub struct Filling {
-    /// Filled parts, and which of them each element has; `None`: all are full.
+    /// Different filled fractions, and the index of each element's fraction; `None` if all are full.
     pub parts: Option<(Vec<f64>, Vec<usize>)>,
     /// Volume of the body, m³.
     pub volume: f64,
-    /// Volume of the elements over it.
+    /// Volume of the elements over that of the body.
     pub ratio: f64,
-    /// The path, with the time of each element, s.
+    /// Path, and the birth time of each element, s.
     pub path: Option<(ToolPath, Vec<f64>)>,
 }
 
-/// A mesh, and what should be looked at.
+/// A mesh with notes for the user.
 pub struct BuiltMesh {
     /// The mesh.
     pub mesh: Mesh,
@@ -103,7 +100,7 @@ pub struct BuiltMesh {
     pub notes: Vec<String>,
     /// Volume of all elements, m³.
     pub volume: f64,
-    /// How full the elements of a path or an STL surface are.
+    /// Filled fractions, for a mesh from a path or an STL surface.
     pub filling: Option<Filling>,
 }
 
@@ -114,27 +111,27 @@ impl PathSpec {
         let file = source.file(&self.file);
         let mut path = read_gcode(&file).map_err(|error| located(source, "mesh.path.file", &error))?;
         let mut notes = std::mem::take(&mut path.notes);
-        let filament = file::filament(source, block, &path, self.filament)?;
-        path = file::timed(source, block, path, self.acceleration, self.jerk, &mut notes)?;
+        let filament = gcode_file::filament(source, block, &path, self.filament)?;
+        path = gcode_file::with_times(source, block, path, self.acceleration, self.jerk, &mut notes)?;
         notes.extend(path.summary(filament));
-        path = file::purged(source, "mesh.path.file", path, &mut notes)?;
+        path = gcode_file::without_loose_beads(source, "mesh.path.file", path, &mut notes)?;
         let height = self.bead_height.map(|x| x.si());
         if height.is_none_or(|height| height > 0.0) && filament > 0.0 {
             path = path.with_heights(filament, height);
         }
-        file::leave_out(source, block, &self.leave_out, &mut path, &mut notes)?;
-        let cells = Cells {
+        gcode_file::leave_out(source, block, &self.leave_out, &mut path, &mut notes)?;
+        let cells = CellSettings {
             size: self.cell.map(|x| x.si()),
             filament,
             height,
-            least: self.least.unwrap_or(LEAST[usize::from(!self.fill)]),
+            least: self.least.unwrap_or(LEAST_FILLED[usize::from(!self.fill)]),
         };
         memory::refuse_mesh(source, "mesh.path.cell", path.cells(&cells).map_err(at)?, 1)?;
         let Deposit { voxels, times, tools } = path.deposit(&cells).map_err(at)?;
         if !tools.is_empty() {
             let sets: Vec<String> = path.tools().iter().map(|tool| format!("`tool-{tool}`")).collect();
             notes.push(format!(
-                "several tools print: element sets {} for the materials of regions",
+                "the file uses several tools: element sets {} select their regions",
                 sets.join(", ")
             ));
         }
@@ -150,17 +147,18 @@ impl StlSpec {
         let mut surface =
             stl::read(&file, self.unit.si()).map_err(|error| located(source, "mesh.stl.file", &error))?;
         let size = self.cell.map(|x| x.si());
-        self.plausible(source, surface.bounds(), size)?;
+        self.check_size(source, surface.bounds(), size)?;
         memory::refuse_mesh(source, "mesh.stl.cell", surface.cells(size).map_err(at)?, 1)?;
-        let least = self.least.unwrap_or(LEAST[usize::from(!self.fill)]);
+        let least = self.least.unwrap_or(LEAST_FILLED[usize::from(!self.fill)]);
         let (voxels, overlaps) = surface.voxels(size, least).map_err(at)?;
         surface.notes.extend(overlaps);
         surface.notes.push(format!("the part is {}", box_of(surface.bounds())));
         finish(source, block, voxels, self.fill, surface.notes, None)
     }
 
-    /// Refuses a part that is too small or too large to be printed, or smaller than a cell: its unit is another.
-    fn plausible(
+    /// Refuses a part that is too small or too large to be printed, or smaller than a cell: its unit is
+    /// wrong.
+    fn check_size(
         &self,
         source: &Source,
         [low, high]: [[f64; 3]; 2],
@@ -168,35 +166,35 @@ impl StlSpec {
     ) -> Result<(), SceneError> {
         let size = [0, 1, 2].map(|d| high[d] - low[d]);
         let largest = size.into_iter().fold(0.0, f64::max);
-        let [least, most] = PRINTED;
+        let [least, most] = PRINTED_SIZES;
         let fits = (0..3).any(|d| size[d] >= 0.5 * cell[d]);
         if largest >= least && largest < most && fits {
             return Ok(());
         }
         let unit = self.unit.si();
-        let found = format!("{unit} m per unit of the file, which makes the part {}", box_of([low, high]));
+        let found = format!("{unit} m per unit of the file, which gives a part of {}", box_of([low, high]));
         let [x, y, z] = size.map(|x| rounded(x / unit));
         let allowed = format!(
-            "a `unit` with which its largest side is between {} mm and {most} m, and it is no smaller than a cell: \
-             the file's own numbers are {x} × {y} × {z}, e.g. \"1 m\" if these are metres",
+            "a `unit` that makes the largest side {} mm to {most} m, and the part larger than a cell (the \
+             file contains {x} × {y} × {z}; write e.g. \"1 m\" if these are metres)",
             1e3 * least
         );
         Err(source.error("mesh.stl.unit", found, allowed))
     }
 }
 
-/// The sides of a box, in mm.
+/// Formats the sides of a box in mm.
 pub(super) fn box_of([low, high]: [[f64; 3]; 2]) -> String {
     let [x, y, z] = [0, 1, 2].map(|d| rounded(1e3 * (high[d] - low[d])));
     format!("{x} × {y} × {z} mm")
 }
 
-/// To five digits.
+/// Rounds to five digits.
 fn rounded(x: f64) -> f64 {
     format!("{x:.4e}").parse().unwrap_or(x)
 }
 
-/// Checks cells and notes what should be looked at.
+/// Checks the cells and adds notes for the user.
 fn finish(
     source: &Source,
     block: &str,
@@ -206,22 +204,22 @@ fn finish(
     path: Option<(ToolPath, Vec<f64>)>,
 ) -> Result<BuiltMesh, SceneError> {
     let cubic = 1e9 * voxels.volume;
-    let told = format!("cells have {:.4} times the volume of the body, {cubic:.3} mm³", voxels.ratio);
-    if !fill && !voxels.may_be_full() {
+    let text = format!("cells have {:.4} times the volume of the body, {cubic:.3} mm³", voxels.ratio);
+    if !fill && !voxels.can_be_full() {
         let [low, high] = RATIOS;
-        let allowed = format!("{low} to {high} times with full cells: smaller ones, or `fill = true`");
-        return Err(source.error(&format!("{block}.cell"), told, allowed));
+        let allowed = format!("{low} to {high} times with full cells (use smaller cells or `fill = true`)");
+        return Err(source.error(&format!("{block}.cell"), text, allowed));
     }
     let most = voxels.fill.iter().copied().fold(0.0, f64::max);
     notes.push(match fill {
-        true => format!(
-            "{told}; density and conductivity are scaled by the part that is filled, at most {most:.3}"
-        ),
-        false => told,
+        true => {
+            format!("{text}; density and conductivity are scaled by the filled fraction, at most {most:.3}")
+        }
+        false => text,
     });
     if voxels.left_out > 1e-6 {
         let share = 100.0 * voxels.left_out;
-        notes.push(format!("{share:.2} % of the volume is in cells left out, and goes to the others"));
+        notes.push(format!("{share:.2} % of the volume lies in omitted cells and is added to the others"));
     }
     let parts = fill.then(|| voxels.bins());
     let found = quality::check(&voxels.mesh, None).map_err(|error| located(source, block, &error))?;

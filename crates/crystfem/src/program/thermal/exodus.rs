@@ -1,7 +1,8 @@
-//! Exodus II, as MOOSE, Cubit and ParaView write it (Schoof & Yarberry 1994, SAND92-2137, "EXODUS II: A Finite Element Data Model").
+//! Exodus II files, as written by MOOSE, Cubit and ParaView (Schoof & Yarberry 1994, SAND92-2137, "EXODUS II:
+//! A Finite Element Data Model").
 
 use super::netcdf::Netcdf;
-use super::{Analysis, Frame, Shapes, chosen, unusable};
+use super::{Analysis, CellsByDimension, ThermalFrame, choose_array, data_error};
 use crate::error::Error;
 use harness::output::vtkhdf::Cells;
 use std::path::Path;
@@ -12,24 +13,24 @@ pub fn open(path: &Path, array: Option<&str>) -> Result<Analysis, Error> {
     let points = points(&mut file, path)?;
     let cells = cells(&mut file, path, points.len())?;
     let names = names(&mut file)?;
-    let chosen = chosen(path, &names, array)?;
+    let chosen = choose_array(path, &names, array)?;
     let variable = names.iter().position(|name| name == chosen).unwrap_or_default() + 1;
     let variable = format!("vals_nod_var{variable}");
     let times = file.numbers("time_whole", None)?;
     let (nodes, path) = (points.len(), path.to_path_buf());
     let frames = times.into_iter().enumerate().map(move |(row, time)| {
         let temperature = file.numbers(&variable, Some(row))?;
-        same(&path, &variable, temperature.len(), nodes)?;
-        Ok(Frame { time, temperature })
+        check_count(&path, &variable, temperature.len(), nodes)?;
+        Ok(ThermalFrame { time, temperature })
     });
     Ok(Analysis { points, cells, frames: Box::new(frames) })
 }
 
-fn same(path: &Path, name: &str, found: usize, allowed: usize) -> Result<(), Error> {
+fn check_count(path: &Path, name: &str, found: usize, allowed: usize) -> Result<(), Error> {
     if found == allowed {
         return Ok(());
     }
-    Err(unusable(path, &format!("`{name}`: {found} numbers; allowed: {allowed}, one of each node")))
+    Err(data_error(path, &format!("found {found} numbers in `{name}`; allowed: {allowed}, one per node")))
 }
 
 fn points(file: &mut Netcdf, path: &Path) -> Result<Vec<[f64; 3]>, Error> {
@@ -50,16 +51,16 @@ fn points(file: &mut Netcdf, path: &Path) -> Result<Vec<[f64; 3]>, Error> {
     };
     let count = axes.first().map_or(0, Vec::len);
     if !(1..=3).contains(&axes.len()) || count == 0 {
-        return Err(unusable(path, &format!("{} axes of coordinates; allowed: 1 to 3", axes.len())));
+        return Err(data_error(path, &format!("found {} axes of coordinates; allowed: 1 to 3", axes.len())));
     }
     for axis in &axes {
-        same(path, "coord", axis.len(), count)?;
+        check_count(path, "coord", axis.len(), count)?;
     }
     Ok((0..count).map(|k| [0, 1, 2].map(|d| axes.get(d).map_or(0.0, |axis| axis[k]))).collect())
 }
 
 fn cells(file: &mut Netcdf, path: &Path, nodes: usize) -> Result<Cells, Error> {
-    let mut cells = Shapes::default();
+    let mut cells = CellsByDimension::default();
     for block in 1.. {
         let name = format!("connect{block}");
         let Some(shape) = file.shape(&name) else { break };
@@ -72,7 +73,7 @@ fn cells(file: &mut Netcdf, path: &Path, nodes: usize) -> Result<Cells, Error> {
             kind if kind.starts_with("PYR") => 14,
             kind if kind.starts_with("TRI") => 5,
             kind if kind.starts_with("QUAD") || kind.starts_with("SHELL") => match own {
-                // shells of triangles
+                // shells may be triangles
                 3 | 6 | 7 => 5,
                 _ => 9,
             },
@@ -83,7 +84,10 @@ fn cells(file: &mut Netcdf, path: &Path, nodes: usize) -> Result<Cells, Error> {
             let mut places = Vec::with_capacity(own);
             for &node in element {
                 if !(1.0..=nodes as f64).contains(&node) {
-                    return Err(unusable(path, &format!("`{name}`: node {node}; allowed: 1 to {nodes}")));
+                    return Err(data_error(
+                        path,
+                        &format!("found node {node} in `{name}`; allowed: 1 to {nodes}"),
+                    ));
                 }
                 places.push(node as u32 - 1);
             }
@@ -91,10 +95,10 @@ fn cells(file: &mut Netcdf, path: &Path, nodes: usize) -> Result<Cells, Error> {
         }
     }
     let allowed = "blocks of HEX, WEDGE, PYRAMID, TET, QUAD, SHELL, TRI, BAR, BEAM or EDGE";
-    cells.highest().ok_or_else(|| unusable(path, &format!("no element; allowed: {allowed}")))
+    cells.highest().ok_or_else(|| data_error(path, &format!("found no elements; allowed: {allowed}")))
 }
 
-/// Names of the variables of nodes.
+/// Returns the names of the nodal variables.
 fn names(file: &mut Netcdf) -> Result<Vec<String>, Error> {
     let longest = file.shape("name_nod_var").and_then(|shape| shape.last().copied()).unwrap_or(1);
     let letters = file.numbers("name_nod_var", None)?;

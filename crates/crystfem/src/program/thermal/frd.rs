@@ -1,9 +1,9 @@
-//! Results of CalculiX, `.frd` in ASCII: nodes, elements, and the temperature of the nodes over time.
+//! Results of CalculiX, ASCII `.frd`: nodes, elements, and nodal temperatures over time.
 //!
-//! Fixed columns (CalculiX GraphiX manual, "Result Format"): a line of data begins with −1 in three columns, then a number in
-//! ten, then numbers in twelve each.
+//! Columns are fixed (CalculiX GraphiX manual, "Result Format"): a data line begins with −1 in three columns,
+//! followed by a number in ten columns and numbers in twelve columns each.
 
-use super::{Analysis, Frame, Shapes};
+use super::{Analysis, CellsByDimension, ThermalFrame};
 use crate::error::Error;
 use harness::output::vtkhdf::Cells;
 use std::collections::HashMap;
@@ -11,7 +11,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-/// CalculiX' element types with their corners, and VTK's number.
+/// Element type of CalculiX, number of corners, and cell type of VTK.
 const SHAPES: [(u32, usize, u64); 12] = [
     (1, 8, 12),
     (4, 8, 12),
@@ -34,14 +34,14 @@ pub fn open(path: &Path) -> Result<Analysis, Error> {
     Ok(Analysis { points, cells, frames: Box::new(std::iter::from_fn(move || frd.frame().transpose())) })
 }
 
-/// A file that is being read.
+/// A file during reading.
 struct Frd {
     path: PathBuf,
     lines: std::io::Lines<BufReader<File>>,
     line: usize,
-    /// Places of the nodes, in the order of the file.
+    /// Positions of the nodes, in file order.
     points: Vec<[f64; 3]>,
-    /// The elements of highest dimension, by their corners.
+    /// Elements of the highest dimension, by their corners.
     cells: Cells,
     places: HashMap<u32, u32>,
 }
@@ -50,9 +50,9 @@ impl Frd {
     /// Opens a file and reads its mesh.
     ///
     /// # Errors
-    /// [`Error::File`] for what is no such file; I/O errors.
+    /// Returns [`Error::File`] for invalid files, and I/O errors.
     fn open(path: &Path) -> Result<Self, Error> {
-        let file = File::open(path).map_err(polycore::Error::io("read", path))?;
+        let file = File::open(path).map_err(polycore::Error::from_io("read", path))?;
         let mut frd = Self {
             path: path.to_path_buf(),
             lines: BufReader::new(file).lines(),
@@ -80,7 +80,7 @@ impl Frd {
         self.line += 1;
         let path = &self.path;
         let line = self.lines.next().transpose().map_err(|error| {
-            let allowed = "text: CalculiX writes it, cgx' binary files are none";
+            let allowed = "text, as CalculiX writes it (cgx also writes binary files)";
             file(path, self.line, "line", error.to_string(), allowed)
         })?;
         Ok(line)
@@ -90,7 +90,7 @@ impl Frd {
         file(&self.path, self.line, what, found.trim().to_owned(), allowed)
     }
 
-    /// The next line of data of a block; none at its end.
+    /// Reads the next data line of a block; `None` at its end.
     fn data(&mut self, what: &str) -> Result<Option<String>, Error> {
         match self.next()? {
             Some(line) if line.starts_with(" -3") => Ok(None),
@@ -135,7 +135,7 @@ impl Frd {
 
     fn elements(&mut self) -> Result<(), Error> {
         let (mut kind, mut wanted, mut own) = (0, 0, Vec::new());
-        let mut cells = Shapes::default();
+        let mut cells = CellsByDimension::default();
         while let Some(line) = self.data("elements")? {
             if line.starts_with(" -1") {
                 let number: u32 = self.number(&line, 13..18, "type of element")?;
@@ -160,16 +160,16 @@ impl Frd {
                 wanted = 0;
             }
         }
-        let none = || self.wrong("elements", "none", "solids, shells or beams");
-        self.cells = cells.highest().ok_or_else(none)?;
+        let missing = || self.wrong("elements", "none", "solids, shells or beams");
+        self.cells = cells.highest().ok_or_else(missing)?;
         Ok(())
     }
 
-    /// The next temperatures; none at the end of the file. Other results are passed over.
+    /// Reads the next temperatures and skips other results; `None` at the end of the file.
     ///
     /// # Errors
-    /// [`Error::File`] for a block that is cut off, a node without a temperature and numbers that are none.
-    fn frame(&mut self) -> Result<Option<Frame>, Error> {
+    /// Returns [`Error::File`] for truncated blocks, nodes without a temperature, and invalid numbers.
+    fn frame(&mut self) -> Result<Option<ThermalFrame>, Error> {
         let mut time = f64::NAN;
         while let Some(line) = self.next()? {
             if line.trim_start().starts_with("100C") {
@@ -189,9 +189,9 @@ impl Frd {
                 if let Some(place) = temperature.iter().position(|value| value.is_nan()) {
                     let node = self.places.iter().find(|(_, other)| **other as usize == place);
                     let node = node.map_or(0, |(node, _)| *node).to_string();
-                    return Err(self.wrong("node without a temperature", &node, "`NT` of all nodes"));
+                    return Err(self.wrong("node without a temperature", &node, "`NT` for all nodes"));
                 }
-                return Ok(Some(Frame { time, temperature }));
+                return Ok(Some(ThermalFrame { time, temperature }));
             }
         }
         Ok(None)
@@ -233,7 +233,7 @@ mod tests {
  9999
 ";
 
-    fn read(text: &str) -> Result<(Frd, Vec<Frame>), Error> {
+    fn read(text: &str) -> Result<(Frd, Vec<ThermalFrame>), Error> {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("a.frd");
         std::fs::write(&path, text).unwrap();
@@ -257,7 +257,7 @@ mod tests {
         assert_eq!(frames[0].temperature, [472.15, 472.16, 472.17, 472.18, -100.0]);
     }
 
-    /// Without solids shells are the mesh, without those beams.
+    /// Shells form the mesh if there are no solids, beams if there are no shells.
     #[test]
     fn shells_and_beams() {
         let shells = GOOD.replace(
@@ -284,7 +284,7 @@ mod tests {
         assert!(read(&none).err().unwrap().to_string().contains("solids, shells or beams"));
     }
 
-    /// Cut at any line and changed anywhere: an error with a line, or fewer results; never a panic.
+    /// A truncated or altered file gives an error with a line, or fewer results, but no panic.
     #[test]
     fn damaged_files() {
         let lines: Vec<&str> = GOOD.lines().collect();

@@ -1,4 +1,4 @@
-//! Thermal analyses of other programs: a mesh, and the temperatures of its nodes over time.
+//! Thermal analyses of other programs: a mesh, and its nodal temperatures over time.
 
 mod exodus;
 pub mod frd;
@@ -11,29 +11,31 @@ use crate::error::Error;
 use harness::output::vtkhdf::Cells;
 use std::path::Path;
 
-/// An analysis that is being read.
+/// An analysis during reading.
 pub struct Analysis {
-    /// Places of the nodes, in the order of the file.
+    /// Positions of the nodes, in file order.
     pub points: Vec<[f64; 3]>,
-    /// The elements of highest dimension, by their corners: solids, shells where there are none, lines where there are no shells.
+    /// Elements of the highest dimension, by their corners: solids, else shells, else lines.
     pub cells: Cells,
-    /// The temperatures, time by time.
-    pub frames: Box<dyn Iterator<Item = Result<Frame, Error>>>,
+    /// Temperatures, time by time.
+    pub frames: Box<dyn Iterator<Item = Result<ThermalFrame, Error>>>,
 }
 
-/// Temperatures at a time.
-pub struct Frame {
+/// Temperatures at one time.
+pub struct ThermalFrame {
     /// Time.
     pub time: f64,
-    /// Of each node, in the unit of the file.
+    /// Temperature of each node, in the unit of the file.
     pub temperature: Vec<f64>,
 }
 
-/// Opens `.frd` of CalculiX, `.pvd`, `.vtu` and `.pvtu` of VTK, `.xdmf` (`.xmf`), or Exodus II (`.e`, `.ex2`, `.exo`, `.g`); `array` is the
-/// name of the temperature where a file names its arrays, by default that of its only scalar of nodes. Meshes are of one, two or three dimensions.
+/// Opens a file of CalculiX (`.frd`), VTK (`.pvd`, `.vtu`, `.pvtu`), XDMF (`.xdmf`, `.xmf`) or Exodus II
+/// (`.e`, `.ex2`, `.exo`, `.g`). `array` names the temperature; by default it is the only nodal scalar.
+/// Meshes have one to three dimensions.
 ///
 /// # Errors
-/// Other endings; files that are none of these, damaged ones, meshes without elements, names of arrays that there are not; I/O errors.
+/// Returns an error for other extensions, damaged files, meshes without elements, unknown arrays, and I/O
+/// errors.
 pub fn open(path: &Path, array: Option<&str>) -> Result<Analysis, Error> {
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
     match ending.as_str() {
@@ -50,15 +52,16 @@ pub fn open(path: &Path, array: Option<&str>) -> Result<Analysis, Error> {
                 }
                 _ => "",
             };
-            let reason =
-                format!("ending `{ending}`; allowed: frd, pvd, vtu, pvtu, xdmf, xmf, e, ex2, exo, g{advice}");
-            Err(unusable(path, &reason))
+            let reason = format!(
+                "found extension `{ending}`; allowed: frd, pvd, vtu, pvtu, xdmf, xmf, e, ex2, exo, g{advice}"
+            );
+            Err(data_error(path, &reason))
         }
     }
 }
 
-/// What `--array` or the file itself says about where the temperature is.
-fn chosen<'a>(path: &Path, names: &'a [String], array: Option<&str>) -> Result<&'a str, Error> {
+/// Returns the name of the temperature array: `array`, or the only array of the file.
+fn choose_array<'a>(path: &Path, names: &'a [String], array: Option<&str>) -> Result<&'a str, Error> {
     let found = match array {
         Some(array) => names.iter().find(|name| *name == array),
         None if names.len() == 1 => names.first(),
@@ -66,16 +69,16 @@ fn chosen<'a>(path: &Path, names: &'a [String], array: Option<&str>) -> Result<&
     };
     found.map(String::as_str).ok_or_else(|| match array {
         Some(array) => {
-            Error::Unknown { what: "scalar array of nodes", name: array.to_owned(), known: names.to_vec() }
+            Error::Unknown { what: "nodal scalar array", name: array.to_owned(), known: names.to_vec() }
         }
         None => {
-            let allowed = "one scalar array of nodes, or `array` with the name of the temperature";
-            unusable(path, &format!("arrays {names:?}; allowed: {allowed}"))
+            let allowed = "one nodal scalar array (otherwise `array` names the temperature)";
+            data_error(path, &format!("found arrays {names:?}; allowed: {allowed}"))
         }
     })
 }
 
-/// VTK's number of a type, its corners, the number of the type of first order, its dimension.
+/// Cell type of VTK, number of corners, cell type of first order, and dimension.
 const TYPES: [(u64, usize, u8, usize); 28] = [
     (1, 1, 1, 0),
     (3, 2, 3, 1),
@@ -107,15 +110,15 @@ const TYPES: [(u64, usize, u8, usize); 28] = [
     (14, 5, 14, 3),
 ];
 
-/// Elements by their dimension.
+/// Cells by their dimension.
 #[derive(Default)]
-struct Shapes([Cells; 4]);
+struct CellsByDimension([Cells; 4]);
 
-impl Shapes {
-    /// An element from VTK's number of its type and its nodes; types that are not known are passed over, their nodes stay.
+impl CellsByDimension {
+    /// Adds a cell of a VTK type; unknown types are skipped, their nodes remain.
     fn push(&mut self, kind: u64, nodes: &[u32]) {
         match kind {
-            // pixels and voxels count their corners along x first
+            // pixels and voxels order their corners along x first
             8 if nodes.len() == 4 => self.0[2].push(9, &[0, 1, 3, 2].map(|corner: usize| nodes[corner])),
             11 if nodes.len() == 8 => {
                 self.0[3].push(12, &[0, 1, 3, 2, 4, 5, 7, 6].map(|corner: usize| nodes[corner]));
@@ -134,13 +137,13 @@ impl Shapes {
         }
     }
 
-    /// Those of the highest dimension; `None` of none.
+    /// Returns the cells of the highest dimension; `None` without cells.
     fn highest(self) -> Option<Cells> {
         self.0.into_iter().rev().find(|cells| !cells.is_empty())
     }
 }
 
-fn unusable(path: &Path, reason: &str) -> Error {
+fn data_error(path: &Path, reason: &str) -> Error {
     Error::Data { what: path.display().to_string(), reason: reason.to_owned() }
 }
 

@@ -1,6 +1,6 @@
-//! Variables of a netCDF file in its classic format or in HDF5.
+//! Variables of a netCDF file, in the classic format or in HDF5.
 
-use super::unusable;
+use super::data_error;
 use crate::error::Error;
 use netcdf3::{DataVector, FileReader};
 use polycore::hdf5::dataset;
@@ -8,21 +8,23 @@ use rust_hdf5::format::messages::datatype::DatatypeMessage;
 use rust_hdf5::{H5Dataset, H5File};
 use std::path::{Path, PathBuf};
 
-/// A file that is being read.
+/// An open file.
 pub struct Netcdf {
     path: PathBuf,
     bytes: u64,
-    form: Form,
+    format: NetcdfFormat,
 }
 
-enum Form {
+enum NetcdfFormat {
     Classic(Box<FileReader>),
     Hdf5(H5File),
 }
 
 impl Netcdf {
+    /// Opens a file.
+    ///
     /// # Errors
-    /// Files that are no netCDF; I/O errors.
+    /// Returns an error for other formats, and I/O errors.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let read = |path: &Path| -> std::io::Result<([u8; 4], u64)> {
             let mut magic = [0; 4];
@@ -30,54 +32,58 @@ impl Netcdf {
             std::io::Read::read_exact(&mut file, &mut magic)?;
             Ok((magic, file.metadata()?.len()))
         };
-        let (magic, bytes) = read(path).map_err(polycore::Error::io("read", path))?;
-        let form = match &magic {
+        let (magic, bytes) = read(path).map_err(polycore::Error::from_io("read", path))?;
+        let format = match &magic {
             b"CDF\x01" | b"CDF\x02" => {
-                let file = FileReader::open(path).map_err(|error| unusable(path, &format!("{error:?}")))?;
-                Form::Classic(Box::new(file))
+                let file = FileReader::open(path).map_err(|error| data_error(path, &format!("{error:?}")))?;
+                NetcdfFormat::Classic(Box::new(file))
             }
-            b"\x89HDF" => Form::Hdf5(H5File::open(path).map_err(|error| unusable(path, &error.to_string()))?),
+            b"\x89HDF" => {
+                NetcdfFormat::Hdf5(H5File::open(path).map_err(|error| data_error(path, &error.to_string()))?)
+            }
             _ => {
-                return Err(unusable(
+                return Err(data_error(
                     path,
-                    "no netCDF; allowed: its classic format (also with 64-bit offsets) or HDF5",
+                    "found another format; allowed: netCDF, classic (also with 64-bit offsets) or HDF5",
                 ));
             }
         };
-        Ok(Self { path: path.to_path_buf(), bytes, form })
+        Ok(Self { path: path.to_path_buf(), bytes, format })
     }
 
     fn wrong(&self, name: &str, reason: impl std::fmt::Display) -> Error {
-        unusable(&self.path, &format!("`{name}`: {reason}"))
+        data_error(&self.path, &format!("`{name}`: {reason}"))
     }
 
     fn dataset(&self, file: &H5File, name: &str) -> Result<H5Dataset, Error> {
         dataset(file, name, self.bytes).map_err(|error| self.wrong(name, error))
     }
 
-    /// Sizes of a variable; none where there is no such variable.
+    /// Returns the shape of a variable; `None` if there is no such variable.
     pub fn shape(&self, name: &str) -> Option<Vec<usize>> {
-        match &self.form {
-            Form::Classic(file) => {
+        match &self.format {
+            NetcdfFormat::Classic(file) => {
                 let sizes = file.data_set().get_var(name)?.get_dims();
                 Some(sizes.iter().map(|size| size.size()).collect())
             }
-            Form::Hdf5(file) => self.dataset(file, name).ok().map(|dataset| dataset.shape()),
+            NetcdfFormat::Hdf5(file) => self.dataset(file, name).ok().map(|dataset| dataset.shape()),
         }
     }
 
-    /// Numbers or characters of a variable, of one row of it where `row` is given.
+    /// Reads the numbers or characters of a variable, or of one of its rows.
     pub fn numbers(&mut self, name: &str, row: Option<usize>) -> Result<Vec<f64>, Error> {
         let Some(shape) = self.shape(name) else {
-            return Err(self.wrong(name, "missing; allowed: the variables of Exodus II"));
+            return Err(self.wrong(name, "missing (Exodus II has this variable)"));
         };
         let count = shape.iter().try_fold(8u64, |product, &size| product.checked_mul(size as u64));
-        // eight bytes of memory for a byte of the file at least, 1032 where it is packed
+        // a byte of the file gives at most eight bytes in memory, or 1032 times as many if compressed
         if count.is_none_or(|count| count > (1 << 22) + 8 * 1032 * self.bytes) {
-            return Err(self.wrong(name, format!("shape {shape:?}; allowed: what fits into the file")));
+            return Err(
+                self.wrong(name, format!("found shape {shape:?}; allowed: at most the size of the file"))
+            );
         }
-        let found = match &mut self.form {
-            Form::Classic(file) => {
+        let found = match &mut self.format {
+            NetcdfFormat::Classic(file) => {
                 let data = match row {
                     None => file.read_var(name),
                     Some(row) => file.read_record(name, row),
@@ -92,24 +98,25 @@ impl Netcdf {
                 })
                 .map_err(|error| format!("{error:?}"))
             }
-            Form::Hdf5(file) => {
+            NetcdfFormat::Hdf5(file) => {
                 let dataset = dataset(file, name, self.bytes).map_err(|error| error.to_string());
-                dataset.and_then(|dataset| of_hdf5(&dataset, &shape, row).map_err(|error| error.to_string()))
+                dataset
+                    .and_then(|dataset| read_hdf5(&dataset, &shape, row).map_err(|error| error.to_string()))
             }
         };
         found.map_err(|reason| self.wrong(name, reason))
     }
 
-    /// Text in the attribute of a variable.
+    /// Reads a text attribute of a variable.
     pub fn attribute(&self, name: &str, key: &str) -> Option<String> {
-        match &self.form {
-            Form::Classic(file) => file.data_set().get_var(name)?.get_attr_as_string(key),
-            Form::Hdf5(file) => self.dataset(file, name).ok()?.attr(key).ok()?.read_string().ok(),
+        match &self.format {
+            NetcdfFormat::Classic(file) => file.data_set().get_var(name)?.get_attr_as_string(key),
+            NetcdfFormat::Hdf5(file) => self.dataset(file, name).ok()?.attr(key).ok()?.read_string().ok(),
         }
     }
 }
 
-fn of_hdf5(
+fn read_hdf5(
     dataset: &H5Dataset,
     shape: &[usize],
     row: Option<usize>,

@@ -1,4 +1,4 @@
-//! Files of other programs, whole, damaged, and with names that there are not.
+//! Result files of other programs: valid, damaged, and with unknown names.
 
 use super::*;
 
@@ -6,9 +6,9 @@ fn file(name: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/thermal").join(name)
 }
 
-/// Files that VTK and netCDF wrote (`make.py` beside them): T = 400 + 100 x + 10 y + z + t.
+/// Files written by VTK and netCDF (`make.py` beside them): T = 400 + 100 x + 10 y + z + t.
 #[test]
-fn files_of_others() {
+fn files_of_other_programs() {
     for (name, array) in [
         ("blocks.pvd", None),
         ("blocks.pvd", Some("Temperature")),
@@ -33,20 +33,20 @@ fn files_of_others() {
     }
 }
 
-/// A strip in the plane as MOOSE writes it (`make.py`): two axes, QUAD4.
+/// A plane strip as MOOSE writes it (`make.py`): two axes, QUAD4.
 #[test]
 fn exodus_in_two_dimensions() {
     let analysis = open(&file("strip.e"), None).unwrap();
     assert_eq!((analysis.points[5], analysis.cells.types.as_slice()), ([2.0, 1.0, 0.0], &[9, 9][..]));
     assert_eq!(analysis.cells.connectivity, [0, 1, 4, 3, 1, 2, 5, 4]);
-    let frames: Vec<Frame> = analysis.frames.collect::<Result<_, _>>().unwrap();
+    let frames: Vec<ThermalFrame> = analysis.frames.collect::<Result<_, _>>().unwrap();
     assert_eq!((frames.len(), frames[2].time, frames[2].temperature[5]), (3, 5.0, 615.0));
 }
 
 #[test]
-fn names_that_there_are_not() {
+fn unknown_names_are_refused() {
     for (name, array, says) in [
-        ("blocks.e", None, "allowed: one scalar array"),
+        ("blocks.e", None, "allowed: one nodal scalar array"),
         ("blocks.e", Some("temprature"), "allowed: velocity, temperature"),
         ("blocks.pvd", Some("T"), "allowed: Temperature"),
         ("make.py", None, "allowed: frd, pvd, vtu, pvtu, xdmf"),
@@ -56,7 +56,8 @@ fn names_that_there_are_not() {
     }
 }
 
-/// Cut anywhere and with any byte changed: an error or other numbers, never a panic, and no more memory than a file can fill.
+/// A file truncated anywhere, or with any byte changed, gives an error or other numbers, but no panic, and
+/// needs no more memory than a file can fill.
 #[test]
 fn damaged_files() {
     let directory = tempfile::tempdir().unwrap();
@@ -68,7 +69,7 @@ fn damaged_files() {
             std::fs::write(&path, bytes).unwrap();
             let array = if name.ends_with(".e") { "temperature" } else { "Temperature" };
             let whole = open(&path, Some(array)).and_then(|analysis| {
-                analysis.frames.collect::<Result<Vec<Frame>, Error>>().map(|frames| frames.len())
+                analysis.frames.collect::<Result<Vec<ThermalFrame>, Error>>().map(|frames| frames.len())
             });
             refused += usize::from(whole.is_err());
         };
@@ -85,7 +86,8 @@ fn damaged_files() {
     }
 }
 
-/// T = 300 + 10 x + y at t = 0, 5 more at t = 2.5, at six nodes of a strip of two quadrilaterals, as other programs write it.
+/// T = 300 + 10 x + y at t = 0, 5 K more at t = 2.5 s, at six nodes of a strip of two quadrilaterals, in the
+/// formats of other programs.
 #[test]
 fn shapes_of_fewer_dimensions_and_parts() {
     let directory = tempfile::tempdir().unwrap();
@@ -101,8 +103,8 @@ fn shapes_of_fewer_dimensions_and_parts() {
     };
     let vtu = |time, own: &[[i32; 2]], nodes: &str, ends: &str, kinds: &str| {
         format!(
-            "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece NumberOfPoints=\"{}\"><Points>{}</Points><Cells>{}{}{}</Cells>\
-             <PointData>{}</PointData></Piece></UnstructuredGrid></VTKFile>",
+            "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece \
+             NumberOfPoints=\"{}\"><Points>{}</Points><Cells>{}{}{}</Cells><PointData>{}</PointData></Piece></UnstructuredGrid></VTKFile>",
             own.len(),
             array("Points", "Float64", &places(own)).replace(" Name", " NumberOfComponents=\"3\" Name"),
             array("connectivity", "Int32", nodes),
@@ -115,7 +117,8 @@ fn shapes_of_fewer_dimensions_and_parts() {
     let part = |time, k: usize| {
         vtu(time, &[points[k], points[k + 1], points[k + 3], points[k + 4]], "0 1 3 2", "4", "9")
     };
-    let empty = "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece NumberOfPoints=\"0\"></Piece></UnstructuredGrid></VTKFile>";
+    let empty = "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece \
+        NumberOfPoints=\"0\"></Piece></UnstructuredGrid></VTKFile>";
     write("empty.vtu", empty.into());
     write("whole.vtu", whole(0));
     for time in [0, 1] {
@@ -148,7 +151,7 @@ fn shapes_of_fewer_dimensions_and_parts() {
     write("pixels.vtu", vtu(0, &points, "0 1 3 4 1 2 4 5", "4 8", "8 8"));
     write("mixed.vtu", vtu(0, &points, "0 1 4 3 1 2 5 1 5 4", "4 7 10", "70 69 5"));
 
-    // XDMF by hand: text, mixed, two axes; a mesh of its own with included references; HDF5
+    // hand-written XDMF: text, mixed cells, two axes; separate mesh with included references; HDF5
     let item = |dimensions: &str, text: &str| {
         format!("<DataItem Dimensions=\"{dimensions}\" NumberType=\"Float\" Format=\"XML\">{text}</DataItem>")
     };
@@ -160,11 +163,14 @@ fn shapes_of_fewer_dimensions_and_parts() {
     };
     let flat: String = points.iter().map(|[x, y]| format!("{x} {y} ")).collect();
     let geometry = format!("<Geometry GeometryType=\"XY\">{}</Geometry>", item("6 2", &flat));
-    let quads = "<Topology TopologyType=\"Quadrilateral\" NumberOfElements=\"2\"><DataItem Dimensions=\"2 4\" Format=\"XML\">0 1 4 3 1 2 5 4</DataItem></Topology>";
-    let mixed = "<Topology Type=\"Mixed\"><DataItem Dimensions=\"13\" Format=\"XML\">5 0 1 4 3 4 1 2 5 4 1 5 4</DataItem></Topology>";
+    let quads = "<Topology TopologyType=\"Quadrilateral\" NumberOfElements=\"2\"><DataItem Dimensions=\"2 \
+        4\" Format=\"XML\">0 1 4 3 1 2 5 4</DataItem></Topology>";
+    let mixed = "<Topology Type=\"Mixed\"><DataItem Dimensions=\"13\" Format=\"XML\">5 0 1 4 3 4 1 2 5 4 1 \
+        5 4</DataItem></Topology>";
     let xdmf = |text: String| {
         format!(
-            "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\" xmlns:xi=\"http://www.w3.org/2001/XInclude\"><Domain>{text}</Domain></Xdmf>"
+            "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\" xmlns:xi=\"http://www.w3.org/2001/XInclude\">\
+                         <Domain>{text}</Domain></Xdmf>"
         )
     };
     let include =
@@ -200,7 +206,8 @@ fn shapes_of_fewer_dimensions_and_parts() {
     let hdf =
         |name: &str| format!("<DataItem Dimensions=\"0\" Format=\"HDF\">\n numbers.h5:/{name}\n</DataItem>");
     let h5 = format!(
-        "<Geometry GeometryType=\"XYZ\">{}</Geometry><Topology TopologyType=\"Quadrilateral\">{}</Topology><Attribute Name=\"T\">{}</Attribute>",
+        "<Geometry GeometryType=\"XYZ\">{}</Geometry><Topology \
+         TopologyType=\"Quadrilateral\">{}</Topology><Attribute Name=\"T\">{}</Attribute>",
         hdf("xyz"),
         hdf("cells"),
         hdf("T0")
@@ -208,10 +215,11 @@ fn shapes_of_fewer_dimensions_and_parts() {
     write("hdf.xdmf", xdmf(grid(&h5)));
     let bytes: Vec<u8> = points.iter().flat_map(|[x, y]| f64::from(300 + 10 * x + y).to_be_bytes()).collect();
     std::fs::write(at("numbers.bin"), [vec![0; 3], bytes].concat()).unwrap();
-    let binary = "<Attribute Name=\"T\"><DataItem Dimensions=\"6\" NumberType=\"Float\" Precision=\"8\" Endian=\"Big\" Seek=\"3\" Format=\"Binary\">numbers.bin</DataItem></Attribute>";
+    let binary = "<Attribute Name=\"T\"><DataItem Dimensions=\"6\" NumberType=\"Float\" Precision=\"8\" \
+        Endian=\"Big\" Seek=\"3\" Format=\"Binary\">numbers.bin</DataItem></Attribute>";
     write("binary.xdmf", xdmf(grid(&format!("{mesh}{binary}"))));
 
-    // cut anywhere and with any letter changed: an error or other numbers
+    // truncated anywhere, or with any byte changed: an error or other numbers
     for name in ["list.xmf", "hdf.xdmf", "binary.xdmf"] {
         let good = std::fs::read(at(name)).unwrap();
         let damaged = at("damaged.xdmf");
@@ -247,7 +255,7 @@ fn shapes_of_fewer_dimensions_and_parts() {
     ] {
         let analysis = open(&at(name), None).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!((analysis.points.len(), analysis.cells.types.as_slice()), (nodes, types), "{name}");
-        let frames: Vec<Frame> =
+        let frames: Vec<ThermalFrame> =
             analysis.frames.collect::<Result<_, _>>().unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!(frames.iter().map(|frame| frame.time).collect::<Vec<f64>>(), times, "{name}");
         for (index, frame) in frames.iter().enumerate() {
@@ -274,13 +282,13 @@ fn shapes_of_fewer_dimensions_and_parts() {
     write("none.vtu", empty.into());
     write("old.vtk", "# vtk".into());
     for (name, says) in [
-        ("missing.pvd", "t7.vtu, which is not there"),
+        ("missing.pvd", "t7.vtu, which does not exist"),
         ("spatial.xdmf", "spatial collection; allowed: uniform grids"),
         ("regular.xdmf", "\"2DCoRectMesh\"; allowed: mixed, polyvertex"),
         ("short.xdmf", "5 values of `T` at t = 0 s; allowed: 6"),
         ("checkpoint.xdmf", "not as a checkpoint"),
-        ("cells.xdmf", "allowed: one scalar array of nodes"),
-        ("beyond.xdmf", "node 6 of an element; allowed: 0 to 5"),
+        ("cells.xdmf", "allowed: one nodal scalar array"),
+        ("beyond.xdmf", "node 6 in an element; allowed: 0 to 5"),
         ("none.vtu", "no points"),
         ("old.vtk", "save it as .vtu"),
     ] {

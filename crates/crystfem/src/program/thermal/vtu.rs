@@ -1,8 +1,10 @@
-//! VTK's unstructured grids in XML (`.vtu`), in parts (`.pvtu`), and their series (`.pvd`): text, base64 and raw blocks, packed by zlib or not.
+//! VTK XML files: unstructured grids (`.vtu`), parallel grids (`.pvtu`) and series (`.pvd`), with text,
+//! base64 or raw arrays, compressed by zlib or not.
 //!
-//! The format: <https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html>. `vtkio` 0.7 was tried: it panics on damaged files.
+//! Format: <https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html>. `vtkio` 0.7 panics on
+//! damaged files.
 
-use super::{Analysis, Frame, Shapes, chosen, unusable};
+use super::{Analysis, CellsByDimension, ThermalFrame, choose_array, data_error};
 use crate::error::Error;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -14,34 +16,38 @@ use std::path::{Path, PathBuf};
 
 type Attributes = HashMap<String, String>;
 
-/// Opens a grid, at t = 0, or a series of them, all with the same nodes. Files of one time are parts of one grid.
+/// Opens a grid, at t = 0, or a series of grids with the same nodes. Files of the same time are parts of one
+/// grid.
 pub fn open(path: &Path, array: Option<&str>) -> Result<Analysis, Error> {
     let files = if has_ending(path, "pvd") { series(path)? } else { vec![(0.0, vec![path.to_path_buf()])] };
     let Some((_, first)) = files.first() else {
-        return Err(unusable(path, "no DataSet; allowed: one at least"));
+        return Err(data_error(path, "found no DataSet; allowed: at least one"));
     };
-    let Grid { points, cells, scalars } = Grid::of_parts(first)?;
+    let VtuGrid { points, cells, scalars } = VtuGrid::from_files(first)?;
     let first = first.first().map_or(path, PathBuf::as_path);
     let allowed = "lines, triangles, quadrilaterals, tetrahedra, pyramids, wedges, hexahedra";
     let Some(cells) = cells.highest() else {
-        return Err(unusable(first, &format!("no element; allowed: {allowed}")));
+        return Err(data_error(first, &format!("found no elements; allowed: {allowed}")));
     };
     let names: Vec<String> = scalars.into_iter().map(|(name, _)| name).collect();
-    let name = chosen(first, &names, array)?.to_owned();
+    let name = choose_array(first, &names, array)?.to_owned();
     let nodes = points.len();
     if let Some(missing) = files.iter().flat_map(|(_, parts)| parts).find(|file| !file.is_file()) {
-        return Err(unusable(path, &format!("{}, which is not there", missing.display())));
+        return Err(data_error(path, &format!("refers to {}, which does not exist", missing.display())));
     }
     let frames = files.into_iter().map(move |(time, parts)| {
-        let mut scalars = Grid::of_parts(&parts)?.scalars;
+        let mut scalars = VtuGrid::from_files(&parts)?.scalars;
         let index = scalars.iter().position(|(own, _)| *own == name);
         let temperature = index.map(|index| scalars.swap_remove(index).1).unwrap_or_default();
         if temperature.len() != nodes {
-            let found = format!("{} values of `{name}`", temperature.len());
+            let found = format!("found {} values of `{name}`", temperature.len());
             let path = parts.first().map_or(Path::new(""), PathBuf::as_path);
-            return Err(unusable(path, &format!("{found}; allowed: {nodes}, the nodes of the first time")));
+            return Err(data_error(
+                path,
+                &format!("{found}; allowed: {nodes}, one per node of the first time"),
+            ));
         }
-        Ok(Frame { time, temperature })
+        Ok(ThermalFrame { time, temperature })
     });
     Ok(Analysis { points, cells, frames: Box::new(frames) })
 }
@@ -50,20 +56,23 @@ fn has_ending(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending))
 }
 
-/// A file or folder named in another, which may be below another path there.
+/// Returns the path of a file that is named in another file, relative to it.
 fn beside(path: &Path, name: &str) -> PathBuf {
     path.with_file_name(name.replace('\\', "/"))
 }
 
-/// Times and files of a series.
+/// Reads times and files of a series.
 fn series(path: &Path) -> Result<Vec<(f64, Vec<PathBuf>)>, Error> {
-    let text = std::fs::read_to_string(path).map_err(polycore::Error::io("read", path))?;
+    let text = std::fs::read_to_string(path).map_err(polycore::Error::from_io("read", path))?;
     let mut files: Vec<(f64, Vec<PathBuf>)> = Vec::new();
     elements(path, text.as_bytes(), |name, attributes, _| {
         if name == "DataSet" {
             let number = attributes.get("timestep").and_then(|time| time.parse::<f64>().ok());
             let (Some(time), Some(file)) = (number, attributes.get("file")) else {
-                return Err(unusable(path, "a DataSet; allowed: with `timestep`, a number, and `file`"));
+                return Err(data_error(
+                    path,
+                    "found a DataSet without them; allowed: `timestep`, a number, and `file`",
+                ));
             };
             match files.iter_mut().find(|(other, _)| *other == time) {
                 Some((_, parts)) => parts.push(beside(path, file)),
@@ -75,7 +84,7 @@ fn series(path: &Path) -> Result<Vec<(f64, Vec<PathBuf>)>, Error> {
     Ok(files)
 }
 
-/// Calls for every element with its attributes and its text.
+/// Calls `found` for each element, with its attributes and text.
 fn elements(
     path: &Path,
     text: &[u8],
@@ -83,7 +92,7 @@ fn elements(
 ) -> Result<(), Error> {
     let mut reader = Reader::from_reader(text);
     reader.config_mut().check_end_names = false;
-    let wrong = |reason: String| unusable(path, &reason);
+    let wrong = |reason: String| data_error(path, &reason);
     let mut open: Option<(String, Attributes)> = None;
     let mut content = String::new();
     loop {
@@ -91,12 +100,12 @@ fn elements(
         let begins = matches!(event, Event::Start(_));
         match event {
             Event::Start(start) | Event::Empty(start) => {
-                // containers are told when their first child begins
+                // report a container when its first child begins
                 if let Some((name, attributes)) = open.take() {
                     found(&name, &attributes, &content)?;
                 }
                 content.clear();
-                let element = of(path, &start)?;
+                let element = parse_element(path, &start)?;
                 if begins {
                     open = Some(element);
                 } else {
@@ -117,13 +126,13 @@ fn elements(
     }
 }
 
-fn of(path: &Path, start: &BytesStart) -> Result<(String, Attributes), Error> {
+fn parse_element(path: &Path, start: &BytesStart) -> Result<(String, Attributes), Error> {
     let name = String::from_utf8_lossy(start.name().as_ref()).into_owned();
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let attributes = start
         .attributes()
         .map(|attribute| {
-            let attribute = attribute.map_err(|error| unusable(path, &format!("<{name}>: {error}")))?;
+            let attribute = attribute.map_err(|error| data_error(path, &format!("<{name}>: {error}")))?;
             Ok((text(attribute.key.as_ref()), text(&attribute.value)))
         })
         .collect::<Result<_, Error>>()?;
@@ -132,34 +141,34 @@ fn of(path: &Path, start: &BytesStart) -> Result<(String, Attributes), Error> {
 
 /// A grid of one or several pieces.
 #[derive(Default)]
-struct Grid {
+struct VtuGrid {
     points: Vec<[f64; 3]>,
-    cells: Shapes,
-    /// Name and values at the nodes.
+    cells: CellsByDimension,
+    /// Names and nodal values.
     scalars: Vec<(String, Vec<f64>)>,
 }
 
-/// How a file packs its arrays.
-struct Coding<'a> {
+/// Encoding of the arrays of a file.
+struct ArrayEncoding<'a> {
     path: &'a Path,
     big: bool,
-    /// Bytes of a number in a header.
+    /// Bytes of a number in an array header.
     header: usize,
     packed: bool,
-    /// Bytes behind the `_` of the appended data, and whether they are base64.
+    /// Bytes after the `_` of the appended data, and a flag for base64.
     appended: (&'a [u8], bool),
 }
 
-impl Grid {
-    /// A grid in several files, `.pvtu` among them, whose pieces are files in turn. Nodes between parts are there in each of them.
-    fn of_parts(files: &[PathBuf]) -> Result<Self, Error> {
+impl VtuGrid {
+    /// Reads a grid from several files, including the files of `.pvtu`. Nodes shared by parts are repeated.
+    fn from_files(files: &[PathBuf]) -> Result<Self, Error> {
         let mut grid = Self::default();
         for file in files {
             if !has_ending(file, "pvtu") {
                 grid.read(file)?;
                 continue;
             }
-            let text = std::fs::read_to_string(file).map_err(polycore::Error::io("read", file))?;
+            let text = std::fs::read_to_string(file).map_err(polycore::Error::from_io("read", file))?;
             let mut pieces = Vec::new();
             elements(file, text.as_bytes(), |name, attributes, _| {
                 if let ("Piece", Some(source)) = (name, attributes.get("Source")) {
@@ -168,34 +177,36 @@ impl Grid {
                 Ok(())
             })?;
             if pieces.is_empty() {
-                return Err(unusable(file, "no Piece with a Source; allowed: one at least"));
+                return Err(data_error(file, "found no Piece with a Source; allowed: at least one"));
             }
             pieces.iter().try_for_each(|piece| grid.read(piece))?;
         }
-        // a part of a parallel run may be empty, a whole grid not
+        // a part of a parallel run may be empty, but not the whole grid
         let first = files.first().filter(|_| grid.points.is_empty());
-        first.map_or(Ok(grid), |path| Err(unusable(path, "no points; allowed: a Piece with Points at least")))
+        first.map_or(Ok(grid), |path| {
+            Err(data_error(path, "found no points; allowed: at least one Piece with Points"))
+        })
     }
 
     fn read(&mut self, path: &Path) -> Result<(), Error> {
-        let bytes = std::fs::read(path).map_err(polycore::Error::io("read", path))?;
-        let wrong = |reason: &str| unusable(path, reason);
-        // raw bytes are no XML: what is appended is cut off before it is parsed
+        let bytes = std::fs::read(path).map_err(polycore::Error::from_io("read", path))?;
+        let wrong = |reason: &str| data_error(path, reason);
+        // raw bytes are not XML: the appended data are cut off before parsing
         let at = bytes.windows(13).position(|window| window == b"<AppendedData").unwrap_or(bytes.len());
         let (text, tail) = bytes.split_at(at);
         let begin = tail.iter().position(|&byte| byte == b'_').map_or(tail.len(), |place| place + 1);
         let base64 = !tail[..begin].windows(5).any(|window| window == b"\"raw\"");
         let mut coding =
-            Coding { path, big: false, header: 4, packed: false, appended: (&tail[begin..], base64) };
+            ArrayEncoding { path, big: false, header: 4, packed: false, appended: (&tail[begin..], base64) };
         let (grid, mut section) = (self, String::new());
-        let mut piece = Piece::default();
+        let mut piece = VtuPiece::default();
         elements(path, text, |name, attributes, content| {
             let attribute = |key: &str| attributes.get(key).map(String::as_str).unwrap_or_default();
             match name {
                 "VTKFile" => {
                     if attribute("type") != "UnstructuredGrid" {
                         let found = attribute("type");
-                        return Err(wrong(&format!("type {found:?}; allowed: UnstructuredGrid")));
+                        return Err(wrong(&format!("found type {found:?}; allowed: UnstructuredGrid")));
                     }
                     coding.big = attribute("byte_order") == "BigEndian";
                     coding.header = if attribute("header_type") == "UInt64" { 8 } else { 4 };
@@ -204,7 +215,7 @@ impl Grid {
                         "vtkZLibDataCompressor" => true,
                         other => {
                             let allowed = "vtkZLibDataCompressor or none";
-                            return Err(wrong(&format!("compressor {other:?}; allowed: {allowed}")));
+                            return Err(wrong(&format!("found compressor {other:?}; allowed: {allowed}")));
                         }
                     };
                 }
@@ -231,7 +242,7 @@ impl Grid {
         Ok(())
     }
 
-    fn add(&mut self, piece: Piece, path: &Path) -> Result<(), Error> {
+    fn add(&mut self, piece: VtuPiece, path: &Path) -> Result<(), Error> {
         let first = self.points.len();
         self.points.extend(piece.points.chunks_exact(3).map(|x| [x[0], x[1], x[2]]));
         let nodes = self.points.len() - first;
@@ -240,8 +251,11 @@ impl Grid {
             let own = piece.nodes.get(begin..end as usize);
             let fits = |&node: &f64| (0.0..nodes as f64).contains(&node);
             let Some(own) = own.filter(|own| own.iter().all(fits)) else {
-                let reason = format!("a cell that ends at {end}; allowed: nodes 0 to {}", nodes.max(1) - 1);
-                return Err(unusable(path, &reason));
+                let reason = format!(
+                    "found a cell that ends at {end} with invalid nodes; allowed: nodes 0 to {}",
+                    nodes.max(1) - 1
+                );
+                return Err(data_error(path, &reason));
             };
             let own: Vec<u32> = own.iter().map(|&node| first as u32 + node as u32).collect();
             self.cells.push(kind as u64, &own);
@@ -258,7 +272,7 @@ impl Grid {
 }
 
 #[derive(Default)]
-struct Piece {
+struct VtuPiece {
     points: Vec<f64>,
     nodes: Vec<f64>,
     ends: Vec<f64>,
@@ -266,10 +280,10 @@ struct Piece {
     scalars: Vec<(String, Vec<f64>)>,
 }
 
-impl Coding<'_> {
+impl ArrayEncoding<'_> {
     fn wrong(&self, attributes: &Attributes, reason: &str) -> Error {
         let name = attributes.get("Name").map(String::as_str).unwrap_or_default();
-        unusable(self.path, &format!("array `{name}`: {reason}"))
+        data_error(self.path, &format!("array `{name}`: {reason}"))
     }
 
     fn values(&self, attributes: &Attributes, content: &str) -> Result<Vec<f64>, Error> {
@@ -289,21 +303,21 @@ impl Coding<'_> {
                 from.and_then(|from| self.block(from, self.appended.1))
             }
             other => {
-                return Err(wrong(&format!("format {other:?}; allowed: ascii, binary, appended")));
+                return Err(wrong(&format!("found format {other:?}; allowed: ascii, binary, appended")));
             }
         };
         let Some(bytes) = bytes else {
-            return Err(wrong("damaged; allowed: a header and as many bytes as it names"));
+            return Err(wrong("damaged or truncated"));
         };
         let kind = attribute("type");
         numbers(&bytes, kind, self.big)
-            .ok_or_else(|| wrong(&format!("type {kind:?}; allowed: Int8 … UInt64, Float32, Float64")))
+            .ok_or_else(|| wrong(&format!("found type {kind:?}; allowed: Int8 … UInt64, Float32, Float64")))
     }
 
-    /// A block of bytes behind its header.
+    /// Decodes a block of bytes after its header.
     fn block(&self, data: &[u8], base64: bool) -> Option<Vec<u8>> {
         let digits = |bytes: usize| if base64 { bytes.div_ceil(3).checked_mul(4) } else { Some(bytes) };
-        // header and data are coded for themselves where they are packed
+        // compressed arrays encode header and data separately
         let cut = |from: usize, bytes: usize| -> Option<Vec<u8>> {
             let part = data.get(from..from.checked_add(digits(bytes)?)?)?;
             let mut all = if base64 { BASE64_STANDARD.decode(part).ok()? } else { part.to_vec() };
@@ -340,8 +354,8 @@ impl Coding<'_> {
 }
 
 pub(super) fn numbers(bytes: &[u8], kind: &str, big: bool) -> Option<Vec<f64>> {
-    fn of<const N: usize>(bytes: &[u8], big: bool, number: impl Fn([u8; N]) -> f64) -> Vec<f64> {
-        let one = |chunk: &[u8]| {
+    fn convert<const N: usize>(bytes: &[u8], big: bool, number: impl Fn([u8; N]) -> f64) -> Vec<f64> {
+        let value = |chunk: &[u8]| {
             let mut own = [0; N];
             own.copy_from_slice(chunk);
             if big {
@@ -349,19 +363,19 @@ pub(super) fn numbers(bytes: &[u8], kind: &str, big: bool) -> Option<Vec<f64>> {
             }
             number(own)
         };
-        bytes.chunks_exact(N).map(one).collect()
+        bytes.chunks_exact(N).map(value).collect()
     }
     Some(match kind {
-        "Int8" => of(bytes, big, |own| f64::from(i8::from_le_bytes(own))),
-        "UInt8" => of(bytes, big, |own| f64::from(u8::from_le_bytes(own))),
-        "Int16" => of(bytes, big, |own| f64::from(i16::from_le_bytes(own))),
-        "UInt16" => of(bytes, big, |own| f64::from(u16::from_le_bytes(own))),
-        "Int32" => of(bytes, big, |own| f64::from(i32::from_le_bytes(own))),
-        "UInt32" => of(bytes, big, |own| f64::from(u32::from_le_bytes(own))),
-        "Int64" => of(bytes, big, |own| i64::from_le_bytes(own) as f64),
-        "UInt64" => of(bytes, big, |own| u64::from_le_bytes(own) as f64),
-        "Float32" => of(bytes, big, |own| f64::from(f32::from_le_bytes(own))),
-        "Float64" => of(bytes, big, f64::from_le_bytes),
+        "Int8" => convert(bytes, big, |own| f64::from(i8::from_le_bytes(own))),
+        "UInt8" => convert(bytes, big, |own| f64::from(u8::from_le_bytes(own))),
+        "Int16" => convert(bytes, big, |own| f64::from(i16::from_le_bytes(own))),
+        "UInt16" => convert(bytes, big, |own| f64::from(u16::from_le_bytes(own))),
+        "Int32" => convert(bytes, big, |own| f64::from(i32::from_le_bytes(own))),
+        "UInt32" => convert(bytes, big, |own| f64::from(u32::from_le_bytes(own))),
+        "Int64" => convert(bytes, big, |own| i64::from_le_bytes(own) as f64),
+        "UInt64" => convert(bytes, big, |own| u64::from_le_bytes(own) as f64),
+        "Float32" => convert(bytes, big, |own| f64::from(f32::from_le_bytes(own))),
+        "Float64" => convert(bytes, big, f64::from_le_bytes),
         _ => return None,
     })
 }

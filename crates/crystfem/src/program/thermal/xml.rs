@@ -1,41 +1,40 @@
 //! Small XML files as a tree.
 
-use super::unusable;
+use super::data_error;
 use crate::error::Error;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 use std::path::Path;
 
-/// An element: its name without a prefix, attributes, text, and what is in it.
+/// An XML element: name without prefix, attributes, text and children.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Node {
+pub(super) struct XmlElement {
     pub name: String,
     attributes: Vec<(String, String)>,
     pub text: String,
-    pub children: Vec<Node>,
+    pub children: Vec<XmlElement>,
 }
 
-impl Node {
-    /// An attribute; empty where it is not there.
+impl XmlElement {
+    /// Returns an attribute, or an empty string.
     pub fn get(&self, key: &str) -> &str {
         self.attributes.iter().find(|(own, _)| own == key).map_or("", |(_, value)| value)
     }
 
-    /// Children of a name.
+    /// Returns the children with a name.
     pub fn all<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a Self> {
         self.children.iter().filter(move |child| child.name == name)
     }
 
-    /// The first child of a name.
+    /// Returns the first child with a name.
     pub fn child<'a>(&'a self, name: &'a str) -> Option<&'a Self> {
         self.all(name).next()
     }
 
-    /// Itself and all below it, from the top down.
-    pub fn below(&self) -> Vec<&Self> {
+    /// Returns the element and all descendants, in file order.
+    pub fn descendants(&self) -> Vec<&Self> {
         let mut found = vec![self];
         let mut at = 0;
-        // in the order of the file
         while let Some(node) = found.get(at).copied() {
             found.splice(at + 1..at + 1, &node.children);
             at += 1;
@@ -44,18 +43,18 @@ impl Node {
     }
 }
 
-/// Reads a file; what holds all of it has no name.
-pub(super) fn read(path: &Path) -> Result<Node, Error> {
-    let text = std::fs::read_to_string(path).map_err(polycore::Error::io("read", path))?;
-    let wrong = |reason: String| unusable(path, &reason);
+/// Reads a file; the root of the tree has no name.
+pub(super) fn read(path: &Path) -> Result<XmlElement, Error> {
+    let text = std::fs::read_to_string(path).map_err(polycore::Error::from_io("read", path))?;
+    let wrong = |reason: String| data_error(path, &reason);
     let mut reader = Reader::from_str(&text);
-    let mut open = vec![Node::default()];
+    let mut open = vec![XmlElement::default()];
     loop {
         let event = reader.read_event().map_err(|error| wrong(error.to_string()))?;
         match event {
-            Event::Start(start) => open.push(of(path, &start)?),
+            Event::Start(start) => open.push(parse_element(path, &start)?),
             Event::Empty(start) => {
-                let node = of(path, &start)?;
+                let node = parse_element(path, &start)?;
                 open.last_mut().into_iter().for_each(|parent| parent.children.push(node.clone()));
             }
             Event::Text(text) => {
@@ -71,22 +70,22 @@ pub(super) fn read(path: &Path) -> Result<Node, Error> {
             _ => {}
         }
         if open.len() > 100 {
-            return Err(wrong("more than 100 elements in each other".into()));
+            return Err(wrong("found more than 100 nested elements; allowed: at most 100".into()));
         }
     }
     match &mut open[..] {
         [all] => Ok(std::mem::take(all)),
-        _ => Err(wrong("the end of the file; allowed: elements that end".into())),
+        _ => Err(wrong("truncated: an element does not end".into())),
     }
 }
 
-fn of(path: &Path, start: &BytesStart) -> Result<Node, Error> {
+fn parse_element(path: &Path, start: &BytesStart) -> Result<XmlElement, Error> {
     let name = String::from_utf8_lossy(start.local_name().as_ref()).into_owned();
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let attributes = start.attributes().map(|attribute| {
-        let attribute = attribute.map_err(|error| unusable(path, &format!("<{name}>: {error}")))?;
+        let attribute = attribute.map_err(|error| data_error(path, &format!("<{name}>: {error}")))?;
         Ok((text(attribute.key.as_ref()), text(&attribute.value)))
     });
     let attributes = attributes.collect::<Result<_, Error>>()?;
-    Ok(Node { name, attributes, ..Node::default() })
+    Ok(XmlElement { name, attributes, ..XmlElement::default() })
 }

@@ -1,17 +1,17 @@
-//! Rows times a vector: runs of equal rows by vectors of the processor, others one by one.
+//! Matrix-vector products: vectorized over runs of equal rows, row by row otherwise.
 
-use super::stencils::Stencil;
-use super::{Rows, Segment};
+use super::stencils::RowStencil;
+use super::{ConductionRows, RowRun};
 use crate::system::vector::dot_simd;
 use pulp::{Simd, WithSimd};
 
-/// Entries of the longest row that the vector path takes.
-const MOST_ENTRIES: usize = 64;
+/// Longest row of the vectorized path.
+const MAX_ENTRIES: usize = 64;
 
-/// One work item of a product.
-pub(super) struct Product<'a, const FLOW: bool> {
-    pub rows: &'a Rows,
-    pub segments: &'a [Segment],
+/// Product of one work item.
+pub(super) struct RowsProduct<'a, const FLOW: bool> {
+    pub rows: &'a ConductionRows,
+    pub segments: &'a [RowRun],
     pub weights: [f64; 2],
     pub diagonal: Option<&'a [f64]>,
     pub x: &'a [f64],
@@ -19,7 +19,7 @@ pub(super) struct Product<'a, const FLOW: bool> {
     pub first: usize,
 }
 
-impl<const FLOW: bool> WithSimd for Product<'_, FLOW> {
+impl<const FLOW: bool> WithSimd for RowsProduct<'_, FLOW> {
     type Output = f64;
 
     #[inline(always)]
@@ -27,14 +27,14 @@ impl<const FLOW: bool> WithSimd for Product<'_, FLOW> {
         let Self { rows, segments, weights, diagonal, x, y, first } = self;
         let stencils = &rows.stencils;
         for segment in segments {
-            let Stencil { pattern, values } = segment.stencil;
+            let RowStencil { pattern, values } = segment.stencil;
             let (range, offsets) = (stencils.values.range(values), stencils.offsets(pattern));
             let start = first + segment.start as usize;
             let length = segment.length as usize;
-            if length >= S::F64_LANES && range.len() <= MOST_ENTRIES {
-                Runs { rows, segment, diagonal, y: &mut *y, first }.run::<S, FLOW>(simd, weights, x);
+            if length >= S::F64_LANES && range.len() <= MAX_ENTRIES {
+                RunProduct { rows, segment, diagonal, y: &mut *y, first }.run::<S, FLOW>(simd, weights, x);
             } else {
-                // vectors of four reach one number further than a row whose columns come in threes
+                // vectors of four read one number past a row with columns in threes
                 let threes = stencils.in_threes(pattern)
                     && stencils.capacity.is_empty()
                     && range.end < stencils.conduction.len()
@@ -64,7 +64,8 @@ impl<const FLOW: bool> WithSimd for Product<'_, FLOW> {
     }
 }
 
-/// Σ v_j (x_j − `own`) of a row whose columns come in threes: vectors of four numbers, whose last one belongs to no sum.
+/// Σ v_j (x_j − `own`) of a row with columns in threes, by vectors of four numbers, the last of which is
+/// ignored.
 #[inline(always)]
 fn in_threes(offsets: &[i32], values: &[f64], x: &[f64], row: usize, own: f64) -> f64 {
     let mut sums = [0.0; 4];
@@ -80,7 +81,7 @@ fn in_threes(offsets: &[i32], values: &[f64], x: &[f64], row: usize, own: f64) -
     sums[0] + sums[1] + sums[2]
 }
 
-/// Σ K_ij (x_j − x_i) of a row, in four sums and the rest.
+/// Σ K_ij (x_j − x_i) of a row, in four partial sums and a remainder.
 #[inline(always)]
 fn flow(offsets: &[i32], values: &[f64], x: &[f64], row: usize) -> f64 {
     let own = x[row];
@@ -99,10 +100,10 @@ fn flow(offsets: &[i32], values: &[f64], x: &[f64], row: usize) -> f64 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
-/// One work item of K x and M u, in one look at each row.
-pub(super) struct Both<'a> {
-    pub rows: &'a Rows,
-    pub segments: &'a [Segment],
+/// Products K x and M u of one work item, in one pass over the rows.
+pub(super) struct FlowAndCapacity<'a> {
+    pub rows: &'a ConductionRows,
+    pub segments: &'a [RowRun],
     pub x: &'a [f64],
     pub u: &'a [f64],
     pub flow: &'a mut [f64],
@@ -110,7 +111,7 @@ pub(super) struct Both<'a> {
     pub first: usize,
 }
 
-impl WithSimd for Both<'_> {
+impl WithSimd for FlowAndCapacity<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -118,12 +119,12 @@ impl WithSimd for Both<'_> {
         let Self { rows, segments, x, u, flow, stored, first } = self;
         let stencils = &rows.stencils;
         for segment in segments {
-            let Stencil { pattern, values } = segment.stencil;
+            let RowStencil { pattern, values } = segment.stencil;
             let (range, offsets) = (stencils.values.range(values), stencils.offsets(pattern));
             let start = first + segment.start as usize;
             let length = segment.length as usize;
-            if length >= S::F64_LANES && range.len() <= MOST_ENTRIES {
-                let rows_of = |y| Runs { rows, segment, diagonal: None, y, first };
+            if length >= S::F64_LANES && range.len() <= MAX_ENTRIES {
+                let rows_of = |y| RunProduct { rows, segment, diagonal: None, y, first };
                 rows_of(&mut *flow).run::<S, true>(simd, [0.0, 1.0], x);
                 rows_of(&mut *stored).run::<S, false>(simd, [1.0, 0.0], u);
                 continue;
@@ -132,7 +133,7 @@ impl WithSimd for Both<'_> {
             let capacity = &stencils.capacity[range][..offsets.len()];
             for row in start..start + length {
                 let own = x[row];
-                // K x and M u, twice each
+                // K x and M u, two partial sums each
                 let mut sums = [0.0; 4];
                 let pairs = offsets.len() / 2;
                 for pair in 0..pairs {
@@ -155,22 +156,22 @@ impl WithSimd for Both<'_> {
     }
 }
 
-/// A run of equal rows.
-struct Runs<'a> {
-    rows: &'a Rows,
-    segment: &'a Segment,
+/// Product of a run of equal rows.
+struct RunProduct<'a> {
+    rows: &'a ConductionRows,
+    segment: &'a RowRun,
     diagonal: Option<&'a [f64]>,
     y: &'a mut [f64],
     first: usize,
 }
 
-impl Runs<'_> {
+impl RunProduct<'_> {
     #[inline(always)]
     fn run<S: Simd, const FLOW: bool>(self, simd: S, weights: [f64; 2], x: &[f64]) {
         let Self { rows, segment, diagonal, y, first } = self;
         let lanes = S::F64_LANES;
         let range = rows.stencils.values.range(segment.stencil.values);
-        let mut values = [0.0; MOST_ENTRIES];
+        let mut values = [0.0; MAX_ENTRIES];
         let offsets = rows.stencils.offsets(segment.stencil.pattern);
         let values = &mut values[..offsets.len()];
         for (value, at) in values.iter_mut().zip(range) {
@@ -190,7 +191,7 @@ impl Runs<'_> {
     }
 }
 
-/// V vectors of rows of one stencil.
+/// Multiplies V vectors of rows of one stencil.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
 fn block<S: Simd, const V: usize, const FLOW: bool>(

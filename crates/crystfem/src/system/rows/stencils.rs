@@ -1,23 +1,23 @@
-//! What rows are made of: distances of their columns, and values. Each distinct list of either is stored once, so that equal cells that are
-//! numbered differently share values, and unequal ones that are numbered alike share distances.
+//! Offsets and values of rows. Each distinct list of either is stored once, so that equal cells with
+//! different numbering share values, and unequal cells with equal numbering share offsets.
 
 use crate::system::NONE;
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// A row: its list of distances and its list of values.
+/// Stencil of a row: its list of offsets and its list of values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Stencil {
+pub(super) struct RowStencil {
     pub(super) pattern: u32,
     pub(super) values: u32,
 }
 
-impl Stencil {
-    /// None yet.
+impl RowStencil {
+    /// Marks a missing stencil.
     pub(super) const NONE: Self = Self { pattern: NONE, values: NONE };
 }
 
-/// Entries of a row, columns ascending: distances, K and, with consistent capacity, M.
+/// Entries of a row, columns ascending: offsets, K and, with consistent capacity, M.
 #[derive(Clone, Copy)]
 pub(super) struct Entries<'a> {
     pub(super) offsets: &'a [i32],
@@ -25,45 +25,45 @@ pub(super) struct Entries<'a> {
     pub(super) capacity: &'a [f64],
 }
 
-/// Where lists lie in flat arrays, how many rows have each, and how equal ones are found.
+/// Index of lists in flat arrays: their ranges, the number of rows of each, and a hash of their content.
 #[derive(Clone, Debug)]
-pub(super) struct Lists {
+pub(super) struct ListIndex {
     starts: Vec<u32>,
     rows: Vec<u32>,
     by_hash: HashMap<u64, u32>,
-    /// Lists that some row has.
+    /// Number of lists in use.
     pub(super) used: usize,
-    /// Entries of the others.
+    /// Number of entries of unused lists.
     pub(super) dead: usize,
 }
 
-/// All lists.
+/// Lists of offsets and of values.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Stencils {
-    pub(super) patterns: Lists,
-    pub(super) values: Lists,
+    pub(super) patterns: ListIndex,
+    pub(super) values: ListIndex,
     offsets: Vec<i32>,
-    /// The place of the diagonal in each pattern; [`NONE`] where there is none.
+    /// Position of the diagonal in each pattern, or [`NONE`].
     diagonal: Vec<u32>,
-    /// Whether the columns of each pattern come in threes, one beside the other.
+    /// True for patterns whose columns are groups of three consecutive ones.
     threes: Vec<bool>,
     pub(super) conduction: Vec<f64>,
-    /// Empty with lumped capacity.
+    /// M values; empty with lumped capacity.
     pub(super) capacity: Vec<f64>,
 }
 
-impl Default for Lists {
+impl Default for ListIndex {
     fn default() -> Self {
         Self { starts: vec![0], rows: Vec::new(), by_hash: HashMap::new(), used: 0, dead: 0 }
     }
 }
 
-impl Lists {
+impl ListIndex {
     pub(super) fn count(&self) -> usize {
         self.rows.len()
     }
 
-    /// Entries of all lists.
+    /// Number of entries of all lists.
     pub(super) fn entries(&self) -> usize {
         self.starts[self.count()] as usize
     }
@@ -73,7 +73,7 @@ impl Lists {
         self.starts[list as usize] as usize..self.starts[list as usize + 1] as usize
     }
 
-    /// Appends a list of so many entries that no row has yet.
+    /// Appends an unused list of `length` entries.
     fn push(&mut self, length: usize) -> u32 {
         self.starts.push((self.entries() + length) as u32);
         self.rows.push(0);
@@ -81,7 +81,7 @@ impl Lists {
         (self.count() - 1) as u32
     }
 
-    /// The list of this hash that is equal; else the place for the hash of a new one.
+    /// Finds an equal list by its hash, or the slot for a new one.
     fn find(
         &self,
         words: impl Iterator<Item = u64>,
@@ -102,8 +102,8 @@ impl Lists {
         Err(hash)
     }
 
-    /// Counts rows that have a list now.
-    pub(super) fn hold(&mut self, list: u32, rows: u16) {
+    /// Counts rows that now use a list.
+    pub(super) fn add_rows(&mut self, list: u32, rows: u16) {
         if self.rows[list as usize] == 0 {
             self.used += 1;
             self.dead -= self.range(list).len();
@@ -111,8 +111,8 @@ impl Lists {
         self.rows[list as usize] += u32::from(rows);
     }
 
-    /// The same of those that have it no more.
-    pub(super) fn release(&mut self, list: u32, rows: u16) {
+    /// Counts rows that no longer use a list.
+    pub(super) fn remove_rows(&mut self, list: u32, rows: u16) {
         self.rows[list as usize] -= u32::from(rows);
         if self.rows[list as usize] == 0 {
             self.used -= 1;
@@ -122,27 +122,27 @@ impl Lists {
 }
 
 impl Stencils {
-    /// Distances of a row.
+    /// Offsets of a row.
     #[inline(always)]
     pub(super) fn offsets(&self, pattern: u32) -> &[i32] {
         &self.offsets[self.patterns.range(pattern)]
     }
 
-    /// Whether the columns of a pattern come in threes, one beside the other.
+    /// Returns true if the columns of a pattern are groups of three consecutive ones.
     #[inline(always)]
     pub(super) fn in_threes(&self, pattern: u32) -> bool {
         self.threes[pattern as usize]
     }
 
-    /// The entry on the diagonal.
-    pub(super) fn diagonal(&self, stencil: Stencil) -> Option<usize> {
+    /// Index of the diagonal entry.
+    pub(super) fn diagonal(&self, stencil: RowStencil) -> Option<usize> {
         let at = self.diagonal[stencil.pattern as usize];
         (at != NONE).then_some(self.values.range(stencil.values).start + at as usize)
     }
 
     /// Bytes of all lists.
     pub(super) fn bytes(&self) -> usize {
-        // start, rows, hash and name; place of the diagonal and threes
+        // start, rows, hash and name; diagonal and threes
         const LIST: usize = 4 + 4 + 16;
         let values = self.conduction.len() + self.capacity.len();
         (self.patterns.count() + self.values.count()) * LIST
@@ -151,7 +151,7 @@ impl Stencils {
             + values * size_of::<f64>()
     }
 
-    pub(super) fn entries(&self, stencil: Stencil) -> Entries<'_> {
+    pub(super) fn entries(&self, stencil: RowStencil) -> Entries<'_> {
         let range = self.values.range(stencil.values);
         Entries {
             offsets: self.offsets(stencil.pattern),
@@ -160,12 +160,12 @@ impl Stencils {
         }
     }
 
-    /// The stencil of these entries, whose values are a row's own or shared.
-    pub(super) fn find_or_add(&mut self, entries: Entries, own: bool) -> Stencil {
-        Stencil { pattern: self.pattern(entries.offsets), values: self.list(entries, own) }
+    /// Finds or adds the stencil of these entries, with values shared or of the row's own.
+    pub(super) fn find_or_add(&mut self, entries: Entries, own: bool) -> RowStencil {
+        RowStencil { pattern: self.pattern(entries.offsets), values: self.list(entries, own) }
     }
 
-    /// The pattern of these distances.
+    /// Finds or adds the pattern of these offsets.
     pub(super) fn pattern(&mut self, offsets: &[i32]) -> u32 {
         let words = offsets.iter().map(|&offset| offset as u64);
         let hash = match self.patterns.find(words, |range| self.offsets[range] == *offsets) {
@@ -183,7 +183,7 @@ impl Stencils {
         added
     }
 
-    /// The list of these values.
+    /// Finds or adds the list of these values.
     pub(super) fn list(&mut self, Entries { conduction, capacity, .. }: Entries, own: bool) -> u32 {
         let hash = (!own).then(|| {
             let words = conduction.iter().chain(capacity).map(|value| value.to_bits());

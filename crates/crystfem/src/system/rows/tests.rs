@@ -1,13 +1,13 @@
-//! Rows, their products, and what of them is kept.
+//! Tests of rows, their products and their storage.
 
 use super::*;
 
-/// −1, 2.5, −1 on a line of 10 000 with one different row, against the plain sum.
+/// Product of −1, 2.5, −1 on a line of 10 000 with one different row agrees with the plain sum.
 #[test]
 fn a_line_has_few_stencils_and_the_right_product() {
     let size = 10_000;
     let values = |row: usize| if row == 5000 { [-2.0, 7.0, -3.0] } else { [-1.0, 2.5, -1.0] };
-    let mut rows = Rows::build(size, true, |row, out| {
+    let mut rows = ConductionRows::build(size, true, |row, out| {
         out.begin(std::iter::empty());
         let v = values(row);
         for (k, offset) in [-1_i32, 0, 1].into_iter().enumerate() {
@@ -48,8 +48,9 @@ fn a_line_has_few_stencils_and_the_right_product() {
     assert_eq!(rows.largest(|row, value| if row < 100 { row as f64 } else { value }), 99.0);
 }
 
-/// Rows of a grid 40 wide that alternate between seven lists of values: their products by vectors of four, up to the last row, whose columns
-/// end where the numbers do; births change values again and again, and lists that no row has any more are dropped.
+/// Rows of a grid 40 wide that alternate between seven lists of values share them: products by vectors of
+/// four, up to the last row, whose columns end with the array; births change values repeatedly, and unused
+/// lists are dropped.
 #[test]
 fn rows_that_alternate_share_their_values() {
     let (width, size) = (40_i64, 2 * CHUNK + 100);
@@ -63,17 +64,17 @@ fn rows_that_alternate_share_their_values() {
         })
     };
     let fill = |turn: usize| {
-        move |row: usize, out: &mut Row| {
+        move |row: usize, out: &mut RowBuilder| {
             out.begin([row as u32, turn as u32].into_iter());
             entries(row, turn).for_each(|(offset, value)| out.add(offset, value, 0.0));
         }
     };
-    let mut rows = Rows::build(size, false, fill(0));
+    let mut rows = ConductionRows::build(size, false, fill(0));
     assert!(rows.are_few() && (0..rows.items()).all(|item| rows.is_unequal(item)));
     let all: Vec<u32> = (0..size as u32).collect();
     for turn in 1..40 {
         rows.update(size, &all, fill(turn));
-        // seven lists, fewer at the ends; no more wait than a quarter, or one a row
+        // seven lists, fewer at the ends; at most a quarter unused, or one a row
         assert!(
             rows.stencils.values.count() * 9 <= size + 400 * 9,
             "{turn}: {}",

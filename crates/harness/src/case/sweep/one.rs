@@ -1,4 +1,4 @@
-//! One run of a sweep: its scene, and where it stands.
+//! A single run of a sweep: its scene and its state.
 
 use super::{Vary, divided};
 use crate::case::{Case, Options};
@@ -8,7 +8,7 @@ use crate::scene::{Failure, SWEEP, SceneError, Source};
 use polycore::Error;
 use std::path::Path;
 
-/// One run: its name, its values, its scene with the table that sets them.
+/// A run: name, values, and the scene with the table that sets them.
 pub(super) struct Run {
     pub name: String,
     pub values: Vec<String>,
@@ -39,7 +39,7 @@ impl Run {
         Self { name, values, source: source.with_text(text) }
     }
 
-    /// Its report, where it is finished in the folder of a sweep.
+    /// Returns the report, if the run is finished in the folder of the sweep.
     pub fn finished(&self, sweep: &Path) -> Option<Report> {
         let report = Report::read(sweep.join(&self.name).join(crate::report::FILE_NAME)).ok()?;
         let Provenance { scene, stamp, .. } = &report.provenance;
@@ -58,7 +58,8 @@ impl Run {
         Ok(crate::case::run::<C>(&self.source, Options { resume, ..options })?.report)
     }
 
-    /// A fault of a scene that nobody wrote, as one of the options that made it: of that at whose key it is, else of all.
+    /// Returns a fault of a scene that nobody wrote, as one of the options that made it: of that at whose key
+    /// it is, else of all.
     pub fn of_options(&self, scene: &Source, vary: &[Vary], fault: &SceneError) -> Error {
         let set = format!("{SWEEP}.set.");
         let key = fault.key().unwrap_or_default().trim_start_matches(set.as_str());
@@ -116,7 +117,8 @@ pub(super) fn quoted(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
 
-/// A value as TOML: numbers, truth values, arrays, tables and texts in quotes as they are, all else a text.
+/// Returns a value as TOML: numbers, truth values, arrays, tables and texts in quotes as they are, all else a
+/// text.
 fn literal(value: &str) -> String {
     if let Ok(whole) = value.parse::<i64>() {
         return whole.to_string();

@@ -14,7 +14,7 @@ use std::str::FromStr;
 const DRAWS: usize = 20;
 
 crate::quantities! {
-    /// What sweeps over samples report of each value.
+    /// Quantities that sweeps over samples report for each value.
     pub OF_SAMPLES:
     LOWER = "{value}.lower", "*", "2.5 % quantile over the samples of a sweep";
     MEDIAN = "{value}.median", "*", "median over the samples of a sweep";
@@ -34,7 +34,8 @@ impl FromStr for Sample {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let usage = "KEY=FILE, e.g. materials.pa12.kinetics=out/fit/nakamura_posterior.csv; =FILE if its columns are whole paths";
+        let usage = "KEY=FILE, e.g. materials.pa12.kinetics=out/fit/nakamura_posterior.csv; \
+                     =FILE if its columns are whole paths";
         match text.split_once('=') {
             Some((key, file)) if !file.trim().is_empty() => {
                 Ok(Self { key: key.trim().to_owned(), file: file.trim().into() })
@@ -44,8 +45,8 @@ impl FromStr for Sample {
     }
 }
 
-/// The first `count` rows of all samples as values of keys that change together: samples are independent of each other. Without a `count` they are
-/// 20, or the rows of the shortest file.
+/// Returns the first `count` rows of all samples as values of keys that change together: samples are
+/// independent of each other. Without a `count` they are 20, or the rows of the shortest file.
 ///
 /// # Errors
 /// A file that is not a table of numbers, or has fewer rows.
@@ -111,7 +112,8 @@ impl Band {
     }
 }
 
-/// Means, deviations and quantiles of all values over the samples: into the report, a table `sweep_bands.csv`, and as text.
+/// Means, deviations and quantiles of all values over the samples: into the report, a table
+/// `sweep_bands.csv`, and as text.
 ///
 /// # Errors
 /// A file that cannot be written.

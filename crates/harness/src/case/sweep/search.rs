@@ -22,7 +22,7 @@ pub struct Search {
 impl FromStr for Search {
     type Err = String;
 
-    /// From `KEY=LOW..HIGH`, of one unit.
+    /// Parses `KEY=LOW..HIGH`, both in one unit.
     fn from_str(text: &str) -> Result<Self, String> {
         let refused = || {
             let usage =
@@ -39,8 +39,9 @@ impl FromStr for Search {
     }
 }
 
-/// Bisects for the least value with which all expectations of a scene are met, to a hundredth of the interval: as sweeps
-/// into one folder, which keeps what is finished. It is taken that a greater value is no worse.
+/// Bisects for the least value with which all expectations of a scene are met, to a hundredth of the
+/// interval: as sweeps into one folder, which keeps what is finished. It is taken that a greater value is no
+/// worse.
 ///
 /// # Errors
 /// As [`super::sweep`]; a scene without expectations.
@@ -61,7 +62,8 @@ pub fn search<C: Case>(
             return Err(Error::Option { option: format!("--search {key}"), reason }.into());
         }
         let first = rows.rows.iter().take(values.len()).map(met).collect();
-        Ok((first, Finished { text: rows.text(), report }))
+        let table = Some(rows.short_text(super::WIDTH));
+        Ok((first, Finished { table, ..Finished::new(report, rows.text()) }))
     };
     let (met, mut finished) = try_out(&[*low, *high])?;
     let verdict = match met[..] {
@@ -98,6 +100,7 @@ pub fn search<C: Case>(
         }
     };
     finished.text += &format!("{verdict}\n");
+    finished.table.iter_mut().for_each(|table| *table += &format!("{verdict}\n"));
     Ok(finished)
 }
 

@@ -17,7 +17,7 @@ pub struct Shard {
     of: usize,
 }
 
-/// What of a sweep is computed.
+/// Part of a sweep to compute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Part {
     /// All runs, and their table.
@@ -32,7 +32,7 @@ pub enum Part {
 impl FromStr for Shard {
     type Err = String;
 
-    /// From `I/N`.
+    /// Parses `I/N`.
     fn from_str(text: &str) -> Result<Self, String> {
         let numbers = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
         match numbers {
@@ -43,14 +43,14 @@ impl FromStr for Shard {
 }
 
 impl Shard {
-    /// Whether it has a run, counted from 0.
-    pub fn has(&self, run: usize) -> bool {
+    /// Returns whether the part contains a run, counted from 0.
+    pub fn contains(&self, run: usize) -> bool {
         run % self.of == self.index - 1
     }
 }
 
-/// Checks a sweep and writes `job.sh`, a SLURM job array of so many parts of it, into its folder; gives a line that says how
-/// to submit it. `command` is the command line of the sweep.
+/// Checks a sweep and writes `job.sh`, a SLURM job array of so many parts of it, into its folder; gives a
+/// line that says how to submit it. `command` is the command line of the sweep.
 ///
 /// # Errors
 /// Faults of the scene or of a key; the folder cannot be written to.
@@ -63,14 +63,15 @@ pub fn job<C: Case>(
 ) -> Result<String, Failure<C::Error>> {
     let runs = runs::<C>(source, vary, options.quick)?.len();
     polycore::file::prepare_directory(options.output)?;
-    let here = std::env::current_dir().map_err(Error::io("read", "."))?;
+    let here = std::env::current_dir().map_err(Error::from_io("read", "."))?;
     let text = script(command, &here, &here.join(options.output), parts.min(runs));
     let path = options.output.join("job.sh");
     polycore::file::atomic_write(&path, |file| std::io::Write::write_all(file, text.as_bytes()))?;
     Ok(format!("{runs} runs in {} parts: sbatch {}", parts.min(runs), path.display()))
 }
 
-/// A SLURM job array of a sweep: `command` is its command line without `--slurm`, to be started in `folder`.
+/// Returns a SLURM job array of a sweep: `command` is its command line without `--slurm`, to be started in
+/// `folder`.
 fn script(command: &[String], folder: &Path, output: &Path, of: usize) -> String {
     let quoted = |text: &str| format!("'{}'", text.replace('\'', "'\\''"));
     let line: Vec<String> = command.iter().map(|word| quoted(word)).collect();
@@ -102,7 +103,7 @@ mod tests {
         let of = |text: &str| text.parse::<Shard>();
         let shards: Vec<Shard> = ["1/3", "2/3", "3/3"].map(|text| of(text).unwrap()).into();
         for run in 0..10 {
-            assert_eq!(shards.iter().filter(|shard| shard.has(run)).count(), 1);
+            assert_eq!(shards.iter().filter(|shard| shard.contains(run)).count(), 1);
         }
         for wrong in ["", "1", "0/3", "4/3", "1/0", "-1/3", "a/b", "1/3/3", "1/100000"] {
             assert!(of(wrong).unwrap_err().contains("allowed"), "{wrong}");

@@ -1,4 +1,4 @@
-//! What a sweep found: its report, and its pictures against the first key.
+//! Report of a sweep, and pictures of its values over the first key.
 
 use super::{FAILED_RUNS, Vary};
 use crate::case::Program;
@@ -38,7 +38,7 @@ pub(super) fn together(program: &Program, source: &Source, vary: &[Vary], rows: 
     report
 }
 
-/// The numbers of values that have one unit, and the unit.
+/// Returns the numbers of values that have one unit, and the unit.
 pub(super) fn numeric(values: &[String]) -> Option<(Vec<f64>, String)> {
     let split = |text: &String| -> Option<(f64, String)> {
         // of keys that change together the first
@@ -89,7 +89,7 @@ pub(super) fn draw(vary: &[Vary], rows: &Rows, output: &Path) -> Result<(), poly
             let mut plot = LinePlot::new("At the end").axes(&label, what).size(800.0, 480.0);
             for other in &others {
                 // not every field has all of them: healing has no largest
-                for statistic in statistics.iter().filter(|name| rows.has(&format!("{name}{field}"))) {
+                for statistic in statistics.iter().filter(|name| rows.has_value(&format!("{name}{field}"))) {
                     plot = plot.series(line(other, statistic));
                 }
             }
@@ -105,7 +105,7 @@ pub(super) fn draw(vary: &[Vary], rows: &Rows, output: &Path) -> Result<(), poly
         plot(shown, what).write(output.join(format!("sweep_{field}.png")))?;
         let deviation = format!("deviation of {field}");
         let what = if unit[1].is_empty() { deviation.as_str() } else { unit[1] };
-        if rows.has(&format!("{}{field}", STATISTICS[3])) {
+        if rows.has_value(&format!("{}{field}", STATISTICS[3])) {
             plot(&STATISTICS[3..], what).write(output.join(format!("sweep_deviation_of_{field}.png")))?;
         }
     }

@@ -1,7 +1,7 @@
 //! Axes: ranges, ticks and their labels.
 
 /// A linear or logarithmic axis.
-pub(super) struct Axis {
+pub(super) struct PlotAxis {
     log: bool,
     /// Ends, logarithms on a logarithmic axis.
     low: f64,
@@ -15,7 +15,7 @@ pub(super) struct Axis {
 /// Empty space beyond the data, as a share of the axis.
 const PADDING: f64 = 0.04;
 
-impl Axis {
+impl PlotAxis {
     /// Around `values`, which are finite, and positive on a logarithmic axis; or exactly from `range`.
     pub(super) fn new(
         values: impl Iterator<Item = f64>,
@@ -43,7 +43,7 @@ impl Axis {
         axis
     }
 
-    /// Where a value lies: 0 at the lower end, 1 at the upper.
+    /// Returns the position of a value: 0 at the lower end, 1 at the upper.
     pub(super) fn share(&self, value: f64) -> f64 {
         let value = if self.log { value.log10() } else { value };
         (value - self.low) / (self.high - self.low)

@@ -1,7 +1,7 @@
 //! The colour bar beside a field.
 
 use super::axis::{labels, ticks};
-use super::canvas::{Anchor, BLACK, Canvas, Text};
+use super::canvas::{BLACK, Canvas, LabelAnchor, Text};
 use super::color::ColorMap;
 
 /// Sizes of letters: of a bar's name, of its ticks.
@@ -12,18 +12,18 @@ pub(super) const TICK_LENGTH: isize = 8;
 pub(super) const LINE: isize = 2;
 
 /// The colour bar with its ticks.
-pub(super) struct Bar {
+pub(super) struct ColorBar {
     ticks: Vec<(f64, Text)>,
     label: Text,
     below: bool,
     above: bool,
-    /// Of everything.
+    /// Title of the colour bar.
     pub(super) width: usize,
     pub(super) height: usize,
 }
 
-impl Bar {
-    /// Of values between `low` and `high`; `beyond`: whether some lie below, above.
+impl ColorBar {
+    /// Creates a bar for `low` to `high`; `beyond` says whether some values lie below, above.
     pub(super) fn new(
         label: &str,
         (low, high): (f64, f64),
@@ -53,7 +53,7 @@ impl Bar {
         let (start, length) = (y + top, height - top - bottom);
         for row in 0..length {
             let share = 1.0 - (row as f64 + 0.5) / length as f64;
-            canvas.rectangle(x, start + row, width, 1, colors.at(share));
+            canvas.rectangle(x, start + row, width, 1, colors.color_at(share));
         }
         canvas.frame(x, start, width, length, LINE, BLACK);
         for (there, base, direction, share) in
@@ -62,7 +62,7 @@ impl Bar {
             if there {
                 for step in 0..width / 2 {
                     let row = if direction < 0 { base - 1 - step } else { base + step };
-                    canvas.rectangle(x + step, row, width - 2 * step, 1, colors.at(share));
+                    canvas.rectangle(x + step, row, width - 2 * step, 1, colors.color_at(share));
                     for edge in [x + step, x + width - 1 - step] {
                         canvas.rectangle(edge - 1, row, LINE + 1, 1, BLACK);
                     }
@@ -73,9 +73,9 @@ impl Bar {
             let at = start + ((1.0 - share) * length as f64).round() as isize;
             let at = at.clamp(start, start + length - 1);
             canvas.rectangle(x + width + LINE, at - LINE / 2, TICK_LENGTH, LINE, BLACK);
-            canvas.text(x + width + LINE + TICK_LENGTH + 6, at, text, Anchor::Left);
+            canvas.text(x + width + LINE + TICK_LENGTH + 6, at, text, LabelAnchor::Left);
         }
         let far = x + self.width as isize - LABEL as isize * 3 / 4;
-        canvas.text(far, start + length / 2, &self.label, Anchor::Upwards);
+        canvas.text(far, start + length / 2, &self.label, LabelAnchor::Upwards);
     }
 }

@@ -5,21 +5,21 @@ use rayon::prelude::*;
 
 use crate::output::lattice::{self, NONE, joined, neighbours};
 
-/// What a particle covers.
+/// Area that a particle covers.
 #[derive(Clone, Debug)]
-pub(super) enum Block {
-    /// How far it reaches to the left, right, down and up.
+pub(super) enum ParticleBlock {
+    /// Distances to the left, right, lower and upper side.
     Upright([f64; 4]),
-    /// Its corners, in order around it.
+    /// Corners, in order around it.
     Cell([[f64; 2]; 4]),
 }
 
 /// The outline of every particle.
-pub(super) struct Blocks(pub(super) Vec<Block>);
+pub(super) struct ParticleBlocks(pub(super) Vec<ParticleBlock>);
 
-impl Blocks {
-    /// Deformed cells of those that `reference` shows to be on a lattice, upright blocks of the others; neighbours
-    /// farther apart than `bridge` spacings have a crack between them.
+impl ParticleBlocks {
+    /// Deformed cells of those that `reference` shows to be on a lattice, upright blocks of the others;
+    /// neighbours farther apart than `bridge` spacings have a crack between them.
     pub(super) fn new(
         positions: &[[f64; 2]],
         reference: Option<&[[f64; 2]]>,
@@ -28,22 +28,22 @@ impl Blocks {
     ) -> Self {
         let next = reference.map_or(vec![[NONE; 6]; positions.len()], |rest| neighbours(rest, spacing));
         let joined = joined(positions, &next, spacing, bridge);
-        let cells = lattice::Cells { positions, joined: &joined, spacing, axes: 2 };
+        let cells = lattice::LatticeCells { positions, joined: &joined, spacing, axes: 2 };
         let all = next.iter().all(|next| *next != [NONE; 6]);
         let reach = if all { vec![[0.0; 4]; positions.len()] } else { reach(positions, spacing, bridge) };
         let block = |(particle, reach)| match next[particle] == [NONE; 6] {
-            true => Block::Upright(reach),
-            false => Block::Cell([0, 1, 3, 2].map(|corner| cells.corner(particle, corner))),
+            true => ParticleBlock::Upright(reach),
+            false => ParticleBlock::Cell([0, 1, 3, 2].map(|corner| cells.corner(particle, corner))),
         };
         Self(reach.into_par_iter().enumerate().map(block).collect())
     }
 }
 
-/// How far each particle's block reaches to the left, right, down and up: half the way to its neighbour there, or half
-/// a spacing where the next one is farther than `bridge` spacings (a surface, a hole, a crack).
+/// Returns the distances from each particle to the sides of its block: half the way to its neighbour there,
+/// or half a spacing where the next one is farther than `bridge` spacings (a surface, a hole, a crack).
 fn reach(positions: &[[f64; 2]], spacing: f64, bridge: f64) -> Vec<[f64; 4]> {
     let far = spacing * bridge.max(1.0) * (1.0 + 1e-9);
-    let cells = Cells::new(positions, far);
+    let cells = GridCells::new(positions, far);
     let nearest = |position: &[f64; 2]| {
         let mut gaps = [f64::INFINITY; 4];
         cells.around(position, |index| {
@@ -64,14 +64,14 @@ fn reach(positions: &[[f64; 2]], spacing: f64, bridge: f64) -> Vec<[f64; 4]> {
 }
 
 /// Particles sorted into square cells.
-struct Cells {
+struct GridCells {
     low: [f64; 2],
     size: f64,
     count: [usize; 2],
     particles: Groups<usize>,
 }
 
-impl Cells {
+impl GridCells {
     fn new(positions: &[[f64; 2]], size: f64) -> Self {
         let [low, high] = bounds(positions.iter().copied());
         let extent = [0, 1].map(|axis| high[axis] - low[axis]);
@@ -99,7 +99,7 @@ impl Cells {
         for row in home[1].saturating_sub(1)..=(home[1] + 1).min(self.count[1] - 1) {
             let first = self.index([home[0].saturating_sub(1), row]);
             let last = self.index([(home[0] + 1).min(self.count[0] - 1), row]);
-            for &particle in self.particles.between(first, last) {
+            for &particle in self.particles.groups(first, last) {
                 each(particle);
             }
         }

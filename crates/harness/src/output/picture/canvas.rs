@@ -20,9 +20,9 @@ pub(super) struct Canvas {
     pixels: Vec<Color>,
 }
 
-/// Which point of a text is given.
+/// Point of a text that its position gives.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Anchor {
+pub(super) enum LabelAnchor {
     /// Middle of the left edge.
     Left,
     /// Middle of the right edge.
@@ -69,7 +69,7 @@ impl Canvas {
         }
     }
 
-    /// The green of every pixel, row by row: all there is of a grey picture.
+    /// Returns the green of every pixel, row by row: all there is of a grey picture.
     pub(super) fn greens(&self) -> impl Iterator<Item = u8> {
         self.pixels.iter().map(|pixel| pixel[1])
     }
@@ -131,8 +131,8 @@ impl Canvas {
         }
     }
 
-    /// The least rectangle (left, top, width, height) outside of which nothing differs from an image of the same size; one
-    /// pixel where nothing does.
+    /// Returns the least rectangle (left, top, width, height) outside of which nothing differs from an image
+    /// of the same size; one pixel where nothing does.
     fn difference(&self, other: &Self) -> [usize; 4] {
         let differs =
             |x: usize, y: usize| self.pixels[y * self.width + x] != other.pixels[y * self.width + x];
@@ -155,7 +155,7 @@ impl Canvas {
         }
     }
 
-    pub(super) fn text(&mut self, x: isize, y: isize, text: &Text, anchor: Anchor) {
+    pub(super) fn text(&mut self, x: isize, y: isize, text: &Text, anchor: LabelAnchor) {
         let (width, height) = (text.width as isize, text.height as isize);
         for row in 0..height {
             for column in 0..width {
@@ -164,10 +164,10 @@ impl Canvas {
                     continue;
                 }
                 let (right, down) = match anchor {
-                    Anchor::Left => (column, row - height / 2),
-                    Anchor::Right => (column - width, row - height / 2),
-                    Anchor::Center => (column - width / 2, row - height / 2),
-                    Anchor::Upwards => (row - height / 2, width / 2 - column),
+                    LabelAnchor::Left => (column, row - height / 2),
+                    LabelAnchor::Right => (column - width, row - height / 2),
+                    LabelAnchor::Center => (column - width / 2, row - height / 2),
+                    LabelAnchor::Upwards => (row - height / 2, width / 2 - column),
                 };
                 self.blend(x + right, y + down, ink);
             }
@@ -182,7 +182,8 @@ impl Canvas {
     }
 }
 
-/// An animated PNG of images of one size, one after another without end; the last is shown `rest` times as long.
+/// Returns an animated PNG of images of one size, one after another without end; the last is shown `rest`
+/// times as long.
 ///
 /// # Errors
 /// Those of `frame`; no frame; what cannot be encoded.

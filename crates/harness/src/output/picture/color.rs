@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use kuva::plot::ColorMap as Kuva;
 
-/// How numbers become colours.
+/// Map from numbers to colours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ColorMap {
     /// Dark blue to yellow, perceptually uniform, legible in grey and to the colour-blind.
@@ -16,20 +16,20 @@ pub enum ColorMap {
     Diverging,
 }
 
-/// Of points without a number.
+/// Colour of points without a number.
 pub(super) const MISSING: [u8; 3] = [190, 190, 190];
 
-type Table = [[u8; 3]; 256];
+type ColorTable = [[u8; 3]; 256];
 
-static VIRIDIS: LazyLock<Table> = LazyLock::new(|| table(&Kuva::Viridis, 0.0, 1.0));
+static VIRIDIS: LazyLock<ColorTable> = LazyLock::new(|| table(&Kuva::Viridis, 0.0, 1.0));
 // without its black, which is no colour of anything
-static INFERNO: LazyLock<Table> = LazyLock::new(|| table(&Kuva::Inferno, 0.15, 1.0));
+static INFERNO: LazyLock<ColorTable> = LazyLock::new(|| table(&Kuva::Inferno, 0.15, 1.0));
 // the scheme runs from red to blue; hot is positive
-static DIVERGING: LazyLock<Table> = LazyLock::new(|| table(&Kuva::RedBlue, 1.0, 0.0));
+static DIVERGING: LazyLock<ColorTable> = LazyLock::new(|| table(&Kuva::RedBlue, 1.0, 0.0));
 
 impl ColorMap {
-    /// The colour at `share` between 0 and 1 (clamped); grey for NaN.
-    pub(super) fn at(self, share: f64) -> [u8; 3] {
+    /// Returns the colour at `share` between 0 and 1 (clamped); grey for NaN.
+    pub(super) fn color_at(self, share: f64) -> [u8; 3] {
         if share.is_nan() {
             return MISSING;
         }
@@ -42,8 +42,8 @@ impl ColorMap {
     }
 }
 
-/// A part of a scheme.
-fn table(map: &Kuva, from: f64, to: f64) -> Table {
+/// Returns a part of a scheme.
+fn table(map: &Kuva, from: f64, to: f64) -> ColorTable {
     std::array::from_fn(|index| {
         // none only for custom maps
         map.map_rgb(from + (to - from) * index as f64 / 255.0).map_or(MISSING, |(r, g, b)| [r, g, b])

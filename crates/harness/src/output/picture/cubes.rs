@@ -3,13 +3,13 @@
 use std::collections::HashSet;
 
 use super::skin::{Corner, Plane, Skin};
-use crate::output::lattice::{Cells, NONE, joined, neighbours};
+use crate::output::lattice::{LatticeCells, NONE, joined, neighbours};
 
 /// Particles in space.
 #[derive(Clone, Copy, Debug)]
 pub struct Particles<'a> {
-    /// Positions before the deformation: those with neighbours one spacing away along the axes are drawn as deformed cells,
-    /// the others as upright cubes.
+    /// Positions before the deformation: those with neighbours one spacing away along the axes are drawn as
+    /// deformed cells, the others as upright cubes.
     pub reference: &'a [[f64; 3]],
     /// Positions.
     pub positions: &'a [[f64; 3]],
@@ -23,8 +23,8 @@ pub struct Particles<'a> {
 const STEPS: [[i64; 3]; 6] = [[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]];
 
 impl Particles<'_> {
-    /// The surface: faces without a neighbour, or with a crack in front. A plane removes particles by their reference positions;
-    /// `value` gives the values of a particle.
+    /// Returns the surface: faces without a neighbour, or with a crack in front. A plane removes particles by
+    /// their reference positions; `value` gives the values of a particle.
     pub fn skin(&self, cut: Option<Plane>, value: impl Fn(usize) -> [f64; 2]) -> Skin {
         // whole particles: nothing is cut in two
         let mut skin = Skin::new(None);
@@ -33,7 +33,7 @@ impl Particles<'_> {
         let next = neighbours(&self.reference[..count], self.spacing);
         let positions = &self.positions[..count];
         let joined = joined(positions, &next, self.spacing, self.bridge);
-        let cells = Cells { positions, joined: &joined, spacing: self.spacing, axes: 3 };
+        let cells = LatticeCells { positions, joined: &joined, spacing: self.spacing, axes: 3 };
         let loose = |k: usize| next[k] == [NONE; 6];
         let taken: HashSet<[i64; 3]> =
             (0..count).filter(|&k| loose(k) && !gone(k)).map(|k| self.cell(self.positions[k])).collect();
@@ -113,7 +113,8 @@ mod tests {
         assert_eq!(all.len(), 5 * 4 * 3 - 3 * 2);
     }
 
-    /// Torn in two: two faces more for each pair that parted, the halves as they were; a cut takes whole particles away.
+    /// Torn in two: two faces more for each pair that parted, the halves as they were; a cut takes whole
+    /// particles away.
     #[test]
     fn cracks_open_and_cuts_show_values() {
         let rest = lattice([4, 3, 2]);

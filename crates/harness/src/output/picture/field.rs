@@ -8,11 +8,11 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::axis::{labels, ticks};
-use super::bar::{Bar, LABEL, LINE, TICK, TICK_LENGTH};
-use super::blocks::Blocks;
-use super::canvas::{Anchor, BLACK, Canvas, Text};
+use super::bar::{ColorBar, LABEL, LINE, TICK, TICK_LENGTH};
+use super::blocks::ParticleBlocks;
+use super::canvas::{BLACK, Canvas, LabelAnchor, Text};
 use super::color::{ColorMap, MISSING};
-use super::particles::{Raster, Window};
+use super::particles::{PixelWindow, Raster};
 use super::picture_error;
 use polycore::Error;
 use polycore::file::atomic_write;
@@ -22,7 +22,7 @@ const MARGIN: usize = 26;
 /// More pixels than this are a mistake.
 const LARGEST_PICTURE: usize = 200_000_000;
 
-/// One or more fields side by side in one PNG.
+/// Fields side by side in one PNG.
 ///
 /// ```
 /// # use harness::output::picture::{FieldMap, Panel};
@@ -44,7 +44,7 @@ pub struct FieldMap<'a> {
     names: [&'a str; 2],
 }
 
-/// One field: where the particles are (deformed or not) and what they carry.
+/// A field: positions of the particles (deformed or not) and their values.
 #[derive(Clone, Debug)]
 pub struct Panel<'a> {
     title: String,
@@ -59,8 +59,8 @@ pub struct Panel<'a> {
 }
 
 impl<'a> Panel<'a> {
-    /// `label` stands beside the colour bar, with its unit; `spacing` is the lattice spacing in the unit of the
-    /// positions. Particles whose value is NaN are grey.
+    /// `label` stands beside the colour bar, with its unit; `spacing` is the lattice spacing in the unit of
+    /// the positions. Particles whose value is NaN are grey.
     pub fn new(title: &str, label: &str, positions: &'a [[f64; 2]], values: &'a [f64], spacing: f64) -> Self {
         Self {
             title: title.to_owned(),
@@ -81,31 +81,32 @@ impl<'a> Panel<'a> {
         self
     }
 
-    /// Values outside take the colours of the ends, and the bar gets a point there; by default all values are inside.
+    /// Values outside take the colours of the ends, and the bar gets a point there; by default all values are
+    /// inside.
     pub fn range(mut self, low: f64, high: f64) -> Self {
         self.range = Some((low, high));
         self
     }
 
-    /// Where the particles were before the deformation: those with neighbours one spacing away along the axes are drawn
-    /// as deformed cells, the others as upright blocks.
+    /// Sets the positions before the deformation: particles with neighbours one spacing away along the axes
+    /// are drawn as deformed cells, the others as upright blocks.
     pub fn reference(mut self, positions: &'a [[f64; 2]]) -> Self {
         self.reference = Some(positions);
         self
     }
 
-    /// Neighbours up to this many spacings apart are drawn without a gap; farther apart there is a crack. By default
-    /// 1.5; larger stretches need more.
+    /// Neighbours up to this many spacings apart are drawn without a gap; farther apart there is a crack. By
+    /// default 1.5; larger stretches need more.
     pub fn bridge(mut self, spacings: f64) -> Self {
         self.bridge = spacings;
         self
     }
 
-    fn outline(&self) -> Blocks {
-        Blocks::new(self.positions, self.reference, self.spacing, self.bridge)
+    fn outline(&self) -> ParticleBlocks {
+        ParticleBlocks::new(self.positions, self.reference, self.spacing, self.bridge)
     }
 
-    /// Whether it shows the same particles in the same places.
+    /// Returns whether it shows the same particles in the same places.
     fn has_outline_of(&self, other: &Self) -> bool {
         let same = |a: &[[f64; 2]], b: &[[f64; 2]]| std::ptr::eq(a, b);
         let reference = match (self.reference, other.reference) {
@@ -202,13 +203,14 @@ impl<'a> FieldMap<'a> {
         self
     }
 
-    /// Draws axes: positions are divided by `factor` and given in `unit`. `("mm", 1e-3)` for positions in metres.
+    /// Draws axes: positions are divided by `factor` and given in `unit`. `("mm", 1e-3)` for positions in
+    /// metres.
     pub fn lengths(mut self, unit: &str, factor: f64) -> Self {
         self.lengths = Some((unit.to_owned(), factor));
         self
     }
 
-    /// What the axes are called; `x` and `y` by default.
+    /// Sets the names of the axes; `x` and `y` by default.
     pub fn axes(mut self, names: [&'a str; 2]) -> Self {
         self.names = names;
         self
@@ -217,8 +219,8 @@ impl<'a> FieldMap<'a> {
     /// Writes a `.png`, whole or not at all.
     ///
     /// # Errors
-    /// [`Error::Data`] for another extension, without panels, for arrays of different lengths, positions that are not
-    /// finite or too far apart, invalid spacings and ranges; [`Error::Io`].
+    /// [`Error::Data`] for another extension, without panels, for arrays of different lengths, positions that
+    /// are not finite or too far apart, invalid spacings and ranges; [`Error::Io`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         let path = path.as_ref();
         let fail = |reason: String| picture_error(path, reason);
@@ -235,13 +237,13 @@ impl<'a> FieldMap<'a> {
         }
         let mut drawn = Vec::with_capacity(self.panels.len());
         // panels of the same particles share their outlines
-        let mut last: Option<(&Panel<'_>, Arc<Blocks>)> = None;
+        let mut last: Option<(&Panel<'_>, Arc<ParticleBlocks>)> = None;
         for panels in self.panels.chunks(rayon::current_num_threads()) {
             let mut outlined = Vec::with_capacity(panels.len());
             for panel in panels {
                 panel.check()?;
-                let window =
-                    Window::around(panel.positions, panel.spacing, self.size as f64).ok_or_else(|| {
+                let window = PixelWindow::around(panel.positions, panel.spacing, self.size as f64)
+                    .ok_or_else(|| {
                         format!("panel `{}`: positions are not finite or too far apart", panel.title)
                     })?;
                 let kept = last.take().filter(|(other, _)| panel.has_outline_of(other));
@@ -249,7 +251,9 @@ impl<'a> FieldMap<'a> {
                 outlined.push((panel, window, Arc::clone(&blocks)));
                 last = Some((panel, blocks));
             }
-            let draw = |(panel, window, blocks): (_, Window, Arc<Blocks>)| self.draw(panel, &window, &blocks);
+            let draw = |(panel, window, blocks): (_, PixelWindow, Arc<ParticleBlocks>)| {
+                self.draw(panel, &window, &blocks)
+            };
             drawn.extend(outlined.into_par_iter().map(draw).collect::<Result<Vec<Canvas>, String>>()?);
         }
         let columns = self.columns.unwrap_or(drawn.len()).min(drawn.len());
@@ -270,12 +274,17 @@ impl<'a> FieldMap<'a> {
         Ok(canvas)
     }
 
-    fn draw(&self, panel: &Panel<'_>, window: &Window, blocks: &Blocks) -> Result<Canvas, String> {
+    fn draw(
+        &self,
+        panel: &Panel<'_>,
+        window: &PixelWindow,
+        blocks: &ParticleBlocks,
+    ) -> Result<Canvas, String> {
         let raster = window.draw(panel.positions, panel.values, blocks);
         let (low, high) = panel.limits();
         let beyond =
             [panel.values.iter().any(|value| *value < low), panel.values.iter().any(|value| *value > high)];
-        let bar = Bar::new(&panel.label, (low, high), beyond, raster.height.max(220))?;
+        let bar = ColorBar::new(&panel.label, (low, high), beyond, raster.height.max(220))?;
         let axes = self.lengths.as_ref().map(|lengths| Axes::new(window, &raster, lengths, self.names));
         let axes = axes.transpose()?;
         let title = Text::new(&panel.title, TITLE)?;
@@ -289,8 +298,11 @@ impl<'a> FieldMap<'a> {
         for (at, value) in raster.values.iter().enumerate() {
             if let Some(value) = value {
                 let (column, row) = (at % raster.width, at / raster.width);
-                let color =
-                    if value.is_nan() { MISSING } else { panel.colors.at((value - low) / (high - low)) };
+                let color = if value.is_nan() {
+                    MISSING
+                } else {
+                    panel.colors.color_at((value - low) / (high - low))
+                };
                 canvas.set(x + column as isize, y + row as isize, color);
             }
         }
@@ -302,7 +314,7 @@ impl<'a> FieldMap<'a> {
             let middle = x + raster.width as isize / 2;
             let half = title.width as isize / 2;
             let middle = middle.clamp(half + 4, (width as isize - half - 4).max(half + 4));
-            canvas.text(middle, (MARGIN + TITLE as usize * 3 / 4) as isize, &title, Anchor::Center);
+            canvas.text(middle, (MARGIN + TITLE as usize * 3 / 4) as isize, &title, LabelAnchor::Center);
         }
         Ok(canvas)
     }
@@ -326,7 +338,7 @@ struct Axes {
 
 impl Axes {
     fn new(
-        window: &Window,
+        window: &PixelWindow,
         raster: &Raster,
         (unit, factor): &(String, f64),
         names: [&str; 2],
@@ -375,16 +387,16 @@ impl Axes {
         let base = y + height + LINE;
         for (at, text) in &self.ticks[0] {
             canvas.rectangle(x + at - LINE / 2, base, LINE, TICK_LENGTH, BLACK);
-            canvas.text(x + at, base + TICK_LENGTH + TICK as isize * 3 / 4 + 2, text, Anchor::Center);
+            canvas.text(x + at, base + TICK_LENGTH + TICK as isize * 3 / 4 + 2, text, LabelAnchor::Center);
         }
         for (at, text) in &self.ticks[1] {
             canvas.rectangle(x - LINE - TICK_LENGTH, y + at - LINE / 2, TICK_LENGTH, LINE, BLACK);
-            canvas.text(x - LINE - TICK_LENGTH - 6, y + at, text, Anchor::Right);
+            canvas.text(x - LINE - TICK_LENGTH - 6, y + at, text, LabelAnchor::Right);
         }
         let under = base + TICK_LENGTH + TICK as isize * 3 / 2 + LABEL as isize * 3 / 4 + 2;
-        canvas.text(x + width / 2, under, &self.names[0], Anchor::Center);
+        canvas.text(x + width / 2, under, &self.names[0], LabelAnchor::Center);
         let beside = x - self.left as isize + LABEL as isize * 3 / 4;
-        canvas.text(beside, y + height / 2, &self.names[1], Anchor::Upwards);
+        canvas.text(beside, y + height / 2, &self.names[1], LabelAnchor::Upwards);
     }
 }
 
@@ -396,7 +408,8 @@ mod tests {
     #[test]
     fn narrow_fields_have_ticks() {
         for (half, width) in [(9.0, 70), (10.5, 62), (10.5, 100), (40.0, 240), (0.9, 120), (1e5, 120)] {
-            let window = Window { low: [-half, 0.0], high: [half, half], scale: width as f64 / (2.0 * half) };
+            let window =
+                PixelWindow { low: [-half, 0.0], high: [half, half], scale: width as f64 / (2.0 * half) };
             let raster = Raster { width, height: width / 2, values: Vec::new() };
             let axes = Axes::new(&window, &raster, &("mm".to_owned(), 1.0), ["x", "y"]).unwrap();
             let across = &axes.ticks[0];

@@ -26,7 +26,7 @@ pub struct LinePlot {
     pub(super) series: Vec<Series>,
 }
 
-/// Where the names of the series stand.
+/// Position of the legend.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum LegendPlace {
@@ -44,11 +44,11 @@ pub enum LegendPlace {
 pub struct Series {
     pub(super) name: String,
     points: Vec<(f64, f64)>,
-    pub(super) style: Style,
+    pub(super) style: SeriesStyle,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Style {
+pub(super) enum SeriesStyle {
     Line,
     Markers,
     Both,
@@ -58,25 +58,25 @@ pub(super) enum Style {
 impl Series {
     /// Joined by a line. A NaN interrupts it.
     pub fn line(name: &str, x: &[f64], y: &[f64]) -> Self {
-        Self::new(name, x, y, Style::Line)
+        Self::new(name, x, y, SeriesStyle::Line)
     }
 
     /// Single points: measurements.
     pub fn markers(name: &str, x: &[f64], y: &[f64]) -> Self {
-        Self::new(name, x, y, Style::Markers)
+        Self::new(name, x, y, SeriesStyle::Markers)
     }
 
     /// Points joined by a line: convergence studies.
     pub fn marked_line(name: &str, x: &[f64], y: &[f64]) -> Self {
-        Self::new(name, x, y, Style::Both)
+        Self::new(name, x, y, SeriesStyle::Both)
     }
 
-    /// A dashed black line: what the others are compared with.
+    /// Returns a dashed black line, a reference for the others.
     pub fn reference(name: &str, x: &[f64], y: &[f64]) -> Self {
-        Self::new(name, x, y, Style::Reference)
+        Self::new(name, x, y, SeriesStyle::Reference)
     }
 
-    fn new(name: &str, x: &[f64], y: &[f64], style: Style) -> Self {
+    fn new(name: &str, x: &[f64], y: &[f64], style: SeriesStyle) -> Self {
         // a missing partner is as undefined as a NaN
         let count = x.len().max(y.len());
         let at = |values: &[f64], index: usize| values.get(index).copied().unwrap_or(f64::NAN);
@@ -84,14 +84,14 @@ impl Series {
         Self { name: name.to_owned(), points, style }
     }
 
-    /// The runs between undefined points.
+    /// Returns the runs between undefined points.
     pub(super) fn runs(&self) -> impl Iterator<Item = &[(f64, f64)]> {
         self.points.split(|(x, y)| x.is_nan() || y.is_nan()).filter(|run| !run.is_empty())
     }
 }
 
 impl LinePlot {
-    /// A plot with linear axes and no series yet.
+    /// Returns a plot with linear axes and no series yet.
     pub fn new(title: &str) -> Self {
         Self {
             title: title.to_owned(),
@@ -112,13 +112,13 @@ impl LinePlot {
         self
     }
 
-    /// A logarithmic x axis.
+    /// Makes the x axis logarithmic.
     pub fn log_x(mut self) -> Self {
         self.log[0] = true;
         self
     }
 
-    /// A logarithmic y axis.
+    /// Makes the y axis logarithmic.
     pub fn log_y(mut self) -> Self {
         self.log[1] = true;
         self

@@ -1,17 +1,17 @@
-//! From particles to whole pixels.
+//! Drawing of particles as whole pixels.
 
-use super::blocks::{Block, Blocks};
+use super::blocks::{ParticleBlock, ParticleBlocks};
 use polycore::numerics::{bounds, range};
 
 /// The part of the plane that is drawn, and its resolution.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Window {
+pub(super) struct PixelWindow {
     /// Lower left corner.
     pub(super) low: [f64; 2],
     /// Upper right corner.
     pub(super) high: [f64; 2],
-    /// Pixels per unit of length; a lattice spacing is a whole number of pixels, or a whole number of spacings is a
-    /// pixel: any other ratio beats with the lattice (moiré).
+    /// Pixels per unit of length; a lattice spacing is a whole number of pixels, or a whole number of
+    /// spacings is a pixel: any other ratio beats with the lattice (moiré).
     pub(super) scale: f64,
 }
 
@@ -25,7 +25,7 @@ pub(super) struct Raster {
 /// A picture may exceed the asked size by this factor for the sake of whole pixels.
 const SLACK: f64 = 1.5;
 
-impl Window {
+impl PixelWindow {
     /// Around all particles, about `size` pixels in its longer direction; none if a position is not finite.
     pub(super) fn around(positions: &[[f64; 2]], spacing: f64, size: f64) -> Option<Self> {
         if !positions.iter().flatten().all(|x| x.is_finite()) {
@@ -49,19 +49,19 @@ impl Window {
         [0, 1].map(|axis| (((self.high[axis] - self.low[axis]) * self.scale).round() as usize).max(1))
     }
 
-    pub(super) fn draw(&self, positions: &[[f64; 2]], values: &[f64], blocks: &Blocks) -> Raster {
+    pub(super) fn draw(&self, positions: &[[f64; 2]], values: &[f64], blocks: &ParticleBlocks) -> Raster {
         let [width, height] = self.pixels();
         let mut sums = vec![(0.0, 0u32); width * height];
         for ((position, value), block) in positions.iter().zip(values).zip(&blocks.0) {
             let mut add = |at: usize| sums[at] = (sums[at].0 + value, sums[at].1 + 1);
             match block {
-                Block::Upright(reach) => {
+                ParticleBlock::Upright(reach) => {
                     // y runs downwards in pictures
                     let x = self.span((position[0] - self.low[0], [reach[0], reach[1]]), width);
                     let y = self.span((self.high[1] - position[1], [reach[3], reach[2]]), height);
                     y.for_each(|row| x.clone().for_each(|column| add(row * width + column)));
                 }
-                Block::Cell(corners) => self.cell(*position, corners, [width, height], add),
+                ParticleBlock::Cell(corners) => self.cell(*position, corners, [width, height], add),
             }
         }
         let mean = |&(sum, count): &(f64, u32)| (count > 0).then(|| sum / f64::from(count));
@@ -115,7 +115,7 @@ impl Window {
     }
 }
 
-/// Whether a triangle, edges included, holds a point.
+/// Returns whether a triangle, edges included, contains a point.
 fn inside(triangle: [[f64; 2]; 3], point: [f64; 2]) -> bool {
     let side = |k: usize| {
         let ([a, b], [c, d]) = (triangle[k], triangle[(k + 1) % 3]);
@@ -126,7 +126,7 @@ fn inside(triangle: [[f64; 2]; 3], point: [f64; 2]) -> bool {
 }
 
 impl Raster {
-    /// Blocks are upright, so a sheared lattice leaves single pixels open between them.
+    /// ParticleBlocks are upright, so a sheared lattice leaves single pixels open between them.
     fn close_pinholes(&mut self) {
         let (width, height) = (self.width, self.height);
         let before = self.values.clone();
@@ -157,8 +157,8 @@ mod tests {
     }
 
     fn draw(positions: &[[f64; 2]], values: &[f64], size: f64) -> Raster {
-        let blocks = Blocks::new(positions, None, 1.0, 1.5);
-        Window::around(positions, 1.0, size).unwrap().draw(positions, values, &blocks)
+        let blocks = ParticleBlocks::new(positions, None, 1.0, 1.5);
+        PixelWindow::around(positions, 1.0, size).unwrap().draw(positions, values, &blocks)
     }
 
     /// Each particle of a regular lattice is the same number of pixels: no moiré, whatever its size.
@@ -212,7 +212,8 @@ mod tests {
         assert_eq!(open, 2 * pixels);
     }
 
-    /// Deformed cells of a lattice, where upright blocks leave holes: stretched to the double, sheared, turned, and bent.
+    /// Deformed cells of a lattice, where upright blocks leave holes: stretched to the double, sheared,
+    /// turned, and bent.
     #[test]
     fn deformed_cells_have_no_holes() {
         let rest = lattice(60, 40, |i, j| [i, j]);
@@ -227,8 +228,8 @@ mod tests {
         ];
         for map in maps {
             let positions: Vec<[f64; 2]> = rest.iter().map(|p| map(p[0], p[1])).collect();
-            let blocks = Blocks::new(&positions, Some(&rest), 1.0, 3.0);
-            let raster = Window::around(&positions, 1.0, 720.0).unwrap();
+            let blocks = ParticleBlocks::new(&positions, Some(&rest), 1.0, 3.0);
+            let raster = PixelWindow::around(&positions, 1.0, 720.0).unwrap();
             let raster = raster.draw(&positions, &vec![1.0; positions.len()], &blocks);
             for row in raster.values.chunks(raster.width) {
                 // a turned body has its corners within the outermost rows
@@ -239,16 +240,16 @@ mod tests {
         }
     }
 
-    /// Of a stretched sheet a crack is drawn open, and a lattice at rest as upright blocks would be.
+    /// A crack of a stretched sheet is drawn open, and a lattice at rest as upright blocks.
     #[test]
     fn deformed_cells_show_cracks() {
         let rest = lattice(60, 40, |i, j| [i, j]);
         let torn: Vec<[f64; 2]> =
             rest.iter().map(|p| [p[0], 1.5 * p[1] + if p[1] < 20.0 { 0.0 } else { 3.0 }]).collect();
         let draw = |positions: &[[f64; 2]]| {
-            let blocks = Blocks::new(positions, Some(&rest), 1.0, 4.0);
+            let blocks = ParticleBlocks::new(positions, Some(&rest), 1.0, 4.0);
             let values: Vec<f64> = (0..positions.len()).map(|index| index as f64).collect();
-            Window::around(positions, 1.0, 720.0).unwrap().draw(positions, &values, &blocks)
+            PixelWindow::around(positions, 1.0, 720.0).unwrap().draw(positions, &values, &blocks)
         };
         let raster = draw(&torn);
         let open = raster.values.iter().step_by(raster.width).filter(|value| value.is_none()).count();
@@ -261,9 +262,9 @@ mod tests {
 
     #[test]
     fn odd_inputs() {
-        assert!(Window::around(&[[0.0, f64::NAN]], 1.0, 100.0).is_none());
-        assert!(Window::around(&[], 1.0, 100.0).is_none());
-        assert!(Window::around(&[[0.0, 0.0], [1e308, 0.0]], 1e-9, 100.0).is_none());
+        assert!(PixelWindow::around(&[[0.0, f64::NAN]], 1.0, 100.0).is_none());
+        assert!(PixelWindow::around(&[], 1.0, 100.0).is_none());
+        assert!(PixelWindow::around(&[[0.0, 0.0], [1e308, 0.0]], 1e-9, 100.0).is_none());
         let raster = draw(&[[5.0, 5.0]], &[2.0], 100.0);
         assert!(raster.values.iter().all(|value| *value == Some(2.0)) && raster.width == 100);
         let raster = draw(&[[0.0, 0.0], [1e6, 1e6]], &[1.0, 2.0], 100.0);

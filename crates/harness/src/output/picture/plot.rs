@@ -8,16 +8,17 @@ use kuva::backend::svg::SvgBackend;
 use kuva::render::color::Color;
 use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
 
-use super::axis::Axis;
-use super::canvas::{Anchor, Canvas, Text};
-use super::line::{LegendPlace, LinePlot, Style};
+use super::axis::PlotAxis;
+use super::canvas::{Canvas, LabelAnchor, Text};
+use super::line::{LegendPlace, LinePlot, SeriesStyle};
 use super::picture_error;
 use polycore::Error;
 use polycore::file::atomic_write;
 
 /// Pixels of a PNG for each unit of the layout.
 const PIXELS: f64 = 2.0;
-/// Okabe & Ito's colours, told apart by the colour-blind (<https://jfly.uni-koeln.de/color/>); black is for references.
+/// Okabe & Ito's colours, told apart by the colour-blind (<https://jfly.uni-koeln.de/color/>); black is for
+/// references.
 const COLORS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f"];
 const GRID: &str = "#dddddd";
 const TITLE: u32 = 15;
@@ -51,8 +52,8 @@ impl LinePlot {
     /// Writes a `.png` or `.svg`, whole or not at all.
     ///
     /// # Errors
-    /// [`Error::Data`] for another extension, for nothing to draw, for infinite numbers and for numbers ≤ 0 on a
-    /// logarithmic axis; [`Error::Io`].
+    /// [`Error::Data`] for another extension, for nothing to draw, for infinite numbers and for numbers ≤ 0
+    /// on a logarithmic axis; [`Error::Io`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         let path = path.as_ref();
         self.check().map_err(|reason| picture_error(path, reason))?;
@@ -77,17 +78,17 @@ impl LinePlot {
         // the raster back end turns letters pixel by pixel; a quarter turn of ours loses nothing
         let text = Text::new(&label.text, (f64::from(label.size) * PIXELS) as u32)?;
         let [x, y] = [label.x, label.y].map(|at| (at * PIXELS).round() as isize);
-        canvas.text(x, y, &text, Anchor::Upwards);
+        canvas.text(x, y, &text, LabelAnchor::Upwards);
         canvas.encode()
     }
 }
 
-/// Everything but the label of the y axis.
+/// Draws all but the label of the y axis.
 fn scene(plot: &LinePlot) -> Result<(Scene, UprightLabel), String> {
     let (width, height) = plot.size;
     let values = |pick: fn(&(f64, f64)) -> f64| plot.series.iter().flat_map(|s| s.runs()).flatten().map(pick);
-    let x = Axis::new(values(|point| point.0), plot.x_range, plot.log[0], (width / 90.0) as usize);
-    let y = Axis::new(values(|point| point.1), plot.y_range, plot.log[1], (height / 60.0) as usize);
+    let x = PlotAxis::new(values(|point| point.0), plot.x_range, plot.log[0], (width / 90.0) as usize);
+    let y = PlotAxis::new(values(|point| point.1), plot.y_range, plot.log[1], (height / 60.0) as usize);
     let mut legend = 0.0f64;
     for series in &plot.series {
         legend = legend.max(measure(&series.name, TICK)?);
@@ -140,8 +141,8 @@ struct Area {
     top: f64,
     right: f64,
     bottom: f64,
-    x: Axis,
-    y: Axis,
+    x: PlotAxis,
+    y: PlotAxis,
 }
 
 impl Area {
@@ -201,16 +202,16 @@ impl Area {
             for run in series.runs() {
                 let points: Vec<(f64, f64)> = run.iter().map(|point| self.place(*point)).collect();
                 match series.style {
-                    Style::Reference => {
+                    SeriesStyle::Reference => {
                         dashes(&points).into_iter().for_each(|dash| scene.add(polyline(dash, color, 1.4)));
                     }
-                    Style::Line | Style::Both if points.len() > 1 => {
+                    SeriesStyle::Line | SeriesStyle::Both if points.len() > 1 => {
                         scene.add(polyline(points.clone(), color, LINE))
                     }
                     _ => {}
                 }
                 // a single point has no line
-                if matches!(series.style, Style::Markers | Style::Both) || points.len() == 1 {
+                if matches!(series.style, SeriesStyle::Markers | SeriesStyle::Both) || points.len() == 1 {
                     points.iter().for_each(|point| scene.add(marker(*point, shape, color)));
                 }
             }
@@ -236,13 +237,13 @@ fn key(scene: &mut Scene, plot: &LinePlot, [x, y]: [f64; 2], [width, height]: [f
         let ends = vec![(x + PADDING, row), (x + PADDING + LEGEND_SAMPLE, row)];
         let middle = (x + PADDING + LEGEND_SAMPLE / 2.0, row);
         match series.style {
-            Style::Reference => {
+            SeriesStyle::Reference => {
                 dashes(&ends).into_iter().for_each(|dash| scene.add(polyline(dash, color, 1.4)))
             }
-            Style::Line | Style::Both => scene.add(polyline(ends, color, LINE)),
-            Style::Markers => {}
+            SeriesStyle::Line | SeriesStyle::Both => scene.add(polyline(ends, color, LINE)),
+            SeriesStyle::Markers => {}
         }
-        if matches!(series.style, Style::Markers | Style::Both) {
+        if matches!(series.style, SeriesStyle::Markers | SeriesStyle::Both) {
             scene.add(marker(middle, shape, color));
         }
         let base = row + 0.365 * f64::from(TICK);
@@ -253,8 +254,8 @@ fn key(scene: &mut Scene, plot: &LinePlot, [x, y]: [f64; 2], [width, height]: [f
 /// Colour and shape of each series; references are black and do not count.
 fn looks(plot: &LinePlot) -> Vec<(&'static str, usize)> {
     let mut colored = 0;
-    let look = |style: Style| {
-        if style == Style::Reference {
+    let look = |style: SeriesStyle| {
+        if style == SeriesStyle::Reference {
             return ("black", 0);
         }
         colored += 1;

@@ -1,7 +1,7 @@
-//! From faces to pixels: parallel projection, depth buffer, light and colour.
+//! Rendering of faces: parallel projection, depth buffer, light and colour.
 
 use super::canvas::Canvas;
-use super::skin::{Face, Skin, cross, dot, minus};
+use super::skin::{Skin, SkinFace, cross, dot, minus};
 use super::strips::Strip;
 
 /// Samples along a pixel's side.
@@ -33,12 +33,12 @@ pub(super) struct Camera {
 pub(super) struct Sight<'a> {
     skin: &'a Skin,
     camera: Camera,
-    /// In pixels.
+    /// Width and height, pixels.
     size: [usize; 2],
     depth: Vec<f32>,
     /// Twice the face, and one more in its second triangle.
     seen: Vec<u32>,
-    /// Whether any sample sees a face.
+    /// Returns whether any sample shows a face.
     visible: Vec<bool>,
 }
 
@@ -46,7 +46,8 @@ pub(super) struct Sight<'a> {
 struct Flat {
     corners: [[f64; 3]; 4],
     light: f64,
-    /// Loss of brightness at its edges, and the edges: a point, a direction, the limit of the cross product with both.
+    /// Loss of brightness at its edges, and the edges: a point, a direction, the limit of the cross product
+    /// with both.
     edge: f64,
     edges: [Option<[f64; 5]>; 4],
 }
@@ -88,7 +89,7 @@ impl<'a> Sight<'a> {
         sight
     }
 
-    fn flat(&self, face: &Face) -> Flat {
+    fn flat(&self, face: &SkinFace) -> Flat {
         let corners = face.at.map(|x| self.camera.place(x));
         let normal = cross(minus(corners[2], corners[0]), minus(corners[3], corners[1]));
         // the visible side is the outside; y points down
@@ -138,7 +139,7 @@ impl<'a> Sight<'a> {
                     }
                     let value = (0..3).map(|k| weights[k] * values[k]).sum::<f64>();
                     beyond = [beyond[0] || value < low - room, beyond[1] || value > high + room];
-                    let color = strip.colors.at((value - low) / (high - low));
+                    let color = strip.colors.color_at((value - low) / (high - low));
                     let light = if flat.is_edge(p) { flat.light * (1.0 - flat.edge) } else { flat.light };
                     colors[at] = color.map(|channel| (light * f64::from(channel) + 0.5) as u8);
                 });
@@ -193,7 +194,7 @@ fn covered(
 }
 
 impl Flat {
-    /// Whether a sample lies within half a pixel of an edge.
+    /// Returns whether a sample lies within half a pixel of an edge.
     fn is_edge(&self, p: [f64; 2]) -> bool {
         let near =
             |[x, y, along, across, most]: [f64; 5]| (along * (p[1] - y) - across * (p[0] - x)).abs() < most;
@@ -219,7 +220,8 @@ mod tests {
         Strip { label: String::new(), range: (0.0, 1.0), colors: ColorMap::Viridis }
     }
 
-    /// The unit cube, each side of another value; edges are too few pixels away to matter in the middle of a side.
+    /// Returns the unit cube, each side of another value; edges are too few pixels away to matter in the
+    /// middle of a side.
     fn cube(cut: Option<Plane>) -> Skin {
         let mut skin = Skin::new(cut);
         for side in 0..6 {
@@ -239,7 +241,8 @@ mod tests {
             .map(|[a, e]: [f64; 2]| View { azimuth: a.to_radians(), elevation: e.to_radians() })
     }
 
-    /// A cube covers Σ |n_d| times the square of its side, n towards the viewer, and is Σ |e_d| wide and high: the axes are equal.
+    /// A cube covers Σ |n_d| times the square of its side, n towards the viewer, and is Σ |e_d| wide and
+    /// high: the axes are equal.
     #[test]
     fn a_cube_covers_what_it_must() {
         for view in views() {
@@ -278,7 +281,7 @@ mod tests {
                 middle[axis] = (side % 2) as f64;
                 let [x, y, _] = camera.place(middle).map(|x| (x / SAMPLES as f64) as usize);
                 let light = AMBIENT + (1.0 - AMBIENT) * (dot(normal, LAMP) / lamp).max(0.0);
-                let color = ColorMap::Viridis.at(0.2 * side as f64).map(|x| light * f64::from(x));
+                let color = ColorMap::Viridis.color_at(0.2 * side as f64).map(|x| light * f64::from(x));
                 let found = canvas.get(x, y);
                 assert!(
                     (0..3).all(|k| (f64::from(found[k]) - color[k]).abs() <= 1.0),
@@ -288,7 +291,7 @@ mod tests {
         }
     }
 
-    /// Who stands in front is seen, in whichever order faces come.
+    /// The nearest face is shown, in any order of faces.
     #[test]
     fn the_nearest_face_is_seen() {
         let square = |y: f64, size: f64, value: f64| {
@@ -304,7 +307,7 @@ mod tests {
             Sight::new(&skin, camera(view), [SIZE; 2]).paint(1, &strip(), &mut canvas, 0, 0);
             let light = AMBIENT + (1.0 - AMBIENT) * LAMP[2] / dot(LAMP, LAMP).sqrt();
             for (x, value) in [(200, 0.0), (200 + 30, 0.0), (200 + 60, 1.0)] {
-                let color = ColorMap::Viridis.at(value).map(|x| (light * f64::from(x)).round() as u8);
+                let color = ColorMap::Viridis.color_at(value).map(|x| (light * f64::from(x)).round() as u8);
                 assert_eq!(canvas.get(x, 200), color, "{x}");
             }
             assert_eq!(canvas.get(399, 200), [255; 3]);
@@ -340,7 +343,8 @@ mod tests {
         assert_eq!(paint(&skin, 1), (MISSING.map(|x| (light * f64::from(x)).round() as u8), [false; 2]));
     }
 
-    /// Without its front half the cube shows the back side's inside, and where cells are cut, what they hold there.
+    /// Without its front half the cube shows the back side's inside, and where cells are cut, what they hold
+    /// there.
     #[test]
     fn a_cut_shows_the_inside() {
         let view = View::default();
@@ -367,7 +371,7 @@ mod tests {
         let light = AMBIENT + (1.0 - AMBIENT) * (dot(normal, LAMP) / dot(LAMP, LAMP).sqrt()).max(0.0);
         for [x, z] in [[0.5, 0.5], [0.2, 0.3], [0.7, 0.9]] {
             let [i, j, _] = camera.place([x, 0.5, z]).map(|x| (x / SAMPLES as f64) as usize);
-            let color = ColorMap::Viridis.at(0.5 * (x + z)).map(|x| light * f64::from(x));
+            let color = ColorMap::Viridis.color_at(0.5 * (x + z)).map(|x| light * f64::from(x));
             let found = canvas.get(i, j);
             assert!(
                 (0..3).all(|k| (f64::from(found[k]) - color[k]).abs() <= 2.0),

@@ -12,7 +12,7 @@ pub struct Corner {
 /// A plane normal · x = at. It removes points with larger values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    /// Of any length but 0.
+    /// Normal vector of any length but 0.
     pub normal: [f64; 3],
     /// Distance from the origin along the normal, in lengths of the normal.
     pub at: f64,
@@ -31,12 +31,12 @@ pub struct View {
 #[derive(Clone, Debug, Default)]
 pub struct Skin {
     pub(super) cut: Option<Plane>,
-    pub(super) faces: Vec<Face>,
+    pub(super) faces: Vec<SkinFace>,
 }
 
 /// A triangle (its last corner twice) or a quadrilateral.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Face {
+pub(super) struct SkinFace {
     pub(super) at: [[f64; 3]; 4],
     pub(super) values: [[f32; 2]; 4],
     /// Bit k: from corner k to the next one runs an edge.
@@ -60,7 +60,7 @@ impl View {
         [[-s, c, 0.0], [-up * c, -up * s, along], [along * c, along * s, up]]
     }
 
-    /// The same plane with its normal towards the viewer: it removes the part in front.
+    /// Returns the same plane with its normal towards the viewer: it removes the part in front.
     pub fn facing(&self, plane: Plane) -> Plane {
         if dot(plane.normal, self.axes()[2]) < 0.0 {
             Plane { normal: plane.normal.map(|x| -x), at: -plane.at }
@@ -76,7 +76,7 @@ impl Plane {
         dot(self.normal, x) - self.at
     }
 
-    /// The intersection with the edge from a corner to another one on the other side.
+    /// Returns the intersection with the edge from a corner to another one on the other side.
     fn between(&self, a: &Corner, b: &Corner) -> Corner {
         let (from, to) = (self.side(a.at), self.side(b.at));
         let t = from / (from - to);
@@ -89,7 +89,7 @@ impl Plane {
 }
 
 impl Skin {
-    /// An empty surface. A plane cuts all faces that come.
+    /// Returns an empty surface. A plane cuts all faces that come.
     pub fn new(cut: Option<Plane>) -> Self {
         Self { cut, faces: Vec::new() }
     }
@@ -110,7 +110,8 @@ impl Skin {
         self.push(&kept);
     }
 
-    /// Adds the section of the plane through a cell: a tetrahedron (four corners) or a hexahedron (eight corners, order of VTK).
+    /// Adds the section of the plane through a cell: a tetrahedron (four corners) or a hexahedron (eight
+    /// corners, order of VTK).
     pub fn section(&mut self, cell: &[Corner]) {
         let Some(plane) = self.cut else { return };
         let mut found: Vec<Corner> = Vec::new();
@@ -157,7 +158,7 @@ impl Skin {
             let four = [corners[0], corners[first], corners[first + 1], corners[last]];
             // inner sides of the fan are not edges, nor is the side of length 0 of a triangle
             let edges = [first == 1, true, last > first + 1, last == count - 1];
-            self.faces.push(Face {
+            self.faces.push(SkinFace {
                 at: four.map(|corner| corner.at),
                 values: four.map(|corner| corner.values.map(|value| value as f32)),
                 edges: (0..4).map(|k| u8::from(edges[k]) << k).sum(),
@@ -195,8 +196,8 @@ mod tests {
         (twice, error)
     }
 
-    /// Sections of bricks and of the tetrahedra in them, by planes through corners, edges and insides, have the area that
-    /// a box has there, and the linear field that is at the corners.
+    /// Sections of bricks and of the tetrahedra in them, by planes through corners, edges and insides, have
+    /// the area that a box has there, and the linear field that is at the corners.
     #[test]
     fn sections_fill_the_plane() {
         let field = |x: [f64; 3]| 1.0 + 2.0 * x[0] - x[1] + 0.5 * x[2];
@@ -238,7 +239,7 @@ mod tests {
         }
     }
 
-    /// Of a face that the plane crosses one side is left, and an edge runs along the cut.
+    /// A face that the plane crosses keeps one side, with an edge along the cut.
     #[test]
     fn faces_are_clipped() {
         let corners = [[0.0, 0.0], [4.0, 0.0], [4.0, 1.0], [0.0, 1.0]]

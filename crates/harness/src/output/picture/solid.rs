@@ -6,8 +6,8 @@ use std::io::Write;
 use std::path::Path;
 
 use super::axis::labels;
-use super::bar::{Bar, TICK};
-use super::canvas::{Anchor, Canvas, Color, Text, film};
+use super::bar::{ColorBar, TICK};
+use super::canvas::{Canvas, Color, LabelAnchor, Text, film};
 use super::picture_error;
 use super::shade::{Camera, Sight};
 use super::skin::{Skin, View};
@@ -32,8 +32,8 @@ const COLORS: [Color; 3] = [[190, 40, 40], [30, 130, 50], [40, 70, 190]];
 /// More pixels than this are a mistake.
 const LARGEST: f64 = 1e8;
 
-/// Solids with one or two fields, under common colour bars and at one scale: stages beside one another, or one after another
-/// as an animation.
+/// Solids with one or two fields, under common colour bars and at one scale: stages beside one another, or
+/// one after another as an animation.
 ///
 /// ```
 /// # use harness::output::picture::{ColorMap, Corner, Skin, Solids, Strip, View};
@@ -68,10 +68,10 @@ pub struct Solids {
 }
 
 /// A title and a surface.
-type Stage = (String, Skin);
+type SolidStage = (String, Skin);
 
 /// Sizes and places of all parts of a picture, pixels.
-struct Layout {
+struct SolidLayout {
     camera: Camera,
     /// Pixels of a panel.
     panel: [usize; 2],
@@ -81,7 +81,7 @@ struct Layout {
     origin: [usize; 2],
     step: [usize; 2],
     /// Colour bars, and their distance from the left side of a panel.
-    bars: Vec<Bar>,
+    bars: Vec<ColorBar>,
     bar: usize,
     size: [usize; 2],
     title: Text,
@@ -96,13 +96,13 @@ impl Solids {
     /// Writes stages beside one another into a `.png`, whole or not at all.
     ///
     /// # Errors
-    /// [`Error::Data`] for no stage, no or more than two fields, invalid bounds, ranges and units; those of `stage`;
-    /// [`Error::Io`].
+    /// [`Error::Data`] for no stage, no or more than two fields, invalid bounds, ranges and units; those of
+    /// `stage`; [`Error::Io`].
     pub fn write(
         &self,
         path: impl AsRef<Path>,
         stages: usize,
-        mut stage: impl FnMut(usize) -> Result<Stage, Error>,
+        mut stage: impl FnMut(usize) -> Result<SolidStage, Error>,
     ) -> Result<(), Error> {
         let path = path.as_ref();
         let fail = |reason: String| picture_error(path, reason);
@@ -115,15 +115,15 @@ impl Solids {
             beyond.iter_mut().zip(seen).for_each(|(all, one)| *all = [all[0] || one[0], all[1] || one[1]]);
         }
         for (bar, (strip, beyond)) in layout.bars.iter_mut().zip(self.fields.iter().zip(beyond)) {
-            *bar = Bar::new(&strip.label, strip.range, beyond, bar.height).map_err(fail)?;
+            *bar = ColorBar::new(&strip.label, strip.range, beyond, bar.height).map_err(fail)?;
         }
         self.surround(&layout, &mut canvas);
         let bytes = canvas.encode().map_err(fail)?;
         atomic_write(path, |file| file.write_all(&bytes))
     }
 
-    /// Writes frames one after another into an animated `.png`. It repeats without end and rests on the last frame;
-    /// viewers that know no animation show the first.
+    /// Writes frames one after another into an animated `.png`. It repeats without end and rests on the last
+    /// frame; viewers that know no animation show the first.
     ///
     /// # Errors
     /// As [`Self::write`].
@@ -132,7 +132,7 @@ impl Solids {
         path: impl AsRef<Path>,
         frames: usize,
         seconds: f64,
-        mut frame: impl FnMut(usize) -> Result<Stage, Error>,
+        mut frame: impl FnMut(usize) -> Result<SolidStage, Error>,
     ) -> Result<(), Error> {
         self.film(path.as_ref(), &vec![self.view; frames], (seconds, 20), |k| Ok(Cow::Owned(frame(k)?)))
     }
@@ -146,7 +146,7 @@ impl Solids {
         path: impl AsRef<Path>,
         frames: usize,
         seconds: f64,
-        stage: &Stage,
+        stage: &SolidStage,
     ) -> Result<(), Error> {
         let View { azimuth, elevation } = self.view;
         let turned = |k: usize| View { azimuth: azimuth + TAU * k as f64 / frames as f64, elevation };
@@ -159,7 +159,7 @@ impl Solids {
         path: &Path,
         views: &[View],
         (seconds, rest): (f64, u16),
-        mut stage: impl FnMut(usize) -> Result<Cow<'s, Stage>, Error>,
+        mut stage: impl FnMut(usize) -> Result<Cow<'s, SolidStage>, Error>,
     ) -> Result<(), Error> {
         let fail = |reason: String| picture_error(path, reason);
         let layout = self.layout(views.len().min(1), views, 520.0).map_err(fail)?;
@@ -173,13 +173,14 @@ impl Solids {
         atomic_write(path, |file| file.write_all(&bytes))
     }
 
-    /// Draws a stage of all fields, and the axes; returns whether visible values lie below, above the range of each field.
+    /// Draws a stage of all fields, and the axes; returns whether visible values lie below, above the range
+    /// of each field.
     fn paint(
         &self,
-        layout: &Layout,
+        layout: &SolidLayout,
         view: View,
         index: usize,
-        (title, skin): &Stage,
+        (title, skin): &SolidStage,
         canvas: &mut Canvas,
     ) -> Result<Vec<[bool; 2]>, String> {
         let camera = Camera { axes: view.axes(), ..layout.camera };
@@ -193,9 +194,9 @@ impl Solids {
         let [x, y] = place(0);
         let above = y - LINE as isize / 2;
         if layout.stacked {
-            canvas.text(x, above, &title, Anchor::Left);
+            canvas.text(x, above, &title, LabelAnchor::Left);
         } else {
-            canvas.text(x + layout.panel[0] as isize / 2, above, &title, Anchor::Center);
+            canvas.text(x + layout.panel[0] as isize / 2, above, &title, LabelAnchor::Center);
         }
         if index == 0 {
             self.arms(layout, camera.axes, canvas);
@@ -208,9 +209,9 @@ impl Solids {
     }
 
     /// Draws title and colour bars.
-    fn surround(&self, layout: &Layout, canvas: &mut Canvas) {
+    fn surround(&self, layout: &SolidLayout, canvas: &mut Canvas) {
         let middle = layout.size[0] as isize / 2;
-        canvas.text(middle, (MARGIN + TITLE as usize / 2) as isize, &layout.title, Anchor::Center);
+        canvas.text(middle, (MARGIN + TITLE as usize / 2) as isize, &layout.title, LabelAnchor::Center);
         for (field, (bar, strip)) in layout.bars.iter().zip(&self.fields).enumerate() {
             let [x, y] = layout.origin;
             let [x, y] = if layout.stacked {
@@ -223,7 +224,7 @@ impl Solids {
     }
 
     /// Draws the axes to scale.
-    fn arms(&self, layout: &Layout, axes: [[f64; 3]; 3], canvas: &mut Canvas) {
+    fn arms(&self, layout: &SolidLayout, axes: [[f64; 3]; 3], canvas: &mut Canvas) {
         let length = layout.arm * layout.camera.scale;
         // from back to front
         let mut order = [0, 1, 2];
@@ -235,11 +236,11 @@ impl Solids {
             // farther from a foreshortened arm
             let far = length + LETTER / x.hypot(y).max(0.2);
             let [x, y] = end(far).map(|x| x.round() as isize);
-            canvas.text(x, y, &layout.letters[d], Anchor::Center);
+            canvas.text(x, y, &layout.letters[d], LabelAnchor::Center);
         }
         let [x, y] = layout.root.map(|x| x as isize);
         let reach = (length + 3.0 * LETTER) as isize;
-        canvas.text(x + reach, y, &layout.caption, Anchor::Left);
+        canvas.text(x + reach, y, &layout.caption, LabelAnchor::Left);
     }
 
     fn check(&self, stages: usize, views: &[View]) -> Result<(), String> {
@@ -268,8 +269,8 @@ impl Solids {
         Ok(())
     }
 
-    /// A layout with panels of `longest` pixels that hold the bounds in each of the views.
-    fn layout(&self, stages: usize, views: &[View], longest: f64) -> Result<Layout, String> {
+    /// Returns a layout with panels of `longest` pixels that hold the bounds in each of the views.
+    fn layout(&self, stages: usize, views: &[View], longest: f64) -> Result<SolidLayout, String> {
         self.check(stages, views)?;
         let [low, high] = self.bounds;
         let centre = [0, 1, 2].map(|d| 0.5 * (low[d] + high[d]));
@@ -294,10 +295,11 @@ impl Solids {
         let head = MARGIN + if self.title.is_empty() { 0 } else { TITLE as usize * 3 / 2 };
         let origin = [MARGIN, head + LINE];
         let rows = if stacked { stages * (panel[1] + LINE) - LINE } else { panel[1] };
-        let bar =
-            |strip: &Strip| Bar::new(&strip.label, strip.range, [false; 2], rows.clamp(LEAST_BAR, MOST_BAR));
-        let bars = self.fields.iter().map(bar).collect::<Result<Vec<Bar>, String>>()?;
-        let of_bars = |size: fn(&Bar) -> usize| bars.iter().map(size).max().unwrap_or(0);
+        let bar = |strip: &Strip| {
+            ColorBar::new(&strip.label, strip.range, [false; 2], rows.clamp(LEAST_BAR, MOST_BAR))
+        };
+        let bars = self.fields.iter().map(bar).collect::<Result<Vec<ColorBar>, String>>()?;
+        let of_bars = |size: fn(&ColorBar) -> usize| bars.iter().map(size).max().unwrap_or(0);
         let [wide, tall] = [of_bars(|bar| bar.width), of_bars(|bar| bar.height)];
         let fields = self.fields.len();
         let (step, inner, bar) = if stacked {
@@ -329,7 +331,7 @@ impl Solids {
             return Err(format!("{width} × {height} pixels are too many"));
         }
         let size = [width as usize, height as usize];
-        Ok(Layout {
+        Ok(SolidLayout {
             camera,
             panel,
             stacked,
@@ -364,15 +366,15 @@ mod tests {
         }
     }
 
-    /// A square across the box, further along at each stage.
-    fn stage(index: usize) -> Stage {
+    /// Returns a square across the box, further along at each stage.
+    fn stage(index: usize) -> SolidStage {
         let mut skin = Skin::new(None);
         let corner = |y: f64, z: f64| Corner { at: [1e-3 * index as f64, y, z], values: [z * 1e3, 0.5] };
         skin.face(&[corner(0.0, 0.0), corner(1e-3, 0.0), corner(1e-3, 1e-3), corner(0.0, 1e-3)]);
         (format!("{index} s"), skin)
     }
 
-    /// What an animation shows, frame after frame over what was there: the pictures of its stages.
+    /// The frames of an animation, drawn over each other, are the pictures of its stages.
     #[test]
     fn animations_hold_their_frames() {
         let directory = tempfile::tempdir().unwrap();

@@ -1,11 +1,11 @@
-//! Fields on regular rasters side by side under common colour bars: stages below one another, or one after another
-//! as an animation.
+//! Fields on regular rasters side by side under common colour bars: stages below one another, or one after
+//! another as an animation.
 
 use std::io::Write;
 use std::path::Path;
 
 use super::axis::{labels, ticks};
-use super::canvas::{Anchor, BLACK, Canvas, Text};
+use super::canvas::{BLACK, Canvas, LabelAnchor, Text};
 use super::color::ColorMap;
 use super::picture_error;
 use polycore::Error;
@@ -24,7 +24,7 @@ const LEVELS: usize = 120;
 /// More pixels than this are a mistake.
 const LARGEST: usize = 100_000_000;
 
-/// What all stages share. A sample is a pixel.
+/// Data shared by all stages. A sample is a pixel.
 ///
 /// ```
 /// # use harness::output::picture::{ColorMap, Strip, Strips};
@@ -73,7 +73,8 @@ pub struct Strip {
     pub colors: ColorMap,
 }
 
-/// The values of a stage: a title, and for each field a value a sample, row by row from below; NaN where nothing is.
+/// The values of a stage: a title, and for each field a value a sample, row by row from below; NaN where
+/// nothing is.
 pub type Stage = (String, Vec<Vec<f64>>);
 
 /// Palette indices of a picture.
@@ -97,8 +98,8 @@ impl Strips<'_> {
         atomic_write(path, |file| file.write_all(&bytes))
     }
 
-    /// Writes frames one after another into an animated `.png`. It repeats without end and rests on the last frame;
-    /// viewers that know no animation show the first.
+    /// Writes frames one after another into an animated `.png`. It repeats without end and rests on the last
+    /// frame; viewers that know no animation show the first.
     ///
     /// # Errors
     /// As [`Self::write`]; those of `frame`.
@@ -154,7 +155,7 @@ impl Strips<'_> {
     fn palette(&self) -> Vec<u8> {
         let greys = (0..GREYS).map(|k| [(255 * k / (GREYS - 1)) as u8; 3]);
         let levels = |strip: &Strip| -> Vec<[u8; 3]> {
-            (0..LEVELS).map(|k| strip.colors.at(k as f64 / (LEVELS - 1) as f64)).collect()
+            (0..LEVELS).map(|k| strip.colors.color_at(k as f64 / (LEVELS - 1) as f64)).collect()
         };
         greys.chain(self.columns.iter().flat_map(levels)).flatten().collect()
     }
@@ -184,7 +185,7 @@ impl Strips<'_> {
         Ok(())
     }
 
-    /// The stages below one another, on one axis of lengths and one colour bar a field.
+    /// Returns the stages below one another, on one axis of lengths and one colour bar a field.
     fn sheet(&self, stages: &[Stage]) -> Result<Sheet, String> {
         self.check(stages)?;
         let [across, up] = self.samples;
@@ -207,15 +208,15 @@ impl Strips<'_> {
         let top = |stage: usize| (head + stage * row + line(TITLE)) as isize;
         if !self.title.is_empty() {
             let title = Text::new(&self.title, TITLE)?;
-            canvas.text(width as isize / 2, (MARGIN + line(TITLE) / 2) as isize, &title, Anchor::Center);
+            canvas.text(width as isize / 2, (MARGIN + line(TITLE) / 2) as isize, &title, LabelAnchor::Center);
         }
         for (stage, (title, _)) in stages.iter().enumerate() {
             let title = Text::new(title, TITLE)?;
-            canvas.text(at(0), top(stage) - line(TITLE) as isize / 2, &title, Anchor::Left);
+            canvas.text(at(0), top(stage) - line(TITLE) as isize / 2, &title, LabelAnchor::Left);
             for (place, text) in upwards.iter().zip(&upward_texts) {
                 let y = top(stage) + ((end(1) - place * self.unit.1) * scale).round() as isize;
                 canvas.rectangle(at(0) - LINE - TICK_LENGTH, y, TICK_LENGTH, LINE, BLACK);
-                canvas.text(at(0) - LINE - TICK_LENGTH - 4, y, text, Anchor::Right);
+                canvas.text(at(0) - LINE - TICK_LENGTH - 4, y, text, LabelAnchor::Right);
             }
             for column in 0..columns {
                 canvas.frame(at(column), top(stage), across as isize, up as isize, LINE, BLACK);
@@ -226,18 +227,18 @@ impl Strips<'_> {
         let name = Text::new(&format!("{} [{}]", self.axes[1], self.unit.0), TICK)?;
         if name.width <= head + stages.len() * row {
             let middle = ((top(0) + base) / 2).max((name.width / 2) as isize);
-            canvas.text((MARGIN + line(TICK) / 2) as isize, middle, &name, Anchor::Upwards);
+            canvas.text((MARGIN + line(TICK) / 2) as isize, middle, &name, LabelAnchor::Upwards);
         }
         let bar = base + (2 * line(TICK) + MARGIN) as isize;
         for (column, strip) in self.columns.iter().enumerate() {
             for (place, text) in rightwards.iter().zip(&rightward_texts) {
                 let x = at(column) + ((place * self.unit.1 - self.low[0]) * scale).round() as isize;
                 canvas.rectangle(x, base, LINE, TICK_LENGTH, BLACK);
-                canvas.text(x, base + TICK_LENGTH + line(TICK) as isize / 2, text, Anchor::Center);
+                canvas.text(x, base + TICK_LENGTH + line(TICK) as isize / 2, text, LabelAnchor::Center);
             }
             let name = Text::new(&format!("{} [{}]", self.axes[0], self.unit.0), TICK)?;
             let middle = at(column) + across as isize / 2;
-            canvas.text(middle, base + TICK_LENGTH + 3 * line(TICK) as isize / 2, &name, Anchor::Center);
+            canvas.text(middle, base + TICK_LENGTH + 3 * line(TICK) as isize / 2, &name, LabelAnchor::Center);
             canvas.frame(at(column), bar, across as isize, BAR as isize, LINE, BLACK);
             let (low, high) = strip.range;
             let marks = ticks(low, high, (across / 90).clamp(2, 8));
@@ -246,11 +247,11 @@ impl Strips<'_> {
                 let x = at(column) + (share * across as f64).round() as isize;
                 canvas.rectangle(x, bar + BAR as isize + LINE, LINE, TICK_LENGTH, BLACK);
                 let y = bar + BAR as isize + TICK_LENGTH + line(TICK) as isize / 2 + 2;
-                canvas.text(x, y, text, Anchor::Center);
+                canvas.text(x, y, text, LabelAnchor::Center);
             }
             let label = Text::new(&strip.label, TICK)?;
             let y = bar + BAR as isize + TICK_LENGTH + 3 * line(TICK) as isize / 2 + 2;
-            canvas.text(middle, y, &label, Anchor::Center);
+            canvas.text(middle, y, &label, LabelAnchor::Center);
         }
         let mut sheet = Sheet::of(&canvas);
         for column in 0..columns {
@@ -319,7 +320,7 @@ mod tests {
         (format!("{value} s"), vec![field.clone(), field])
     }
 
-    /// What is written is read again: the frames, their colours, white where nothing is.
+    /// An animation is read back: frames, colours, white background.
     #[test]
     fn animations_hold_their_frames() {
         let directory = tempfile::tempdir().unwrap();
@@ -340,7 +341,7 @@ mod tests {
                 // the raster without the sample that is nothing, and a level of the bar
                 let last = (LEVELS - 1) as f64;
                 let level = (frame as f64 / 2.0 * last).round();
-                assert!(pixel(colors.at(level / last)) >= 3599, "frame {frame}");
+                assert!(pixel(colors.color_at(level / last)) >= 3599, "frame {frame}");
             }
             assert!(pixel([255; 3]) > 3600);
         }

@@ -51,7 +51,7 @@ fn convergence() -> LinePlot {
     plot.series(Series::markers("measured", &h, &h.map(|h| 0.02 * h))).legend(LegendPlace::TopLeft)
 }
 
-/// What `xtask bench langevin` draws: sixteen decades of error.
+/// Sixteen decades of error, as `xtask bench langevin` draws.
 fn errors() -> LinePlot {
     let time = [1.2, 3.4, 5.0, 8.1, 20.0];
     LinePlot::new("Inverse Langevin function: error against time")
@@ -110,7 +110,7 @@ fn what_cannot_be_drawn_is_refused() {
     LinePlot::new("").series(Series::line("<&\"", &[1.0, 2.0, 3.0], &[1.0])).write(&path).unwrap();
 }
 
-/// A plate with a hole under tension: enough to see edges, extremes and a deformed shape.
+/// Returns a plate with a hole under tension: enough to see edges, extremes and a deformed shape.
 fn plate(columns: usize, stretch: f64) -> (Vec<[f64; 2]>, Vec<f64>) {
     let spacing = 1.0 / columns as f64;
     let mut positions = Vec::new();

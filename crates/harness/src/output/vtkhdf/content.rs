@@ -1,6 +1,6 @@
 //! Content of a file: cells of a mesh, and a step.
 
-use super::packed::Rows;
+use super::packed::PackedRows;
 use polycore::Error;
 
 /// Cells of a mesh.
@@ -8,7 +8,7 @@ use polycore::Error;
 pub struct Cells {
     /// Points of all cells, one cell after another, in VTK's order.
     pub connectivity: Vec<u32>,
-    /// Where each cell ends in `connectivity`.
+    /// End of each cell in `connectivity`.
     pub ends: Vec<usize>,
     /// VTK's number of each cell's type: 10 tetrahedron, 12 hexahedron.
     pub types: Vec<u8>,
@@ -27,7 +27,7 @@ impl Cells {
         self.types.len()
     }
 
-    /// Whether there is none.
+    /// Returns whether there is no cell.
     pub fn is_empty(&self) -> bool {
         self.types.is_empty()
     }
@@ -50,11 +50,11 @@ impl Cells {
 }
 
 /// A step: time, points where they move, arrays on points and on cells.
-pub struct Step<'a> {
+pub struct StepContent<'a> {
     pub time: f64,
-    pub points: Option<Rows<'a>>,
-    pub arrays: Vec<Rows<'a>>,
-    pub cell_arrays: Vec<Rows<'a>>,
-    /// In the order of the layout.
+    pub points: Option<PackedRows<'a>>,
+    pub arrays: Vec<PackedRows<'a>>,
+    pub cell_arrays: Vec<PackedRows<'a>>,
+    /// Arrays in the order of the layout.
     pub moments: Vec<f64>,
 }

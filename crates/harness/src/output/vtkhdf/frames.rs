@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::content::{Cells, Step};
-use super::packed::Table;
+use super::content::{Cells, StepContent};
+use super::packed::StoredTable;
 use super::read::{Series, read};
 use super::write::Writer;
 use super::{Layout, data_error, remove, temporary_name, whole_file};
@@ -13,17 +13,17 @@ use polycore::file::{parent, sync_directory};
 
 /// The frames of a series.
 #[derive(Debug)]
-pub struct Frames {
+pub struct FrameFiles {
     path: PathBuf,
     frames: PathBuf,
     steps: usize,
     last_time: f64,
     layout: Option<Layout>,
-    /// Of a mesh: what stands still.
+    /// Points and cells of a mesh, equal in all steps.
     mesh: Option<(Vec<[f64; 3]>, Cells)>,
 }
 
-impl Frames {
+impl FrameFiles {
     /// A new series; removes what an earlier run left there.
     pub fn create(path: &Path, mesh: Option<(Vec<[f64; 3]>, Cells)>) -> Result<Self, Error> {
         let series = Self::new(path, mesh)?;
@@ -74,7 +74,7 @@ impl Frames {
     }
 
     /// Writes the next step as a complete file.
-    pub fn step(&mut self, layout: &Layout, step: Step<'_>) -> Result<(), Error> {
+    pub fn step(&mut self, layout: &Layout, step: StepContent<'_>) -> Result<(), Error> {
         self.check(layout, step.time)?;
         let target = self.frame(self.steps);
         whole_file(&target, |temporary| {
@@ -93,7 +93,7 @@ impl Frames {
         };
         if self.steps == 1 {
             // it is the whole series
-            fs::rename(self.frame(0), &self.path).map_err(Error::io("rename to", &self.path))?;
+            fs::rename(self.frame(0), &self.path).map_err(Error::from_io("rename to", &self.path))?;
             sync_directory(parent(&self.path));
             remove(&self.frames)?;
             return Ok(self.path);
@@ -119,11 +119,11 @@ impl Frames {
     }
 
     fn prepare(&self) -> Result<(), Error> {
-        fs::create_dir_all(&self.frames).map_err(Error::io("create", &self.frames))?;
+        fs::create_dir_all(&self.frames).map_err(Error::from_io("create", &self.frames))?;
         remove(&temporary_name(&self.path))
     }
 
-    /// The file of a step.
+    /// Returns the file of a step.
     pub fn frame(&self, step: usize) -> PathBuf {
         self.frames.join(format!("{step:04}.vtkhdf"))
     }
@@ -143,9 +143,9 @@ impl Frames {
     /// Removes later frames and whatever a killed writer left behind.
     fn discard_from(&self, steps: usize) -> Result<(), Error> {
         let keep: Vec<PathBuf> = (0..steps).map(|step| self.frame(step)).collect();
-        let entries = fs::read_dir(&self.frames).map_err(Error::io("list", &self.frames))?;
+        let entries = fs::read_dir(&self.frames).map_err(Error::from_io("list", &self.frames))?;
         for entry in entries {
-            let path = entry.map_err(Error::io("list", &self.frames))?.path();
+            let path = entry.map_err(Error::from_io("list", &self.frames))?.path();
             if !keep.contains(&path) {
                 remove(&path)?;
             }
@@ -176,11 +176,11 @@ impl Frames {
 fn append(writer: &mut Writer, from: &Series, step: usize) -> Result<(), Error> {
     let layout = from.layout();
     let [points, arrays, cells] = writer.tables();
-    let all = |tables: &[Table], names: &[(String, usize)], kind| {
+    let all = |tables: &[StoredTable], names: &[(String, usize)], kind| {
         let rows = tables.iter().zip(names).map(|(table, (name, _))| from.packed(table, kind, name, step));
         rows.collect::<Result<Vec<_>, _>>()
     };
-    let copied = Step {
+    let copied = StepContent {
         time: from.times()[step],
         points: points.first().map(|table| from.packed(table, "", "Points", step)).transpose()?,
         arrays: all(arrays, &layout.arrays, "PointData")?,

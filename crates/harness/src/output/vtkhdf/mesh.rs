@@ -2,16 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use super::content::{Cells, Step};
-use super::frames::Frames;
-use super::packed::Rows;
+use super::content::{Cells, StepContent};
+use super::frames::FrameFiles;
+use super::packed::PackedRows;
 use super::{Data, Layout, check_points};
 use polycore::Error;
 
 /// Writes the steps of fields on a mesh.
 #[derive(Debug)]
 pub struct MeshSeries {
-    frames: Frames,
+    frames: FrameFiles,
     counts: [usize; 2],
 }
 
@@ -19,16 +19,18 @@ impl MeshSeries {
     /// Begins a series that will end as `path` (`….vtkhdf`); removes what an earlier run left there.
     ///
     /// # Errors
-    /// [`Error::Data`] for a mesh that does not fit together, [`Error::Io`] if the directory cannot be prepared.
+    /// [`Error::Data`] for a mesh that does not fit together, [`Error::Io`] if the directory cannot be
+    /// prepared.
     pub fn create(path: impl AsRef<Path>, points: Vec<[f64; 3]>, cells: Cells) -> Result<Self, Error> {
         let counts = counts(&points, &cells)?;
-        Ok(Self { frames: Frames::create(path.as_ref(), Some((points, cells)))?, counts })
+        Ok(Self { frames: FrameFiles::create(path.as_ref(), Some((points, cells)))?, counts })
     }
 
     /// Continues a series of the same mesh after its first `steps_done` steps; discards later ones.
     ///
     /// # Errors
-    /// As [`MeshSeries::create`]; [`Error::Data`] if fewer steps than that exist, [`Error::Format`] if one is damaged.
+    /// As [`MeshSeries::create`]; [`Error::Data`] if fewer steps than that exist, [`Error::Format`] if one is
+    /// damaged.
     pub fn resume(
         path: impl AsRef<Path>,
         points: Vec<[f64; 3]>,
@@ -36,7 +38,7 @@ impl MeshSeries {
         steps_done: usize,
     ) -> Result<Self, Error> {
         let counts = counts(&points, &cells)?;
-        Ok(Self { frames: Frames::resume(path.as_ref(), Some((points, cells)), steps_done)?, counts })
+        Ok(Self { frames: FrameFiles::resume(path.as_ref(), Some((points, cells)), steps_done)?, counts })
     }
 
     /// Steps written so far.
@@ -44,15 +46,18 @@ impl MeshSeries {
         self.frames.steps()
     }
 
-    /// Writes the next step as a complete file. `time` grows from step to step; all steps have the same arrays.
+    /// Writes the next step as a complete file. `time` grows from step to step; all steps have the same
+    /// arrays.
     ///
     /// # Errors
-    /// [`Error::Data`] if the arrays do not fit the mesh, [`Error::Io`] or [`Error::Format`] if writing fails.
+    /// [`Error::Data`] if the arrays do not fit the mesh, [`Error::Io`] or [`Error::Format`] if writing
+    /// fails.
     pub fn step(&mut self, time: f64, point_data: &[Data<'_>], cell_data: &[Data<'_>]) -> Result<(), Error> {
-        let layout = Layout::of(self.counts, point_data, cell_data)?;
+        let layout = Layout::from_data(self.counts, point_data, cell_data)?;
         let [arrays, cell_arrays] = [point_data, cell_data]
-            .map(|data| data.iter().map(|(_, _, values)| Rows::Values((*values).into())).collect());
-        self.frames.step(&layout, Step { time, points: None, arrays, cell_arrays, moments: Vec::new() })
+            .map(|data| data.iter().map(|(_, _, values)| PackedRows::Values((*values).into())).collect());
+        self.frames
+            .step(&layout, StepContent { time, points: None, arrays, cell_arrays, moments: Vec::new() })
     }
 
     /// Merges all steps into the one transient file and removes the frames; returns its path.

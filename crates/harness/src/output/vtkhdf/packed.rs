@@ -1,4 +1,5 @@
-//! The rows of a step in a dataset: one chunk, packed here, on all threads, and copied packed from file to file.
+//! The rows of a step in a dataset: one chunk, packed here, on all threads, and copied packed from file to
+//! file.
 
 use std::borrow::Cow;
 use std::io::Write;
@@ -7,45 +8,47 @@ use flate2::{Compression, write::ZlibEncoder};
 use rayon::prelude::*;
 use rust_hdf5::{H5Dataset, H5File, Hdf5Error};
 
-/// Deflate's level: the last bits of measured numbers cannot be packed, and higher levels take long to find that out.
+/// Deflate's level: the last bits of measured numbers cannot be packed, and higher levels take long to find
+/// that out.
 pub const LEVEL: u32 = 2;
 /// HDF5's numbers of the filters shuffle and deflate.
 const FILTERS: [u16; 2] = [2, 1];
 /// Bytes that are sorted at a time, before they are packed.
 const BLOCK: usize = 1 << 16;
 
-/// Whether an array of so many components is stored in single precision: second-order tensors, the bulk of a file, whose seventh
-/// digit no one needs.
+/// Returns whether an array of so many components is stored in single precision: second-order tensors, the
+/// bulk of a file, whose seventh digit no one needs.
 pub fn is_single(components: usize) -> bool {
     components == 9
 }
 
 /// A dataset of which each step is a chunk.
-pub struct Table {
+pub struct StoredTable {
     pub dataset: H5Dataset,
     rows: usize,
     columns: usize,
 }
 
-/// What is written of a step.
-pub enum Rows<'a> {
-    /// As they are.
+/// Values of a step as they are written.
+pub enum PackedRows<'a> {
+    /// Double precision.
     Values(Cow<'a, [f64]>),
-    /// Packed as [`Table::write`] does it.
+    /// Packed as [`StoredTable::write`] does it.
     Packed(Vec<u8>),
 }
 
-impl Table {
-    /// Of so many rows a step and so many components.
+impl StoredTable {
+    /// Creates an array of so many rows per step and so many components.
     pub fn new(dataset: H5Dataset, rows: usize, columns: usize) -> Self {
         Self { dataset, rows, columns }
     }
 
     /// Writes the step `at` of each table.
-    pub fn write(all: Vec<(&Self, Rows<'_>)>, at: usize) -> Result<(), Hdf5Error> {
-        // as many at a time as there are threads: packed arrays are nearly as large as those that the caller holds
+    pub fn write(all: Vec<(&Self, PackedRows<'_>)>, at: usize) -> Result<(), Hdf5Error> {
+        // as many at a time as there are threads: packed arrays are nearly as large as those that the caller
+        // holds
         for some in all.chunks(rayon::current_num_threads()) {
-            let work: Vec<(usize, &Rows<'_>)> =
+            let work: Vec<(usize, &PackedRows<'_>)> =
                 some.iter().map(|(table, rows)| (table.columns, rows)).collect();
             let packed: Vec<Cow<'_, [u8]>> = work.into_par_iter().map(|(n, rows)| rows.packed(n)).collect();
             for ((table, _), packed) in some.iter().zip(packed) {
@@ -55,12 +58,13 @@ impl Table {
         Ok(())
     }
 
-    /// The chunk of a step.
+    /// Returns the chunk of a step.
     fn place(&self, at: usize) -> Vec<usize> {
         if self.columns == 1 { vec![at] } else { vec![at, 0] }
     }
 
-    /// The step `at` of the same dataset of another file as it is packed there, if it is stored in the same way.
+    /// Returns the step `at` of the same dataset of another file as it is packed there, if it is stored in
+    /// the same way.
     pub fn same_of(&self, file: &H5File, name: &str, at: usize) -> Option<Vec<u8>> {
         let other = file.dataset(name).ok()?;
         let chunk = if self.columns == 1 { vec![self.rows] } else { vec![self.rows, self.columns] };
@@ -77,12 +81,12 @@ impl Table {
     }
 }
 
-impl Rows<'_> {
-    /// Of so many components, as HDF5's filters pack them.
+impl PackedRows<'_> {
+    /// Packs an array of so many components with HDF5's filters.
     fn packed(&self, components: usize) -> Cow<'_, [u8]> {
         let values = match self {
-            Rows::Values(values) => values,
-            Rows::Packed(bytes) => return Cow::Borrowed(bytes),
+            PackedRows::Values(values) => values,
+            PackedRows::Packed(bytes) => return Cow::Borrowed(bytes),
         };
         Cow::Owned(match is_single(components) {
             true => packed(values, |value| (value as f32).to_le_bytes()),
@@ -91,7 +95,7 @@ impl Rows<'_> {
     }
 }
 
-/// The first bytes of all values, then their second bytes, and so on (HDF5's shuffle), deflated.
+/// Returns the first bytes of all values, then their second bytes, and so on (HDF5's shuffle), deflated.
 fn packed<const N: usize>(values: &[f64], bytes: impl Fn(f64) -> [u8; N]) -> Vec<u8> {
     let mut encoder = ZlibEncoder::new(Vec::with_capacity(values.len() * N / 2), Compression::new(LEVEL));
     let mut sorted = Vec::with_capacity(BLOCK);
@@ -111,12 +115,12 @@ mod tests {
     use rust_hdf5::H5Type;
     use std::path::Path;
 
-    /// A file with an array `a` of some rows to a chunk, and its table.
-    fn begun<T: H5Type>(path: &Path, rows: usize, columns: usize) -> (H5File, Table) {
+    /// Returns a file with an array `a` of some rows to a chunk, and its table.
+    fn begun<T: H5Type>(path: &Path, rows: usize, columns: usize) -> (H5File, StoredTable) {
         let file = H5File::create(path).unwrap();
         let builder = file.new_dataset::<T>().shape([0, columns]).chunk(&[rows, columns]);
         let builder = builder.max_shape(&[None, Some(columns)]).shuffle_deflate(LEVEL);
-        let table = Table::new(builder.create("a").unwrap(), rows, columns);
+        let table = StoredTable::new(builder.create("a").unwrap(), rows, columns);
         (file, table)
     }
 
@@ -134,8 +138,8 @@ mod tests {
             let create = if is_single(columns) { begun::<f32> } else { begun::<f64> };
             let (file, table) = create(&path, 4, columns);
             let (first, second) = values.split_at(4 * columns);
-            Table::write(vec![(&table, Rows::Values(second.into()))], 1).unwrap();
-            Table::write(vec![(&table, Rows::Values(first.into()))], 0).unwrap();
+            StoredTable::write(vec![(&table, PackedRows::Values(second.into()))], 1).unwrap();
+            StoredTable::write(vec![(&table, PackedRows::Values(first.into()))], 0).unwrap();
             file.close().unwrap();
             let found = read(&path);
             let far = found.iter().zip(&values).map(|(a, b)| ((a - b) / b).abs()).fold(0.0, f64::max);
@@ -154,17 +158,17 @@ mod tests {
                 if single { begun::<f32>(&from, rows, 9) } else { begun::<f64>(&from, rows, 9) };
             let values = &values[..9 * rows];
             let rows = if single {
-                Rows::Values(values.into())
+                PackedRows::Values(values.into())
             } else {
-                Rows::Packed(packed(values, f64::to_le_bytes))
+                PackedRows::Packed(packed(values, f64::to_le_bytes))
             };
-            Table::write(vec![(&table, rows)], 0).unwrap();
+            StoredTable::write(vec![(&table, rows)], 0).unwrap();
             file.close().unwrap();
             let (file, table) = begun::<f32>(&to, 4, 9);
             let bytes = table.same_of(&H5File::open(&from).unwrap(), "a", 0);
             assert_eq!(bytes.is_some(), alike, "{single} {}", values.len());
             if let Some(bytes) = bytes {
-                Table::write(vec![(&table, Rows::Packed(bytes))], 0).unwrap();
+                StoredTable::write(vec![(&table, PackedRows::Packed(bytes))], 0).unwrap();
                 file.close().unwrap();
                 assert_eq!(read(&to), values);
             }

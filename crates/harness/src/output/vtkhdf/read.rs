@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use rust_hdf5::{H5Dataset, H5File};
 
-use super::packed::{Rows, Table};
+use super::packed::{PackedRows, StoredTable};
 use super::{Cells, Layout, OF_THE_FORMAT, format_error};
 use polycore::Error;
 use polycore::hdf5::dataset as checked;
@@ -14,7 +14,7 @@ pub struct Series {
     path: PathBuf,
     file: H5File,
     times: Vec<f64>,
-    /// Where the points of each step begin.
+    /// First point of each step.
     offsets: Vec<usize>,
     moves: bool,
     /// Numbers of the steps as a whole.
@@ -29,8 +29,10 @@ pub struct Series {
 pub fn read(path: impl AsRef<Path>) -> Result<Series, Error> {
     let path = path.as_ref();
     // tells a missing file from a damaged one
-    let size =
-        std::fs::File::open(path).and_then(|file| file.metadata()).map_err(Error::io("open", path))?.len();
+    let size = std::fs::File::open(path)
+        .and_then(|file| file.metadata())
+        .map_err(Error::from_io("open", path))?
+        .len();
     let fail = |reason: &str| format_error(path, reason);
     let hdf5 = |error: rust_hdf5::Hdf5Error| format_error(path, error);
     let file = H5File::open(path).map_err(hdf5)?;
@@ -95,18 +97,18 @@ pub fn read(path: impl AsRef<Path>) -> Result<Series, Error> {
 }
 
 impl Series {
-    /// The times of the steps, in the unit the writer used.
+    /// Returns the times of the steps, in the unit the writer used.
     pub fn times(&self) -> &[f64] {
         &self.times
     }
 
-    /// The number of steps, at least one.
+    /// Returns the number of steps, at least one.
     #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> usize {
         self.times.len()
     }
 
-    /// A number of a step as a whole.
+    /// Returns a number of a step as a whole.
     pub fn moment(&self, step: usize, name: &str) -> Option<f64> {
         self.moments.iter().find(|(other, _)| other == name)?.1.get(step).copied()
     }
@@ -116,17 +118,17 @@ impl Series {
         self.layout.points
     }
 
-    /// Names and numbers of components of the point arrays.
+    /// Returns names and numbers of components of the point arrays.
     pub fn arrays(&self) -> &[(String, usize)] {
         &self.layout.arrays
     }
 
-    /// Names and numbers of components of the cell arrays; none of particles.
+    /// Returns names and numbers of components of the cell arrays; none of particles.
     pub fn cell_arrays(&self) -> &[(String, usize)] {
         &self.layout.cell_arrays
     }
 
-    /// The cells of a mesh; none of particles.
+    /// Returns the cells of a mesh; none of particles.
     ///
     /// # Errors
     /// [`Error::Format`] for damaged data.
@@ -153,12 +155,12 @@ impl Series {
         }
     }
 
-    /// Whether points have a position for each step.
+    /// Returns whether points have a position for each step.
     pub fn moves(&self) -> bool {
         self.moves
     }
 
-    /// The positions at a step.
+    /// Returns the positions at a step.
     ///
     /// # Errors
     /// [`Error::Data`] beyond the last step, [`Error::Format`] for damaged data.
@@ -168,7 +170,7 @@ impl Series {
         Ok(flat.chunks_exact(3).map(|point| [point[0], point[1], point[2]]).collect())
     }
 
-    /// A point array at a step, the components of a point together.
+    /// Returns a point array at a step, the components of a point together.
     ///
     /// # Errors
     /// [`Error::Data`] beyond the last step or for an unknown name, [`Error::Format`] for damaged data.
@@ -176,7 +178,7 @@ impl Series {
         self.array("point", &self.layout.arrays, self.layout.points, step, name)
     }
 
-    /// A cell array at a step, the components of a cell together.
+    /// Returns a cell array at a step, the components of a cell together.
     ///
     /// # Errors
     /// As [`Series::data`].
@@ -204,23 +206,24 @@ impl Series {
         self.rows(&format!("{group}/{name}"), *components, step * count, count)
     }
 
-    /// An array at a step for a table of another file: packed as it is where both store it in the same way.
+    /// Returns an array at a step for a table of another file: packed as it is where both store it in the
+    /// same way.
     pub(super) fn packed(
         &self,
-        table: &Table,
+        table: &StoredTable,
         kind: &str,
         name: &str,
         step: usize,
-    ) -> Result<Rows<'static>, Error> {
+    ) -> Result<PackedRows<'static>, Error> {
         if let Some(bytes) = table.same_of(&self.file, &format!("VTKHDF/{kind}/{name}"), step) {
-            return Ok(Rows::Packed(bytes));
+            return Ok(PackedRows::Packed(bytes));
         }
         let values = match kind {
             "PointData" => self.data(step, name),
             "CellData" => self.cell_data(step, name),
             _ => self.points(step).map(Vec::into_flattened),
         };
-        values.map(|values| Rows::Values(values.into()))
+        values.map(|values| PackedRows::Values(values.into()))
     }
 
     pub(super) fn layout(&self) -> Layout {

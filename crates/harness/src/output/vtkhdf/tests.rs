@@ -57,8 +57,8 @@ fn all_steps_come_back() {
     assert_eq!(listing(directory.path()), ["body.vtkhdf"]);
 }
 
-/// A process killed at any point leaves frames, possibly a half-written temporary file, possibly later frames than
-/// its checkpoint; the resumed run ends with the bytes of an undisturbed one.
+/// A process killed at any point leaves frames, possibly a half-written temporary file, possibly later frames
+/// than its checkpoint; the resumed run ends with the bytes of an undisturbed one.
 #[test]
 fn resumed_series_equal_undisturbed_ones() {
     let undisturbed = tempfile::tempdir().unwrap();

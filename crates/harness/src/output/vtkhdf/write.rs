@@ -1,12 +1,12 @@
-//! One transient VTKHDF file of known length.
+//! Transient VTKHDF file of known length.
 
 use std::path::{Path, PathBuf};
 
 use rust_hdf5::{DatatypeMessage, H5Dataset, H5Group};
 
 use super::Layout;
-use super::content::{Cells, Step};
-use super::packed::{LEVEL, Rows, Table, is_single};
+use super::content::{Cells, StepContent};
+use super::packed::{LEVEL, PackedRows, StoredTable, is_single};
 use polycore::Error;
 use polycore::hdf5::{Created, write_error};
 
@@ -18,26 +18,31 @@ pub struct Writer {
     file: Created,
     group: H5Group,
     layout: Layout,
-    /// Where points move.
-    points: Option<Table>,
-    arrays: Vec<Table>,
-    cell_arrays: Vec<Table>,
+    /// Positions of points that move.
+    points: Option<StoredTable>,
+    arrays: Vec<StoredTable>,
+    cell_arrays: Vec<StoredTable>,
     times: Vec<f64>,
-    /// Step by step, in the order of the layout.
+    /// StepContent by step, in the order of the layout.
     moments: Vec<Vec<f64>>,
     steps: usize,
 }
 
-type Hdf5<T> = Result<T, rust_hdf5::Hdf5Error>;
-type Mesh = (Vec<[f64; 3]>, Cells);
+type Hdf5Result<T> = Result<T, rust_hdf5::Hdf5Error>;
+type MeshContent = (Vec<[f64; 3]>, Cells);
 
 impl Writer {
-    /// A file for exactly `steps` steps; of particles where there is no mesh.
-    pub fn create(path: &Path, layout: &Layout, mesh: Option<&Mesh>, steps: usize) -> Result<Self, Error> {
+    /// Returns a file for exactly `steps` steps; of particles where there is no mesh.
+    pub fn create(
+        path: &Path,
+        layout: &Layout,
+        mesh: Option<&MeshContent>,
+        steps: usize,
+    ) -> Result<Self, Error> {
         Self::begin(path, layout, mesh, steps).map_err(|error| write_error(path, error))
     }
 
-    fn begin(path: &Path, layout: &Layout, mesh: Option<&Mesh>, steps: usize) -> Hdf5<Self> {
+    fn begin(path: &Path, layout: &Layout, mesh: Option<&MeshContent>, steps: usize) -> Hdf5Result<Self> {
         let file = Created::new(path)?;
         let group = file.create_group("VTKHDF")?;
         group.set_attr_array_numeric("Version", &[2i64, 0])?;
@@ -46,7 +51,7 @@ impl Writer {
         let ascii = DatatypeMessage::FixedString { size: name.len() as u32, padding: 1, charset: 0 };
         group.set_attr_typed("Type", ascii, name.to_vec())?;
         integers(&group, "NumberOfPoints", &[layout.points as i64])?;
-        let points = Table::new(table::<f64>(&group, "Points", 3, layout.points)?, layout.points, 3);
+        let points = StoredTable::new(table::<f64>(&group, "Points", 3, layout.points)?, layout.points, 3);
         let points = match mesh {
             Some((places, cells)) => {
                 points.dataset.append(places.as_flattened())?;
@@ -62,9 +67,9 @@ impl Writer {
             let group = group.create_group(name)?;
             let create = |(name, n): &(String, usize)| {
                 let table = if is_single(*n) { table::<f32> } else { table::<f64> };
-                Ok(Table::new(table(&group, name, *n, rows)?, rows, *n))
+                Ok(StoredTable::new(table(&group, name, *n, rows)?, rows, *n))
             };
-            arrays.iter().map(create).collect::<Hdf5<Vec<_>>>()
+            arrays.iter().map(create).collect::<Hdf5Result<Vec<_>>>()
         };
         let arrays = tables("PointData", &layout.arrays, layout.points)?;
         let cell_arrays =
@@ -84,18 +89,18 @@ impl Writer {
         })
     }
 
-    pub fn step(&mut self, step: Step<'_>) -> Result<(), Error> {
+    pub fn step(&mut self, step: StepContent<'_>) -> Result<(), Error> {
         let tables = self.points.iter().chain(&self.arrays).chain(&self.cell_arrays);
         let rows = step.points.into_iter().chain(step.arrays).chain(step.cell_arrays);
-        let all: Vec<(&Table, Rows<'_>)> = tables.zip(rows).collect();
-        Table::write(all, self.times.len()).map_err(|error| write_error(&self.path, error))?;
+        let all: Vec<(&StoredTable, PackedRows<'_>)> = tables.zip(rows).collect();
+        StoredTable::write(all, self.times.len()).map_err(|error| write_error(&self.path, error))?;
         self.times.push(step.time);
         self.moments.push(step.moments);
         Ok(())
     }
 
-    /// The datasets of points, arrays on points and arrays on cells, in their order in a step.
-    pub fn tables(&self) -> [&[Table]; 3] {
+    /// Returns the datasets of points, arrays on points and arrays on cells, in their order in a step.
+    pub fn tables(&self) -> [&[StoredTable]; 3] {
         [self.points.as_slice(), &self.arrays, &self.cell_arrays]
     }
 
@@ -104,7 +109,7 @@ impl Writer {
         self.end().map_err(|error| write_error(&path, error))
     }
 
-    fn end(self) -> Hdf5<()> {
+    fn end(self) -> Hdf5Result<()> {
         let n = self.steps;
         debug_assert_eq!(n, self.times.len());
         let group = self.group.create_group("Steps")?;
@@ -147,7 +152,7 @@ impl Writer {
 }
 
 /// Each particle a vertex.
-fn write_vertices(group: &H5Group, points: usize) -> Hdf5<()> {
+fn write_vertices(group: &H5Group, points: usize) -> Hdf5Result<()> {
     for kind in KINDS {
         let count = if kind == "Vertices" { points } else { 0 };
         let subgroup = group.create_group(kind)?;
@@ -160,7 +165,7 @@ fn write_vertices(group: &H5Group, points: usize) -> Hdf5<()> {
     Ok(())
 }
 
-fn write_cells(group: &H5Group, cells: &Cells) -> Hdf5<()> {
+fn write_cells(group: &H5Group, cells: &Cells) -> Hdf5Result<()> {
     let ids: Vec<i64> = cells.connectivity.iter().map(|&point| i64::from(point)).collect();
     let offsets: Vec<i64> = std::iter::once(0).chain(cells.ends.iter().map(|&end| end as i64)).collect();
     integers(group, "NumberOfCells", &[cells.len() as i64])?;
@@ -170,12 +175,17 @@ fn write_cells(group: &H5Group, cells: &Cells) -> Hdf5<()> {
     table::<u8>(group, "Types", 1, cells.len())?.append(&cells.types)
 }
 
-fn integers(group: &H5Group, name: &str, values: &[i64]) -> Hdf5<()> {
+fn integers(group: &H5Group, name: &str, values: &[i64]) -> Hdf5Result<()> {
     group.new_dataset::<i64>().shape([values.len()]).create(name)?.write_raw(values)
 }
 
-/// An empty compressed dataset with unlimited rows; a step is a chunk.
-fn table<T: rust_hdf5::H5Type>(group: &H5Group, name: &str, columns: usize, rows: usize) -> Hdf5<H5Dataset> {
+/// Returns an empty compressed dataset with unlimited rows; a step is a chunk.
+fn table<T: rust_hdf5::H5Type>(
+    group: &H5Group,
+    name: &str,
+    columns: usize,
+    rows: usize,
+) -> Hdf5Result<H5Dataset> {
     let chunk = rows.max(1);
     let builder = group.new_dataset::<T>();
     let builder = if columns == 1 {

@@ -1,33 +1,34 @@
-//! Laws evaluated on a scene's data.
+//! `mdsurrogate eval`: evaluates laws on the data of a scene.
 
-use crate::program::run::{Failure, Named, Prepared, judge_laws};
+use crate::error::Error;
+use crate::program::run::{NamedLaw, Prepared, judge_laws};
 use crate::program::scene::Scene;
 use crate::surrogate::Surrogate;
 use harness::case::terminal::{default_output, print};
 use harness::report::Report;
-use harness::scene::Source;
+use harness::scene::{Failure, Source};
 use std::path::{Path, PathBuf};
 
-/// Laws to judge.
+/// Laws to evaluate.
 #[derive(clap::Args)]
 pub struct Eval {
-    /// The scene (TOML) whose data they are judged on.
+    /// Scene (TOML) with the data.
     scene: PathBuf,
-    /// The laws (safetensors).
+    /// Laws (safetensors).
     #[arg(required = true)]
     laws: Vec<PathBuf>,
-    /// Directory for results; default: out/NAME-eval after the scene's folder.
+    /// Output directory; default: out/NAME-eval, after the folder of the scene.
     #[arg(long, short)]
     output: Option<PathBuf>,
 }
 
 impl Eval {
-    /// Judges the laws.
-    pub fn run(self) -> Result<bool, Failure> {
+    /// Evaluates the laws.
+    pub fn run(self) -> Result<bool, Failure<Error>> {
         let source = Source::read(&self.scene)?;
         let scene = source.parse::<Scene>()?;
         scene.check(&source)?;
-        let laws = names(&self.laws).into_iter().zip(&self.laws);
+        let laws = law_names(&self.laws).into_iter().zip(&self.laws);
         let laws = laws.map(|(name, path)| Ok((name, Surrogate::read(path)?)));
         let laws = laws.collect::<Result<Vec<_>, crate::Error>>()?;
         let data = Prepared::new(&source, &scene)?;
@@ -37,9 +38,9 @@ impl Eval {
         });
         let _lock = harness::case::prepare_run(&output)?;
         let mut report = Report::new("mdsurrogate", env!("CARGO_PKG_VERSION"), &source.text);
-        let named: Vec<Named> = laws
+        let named: Vec<NamedLaw> = laws
             .iter()
-            .map(|(name, law)| Named { name, law, runs: &[], seconds: None, split: None })
+            .map(|(name, law)| NamedLaw { name, law, runs: &[], seconds: None, split: None })
             .collect();
         let table = judge_laws(&named, &data, &output, &mut report)?;
         report.threads(1).write(&output)?;
@@ -52,8 +53,8 @@ impl Eval {
     }
 }
 
-/// Names of laws by their files: of those with one name the folder, too, and of those in one folder a number.
-fn names(laws: &[PathBuf]) -> Vec<String> {
+/// Names laws by their files, with the folder for equal file names, and a number for equal folders.
+fn law_names(laws: &[PathBuf]) -> Vec<String> {
     let text = |part: Option<&std::ffi::OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
     let plain: Vec<String> = laws.iter().map(|path| text(path.file_stem())).collect();
     let count = |names: &[String], name: &String| names.iter().filter(|other| *other == name).count();
@@ -75,14 +76,14 @@ fn names(laws: &[PathBuf]) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::names;
+    use super::law_names;
 
     #[test]
-    fn laws_of_one_name_are_told_apart() {
-        let of = |paths: &[&str]| names(&paths.iter().map(Into::into).collect::<Vec<_>>());
-        assert_eq!(of(&["a/energy.safetensors", "b/ann.safetensors"]), ["energy", "ann"]);
+    fn equal_names_get_folder_and_number() {
+        let found = |paths: &[&str]| law_names(&paths.iter().map(Into::into).collect::<Vec<_>>());
+        assert_eq!(found(&["a/energy.safetensors", "b/ann.safetensors"]), ["energy", "ann"]);
         let same = ["a/energy.safetensors", "b/energy.safetensors", "b/ann.safetensors"];
-        assert_eq!(of(&same), ["a-energy", "b-energy", "ann"]);
-        assert_eq!(of(&["a/energy.safetensors", "a/energy.safetensors"]), ["a-energy", "a-energy-2"]);
+        assert_eq!(found(&same), ["a-energy", "b-energy", "ann"]);
+        assert_eq!(found(&["a/energy.safetensors", "a/energy.safetensors"]), ["a-energy", "a-energy-2"]);
     }
 }

@@ -1,79 +1,81 @@
-//! `mdsurrogate md`: molecular dynamics.
+//! `mdsurrogate md`: molecular dynamics with LAMMPS.
 
 use crate::Error;
 use crate::dataset::{ReadOptions, hdf5, read};
-use crate::md::{Engine, Folder, Grid, Plan, Protocol, Run, Stepwise};
+use crate::md::{Engine, Folder, MdPlan, MdRun, Protocol, RateGrid, Stepwise};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
 pub enum Md {
-    /// Write the cell, all inputs, the plan and a SLURM job array into a folder.
-    Write(Box<Write>),
-    /// Relax the box at 0 K, equilibrate, and make the start configurations.
-    Prepare(Where),
-    /// Run all unfinished runs (prepares first if needed); repeat it after an interruption.
+    /// Write cell, inputs, plan and a SLURM job array into a folder.
+    Write(Box<WriteArguments>),
+    /// Relax the box at 0 K, equilibrate, and write the start configurations.
+    Prepare(FolderArguments),
+    /// Run all unfinished runs, after preparation if needed; repeat after an interruption.
     Run {
         #[command(flatten)]
-        place: Where,
-        /// Runs at a time, one core each.
+        place: FolderArguments,
+        /// Number of parallel runs, one core each.
         #[arg(long, default_value_t = 1)]
         jobs: usize,
-        /// Only this run, by its number in the plan: for job arrays, which join no tables.
+        /// Run only this run of the plan; for job arrays, which do not join tables.
         #[arg(long)]
         index: Option<usize>,
     },
     /// Join the tables of all finished runs into runs.csv and runs.h5.
     Collect {
-        /// The folder.
+        /// Folder of the runs.
         folder: PathBuf,
     },
 }
 
 #[derive(clap::Args)]
-pub struct Where {
-    /// The folder that `md write` wrote.
+pub struct FolderArguments {
+    /// Folder written by `md write`.
     folder: PathBuf,
-    /// LAMMPS: an executable, or a Python interpreter that can import `lammps`; default: searched for.
+    /// LAMMPS: an executable, or a Python interpreter that can import `lammps`; default: searched in PATH.
     #[arg(long)]
     lammps: Option<PathBuf>,
-    /// The ReaxFF file; default: LAMMPS' own ffield.reax.mattsson.
+    /// ReaxFF force field; default: ffield.reax.mattsson of LAMMPS.
     #[arg(long)]
     force_field: Option<PathBuf>,
 }
 
 #[derive(clap::Args)]
-pub struct Write {
-    /// The folder.
+pub struct WriteArguments {
+    /// Folder of the runs.
     folder: PathBuf,
     /// Cells along x, y, z.
     #[arg(long, num_args = 3, default_values_t = [8, 4, 2])]
     cells: Vec<usize>,
-    /// Levels of rate a direction: n uniaxial runs a direction, n² biaxial ones a pair; 0 for paths only.
+    /// Levels of rate per direction: n uniaxial runs per direction, n² biaxial runs per pair; 0 for paths
+    /// only.
     #[arg(long, default_value_t = 15)]
     levels: usize,
-    /// Engineering strains in x, y, z at the end of a run with the greatest rate.
+    /// Engineering strains in x, y, z at the end of a run with the largest rate.
     #[arg(long, num_args = 3, default_values_t = [0.5, 0.6, 0.15])]
     ultimate_strains: Vec<f64>,
-    /// A factor on all rates of the grid.
+    /// Factor on all rates of the grid.
     #[arg(long, default_value_t = 1.0)]
     rate_scale: f64,
-    /// A general path, rates in 1/fs: x=1e-5,xy=2e-5, with unload=0.6 turned round after that share of the run; may be repeated.
+    /// General path, rates in 1/fs: x=1e-5,xy=2e-5; unload=0.6 reverses it after that fraction; may be
+    /// repeated.
     #[arg(long)]
     path: Vec<String>,
-    /// Runs of each path, from start configurations and velocities of their own.
+    /// Number of runs per path, with different start configurations and velocities.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=100))]
     replicas: u16,
     /// Time step, fs.
     #[arg(long, default_value_t = 0.5)]
     time_step: f64,
-    /// Steps of a run.
+    /// Number of steps per run.
     #[arg(long, default_value_t = 10_000)]
     steps: u64,
     /// Steps between samples.
     #[arg(long, default_value_t = 100)]
     every: u64,
-    /// Pull in steps, as for Fig. 3.5: in each interval between samples so many steps in which its strain is put on, then
-    /// so many of NVT with a fixed box, and averages over the rest of the interval.
+    /// Load stepwise, as for Fig. 3.5: in each interval between samples PULL steps apply the strain, RELAX
+    /// steps of NVT follow, and the rest is averaged.
     #[arg(long, num_args = 2, value_names = ["PULL", "RELAX"])]
     stepwise: Option<Vec<u64>>,
     /// Temperature, K.
@@ -82,7 +84,7 @@ pub struct Write {
     /// Steps of box relaxation at 0 K.
     #[arg(long, default_value_t = 200)]
     relaxation: u64,
-    /// Steps of NVT after the velocities are drawn.
+    /// Steps of NVT after the initial velocities.
     #[arg(long, default_value_t = 400)]
     warm_up: u64,
     /// Steps of NPT at 1 atm.
@@ -91,13 +93,13 @@ pub struct Write {
     /// Steps of NVT before the first start configuration.
     #[arg(long, default_value_t = 1200)]
     settling: u64,
-    /// Start configurations.
+    /// Number of start configurations.
     #[arg(long, default_value_t = 6)]
     snapshots: usize,
-    /// Steps between them.
+    /// Steps between start configurations.
     #[arg(long, default_value_t = 300)]
     gap: u64,
-    /// Seed of the first velocities.
+    /// Seed of the initial velocities.
     #[arg(long, default_value_t = 1201)]
     seed: u32,
 }
@@ -116,10 +118,10 @@ impl Md {
             Self::Run { place, jobs, index } => {
                 let (folder, engine) = place.open()?;
                 if let Some(index) = index {
-                    folder.run_one(&engine, index)?;
+                    folder.run_index(&engine, index)?;
                     return Ok(true);
                 }
-                // a job array is many processes, of which each has its own run
+                // in a job array each process has its own run
                 let _lock = harness::case::lock_run(&place.folder)?;
                 folder.prepare(&engine)?;
                 let (all, open) = (folder.plan().runs.len(), folder.open_runs().len());
@@ -135,7 +137,7 @@ impl Md {
     }
 }
 
-/// runs.csv, and runs.h5 with the averaged columns.
+/// Writes runs.csv, and runs.h5 with the averaged columns.
 fn join(folder: &Path) -> Result<bool, Error> {
     let count = Folder::open(folder)?.collect()?;
     let table = folder.join("runs.csv");
@@ -144,7 +146,7 @@ fn join(folder: &Path) -> Result<bool, Error> {
     Ok(true)
 }
 
-impl Where {
+impl FolderArguments {
     fn open(&self) -> Result<(Folder, Engine), Error> {
         let folder = Folder::open(&self.folder)?;
         let engine = Engine::find(self.lammps.as_deref())?;
@@ -153,7 +155,7 @@ impl Where {
     }
 }
 
-impl Write {
+impl WriteArguments {
     fn run(self) -> Result<bool, Error> {
         let three = |values: &[f64]| [values[0], values[1], values[2]];
         let protocol = Protocol {
@@ -175,26 +177,27 @@ impl Write {
             }),
         };
         protocol.check()?;
-        let grid = Grid {
+        let grid = RateGrid {
             levels: self.levels,
             ultimate_strains: three(&self.ultimate_strains),
             rate_scale: self.rate_scale,
         };
         let mut runs = grid.runs(&protocol)?;
         for (index, text) in self.path.iter().enumerate() {
-            runs.push(Run::parse(text, format!("p{index}"), runs.len() % protocol.snapshots)?);
+            runs.push(MdRun::parse(text, format!("p{index}"), runs.len() % protocol.snapshots)?);
         }
-        let runs: Vec<Run> =
+        let runs: Vec<MdRun> =
             runs.into_iter().flat_map(|run| run.replicas(usize::from(self.replicas), &protocol)).collect();
         let atoms = 148 * protocol.cells.iter().product::<usize>();
         let atom_steps = runs.len() as f64 * protocol.steps as f64 * atoms as f64;
         harness::say!(
-            "{} runs of {} steps with {atoms} atoms: {atom_steps:.2e} atom-steps, {:.0} core-hours at 15,000 a second",
+            "{} runs of {} steps with {atoms} atoms: {atom_steps:.2e} atom-steps, {:.0} core-hours at \
+             15,000 per second",
             runs.len(),
             protocol.steps,
             atom_steps / 15e3 / 3600.0
         );
-        Folder::create(&self.folder, Plan { protocol, runs })?;
+        Folder::create(&self.folder, MdPlan { protocol, runs })?;
         harness::say!("written to {}", self.folder.display());
         Ok(true)
     }

@@ -1,4 +1,4 @@
-//! `mdsurrogate predict`: what a model predicts at the strains of a table.
+//! `mdsurrogate predict`: predictions of a law at the strains of a table.
 
 use crate::Error;
 use crate::dataset::read_strains;
@@ -8,22 +8,22 @@ use harness::output::csv;
 use polycore::tensor::Voigt;
 use std::path::{Path, PathBuf};
 
-/// Pascals in a megapascal.
+/// Pascals per megapascal.
 const MEGA: f64 = 1e6;
 
-/// A model and where it is asked.
+/// Predict stress, tangent and uncertainty.
 #[derive(clap::Args)]
 pub struct Predict {
-    /// The law (safetensors).
+    /// Law (safetensors).
     law: PathBuf,
-    /// The strains (CSV): columns C11, C22, C33 and, where there is shear, C12, C13, C23 (C = FᵀF; C12 counted once), or
-    /// stretch_1, stretch_2, stretch_3 as in tables of data; other columns are left alone.
+    /// Strains (CSV): columns C11, C22, C33 and, with shear, C12, C13, C23 (C = FᵀF; C12 counted once), or
+    /// stretch_1, stretch_2, stretch_3; other columns are ignored.
     table: PathBuf,
-    /// The predictions (CSV): S in MPa, of an ensemble with the standard deviation of each component beside it, their norm
-    /// (`spread`), W in MJ/m³ of an energy, and a 1 for each flag.
+    /// Predictions (CSV): S in MPa, standard deviations and their norm (`spread`) for an ensemble, W in MJ/m³
+    /// for an energy, and flags.
     #[arg(long, short)]
     output: PathBuf,
-    /// Also the 36 components of 2 ∂S/∂C.
+    /// Also write the 36 components of 2 ∂S/∂C.
     #[arg(long)]
     tangent: bool,
 }
@@ -71,7 +71,7 @@ fn write(
     path: &Path,
     points: &[Voigt],
     predictions: &[Prediction<f64>],
-    of_ensemble: bool,
+    is_ensemble: bool,
 ) -> Result<(), Error> {
     let column =
         |value: &dyn Fn(&Prediction<f64>) -> f64| predictions.iter().map(value).collect::<Vec<f64>>();
@@ -81,7 +81,7 @@ fn write(
     }
     for (a, name) in NAMES.iter().enumerate() {
         columns.push((format!("S{name}"), "MPa", column(&|prediction| prediction.stress[a] / MEGA)));
-        if of_ensemble {
+        if is_ensemble {
             let deviation = column(&|prediction| prediction.deviation[a] / MEGA);
             columns.push((format!("S{name} std"), "MPa", deviation));
         }

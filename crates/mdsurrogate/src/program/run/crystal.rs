@@ -1,8 +1,8 @@
-//! What the crystal of Table 3.1, the grid of Table 3.2 and the networks of Table 3.4 are, in numbers and pictures.
+//! Crystal of Table 3.1, grid of Table 3.2 and networks of Table 3.4, in numbers and pictures.
 
-use crate::cell::{Crystal, Element, LATTICE, Packing, amide_torsions};
+use crate::cell::{ChemicalElement, Crystal, LATTICE, Packing, amide_torsions};
 use crate::error::Error;
-use crate::md::{AXES, Grid, Protocol};
+use crate::md::{AXES, Protocol, RateGrid};
 use crate::network::Architecture;
 use crate::program::quantities as q;
 use crate::program::scene::CrystalSpec;
@@ -10,10 +10,10 @@ use harness::output::picture::{LinePlot, Series};
 use harness::report::{Named, Report};
 use std::path::Path;
 
-/// Builds the crystal and measures it; writes `cell-xy.png`, `cell-yz.png` and the same of the supercell.
+/// Builds and measures the crystal; draws `cell-xy.png`, `cell-yz.png` and the same for the supercell.
 ///
 /// # Errors
-/// A supercell of too many atoms; I/O errors.
+/// Returns an error for a supercell with too many atoms, and I/O errors.
 pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result<(), Error> {
     let cell = Crystal::unit_cell(&LATTICE, Packing::default())?;
     let supercell = cell.replicate(spec.cells)?;
@@ -28,31 +28,32 @@ pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result
             value(q::EDGE.of(&[name, axis]), length);
         }
     }
-    let nitrogens = cell.atoms.iter().filter(|(element, _)| *element == Element::N).count();
+    let nitrogens = cell.atoms.iter().filter(|(element, _)| *element == ChemicalElement::N).count();
     value(q::MONOMERS.into(), nitrogens as f64);
     let bonds = cell.bonds();
     value(q::BONDS.into(), bonds.len() as f64);
     value(q::CHAINS.into(), cell.molecules() as f64);
-    let of_atom = cell.bonds_of_atoms();
-    for element in Element::ALL {
+    let neighbours = cell.bonds_of_atoms();
+    for element in ChemicalElement::ALL {
         for count in 1..=4 {
-            let with =
-                |(atom, own): &(&(Element, [f64; 3]), &Vec<_>)| atom.0 == element && own.len() == count;
-            let found = cell.atoms.iter().zip(&of_atom).filter(with).count();
+            let matches = |(atom, own): &(&(ChemicalElement, [f64; 3]), &Vec<_>)| {
+                atom.0 == element && own.len() == count
+            };
+            let found = cell.atoms.iter().zip(&neighbours).filter(matches).count();
             if found > 0 {
                 value(q::ATOMS_WITH_BONDS.of(&[&format!("{element:?}"), &count.to_string()]), found as f64);
             }
         }
     }
-    let carbon = cell.angles(Element::C, 4).map(f64::to_degrees);
+    let carbon = cell.angles(ChemicalElement::C, 4).map(f64::to_degrees);
     value(q::LEAST_ANGLE.into(), carbon[0]);
     value(q::GREATEST_ANGLE.into(), carbon[1]);
     for (first, second) in [
-        (Element::C, Element::C),
-        (Element::C, Element::H),
-        (Element::C, Element::O),
-        (Element::C, Element::N),
-        (Element::N, Element::H),
+        (ChemicalElement::C, ChemicalElement::C),
+        (ChemicalElement::C, ChemicalElement::H),
+        (ChemicalElement::C, ChemicalElement::O),
+        (ChemicalElement::C, ChemicalElement::N),
+        (ChemicalElement::N, ChemicalElement::H),
     ] {
         let pair = format!("{first:?}{second:?}");
         let [shortest, longest] = cell.bond_lengths(first, second);
@@ -62,7 +63,7 @@ pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result
     for (index, torsion) in amide_torsions(LATTICE.b / 2.0)?.into_iter().enumerate() {
         value(q::TORSION.of(&[&(index + 1).to_string()]), torsion.abs());
     }
-    let (protocol, grid) = (Protocol::default(), Grid { levels: spec.levels, ..Grid::default() });
+    let (protocol, grid) = (Protocol::default(), RateGrid { levels: spec.levels, ..RateGrid::default() });
     let runs = grid.runs(&protocol)?;
     value(q::GRID_RUNS.into(), runs.len() as f64);
     let samples = (protocol.steps / protocol.every + 1) as f64 * runs.len() as f64;
@@ -70,7 +71,7 @@ pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result
     let steps = protocol.steps as f64;
     for (axis, rates) in AXES.iter().zip(grid.rates(&protocol)) {
         let (Some(least), Some(greatest)) = (rates.first(), rates.last()) else { continue };
-        // Table 3.2 prints them in 1e-6 a step of 0.5 fs, and calls them 1e-6/fs
+        // Table 3.2 prints the rates in 1e-6 per step of 0.5 fs, but states 1e-6/fs
         let printed = |rate: f64| rate * protocol.time_step * 1e6;
         value(q::LEAST_RATE.of(&[axis]), printed(*least));
         value(q::GREATEST_RATE.of(&[axis]), printed(*greatest));
@@ -92,7 +93,7 @@ pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result
             let mut plot = LinePlot::new(&format!("γ-PA12, {name}"))
                 .axes(axes[across], axes[up])
                 .size(460.0, (340.0 * high / wide).clamp(340.0, 1000.0) + 80.0);
-            for element in Element::ALL {
+            for element in ChemicalElement::ALL {
                 let own = || crystal.atoms.iter().filter(|(other, _)| *other == element);
                 let along = |axis: usize| own().map(|(_, p)| p[axis]).collect::<Vec<f64>>();
                 plot = plot.series(Series::markers(&format!("{element:?}"), &along(across), &along(up)));

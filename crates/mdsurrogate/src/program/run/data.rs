@@ -1,18 +1,18 @@
-//! The data of a scene: read, measured, divided, drawn, written as HDF5.
+//! Data of a scene: reading, measures, split, pictures and HDF5.
 
-use super::{Failure, uniaxial};
+use super::uniaxial;
 use crate::dataset::{
-    Dataset, Method, Noise, Path as Path_, ReadOptions, Row, Split, Standardisation, hdf5, leak, noise, read,
-    split,
+    DataRow, DataSplit, Dataset, Noise, Path as Path_, ReadOptions, SplitMethod, Standardisation, hdf5, leak,
+    noise, read, split,
 };
 use crate::error::Error;
 use crate::kinematics::{ANGSTROM, NAMES, PeriodicBox};
 use crate::program::quantities as q;
-use crate::program::scene::{Data, Scene};
+use crate::program::scene::{DatasetSpec, Scene};
 use crate::surrogate::{Kind, Symmetry};
 use crate::train::loading;
 use harness::report::{Named, Report};
-use harness::scene::Source;
+use harness::scene::{Failure, Source};
 use polycore::tensor::Voigt;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -20,12 +20,17 @@ use std::path::{Path, PathBuf};
 /// Reads, checks and joins the files of a scene; paths are relative to it.
 ///
 /// # Errors
-/// [`Failure`]: reference lengths or a unit out of range, and all of [`read`].
-pub fn load(source: &Source, data: &Data, files: &[PathBuf], key: &str) -> Result<Dataset, Failure> {
+/// Returns a [`Failure`] for invalid reference lengths or units, and the errors of [`read`].
+pub fn load(
+    source: &Source,
+    data: &DatasetSpec,
+    files: &[PathBuf],
+    key: &str,
+) -> Result<Dataset, Failure<Error>> {
     let mut options = ReadOptions {
         columns: data.columns,
         origin: data.reference,
-        measure: data.stress,
+        pressure: data.stress,
         units: data.units,
         names: data.names.clone(),
         blocks: data.blocks.clone(),
@@ -42,92 +47,92 @@ pub fn load(source: &Source, data: &Data, files: &[PathBuf], key: &str) -> Resul
     }
     if let Some(unit) = data.stress_unit {
         if unit.si() <= 0.0 {
-            return Err(source.error("data.stress_unit", unit, "a positive stress, as \"1 MPa\"").into());
+            return Err(source.error("data.stress_unit", unit, "a positive stress, e.g. \"1 MPa\"").into());
         }
         options.stress_unit = Some(unit.si());
     }
     if files.is_empty() {
-        return Err(source.error(key, "no file", "at least one").into());
+        return Err(source.error(key, "no files", "at least one file").into());
     }
     let mut set = Dataset::default();
     for (index, file) in files.iter().enumerate() {
         let path = source.file(file);
         let part = read(&path, &options).map_err(|error| match error {
             Error::Shared(polycore::Error::Io { source: reason, .. }) => {
-                let allowed = format!("a file that can be read ({reason})");
+                let allowed = format!("a readable file ({reason})");
                 Failure::from(source.error(&format!("{key}[{index}]"), path.display(), allowed))
             }
             other => other.into(),
         })?;
-        set.append(if set.shares_a_name(&part) { part.of_folder(&path) } else { part })?;
+        set.append(if set.shares_a_name(&part) { part.with_folder_prefix(&path) } else { part })?;
     }
     set.check()?;
     Ok(set)
 }
 
-/// What a scene learns from and is judged by.
+/// Data of a scene, with their split.
 pub struct Prepared {
-    /// The runs to learn from.
+    /// Runs of the split.
     pub set: Dataset,
-    /// The runs kept out of the split.
+    /// Held-out runs, outside the split.
     pub heldout: Option<Dataset>,
-    /// Which rows of `set` are for what.
-    pub split: Split,
-    /// The same by the other method, where a model asks for it.
-    pub second: Option<Split>,
+    /// Split of the rows of `set`.
+    pub split: DataSplit,
+    /// Split by the other method, if a model requests it.
+    pub second: Option<DataSplit>,
 }
 
 impl Prepared {
-    /// Reads and divides the data of a scene.
+    /// Reads and splits the data of a scene.
     ///
     /// # Errors
-    /// [`load`]; a split that the data do not allow.
-    pub fn new(source: &Source, scene: &Scene) -> Result<Self, Failure> {
+    /// Returns the errors of [`load`], and an error for an impossible split.
+    pub fn new(source: &Source, scene: &Scene) -> Result<Self, Failure<Error>> {
         let Some(data) = &scene.data else {
-            return Err(source.error("data", "no `[data]`", "`[data]` with `files`").into());
+            return Err(source.missing("data", "the scene needs `[data]` with `files`").into());
         };
         let set = load(source, data, &data.files, "data.files")?;
         let heldout = match &data.heldout[..] {
             [] => None,
             files => Some(load(source, data, files, "data.heldout")?),
         };
-        let divide = |by: Method| {
+        let divide = |by: SplitMethod| {
             split(&set, by, scene.split.fractions, scene.split.seed).map_err(|error| match error {
                 Error::Parameter { found, allowed, .. } | Error::Data { found, allowed, .. } => {
                     source.error("split", found, allowed)
                 }
-                other => source.error("split", other, "a split that the data allow"),
+                other => source.error("split", other, "a possible split of the data"),
             })
         };
-        let own = divide(scene.split.by)?;
+        let first = divide(scene.split.by)?;
         let other = scene.model.iter().filter_map(|model| model.split).find(|by| *by != scene.split.by);
         let second = other.map(divide).transpose()?;
-        let data = Self { set, heldout, split: own, second };
+        let data = Self { set, heldout, split: first, second };
         data.check_models(source, scene)?;
         Ok(data)
     }
 
-    /// The split of a model.
-    pub fn split_of(&self, model: Option<Method>) -> &Split {
+    /// Returns the split of a model.
+    pub fn split_of(&self, model: Option<SplitMethod>) -> &DataSplit {
         match (&self.second, model) {
             (Some(second), Some(by)) if second.method == by => second,
             _ => &self.split,
         }
     }
 
-    /// Whether every model can learn from these data.
-    fn check_models(&self, source: &Source, scene: &Scene) -> Result<(), Failure> {
+    /// Checks that each model can be trained on these data.
+    fn check_models(&self, source: &Source, scene: &Scene) -> Result<(), Failure<Error>> {
         if self.set.is_nominal() && scene.search.is_some() {
-            let found = "a search for an ann, which has no pressure to eliminate";
-            return Err(source.error("search", found, "data of whole stresses").into());
+            let found = "a search for an ann with nominal stresses";
+            return Err(source.error("search", found, "data with full stresses").into());
         }
         for (index, model) in scene.model.iter().enumerate() {
             let at = |key: &str| format!("model[{index}].{key}");
             let isotropic = matches!(model.law(), Kind::Energy { symmetry: Symmetry::Isotropic, .. });
             if self.set.is_nominal() && !isotropic {
                 let key = if model.symmetry.is_some() { "symmetry" } else { "kind" };
-                let allowed = "`kind = \"energy\"` and `symmetry = \"isotropic\"` for nominal stresses of an \
-                               incompressible body";
+                let allowed = "`kind = \"energy\"` with `symmetry = \"isotropic\"`, for nominal stresses of \
+                    an incompressible body";
                 return Err(source.error(&at(key), "another law", allowed).into());
             }
             for name in &model.runs {
@@ -141,36 +146,34 @@ impl Prepared {
             if model.softening.is_some() {
                 let turned = |path: &&Path_| loading(path).contains(&false);
                 if self.set.is_nominal() {
-                    let found = "nominal stresses";
-                    return Err(source.error(&at("softening"), found, "data of whole stresses").into());
+                    let found = "softening with nominal stresses";
+                    return Err(source.error(&at("softening"), found, "data with full stresses").into());
                 }
-                if split.method == Method::Random {
-                    let allowed = "`split = \"path\"`: the history of a row is that of its run";
-                    return Err(source
-                        .error(&at("softening"), "rows of runs divided at random", allowed)
-                        .into());
+                if split.method == SplitMethod::Random {
+                    let allowed = "`split = \"path\"`, because the damage of a row depends on its run";
+                    return Err(source.error(&at("softening"), "a random split of rows", allowed).into());
                 }
                 if !self.paths_of(&split.train, &model.runs).iter().any(turned) {
-                    let allowed = "training runs that turn round (`md write --path z=6e-5,unload=0.6`)";
-                    return Err(source.error(&at("softening"), "no run that unloads", allowed).into());
+                    let allowed = "training runs with unloading (`md write --path z=6e-5,unload=0.6`)";
+                    return Err(source.error(&at("softening"), "no run with unloading", allowed).into());
                 }
             }
             if self.rows_of(&split.train, &model.runs).is_empty() {
-                let found = "runs without a training row";
-                return Err(source.error(&at("runs"), found, "runs that the split trains on").into());
+                let found = "runs without training rows";
+                return Err(source.error(&at("runs"), found, "runs in the training set of the split").into());
             }
         }
         Ok(())
     }
 
-    /// Rows of the set by their numbers, of some runs; of all where none is named.
-    pub fn rows_of(&self, numbers: &[usize], runs: &[String]) -> Vec<&Row> {
+    /// Returns rows by number, restricted to some runs; an empty list means all runs.
+    pub fn rows_of(&self, numbers: &[usize], runs: &[String]) -> Vec<&DataRow> {
         let paths = self.set.path_of_rows();
-        let of = |row: &&usize| runs.is_empty() || runs.contains(&self.set.paths[paths[**row]].id);
-        self.rows(&numbers.iter().filter(of).copied().collect::<Vec<_>>())
+        let is_chosen = |row: &&usize| runs.is_empty() || runs.contains(&self.set.paths[paths[**row]].id);
+        self.rows(&numbers.iter().filter(is_chosen).copied().collect::<Vec<_>>())
     }
 
-    /// The runs that rows are of, as [`Self::rows_of`].
+    /// Returns the runs of rows, with the restriction of [`Self::rows_of`].
     pub fn paths_of(&self, numbers: &[usize], runs: &[String]) -> Vec<&Path_> {
         let of_row = self.set.path_of_rows();
         let used: BTreeSet<usize> = numbers.iter().map(|&row| of_row[row]).collect();
@@ -178,16 +181,16 @@ impl Prepared {
         used.into_iter().map(|path| &self.set.paths[path]).filter(named).collect()
     }
 
-    /// Rows of the set by their numbers.
-    pub fn rows(&self, numbers: &[usize]) -> Vec<&Row> {
-        let all: Vec<&Row> = self.set.rows().collect();
+    /// Returns rows by number.
+    pub fn rows(&self, numbers: &[usize]) -> Vec<&DataRow> {
+        let all: Vec<&DataRow> = self.set.rows().collect();
         numbers.iter().map(|&row| all[row]).collect()
     }
 
-    /// Measures the data into a report; gives lines that no number can say.
+    /// Reports measures of the data; returns remarks that are not numbers.
     ///
     /// # Errors
-    /// Numbers that are not finite.
+    /// Returns an error for non-finite numbers.
     pub fn measure(&self, report: &mut Report) -> Result<Vec<String>, Error> {
         let standardisation = self.standardisation()?;
         describe(report, "", &self.set);
@@ -201,7 +204,7 @@ impl Prepared {
         let constant = self.set.constant_components();
         if !constant.is_empty() {
             remarks.push(format!(
-                "without variance: {} (standardised to 0; predictions for other values are not reliable)",
+                "constant components: {} (standardised to 0; predictions at other values are not reliable)",
                 constant.join(", ")
             ));
         }
@@ -210,15 +213,15 @@ impl Prepared {
 
     fn standardisation(&self) -> Result<Standardisation, Error> {
         let training: Vec<Voigt> = self.rows(&self.split.train).iter().map(|row| row.c).collect();
-        Standardisation::of(training.iter())
+        Standardisation::from_rows(training.iter())
     }
 
     /// Writes the data as HDF5 and draws the uniaxial runs.
     ///
     /// # Errors
-    /// I/O errors.
+    /// Returns I/O errors.
     pub fn write(&self, output: &Path) -> Result<(), Error> {
-        // the layout has no place for what was not measured
+        // the layout cannot mark stresses that were not measured
         if !self.set.is_nominal() {
             let labels = Some((&self.split, &self.standardisation()?));
             hdf5::write(output.join("data.h5"), &self.set, labels)?;
@@ -230,7 +233,7 @@ impl Prepared {
     }
 }
 
-/// Counts, ranges and noise of a set.
+/// Reports counts, ranges and noise of a set.
 pub fn describe(report: &mut Report, prefix: &str, set: &Dataset) {
     let mut value = |quantity: Named, value: f64| {
         report.value(Named { name: format!("{prefix}{}", quantity.name), ..quantity }, value);
@@ -243,7 +246,7 @@ pub fn describe(report: &mut Report, prefix: &str, set: &Dataset) {
     for (kind, count) in set.kinds() {
         value(q::PATHS_OF_KIND.of(&[kind]), count as f64);
     }
-    for (name, [low, high]) in NAMES.iter().zip(set.box_of_c()) {
+    for (name, [low, high]) in NAMES.iter().zip(set.strain_box()) {
         value(q::LEAST_C.of(&[name]), low);
         value(q::GREATEST_C.of(&[name]), high);
     }
@@ -265,7 +268,7 @@ pub fn describe(report: &mut Report, prefix: &str, set: &Dataset) {
     }
 }
 
-fn measure_split(report: &mut Report, set: &Dataset, split: &Split, standardisation: &Standardisation) {
+fn measure_split(report: &mut Report, set: &Dataset, split: &DataSplit, standardisation: &Standardisation) {
     let sets = [("training", &split.train), ("validation", &split.validation), ("test", &split.test)];
     for (name, rows) in sets {
         report.value(q::SET_ROWS.of(&[name]), rows.len() as f64);

@@ -1,28 +1,28 @@
 //! Pictures of trained laws: Figs 3.7 and 3.9–3.11 of the thesis, and error against time.
 
 use super::heldout::{Heldout, percentages};
-use crate::dataset::Row;
+use crate::dataset::DataRow;
 use crate::error::Error;
 use crate::kinematics::NAMES;
 use crate::program::quantities as q;
 use crate::surrogate::{Surrogate, Workspace};
-use crate::train::State;
+use crate::train::TrainingState;
 use harness::output::picture::{LinePlot, Series};
 use harness::report::Report;
 use std::io::Write;
 use std::path::Path;
 
-/// Percentages beyond this are drawn at the edge: (3.13) has no bound where the stress vanishes.
+/// Larger percentage errors are drawn at the edge: (3.13) is unbounded for vanishing stress.
 const LARGEST_PERCENTAGE: f64 = 300.0;
 
-/// Fig. 3.7: training and validation loss by epoch, of the first member of each law.
-pub(super) fn learning(curves: &[(&str, &State)], output: &Path) -> Result<(), Error> {
+/// Draws Fig. 3.7: training and validation loss by epoch, for the first member of each law.
+pub(super) fn learning(curves: &[(&str, &TrainingState)], output: &Path) -> Result<(), Error> {
     let mut plot = LinePlot::new("Learning curves").axes("epoch", "loss (3.12) (MPa²)").log_y();
     let mut drawn = false;
     for (name, state) in curves {
         let history = state.history();
         let epochs: Vec<f64> = (1..=history.len()).map(|epoch| epoch as f64).collect();
-        // a loss of exactly 0 has no place on a logarithmic axis
+        // a logarithmic axis cannot show 0
         let shown = |loss: f64| if loss > 0.0 { loss } else { f64::NAN };
         let train: Vec<f64> = history.iter().map(|epoch| shown(epoch.train)).collect();
         plot = plot.series(Series::line(&format!("{name}, training"), &epochs, &train));
@@ -36,7 +36,7 @@ pub(super) fn learning(curves: &[(&str, &State)], output: &Path) -> Result<(), E
     if drawn { Ok(plot.write(output.join("learning.png"))?) } else { Ok(()) }
 }
 
-/// Error on the test rows against training time and against the time of one stress, as picture and table.
+/// Draws and tabulates the error on the test rows against training time and the time per stress.
 pub(super) fn against_time(
     names: &[&str],
     losses: &[f64],
@@ -79,7 +79,7 @@ pub(super) fn against_time(
     Ok(())
 }
 
-/// Figs 3.9–3.11: measured and predicted stress of each held-out run, and the percentage error of all.
+/// Draws Figs 3.9–3.11: measured and predicted stress of each held-out run, and the percentage error of all.
 pub(super) fn heldout(seen: &[Heldout], names: &[&str], output: &Path) -> Result<(), Error> {
     let mut errors = LinePlot::new("Percentage error (3.13) of held-out runs")
         .axes("C along the axis of tension", "percentage error (%)")
@@ -90,7 +90,7 @@ pub(super) fn heldout(seen: &[Heldout], names: &[&str], output: &Path) -> Result
         let (stress, measured) = held.measured();
         let rates = match held.within {
             Some(true) => ", rates within the training range",
-            Some(false) => ", rates beyond the training range",
+            Some(false) => ", rates outside the training range",
             None => "",
         };
         let mut plot = LinePlot::new(&format!("Held-out run {}{rates}", held.run.id))
@@ -108,13 +108,13 @@ pub(super) fn heldout(seen: &[Heldout], names: &[&str], output: &Path) -> Result
     if seen.is_empty() { Ok(()) } else { Ok(errors.write(output.join("percentage-error.png"))?) }
 }
 
-/// Width of a bin of C in which percentage errors are averaged.
+/// Width of a bin of C for mean percentage errors.
 const BIN: f64 = 0.05;
-/// Bins at most: beyond, the first ones are of rubber, and wider.
+/// Largest number of bins; larger ranges, e.g. of rubber, get wider bins.
 const BINS: usize = 12;
 
-/// Fig. 3.11 in numbers: the mean of (3.13) over the rows of all held-out runs pulled along one axis, by bins of C there;
-/// values, a curve a law, and a picture.
+/// Reports Fig. 3.11 in numbers: the mean of (3.13) over the rows of the held-out runs pulled along an axis,
+/// by bins of C; values, a curve per law, and a picture.
 pub(super) fn binned(
     report: &mut Report,
     seen: &[Heldout],
@@ -122,10 +122,10 @@ pub(super) fn binned(
     output: &Path,
 ) -> Result<(), Error> {
     for axis in 0..3 {
-        // runs of unknown rates need be no tension
+        // runs with unknown rates may not be tension
         let runs: Vec<&Heldout> =
             seen.iter().filter(|held| held.axis == axis && !held.run.rates[axis].is_nan()).collect();
-        let c = |row: &Row| row.c[axis];
+        let c = |row: &DataRow| row.c[axis];
         let greatest = runs.iter().flat_map(|held| &held.run.rows).map(c).fold(1.0, f64::max);
         if greatest <= 1.0 {
             continue;
@@ -161,14 +161,15 @@ pub(super) fn binned(
                 &[(&format!("C{component}"), "", centres), ("error", "%", means), ("rows", "", counts)],
             );
         }
-        plot = plot.series(Series::reference("no stress at all", &ends, &[100.0, 100.0]));
+        plot = plot.series(Series::reference("zero stress", &ends, &[100.0, 100.0]));
         plot.write(output.join(format!("percentage-error-C{component}.png")))?;
     }
     Ok(())
 }
 
-/// Predicted against measured stress of the test rows, S or nominal, all components: `predicted-LAW.png`.
-pub(super) fn predicted(name: &str, law: &Surrogate, test: &[&Row], output: &Path) -> Result<(), Error> {
+/// Draws `predicted-LAW.png`: predicted against measured stress of the test rows, S or nominal, all
+/// components.
+pub(super) fn predicted(name: &str, law: &Surrogate, test: &[&DataRow], output: &Path) -> Result<(), Error> {
     let mut memory = Workspace::default();
     let mut pairs = Vec::with_capacity(test.len());
     for row in test {

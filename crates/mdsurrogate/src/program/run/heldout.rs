@@ -1,21 +1,21 @@
-//! Held-out runs, what was measured on them and what laws predict.
+//! Held-out runs with measured and predicted stresses.
 
-use crate::dataset::{Path as Path_, Row};
+use crate::dataset::{DataRow, Path as Path_};
 use crate::eval::percentage_error;
 
-/// A held-out run as laws see it.
+/// Held-out run with predictions.
 pub(super) struct Heldout<'a> {
     pub run: &'a Path_,
-    /// The axis that is pulled most; of all, where it is not known which ones are.
+    /// Axis with the largest deformation; of the pulled axes if the rates are known.
     pub axis: usize,
-    /// Whether its rates lie within those of the training runs, where that is known.
+    /// True if its rates lie within those of the training runs; `None` if unknown.
     pub within: Option<bool>,
-    /// Of each law: S at the rows, or what was measured there ([`Row::compared`]).
+    /// Predictions of each law: S at the rows, or nominal stresses ([`DataRow::compared`]).
     pub predicted: Vec<Vec<[f64; 6]>>,
 }
 
 impl Heldout<'_> {
-    /// What was measured along the axis, and its name.
+    /// Returns name and values of the measured stress along the axis.
     pub fn measured(&self) -> (String, Vec<f64>) {
         let rows = &self.run.rows;
         let letter = if rows.iter().any(|row| row.nominal.is_some()) { "P" } else { "S" };
@@ -24,9 +24,9 @@ impl Heldout<'_> {
     }
 }
 
-/// (3.13) row by row; NaN where there is no stress.
-pub(super) fn percentages(rows: &[Row], predicted: &[[f64; 6]]) -> Vec<f64> {
-    let error = |(row, stress): (&Row, &[f64; 6])| {
+/// Computes (3.13) for each row; NaN without stress.
+pub(super) fn percentages(rows: &[DataRow], predicted: &[[f64; 6]]) -> Vec<f64> {
+    let error = |(row, stress): (&DataRow, &[f64; 6])| {
         percentage_error(&row.compared(&row.s)[0], &(*stress).into()).unwrap_or(f64::NAN)
     };
     rows.iter().zip(predicted).map(error).collect()

@@ -1,55 +1,57 @@
-//! Laws judged on the data of a scene: errors, physics, error against time; figures and tables.
+//! Evaluation of laws on the data of a scene: errors, physics, error against time; figures and tables.
 
 use super::heldout::{Heldout, percentages};
-use super::{Failure, Prepared, draw, short};
-use crate::dataset::{Method, Row, noise};
+use super::{Prepared, draw, short};
+use crate::dataset::{DataRow, SplitMethod, noise};
 use crate::error::Error;
 use crate::eval::{
-    Ellipticity, Errors, FLAGS, Physics, Uncertainty, agreement, errors, errors_along, seconds_of_a_stress,
-    within_rates,
+    Ellipticity, Errors, FLAGS, FlagStatistics, PhysicsChecks, agreement, errors, errors_along,
+    time_per_stress, within_rates,
 };
 use crate::program::quantities as q;
-use crate::surrogate::{History, Surrogate, Workspace};
+use crate::surrogate::{SofteningHistory, Surrogate, Workspace};
 use harness::output::csv;
 use harness::report::Report;
+use harness::scene::Failure;
 use std::path::Path;
 
-/// Rows at which physics is measured, at most.
-const PROBED: usize = 200;
+/// Largest number of rows for the physics checks.
+const MOST_PHYSICS_ROWS: usize = 200;
 
-/// Strains at which ellipticity is looked for, at most.
-const SCANNED: usize = 500;
+/// Largest number of strains for the ellipticity scan.
+const MOST_SCANNED_STRAINS: usize = 500;
 
-/// A law whose mean square error is so many times the noise of the data …
+/// A warning follows if the mean square error exceeds both this multiple of the noise …
 const FAR_ABOVE_NOISE: f64 = 100.0;
-/// … and this part of the mean square stress has learnt too little.
+/// … and this fraction of the mean square stress.
 const FAR_FROM_STRESS: f64 = 0.01;
 
 /// A law with its name.
-pub struct Named<'a> {
-    /// Of files and values.
+pub struct NamedLaw<'a> {
+    /// Name, in files and values.
     pub name: &'a str,
     /// The law.
     pub law: &'a Surrogate,
-    /// The training runs that it learnt from; empty for all.
+    /// Names of its training runs; empty for all.
     pub runs: &'a [String],
-    /// How long it was trained, where that is known.
+    /// Training time, s, if known.
     pub seconds: Option<f64>,
-    /// How its rows were divided, if not as the scene's.
-    pub split: Option<Method>,
+    /// Method of its split, if different from the scene's.
+    pub split: Option<SplitMethod>,
 }
 
-/// Judges laws: values into the report, CSV and pictures into `output`; gives a table in lines.
+/// Evaluates laws: reports values, writes CSV files and pictures to `output`, and returns a table, line by
+/// line.
 ///
 /// # Errors
-/// A law that overflows at a row; I/O errors.
+/// Returns an error for a law that overflows, and I/O errors.
 pub fn judge_laws(
-    laws: &[Named],
+    laws: &[NamedLaw],
     data: &Prepared,
     output: &Path,
     report: &mut Report,
-) -> Result<Vec<String>, Failure> {
-    // what rounding leaves of smooth data is no noise
+) -> Result<Vec<String>, Failure<Error>> {
+    // rounding errors of smooth data are not noise
     let largest = data.set.rows().map(|row| row.s.norm_squared()).fold(0.0, f64::max);
     let floor =
         noise(&data.set, |row| row.s).map(|noise| noise.floor).filter(|floor| *floor > 1e-24 * largest);
@@ -68,21 +70,27 @@ pub fn judge_laws(
     let mut warnings = Vec::new();
     let (mut losses, mut training, mut inference) = (Vec::new(), Vec::new(), Vec::new());
     let mut unseen = Vec::new();
-    // of a row: √ of the floor, which is a sum over components
+    // noise of a row: root of the floor, which is a sum over components
     let chance = floor.unwrap_or(0.0).sqrt();
-    for Named { name, law, runs, seconds, split } in laws {
+    for NamedLaw { name, law, runs, seconds, split } in laws {
         let split = data.split_of(*split);
         let test = data.rows(if split.test.is_empty() { &split.train } else { &split.test });
         let stress_square =
             test.iter().map(|row| row.s.norm_squared()).sum::<f64>() / test.len().max(1) as f64;
         let sets = [("training", &split.train), ("validation", &split.validation), ("test", &split.test)];
         for (set, rows) in sets.into_iter().filter(|(_, rows)| !rows.is_empty()) {
-            // whatever a law did not learn from it is tested on
+            // the test includes all rows, also of runs that are not in its training
             let rows = if set == "test" { data.rows(rows) } else { data.rows_of(rows, runs) };
             let found = errors(law, rows.iter().copied())?;
             record(report, name, set, &found, floor);
             if set == "test" {
-                uncertain(report, name, set, law, &Uncertainty::of(law, rows.into_iter(), chance)?);
+                record_uncertainty(
+                    report,
+                    name,
+                    set,
+                    law,
+                    &FlagStatistics::count(law, rows.into_iter(), chance)?,
+                );
             }
         }
         if data.set.is_nominal() {
@@ -96,19 +104,25 @@ pub fn judge_laws(
                 report.value(q::ERROR_WITHOUT_SOFTENING.of(&[name, &set]), ratio);
             }
             record(report, name, &set, &found, floor);
-            uncertain(report, name, &set, law, &Uncertainty::of(law, run.rows.iter(), chance)?);
+            record_uncertainty(
+                report,
+                name,
+                &set,
+                law,
+                &FlagStatistics::count(law, run.rows.iter(), chance)?,
+            );
         }
-        let every = test.len().div_ceil(PROBED).max(1);
-        let physics = Physics::of(law, &test.iter().step_by(every).copied().collect::<Vec<_>>())?;
-        obey(report, name, &physics);
-        // an incompressible body has no waves along their direction: its pressure is not in these laws
+        let every = test.len().div_ceil(MOST_PHYSICS_ROWS).max(1);
+        let physics = PhysicsChecks::measure(law, &test.iter().step_by(every).copied().collect::<Vec<_>>())?;
+        record_physics(report, name, &physics);
+        // an incompressible body has no longitudinal waves, and these laws lack its pressure
         if !data.set.is_nominal() {
             let learnt = data.rows_of(&split.train, runs);
-            let every = learnt.len().div_ceil(SCANNED).max(1);
+            let every = learnt.len().div_ceil(MOST_SCANNED_STRAINS).max(1);
             let strains: Vec<_> = learnt.iter().step_by(every).map(|row| row.c).collect();
-            warnings.extend(waves(report, name, Ellipticity::of(*law, &strains)?));
+            warnings.extend(record_ellipticity(report, name, Ellipticity::scan(*law, &strains)?));
         }
-        let stress = seconds_of_a_stress(law, &test)?;
+        let stress = time_per_stress(law, &test)?;
         report.seconds(&format!("one stress of {name}"), stress);
         let found = errors(law, test.iter().copied())?;
         losses.push(found.mean_square() / 1e12);
@@ -132,8 +146,8 @@ pub fn judge_laws(
         let far = floor.is_some_and(|floor| found.mean_square() > FAR_ABOVE_NOISE * floor);
         if far && found.mean_square() > FAR_FROM_STRESS * stress_square {
             warnings.push(format!(
-                "{name}: its error on the test rows is {} times the noise of the data and {} of their stress; the model has \
-                 not learnt the data",
+                "{name}: the error on the test rows is {} times the noise and {} of the stress; the model \
+                  has not learnt the data",
                 short(found.mean_square() / floor.unwrap_or(f64::NAN)),
                 short((found.mean_square() / stress_square).sqrt())
             ));
@@ -143,26 +157,27 @@ pub fn judge_laws(
     leaks(laws, &unseen, report);
     let names: Vec<&str> = laws.iter().map(|law| law.name).collect();
     draw::against_time(&names, &losses, &training, &inference, floor.map(|floor| floor / 1e12), output)?;
-    let heldout = look_at_heldout(laws, data)?;
+    let heldout = predict_heldout(laws, data)?;
     for run in &heldout {
         write_heldout(run, &names, output)?;
         table.push(match run.within {
             Some(true) => format!("held-out run {}: rates within those of the training runs", run.run.id),
-            Some(false) => format!("held-out run {}: rates beyond those of the training runs", run.run.id),
+            Some(false) => format!("held-out run {}: rates outside those of the training runs", run.run.id),
             None => {
-                format!("held-out run {}: of unknown rates, or of a kind without training runs", run.run.id)
+                format!("held-out run {}: unknown rates, or no training runs of its kind", run.run.id)
             }
         });
     }
     draw::heldout(&heldout, &names, output)?;
     for held in &heldout {
-        scores_to_beat(report, held, floor);
+        record_bounds(report, held, floor);
     }
     draw::binned(report, &heldout, &names, output)?;
     Ok(table)
 }
 
-/// R² and mean absolute error of each run with nominal stresses and of all; lines that say so.
+/// Reports R² and mean absolute error for each run with nominal stresses and for all; returns lines of a
+/// table.
 fn by_mode(
     report: &mut Report,
     name: &str,
@@ -176,8 +191,8 @@ fn by_mode(
     for (what, paths) in single.chain([whole]) {
         let rows = || paths.iter().flat_map(|path| &path.rows);
         let Some(found) = agreement(law, rows())? else { continue };
-        let uncertainty = Uncertainty::of(law, rows(), 0.0)?;
-        uncertain(report, name, &what, law, &uncertainty);
+        let uncertainty = FlagStatistics::count(law, rows(), 0.0)?;
+        record_uncertainty(report, name, &what, law, &uncertainty);
         let flagged = (uncertainty.caught[0] + uncertainty.alarms[0]) as f64
             / (uncertainty.bad + uncertainty.good) as f64;
         report.value(q::SHARE_FLAGGED.of(&[name, &what]), flagged);
@@ -199,31 +214,31 @@ fn by_mode(
     Ok(lines)
 }
 
-/// The error on validation and test rows of a law trained on another split, over that of the same network on the scene's
-/// split: what is owed to rows beside training rows.
-fn leaks(laws: &[Named], unseen: &[f64], report: &mut Report) {
+/// Reports the error on validation and test rows of a law trained on another split, over that of the same
+/// network on the scene's split: the effect of neighbouring training rows.
+fn leaks(laws: &[NamedLaw], unseen: &[f64], report: &mut Report) {
     for (other, loss) in laws.iter().zip(unseen).filter(|(law, _)| law.split.is_some()) {
-        let same = |law: &&Named| {
+        let same = |law: &&NamedLaw| {
             let [a, b] = [law.law, other.law].map(Surrogate::header);
             law.split.is_none() && (&a.kind, &a.architecture) == (&b.kind, &b.architecture)
         };
-        let of_scene = laws.iter().zip(unseen).find(|(law, _)| same(law));
-        if let Some((law, own)) = of_scene.filter(|(_, own)| **own > 0.0) {
+        let reference = laws.iter().zip(unseen).find(|(law, _)| same(law));
+        if let Some((law, own)) = reference.filter(|(_, own)| **own > 0.0) {
             report.value(q::UNSEEN_ERROR_RATIO.of(&[other.name, law.name]), loss / own);
         }
     }
 }
 
-/// (3.13) of no stress at all, 100 % by definition, and of the noise alone, which is what a perfect law has on average.
-fn scores_to_beat(report: &mut Report, held: &Heldout, floor: Option<f64>) {
+/// Reports (3.13) for zero stress, 100 % by definition, and for the noise, the average of a perfect law.
+fn record_bounds(report: &mut Report, held: &Heldout, floor: Option<f64>) {
     let zero = vec![[0.0; 6]; held.run.rows.len()];
     let mean = |values: Vec<f64>| {
         let known: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
         known.iter().sum::<f64>() / known.len().max(1) as f64
     };
     let set = format!("heldout.{}", held.run.id);
-    let nothing = mean(percentages(&held.run.rows, &zero));
-    report.value(q::PERCENTAGE_ERROR.of(&["zero_stress", &set]), nothing);
+    let zero_error = mean(percentages(&held.run.rows, &zero));
+    report.value(q::PERCENTAGE_ERROR.of(&["zero_stress", &set]), zero_error);
     if let Some(floor) = floor {
         let noise = held.run.rows.iter().map(|row| 100.0 * floor.sqrt() / row.s.norm()).collect();
         report.value(q::PERCENTAGE_ERROR.of(&["noise", &set]), mean(noise));
@@ -241,8 +256,14 @@ fn record(report: &mut Report, name: &str, set: &str, errors: &Errors, floor: Op
     }
 }
 
-/// Shares of badly wrong answers, of those caught, and of the others flagged all the same.
-fn uncertain(report: &mut Report, name: &str, set: &str, law: &Surrogate, uncertainty: &Uncertainty) {
+/// Reports fractions of bad predictions, of those with flags, and of false alarms.
+fn record_uncertainty(
+    report: &mut Report,
+    name: &str,
+    set: &str,
+    law: &Surrogate,
+    uncertainty: &FlagStatistics,
+) {
     let share = |part: usize, all: usize| part as f64 / all.max(1) as f64;
     let rows = uncertainty.bad + uncertainty.good;
     report.value(q::SHARE_BADLY_WRONG.of(&[name, set]), share(uncertainty.bad, rows));
@@ -268,8 +289,8 @@ fn uncertain(report: &mut Report, name: &str, set: &str, law: &Surrogate, uncert
     }
 }
 
-/// The slowest wave, and a line where there is none any more.
-fn waves(report: &mut Report, name: &str, found: Option<Ellipticity>) -> Option<String> {
+/// Reports the slowest wave; returns a warning if ellipticity is lost.
+fn record_ellipticity(report: &mut Report, name: &str, found: Option<Ellipticity>) -> Option<String> {
     let Ellipticity { states, lost, least, at, direction } = found?;
     report.value(q::LEAST_WAVE.of(&[name]), least / 1e6);
     for (component, value) in crate::kinematics::NAMES.iter().zip(&at) {
@@ -280,8 +301,8 @@ fn waves(report: &mut Report, name: &str, found: Option<Ellipticity>) -> Option<
         |values: &[f64]| values.iter().map(|value| format!("{value:.4}")).collect::<Vec<_>>().join(", ");
     (lost > 0).then(|| {
         format!(
-            "{name}: loses ellipticity at {lost} of {states} training strains; the worst has C = ({}), waves along N = ({}): {} MPa. \
-             Finite elements localise there; `polyconvex` excludes it",
+            "{name}: loses ellipticity at {lost} of {states} training strains; the worst has C = ({}) and \
+              waves along N = ({}): {} MPa. Finite elements localise there; `polyconvex` excludes it",
             numbers(at.as_slice()),
             numbers(&direction),
             short(least / 1e6)
@@ -289,7 +310,7 @@ fn waves(report: &mut Report, name: &str, found: Option<Ellipticity>) -> Option<
     })
 }
 
-fn obey(report: &mut Report, name: &str, physics: &Physics) {
+fn record_physics(report: &mut Report, name: &str, physics: &PhysicsChecks) {
     report.value(q::STRESS_AT_REST.of(&[name]), physics.rest / 1e6);
     report.value(q::ASYMMETRY.of(&[name]), physics.asymmetry);
     report.value(q::LARGEST_ASYMMETRY.of(&[name]), physics.largest_asymmetry);
@@ -301,14 +322,14 @@ fn obey(report: &mut Report, name: &str, physics: &Physics) {
     }
 }
 
-fn look_at_heldout<'a>(laws: &[Named], data: &'a Prepared) -> Result<Vec<Heldout<'a>>, Error> {
+fn predict_heldout<'a>(laws: &[NamedLaw], data: &'a Prepared) -> Result<Vec<Heldout<'a>>, Error> {
     let mut memory = Workspace::default();
     let mut seen = Vec::new();
     for run in data.heldout.iter().flat_map(|set| &set.paths) {
         let mut predicted = Vec::new();
-        for Named { law, .. } in laws {
-            let mut history = History::default();
-            let mut stress = |row: &Row, memory: &mut _| {
+        for NamedLaw { law, .. } in laws {
+            let mut history = SofteningHistory::default();
+            let mut stress = |row: &DataRow, memory: &mut _| {
                 law.follow(&row.c, false, &mut history, memory)
                     .map(|answer| row.compared(&answer.stress)[1].into())
             };
@@ -324,7 +345,7 @@ fn look_at_heldout<'a>(laws: &[Named], data: &'a Prepared) -> Result<Vec<Heldout
     Ok(seen)
 }
 
-/// C and S along the axis that is pulled most, measured and predicted, and (3.13).
+/// Writes C and S along the axis of the largest deformation, measured and predicted, and (3.13).
 fn write_heldout(seen: &Heldout, names: &[&str], output: &Path) -> Result<(), Error> {
     let component = crate::kinematics::NAMES[seen.axis];
     let rows = &seen.run.rows;

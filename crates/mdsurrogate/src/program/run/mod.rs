@@ -1,4 +1,4 @@
-//! Whole scenes: data measured, laws trained, judged, drawn and written, with `report.json` last.
+//! Runs whole scenes: measures data, trains, evaluates, draws; `report.json` is written last.
 
 mod crystal;
 mod data;
@@ -13,7 +13,7 @@ mod trials;
 mod uniaxial;
 
 pub use data::{Prepared, describe, load};
-pub use judge::{Named, judge_laws};
+pub use judge::{NamedLaw, judge_laws};
 pub use program::Mdsurrogate;
 
 use crate::cell::ATOMS_OF_MONOMER;
@@ -21,16 +21,13 @@ use crate::error::Error;
 use crate::program::scene::{CrystalSpec, Scene};
 use harness::case::{Finished, Run};
 use harness::report::{Phases, Report};
-use harness::scene::Source;
+use harness::scene::{Failure, Source};
 
-/// What stops a run: a fault in the scene, or one met on the way.
-pub type Failure = harness::scene::Failure<Error>;
-
-/// Runs a scene, all but `report.json`, which [`Run::finish`] writes.
+/// Runs a scene; [`Run::finish`] writes `report.json`.
 ///
 /// # Errors
-/// [`Failure`]; nothing half-written remains.
-pub fn run(source: &Source, run: &mut Run) -> Result<Finished, Failure> {
+/// Returns a [`Failure`] for an invalid scene or a failed run; no partial files remain.
+pub fn run(source: &Source, run: &mut Run) -> Result<Finished, Failure<Error>> {
     let (output, quick) = (run.options.output, run.options.quick);
     let scene = source.parse::<Scene>()?;
     scene.check(source)?;
@@ -49,11 +46,12 @@ pub fn run(source: &Source, run: &mut Run) -> Result<Finished, Failure> {
     }
     phases.stop();
     report.phases(&phases).threads(1).judge(&scene.expect, quick);
-    let text = remarks.iter().fold(report.table(), |text, line| text + line + "\n");
-    Ok(Finished { report, text })
+    let notes: String = remarks.iter().map(|line| format!("{line}\n")).collect();
+    let text = report.table() + &notes;
+    Ok(Finished::new(report, text).with_notes(&notes))
 }
 
-/// Measures data, trains and judges laws on them, searches.
+/// Measures the data, trains and evaluates laws, and searches hyperparameters.
 fn learn(
     source: &Source,
     scene: &Scene,
@@ -62,7 +60,7 @@ fn learn(
     phases: &mut Phases,
     report: &mut Report,
     remarks: &mut Vec<String>,
-) -> Result<(), Failure> {
+) -> Result<(), Failure<Error>> {
     phases.start("measure");
     remarks.extend(data.measure(report)?);
     report.work("rows", data.set.len() as u64).work("paths", data.set.paths.len() as u64);
@@ -76,7 +74,7 @@ fn learn(
         phases.start("judge");
         training::record(&trained, run.options.output, report)?;
         remarks.extend(training::remarks(&trained, data));
-        let laws: Vec<judge::Named> = trained.iter().map(training::Trained::named).collect();
+        let laws: Vec<judge::NamedLaw> = trained.iter().map(training::Trained::named).collect();
         remarks.extend(judge_laws(&laws, data, run.options.output, report)?);
     }
     if let Some(spec) = &scene.search {
@@ -87,7 +85,7 @@ fn learn(
     Ok(data.write(run.options.output)?)
 }
 
-/// Three significant digits.
+/// Formats a number with three significant digits.
 fn short(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 || !value.is_finite() {
@@ -100,18 +98,18 @@ fn short(value: f64) -> String {
     format!("{value:.*}", digits as usize)
 }
 
-/// What a scene builds and leaves out, in lines.
+/// Describes a scene, line by line.
 ///
 /// # Errors
-/// A fault of the scene or its data.
-pub fn explain(source: &Source) -> Result<Vec<String>, Failure> {
+/// Returns an error for an invalid scene or invalid data.
+pub fn explain(source: &Source) -> Result<Vec<String>, Failure<Error>> {
     let scene = source.parse::<Scene>()?;
     scene.check(source)?;
     let mut lines = Vec::new();
     if let Some(CrystalSpec { cells: [x, y, z], levels }) = scene.crystal {
         let atoms = 4 * ATOMS_OF_MONOMER * x * y * z;
         lines.push(format!(
-            "builds     {x} × {y} × {z} cells of γ-PA12, {atoms} atoms; a grid of {levels} rates"
+            "builds     {x} × {y} × {z} cells of γ-PA12, {atoms} atoms; a grid with {levels} levels of rate"
         ));
     }
     if scene.data.is_none() {
@@ -121,7 +119,7 @@ pub fn explain(source: &Source) -> Result<Vec<String>, Failure> {
     let data = Prepared::new(source, &scene)?;
     let (set, split) = (&data.set, &data.split);
     lines.push(format!(
-        "reads      {} rows of {} runs: {} to train, {} to validate, {} to test",
+        "reads      {} rows of {} runs: {} for training, {} for validation, {} for test",
         set.len(),
         set.paths.len(),
         split.train.len(),
@@ -133,9 +131,9 @@ pub fn explain(source: &Source) -> Result<Vec<String>, Failure> {
         None => lines.push("leaves out held-out runs".into()),
     }
     for model in &scene.model {
-        let settings = model.training.over(&scene.training, false);
+        let settings = model.training.combine(&scene.training, false);
         lines.push(format!(
-            "trains     {}: {} of {} parameters, {} epochs of {} steps",
+            "trains     {}: {} with {} parameters, {} epochs of {} steps",
             model.title(),
             if model.members == 1 { "a network".into() } else { format!("{} networks", model.members) },
             model.architecture().parameters(),
@@ -145,7 +143,7 @@ pub fn explain(source: &Source) -> Result<Vec<String>, Failure> {
     }
     if let Some(search) = &scene.search {
         let names: Vec<&str> = search.methods.iter().map(|method| method.name()).collect();
-        lines.push(format!("searches   by {}, {} epochs at most", names.join(" and "), search.epochs));
+        lines.push(format!("searches   by {}, at most {} epochs", names.join(" and "), search.epochs));
     }
     if scene.model.is_empty() {
         lines.push("leaves out training".into());

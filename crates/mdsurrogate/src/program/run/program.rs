@@ -6,22 +6,22 @@ use crate::program::scene;
 use harness::case::{Case, Fault, Finished, Program, Run};
 use harness::scene::{Failure, Source};
 
-/// From molecular dynamics to a constitutive law.
+/// Constitutive laws from molecular dynamics.
 pub struct Mdsurrogate;
 
 impl Case for Mdsurrogate {
     const PROGRAM: Program = Program {
         name: "mdsurrogate",
         version: env!("CARGO_PKG_VERSION"),
-        about: "From molecular dynamics to a constitutive law",
-        examples: "  mdsurrogate check cases/ch3/train-default/case.toml   the scene and its data
-  mdsurrogate run cases/ch3/train-default/case.toml     train, judge, draw; results in out/train-default
+        about: "Constitutive laws from molecular dynamics",
+        examples: "  mdsurrogate check cases/ch3/train-default/case.toml   describe the scene and its data
+  mdsurrogate run cases/ch3/train-default/case.toml     train and evaluate; results in out/train-default
   mdsurrogate resume out/train-default                  continue an interrupted run
   mdsurrogate sweep cases/ch3/train-default/case.toml --vary training.batch=32,256
   mdsurrogate predict law.safetensors strains.csv -o stresses.csv
-                                                        stress and uncertainty at the strains of a table
+                                                        predict stress and uncertainty at these strains
   mdsurrogate info cases/ch3/pa12-data/runs.csv.gz      describe a table
-  mdsurrogate schema > mdsurrogate.schema.json          for editors",
+  mdsurrogate schema > mdsurrogate.schema.json          write the schema for editors",
         magic: b"mdsg-ck4",
         columns: &["*.error_over_noise", "*.best_validation_loss"],
     };
@@ -31,8 +31,8 @@ impl Case for Mdsurrogate {
         explain(source)
     }
 
-    fn solve(source: &Source, own: &mut Run) -> Result<Finished, Failure<Error>> {
-        run(source, own)
+    fn solve(source: &Source, case: &mut Run) -> Result<Finished, Failure<Error>> {
+        run(source, case)
     }
 
     fn schema() -> serde_json::Value {

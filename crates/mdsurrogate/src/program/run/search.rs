@@ -1,48 +1,49 @@
-//! A scene's search for hyperparameters: trained, remembered, written as a table like 3.4.
+//! Search for hyperparameters: training, checkpoints, and a table like Table 3.4.
 
-use super::searched::Searched;
-use super::{Failure, Prepared, short};
-use crate::dataset::Row;
+use super::searched::FinishedSearch;
+use super::{Prepared, short};
+use crate::dataset::DataRow;
 use crate::error::Error;
 use crate::program::quantities as q;
 use crate::program::scene::{Scene, SearchSpec};
-use crate::search::{Journal, Method, Oracle, Trial, at_random, bayesian, hyperband};
+use crate::search::{Journal, Oracle, SearchMethod, Trial, bayesian, hyperband, random_search};
 use crate::surrogate::Kind;
-use crate::train::{Settings, State, Training};
+use crate::train::{Settings, Training, TrainingState};
 use harness::case::Run;
 use harness::output::picture::{LinePlot, Series};
 use harness::report::Report;
+use harness::scene::Failure;
 use polycore::file::atomic_write;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
 
-/// Where the searches stand.
+/// Progress of the searches.
 #[derive(Debug, Default, Deserialize)]
-struct Progress {
-    /// Those with the seeds before.
-    done: Vec<Searched>,
-    current: Searched,
-    /// Trainings of candidates that may be asked about again, by method and number.
-    states: BTreeMap<(Method, usize), State>,
+struct SearchProgress {
+    /// Finished searches with earlier seeds.
+    done: Vec<FinishedSearch>,
+    current: FinishedSearch,
+    /// Trainings that may continue, by method and number.
+    states: BTreeMap<(SearchMethod, usize), TrainingState>,
 }
 
-/// Searches, or resumes it; gives the table in lines.
+/// Runs or resumes the searches; returns a table, line by line.
 ///
 /// # Errors
-/// [`Error::Interrupted`]; I/O errors.
+/// Returns [`Error::Interrupted`] and I/O errors.
 pub fn search(
     scene: &Scene,
     spec: &SearchSpec,
     data: &Prepared,
     run: &mut Run,
     report: &mut Report,
-) -> Result<Vec<String>, Failure> {
-    let Progress { done, current: Searched { mut journal, mut seconds }, states } =
+) -> Result<Vec<String>, Failure<Error>> {
+    let SearchProgress { done, current: FinishedSearch { mut journal, mut seconds }, states } =
         run.reached()?.unwrap_or_default();
     let quick = run.options.quick;
-    // of a trial that was answered and not yet in the journal
+    // drop trials that were finished after the last entry of the journal
     seconds.truncate(journal.trials.len());
     let (epochs, trials) = (spec.epochs(quick), spec.trials(quick));
     let repeats = spec.repeats(quick);
@@ -50,7 +51,7 @@ pub fn search(
     let mut trainer = Trainer {
         rows: data.rows(&data.split.train),
         validation: data.rows(&data.split.validation),
-        settings: scene.training.over(&Default::default(), quick),
+        settings: scene.training.combine(&Default::default(), quick),
         done,
         states,
         seconds,
@@ -59,44 +60,46 @@ pub fn search(
         run,
     };
     for repeat in trainer.done.len() as u64..u64::from(repeats) {
-        // streams of numbers far enough from each other, and those of a single search what they always were
+        // seeds that are far apart; the first is that of a single search
         let seed = spec.seed.wrapping_add(1000 * repeat);
         for method in &spec.methods {
             let (space, journal, trainer) = (&spec.space, &mut journal, &mut trainer);
             match method {
-                Method::Hyperband => hyperband(space, epochs, spec.eta, seed, journal, trainer)?,
-                Method::Bayesian => {
+                SearchMethod::Hyperband => hyperband(space, epochs, spec.eta, seed, journal, trainer)?,
+                SearchMethod::Bayesian => {
                     let seed = seed.wrapping_add(1);
                     bayesian(space, [spec.initial, trials], epochs, seed, journal, trainer)?;
                 }
-                Method::Random => {
-                    at_random(space, trials, epochs, seed.wrapping_add(2), journal, trainer)?;
+                SearchMethod::Random => {
+                    random_search(space, trials, epochs, seed.wrapping_add(2), journal, trainer)?;
                 }
             }
         }
         trainer.states.clear();
-        let own =
-            Searched { journal: std::mem::take(&mut journal), seconds: std::mem::take(&mut trainer.seconds) };
-        trainer.done.push(own);
+        let finished = FinishedSearch {
+            journal: std::mem::take(&mut journal),
+            seconds: std::mem::take(&mut trainer.seconds),
+        };
+        trainer.done.push(finished);
         let Trainer { done, states, seconds, run, .. } = &mut trainer;
-        run.save(&Borrowed { done, current: (&journal, seconds), states })?;
+        run.save(&BorrowedProgress { done, current: (&journal, seconds), states })?;
     }
     let Trainer { done, run, .. } = trainer;
-    let count: usize = done.iter().map(|one| one.journal.trials.len()).sum();
+    let count: usize = done.iter().map(|search| search.journal.trials.len()).sum();
     report.work("trainings of the search", count as u64);
     super::searched::against_time(spec, &done, report);
     Ok(write(spec, &done, run.options.output, report)?)
 }
 
-/// Epochs that a search will train, for its progress.
+/// Returns the number of epochs that a search will train, for its progress.
 fn expected_epochs(spec: &SearchSpec, epochs: u32, trials: usize) -> u64 {
     let mut sum = 0;
     for method in &spec.methods {
         sum += match method {
-            Method::Bayesian | Method::Random => trials as u64 * u64::from(epochs),
-            Method::Hyperband => {
+            SearchMethod::Bayesian | SearchMethod::Random => trials as u64 * u64::from(epochs),
+            SearchMethod::Hyperband => {
                 let brackets = crate::search::brackets(epochs, spec.eta).unwrap_or_default();
-                let of = |rounds: &Vec<(usize, u32)>| {
+                let epochs_of_bracket = |rounds: &Vec<(usize, u32)>| {
                     let mut before = 0;
                     let mut sum = 0;
                     for &(count, trained) in rounds {
@@ -105,32 +108,32 @@ fn expected_epochs(spec: &SearchSpec, epochs: u32, trials: usize) -> u64 {
                     }
                     sum
                 };
-                brackets.iter().map(of).sum()
+                brackets.iter().map(epochs_of_bracket).sum()
             }
         };
     }
     sum.max(1)
 }
 
-/// Trains candidates, further where they were trained before.
+/// Trains candidates, and continues earlier trainings.
 struct Trainer<'a, 'o> {
-    rows: Vec<&'a Row>,
-    validation: Vec<&'a Row>,
+    rows: Vec<&'a DataRow>,
+    validation: Vec<&'a DataRow>,
     settings: Settings,
-    done: Vec<Searched>,
-    states: BTreeMap<(Method, usize), State>,
+    done: Vec<FinishedSearch>,
+    states: BTreeMap<(SearchMethod, usize), TrainingState>,
     seconds: Vec<f64>,
     epochs: u64,
     expected: u64,
     run: &'a mut Run<'o>,
 }
 
-/// The fields of [`Progress`], one after the other.
+/// BorrowedProgress fields of the progress, serialized like it.
 #[derive(Serialize)]
-struct Borrowed<'a> {
-    done: &'a [Searched],
+struct BorrowedProgress<'a> {
+    done: &'a [FinishedSearch],
     current: (&'a Journal, &'a [f64]),
-    states: &'a BTreeMap<(Method, usize), State>,
+    states: &'a BTreeMap<(SearchMethod, usize), TrainingState>,
 }
 
 impl Oracle for Trainer<'_, '_> {
@@ -152,7 +155,7 @@ impl Oracle for Trainer<'_, '_> {
             let Self { done, states, seconds, run, .. } = self;
             run.pause(|| {
                 states.insert(key, training.state().clone());
-                Some(Borrowed { done, current: (journal, seconds), states })
+                Some(BorrowedProgress { done, current: (journal, seconds), states })
             })?;
             match training.epoch() {
                 Ok(_) => {}
@@ -183,24 +186,24 @@ impl Oracle for Trainer<'_, '_> {
         Ok(Some(loss))
     }
 
-    fn forget(&mut self, method: Method, numbers: &[usize]) {
+    fn forget(&mut self, method: SearchMethod, numbers: &[usize]) {
         for number in numbers {
             self.states.remove(&(method, *number));
         }
     }
 }
 
-/// The table of the best candidates as CSV and in lines, their losses as a picture and values.
+/// Writes the table of the best candidates as CSV and lines; draws and reports their losses.
 fn write(
     spec: &SearchSpec,
-    done: &[Searched],
+    done: &[FinishedSearch],
     output: &Path,
     report: &mut Report,
 ) -> Result<Vec<String>, Error> {
-    let mut ranking: Vec<&Trial> = done.iter().flat_map(|one| one.journal.ranking()).collect();
-    // stable: a single search keeps its order
-    let worth = |trial: &&Trial| trial.loss.unwrap_or(f64::INFINITY);
-    ranking.sort_by(|a, b| worth(a).total_cmp(&worth(b)));
+    let mut ranking: Vec<&Trial> = done.iter().flat_map(|search| search.journal.ranking()).collect();
+    // the sort is stable: a single search keeps its order
+    let loss = |trial: &&Trial| trial.loss.unwrap_or(f64::INFINITY);
+    ranking.sort_by(|a, b| loss(a).total_cmp(&loss(b)));
     let parameters = |trial: &Trial| trial.candidate.architecture().parameters();
     let top: Vec<&Trial> = ranking.iter().copied().filter(|t| t.loss.is_some()).take(spec.top).collect();
     // the thesis takes the least complex of the best ten (§3.3)
@@ -208,7 +211,8 @@ fn write(
     atomic_write(output.join("search.csv"), |file| {
         writeln!(
             file,
-            "rank,method,number,hidden layers,learning rate,parameters,epochs,validation loss (3.12) [MPa²],chosen"
+            "rank,method,number,hidden layers,learning rate,parameters,epochs,validation loss (3.12) \
+             [MPa²],chosen"
         )?;
         for (rank, trial) in ranking.iter().enumerate() {
             writeln!(
@@ -241,7 +245,7 @@ fn write(
             trial.epochs,
             short(trial.loss.unwrap_or(f64::NAN)),
             trial.candidate.layers(),
-            if chosen == Some(*trial) { "  ← the fewest parameters" } else { "" }
+            if chosen == Some(*trial) { "  ← fewest parameters" } else { "" }
         ));
     }
     let diverged = ranking.iter().filter(|trial| trial.loss.is_none()).count();

@@ -1,31 +1,33 @@
-//! What searches have found at what cost: the best loss against epochs and seconds, by method.
+//! Results and cost of searches: the best loss against epochs and seconds, by method.
 
 use crate::dataset::statistics::median;
 use crate::program::quantities as q;
 use crate::program::scene::SearchSpec;
-use crate::search::{Journal, Method};
+use crate::search::{Journal, SearchMethod};
 use harness::report::Report;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
-/// Points of a curve.
+/// Number of points per curve.
 const POINTS: usize = 8;
 
-/// A search with one seed.
+/// Search with one seed.
 #[derive(Debug, Default, Serialize, Deserialize)]
-pub(super) struct Searched {
+pub(super) struct FinishedSearch {
     pub journal: Journal,
-    /// Of each trial: seconds of training of its candidate up to then.
+    /// Training time of the candidate of each trial so far, s.
     pub seconds: Vec<f64>,
 }
 
-/// After each trial of a method: epochs and seconds trained in all, the best loss so far.
-fn course(one: &Searched, method: Method) -> Vec<[f64; 3]> {
+/// Returns total epochs, total seconds and best loss after each trial of a method.
+fn cost_curve(search: &FinishedSearch, method: SearchMethod) -> Vec<[f64; 3]> {
     let mut before: HashMap<usize, [f64; 2]> = HashMap::new();
     let (mut epochs, mut seconds, mut best) = (0.0, 0.0, f64::INFINITY);
     let mut points = Vec::new();
-    for (trial, total) in one.journal.trials.iter().zip(&one.seconds).filter(|(t, _)| t.method == method) {
-        // a candidate is trained on, not anew
+    for (trial, total) in
+        search.journal.trials.iter().zip(&search.seconds).filter(|(t, _)| t.method == method)
+    {
+        // a candidate continues its training
         let now = [f64::from(trial.epochs), *total];
         let [was, took] = before.insert(trial.number, now).unwrap_or_default();
         epochs += now[0] - was;
@@ -36,11 +38,11 @@ fn course(one: &Searched, method: Method) -> Vec<[f64; 3]> {
     points
 }
 
-/// Curves `error_against_time_METHOD` with medians over the seeds, and what was found in the end.
-pub(super) fn against_time(spec: &SearchSpec, done: &[Searched], report: &mut Report) {
+/// Reports the curves `error_against_time_METHOD`, medians over the seeds, and the final results.
+pub(super) fn against_time(spec: &SearchSpec, done: &[FinishedSearch], report: &mut Report) {
     for method in &spec.methods {
-        let courses: Vec<_> = done.iter().map(|one| course(one, *method)).collect();
-        let ends: Vec<[f64; 3]> = courses.iter().filter_map(|course| course.last().copied()).collect();
+        let curves: Vec<_> = done.iter().map(|search| cost_curve(search, *method)).collect();
+        let ends: Vec<[f64; 3]> = curves.iter().filter_map(|curve| curve.last().copied()).collect();
         let finite = |k: usize| ends.iter().map(|end| end[k]).filter(|v| v.is_finite()).collect::<Vec<f64>>();
         if finite(2).is_empty() {
             continue;
@@ -55,9 +57,9 @@ pub(super) fn against_time(spec: &SearchSpec, done: &[Searched], report: &mut Re
         let mut columns = [Vec::new(), Vec::new(), Vec::new()];
         for point in 1..=POINTS {
             let budget = most * point as f64 / POINTS as f64;
-            let within = courses.iter().filter_map(|course| course.iter().rfind(|at| at[0] <= budget));
+            let within = curves.iter().filter_map(|curve| curve.iter().rfind(|at| at[0] <= budget));
             let found: Vec<[f64; 3]> = within.copied().filter(|at| at[2].is_finite()).collect();
-            // a median over fewer seeds is no point of the curve
+            // a point needs the median over all seeds
             if found.len() == done.len() {
                 for (k, column) in columns.iter_mut().enumerate() {
                     column.push(median(found.iter().map(|at| at[k]).collect()));
@@ -84,23 +86,26 @@ pub(super) fn against_time(spec: &SearchSpec, done: &[Searched], report: &mut Re
 mod tests {
     use super::*;
     use crate::network::Activation::Relu;
-    use crate::search::{Candidate, Journal, Trial};
+    use crate::search::{Journal, SearchCandidate, Trial};
 
     #[test]
     fn costs_by_hand() {
         let trial = |number, epochs, loss| Trial {
-            method: Method::Hyperband,
+            method: SearchMethod::Hyperband,
             number,
-            candidate: Candidate { hidden: vec![(8, Relu)], learning_rate: 0.1 },
+            candidate: SearchCandidate { hidden: vec![(8, Relu)], learning_rate: 0.1 },
             epochs,
             loss,
         };
         let journal =
             Journal { trials: vec![trial(0, 1, Some(9.0)), trial(1, 1, None), trial(0, 3, Some(4.0))] };
-        let one = Searched { journal, seconds: vec![0.5, 0.25, 1.5] };
-        // candidate 0 is trained on for two epochs and a second
-        assert_eq!(course(&one, Method::Hyperband), [[1.0, 0.5, 9.0], [2.0, 0.75, 9.0], [4.0, 1.75, 4.0]]);
-        assert_eq!(course(&one, Method::Random), [[0.0; 3]; 0]);
+        let one = FinishedSearch { journal, seconds: vec![0.5, 0.25, 1.5] };
+        // candidate 0 trains two more epochs in one more second
+        assert_eq!(
+            cost_curve(&one, SearchMethod::Hyperband),
+            [[1.0, 0.5, 9.0], [2.0, 0.75, 9.0], [4.0, 1.75, 4.0]]
+        );
+        assert_eq!(cost_curve(&one, SearchMethod::Random), [[0.0; 3]; 0]);
         assert_eq!((median(vec![3.0, 1.0, 2.0]), median(vec![4.0, 1.0])), (2.0, 2.5));
     }
 }

@@ -1,40 +1,41 @@
-//! The models of a scene, trained one after the other.
+//! Training of the models of a scene, one after the other.
 
-use super::judge::Named;
-use super::{Failure, Prepared, short};
-use crate::dataset::Method;
+use super::judge::NamedLaw;
+use super::{Prepared, short};
+use crate::dataset::SplitMethod;
 use crate::error::Error;
 use crate::program::quantities as q;
 use crate::program::scene::{ModelSpec, Scene};
 use crate::surrogate::{Header, Surrogate};
-use crate::train::{Settings, State, Training, ensemble, loading, soften};
+use crate::train::{Settings, Training, TrainingState, ensemble, loading, soften};
 use harness::case::Run;
 use harness::output::csv;
 use harness::report::Report;
+use harness::scene::Failure;
 use polycore::tensor::Voigt;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Where the trainings of a scene stand: member by member of model by model; the last may be unfinished.
+/// Progress of the trainings: all members of all models in order; the last may be unfinished.
 #[derive(Debug, Default, Serialize, Deserialize)]
-struct Progress {
-    states: Vec<State>,
+struct TrainingProgress {
+    states: Vec<TrainingState>,
 }
 
-/// A law and how it came to be.
+/// A trained law.
 pub struct Trained {
     name: String,
     runs: Vec<String>,
     law: Surrogate,
-    states: Vec<State>,
-    split: Option<Method>,
+    states: Vec<TrainingState>,
+    split: Option<SplitMethod>,
 }
 
 impl Trained {
-    /// The law with its training time.
-    pub fn named(&self) -> Named<'_> {
-        let seconds = self.states.iter().map(State::seconds).sum();
-        Named {
+    /// Returns the law with its name and training time.
+    pub fn named(&self) -> NamedLaw<'_> {
+        let seconds = self.states.iter().map(TrainingState::seconds).sum();
+        NamedLaw {
             name: &self.name,
             law: &self.law,
             runs: &self.runs,
@@ -44,18 +45,18 @@ impl Trained {
     }
 }
 
-/// Trains the models, or resumes it; writes each law when its members are done.
+/// Trains the models or resumes the training; writes each law when its members are finished.
 ///
 /// # Errors
-/// Those of [`Training`], with what is finished kept in the checkpoint; [`Error::Interrupted`].
+/// Returns the errors of [`Training`] (finished trainings stay in the checkpoint) and [`Error::Interrupted`].
 pub fn train(
     scene: &Scene,
     models: &[&ModelSpec],
     data: &Prepared,
     run: &mut Run,
-) -> Result<Vec<Trained>, Failure> {
+) -> Result<Vec<Trained>, Failure<Error>> {
     let (output, quick) = (run.options.output, run.options.quick);
-    let mut queue = Queue {
+    let mut queue = TrainingQueue {
         progress: run.reached()?.unwrap_or_default(),
         total: models.iter().map(|model| model.members).sum(),
         done: 0,
@@ -77,7 +78,7 @@ pub fn train(
             &rows,
             model.standardised(),
         )?;
-        let settings = model.training.over(&scene.training, quick);
+        let settings = model.training.combine(&scene.training, quick);
         header.provenance.clone_from(&data.set.provenance);
         header.provenance.push(format!(
             "{} {}: {} training rows of a split by {:?} with seed {}; {settings:?}",
@@ -99,7 +100,7 @@ pub fn train(
                 members => format!("{} ({} of {members})", model.title(), member + 1),
             };
             let result = queue.finish(training?, &title, settings, run);
-            // also of a diverged training: its best epoch is a law
+            // after divergence too: the best epoch gives a law
             if let Err(failure) = result {
                 let begun = &queue.progress.states[first.min(queue.progress.states.len())..];
                 write(&model.title(), &header, begun, &strains, output)?;
@@ -118,14 +119,14 @@ pub fn train(
     Ok(trained)
 }
 
-/// The trainings of a scene, in their order.
-struct Queue {
-    progress: Progress,
+/// Trainings of a scene, in order.
+struct TrainingQueue {
+    progress: TrainingProgress,
     total: usize,
     done: usize,
 }
 
-impl Queue {
+impl TrainingQueue {
     /// Trains to the end, with checkpoints.
     fn finish(
         &mut self,
@@ -133,7 +134,7 @@ impl Queue {
         title: &str,
         settings: Settings,
         run: &mut Run,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), Failure<Error>> {
         while training.ending().is_none() {
             let result = training.epoch().copied();
             let epochs = training.state().history().len();
@@ -169,11 +170,11 @@ impl Queue {
     }
 }
 
-/// Writes a law of the best epochs with the limit of its spread, and its learning curves.
+/// Writes the law of the best epochs, with its spread limit, and the learning curves.
 fn write(
     name: &str,
     header: &Header,
-    states: &[State],
+    states: &[TrainingState],
     strains: &[Voigt],
     output: &Path,
 ) -> Result<Surrogate, Error> {
@@ -191,8 +192,8 @@ fn write(
     Ok(law)
 }
 
-/// Loss by epoch: (3.12), and the mean over the components that Keras reports.
-fn learning_curve(state: &State, path: &Path) -> Result<(), Error> {
+/// Writes the loss by epoch: (3.12), and the mean over the components as in Keras.
+fn learning_curve(state: &TrainingState, path: &Path) -> Result<(), Error> {
     let history = state.history();
     let column = |value: &dyn Fn(usize) -> f64| (0..history.len()).map(value).collect::<Vec<f64>>();
     let validation = |k: usize| history[k].validation.unwrap_or(f64::NAN);
@@ -209,7 +210,7 @@ fn learning_curve(state: &State, path: &Path) -> Result<(), Error> {
     )?)
 }
 
-/// What no number says about the trainings: invariants that the data do not vary.
+/// Returns remarks on the trainings: invariants that hardly vary in the data, and early best epochs.
 pub fn remarks(trained: &[Trained], data: &Prepared) -> Vec<String> {
     let remark = |model: &Trained| {
         let names = crate::fitted::constrained(
@@ -217,26 +218,27 @@ pub fn remarks(trained: &[Trained], data: &Prepared) -> Vec<String> {
             &data.rows_of(&data.split_of(model.split).train, &model.runs),
         );
         let text = format!(
-            "{}: {} does not vary independently in these data: the dependence of the energy on it is not known",
+            "{}: {} does not vary independently in these data, so the energy's dependence on it is unknown",
             model.name,
             names.join(", ")
         );
         (!names.is_empty()).then_some(text)
     };
-    trained.iter().filter_map(remark).chain(trained.iter().flat_map(early)).collect()
+    trained.iter().filter_map(remark).chain(trained.iter().flat_map(early_stops)).collect()
 }
 
-/// Members whose best epoch is among the first: they have not learnt from the rest of their training.
-fn early(model: &Trained) -> Vec<String> {
+/// Returns a remark for each member with an early best epoch: the rest of its training had no effect.
+fn early_stops(model: &Trained) -> Vec<String> {
     let members = model.states.len();
-    let line = |(member, state): (usize, &State)| {
+    let line = |(member, state): (usize, &TrainingState)| {
         let (best, epochs) = (state.best_epoch() as usize, state.history().len());
-        let of = if members > 1 { format!(" (member {} of {members})", member + 1) } else { String::new() };
+        let which =
+            if members > 1 { format!(" (member {} of {members})", member + 1) } else { String::new() };
         state.is_best_early().then(|| {
             format!(
-                "{}{of}: its best epoch is {best} of {epochs}: the loss on the validation rows only grew afterwards, so the law is \
-                 that of the first steps. Look at its learning curve; a smaller learning rate, or validation rows more like the \
-                 training rows, may help",
+                "{}{which}: the best epoch is {best} of {epochs}; the validation loss only grew \
+                  afterwards. Check the learning curve; a smaller learning rate, or validation rows more \
+                  like the training rows, may help",
                 model.name
             )
         })
@@ -244,17 +246,17 @@ fn early(model: &Trained) -> Vec<String> {
     model.states.iter().enumerate().filter_map(line).collect()
 }
 
-/// Numbers of the trainings, and Fig. 3.7.
+/// Reports numbers of the trainings, and draws Fig. 3.7.
 ///
 /// # Errors
-/// I/O errors.
+/// Returns I/O errors.
 pub fn record(trained: &[Trained], output: &Path, report: &mut Report) -> Result<(), Error> {
     for model in trained {
         let name = &model.name;
         let epochs: usize = model.states.iter().map(|state| state.history().len()).sum();
         report.work(&format!("epochs of {name}"), epochs as u64);
         report.value(q::PARAMETERS.of(&[name]), model.law.header().architecture.parameters() as f64);
-        report.seconds(&format!("training of {name}"), model.states.iter().map(State::seconds).sum());
+        report.seconds(&format!("training of {name}"), model.states.iter().map(TrainingState::seconds).sum());
         if let Some(limit) = model.law.header().spread_limit {
             report.value(q::SPREAD_LIMIT.of(&[name]), limit / 1e6);
         }

@@ -1,29 +1,29 @@
-//! The trials of a stability suite: data that are extreme or degenerate, laws asked where they cannot know; each must be
-//! refused with a message, or end with finite numbers, flagged where they are uncertain.
+//! Trials of a stability suite: extreme or degenerate data, and predictions far from the data. Each trial
+//! must be refused with a message, or give finite numbers, with flags if they are uncertain.
 
-use super::{Failure, Prepared, short};
+use super::{Prepared, short};
 use crate::error::Error;
 use crate::program::quantities as q;
 use crate::program::scene::{ModelSpec, Scene, TrialSpec};
 use crate::surrogate::Workspace;
-use crate::train::{State, fit};
+use crate::train::{TrainingState, fit};
 use harness::case::Run;
 use harness::report::{Report, Trial};
-use harness::scene::Source;
+use harness::scene::{Failure, Source};
 use polycore::tensor::Voigt;
 
-/// Goes through the trials: a row each in the report, and the value `NAME as expected`, 1 or 0.
+/// Runs the trials; reports a row and the value `NAME.as_expected`, 1 or 0, for each.
 ///
 /// # Errors
-/// [`Error::Interrupted`]: errors of a trial are what it shows.
-pub fn run(source: &Source, scene: &Scene, run: &Run, report: &mut Report) -> Result<(), Failure> {
+/// Returns [`Error::Interrupted`]; errors of trials are results.
+pub fn run(source: &Source, scene: &Scene, run: &Run, report: &mut Report) -> Result<(), Failure<Error>> {
     for trial in &scene.trial {
-        let mut own = scene.clone();
-        if let (Some(files), Some(data)) = (&trial.files, &mut own.data) {
+        let mut changed = scene.clone();
+        if let (Some(files), Some(data)) = (&trial.files, &mut changed.data) {
             data.files.clone_from(files);
         }
         let mut epochs = 0;
-        let result = observed(source, &own, trial, run.options.quick, &mut epochs);
+        let result = observed(source, &changed, trial, run.options.quick, &mut epochs);
         if (run.options.interrupted)() {
             return Err(run.interruption().into());
         }
@@ -51,34 +51,35 @@ pub fn run(source: &Source, scene: &Scene, run: &Run, report: &mut Report) -> Re
     Ok(())
 }
 
-/// Trains the models on a trial's data and asks them; what came out, and whether all answers were flagged.
+/// Trains the models on the data of a trial and evaluates them; returns a description, and true if all
+/// predictions were flagged.
 fn observed(
     source: &Source,
     scene: &Scene,
     trial: &TrialSpec,
     quick: bool,
     epochs: &mut u64,
-) -> Result<(String, Option<bool>), Failure> {
+) -> Result<(String, Option<bool>), Failure<Error>> {
     let data = Prepared::new(source, scene)?;
     let mut parts = Vec::new();
     let mut flagged: Option<bool> = None;
     let chosen =
         |model: &&ModelSpec| trial.models.as_ref().is_none_or(|names| names.contains(&model.title()));
     for model in scene.model.iter().filter(chosen) {
-        let settings = model.training.over(&scene.training, quick);
+        let settings = model.training.combine(&scene.training, quick);
         let (rows, validation) = (data.rows(&data.split.train), data.rows(&data.split.validation));
         let (kind, shape) = (model.law(), model.architecture());
         let header = crate::fitted::header(kind, shape, model.members, &rows, model.standardised())?;
         let (law, states) = fit(header, &rows, &validation, settings)?;
         *epochs += states.iter().map(|state| state.history().len() as u64).sum::<u64>();
-        let best = states.iter().map(State::best_loss).fold(0.0, f64::max);
+        let best = states.iter().map(TrainingState::best_loss).fold(0.0, f64::max);
         let mut part = format!("{}: loss {} MPa²", model.title(), short(best));
         if let Some(c) = trial.at {
             let answer = law.stress(&Voigt::from(c), &mut Workspace::default()).map_err(Error::from)?;
             let all = flagged.unwrap_or(true) && answer.flags.any();
             flagged = Some(all);
-            let doubt = if answer.flags.any() { "flagged" } else { "not flagged" };
-            part += &format!(", largest |S| = {} MPa, {doubt}", short(answer.stress.amax() / 1e6));
+            let flags = if answer.flags.any() { "flagged" } else { "not flagged" };
+            part += &format!(", largest |S| = {} MPa, {flags}", short(answer.stress.amax() / 1e6));
         }
         parts.push(part);
     }

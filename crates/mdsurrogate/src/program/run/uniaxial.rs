@@ -1,4 +1,4 @@
-//! Uniaxial runs: stress against strain as in Fig. 3.5, moduli, peaks.
+//! Uniaxial runs: stress-strain curves as in Fig. 3.5, moduli and peaks.
 
 use crate::dataset::Dataset;
 use crate::error::Error;
@@ -11,7 +11,7 @@ use std::path::Path;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Moduli of all runs in a direction, peaks of the run that has the highest, and their ratios.
+/// Reports for each direction the modulus of all runs and the highest peak, and their ratios.
 pub(super) fn measure(report: &mut Report, set: &Dataset) {
     let mut moduli = [None; 3];
     let mut peaks = [None; 3];
@@ -41,7 +41,7 @@ pub(super) fn measure(report: &mut Report, set: &Dataset) {
     }
 }
 
-/// Stress against engineering strain, one picture a direction as in Fig. 3.5.
+/// Draws stress against engineering strain, one picture per direction, as in Fig. 3.5.
 pub(super) fn draw(set: &Dataset, heldout: Option<&Dataset>, output: &Path) -> Result<(), Error> {
     for (axis, name) in AXES.iter().enumerate() {
         let kind = format!("u{name}");

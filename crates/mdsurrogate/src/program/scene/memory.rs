@@ -1,36 +1,36 @@
-//! Memory that a run needs, stated before anything is trained.
+//! Memory of a run, estimated before training.
 //!
-//! Counted are the arrays that live at once, in bytes; the test `memory` of the workspace compares the sum with what whole
-//! runs take.
+//! Counts the bytes of arrays that are alive at the same time. The workspace test `memory` compares the sum
+//! with measured peaks.
 
 use super::{ModelSpec, Scene};
 use harness::scene::{SceneError, Source};
 use polycore::memory::{available, gib};
 
-/// Threads, tables, the canvas and the letters of pictures.
+/// Threads, tables, drawing surfaces and fonts.
 const ALWAYS: f64 = 60e6;
-/// A row of data: as it was read, as it is kept, and as it is written as HDF5 and drawn.
+/// Row of data: as read, as kept, and as written to HDF5 and drawn.
 const ROW: f64 = 1200.0;
-/// A parameter of the law in training: weight, gradient, moments, the best so far, its checkpoint and law file.
+/// Parameter in training: weight, gradient, moments, best value, checkpoint and law file.
 const TRAINED: f64 = 100.0;
-/// A parameter of a law that is done: its number, in panels too.
+/// Parameter of a finished law, including packed copies.
 const KEPT: f64 = 24.0;
-/// A number in a layer for each row of a batch: values and derivatives that backpropagation keeps.
+/// Number of a layer per row of a batch: values and derivatives for backpropagation.
 const ACTIVATION: f64 = 160.0;
-/// Weights and biases of all networks of a law: training them takes 2 GB.
+/// Largest number of parameters of all networks of a law; their training needs 2 GB.
 pub(super) const MOST_PARAMETERS: usize = 20_000_000;
 
-/// Weights and biases of all networks of a model.
+/// Counts the parameters of all networks of a model.
 pub(super) fn parameters(model: &ModelSpec) -> usize {
     model.architecture().parameters().saturating_mul(model.members)
 }
 
 impl Scene {
-    /// Bytes that a run on so many rows of data needs at most.
+    /// Returns the bytes that a run on this number of rows needs at most.
     pub fn memory(&self, rows: usize) -> f64 {
         let counts = || self.model.iter().map(|model| parameters(model) as f64);
         let batch = |model: &ModelSpec| {
-            let batch = model.training.over(&self.training, false).batch.min(rows).max(rows.min(4096));
+            let batch = model.training.combine(&self.training, false).batch.min(rows).max(rows.min(4096));
             batch as f64 * model.architecture().widths.iter().sum::<usize>() as f64
         };
         let mut bytes = ALWAYS + ROW * rows as f64;
@@ -44,10 +44,10 @@ impl Scene {
         bytes
     }
 
-    /// Refuses laws that do not fit before anything is read.
+    /// Refuses laws that do not fit into memory, before reading data.
     ///
     /// # Errors
-    /// What is needed and what there is.
+    /// Returns needed and available memory.
     pub(super) fn refuse_too_large(&self, source: &Source) -> Result<(), SceneError> {
         let (needed, available) = (self.memory(0), available());
         if needed <= available {

@@ -1,6 +1,8 @@
-//! Scenes, as written in TOML: data and what is learnt from them.
+//! TOML scenes of `mdsurrogate`: data, and models trained on them.
 
-use crate::dataset::{Columns, Fractions, LammpsUnits, Measure, Method, Origin, PROPERTIES};
+use crate::dataset::{
+    BoxReference, Fractions, LammpsUnits, PROPERTIES, PressureConvention, SampledColumns, SplitMethod,
+};
 use crate::program::quantities;
 use harness::report::Expect;
 use harness::scene::{SceneError, Source};
@@ -13,23 +15,23 @@ mod memory;
 mod model;
 mod search;
 
-pub use model::{KindName, ModelSpec, Outputs, ThesisNetwork, TrainingSpec, check_models};
+pub use model::{KindName, ModelSpec, OutputUnits, ThesisNetwork, TrainingSpec, check_models};
 pub use search::SearchSpec;
 
-/// A whole scene.
+/// A scene.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
-    /// The program that runs it: `mdsurrogate`.
+    /// Program of the scene: `mdsurrogate`.
     pub program: Program,
-    /// One line for tables and pictures.
+    /// Title for tables and pictures.
     #[serde(default)]
     pub title: String,
-    /// The data.
-    pub data: Option<Data>,
-    /// Instead of data, or beside them: the crystal, the grid of runs and the networks of the thesis, in numbers.
+    /// Data for training and tests.
+    pub data: Option<DatasetSpec>,
+    /// Crystal, grid of runs and networks of the thesis, in numbers; instead of data or with them.
     pub crystal: Option<CrystalSpec>,
-    /// Division into training, validation and test rows.
+    /// Split into training, validation and test rows.
     #[serde(default)]
     pub split: SplitSpec,
     /// Laws to train, in this order.
@@ -38,9 +40,10 @@ pub struct Scene {
     /// Training settings.
     #[serde(default)]
     pub training: TrainingSpec,
-    /// A search for hyperparameters of an `ann`.
+    /// Search for hyperparameters of an `ann`.
     pub search: Option<SearchSpec>,
-    /// A stability suite: expected behaviour with other data or at other strains. The models are trained in trials only.
+    /// Trials of a stability suite, with other data or at other strains. With trials, models are trained in
+    /// trials only.
     #[serde(default)]
     pub trial: Vec<TrialSpec>,
     /// Expected results.
@@ -48,7 +51,7 @@ pub struct Scene {
     pub expect: Vec<Expect>,
 }
 
-/// The JSON Schema of scenes.
+/// Returns the JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
     harness::scene::schema("mdsurrogate", quantities::ALL, |generator| {
         vec![generator.subschema_for::<Scene>()]
@@ -56,19 +59,19 @@ pub fn schema() -> serde_json::Value {
 }
 
 impl Scene {
-    /// Rules that serde does not know.
+    /// Checks rules between keys.
     ///
     /// # Errors
-    /// What is wrong and where.
+    /// Returns a [`SceneError`] with key and advice.
     pub fn check(&self, source: &Source) -> Result<(), SceneError> {
         harness::case::check_expectations(source, &self.expect, quantities::ALL)?;
         if self.data.is_none() {
             if self.crystal.is_none() {
-                return Err(source.error("data", "no `[data]`", "`[data]` with `files`, or `[crystal]`"));
+                return Err(source.missing("data", "the scene needs `[data]` with `files`, or `[crystal]`"));
             }
             if !self.model.is_empty() || self.search.is_some() {
                 let key = if self.model.is_empty() { "search" } else { "model" };
-                return Err(source.error(key, "laws without data", "`[data]` with `files`"));
+                return Err(source.unexpected(key, "laws need data; add `[data]` with `files`"));
             }
         }
         if let Some(data) = &self.data {
@@ -81,11 +84,7 @@ impl Scene {
         check_trials(source, &self.trial, &self.model)?;
         match &self.search {
             Some(_) if !self.model.is_empty() => {
-                return Err(source.error(
-                    "search",
-                    "`[search]` together with `[[model]]`",
-                    "one of them in a scene",
-                ));
+                return Err(source.conflict("search", "model", "keep one of them in a scene"));
             }
             Some(search) => search.check(source)?,
             None => {}
@@ -94,98 +93,101 @@ impl Scene {
     }
 }
 
-/// The only program that runs these scenes.
+/// Program of these scenes.
 #[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Program {
-    /// This crate.
+    /// `mdsurrogate`.
     Mdsurrogate,
 }
 
-/// Files and how to read them.
+/// Data files, and options for reading them.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Data {
-    /// CSV (also gzip) or HDF5 files to learn from, relative to the scene.
+pub struct DatasetSpec {
+    /// CSV (also gzip), LAMMPS or HDF5 files for the split, relative to the scene.
     pub files: Vec<PathBuf>,
-    /// Files that are kept out of the split.
+    /// Files of held-out runs, outside the split.
     #[serde(default)]
     pub heldout: Vec<PathBuf>,
-    /// `averaged` or `instantaneous` columns of molecular dynamics tables.
+    /// Kind of columns in molecular-dynamics tables: `averaged` (default) or `instantaneous`.
     #[serde(default)]
-    pub columns: Columns,
-    /// The row of undeformed lengths: `run`, the first of each run, or `file`, the first of the file; default: where the
-    /// run's own F is 1, and the first row of a LAMMPS log with one run.
-    pub reference: Option<Origin>,
+    pub columns: SampledColumns,
+    /// Undeformed row: `run`, the first row of each run, or `file`, the first row of the file; default: the
+    /// row where F of the file is 1, or the first row of a LAMMPS log with one run.
+    pub reference: Option<BoxReference>,
     /// Edges of the undeformed box.
     pub reference_lengths: Option<[Length; 3]>,
-    /// Its tilts xy, xz, yz; default 0.
+    /// Tilts xy, xz, yz of the undeformed box; default 0.
     pub reference_tilts: Option<[Length; 3]>,
-    /// The unit of stress columns without a unit in their heading; default 1 MPa.
+    /// Unit of stress columns without a unit in their heading; default 1 MPa.
     pub stress_unit: Option<Stress>,
-    /// `pressure`: columns `pxx …` are read as pressures of LAMMPS, σ = −p.
-    pub stress: Option<Measure>,
-    /// Units of files of LAMMPS: `real`, `metal`, `si`, `cgs`, `electron`, `micro`, `nano`; default: as a log says.
+    /// Stress measure of columns `pxx …`: `pressure` as in LAMMPS, σ = −p.
+    pub stress: Option<PressureConvention>,
+    /// Units of LAMMPS output: `real`, `metal`, `si`, `cgs`, `electron`, `micro`, `nano`; default: those in
+    /// the log.
     pub units: Option<LammpsUnits>,
-    /// Headings of columns by property, as `{ lx = "v_lx", pxx = "c_p[1]" }`.
+    /// Headings of columns by property, e.g. `{ lx = "v_lx", pxx = "c_p[1]" }`.
     #[serde(default)]
     pub names: BTreeMap<String, String>,
-    /// Runs of a LAMMPS log that are read, from 1; default all.
+    /// Runs of a LAMMPS log to read, from 1; default: all.
     #[serde(default)]
     pub blocks: Vec<usize>,
 }
 
-impl Data {
+impl DatasetSpec {
+    /// Checks rules between keys.
+    ///
     /// # Errors
-    /// What is wrong and where.
+    /// Returns a [`SceneError`] with key and advice.
     fn check(&self, source: &Source) -> Result<(), SceneError> {
         if let Some(wrong) = self.names.keys().find(|name| !PROPERTIES.contains(&name.as_str())) {
             return Err(source.unknown("data.names", wrong, &PROPERTIES));
         }
         if self.reference.is_some() && self.reference_lengths.is_some() {
-            let allowed = "one of `reference` and `reference_lengths`";
-            return Err(source.error("data.reference", "two references", allowed));
+            let lengths = "data.reference_lengths";
+            return Err(source.conflict("data.reference", lengths, "keep one of them"));
         }
         if self.reference_tilts.is_some() && self.reference_lengths.is_none() {
-            let allowed = "`reference_lengths` beside them";
-            return Err(source.error("data.reference_tilts", "tilts alone", allowed));
+            let why = "`reference_tilts` need them";
+            return Err(source.missing("data.reference_lengths", why));
         }
         if self.blocks.contains(&0) {
-            return Err(source.error("data.blocks", 0, "numbers of runs, from 1"));
+            return Err(source.error("data.blocks", 0, "run numbers from 1"));
         }
         Ok(())
     }
 }
 
-/// The γ-PA12 crystal of Table 3.1 and the grid of Table 3.2.
+/// Crystal of γ-PA12 (Table 3.1) and grid of rates (Table 3.2).
 #[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CrystalSpec {
-    /// Cells of the supercell along x, y, z; default: the thesis' 8, 4, 2.
+    /// Cells of the supercell along x, y, z; default: 8, 4, 2 as in the thesis.
     #[serde(default = "thesis_cells")]
     pub cells: [usize; 3],
-    /// Levels of rate a direction; default: the thesis' 15.
+    /// Levels of rate per direction; default: 15 as in the thesis.
     #[serde(default = "thesis_levels")]
     pub levels: usize,
 }
 
-/// A trial of a stability suite.
+/// Trial of a stability suite.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TrialSpec {
-    /// Names its row and its value `NAME as expected`.
+    /// Name of its row and its value `NAME.as_expected`.
     pub name: String,
     /// Expected behaviour, for the table of the suite.
     pub description: String,
-    /// Instead of the scene's `data.files`.
+    /// Data files, instead of `data.files`.
     pub files: Option<Vec<PathBuf>>,
-    /// Models by name; default: all.
+    /// Names of models; default: all.
     pub models: Option<Vec<String>>,
-    /// The trial must end with an error that contains this.
+    /// Part of the error with which the trial must end.
     pub refused: Option<String>,
-    /// A C at which the trained models are evaluated, as C11, C22, C33, C12, C13, C23.
+    /// Components C11, C22, C33, C12, C13, C23 at which the trained models are evaluated.
     pub at: Option<[f64; 6]>,
-    /// Whether all of their predictions there must be flagged, or none.
+    /// If true, all predictions there must be flagged; if false, none.
     pub flagged: Option<bool>,
 }
 
@@ -196,7 +198,7 @@ fn check_trials(source: &Source, trials: &[TrialSpec], models: &[ModelSpec]) -> 
             return Err(source.error(
                 &at("name"),
                 format!("`{}` twice", trial.name),
-                "a name for each trial",
+                "a different name for each trial",
             ));
         }
         let titles: Vec<String> = models.iter().map(ModelSpec::title).collect();
@@ -205,8 +207,11 @@ fn check_trials(source: &Source, trials: &[TrialSpec], models: &[ModelSpec]) -> 
             return Err(source.unknown(&at("models"), name, &known));
         }
         if trial.flagged.is_some() && (trial.at.is_none() || trial.refused.is_some()) {
-            let allowed = "`at`, and no `refused`, beside it";
-            return Err(source.error(&at("flagged"), "`flagged` without a prediction", allowed));
+            let key = at("flagged");
+            return Err(match trial.at {
+                None => source.missing(&at("at"), "`flagged` needs a strain at which models are evaluated"),
+                Some(_) => source.conflict(&key, &at("refused"), "keep one of them"),
+            });
         }
     }
     Ok(())
@@ -217,14 +222,16 @@ fn thesis_cells() -> [usize; 3] {
 }
 
 fn thesis_levels() -> usize {
-    crate::md::Grid::default().levels
+    crate::md::RateGrid::default().levels
 }
 
 impl CrystalSpec {
+    /// Checks the ranges.
+    ///
     /// # Errors
-    /// What is wrong and where.
+    /// Returns a [`SceneError`] with key and allowed values.
     fn check(&self, source: &Source) -> Result<(), SceneError> {
-        // pictures of more are black
+        // more atoms cannot be seen in pictures
         if self.cells.iter().any(|n| !(1..=20).contains(n)) {
             return Err(source.error("crystal.cells", format!("{:?}", self.cells), "1 to 20 each"));
         }
@@ -235,14 +242,14 @@ impl CrystalSpec {
     }
 }
 
-/// How rows are divided.
+/// Split of the rows.
 #[derive(Clone, Copy, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SplitSpec {
-    /// `path` (default) or `random` (the thesis').
+    /// Method: `path` (default), or `random` as in the thesis.
     #[serde(default)]
-    pub by: Method,
-    /// Shares of train, validation, test; default 0.64, 0.16, 0.2.
+    pub by: SplitMethod,
+    /// Fractions of training, validation and test; default 0.64, 0.16, 0.2.
     #[serde(default)]
     pub fractions: Fractions,
     /// Seed of the shuffle.

@@ -1,7 +1,7 @@
-//! Models and their training, as written in a scene.
+//! Models of a scene, and their training.
 
 use super::memory::{MOST_PARAMETERS, parameters};
-use crate::dataset::Method;
+use crate::dataset::SplitMethod;
 use crate::network::{Activation, Architecture};
 use crate::surrogate::{Header, Kind, Surrogate, Symmetry};
 use crate::train::{Loss, MOST_UNITS, Schedule, Settings};
@@ -9,65 +9,65 @@ use harness::scene::{SceneError, Source};
 use serde::Deserialize;
 use std::collections::HashSet;
 
-/// The axes of the data.
-const OWN_AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// Axes of the data.
+const DATA_AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// A law to train.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ModelSpec {
-    /// Prefix of its files and results; default: its network's row of Table 3.4, or its kind.
+    /// Prefix of its files and values; default: the name of its network in Table 3.4, or its kind.
     pub name: Option<String>,
-    /// What its networks compute.
+    /// Kind of law.
     pub kind: KindName,
-    /// A row of Table 3.4 instead of `hidden`; default of an `ann`: ANN-4.
+    /// Network of Table 3.4, instead of `hidden`; default for an `ann`: ANN-4.
     pub network: Option<ThesisNetwork>,
-    /// Neurons and activation of each hidden layer; default of an `energy`: two of 64, softplus.
+    /// Neurons and activation of each hidden layer; default for an `energy`: two layers of 64, softplus.
     pub hidden: Option<Vec<(usize, Activation)>>,
     /// Material symmetry of an energy; default: orthotropic.
     pub symmetry: Option<Symmetry>,
-    /// Material axes of an energy as rows; default: those of the data.
+    /// Material axes of an energy, as rows; default: the axes of the data.
     pub axes: Option<[[f64; 3]; 3]>,
-    /// Whether an energy is polyconvex by construction: elliptic everywhere, but it cannot represent softening. Its
-    /// symmetry is orthotropic, transverse or isotropic, its activations are softplus, elu or linear.
+    /// Makes an energy polyconvex by construction: elliptic everywhere, but without softening. Its symmetry
+    /// is orthotropic, transverse or isotropic, its activations are softplus, elu or linear.
     #[serde(default)]
     pub polyconvex: bool,
-    /// Whether a polyconvex isotropic energy takes √I₁ = ‖F‖ and √I₂ = ‖cof F‖ for I₁ and I₂: polyconvex too, and less
-    /// stiff (rubber asks for √I₂).
+    /// Uses √I₁ = ‖F‖ and √I₂ = ‖cof F‖ in a polyconvex isotropic energy instead of I₁ and I₂: also
+    /// polyconvex, and less stiff (rubber needs √I₂).
     #[serde(default)]
     pub norms: bool,
-    /// Units of a damage variable of an energy, by which runs that turn round unload below the curve of loading; their rows of
-    /// unloading are for it alone. Default: none.
+    /// Units of a damage variable of an energy, which lets runs unload below the loading curve; it alone is
+    /// fitted to the rows of unloading. Default: none.
     pub softening: Option<usize>,
-    /// Names of the training runs that it learns from; default: all of them. The others are then held out of it.
+    /// Names of its training runs; the others are held out. Default: all.
     #[serde(default)]
     pub runs: Vec<String>,
-    /// Networks trained from different seeds into one law.
-    #[serde(default = "one")]
+    /// Number of networks in the law, trained from different seeds.
+    #[serde(default = "one_member")]
     pub members: usize,
-    /// Internal units of an `ann`'s outputs; default: standardised.
-    pub outputs: Option<Outputs>,
-    /// Overrides of the scene's `[training]`.
+    /// Units of the outputs of an `ann` during training; default: standardised.
+    pub outputs: Option<OutputUnits>,
+    /// Training settings that replace those of the scene's `[training]`.
     #[serde(default)]
     pub training: TrainingSpec,
-    /// Divides the rows by another method than the scene's `[split]`, for this model alone.
-    pub split: Option<Method>,
-    /// Trained in `--quick` runs too.
-    #[serde(default = "yes")]
+    /// Split method for this model instead of the scene's `[split]`.
+    pub split: Option<SplitMethod>,
+    /// Trains the model in `--quick` runs too; default true.
+    #[serde(default = "default_true")]
     pub quick: bool,
 }
 
-/// What the networks of a law compute, by name.
+/// Kind of law, by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum KindName {
-    /// C → S (3.9).
+    /// Stress from strain, C → S (3.9).
     Ann,
-    /// Invariants of C → W.
+    /// Energy from invariants of C, → W.
     Energy,
 }
 
-/// The columns of Table 3.4.
+/// Networks of Table 3.4.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[allow(missing_docs)]
 pub enum ThesisNetwork {
@@ -81,49 +81,49 @@ pub enum ThesisNetwork {
     Ann4 = 4,
 }
 
-/// Units of an `ann`'s outputs.
+/// Units of the outputs of an `ann` during training.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Outputs {
+pub enum OutputUnits {
     /// Mean 0 and deviation 1 over the training rows, component by component.
     Standardised,
-    /// MPa, as in the thesis.
+    /// Stress in MPa, as in the thesis.
     Stress,
 }
 
-/// How networks are trained; what is left out is that of [`Settings::default`].
+/// Training settings; defaults are those of [`Settings::default`].
 #[derive(Clone, Copy, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TrainingSpec {
-    /// Passes over the training rows.
+    /// Number of passes over the training rows.
     pub epochs: Option<u32>,
-    /// The same in `--quick` runs.
+    /// Number of passes in `--quick` runs.
     pub quick_epochs: Option<u32>,
-    /// Rows in a step.
+    /// Rows per training step.
     pub batch: Option<usize>,
-    /// Adam's step.
+    /// Learning rate of Adam.
     pub learning_rate: Option<f64>,
-    /// `constant` or `cosine`.
+    /// Schedule of the learning rate: `constant` or `cosine`.
     pub schedule: Option<Schedule>,
-    /// Epochs without a better validation loss before it stops.
+    /// Epochs without a lower validation loss before the training stops.
     pub patience: Option<u32>,
-    /// `stress` (3.12) or `scaled`.
+    /// Loss function: `stress` (3.12) or `scaled`.
     pub loss: Option<Loss>,
-    /// Of the first member; the others count on.
+    /// Seed of the first member; the others use the following numbers.
     pub seed: Option<u64>,
 }
 
-fn one() -> usize {
+fn one_member() -> usize {
     1
 }
 
-fn yes() -> bool {
+fn default_true() -> bool {
     true
 }
 
 impl TrainingSpec {
-    /// What is written here, else what is written in `general`, else the defaults.
-    pub fn over(&self, general: &Self, quick: bool) -> Settings {
+    /// Combines these settings with `general` and the defaults, in this order of precedence.
+    pub fn combine(&self, general: &Self, quick: bool) -> Settings {
         let default = Settings::default();
         let epochs = |spec: &Self| spec.quick_epochs.filter(|_| quick).or(spec.epochs);
         Settings {
@@ -139,7 +139,7 @@ impl TrainingSpec {
 }
 
 impl ModelSpec {
-    /// Its name, or the default one.
+    /// Returns the name, or the default one.
     pub fn title(&self) -> String {
         if let Some(name) = &self.name {
             return name.clone();
@@ -152,31 +152,31 @@ impl ModelSpec {
         }
     }
 
-    /// What its networks compute.
+    /// Returns the kind of law.
     pub fn law(&self) -> Kind {
         match self.kind {
             KindName::Ann => Kind::Ann,
             KindName::Energy => Kind::Energy {
                 symmetry: self.symmetry.unwrap_or(Symmetry::Orthotropic),
-                axes: self.axes.unwrap_or(OWN_AXES),
+                axes: self.axes.unwrap_or(DATA_AXES),
                 polyconvex: self.polyconvex,
                 norms: self.norms,
             },
         }
     }
 
-    /// Whether an `ann`'s outputs are standardised.
+    /// Tells if the outputs of an `ann` are standardised.
     pub fn standardised(&self) -> bool {
-        self.outputs != Some(Outputs::Stress)
+        self.outputs != Some(OutputUnits::Stress)
     }
 
-    /// Its networks.
+    /// Returns the architecture of its networks.
     pub fn architecture(&self) -> Architecture {
         let kind = self.law();
         let hidden = match (&self.hidden, self.network, self.kind) {
             (Some(hidden), ..) => hidden.clone(),
             (None, network, KindName::Ann) => {
-                // a number from 1 to 4 is always known
+                // numbers from 1 to 4 are valid
                 let number = network.unwrap_or(ThesisNetwork::Ann4) as usize;
                 return Architecture::thesis(number).unwrap_or_else(|_| Architecture::new(6, &[], 6));
             }
@@ -186,10 +186,10 @@ impl ModelSpec {
     }
 }
 
-/// Checks models and training; `key` of the first model is `model[0]`.
+/// Checks models and training.
 ///
 /// # Errors
-/// What is wrong and where.
+/// Returns a [`SceneError`] with key and advice.
 pub fn check_models(source: &Source, models: &[ModelSpec], general: &TrainingSpec) -> Result<(), SceneError> {
     let mut names = HashSet::new();
     for (index, model) in models.iter().enumerate() {
@@ -201,10 +201,14 @@ pub fn check_models(source: &Source, models: &[ModelSpec], general: &TrainingSpe
             return Err(source.error(&at("name"), format!("`{name}`"), allowed));
         }
         if !names.insert(name.clone()) {
-            return Err(source.error(&at("name"), format!("`{name}` twice"), "a name for each model"));
+            return Err(source.error(
+                &at("name"),
+                format!("`{name}` twice"),
+                "a different name for each model",
+            ));
         }
         if model.hidden.is_some() && model.network.is_some() {
-            return Err(source.error(&at("network"), "`network` together with `hidden`", "one of them"));
+            return Err(source.conflict(&at("network"), &at("hidden"), "keep one of them"));
         }
         let energy = model.kind == KindName::Energy;
         for (key, written) in [
@@ -215,24 +219,25 @@ pub fn check_models(source: &Source, models: &[ModelSpec], general: &TrainingSpe
             ("softening", model.softening.is_some()),
         ] {
             if written && !energy {
-                let found = format!("`{key}` of an ann, which has none");
-                return Err(source.error(&at(key), found, "`kind = \"energy\"`"));
+                let why = "it belongs to `kind = \"energy\"`; remove it or change the kind";
+                return Err(source.unexpected(&at(key), why));
             }
         }
         if let Some(units) = model.softening.filter(|units| !(1..=MOST_UNITS).contains(units)) {
             return Err(source.error(&at("softening"), units, format!("1 to {MOST_UNITS} units")));
         }
         if energy && model.network.is_some() {
-            let found = "a network of Table 3.4, which returns a stress";
-            return Err(source.error(&at("network"), found, "`hidden` layers for an energy"));
+            let why = "networks of Table 3.4 return a stress; use `hidden` for an energy";
+            return Err(source.unexpected(&at("network"), why));
         }
         if energy && model.outputs.is_some() {
-            return Err(source.error(&at("outputs"), "`outputs` of an energy", "`kind = \"ann\"`"));
+            return Err(source
+                .unexpected(&at("outputs"), "it belongs to `kind = \"ann\"`; remove it or change the kind"));
         }
         if energy && model.architecture().activations.contains(&Activation::Relu) {
             let allowed = match model.polyconvex {
-                true => "softplus, elu or linear (convex, and its stress is a derivative)",
-                false => "softplus, tanh, sigmoid, silu or elu (its stress is a derivative)",
+                true => "softplus, elu or linear (convex, with a continuous derivative)",
+                false => "softplus, tanh, sigmoid, silu or elu (with a continuous derivative)",
             };
             return Err(source.error(&at("hidden"), "relu in an energy", allowed));
         }
@@ -242,24 +247,24 @@ pub fn check_models(source: &Source, models: &[ModelSpec], general: &TrainingSpe
             return Err(source.error(&at("symmetry"), format!("{symmetry:?}").to_lowercase(), allowed));
         }
         if model.norms && !(model.polyconvex && symmetry == Symmetry::Isotropic) {
-            let allowed = "`polyconvex = true` and `symmetry = \"isotropic\"` beside it";
-            return Err(source.error(&at("norms"), "norms of another energy", allowed));
+            let why = "it needs `polyconvex = true` and `symmetry = \"isotropic\"`";
+            return Err(source.unexpected(&at("norms"), why));
         }
         let mut header = Header::new(model.law(), &[], model.members);
         if (1..=1000).contains(&model.members) {
-            // a law without hidden layers has the same axes
+            // hidden layers do not affect the axes
             Surrogate::<f64>::random(header.clone(), 0)
-                .map_err(|error| source.error(&at("axes"), error, "axes that a material can have"))?;
+                .map_err(|error| source.error(&at("axes"), error, "orthonormal material axes"))?;
         }
         header.architecture = model.architecture();
         header.check().map_err(|error| {
             let key = if (1..=1000).contains(&model.members) { "hidden" } else { "members" };
-            source.error(&at(key), error, "a network that can be built")
+            source.error(&at(key), error, "a valid network")
         })?;
         let parameters = parameters(model);
         if parameters > MOST_PARAMETERS {
-            let found = format!("{parameters} parameters, in networks: {}", model.members);
-            let allowed = format!("networks of {MOST_PARAMETERS} at most, all members together");
+            let found = format!("{parameters} parameters in {} networks", model.members);
+            let allowed = format!("at most {MOST_PARAMETERS} in all members");
             return Err(source.error(&at("hidden"), found, allowed));
         }
         check_training(source, &at("training"), &model.training)?;
@@ -267,12 +272,12 @@ pub fn check_models(source: &Source, models: &[ModelSpec], general: &TrainingSpe
     check_training(source, "training", general)
 }
 
-/// Numbers of a block of training settings.
+/// Checks the numbers of training settings.
 ///
 /// # Errors
-/// What is wrong and where.
+/// Returns a [`SceneError`] with key and allowed values.
 fn check_training(source: &Source, key: &str, spec: &TrainingSpec) -> Result<(), SceneError> {
-    let settings = |spec: &TrainingSpec| spec.over(&TrainingSpec::default(), false);
+    let settings = |spec: &TrainingSpec| spec.combine(&TrainingSpec::default(), false);
     let quick = TrainingSpec { epochs: spec.quick_epochs, ..TrainingSpec::default() };
     for (name, alone) in [
         ("epochs", TrainingSpec { epochs: spec.epochs, ..TrainingSpec::default() }),

@@ -1,108 +1,110 @@
-//! A search for hyperparameters, as written in a scene.
+//! Search for hyperparameters in a scene.
 
 use super::memory::MOST_PARAMETERS;
-use crate::search::{Method, Space, brackets};
+use crate::search::{SearchMethod, SearchSpace, brackets};
 use crate::surrogate::Header;
 use crate::surrogate::Kind;
 use harness::scene::{SceneError, Source};
 use serde::Deserialize;
 
-/// A search for hyperparameters.
+/// Search for hyperparameters.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SearchSpec {
-    /// `hyperband`, `bayesian`, `random` or some of them, in this order.
-    #[serde(default = "both")]
-    pub methods: Vec<Method>,
-    /// Maximum epochs of a training; `bayesian` always uses it.
-    #[serde(default = "epochs")]
+    /// Search methods, in this order: `hyperband`, `bayesian`, `random`; default: the first two.
+    #[serde(default = "default_methods")]
+    pub methods: Vec<SearchMethod>,
+    /// Largest number of epochs of a training; `bayesian` always uses it.
+    #[serde(default = "default_epochs")]
     pub epochs: u32,
-    /// The same in `--quick` runs.
+    /// Epochs in `--quick` runs.
     pub quick_epochs: Option<u32>,
-    /// Of `hyperband`: one of so many candidates is kept for so many times the epochs.
-    #[serde(default = "eta")]
+    /// Reduction factor of `hyperband`: one in `eta` candidates continues, for `eta` times the epochs.
+    #[serde(default = "default_eta")]
     pub eta: u32,
-    /// Trainings of `bayesian` and of `random`.
-    #[serde(default = "trials")]
+    /// Number of trainings of `bayesian` and `random`.
+    #[serde(default = "default_trials")]
     pub trials: usize,
-    /// The same in `--quick` runs.
+    /// Number of trainings in `--quick` runs.
     pub quick_trials: Option<usize>,
-    /// Random trials before the Gaussian process is fitted.
-    #[serde(default = "initial")]
+    /// Number of random trials before the Gaussian process is fitted.
+    #[serde(default = "default_initial")]
     pub initial: usize,
     /// Seed of the random choices.
     #[serde(default)]
     pub seed: u64,
-    /// Whole searches with one seed after the other, for medians of their best losses.
-    #[serde(default = "once")]
+    /// Number of whole searches with consecutive seeds, for medians of their best losses.
+    #[serde(default = "default_repeats")]
     pub repeats: u32,
-    /// The same in `--quick` runs.
+    /// Number of searches in `--quick` runs.
     pub quick_repeats: Option<u32>,
-    /// Of the best so many, the one with the fewest parameters is chosen.
-    #[serde(default = "top")]
+    /// Number of best candidates among which the one with the fewest parameters is chosen.
+    #[serde(default = "default_top")]
     pub top: usize,
     /// Search space; default: Table 3.3.
     #[serde(default)]
-    pub space: Space,
+    pub space: SearchSpace,
 }
 
-fn both() -> Vec<Method> {
-    vec![Method::Hyperband, Method::Bayesian]
+fn default_methods() -> Vec<SearchMethod> {
+    vec![SearchMethod::Hyperband, SearchMethod::Bayesian]
 }
 
-fn epochs() -> u32 {
+fn default_epochs() -> u32 {
     81
 }
 
-fn eta() -> u32 {
+fn default_eta() -> u32 {
     3
 }
 
-fn trials() -> usize {
+fn default_trials() -> usize {
     40
 }
 
-fn initial() -> usize {
+fn default_initial() -> usize {
     10
 }
 
-fn once() -> u32 {
+fn default_repeats() -> u32 {
     1
 }
 
-fn top() -> usize {
+fn default_top() -> usize {
     10
 }
 
 impl SearchSpec {
-    /// Epochs of a run.
+    /// Returns the epochs of a run.
     pub fn epochs(&self, quick: bool) -> u32 {
         self.quick_epochs.filter(|_| quick).unwrap_or(self.epochs)
     }
 
-    /// Trainings of `bayesian` in a run.
+    /// Returns the trainings of `bayesian` in a run.
     pub fn trials(&self, quick: bool) -> usize {
         self.quick_trials.filter(|_| quick).unwrap_or(self.trials)
     }
 
-    /// Searches of a run.
+    /// Returns the searches of a run.
     pub fn repeats(&self, quick: bool) -> u32 {
         self.quick_repeats.filter(|_| quick).unwrap_or(self.repeats)
     }
 
+    /// Checks the settings.
+    ///
     /// # Errors
-    /// What is wrong and where.
+    /// Returns a [`SceneError`] with key and allowed values.
     pub fn check(&self, source: &Source) -> Result<(), SceneError> {
         let wrong = |key: &str, error: crate::Error| {
             let (found, allowed) = match error {
                 crate::Error::Parameter { found, allowed, .. } => (found, allowed),
-                other => (other.to_string(), "a search that can run".into()),
+                other => (other.to_string(), "a valid search".into()),
             };
             source.error(&format!("search.{key}"), found, allowed)
         };
-        let twice = |k: usize| self.methods[..k].contains(&self.methods[k]);
-        if self.methods.is_empty() || (0..self.methods.len()).any(twice) {
-            let allowed = "`hyperband`, `bayesian`, `random` or some of them, each once";
+        let repeated = |k: usize| self.methods[..k].contains(&self.methods[k]);
+        if self.methods.is_empty() || (0..self.methods.len()).any(repeated) {
+            let allowed = "some of `hyperband`, `bayesian`, `random`, each once";
             return Err(source.error("search.methods", format!("{:?}", self.methods), allowed));
         }
         for (key, repeats) in [("repeats", Some(self.repeats)), ("quick_repeats", self.quick_repeats)] {
@@ -112,15 +114,15 @@ impl SearchSpec {
         }
         for (key, epochs) in [("epochs", Some(self.epochs)), ("quick_epochs", self.quick_epochs)] {
             if let Some(epochs) = epochs {
-                let fault = |error: crate::Error| match &error {
+                let locate = |error: crate::Error| match &error {
                     crate::Error::Parameter { name: "eta", .. } => wrong("eta", error),
                     _ => wrong(key, error),
                 };
-                brackets(epochs, self.eta).map_err(fault)?;
+                brackets(epochs, self.eta).map_err(locate)?;
             }
         }
         if self.initial < 3 {
-            return Err(source.error("search.initial", self.initial, "3 or more, to fit a process"));
+            return Err(source.error("search.initial", self.initial, "3 or more, to fit a Gaussian process"));
         }
         for (key, trials) in [("trials", Some(self.trials)), ("quick_trials", self.quick_trials)] {
             if trials.is_some_and(|trials| !(self.initial..=10_000).contains(&trials)) {
@@ -138,14 +140,14 @@ impl SearchSpec {
             };
             wrong(&key, error)
         })?;
-        // the largest network of the space
+        // largest network of the space
         let widest = (self.space.neurons[1], self.space.activations[0]);
         let largest = Header::new(Kind::Ann, &vec![widest; self.space.layers[1]], 1);
         largest.check().map_err(|error| wrong("space", error.into()))?;
         let parameters = largest.architecture.parameters();
         if parameters > MOST_PARAMETERS {
             let found = format!("networks of up to {parameters} parameters");
-            return Err(source.error("search.space", found, format!("{MOST_PARAMETERS} at most")));
+            return Err(source.error("search.space", found, format!("at most {MOST_PARAMETERS}")));
         }
         Ok(())
     }

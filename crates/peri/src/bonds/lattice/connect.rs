@@ -1,14 +1,14 @@
-//! What bonds a lattice is built with, and what the kernel must look at for them.
+//! Connects a lattice, and classifies its tiles for the kernel.
 
 use super::LatticeBonds;
 use crate::bonds::BodyGeometry;
-use crate::bonds::lattice_kernel::{Class, TILE};
+use crate::bonds::lattice_kernel::{TILE, TileClass};
 use crate::field::{CHUNK, chunk_range};
 use crate::geometry::{Cut, Gaps, cuts_within, severed};
 use rayon::prelude::*;
 
 impl<const D: usize> LatticeBonds<D> {
-    /// Bonds of all pairs of occupied sites within the stencil, less those that cross a cut or a gap.
+    /// Bonds all pairs of occupied sites within the stencil, except those that cross a cut or a gap.
     pub(super) fn connect(&mut self, cuts: &[Cut<D>], gaps: Option<&Gaps<D>>) {
         let words = self.stencil.offsets.len().div_ceil(64);
         let occupied = self.occupancy();
@@ -50,7 +50,7 @@ impl<const D: usize> LatticeBonds<D> {
         self.intact = intact;
     }
 
-    /// Sorts the tiles by what the kernel must look at.
+    /// Classifies the tiles by the checks that the kernel must make.
     pub(super) fn classify(&mut self) {
         let bonds = self.stencil.offsets.len();
         let full: Vec<u64> =
@@ -65,21 +65,21 @@ impl<const D: usize> LatticeBonds<D> {
         let class = |tile: usize| {
             let mut range = tile * TILE..(tile + 1) * TILE;
             if range.clone().all(|s| intact.iter().all(|w| w[s] == 0)) {
-                Class::Empty
+                TileClass::Empty
             } else if range.start >= guard
                 && range.end + guard <= sites
                 && range.all(|s| intact.iter().zip(&full).all(|(w, f)| w[s] == *f) && uniform(s))
             {
-                Class::Full
+                TileClass::Full
             } else {
-                Class::Partial
+                TileClass::Partial
             }
         };
         let classes = (0..sites / TILE).into_par_iter().map(class).collect();
         self.classes = classes;
     }
 
-    /// Which sites hold a particle.
+    /// Returns, for each cell, whether a particle occupies it.
     pub fn occupancy(&self) -> Vec<bool> {
         let mut occupied = vec![false; self.sites];
         for &site in &self.particles {
@@ -88,7 +88,7 @@ impl<const D: usize> LatticeBonds<D> {
         occupied
     }
 
-    /// The site of the cell at `offset` from `cell`, if it lies in the box.
+    /// Returns the site of the cell at `offset` from `cell`; `None` outside the box.
     pub fn cell_at(&self, cell: [usize; D], offset: [i32; D]) -> Option<usize> {
         let mut there = [0; D];
         for d in 0..D {
@@ -98,7 +98,7 @@ impl<const D: usize> LatticeBonds<D> {
         Some(self.site(there))
     }
 
-    /// The cell of a site, if the site is one of the box's.
+    /// Returns the cell of a site; `None` outside the box.
     pub fn cell_of(&self, site: usize) -> Option<[usize; D]> {
         let mut rest = site.checked_sub(self.guard)?;
         let mut cell = [0; D];

@@ -1,7 +1,7 @@
 //! Forces in mixed precision: bonds in single precision, the sums of their forces in double precision.
 //!
-//! Kernels read displacements over the spacing, rounded to 24 bits: the stretch of a bond is wrong by about 6e-8 of the displacement
-//! over the bond's length. All else of a body is in double precision.
+//! Kernels read displacements over the spacing, rounded to 24 bits: the stretch of a bond has an error of
+//! about 6e-8 of the displacement over the bond's length. All other data are in double precision.
 
 use super::LatticeBonds;
 use crate::bonds::BondForces;
@@ -14,12 +14,12 @@ use rayon::prelude::*;
 /// Largest relative error of the law in single precision.
 const LAW_ERROR: f64 = 1e-5;
 
-/// What forces in mixed precision read.
+/// Input of forces in mixed precision.
 pub(super) struct Mixed<const D: usize> {
     /// Displacement over the spacing.
     displacement: [Vec<f32>; D],
     factors: Option<[Vec<f32>; D]>,
-    /// None where the law needs double precision.
+    /// `None` if the law needs double precision.
     kernel: Option<Box<dyn LatticeKernel<D, f32>>>,
 }
 
@@ -34,7 +34,7 @@ impl<const D: usize> Mixed<D> {
         self.factors = Some(factors.components().map(single));
     }
 
-    pub(super) fn round(&mut self, displacement: &Field<D>, spacing: f64) {
+    pub(super) fn set_displacement(&mut self, displacement: &Field<D>, spacing: f64) {
         let inverse = 1.0 / spacing;
         for (rounded, exact) in self.displacement.iter_mut().zip(displacement.components()) {
             rounded.par_chunks_mut(CHUNK).zip(exact.par_chunks(CHUNK)).for_each(|(rounded, exact)| {
@@ -50,9 +50,10 @@ impl<const D: usize> Mixed<D> {
 }
 
 impl<const D: usize> LatticeBonds<D> {
-    /// Has [`BondForces::force`] evaluate bonds in single precision and sum their forces in double precision, from the next
-    /// [`BondForces::set_law`] on: forces of the displacement last given to [`crate::bonds::BondForces::prepare`]. A law that single precision misses by more
-    /// than 1e-5 ([`KernelFit::single_error`]) stays in double precision.
+    /// Evaluates bonds in single precision and sums their forces in double precision, from the next
+    /// [`BondForces::set_law`] on: forces of the displacement last given to
+    /// [`crate::bonds::BondForces::prepare`]. A law whose single-precision error exceeds 1e-5
+    /// ([`KernelFit::single_error`]) stays in double precision.
     pub fn set_mixed(&mut self) {
         let displacement = std::array::from_fn(|_| vec![0.0; self.sites]);
         let mut mixed = Mixed { displacement, factors: None, kernel: None };
@@ -62,8 +63,8 @@ impl<const D: usize> LatticeBonds<D> {
         self.mixed = Some(mixed);
     }
 
-    /// Root mean square of what forces in mixed precision differ by from those in double precision, over that of the latter, in the
-    /// displacement last given to [`crate::bonds::BondForces::prepare`]; `None` without mixed precision.
+    /// Root mean square of the difference of forces in mixed and double precision over that of the latter, in
+    /// the displacement last given to [`crate::bonds::BondForces::prepare`]; `None` without mixed precision.
     pub fn mixed_error(&self, displacement: &Field<D>) -> Option<f64> {
         self.mixed.as_ref()?;
         let squares = |chunk: usize| {
@@ -80,7 +81,7 @@ impl<const D: usize> LatticeBonds<D> {
         Some(if force > 0.0 { (difference / force).sqrt() } else { 0.0 })
     }
 
-    /// [`BondForces::force`] in mixed precision; false where there is none.
+    /// Computes [`BondForces::force`] in mixed precision; returns false if it is not set.
     pub(super) fn mixed_force(
         &self,
         start: usize,

@@ -1,4 +1,4 @@
-//! The self-check state in LAMMPS itself.
+//! Compares the self-check state with LAMMPS.
 
 use crate::Error;
 use polycore::Error as Shared;
@@ -6,10 +6,10 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The largest difference of forces, over their rms, that rounding and the tables' splines explain.
+/// Largest difference of forces over their rms that rounding and the splines of the tables explain.
 pub const BOUND: f64 = 1e-11;
 
-/// Forces of LAMMPS against ours.
+/// Difference of the forces of LAMMPS and ours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Comparison {
     /// Ranks.
@@ -18,30 +18,31 @@ pub struct Comparison {
     pub largest: f64,
 }
 
-/// Runs LAMMPS on the self-check state of an exported folder, on one rank, and on two where there is an `mpiexec`.
+/// Runs LAMMPS on the self-check state of an exported folder, on one rank, and on two if there is an
+/// `mpiexec`.
 ///
 /// # Errors
-/// A folder that is no export, a `python` without LAMMPS, a run that fails.
+/// A folder without an export, a `python` without LAMMPS, a run that fails.
 pub fn compare(folder: &Path, python: &Path) -> Result<Vec<Comparison>, Error> {
-    // it runs in the folder, where a relative path would lead elsewhere
+    // the command runs in the folder, where a relative path would change its meaning
     let python = match python.components().count() {
-        1 => of_environment(python, std::env::var_os("VIRTUAL_ENV"), std::env::var_os("PATH")),
-        _ => std::path::absolute(python).map_err(Shared::io("find", python))?,
+        1 => find_program(python, std::env::var_os("VIRTUAL_ENV"), std::env::var_os("PATH")),
+        _ => std::path::absolute(python).map_err(Shared::from_io("find", python))?,
     };
     let python = &*python;
     let table = folder.join("check.csv");
-    let text = std::fs::read_to_string(&table).map_err(Shared::io("read", &table))?;
+    let text = std::fs::read_to_string(&table).map_err(Shared::from_io("read", &table))?;
     let own = forces(&table, text.lines().skip(1), ',', 4)?;
-    let mut found = vec![on(folder, python, None, &own)?];
+    let mut found = vec![run_check(folder, python, None, &own)?];
     if let Some(mpiexec) = mpiexec(python) {
-        found.push(on(folder, python, Some(&mpiexec), &own)?);
+        found.push(run_check(folder, python, Some(&mpiexec), &own)?);
     }
     Ok(found)
 }
 
-/// The program of a bare name: of the active virtual environment, else the first of the path, so that what lies beside it (MPI) is
-/// found.
-fn of_environment(name: &Path, active: Option<OsString>, path: Option<OsString>) -> PathBuf {
+/// Finds a program by name: in the active virtual environment, else the first on the path, so that MPI beside
+/// it is found.
+fn find_program(name: &Path, active: Option<OsString>, path: Option<OsString>) -> PathBuf {
     let own = active.into_iter().map(|folder| PathBuf::from(folder).join("bin"));
     let paths = path.iter().flat_map(std::env::split_paths);
     let found =
@@ -49,13 +50,19 @@ fn of_environment(name: &Path, active: Option<OsString>, path: Option<OsString>)
     found.unwrap_or_else(|| name.to_path_buf())
 }
 
-fn on(folder: &Path, python: &Path, mpiexec: Option<&Path>, own: &[[f64; 3]]) -> Result<Comparison, Error> {
+/// Runs the self-check, with `mpiexec` on two ranks, and compares the forces.
+fn run_check(
+    folder: &Path,
+    python: &Path,
+    mpiexec: Option<&Path>,
+    own: &[[f64; 3]],
+) -> Result<Comparison, Error> {
     let ranks = if mpiexec.is_some() { 2 } else { 1 };
     let name = format!("check.{ranks}.dump");
     let path = folder.join(&name);
-    // a dump of an earlier run would be compared in place of a missing one
+    // a dump of an earlier run must not replace a missing one
     if path.exists() {
-        std::fs::remove_file(&path).map_err(Shared::io("remove", &path))?;
+        std::fs::remove_file(&path).map_err(Shared::from_io("remove", &path))?;
     }
     let mut command = match mpiexec {
         Some(mpiexec) => {
@@ -69,14 +76,15 @@ fn on(folder: &Path, python: &Path, mpiexec: Option<&Path>, own: &[[f64; 3]]) ->
         command.env("LD_LIBRARY_PATH", libraries);
     }
     let run = command.args(["drive.py", "--check", &name]).current_dir(folder).output();
-    let run = run.map_err(Shared::io("run", mpiexec.unwrap_or(python)))?;
+    let run = run.map_err(Shared::from_io("run", mpiexec.unwrap_or(python)))?;
     if !run.status.success() || !path.exists() {
-        let said = String::from_utf8_lossy(&run.stderr);
-        let last = said.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("no word").to_owned();
+        let message = String::from_utf8_lossy(&run.stderr);
+        let last =
+            message.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("no message").to_owned();
         let reason = format!("{} with {} rank(s): {last}", run.status, ranks);
         return Err(Shared::Data { what: "LAMMPS".into(), reason }.into());
     }
-    let text = std::fs::read_to_string(&path).map_err(Shared::io("read", &path))?;
+    let text = std::fs::read_to_string(&path).map_err(Shared::from_io("read", &path))?;
     let theirs = forces(&path, text.lines().skip(9), ' ', 5)?;
     if theirs.len() != own.len() {
         let reason = format!("{} particles, the self-check state has {}", theirs.len(), own.len());
@@ -90,7 +98,7 @@ fn on(folder: &Path, python: &Path, mpiexec: Option<&Path>, own: &[[f64; 3]]) ->
     Ok(Comparison { ranks, largest })
 }
 
-/// Three columns from `first` on; the first column counts from 1.
+/// Parses three columns from `first` on; the first column counts from 1.
 fn forces<'a>(
     path: &Path,
     lines: impl Iterator<Item = &'a str>,
@@ -118,7 +126,8 @@ fn forces<'a>(
     Ok(rows)
 }
 
-/// The `mpiexec` beside `python`, with which its LAMMPS was installed; else that of the path, where a bare name of `python` stands.
+/// Finds the `mpiexec` beside `python`, with which its LAMMPS was installed; for a bare name of `python` the
+/// first on the path.
 fn mpiexec(python: &Path) -> Option<PathBuf> {
     let beside = python.parent().map(|folder| folder.join("mpiexec"));
     if let Some(beside) = beside.filter(|path| path.is_file() && path.components().count() > 1) {
@@ -128,7 +137,7 @@ fn mpiexec(python: &Path) -> Option<PathBuf> {
     std::env::split_paths(&paths).map(|folder| folder.join("mpiexec")).find(|path| path.is_file())
 }
 
-/// The library path with that of the environment of `python`, where a wheel puts its MPI.
+/// Returns the library path extended by that of `python`'s environment, where a wheel puts its MPI.
 fn libraries(python: &Path) -> Option<OsString> {
     let own = python.parent()?.parent()?.join("lib");
     own.is_dir().then_some(())?;
@@ -157,7 +166,7 @@ mod tests {
         let (active, system) = (make("active"), make("system"));
         let path = || Some(std::env::join_paths([&system, &active]).unwrap());
         let root = || active.parent().map(|root| root.as_os_str().to_owned());
-        let found = |active, path| of_environment(Path::new("python3"), active, path);
+        let found = |active, path| find_program(Path::new("python3"), active, path);
         assert_eq!(found(root(), path()), active.join("python3"));
         assert_eq!(found(None, path()), system.join("python3"));
         assert_eq!(found(Some("/nowhere".into()), None), Path::new("python3"));

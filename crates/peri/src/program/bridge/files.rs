@@ -1,6 +1,6 @@
-//! The files of an export. Lengths in mm, forces in N: LAMMPS has thresholds of its own near 1.
+//! Writes the files of an export, in mm and N: thresholds of LAMMPS assume numbers near 1.
 
-use super::{BondType, Model};
+use super::{BondType, LammpsModel};
 use crate::Error;
 use crate::potential::BondPotential;
 use crate::program::scene::{Scene, region_names};
@@ -9,17 +9,17 @@ use polycore::file::{atomic_write, prepare_directory};
 use std::io::Write;
 use std::path::Path;
 
-/// Fewest points of a table: with 16,000 over l = 0 to 80 forces keep 1e-12.
-const POINTS: usize = 16_000;
-/// Points per unit of stretch, where tables are longer.
-const DENSITY: f64 = 200.0;
-/// Bonds beside a crack are crushed to nearly nothing while it runs.
-const SHORTEST: f64 = 1e-6;
+/// Smallest number of points of a table: 16,000 over l = 0 to 80 keep forces to 1e-12.
+const LEAST_POINTS: usize = 16_000;
+/// Points per unit of stretch of longer tables.
+const POINT_DENSITY: f64 = 200.0;
+/// Smallest stretch of tables: bonds beside a running crack are crushed nearly to zero.
+const LEAST_STRETCH: f64 = 1e-6;
 const MM: f64 = 1e3;
 
-/// Writes everything.
+/// Writes all files.
 pub(super) fn write<const D: usize>(
-    model: &Model<D>,
+    model: &LammpsModel<D>,
     scene: &Scene,
     loads: &Loads<D>,
     [text_of_scene, variant]: [&str; 2],
@@ -31,10 +31,10 @@ pub(super) fn write<const D: usize>(
     let mut json = model.json(scene, &names[..loads.held_regions.len().min(names.len())]);
     json["variant"] = variant.into();
     atomic_write(output.join("scene.toml"), |file| file.write_all(text_of_scene.as_bytes()))?;
-    atomic_write(output.join("peri.data"), |file| model.data(file))?;
-    atomic_write(output.join("peri.table"), |file| model.tables(points, file))?;
+    atomic_write(output.join("peri.data"), |file| model.write_data(file))?;
+    atomic_write(output.join("peri.table"), |file| model.write_tables(points, file))?;
     atomic_write(output.join("in.peri"), |file| file.write_all(text.as_bytes()))?;
-    atomic_write(output.join("check.csv"), |file| model.check(file))?;
+    atomic_write(output.join("check.csv"), |file| model.write_check(file))?;
     atomic_write(output.join("drive.py"), |file| file.write_all(include_bytes!("drive.py")))?;
     atomic_write(output.join("README.md"), |file| file.write_all(include_bytes!("README.md")))?;
     atomic_write(output.join("model.json"), |file| {
@@ -44,13 +44,14 @@ pub(super) fn write<const D: usize>(
     Ok(())
 }
 
-/// The law as tables have it: beyond `switch` it continues linearly, never falling, because leaving a table aborts a run.
-struct Continued<'a> {
+/// Law of the tables: beyond `switch` it continues linearly without falling, because LAMMPS aborts outside a
+/// table.
+struct ContinuedLaw<'a> {
     law: &'a dyn BondPotential,
     switch: f64,
 }
 
-impl Continued<'_> {
+impl ContinuedLaw<'_> {
     fn slope(&self) -> f64 {
         self.law.tension_derivative(self.switch).max(0.0)
     }
@@ -72,9 +73,10 @@ impl Continued<'_> {
     }
 }
 
-impl<const D: usize> Model<'_, D> {
-    /// The longest stretch of the tables: the shortest bond across the widest gap; without breaking, several times the mean stretch.
-    pub(super) fn longest(&self) -> f64 {
+impl<const D: usize> LammpsModel<'_, D> {
+    /// Returns the largest stretch of the tables: the shortest bond across the widest gap; without breaking,
+    /// several times the mean stretch.
+    pub(super) fn largest_stretch(&self) -> f64 {
         match self.critical {
             Some(critical) => (2.0 * critical).max(2.0 + 1.1 * self.reach / self.spacing),
             None => {
@@ -89,17 +91,17 @@ impl<const D: usize> Model<'_, D> {
     }
 
     pub(super) fn points(&self) -> usize {
-        POINTS.max((DENSITY * self.longest()).ceil() as usize)
+        LEAST_POINTS.max((POINT_DENSITY * self.largest_stretch()).ceil() as usize)
     }
 
-    fn law(&self) -> Continued<'_> {
-        // a little beyond the criterion, so that the spline's kink touches no bond that holds
+    fn law(&self) -> ContinuedLaw<'_> {
+        // slightly beyond the criterion, so that the kink of the spline affects no intact bond
         let switch = self.critical.map_or(f64::INFINITY, |critical| 1.02 * critical + 0.02);
-        Continued { law: self.law, switch }
+        ContinuedLaw { law: self.law, switch }
     }
 
-    /// `atom_style bond`: bond type = reference length, molecule = clamp.
-    pub(super) fn data(&self, file: &mut impl Write) -> std::io::Result<()> {
+    /// Writes the data file with `atom_style bond`: bond type = reference length, molecule = clamp.
+    pub(super) fn write_data(&self, file: &mut impl Write) -> std::io::Result<()> {
         let (atoms, bonds, types) = (self.positions.len(), self.bonds.len(), self.types.len());
         writeln!(
             file,
@@ -117,7 +119,7 @@ impl<const D: usize> Model<'_, D> {
         }
         writeln!(file, "\nMasses\n\n1 {}\n\nAtoms # bond\n", self.mass())?;
         for (index, (x, label)) in self.positions.iter().zip(&self.labels).enumerate() {
-            writeln!(file, "{} {label} 1 {}", index + 1, places(x))?;
+            writeln!(file, "{} {label} 1 {}", index + 1, format_position(x))?;
         }
         writeln!(file, "\nBonds\n")?;
         for (index, &(kind, a, b)) in self.bonds.iter().enumerate() {
@@ -126,19 +128,20 @@ impl<const D: usize> Model<'_, D> {
         Ok(())
     }
 
-    /// A section of force −2 kθ t w V_I V_J, N, and energy, N mm, over the length, mm, for each reference length.
-    pub(super) fn tables(&self, points: usize, file: &mut impl Write) -> std::io::Result<()> {
-        let (law, longest) = (self.law(), self.longest());
+    /// Writes tables of force −2 kθ t w V_I V_J, N, and energy, N mm, over the length, mm, for each reference
+    /// length.
+    pub(super) fn write_tables(&self, points: usize, file: &mut impl Write) -> std::io::Result<()> {
+        let (law, longest) = (self.law(), self.largest_stretch());
         let slope = |l: f64| if l > law.switch { law.slope() } else { self.law.tension_derivative(l) };
         let rows: Vec<[f64; 3]> = (0..points)
             .map(|k| {
-                let l = SHORTEST + (longest - SHORTEST) * k as f64 / (points - 1) as f64;
+                let l = LEAST_STRETCH + (longest - LEAST_STRETCH) * k as f64 / (points - 1) as f64;
                 [l, law.energy(l), law.tension(l)]
             })
             .collect();
         for (kind, &BondType { length, scale }) in self.types.iter().enumerate() {
             let length = length * MM;
-            let ends = [SHORTEST, longest].map(|l| -scale * slope(l) / length);
+            let ends = [LEAST_STRETCH, longest].map(|l| -scale * slope(l) / length);
             writeln!(file, "\nB{}\nN {points} FP {:e} {:e} EQ {length}\n", kind + 1, ends[0], ends[1])?;
             for (index, [l, energy, tension]) in rows.iter().enumerate() {
                 let (energy, force) = (scale * length * energy, -scale * tension);
@@ -148,8 +151,8 @@ impl<const D: usize> Model<'_, D> {
         Ok(())
     }
 
-    /// A particle's mass with which FIRE's time step of 0.05 grows (ten-fold at most) to 0.8 of the critical 2/ω of small strains:
-    /// ω² ≤ 2 Σ|stiffness|/m.
+    /// Returns the mass of particles with which FIRE's time step of 0.05 grows (at most ten-fold) to 0.8 of
+    /// the critical step 2/ω of small strains: ω² ≤ 2 Σ|stiffness|/m.
     fn mass(&self) -> f64 {
         let mut sums = vec![0.0; self.positions.len()];
         for &(kind, a, b) in &self.bonds {
@@ -162,11 +165,12 @@ impl<const D: usize> Model<'_, D> {
         0.5 * critical.powi(2) * sums.iter().fold(f64::MIN_POSITIVE, |most: f64, &sum| most.max(sum))
     }
 
-    /// What `drive.py` loads before it moves anything.
+    /// Returns the input script that `drive.py` loads first.
     pub(super) fn input(&self, points: usize) -> String {
         let mut text = format!(
             "# written by `peri export lammps`; lengths in mm, forces in N\n\
-             variable cutoff index {cutoff}\nunits lj\ndimension {D}\nboundary {boundary}\nnewton on\natom_style bond\n\
+             variable cutoff index {cutoff}\nunits lj\ndimension {D}\nboundary {boundary}\n\
+             newton on\natom_style bond\n\
              atom_modify map array\ncomm_modify cutoff ${{cutoff}}\nspecial_bonds lj 0 1 1 coul 0 1 1\n\
              bond_style table spline {points}\nfix broken all property/atom i_broken\nread_data peri.data\n",
             cutoff = self.cutoff(),
@@ -187,14 +191,15 @@ impl<const D: usize> Model<'_, D> {
         }
         text +=
             "variable marks atom i_broken\ncompute cut all reduce sum v_marks\nvariable cut equal c_cut\n";
-        text += "thermo_style custom step bonds ebond fnorm v_cut\nthermo_modify norm no lost error\nthermo 100000\n";
+        text += "thermo_style custom step bonds ebond fnorm v_cut\nthermo_modify norm no lost error\n\
+                 thermo 100000\n";
         text += &format!("min_style fire\nmin_modify dmax {}\ntimestep 0.05\n", 0.5 * self.spacing * MM);
         text
     }
 
-    /// How far ranks must see each other, mm: bonds until they are cut.
+    /// Returns the communication cutoff of ranks, mm: the longest intact bond.
     fn cutoff(&self) -> f64 {
-        2.0 * MM * self.horizon * self.critical.unwrap_or(self.longest().min(4.0))
+        2.0 * MM * self.horizon * self.critical.unwrap_or(self.largest_stretch().min(4.0))
     }
 
     pub(super) fn json(&self, scene: &Scene, regions: &[String]) -> serde_json::Value {
@@ -213,14 +218,15 @@ impl<const D: usize> Model<'_, D> {
             "format": "peri-lammps 1", "dimension": D, "clamps": clamps, "regions": regions,
             "lengths_mm": self.types.iter().map(|kind| kind.length * MM).collect::<Vec<f64>>(),
             "critical_stretch": self.critical, "factors": factors, "reach_mm": self.reach * MM,
-            "tolerance": scene.tolerance(), "stop_below": scene.solver.stop_below.unwrap_or(0.0),
+            "tolerance": scene.tolerance(),
+            "stop_below": scene.solver.stop_below.map_or(0.0, |part| part.si()),
             "every": scene.output.every.unwrap_or(factors.len()).max(1), "cutoff_mm": self.cutoff(),
             "predictor": self.predictor.iter().map(|row| row.to_vec()).collect::<Vec<_>>(),
         })
     }
 
-    /// Places, mm, and forces, N, of the self-check state.
-    pub(super) fn check(&self, file: &mut impl Write) -> std::io::Result<()> {
+    /// Writes positions, mm, and forces, N, of the self-check state.
+    pub(super) fn write_check(&self, file: &mut impl Write) -> std::io::Result<()> {
         let places_now = self.check_state();
         writeln!(file, "id,x [mm],y [mm],z [mm],fx [N],fy [N],fz [N]")?;
         for (index, (x, force)) in places_now.iter().zip(self.forces(&places_now)).enumerate() {
@@ -229,16 +235,16 @@ impl<const D: usize> Model<'_, D> {
                 file,
                 "{},{},{}",
                 index + 1,
-                places(x).replace(' ', ","),
-                places(&force).replace(' ', ",")
+                format_position(x).replace(' ', ","),
+                format_position(&force).replace(' ', ",")
             )?;
         }
         Ok(())
     }
 }
 
-/// Three numbers, mm of m, that give the same bits when they are read.
-fn places<const D: usize>(x: &[f64; D]) -> String {
+/// Formats three numbers, m as mm, so that reading restores the same bits.
+fn format_position<const D: usize>(x: &[f64; D]) -> String {
     let place = |d: usize| x.get(d).map_or(0.0, |x| x * MM);
     format!("{} {} {}", place(0), place(1), place(2))
 }

@@ -1,7 +1,7 @@
-//! Results of LAMMPS as those of a run of ours: report, history, curve, fields.
+//! Converts results of LAMMPS to a report, a history, a curve and fields.
 
 use crate::program::quantities as q;
-use crate::program::run::Failure;
+use crate::program::run::PeriFailure;
 use crate::program::scene::{NAMING, Scene};
 use harness::output::csv;
 use harness::output::picture::{LinePlot, Series};
@@ -14,27 +14,28 @@ use std::collections::BTreeMap;
 use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
 
-/// What an export says of itself, as far as it is needed here.
+/// Header of an export.
 #[derive(serde::Deserialize)]
-struct Model {
+struct ExportHeader {
     format: String,
     variant: String,
     critical_stretch: Option<f64>,
 }
 
-/// Names of columns of drive.py that are others in our histories.
+/// Columns of drive.py and their names in our histories.
 const NAMES: [(&str, &str); 3] =
     [("residual", "out_of_balance"), ("rounds", "equilibria"), ("broken", "broken_bonds")];
 
-/// Reads what `drive.py` has written in `folder`, and writes history.csv, load.png, fields.vtkhdf and report.json into `output`. Expectations of the scene are judged
-/// where LAMMPS gives all their values.
+/// Reads the results of `drive.py` in `folder`, and writes history.csv, load.png, fields.vtkhdf and
+/// report.json into `output`. Judges the expectations of the scene whose values LAMMPS gives.
 ///
 /// # Errors
-/// A folder that is no export or without steps, a file that is cut off, results that cannot be written.
-pub fn import(folder: &Path, output: &Path) -> Result<Report, Failure> {
+/// A folder without an export or without steps, a truncated file, results that cannot be written.
+pub fn import(folder: &Path, output: &Path) -> Result<Report, PeriFailure> {
     let path = folder.join("model.json");
-    let model: Model = serde_json::from_str(&read_to_string(&path).map_err(Error::io("read", &path))?)
-        .map_err(|error| fault(&path, "model of an export", error.to_string()))?;
+    let model: ExportHeader =
+        serde_json::from_str(&read_to_string(&path).map_err(Error::from_io("read", &path))?)
+            .map_err(|error| fault(&path, "model of an export", error.to_string()))?;
     if model.format != "peri-lammps 1" {
         return Err(fault(&path, "model of an export", format!("its format is `{}`", model.format)).into());
     }
@@ -89,7 +90,7 @@ pub fn import(folder: &Path, output: &Path) -> Result<Report, Failure> {
         let plot = LinePlot::new("Load, by LAMMPS").axes("displacement (mm)", "load (N)");
         plot.series(Series::line("LAMMPS", &shown, load)).write(output.join("load.png"))?;
     }
-    fields(folder, output, |step| {
+    write_fields(folder, output, |step| {
         let row = steps.iter().position(|&own| own == step as f64)?;
         Some([displacement[row], load[row]])
     })?;
@@ -104,15 +105,19 @@ pub fn import(folder: &Path, output: &Path) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Displacements and the share of broken bonds of each particle at each step that was dumped, with the displacement and the load there.
-fn fields(folder: &Path, output: &Path, moments: impl Fn(u64) -> Option<[f64; 2]>) -> Result<(), Error> {
+/// Writes displacements and damage at each dumped step, with its displacement and load.
+fn write_fields(
+    folder: &Path,
+    output: &Path,
+    moments: impl Fn(u64) -> Option<[f64; 2]>,
+) -> Result<(), Error> {
     let body = folder.join("peri.data");
     let (places, bonds) = read_body(&body)?;
     let mut whole = vec![0_u32; places.len()];
     bonds.iter().flatten().for_each(|&end| whole[end] += 1);
     let pairs = read_broken(folder, places.len())?;
     let mut series = ParticleSeries::create(output.join("fields.vtkhdf"))?;
-    for (step, path) in dumps(folder)? {
+    for (step, path) in find_dumps(folder)? {
         let Some([displacement, load]) = moments(step) else { continue };
         let points = read_dump(&path, places.len())?;
         let moved: Vec<f64> =
@@ -139,21 +144,21 @@ fn numbers(path: &Path, line: &str, between: char) -> Result<Vec<f64>, Error> {
     let fields = line.split(between).map(|field| field.trim().parse::<f64>());
     let found: Result<Vec<f64>, _> = fields.collect();
     let found = found.ok().filter(|row| row.iter().all(|x| x.is_finite()));
-    found.ok_or_else(|| fault(path, "table of LAMMPS", format!("`{line}` has what is no finite number")))
+    found.ok_or_else(|| fault(path, "table of LAMMPS", format!("`{line}`: expected finite numbers")))
 }
 
-/// Reference places, m, and the ends of all bonds, from 0.
-type Body = (Vec<[f64; 3]>, Vec<[usize; 2]>);
+/// Reference positions, m, and the ends of all bonds, from 0.
+type ReferenceBody = (Vec<[f64; 3]>, Vec<[usize; 2]>);
 
-fn read_body(path: &Path) -> Result<Body, Error> {
-    let text = read_to_string(path).map_err(Error::io("read", path))?;
+fn read_body(path: &Path) -> Result<ReferenceBody, Error> {
+    let text = read_to_string(path).map_err(Error::from_io("read", path))?;
     let section = |name: &'static str| {
         let mut lines = text.lines().skip_while(move |line| !line.starts_with(name));
         lines.next();
         lines.skip(1).take_while(|line| !line.is_empty())
     };
     let (mut places, mut bonds) = (Vec::new(), Vec::new());
-    let short = |line: &str| fault(path, "LAMMPS data", format!("`{line}` is cut off"));
+    let short = |line: &str| fault(path, "LAMMPS data", format!("`{line}` is truncated"));
     for line in section("Atoms") {
         let [_, _, _, x, y, z] = numbers(path, line, ' ')?[..] else { return Err(short(line)) };
         places.push([x, y, z].map(|x| 1e-3 * x));
@@ -162,18 +167,18 @@ fn read_body(path: &Path) -> Result<Body, Error> {
         let [_, _, a, b] = numbers(path, line, ' ')?[..] else { return Err(short(line)) };
         let ends = [a, b].map(|end| end as usize - 1);
         if ends.iter().any(|&end| end >= places.len()) {
-            return Err(fault(path, "LAMMPS data", format!("`{line}` names a particle that is not there")));
+            return Err(fault(path, "LAMMPS data", format!("`{line}`: no such particle")));
         }
         bonds.push(ends);
     }
     Ok((places, bonds))
 }
 
-/// Step and ends, from 0, of each broken bond, of all ranks.
+/// Reads the step and the ends, from 0, of each broken bond, of all ranks.
 fn read_broken(folder: &Path, count: usize) -> Result<Vec<(u64, usize, usize)>, Error> {
     let mut pairs = Vec::new();
-    for path in named(folder, "broken.", ".csv")?.into_values() {
-        for line in read_to_string(&path).map_err(Error::io("read", &path))?.lines() {
+    for path in find_numbered(folder, "broken.", ".csv")?.into_values() {
+        for line in read_to_string(&path).map_err(Error::from_io("read", &path))?.lines() {
             match numbers(&path, line, ',')?[..] {
                 [step, _, a, b] if (1.0..=count as f64).contains(&a) && (1.0..=count as f64).contains(&b) => {
                     pairs.push((step as u64, a as usize - 1, b as usize - 1));
@@ -185,15 +190,15 @@ fn read_broken(folder: &Path, count: usize) -> Result<Vec<(u64, usize, usize)>, 
     Ok(pairs)
 }
 
-/// Dumps by their steps.
-fn dumps(folder: &Path) -> Result<BTreeMap<u64, PathBuf>, Error> {
-    named(folder, "step.", ".dump")
+/// Finds the dumps by step.
+fn find_dumps(folder: &Path) -> Result<BTreeMap<u64, PathBuf>, Error> {
+    find_numbered(folder, "step.", ".dump")
 }
 
-/// The files PREFIX NUMBER SUFFIX of a folder.
-fn named(folder: &Path, prefix: &str, suffix: &str) -> Result<BTreeMap<u64, PathBuf>, Error> {
+/// Finds the files PREFIX NUMBER SUFFIX of a folder.
+fn find_numbered(folder: &Path, prefix: &str, suffix: &str) -> Result<BTreeMap<u64, PathBuf>, Error> {
     let mut found = BTreeMap::new();
-    for entry in std::fs::read_dir(folder).map_err(Error::io("read", folder))?.flatten() {
+    for entry in std::fs::read_dir(folder).map_err(Error::from_io("read", folder))?.flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
         let number = name.strip_prefix(prefix).and_then(|rest| rest.strip_suffix(suffix)?.parse().ok());
         found.extend(number.map(|number| (number, entry.path())));
@@ -201,9 +206,9 @@ fn named(folder: &Path, prefix: &str, suffix: &str) -> Result<BTreeMap<u64, Path
     Ok(found)
 }
 
-/// Places, m, of a dump sorted by id.
+/// Reads the positions, m, of a dump sorted by id.
 fn read_dump(path: &Path, count: usize) -> Result<Vec<[f64; 3]>, Error> {
-    let text = read_to_string(path).map_err(Error::io("read", path))?;
+    let text = read_to_string(path).map_err(Error::from_io("read", path))?;
     let mut places = Vec::with_capacity(count);
     for line in text.lines().skip(9) {
         match numbers(path, line.trim(), ' ')?[..] {

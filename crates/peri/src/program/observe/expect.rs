@@ -1,14 +1,14 @@
-//! What a scene's expectations may ask for: the names of the scalars that its report can have.
+//! Names of the scalars that the report of a scene can have, and checks of expectations against them.
 
 use super::list::quantities;
-use super::probes::of_probe;
+use super::probes::probe_scalars;
 use crate::program::quantities as q;
-use crate::program::scene::{self, Scene, Variant, variants};
+use crate::program::scene::{self, Scene, SceneVariant, variants};
 use harness::observe::Scalars;
 use harness::report::Named;
 use harness::scene::{SceneError, Source};
 
-/// Scalars that the report of a scene can have, with its variants.
+/// Returns the names of the scalars that the report of a scene can have, with its variants.
 ///
 /// # Errors
 /// As [`super::check`].
@@ -26,8 +26,10 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
                     let compared = scene.output.compare.as_ref().filter(|c| c.quantity == name).is_some();
                     names.extend(compared.then(|| q::COMPARED.of(&[&name, &variant.name()]).name));
                     names.extend(compared.then(|| q::SAME_EVENTS.of(&[&variant.name()]).name));
-                    names
-                        .extend(q::BALANCES.iter().any(|balance| balance.name == name).then(|| name.clone()));
+                    let is_balance = q::BALANCES.iter().any(|balance| balance.name == name);
+                    if is_balance && !names.contains(&name) {
+                        names.push(name.clone());
+                    }
                     names.push(scene::NAMING.value(&variant.of.name, &name));
                 }
             }
@@ -52,17 +54,17 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
     Ok(names)
 }
 
-/// Checks a scene, lists its variants, and refuses an expectation that no run of the scene could meet, and probes whose values have
-/// names of others.
+/// Checks a scene and returns its variants; refuses expectations of scalars that the report lacks, and probes
+/// whose values have names of other scalars.
 ///
 /// # Errors
-/// As [`scene::check`]; the name, and those that are most like it.
-pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>, SceneError> {
+/// As [`scene::check`]; an unknown name, with the most similar ones.
+pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<SceneVariant>, SceneError> {
     let variants = scene::check(source, scene, quick)?;
     for variant in &variants {
         if variant.of.expect_error.is_none() {
             let (source, scene) = variant.resolved();
-            unique(source, scene)?;
+            check_probe_names(source, scene)?;
         }
     }
     if !scene.expect.is_empty() {
@@ -74,7 +76,7 @@ pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>
 }
 
 /// Refuses probes whose values have names of other scalars.
-fn unique(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+fn check_probe_names(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     if scene.probe.is_empty() {
         return Ok(());
     }
@@ -82,9 +84,9 @@ fn unique(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let mut taken: Vec<String> = quantities(&others).into_iter().map(|named| named.name).collect();
     for (index, probe) in scene.probe.iter().enumerate() {
         let mut own = Vec::new();
-        of_probe::<2>(probe, 0, &mut Scalars::new(None, &mut |named, _| own.push(named.name)));
+        probe_scalars::<2>(probe, 0, &mut Scalars::new(None, &mut |named, _| own.push(named.name)));
         if let Some(value) = own.iter().find(|value| taken.contains(value)) {
-            let found = format!("`{}`, of which `{value}` is taken", probe.name);
+            let found = format!("`{}`, whose value `{value}` has the name of another", probe.name);
             return Err(source.error(&format!("probe[{index}].name"), found, "a unique name"));
         }
         taken.extend(own);

@@ -1,37 +1,38 @@
-//! Fields of single steps: what is written during a run.
+//! Writes the fields of a run to a file.
 
-use super::moment::{Moment, Observers};
-use crate::bonds::Kind;
+use super::moment::{Moment, SceneObservers};
+use crate::bonds::BondKind;
 use crate::error::Error;
 use crate::program::scene::Scene;
-use crate::solver::{Record, State};
-use crate::stress::Tensor;
+use crate::solver::{State, StepRecord};
+use crate::stress::StressTensor;
 use harness::observe::{Fields, Place};
 use harness::output::vtkhdf::ParticleSeries;
 use std::path::Path;
 
-/// The field file of a variant.
-pub struct Frames {
+/// Field file of a variant.
+pub struct FieldFrames {
     series: Option<ParticleSeries>,
-    /// The last step written.
+    /// Last step written.
     written: Option<usize>,
 }
 
-/// Whether the fields after the first `rows` of the history are written during the run.
-fn wanted<const D: usize>(every: usize, state: &State<D>, rows: usize) -> bool {
+/// Returns true if the fields after the first `rows` of the history are written during the run.
+fn is_written<const D: usize>(every: usize, state: &State<D>, rows: usize) -> bool {
     let history = &state.history;
     let before = rows.checked_sub(2).map_or(0, |k| history[k].broken);
     let prescribed = state.control.prescribed(rows).is_some_and(|steps| steps.is_multiple_of(every));
     rows > 0 && (prescribed || history[rows - 1].broken > before)
 }
 
-/// Whether an equilibrium within a step is written: the 1st, 2nd, 3rd, 4th, 6th, 8th, 12th, 16th, 24th, …
+/// Returns true if an equilibrium within a step is written: the 1st, 2nd, 3rd, 4th, 6th, 8th, 12th, 16th,
+/// 24th, …
 fn is_stage(equilibrium: u64) -> bool {
     equilibrium.is_power_of_two() || (equilibrium.is_multiple_of(3) && (equilibrium / 3).is_power_of_two())
 }
 
-/// How many of the first equilibria are written.
-fn in_between(equilibria: u64) -> usize {
+/// Counts the equilibria written among the first ones.
+fn count_stages(equilibria: u64) -> usize {
     let powers = |n: u64| (u64::BITS - n.leading_zeros()) as usize;
     powers(equilibria) + powers(equilibria / 3)
 }
@@ -39,38 +40,39 @@ fn in_between(equilibria: u64) -> usize {
 /// Frames written up to a state.
 fn frames_of<const D: usize>(every: usize, state: &State<D>) -> usize {
     let of_step = |step: usize| {
-        let last = wanted(every, state, step + 1);
-        in_between(state.history[step].rounds.saturating_sub(1)) + usize::from(last)
+        let last = is_written(every, state, step + 1);
+        count_stages(state.history[step].rounds.saturating_sub(1)) + usize::from(last)
     };
-    (0..state.history.len()).map(of_step).sum::<usize>() + in_between(state.control.round)
+    (0..state.history.len()).map(of_step).sum::<usize>() + count_stages(state.control.round)
 }
 
-/// A vector with zeros for what a plane body lacks.
+/// Extends a vector of a plane body by zeros.
 pub fn in_space<const D: usize>(v: [f64; D]) -> [f64; 3] {
     std::array::from_fn(|d| v.get(d).copied().unwrap_or(0.0))
 }
 
-/// A tensor, rows first, with zeros for what a plane body lacks.
-pub(super) fn tensor_in_space<const D: usize>(t: &Tensor<D>) -> [f64; 9] {
+/// Flattens a tensor, rows first, extended by zeros for a plane body.
+pub(super) fn tensor_in_space<const D: usize>(t: &StressTensor<D>) -> [f64; 9] {
     std::array::from_fn(|k| t.get(k / 3).and_then(|row| row.get(k % 3)).copied().unwrap_or(0.0))
 }
 
-/// Displacement, and of a cloud the line of each particle in the user's file, from 0: its particles are sorted for locality.
-pub(super) fn places<const D: usize>(scene: &Scene, to: &mut Fields<Moment<D>>) {
+/// Adds displacements, and for a cloud the index of each particle in the input file: particles are sorted for
+/// locality.
+pub(super) fn displacement_fields<const D: usize>(scene: &Scene, to: &mut Fields<Moment<D>>) {
     to.add("displacement", 3, Place::Points, |m| {
         let each: Vec<[f64; 3]> = m.sites().map(|site| in_space(m.state.displacement.get(site))).collect();
         each.into_flattened()
     });
     if scene.body.has_points() {
         to.add("input_index", 1, Place::Points, |m| match m.bonds.kind() {
-            Kind::Cloud(cloud) => cloud.input_order().iter().map(|&line| f64::from(line)).collect(),
-            Kind::Lattice(_) => Vec::new(),
+            BondKind::Cloud(cloud) => cloud.input_order().iter().map(|&line| f64::from(line)).collect(),
+            BondKind::Lattice(_) => Vec::new(),
         });
     }
 }
 
-/// Stresses by every measure.
-pub(super) fn stresses<const D: usize>(scene: &Scene, to: &mut Fields<Moment<D>>) {
+/// Adds stresses by every measure.
+pub(super) fn stress_fields<const D: usize>(scene: &Scene, to: &mut Fields<Moment<D>>) {
     for piola in [false, true] {
         let kind = if piola { "piola" } else { "cauchy" };
         for measure in scene.stress.iter().flat_map(|stress| &stress.measures) {
@@ -86,8 +88,8 @@ pub(super) fn stresses<const D: usize>(scene: &Scene, to: &mut Fields<Moment<D>>
     }
 }
 
-impl Frames {
-    /// Begins, or continues after the steps in `state`.
+impl FieldFrames {
+    /// Creates the file, or continues it after the steps in `state`.
     ///
     /// # Errors
     /// Files that cannot be written or read.
@@ -99,31 +101,40 @@ impl Frames {
             (true, 0) => Some(ParticleSeries::create(path)?),
             (true, done) => Some(ParticleSeries::resume(path, done)?),
         };
-        let last = |every| (1..=state.history.len()).rev().find(|&k| wanted(every, state, k));
+        let last = |every| (1..=state.history.len()).rev().find(|&k| is_written(every, state, k));
         Ok(Self { series, written: every.and_then(last) })
     }
 
-    /// After a step, or an equilibrium in which bonds broke: writes its fields if the scene wants them.
+    /// Writes the fields after a step, or after an equilibrium in which bonds broke, if the scene requests
+    /// them.
     ///
     /// # Errors
     /// Files that cannot be written.
-    pub fn step<const D: usize>(&mut self, observers: &Observers<D>, m: &Moment<D>) -> Result<(), Error> {
+    pub fn step<const D: usize>(
+        &mut self,
+        observers: &SceneObservers<D>,
+        m: &Moment<D>,
+    ) -> Result<(), Error> {
         let (Some(every), state) = (m.scene.output.every, m.state) else { return Ok(()) };
         if is_stage(state.control.round) {
             let equilibrium = state.control.round as f64;
             self.write(observers, m, state.step as f64 + equilibrium / (equilibrium + 1.0))?;
-        } else if state.control.round == 0 && wanted(every, state, state.history.len()) {
+        } else if state.control.round == 0 && is_written(every, state, state.history.len()) {
             self.write(observers, m, state.step as f64)?;
             self.written = Some(state.step);
         }
         Ok(())
     }
 
-    /// Closes the series with the last step.
+    /// Writes the last step and closes the file.
     ///
     /// # Errors
     /// Files that cannot be written.
-    pub fn finish<const D: usize>(mut self, observers: &Observers<D>, m: &Moment<D>) -> Result<(), Error> {
+    pub fn finish<const D: usize>(
+        mut self,
+        observers: &SceneObservers<D>,
+        m: &Moment<D>,
+    ) -> Result<(), Error> {
         if self.written != Some(m.state.history.len()) {
             self.write(observers, m, m.state.step as f64)?;
         }
@@ -135,7 +146,7 @@ impl Frames {
 
     fn write<const D: usize>(
         &mut self,
-        observers: &Observers<D>,
+        observers: &SceneObservers<D>,
         m: &Moment<D>,
         time: f64,
     ) -> Result<(), Error> {
@@ -151,10 +162,10 @@ impl Frames {
         let fields = fields.each.iter().filter(|field| !field.values.is_empty());
         let data: Vec<(&str, usize, &[f64])> =
             fields.map(|field| (&*field.name, field.components, &*field.values)).collect();
-        // between two steps a load is that of neither
+        // between two steps the load is unknown
         let record = m.state.history.last().filter(|_| time.fract() == 0.0);
-        let of = |get: fn(&Record) -> f64| record.map_or(f64::NAN, get);
-        let moments = [("displacement", of(|r| r.displacement)), ("load", of(|r| r.load))];
+        let value = |get: fn(&StepRecord) -> f64| record.map_or(f64::NAN, get);
+        let moments = [("displacement", value(|r| r.displacement)), ("load", value(|r| r.load))];
         series.moment(time, &points, &data, &moments)?;
         Ok(())
     }
@@ -167,7 +178,7 @@ mod tests {
     #[test]
     fn stages_are_counted() {
         for n in 0..200 {
-            assert_eq!(in_between(n), (1..=n).filter(|&k| is_stage(k)).count(), "{n}");
+            assert_eq!(count_stages(n), (1..=n).filter(|&k| is_stage(k)).count(), "{n}");
         }
     }
 }

@@ -4,26 +4,26 @@ use super::moment::Moment;
 use crate::probe::load_at;
 use crate::program::quantities as q;
 use crate::program::scene::Scene;
-use crate::solver::{Balance, Record};
+use crate::solver::{Balance, StepRecord};
 use harness::observe::Scalars;
 use harness::report::Quantity;
 
-/// Whether a history is one in time.
-pub fn is_dynamic(history: &[Record]) -> bool {
+/// Returns true for a history of explicit dynamics.
+pub fn is_dynamic(history: &[StepRecord]) -> bool {
     history.iter().any(|row| row.time > 0.0)
 }
 
-/// Energy that damping has taken, J: in quasi-static runs all that is neither stored nor released.
-pub fn damped(row: &Record, dynamic: bool) -> f64 {
+/// Returns the damped energy, J; in quasi-static runs work less stored, released and friction energy.
+pub fn damped_energy(row: &StepRecord, dynamic: bool) -> f64 {
     if dynamic { row.damped } else { row.work - row.stored - row.released - row.rubbed }
 }
 
-/// Peak, first break, energies at the end.
+/// Adds peak, first break, energies and balances.
 pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
     let dynamic = scene.dynamics.is_some();
     let breaks = scene.material.critical.is_some();
     let records = scene.dynamics.as_ref().map_or(scene.solver.steps, |dynamics| dynamics.method().records);
-    let peak = |get: fn(&Record) -> f64| {
+    let peak = |get: fn(&StepRecord) -> f64| {
         move |m: &Moment<D>| {
             let peak = m.state.history.iter().max_by(|a, b| a.load.total_cmp(&b.load));
             peak.filter(|_| m.state.history.len() > 1).map(get)
@@ -39,19 +39,24 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
         to.add_if(q::load_at(at), path);
     }
     if breaks {
-        breaking(dynamic, to);
+        breaking_scalars(dynamic, to);
     }
-    last(to, q::WORK_OF_LOADS, |row| row.work);
-    last(to, q::STORED_ENERGY, |row| row.stored);
+    add_last(to, q::WORK_OF_LOADS, |row| row.work);
+    add_last(to, q::STORED_ENERGY, |row| row.stored);
     if breaks {
-        last(to, q::RELEASED_ENERGY, |row| row.released);
+        add_last(to, q::RELEASED_ENERGY, |row| row.released);
     }
-    last(to, q::DAMPED_ENERGY, if dynamic { |row| damped(row, true) } else { |row| damped(row, false) });
+    add_last(
+        to,
+        q::DAMPED_ENERGY,
+        if dynamic { |row| damped_energy(row, true) } else { |row| damped_energy(row, false) },
+    );
     if dynamic {
-        // largest difference of what came in and what is there, over what was turned over
+        // largest error of the energy balance over the largest work or kinetic energy
         to.add_if(q::ENERGY_ERROR, |m| {
             m.state.history.last()?;
-            let off = |r: &Record| (r.work - r.stored - r.released - r.damped - r.rubbed - r.kinetic).abs();
+            let off =
+                |r: &StepRecord| (r.work - r.stored - r.released - r.damped - r.rubbed - r.kinetic).abs();
             let most = m.each(|r| r.work.abs().max(r.kinetic)).fold(f64::MIN_POSITIVE, f64::max);
             Some(m.state.history.iter().map(off).fold(0.0, f64::max) / most)
         });
@@ -74,10 +79,11 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
     });
 }
 
-fn breaking<const D: usize>(dynamic: bool, to: &mut Scalars<Moment<D>>) {
-    let first = |history: &[Record]| history.iter().position(|row| row.broken > 0);
+/// Adds first break, breaking events and the last load.
+fn breaking_scalars<const D: usize>(dynamic: bool, to: &mut Scalars<Moment<D>>) {
+    let first = |history: &[StepRecord]| history.iter().position(|row| row.broken > 0);
     to.add_if(q::FIRST_BREAK, |m| Some(m.state.history[first(&m.state.history)?].displacement));
-    // that at the end of the step may be past the collapse
+    // the load at the end of the step may be past the collapse
     to.add_if(q::LOAD_AT_FIRST_BREAK, |m| {
         Some(first(&m.state.history)?.checked_sub(1).map_or(0.0, |before| m.state.history[before].load))
     });
@@ -87,18 +93,22 @@ fn breaking<const D: usize>(dynamic: bool, to: &mut Scalars<Moment<D>>) {
             Some(m.state.fracture.events.first()?.load)
         });
     }
-    last(to, q::BROKEN_BONDS, |row| row.broken as f64);
+    add_last(to, q::BROKEN_BONDS, |row| row.broken as f64);
     if !dynamic {
         to.add_if(q::BREAKING_EVENTS, |m| {
             m.state.history.last().map(|_| m.state.fracture.events.len() as f64)
         });
     }
-    last(to, q::DETACHED_PARTICLES, |row| row.detached as f64);
-    last(to, q::LAST_LOAD, |row| row.load);
-    last(to, q::LAST_DISPLACEMENT, |row| row.displacement);
+    add_last(to, q::DETACHED_PARTICLES, |row| row.detached as f64);
+    add_last(to, q::LAST_LOAD, |row| row.load);
+    add_last(to, q::LAST_DISPLACEMENT, |row| row.displacement);
 }
 
 /// Adds a number of the last row.
-pub(super) fn last<const D: usize>(to: &mut Scalars<Moment<D>>, quantity: Quantity, get: fn(&Record) -> f64) {
+pub(super) fn add_last<const D: usize>(
+    to: &mut Scalars<Moment<D>>,
+    quantity: Quantity,
+    get: fn(&StepRecord) -> f64,
+) {
     to.add_if(quantity, |m| m.state.history.last().map(get));
 }

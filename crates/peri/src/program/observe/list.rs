@@ -1,6 +1,6 @@
-//! The observers of a scene.
+//! List of all observers.
 
-use super::moment::{Moment, Observers, Values};
+use super::moment::{Moment, SceneObservers, StatelessObserver};
 use super::{contact, cracks, exact, flags, frames, history, lines, maps, probes, sections, values};
 use crate::calibrate::Space;
 use crate::error::Error;
@@ -8,35 +8,38 @@ use crate::program::scene::Scene;
 use harness::observe::{Observer, Scalars};
 use harness::report::Named;
 
-/// Observers of a scene, which know nothing of its body.
-pub fn observers<const D: usize>(scene: &Scene) -> Observers<'_, D> {
-    let values =
-        |of| Box::new(Values { scene, ..of }) as Box<dyn for<'m> Observer<Moment<'m, D>, Error> + '_>;
-    let none = Values::none(scene);
+/// Returns the observers of a scene; they need no body yet.
+pub fn observers<const D: usize>(scene: &Scene) -> SceneObservers<'_, D> {
+    let stateless = |functions| {
+        Box::new(StatelessObserver { scene, ..functions })
+            as Box<dyn for<'m> Observer<Moment<'m, D>, Error> + '_>
+    };
+    let none = StatelessObserver::empty(scene);
     vec![
-        values(Values { scalars: values::followed, ..none }),
-        values(Values { scalars: values::stretches, ..none }),
-        Box::new(values::Fit::new(scene)),
-        values(Values { scalars: cracks::breaking, ..none }),
-        values(Values { scalars: values::motion, warnings: values::mixed, ..none }),
-        values(Values { scalars: values::responses, ..none }),
-        values(Values { scalars: history::scalars, ..none }),
+        stateless(StatelessObserver { scalars: values::followed_fields, ..none }),
+        stateless(StatelessObserver { scalars: values::stretches, ..none }),
+        Box::new(values::FitError::new(scene)),
+        stateless(StatelessObserver { scalars: cracks::breaking, ..none }),
+        stateless(StatelessObserver { scalars: values::motion, warnings: values::mixed_warnings, ..none }),
+        stateless(StatelessObserver { scalars: values::responses, ..none }),
+        stateless(StatelessObserver { scalars: history::scalars, ..none }),
         Box::new(cracks::NewCracks::new(scene)),
-        values(Values { scalars: contact::scalars, warnings: contact::warnings, ..none }),
-        values(Values { scalars: probes::scalars, ..none }),
-        values(Values { scalars: flags::scalars, warnings: flags::warnings, ..none }),
-        Box::new(exact::Exact::new(scene)),
+        stateless(StatelessObserver { scalars: contact::scalars, warnings: contact::warnings, ..none }),
+        stateless(StatelessObserver { scalars: probes::scalars, ..none }),
+        stateless(StatelessObserver { scalars: flags::scalars, warnings: flags::warnings, ..none }),
+        Box::new(exact::HoleErrors::new(scene)),
         Box::new(sections::Sections(scene)),
-        Box::new(lines::Lines(scene)),
-        values(Values { fields: frames::places, ..none }),
-        values(Values { fields: cracks::field, ..none }),
-        values(Values { fields: flags::field, ..none }),
-        values(Values { fields: frames::stresses, ..none }),
+        Box::new(lines::LineObserver(scene)),
+        stateless(StatelessObserver { fields: frames::displacement_fields, ..none }),
+        stateless(StatelessObserver { fields: cracks::damage_field, ..none }),
+        stateless(StatelessObserver { fields: flags::flag_field, ..none }),
+        stateless(StatelessObserver { fields: frames::stress_fields, ..none }),
         Box::new(maps::Pictures(scene)),
     ]
 }
 
-/// Scalars that a run of a scene without studies can give; some only where something happens (`first_break`).
+/// Returns the scalars that a run of a scene without studies can report; some depend on events, such as
+/// `first_break`.
 pub fn quantities(scene: &Scene) -> Vec<Named> {
     match scene.body.space {
         Space::Solid => names(&observers::<3>(scene)),
@@ -44,7 +47,7 @@ pub fn quantities(scene: &Scene) -> Vec<Named> {
     }
 }
 
-fn names<const D: usize>(observers: &Observers<D>) -> Vec<Named> {
+fn names<const D: usize>(observers: &SceneObservers<D>) -> Vec<Named> {
     let mut names = Vec::new();
     let take = &mut |named, _| names.push(named);
     observers.iter().for_each(|observer| observer.scalars(&mut Scalars::new(None, take)));

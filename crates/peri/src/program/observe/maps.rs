@@ -1,7 +1,7 @@
-//! Pictures of a body at the end of a run.
+//! Draws a body at the end of a run.
 
 use super::moment::Moment;
-use super::scale::{bridge, short, stress_unit};
+use super::scale::{bridge_length, short, stress_unit};
 use super::{solid, stages};
 use crate::error::Error;
 use crate::program::scene::Scene;
@@ -9,7 +9,7 @@ use harness::observe::{Observer, Outputs};
 use harness::output::picture::{FieldMap, Panel};
 use std::path::Path;
 
-/// Pictures of a scene: stresses and flags of plane bodies, stages of what breaks, solids from outside.
+/// Observer that draws stresses and flags of plane bodies, stages of breaking, and solids.
 pub(super) struct Pictures<'s>(pub &'s Scene);
 
 impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Pictures<'_> {
@@ -27,20 +27,20 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Pictures<'_> {
         }
         let breaks = m.physics.body.criterion.is_some();
         if spec.fields && spec.every.is_some() && self.0.stress.is_some() && breaks {
-            stages::stages(m, to.folder)?;
+            stages::draw_stages(m, to.folder)?;
         } else if D == 3 {
             let flags = flags.map(|flags| (solid::flagged_field(), flags));
             let second = flags.or_else(|| Some((solid::damage_field(), m.damage()?)));
-            solid::end(m, second, to.folder)?;
+            solid::draw_end(m, second, to.folder)?;
         }
         Ok(())
     }
 }
 
-/// Maps of the stress components of the first measure (Fig. 2.6); plane bodies only.
+/// Draws the stress components of the first measure (Fig. 2.6) in a plane body.
 fn maps<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error> {
     let Some((measure, field)) = m.stresses()?.cauchy.first() else { return Ok(()) };
-    let [rest, places] = in_plane(m);
+    let [rest, places] = plane_positions(m);
     let largest = field.iter().flatten().flatten().fold(0.0_f64, |most, s| most.max(s.abs()));
     let (scale, unit) = match &m.scene.exact {
         Some(exact) => (1.0 / exact.hole().1, "/σ∞".to_owned()),
@@ -63,33 +63,34 @@ fn maps<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error> {
     }
     for (name, values) in &components {
         let label = format!("{name}{unit}");
-        // of a body that is torn this is what is left in its pieces
+        // in a torn body these are residual stresses of its pieces
         let last = m.state.history.last().filter(|last| last.broken > 0);
-        let at = last.map_or(String::new(), |r| {
+        let moment = last.map_or(String::new(), |r| {
             format!(", U = {} mm, F = {} N", short(r.displacement * 1e3), short(r.load))
         });
-        let title = format!("{label}, {}{at}", measure.name());
+        let title = format!("{label}, {}{moment}", measure.name());
         let panel = Panel::new(&title, &label, &places, values, m.bonds.spacing()).reference(&rest);
-        map = map.panel(panel.bridge(bridge(m)));
+        map = map.panel(panel.bridge(bridge_length(m)));
     }
     Ok(map.write(output.join(format!("stress_{}.png", m.physics.name)))?)
 }
 
-/// Map of the particles of a plane body at which a learnt law is uncertain.
+/// Draws the particles of a plane body at which a learnt law is uncertain.
 ///
 /// # Errors
 /// A file that cannot be written.
 fn flagged<const D: usize>(m: &Moment<D>, values: &[f64], output: &Path) -> Result<(), Error> {
-    let [rest, places] = in_plane(m);
+    let [rest, places] = plane_positions(m);
     let panel =
         Panel::new("where the learnt law is uncertain", "flagged", &places, values, m.bonds.spacing());
-    let map =
-        FieldMap::new().lengths("mm", 1e-3).panel(panel.range(0.0, 1.0).reference(&rest).bridge(bridge(m)));
+    let map = FieldMap::new()
+        .lengths("mm", 1e-3)
+        .panel(panel.range(0.0, 1.0).reference(&rest).bridge(bridge_length(m)));
     Ok(map.write(output.join(format!("flags_{}.png", m.physics.name)))?)
 }
 
-/// Where the particles of a plane body were and are.
-fn in_plane<const D: usize>(m: &Moment<D>) -> [Vec<[f64; 2]>; 2] {
+/// Returns the reference and current positions of the particles of a plane body.
+fn plane_positions<const D: usize>(m: &Moment<D>) -> [Vec<[f64; 2]>; 2] {
     let rest: Vec<[f64; 2]> =
         m.sites().map(|site| [m.bonds.position(site)[0], m.bonds.position(site)[1]]).collect();
     let moved = m.sites().map(|site| m.state.displacement.get(site));

@@ -1,35 +1,35 @@
-//! What a variant of a scene is turned into before it is solved: a body, its material, its loads, what its outputs look at.
+//! Physics of a variant: its body, material and loads, and the data that its outputs need.
 
-use super::rows::{Row, rows};
+use super::rows::{RowPart, rows};
 use crate::bonds::{Bonds, Property};
 use crate::calibrate;
 use crate::correction::{bond_factors, surface_factors};
 use crate::critical::{Context, CrackArea, Critical, Crossing, Toughness};
 use crate::error::Error;
 use crate::exact::Plate;
-use crate::material::{BondMaterial, Material, NonlocalSolid, Prestrained, Response, relief};
+use crate::material::{BondMaterial, Material, NonlocalSolid, Prestrained, SolverMaterial, relief};
 use crate::potential::BondPotential;
-use crate::probe::{LineSampler, Solid, StressEvaluator};
-use crate::program::scene::{self, Body, Followed, Inclusions, Scene, SurfaceCorrection, Variant};
+use crate::probe::{AnySolid, LineSampler, StressEvaluator};
+use crate::program::scene::{
+    self, DiscreteBody, Inclusions, ParameterField, Scene, SceneVariant, SurfaceCorrection,
+};
 use crate::solver::{Criterion, Loads, State};
-use harness::scene::{SceneError, Source};
+use harness::scene::{Failure, SceneError, Source};
 use std::sync::Arc;
 
-type Failure = harness::scene::Failure<Error>;
-
-/// What acts between the particles of a scene.
+/// Material of a scene.
 pub enum SceneMaterial<const D: usize> {
-    /// A bond law.
+    /// Bond law.
     Bonds(BondMaterial<'static>),
-    /// A bond law with prestrains.
+    /// Bond law with prestrains.
     Prestrained(Prestrained<D>),
-    /// A solid of the mean deformation of a family.
-    Solid(Solid<D>),
+    /// Solid of the mean deformation of a family.
+    Solid(AnySolid<D>),
 }
 
 impl<const D: usize> SceneMaterial<D> {
-    /// For the solver.
-    pub fn respond(&self, bonds: &dyn Bonds<D>) -> Box<dyn Response<D>> {
+    /// Returns the material as solvers use it.
+    pub fn respond(&self, bonds: &dyn Bonds<D>) -> Box<dyn SolverMaterial<D>> {
         match self {
             Self::Bonds(bonded) => bonded.clone().respond(bonds),
             Self::Prestrained(prestrained) => prestrained.clone().respond(bonds),
@@ -37,7 +37,7 @@ impl<const D: usize> SceneMaterial<D> {
         }
     }
 
-    /// Longitudinal modulus at rest, Pa.
+    /// Returns the longitudinal modulus at rest, Pa.
     pub fn longitudinal_modulus(&self, bonds: &dyn Bonds<D>) -> f64 {
         match self {
             Self::Bonds(bonded) => bonded.longitudinal_modulus(bonds),
@@ -46,7 +46,7 @@ impl<const D: usize> SceneMaterial<D> {
         }
     }
 
-    /// kθ, N/m⁶, of linear bonds about as stiff.
+    /// Returns kθ of linear bonds of similar stiffness, N/m⁶.
     pub fn micromodulus(&self, bonds: &dyn Bonds<D>) -> f64 {
         match self {
             Self::Bonds(bonded) => bonded.modulus(),
@@ -55,7 +55,7 @@ impl<const D: usize> SceneMaterial<D> {
         }
     }
 
-    /// The bond law, where its bonds are at rest as the body was built.
+    /// Returns the bond law of bonds that are at rest in the undeformed body.
     pub fn bond_law(&self) -> Option<&dyn BondPotential> {
         match self {
             Self::Bonds(bonded) => Some(bonded.law()),
@@ -64,17 +64,17 @@ impl<const D: usize> SceneMaterial<D> {
     }
 }
 
-/// A material in a body, whose bonds have their factors but not their law yet.
+/// Calibrated material in a body with surface and stiffness factors.
 pub struct BodyWithMaterial<const D: usize> {
-    /// The material.
+    /// Material.
     pub material: SceneMaterial<D>,
-    /// When bonds break, where the scene says so.
+    /// Criterion of breaking, if bonds break.
     pub criterion: Option<Criterion>,
     /// Fracture energies of the critical stretch of a bond law.
     pub toughness: Option<Toughness>,
-    /// The parameters that follow fields.
-    pub followed: Vec<Followed>,
-    /// Stiffness of the material over what it is without inclusions.
+    /// Parameters that follow fields.
+    pub followed: Vec<ParameterField>,
+    /// Stiffness over that without inclusions.
     pub stiffness: Property,
 }
 
@@ -82,13 +82,13 @@ impl<const D: usize> BodyWithMaterial<D> {
     /// Calibrates and corrects a body.
     ///
     /// # Errors
-    /// A fault of the material.
+    /// An invalid material.
     pub fn new(
         source: &Source,
         scene: &Scene,
-        variant: &Variant,
-        body: &mut Body<D>,
-    ) -> Result<Self, Failure> {
+        variant: &SceneVariant,
+        body: &mut DiscreteBody<D>,
+    ) -> Result<Self, Failure<Error>> {
         let (space, spec) = (scene.body.space, &scene.material);
         let (horizon, thickness) = (body.bonds.horizon(), body.thickness);
         let fault = |error| match error {
@@ -104,7 +104,7 @@ impl<const D: usize> BodyWithMaterial<D> {
         };
         if let Some(solid) = &spec.solid {
             let law = solid.build::<D>(source, space, scene.is_beside_planes())?;
-            let criterion = spec.critical.map(|critical| critical.of_solid(&*law, &*body.bonds));
+            let criterion = spec.critical.map(|critical| critical.solid_criterion(&*law, &*body.bonds));
             return Ok(Self {
                 criterion: criterion.transpose().map_err(fault)?,
                 material: SceneMaterial::Solid(NonlocalSolid(law)),
@@ -161,42 +161,47 @@ impl<const D: usize> BodyWithMaterial<D> {
     }
 }
 
-/// What a variant is before it is solved, its body aside.
+/// Physics of a variant, without its body.
 pub struct Physics<const D: usize> {
-    /// Name of its files.
+    /// Name of the variant in file names.
     pub name: String,
-    /// The material in the body.
+    /// Material in the body.
     pub body: BodyWithMaterial<D>,
     /// Loads and supports.
     pub loads: Loads<D>,
-    /// Sites in any loading layer.
+    /// Sites on which a load or support acts.
     pub loaded: Vec<bool>,
-    /// Particles of grips that are tied at their surface, by site.
+    /// Grips that are tied at their surface, by site.
     pub held: Option<Vec<bool>>,
-    rows: Vec<Row<D>>,
-    /// Forces and stresses, since [`Self::begin`], as the following.
+    rows: Vec<RowPart<D>>,
+    /// Evaluator of forces and stresses; this and the following fields are set by [`Self::begin`].
     pub evaluator: StressEvaluator<D>,
-    /// Bonds of each particle without cracks, and how many these have broken; only where there are cracks, or bonds break.
+    /// Bonds of each particle without cracks, and the bonds that cracks break; only with cracks or breaking
+    /// bonds.
     pub whole: Option<[Vec<u32>; 2]>,
-    /// Area of new cracks, where bonds break.
+    /// Area of new cracks, if bonds break.
     pub cracks: Option<CrackArea>,
-    /// Energy at which a crack runs, J/m²; none of a solid with a critical stretch.
+    /// Tearing energy, J/m²; `None` for a solid with a critical stretch.
     pub tearing: Option<f64>,
-    /// Exact stresses of the plate that the scene names.
+    /// Exact stresses of the plate of `[exact]`.
     pub plate: Option<Plate>,
-    /// Sites in which stress measures make up for missing bonds by their window's share in the body: where forces act, and where the
-    /// surface correction has already made up for them.
+    /// Sites at which stress measures compensate for missing bonds by the window's share in the body: where
+    /// forces act, or where the surface correction already compensates.
     pub by_window: Vec<bool>,
 }
 
 impl<const D: usize> Physics<D> {
-    /// Builds the body of a variant, its material, its loads, and finds what its outputs look at.
+    /// Builds the body of a variant, its material, its loads, and the rows of its history.
     ///
     /// # Errors
-    /// A fault of the scene.
-    pub fn new(source: &Source, scene: &Scene, variant: &Variant) -> Result<(Body<D>, Self), Failure> {
+    /// An invalid scene.
+    pub fn new(
+        source: &Source,
+        scene: &Scene,
+        variant: &SceneVariant,
+    ) -> Result<(DiscreteBody<D>, Self), Failure<Error>> {
         let mut body = scene::body_of::<D>(source, scene, variant)?;
-        // before the loads: tractions act on the areas that it leaves
+        // before the loads: tractions act on the relieved areas
         if scene.material.solid.is_some()
             && let Some(theta) = relief(&*body.bonds)
         {
@@ -207,7 +212,7 @@ impl<const D: usize> Physics<D> {
         let held = scene::tied_grips(source, scene, &*body.bonds, &loads)?;
         if let Some(held) = &held {
             let list = crate::contact::across(&*body.bonds, held);
-            body.bonds.sever(&list);
+            body.bonds.break_bonds(&list);
         }
         let rows = rows(source, scene, &body)?;
         check_lines(source, scene, &*body.bonds)?;
@@ -229,26 +234,26 @@ impl<const D: usize> Physics<D> {
         Ok((body, physics))
     }
 
-    /// Notes what outputs need of the body as it was built.
+    /// Records the data of the undeformed body that outputs need.
     ///
     /// # Errors
-    /// A hole that the plate of `[exact]` cannot have.
+    /// A hole of `[exact]` that does not fit into the plate.
     pub fn begin(
         &mut self,
         source: &Source,
         scene: &Scene,
-        variant: &Variant,
-        body: &Body<D>,
+        variant: &SceneVariant,
+        body: &DiscreteBody<D>,
     ) -> Result<(), SceneError> {
         let (bonds, own) = (&*body.bonds, &self.body);
         let breaks = own.criterion.is_some();
         self.plate = scene::exact_plate(source, scene, body)?;
         self.evaluator = match &own.material {
             SceneMaterial::Bonds(material) => {
-                StressEvaluator::of_bonds(material.clone(), scene.fit_bound(), breaks)
+                StressEvaluator::for_bonds(material.clone(), scene.fit_bound(), breaks)
             }
             SceneMaterial::Solid(solid) if scene.observes_forces() => {
-                StressEvaluator::of_solid(solid.0.clone(), scene.is_learnt(), bonds)
+                StressEvaluator::for_solid(solid.0.clone(), scene.is_learnt(), bonds)
             }
             _ => StressEvaluator::none(),
         };
@@ -268,21 +273,21 @@ impl<const D: usize> Physics<D> {
         Ok(())
     }
 
-    /// Numbers of a row of the history: of probes, of a learnt law's flags, of sections.
+    /// Returns the numbers of a row of the history: probes, flags of a learnt law, sections.
     pub fn row(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Vec<f64> {
         self.rows.iter().flat_map(|part| part(bonds, state, &self.evaluator)).collect()
     }
 
-    /// Name of the field file.
+    /// Returns the name of the field file.
     pub fn field_file(&self) -> String {
         format!("{}.vtkhdf", self.name)
     }
 }
 
-/// Refuses lines of which no point lies in the body.
+/// Refuses lines without any point in the body.
 ///
 /// # Errors
-/// The line.
+/// A [`SceneError`] that names the line.
 fn check_lines<const D: usize>(
     source: &Source,
     scene: &Scene,

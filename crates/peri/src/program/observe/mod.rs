@@ -1,4 +1,4 @@
-//! Observers of a run: each names its scalars, its fields and its files, and how they follow from a state, in one place.
+//! Observers of a run: each defines its scalars, fields and files, and computes them from a state.
 
 mod contact;
 mod cracks;
@@ -21,11 +21,11 @@ mod stages;
 mod values;
 
 pub use expect::{check, quantities_of};
-pub use frames::Frames;
+pub use frames::FieldFrames;
 pub(crate) use frames::in_space;
-pub use history::{damped, is_dynamic};
+pub use history::{damped_energy, is_dynamic};
 pub use list::{observers, quantities};
 pub use material::{BodyWithMaterial, Physics, SceneMaterial};
-pub use moment::{Moment, Observers};
+pub use moment::{Moment, SceneObservers};
 pub use rows::columns;
 pub use scale::{short, stress_unit};

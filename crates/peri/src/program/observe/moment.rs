@@ -1,34 +1,37 @@
-//! A body in a state, and what is derived from it once.
+//! State of a body at one moment, with derived fields computed at most once.
 
 use super::material::Physics;
 use crate::bonds::{Bonds, Fragment, covered_stretches, fragments};
 use crate::error::Error;
 use crate::potential::KernelFit;
 use crate::program::scene::Scene;
-use crate::solver::{Record, State};
-use crate::stress::{self, Loaded, Measure, Measured, Missing, Tensor, cauchy, deformation_gradients};
+use crate::solver::{State, StepRecord};
+use crate::stress::{
+    self, MeasuredStress, StressInput, StressMethod, StressTensor, SurfaceCompensation, cauchy,
+    deformation_gradients,
+};
 use harness::observe::{Fields, Observer, Scalars};
 use harness::report::Phases;
 use std::cell::{OnceCell, RefCell};
 use std::time::Instant;
 
-/// A stress field of each measure.
-pub type StressFields<const D: usize> = Vec<(Measure, Vec<Tensor<D>>)>;
+/// Stress fields by measure.
+pub type StressFields<const D: usize> = Vec<(StressMethod, Vec<StressTensor<D>>)>;
 
-/// Stresses of a state by every measure that the scene names.
+/// Stresses of a state by every measure of the scene.
 #[derive(Default)]
 pub struct Stresses<const D: usize> {
-    /// First Piola–Kirchhoff.
+    /// First Piola–Kirchhoff stress, Pa.
     pub piola: StressFields<D>,
-    /// Cauchy.
+    /// Cauchy stress, Pa.
     pub cauchy: StressFields<D>,
 }
 
-/// A body in a state, and what is derived from it once.
+/// State of a body, with derived fields computed at most once.
 pub struct Moment<'a, const D: usize> {
-    /// The scene of the variant.
+    /// Scene of the variant.
     pub scene: &'a Scene,
-    /// What the scene has been turned into.
+    /// Physics of the variant.
     pub physics: &'a Physics<D>,
     /// Intact bonds.
     pub bonds: &'a dyn Bonds<D>,
@@ -40,7 +43,7 @@ pub struct Moment<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Moment<'a, D> {
-    /// A body in a state; `phases` take the time of its stresses.
+    /// Wraps a state; `phases` records the time of stresses.
     pub fn new(
         (scene, physics): (&'a Scene, &'a Physics<D>),
         bonds: &'a dyn Bonds<D>,
@@ -51,24 +54,24 @@ impl<'a, const D: usize> Moment<'a, D> {
         Self { scene, physics, bonds, state, phases, stresses, fragments }
     }
 
-    /// A number of every row of the history.
-    pub fn each(&self, get: fn(&Record) -> f64) -> impl Iterator<Item = f64> {
+    /// Iterates over a number of every row of the history.
+    pub fn each(&self, get: fn(&StepRecord) -> f64) -> impl Iterator<Item = f64> {
         self.state.history.iter().map(get)
     }
 
-    /// Sites of the particles.
+    /// Iterates over the sites of the particles.
     pub fn sites(&self) -> impl Iterator<Item = usize> + Clone {
         self.bonds.particles().iter().map(|&site| site as usize)
     }
 
-    /// Pieces of the body, the largest first, where bonds may break.
+    /// Returns the pieces of the body, the largest first; none if bonds cannot break.
     pub fn fragments(&self) -> &[Fragment] {
         let breaks = self.physics.body.criterion.is_some();
         self.fragments.get_or_init(|| if breaks { fragments(self.bonds) } else { Vec::new() })
     }
 
-    /// Broken bonds over those of the body without cracks, particle by particle: bonds that cracks of the scene break are damage.
-    /// `None` where there are no cracks and no bond breaks.
+    /// Returns the damage of each particle: broken bonds over the bonds of the body without cracks, so that
+    /// cracks of the scene count as damage. `None` without cracks and breaking bonds.
     pub fn damage(&self) -> Option<Vec<f64>> {
         let [whole, _] = self.physics.whole.as_ref()?;
         let part = |(&whole, site): (&u32, usize)| match whole {
@@ -78,7 +81,7 @@ impl<'a, const D: usize> Moment<'a, D> {
         Some(whole.iter().zip(self.sites()).map(part).collect())
     }
 
-    /// The sum of the damage that cracks of the scene are.
+    /// Returns the sum of the damage by cracks of the scene.
     pub fn damage_of_cracks(&self) -> f64 {
         let part = |(&whole, &cracked): (&u32, &u32)| match whole {
             0 => 0.0,
@@ -87,7 +90,7 @@ impl<'a, const D: usize> Moment<'a, D> {
         self.physics.whole.as_ref().map_or(0.0, |[whole, cracked]| whole.iter().zip(cracked).map(part).sum())
     }
 
-    /// Stresses; the phase of a measure is what it would take alone ([`Measured::seconds`]).
+    /// Returns the stresses; the recorded time of a measure is its time alone ([`MeasuredStress::seconds`]).
     ///
     /// # Errors
     /// As [`KernelFit::new`].
@@ -110,8 +113,8 @@ impl<'a, const D: usize> Moment<'a, D> {
         let Some(material) = evaluator.bond_material() else {
             let found = phases.time("stress constitutive", || evaluator.stress(bonds, state));
             if let Some([piola, cauchy]) = found {
-                stresses.cauchy.push((Measure::Constitutive, cauchy));
-                stresses.piola.extend(keeps.then_some((Measure::Constitutive, piola)));
+                stresses.cauchy.push((StressMethod::Constitutive, cauchy));
+                stresses.piola.extend(keeps.then_some((StressMethod::Constitutive, piola)));
             }
             return Ok(stresses);
         };
@@ -119,10 +122,10 @@ impl<'a, const D: usize> Moment<'a, D> {
         let fit = KernelFit::new(material.law(), stretches, self.scene.fit_bound())?;
         let gradients =
             phases.time("deformation gradient", || deformation_gradients(bonds, &state.displacement));
-        let (modulus, missing) = (material.modulus(), Missing::WindowAt(&self.physics.by_window));
-        let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus, missing };
+        let (modulus, missing) = (material.modulus(), SurfaceCompensation::WindowAt(&self.physics.by_window));
+        let loaded = StressInput { displacement: &state.displacement, fit: &fit, modulus, missing };
         let measured = stress::piolas(bonds, &loaded, &spec.measures, spec.ball);
-        for (&measure, Measured { piola, seconds }) in spec.measures.iter().zip(measured) {
+        for (&measure, MeasuredStress { piola, seconds }) in spec.measures.iter().zip(measured) {
             let started = Instant::now();
             stresses.cauchy.push((measure, cauchy(&piola, &gradients)));
             let seconds = seconds + started.elapsed().as_secs_f64();
@@ -135,25 +138,25 @@ impl<'a, const D: usize> Moment<'a, D> {
     }
 }
 
-/// The observers of a scene, in the order of their output.
-pub type Observers<'s, const D: usize> = Vec<Box<dyn for<'m> Observer<Moment<'m, D>, Error> + 's>>;
+/// Observers of a scene, in the order of their output.
+pub type SceneObservers<'s, const D: usize> = Vec<Box<dyn for<'m> Observer<Moment<'m, D>, Error> + 's>>;
 
-/// An observer without memory and files: scalars, fields and warnings of a scene.
+/// Observer without state and files, from functions for scalars, fields and warnings.
 #[derive(Clone, Copy)]
-pub(super) struct Values<'s, const D: usize> {
+pub(super) struct StatelessObserver<'s, const D: usize> {
     pub scene: &'s Scene,
     pub scalars: for<'t, 'm> fn(&Scene, &mut Scalars<'t, Moment<'m, D>>),
     pub fields: for<'t, 'm> fn(&Scene, &mut Fields<'t, Moment<'m, D>>),
     pub warnings: for<'m> fn(&Moment<'m, D>) -> Vec<String>,
 }
 
-impl<'s, const D: usize> Values<'s, D> {
-    pub fn none(scene: &'s Scene) -> Self {
+impl<'s, const D: usize> StatelessObserver<'s, D> {
+    pub fn empty(scene: &'s Scene) -> Self {
         Self { scene, scalars: |_, _| {}, fields: |_, _| {}, warnings: |_| Vec::new() }
     }
 }
 
-impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Values<'_, D> {
+impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for StatelessObserver<'_, D> {
     fn scalars(&self, to: &mut Scalars<Moment<'m, D>>) {
         (self.scalars)(self.scene, to);
     }

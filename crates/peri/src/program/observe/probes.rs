@@ -1,46 +1,50 @@
-//! Values of a scene's probes, which follow from their columns in the history.
+//! Scalars of probes, computed from their columns in the history.
 
 use super::moment::Moment;
 use super::rows::width;
 use crate::probe::{crossing, first_swing, unwrapped};
 use crate::program::quantities as q;
-use crate::program::scene::{Probe, Scene, Track};
+use crate::program::scene::{HistoryProbe, Scene, Track};
 use harness::observe::Scalars;
 use harness::report::Quantity;
 use std::f64::consts::PI;
 
-/// Values of all probes.
+/// Adds the scalars of all probes.
 pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
     let mut column = 0;
     for probe in &scene.probe {
-        of_probe(probe, column, to);
+        probe_scalars(probe, column, to);
         column += width(probe);
     }
 }
 
-/// Time and number of each row in which a probe saw something.
-type Seen = [(f64, f64)];
+/// Time and value of each row in which a probe has a value.
+type ProbeRows = [(f64, f64)];
 
-/// The values of a probe; what was never seen has none.
-pub(super) fn of_probe<const D: usize>(probe: &Probe, column: usize, to: &mut Scalars<Moment<D>>) {
-    let turns = probe.track == Track::Rotation;
+/// Adds the scalars of a probe that has values.
+pub(super) fn probe_scalars<const D: usize>(
+    probe: &HistoryProbe,
+    column: usize,
+    to: &mut Scalars<Moment<D>>,
+) {
+    let is_rotation = probe.track == Track::Rotation;
     let rows = |m: &Moment<D>| {
         let all = m.state.history.iter().map(|row| (row.time, row.seen[column]));
         let rows = all.filter(|(_, x)| x.is_finite()).collect();
-        if turns { unwrapped(rows) } else { rows }
+        if is_rotation { unwrapped(rows) } else { rows }
     };
-    let mut add = |quantity: Quantity, value: &dyn Fn(&Seen) -> Option<f64>| {
+    let mut add = |quantity: Quantity, value: &dyn Fn(&ProbeRows) -> Option<f64>| {
         to.add_if(probe.named(quantity), |m| value(&rows(m)).filter(|value| value.is_finite()));
     };
-    let frequency = |rows: &Seen| first_swing(rows).map(|(_, time)| PI / time);
-    let peak = |rows: &Seen| {
-        let swing = if turns { first_swing(rows) } else { None };
+    let frequency = |rows: &ProbeRows| first_swing(rows).map(|(_, time)| PI / time);
+    let peak = |rows: &ProbeRows| {
+        let swing = if is_rotation { first_swing(rows) } else { None };
         let until = swing.map_or(rows.len(), |(end, _)| end);
         rows[..until].iter().map(|row| row.1).max_by(|a, b| a.abs().total_cmp(&b.abs()))
     };
     add(q::PROBE, &|rows| rows.last().map(|row| row.1));
     add(q::PROBE_PEAK, &peak);
-    if turns {
+    if is_rotation {
         add(q::PROBE_FREQUENCY, &frequency);
         add(q::PROBE_RATE, &|rows| frequency(rows).zip(peak(rows)).map(|(a, b)| a * b.abs()));
     }
@@ -50,7 +54,7 @@ pub(super) fn of_probe<const D: usize>(probe: &Probe, column: usize, to: &mut Sc
             Some([from, to]) => Some((to - from) / (crossing(rows, to)? - crossing(rows, from)?)),
             None => rows.first().zip(rows.last()).map(|(a, b)| (b.1 - a.1) / (b.0 - a.0)),
         });
-        let between = |rows: &Seen| -> Option<Vec<f64>> {
+        let between = |rows: &ProbeRows| -> Option<Vec<f64>> {
             let [from, to] = gauges?;
             Some(rows.iter().map(|row| row.1).filter(|x| (from..=to).contains(x)).collect())
         };

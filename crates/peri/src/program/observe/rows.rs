@@ -1,38 +1,38 @@
-//! Rows of the history: what a scene's probes are on a body, and the columns of their numbers.
+//! Rows of the history: numbers of probes, flags and sections, and their columns.
 
 use crate::bonds::Bonds;
 use crate::probe::{
     CrackTip, JIntegral, Section, StressEvaluator, WaveFront, mean_displacement, rotation, strain,
 };
 use crate::program::quantities as q;
-use crate::program::scene::{Body, Probe, Scene, Track};
+use crate::program::scene::{DiscreteBody, HistoryProbe, Scene, Track};
 use crate::solver::State;
 use harness::report::Named;
 use harness::scene::{SceneError, Source};
 
-/// Damage of particles at the tip of a crack: less is not torn, more lies behind it.
-const AT_THE_TIP: [f64; 2] = [0.35, 0.9];
-/// Part of the largest velocity that the front of a wave has.
-const AT_THE_FRONT: f64 = 0.02;
+/// Range of damage of particles at a crack tip: less is ahead of it, more behind it.
+const TIP_DAMAGE: [f64; 2] = [0.35, 0.9];
+/// Velocity of a wave front over the largest velocity.
+const FRONT_VELOCITY: f64 = 0.02;
 
-/// Numbers of a body in a state, a part of a row of the history.
-pub type Row<const D: usize> =
+/// Function that computes part of a row of the history from a state.
+pub type RowPart<const D: usize> =
     Box<dyn Fn(&dyn Bonds<D>, &State<D>, &StressEvaluator<D>) -> Vec<f64> + Send + Sync>;
 
-/// Parts of a row: of probes, of the flags of a learnt law, of sections.
+/// Returns the parts of a row: probes, flags of a learnt law, sections.
 ///
 /// # Errors
-/// Regions without particles, marks outside the body, sections that no bond crosses.
+/// Regions without particles, marks outside the body, sections without bonds across them.
 pub(super) fn rows<const D: usize>(
     source: &Source,
     scene: &Scene,
-    body: &Body<D>,
-) -> Result<Vec<Row<D>>, SceneError> {
+    body: &DiscreteBody<D>,
+) -> Result<Vec<RowPart<D>>, SceneError> {
     let probes = scene.probe.iter().enumerate();
     let probes = probes.map(|(index, spec)| probe(source, &format!("probe[{index}]"), spec, body));
-    let flags: Row<D> =
+    let flags: RowPart<D> =
         Box::new(|bonds, state, evaluator| evaluator.flagged(bonds, state).into_iter().flatten().collect());
-    let sections = scene.output.section.iter().enumerate().map(|(index, spec)| -> Result<Row<D>, _> {
+    let sections = scene.output.section.iter().enumerate().map(|(index, spec)| -> Result<RowPart<D>, _> {
         let key = format!("output.section[{index}]");
         let (point, normal) = spec.plane(source, &key)?;
         let allowed = "a point in the body: bonds must cross the plane";
@@ -46,13 +46,13 @@ pub(super) fn rows<const D: usize>(
     probes.chain([Ok(flags)]).chain(sections).collect()
 }
 
-/// A probe on a body: one number, two of a crack.
+/// Builds a probe: one number, for a crack two.
 fn probe<const D: usize>(
     source: &Source,
     key: &str,
-    spec: &Probe,
-    body: &Body<D>,
-) -> Result<Row<D>, SceneError> {
+    spec: &HistoryProbe,
+    body: &DiscreteBody<D>,
+) -> Result<RowPart<D>, SceneError> {
     let (axis, bonds) = (spec.axis.map_or(0, |axis| axis.index()), &*body.bonds);
     let sites = || spec.members(source, key, body);
     Ok(match spec.track {
@@ -72,14 +72,14 @@ fn probe<const D: usize>(
             let tip = CrackTip {
                 sites: sites()?,
                 whole: (0..bonds.sites()).map(|site| bonds.bonded(site)).collect(),
-                damage: spec.damage.unwrap_or(AT_THE_TIP),
+                damage: spec.damage.unwrap_or(TIP_DAMAGE),
                 axis,
                 across: spec.across.map(|across| across.index()),
             };
             Box::new(move |bonds, _, _| tip.value(bonds).to_vec())
         }
         Track::Front => {
-            let front = WaveFront::new(bonds, sites()?, axis, spec.threshold.unwrap_or(AT_THE_FRONT));
+            let front = WaveFront::new(bonds, sites()?, axis, spec.threshold.unwrap_or(FRONT_VELOCITY));
             Box::new(move |_, state, _| vec![front.value(state)])
         }
         Track::JIntegral => {
@@ -91,14 +91,14 @@ fn probe<const D: usize>(
     })
 }
 
-/// Numbers of a probe in a row.
-pub(super) fn width(probe: &Probe) -> usize {
+/// Returns the count of numbers of a probe in a row.
+pub(super) fn width(probe: &HistoryProbe) -> usize {
     1 + usize::from(probe.track == Track::Crack)
 }
 
-/// Columns of probes and flags in the table of the history, with their units.
+/// Returns the columns of probes and flags in the history, with units.
 pub fn columns(scene: &Scene) -> Vec<(String, String)> {
-    let each = |probe: &Probe| {
+    let each = |probe: &HistoryProbe| {
         let own = (probe.name.clone(), probe.track.unit().to_owned());
         let across = (width(probe) > 1).then(|| probe.named(q::PROBE_ACROSS));
         [Some(own), across.map(|Named { name, unit }| (name, unit))]

@@ -1,4 +1,4 @@
-//! Forces and moments across sections of the body.
+//! Scalars and tables of forces and moments across sections.
 
 use super::history::is_dynamic;
 use super::moment::Moment;
@@ -7,17 +7,17 @@ use crate::calibrate::Space;
 use crate::error::Error;
 use crate::program::quantities as q;
 use crate::program::scene::{Scene, SectionSpec};
-use crate::solver::Record;
+use crate::solver::StepRecord;
 use harness::observe::{Observer, Outputs, Scalars};
 use harness::output::csv;
 use harness::report::Named;
 
-/// The sections of a scene.
+/// Observer of the sections of a scene.
 pub(super) struct Sections<'s>(pub &'s Scene);
 
 impl Sections<'_> {
-    /// Sections, the first column of each in a row of the history, and their values: forces along x, y(, z), then moments about z in a
-    /// plane body, about x, y, z in a solid.
+    /// Iterates over sections, the first column of each in a row of the history, and their scalars: forces
+    /// along x, y(, z), then moments about z in a plane body, about x, y, z in a solid.
     fn each(&self) -> impl Iterator<Item = (&SectionSpec, usize, Vec<Named>)> {
         let solid = self.0.body.space == Space::Solid;
         let (axes, about) = (&["x", "y", "z"][..if solid { 3 } else { 2 }], if solid { 0 } else { 2 });
@@ -43,9 +43,9 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Sections<'_> {
         }
     }
 
-    /// `section_NAME_VARIANT.csv`, a row for each row of the history.
+    /// Writes `section_NAME_VARIANT.csv` with the rows of the history.
     fn write(&self, m: &Moment<'m, D>, to: &Outputs) -> Result<(), Error> {
-        let column = |get: &dyn Fn(&Record) -> f64| m.state.history.iter().map(get).collect::<Vec<f64>>();
+        let column = |get: &dyn Fn(&StepRecord) -> f64| m.state.history.iter().map(get).collect::<Vec<f64>>();
         for (section, first, names) in self.each() {
             let mut table = vec![
                 ("displacement", "m", column(&|row| row.displacement)),

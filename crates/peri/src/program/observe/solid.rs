@@ -1,8 +1,8 @@
-//! Pictures of solids as they look from outside.
+//! Draws solids from outside.
 
 use super::frames::{in_space, tensor_in_space};
 use super::moment::Moment;
-use super::scale::{bridge, stress_unit, title};
+use super::scale::{bridge_length, moment_title, stress_unit};
 use crate::error::Error;
 use crate::program::scene::StressSpec;
 use harness::output::picture::{ColorMap, Particles, Skin, Solids, Strip};
@@ -10,36 +10,37 @@ use nalgebra::Matrix3;
 use std::borrow::Cow;
 use std::path::Path;
 
-/// Pictures of a full turn, and how long each is shown, s.
-const TURN: usize = 36;
-const SHOWN: f64 = 0.12;
-/// A box that holds nothing yet.
-pub const NOWHERE: [[f64; 3]; 2] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+/// Number of pictures of a full turn.
+const TURN_PICTURES: usize = 36;
+/// Time for which each picture of a turn is shown, s.
+const PICTURE_TIME: f64 = 0.12;
+/// Empty bounding box.
+pub const EMPTY_BOX: [[f64; 3]; 2] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
 
-/// A body at a moment: where its particles are, where they were at rest, and the values of one or two fields.
+/// Body at a moment: current and reference positions of its particles, and values of one or two fields.
 #[derive(Clone)]
-pub struct Look {
+pub struct BodyView {
     pub title: String,
     pub places: Vec<[f64; 3]>,
     pub rest: Vec<[f64; 3]>,
     pub values: [Vec<f64>; 2],
 }
 
-/// A field in a picture: what its values are multiplied with, and its colours.
-pub struct Field {
+/// Field in a picture: the factor of its values, and its colours.
+pub struct ColouredField {
     pub scale: f64,
     pub strip: Strip,
 }
 
-/// A variant in pictures.
-pub struct Picture<'a, const D: usize> {
+/// Pictures of a variant.
+pub struct BodyPictures<'a, const D: usize> {
     pub moment: &'a Moment<'a, D>,
-    /// Around all places.
+    /// Bounding box of all positions.
     pub bounds: [[f64; 3]; 2],
 }
 
-/// Takes places into a box.
-pub fn widen(bounds: &mut [[f64; 3]; 2], places: &[[f64; 3]]) {
+/// Extends a box by positions.
+pub fn extend_box(bounds: &mut [[f64; 3]; 2], places: &[[f64; 3]]) {
     for place in places {
         for d in 0..3 {
             bounds[0][d] = bounds[0][d].min(place[d]);
@@ -48,8 +49,9 @@ pub fn widen(bounds: &mut [[f64; 3]; 2], places: &[[f64; 3]]) {
     }
 }
 
-/// The component of a row-major 3 × 3 that the scene names, or the largest principal stress, of a plane tensor in its plane.
-pub fn shown(spec: &StressSpec, flat: bool, t: &[f64]) -> f64 {
+/// Returns the stress component of the scene from a row-major 3 × 3 tensor; by default the largest principal
+/// stress, of a plane tensor in its plane.
+pub fn shown_stress(spec: &StressSpec, flat: bool, t: &[f64]) -> f64 {
     if let Some([a, b]) = spec.component() {
         return t[3 * a + b];
     }
@@ -57,7 +59,7 @@ pub fn shown(spec: &StressSpec, flat: bool, t: &[f64]) -> f64 {
         let (mean, half) = (0.5 * (t[0] + t[4]), 0.5 * (t[0] - t[4]));
         return mean + half.hypot(0.5 * (t[1] + t[3]));
     }
-    // its iteration would not end
+    // the eigenvalue iteration would not end
     if t.iter().any(|x| !x.is_finite()) {
         return f64::NAN;
     }
@@ -65,9 +67,9 @@ pub fn shown(spec: &StressSpec, flat: bool, t: &[f64]) -> f64 {
     (0.5 * (tensor + tensor.transpose())).symmetric_eigenvalues().max()
 }
 
-/// Stresses that the scene names, with a range that holds these values but the very extremes: a crushed particle's Cauchy
-/// stress would take all the colours.
-pub fn stress_field(spec: &StressSpec, mut values: Vec<f64>) -> Field {
+/// Returns the field of stresses, with a range that leaves out extremes: the Cauchy stress of a crushed
+/// particle would use all colours.
+pub fn stress_field(spec: &StressSpec, mut values: Vec<f64>) -> ColouredField {
     values.retain(|value| !value.is_nan());
     values.sort_by(f64::total_cmp);
     let part =
@@ -83,29 +85,29 @@ pub fn stress_field(spec: &StressSpec, mut values: Vec<f64>) -> Field {
     field(format!("σ{index} ({unit})"), scale, (low, high))
 }
 
-/// Broken bonds over those there were.
-pub fn damage_field() -> Field {
+/// Returns the field of damage.
+pub fn damage_field() -> ColouredField {
     field("damage".to_owned(), 1.0, (0.0, 0.6))
 }
 
-/// Where a learnt law is uncertain: 1, elsewhere 0.
-pub fn flagged_field() -> Field {
+/// Returns the field of flags: 1 where a learnt law is uncertain, else 0.
+pub fn flagged_field() -> ColouredField {
     field("flagged".to_owned(), 1.0, (0.0, 1.0))
 }
 
-fn field(label: String, scale: f64, (low, high): (f64, f64)) -> Field {
+fn field(label: String, scale: f64, (low, high): (f64, f64)) -> ColouredField {
     let range = (low * scale, high * scale);
     let range = if range.0 < range.1 && (range.1 - range.0).is_finite() { range } else { (0.0, 1.0) };
-    Field { scale, strip: Strip { label, range, colors: ColorMap::Viridis } }
+    ColouredField { scale, strip: Strip { label, range, colors: ColorMap::Viridis } }
 }
 
-/// The end of a run without stages: stress, or the length of the displacement, and a second field.
+/// Draws the end of a run without stages: stress or the length of the displacement, and a second field.
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn end<const D: usize>(
+pub fn draw_end<const D: usize>(
     m: &Moment<D>,
-    second: Option<(Field, Vec<f64>)>,
+    second: Option<(ColouredField, Vec<f64>)>,
     output: &Path,
 ) -> Result<(), Error> {
     let stresses = m.stresses()?;
@@ -115,7 +117,8 @@ pub fn end<const D: usize>(
         rest.iter().zip(moved()).map(|(x, u)| [0, 1, 2].map(|d| x[d] + u[d])).collect();
     let (first, values) = match (&m.scene.stress, stresses.cauchy.first()) {
         (Some(spec), Some((_, tensors))) => {
-            let values: Vec<f64> = tensors.iter().map(|t| shown(spec, false, &tensor_in_space(t))).collect();
+            let values: Vec<f64> =
+                tensors.iter().map(|t| shown_stress(spec, false, &tensor_in_space(t))).collect();
             (stress_field(spec, values.clone()), values)
         }
         _ => {
@@ -126,25 +129,25 @@ pub fn end<const D: usize>(
     };
     let (second, others) = second.filter(|(_, values)| values.iter().any(|&value| value > 0.0)).unzip();
     let fields = std::iter::once(first).chain(second).collect();
-    let mut bounds = NOWHERE;
-    let title = title(&m.state.history, m.state.history.len() as f64);
-    widen(&mut bounds, &places);
-    let look = Look { title, places, rest, values: [values, others.unwrap_or_default()] };
-    let picture = Picture { moment: m, bounds };
-    picture.draw(output, fields, 1, |_| Ok(Cow::Borrowed(&look)))
+    let mut bounds = EMPTY_BOX;
+    let title = moment_title(&m.state.history, m.state.history.len() as f64);
+    extend_box(&mut bounds, &places);
+    let view = BodyView { title, places, rest, values: [values, others.unwrap_or_default()] };
+    let picture = BodyPictures { moment: m, bounds };
+    picture.draw(output, fields, 1, |_| Ok(Cow::Borrowed(&view)))
 }
 
-impl<const D: usize> Picture<'_, D> {
-    /// Writes the stages beside one another, and the last in a full turn where the scene wants one.
+impl<const D: usize> BodyPictures<'_, D> {
+    /// Draws the stages side by side, and the last in a full turn if the scene requests it.
     ///
     /// # Errors
-    /// A file that cannot be written; those of `look`.
+    /// A file that cannot be written; errors of `view`.
     pub fn draw<'l>(
         &self,
         output: &Path,
-        fields: Vec<Field>,
+        fields: Vec<ColouredField>,
         stages: usize,
-        mut look: impl FnMut(usize) -> Result<Cow<'l, Look>, polycore::Error>,
+        mut view: impl FnMut(usize) -> Result<Cow<'l, BodyView>, polycore::Error>,
     ) -> Result<(), Error> {
         let (m, spacing) = (self.moment, self.moment.bonds.spacing());
         let spec = m.scene.output.solid.unwrap_or_default();
@@ -163,11 +166,11 @@ impl<const D: usize> Picture<'_, D> {
             fields: fields.into_iter().map(|field| field.strip).collect(),
         };
         let mut stage = |index: usize| -> Result<(String, Skin), polycore::Error> {
-            let look = look(index)?;
-            let Look { title, places, rest, values } = &*look;
-            let mut at_rest = NOWHERE;
-            widen(&mut at_rest, rest);
-            let bridge = bridge(m);
+            let view = view(index)?;
+            let BodyView { title, places, rest, values } = &*view;
+            let mut at_rest = EMPTY_BOX;
+            extend_box(&mut at_rest, rest);
+            let bridge = bridge_length(m);
             let particles = Particles { reference: rest, positions: places, spacing, bridge };
             let value = |field: usize, k: usize| {
                 let scale = scales.get(field).copied().unwrap_or(1.0);
@@ -182,7 +185,7 @@ impl<const D: usize> Picture<'_, D> {
             Ok(drawn)
         })?;
         if let Some(last) = last {
-            solids.turn(output.join(format!("turntable_{name}.png")), TURN, SHOWN, &last)?;
+            solids.turn(output.join(format!("turntable_{name}.png")), TURN_PICTURES, PICTURE_TIME, &last)?;
         }
         Ok(())
     }

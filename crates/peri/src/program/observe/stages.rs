@@ -1,42 +1,42 @@
-//! Pictures of the stages of a run: the body as its fields show it.
+//! Draws the stages of a run from its field file.
 
 use super::moment::Moment;
-use super::scale::{bridge, title};
-use super::solid::{self, Look, shown};
+use super::scale::{bridge_length, moment_title};
+use super::solid::{self, BodyView, shown_stress};
 use crate::error::Error;
 use harness::output::picture::{FieldMap, Panel};
 use harness::output::vtkhdf;
 use std::borrow::Cow;
 use std::path::Path;
 
-/// Largest principal stress and damage at some stages from the last whole state on, of a plane body or of the middle
-/// plane y = const of a solid; of a solid also as it looks from outside.
+/// Draws stress and damage at some stages from the last intact state on, of a plane body or of the middle
+/// plane y = const of a solid; a solid also from outside.
 ///
 /// # Errors
 /// Files that cannot be read or written.
-pub fn stages<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error> {
+pub fn draw_stages<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error> {
     let (cracks, spacing, history) = (m.damage_of_cracks(), m.bonds.spacing(), &m.state.history);
     let frames = vtkhdf::read(output.join(m.physics.field_file()))?;
     let damages: Vec<f64> = (0..frames.len())
-        .map(|k| Ok(since(frames.data(k, "damage")?.iter().sum(), cracks)))
+        .map(|k| Ok(new_damage(frames.data(k, "damage")?.iter().sum(), cracks)))
         .collect::<Result<_, Error>>()?;
-    // the step of the peak load, which the damage does not determine
+    // frame of the peak load, which the damage does not determine
     let peak = history.iter().enumerate().max_by(|a, b| a.1.load.total_cmp(&b.1.load));
     let peak = peak.and_then(|(k, _)| frames.times().iter().position(|&time| time == (k + 1) as f64));
-    let chosen = choose(&damages, peak, m.scene.output.stages);
+    let chosen = choose_frames(&damages, peak, m.scene.output.stages);
     let Some(spec) = &m.scene.stress else { return Ok(()) };
     let measure = format!("cauchy_{}", spec.measures[0].name());
     let flat = D == 2;
-    let look = |frame: usize| -> Result<Look, polycore::Error> {
+    let view = |frame: usize| -> Result<BodyView, polycore::Error> {
         let (places, moved) = (frames.points(frame)?, frames.data(frame, "displacement")?);
         let tensors = frames.data(frame, &measure)?;
         let at_rest = |(k, x): (usize, &[f64; 3])| [0, 1, 2].map(|d| x[d] - moved[3 * k + d]);
-        Ok(Look {
-            title: title(history, frames.times()[frame]),
+        Ok(BodyView {
+            title: moment_title(history, frames.times()[frame]),
             rest: places.iter().enumerate().map(at_rest).collect(),
             places,
             values: [
-                tensors.chunks(9).map(|t| shown(spec, flat, t)).collect(),
+                tensors.chunks(9).map(|t| shown_stress(spec, flat, t)).collect(),
                 frames.data(frame, "damage")?,
             ],
         })
@@ -48,10 +48,10 @@ pub fn stages<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error>
         damage: Vec<f64>,
         title: String,
     }
-    let (mut stages, mut all, mut bounds) = (Vec::new(), Vec::new(), solid::NOWHERE);
+    let (mut stages, mut all, mut bounds) = (Vec::new(), Vec::new(), solid::EMPTY_BOX);
     for &frame in &chosen {
-        let Look { title, places, rest, values: [stress, damage] } = look(frame)?;
-        solid::widen(&mut bounds, &places);
+        let BodyView { title, places, rest, values: [stress, damage] } = view(frame)?;
+        solid::extend_box(&mut bounds, &places);
         let (low, high) = rest.iter().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x[1]), h.max(x[1])));
         let middle = 0.5 * (low + high);
         let keep: Vec<usize> = (0..places.len())
@@ -70,17 +70,17 @@ pub fn stages<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error>
     let (field, damage) = (solid::stress_field(spec, all), solid::damage_field());
     let (scale, strips) = (field.scale, [field.strip.clone(), damage.strip.clone()]);
     if !flat {
-        let picture = solid::Picture { moment: m, bounds };
+        let picture = solid::BodyPictures { moment: m, bounds };
         let fields = vec![field, damage];
-        picture.draw(output, fields, chosen.len(), |k| Ok(Cow::Owned(look(chosen[k])?)))?;
+        picture.draw(output, fields, chosen.len(), |k| Ok(Cow::Owned(view(chosen[k])?)))?;
     }
-    let bridge = bridge(m);
+    let bridge = bridge_length(m);
     let [wide, tall] = [0, 1].map(|d| {
         let ends = |(low, high): (f64, f64), x: &[f64; 2]| (low.min(x[d]), high.max(x[d]));
         let extent = |stage: &Stage| stage.places.iter().fold((f64::MAX, f64::MIN), ends);
         stages.iter().map(extent).map(|(low, high)| high - low).fold(0.0, f64::max)
     });
-    let layout = Layout::of(wide / tall, stages.len());
+    let layout = StageLayout::for_aspect(wide / tall, stages.len());
     let mut map = FieldMap::new().lengths("mm", 1e-3).columns(layout.columns).size(layout.size);
     if !flat {
         map = map.axes(["x", "z"]);
@@ -105,23 +105,23 @@ pub fn stages<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error>
     Ok(())
 }
 
-/// Damage beside that of the scene's cracks; a sum of both has rounding.
-fn since(damage: f64, cracks: f64) -> f64 {
+/// Returns the damage without that of the scene's cracks; smaller than rounding counts as 0.
+fn new_damage(damage: f64, cracks: f64) -> f64 {
     let since = damage - cracks;
     if since > 3e-7 * cracks { since } else { 0.0 }
 }
 
-/// How stages are laid out: side by side, damage under stress; wide bodies one under another, damage beside stress.
-struct Layout {
+/// Layout of stages: side by side, damage below stress; wide bodies one below another, damage beside stress.
+struct StageLayout {
     pairs: bool,
     columns: usize,
     /// Pixels of a body's longer side.
     size: usize,
 }
 
-impl Layout {
-    /// For bodies `aspect` times as wide as high.
-    fn of(aspect: f64, stages: usize) -> Self {
+impl StageLayout {
+    /// Returns the layout for bodies `aspect` times as wide as high.
+    fn for_aspect(aspect: f64, stages: usize) -> Self {
         match aspect {
             wide if wide > 1.8 => Self { pairs: true, columns: 2, size: 720 },
             narrow if narrow < 0.5 => Self { pairs: false, columns: stages, size: 720 },
@@ -130,9 +130,9 @@ impl Layout {
     }
 }
 
-/// The last frame before the first break, the peak where it is later, then frames at even parts of all damage, then the
-/// last.
-fn choose(damage: &[f64], peak: Option<usize>, count: usize) -> Vec<usize> {
+/// Chooses the last frame before the first break, the peak if it is later, frames at even fractions of all
+/// damage, and the last frame.
+fn choose_frames(damage: &[f64], peak: Option<usize>, count: usize) -> Vec<usize> {
     let last = damage.len() - 1;
     let whole = damage.iter().rposition(|&d| d == 0.0).unwrap_or(0);
     let mut chosen = vec![whole];
@@ -155,10 +155,10 @@ mod tests {
 
     #[test]
     fn stages_are_chosen_by_damage() {
-        assert_eq!(choose(&[0.0, 0.0, 1.0, 5.0, 6.0, 9.0], None, 4), [1, 2, 4, 5]);
+        assert_eq!(choose_frames(&[0.0, 0.0, 1.0, 5.0, 6.0, 9.0], None, 4), [1, 2, 4, 5]);
         // the peak takes the place of the first of them
-        assert_eq!(choose(&[0.0, 0.0, 0.1, 1.0, 5.0, 6.0, 9.0], Some(2), 4), [1, 2, 5, 6]);
-        assert_eq!(choose(&[0.0, 0.0], Some(0), 4), [1]);
-        assert_eq!(choose(&[3.0], None, 4), [0]);
+        assert_eq!(choose_frames(&[0.0, 0.0, 0.1, 1.0, 5.0, 6.0, 9.0], Some(2), 4), [1, 2, 5, 6]);
+        assert_eq!(choose_frames(&[0.0, 0.0], Some(0), 4), [1]);
+        assert_eq!(choose_frames(&[3.0], None, 4), [0]);
     }
 }

@@ -1,4 +1,5 @@
-//! Scalars of every run: stretches, the fit of the law, reactions, the largest displacement, motion, fields of other scenes.
+//! Scalars of every run: stretches, fit error, reactions, the largest displacement, motion, fields of other
+//! scenes.
 
 use super::moment::Moment;
 use crate::bonds::covered_stretches;
@@ -9,19 +10,19 @@ use crate::program::quantities as q;
 use crate::program::scene::Scene;
 use harness::observe::{Observer, Scalars};
 
-/// Error of forces in mixed precision beyond which a run warns.
-const MIXED: f64 = 1e-2;
+/// Error of forces in mixed precision above which a run warns.
+const LARGEST_MIXED_ERROR: f64 = 1e-2;
 
-/// Axes of a scene.
+/// Returns the names of the axes of a scene.
 pub(super) fn axes(scene: &Scene) -> &'static [&'static str] {
     if scene.body.space == Space::Solid { &["x", "y", "z"] } else { &["x", "y"] }
 }
 
-/// Parameters that follow fields of other scenes.
-pub(super) fn followed<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
+/// Adds the scalars of parameters that follow fields of other scenes.
+pub(super) fn followed_fields<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
     for field in &scene.material.fields {
         for (index, quantity) in q::OF_A_FIELD.iter().enumerate() {
-            // its unit is that of the field, which only the body knows
+            // the unit of the field is known only after reading it
             to.add_in_unit(quantity.of(&[field.of.value_name()]), |m| {
                 let one = m.physics.body.followed.iter().find(|one| one.parameter == field.of)?;
                 let [mean, least, largest] = one.field;
@@ -31,7 +32,7 @@ pub(super) fn followed<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>
     }
 }
 
-/// Smallest and largest stretches.
+/// Adds the smallest and largest stretches.
 pub(super) fn stretches<const D: usize>(_: &Scene, to: &mut Scalars<Moment<D>>) {
     to.add(q::SMALLEST_STRETCH, |m| m.each(|row| row.smallest_stretch).fold(1.0, f64::min));
     to.add(q::LARGEST_STRETCH, |m| m.each(|row| row.largest_stretch).fold(1.0, f64::max));
@@ -39,13 +40,13 @@ pub(super) fn stretches<const D: usize>(_: &Scene, to: &mut Scalars<Moment<D>>) 
     to.add(q::LARGEST_STRETCH_MET, |m| (1.0 + m.state.stretches.observed.high).sqrt());
 }
 
-/// Error of the fitted bond law.
-pub(super) struct Fit<'s> {
+/// Observer of the error of the fitted bond law.
+pub(super) struct FitError<'s> {
     scene: &'s Scene,
     error: f64,
 }
 
-impl<'s> Fit<'s> {
+impl<'s> FitError<'s> {
     pub(super) fn new(scene: &'s Scene) -> Self {
         Self { scene, error: f64::NAN }
     }
@@ -55,7 +56,7 @@ impl<'s> Fit<'s> {
     }
 }
 
-impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Fit<'_> {
+impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for FitError<'_> {
     fn scalars(&self, to: &mut Scalars<Moment<'m, D>>) {
         if self.is_fitted() {
             to.add(q::FIT_ERROR, |_| self.error);
@@ -71,7 +72,7 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Fit<'_> {
     }
 }
 
-/// Explicit dynamics; a body that is held everywhere has no critical step.
+/// Adds scalars of explicit dynamics; a body that is held everywhere has no critical step.
 pub(super) fn motion<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
     if scene.dynamics.is_none() {
         return;
@@ -91,22 +92,24 @@ fn mixed_error<const D: usize>(m: &Moment<D>) -> Option<f64> {
     m.bonds.as_lattice()?.mixed_error(&m.state.displacement)
 }
 
-/// A warning where mixed precision is too rough.
-pub(super) fn mixed<const D: usize>(m: &Moment<D>) -> Vec<String> {
-    let error = mixed_error(m).filter(|&error| error > MIXED);
+/// Warns if mixed precision is too rough.
+pub(super) fn mixed_warnings<const D: usize>(m: &Moment<D>) -> Vec<String> {
+    let error = mixed_error(m).filter(|&error| error > LARGEST_MIXED_ERROR);
     let warning = |error| {
-        format!("forces in mixed precision are wrong by {error:.1e} of their mean: take double precision")
+        format!(
+            "forces in mixed precision are wrong by {error:.1e} of their rms: use `precision = \"double\"`"
+        )
     };
     error.map(warning).into_iter().collect()
 }
 
-/// Largest displacement, force of the held regions, applied force.
+/// Adds the largest displacement, reactions and applied forces.
 pub(super) fn responses<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
     to.add(q::LARGEST_DISPLACEMENT, |m| {
         let length = |site| m.state.displacement.get(site).iter().map(|x| x * x).sum::<f64>().sqrt();
         m.sites().map(length).fold(0.0, f64::max)
     });
-    let holds = scene.boundary.iter().any(|boundary| boundary.holds());
+    let holds = scene.boundary.iter().any(|boundary| boundary.prescribes_displacement());
     let loads = scene.boundary.iter().any(|boundary| boundary.traction.is_some() || boundary.force.is_some());
     for (d, axis) in axes(scene).iter().enumerate() {
         if holds {

@@ -1,6 +1,6 @@
-//! Comparison with closed forms, convergence, and the report.
+//! Reports of all variants: comparison with closed forms, convergence, tables, notes.
 
-use super::outcome::{Outcome, families};
+use super::outcome::{VariantOutcome, families};
 use crate::exact;
 use crate::program::quantities as q;
 use crate::program::scene::{NAMING, Scene};
@@ -9,23 +9,23 @@ use harness::scene::Source;
 use harness::study::{self, Compare, SuiteRow};
 use std::path::Path;
 
-/// Seconds that a stress field of one measure takes from the scene on, as if it were the only one.
-pub fn run_time(outcome: &Outcome, measure: &str) -> f64 {
+/// Returns the seconds from the scene to the stress field of one measure alone.
+pub fn run_time(outcome: &VariantOutcome, measure: &str) -> f64 {
     ["build", "solve", "deformation gradient", &format!("stress {measure}")]
         .map(|phase| outcome.seconds_of(phase))
         .iter()
         .sum()
 }
 
-/// The report of all variants; with one variant its values keep their plain names.
-pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool) -> Report {
+/// Builds the report of all variants; with a single variant values keep their plain names.
+pub fn report(source: &Source, scene: &Scene, outcomes: &[VariantOutcome], quick: bool) -> Report {
     let mut report =
-        Report::new("peri", env!("CARGO_PKG_VERSION"), &resolved(source, scene, outcomes, quick));
+        Report::new("peri", env!("CARGO_PKG_VERSION"), &text_with_defaults(source, scene, outcomes, quick));
     report.threads(rayon::current_num_threads());
-    // names must not depend on how many of the variants run
+    // names must not depend on the number of variants of this run
     let several =
         crate::program::scene::variants(source, scene, false).map_or(outcomes.len(), |all| all.len()) > 1;
-    let full = |name: &str, outcome: &Outcome| {
+    let full = |name: &str, outcome: &VariantOutcome| {
         if several { NAMING.value(&outcome.name, name) } else { name.to_owned() }
     };
     for outcome in outcomes {
@@ -86,22 +86,22 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
         }
     }
     if let Some(compare) = &scene.output.compare {
-        compare.add(&mut report, outcomes, q::COMPARED, method);
-        same_events(&mut report, compare, outcomes);
+        compare.add(&mut report, outcomes, q::COMPARED, method_name);
+        add_same_events(&mut report, compare, outcomes);
     }
     scene.comparisons().add(&mut report, outcomes);
     for (family, change) in super::history::peak_changes(outcomes) {
         report.value(q::PEAK_LOAD_CHANGE.of(&[&family]), change);
     }
     let mut expectations = scene.expect.clone();
-    expectations.extend(outcomes.iter().filter_map(|outcome| stiff_contact(scene, outcome, several)));
+    expectations.extend(outcomes.iter().filter_map(|outcome| contact_expectation(scene, outcome, several)));
     report.judge(&expectations, quick);
     report
 }
 
-/// Adds `same_events[VARIANT]`, how many of the first events of a variant have the same bonds in the same load step as those of
-/// the reference, where bonds break.
-fn same_events(report: &mut Report, compare: &Compare, outcomes: &[Outcome]) {
+/// Adds `same_events[VARIANT]`: the number of first events of a variant with the same bonds and load step as
+/// in the reference.
+fn add_same_events(report: &mut Report, compare: &Compare, outcomes: &[VariantOutcome]) {
     let compared = || outcomes.iter().filter(|outcome| outcome.get(&compare.quantity).is_some());
     let truth = compared().find(|o| Some(&o.name) == compare.variant.as_ref());
     let Some(truth) = truth.filter(|truth| !truth.events.is_empty()) else { return };
@@ -112,33 +112,33 @@ fn same_events(report: &mut Report, compare: &Compare, outcomes: &[Outcome]) {
     }
 }
 
-/// Name of a variant without its spacing, and without a number at its end.
-fn method(outcome: &Outcome) -> String {
+/// Returns the name of a variant without its spacing and without a number at its end.
+fn method_name(outcome: &VariantOutcome) -> String {
     match outcome.family.rsplit_once(' ') {
         Some((method, last)) if last.parse::<f64>().is_ok() => method.to_owned(),
         _ => outcome.family.clone(),
     }
 }
 
-/// Part of the stored energy that contact may hold in equilibrium.
-const SOFTEST: f64 = 0.1;
+/// Largest energy of contact over the stored energy of a run in equilibrium that passes.
+const LARGEST_CONTACT_SHARE: f64 = 0.1;
 
-/// The expectation that contact is stiff enough for its load to be right, of a variant in equilibrium.
-fn stiff_contact(scene: &Scene, outcome: &Outcome, several: bool) -> Option<Expect> {
+/// Returns the expectation that contact is stiff enough for the load of a variant in equilibrium.
+fn contact_expectation(scene: &Scene, outcome: &VariantOutcome, several: bool) -> Option<Expect> {
     let judged = scene.contact.as_ref().is_some_and(|contact| contact.short_range.is_none());
     outcome.get(q::CONTACT_SHARE.name).filter(|_| judged && scene.dynamics.is_none())?;
     let name = q::CONTACT_SHARE.name;
     Some(Expect {
         quantity: if several { NAMING.value(&outcome.name, name) } else { name.to_owned() },
-        bound: Bound::Range { at_least: None, at_most: Some(SOFTEST) },
+        bound: Bound::Range { at_least: None, at_most: Some(LARGEST_CONTACT_SHARE) },
         kind: Kind::Bound,
-        source: "of every scene with contact: the load is about this part too low".to_owned(),
+        source: "every scene with contact: the load is too low by about this fraction".to_owned(),
         quick: true,
     })
 }
 
-/// The scene with everything that it left to defaults, as comments behind its text.
-fn resolved(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool) -> String {
+/// Returns the text of the scene, followed by all settings with their defaults as comments.
+fn text_with_defaults(source: &Source, scene: &Scene, outcomes: &[VariantOutcome], quick: bool) -> String {
     let Scene { material, solver, stress, output, .. } = scene;
     let mut text = format!("{}\n# as run, with defaults (quick = {quick}):\n", source.text.trim_end());
     for line in [format!("{material:?}"), format!("{solver:?}"), format!("{stress:?}"), format!("{output:?}")]
@@ -151,8 +151,8 @@ fn resolved(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool) -
     text
 }
 
-/// Names and units of the values of all variants, in the order in which they come.
-fn columns(outcomes: &[Outcome]) -> Vec<(&str, &str)> {
+/// Returns names and units of the values of all variants, in order of appearance.
+fn columns(outcomes: &[VariantOutcome]) -> Vec<(&str, &str)> {
     let mut columns: Vec<(&str, &str)> = Vec::new();
     for (name, _, unit) in outcomes.iter().flat_map(|o| &o.values) {
         if !columns.iter().any(|(known, _)| known == name) {
@@ -162,10 +162,10 @@ fn columns(outcomes: &[Outcome]) -> Vec<(&str, &str)> {
     columns
 }
 
-/// Variants as lines of a table: size, work, time, then their main results; `study.csv` has all of them.
-pub fn table(outcomes: &[Outcome]) -> String {
+/// Returns a table of variants: size, work, time and main results; `study.csv` has all results.
+pub fn table(outcomes: &[VariantOutcome]) -> String {
     use std::fmt::Write;
-    // once a body is torn, reactions are those of its pieces
+    // reactions of a torn body are those of its pieces
     let torn = outcomes.iter().any(|o| o.history.iter().any(|r| r.broken > 0));
     let main = ["_peak", "_rmse", "_rmse_inner", "_rmse_ring", "largest_displacement"];
     let of_loading = ["peak_load", "displacement_at_peak", "first_break", "broken_bonds"];
@@ -198,15 +198,15 @@ pub fn table(outcomes: &[Outcome]) -> String {
         );
         for (name, heading) in &shown {
             let column = heading.chars().count().max(10);
-            let _ = write!(text, "  {:>column$}", outcome.get(name).map_or("-".to_owned(), digits));
+            let _ = write!(text, "  {:>column$}", outcome.get(name).map_or("-".to_owned(), format_value));
         }
         text.push('\n');
     }
     text
 }
 
-/// Six digits.
-fn digits(value: f64) -> String {
+/// Formats with six digits.
+fn format_value(value: f64) -> String {
     let size = value.abs();
     if value != 0.0 && !(1e-4..1e7).contains(&size) {
         return format!("{value:.5e}");
@@ -216,26 +216,31 @@ fn digits(value: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// What the results do not say by themselves: warnings, runs in which nothing broke, how far a peak is known.
-pub fn notes(outcomes: &[Outcome]) -> String {
+/// Returns notes on the results: warnings, variants without broken bonds, resolution of peak loads.
+pub fn notes(outcomes: &[VariantOutcome]) -> String {
     let mut lines = Vec::new();
     let several = outcomes.len() > 1;
-    let of = |outcome: &Outcome| if several { format!("{}: ", outcome.name) } else { String::new() };
+    let prefix =
+        |outcome: &VariantOutcome| if several { format!("{}: ", outcome.name) } else { String::new() };
     for outcome in outcomes {
-        lines.extend(outcome.warnings.iter().map(|text| format!("warning: {}{text}", of(outcome))));
+        lines.extend(outcome.warnings.iter().map(|text| format!("warning: {}{text}", prefix(outcome))));
         let unbroken = outcome.history.last().is_some_and(|last| last.broken == 0);
         if let (Some(critical), true) = (outcome.get("critical_stretch"), unbroken) {
             let largest = outcome.history.iter().map(|r| r.largest_stretch).fold(1.0, f64::max);
-            lines
-                .push(format!("{}largest stretch {largest:.4} of {critical:.4}: nothing broke", of(outcome)));
+            lines.push(format!(
+                "{}largest stretch {largest:.4} of {critical:.4}: nothing broke",
+                prefix(outcome)
+            ));
         }
     }
     for (family, change) in super::history::peak_changes(outcomes) {
-        let members: Vec<&Outcome> = outcomes.iter().filter(|o| o.family == family).collect();
+        let members: Vec<&VariantOutcome> = outcomes.iter().filter(|o| o.family == family).collect();
         let step = members.iter().filter_map(|o| o.step_at_peak()).fold(0.0, f64::max);
-        let known = if step >= change { ": smaller steps first" } else { "" };
+        let known = if step >= change { ": use smaller steps first" } else { "" };
         lines.push(format!(
-            "{family}: the peak load changes by {:.2} % between the two finest spacings; a load step changes it by up to {:.2} %{known}",
+            "{family}: the peak load changes by {:.2} % between the two finest spacings; a load step changes \
+             it by up to \
+             {:.2} %{known}",
             100.0 * change,
             100.0 * step
         ));
@@ -243,12 +248,13 @@ pub fn notes(outcomes: &[Outcome]) -> String {
     lines.iter().map(|line| format!("{line}\n")).collect()
 }
 
-/// The table of a suite, also as trials of the report: each variant, its expected and observed behaviour, and its cost.
+/// Writes the table of a suite, also as trials of the report: expected and observed behaviour and cost of
+/// each variant.
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn suite(report: &mut Report, outcomes: &[Outcome], output: &Path) -> Result<(), polycore::Error> {
-    let row = |outcome: &'_ Outcome| {
+pub fn suite(report: &mut Report, outcomes: &[VariantOutcome], output: &Path) -> Result<(), polycore::Error> {
+    let row = |outcome: &'_ VariantOutcome| {
         let value = |name: &str| outcome.get(name).unwrap_or(f64::NAN);
         format!(
             "stretches {:.3} to {:.3}, residual {:.1e}, {} bonds broken",
@@ -271,8 +277,8 @@ pub fn suite(report: &mut Report, outcomes: &[Outcome], output: &Path) -> Result
     Ok(())
 }
 
-/// All values of all variants, a row for each.
-pub fn write(outcomes: &[Outcome], output: &Path) -> Result<(), polycore::Error> {
+/// Writes all values of all variants to `study.csv`.
+pub fn write(outcomes: &[VariantOutcome], output: &Path) -> Result<(), polycore::Error> {
     if outcomes.len() < 2 {
         return Ok(());
     }
@@ -297,7 +303,7 @@ pub fn write(outcomes: &[Outcome], output: &Path) -> Result<(), polycore::Error>
     })
 }
 
-/// Width of the plate across the load, from the added boxes.
+/// Returns the width of the plate across the load, from the added boxes, m.
 pub fn plate_width(scene: &Scene) -> Option<f64> {
     let edges = |get: fn(&crate::program::scene::ShapeSpec) -> &Option<Vec<polycore::units::Length>>| {
         scene
@@ -318,7 +324,7 @@ mod tests {
 
     #[test]
     fn six_digits() {
-        let texts = [0.0, 1234567.8, 0.001234567, 8.9e-5, -15.25, 2e9].map(digits);
+        let texts = [0.0, 1234567.8, 0.001234567, 8.9e-5, -15.25, 2e9].map(format_value);
         assert_eq!(texts, ["0", "1234568", "0.00123457", "8.90000e-5", "-15.25", "2.00000e9"]);
     }
 }

@@ -1,23 +1,23 @@
-//! Pictures of several variants: profiles, convergence, error against run time.
+//! Draws variants together: profiles, convergence, error against run time.
 
 use super::compare::{plate_width, run_time};
-use super::outcome::Outcome;
+use super::outcome::VariantOutcome;
 use super::outcome::families;
 use crate::exact;
 use crate::program::scene::{ExactSpec, Scene};
-use crate::stress::Measure;
+use crate::stress::StressMethod;
 use harness::output::csv;
 use harness::output::picture::{LegendPlace, LinePlot, Series};
 use polycore::Error;
 use std::path::Path;
 
-/// Profiles (Fig. 2.7), convergence (Fig. 2.8), error against run time.
-pub fn curves(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
+/// Draws profiles (Fig. 2.7), convergence (Fig. 2.8) and error against run time.
+pub fn draw_curves(scene: &Scene, outcomes: &[VariantOutcome], output: &Path) -> Result<(), Error> {
     let (Some(exact), Some(stress)) = (&scene.exact, &scene.stress) else { return Ok(()) };
     let (radius, is_plate) = (exact.hole().0, matches!(exact, ExactSpec::PlateWithHole { .. }));
     let kind = if is_plate { "rmse_inner" } else { "rmse" };
     let error_axis = if is_plate {
-        "RMSE of σ₁₁/σ∞, loaded layers left out"
+        "RMSE of σ₁₁/σ∞ without loaded layers"
     } else {
         "RMSE of σ₁₁/σ∞ (2.84)"
     };
@@ -29,11 +29,17 @@ pub fn curves(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), 
     let mut cost = LinePlot::new("Error against run time").log_x().log_y().size(1000.0, 560.0);
     cost = cost.axes("build + solve + stress (s)", error_axis);
     let mut rows: Vec<Vec<f64>> = vec![Vec::new(); 5];
-    for (index, measure) in stress.measures.iter().enumerate().filter(|(_, m)| **m != Measure::AsPublished) {
+    let convergence = |title: &str| {
+        let plot = LinePlot::new(title).log_x().log_y().size(900.0, 500.0);
+        plot.axes("spacing Δx (mm)", error_axis)
+    };
+    let title = "Stress error of the plate with a hole";
+    let mut together = convergence(title);
+    for (index, measure) in
+        stress.measures.iter().enumerate().filter(|(_, m)| **m != StressMethod::AsPublished)
+    {
         let name = measure.name();
-        let mut convergence = LinePlot::new(&format!("Stress error of the plate with a hole, {name}"));
-        convergence = convergence.log_x().log_y().size(900.0, 500.0);
-        convergence = convergence.axes("spacing Δx (mm)", error_axis);
+        let mut single = convergence(&format!("{title}, {name}"));
         for (family, members) in &families {
             let error: Vec<f64> = members.iter().filter_map(|o| o.get(&format!("{name}_{kind}"))).collect();
             let spacing: Vec<f64> = members.iter().map(|o| o.spacing * 1e3).collect();
@@ -44,10 +50,16 @@ pub fn curves(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), 
                     column.push(value);
                 }
             }
-            convergence = convergence.series(Series::marked_line(family, &spacing, &error));
+            single = single.series(Series::marked_line(family, &spacing, &error));
+            together = together.series(Series::marked_line(name, &spacing, &error));
             cost = cost.series(Series::marked_line(&format!("{name} {family}"), &seconds, &error));
         }
-        convergence.write(output.join(format!("convergence_{name}.png")))?;
+        if families.len() > 1 {
+            single.write(output.join(format!("convergence_{name}.png")))?;
+        }
+    }
+    if families.len() == 1 {
+        together.write(output.join("convergence.png"))?;
     }
     cost.write(output.join("error_against_time.png"))?;
     let names = [("spacing", "mm"), ("horizon_ratio", ""), ("measure", ""), ("run_time", "s"), (kind, "")];
@@ -58,7 +70,7 @@ pub fn curves(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), 
 
 fn profiles(
     scene: &Scene,
-    outcomes: &[Outcome],
+    outcomes: &[VariantOutcome],
     measure: &str,
     radius: f64,
     output: &Path,
@@ -76,6 +88,7 @@ fn profiles(
         plot = plot.series(Series::markers(&format!("long strip, Heywood: {peak:.3}"), &[1.0], &[peak]));
     }
     let first = outcomes.first().map(|o| o.family.clone());
+    let mut columns: Vec<(&str, &str, Vec<f64>)> = vec![("spacing", "m", Vec::new()), ("y", "m", Vec::new())];
     for outcome in outcomes.iter().filter(|o| Some(&o.family) == first.as_ref()) {
         if let Some(profile) = outcome.profiles.iter().find(|p| p.name == measure) {
             let keep = profile.at.iter().filter(|&&y| y <= far).count();
@@ -83,10 +96,21 @@ fn profiles(
             plot =
                 plot.series(Series::line(&label, &over_radius(&profile.at[..keep]), &profile.value[..keep]));
         }
+        // all profiles of a variant are at the same particles
+        let rows = outcome.profiles.first().map_or(0, |profile| profile.at.len());
+        columns[0].2.extend(std::iter::repeat_n(outcome.spacing, rows));
+        columns[1].2.extend(outcome.profiles.iter().take(1).flat_map(|profile| &profile.at));
         for profile in &outcome.profiles {
-            let path = output.join(format!("profile_{}_{}.csv", profile.name, outcome.file_name()));
-            csv::write(path, &[("y", "m", &profile.at), ("stress_ratio", "", &profile.value)])?;
+            if !columns.iter().any(|column| column.0 == profile.name) {
+                columns.push((&profile.name, "", Vec::new()));
+            }
+            let column = columns.iter_mut().find(|column| column.0 == profile.name);
+            column.into_iter().for_each(|column| column.2.extend(&profile.value));
         }
+    }
+    let views: Vec<_> = columns.iter().map(|(name, unit, data)| (*name, *unit, data.as_slice())).collect();
+    if !columns[1].2.is_empty() {
+        csv::write(output.join("profile.csv"), &views)?;
     }
     let kirsch = ("Kirsch, infinite plate", over_radius(&line), exact);
     let finest = outcomes.iter().rfind(|o| Some(&o.family) == first.as_ref());

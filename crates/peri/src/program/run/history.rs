@@ -1,30 +1,30 @@
-//! The history of loading: values, tables and curves of load against displacement and of energies.
+//! History of loading: tables and curves of load against displacement and of energies.
 
-use super::outcome::Outcome;
+use super::outcome::VariantOutcome;
 use crate::probe::envelope;
-use crate::program::observe::{damped, is_dynamic};
+use crate::program::observe::{damped_energy, is_dynamic};
 use crate::program::scene::Scene;
-use crate::solver::{Event, Record};
+use crate::solver::{BreakingEvent, StepRecord};
 use harness::output::csv;
 use harness::output::picture::{LegendPlace, LinePlot, Series};
 use polycore::Error;
 use std::path::Path;
 
-/// More curves have their legend beside the picture.
-const LEGEND: usize = 8;
+/// Largest number of curves with a legend inside the picture.
+const INNER_LEGEND: usize = 8;
 
-/// A column: name, unit, values.
-type Column = (String, String, Vec<f64>);
+/// Column of the history: name, unit, values.
+type HistoryColumn = (String, String, Vec<f64>);
 
-impl Outcome {
+impl VariantOutcome {
     pub(super) fn is_dynamic(&self) -> bool {
         is_dynamic(&self.history)
     }
 
-    /// The steps as columns.
-    pub fn columns(&self) -> Vec<Column> {
-        let each = |get: &dyn Fn(&Record) -> f64| self.history.iter().map(get).collect();
-        let mut columns: Vec<Column> = Vec::new();
+    /// Returns the steps as columns.
+    pub fn columns(&self) -> Vec<HistoryColumn> {
+        let each = |get: &dyn Fn(&StepRecord) -> f64| self.history.iter().map(get).collect();
+        let mut columns: Vec<HistoryColumn> = Vec::new();
         columns.extend([
             ("displacement".to_owned(), "m".to_owned(), each(&|r| r.displacement)),
             ("load".to_owned(), "N".to_owned(), each(&|r| r.load)),
@@ -52,13 +52,13 @@ impl Outcome {
             ("work".to_owned(), "J".to_owned(), each(&|r| r.work)),
             ("stored".to_owned(), "J".to_owned(), each(&|r| r.stored)),
             ("released".to_owned(), "J".to_owned(), each(&|r| r.released)),
-            ("damped".to_owned(), "J".to_owned(), each(&|r| damped(r, self.is_dynamic()))),
+            ("damped".to_owned(), "J".to_owned(), each(&|r| damped_energy(r, self.is_dynamic()))),
         ]);
         if self.history.iter().any(|r| r.rubbed != 0.0) {
             columns.push(("friction_work".to_owned(), "J".to_owned(), each(&|r| r.rubbed)));
         }
         for (index, plane) in self.planes.iter().enumerate() {
-            let resting = |r: &Record| r.resting.get(index).copied().unwrap_or_default();
+            let resting = |r: &StepRecord| r.resting.get(index).copied().unwrap_or_default();
             for (d, axis) in ["x", "y", "z"].iter().enumerate() {
                 let values = each(&|r| resting(r).force[d]);
                 if values.iter().any(|&v| v != 0.0) {
@@ -87,34 +87,34 @@ impl Outcome {
         columns
     }
 
-    /// By how much of it the load rises to its peak, or falls from it, in one step.
+    /// Returns the change of the load in the step that reaches the peak, over the peak.
     pub(super) fn step_at_peak(&self) -> Option<f64> {
         let loads: Vec<f64> = std::iter::once(0.0).chain(self.history.iter().map(|r| r.load)).collect();
         let (at, &peak) = loads.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
         (at > 0 && peak > 0.0).then(|| (peak - loads[at - 1]).abs() / peak)
     }
 
-    /// See [`envelope`], from the undeformed body on.
+    /// Returns the [`envelope`] of displacement and load, from the undeformed body on.
     fn envelope(&self) -> [Vec<f64>; 2] {
         let rows = self.history.iter().map(|r| [r.displacement, r.load]);
         envelope(&std::iter::once([0.0; 2]).chain(rows).collect::<Vec<_>>())
     }
 }
 
-/// Peaks as far as load steps resolve them, a line for each variant with several steps.
-pub fn peak_lines(outcomes: &[Outcome]) -> String {
-    let line = |outcome: &Outcome| {
+/// Returns a line per variant with its peak load and the resolution by load steps.
+pub fn peak_lines(outcomes: &[VariantOutcome]) -> String {
+    let line = |outcome: &VariantOutcome| {
         let peak = (0..outcome.history.len())
             .max_by(|&a, &b| outcome.history[a].load.total_cmp(&outcome.history[b].load))?;
         let (at, name) = (outcome.history[peak].displacement, &outcome.name);
         let load = outcome.history[peak].load;
         let near = [peak.checked_sub(1), Some(peak + 1)];
-        let near: Vec<&Record> = near.into_iter().filter_map(|row| outcome.history.get(row?)).collect();
-        let gap = |r: &&Record| [(r.displacement - at).abs(), (r.load - load).abs()];
+        let near: Vec<&StepRecord> = near.into_iter().filter_map(|row| outcome.history.get(row?)).collect();
+        let gap = |r: &&StepRecord| [(r.displacement - at).abs(), (r.load - load).abs()];
         let gaps: Vec<[f64; 2]> = near.iter().map(gap).collect();
         let broken = outcome.history[peak].broken;
         let [apart, least] = match (&near[..], &gaps[..]) {
-            // nothing breaks before the peak and something after: it lies between the two
+            // bonds break only after the peak: it lies between the two rows
             ([before, after], [[back, rise], [ahead, _]])
                 if before.broken == broken && after.broken > broken =>
             {
@@ -124,12 +124,12 @@ pub fn peak_lines(outcomes: &[Outcome]) -> String {
         };
         (apart > 0.0 && load > 0.0 && !outcome.is_dynamic()).then(|| {
             let (at, apart) = (at * 1e3, apart * 1e3);
-            // where the load was lowered behind the peak, the step in which bonds broke is no row
+            // with a load lowered after the peak, the step in which bonds broke has no row
             let lowered =
                 outcome.history.get(peak + 1).is_some_and(|r| r.factor < outcome.history[peak].factor);
             let within = match lowered {
                 true => String::new(),
-                false => format!(", ± one load step: {apart:.3} mm, {least:.3} N"),
+                false => format!(", resolved to a load step of {apart:.3} mm, {least:.3} N"),
             };
             format!("{name}: peak {load:.5} N at {at:.5} mm{within}\n")
         })
@@ -137,9 +137,9 @@ pub fn peak_lines(outcomes: &[Outcome]) -> String {
     outcomes.iter().filter_map(line).collect()
 }
 
-/// How much the peak load still changes between the two finest spacings of each family, over the finest.
-pub fn peak_changes(outcomes: &[Outcome]) -> Vec<(String, f64)> {
-    let change = |(family, members): (String, Vec<&Outcome>)| {
+/// Returns the relative change of the peak load between the two finest spacings of each family.
+pub fn peak_changes(outcomes: &[VariantOutcome]) -> Vec<(String, f64)> {
+    let change = |(family, members): (String, Vec<&VariantOutcome>)| {
         let mut finest = members.iter().rev().map(|o| o.get("peak_load"));
         let (last, before) = (finest.next()??, finest.next()??);
         (last != 0.0).then(|| (family, ((last - before) / last).abs()))
@@ -147,8 +147,8 @@ pub fn peak_changes(outcomes: &[Outcome]) -> Vec<(String, f64)> {
     super::outcome::families(outcomes).into_iter().filter_map(change).collect()
 }
 
-/// Peak load over spacing, where variants differ in it.
-fn peaks(outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
+/// Draws the peak load over the spacing of each family.
+fn draw_peaks(outcomes: &[VariantOutcome], output: &Path) -> Result<(), Error> {
     let mut plot = LinePlot::new("Peak load").size(900.0, 560.0).axes("spacing Δx (mm)", "peak load (N)");
     let mut any = false;
     for (family, members) in super::outcome::families(outcomes) {
@@ -162,9 +162,10 @@ fn peaks(outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
     if any { plot.write(output.join("peak_load.png")) } else { Ok(()) }
 }
 
-/// Tables of every variant, one plot of all loads, and a plot of energies for each variant whose bonds break.
-pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
-    let several: Vec<&Outcome> = outcomes.iter().filter(|o| o.history.len() > 1).collect();
+/// Writes the tables of every variant, a plot of all loads, and a plot of energies for each variant with
+/// broken bonds.
+pub fn write(scene: &Scene, outcomes: &[VariantOutcome], output: &Path) -> Result<(), Error> {
+    let several: Vec<&VariantOutcome> = outcomes.iter().filter(|o| o.history.len() > 1).collect();
     for outcome in &several {
         let columns = outcome.columns();
         let views: Vec<_> = columns.iter().map(|(n, u, v)| (n.as_str(), u.as_str(), v.as_slice())).collect();
@@ -176,7 +177,7 @@ pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), E
         csv::write(output.join(format!("envelope_{}.csv", outcome.file_name())), &columns)?;
     }
     for outcome in outcomes.iter().filter(|outcome| !outcome.events.is_empty()) {
-        let each = |get: &dyn Fn(&Event) -> f64| outcome.events.iter().map(get).collect::<Vec<f64>>();
+        let each = |get: &dyn Fn(&BreakingEvent) -> f64| outcome.events.iter().map(get).collect::<Vec<f64>>();
         let (step, load) = (each(&|e| e.step as f64 + 1.0), each(&|e| e.load));
         let bonds = each(&|e| e.bonds as f64);
         let columns = [("step", "", &step[..]), ("load_before", "N", &load), ("bonds", "", &bonds)];
@@ -197,12 +198,12 @@ pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), E
     let mut plot = LinePlot::new(if scene.title.is_empty() { "Load" } else { &scene.title })
         .size(900.0, 560.0)
         .axes("displacement (mm)", "load (N)")
-        .legend(if several.len() > LEGEND { LegendPlace::Outside } else { LegendPlace::TopLeft });
+        .legend(if several.len() > INNER_LEGEND { LegendPlace::Outside } else { LegendPlace::TopLeft });
     let from_rest = |values: &[f64], scale: f64| -> Vec<f64> {
         std::iter::once(0.0).chain(values.iter().map(|v| v * scale)).collect()
     };
-    // a body in free flight has neither
-    let loaded: Vec<&&Outcome> =
+    // a body in free flight has neither load nor displacement
+    let loaded: Vec<&&VariantOutcome> =
         several.iter().filter(|o| o.history.iter().any(|r| r.load != 0.0 || r.displacement != 0.0)).collect();
     for outcome in &loaded {
         let columns = outcome.columns();
@@ -217,10 +218,10 @@ pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), E
     if !loaded.is_empty() {
         plot.write(output.join("load_displacement.png"))?;
     }
-    peaks(outcomes, output)?;
+    draw_peaks(outcomes, output)?;
     for outcome in several.iter().filter(|o| o.history.iter().any(|r| r.broken > 0)) {
         let columns = outcome.columns();
-        // a body in motion does not stop where its loads do
+        // a body in motion keeps moving after its loads stop
         let time = columns.iter().find(|c| c.0 == "time");
         let (label, x) = match time {
             Some(time) => ("time (ms)", from_rest(&time.2, 1e3)),
@@ -230,7 +231,7 @@ pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), E
             .size(900.0, 560.0)
             .axes(label, "energy (J)")
             .legend(LegendPlace::TopLeft);
-        // stored is with that of contact
+        // `stored` includes the energy of contact
         for name in ["work", "stored", "contact_energy", "kinetic", "released", "damped", "friction_work"] {
             if let Some(column) = columns.iter().find(|c| c.0 == name) {
                 plot = plot.series(Series::line(name, &x, &from_rest(&column.2, 1.0)));

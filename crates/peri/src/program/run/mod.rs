@@ -1,24 +1,25 @@
-//! A whole scene: every variant solved, measured, compared, drawn and judged; restartable at any moment.
+//! Runs a scene: solves every variant, compares, draws and judges; resumable from checkpoints.
 
 mod compare;
+mod device;
 mod draw;
 mod history;
 mod outcome;
 mod program;
 mod variants;
 
-pub use outcome::{Outcome, Profile};
+pub use outcome::{Profile, VariantOutcome};
 pub use program::Peri;
 
-use variants::UnderWay;
+use variants::VariantRun;
 
 use crate::bonds::{Bonds, Property};
 use crate::calibrate::Space;
 use crate::error::Error;
-use crate::program::observe::{self, Frames, Moment, Observers, Physics, in_space};
+use crate::program::observe::{self, FieldFrames, Moment, Physics, SceneObservers, in_space};
 use crate::program::quantities as q;
-use crate::program::scene::{self, NAMING, Scene, Variant};
-use crate::solver::{Breaking, Method, Record, State, Status, System, load_stepping};
+use crate::program::scene::{self, NAMING, Scene, SceneVariant};
+use crate::solver::{Breaking, State, Status, StepRecord, System, load_stepping};
 use harness::case::{Fault, Run, Step, StepField};
 use harness::observe::{Outputs, Scalars};
 use harness::report::{Phases, Report};
@@ -28,24 +29,30 @@ use polycore::memory::available;
 use std::cell::RefCell;
 use std::path::Path;
 
-/// What stops a run: a fault in the scene, or one on the way.
-pub type Failure = harness::scene::Failure<Error>;
+/// Error of a run: an invalid scene, or a failure while solving.
+pub type PeriFailure = harness::scene::Failure<Error>;
 
-/// Particles of a body from which on its own loops keep all threads busy: such variants are solved one after another.
-const LARGE: usize = 100_000;
+/// Particles of a body whose loops keep all threads busy: larger variants are solved one after another.
+const LARGE_BODY: usize = 100_000;
 
-/// A finished run.
-pub struct Finished {
-    /// As written to `report.json`.
+/// Finished run of a scene.
+pub struct FinishedScene {
+    /// Report, as in `report.json`.
     pub report: Report,
-    /// The variants, in the order they ran.
-    pub outcomes: Vec<Outcome>,
+    /// Results of the variants, in their order.
+    pub outcomes: Vec<VariantOutcome>,
 }
 
-impl Finished {
-    /// For the terminal: all values of a single variant, a line for each of several, then the judged expectations.
+impl FinishedScene {
+    /// Returns warnings and remarks, a line each.
+    pub fn notes(&self) -> String {
+        compare::notes(&self.outcomes)
+    }
+
+    /// Returns the summary for the terminal: all values of a single variant or a line per variant, then the
+    /// verdicts.
     pub fn summary(&self) -> String {
-        let notes = compare::notes(&self.outcomes);
+        let notes = self.notes();
         if self.outcomes.len() == 1 {
             self.report.table() + &history::peak_lines(&self.outcomes) + &notes
         } else {
@@ -57,59 +64,64 @@ impl Finished {
     }
 }
 
-/// Runs a scene in its dimension, all but `report.json`, which [`Run::finish`] writes.
+/// Runs a scene and writes all files but `report.json`, which [`Run::finish`] writes.
 ///
 /// # Errors
-/// [`Failure`]; nothing half-written remains, and an interrupted run can be resumed.
-pub fn run(source: &Source, scene: &Scene, run: &mut Run) -> Result<Finished, Failure> {
+/// [`PeriFailure`]; no file is half-written, and an interrupted run can be resumed.
+pub fn run(source: &Source, scene: &Scene, run: &mut Run) -> Result<FinishedScene, PeriFailure> {
     match scene.body.space {
         Space::Solid => run_in::<3>(source, scene, run),
         _ => run_in::<2>(source, scene, run),
     }
 }
 
-fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Result<Finished, Failure> {
+fn run_in<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    run: &mut Run,
+) -> Result<FinishedScene, PeriFailure> {
     let (output, quick) = (run.options.output, run.options.quick);
     let variants = observe::check(source, scene, quick)?;
-    // every body is built once before anything is computed or written: faults show at once
-    let (mut largest, mut memory) = (0, f64::MIN_POSITIVE);
+    // every body is built once before anything is computed or written, so that errors show at once
+    let (mut largest, mut memory, mut on_card) = (0, f64::MIN_POSITIVE, false);
     for variant in variants.iter().filter(|variant| variant.of.expect_error.is_none()) {
         let (source, scene) = variant.resolved();
         let bonds = Physics::<D>::new(source, scene, variant)?.0.bonds;
+        on_card |= device::choose(source, scene, &*bonds)?.card.is_some();
         largest = largest.max(bonds.particles().len());
         memory = memory.max(scene::memory_needed(scene, &*bonds));
     }
     run.begin()?;
-    // one after another where steps are watched and where errors are drawn against run times
+    // one after another if steps are observed or run times are compared
     let timed = scene.exact.is_some() || scene.output.compare.is_some();
-    let alone = run.options.on_step.is_some() || timed || largest > LARGE;
+    let alone = run.options.on_step.is_some() || timed || on_card || largest > LARGE_BODY;
     let fitting = (available() / memory) as usize;
     let at_once = if alone { 1 } else { rayon::current_num_threads().min(fitting).max(1) };
-    let names: Vec<String> = variants.iter().map(Variant::name).collect();
+    let names: Vec<String> = variants.iter().map(SceneVariant::name).collect();
     let lengths = scene::free_lengths::<D>(&variants)?;
     let mut finished = study::solve(run, NAMING, &names, at_once, |index, own| {
         let variant = &variants[index];
         let (state, expected) = (own.reached()?, variant.of.expect_error.as_deref());
         let (own_source, own_scene) = variant.resolved();
         let outcome = scene::check_variant(own_source, own_scene)
-            .map_err(Failure::from)
+            .map_err(PeriFailure::from)
             .and_then(|()| {
-                run_variant::<D>(own_source, own_scene, variant, output, &UnderWay(own.into()), state)
+                run_variant::<D>(own_source, own_scene, variant, output, &VariantRun(own.into()), state)
             })
             .and_then(|(outcome, ended)| match ended {
                 Some(error) if expected.is_none_or(|text| !error.to_string().contains(text)) => {
-                    kept((source, scene, quick), outcome, &error, output)?;
-                    Err(Failure::Run(error))
+                    write_failed((source, scene, quick), outcome, &error, output)?;
+                    Err(PeriFailure::Run(error))
                 }
                 _ => Ok(outcome),
             });
         let mut outcome = match study::expected(outcome, expected) {
-            Err(Failure::Run(error)) if variants.len() > 1 && !error.is_interruption() => {
+            Err(PeriFailure::Run(error)) if variants.len() > 1 && !error.is_interruption() => {
                 return Err(Error::Within { variant: variant.name(), error: Box::new(error) }.into());
             }
-            outcome => outcome?.unwrap_or_else(|error| Outcome {
+            outcome => outcome?.unwrap_or_else(|error| VariantOutcome {
                 error: Some(error),
-                ..Outcome::new(variant.name(), variant)
+                ..VariantOutcome::new(variant.name(), variant)
             }),
         };
         if expected.is_some() {
@@ -124,18 +136,18 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
     compare::write(&finished, output)?;
     compare::suite(&mut report, &finished, output)?;
     if scene.output.pictures {
-        draw::curves(scene, &finished, output)?;
+        draw::draw_curves(scene, &finished, output)?;
     }
-    Ok(Finished { report, outcomes: finished })
+    Ok(FinishedScene { report, outcomes: finished })
 }
 
-/// Writes what there is of a variant that ended in an error: its history, its values, and a report that has not passed.
-fn kept(
+/// Writes the history, values and failed report of a variant that ended in an error.
+fn write_failed(
     (source, scene, quick): (&Source, &Scene, bool),
-    outcome: Outcome,
+    outcome: VariantOutcome,
     error: &Error,
     output: &Path,
-) -> Result<(), Failure> {
+) -> Result<(), PeriFailure> {
     let outcomes = [outcome];
     history::write(scene, &outcomes, output)?;
     let mut report = compare::report(source, scene, &outcomes, quick);
@@ -147,38 +159,42 @@ fn kept(
 fn run_variant<const D: usize>(
     source: &Source,
     scene: &Scene,
-    variant: &Variant,
+    variant: &SceneVariant,
     output: &Path,
-    under_way: &UnderWay,
+    variant_run: &VariantRun,
     state: Option<State<D>>,
-) -> Result<(Outcome, Option<Error>), Failure> {
+) -> Result<(VariantOutcome, Option<Error>), PeriFailure> {
     let phases = RefCell::new(Phases::new());
     phases.borrow_mut().start("build");
     let (mut body, mut physics) = Physics::<D>::new(source, scene, variant)?;
     physics.begin(source, scene, variant, &body)?;
     phases.borrow_mut().stop();
-    let mut outcome = Outcome::new(variant.name(), variant);
+    let mut outcome = VariantOutcome::new(variant.name(), variant);
     physics.name = outcome.file_name();
     outcome.warnings = scene::warnings(source, scene, &body);
     outcome.warnings.extend(scene::tearing_warnings(scene, &body, physics.body.toughness.as_ref()));
+    let device = device::choose(source, scene, &*body.bonds)?;
+    outcome.warnings.extend(device.note);
     outcome.snaps_back = scene.solver.snap_back;
-    let mut state = begin((source, scene), &body, state, output)?;
+    let mut state = initial_state((source, scene), &body, state, output)?;
     let mut observers = observe::observers::<D>(scene);
-    let mut frames = Frames::new(scene, &state, &output.join(physics.field_file()))?;
+    let mut frames = FieldFrames::new(scene, &state, &output.join(physics.field_file()))?;
     let ended = match solve(
-        (source, scene),
+        (source, scene, device.card.as_ref()),
         &physics,
-        under_way,
+        variant_run,
         &mut body,
         &mut state,
         &phases,
         (&mut observers, &mut frames),
     ) {
-        Err(Failure::Run(error @ Error::NoEquilibrium { .. })) if !state.history.is_empty() => Some(error),
+        Err(PeriFailure::Run(error @ Error::NoEquilibrium { .. })) if !state.history.is_empty() => {
+            Some(error)
+        }
         other => other.map(|()| None)?,
     };
     if let Some(error) = &ended {
-        // the last equilibrium has bonds that are broken by now
+        // bonds of the last equilibrium have broken since
         body = Physics::<D>::new(source, scene, variant)?.0;
         state.fracture.restore(&mut *body.bonds)?;
         outcome.error = Some(error.to_string());
@@ -194,10 +210,10 @@ fn run_variant<const D: usize>(
         let mut take = |named, value| outcome.value(named, value);
         observer.scalars(&mut Scalars::new(Some(&moment), &mut take));
         outcome.warnings.extend(observer.warnings(&moment));
-        outcome.profiles.extend(observer.curves(&moment).into_iter().filter_map(Profile::of));
+        outcome.profiles.extend(observer.curves(&moment).into_iter().filter_map(Profile::from_curve));
     }
     phases.borrow_mut().stop();
-    outcome.work_of(&*body.bonds, &state);
+    outcome.record_work(&*body.bonds, &state);
     outcome.history.clone_from(&state.history);
     outcome.events.clone_from(&state.fracture.events);
     outcome.fragments = moment.fragments().to_vec();
@@ -205,20 +221,20 @@ fn run_variant<const D: usize>(
     let planes = scene.contact.iter().flat_map(|contact| contact.plane.iter().enumerate());
     outcome.planes = planes.map(|(index, plane)| plane.name(index)).collect();
     outcome.probes = observe::columns(scene);
-    outcome.seconds(&phases.borrow());
+    outcome.record_seconds(&phases.borrow());
     frames.finish(&observers, &moment)?;
     let outputs = Outputs { folder: output, pictures: scene.output.pictures };
     observers.iter().try_for_each(|observer| observer.write(&moment, &outputs))?;
     Ok((outcome, ended))
 }
 
-/// The state from which a variant is solved: the undeformed body, unless the checkpoint has one.
-fn begin<const D: usize>(
+/// Returns the initial state of a variant: that of the checkpoint, else the undeformed body.
+fn initial_state<const D: usize>(
     (source, scene): (&Source, &Scene),
-    body: &scene::Body<D>,
+    body: &scene::DiscreteBody<D>,
     state: Option<State<D>>,
     output: &Path,
-) -> Result<State<D>, Failure> {
+) -> Result<State<D>, PeriFailure> {
     let sites = body.bonds.sites();
     let Some(state) = state else {
         let mut state = State::new(sites);
@@ -228,7 +244,7 @@ fn begin<const D: usize>(
         return Ok(state);
     };
     if state.displacement.sites() != sites {
-        let why = format!("it has {} particles' sites, the body now has {sites}", state.displacement.sites());
+        let why = format!("it has {} sites, the body now has {sites}", state.displacement.sites());
         let path = output.join(harness::checkpoint::FILE_NAME);
         return Err(polycore::Error::Checkpoint { path, why }.into());
     }
@@ -236,22 +252,23 @@ fn begin<const D: usize>(
 }
 
 fn solve<const D: usize>(
-    (source, scene): (&Source, &Scene),
+    (source, scene, card): (&Source, &Scene, Option<&device::Card>),
     physics: &Physics<D>,
-    under_way: &UnderWay,
-    body: &mut scene::Body<D>,
+    variant_run: &VariantRun,
+    body: &mut scene::DiscreteBody<D>,
     state: &mut State<D>,
     phases: &RefCell<Phases>,
-    (observers, frames): (&mut Observers<D>, &mut Frames),
-) -> Result<(), Failure> {
+    (observers, frames): (&mut SceneObservers<D>, &mut FieldFrames),
+) -> Result<(), PeriFailure> {
     let (material, loads) = (&physics.body.material, &physics.loads);
     let factors = scene.solver.factors();
-    let mut watch = |status: &Status, state: &State<D>| under_way.watch(status, state);
+    let mut watch = |status: &Status, state: &State<D>| variant_run.watch(status, state);
     let contact = match &scene.contact {
         Some(contact) => {
-            let planes = contact.planes(source, scene.dynamics.is_some()).map_err(Failure::from)?;
+            let planes = contact.planes(source, scene.dynamics.is_some()).map_err(PeriFailure::from)?;
             let whole = material.longitudinal_modulus(&*body.bonds);
-            let modulus = Property::new(&*body.bonds, |site, _| whole * physics.body.stiffness.at(site));
+            let modulus =
+                Property::new(&*body.bonds, |site, _| whole * physics.body.stiffness.value_at(site));
             let held = physics.held.as_deref();
             let tied = held.map(|held| (held, contact.tie_stiffness(scene.dynamics.is_some())));
             Some(contact.contact(planes, body, material.micromodulus(&*body.bonds), &modulus, tied)?)
@@ -259,7 +276,7 @@ fn solve<const D: usize>(
         None => None,
     };
     let course = scene.dynamics.as_ref().and_then(|dynamics| dynamics.factor.as_ref());
-    let course = course.map(|formula| |time: f64| formula.in_time(time));
+    let course = course.map(|formula| |time: f64| formula.value_and_rate(time));
     let row = |bonds: &dyn Bonds<D>, state: &State<D>| physics.row(bonds, state);
     let response = material.respond(&*body.bonds);
     let mut system = System::of_response(&mut *body.bonds, response, loads, &factors);
@@ -270,7 +287,7 @@ fn solve<const D: usize>(
     system.breaking = criterion.map(|criterion| Breaking { criterion, policy: scene.solver.breaking });
     system.contact = contact;
     (system.refine, system.snap_back) = (scene.solver.refine, scene.solver.snap_back);
-    system.stop_below = scene.solver.stop_below.unwrap_or(0.0);
+    system.stop_below = scene.solver.stop_below.map_or(0.0, |part| part.si());
     phases.borrow_mut().start("solve");
     let mut finished = |bonds: &dyn Bonds<D>, state: &State<D>| {
         phases.borrow_mut().stop();
@@ -278,28 +295,30 @@ fn solve<const D: usize>(
         observers.iter_mut().try_for_each(|observer| observer.see(&moment))?;
         frames.step(observers, &moment)?;
         if state.control.round == 0 {
-            under_way.step(|| seen(bonds, state));
+            variant_run.step(|| step_data(bonds, state));
         }
         phases.borrow_mut().start("solve");
         Ok(())
     };
     let solved = match &scene.dynamics {
-        Some(dynamics) => dynamics.method().solve(&mut system, state, &mut watch, &mut finished),
+        Some(dynamics) => {
+            device::solve(card, &dynamics.method(), &mut system, state, &mut watch, &mut finished)
+        }
         None => load_stepping(&mut *scene.equilibria(), &mut system, state, &mut watch, &mut finished),
     };
     phases.borrow_mut().stop();
     Ok(solved?)
 }
 
-/// A finished step, as who watches the run sees it: positions and displacements in three components.
-fn seen<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> Step {
+/// Returns the data of a finished step for a callback: positions and displacements in three components.
+fn step_data<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> Step {
     let Some(record) = state.history.last() else { return Step::default() };
     let of_particles = |name, get: &dyn Fn(usize) -> [f64; D]| {
         let each = bonds.particles().iter().flat_map(|&site| in_space(get(site as usize)));
         StepField { name, unit: "m", components: 3, data: each.collect() }
     };
     Step {
-        values: Record::SCALARS.map(|(name, unit, get)| (name, unit, get(record))).to_vec(),
+        values: StepRecord::SCALARS.map(|(name, unit, get)| (name, unit, get(record))).to_vec(),
         fields: vec![
             of_particles("position", &|site| bonds.position(site)),
             of_particles("displacement", &|site| state.displacement.get(site)),
@@ -307,26 +326,26 @@ fn seen<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> Step {
     }
 }
 
-/// An iteration in a line.
-fn line_of(status: &Status) -> String {
+/// Formats the progress line of an iteration.
+fn progress_line(status: &Status) -> String {
     let Status { step, steps, iteration, residual, load, broken, .. } = *status;
     let broken = if broken > 0 { format!("  broken {broken}") } else { String::new() };
     let load = load.map_or(String::new(), |load| format!("  load {load:.4e} N before"));
     format!("step {}/{steps}{broken}  iteration {iteration}  residual {residual:.2e}{load}", step + 1)
 }
 
-/// The part of a variant that is done, 0 to 1: residuals fall by powers of ten.
-fn part_of(status: &Status) -> f64 {
+/// Returns the finished fraction of a variant, 0 to 1, from the logarithm of the residual.
+fn finished_fraction(status: &Status) -> f64 {
     let decades = (1.0 / status.tolerance).log10();
     let done = (-status.residual.log10()).clamp(0.0, decades) / decades;
     (status.step as f64 + done) / status.steps as f64
 }
 
-/// What a scene builds and leaves out, variant by variant.
+/// Lists what a scene builds and leaves out, by variant.
 ///
 /// # Errors
-/// A fault of the scene.
-pub fn explanation(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<String>, Failure> {
+/// An invalid scene.
+pub fn explanation(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<String>, PeriFailure> {
     match scene.body.space {
         Space::Solid => explanation_in::<3>(source, scene, quick),
         _ => explanation_in::<2>(source, scene, quick),
@@ -337,7 +356,7 @@ fn explanation_in<const D: usize>(
     source: &Source,
     scene: &Scene,
     quick: bool,
-) -> Result<Vec<String>, Failure> {
+) -> Result<Vec<String>, PeriFailure> {
     let mut lines = Vec::new();
     let variants = observe::check(source, scene, quick)?;
     let lengths = scene::free_lengths::<D>(&variants)?;
@@ -351,6 +370,8 @@ fn explanation_in<const D: usize>(
         let (criterion, reports) = (physics.body.criterion.as_ref(), observe::quantities(scene));
         lines.extend(scene::explain(source, scene, &variant, &body, criterion, &reports)?);
         lines.extend(scene::explain_tearing(scene, &body, physics.body.toughness.as_ref()));
+        let device = device::choose(source, scene, &*body.bonds)?;
+        lines.extend(device.note.map(|note| format!("  builds     {note}")));
         lines.extend(physics.body.followed.iter().map(|one| format!("  follows    {one}")));
     }
     lines.extend(lengths.into_iter().map(|text| format!("  warning    {text}")));

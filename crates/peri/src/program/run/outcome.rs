@@ -1,47 +1,47 @@
 //! Results of one variant.
 
 use crate::bonds::{Bonds, Fragment};
-use crate::program::scene::Variant;
-use crate::solver::{Event, Record, State};
+use crate::program::scene::SceneVariant;
+use crate::solver::{BreakingEvent, State, StepRecord};
 use harness::observe::Curve;
 use harness::report::{Named, Phases};
 use harness::study::Solved;
 use serde::{Deserialize, Serialize};
 
-/// Everything of a variant that outlives its fields.
+/// Results of a variant without its fields.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Outcome {
-    /// The variant's name.
+pub struct VariantOutcome {
+    /// Name of the variant.
     pub name: String,
     /// Spacing, m.
     pub spacing: f64,
     /// Horizon over spacing.
     pub horizon_ratio: f64,
-    /// Name of the variant without its spacing: variants that differ in nothing else converge together.
+    /// Name without the spacing: variants of one family differ in spacing only.
     pub family: String,
     /// Named scalars with units.
     pub values: Vec<(String, f64, String)>,
     /// Named profiles.
     pub profiles: Vec<Profile>,
-    /// The load steps.
-    pub history: Vec<Record>,
-    /// Bonds that broke together, in their order.
-    pub events: Vec<Event>,
-    /// The fragments, the largest first.
+    /// History of load steps.
+    pub history: Vec<StepRecord>,
+    /// Breaking events in their order.
+    pub events: Vec<BreakingEvent>,
+    /// Fragments, the largest first.
     pub fragments: Vec<Fragment>,
-    /// Whether the load was lowered where bonds broke, see `solver.snap_back`.
+    /// True if the load was lowered after bonds broke, see `solver.snap_back`.
     pub snaps_back: bool,
     /// Names of the regions of prescribed displacement.
     pub regions: Vec<String>,
     /// Names of rigid planes.
     pub planes: Vec<String>,
-    /// Columns of what the probes saw, with their units.
+    /// Columns of probes, with units.
     pub probes: Vec<(String, String)>,
-    /// What is allowed and most likely not meant.
+    /// Warnings.
     pub warnings: Vec<String>,
-    /// Expected behaviour, where the scene says so.
+    /// Expected behaviour from the scene.
     pub description: Option<String>,
-    /// The error with which it ended, where the scene expects one.
+    /// Error with which the variant ended.
     pub error: Option<String>,
     /// Work done.
     pub work: Vec<(String, u64)>,
@@ -49,28 +49,28 @@ pub struct Outcome {
     pub seconds: Vec<(String, f64)>,
 }
 
-/// A curve along a line: abscissa in m, value relative to its reference.
+/// Curve along a line.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Profile {
-    /// What.
+    /// Name.
     pub name: String,
-    /// Where, m.
+    /// Positions, m.
     pub at: Vec<f64>,
-    /// How much.
+    /// Values relative to the reference.
     pub value: Vec<f64>,
 }
 
 impl Profile {
-    /// Of a curve of two columns.
-    pub fn of(curve: Curve) -> Option<Self> {
+    /// Converts a curve of two columns.
+    pub fn from_curve(curve: Curve) -> Option<Self> {
         let mut columns = curve.columns.into_iter().map(|(_, _, values)| values);
         Some(Self { name: curve.name, at: columns.next()?, value: columns.next()? })
     }
 }
 
-impl Outcome {
-    /// Nothing yet.
-    pub fn new(name: String, variant: &Variant) -> Self {
+impl VariantOutcome {
+    /// Creates empty results.
+    pub fn new(name: String, variant: &SceneVariant) -> Self {
         Self {
             name,
             spacing: variant.spacing,
@@ -93,7 +93,7 @@ impl Outcome {
         }
     }
 
-    /// Name for files: no spaces, no signs that shells know.
+    /// Returns the name for files, without spaces and shell characters.
     pub fn file_name(&self) -> String {
         self.name.replace(' ', "_").replace('=', "-")
     }
@@ -104,18 +104,18 @@ impl Outcome {
         self.values.push((name, value, unit));
     }
 
-    /// A scalar by name.
+    /// Returns a scalar by name.
     pub fn get(&self, name: &str) -> Option<f64> {
         self.values.iter().find(|(n, _, _)| n == name).map(|v| v.1)
     }
 
-    /// A count of work by name.
+    /// Returns a count of work by name.
     pub fn count_of(&self, name: &str) -> u64 {
         self.work.iter().find(|(n, _)| n == name).map_or(0, |w| w.1)
     }
 
-    /// Counts of the solution.
-    pub fn work_of<const D: usize>(&mut self, bonds: &dyn Bonds<D>, state: &State<D>) {
+    /// Records counts of the solution.
+    pub fn record_work<const D: usize>(&mut self, bonds: &dyn Bonds<D>, state: &State<D>) {
         let directed = bonds.directed_bonds();
         for (name, count) in [
             ("particles", bonds.particles().len() as u64),
@@ -135,18 +135,18 @@ impl Outcome {
         }
     }
 
-    /// Seconds of all phases.
-    pub fn seconds(&mut self, phases: &Phases) {
+    /// Records the seconds of all phases.
+    pub fn record_seconds(&mut self, phases: &Phases) {
         self.seconds = phases.seconds().map(|(name, seconds)| (name.to_owned(), seconds)).collect();
     }
 
-    /// Seconds of a phase.
+    /// Returns the seconds of a phase.
     pub fn seconds_of(&self, phase: &str) -> f64 {
         self.seconds.iter().filter(|(name, _)| name == phase).map(|s| s.1).fold(0.0, |sum, s| sum + s)
     }
 }
 
-impl Solved for Outcome {
+impl Solved for VariantOutcome {
     fn name(&self) -> &str {
         &self.name
     }
@@ -160,9 +160,9 @@ impl Solved for Outcome {
     }
 }
 
-/// Families of variants that differ in spacing only, coarse to fine, at least two in each.
-pub fn families(outcomes: &[Outcome]) -> Vec<(String, Vec<&Outcome>)> {
-    let mut families: Vec<(String, Vec<&Outcome>)> = Vec::new();
+/// Returns families of at least two variants that differ in spacing only, coarse to fine.
+pub fn families(outcomes: &[VariantOutcome]) -> Vec<(String, Vec<&VariantOutcome>)> {
+    let mut families: Vec<(String, Vec<&VariantOutcome>)> = Vec::new();
     for outcome in outcomes {
         match families.iter_mut().find(|(name, _)| *name == outcome.family) {
             Some((_, members)) => members.push(outcome),

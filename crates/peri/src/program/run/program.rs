@@ -1,4 +1,4 @@
-//! `peri` as a program of the harness.
+//! The program `peri` for the harness.
 
 use super::{explanation, run};
 use crate::error::Error;
@@ -6,7 +6,7 @@ use crate::program::scene::{self, Scene};
 use harness::case::{Case, Fault, Finished, Program, Run};
 use harness::scene::{Failure, Source};
 
-/// Bond-based peridynamics of elastomers.
+/// Program that runs scenes of `peri`.
 pub struct Peri;
 
 impl Case for Peri {
@@ -37,7 +37,8 @@ impl Case for Peri {
 
     fn solve(source: &Source, own: &mut Run) -> Result<Finished, Failure<Error>> {
         let finished = run(source, &source.parse::<Scene>()?, own)?;
-        Ok(Finished { text: finished.summary(), report: finished.report })
+        let (text, notes) = (finished.summary(), finished.notes());
+        Ok(Finished::new(finished.report, text).with_notes(&notes))
     }
 
     fn bulky(_: &Source) -> &'static [&'static str] {
@@ -53,6 +54,8 @@ impl Fault for Error {
     fn exit_code(&self) -> u8 {
         match self {
             Self::Geometry(_) | Self::Parameter { .. } | Self::TimeStep { .. } => 2,
+            #[cfg(feature = "gpu")]
+            Self::Device(_) => 2,
             Self::NoEquilibrium { torn, .. } => 2 - u8::from(*torn),
             Self::NotFinite { .. }
             | Self::NotConverged { .. }

@@ -1,28 +1,28 @@
-//! A variant under way, as its solver sees the run.
+//! Checkpoints and progress of a variant while it is solved.
 
-use super::{line_of, part_of};
+use super::{finished_fraction, progress_line};
 use crate::error::Error;
 use crate::solver::{State, Status};
 use harness::case::{Run, Step};
 use std::cell::RefCell;
 
-/// The run of a variant: its checkpoint, its progress, who watches it.
-pub struct UnderWay<'a, 'r>(pub RefCell<&'a mut Run<'r>>);
+/// Run of a variant: checkpoint, progress, callback.
+pub struct VariantRun<'a, 'r>(pub RefCell<&'a mut Run<'r>>);
 
-impl UnderWay<'_, '_> {
-    /// After an iteration: shows it, keeps its state where a checkpoint is due, ends where the user or another variant asks for it.
+impl VariantRun<'_, '_> {
+    /// Shows the progress after an iteration, writes a due checkpoint, and stops at an interruption.
     ///
     /// # Errors
-    /// [`polycore::Error::Interrupted`]; a checkpoint cannot be written.
+    /// [`polycore::Error::Interrupted`]; a checkpoint that cannot be written.
     pub fn watch<const D: usize>(&self, status: &Status, state: &State<D>) -> Result<(), Error> {
         let mut run = self.0.borrow_mut();
         if status.iteration.is_multiple_of(20) {
-            run.show(part_of(status), &|| line_of(status));
+            run.show(finished_fraction(status), &|| progress_line(status));
         }
         Ok(run.pause(|| status.restartable.then_some(state))?)
     }
 
-    /// After a step.
+    /// Passes a finished step to the callback of the run.
     pub fn step(&self, step: impl FnOnce() -> Step) {
         self.0.borrow_mut().step(step);
     }

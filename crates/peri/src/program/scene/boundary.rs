@@ -1,4 +1,4 @@
-//! Regions of a body and what holds there.
+//! Boundaries of a scene: regions of the body with loads or supports.
 
 use super::ShapeSpec;
 use super::formula::Formula;
@@ -9,13 +9,13 @@ use serde::Deserialize;
 #[derive(Clone, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Boundary {
-    /// Its name in curves and values; default: the side, or `box` and its number.
+    /// Name in curves and values; default: the side, or `box` and its number.
     pub name: Option<String>,
     /// A side of the body's bounding box …
     pub side: Option<Side>,
-    /// … to this depth in particles; default: the horizon, rounded down …
+    /// … with this depth in particles; default: the horizon, rounded down …
     pub layers: Option<usize>,
-    /// … or to this depth as a length: particles whose centres lie in it.
+    /// … or with this depth as a length: particles whose centres lie in it.
     pub depth: Option<Length>,
     /// Or a box: lower corner …
     pub min: Option<Vec<Length>>,
@@ -32,21 +32,21 @@ pub struct Boundary {
     pub velocity: Option<Vec<Speed>>,
     /// Displacement at the end of the last step, component by component: a length or `"free"`.
     pub displacement: Option<Vec<Prescribed>>,
-    /// A turn about an axis, along the arc; `displacement` adds to it.
+    /// Rotation about an axis, along the arc; `displacement` adds to it.
     pub rotation: Option<RotationSpec>,
-    /// The same as formulas of the place, m.
+    /// Displacement at the end of the last step as formulas of the position, m.
     pub displacement_field: Option<Vec<PrescribedField>>,
-    /// Velocity at the start as formulas of the place, m/s.
+    /// Velocity at the start as formulas of the position, m/s.
     pub velocity_field: Option<Vec<Formula>>,
 }
 
 impl Boundary {
-    /// Whether displacements are prescribed here.
-    pub fn holds(&self) -> bool {
+    /// Returns true if the boundary prescribes displacements.
+    pub fn prescribes_displacement(&self) -> bool {
         self.displacement.is_some() || self.displacement_field.is_some() || self.rotation.is_some()
     }
 
-    /// Layers of particles at a side that it acts on.
+    /// Returns the number of layers of particles that it takes at a side.
     pub fn layers_of(&self, spacing: f64, horizon_ratio: f64) -> usize {
         match (self.depth, self.layers) {
             // centres lie half a spacing inside
@@ -55,19 +55,19 @@ impl Boundary {
         }
     }
 
-    /// The key of its depth from a side, where one is given.
+    /// Returns the key that gives its depth: `layers`, `depth` or none.
     pub fn depth_key(&self) -> Option<&'static str> {
         let keys = [("layers", self.layers.is_some()), ("depth", self.depth.is_some())];
         keys.into_iter().find_map(|(name, given)| given.then_some(name))
     }
 
-    /// Whether it gives a velocity at the start.
-    pub fn moves(&self) -> bool {
+    /// Returns true if the boundary prescribes velocities at the start.
+    pub fn prescribes_velocity(&self) -> bool {
         self.velocity.is_some() || self.velocity_field.is_some()
     }
 }
 
-/// A turn of a region about an axis, of a plane body about a point.
+/// Rotation of a region about an axis; in a plane body about a point.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RotationSpec {
@@ -75,7 +75,7 @@ pub struct RotationSpec {
     pub point: Vec<Length>,
     /// Direction of the axis, of any length, in a solid.
     pub axis: Option<Vec<f64>>,
-    /// Angle at the end of the last step, of the right hand about the axis; in the plane from x to y.
+    /// Angle at the end of the last step, right-handed about the axis; in the plane from x to y.
     pub angle: Angle,
 }
 
@@ -110,7 +110,7 @@ impl std::fmt::Display for Side {
 }
 
 impl Side {
-    /// Axis index, and whether the upper end is meant.
+    /// Returns the index of the axis, and true for its upper end.
     pub fn axis(self) -> (usize, bool) {
         match self {
             Self::XLow => (0, false),
@@ -140,7 +140,7 @@ impl schemars::JsonSchema for Prescribed {
     fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
         let length = generator.subschema_for::<Length>();
         schemars::json_schema!({
-            "description": "a length, or free: not prescribed",
+            "description": "a length, or `free`: not prescribed",
             "anyOf": [{ "const": "free" }, length],
         })
     }
@@ -176,7 +176,7 @@ impl schemars::JsonSchema for PrescribedField {
     fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
         let formula = generator.subschema_for::<Formula>();
         schemars::json_schema!({
-            "description": "a formula of x, y, z (m), or free: not prescribed",
+            "description": "a formula of x, y, z (m), or `free`: not prescribed",
             "anyOf": [{ "const": "free" }, formula],
         })
     }

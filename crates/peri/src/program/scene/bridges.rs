@@ -1,34 +1,36 @@
-//! Cracks that end just before the surface or another crack: bonds cross there, and the crack is bridged.
+//! Finds cracks that end just before the surface or another crack, where bonds bridge them.
 
-use super::Body;
+use super::DiscreteBody;
 use crate::geometry::{Cut, length};
 use std::collections::BTreeMap;
 
-/// Width of a bridge beyond a rim, over the spacing; beyond it bonds are looked for …
-const NARROW: f64 = 0.5;
-/// … up to this distance.
-const BEYOND: f64 = 1.5;
-/// Length of a rim that is looked at at once, over the spacing.
-const PIECE: f64 = 2.0;
-/// Cracks that miss each other by less, over the spacing, meet.
-const MEETING: f64 = 2e-3;
+/// Width of a bridge beyond a crack front, in spacings.
+const BRIDGE_WIDTH: f64 = 0.5;
+/// Distance beyond a crack front up to which bonds are counted, in spacings.
+const SEARCH_WIDTH: f64 = 1.5;
+/// Length of the pieces of a crack front in which bonds are counted, in spacings.
+const PIECE_LENGTH: f64 = 2.0;
+/// Largest distance of two cracks that meet, in spacings.
+const MEETING_DISTANCE: f64 = 2e-3;
 
-/// One sentence for each crack that is bridged.
-pub(super) fn bridges<const D: usize>(body: &Body<D>) -> Vec<String> {
+/// Returns a warning for each bridged crack.
+pub(super) fn bridges<const D: usize>(body: &DiscreteBody<D>) -> Vec<String> {
     let spacing = body.bonds.spacing();
     let each = body.cuts.iter().enumerate().filter_map(|(index, cut)| {
         if let Some((other, gap)) = missed(body, index) {
             return Some(format!(
-                "body.cracks[{index}] misses body.cracks[{other}] by {:.4} mm: bonds pass between them; let them meet within \
+                "body.cracks[{index}] misses body.cracks[{other}] by {:.4} mm: bonds pass between them; let \
+                 them meet within \
                  {:.4} mm, or reach beyond each other",
                 gap * 1e3,
-                MEETING * spacing * 1e3
+                MEETING_DISTANCE * spacing * 1e3
             ));
         }
         let bonds = before_an_end(body, cut);
         (bonds > 0).then(|| {
             format!(
-                "body.cracks[{index}] ends less than a spacing ({:.3} mm) before the surface or another crack: {bonds} bonds cross \
+                "body.cracks[{index}] ends less than a spacing ({:.3} mm) before the surface or another \
+                 crack: {bonds} bonds cross \
                  there and bridge it; let it reach beyond",
                 spacing * 1e3
             )
@@ -37,15 +39,15 @@ pub(super) fn bridges<const D: usize>(body: &Body<D>) -> Vec<String> {
     each.collect()
 }
 
-/// Bonds that pass a cut's plane just beyond its rims, where none pass it farther out.
-fn before_an_end<const D: usize>(body: &Body<D>, cut: &Cut<D>) -> u64 {
+/// Counts bonds that pass the plane of a cut just beyond its front, at places where none pass farther out.
+fn before_an_end<const D: usize>(body: &DiscreteBody<D>, cut: &Cut<D>) -> u64 {
     let (bonds, spacing) = (&*body.bonds, body.bonds.spacing());
     let sizes = cut.edges.map(length);
     // near and far, by the edge, its end and the piece along the rim
     let mut counts: BTreeMap<(usize, bool, i64), [u64; 2]> = BTreeMap::new();
     for &site in bonds.particles() {
         let here = bonds.position(site as usize);
-        if !cut.is_within(here, bonds.horizon() + BEYOND * spacing) {
+        if !cut.is_within(here, bonds.horizon() + SEARCH_WIDTH * spacing) {
             continue;
         }
         bonds.neighbours(site as usize, &mut |bond| {
@@ -61,20 +63,21 @@ fn before_an_end<const D: usize>(body: &Body<D>, cut: &Cut<D>) -> u64 {
                 let beyond = size * if upper { place - 1.0 } else { -place } / spacing;
                 let along = (0..D - 1).find(|&other| other != edge);
                 let beside = along.is_some_and(|other| !(0.0..=1.0).contains(&found[other + 1]));
-                if beside || !(MEETING..=BEYOND).contains(&beyond) {
+                if beside || !(MEETING_DISTANCE..=SEARCH_WIDTH).contains(&beyond) {
                     continue;
                 }
-                let piece =
-                    along.map_or(0, |other| (found[other + 1] * sizes[other] / (PIECE * spacing)) as i64);
-                counts.entry((edge, upper, piece)).or_default()[usize::from(beyond > NARROW)] += 1;
+                let piece = along
+                    .map_or(0, |other| (found[other + 1] * sizes[other] / (PIECE_LENGTH * spacing)) as i64);
+                counts.entry((edge, upper, piece)).or_default()[usize::from(beyond > BRIDGE_WIDTH)] += 1;
             }
         });
     }
     counts.values().filter(|[_, far]| *far == 0).map(|[near, _]| near).sum()
 }
 
-/// The crack that a rim of this one misses by less than half a spacing inside of the body, and by how much.
-fn missed<const D: usize>(body: &Body<D>, index: usize) -> Option<(usize, f64)> {
+/// Returns the crack that a front of crack `index` misses by less than half a spacing inside the body, and
+/// the distance, m.
+fn missed<const D: usize>(body: &DiscreteBody<D>, index: usize) -> Option<(usize, f64)> {
     let (bonds, spacing) = (&*body.bonds, body.bonds.spacing());
     let inside = |place: &[f64; D]| {
         let near = |&site: &u32| {
@@ -90,13 +93,13 @@ fn missed<const D: usize>(body: &Body<D>, index: usize) -> Option<(usize, f64)> 
     };
     rim(&body.cuts[index], 0.5 * spacing).iter().find_map(|place| {
         let (other, (apart, corner)) = nearest(place)?;
-        let near = MEETING * spacing < apart && apart < NARROW * spacing;
+        let near = MEETING_DISTANCE * spacing < apart && apart < BRIDGE_WIDTH * spacing;
         // of rims of unequal length, one ends beside the other's corner
         (near && (D == 2 || !corner) && inside(place)).then_some((other, apart))
     })
 }
 
-/// Places along the rims of a cut, `apart` or nearer.
+/// Returns points along the fronts of a cut, at most `apart` from each other, m.
 fn rim<const D: usize>(cut: &Cut<D>, apart: f64) -> Vec<[f64; D]> {
     if D == 2 {
         return cut.corners();
@@ -117,7 +120,7 @@ fn rim<const D: usize>(cut: &Cut<D>, apart: f64) -> Vec<[f64; D]> {
     places
 }
 
-/// Distance of a point from a cut, m, and whether a corner of it (in 2D an end) is nearest.
+/// Returns the distance of a point from a cut, m, and true if a corner (in 2D an end) is nearest.
 fn distance<const D: usize>(cut: &Cut<D>, point: [f64; D]) -> (f64, bool) {
     let dot = |a: &[f64; D], b: &[f64; D]| (0..D).map(|d| a[d] * b[d]).sum::<f64>();
     let from: [f64; D] = std::array::from_fn(|d| point[d] - cut.corner[d]);

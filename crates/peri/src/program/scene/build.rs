@@ -1,11 +1,11 @@
-//! From a scene to a body. Every rule that spans several keys is checked here, once.
+//! Builds the body of a variant, and checks the rules that span several keys.
 
 use super::cloud::cloud;
 use super::crack::{cracks, severed};
 use super::memory;
-use super::values::{Body, needed, ordered, vector};
-use super::variant::Variant;
-use super::{Axis, Scene, ShapeKind, ShapeSpec};
+use super::values::{DiscreteBody, ONE_OF_THEM, check_order, required, vector};
+use super::variant::SceneVariant;
+use super::{AxisName, Scene, ShapeKind, ShapeSpec};
 use crate::bonds::{BodyGeometry, BondDamage, LatticeBonds};
 use crate::calibrate::Space;
 use crate::geometry::{Cut, Gaps, MOST_CELLS, Operation, Shape, bounds, cell_counts, lattice};
@@ -13,7 +13,7 @@ use harness::scene::{SceneError, Source};
 use polycore::memory::{available, gib};
 use polycore::units::Length;
 
-/// Sites a body may have at most, whatever memory there is: they are counted in 32 bits.
+/// Largest number of sites of a body: they are counted in 32 bits.
 const MOST_SITES: f64 = u32::MAX as f64;
 
 /// Builds the body of a variant.
@@ -23,34 +23,33 @@ const MOST_SITES: f64 = u32::MAX as f64;
 pub fn body_of<const D: usize>(
     source: &Source,
     scene: &Scene,
-    variant: &Variant,
-) -> Result<Body<D>, SceneError> {
+    variant: &SceneVariant,
+) -> Result<DiscreteBody<D>, SceneError> {
     let thickness = thickness(source, scene)?;
     let cuts = cracks(source, scene)?;
     let mut body = match scene.body.has_points() {
         true => cloud(source, scene, variant, thickness, &cuts)?,
-        false => filled(source, scene, variant, thickness, &cuts)?,
+        false => build_lattice_body(source, scene, variant, thickness, &cuts)?,
     };
     body.severed = severed(source, &*body.bonds, &cuts)?;
     body.cuts = cuts;
     Ok(body)
 }
 
-/// The lattice in the shapes.
-fn filled<const D: usize>(
+/// Fills the shapes with a lattice of particles.
+fn build_lattice_body<const D: usize>(
     source: &Source,
     scene: &Scene,
-    variant: &Variant,
+    variant: &SceneVariant,
     thickness: f64,
     cuts: &[Cut<D>],
-) -> Result<Body<D>, SceneError> {
+) -> Result<DiscreteBody<D>, SceneError> {
     let (operations, low, high) = outline(source, scene)?;
     let counts = cell_counts(low, high, variant.spacing);
     refuse_too_large(source, scene, counts, variant.horizon_ratio)?;
     check_shapes(source, &operations, low, high)?;
-    let lattice = lattice(&operations, variant.spacing, thickness).map_err(|error| {
-        source.error("body.shapes", error, "a body that contains at least one particle of the lattice")
-    })?;
+    let lattice = lattice(&operations, variant.spacing, thickness)
+        .map_err(|error| source.error("body.shapes", error, "a body with at least one particle"))?;
     let volume = variant.spacing.powi(D as i32) * thickness;
     if !(volume.is_normal()) {
         let found = format!("{} m, with which the volume of a particle is {volume} m³", variant.spacing);
@@ -80,52 +79,49 @@ fn filled<const D: usize>(
     memory::refuse_too_large(source, scene, spacing_key(scene), &bonds)?;
     let (severed, cuts) = (Vec::new(), Vec::new());
     let bonds = Box::new(bonds);
-    Ok(Body { bonds, bounds: (low, high), thickness, severed, cuts, gaps, operations })
+    Ok(DiscreteBody { bonds, bounds: (low, high), thickness, severed, cuts, gaps, operations })
 }
 
-/// Bytes that a variant needs at least, as far as its lattice determines it, before anything of it is built; 0 for a cloud.
+/// Returns a lower bound of the memory of a variant before it is built, bytes; 0 for a cloud.
 ///
 /// # Errors
 /// As [`body_of`].
 pub fn least_memory<const D: usize>(
     source: &Source,
     scene: &Scene,
-    variant: &Variant,
+    variant: &SceneVariant,
 ) -> Result<f64, SceneError> {
     if scene.body.has_points() {
         return Ok(0.0);
     }
     let (_, low, high) = outline::<D>(source, scene)?;
-    Ok(memory::of_lattice(scene, cell_counts(low, high, variant.spacing), variant.horizon_ratio).1)
+    Ok(memory::bytes_of_lattice(scene, cell_counts(low, high, variant.spacing), variant.horizon_ratio).1)
 }
 
-/// Operations on shapes, and the box around what they add.
-type Outline<const D: usize> = (Vec<Operation<D>>, [f64; D], [f64; D]);
+/// Operations on shapes, and the bounding box of the added shapes.
+type BodyOutline<const D: usize> = (Vec<Operation<D>>, [f64; D], [f64; D]);
 
-pub(super) fn outline<const D: usize>(source: &Source, scene: &Scene) -> Result<Outline<D>, SceneError> {
+pub(super) fn outline<const D: usize>(source: &Source, scene: &Scene) -> Result<BodyOutline<D>, SceneError> {
     let operations = operations(source, "body.shapes", scene.body.shapes())?;
-    let (low, high) = bounds(&operations)
-        .ok_or_else(|| source.error("body.shapes", "no shape is added", "at least one shape with `add`"))?;
+    let (low, high) = bounds(&operations).ok_or_else(|| {
+        source.error("body.shapes", "only shapes that are cut", "at least one shape with `add`")
+    })?;
     Ok((operations, low, high))
 }
 
 fn thickness(source: &Source, scene: &Scene) -> Result<f64, SceneError> {
     match (scene.body.space, scene.body.thickness) {
         (Space::Solid, None) => Ok(1.0),
-        (Space::Solid, Some(_)) => Err(source.error(
-            "body.thickness",
-            "a thickness",
-            "none: the body is `solid`, its size is in its shapes",
-        )),
+        (Space::Solid, Some(_)) => {
+            Err(source.unexpected("body.thickness", "a `solid` takes its size from its shapes"))
+        }
         (_, Some(t)) if t.si() > 0.0 => Ok(t.si()),
         (_, Some(t)) => Err(source.error("body.thickness", format!("{} m", t.si()), "above 0")),
-        (_, None) => {
-            Err(source.error("body.thickness", "nothing", "a length; a plane body needs its thickness"))
-        }
+        (_, None) => Err(source.missing("body.thickness", "needed for a plane body")),
     }
 }
 
-/// Refuses a lattice before anything of it is allocated.
+/// Refuses a lattice that is too large before it is allocated.
 fn refuse_too_large<const D: usize>(
     source: &Source,
     scene: &Scene,
@@ -133,7 +129,7 @@ fn refuse_too_large<const D: usize>(
     ratio: f64,
 ) -> Result<(), SceneError> {
     let cells: f64 = counts.iter().product();
-    let (sites, needed) = memory::of_lattice(scene, counts, ratio);
+    let (sites, needed) = memory::bytes_of_lattice(scene, counts, ratio);
     let available = available();
     if !(cells <= MOST_CELLS && sites <= MOST_SITES && needed <= available) {
         let found = format!("{cells:.3e} lattice cells, which need about {}", gib(needed));
@@ -146,12 +142,12 @@ fn refuse_too_large<const D: usize>(
     Ok(())
 }
 
-/// Where the spacings stand.
+/// Returns the key that gives the spacing.
 fn spacing_key(scene: &Scene) -> &'static str {
     if scene.study.iter().any(|study| !study.spacing.is_empty()) { "study" } else { "body.spacing" }
 }
 
-/// The list of shapes that stands at `list`.
+/// Reads the list of shapes under the key `list`.
 pub(super) fn operations<const D: usize>(
     source: &Source,
     list: &str,
@@ -162,9 +158,9 @@ pub(super) fn operations<const D: usize>(
         match (spec.add, spec.cut) {
             (Some(kind), None) => Ok(Operation::Add(shape(source, &key, kind, spec)?)),
             (None, Some(kind)) => Ok(Operation::Cut(shape(source, &key, kind, spec)?)),
-            (Some(_), Some(_)) => Err(source.error(&key, "both `add` and `cut`", "one of them")),
+            (Some(_), Some(_)) => Err(source.conflict(&format!("{key}.add"), "cut", ONE_OF_THEM)),
             (None, None) => {
-                Err(source.error(&key, "neither `add` nor `cut`", "one of them, with the kind of shape"))
+                Err(source.missing(&format!("{key}.add"), "needed for a shape: `add` or `cut` with its kind"))
             }
         }
     });
@@ -188,19 +184,15 @@ pub(super) fn shape<const D: usize>(
     for (name, is_given, belongs) in given {
         let path = format!("{key}.{name}");
         if is_given && !belongs {
-            return Err(source.error(
-                &path,
-                format!("`{name}`"),
-                format!("nothing: a {kind:?} has no {name}"),
-            ));
+            return Err(source.unexpected(&path, format!("a {} has no {name}", kind.name())));
         }
         if belongs && !is_given {
-            return Err(source.error(&path, "nothing", format!("a {kind:?} needs its `{name}`")));
+            return Err(source.missing(&path, format!("needed for a {}", kind.name())));
         }
     }
     let positive = |name: &str, value: Option<Length>| {
         let path = format!("{key}.{name}");
-        let value = needed(source, &path, value, "a length")?.si();
+        let value = required(source, &path, value, "needed for its size")?.si();
         if value > 0.0 { Ok(value) } else { Err(source.error(&path, format!("{value} m"), "above 0")) }
     };
     let point = |name: &str, value: &Option<Vec<Length>>| {
@@ -210,7 +202,7 @@ pub(super) fn shape<const D: usize>(
     match kind {
         ShapeKind::Box => {
             let (min, max) = (point("min", &spec.min)?, point("max", &spec.max)?);
-            ordered(source, key, min, max)?;
+            check_order(source, key, min, max)?;
             Ok(Shape::Box { min, max })
         }
         ShapeKind::Disk | ShapeKind::Ball => {
@@ -220,7 +212,7 @@ pub(super) fn shape<const D: usize>(
                 } else {
                     "`ball`, `cylinder` or `box` in a solid"
                 };
-                return Err(source.error(key, format!("a {kind:?}"), allowed));
+                return Err(source.error(key, format!("a {}", kind.name()), allowed));
             }
             Ok(Shape::Ball {
                 centre: point("centre", &spec.centre)?,
@@ -229,12 +221,12 @@ pub(super) fn shape<const D: usize>(
         }
         ShapeKind::Cylinder => {
             if D != 3 {
-                return Err(source.error(key, "a Cylinder", "`disk` or `box` in a plane body"));
+                return Err(source.error(key, "a cylinder", "`disk` or `box` in a plane body"));
             }
-            let axis = match needed(source, &format!("{key}.axis"), spec.axis, "an axis")? {
-                Axis::X => 0,
-                Axis::Y => 1,
-                Axis::Z => 2,
+            let axis = match required(source, &format!("{key}.axis"), spec.axis, "needed for a cylinder")? {
+                AxisName::X => 0,
+                AxisName::Y => 1,
+                AxisName::Z => 2,
             };
             Ok(Shape::Cylinder {
                 centre: point("centre", &spec.centre)?,
@@ -246,7 +238,7 @@ pub(super) fn shape<const D: usize>(
     }
 }
 
-/// A cut that reaches past the body on all sides leaves nothing to solve: name it rather than the empty lattice.
+/// Refuses a cut that removes the whole body, by its key rather than as an empty lattice.
 fn check_shapes<const D: usize>(
     source: &Source,
     operations: &[Operation<D>],

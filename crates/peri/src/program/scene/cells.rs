@@ -1,4 +1,4 @@
-//! Fields over the hexahedra of a file.
+//! Meshes of hexahedra in field files, and fields over them.
 
 use harness::output::vtkhdf::Series;
 use polycore::transfer::{Overlap, integral};
@@ -7,18 +7,18 @@ use polycore::transfer::{Overlap, integral};
 const HEXAHEDRON: u8 = 12;
 
 /// Points and hexahedra of a file.
-pub struct Mesh {
-    /// m.
+pub struct HexMesh {
+    /// Positions of the nodes, m.
     pub points: Vec<[f64; 3]>,
-    /// Corners.
+    /// Nodes of each hexahedron.
     pub cells: Vec<[u32; 8]>,
 }
 
-impl Mesh {
-    /// Of the first step.
+impl HexMesh {
+    /// Reads the mesh of the first step.
     ///
     /// # Errors
-    /// What is not a mesh of hexahedra.
+    /// A mesh without cells, or with cells other than hexahedra.
     pub fn new(series: &Series) -> Result<Self, String> {
         let points = series.points(0).map_err(|error| error.to_string())?;
         let cells = series.cells().map_err(|error| error.to_string())?;
@@ -33,17 +33,18 @@ impl Mesh {
     }
 }
 
-/// A field over nodes, trilinear in each cell, or over cells: a number, or the six components of a symmetric tensor.
-pub struct Values {
+/// Field over nodes (trilinear in each cell) or over cells: a scalar, or the six components of a symmetric
+/// tensor.
+pub struct MeshField {
     of_cells: bool,
-    /// 1 or 6.
+    /// Number of components, 1 or 6.
     pub components: usize,
-    /// All values of a component together.
+    /// Values of each component.
     data: Vec<Vec<f64>>,
 }
 
-impl Values {
-    /// An array at a step.
+impl MeshField {
+    /// Reads an array at a step.
     ///
     /// # Errors
     /// As [`Series::data`].
@@ -57,18 +58,19 @@ impl Values {
         Ok(Self { of_cells: known.is_none(), components, data })
     }
 
-    /// The number, or a third of the trace of the tensor.
+    /// Returns the scalar, or a third of the trace of the tensor.
     pub fn mean_of(&self, component: impl Fn(usize) -> f64) -> f64 {
         if self.components == 6 { (0..3).map(component).sum::<f64>() / 3.0 } else { component(0) }
     }
 
-    /// Of VTK's order xx, yy, zz, xy, yz, xz.
+    /// Builds a tensor from components in VTK's order xx, yy, zz, xy, yz, xz.
     pub fn tensor(component: impl Fn(usize) -> f64) -> [[f64; 3]; 3] {
         [[0, 3, 5], [3, 1, 4], [5, 4, 2]].map(|row| row.map(&component))
     }
 
-    /// The place of a node or the middle of a cell in a box where the field has no finite value.
-    pub fn missing(&self, mesh: &Mesh, overlap: &Overlap, index: usize) -> Option<([f64; 3], f64)> {
+    /// Returns the node or the middle of the cell in a box at which the field is not finite, and the value
+    /// there.
+    pub fn missing(&self, mesh: &HexMesh, overlap: &Overlap, index: usize) -> Option<([f64; 3], f64)> {
         let wrong = |at: u32| self.data.iter().map(|values| values[at as usize]).find(|x| !x.is_finite());
         if self.of_cells {
             let (cell, value) = overlap.cells_of(index).find_map(|cell| Some((cell, wrong(cell)?)))?;
@@ -80,23 +82,23 @@ impl Values {
         Some((mesh.points[node as usize], value))
     }
 
-    /// Means over the boxes, component by component.
+    /// Returns the means over the boxes, by component.
     ///
     /// # Errors
     /// As [`Overlap::from_nodes`].
     pub fn means(&self, overlap: &Overlap) -> Result<Vec<Vec<Option<f64>>>, polycore::Error> {
-        let of = |values: &Vec<f64>| match self.of_cells {
+        let means = |values: &Vec<f64>| match self.of_cells {
             true => overlap.from_cells(values),
             false => overlap.from_nodes(values),
         };
-        self.data.iter().map(of).collect()
+        self.data.iter().map(means).collect()
     }
 
-    /// Volume of the mesh where the field has values, and the integral of [`Self::mean_of`].
+    /// Returns the volume of the mesh where the field is finite, and the integral of [`Self::mean_of`].
     ///
     /// # Errors
     /// As [`integral`].
-    pub fn integral(&self, mesh: &Mesh) -> Result<[f64; 2], polycore::Error> {
+    pub fn integral(&self, mesh: &HexMesh) -> Result<[f64; 2], polycore::Error> {
         let value = |at: usize| self.mean_of(|component| self.data[component][at]);
         if !self.of_cells {
             let values: Vec<f64> = (0..mesh.points.len()).map(value).collect();

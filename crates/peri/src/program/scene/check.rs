@@ -1,24 +1,27 @@
-//! Values that can be judged without building anything, and the list of variants to run.
+//! Checks of a scene that need no body, and the list of its variants.
 
-use super::values::{plain, positive, ratio};
-use super::variant::{Variant, variants};
-use super::{HORIZON_RATIO, Method, Parameter, Probe, Scene, Track};
+use super::values::{ONE_OF_THEM, plain, positive, ratio, required};
+use super::variant::{SceneVariant, variants};
+use super::{
+    DeviceChoice, Dynamics, ForcePrecision, HORIZON_RATIO, HistoryProbe, Scene, SolverMethod, Track,
+    VaryingParameter,
+};
 use crate::calibrate::{Calibration, Space};
 use crate::solver::Policy;
-use crate::stress::Measure;
+use crate::stress::StressMethod;
 use harness::scene::{SceneError, Source};
 
-/// Rows of history of a run in time.
+/// Largest number of history rows of a run in time.
 const MOST_RECORDS: usize = 1_000_000;
 
 /// Checks a scene and lists its variants; `quick` leaves out those that a `--quick` run leaves out.
 ///
 /// # Errors
 /// A [`SceneError`] that names the key, the value found and what is allowed.
-pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>, SceneError> {
+pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<SceneVariant>, SceneError> {
     let variants = variants(source, scene, quick)?;
     for variant in &variants {
-        // what must fail does so when its turn comes
+        // a variant that must fail does so when it runs
         if variant.of.expect_error.is_none() {
             let (source, scene) = variant.resolved();
             check_variant(source, scene)?;
@@ -31,7 +34,7 @@ pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>
     Ok(variants)
 }
 
-/// Checks the scene of one variant, see [`Variant::resolved`].
+/// Checks the scene of one variant, see [`SceneVariant::resolved`].
 ///
 /// # Errors
 /// As [`check`].
@@ -40,7 +43,7 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     material(source, scene)?;
     solver(source, scene)?;
     if scene.boundary.is_empty() {
-        return Err(source.error("boundary", "nothing", "at least one [[boundary]]"));
+        return Err(source.missing("boundary", "needed for loads and supports: at least one [[boundary]]"));
     }
     if let Some(stress) = &scene.stress
         && stress.measures.is_empty()
@@ -67,8 +70,8 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         positive(source, "exact.radius", radius, "m")?;
         positive(source, "exact.remote_stress", remote, "Pa")?;
         if scene.body.space == Space::Solid {
-            let (found, allowed) = (format!("{name} in a solid"), format!("{name} in a plane body"));
-            return Err(source.error("exact.problem", found, allowed));
+            let why = format!("`{name}` is the solution of a plane body");
+            return Err(source.conflict("exact.problem", "space = \"solid\"", why));
         }
         if scene.stress.is_none() {
             let allowed = "a [stress] block with the measures to compare";
@@ -83,15 +86,16 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
 }
 
 fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
-    let explicit = scene.method() == Method::Verlet;
+    let explicit = scene.method() == SolverMethod::Verlet;
     match &scene.dynamics {
         None if explicit => {
-            let allowed = "a [dynamics] block with `density` and `end_time`: `verlet` needs it";
-            return Err(source.error("dynamics", "nothing", allowed));
+            let why = "needed for `method = \"verlet\"`: a block with `density` and `end_time`";
+            return Err(source.missing("dynamics", why));
         }
         Some(_) if !explicit => {
-            let allowed = "nothing, or `solver.method = \"verlet\"`";
-            return Err(source.error("dynamics", "a [dynamics] block of a quasi-static method", allowed));
+            let why =
+                format!("needs `solver.method = \"verlet\"`; `{}` is quasi-static", scene.method().name());
+            return Err(source.unexpected("dynamics", why));
         }
         Some(dynamics) => {
             let method = dynamics.method();
@@ -120,21 +124,18 @@ fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                 let allowed = "\"double\"; \"mixed\" is for bond laws in bodies of shapes";
                 return Err(source.error("dynamics.precision", format!("\"mixed\" of {what}"), allowed));
             }
+            device(source, dynamics)?;
             if let Some(factor) = &dynamics.factor {
                 if dynamics.ramp.is_some() {
-                    return Err(source.error(
-                        "dynamics.factor",
-                        "`factor` together with `ramp`",
-                        "one of them",
-                    ));
+                    return Err(source.conflict("dynamics.factor", "ramp", ONE_OF_THEM));
                 }
-                if let Some(found) = factor.other_than("t") {
+                if let Some(found) = factor.find_variable_except("t") {
                     let found = format!("`{found}` in `{}`", factor.text());
                     return Err(source.error("dynamics.factor", found, "a formula of `t`, the time in s"));
                 }
                 for part in 0..=16 {
                     let time = method.end_time * f64::from(part) / 16.0;
-                    let (value, rate) = factor.in_time(time);
+                    let (value, rate) = factor.value_and_rate(time);
                     if !(value.is_finite() && rate.is_finite()) {
                         let found = format!("{value}, rising at {rate} 1/s, at {time} s");
                         return Err(source.error("dynamics.factor", found, "finite values and rates"));
@@ -144,18 +145,30 @@ fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         }
         None => {}
     }
-    let moving = scene.boundary.iter().position(super::Boundary::moves);
+    let moving = scene.boundary.iter().position(super::Boundary::prescribes_velocity);
     match moving.filter(|_| !explicit) {
         Some(index) => {
             let key = format!("boundary[{index}].velocity");
-            Err(source.error(
-                &key,
-                "`velocity` of a quasi-static method",
-                "nothing, or `solver.method = \"verlet\"`",
-            ))
+            let why =
+                format!("needs `solver.method = \"verlet\"`; `{}` is quasi-static", scene.method().name());
+            Err(source.unexpected(&key, why))
         }
         None => Ok(()),
     }
+}
+
+fn device(source: &Source, dynamics: &Dynamics) -> Result<(), SceneError> {
+    let (device, precision) = (dynamics.device, dynamics.precision);
+    let found = match (device, precision) {
+        (DeviceChoice::Cpu, ForcePrecision::Single) => "\"single\" on the processor",
+        (DeviceChoice::Gpu, ForcePrecision::Mixed) => "\"mixed\" on a graphics card",
+        _ => return Ok(()),
+    };
+    let allowed = match device {
+        DeviceChoice::Cpu => "\"double\" or \"mixed\"; \"single\" is for `device = \"gpu\"`",
+        _ => "\"double\" or \"single\"",
+    };
+    Err(source.error("dynamics.precision", found, allowed))
 }
 
 fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
@@ -166,15 +179,15 @@ fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         return Err(source.error("output.every", 0, "at least 1 step"));
     }
     if scene.output.flags && !scene.is_learnt() && scene.study.is_empty() {
-        let allowed = "only with `material.solid.constitutive.learnt`: other laws have none";
-        return Err(source.error("output.flags", "flags of a law in closed form", allowed));
+        let why = "only laws of `material.solid.constitutive.learnt` have flags";
+        return Err(source.unexpected("output.flags", why));
     }
     if !(1..=12).contains(&scene.output.stages) {
         return Err(source.error("output.stages", scene.output.stages, "1 to 12"));
     }
     match &scene.output.solid {
         Some(_) if scene.body.space != Space::Solid => {
-            Err(source.error("output.solid", "a view of a solid", "only with `space = \"solid\"`"))
+            Err(source.unexpected("output.solid", "views need `space = \"solid\"`"))
         }
         Some(solid) => solid.check(source, "output.solid"),
         None => Ok(()),
@@ -184,28 +197,25 @@ fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
 fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let body = &scene.body;
     if body.points.is_some() && body.grid.is_some() {
-        return Err(source.error("body.grid", "`grid` together with `points`", "one of them"));
+        return Err(source.conflict("body.grid", "points", ONE_OF_THEM));
     }
     let name = if body.grid.is_some() { "grid" } else { "points" };
     match (body.shapes().is_empty(), body.has_points()) {
         (true, false) => {
-            return Err(source.error("body.shapes", "nothing", "at least one shape, `points` or a `grid`"));
+            return Err(
+                source.missing("body.shapes", "needed for the body, as `shapes`, `points` or a `grid`")
+            );
         }
         (_, true) if body.shapes.is_some() => {
-            return Err(source.error(
-                &format!("body.{name}"),
-                format!("`{name}` together with `shapes`"),
-                "one of them",
-            ));
+            return Err(source.conflict(&format!("body.{name}"), "shapes", ONE_OF_THEM));
         }
         (false, false) => {
-            let spacing = body.spacing.ok_or_else(|| {
-                source.error("body.spacing", "nothing", "a length; a lattice needs its `spacing`")
-            })?;
+            let spacing =
+                required(source, "body.spacing", body.spacing, "needed for a lattice of particles")?;
             positive(source, "body.spacing", spacing.si(), "m")?;
             ratio(source, "body.horizon_ratio", body.horizon_ratio.unwrap_or(HORIZON_RATIO))?;
             if body.horizon.is_some() {
-                return Err(source.error("body.horizon", "`horizon` of a lattice", "`horizon_ratio`"));
+                return Err(source.unexpected("body.horizon", "a lattice takes `horizon_ratio`"));
             }
         }
         (_, true) => {
@@ -214,11 +224,8 @@ fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                 ("body.horizon_ratio", body.horizon_ratio.is_some()),
             ] {
                 if given {
-                    return Err(source.error(
-                        key,
-                        "a lattice's key",
-                        "nothing: `points` bring their own spacing; set `horizon`",
-                    ));
+                    let why = "`points` and `grid` have their own spacing; write `horizon`";
+                    return Err(source.unexpected(key, why));
                 }
             }
             if scene.material.calibration == Calibration::Lattice {
@@ -239,12 +246,12 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         return super::solid::check(source, scene, solid);
     }
     let Some(youngs_modulus) = material.youngs_modulus else {
-        let allowed = "a stress, or a `solid` in place of a bond law";
-        return Err(source.error("material.youngs_modulus", "nothing", allowed));
+        let why = "needed for a bond law; a [material.solid] takes its place";
+        return Err(source.missing("material.youngs_modulus", why));
     };
     positive(source, "material.youngs_modulus", youngs_modulus.si(), "Pa")?;
     if let Some(index) =
-        scene.stress.iter().flat_map(|stress| &stress.measures).position(|&m| m == Measure::Constitutive)
+        scene.stress.iter().flat_map(|stress| &stress.measures).position(|&m| m == StressMethod::Constitutive)
     {
         let key = format!("stress.measures[{index}]");
         return Err(source.error(
@@ -262,27 +269,24 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         let key = format!("material.{key}");
         match value {
             None if chain => {
-                return Err(source.error(
-                    &key,
-                    "nothing",
-                    format!("a number of at least {least}: `{}` needs it", law.name()),
-                ));
+                let why = format!("needed for `{}`: a number of at least {least}", law.name());
+                return Err(source.missing(&key, why));
             }
             Some(value) if !(least..=most).contains(&value) => {
                 return Err(source.error(&key, plain(value), format!("{least} to {most:e}")));
             }
             Some(_) if !chain => {
-                return Err(source.error(
-                    &key,
-                    "a chain's parameter",
-                    format!("nothing: `{}` has no chains", law.name()),
-                ));
+                return Err(source.unexpected(&key, format!("`{}` has no chains", law.name())));
             }
             _ => {}
         }
     }
     if let Some(critical) = &material.critical {
-        let given = critical.given();
+        if critical.strength.is_some() {
+            let why = "bond laws have no strength; [material.solid] has";
+            return Err(source.unexpected("material.critical.strength", why));
+        }
+        let given = critical.alternatives();
         if given.len() != 1 {
             let found = given.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" and ");
             let found = if found.is_empty() { "none of them".to_owned() } else { found };
@@ -296,7 +300,7 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             return Err(source.error(&key, format!("`{}` a second time", field.of.name()), "each once"));
         }
         let energy = material.critical.is_some_and(|critical| critical.fracture_energy.is_some());
-        if field.of == Parameter::FractureEnergy && !energy {
+        if field.of == VaryingParameter::FractureEnergy && !energy {
             let allowed = "`material.critical.fracture_energy` beside it";
             return Err(source.error(&key, "a fracture energy of a material without one", allowed));
         }
@@ -305,18 +309,17 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         // forces of these bonds are not those of the fitted law, from which stresses are taken
         let what = if scene.softens() { "bonds that soften" } else { "a prestrain in `material`" };
         if material.is_prestrained() && scene.softens() {
-            let found = "`softening` of prestrained bonds";
-            return Err(source.error("material.critical.convention", found, "`tearing` or `bonds`"));
+            let why = "prestrained bonds take `tearing` or `bonds`";
+            return Err(source.conflict("material.critical.convention", "prestrain", why));
         }
-        let j_integral = |probe: &Probe| probe.track == Track::JIntegral;
+        let j_integral = |probe: &HistoryProbe| probe.track == Track::JIntegral;
         for (key, given) in [
             ("stress", scene.stress.is_some()),
             ("output.section", !scene.output.section.is_empty()),
             ("probe", scene.probe.iter().any(j_integral)),
         ] {
             if given {
-                let found = format!("together with {what}");
-                return Err(source.error(key, found, "displacements of such bodies only, so far"));
+                return Err(source.unexpected(key, format!("not available with {what}")));
             }
         }
     }
@@ -325,11 +328,7 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         positive(source, &key, inclusion.stiffness, "")?;
         if inclusion.critical.is_some() && material.critical.is_none() {
             let key = format!("material.inclusions[{index}].critical");
-            return Err(source.error(
-                &key,
-                "a critical stretch of a part",
-                "`material.critical` beside it, of the rest",
-            ));
+            return Err(source.unexpected(&key, "needs `material.critical`, that of the rest of the body"));
         }
     }
     Ok(())
@@ -359,21 +358,17 @@ fn solver(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     }
     within("max_iterations", solver.max_iterations as f64, 1.0, 1e9)?;
     within("mass_safety", solver.mass_safety.unwrap_or(1.1), 1.0, 100.0)?;
-    if solver.mass_safety.is_some() && scene.method() != Method::Adr {
-        let found = format!("`mass_safety` of `{}`", scene.method().name());
-        return Err(source.error(
-            "solver.mass_safety",
-            found,
-            "nothing, or `method = \"adr\"`: only it has a fictitious mass",
-        ));
+    if solver.mass_safety.is_some() && scene.method() != SolverMethod::Adr {
+        let why = format!("`{}` has no fictitious mass; `method = \"adr\"` has", scene.method().name());
+        return Err(source.unexpected("solver.mass_safety", why));
     }
     within("refine", solver.refine as f64, 1.0, 1e6)?;
     let refuses = [
         (scene.material.critical.is_none(), "bonds that never break"),
-        (scene.method() == Method::Verlet, "explicit dynamics"),
+        (scene.method() == SolverMethod::Verlet, "explicit dynamics"),
         (solver.breaking == Policy::EachIteration, "`breaking = \"each-iteration\"`"),
         (scene.material.critical.is_some_and(|critical| critical.strength.is_some()), "bonds that soften"),
-        (scene.contact.as_ref().is_some_and(super::ContactSpec::rubs), "friction"),
+        (scene.contact.as_ref().is_some_and(super::ContactSpec::has_friction), "friction"),
     ];
     if let Some((_, what)) = refuses.into_iter().find(|(refused, _)| *refused && solver.refine > 1) {
         let allowed =
@@ -390,5 +385,5 @@ fn solver(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         return Err(source.error("solver.snap_back", found, allowed));
     }
     within("accept", solver.accept.unwrap_or(0.0), 0.0, 1.0)?;
-    within("stop_below", solver.stop_below.unwrap_or(0.0), 0.0, 1.0)
+    within("stop_below", solver.stop_below.map_or(0.0, |part| part.si()), 0.0, 1.0)
 }

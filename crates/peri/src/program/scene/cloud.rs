@@ -1,10 +1,10 @@
-//! Bodies from a CSV file of points.
+//! Bodies of points: from a CSV file or a grid.
 
 use super::GridSpec;
 use super::Scene;
 use super::memory;
-use super::values::{Body, LARGEST_RATIO, needed, ordered, positive, vector};
-use super::variant::Variant;
+use super::values::{DiscreteBody, LARGEST_RATIO, check_order, positive, required, vector};
+use super::variant::SceneVariant;
 use crate::bonds::{BodyGeometry, BondDamage, CloudBonds, LatticeBonds};
 use crate::geometry::{Cut, Gaps, recognise};
 use harness::scene::{SceneError, Source};
@@ -15,7 +15,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 /// Positions (m) and volumes (m³).
-type Points<const D: usize> = (Vec<[f64; D]>, Vec<f64>);
+type CloudPoints<const D: usize> = (Vec<[f64; D]>, Vec<f64>);
 
 /// Builds the body of a cloud.
 ///
@@ -24,12 +24,11 @@ type Points<const D: usize> = (Vec<[f64; D]>, Vec<f64>);
 pub fn cloud<const D: usize>(
     source: &Source,
     scene: &Scene,
-    variant: &Variant,
+    variant: &SceneVariant,
     thickness: f64,
     cuts: &[Cut<D>],
-) -> Result<Body<D>, SceneError> {
-    let horizon =
-        needed(source, "body.horizon", scene.body.horizon, "a length; a cloud needs its `horizon`")?.si();
+) -> Result<DiscreteBody<D>, SceneError> {
+    let horizon = required(source, "body.horizon", scene.body.horizon, "needed for a cloud of points")?.si();
     positive(source, "body.horizon", horizon, "m")?;
     let (positions, volumes, key) = match (&scene.body.points, &scene.body.grid) {
         (Some(points), _) => {
@@ -41,9 +40,9 @@ pub fn cloud<const D: usize>(
             let (positions, volumes) = grid(source, spec, thickness)?;
             (positions, volumes, "body.grid")
         }
-        (None, None) => return Err(source.error("body.points", "nothing", "`points` or a `grid`")),
+        (None, None) => return Err(source.missing("body.points", "needed for a cloud: `points` or a `grid`")),
     };
-    if let Some(body) = regular(&positions, &volumes, thickness, horizon, (scene, variant), cuts) {
+    if let Some(body) = recognise_lattice(&positions, &volumes, thickness, horizon, (scene, variant), cuts) {
         memory::refuse_too_large(source, scene, key, &*body.bonds)?;
         return Ok(body);
     }
@@ -66,7 +65,7 @@ pub fn cloud<const D: usize>(
     let half = 0.5 * bonds.spacing();
     let [low, high] = polycore::numerics::bounds(positions.iter().copied());
     let (low, high) = (low.map(|x| x - half), high.map(|x| x + half));
-    Ok(Body {
+    Ok(DiscreteBody {
         bonds: Box::new(bonds),
         bounds: (low, high),
         thickness,
@@ -77,19 +76,19 @@ pub fn cloud<const D: usize>(
     })
 }
 
-/// The body where the points lie on a regular lattice: then it needs no neighbour list.
-fn regular<const D: usize>(
+/// Builds a lattice, which needs no neighbour list, if the points lie on one.
+fn recognise_lattice<const D: usize>(
     positions: &[[f64; D]],
     volumes: &[f64],
     thickness: f64,
     horizon: f64,
-    (scene, variant): (&Scene, &Variant),
+    (scene, variant): (&Scene, &SceneVariant),
     cuts: &[Cut<D>],
-) -> Option<Body<D>> {
+) -> Option<DiscreteBody<D>> {
     let lattice = recognise(positions, volumes, thickness)?;
-    // bonds as long as the horizon count, whatever the rounding, as in a cloud
+    // bonds as long as the horizon count despite rounding, as in a cloud
     let ratio = horizon / lattice.spacing * (1.0 + 1e-9);
-    // longer stencils are refused for lattices: a list takes what it gets
+    // larger ratios are refused for lattices; a neighbour list takes them
     if !(1.0..=LARGEST_RATIO).contains(&ratio) {
         return None;
     }
@@ -98,7 +97,7 @@ fn regular<const D: usize>(
     let gaps = Gaps::of_cells(&lattice);
     let severing = gaps.as_ref().filter(|_| scene.body.bond_gaps != Some(true));
     let bonds = LatticeBonds::with_gaps(lattice, ratio, variant.volume, cuts, severing).ok()?;
-    (bonds.directed_bonds() > 0).then(|| Body {
+    (bonds.directed_bonds() > 0).then(|| DiscreteBody {
         bonds: Box::new(bonds),
         bounds: (low, high),
         thickness,
@@ -109,16 +108,20 @@ fn regular<const D: usize>(
     })
 }
 
-/// The middles of a grid's cells, the first axis running fastest.
-fn grid<const D: usize>(source: &Source, spec: &GridSpec, thickness: f64) -> Result<Points<D>, SceneError> {
+/// Returns the centres and volumes of the cells of a grid, the first axis varying fastest.
+fn grid<const D: usize>(
+    source: &Source,
+    spec: &GridSpec,
+    thickness: f64,
+) -> Result<CloudPoints<D>, SceneError> {
     let min: [f64; D] = vector(source, "body.grid.min", &spec.min)?;
     let max: [f64; D] = vector(source, "body.grid.max", &spec.max)?;
-    ordered(source, "body.grid", min, max)?;
+    check_order(source, "body.grid", min, max)?;
     let cells = <[usize; D]>::try_from(spec.cells.as_slice()).map_err(|_| {
         source.error("body.grid.cells", format!("{} numbers", spec.cells.len()), format!("{D} numbers"))
     })?;
     let count: f64 = cells.iter().map(|&n| n as f64).product();
-    let needed = memory::of_cloud::<D>(count, 0.0);
+    let needed = memory::bytes_of_cloud::<D>(count, 0.0);
     if cells.contains(&0) || needed > available() || count > f64::from(u32::MAX) {
         let allowed =
             format!("at least 1 along each axis, and at most {} (the available memory)", gib(available()));
@@ -142,13 +145,16 @@ fn grid<const D: usize>(source: &Source, spec: &GridSpec, thickness: f64) -> Res
     Ok(((0..count).map(place).collect(), vec![volume; count]))
 }
 
-fn read<const D: usize>(source: &Source, path: &Path) -> Result<Points<D>, SceneError> {
+fn read<const D: usize>(source: &Source, path: &Path) -> Result<CloudPoints<D>, SceneError> {
     let bad = |found: String, allowed: &str| {
         source.error("body.points", format!("{}{found}", path.display()), allowed)
     };
     let names: &[&str] = if D == 2 { &["x", "y", "volume"] } else { &["x", "y", "z", "volume"] };
     let columns = format!("columns {} (m, m³)", names.join(", "));
-    let table = Table::read(path).map_err(|error| bad(format!(": {error}"), &columns))?;
+    let refused = |error: &dyn std::fmt::Display| {
+        source.refused("body.points", format!("{error}; the file needs {columns}"))
+    };
+    let table = Table::read(path).map_err(|error| refused(&error))?;
     let headings: Vec<&str> = table.headings.iter().map(|heading| heading.text.as_str()).collect();
     let found = names.iter().filter_map(|name| table.find(name)).collect::<Vec<usize>>();
     if found.len() != names.len() || headings.len() != names.len() {
@@ -160,7 +166,7 @@ fn read<const D: usize>(source: &Source, path: &Path) -> Result<Points<D>, Scene
         _ => table.column::<LengthDimension>(column, Some("m")),
     };
     let values = found.iter().map(in_si).collect::<Result<Vec<_>, _>>();
-    let values = values.map_err(|error| bad(format!(": {error}"), &columns))?;
+    let values = values.map_err(|error| refused(&error))?;
     let (mut positions, mut volumes) = (Vec::new(), Vec::new());
     for row in 0..table.rows() {
         let volume = values[D][row];
@@ -177,8 +183,9 @@ fn read<const D: usize>(source: &Source, path: &Path) -> Result<Points<D>, Scene
     Ok((positions, volumes))
 }
 
-/// A horizon that holds the whole cloud asks for N² bonds. Counts points in cells as wide as the horizon: a block of
-/// 3^D cells around a point holds its ball, and about (block/ball) times its neighbours.
+/// Refuses a horizon with so many bonds that memory does not suffice. Counts points in cells as wide as the
+/// horizon: the block of 3^D cells around a point contains its ball, and about (block/ball) times as many
+/// points.
 fn refuse_too_many_bonds<const D: usize>(
     source: &Source,
     positions: &[[f64; D]],
@@ -197,7 +204,7 @@ fn refuse_too_many_bonds<const D: usize>(
     let pairs: f64 = cells.iter().map(|(cell, count)| count * around(cell)).sum();
     let share = if D == 2 { std::f64::consts::PI / 9.0 } else { 4.0 / 3.0 * std::f64::consts::PI / 27.0 };
     let bonds = pairs * share;
-    let (needed, available) = (memory::of_cloud::<D>(positions.len() as f64, bonds), available());
+    let (needed, available) = (memory::bytes_of_cloud::<D>(positions.len() as f64, bonds), available());
     if needed > available {
         let found = format!("{horizon} m, which makes about {bonds:.1e} bonds that need {}", gib(needed));
         let allowed = format!("at most {} (the available memory); take a smaller horizon", gib(available));

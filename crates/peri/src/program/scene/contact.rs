@@ -1,18 +1,18 @@
-//! What a scene says of contact: between particles, and with rigid planes.
+//! Contact settings of a scene: between particles, and with rigid planes.
 
 use super::line::plane_of;
-use super::values::{Body, plain, vector};
-use super::{Method, Scene};
+use super::values::{DiscreteBody, plain, vector};
+use super::{Scene, SolverMethod};
 use crate::bonds::{Bonds, Property};
 use crate::calibrate::Space;
-use crate::contact::{Contact, Interface, PAIR_STIFFNESS, PLANE_STIFFNESS, Plane, grips};
+use crate::contact::{Contact, GripInterface, PAIR_STIFFNESS, PLANE_STIFFNESS, RigidPlane, grips};
 use crate::error::Error;
 use crate::solver::Loads;
 use harness::scene::{SceneError, Source, check_name};
 use polycore::units::{Length, Speed};
 use serde::Deserialize;
 
-/// Stiffest contact, beyond which no method would get anywhere.
+/// Largest stiffness s: above it no method converges.
 const STIFFEST: f64 = 1e4;
 /// Largest coefficient of friction.
 const ROUGHEST: f64 = 100.0;
@@ -21,20 +21,22 @@ const ROUGHEST: f64 = 100.0;
 #[derive(Clone, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ContactSpec {
-    /// s: 2/s layers of confined material are as compliant as a contact of two bodies, 1/s layers as that with a plane; 0 only shows how
-    /// particles overlap; default: 2, of planes in equilibria 10.
+    /// Stiffness s: a contact of two bodies is as compliant as 2/s layers of confined material, a contact
+    /// with a plane as 1/s layers; 0 only records overlaps. Default: 2; for planes in equilibrium 10.
     pub stiffness: Option<f64>,
-    /// κ: stiffness of a contact of particles over that of a bond as long as the horizon, instead of `stiffness`; 15 in the literature.
+    /// Stiffness κ of a contact of particles over that of a bond as long as the horizon, instead of
+    /// `stiffness`; 15 in the literature.
     pub short_range: Option<f64>,
-    /// Coefficient of Coulomb friction μ between particles, and of planes that have none of their own.
+    /// Coefficient of Coulomb friction μ between particles, and of planes without `friction`.
     pub friction: f64,
-    /// γ: elastic slip of two sides that stick at the force at which they slide; default: that of equal tangential and normal stiffness.
+    /// Elastic slip γ of sticking contacts at the force at which they begin to slide; default: the slip at
+    /// which tangential and normal stiffness are equal.
     #[serde(alias = "slip_length")]
     pub elastic_slip: Option<Length>,
-    /// Not used any more: friction holds what sticks.
+    /// Ignored; kept for older scenes. Sticking friction holds by its elastic slip.
     pub slip_velocity: Option<Speed>,
-    /// Whether a region of prescribed displacement holds a solid at its surface, instead of by bonds across it, which give way as a layer
-    /// of the body would; default: true beside planes, unless bonds break.
+    /// Holds regions of prescribed displacement at the surface of a solid instead of by bonds across it,
+    /// which are as compliant as a layer of the body. Default: true beside planes, unless bonds break.
     pub tied_grips: Option<bool>,
     /// Rigid planes.
     pub plane: Vec<PlaneSpec>,
@@ -44,17 +46,17 @@ pub struct ContactSpec {
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlaneSpec {
-    /// Its name in curves and values; default: `plane` and its number.
+    /// Name in curves and values; default: `plane` and its number.
     pub name: Option<String>,
     /// A point of the plane.
     pub point: Vec<Length>,
-    /// Its normal, of any length, towards the body.
+    /// Normal of any length, towards the body.
     pub normal: Vec<f64>,
-    /// s of the plane; default: that of `contact` where that is above 0, or 10, in explicit dynamics 2.
+    /// Stiffness s of the plane; default: `contact.stiffness` if above 0, else 10, in explicit dynamics 2.
     pub stiffness: Option<f64>,
-    /// Its coefficient of friction; default: that of `contact`.
+    /// Coefficient of friction; default: `contact.friction`.
     pub friction: Option<f64>,
-    /// Ties the faces of the body that lie on it at the start: it holds and pulls them in all directions; default false.
+    /// Ties the faces of the body that lie on the plane at the start, in all directions; default: false.
     #[serde(default)]
     pub bonded: bool,
     /// Displacement at the end of the last step; the plane follows the load factor.
@@ -64,7 +66,7 @@ pub struct PlaneSpec {
 }
 
 impl PlaneSpec {
-    /// Its own name, or its number.
+    /// Returns its name; default: `plane` and its number.
     pub fn name(&self, index: usize) -> String {
         self.name.clone().unwrap_or_else(|| format!("plane{}", index + 1))
     }
@@ -78,13 +80,13 @@ impl Scene {
 }
 
 impl ContactSpec {
-    /// s of ties: that of the stiffest plane.
+    /// Returns the stiffness s of ties: that of the stiffest plane.
     pub fn tie_stiffness(&self, explicit: bool) -> f64 {
         let planes = self.plane.iter().map(|plane| self.stiffness_of(plane, explicit));
         planes.fold(if explicit { PAIR_STIFFNESS } else { PLANE_STIFFNESS }, f64::max)
     }
 
-    /// s of pairs of particles.
+    /// Returns the stiffness s of pairs of particles.
     pub fn pair_stiffness(&self) -> f64 {
         self.stiffness.unwrap_or(PAIR_STIFFNESS)
     }
@@ -94,24 +96,24 @@ impl ContactSpec {
         self.short_range.unwrap_or(self.pair_stiffness()) > 0.0
     }
 
-    /// s of a plane.
+    /// Returns the stiffness s of a plane.
     pub fn stiffness_of(&self, plane: &PlaneSpec, explicit: bool) -> f64 {
         let own = if explicit { PAIR_STIFFNESS } else { PLANE_STIFFNESS };
         plane.stiffness.or(self.stiffness.filter(|&s| s > 0.0)).unwrap_or(own)
     }
 
-    /// μ of a plane.
+    /// Returns the coefficient of friction of a plane.
     fn friction_of(&self, plane: &PlaneSpec) -> f64 {
         plane.friction.unwrap_or(self.friction)
     }
 
-    /// Whether any coefficient of friction is above 0.
-    pub fn rubs(&self) -> bool {
+    /// Returns true if any coefficient of friction is above 0.
+    pub fn has_friction(&self) -> bool {
         (self.friction > 0.0 && self.has_pairs())
             || self.plane.iter().any(|plane| self.friction_of(plane) > 0.0 && !plane.bonded)
     }
 
-    /// The plane in its dimension.
+    /// Converts a plane.
     ///
     /// # Errors
     /// As [`super::check`].
@@ -121,7 +123,7 @@ impl ContactSpec {
         key: &str,
         spec: &PlaneSpec,
         explicit: bool,
-    ) -> Result<Plane<D>, SceneError> {
+    ) -> Result<RigidPlane<D>, SceneError> {
         let (point, normal) = plane_of(source, key, &spec.point, &spec.normal)?;
         let none = [0.0; D];
         let displacement = spec.displacement.as_ref();
@@ -137,7 +139,7 @@ impl ContactSpec {
                 })?
             }
         };
-        Ok(Plane {
+        Ok(RigidPlane {
             point,
             normal,
             stiffness: self.stiffness_of(spec, explicit),
@@ -149,7 +151,7 @@ impl ContactSpec {
         })
     }
 
-    /// All planes; `explicit` where their default stiffness is that of explicit dynamics.
+    /// Converts all planes; `explicit` selects the default stiffness of explicit dynamics.
     ///
     /// # Errors
     /// As [`super::check`].
@@ -157,20 +159,20 @@ impl ContactSpec {
         &self,
         source: &Source,
         explicit: bool,
-    ) -> Result<Vec<Plane<D>>, SceneError> {
+    ) -> Result<Vec<RigidPlane<D>>, SceneError> {
         let each = self.plane.iter().enumerate();
         each.map(|(index, plane)| self.plane_in(source, &format!("contact.plane[{index}]"), plane, explicit))
             .collect()
     }
 
-    /// Contact of a body of the bond modulus kθ = `micromodulus` and the longitudinal modulus `modulus`.
+    /// Builds the contact of a body with bond modulus kθ = `micromodulus` and longitudinal modulus `modulus`.
     ///
     /// # Errors
-    /// As [`Contact::with_planes`]; none of a scene that is checked.
+    /// As [`Contact::with_planes`]; none after [`super::check`].
     pub fn contact<const D: usize>(
         &self,
-        planes: Vec<Plane<D>>,
-        body: &Body<D>,
+        planes: Vec<RigidPlane<D>>,
+        body: &DiscreteBody<D>,
         micromodulus: f64,
         modulus: &Property,
         tied: Option<(&[bool], f64)>,
@@ -185,7 +187,7 @@ impl ContactSpec {
         let (Some((held, stiffness)), Some(lattice)) = (tied, bonds.as_lattice()) else {
             return contact.with_planes(bonds, &outside, modulus.clone(), planes);
         };
-        let interface = Interface::new(lattice, held);
+        let interface = GripInterface::new(lattice, held);
         let surface = outside.clone().bounded_by(&interface.surface);
         contact.with_planes(bonds, &surface, modulus.clone(), planes)?.with_tied(
             lattice,
@@ -197,10 +199,10 @@ impl ContactSpec {
     }
 }
 
-/// Particles of the regions of prescribed displacement that are tied at their surface, by site; `None` where none is.
+/// Returns the particles of grips that are tied at their surface, by site; `None` without any.
 ///
 /// # Errors
-/// Ties of a body that cannot have any.
+/// `tied_grips` of a bond law or a cloud.
 pub fn tied_grips<const D: usize>(
     source: &Source,
     scene: &Scene,
@@ -222,13 +224,13 @@ pub fn tied_grips<const D: usize>(
     Ok((free && held.contains(&true)).then_some(held))
 }
 
-/// Checks what can be judged without a body.
+/// Checks what needs no body.
 ///
 /// # Errors
-/// The key, what was found and what is allowed.
+/// A [`SceneError`] that names the key, the value found and what is allowed.
 pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let Some(contact) = &scene.contact else { return Ok(()) };
-    let explicit = scene.method() == Method::Verlet;
+    let explicit = scene.method() == SolverMethod::Verlet;
     let stiff = |key: &str, found: f64| {
         let allowed = format!("0 to {}", plain(STIFFEST));
         if (0.0..=STIFFEST).contains(&found) { Ok(()) } else { Err(source.error(key, plain(found), allowed)) }
@@ -240,9 +242,8 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     stiff("contact.stiffness", contact.pair_stiffness())?;
     stiff("contact.short_range", contact.short_range.unwrap_or(0.0))?;
     if contact.short_range.is_some() && contact.stiffness.is_some() {
-        let allowed =
-            "one of them: `stiffness` follows the material, `short_range` is the κ of the literature";
-        return Err(source.error("contact.short_range", "`short_range` beside `stiffness`", allowed));
+        let why = "`stiffness` follows the material, `short_range` is the κ of the literature";
+        return Err(source.conflict("contact.short_range", "stiffness", why));
     }
     rough("contact.friction", contact.friction)?;
     for (index, plane) in contact.plane.iter().enumerate() {
@@ -255,8 +256,11 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             return Err(source.error(&key("name"), format!("`{name}` twice"), "different names"));
         }
         if plane.velocity.is_some() && !explicit {
-            let allowed = "`displacement`, or `solver.method = \"verlet\"`";
-            return Err(source.error(&key("velocity"), "`velocity` of a quasi-static method", allowed));
+            let why = format!(
+                "needs `solver.method = \"verlet\"`; with `{}` write `displacement`",
+                scene.method().name()
+            );
+            return Err(source.unexpected(&key("velocity"), why));
         }
     }
     if scene.body.space == Space::Solid {

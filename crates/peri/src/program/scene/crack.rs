@@ -1,13 +1,13 @@
 //! Cracks of zero width, and the bonds that they sever.
 
 use super::Scene;
-use super::values::vector;
+use super::values::{plain, vector};
 use crate::bonds::{Bonds, CellGrid};
 use crate::geometry::{Cut, cuts_within, severed as severs};
 use harness::scene::{SceneError, Source};
 use polycore::units::Length;
 
-/// The cracks of a scene.
+/// Checks and converts the cracks of a scene.
 ///
 /// # Errors
 /// As [`super::body_of`].
@@ -22,8 +22,12 @@ pub(super) fn cracks<const D: usize>(source: &Source, scene: &Scene) -> Result<V
                 vector::<D>(source, &key("and"), and)?;
             }
             (None, 2) => {}
-            (Some(_), _) => return Err(source.error(&key("and"), "a third corner", "none in a plane body")),
-            (None, _) => return Err(source.error(&key("and"), "nothing", "a third corner in a solid")),
+            (Some(_), _) => {
+                return Err(source.unexpected(&key("and"), "a crack of a plane body has two corners"));
+            }
+            (None, _) => {
+                return Err(source.missing(&key("and"), "needed in a solid: the third corner of the crack"));
+            }
         }
         if edges.iter().take(D - 1).any(|e| e.iter().all(|&x| x == 0.0)) {
             return Err(source.error(&key("to"), "the same point as `from`", "another point"));
@@ -35,7 +39,7 @@ pub(super) fn cracks<const D: usize>(source: &Source, scene: &Scene) -> Result<V
     Ok(cuts)
 }
 
-/// The same of a scene that is checked.
+/// Converts the cracks of a checked scene.
 pub fn cuts_of<const D: usize>(scene: &Scene) -> Vec<Cut<D>> {
     let each = scene.body.cracks.iter().map(|crack| {
         let place =
@@ -50,7 +54,7 @@ pub fn cuts_of<const D: usize>(scene: &Scene) -> Vec<Cut<D>> {
     each.collect()
 }
 
-/// Number of bonds that each crack breaks by itself.
+/// Counts the bonds that each crack breaks on its own.
 ///
 /// # Errors
 /// A crack that breaks none.
@@ -59,7 +63,7 @@ pub(super) fn severed<const D: usize>(
     bonds: &dyn Bonds<D>,
     cuts: &[Cut<D>],
 ) -> Result<Vec<u64>, SceneError> {
-    // bonds as long as the horizon are bonds, whatever the rounding of positions
+    // bonds as long as the horizon count despite rounding of positions
     let reach = bonds.horizon() * (1.0 + 1e-9);
     let count = |(index, cut): (usize, &Cut<D>)| {
         let places = bonds.particles().iter().map(|&site| bonds.position(site as usize));
@@ -76,11 +80,12 @@ pub(super) fn severed<const D: usize>(
             }
         }
         if severed == 0 {
-            let found = "a crack that breaks no bond";
+            let spacing = plain((bonds.spacing() * 1e9).round() / 1e6);
+            let found = format!("a crack that breaks no bond of particles {spacing} mm apart");
             return Err(source.error(
                 &format!("body.cracks[{index}]"),
                 found,
-                "a crack across a part of the body",
+                "a crack across a part of the body, or a smaller spacing",
             ));
         }
         Ok(severed)
@@ -88,7 +93,7 @@ pub(super) fn severed<const D: usize>(
     cuts.iter().enumerate().map(count).collect()
 }
 
-/// Bonds of each particle that the cracks of a body break together.
+/// Counts the bonds of each particle that the cracks break together.
 pub fn severed_of_each<const D: usize>(bonds: &dyn Bonds<D>, cuts: &[Cut<D>]) -> Vec<u32> {
     let reach = bonds.horizon() * (1.0 + 1e-9);
     let mut counts = vec![0; bonds.particles().len()];
@@ -110,7 +115,7 @@ pub fn severed_of_each<const D: usize>(bonds: &dyn Bonds<D>, cuts: &[Cut<D>]) ->
     counts
 }
 
-/// Whether |a × b| vanishes to rounding.
+/// Returns true if |a × b| vanishes to rounding.
 fn parallel<const D: usize>(a: [f64; D], b: [f64; D]) -> bool {
     let dot = |a: [f64; D], b: [f64; D]| (0..D).map(|d| a[d] * b[d]).sum::<f64>();
     let (aa, bb, ab) = (dot(a, a), dot(b, b), dot(a, b));

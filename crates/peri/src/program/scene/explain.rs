@@ -1,20 +1,20 @@
-//! What a scene will build, and what it leaves out.
+//! Lists what a scene builds and what it leaves out, for `peri check`.
 
 use super::values::plain;
-use super::variant::Variant;
-use super::{Body, Method, Scene, SurfaceCorrection};
+use super::variant::SceneVariant;
+use super::{Boundary, DiscreteBody, Scene, SolverMethod, SurfaceCorrection};
 use crate::bonds::VolumeCorrection;
-use crate::material::Point;
+use crate::material::SolidPoint;
 use crate::solver::Criterion;
 use harness::report::Named;
 use harness::scene::{SceneError, Source};
 
-/// Lines for `peri check`.
+/// Returns the lines of `peri check` for a variant.
 pub fn explain<const D: usize>(
     source: &Source,
     scene: &Scene,
-    variant: &Variant,
-    body: &Body<D>,
+    variant: &SceneVariant,
+    body: &DiscreteBody<D>,
     criterion: Option<&Criterion>,
     reports: &[Named],
 ) -> Result<Vec<String>, SceneError> {
@@ -40,7 +40,7 @@ pub fn explain<const D: usize>(
         (bonds.sites() * (3 * D + 1) * 8) as f64 / 1e6
     ));
     if let Some(solid) = &scene.material.solid {
-        let states = (bonds.sites() * size_of::<Point<D>>()) as f64 / 1e6;
+        let states = (bonds.sites() * size_of::<SolidPoint<D>>()) as f64 / 1e6;
         builds(format!("a solid, `{}`: states of particles {states:.1} MB", solid.law.name()));
     }
     for (crack, severed) in scene.body.cracks.iter().zip(&body.severed) {
@@ -58,27 +58,27 @@ pub fn explain<const D: usize>(
     if let Some(criterion) = criterion {
         let limit = match criterion {
             Criterion::Stretch(stretch) => format!("at a stretch of {:.6}", stretch.least()),
-            Criterion::Energy(limit) => format!("where that releases more than {limit:.4e} J/m³"),
+            Criterion::Energy(limit) => format!("when they release more than {limit:.4e} J/m³"),
             Criterion::Softening(law) => format!(
-                "where that has taken {:.4e} J/m³ and soften from {:.4e} J/m³ on (e_f = {:.3})",
+                "when they have taken {:.4e} J/m³, and soften from {:.4e} J/m³ on (e_f = {:.3})",
                 law.limit,
                 law.onset,
                 law.ductility()
             ),
         };
-        builds(format!("bonds that break {limit}, damage, a count of each particle's bonds"));
+        builds(format!("bonds that break {limit}; damage of each particle"));
     }
-    if scene.method() == Method::Lbfgs {
-        builds("ten pairs of steps and gradient changes, a coarse level with its factors".to_owned());
+    if scene.method() == SolverMethod::Lbfgs {
+        builds("L-BFGS: ten pairs of steps and gradient changes, a factored coarse level".to_owned());
     }
     if scene.solver.refine > 1 {
         builds(format!(
-            "load steps cut where bonds would break, down to 1/{} of a step",
+            "load steps that are bisected where bonds would break, down to 1/{} of a step",
             scene.solver.refine
         ));
     }
     if scene.solver.snap_back {
-        builds("loads that are lowered after bonds broke, until no others would at once".to_owned());
+        builds("loads that are lowered after bonds break, until no other bond would break".to_owned());
     }
     if let Some(dynamics) = &scene.dynamics {
         let method = dynamics.method();
@@ -90,47 +90,97 @@ pub fn explain<const D: usize>(
                 Some(kappa) => format!("κ = {kappa}"),
                 None => format!("s = {}", contact.pair_stiffness()),
             };
-            format!("contact of stiffness {stiffness}, a list of close pairs without a bond")
+            format!("contact of stiffness {stiffness}: a list of close particles without a bond")
         } else {
-            "detection of overlaps in each step, no repulsion".to_owned()
+            "a search for overlaps in each step, no repulsion".to_owned()
         });
         if !contact.plane.is_empty() {
             builds(format!("{} rigid planes, faces of the body", contact.plane.len()));
         }
-        if contact.rubs() {
-            builds("friction: its forces, a pass of its own in each step".to_owned());
+        if contact.has_friction() {
+            builds("friction: a pass over contacts in each step".to_owned());
         }
     }
     if let Some(stress) = &scene.stress {
         let names: Vec<&str> = stress.measures.iter().map(|m| m.name()).collect();
-        let when = if scene.output.every.is_some() { "in the steps written" } else { "once per variant" };
+        let when = if scene.output.every.is_some() { "in each written step" } else { "once per variant" };
         builds(format!("stress {when}: {}", names.join(", ")));
     }
-    let mut omits = |needed: bool, text: &str| {
-        if !needed {
-            lines.push(format!("  leaves out {text}"));
-        }
-    };
-    omits(bonds.as_lattice().is_none(), "neighbour lists");
-    omits(variant.surface == SurfaceCorrection::Energy, "surface-correction factors");
-    omits(variant.volume == VolumeCorrection::Linear, "volume correction");
-    omits(scene.stress.is_some(), "the stress pass");
-    omits(scene.dynamics.is_some(), "inertia");
-    omits(!scene.body.cracks.is_empty(), "pre-cut cracks");
-    omits(scene.contact.is_some(), "contact (no [contact] in this scene)");
-    omits(criterion.is_some(), "damage and bond breaking (no `critical` in this scene)");
-    omits(scene.output.every.is_some(), "fields of the steps before the last");
-    let constrained = scene.boundary.iter().any(|b| b.holds());
-    omits(constrained, "prescribed displacements");
-    omits(scene.boundary.iter().any(|b| b.traction.is_some() || b.force.is_some()), "body forces");
-    omits(scene.output.fields, "VTKHDF fields");
-    omits(scene.output.pictures, "pictures");
-    lines.push(format!("  reports    {}", Named::list(reports)));
+    let pulled = scene.boundary.iter().any(|b| b.traction.is_some() || b.force.is_some());
+    let left_out: Vec<&str> = [
+        (bonds.as_lattice().is_none(), "neighbour lists"),
+        (variant.surface == SurfaceCorrection::Energy, "surface correction"),
+        (variant.volume == VolumeCorrection::Linear, "volume correction"),
+        (scene.stress.is_some(), "stress"),
+        (scene.dynamics.is_some(), "inertia"),
+        (!scene.body.cracks.is_empty(), "pre-cut cracks"),
+        (scene.contact.is_some(), "contact (needs [contact])"),
+        (criterion.is_some(), "damage and bond breaking (needs `material.critical`)"),
+        (scene.output.every.is_some(), "fields of earlier steps (need `output.every`)"),
+        (scene.boundary.iter().any(Boundary::prescribes_displacement), "prescribed displacements"),
+        (pulled, "body forces"),
+        (scene.output.fields, "VTKHDF fields"),
+        (scene.output.pictures, "pictures"),
+    ]
+    .into_iter()
+    .filter_map(|(is_built, name)| (!is_built).then_some(name))
+    .collect();
+    lines.extend(wrapped_list("leaves out", &left_out));
+    let names: Vec<String> = reports.iter().map(|named| Named::list([named])).collect();
+    let mut names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let more = format!("and {} more in report.json", names.len().saturating_sub(LISTED_REPORTS));
+    if names.len() > LISTED_REPORTS {
+        names.truncate(LISTED_REPORTS);
+        names.push(&more);
+    }
+    lines.extend(wrapped_list("reports", &names));
     lines.extend(super::warnings(source, scene, body).into_iter().map(|text| format!("  warning    {text}")));
     Ok(lines)
 }
 
-/// Without the digits that a change of units leaves behind.
+/// Names of scalars that `check` lists.
+const LISTED_REPORTS: usize = 40;
+
+/// Characters of a line of `check` that lists names.
+const LINE_WIDTH: usize = 100;
+
+/// Returns names separated by commas, in lines of up to [`LINE_WIDTH`] characters; the label stands before
+/// the first.
+fn wrapped_list(label: &str, names: &[&str]) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for (index, name) in names.iter().enumerate() {
+        let comma = if index + 1 < names.len() { "," } else { "" };
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + name.chars().count() + 2 <= LINE_WIDTH => {
+                *line += &format!(" {name}{comma}");
+            }
+            _ => {
+                let label = if index == 0 { label } else { "" };
+                lines.push(format!("  {label:<10} {name}{comma}"));
+            }
+        }
+    }
+    lines
+}
+
+/// Rounds off the digits that a change of units leaves behind.
 fn rounded(value: f64) -> f64 {
     (value * 1e9).round() / 1e9
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_are_wrapped() {
+        let names = ["a".repeat(50), "b".repeat(34), "c".repeat(90)];
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let lines = wrapped_list("reports", &names);
+        assert_eq!(lines.len(), 2, "{lines:?}");
+        assert_eq!(lines[0], format!("  reports    {}, {},", names[0], names[1]));
+        assert_eq!(lines[0].len(), LINE_WIDTH);
+        assert_eq!(lines[1], format!("             {}", names[2]));
+        assert!(wrapped_list("reports", &[]).is_empty());
+    }
 }

@@ -1,4 +1,5 @@
-//! Parameters of the material that follow a field of another scene, such as the crystallinity of a printed part, as written in TOML.
+//! Specification of material parameters that follow a field of another scene, such as the crystallinity of a
+//! part.
 
 use polycore::units::{Length, Time};
 use serde::{Deserialize, Deserializer};
@@ -9,15 +10,15 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FieldSpec {
-    /// The parameter, in the place of its value in `[material]`.
-    pub of: Parameter,
+    /// Parameter whose value in `[material]` the field replaces.
+    pub of: VaryingParameter,
     /// The field.
     pub from: FieldSource,
-    /// Rows [value of the field, value of the parameter]; linear between them, an error outside. None of a `prestrain` from a stress tensor, which is
-    /// to be there while the body is held in its shape.
+    /// Rows [value of the field, value of the parameter]; linear between them, an error outside. Empty for a
+    /// `prestrain` from a stress tensor: the stress while the body is held in its shape.
     #[serde(default)]
-    pub table: Vec<[Entry; 2]>,
-    /// Where the body lies in the mesh of the field; default: as it is written.
+    pub table: Vec<[TableEntry; 2]>,
+    /// Placement of the body in the mesh of the field; default: equal coordinates.
     #[serde(default)]
     pub placement: FieldPlacement,
 }
@@ -25,12 +26,12 @@ pub struct FieldSpec {
 /// Parameters that can follow a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Parameter {
+pub enum VaryingParameter {
     /// `material.youngs_modulus`; a bond has the mean of its ends.
     YoungsModulus,
-    /// `material.critical.fracture_energy`; a bond breaks as the weaker of its ends does.
+    /// `material.critical.fracture_energy`; a bond takes the weaker of its ends.
     FractureEnergy,
-    /// ε*: the strain that a particle would have if it were free, the same in all directions; a bond has the mean of its ends.
+    /// Strain ε* of a free particle, equal in all directions; a bond has the mean of its ends.
     Prestrain,
 }
 
@@ -48,17 +49,17 @@ pub struct FieldSource {
     pub file: Option<PathBuf>,
 }
 
-/// x of the mesh = `origin` + `scale` x of the body along each of `axes`.
+/// Coordinates of the mesh = `origin` + `scale` × those of the body along each of `axes`.
 #[derive(Clone, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FieldPlacement {
-    /// Where the origin of the body lies in the mesh; default: its origin.
+    /// Origin of the body in the mesh; default: the origin of the mesh.
     pub origin: Option<[Length; 3]>,
-    /// Axes of the mesh along which those of the body lie; default: the same ones.
+    /// Axes of the mesh along the axes of the body; default: x, y, z.
     pub axes: Option<Vec<MeshAxis>>,
     /// Length in the mesh over length in the body; default: 1.
     pub scale: Option<f64>,
-    /// Of a plane body: the range along the third axis over which the mean is taken; default: the whole mesh.
+    /// Range along the third axis for the mean in a plane body; default: the whole mesh.
     pub depth: Option<[Length; 2]>,
 }
 
@@ -86,8 +87,8 @@ pub enum MeshAxis {
 }
 
 impl MeshAxis {
-    /// Its number and sign.
-    pub fn of(self) -> (usize, f64) {
+    /// Returns its index and sign.
+    pub fn index_and_sign(self) -> (usize, f64) {
         match self {
             Self::X => (0, 1.0),
             Self::Y => (1, 1.0),
@@ -99,8 +100,8 @@ impl MeshAxis {
     }
 }
 
-impl Parameter {
-    /// Name in scenes.
+impl VaryingParameter {
+    /// Returns the name in scenes.
     pub fn name(self) -> &'static str {
         match self {
             Self::YoungsModulus => "youngs-modulus",
@@ -109,7 +110,7 @@ impl Parameter {
         }
     }
 
-    /// Name in reports.
+    /// Returns the name in reports.
     pub fn value_name(self) -> &'static str {
         match self {
             Self::YoungsModulus => "youngs_modulus",
@@ -121,42 +122,43 @@ impl Parameter {
 
 /// A number, or a text with a unit.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Entry {
-    /// Without a unit.
+pub enum TableEntry {
+    /// Number without unit.
     Number(f64),
-    /// With one.
+    /// Text with a unit.
     Text(String),
 }
 
-impl<'de> Deserialize<'de> for Entry {
+impl<'de> Deserialize<'de> for TableEntry {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         struct Visitor;
         impl serde::de::Visitor<'_> for Visitor {
-            type Value = Entry;
+            type Value = TableEntry;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("a number, or a text with a unit such as \"1.6 GPa\"")
             }
-            fn visit_f64<E>(self, value: f64) -> Result<Entry, E> {
-                Ok(Entry::Number(value))
+            fn visit_f64<E>(self, value: f64) -> Result<TableEntry, E> {
+                Ok(TableEntry::Number(value))
             }
-            fn visit_i64<E>(self, value: i64) -> Result<Entry, E> {
-                Ok(Entry::Number(value as f64))
+            fn visit_i64<E>(self, value: i64) -> Result<TableEntry, E> {
+                Ok(TableEntry::Number(value as f64))
             }
-            fn visit_str<E>(self, text: &str) -> Result<Entry, E> {
-                Ok(Entry::Text(text.to_owned()))
+            fn visit_str<E>(self, text: &str) -> Result<TableEntry, E> {
+                Ok(TableEntry::Text(text.to_owned()))
             }
         }
         from.deserialize_any(Visitor)
     }
 }
 
-impl schemars::JsonSchema for Entry {
+impl schemars::JsonSchema for TableEntry {
     fn schema_name() -> std::borrow::Cow<'static, str> {
-        "Entry".into()
+        "TableEntry".into()
     }
 
     fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
-        schemars::json_schema!({ "description": "a number, or a text with a unit", "type": ["number", "string"] })
+        schemars::json_schema!({ "description": "a number, or a text with a \
+            unit", "type": ["number", "string"] })
     }
 }

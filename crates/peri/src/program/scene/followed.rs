@@ -1,9 +1,9 @@
-//! Parameters in the particles of a body, from fields of other scenes.
+//! Computes material parameters of particles from fields of other scenes.
 
-use super::cells::{Mesh, Values};
-use super::field::Entry;
-use super::values::{Body, plain, positive};
-use super::{FieldSpec, Parameter, Scene};
+use super::cells::{HexMesh, MeshField};
+use super::field::TableEntry;
+use super::values::{DiscreteBody, plain, positive};
+use super::{FieldSpec, Scene, VaryingParameter};
 use crate::bonds::Property;
 use harness::output::vtkhdf::{self, Series};
 use harness::scene::{SceneError, Source};
@@ -12,22 +12,22 @@ use polycore::units::dimension::{EnergyPerAreaDimension, RatioDimension, StressD
 use polycore::units::{Dimension, Quantity, Ratio, Stress, Temperature};
 use std::fmt;
 
-/// Values this far beyond a table, over its range, are at its end: rounding.
-const AT_END: f64 = 1e-9;
-/// Less of a particle inside of the mesh is outside of it.
-const INSIDE: f64 = 1e-6;
+/// Distance beyond a table, over its range, that counts as rounding.
+const TABLE_TOLERANCE: f64 = 1e-9;
+/// Fraction of a particle's volume below which it lies outside the mesh.
+const LEAST_COVERED: f64 = 1e-6;
 
-/// What kinds of fields there are, by the units in the names of their arrays.
+/// Kind of a field, by the unit in the name of its array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum FieldKind {
     Number,
     Temperature,
     Stress,
 }
 
-impl Kind {
-    /// Of an array, and the unit of its values: `temperature_degC`, `crystallinity`.
-    fn of(array: &str) -> (Self, &str) {
+impl FieldKind {
+    /// Returns the kind of an array and the unit of its values: `temperature_degC`, `crystallinity`.
+    fn from_array_name(array: &str) -> (Self, &str) {
         match array.rsplit_once('_') {
             Some((_, unit @ ("degC" | "degF" | "K"))) => (Self::Temperature, unit),
             Some((_, unit @ ("Pa" | "kPa" | "MPa" | "GPa"))) => (Self::Stress, unit),
@@ -43,25 +43,25 @@ impl Kind {
         }
     }
 
-    /// In SI units; `None` of another kind.
-    fn si(self, entry: &Entry) -> Option<f64> {
+    /// Converts an entry to SI units; `None` for an entry of another kind.
+    fn si(self, entry: &TableEntry) -> Option<f64> {
         match (self, entry) {
-            (Self::Number, Entry::Number(value)) if value.is_finite() => Some(*value),
-            (Self::Number, Entry::Text(text)) => text.parse::<Ratio>().ok().map(|value| value.si()),
-            (Self::Temperature, Entry::Text(text)) => text.parse::<Temperature>().ok().map(|t| t.si()),
-            (Self::Stress, Entry::Text(text)) => text.parse::<Stress>().ok().map(|stress| stress.si()),
+            (Self::Number, TableEntry::Number(value)) if value.is_finite() => Some(*value),
+            (Self::Number, TableEntry::Text(text)) => text.parse::<Ratio>().ok().map(|value| value.si()),
+            (Self::Temperature, TableEntry::Text(text)) => text.parse::<Temperature>().ok().map(|t| t.si()),
+            (Self::Stress, TableEntry::Text(text)) => text.parse::<Stress>().ok().map(|stress| stress.si()),
             _ => None,
         }
     }
 
-    /// A value of an array in SI units.
+    /// Returns the offset and the factor that convert values of an array to SI units.
     fn scale(self, unit: &str) -> (f64, f64) {
-        let at = |value: f64| self.si(&Entry::Text(format!("{value} {unit}"))).unwrap_or(f64::NAN);
+        let si_of = |value: f64| self.si(&TableEntry::Text(format!("{value} {unit}"))).unwrap_or(f64::NAN);
         match self {
             Self::Number => (0.0, 1.0),
             _ => {
-                // as far above absolute zero as all units are
-                let (low, high) = (at(100.0), at(200.0));
+                // offset and factor from two temperatures
+                let (low, high) = (si_of(100.0), si_of(200.0));
                 (low - (high - low), 0.01 * (high - low))
             }
         }
@@ -76,14 +76,14 @@ impl Kind {
     }
 }
 
-impl Parameter {
-    fn si(self, entry: &Entry) -> Result<f64, String> {
+impl VaryingParameter {
+    fn si(self, entry: &TableEntry) -> Result<f64, String> {
         let example = match (self, entry) {
-            (Self::Prestrain, Entry::Number(value)) if value.is_finite() => return Ok(*value),
-            (Self::Prestrain, Entry::Text(text)) => return in_si::<RatioDimension>(text),
+            (Self::Prestrain, TableEntry::Number(value)) if value.is_finite() => return Ok(*value),
+            (Self::Prestrain, TableEntry::Text(text)) => return in_si::<RatioDimension>(text),
             (Self::Prestrain, _) => return Err("a finite number".to_owned()),
-            (Self::YoungsModulus, Entry::Text(text)) => return in_si::<StressDimension>(text),
-            (Self::FractureEnergy, Entry::Text(text)) => return in_si::<EnergyPerAreaDimension>(text),
+            (Self::YoungsModulus, TableEntry::Text(text)) => return in_si::<StressDimension>(text),
+            (Self::FractureEnergy, TableEntry::Text(text)) => return in_si::<EnergyPerAreaDimension>(text),
             (Self::YoungsModulus, _) => "1.6 GPa",
             (Self::FractureEnergy, _) => "5 kJ/m^2",
         };
@@ -103,26 +103,26 @@ fn in_si<D: Dimension>(text: &str) -> Result<f64, String> {
     text.parse::<Quantity<D>>().map(Quantity::si).map_err(|error| error.to_string())
 }
 
-/// A parameter in the particles of a body, and the field that it follows.
+/// Parameter in the particles of a body, and the field that it follows.
 #[derive(Clone, Debug)]
-pub struct Followed {
+pub struct ParameterField {
     /// The parameter.
-    pub parameter: Parameter,
-    /// Its values by site, SI; of a stress, that of the mean stress.
+    pub parameter: VaryingParameter,
+    /// Values by site, SI; for a stress tensor, of the mean stress.
     pub values: Property,
-    /// The stress, Pa, site by site along the axes of the body, which is to be there while the body is held in its shape; empty of other fields.
+    /// Stress by site along the axes of the body while it is held in its shape, Pa; empty for scalar fields.
     pub stress: Vec<[[f64; 3]; 3]>,
-    /// Mean, least and largest value of the field in the particles, SI.
+    /// Mean, smallest and largest value of the field in the particles, SI.
     pub field: [f64; 3],
-    /// Its mean over the mesh, where it exists.
+    /// Mean of the field over its mesh.
     pub mesh_mean: f64,
-    /// Its unit.
+    /// Unit of the field.
     pub unit: &'static str,
     array: String,
     input: String,
 }
 
-impl fmt::Display for Followed {
+impl fmt::Display for ParameterField {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { parameter, values, field: [_, low, high], array, input, unit, .. } = self;
         let (least, greatest, name) = (values.least(), values.greatest(), parameter.name());
@@ -134,16 +134,16 @@ impl fmt::Display for Followed {
     }
 }
 
-/// The parameters of a scene that follow fields.
+/// Computes the parameters of a scene that follow fields.
 ///
 /// # Errors
-/// A file that cannot be read, has no such field, step or unit, or no hexahedra; a table that does not increase, or that the field leaves;
-/// a body that lies outside of the mesh, or where the field has no value.
+/// A file that cannot be read, or without the field, step or unit, or without hexahedra; a table that does
+/// not increase, or that the field leaves; a body outside the mesh, or where the field is not finite.
 pub fn followed<const D: usize>(
     source: &Source,
     scene: &Scene,
-    body: &Body<D>,
-) -> Result<Vec<Followed>, SceneError> {
+    body: &DiscreteBody<D>,
+) -> Result<Vec<ParameterField>, SceneError> {
     let specs = scene.material.fields.iter().enumerate();
     specs.map(|(index, spec)| spec.follow(source, &format!("material.fields[{index}]"), body)).collect()
 }
@@ -153,16 +153,16 @@ impl FieldSpec {
         &self,
         source: &Source,
         key: &str,
-        body: &Body<D>,
-    ) -> Result<Followed, SceneError> {
+        body: &DiscreteBody<D>,
+    ) -> Result<ParameterField, SceneError> {
         let (array, mesh, values) = self.read(source, key)?;
-        let (kind, unit) = Kind::of(&array);
+        let (kind, unit) = FieldKind::from_array_name(&array);
         let table = match values.components {
             1 => self.table(source, key, kind, &array)?,
             _ if self.table.is_empty() => Vec::new(),
             _ => {
-                let allowed = "none: the strain that this stress belongs to follows from Young's modulus";
-                return Err(source.error(&format!("{key}.table"), "a table of a tensor", allowed));
+                let why = "the strain of a stress tensor follows from Young's modulus";
+                return Err(source.unexpected(&format!("{key}.table"), why));
             }
         };
         let boxes = self.boxes(source, &format!("{key}.placement"), body, &mesh.points)?;
@@ -176,7 +176,7 @@ impl FieldSpec {
             format!("the particle at ({}) mm", numbers.join(", "))
         };
         for (index, own) in boxes.iter().enumerate() {
-            if overlap.covered(index) < INSIDE * own.volume() {
+            if overlap.covered_volume(index) < LEAST_COVERED * own.volume() {
                 let reason = format!("{} lies outside of the mesh of `{}`", place(index), self.from.input);
                 return Err(refused("placement", format!("{reason}; is it another mesh?")));
             }
@@ -195,10 +195,11 @@ impl FieldSpec {
         let mut stress = vec![[[0.0; 3]; 3]; if values.components == 6 { bonds.sites() } else { 0 }];
         let (mut sum, mut volume) = (0.0, 0.0);
         for index in 0..boxes.len() {
-            let at = |component: usize| zero + scale * means[component][index].unwrap_or(f64::NAN);
-            let value = values.mean_of(at);
+            let component_mean =
+                |component: usize| zero + scale * means[component][index].unwrap_or(f64::NAN);
+            let value = values.mean_of(component_mean);
             let mapped = match values.components {
-                1 => interpolated(&table, value),
+                1 => interpolate(&table, value),
                 _ => Some(value),
             };
             let Some(mapped) = mapped else {
@@ -210,7 +211,7 @@ impl FieldSpec {
             let site = bonds.particles()[index] as usize;
             parameter[site] = mapped;
             if let Some(tensor) = stress.get_mut(site) {
-                *tensor = self.along_axes(Values::tensor(at));
+                *tensor = self.along_axes(MeshField::tensor(component_mean));
             }
             sum += bonds.volume(site) * value;
             volume += bonds.volume(site);
@@ -218,7 +219,7 @@ impl FieldSpec {
         }
         let extreme = |better: fn(f64, f64) -> f64| field.iter().copied().reduce(better).unwrap_or(f64::NAN);
         let [mesh_volume, mesh_sum] = values.integral(&mesh).map_err(fault)?;
-        Ok(Followed {
+        Ok(ParameterField {
             parameter: self.of,
             values: Property::new(bonds, |site, _| parameter[site]),
             stress,
@@ -230,8 +231,8 @@ impl FieldSpec {
         })
     }
 
-    /// The array, its mesh and its values.
-    fn read(&self, source: &Source, key: &str) -> Result<(String, Mesh, Values), SceneError> {
+    /// Reads the array, its mesh and its values.
+    fn read(&self, source: &Source, key: &str) -> Result<(String, HexMesh, MeshField), SceneError> {
         let from = &self.from;
         let folder = source.input(&format!("{key}.from.input"), &from.input)?;
         let path = source.file(folder.join(from.file.as_deref().unwrap_or("fields.vtkhdf".as_ref())));
@@ -239,14 +240,17 @@ impl FieldSpec {
             |at: &str, reason: &dyn fmt::Display| source.refused(&format!("{key}.from.{at}"), reason);
         let series = vtkhdf::read(&path).map_err(|error| refused("input", &error))?;
         let (of_nodes, of_cells) = (series.arrays().iter(), series.cell_arrays().iter());
-        // of tensors, stresses that prestrains belong to
+        // of tensors only stresses, for prestrains
         let fits = |name: &str, n: usize| {
-            n == 1 || (n == 6 && self.of == Parameter::Prestrain && Kind::of(name).0 == Kind::Stress)
+            n == 1
+                || (n == 6
+                    && self.of == VaryingParameter::Prestrain
+                    && FieldKind::from_array_name(name).0 == FieldKind::Stress)
         };
         let arrays: Vec<&str> =
             of_nodes.chain(of_cells).filter(|(name, n)| fits(name, *n)).map(|(name, _)| &**name).collect();
         let named = |array: &&&str| {
-            let (_, unit) = Kind::of(array);
+            let (_, unit) = FieldKind::from_array_name(array);
             **array == from.field
                 || (!unit.is_empty() && array.strip_suffix(unit) == Some(&format!("{}_", from.field)))
         };
@@ -254,10 +258,10 @@ impl FieldSpec {
             return Err(source.unknown(&format!("{key}.from.field"), &from.field, &arrays));
         };
         let step = self.step(source, key, &series)?;
-        let mesh = Mesh::new(&series).map_err(|reason| {
+        let mesh = HexMesh::new(&series).map_err(|reason| {
             refused("input", &format!("{}: {reason}; fields lie on hexahedra", path.display()))
         })?;
-        let values = Values::new(&series, step, &array).map_err(|error| refused("field", &error))?;
+        let values = MeshField::new(&series, step, &array).map_err(|error| refused("field", &error))?;
         Ok((array, mesh, values))
     }
 
@@ -273,30 +277,38 @@ impl FieldSpec {
         })
     }
 
-    /// Its rows in SI units.
+    /// Converts the rows of its table to SI units.
     fn table(
         &self,
         source: &Source,
         key: &str,
-        kind: Kind,
+        kind: FieldKind,
         array: &str,
     ) -> Result<Vec<(f64, f64)>, SceneError> {
         let mut table: Vec<(f64, f64)> = Vec::new();
         for (row, [from, to]) in self.table.iter().enumerate() {
-            let at = |column: usize| format!("{key}.table[{row}][{column}]");
+            let entry_key = |column: usize| format!("{key}.table[{row}][{column}]");
             let found = match from {
-                Entry::Number(number) => plain(*number),
-                Entry::Text(text) => format!("`{text}`"),
+                TableEntry::Number(number) => plain(*number),
+                TableEntry::Text(text) => format!("`{text}`"),
             };
             let Some(from) = kind.si(from) else {
-                return Err(source.error(&at(0), found, format!("{}: the field is `{array}`", kind.name())));
+                return Err(source.error(
+                    &entry_key(0),
+                    found,
+                    format!("{}: the field is `{array}`", kind.name()),
+                ));
             };
             if table.last().is_some_and(|(before, _)| *before >= from) {
-                return Err(source.error(&at(0), found, "values of the field that increase from row to row"));
+                return Err(source.error(
+                    &entry_key(0),
+                    found,
+                    "values of the field that increase from row to row",
+                ));
             }
-            let to = self.of.si(to).map_err(|reason| source.refused(&at(1), reason))?;
-            if self.of != Parameter::Prestrain {
-                positive(source, &at(1), to, self.of.unit())?;
+            let to = self.of.si(to).map_err(|reason| source.refused(&entry_key(1), reason))?;
+            if self.of != VaryingParameter::Prestrain {
+                positive(source, &entry_key(1), to, self.of.unit())?;
             }
             table.push((from, to));
         }
@@ -309,30 +321,30 @@ impl FieldSpec {
         }
     }
 
-    /// A tensor of the mesh along the axes of the body; those of a plane body across it are zero.
+    /// Rotates a tensor of the mesh to the axes of the body; components across a plane body are zero.
     fn along_axes(&self, tensor: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
         let Some(axes) = &self.placement.axes else { return tensor };
         let mut along = [[0.0; 3]; 3];
-        for (a, (from, sign)) in axes.iter().map(|axis| axis.of()).enumerate() {
-            for (b, (to, other)) in axes.iter().map(|axis| axis.of()).enumerate() {
+        for (a, (from, sign)) in axes.iter().map(|axis| axis.index_and_sign()).enumerate() {
+            for (b, (to, other)) in axes.iter().map(|axis| axis.index_and_sign()).enumerate() {
                 along[a][b] = sign * other * tensor[from][to];
             }
         }
         along
     }
 
-    /// The particles as boxes in the mesh: cubes, or columns through the mesh, of their volumes.
+    /// Returns the particles as boxes in the mesh: cubes, or for a plane body columns through the mesh.
     fn boxes<const D: usize>(
         &self,
         source: &Source,
         key: &str,
-        body: &Body<D>,
+        body: &DiscreteBody<D>,
         points: &[[f64; 3]],
     ) -> Result<Vec<Cuboid>, SceneError> {
         let placement = &self.placement;
         let axes: Vec<(usize, f64)> = match &placement.axes {
             None => (0..D).map(|d| (d, 1.0)).collect(),
-            Some(axes) => axes.iter().map(|axis| axis.of()).collect(),
+            Some(axes) => axes.iter().map(|axis| axis.index_and_sign()).collect(),
         };
         let twice = (0..axes.len()).any(|a| (0..a).any(|b| axes[a].0 == axes[b].0));
         if axes.len() != D || twice {
@@ -346,14 +358,17 @@ impl FieldSpec {
         let scale = placement.scale.unwrap_or(1.0);
         positive(source, &format!("{key}.scale"), scale, "")?;
         let origin = placement.origin.map_or([0.0; 3], |origin| origin.map(|x| x.si()));
-        let mut whole = Cuboid::around(points);
+        let mut whole = Cuboid::bounding(points);
         if let Some(depth) = placement.depth {
-            if D == 3 || depth[0].si() >= depth[1].si() {
-                let found = if D == 3 { "a depth of a solid" } else { "a depth that does not increase" };
+            if D == 3 {
+                return Err(source.unexpected(&format!("{key}.depth"), "a solid has its own depth"));
+            }
+            if depth[0].si() >= depth[1].si() {
+                let found = format!("{} m to {} m", depth[0].si(), depth[1].si());
                 return Err(source.error(
                     &format!("{key}.depth"),
                     found,
-                    "of plane bodies: [from, to] in the mesh",
+                    "[from, to], from < to, in the mesh",
                 ));
             }
             if let Some(across) = (0..3).find(|d| axes.iter().all(|(axis, _)| axis != d)) {
@@ -361,7 +376,7 @@ impl FieldSpec {
             }
         }
         let bonds = &*body.bonds;
-        let of = |&site: &u32| {
+        let cuboid = |&site: &u32| {
             let (position, volume) = (bonds.position(site as usize), bonds.volume(site as usize));
             let edge = if D == 3 { volume.cbrt() } else { (volume / body.thickness).sqrt() };
             let mut own = whole;
@@ -371,14 +386,14 @@ impl FieldSpec {
             }
             own
         };
-        Ok(bonds.particles().iter().map(of).collect())
+        Ok(bonds.particles().iter().map(cuboid).collect())
     }
 }
 
-/// Linear between the rows; `None` outside of them.
-fn interpolated(table: &[(f64, f64)], value: f64) -> Option<f64> {
+/// Interpolates linearly between rows; `None` outside the table.
+fn interpolate(table: &[(f64, f64)], value: f64) -> Option<f64> {
     let (low, high) = (table.first()?.0, table.last()?.0);
-    let slack = AT_END * (high - low);
+    let slack = TABLE_TOLERANCE * (high - low);
     if !(low - slack..=high + slack).contains(&value) {
         return None;
     }
@@ -396,23 +411,23 @@ mod tests {
     fn tables() {
         let table = [(0.0, 1.0), (1.0, 3.0), (3.0, 2.0)];
         for (value, expected) in [(0.0, Some(1.0)), (0.5, Some(2.0)), (1.0, Some(3.0)), (2.0, Some(2.5))] {
-            assert_eq!(interpolated(&table, value), expected);
+            assert_eq!(interpolate(&table, value), expected);
         }
-        assert_eq!(interpolated(&table, 3.0 + 1e-10), Some(2.0));
-        assert_eq!((interpolated(&table, 3.1), interpolated(&table, f64::NAN)), (None, None));
+        assert_eq!(interpolate(&table, 3.0 + 1e-10), Some(2.0));
+        assert_eq!((interpolate(&table, 3.1), interpolate(&table, f64::NAN)), (None, None));
     }
 
     #[test]
     fn units_of_arrays() {
-        assert_eq!(Kind::of("temperature_degC"), (Kind::Temperature, "degC"));
-        assert_eq!(Kind::of("mean_stress_MPa"), (Kind::Stress, "MPa"));
-        assert_eq!(Kind::of("relative_crystallinity"), (Kind::Number, ""));
+        assert_eq!(FieldKind::from_array_name("temperature_degC"), (FieldKind::Temperature, "degC"));
+        assert_eq!(FieldKind::from_array_name("mean_stress_MPa"), (FieldKind::Stress, "MPa"));
+        assert_eq!(FieldKind::from_array_name("relative_crystallinity"), (FieldKind::Number, ""));
         for (kind, unit, value, si) in [
-            (Kind::Temperature, "degC", 25.0, 298.15),
-            (Kind::Temperature, "K", 25.0, 25.0),
-            (Kind::Temperature, "degF", 32.0, 273.15),
-            (Kind::Stress, "MPa", 2.0, 2e6),
-            (Kind::Number, "", 0.3, 0.3),
+            (FieldKind::Temperature, "degC", 25.0, 298.15),
+            (FieldKind::Temperature, "K", 25.0, 25.0),
+            (FieldKind::Temperature, "degF", 32.0, 273.15),
+            (FieldKind::Stress, "MPa", 2.0, 2e6),
+            (FieldKind::Number, "", 0.3, 0.3),
         ] {
             let (zero, scale) = kind.scale(unit);
             assert!(
@@ -421,7 +436,7 @@ mod tests {
                 zero + scale * value
             );
         }
-        assert_eq!(Kind::Temperature.si(&Entry::Number(20.0)), None);
-        assert_eq!(Kind::Number.si(&Entry::Text("20 degC".into())), None);
+        assert_eq!(FieldKind::Temperature.si(&TableEntry::Number(20.0)), None);
+        assert_eq!(FieldKind::Number.si(&TableEntry::Text("20 degC".into())), None);
     }
 }

@@ -1,34 +1,34 @@
-//! Formulas in scenes: a number as a function of place (`x`, `y`, `z`, m) or of time (`t`, s), in SI units.
+//! Formulas of scenes: functions of position (`x`, `y`, `z`, m) or time (`t`, s), in SI units.
 //!
-//! Sums, products, powers (`^`), brackets, `pi`, and the functions of [`Function`]. Derivatives are exact: a formula is
-//! evaluated together with its rate along one direction of its variables.
+//! They have sums, products, powers (`^`), brackets, `pi`, and the functions of [`FormulaFunction`]. A
+//! formula is evaluated together with its exact rate, by dual numbers.
 
 use serde::Deserialize;
 use std::f64::consts::PI;
 
-/// Longer formulas are refused: each bracket nests one level deeper.
+/// Largest length of a formula, which bounds the depth of recursion.
 const LONGEST: usize = 500;
 
 /// A parsed formula.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Formula {
     text: String,
-    root: Node,
+    root: FormulaNode,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-enum Node {
+enum FormulaNode {
     Number(f64),
-    /// `x`, `y`, `z` or `t`, by its place in [`VARIABLES`].
+    /// `x`, `y`, `z` or `t`, by its index in [`VARIABLES`].
     Variable(usize),
-    Binary(char, Box<[Node; 2]>),
-    Call(Function, Vec<Node>),
+    Binary(char, Box<[FormulaNode; 2]>),
+    Call(FormulaFunction, Vec<FormulaNode>),
 }
 
 const VARIABLES: [char; 4] = ['x', 'y', 'z', 't'];
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Function {
+enum FormulaFunction {
     Sin,
     Cos,
     Exp,
@@ -40,7 +40,7 @@ enum Function {
     Atan2,
 }
 
-impl Function {
+impl FormulaFunction {
     const ALL: [(&str, Self, usize); 9] = [
         ("sin", Self::Sin, 1),
         ("cos", Self::Cos, 1),
@@ -58,10 +58,10 @@ impl Function {
 type Dual = [f64; 2];
 
 impl Formula {
-    /// Reads a formula.
+    /// Parses a formula.
     ///
     /// # Errors
-    /// What was found where, and what is allowed.
+    /// The text found, its position, and what is allowed.
     pub fn parse(text: &str) -> Result<Self, String> {
         if text.len() > LONGEST {
             return Err(format!("found a formula of {} characters; allowed: up to {LONGEST}", text.len()));
@@ -70,12 +70,12 @@ impl Formula {
         let root = parser.sum()?;
         match parser.peek() {
             None => Ok(Self { text: text.to_owned(), root }),
-            Some(_) => Err(parser.expected("an operator, or the end")),
+            Some(_) => Err(parser.error("an operator, or the end")),
         }
     }
 
-    /// Its value at a place.
-    pub fn at<const D: usize>(&self, place: [f64; D]) -> f64 {
+    /// Returns the value at a position.
+    pub fn value_at<const D: usize>(&self, place: [f64; D]) -> f64 {
         let mut values = [[0.0; 2]; 4];
         for (value, x) in values.iter_mut().zip(place) {
             value[0] = x;
@@ -83,36 +83,38 @@ impl Formula {
         eval(&self.root, &values)[0]
     }
 
-    /// Its value at a time, and its rate.
-    pub fn in_time(&self, time: f64) -> (f64, f64) {
+    /// Returns the value and the rate at a time.
+    pub fn value_and_rate(&self, time: f64) -> (f64, f64) {
         let [value, rate] = eval(&self.root, &[[0.0; 2], [0.0; 2], [0.0; 2], [time, 1.0]]);
         (value, rate)
     }
 
-    /// The first variable in it that is none of the `allowed`.
-    pub fn other_than(&self, allowed: &str) -> Option<char> {
-        fn find(node: &Node, allowed: &str) -> Option<char> {
+    /// Returns the first variable that is not `allowed`.
+    pub fn find_variable_except(&self, allowed: &str) -> Option<char> {
+        fn find(node: &FormulaNode, allowed: &str) -> Option<char> {
             match node {
-                Node::Number(_) => None,
-                Node::Variable(index) => Some(VARIABLES[*index]).filter(|&name| !allowed.contains(name)),
-                Node::Binary(_, parts) => parts.iter().find_map(|part| find(part, allowed)),
-                Node::Call(_, parts) => parts.iter().find_map(|part| find(part, allowed)),
+                FormulaNode::Number(_) => None,
+                FormulaNode::Variable(index) => {
+                    Some(VARIABLES[*index]).filter(|&name| !allowed.contains(name))
+                }
+                FormulaNode::Binary(_, parts) => parts.iter().find_map(|part| find(part, allowed)),
+                FormulaNode::Call(_, parts) => parts.iter().find_map(|part| find(part, allowed)),
             }
         }
         find(&self.root, allowed)
     }
 
-    /// As it was written.
+    /// Returns the text as written.
     pub fn text(&self) -> &str {
         &self.text
     }
 }
 
-fn eval(node: &Node, values: &[Dual; 4]) -> Dual {
+fn eval(node: &FormulaNode, values: &[Dual; 4]) -> Dual {
     match node {
-        Node::Number(value) => [*value, 0.0],
-        Node::Variable(index) => values[*index],
-        Node::Binary(sign, parts) => {
+        FormulaNode::Number(value) => [*value, 0.0],
+        FormulaNode::Variable(index) => values[*index],
+        FormulaNode::Binary(sign, parts) => {
             let [[a, da], [b, db]] = [eval(&parts[0], values), eval(&parts[1], values)];
             match sign {
                 '+' => [a + b, da + db],
@@ -121,41 +123,41 @@ fn eval(node: &Node, values: &[Dual; 4]) -> Dual {
                 '/' => [a / b, (da * b - a * db) / (b * b)],
                 _ => {
                     let value = a.powf(b);
-                    // of a fixed exponent, also where the base is not above 0
+                    // a constant exponent is also valid for bases up to 0
                     let base = if da == 0.0 { 0.0 } else { b * a.powf(b - 1.0) * da };
                     [value, if db == 0.0 { base } else { base + value * a.ln() * db }]
                 }
             }
         }
-        Node::Call(function, parts) => {
+        FormulaNode::Call(function, parts) => {
             let [a, da] = eval(&parts[0], values);
             let second = parts.get(1).map_or([0.0; 2], |part| eval(part, values));
             let [b, db] = second;
             match function {
-                Function::Sin => [a.sin(), a.cos() * da],
-                Function::Cos => [a.cos(), -a.sin() * da],
-                Function::Exp => [a.exp(), a.exp() * da],
-                Function::Sqrt => [a.sqrt(), if da == 0.0 { 0.0 } else { 0.5 * da / a.sqrt() }],
-                Function::Abs => [a.abs(), if a < 0.0 { -da } else { da }],
-                Function::Min => {
+                FormulaFunction::Sin => [a.sin(), a.cos() * da],
+                FormulaFunction::Cos => [a.cos(), -a.sin() * da],
+                FormulaFunction::Exp => [a.exp(), a.exp() * da],
+                FormulaFunction::Sqrt => [a.sqrt(), if da == 0.0 { 0.0 } else { 0.5 * da / a.sqrt() }],
+                FormulaFunction::Abs => [a.abs(), if a < 0.0 { -da } else { da }],
+                FormulaFunction::Min => {
                     if b < a {
                         second
                     } else {
                         [a, da]
                     }
                 }
-                Function::Max => {
+                FormulaFunction::Max => {
                     if b > a {
                         second
                     } else {
                         [a, da]
                     }
                 }
-                Function::Hypot => {
+                FormulaFunction::Hypot => {
                     let length = a.hypot(b);
                     [length, if length == 0.0 { 0.0 } else { (a * da + b * db) / length }]
                 }
-                Function::Atan2 => {
+                FormulaFunction::Atan2 => {
                     let square = a * a + b * b;
                     [a.atan2(b), if square == 0.0 { 0.0 } else { (b * da - a * db) / square }]
                 }
@@ -177,19 +179,19 @@ impl Parser<'_> {
         self.text[self.at..].chars().next()
     }
 
-    fn takes(&mut self, sign: char) -> bool {
+    fn accept(&mut self, sign: char) -> bool {
         let found = self.peek() == Some(sign);
         self.at += if found { sign.len_utf8() } else { 0 };
         found
     }
 
-    fn expected(&mut self, what: &str) -> String {
+    fn error(&mut self, what: &str) -> String {
         let found =
             self.peek().map_or("the end".to_owned(), |c| format!("`{c}` at character {}", self.at + 1));
         format!("found {found} in the formula `{}`; allowed: {what}", self.text)
     }
 
-    fn sum(&mut self) -> Result<Node, String> {
+    fn sum(&mut self) -> Result<FormulaNode, String> {
         let mut left = self.product()?;
         loop {
             let sign = match self.peek() {
@@ -197,11 +199,11 @@ impl Parser<'_> {
                 _ => return Ok(left),
             };
             self.at += 1;
-            left = Node::Binary(sign, Box::new([left, self.product()?]));
+            left = FormulaNode::Binary(sign, Box::new([left, self.product()?]));
         }
     }
 
-    fn product(&mut self) -> Result<Node, String> {
+    fn product(&mut self) -> Result<FormulaNode, String> {
         let mut left = self.signed()?;
         loop {
             let sign = match self.peek() {
@@ -209,37 +211,37 @@ impl Parser<'_> {
                 _ => return Ok(left),
             };
             self.at += 1;
-            left = Node::Binary(sign, Box::new([left, self.signed()?]));
+            left = FormulaNode::Binary(sign, Box::new([left, self.signed()?]));
         }
     }
 
-    /// −a^b is −(a^b).
-    fn signed(&mut self) -> Result<Node, String> {
-        if self.takes('-') {
-            return Ok(Node::Binary('-', Box::new([Node::Number(0.0), self.signed()?])));
+    /// Parses a sign and a power: −a^b is −(a^b).
+    fn signed(&mut self) -> Result<FormulaNode, String> {
+        if self.accept('-') {
+            return Ok(FormulaNode::Binary('-', Box::new([FormulaNode::Number(0.0), self.signed()?])));
         }
-        let base = self.single()?;
-        if self.takes('^') {
-            return Ok(Node::Binary('^', Box::new([base, self.signed()?])));
+        let base = self.atom()?;
+        if self.accept('^') {
+            return Ok(FormulaNode::Binary('^', Box::new([base, self.signed()?])));
         }
         Ok(base)
     }
 
-    fn single(&mut self) -> Result<Node, String> {
+    fn atom(&mut self) -> Result<FormulaNode, String> {
         let what = "a number, `x`, `y`, `z`, `t`, `pi`, a function or a bracket";
         match self.peek() {
             Some('(') => {
                 self.at += 1;
                 let inner = self.sum()?;
-                if self.takes(')') { Ok(inner) } else { Err(self.expected("`)`")) }
+                if self.accept(')') { Ok(inner) } else { Err(self.error("`)`")) }
             }
             Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
             Some(c) if c.is_ascii_alphabetic() => self.name(),
-            _ => Err(self.expected(what)),
+            _ => Err(self.error(what)),
         }
     }
 
-    fn number(&mut self) -> Result<Node, String> {
+    fn number(&mut self) -> Result<FormulaNode, String> {
         let rest = &self.text[self.at..];
         let mut end = rest.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(rest.len());
         if let Some(exponent) = rest[end..].strip_prefix(['e', 'E']) {
@@ -250,37 +252,38 @@ impl Parser<'_> {
         match rest[..end].parse::<f64>() {
             Ok(value) if value.is_finite() => {
                 self.at += end;
-                Ok(Node::Number(value))
+                Ok(FormulaNode::Number(value))
             }
-            _ => Err(self.expected("a finite number")),
+            _ => Err(self.error("a finite number")),
         }
     }
 
-    fn name(&mut self) -> Result<Node, String> {
+    fn name(&mut self) -> Result<FormulaNode, String> {
         let rest = &self.text[self.at..];
         let end = rest.find(|c: char| !c.is_ascii_alphanumeric()).unwrap_or(rest.len());
         let name = &rest[..end];
         if name == "pi" {
             self.at += end;
-            return Ok(Node::Number(PI));
+            return Ok(FormulaNode::Number(PI));
         }
         if let Some(index) = VARIABLES.iter().position(|v| name.chars().eq([*v])) {
             self.at += end;
-            return Ok(Node::Variable(index));
+            return Ok(FormulaNode::Variable(index));
         }
-        let Some(&(_, function, count)) = Function::ALL.iter().find(|(known, _, _)| *known == name) else {
-            let known: Vec<&str> = Function::ALL.iter().map(|(name, _, _)| *name).collect();
-            return Err(self.expected(&format!("`x`, `y`, `z`, `t`, `pi`, {}", known.join(", "))));
+        let Some(&(_, function, count)) = FormulaFunction::ALL.iter().find(|(known, _, _)| *known == name)
+        else {
+            let known: Vec<&str> = FormulaFunction::ALL.iter().map(|(name, _, _)| *name).collect();
+            return Err(self.error(&format!("`x`, `y`, `z`, `t`, `pi`, {}", known.join(", "))));
         };
         self.at += end;
         let mut parts = Vec::new();
         for index in 0..count {
-            if !self.takes(if index == 0 { '(' } else { ',' }) {
-                return Err(self.expected(if index == 0 { "`(`" } else { "`,` and a second argument" }));
+            if !self.accept(if index == 0 { '(' } else { ',' }) {
+                return Err(self.error(if index == 0 { "`(`" } else { "`,` and a second argument" }));
             }
             parts.push(self.sum()?);
         }
-        if self.takes(')') { Ok(Node::Call(function, parts)) } else { Err(self.expected("`)`")) }
+        if self.accept(')') { Ok(FormulaNode::Call(function, parts)) } else { Err(self.error("`)`")) }
     }
 }
 
@@ -324,7 +327,7 @@ mod tests {
             ("2e", f64::NAN),
         ] {
             match Formula::parse(text) {
-                Ok(formula) => assert!((formula.at(place) - value).abs() < 1e-15, "{text}"),
+                Ok(formula) => assert!((formula.value_at(place) - value).abs() < 1e-15, "{text}"),
                 Err(_) => assert!(value.is_nan(), "{text}"),
             }
         }
@@ -338,11 +341,12 @@ mod tests {
         {
             let formula = Formula::parse(text).unwrap();
             let (time, step) = (0.8, 1e-5);
-            let difference = (formula.in_time(time + step).0 - formula.in_time(time - step).0) / (2.0 * step);
-            assert!((formula.in_time(time).1 - difference).abs() < 1e-8, "{text}");
+            let difference = (formula.value_and_rate(time + step).0 - formula.value_and_rate(time - step).0)
+                / (2.0 * step);
+            assert!((formula.value_and_rate(time).1 - difference).abs() < 1e-8, "{text}");
         }
         let pulse = Formula::parse("(1 - cos(2*pi*min(t/2, 1)))/2").unwrap();
-        assert_eq!(pulse.in_time(3.0).1, 0.0, "after its end");
+        assert_eq!(pulse.value_and_rate(3.0).1, 0.0, "after its end");
     }
 
     #[test]
@@ -364,6 +368,9 @@ mod tests {
         assert!(Formula::parse(&"(".repeat(100_000)).unwrap_err().contains("up to 500"));
         assert!(Formula::parse(&"(".repeat(500)).is_err());
         let formula = Formula::parse("0.1*x + t").unwrap();
-        assert_eq!((formula.other_than("xyz"), formula.other_than("xt")), (Some('t'), None));
+        assert_eq!(
+            (formula.find_variable_except("xyz"), formula.find_variable_except("xt")),
+            (Some('t'), None)
+        );
     }
 }

@@ -1,8 +1,8 @@
-//! Where a body is stiffer or softer, or breaks earlier or later: its inclusions, and fields of other scenes.
+//! Inclusions and fields of other scenes: stiffness, critical stretch and prestrain of each particle.
 
 use super::build::shape;
-use super::values::Body;
-use super::{Followed, Material, Parameter, Scene, ShapeSpec, plain};
+use super::values::DiscreteBody;
+use super::{Material, ParameterField, Scene, ShapeSpec, VaryingParameter, plain};
 use crate::bonds::{Bonds, Property};
 use crate::calibrate::{Space, poisson_ratio};
 use crate::critical::Critical;
@@ -18,72 +18,79 @@ use std::collections::HashMap;
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Inclusion {
-    /// Where: a shape to `add`.
+    /// Shape of the inclusion, with `add`.
     pub shape: ShapeSpec,
-    /// Its stiffness over that of the rest; default: 1.
-    #[serde(default = "whole")]
+    /// Stiffness over that of the rest; default: 1.
+    #[serde(default = "default_stiffness")]
     pub stiffness: f64,
-    /// When its bonds break, instead of `material.critical`; a bond that ends in it or passes through it breaks as the weakest
-    /// part on its way does, so that a layer may be thinner than the spacing.
+    /// Replaces `material.critical`. A bond that ends in inclusions or passes through them takes the lowest
+    /// value on its way, so that a layer may be thinner than the spacing.
     pub critical: Option<Critical>,
-    /// ε*: the strain that it would have if it were free, the same in all directions; those of several parts add up.
+    /// Strain ε* of the free part, equal in all directions; prestrains of overlapping parts add up.
     pub prestrain: Option<Ratio>,
 }
 
-fn whole() -> f64 {
+fn default_stiffness() -> f64 {
     1.0
 }
 
-/// ε* = −S:σ of a body of bonds, with its Poisson ratio: held in its shape it has the stress σ.
-fn relaxed<const D: usize>(space: Space, youngs_modulus: f64, stress: &[[f64; 3]; 3]) -> [[f64; D]; D] {
+/// Returns the prestrain ε* = −S:σ with which a body of bonds has the stress σ while it is held in its shape.
+fn prestrain_of_stress<const D: usize>(
+    space: Space,
+    youngs_modulus: f64,
+    stress: &[[f64; 3]; 3],
+) -> [[f64; D]; D] {
     let nu = poisson_ratio(space);
     let trace: f64 = (0..D).map(|d| stress[d][d]).sum();
     // a strain across the plane that is zero takes ν(1 + ν) of the sum, in its plane
     let across = if space == Space::PlaneStrain { nu * (1.0 + nu) } else { nu };
-    let of = |a: usize, b: usize| across * if a == b { trace } else { 0.0 } - (1.0 + nu) * stress[a][b];
-    array::from_fn(|a| array::from_fn(|b| of(a, b) / youngs_modulus))
+    let strain = |a: usize, b: usize| across * if a == b { trace } else { 0.0 } - (1.0 + nu) * stress[a][b];
+    array::from_fn(|a| array::from_fn(|b| strain(a, b) / youngs_modulus))
 }
 
-/// The inclusions of a scene, and the parameters that follow fields, as fields.
+/// Material parameters of each particle, from inclusions and fields of other scenes.
 pub struct Inclusions<'a, const D: usize> {
-    /// Micromodulus over that of the scene's Young's modulus: the product of all that hold for a particle.
+    /// Micromodulus over that of the scene's Young's modulus, the product of all inclusions of a particle.
     pub micromodulus: Property,
-    /// Fracture energy, J/m², where it follows a field.
+    /// Fracture energy, J/m², if it follows a field.
     fracture_energy: Option<Property>,
-    /// ε* site by site, where there is any.
+    /// Prestrain ε* by site, if there is any.
     pub prestrain: Option<Vec<[[f64; D]; D]>>,
-    /// The inclusions, and their particles' sites.
+    /// Inclusions with their shapes and the sites of their particles.
     each: Vec<(&'a Inclusion, Shape<D>, Vec<u32>)>,
 }
 
 impl<'a, const D: usize> Inclusions<'a, D> {
-    /// Finds the particles of all inclusions; `followed` are the parameters that follow fields.
+    /// Finds the particles of all inclusions and applies `followed`, the parameters that follow fields.
     ///
     /// # Errors
-    /// A fault of an inclusion's shape, or one that contains no particle.
+    /// An invalid shape, or one without particles.
     pub fn new(
         source: &Source,
         scene: &'a Scene,
-        body: &Body<D>,
-        followed: &[Followed],
+        body: &DiscreteBody<D>,
+        followed: &[ParameterField],
     ) -> Result<Self, SceneError> {
         let bonds = &*body.bonds;
         let mut each = Vec::new();
         let following =
             |parameter| followed.iter().find(|one| one.parameter == parameter).map(|one| &one.values);
         let stressed = followed.iter().find(|one| !one.stress.is_empty());
-        let modulus = following(Parameter::YoungsModulus).zip(scene.material.youngs_modulus);
+        let modulus = following(VaryingParameter::YoungsModulus).zip(scene.material.youngs_modulus);
         let varies = modulus.is_some() || stressed.is_some() || !scene.material.inclusions.is_empty();
         let mut stiffness = vec![1.0; if varies { bonds.sites() } else { 0 }];
         if let Some((values, whole)) = modulus {
             bonds.particles().iter().for_each(|&site| {
-                stiffness[site as usize] = values.at(site as usize) / whole.si();
+                stiffness[site as usize] = values.value_at(site as usize) / whole.si();
             });
         }
         let shrinks = scene.material.is_prestrained();
         let mut prestrain = vec![0.0; if shrinks { bonds.sites() } else { 0 }];
-        if let Some(values) = following(Parameter::Prestrain).filter(|_| stressed.is_none()) {
-            bonds.particles().iter().for_each(|&site| prestrain[site as usize] = values.at(site as usize));
+        if let Some(values) = following(VaryingParameter::Prestrain).filter(|_| stressed.is_none()) {
+            bonds
+                .particles()
+                .iter()
+                .for_each(|&site| prestrain[site as usize] = values.value_at(site as usize));
         }
         for (index, inclusion) in scene.material.inclusions.iter().enumerate() {
             let key = format!("material.inclusions[{index}].shape");
@@ -105,14 +112,14 @@ impl<'a, const D: usize> Inclusions<'a, D> {
             }
             each.push((inclusion, shape, members));
         }
-        let at = |site: usize, _| stiffness.get(site).copied().unwrap_or(1.0);
-        let fracture_energy = following(Parameter::FractureEnergy).cloned();
+        let factor = |site: usize, _| stiffness.get(site).copied().unwrap_or(1.0);
+        let fracture_energy = following(VaryingParameter::FractureEnergy).cloned();
         let strain = |site: usize| {
             let own: [[f64; D]; D] =
                 array::from_fn(|a| array::from_fn(|b| if a == b { prestrain[site] } else { 0.0 }));
             let (Some(one), Some(whole)) = (stressed, scene.material.youngs_modulus) else { return own };
             let held: [[f64; D]; D] =
-                relaxed(scene.body.space, stiffness[site] * whole.si(), &one.stress[site]);
+                prestrain_of_stress(scene.body.space, stiffness[site] * whole.si(), &one.stress[site]);
             array::from_fn(|a| array::from_fn(|b| own[a][b] + held[a][b]))
         };
         let prestrain: Option<Vec<[[f64; D]; D]>> = shrinks.then(|| (0..bonds.sites()).map(strain).collect());
@@ -120,11 +127,12 @@ impl<'a, const D: usize> Inclusions<'a, D> {
         if let Some(found) = along.reduce(f64::min).filter(|&least| least <= -1.0) {
             return Err(source.error("material", format!("a prestrain of {}", plain(found)), "above -1"));
         }
-        Ok(Self { micromodulus: Property::new(bonds, at), fracture_energy, prestrain, each })
+        Ok(Self { micromodulus: Property::new(bonds, factor), fracture_energy, prestrain, each })
     }
 
-    /// The critical stretch: `rest`, or that of the fracture energy that follows a field, and of inclusions with a critical stretch of their own what `resolve` makes of it with
-    /// their micromodulus over that of the rest; of several the last.
+    /// Returns the critical stretch of each particle: `rest`, replaced by the stretch of a fracture energy
+    /// that follows a field, or of the last inclusion with `critical`. `resolve` computes it from the
+    /// criterion and the relative micromodulus.
     ///
     /// # Errors
     /// A critical stretch out of its domain.
@@ -139,9 +147,9 @@ impl<'a, const D: usize> Inclusions<'a, D> {
         let mut stretch = vec![rest; if varies { bonds.sites() } else { 0 }];
         if let Some(energies) = &self.fracture_energy {
             for site in bonds.particles().iter().map(|&site| site as usize) {
-                let energy = Some(EnergyPerArea::from_si(energies.at(site)));
+                let energy = Some(EnergyPerArea::from_si(energies.value_at(site)));
                 let critical = Critical { fracture_energy: energy, ..Critical::default() };
-                stretch[site] = resolve(critical, self.micromodulus.at(site)).map_err(|error| {
+                stretch[site] = resolve(critical, self.micromodulus.value_at(site)).map_err(|error| {
                     source.error("material.fields", error, "a fracture energy that bonds can have")
                 })?;
             }
@@ -153,10 +161,10 @@ impl<'a, const D: usize> Inclusions<'a, D> {
                 Error::Parameter { found, allowed, .. } => source.error(&key, plain(found), allowed),
                 other => source.error(&key, other, "a critical stretch"),
             };
-            // one bisection for neighbours of one stiffness
+            // neighbours of equal stiffness share one bisection
             let mut last = None;
             for &site in members {
-                let stiffness = self.micromodulus.at(site as usize);
+                let stiffness = self.micromodulus.value_at(site as usize);
                 let own = match last {
                     Some((before, own)) if before == stiffness => own,
                     _ => resolve(critical, stiffness).map_err(fault)?,
@@ -169,7 +177,7 @@ impl<'a, const D: usize> Inclusions<'a, D> {
         if self.each.iter().all(|(inclusion, ..)| inclusion.critical.is_none()) {
             return Ok(property);
         }
-        let weak = self.passing(source, bonds, resolve)?;
+        let weak = self.weakened_bonds(source, bonds, resolve)?;
         for (index, (_, _, members)) in self.each.iter().enumerate() {
             if members.is_empty() && !weak.iter().any(|one| one.0.contains(&index)) {
                 let key = format!("material.inclusions[{index}].shape");
@@ -180,9 +188,9 @@ impl<'a, const D: usize> Inclusions<'a, D> {
         Ok(property.weakened(weak.into_iter().map(|(_, bond, value)| (bond, value)).collect()))
     }
 
-    /// Bonds that pass through inclusions with a critical stretch: these, the bond's sites and the least critical stretch on its way between
-    /// the ends.
-    fn passing(
+    /// Finds bonds that pass through inclusions with a critical stretch, and the lowest critical stretch
+    /// between their ends.
+    fn weakened_bonds(
         &self,
         source: &Source,
         bonds: &dyn Bonds<D>,
@@ -201,10 +209,10 @@ impl<'a, const D: usize> Inclusions<'a, D> {
             if near.iter().all(|&index| self.each[index].0.critical.is_none()) {
                 continue;
             }
-            // of the rest of the body at this end
+            // relative micromodulus of the rest at this end
             let inside = |place| near.iter().filter(move |&&index| self.each[index].1.contains(place));
             let stiffness = |place| inside(place).map(|&index| self.each[index].0.stiffness).product::<f64>();
-            let rest = self.micromodulus.at(site as usize) / stiffness(here);
+            let rest = self.micromodulus.value_at(site as usize) / stiffness(here);
             let mut others = Vec::new();
             bonds.neighbours(site as usize, &mut |bond| {
                 if site < bond.site as u32 {
@@ -247,23 +255,23 @@ impl<'a, const D: usize> Inclusions<'a, D> {
     }
 }
 
-/// Part of a bond's length that is none: where faces meet.
+/// Fraction of a bond's length below which a crossed part is rounding, where faces meet.
 const THIN: f64 = 1e-6;
 
-/// Inclusions that a bond passes through, its sites, and the least critical stretch in them.
+/// Inclusions that a bond passes through, its sites, and the lowest critical stretch in them.
 type Passing = (Vec<usize>, [u32; 2], f64);
 
 impl Material {
-    /// Whether some bonds are at rest at another stretch than 1.
+    /// Returns true if some bonds are at rest at a stretch other than 1.
     pub fn is_prestrained(&self) -> bool {
-        let follows = self.fields.iter().any(|field| field.of == Parameter::Prestrain);
+        let follows = self.fields.iter().any(|field| field.of == VaryingParameter::Prestrain);
         follows || self.inclusions.iter().any(|inclusion| inclusion.prestrain.is_some())
     }
 
-    /// The bond law of this material.
+    /// Builds the bond law.
     ///
     /// # Errors
-    /// [`crate::Error::Parameter`] where a chain parameter is out of its domain.
+    /// [`crate::Error::Parameter`] for a chain parameter out of its domain.
     pub fn bond_law(&self) -> Result<Box<dyn crate::potential::BondPotential>, crate::Error> {
         let law = self.law.unwrap_or_default();
         let rescale = self.rescale.unwrap_or(law.rescales());
@@ -275,21 +283,23 @@ impl Material {
 mod tests {
     use super::*;
 
-    /// ε of Hooke's law: ε_xx = σ/E and ε_yy = −νσ/E of a bar, with 1 − ν² and −ν(1 + ν) in plane strain; shear σ_xy(1 + ν)/E.
+    /// Hooke's law: ε_xx = σ/E and ε_yy = −νσ/E of a bar, with 1 − ν² and −ν(1 + ν) in plane strain; shear
+    /// σ_xy(1 + ν)/E.
     #[test]
     fn strains_of_stresses() {
         let bar = [[2.0, 0.0, 0.0], [0.0; 3], [0.0; 3]];
         let close =
             |found: f64, expected: f64| assert!((found - expected).abs() < 1e-15, "{found} {expected}");
-        let sheet: [[f64; 2]; 2] = relaxed(Space::PlaneStress, 4.0, &bar);
+        let sheet: [[f64; 2]; 2] = prestrain_of_stress(Space::PlaneStress, 4.0, &bar);
         close(sheet[0][0], -0.5);
         close(sheet[1][1], 0.5 / 3.0);
-        let slab: [[f64; 2]; 2] = relaxed(Space::PlaneStrain, 4.0, &bar);
+        let slab: [[f64; 2]; 2] = prestrain_of_stress(Space::PlaneStrain, 4.0, &bar);
         close(slab[0][0], -0.5 * (1.0 - 0.0625));
         close(slab[1][1], 0.5 * 0.25 * 1.25);
-        let block: [[f64; 3]; 3] = relaxed(Space::Solid, 4.0, &bar);
+        let block: [[f64; 3]; 3] = prestrain_of_stress(Space::Solid, 4.0, &bar);
         close(block[2][2], 0.125);
-        let shear: [[f64; 3]; 3] = relaxed(Space::Solid, 4.0, &[[0.0, 2.0, 0.0], [2.0, 0.0, 0.0], [0.0; 3]]);
+        let shear: [[f64; 3]; 3] =
+            prestrain_of_stress(Space::Solid, 4.0, &[[0.0, 2.0, 0.0], [2.0, 0.0, 0.0], [0.0; 3]]);
         close(shear[1][0], -0.625);
         close(shear[0][0] + shear[2][2], 0.0);
     }

@@ -1,4 +1,4 @@
-//! Lines and sections whose values are written as tables.
+//! Lines and sections of a scene, whose values are written as tables.
 
 use super::Scene;
 use super::values::vector;
@@ -8,19 +8,19 @@ use harness::scene::{LineSpec, SceneError, Source, check_name};
 use polycore::units::Length;
 use serde::Deserialize;
 
-/// A plane (a line in a plane body) through the body at rest, and the force that bonds transmit across it.
+/// Plane (in a plane body a line) through the body at rest across which bonds transmit a force.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SectionSpec {
-    /// Its name, a part of its file's, and the prefix of its values.
+    /// Name, part of the file name and prefix of the values.
     pub name: String,
-    /// A point of the plane, about which moments are taken.
+    /// Point of the plane, and reference point of moments.
     pub point: Vec<Length>,
-    /// Its normal, of any length: the part of the body in front of the plane pulls at the part behind.
+    /// Normal of any length; the force is that of the part in front of the plane on the part behind.
     pub normal: Vec<f64>,
 }
 
-/// What a column along a line shows.
+/// Quantity of a column along a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineField {
     /// A component of the displacement.
@@ -31,14 +31,14 @@ pub enum LineField {
     Stress {
         /// First Piola–Kirchhoff instead of Cauchy.
         piola: bool,
-        /// Which measure.
+        /// Index of the measure in `stress.measures`.
         measure: usize,
         /// Row and column.
         entry: [usize; 2],
     },
 }
 
-/// What can be written along a line: fields with their names and units, in order.
+/// Returns the fields that a line can have, with names and units.
 pub fn line_fields(scene: &Scene) -> Vec<(LineField, String, &'static str)> {
     let dimension = dimension(scene);
     let mut fields = Vec::new();
@@ -65,7 +65,7 @@ fn dimension(scene: &Scene) -> usize {
 }
 
 impl SectionSpec {
-    /// Point, m, and unit normal.
+    /// Returns the point, m, and the unit normal.
     ///
     /// # Errors
     /// As [`super::check`].
@@ -78,7 +78,7 @@ impl SectionSpec {
     }
 }
 
-/// A point, m, and a unit normal, of the keys `point` and `normal` under `key`.
+/// Converts the keys `point` and `normal` under `key` to a point, m, and a unit normal.
 ///
 /// # Errors
 /// As [`super::check`].
@@ -98,16 +98,16 @@ pub(super) fn plane_of<const D: usize>(
     if largest == 0.0 || !normal.iter().all(|x| x.is_finite()) {
         return Err(source.error(&key, format!("{normal:?}"), "finite numbers, not all of them 0"));
     }
-    // squares of what is very small or large are 0 or infinite
+    // squares of very small or large numbers are 0 or infinite
     let normal = normal.map(|x| x / largest);
     let size = length(normal);
     Ok((point, normal.map(|x| x / size)))
 }
 
-/// Checks what can be judged without a body.
+/// Checks what needs no body.
 ///
 /// # Errors
-/// The key, what was found and what is allowed.
+/// A [`SceneError`] that names the key, the value found and what is allowed.
 pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let columns: Vec<String> = line_fields(scene).into_iter().map(|(_, name, _)| name).collect();
     LineSpec::check(&scene.output.line, source, dimension(scene), &columns)?;

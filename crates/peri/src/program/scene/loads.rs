@@ -1,22 +1,22 @@
-//! From a scene's boundaries to the loads and supports of a body.
+//! Converts the boundaries of a scene to loads and supports.
 
 use super::formula::Formula;
 use super::region::region;
-use super::values::Body;
-use super::{Boundary, ContactSpec, Method, Prescribed, PrescribedField, Scene, Side};
+use super::values::{DiscreteBody, ONE_OF_THEM};
+use super::{Boundary, ContactSpec, Prescribed, PrescribedField, Scene, Side, SolverMethod};
 use crate::field::Field;
-use crate::material::{Tensor, surface_load};
-use crate::solver::{Adrift, INVERTS, Loads, Stops, Support, adrift, inverted};
+use crate::material::{BodyTensor, surface_load};
+use crate::solver::{ContactStops, INVERTS, Loads, Support, Unsupported, find_unsupported, inverted};
 use harness::scene::{SceneError, Source};
 
-/// Loads and supports of a body, and the sites where forces act on it, of loads or of holding.
+/// Returns the loads and supports of a body, and by site whether a load or support acts there.
 ///
 /// # Errors
 /// As [`super::body_of`].
 pub fn loads_of<const D: usize>(
     source: &Source,
     scene: &Scene,
-    body: &Body<D>,
+    body: &DiscreteBody<D>,
 ) -> Result<(Loads<D>, Vec<bool>), SceneError> {
     let (mut regions, mut tractions) = (Vec::new(), Vec::new());
     let mut loaded = vec![false; body.bonds.sites()];
@@ -43,14 +43,14 @@ pub fn loads_of<const D: usize>(
     for (side, traction) in tractions {
         add_traction(body, side, traction, &mut loads, &mut loaded);
     }
-    follow_formulas(source, scene, body, &regions, &mut loads)?;
+    apply_formulas(source, scene, body, &regions, &mut loads)?;
     super::rotation::turn(source, scene, body, &regions, &mut loads)?;
-    upright(source, scene, body, &loads)?;
-    if scene.method() == Method::Verlet {
-        // a body in motion needs neither balance nor hold
+    refuse_inverted(source, scene, body, &loads)?;
+    if scene.method() == SolverMethod::Verlet {
+        // explicit dynamics needs neither balance nor supports
         return Ok((loads, loaded));
     }
-    balanced(source, scene, body, &loads)?;
+    refuse_unbalanced(source, scene, body, &loads)?;
     let all = (1_u8 << D) - 1;
     if body.bonds.particles().iter().all(|&site| loads.constrained(site as usize) == all) {
         return Err(source.error(
@@ -62,10 +62,11 @@ pub fn loads_of<const D: usize>(
     Ok((loads, loaded))
 }
 
-/// Adds a traction on a side of a solid: t (n·h_I)/V_I of the area vectors h, which balances a uniform stress in every particle
-/// ([`surface_load`]). It acts in two horizons below the side, in a thin body in the half next to it.
+/// Adds a traction on a side of a solid: t (n·h_I)/V_I with area vectors h, which balances a uniform stress
+/// in every particle ([`surface_load`]). It acts within two horizons of the side, in a thin body in the half
+/// next to it.
 fn add_traction<const D: usize>(
-    body: &Body<D>,
+    body: &DiscreteBody<D>,
     side: Side,
     traction: [f64; D],
     loads: &mut Loads<D>,
@@ -75,7 +76,7 @@ fn add_traction<const D: usize>(
     let bounds = [body.bounds.0[axis], body.bounds.1[axis]];
     let reach = (2.0 * body.bonds.horizon()).min(0.5 * (bounds[1] - bounds[0]));
     let sign = if upper { 1.0 } else { -1.0 };
-    let stress = Tensor::from_fn(|a, b| if b == axis { sign * traction[a] } else { 0.0 });
+    let stress = BodyTensor::from_fn(|a, b| if b == axis { sign * traction[a] } else { 0.0 });
     let surface = surface_load(&*body.bonds, stress);
     let field = loads.body_force.get_or_insert_with(|| Field::zeros(body.bonds.sites()));
     for &site in body.bonds.particles() {
@@ -89,18 +90,18 @@ fn add_traction<const D: usize>(
     }
 }
 
-/// Velocities at the start, m/s; the last region applies.
+/// Returns the velocities at the start, m/s; where regions overlap, the last one wins.
 ///
 /// # Errors
 /// As [`super::body_of`].
 pub fn velocities_of<const D: usize>(
     source: &Source,
     scene: &Scene,
-    body: &Body<D>,
+    body: &DiscreteBody<D>,
 ) -> Result<Field<D>, SceneError> {
     let mut field = Field::zeros(body.bonds.sites());
     for (index, boundary) in scene.boundary.iter().enumerate() {
-        if !boundary.moves() {
+        if !boundary.prescribes_velocity() {
             continue;
         }
         let (members, _) = region(source, &format!("boundary[{index}]"), boundary, body)?;
@@ -111,7 +112,8 @@ pub fn velocities_of<const D: usize>(
                 if let Some(velocity) = boundary.velocity.as_ref().and_then(|v| v.get(d)) {
                     *value = velocity.si();
                 } else if let Some(formula) = boundary.velocity_field.as_ref().and_then(|v| v.get(d)) {
-                    *value = at(source, &format!("boundary[{index}].velocity_field[{d}]"), formula, place)?;
+                    *value =
+                        evaluate(source, &format!("boundary[{index}].velocity_field[{d}]"), formula, place)?;
                 }
             }
             field.set(site as usize, value);
@@ -120,14 +122,14 @@ pub fn velocities_of<const D: usize>(
     Ok(field)
 }
 
-/// The value of a formula at a particle.
-fn at<const D: usize>(
+/// Evaluates a formula at a particle.
+fn evaluate<const D: usize>(
     source: &Source,
     key: &str,
     formula: &Formula,
     place: [f64; D],
 ) -> Result<f64, SceneError> {
-    let value = formula.at(place);
+    let value = formula.value_at(place);
     if value.is_finite() {
         return Ok(value);
     }
@@ -135,11 +137,11 @@ fn at<const D: usize>(
     Err(source.error(key, found, "a finite value at every particle of the region"))
 }
 
-/// Prescribed displacements that differ from particle to particle; of two regions the last one holds.
-fn follow_formulas<const D: usize>(
+/// Sets the displacements of `displacement_field`; where regions overlap, the last one wins.
+fn apply_formulas<const D: usize>(
     source: &Source,
     scene: &Scene,
-    body: &Body<D>,
+    body: &DiscreteBody<D>,
     regions: &[(Vec<u32>, Support<D>)],
     loads: &mut Loads<D>,
 ) -> Result<(), SceneError> {
@@ -154,7 +156,7 @@ fn follow_formulas<const D: usize>(
                 match boundary.displacement_field.as_ref().and_then(|field| field.get(d)) {
                     Some(PrescribedField::By(formula)) => {
                         let key = format!("boundary[{index}].displacement_field[{d}]");
-                        *value = at(source, &key, formula, body.bonds.position(site as usize))?;
+                        *value = evaluate(source, &key, formula, body.bonds.position(site as usize))?;
                     }
                     _ => *value = support.displacement[d].unwrap_or(*value),
                 }
@@ -165,25 +167,27 @@ fn follow_formulas<const D: usize>(
     Ok(())
 }
 
-/// A part of a body that nothing holds is never at rest under forces that do not balance.
-fn balanced<const D: usize>(
+/// Refuses a part without supports under forces that do not balance: it has no equilibrium.
+fn refuse_unbalanced<const D: usize>(
     source: &Source,
     scene: &Scene,
-    body: &Body<D>,
+    body: &DiscreteBody<D>,
     loads: &Loads<D>,
 ) -> Result<(), SceneError> {
     let planes =
         scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes::<D>(source, false))?;
     let normals = planes.iter().map(|plane| plane.normal).collect();
-    let stops = Stops {
+    let stops = ContactStops {
         normals,
         pairs: scene.contact.is_some(),
-        rubs: scene.contact.as_ref().is_some_and(ContactSpec::rubs)
+        rubs: scene.contact.as_ref().is_some_and(ContactSpec::has_friction)
             || planes.iter().any(|plane| plane.bonded),
     };
-    let Some(part) = adrift(&*body.bonds, loads, None, &stops, scene.tolerance()) else { return Ok(()) };
-    let Adrift { particles, of, force, axis, .. } = &part;
-    let found = if particles == of {
+    let Some(part) = find_unsupported(&*body.bonds, loads, None, &stops, scene.tolerance()) else {
+        return Ok(());
+    };
+    let Unsupported { particles, total, force, axis, .. } = &part;
+    let found = if particles == total {
         format!("a total force of {force:.3e} N along {axis}, along which no displacement is prescribed")
     } else {
         part.to_string()
@@ -192,15 +196,15 @@ fn balanced<const D: usize>(
     Err(source.error("boundary", found, allowed))
 }
 
-/// Displacements that a body can follow.
-fn upright<const D: usize>(
+/// Refuses prescribed displacements that turn the body inside out.
+fn refuse_inverted<const D: usize>(
     source: &Source,
     scene: &Scene,
-    body: &Body<D>,
+    body: &DiscreteBody<D>,
     loads: &Loads<D>,
 ) -> Result<(), SceneError> {
     let factors = match &scene.dynamics {
-        // a course of its own may stay far below 1
+        // a load curve may stay far below 1
         Some(dynamics) if dynamics.factor.is_some() => return Ok(()),
         Some(_) => vec![1.0],
         None => scene.solver.factors(),
@@ -211,17 +215,17 @@ fn upright<const D: usize>(
     }
 }
 
-/// What the regions of prescribed displacement are called, in their order.
+/// Returns the names of the regions of prescribed displacement.
 pub fn region_names(scene: &Scene) -> Vec<String> {
-    let constrained = scene.boundary.iter().enumerate().filter(|(_, b)| b.holds());
+    let constrained = scene.boundary.iter().enumerate().filter(|(_, b)| b.prescribes_displacement());
     constrained.map(|(index, boundary)| name_of(index, boundary)).collect()
 }
 
-/// Lines for `peri check`: which particles a boundary takes, and what is free between two grips.
+/// Returns lines for `peri check`: the particles of each boundary, and the free length between two grips.
 pub(super) fn explain<const D: usize>(
     source: &Source,
     scene: &Scene,
-    body: &Body<D>,
+    body: &DiscreteBody<D>,
 ) -> Result<Vec<String>, SceneError> {
     let mut lines = Vec::new();
     let mut grips = [[None; 2]; 3];
@@ -230,7 +234,7 @@ pub(super) fn explain<const D: usize>(
         let layers = match (boundary.side, depth) {
             (Some(side), Some(depth)) => {
                 let (axis, upper) = side.axis();
-                if boundary.holds() {
+                if boundary.prescribes_displacement() {
                     grips[axis][usize::from(upper)] = Some(depth);
                 }
                 let layers = (depth / body.bonds.spacing()).round();
@@ -243,9 +247,9 @@ pub(super) fn explain<const D: usize>(
             _ => String::new(),
         };
         let what = [
-            ("constrained", boundary.holds()),
-            ("pulled", boundary.traction.is_some() || boundary.force.is_some()),
-            ("moving at the start", boundary.moves()),
+            ("constrained", boundary.prescribes_displacement()),
+            ("loaded", boundary.traction.is_some() || boundary.force.is_some()),
+            ("moving at the start", boundary.prescribes_velocity()),
         ];
         let what: Vec<&str> = what.iter().filter(|(_, given)| *given).map(|(what, _)| *what).collect();
         let name = name_of(index, boundary);
@@ -267,14 +271,14 @@ pub(super) fn explain<const D: usize>(
     Ok(lines)
 }
 
-/// In mm, without the digits that a change of units leaves behind.
+/// Converts to mm and rounds off the digits that a change of units leaves behind.
 fn mm(length: f64) -> f64 {
     (length * 1e9).round() / 1e6
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Its own name, its side, or its number.
+/// Returns the name of a boundary: its own, its side, or its number.
 fn name_of(index: usize, boundary: &Boundary) -> String {
     match (&boundary.name, boundary.side) {
         (Some(name), _) => name.clone(),
@@ -288,7 +292,7 @@ fn support<const D: usize>(
     source: &Source,
     key: &str,
     boundary: &Boundary,
-    body: &Body<D>,
+    body: &DiscreteBody<D>,
     members: &[u32],
     depth: Option<f64>,
 ) -> Result<Support<D>, SceneError> {
@@ -303,15 +307,11 @@ fn support<const D: usize>(
             ))
         }
     };
-    let either = |name: &str, both: bool, other: &str| match both {
-        true => Err(source.error(
-            &format!("{key}.{name}"),
-            format!("`{name}` together with `{other}`"),
-            "one of them",
-        )),
+    let refuse_both = |name: &str, both: bool, other: &str| match both {
+        true => Err(source.conflict(&format!("{key}.{name}"), other, ONE_OF_THEM)),
         false => Ok(()),
     };
-    let of_place = |name: &str, formula: &Formula| match formula.other_than(&"xyz"[..D]) {
+    let of_place = |name: &str, formula: &Formula| match formula.find_variable_except(&"xyz"[..D]) {
         Some(found) => {
             let allowed = if D == 2 { "`x` and `y`" } else { "`x`, `y` and `z`" };
             Err(source.error(&format!("{key}.{name}"), format!("`{found}` in `{}`", formula.text()), allowed))
@@ -322,8 +322,8 @@ fn support<const D: usize>(
     if let Some(traction) = &boundary.traction {
         count("traction", traction.len())?;
         if boundary.side.is_none() {
-            let allowed = "`side`, or `force` on the box";
-            return Err(source.error(&format!("{key}.traction"), "a traction on a box", allowed));
+            let why = "needs a `side`; a box takes `force`";
+            return Err(source.unexpected(&format!("{key}.traction"), why));
         }
         if let Some(depth) = depth {
             support.body_force = std::array::from_fn(|d| traction[d].si() / depth);
@@ -351,7 +351,7 @@ fn support<const D: usize>(
     }
     if let Some(field) = &boundary.displacement_field {
         count("displacement_field", field.len())?;
-        either("displacement_field", boundary.displacement.is_some(), "displacement")?;
+        refuse_both("displacement_field", boundary.displacement.is_some(), "displacement")?;
         for (d, constrained) in field.iter().enumerate() {
             if let PrescribedField::By(formula) = constrained {
                 of_place(&format!("displacement_field[{d}]"), formula)?;
@@ -364,16 +364,21 @@ fn support<const D: usize>(
     }
     if let Some(field) = &boundary.velocity_field {
         count("velocity_field", field.len())?;
-        either("velocity_field", boundary.velocity.is_some(), "velocity")?;
+        refuse_both("velocity_field", boundary.velocity.is_some(), "velocity")?;
         for (d, formula) in field.iter().enumerate() {
             of_place(&format!("velocity_field[{d}]"), formula)?;
         }
     }
-    if boundary.traction.is_none() && boundary.force.is_none() && !boundary.holds() && !boundary.moves() {
-        return Err(source.error(
-            key,
-            "a region without a condition",
-            "`traction`, `force`, `displacement`, `rotation` or, in explicit dynamics, `velocity`",
+    if boundary.traction.is_none()
+        && boundary.force.is_none()
+        && !boundary.prescribes_displacement()
+        && !boundary.prescribes_velocity()
+    {
+        return Err(source.missing(
+            &format!("{key}.displacement"),
+            "needed for a boundary: `displacement`, `rotation`, `traction`, `force` or, in explicit \
+             dynamics, \
+             `velocity`",
         ));
     }
     Ok(support)

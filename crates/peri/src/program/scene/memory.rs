@@ -1,54 +1,59 @@
-//! Memory that a variant needs, stated before it is solved and, as far as its lattice determines it, before it is built.
+//! Estimates the memory of a variant before it is solved and, for a lattice, before it is built.
 //!
-//! Counted are the arrays that live at once, in bytes a site or a particle; the test `memory` of the workspace compares
-//! the sum with what whole runs take.
+//! The sum counts arrays that live at the same time, in bytes per site or particle; the test `memory` of the
+//! workspace compares it with whole runs.
 
-use super::{Method, Scene};
+use super::{Scene, SolverMethod};
 use crate::bonds::{Bonds, Stencil, storage};
-use crate::material::Point;
-use crate::solver::{Lbfgs, Record};
+use crate::material::SolidPoint;
+use crate::solver::{Lbfgs, StepRecord};
 use harness::scene::{SceneError, Source};
 use polycore::constitutive::Flags;
 use polycore::memory::{available, gib};
 
-/// Threads, the fitted law, tables.
+/// Bytes of threads, the fitted law and tables.
 const ALWAYS: f64 = 20e6;
-/// Vector fields of any method: displacement, velocity, force and loads, what a pass sums, and a checkpoint, which is a
-/// copy of the first three in a list that grows.
+/// Vector fields of any method: displacement, velocity, force, loads, sums of a pass, and a checkpoint with
+/// copies of the first three in a growing list.
 const FIELDS: f64 = 10.0;
-/// Equilibria before the last, from which the next is guessed, and their copies in a checkpoint; springs, in a component.
+/// Vector fields of earlier equilibria, from which the next is predicted, with copies in a checkpoint, and of
+/// springs.
 const PAST: f64 = 6.0;
-/// Fields of L-BFGS beside its pairs, and bytes of its coarse level a particle: factors in both precisions while they are made.
+/// Vector fields of L-BFGS beside its pairs.
 const FIELDS_OF_LBFGS: f64 = 8.0;
+/// Bytes per particle of the coarse level of L-BFGS: factors in both precisions during the factorization.
 const COARSE: f64 = 300.0;
-/// A face of a plane body with its entries, there and back; there are about four times as many in space.
+/// Bytes per face of a plane body with its entries in both directions; a solid has about four times as many.
 const FACE: f64 = 700.0;
-/// Sites and particles of contact: cells, their order, the list of near pairs.
+/// Bytes per site of contact: cells, their order, the list of near pairs.
 const CONTACT: f64 = 190.0;
-/// Damage: bonds at the start, what breaks.
+/// Bytes per site of damage: bonds at the start, broken bonds.
 const BREAKING: f64 = 24.0;
-/// A particle in a field file: place, displacement, damage, line; two tensors of nine for each measure; what is packed.
+/// Bytes per particle of a field file: position, displacement, damage, line.
 const WRITTEN: f64 = 64.0;
+/// Bytes per particle and measure: two tensors of nine components.
 const WRITTEN_TENSORS: f64 = 2.0 * 72.0;
+/// Bytes per particle of compressed data.
 const PACKED: f64 = 160.0;
-/// Canvases and letters of pictures, and a particle in one: its place, its components, its reach, its cell.
+/// Bytes of canvases and fonts of pictures.
 const PICTURES: f64 = 60e6;
+/// Bytes per particle in a picture: position, components, reach, cell.
 const DRAWN: f64 = 150.0;
-/// The same of a solid: two places, two values, its place in the lattice, its neighbours, the faces of its surface.
+/// Bytes per particle in a picture of a solid: positions, values, lattice index, neighbours, faces.
 const DRAWN_IN_SPACE: f64 = 350.0;
-/// A particle near a line: its site, its place, its cell, as they are sorted.
+/// Bytes per particle near a line: site, position, cell, while they are sorted.
 const NEAR_LINE: f64 = 100.0;
-/// A bond of a cloud beside what it keeps: the lists while they are built.
+/// Bytes per bond of a cloud for the lists while they are built.
 const BOND_LISTS: f64 = 12.0;
 
-/// Bytes of a lattice's bonds and of the solver's fields: what is known from its box of cells.
-fn of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> f64 {
+/// Returns the bytes of the bonds of a lattice and of solver fields.
+fn bytes_of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> f64 {
     let masks = 8.0 * stencil.div_ceil(64) as f64;
     let vector = 8.0 * D as f64;
-    // a bit for what is occupied, its number, a surface factor twice while it is found
+    // occupancy bits, site number, surface factors twice during their computation
     let mut each = masks + 8.0 + 2.0 * vector;
     each += FIELDS * vector + if scene.material.critical.is_some() { PAST * vector } else { 8.0 };
-    if scene.method() == Method::Lbfgs {
+    if scene.method() == SolverMethod::Lbfgs {
         // both fields of a pair are in single precision
         each += (FIELDS_OF_LBFGS + Lbfgs::default().memory as f64) * vector + COARSE;
     }
@@ -59,11 +64,11 @@ fn of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> f64 {
             let side = 2.0 * D as f64 * sites.powf(-1.0 / D as f64);
             each += 20.0 + side.min(1.0) * FACE * if D == 2 { 1.0 } else { 4.0 };
         }
-        each += if contact.rubs() { 3.0 * vector } else { 0.0 };
+        each += if contact.has_friction() { 3.0 * vector } else { 0.0 };
     }
     if scene.material.solid.is_some() {
         // states of particles, while they are made, and another set for outputs
-        let (state, passes) = (size_of::<Point<D>>() as f64, 8.0 * (1 + D * D) as f64 + 5.0);
+        let (state, passes) = (size_of::<SolidPoint<D>>() as f64, 8.0 * (1 + D * D) as f64 + 5.0);
         each += if scene.observes_forces() { 3.0 * state + 2.0 * passes } else { 2.0 * state + passes };
     }
     if scene.material.critical.is_some() {
@@ -77,8 +82,8 @@ fn of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> f64 {
     sites * each
 }
 
-/// Bytes of results, of `particles`.
-fn of_results<const D: usize>(scene: &Scene, particles: f64) -> f64 {
+/// Returns the bytes of results.
+fn bytes_of_results<const D: usize>(scene: &Scene, particles: f64) -> f64 {
     let tensor = 8.0 * (D * D) as f64;
     let measures = scene.stress.as_ref().map_or(0, |stress| stress.measures.len()) as f64;
     let kept = if scene.output.fields || !scene.output.line.is_empty() { 2.0 } else { 1.0 };
@@ -98,7 +103,7 @@ fn of_results<const D: usize>(scene: &Scene, particles: f64) -> f64 {
         None => scene.solver.steps,
     };
     // a row of history and its copy in a checkpoint
-    let row = size_of::<Record>() + 24 * scene.boundary.len() + 48 * scene.output.section.len();
+    let row = size_of::<StepRecord>() + 24 * scene.boundary.len() + 48 * scene.output.section.len();
     // a table: arc length, position twice, every column; near particles and their cells
     let points = scene.output.line.iter().map(|line| line.points).max().unwrap_or(0) as f64;
     let line = points * 8.0 * (2.0 + 4.0 * D as f64 + 2.0 * measures * (D * D) as f64);
@@ -109,41 +114,43 @@ fn of_results<const D: usize>(scene: &Scene, particles: f64) -> f64 {
     canvas + line + particles * each + 2.0 * rows as f64 * row as f64
 }
 
-/// Bytes that the run of a variant needs at most, of a body that is built.
+/// Returns the largest memory of a run, for a body that is built, bytes.
 pub fn needed<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> f64 {
     let (sites, particles) = (bonds.sites() as f64, bonds.particles().len() as f64);
     let body = match bonds.as_lattice() {
-        Some(lattice) => of_sites::<D>(scene, sites, lattice.stencil().offsets.len()),
+        Some(lattice) => bytes_of_sites::<D>(scene, sites, lattice.stencil().offsets.len()),
         None => {
             let directed = bonds.directed_bonds() as f64;
             // the weights by which bonds are shared out, in lists that grow
             let shared = if scene.stress.is_some() { 16.0 * directed + 24.0 * particles } else { 0.0 };
-            of_sites::<D>(scene, sites, 0)
-                + of_cloud::<D>(particles, directed)
-                + of_relief::<D>(scene, particles)
-                + of_pairs::<D>(scene, particles)
+            bytes_of_sites::<D>(scene, sites, 0)
+                + bytes_of_cloud::<D>(particles, directed)
+                + bytes_of_relief::<D>(scene, particles)
+                + bytes_of_pairs::<D>(scene, particles)
                 + shared
         }
     };
-    ALWAYS + body + of_results::<D>(scene, particles)
+    ALWAYS + body + bytes_of_results::<D>(scene, particles)
 }
 
-/// Bytes of a cloud: points as they are read, sorted and kept; bonds, where they differ in weight, and their lists.
-pub(super) fn of_cloud<const D: usize>(particles: f64, bonds: f64) -> f64 {
+/// Returns the bytes of a cloud: points as read, sorted and kept; bonds with weights, and their lists.
+pub(super) fn bytes_of_cloud<const D: usize>(particles: f64, bonds: f64) -> f64 {
     let padded = bonds + 8.0 * particles;
     // and the rows that the kernel reads
     particles * (6.0 * 8.0 * D as f64 + 96.0 + 32.0 * (D as f64 - 1.0))
         + padded * (4.0 + 8.0 + 8.0 + BOND_LISTS)
 }
 
-/// Bytes of the short bonds of a cloud whose cracks have an area, in a list that grows, and of their sums.
-fn of_pairs<const D: usize>(scene: &Scene, particles: f64) -> f64 {
+/// Returns the bytes of the short bonds that give the crack area of a cloud, in a growing list, and of their
+/// sums.
+fn bytes_of_pairs<const D: usize>(scene: &Scene, particles: f64) -> f64 {
     let pairs = if D == 2 { 4.0 } else { 13.0 };
     if scene.material.critical.is_some() { particles * pairs * (16.0 + 8.0) } else { 0.0 }
 }
 
-/// Bytes of a solid in a cloud beside those of one on a lattice: θ, what it adds to states, and what the kernels read of a particle.
-fn of_relief<const D: usize>(scene: &Scene, particles: f64) -> f64 {
+/// Returns the additional bytes of a solid in a cloud: θ, its part of the states, and the kernels' data of
+/// particles.
+fn bytes_of_relief<const D: usize>(scene: &Scene, particles: f64) -> f64 {
     if scene.material.solid.is_none() {
         return 0.0;
     }
@@ -153,16 +160,16 @@ fn of_relief<const D: usize>(scene: &Scene, particles: f64) -> f64 {
     particles * (vector + each)
 }
 
-/// What a run takes at least, whose lattice has these cells: before any of it is allocated.
-pub(super) fn of_lattice<const D: usize>(scene: &Scene, cells: [f64; D], ratio: f64) -> (f64, f64) {
+/// Returns the sites of a lattice with these cells, and a lower bound of the memory of its run, bytes.
+pub(super) fn bytes_of_lattice<const D: usize>(scene: &Scene, cells: [f64; D], ratio: f64) -> (f64, f64) {
     let sites = storage(cells, ratio);
-    (sites, of_sites::<D>(scene, sites, Stencil::<D>::new(ratio).offsets.len()))
+    (sites, bytes_of_sites::<D>(scene, sites, Stencil::<D>::new(ratio).offsets.len()))
 }
 
-/// Refuses a body that is built where its run would not fit.
+/// Refuses a body whose run exceeds the available memory.
 ///
 /// # Errors
-/// What is needed and what there is, at `key`.
+/// The needed and the available memory, at `key`.
 pub(super) fn refuse_too_large<const D: usize>(
     source: &Source,
     scene: &Scene,

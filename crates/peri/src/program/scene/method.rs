@@ -1,44 +1,45 @@
-//! What a scene says of its solver: quasi-static methods and explicit dynamics.
+//! Solver settings of a scene: quasi-static methods and explicit dynamics.
 
 use super::Scene;
 use super::formula::Formula;
 use crate::solver::{
     DynamicRelaxation, Equilibrium, Lbfgs, LbfgsSolver, Policy, RelaxationSolver, VelocityVerlet,
 };
-use polycore::units::{Density, Rate, Time};
+use polycore::units::{Density, Rate, Ratio, Time};
 use serde::Deserialize;
 
 /// Solver settings.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct Solver {
+pub struct SolverSpec {
     /// Method; default: [`Scene::method`].
-    pub method: Option<Method>,
+    pub method: Option<SolverMethod>,
     /// Out-of-balance force over reference force; default: [`Scene::tolerance`].
     pub tolerance: Option<f64>,
     /// Load steps from 0 to the full load, or along the whole path.
     pub steps: usize,
-    /// Load factors that are reached one after the other from 0, in equally many steps each; default: 1.
+    /// Load factors to reach one after the other from 0, with equally many steps each; default: 1.
     pub path: Option<Vec<f64>>,
-    /// Iterations a step may take.
+    /// Largest number of iterations of a step.
     pub max_iterations: u64,
-    /// Largest relative error of the fitted bond law; default 1e-9, or 1e-6 where bonds break or forces are in mixed precision.
+    /// Largest relative error of the fitted bond law; default 1e-9, or 1e-6 where bonds break or forces are
+    /// in mixed precision.
     pub fit_bound: Option<f64>,
     /// Factor on the fictitious mass of dynamic relaxation; default by law.
     pub mass_safety: Option<f64>,
-    /// Go on from a search that has used all its iterations if its residual is below this; default: that is an error.
+    /// Residual below which a search that has used all its iterations is accepted; default: it is an error.
     pub accept: Option<f64>,
-    /// Where bonds would break in a load step, cut it: they break within this part, 1/`refine`, of a step.
+    /// Bisects load steps in which bonds would break, down to 1/`refine` of a step.
     pub refine: usize,
-    /// Lower the load after bonds broke, until no others would break at once; needs `refine`.
+    /// Lowers the load after bonds break, until no other bond would break; needs `refine`.
     pub snap_back: bool,
-    /// When bonds are looked at that may break.
+    /// Times at which bonds are tested for breaking.
     pub breaking: Policy,
-    /// Skip what is left of the load once it has fallen below this part of its peak.
-    pub stop_below: Option<f64>,
+    /// Ends the run once the load has fallen below this fraction of its peak.
+    pub stop_below: Option<Ratio>,
 }
 
-impl Default for Solver {
+impl Default for SolverSpec {
     fn default() -> Self {
         Self {
             method: None,
@@ -57,8 +58,8 @@ impl Default for Solver {
     }
 }
 
-impl Solver {
-    /// Load factor at the end of each step.
+impl SolverSpec {
+    /// Returns the load factor at the end of each step.
     pub fn factors(&self) -> Vec<f64> {
         let path = self.path.as_deref().unwrap_or(&[1.0]);
         let each = self.steps / path.len().max(1);
@@ -76,7 +77,7 @@ impl Solver {
 /// Methods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Method {
+pub enum SolverMethod {
     /// Adaptive dynamic relaxation, quasi-static.
     Adr,
     /// Preconditioned L-BFGS, quasi-static.
@@ -85,8 +86,8 @@ pub enum Method {
     Verlet,
 }
 
-impl Method {
-    /// Its name in scenes.
+impl SolverMethod {
+    /// Returns the name in scenes.
     pub fn name(self) -> &'static str {
         match self {
             Self::Adr => "adr",
@@ -97,33 +98,37 @@ impl Method {
 }
 
 impl Scene {
-    /// The method: L-BFGS unless told otherwise, and dynamic relaxation where particles touch, of which the coarse level
-    /// of L-BFGS knows nothing.
-    pub fn method(&self) -> Method {
-        self.solver.method.unwrap_or(if self.contact.is_some() { Method::Adr } else { Method::Lbfgs })
+    /// Returns the method; default: L-BFGS, with contact dynamic relaxation, because the coarse level of
+    /// L-BFGS does not include contact.
+    pub fn method(&self) -> SolverMethod {
+        self.solver.method.unwrap_or(if self.contact.is_some() {
+            SolverMethod::Adr
+        } else {
+            SolverMethod::Lbfgs
+        })
     }
 
-    /// The tolerance: 1e-3 unless told otherwise; where bonds break that at which those of equilibrium do
-    /// (`cases/ch2/dent-events`), 1e-4 of L-BFGS and 1e-5 of relaxation.
+    /// Returns the tolerance; default: 1e-3; with breaking bonds 1e-4 of L-BFGS and 1e-5 of relaxation, with
+    /// which the bonds break as in exact equilibrium (`cases/ch2/dent-events`).
     pub fn tolerance(&self) -> f64 {
         let plain = match (self.material.critical.is_some(), self.method()) {
             (false, _) => 1e-3,
-            (true, Method::Lbfgs) => 1e-4,
+            (true, SolverMethod::Lbfgs) => 1e-4,
             (true, _) => 1e-5,
         };
         self.solver.tolerance.unwrap_or(plain)
     }
 
-    /// The quasi-static method with the settings of this scene.
+    /// Builds the quasi-static method.
     pub fn equilibria<const D: usize>(&self) -> Box<dyn Equilibrium<D>> {
         let (tolerance, max_iterations) = (self.tolerance(), self.solver.max_iterations);
         let accept = self.solver.accept.unwrap_or(0.0);
         match self.method() {
-            Method::Lbfgs => {
+            SolverMethod::Lbfgs => {
                 let plain = Lbfgs::default();
                 Box::new(LbfgsSolver::new(Lbfgs { tolerance, max_iterations, accept, ..plain }))
             }
-            Method::Adr | Method::Verlet => {
+            SolverMethod::Adr | SolverMethod::Verlet => {
                 let mass_safety =
                     self.solver.mass_safety.unwrap_or(self.material.law.unwrap_or_default().mass_safety());
                 let settings = DynamicRelaxation { tolerance, max_iterations, accept, mass_safety };
@@ -133,45 +138,78 @@ impl Scene {
     }
 }
 
-/// Explicit dynamics: loads rise linearly over the ramp and then stay.
+/// Settings of explicit dynamics: loads rise linearly over the ramp and then stay constant.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Dynamics {
     /// Mass density ρ.
     pub density: Density,
-    /// When to end.
+    /// Duration of the run.
     pub end_time: Time,
-    /// Time over which the loads rise; default: at once.
+    /// Time over which the loads rise; default: 0.
     pub ramp: Option<Time>,
-    /// The load factor as a formula of the time `t`, s, instead of `ramp`.
+    /// Load factor as a formula of the time `t`, s, instead of `ramp`.
     pub factor: Option<Formula>,
     /// Largest time step; default: `safety` times the critical one.
     pub time_step: Option<Time>,
-    /// Part of the critical time step; default 0.9.
+    /// Time step over the critical one; default: 0.9.
     pub safety: Option<f64>,
     /// Mass-proportional damping; default: none.
     pub damping: Option<Rate>,
-    /// Rows of history, equally far apart; default 100.
+    /// Number of history rows at equal intervals; default: 100.
     pub records: Option<usize>,
-    /// Precision of the forces of bonds; default: double.
+    /// Precision of bond forces; default: double.
     #[serde(default)]
-    pub precision: Precision,
+    pub precision: ForcePrecision,
+    /// Device that takes the steps; default: the processor.
+    #[serde(default)]
+    pub device: DeviceChoice,
 }
 
-/// Precision of the forces of bonds in a lattice; all else is in double precision.
+/// Device that takes the steps of explicit dynamics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Precision {
+pub enum DeviceChoice {
+    /// The processor.
+    #[default]
+    Cpu,
+    /// A graphics card: a lattice of a bond law, without contact, inclusions, surface correction and
+    /// rotations.
+    Gpu,
+    /// A graphics card where there is one that can do it and the body is large enough to gain by it, the
+    /// processor otherwise.
+    Auto,
+}
+
+impl DeviceChoice {
+    /// Its name in scenes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cpu => "cpu",
+            Self::Gpu => "gpu",
+            Self::Auto => "auto",
+        }
+    }
+}
+
+/// Precision of bond forces on a lattice; everything else is in double precision, but on a graphics card in
+/// single precision.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ForcePrecision {
     /// Double precision.
     #[default]
     Double,
-    /// Bonds in single precision, the sums of their forces in double precision; `mixed_error` of the report says what that costs.
-    /// Double precision while bonds are stretched or crushed so far that single precision would miss the law by more than 1e-5.
+    /// Single precision for bonds, double precision for the sums of their forces; the report has the error,
+    /// `mixed_error`. Double precision while stretches are so extreme that single precision would miss the
+    /// law by more than 1e-5.
     Mixed,
+    /// Single precision throughout, on a graphics card.
+    Single,
 }
 
 impl Dynamics {
-    /// The method with these settings.
+    /// Builds the method.
     pub fn method(&self) -> VelocityVerlet {
         let plain = VelocityVerlet::new(self.density.si(), self.end_time.si());
         VelocityVerlet {
@@ -181,6 +219,21 @@ impl Dynamics {
             ramp: self.ramp.map_or(0.0, |t| t.si()),
             records: self.records.unwrap_or(plain.records),
             ..plain
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use harness::scene::Source;
+
+    #[test]
+    fn fractions_may_be_percentages() {
+        for text in ["0.02", "\"2 %\""] {
+            let source = Source::new("scene.toml", format!("version = 1\nstop_below = {text}"));
+            let solver = source.parse::<SolverSpec>().unwrap();
+            assert_eq!(solver.stop_below.map(|part| part.si()), Some(0.02));
         }
     }
 }

@@ -36,28 +36,28 @@ pub use check::{check, check_variant};
 pub use contact::{ContactSpec, PlaneSpec, tied_grips};
 pub use crack::{cuts_of, severed_of_each};
 pub use explain::explain;
-pub use field::{FieldSpec, Parameter};
-pub use followed::{Followed, followed};
+pub use field::{FieldSpec, VaryingParameter};
+pub use followed::{ParameterField, followed};
 pub use formula::Formula;
 pub use grips::free_lengths;
 pub use inclusion::{Inclusion, Inclusions};
 pub use line::{LineField, SectionSpec, line_fields};
 pub use loads::{loads_of, region_names, velocities_of};
 pub use memory::needed as memory_needed;
-pub use method::{Dynamics, Method, Precision, Solver};
+pub use method::{DeviceChoice, Dynamics, ForcePrecision, SolverMethod, SolverSpec};
 pub use placement::{check_placement, exact_plate};
-pub use probe::{Probe, Track};
+pub use probe::{HistoryProbe, Track};
 pub use solid::{SolidKind, SolidLaw};
 pub use tearing::{explain_tearing, tearing_warnings};
-pub use values::{Body, plain};
-pub use variant::{NAMING, Study, Variant, variants};
+pub use values::{DiscreteBody, plain};
+pub use variant::{NAMING, SceneVariant, Study, variants};
 pub use warn::warnings;
 
 use crate::bonds::VolumeCorrection;
 use crate::calibrate::{Calibration, Space};
 use crate::critical::{Convention, Critical};
 use crate::potential::Law;
-use crate::stress::{BallVolume, Measure};
+use crate::stress::{BallVolume, StressMethod};
 use harness::report::Expect;
 use harness::scene::{LineSpec, SolidSpec};
 use harness::study::{Compare, Comparisons, Convergence, ErrorAgainstTime};
@@ -71,7 +71,7 @@ use std::path::PathBuf;
 pub struct Scene {
     /// The program that runs it: `peri`.
     pub program: Program,
-    /// One line for tables and pictures.
+    /// Title for tables and pictures.
     #[serde(default)]
     pub title: String,
     /// Geometry and discretisation.
@@ -83,21 +83,21 @@ pub struct Scene {
     pub boundary: Vec<Boundary>,
     /// Solver settings.
     #[serde(default)]
-    pub solver: Solver,
+    pub solver: SolverSpec,
     /// Density and times of explicit dynamics.
     pub dynamics: Option<Dynamics>,
     /// Repulsion of particles without a bond, friction, rigid planes; default: none.
     pub contact: Option<ContactSpec>,
     /// Quantities recorded in every row of the history.
     #[serde(default)]
-    pub probe: Vec<Probe>,
+    pub probe: Vec<HistoryProbe>,
     /// Stress output; without it no stress is computed.
     pub stress: Option<StressSpec>,
     /// A closed-form solution to compare with.
     pub exact: Option<ExactSpec>,
     /// Files to write.
     #[serde(default)]
-    pub output: OutputSpec,
+    pub output: OutputFiles,
     /// Variants to run instead of the scene's own discretisation.
     #[serde(default)]
     pub study: Vec<Study>,
@@ -116,7 +116,7 @@ pub struct Scene {
 #[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Program {
-    /// This crate.
+    /// Program of this crate.
     Peri,
 }
 
@@ -140,8 +140,8 @@ pub struct BodySpec {
     pub points: Option<PathBuf>,
     /// A box of cells that may have unequal sides, with `horizon`.
     pub grid: Option<GridSpec>,
-    /// Bonds across gaps: between parts that do not touch and across cuts narrower than the horizon. Default: false; of points
-    /// that form no lattice: true.
+    /// Bonds across gaps: between parts that do not touch and across cuts narrower than the horizon. Default:
+    /// false; for points without a lattice: true.
     pub bond_gaps: Option<bool>,
     /// Cracks of zero width.
     #[serde(default)]
@@ -161,12 +161,12 @@ pub struct GridSpec {
 }
 
 impl BodySpec {
-    /// Whether it has points instead of shapes.
+    /// Returns true for a body of points instead of shapes.
     pub fn has_points(&self) -> bool {
         self.points.is_some() || self.grid.is_some()
     }
 
-    /// The shapes, none where there are points.
+    /// Returns the shapes; none for a body of points.
     pub fn shapes(&self) -> &[ShapeSpec] {
         self.shapes.as_deref().unwrap_or_default()
     }
@@ -175,7 +175,7 @@ impl BodySpec {
 /// Default horizon over spacing, as in the thesis.
 pub const HORIZON_RATIO: f64 = 3.015;
 
-/// One shape; which lengths it needs depends on its kind.
+/// Shape; its kind determines the lengths that it needs.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ShapeSpec {
@@ -194,7 +194,7 @@ pub struct ShapeSpec {
     /// Length of a cylinder.
     pub length: Option<Length>,
     /// Axis of a cylinder.
-    pub axis: Option<Axis>,
+    pub axis: Option<AxisName>,
 }
 
 /// Kinds of shapes.
@@ -211,10 +211,22 @@ pub enum ShapeKind {
     Cylinder,
 }
 
+impl ShapeKind {
+    /// Returns the name in scenes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Box => "box",
+            Self::Disk => "disk",
+            Self::Ball => "ball",
+            Self::Cylinder => "cylinder",
+        }
+    }
+}
+
 /// A coordinate axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Axis {
+pub enum AxisName {
     /// First.
     X,
     /// Second.
@@ -223,8 +235,8 @@ pub enum Axis {
     Z,
 }
 
-/// A crack of zero width: the segment `from`–`to` in 2D, the parallelogram `from`, `to`, `and` (two neighbouring
-/// corners of `from`) in 3D.
+/// Crack of zero width: the segment `from`–`to` in 2D; in 3D a parallelogram with the corner `from` and its
+/// neighbours `to` and `and`.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CrackSpec {
@@ -240,25 +252,25 @@ pub struct CrackSpec {
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Material {
-    /// Young's modulus E of the continuum, of bond laws; ν follows from the space.
+    /// Young's modulus E of a bond law; ν follows from the space.
     pub youngs_modulus: Option<Stress>,
     /// Bond law; default: `chain-offset`.
     pub law: Option<Law>,
-    /// A solid with any Poisson ratio in place of a bond law.
+    /// Solid with any Poisson ratio, in place of a bond law.
     pub solid: Option<SolidLaw>,
     /// Links per bond n̄, for the chain laws.
     pub links: Option<f64>,
     /// Dissociation energy over kθ, D̂, for the chain laws.
     pub dissociation: Option<f64>,
-    /// Scale kθ so that the small-strain modulus is exact; default by law.
+    /// Scales kθ so that the small-strain modulus is exact; default by law.
     pub rescale: Option<bool>,
-    /// kθ from the continuum's integrals or from the lattice's sums.
+    /// Calibration of kθ, from integrals of the continuum or sums of the lattice.
     #[serde(default)]
     pub calibration: Calibration,
-    /// Volumes near the horizon.
+    /// Correction of volumes near the horizon.
     #[serde(default)]
     pub volume_correction: VolumeCorrection,
-    /// Bonds near free surfaces.
+    /// Correction of bonds near free surfaces.
     #[serde(default)]
     pub surface_correction: SurfaceCorrection,
     /// Critical stretch, beyond which bonds break; default: no bond breaks.
@@ -271,14 +283,14 @@ pub struct Material {
     pub fields: Vec<FieldSpec>,
 }
 
-/// Whether bonds near a free surface are stiffened.
+/// Stiffening of bonds near free surfaces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SurfaceCorrection {
-    /// As printed.
+    /// No correction, as in the thesis.
     #[default]
     None,
-    /// Until a homogeneous strain stores the continuum's energy (Madenci & Oterkus).
+    /// Factors with which a homogeneous strain stores the energy of the continuum (Madenci & Oterkus).
     Energy,
 }
 
@@ -287,16 +299,17 @@ pub enum SurfaceCorrection {
 #[serde(deny_unknown_fields)]
 pub struct StressSpec {
     /// Measures to compute; the first is drawn.
-    pub measures: Vec<Measure>,
+    pub measures: Vec<StressMethod>,
     /// Volume of the averaging ball of `ball-share`.
     #[serde(default)]
     pub ball: BallVolume,
-    /// The component that pictures of stages show, e.g. `22`; default: the largest principal stress, of a plane body that in the plane.
+    /// Stress component in pictures of stages, e.g. `22`; default: the largest principal stress, in a plane
+    /// body in its plane.
     pub component: Option<String>,
 }
 
 impl StressSpec {
-    /// Row and column of the component, from 0.
+    /// Returns the row and the column of the component, from 0.
     pub fn component(&self) -> Option<[usize; 2]> {
         let digits: Vec<usize> =
             self.component.as_ref()?.chars().map(|c| c.to_digit(10).map_or(9, |d| d as usize)).collect();
@@ -318,8 +331,8 @@ pub enum ExactSpec {
         /// Remote stress.
         remote_stress: Stress,
     },
-    /// The same in the body's own rectangle, by [`crate::exact::Plate`]: free hole, tractions `remote_stress` on the sides x+
-    /// and x−, acting in their layers.
+    /// Circular hole in the body's own rectangle, by [`crate::exact::Plate`]: free hole, tractions
+    /// `remote_stress` in the layers of the sides x+ and x−.
     PlateWithHole {
         /// Radius of the hole.
         radius: Length,
@@ -329,13 +342,13 @@ pub enum ExactSpec {
 }
 
 impl ExactSpec {
-    /// Radius of the hole, m, and the stress far from it, Pa.
+    /// Returns the radius of the hole, m, and the remote stress, Pa.
     pub fn hole(&self) -> (f64, f64) {
         let (Self::Kirsch { radius, remote_stress } | Self::PlateWithHole { radius, remote_stress }) = self;
         (radius.si(), remote_stress.si())
     }
 
-    /// Name in scenes.
+    /// Returns the name in scenes.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Kirsch { .. } => "kirsch",
@@ -343,7 +356,7 @@ impl ExactSpec {
         }
     }
 
-    /// What errors of a measure are called, `MEASURE_…`.
+    /// Returns the names of the errors of a measure, as in `MEASURE_rmse`.
     pub fn errors(&self) -> &'static [&'static str] {
         match self {
             Self::Kirsch { .. } => &["rmse", "rmse_inner"],
@@ -357,32 +370,33 @@ impl ExactSpec {
 /// Files to write beside the report.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct OutputSpec {
+pub struct OutputFiles {
     /// Pictures (PNG).
     pub pictures: bool,
     /// Fields as VTKHDF.
     pub fields: bool,
-    /// Write the fields every so many steps, and in every step in which bonds break; default: at the end only.
+    /// Interval of steps at which fields are written, also in every step in which bonds break; default: only
+    /// the end.
     pub every: Option<usize>,
-    /// Pictures of so many stages from the last whole state to the end, of what is written with `every`.
+    /// Number of stages in pictures, from the last intact state to the end; needs `every`.
     pub stages: usize,
-    /// How pictures show a solid.
+    /// View of a solid in pictures.
     pub solid: Option<SolidSpec>,
-    /// Where a learnt law is uncertain, as a field and in pictures.
+    /// Writes where a learnt law is uncertain, as a field and in pictures.
     pub flags: bool,
-    /// Displacements at which the load becomes a value of the report: `load_at_20mm`.
+    /// Displacements at which the report has the load, as `load_at_20mm`.
     pub load_at: Vec<Length>,
-    /// The integrals over the horizon of Appendix A, by quadrature, among the values of the report.
+    /// Adds the integrals of Appendix A over the horizon, by quadrature, to the report.
     pub integrals: bool,
     /// Reference for the variants.
     pub compare: Option<Compare>,
     /// Lines along which fields are written at the end.
     pub line: Vec<LineSpec>,
-    /// Planes across which the transmitted force is written in every row of the history.
+    /// Planes whose transmitted force is written in every row of the history.
     pub section: Vec<SectionSpec>,
 }
 
-impl Default for OutputSpec {
+impl Default for OutputFiles {
     fn default() -> Self {
         Self {
             pictures: true,
@@ -400,7 +414,7 @@ impl Default for OutputSpec {
     }
 }
 
-/// The JSON Schema of scenes.
+/// Returns the JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
     harness::scene::schema("peri", crate::program::quantities::ALL, |generator| {
         vec![generator.subschema_for::<Scene>()]
@@ -408,35 +422,37 @@ pub fn schema() -> serde_json::Value {
 }
 
 impl Scene {
-    /// What compares its variants.
+    /// Returns the comparisons of its variants.
     pub fn comparisons(&self) -> Comparisons<'_> {
         Comparisons { convergence: &self.convergence, curves: &self.error_against_time }
     }
 
-    /// Whether outputs ask for forces, stresses or flags.
+    /// Returns true if outputs need forces, stresses or flags.
     pub fn observes_forces(&self) -> bool {
         let j_integral = self.probe.iter().any(|probe| probe.track == Track::JIntegral);
         self.stress.is_some() || !self.output.section.is_empty() || j_integral || self.is_learnt()
     }
 
-    /// Whether its law is learnt from data.
+    /// Returns true for a law learnt from data.
     pub fn is_learnt(&self) -> bool {
         self.material.solid.as_ref().is_some_and(SolidLaw::is_learnt)
     }
 
-    /// Whether the bonds of its law soften before they break.
+    /// Returns true if bonds soften before they break.
     pub fn softens(&self) -> bool {
         self.material.critical.and_then(|own| own.convention) == Some(Convention::Softening)
     }
 
-    /// Largest relative error of the fitted bond law.
+    /// Returns the largest relative error of the fitted bond law.
     pub fn fit_bound(&self) -> f64 {
-        let rough = self.material.critical.is_some() || self.is_mixed();
+        let single =
+            self.dynamics.as_ref().is_some_and(|dynamics| dynamics.precision == ForcePrecision::Single);
+        let rough = self.material.critical.is_some() || self.is_mixed() || single;
         self.solver.fit_bound.unwrap_or(if rough { 1e-6 } else { 1e-9 })
     }
 
-    /// Whether forces of bonds are evaluated in mixed precision.
+    /// Returns true if bond forces are in mixed precision.
     pub fn is_mixed(&self) -> bool {
-        self.dynamics.as_ref().is_some_and(|dynamics| dynamics.precision == Precision::Mixed)
+        self.dynamics.as_ref().is_some_and(|dynamics| dynamics.precision == ForcePrecision::Mixed)
     }
 }

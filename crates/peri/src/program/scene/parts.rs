@@ -1,23 +1,23 @@
-//! The parts of a body that do not touch, and which of them are bonded.
+//! Parts of a body that do not touch, and bonds between them.
 
-use super::{Body, Scene};
+use super::{DiscreteBody, Scene};
 use crate::bonds::components;
 use crate::geometry::Operation;
 use std::collections::BTreeMap;
 
-/// Parts that `peri check` lists one by one.
+/// Largest number of parts that `peri check` lists.
 const LISTED: usize = 12;
 
-/// Whether the bond of two sites crosses a gap.
-fn crosses<const D: usize>(body: &Body<D>, site: usize, other: usize) -> bool {
+/// Returns true if the bond of two sites crosses a gap.
+fn crosses<const D: usize>(body: &DiscreteBody<D>, site: usize, other: usize) -> bool {
     let bonds = &*body.bonds;
     let (here, there) = (bonds.position(site), bonds.position(other));
     let near = body.gaps.as_ref().and_then(|gaps| gaps.within(here, bonds.horizon() * (1.0 + 1e-9)));
     near.is_some_and(|near| near.severs(here, there))
 }
 
-/// A warning of points that fall into parts which are bonded, where nobody has asked for that.
-pub(super) fn bonded_parts<const D: usize>(scene: &Scene, body: &Body<D>) -> Option<String> {
+/// Warns of bonds between separate parts of a cloud without `bond_gaps`.
+pub(super) fn bonded_parts<const D: usize>(scene: &Scene, body: &DiscreteBody<D>) -> Option<String> {
     if body.gaps.is_none() || scene.body.bond_gaps.is_some() {
         return None;
     }
@@ -30,14 +30,15 @@ pub(super) fn bonded_parts<const D: usize>(scene: &Scene, body: &Body<D>) -> Opt
     }
     (across > 0).then(|| {
         format!(
-            "the points fall into parts more than 1.5 edges of their cubes apart, which {across} bonds join: `body.bond_gaps = false` \
-             parts them, `true` says that this is meant"
+            "the points form parts more than 1.5 edges of their cubes apart, joined by {across} bonds: \
+             `body.bond_gaps = false` \
+             separates them, `true` keeps the bonds"
         )
     })
 }
 
-/// Lines for `peri check`; none of a body without gaps.
-pub(super) fn explain<const D: usize>(body: &Body<D>) -> Vec<String> {
+/// Returns lines for `peri check`; none for a body without gaps.
+pub(super) fn explain<const D: usize>(body: &DiscreteBody<D>) -> Vec<String> {
     if body.gaps.is_none() {
         return Vec::new();
     }
@@ -64,8 +65,8 @@ pub(super) fn explain<const D: usize>(body: &Body<D>) -> Vec<String> {
     for (number, (particles, of)) in parts.values().enumerate().take(LISTED) {
         let shapes: Vec<String> =
             (0..of.len()).filter(|&index| of[index]).map(|index| format!("shapes[{index}]")).collect();
-        let of = if shapes.is_empty() { String::new() } else { format!(" of {}", shapes.join(", ")) };
-        lines.push(format!("  part {:<5} {particles} particles{of}", number + 1));
+        let names = if shapes.is_empty() { String::new() } else { format!(" of {}", shapes.join(", ")) };
+        lines.push(format!("  part {:<5} {particles} particles{names}", number + 1));
     }
     if parts.len() > LISTED {
         lines.push(format!("  parts      {} more", parts.len() - LISTED));

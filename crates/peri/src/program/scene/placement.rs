@@ -1,31 +1,31 @@
-//! What a scene names beside its body must lie where the body is: a closed form's hole, displacements of the loads.
+//! Checks that need the body and its loads: the hole of `[exact]`, displacements of `output.load_at`, planes.
 
 use super::region::layers;
-use super::values::Body;
+use super::values::DiscreteBody;
 use super::{ExactSpec, Scene, Side};
 use crate::exact::Plate;
 use crate::solver::Loads;
 use harness::scene::{SceneError, Source};
 
-/// Checks what only the body and its loads can tell.
+/// Checks what needs the body and its loads.
 ///
 /// # Errors
-/// A hole of `[exact]` that the body does not have; a load requested at a displacement that is never reached.
+/// A hole of `[exact]` that the body lacks; a load at a displacement that is never reached; planes.
 pub fn check_placement<const D: usize>(
     source: &Source,
     scene: &Scene,
-    body: &Body<D>,
+    body: &DiscreteBody<D>,
     loads: &Loads<D>,
 ) -> Result<(), SceneError> {
     if let Some(exact) = &scene.exact {
-        hole(source, body, exact.hole().0)?;
+        check_hole(source, body, exact.hole().0)?;
     }
     plate_frame(source, scene, body)?;
     super::planes::check(source, scene, body)?;
     let planes = scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes(source, false))?;
     let rigid: Vec<[f64; D]> = planes.iter().map(|plane| plane.displacement).collect();
     let reach = loads.reach(&*body.bonds, &rigid);
-    // under forces alone nobody knows before the run how far they get
+    // the displacement under forces is unknown before the run
     let beyond = |at: f64| reach > 0.0 && at > reach * (1.0 + 1e-9);
     match scene.output.load_at.iter().position(|at| beyond(at.si())) {
         Some(index) => {
@@ -36,11 +36,12 @@ pub fn check_placement<const D: usize>(
     }
 }
 
-/// Half the edges of the plate that `[exact]` names, and the width of its loaded layers, m; none for other problems.
+/// Returns half the edges of the plate of `[exact]` and the width of its loaded layers, m; `None` for other
+/// problems.
 fn plate_frame<const D: usize>(
     source: &Source,
     scene: &Scene,
-    body: &Body<D>,
+    body: &DiscreteBody<D>,
 ) -> Result<Option<([f64; 2], f64)>, SceneError> {
     let Some(exact @ ExactSpec::PlateWithHole { .. }) = &scene.exact else { return Ok(None) };
     let (low, high) = &body.bounds;
@@ -76,14 +77,14 @@ fn plate_frame<const D: usize>(
     Ok(Some((half, widths[0])))
 }
 
-/// The exact stresses of the plate that `[exact]` names, judged with the width of the scene's own loaded layers.
+/// Returns the exact stresses of the plate of `[exact]`, with the width of the scene's loaded layers.
 ///
 /// # Errors
-/// Loads or a body that the problem does not have; see [`check_placement`].
+/// As [`check_placement`].
 pub fn exact_plate<const D: usize>(
     source: &Source,
     scene: &Scene,
-    body: &Body<D>,
+    body: &DiscreteBody<D>,
 ) -> Result<Option<Plate>, SceneError> {
     let Some((half, layer)) = plate_frame(source, scene, body)? else { return Ok(None) };
     let radius = scene.exact.as_ref().map_or(0.0, |exact| exact.hole().0);
@@ -95,8 +96,12 @@ pub fn exact_plate<const D: usize>(
     Ok(Some(plate))
 }
 
-/// No particle inside the radius, and some at the rim.
-fn hole<const D: usize>(source: &Source, body: &Body<D>, radius: f64) -> Result<(), SceneError> {
+/// Refuses a hole radius that contains a particle or has none at the rim.
+fn check_hole<const D: usize>(
+    source: &Source,
+    body: &DiscreteBody<D>,
+    radius: f64,
+) -> Result<(), SceneError> {
     let places = body.bonds.particles().iter().map(|&site| body.bonds.position(site as usize));
     let distance = |place: &[f64; D]| place[0].hypot(place[1]);
     let Some(nearest) = places.min_by(|a, b| distance(a).total_cmp(&distance(b))) else { return Ok(()) };

@@ -1,47 +1,48 @@
-//! Rigid planes beside a body: what they leave no room for, and what they will not reach.
+//! Checks of rigid planes: planes behind the body, without room between them, or out of reach.
 
-use super::values::Body;
-use super::{Method, Scene};
-use crate::contact::Plane;
+use super::values::DiscreteBody;
+use super::{Scene, SolverMethod};
+use crate::contact::RigidPlane;
 use harness::scene::{SceneError, Source};
 use polycore::numerics::range;
 
-/// n₁·n₂ of planes that face each other.
+/// Largest n₁·n₂ of planes that face each other.
 const FACING: f64 = -0.99;
-/// Part of the body between two planes that must be left.
-const LEFT: f64 = 0.2;
-/// Distance of the surface from a bonded plane, in spacings.
-const TIED: f64 = 0.5;
-/// Overlap of faces, in spacings, up to which particles are still in front of a plane.
+/// Smallest distance of facing planes over the thickness of the body between them.
+const LEAST_ROOM: f64 = 0.2;
+/// Largest distance of the surface from a bonded plane, in spacings.
+const TIE_DISTANCE: f64 = 0.5;
+/// Overlap at the start above which a plane presses on the body, in spacings.
 const PRESTRESSED: f64 = 0.01;
-/// Load factors at which planes are looked at.
-const LOOKS: u32 = 100;
+/// Number of moments at which planes of a run in time are checked.
+const MOMENTS: u32 = 100;
 
-/// A plane of a scene with a unit normal, and the range of the body's particles along it, m.
-struct StretchScan<const D: usize> {
+/// Plane of a scene with a unit normal, and the range of the particles' heights above it, m.
+struct PlanePosition<const D: usize> {
     name: String,
-    plane: Plane<D>,
+    plane: RigidPlane<D>,
     low: f64,
     high: f64,
-    /// Height of the lowest point of the surface, m.
+    /// Height of the lowest point of the surface above the plane, m.
     surface: f64,
 }
 
-impl<const D: usize> StretchScan<D> {
-    /// Height of the plane over its place at rest along its normal, m, at a load factor and a time, s.
-    fn raised(&self, factor: f64, time: f64) -> f64 {
-        let Plane { normal, displacement, velocity, .. } = self.plane;
+impl<const D: usize> PlanePosition<D> {
+    /// Returns the displacement of the plane along its normal, m, at a load factor and a time, s.
+    fn displacement(&self, factor: f64, time: f64) -> f64 {
+        let RigidPlane { normal, displacement, velocity, .. } = self.plane;
         (0..D).map(|d| normal[d] * (factor * displacement[d] + time * velocity[d])).sum()
     }
 }
 
-fn seen<const D: usize>(
+/// Returns the planes of a scene in relation to the body.
+fn plane_positions<const D: usize>(
     source: &Source,
     scene: &Scene,
-    body: &Body<D>,
-) -> Result<Vec<StretchScan<D>>, SceneError> {
+    body: &DiscreteBody<D>,
+) -> Result<Vec<PlanePosition<D>>, SceneError> {
     let Some(contact) = &scene.contact else { return Ok(Vec::new()) };
-    let planes = contact.planes::<D>(source, scene.method() == Method::Verlet)?;
+    let planes = contact.planes::<D>(source, scene.method() == SolverMethod::Verlet)?;
     let surface = body.surface();
     let each = planes.into_iter().enumerate().map(|(index, mut plane)| {
         let size = crate::geometry::length(plane.normal);
@@ -53,15 +54,15 @@ fn seen<const D: usize>(
         let lowest = faces.fold(f64::INFINITY, f64::min);
         let of_particles = low - 0.5 * body.bonds.spacing();
         let lowest = if lowest.is_finite() { lowest } else { of_particles };
-        StretchScan { name: contact.plane[index].name(index), plane, low, high, surface: lowest }
+        PlanePosition { name: contact.plane[index].name(index), plane, low, high, surface: lowest }
     });
     Ok(each.collect())
 }
 
-/// Load factors and times, s, at which planes are looked at: all that are prescribed, and more between them.
+/// Returns the load factors and times, s, at which planes are checked.
 fn moments(scene: &Scene) -> Vec<(f64, f64)> {
     let end = scene.dynamics.as_ref().map_or(0.0, |dynamics| dynamics.method().end_time);
-    let even = (0..=LOOKS).map(|k| f64::from(k) / f64::from(LOOKS));
+    let even = (0..=MOMENTS).map(|k| f64::from(k) / f64::from(MOMENTS));
     if scene.dynamics.is_some() {
         let ramp = scene.dynamics.as_ref().map_or(0.0, |dynamics| dynamics.method().ramp);
         let factor = |time: f64| if time < ramp { time / ramp } else { 1.0 };
@@ -71,16 +72,16 @@ fn moments(scene: &Scene) -> Vec<(f64, f64)> {
     std::iter::once(0.0).chain(factors).map(|factor| (factor, 0.0)).collect()
 }
 
-/// Checks that planes are in front of the body at the start, and leave it room all along.
+/// Checks that the body is in front of all planes at the start, and that they leave it room during the run.
 ///
 /// # Errors
-/// The plane, what was found and what is allowed.
+/// A [`SceneError`] that names the plane, the value found and what is allowed.
 pub(super) fn check<const D: usize>(
     source: &Source,
     scene: &Scene,
-    body: &Body<D>,
+    body: &DiscreteBody<D>,
 ) -> Result<(), SceneError> {
-    let (planes, spacing) = (seen(source, scene, body)?, body.bonds.spacing());
+    let (planes, spacing) = (plane_positions(source, scene, body)?, body.bonds.spacing());
     let particles = body.bonds.particles();
     for (index, own) in planes.iter().enumerate() {
         let key = format!("contact.plane[{index}]");
@@ -101,10 +102,12 @@ pub(super) fn check<const D: usize>(
             };
             return Err(source.error(&format!("{key}.normal"), found, advice));
         }
-        if own.plane.bonded && own.surface.abs() >= TIED * spacing {
+        if own.plane.bonded && own.surface.abs() >= TIE_DISTANCE * spacing {
             let found = format!("plane `{}` {:.3e} m from the surface of the body", own.name, own.surface);
-            let allowed =
-                format!("up to half a spacing, {:.3e} m: a bonded plane touches the body", TIED * spacing);
+            let allowed = format!(
+                "up to half a spacing, {:.3e} m: a bonded plane touches the body",
+                TIE_DISTANCE * spacing
+            );
             return Err(source.error(&format!("{key}.point"), found, allowed));
         }
         if own.plane.bonded && body.surface().faces().is_empty() {
@@ -119,18 +122,20 @@ pub(super) fn check<const D: usize>(
             let apart = own.plane.height(other.plane.point);
             let body_between = own.high - own.low + spacing;
             for (factor, time) in moments(scene) {
-                let gap = apart - own.raised(factor, time) - other.raised(factor, time);
-                if gap < LEFT * body_between {
+                let gap = apart - own.displacement(factor, time) - other.displacement(factor, time);
+                if gap < LEAST_ROOM * body_between {
                     let when = if time > 0.0 {
                         format!("time {time:.3e} s")
                     } else {
                         format!("load factor {factor:.3}")
                     };
                     let found = format!(
-                        "planes `{}` and `{}` {:.3e} m apart at {when}, with {body_between:.3e} m of the body between them",
+                        "planes `{}` and `{}` {:.3e} m apart at {when}, with {body_between:.3e} m of the \
+                         body between them",
                         own.name, other.name, gap
                     );
-                    let allowed = format!("at least {:.3e} m, a fifth of the body", LEFT * body_between);
+                    let allowed =
+                        format!("at least {:.3e} m, a fifth of the body", LEAST_ROOM * body_between);
                     let key = format!("contact.plane[{other_index}].displacement");
                     return Err(source.error(&key, found, allowed));
                 }
@@ -139,7 +144,7 @@ pub(super) fn check<const D: usize>(
     }
     if let Some((factor, time)) = moments(scene).into_iter().find(|&(f, t)| !has_room(&planes, body, f, t)) {
         let when = if time > 0.0 { format!("time {time:.3e} s") } else { format!("load factor {factor:.3}") };
-        let names: Vec<String> = planes.iter().map(|seen| format!("`{}`", seen.name)).collect();
+        let names: Vec<String> = planes.iter().map(|position| format!("`{}`", position.name)).collect();
         let found = format!("planes {} that leave no room between them at {when}", names.join(", "));
         return Err(source.error(
             "contact.plane",
@@ -150,16 +155,21 @@ pub(super) fn check<const D: usize>(
     Ok(())
 }
 
-/// Whether some point near the body is in front of all planes: the largest t with n_i·x − h_i ≥ t is positive. It is at a corner, where
-/// D + 1 of the constraints hold with equality.
-fn has_room<const D: usize>(planes: &[StretchScan<D>], body: &Body<D>, factor: f64, time: f64) -> bool {
+/// Returns true if some point near the body is in front of all planes: the largest t with n_i·x − h_i ≥ t is
+/// positive. The maximum is at a corner, where D + 1 of the constraints hold with equality.
+fn has_room<const D: usize>(
+    planes: &[PlanePosition<D>],
+    body: &DiscreteBody<D>,
+    factor: f64,
+    time: f64,
+) -> bool {
     let (low, high) = body.bounds;
     let size = (0..D).map(|d| high[d] - low[d]).fold(0.0, f64::max);
     // n·x − t ≥ h of planes and of a box ten times the body
     let mut rows: Vec<([f64; D], f64)> = Vec::new();
-    for seen in planes {
-        let at: f64 = (0..D).map(|d| seen.plane.normal[d] * seen.plane.point[d]).sum();
-        rows.push((seen.plane.normal, at + seen.raised(factor, time)));
+    for position in planes {
+        let at: f64 = (0..D).map(|d| position.plane.normal[d] * position.plane.point[d]).sum();
+        rows.push((position.plane.normal, at + position.displacement(factor, time)));
     }
     if rows.len() < 2 {
         return true;
@@ -196,23 +206,32 @@ fn has_room<const D: usize>(planes: &[StretchScan<D>], body: &Body<D>, factor: f
     }
 }
 
-/// One sentence for each plane that presses at the start, or that will not reach the body.
-pub(super) fn warnings<const D: usize>(source: &Source, scene: &Scene, body: &Body<D>) -> Vec<String> {
-    let (planes, spacing) = (seen(source, scene, body).unwrap_or_default(), body.bonds.spacing());
-    let of = |seen: &StretchScan<D>| {
-        let gap = seen.surface;
+/// Warns of planes that press at the start, or that do not reach the body.
+pub(super) fn warnings<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &DiscreteBody<D>,
+) -> Vec<String> {
+    let (planes, spacing) = (plane_positions(source, scene, body).unwrap_or_default(), body.bonds.spacing());
+    let warning = |position: &PlanePosition<D>| {
+        let gap = position.surface;
         if gap < -PRESTRESSED * spacing {
             return Some(format!(
-                "plane `{}` stands {:.3e} m inside the surface of the body at the start: it presses before it moves",
-                seen.name, -gap
+                "plane `{}` stands {:.3e} m inside the surface of the body at the start: it presses before \
+                 it moves",
+                position.name, -gap
             ));
         }
-        let moves = seen.plane.displacement != [0.0; D] || seen.plane.velocity != [0.0; D];
-        let reach = moments(scene).into_iter().map(|(f, t)| seen.raised(f, t)).fold(0.0, f64::max);
-        let far = reach < gap - PRESTRESSED * spacing && !seen.plane.bonded;
+        let moves = position.plane.displacement != [0.0; D] || position.plane.velocity != [0.0; D];
+        let reach = moments(scene).into_iter().map(|(f, t)| position.displacement(f, t)).fold(0.0, f64::max);
+        let far = reach < gap - PRESTRESSED * spacing && !position.plane.bonded;
         (moves && far && scene.dynamics.is_none()).then(|| {
-            format!("plane `{}` comes {reach:.3e} m nearer to the body, whose gap is {gap:.3e} m: it does not reach it", seen.name)
+            format!(
+                "plane `{}` comes {reach:.3e} m nearer to the body, whose gap is {gap:.3e} m: it does \
+                not reach it",
+                position.name
+            )
         })
     };
-    planes.iter().filter_map(of).collect()
+    planes.iter().filter_map(warning).collect()
 }

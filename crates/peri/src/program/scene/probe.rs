@@ -1,28 +1,28 @@
-//! Quantities that a scene records in every row of the history: displacements, strains between marks, rotations, crack tips, wave
-//! fronts, J-integrals.
+//! Probes of a scene, recorded in every row of the history: displacements, strains between marks, rotations,
+//! crack tips, wave fronts, J-integrals.
 
 use super::region::region;
-use super::values::{Body, vector};
-use super::{Axis, Boundary, Method, Scene, Side};
+use super::values::{DiscreteBody, vector};
+use super::{AxisName, Boundary, Scene, Side, SolverMethod};
 use crate::calibrate::Space;
 use harness::report::{Named, Quantity};
 use harness::scene::{SceneError, Source};
 use polycore::units::Length;
 use serde::{Deserialize, Serialize};
 
-/// A quantity recorded in every row of the history.
+/// Probe: a quantity recorded in every row of the history.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Probe {
-    /// Its column in the history, and the prefix of its values.
+pub struct HistoryProbe {
+    /// Name, its column in the history and the prefix of its values.
     pub name: String,
-    /// Its quantity.
+    /// Quantity.
     pub track: Track,
     /// Direction, or axis of rotation.
-    pub axis: Option<Axis>,
+    pub axis: Option<AxisName>,
     /// A side of the bounding box; default: the whole body.
     pub side: Option<Side>,
-    /// Its depth in particles.
+    /// Depth from the side in particles.
     pub layers: Option<usize>,
     /// Or a box: lower corner …
     pub min: Option<Vec<Length>>,
@@ -32,17 +32,17 @@ pub struct Probe {
     pub from: Option<Vec<Length>>,
     /// The other mark.
     pub to: Option<Vec<Length>>,
-    /// Damage, from and to, of the particles at a crack's tip.
+    /// Range of damage of the particles at a crack tip.
     pub damage: Option<[f64; 2]>,
-    /// Axis along which the distance of a crack's tip from 0 is recorded.
-    pub across: Option<Axis>,
-    /// Two places between which a crack's or a front's speed is measured.
+    /// Axis along which the distance of a crack tip from 0 is recorded.
+    pub across: Option<AxisName>,
+    /// Two positions between which the speed of a crack or a front is measured.
     pub gauges: Option<[Length; 2]>,
     /// Velocity of a front, as a fraction of the largest.
     pub threshold: Option<f64>,
     /// Crack tip of a J-integral.
     pub tip: Option<Vec<Length>>,
-    /// Radii about the tip between which it is taken.
+    /// Inner and outer radius of the integration ring about the tip.
     pub radii: Option<[Length; 2]>,
 }
 
@@ -56,16 +56,16 @@ pub enum Track {
     Strain,
     /// Rotation of the region about the axis through the origin, rad.
     Rotation,
-    /// Farthest place along the axis with damage in a range, m.
+    /// Farthest position along the axis with damage in a range, m.
     Crack,
-    /// Farthest place along the axis at which the velocity along it is a part of the largest, m.
+    /// Farthest position along the axis at which the velocity along it exceeds a fraction of the largest, m.
     Front,
     /// J-integral of a crack that grows along the axis, J/m².
     JIntegral,
 }
 
 impl Track {
-    /// Unit of its column.
+    /// Returns the unit of its column.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Displacement | Self::Crack | Self::Front => "m",
@@ -76,21 +76,21 @@ impl Track {
     }
 }
 
-impl Axis {
-    /// 0, 1 or 2.
+impl AxisName {
+    /// Returns 0, 1 or 2.
     pub fn index(self) -> usize {
         self as usize
     }
 }
 
-impl Probe {
-    /// A quantity of this probe, in its unit where it has none of its own.
+impl HistoryProbe {
+    /// Names a quantity of this probe; `*` becomes the unit of the probe.
     pub fn named(&self, quantity: Quantity) -> Named {
         let named = quantity.of(&[&self.name]);
         if named.unit == "*" { named.in_unit(self.track.unit()) } else { named }
     }
 
-    /// Sites of its region, of the whole body where it names none.
+    /// Returns the sites of its region; without a region those of the whole body.
     ///
     /// # Errors
     /// As [`super::body_of`].
@@ -98,7 +98,7 @@ impl Probe {
         &self,
         source: &Source,
         key: &str,
-        body: &Body<D>,
+        body: &DiscreteBody<D>,
     ) -> Result<Vec<u32>, SceneError> {
         if self.side.is_none() && self.min.is_none() && self.max.is_none() {
             return Ok(body.bonds.particles().to_vec());
@@ -117,15 +117,15 @@ impl Probe {
         Ok(members)
     }
 
-    /// The particles at the two marks of a strain: the nearest, and all that are as near.
+    /// Returns the particles nearest to each of the two marks of a strain.
     ///
     /// # Errors
-    /// Marks that are one.
+    /// Marks outside the body or at the same particles.
     pub fn marks<const D: usize>(
         &self,
         source: &Source,
         key: &str,
-        body: &Body<D>,
+        body: &DiscreteBody<D>,
     ) -> Result<[Vec<u32>; 2], SceneError> {
         let near = |name: &str, mark: &Option<Vec<Length>>| {
             let mark = vector::<D>(source, &format!("{key}.{name}"), mark.as_deref().unwrap_or_default())?;
@@ -150,7 +150,7 @@ impl Probe {
         Ok(marks)
     }
 
-    /// Tip and radii of a J-integral, m.
+    /// Returns the tip and the radii of a J-integral, m.
     ///
     /// # Errors
     /// A tip of another dimension.
@@ -164,10 +164,10 @@ impl Probe {
     }
 }
 
-/// Checks what can be judged without a body.
+/// Checks what needs no body.
 ///
 /// # Errors
-/// The key, what was found and what is allowed.
+/// A [`SceneError`] that names the key, the value found and what is allowed.
 pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let dimension = if scene.body.space == Space::Solid { 3 } else { 2 };
     for (index, probe) in scene.probe.iter().enumerate() {
@@ -198,26 +198,26 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             ("threshold", probe.threshold.is_some(), track == Track::Front, false),
         ] {
             if given && !belongs {
-                let found = format!("`{name}` of a probe of `{}`", name_of(track));
-                return Err(source.error(&key(name), found, "nothing"));
+                let why = format!("a probe of `{}` does not use it", name_of(track));
+                return Err(source.unexpected(&key(name), why));
             }
             if needed && !given {
-                let allowed = format!("a probe of `{}` needs `{name}`", name_of(track));
-                return Err(source.error(&key(name), "nothing", allowed));
+                return Err(source.missing(&key(name), format!("needed for a probe of `{}`", name_of(track))));
             }
         }
         for (name, axis) in [("axis", probe.axis), ("across", probe.across)] {
-            let plane_rotation = track == Track::Rotation && axis == Some(Axis::Z);
+            let plane_rotation = track == Track::Rotation && axis == Some(AxisName::Z);
             if axis.is_some_and(|axis| axis.index() >= dimension) && !plane_rotation {
                 return Err(source.error(&key(name), "`z` in a plane body", "`x` or `y`"));
             }
         }
-        if track == Track::Rotation && dimension == 2 && probe.axis != Some(Axis::Z) {
+        if track == Track::Rotation && dimension == 2 && probe.axis != Some(AxisName::Z) {
             return Err(source.error(&key("axis"), "an axis in the plane", "`z` in a plane body"));
         }
         if of_crack && scene.material.critical.is_none() {
-            let allowed = "nothing, or `material.critical`: without it nothing breaks";
-            return Err(source.error(&key("track"), "`crack`", allowed));
+            return Err(
+                source.unexpected(&key("track"), "`crack` needs `material.critical`, so that bonds break")
+            );
         }
         if of_j && (dimension == 3 || scene.material.solid.is_none()) {
             let found = if dimension == 3 {
@@ -233,7 +233,7 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             let found = format!("{} m to {} m", inner.si(), outer.si());
             return Err(source.error(&key("radii"), found, "0 ≤ inner < outer"));
         }
-        if track == Track::Front && scene.method() != Method::Verlet {
+        if track == Track::Front && scene.method() != SolverMethod::Verlet {
             return Err(source.error(
                 &key("track"),
                 "`front` without motion",

@@ -1,23 +1,23 @@
-//! Particles that a boundary acts on.
+//! Selects the particles of a boundary.
 
 use super::Boundary;
 use super::build::operations;
-use super::values::{Body, ordered, vector};
+use super::values::{DiscreteBody, ONE_OF_THEM, check_order, vector};
 use crate::bonds::Bonds;
 use crate::geometry::inside;
 use harness::scene::{SceneError, Source};
 
-/// Layers of particles at a side that a boundary acts on.
+/// Returns the number of layers of particles that a boundary takes at a side.
 pub(super) fn layers<const D: usize>(boundary: &Boundary, bonds: &dyn Bonds<D>) -> usize {
     boundary.layers_of(bonds.spacing(), bonds.horizon() / bonds.spacing())
 }
 
-/// Particles of the region of a boundary, and its depth at a side, m.
+/// Returns the particles of a boundary, and its depth from a side, m.
 pub(super) fn region<const D: usize>(
     source: &Source,
     key: &str,
     boundary: &Boundary,
-    body: &Body<D>,
+    body: &DiscreteBody<D>,
 ) -> Result<(Vec<u32>, Option<f64>), SceneError> {
     let spacing = body.bonds.spacing();
     let (low, high, depth) = match (boundary.side, &boundary.min, &boundary.max) {
@@ -32,11 +32,7 @@ pub(super) fn region<const D: usize>(
             }
             let name = boundary.depth_key().unwrap_or("layers");
             if boundary.depth.is_some() && boundary.layers.is_some() {
-                return Err(source.error(
-                    &format!("{key}.depth"),
-                    "`depth` together with `layers`",
-                    "one of them",
-                ));
+                return Err(source.conflict(&format!("{key}.depth"), "layers", ONE_OF_THEM));
             }
             if boundary.layers == Some(0) {
                 return Err(source.error(&format!("{key}.layers"), 0, "at least 1"));
@@ -71,15 +67,11 @@ pub(super) fn region<const D: usize>(
         }
         (None, Some(min), Some(max)) if boundary.shapes.is_empty() => {
             if let Some(name) = boundary.depth_key() {
-                return Err(source.error(
-                    &format!("{key}.{name}"),
-                    format!("`{name}`"),
-                    "nothing: the box has its own depth",
-                ));
+                return Err(source.unexpected(&format!("{key}.{name}"), "a box has its own depth"));
             }
             let (min, max) =
                 (vector(source, &format!("{key}.min"), min)?, vector(source, &format!("{key}.max"), max)?);
-            ordered(source, key, min, max)?;
+            check_order(source, key, min, max)?;
             (min, max, None)
         }
         (None, None, None) if !boundary.shapes.is_empty() && boundary.depth_key().is_none() => {

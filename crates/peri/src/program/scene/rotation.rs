@@ -1,23 +1,25 @@
-//! Boundaries that turn about an axis, and fields of displacements that would cut across the arc.
+//! Boundaries that rotate about an axis, and warnings of displacement fields that rotate along the chord.
 
 use super::boundary::RotationSpec;
 use super::region::region;
-use super::values::{Body, plain, vector};
+use super::values::{DiscreteBody, ONE_OF_THEM, plain, vector};
 use super::{Boundary, Prescribed, PrescribedField, Scene};
 use crate::bonds::Bonds;
-use crate::solver::{Loads, Rotation, Support, Turned};
+use crate::solver::{Loads, RotatingRegion, Rotation, Support};
 use harness::scene::{SceneError, Source};
 use nalgebra::{DMatrix, SMatrix};
 
-/// Turn of a `displacement_field`, °, from which `check` points to `rotation`: at half of it, chords are shorter than the arc by 0.4 %.
-const LARGE: f64 = 10.0;
-/// Strain up to which a field turns the region as a whole.
-const RIGID: f64 = 0.02;
+/// Rotation of a `displacement_field`, °, above which `check` proposes `rotation`: at half of it the chord is
+/// 0.4 % off.
+const LARGE_ROTATION: f64 = 10.0;
+/// Largest strain of a field that rotates its region as a rigid body.
+const RIGID_STRAIN: f64 = 0.02;
 
-/// The rotation of a boundary.
+/// Converts the rotation of a boundary.
 ///
 /// # Errors
-/// A point, an axis or an angle that is none, a free component that the rotation needs, a `displacement_field` beside it.
+/// An invalid point, axis or angle; a free component that the rotation needs; a `displacement_field` beside
+/// it.
 pub(super) fn rotation_of<const D: usize>(
     source: &Source,
     key: &str,
@@ -37,25 +39,18 @@ pub(super) fn rotation_of<const D: usize>(
             three.map(|x| x / size)
         }
         (None, _) => {
-            return Err(source.error(
-                &format!("{key}.axis"),
-                "nothing",
-                "the direction of the axis, e.g. [0, 0, 1]",
-            ));
+            let why = "needed in a solid: the direction of the axis, e.g. [0, 0, 1]";
+            return Err(source.missing(&format!("{key}.axis"), why));
         }
         (Some(_), _) => {
-            return Err(source.error(
-                &format!("{key}.axis"),
-                "an axis",
-                "none: a plane body turns in its plane",
-            ));
+            return Err(source.unexpected(&format!("{key}.axis"), "a plane body turns in its plane"));
         }
     };
     if angle.si() == 0.0 {
         return Err(source.error(&format!("{key}.angle"), "0", "an angle other than 0"));
     }
     if boundary.displacement_field.is_some() {
-        return Err(source.error(&key, "`rotation` together with `displacement_field`", "one of them"));
+        return Err(source.conflict(&key, "displacement_field", ONE_OF_THEM));
     }
     let moved = boundary.displacement.iter().flatten().enumerate();
     for (d, _) in moved.filter(|(_, component)| **component == Prescribed::Free) {
@@ -71,14 +66,14 @@ pub(super) fn rotation_of<const D: usize>(
     Ok(Some(Rotation { centre, axis, angle: angle.si() }))
 }
 
-/// Turns regions; of two regions of prescribed displacement the last one holds.
+/// Adds the rotations to the loads; where regions overlap, the last one wins.
 ///
 /// # Errors
 /// As [`rotation_of`].
 pub(super) fn turn<const D: usize>(
     source: &Source,
     scene: &Scene,
-    body: &Body<D>,
+    body: &DiscreteBody<D>,
     regions: &[(Vec<u32>, Support<D>)],
     loads: &mut Loads<D>,
 ) -> Result<(), SceneError> {
@@ -93,7 +88,7 @@ pub(super) fn turn<const D: usize>(
                 }
             }
             let bit = |d: usize| u8::from(support.displacement[d].is_some()) << d;
-            let turned = Turned {
+            let turned = RotatingRegion {
                 rotation,
                 shift: support.displacement.map(|component| component.unwrap_or(0.0)),
                 components: (0..D).map(bit).sum(),
@@ -108,25 +103,26 @@ pub(super) fn turn<const D: usize>(
 }
 
 /// Warnings of fields of displacements that turn a region: they grow along the chord.
-pub(super) fn chords<const D: usize>(source: &Source, scene: &Scene, body: &Body<D>) -> Vec<String> {
-    let of = |(index, boundary): (usize, &Boundary)| {
+pub(super) fn chords<const D: usize>(source: &Source, scene: &Scene, body: &DiscreteBody<D>) -> Vec<String> {
+    let warning = |(index, boundary): (usize, &Boundary)| {
         let field = boundary.displacement_field.as_ref()?;
         let key = format!("boundary[{index}]");
         let (members, _) = region(source, &key, boundary, body).ok()?;
         let angle = angle_of(&*body.bonds, &members, field)?.to_degrees();
-        (angle > LARGE).then(|| {
+        (angle > LARGE_ROTATION).then(|| {
             format!(
-                "{key}.displacement_field turns its region by {}°, along the chord: at half the load it is narrower by a factor of \
+                "{key}.displacement_field turns its region by {}°, along the chord: at half the load it is \
+                 narrower by a factor of \
                  {:.4}; `rotation` turns it along the arc",
                 plain((angle * 10.0).round() / 10.0),
                 (0.5 * angle.to_radians()).cos()
             )
         })
     };
-    scene.boundary.iter().enumerate().filter_map(of).collect()
+    scene.boundary.iter().enumerate().filter_map(warning).collect()
 }
 
-/// Angle of a field that turns its region nearly as a whole, rad: of the affine field closest to it.
+/// Returns the angle of a field that rotates its region nearly rigidly, rad, from the closest affine field.
 fn angle_of<const D: usize>(bonds: &dyn Bonds<D>, members: &[u32], field: &[PrescribedField]) -> Option<f64> {
     let places: Vec<[f64; D]> = members.iter().map(|&site| bonds.position(site as usize)).collect();
     let formulas: Vec<_> = field
@@ -142,8 +138,8 @@ fn angle_of<const D: usize>(bonds: &dyn Bonds<D>, members: &[u32], field: &[Pres
     let rows =
         DMatrix::from_fn(places.len(), D + 1, |i, j| if j == D { 1.0 } else { places[i][j] - mean[j] });
     let values = DMatrix::from_fn(places.len(), D, |i, d| {
-        // a free component may turn along: as it is, it does not
-        formulas.get(d).copied().flatten().map_or(0.0, |formula| formula.at(places[i]))
+        // a free component counts as not moving
+        formulas.get(d).copied().flatten().map_or(0.0, |formula| formula.value_at(places[i]))
     });
     let size = rows.columns(0, D).norm();
     let solution =
@@ -154,5 +150,5 @@ fn angle_of<const D: usize>(bonds: &dyn Bonds<D>, members: &[u32], field: &[Pres
     }
     let strain = (gradient.transpose() * gradient - SMatrix::<f64, D, D>::identity()) * 0.5;
     let cosine = if D == 2 { 0.5 * gradient.trace() } else { 0.5 * (gradient.trace() - 1.0) };
-    (strain.norm() < RIGID).then(|| cosine.clamp(-1.0, 1.0).acos())
+    (strain.norm() < RIGID_STRAIN).then(|| cosine.clamp(-1.0, 1.0).acos())
 }

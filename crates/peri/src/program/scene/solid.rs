@@ -1,4 +1,4 @@
-//! Solids with any Poisson ratio in place of a bond law.
+//! Solids with any Poisson ratio, specified in place of a bond law.
 
 use super::Scene;
 use super::SurfaceCorrection;
@@ -6,19 +6,19 @@ use super::values::{plain, positive};
 use crate::bonds::VolumeCorrection;
 use crate::calibrate::{Calibration, Space};
 use crate::error::Error;
-use crate::material::{Correspondence, EightChain, PointLaw};
-use crate::stress::Measure;
+use crate::material::{Correspondence, EightChainSolid, PointLaw};
+use crate::stress::StressMethod;
 use harness::scene::{ConstitutiveSpec, SceneError, Source};
 use polycore::constitutive::surrogate::Kind;
 use polycore::units::Stress;
 use serde::Deserialize;
 use std::sync::Arc;
 
-/// A solid whose energy follows from the mean deformation of a family.
+/// Solid whose energy follows from the mean deformation of a family.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SolidLaw {
-    /// Its law.
+    /// Law of the solid.
     pub law: SolidKind,
     /// Shear modulus at rest, of `eight-chain`.
     pub shear_modulus: Option<Stress>,
@@ -26,27 +26,28 @@ pub struct SolidLaw {
     pub bulk_modulus: Option<Stress>,
     /// Links of a chain, of `eight-chain`.
     pub links: Option<f64>,
-    /// Whether the volumetric energy depends on J averaged over nearest neighbours, of `eight-chain` on a lattice, solid or plane strain;
-    /// default: beside rigid planes true from a bulk modulus of 50 times the shear modulus on.
+    /// Averages J of the volumetric energy over nearest neighbours, for `eight-chain` on a lattice, solid or
+    /// plane strain. Default: true beside rigid planes if the bulk modulus is at least 50 times the shear
+    /// modulus.
     pub pressure_filter: Option<bool>,
-    /// The constitutive law of `correspondence`.
+    /// Constitutive law of `correspondence`.
     pub constitutive: Option<ConstitutiveSpec>,
-    /// Factor on the stabilisation of `correspondence`; default 1.
+    /// Factor on the stabilisation of `correspondence`; default: 1.
     pub stabilisation: Option<f64>,
 }
 
-/// Laws of such solids.
+/// Kinds of solids.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SolidKind {
-    /// Arruda and Boyce's network over the directions of a family.
+    /// Eight-chain network of Arruda and Boyce over the directions of a family.
     EightChain,
-    /// Any constitutive law at the mean deformation of a family.
+    /// Any constitutive law, at the mean deformation of a family.
     Correspondence,
 }
 
 impl SolidKind {
-    /// Name in scenes.
+    /// Returns the name in scenes.
     pub fn name(self) -> &'static str {
         match self {
             Self::EightChain => "eight-chain",
@@ -55,23 +56,24 @@ impl SolidKind {
     }
 }
 
-/// Bulk modulus over shear modulus from which on the pressure is filtered beside planes: without it coarse lattices are too stiff there
-/// (docs/guide/src/how-to/contact.md). Grips that hold by bonds give way, which makes up for that.
-const FILTERED: f64 = 50.0;
+/// Bulk modulus over shear modulus above which the pressure is filtered beside planes, where coarse lattices
+/// are too stiff otherwise (docs/guide/src/how-to/contact.md). Without planes the compliance of grips held by
+/// bonds compensates for that.
+const FILTERED_RATIO: f64 = 50.0;
 
-/// Where the block stands.
+/// Key of the block.
 const KEY: &str = "material.solid";
 
 impl SolidLaw {
-    /// Whether its law is learnt from data.
+    /// Returns true for a law learnt from data.
     pub fn is_learnt(&self) -> bool {
         self.constitutive.as_ref().is_some_and(|spec| spec.learnt.is_some())
     }
 
-    /// The law in a space; `planes`: on a lattice beside rigid planes.
+    /// Builds the law; `planes` is true on a lattice beside rigid planes.
     ///
     /// # Errors
-    /// A key that the law lacks or does not know, or a value out of its domain.
+    /// A missing or unexpected key, or a value out of its domain.
     pub fn build<const D: usize>(
         &self,
         source: &Source,
@@ -89,15 +91,11 @@ impl SolidLaw {
             ("stabilisation", self.stabilisation.is_some(), false),
         ] {
             if given && of_chains != chains {
-                let allowed = format!("nothing: it belongs to `{other}`");
-                return Err(source.error(
-                    &format!("{KEY}.{key}"),
-                    format!("`{key}` of `{}`", self.law.name()),
-                    allowed,
-                ));
+                let why = format!("`{}` does not use it, `{other}` does", self.law.name());
+                return Err(source.unexpected(&format!("{KEY}.{key}"), why));
             }
         }
-        let missing = |key: &str, what: &str| source.error(&format!("{KEY}.{key}"), "nothing", what);
+        let missing = |key: &str, why: &str| source.missing(&format!("{KEY}.{key}"), why);
         let wrong = |error: Error| match error {
             Error::Parameter { name, found, allowed } if chains || name == "stabilisation" => {
                 source.error(&format!("{KEY}.{}", name.replace(' ', "_")), plain(found), allowed)
@@ -108,32 +106,34 @@ impl SolidLaw {
             other => source.error(KEY, other, "a law with an energy, and without stress at rest"),
         };
         if chains {
-            let shear = self.shear_modulus.ok_or_else(|| missing("shear_modulus", "a stress"))?;
-            let links = self.links.ok_or_else(|| missing("links", "a number above 1"))?;
+            let shear = self
+                .shear_modulus
+                .ok_or_else(|| missing("shear_modulus", "needed for `eight-chain`: a stress"))?;
+            let links =
+                self.links.ok_or_else(|| missing("links", "needed for `eight-chain`: a number above 1"))?;
             let bulk = match self.bulk_modulus {
                 Some(bulk) => bulk.si(),
                 None if space == Space::PlaneStress => f64::INFINITY,
                 None => {
-                    return Err(missing(
-                        "bulk_modulus",
-                        "a stress; only plane stress is incompressible without it",
-                    ));
+                    let why = "needed for `eight-chain`; only in plane stress is the default incompressible";
+                    return Err(missing("bulk_modulus", why));
                 }
             };
-            let network = EightChain::new(space, shear.si(), links, bulk).map_err(wrong)?;
+            let network = EightChainSolid::new(space, shear.si(), links, bulk).map_err(wrong)?;
             let volumetric = space != Space::PlaneStress && planes;
-            let stiff = volumetric && bulk >= FILTERED * shear.si();
+            let stiff = volumetric && bulk >= FILTERED_RATIO * shear.si();
             if !self.pressure_filter.unwrap_or(stiff) {
                 return Ok(Arc::new(network));
             }
             if space == Space::PlaneStress {
-                let allowed = "false: the thickness of plane stress gives way";
+                let allowed = "false: in plane stress the thickness is free to change";
                 return Err(source.error(&format!("{KEY}.pressure_filter"), "true", allowed));
             }
             return Ok(Arc::new(network.filtered().map_err(wrong)?));
         }
         let spec = self.constitutive.as_ref().ok_or_else(|| {
-            missing("constitutive", "a block with `model`, `parameters`, `bulk_modulus`, or `learnt`")
+            let why = "needed for `correspondence`: `model`, `parameters` and `bulk_modulus`, or `learnt`";
+            missing("constitutive", why)
         })?;
         let (key, stabilisation) = (format!("{KEY}.constitutive"), self.stabilisation.unwrap_or(1.0));
         let Some(learnt) = spec.learnt(source, &key)? else {
@@ -152,7 +152,7 @@ impl SolidLaw {
     }
 }
 
-/// Checks what a scene with such a solid may and may not have.
+/// Checks a scene with a solid.
 ///
 /// # Errors
 /// A key of bond laws, or a block that the law does not take.
@@ -171,29 +171,29 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         ("fields", !material.fields.is_empty()),
     ] {
         if given {
-            let found = format!("`{key}` of bond laws together with `solid`");
-            return Err(source.error(&format!("material.{key}"), found, "one of them"));
+            let why = format!("`{key}` belongs to bond laws");
+            return Err(source.conflict(&format!("material.{key}"), "solid", why));
         }
     }
     if let Some(critical) = &material.critical {
         if critical.convention.is_some() {
-            let allowed = "nothing: the fracture energy of a `solid` is always that of tearing";
-            return Err(source.error("material.critical.convention", "a convention of bond laws", allowed));
+            let why = "a convention of bond laws; a `solid` always takes its `fracture_energy` by tearing";
+            return Err(source.unexpected("material.critical.convention", why));
         }
         if let Some(strength) = critical.strength {
             let key = "material.critical.strength";
             positive(source, key, strength.si(), "Pa")?;
             if critical.fracture_energy.is_none() {
-                return Err(source.error(key, "a strength without `fracture_energy`", "both of them"));
+                return Err(source.unexpected(key, "needs `fracture_energy` beside it"));
             }
         }
         let allowed = "either `stretch`, above 1, or `fracture_energy`, above 0";
-        let found = match (critical.given().len(), critical.stretch, critical.fracture_energy) {
+        let found = match (critical.alternatives().len(), critical.stretch, critical.fracture_energy) {
             (1, Some(stretch), _) if stretch > 1.0 && stretch.is_finite() => None,
             (1, _, Some(energy)) if energy.si() > 0.0 && energy.si().is_finite() => None,
             (1, Some(stretch), _) => Some(format!("a stretch of {}", plain(stretch))),
             (1, _, Some(energy)) => Some(format!("{} J/m²", plain(energy.si()))),
-            _ => Some(format!("`{}` of a solid", critical.given().join("` and `"))),
+            _ => Some(format!("`{}` of a solid", critical.alternatives().join("` and `"))),
         };
         if let Some(found) = found {
             return Err(source.error("material.critical", found, allowed));
@@ -204,8 +204,11 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         let allowed = "false: points of a cloud have no nearest neighbours";
         return Err(source.error(&format!("{KEY}.pressure_filter"), "true", allowed));
     }
-    let other =
-        scene.stress.iter().flat_map(|stress| &stress.measures).position(|&m| m != Measure::Constitutive);
+    let other = scene
+        .stress
+        .iter()
+        .flat_map(|stress| &stress.measures)
+        .position(|&m| m != StressMethod::Constitutive);
     if let Some(index) = other {
         let allowed = "`constitutive`, the stress of the law itself";
         return Err(source.error(&format!("stress.measures[{index}]"), "a measure of bond forces", allowed));

@@ -1,6 +1,6 @@
-//! Fracture energies of a bond law: what a scene's is the energy of, and where cracks run at another one.
+//! Fracture energies of a bond law: their conventions, and warnings where cracks run at a different energy.
 
-use super::{Body, Scene, plain};
+use super::{DiscreteBody, Scene, plain};
 use crate::bonds::Bonds;
 use crate::calibrate::Space;
 use crate::critical::{Convention, Toughness};
@@ -8,17 +8,17 @@ use crate::geometry::Cut;
 use crate::potential::onset;
 use harness::scene::{SceneError, Source};
 
-/// Horizon ratio below which a crack keeps to the lattice's axes.
+/// Horizon ratio below which cracks follow the axes of the lattice.
 const LEAST_RATIO: f64 = 2.5;
-/// Horizon ratio from which on a tip advances by up to five spacings before it runs.
-const WIDE: f64 = 3.5;
-/// Spacings that a crack must have for 3 % in the load, below and from [`WIDE`] on.
-const LONG: [f64; 2] = [20.0, 60.0];
-/// Scatter of the nearest distances in a cloud, over their mean, of a jitter of 0.1 spacings.
+/// Horizon ratio above which a tip advances by up to five spacings before it runs.
+const WIDE_RATIO: f64 = 3.5;
+/// Crack length in spacings for an error of 3 % in the load, below and above [`WIDE_RATIO`].
+const LONG_CRACK: [f64; 2] = [20.0, 60.0];
+/// Scatter of nearest distances over their mean, for points with a jitter of 0.1 spacings.
 const UNEVEN: f64 = 0.06;
-/// Stretch from which on the lattice loses less.
-const LARGE: f64 = 1.5;
-/// Layers from which on a solid has all of its bonds across a cut but a tenth.
+/// Critical stretch above which cracks run at a lower energy.
+const LARGE_STRETCH: f64 = 1.5;
+/// Number of layers above which a solid lacks less than a tenth of the bonds across a cut.
 const LAYERS: f64 = 10.5;
 
 /// Checks the conventions of a bond law's fracture energies.
@@ -35,8 +35,7 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         let Some(convention) = critical.convention else { continue };
         let key = format!("{key}.convention");
         if critical.fracture_energy.is_none() {
-            let found = format!("`{}` without `fracture_energy`", convention.name());
-            return Err(source.error(&key, found, "a `fracture_energy` beside it"));
+            return Err(source.unexpected(&key, "needs `fracture_energy` beside it"));
         }
         let soft = convention == Convention::Softening;
         if soft != scene.softens() {
@@ -47,10 +46,10 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// Lines for `peri check`: the fracture energy by both conventions, and warnings.
+/// Returns lines for `peri check`: the fracture energy by both conventions, and warnings.
 pub fn explain_tearing<const D: usize>(
     scene: &Scene,
-    body: &Body<D>,
+    body: &DiscreteBody<D>,
     toughness: Option<&Toughness>,
 ) -> Vec<String> {
     let Some(own) = toughness else { return Vec::new() };
@@ -64,11 +63,13 @@ pub fn explain_tearing<const D: usize>(
             onset(own.stretch)
         ),
         Convention::Tearing => format!(
-            "λc = {:.6}: {tearing} J/m² by `tearing`, {bonds} J/m² by `bonds`; c = {c:.4} (κ = {loss:.4} of {count:.1} bonds)",
+            "λc = {:.6}: {tearing} J/m² by `tearing`, {bonds} J/m² by `bonds`; c = {c:.4} (κ = {loss:.4} of \
+             {count:.1} bonds)",
             own.stretch
         ),
         Convention::Bonds => format!(
-            "λc = {:.6}: {bonds} J/m² by `bonds`, {tearing} J/m² by `tearing`; c = {c:.4} (κ = {loss:.4} of {count:.1} bonds)",
+            "λc = {:.6}: {bonds} J/m² by `bonds`, {tearing} J/m² by `tearing`; c = {c:.4} (κ = {loss:.4} of \
+             {count:.1} bonds)",
             own.stretch
         ),
     };
@@ -91,10 +92,11 @@ fn digits(value: f64) -> String {
     )
 }
 
-/// Where a crack runs at another energy than the fracture energy by `tearing`: formulation-tearing.md, section 4, has the figures.
+/// Warns where a crack runs at an energy other than the fracture energy by `tearing`; numbers from the theory
+/// page of tearing.
 pub fn tearing_warnings<const D: usize>(
     scene: &Scene,
-    body: &Body<D>,
+    body: &DiscreteBody<D>,
     toughness: Option<&Toughness>,
 ) -> Vec<String> {
     let meant = |own: &&Toughness| own.convention.is_some_and(|one| one != Convention::Bonds);
@@ -104,39 +106,43 @@ pub fn tearing_warnings<const D: usize>(
     let ratio = bonds.horizon() / bonds.spacing();
     let whole = (!own.crossing.whole).then(|| {
         format!(
-            "no particle has a whole family: the fracture energy is that of the largest, of {:.0} bonds; take a finer spacing",
+            "no particle has a whole family: the fracture energy is that of the largest, of {:.0} bonds; \
+             take a finer spacing",
             own.crossing.bonds
         )
     });
     let narrow = (ratio < LEAST_RATIO).then(|| {
         format!(
-            "a horizon of {ratio:.3} spacings: cracks keep to the axes of the lattice, others take more than twice the fracture \
+            "a horizon of {ratio:.3} spacings: cracks keep to the axes of the lattice, others take more than \
+             twice the fracture \
              energy; take a ratio of 3.015"
         )
     });
     let scatter = if scene.body.has_points() { scatter(bonds) } else { 0.0 };
     let uneven = (scatter > UNEVEN && !soft).then(|| {
         format!(
-            "points lie unevenly (nearest distances scatter by {:.0} %): cracks run at the fracture energy to 15 %, on a regular \
+            "points lie unevenly (nearest distances scatter by {:.0} %): cracks run at the fracture energy \
+             to 15 %, on a regular \
              lattice to 5 %",
             100.0 * scatter
         )
     });
-    let large = (own.stretch > LARGE && !soft).then(|| {
+    let large = (own.stretch > LARGE_STRETCH && !soft).then(|| {
         format!(
             "a critical stretch of {:.3}: from 1.5 on cracks run at up to 10 % less than the fracture energy",
             own.stretch
         )
     });
-    let least = LONG[usize::from(ratio >= WIDE)] * bonds.spacing();
+    let least = LONG_CRACK[usize::from(ratio >= WIDE_RATIO)] * bonds.spacing();
     let cracks = body.cuts.iter().enumerate().filter_map(|(index, cut)| {
         let length = length_inside(cut, body.bounds)?;
         (length < least * (1.0 - 1e-9)).then(|| {
             format!(
-                "body.cracks[{index}] is {:.1} spacings long: its tip advances before it runs, so that the load comes out low; 3 % \
+                "body.cracks[{index}] is {:.1} spacings long: its tip advances before it runs, so that the \
+                 load comes out low; 3 % \
                  need {} spacings at a horizon of {ratio:.3}",
                 length / bonds.spacing(),
-                LONG[usize::from(ratio >= WIDE)]
+                LONG_CRACK[usize::from(ratio >= WIDE_RATIO)]
             )
         })
     });
@@ -144,21 +150,22 @@ pub fn tearing_warnings<const D: usize>(
     once.into_iter().flatten().chain(cracks).collect()
 }
 
-/// A solid of few layers, which has fewer bonds across a cut.
-fn slab<const D: usize>(scene: &Scene, body: &Body<D>) -> Option<String> {
+/// Warns of a solid of few layers, which has fewer bonds across a cut.
+fn slab<const D: usize>(scene: &Scene, body: &DiscreteBody<D>) -> Option<String> {
     let (low, high) = body.bounds;
     let across = (0..D).min_by(|&a, &b| (high[a] - low[a]).total_cmp(&(high[b] - low[b])))?;
     let layers = (high[across] - low[across]) / body.bonds.spacing();
     (scene.body.space == Space::Solid && layers < LAYERS).then(|| {
         format!(
-            "the body is {layers:.1} layers thick along {}: bonds that its faces lack make cracks run at less than the fracture energy, by \
+            "the body is {layers:.1} layers thick along {}: bonds that its faces lack make cracks run at \
+             less than the fracture energy, by \
              about a tenth at 10 layers and a fifth at 6",
             ["x", "y", "z"][across]
         )
     })
 }
 
-/// Standard deviation of the distances to the nearest neighbours over their mean, of every tenth particle.
+/// Returns the standard deviation of nearest distances over their mean, from every tenth particle.
 fn scatter<const D: usize>(bonds: &dyn Bonds<D>) -> f64 {
     let nearest: Vec<f64> = bonds
         .particles()
@@ -175,11 +182,12 @@ fn scatter<const D: usize>(bonds: &dyn Bonds<D>) -> f64 {
     square.sqrt() / mean
 }
 
-/// Length, m, of a crack in a box, of two tips half of it; in space that of its shorter edge. `None` where it has no tip inside.
+/// Returns the length, m, of a crack in a box: with two tips half of it, in a solid that of its shorter edge;
+/// `None` without a tip inside.
 fn length_inside<const D: usize>(cut: &Cut<D>, (low, high): ([f64; D], [f64; D])) -> Option<f64> {
     let edges = cut.edges[..D - 1].iter();
     let lengths = edges.filter_map(|edge| {
-        // from a line through the middle of the crack
+        // along a line through the middle of the crack
         let start: [f64; D] = std::array::from_fn(|d| {
             let all: f64 = cut.edges[..D - 1].iter().map(|other| other[d]).sum();
             cut.corner[d] + 0.5 * (all - edge[d])
@@ -206,10 +214,10 @@ mod tests {
     #[test]
     fn lengths_of_cracks() {
         let bounds = ([0.0, 0.0], [10.0, 6.0]);
-        let of = |from, to| length_inside(&Cut::<2>::segment(from, to), bounds);
-        assert_eq!(of([-1.0, 3.0], [4.0, 3.0]), Some(4.0));
-        assert_eq!(of([3.0, 3.0], [7.0, 3.0]), Some(2.0));
-        assert_eq!(of([-1.0, 3.0], [11.0, 3.0]), None);
+        let length = |from, to| length_inside(&Cut::<2>::segment(from, to), bounds);
+        assert_eq!(length([-1.0, 3.0], [4.0, 3.0]), Some(4.0));
+        assert_eq!(length([3.0, 3.0], [7.0, 3.0]), Some(2.0));
+        assert_eq!(length([-1.0, 3.0], [11.0, 3.0]), None);
         let through =
             Cut::<3> { corner: [-1.0, 3.0, -1.0], edges: [[5.0, 0.0, 0.0], [0.0, 0.0, 4.0], [0.0; 3]] };
         assert_eq!(length_inside(&through, ([0.0; 3], [10.0, 6.0, 2.0])), Some(4.0));

@@ -1,44 +1,49 @@
-//! What readers of several blocks share: checks of single values, and the body that they refer to.
+//! Shared by several blocks: checks of single values, and the discretised body.
 
 use crate::bonds::Bonds;
 use crate::geometry::{Cut, Gaps, Operation};
-use crate::surface::Surface;
+use crate::surface::BodySurface;
 use harness::scene::{SceneError, Source};
 use polycore::units::Length;
 
-/// Largest horizon ratio: a stencil beyond it has more bonds than any use.
+/// Largest horizon ratio.
 pub const LARGEST_RATIO: f64 = 20.0;
 
+/// Advice for two keys that exclude each other.
+pub(super) const ONE_OF_THEM: &str = "write one of them";
+
 /// A discretised body.
-pub struct Body<const D: usize> {
-    /// Its bonds.
+pub struct DiscreteBody<const D: usize> {
+    /// Bonds.
     pub bonds: Box<dyn Bonds<D>>,
-    /// Lower and upper corner of its particles' cells, m.
+    /// Lower and upper corner of the cells of all particles, m.
     pub bounds: ([f64; D], [f64; D]),
     /// Thickness (1 in 3D), m.
     pub thickness: f64,
-    /// How many bonds each crack severs.
+    /// Number of bonds that each crack breaks.
     pub severed: Vec<u64>,
-    /// Its cracks.
+    /// Cracks.
     pub cuts: Vec<Cut<D>>,
-    /// Its gaps, whether bonds cross them or not.
+    /// Gaps, with or without bonds across them.
     pub gaps: Option<Gaps<D>>,
-    /// The shapes added and cut; empty for points and grids.
+    /// Added and cut shapes; empty for points and grids.
     pub operations: Vec<Operation<D>>,
 }
 
-impl<const D: usize> Body<D> {
-    /// Face points of its surface: of its shapes, else of its lattice; none of a cloud.
-    pub fn surface(&self) -> Surface<D> {
+impl<const D: usize> DiscreteBody<D> {
+    /// Returns the face points of its surface: of its shapes, else of its lattice; none of a cloud.
+    pub fn surface(&self) -> BodySurface<D> {
         match self.bonds.as_lattice() {
-            _ if !self.operations.is_empty() => Surface::of_shapes(&self.operations, self.bonds.spacing()),
-            Some(lattice) => Surface::of_lattice(lattice),
-            None => Surface::default(),
+            _ if !self.operations.is_empty() => {
+                BodySurface::of_shapes(&self.operations, self.bonds.spacing())
+            }
+            Some(lattice) => BodySurface::of_lattice(lattice),
+            None => BodySurface::default(),
         }
     }
 }
 
-/// A number as a user would write it.
+/// Formats a number as a user would write it.
 pub fn plain(value: f64) -> String {
     if value == 0.0 || !value.is_finite() || (1e-3..1e5).contains(&value.abs()) {
         value.to_string()
@@ -47,6 +52,7 @@ pub fn plain(value: f64) -> String {
     }
 }
 
+/// Refuses a value that is not positive and finite.
 pub(super) fn positive(source: &Source, key: &str, value: f64, unit: &str) -> Result<(), SceneError> {
     if value > 0.0 && value.is_finite() {
         Ok(())
@@ -55,6 +61,7 @@ pub(super) fn positive(source: &Source, key: &str, value: f64, unit: &str) -> Re
     }
 }
 
+/// Refuses a horizon ratio out of range.
 pub(super) fn ratio(source: &Source, key: &str, ratio: f64) -> Result<(), SceneError> {
     if (1.0..=LARGEST_RATIO).contains(&ratio) {
         Ok(())
@@ -67,6 +74,7 @@ pub(super) fn ratio(source: &Source, key: &str, ratio: f64) -> Result<(), SceneE
     }
 }
 
+/// Converts lengths to a vector, m.
 pub(super) fn vector<const D: usize>(
     source: &Source,
     key: &str,
@@ -77,8 +85,8 @@ pub(super) fn vector<const D: usize>(
         .map_err(|_| source.error(key, format!("{} components", value.len()), format!("{D} components")))
 }
 
-/// The corners of a box must span one.
-pub(super) fn ordered<const D: usize>(
+/// Refuses a box whose lower corner is not below its upper one.
+pub(super) fn check_order<const D: usize>(
     source: &Source,
     key: &str,
     min: [f64; D],
@@ -93,11 +101,12 @@ pub(super) fn ordered<const D: usize>(
     }
 }
 
-pub(super) fn needed<T: Copy>(
+/// Returns a value that must be written; `why` says what needs it.
+pub(super) fn required<T: Copy>(
     source: &Source,
     key: &str,
     value: Option<T>,
-    what: &str,
+    why: &str,
 ) -> Result<T, SceneError> {
-    value.ok_or_else(|| source.error(key, "nothing", what))
+    value.ok_or_else(|| source.missing(key, why))
 }

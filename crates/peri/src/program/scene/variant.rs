@@ -1,4 +1,4 @@
-//! The variants of a scene: its own discretisation, or the combinations that its studies list.
+//! Variants of a scene: its own discretisation, or the combinations that its studies list.
 
 use super::{HORIZON_RATIO, Scene, SurfaceCorrection};
 use crate::bonds::VolumeCorrection;
@@ -7,8 +7,8 @@ use harness::study::{self, Naming};
 use polycore::units::Length;
 
 harness::study! {
-    /// A set of variants: every combination of the listed values; other keys keep the scene's value. A replaced part of the
-    /// scene is replaced as a whole.
+    /// Set of variants: all combinations of the listed values. Other keys keep the value of the scene; a
+    /// replaced block is replaced as a whole.
     pub struct Study;
     replaces {
         critical: crate::critical::Critical = "material.critical",
@@ -16,7 +16,7 @@ harness::study! {
         shapes: Vec<super::ShapeSpec> = "body.shapes",
         cracks: Vec<super::CrackSpec> = "body.cracks",
         boundary: Vec<super::Boundary> = "boundary",
-        solver: super::Solver = "solver",
+        solver: super::SolverSpec = "solver",
         dynamics: super::Dynamics = "dynamics",
         contact: super::ContactSpec = "contact",
     }
@@ -28,15 +28,15 @@ harness::study! {
     }
 }
 
-/// Values and files of a variant have its name behind theirs.
+/// Names of values and files end with the name of the variant.
 pub const NAMING: Naming = Naming::Brackets;
 
-/// A variant and its discretisation.
+/// Variant of a scene and its discretisation.
 #[derive(Clone, Debug)]
-pub struct Variant {
-    /// Its name, its study, its source.
+pub struct SceneVariant {
+    /// Name, study and source.
     pub of: study::Variant,
-    /// Its scene.
+    /// Scene of the variant.
     pub scene: Scene,
     /// Spacing, m (0 for a cloud).
     pub spacing: f64,
@@ -48,7 +48,7 @@ pub struct Variant {
     pub volume: VolumeCorrection,
 }
 
-impl Variant {
+impl SceneVariant {
     fn new(of: study::Variant) -> Result<Self, SceneError> {
         let scene: Scene = of.source.parse()?;
         Ok(Self {
@@ -61,26 +61,27 @@ impl Variant {
         })
     }
 
-    /// Short name in tables, curves and expectations: `dx=4mm m=3.015`, corrections where there are any, the study's name.
+    /// Returns the short name for tables, curves and expectations: `dx=4mm m=3.015`, corrections, the name of
+    /// the study.
     pub fn name(&self) -> String {
         self.of.name.clone()
     }
 
-    /// Its name without its spacing: variants that differ in nothing else converge together.
+    /// Returns the name without the spacing: variants of one family differ in spacing only.
     pub fn family(&self) -> String {
         self.of.name.split_once(' ').map_or(&*self.of.name, |(_, rest)| rest).to_owned()
     }
 
-    /// Its source, whose errors point at its study, and its scene.
+    /// Returns the source, whose errors point at the study, and the scene.
     pub fn resolved(&self) -> (&Source, &Scene) {
         (&self.of.source, &self.scene)
     }
 }
 
-/// `dx=4mm m=3.015`, corrections where there are any, the study's name.
+/// Builds a name such as `dx=4mm m=3.015`, with corrections and the name of the study.
 fn name(source: &Source, study: Option<&str>) -> Result<String, SceneError> {
     let Scene { body, material, .. } = source.parse()?;
-    // twelve digits: what a user wrote, without the rounding of its conversion to SI
+    // twelve digits: the number as written, without rounding by the conversion to SI
     let round = |value: f64| format!("{value:.12e}").parse().unwrap_or(value);
     let ratio = body.horizon_ratio.unwrap_or(HORIZON_RATIO);
     let lattice = body.spacing.map(|spacing| format!("dx={}mm m={ratio}", round(spacing.si() * 1e3)));
@@ -94,8 +95,8 @@ fn name(source: &Source, study: Option<&str>) -> Result<String, SceneError> {
     Ok(study.map_or(name.clone(), |study| name + " " + study))
 }
 
-/// The scene's own discretisation, or every combination that its studies list.
-pub fn variants(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>, SceneError> {
+/// Returns the variants: the scene's own discretisation, or all combinations that its studies list.
+pub fn variants(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<SceneVariant>, SceneError> {
     let studies: Vec<study::Study> = scene.study.iter().map(Study::study).collect();
-    study::variants(source, &studies, quick, NAMING, name)?.into_iter().map(Variant::new).collect()
+    study::variants(source, &studies, quick, NAMING, name)?.into_iter().map(SceneVariant::new).collect()
 }

@@ -1,29 +1,29 @@
-//! What is allowed and yet most likely not meant.
+//! Warnings of a scene that is valid but probably not intended.
 
-use super::{Body, Scene};
+use super::{DiscreteBody, Scene};
 use crate::bonds::{BodyGeometry, Bonds, CellGrid};
 use crate::geometry::{Cut, Operation, inside};
 use harness::scene::Source;
 
-/// Grips that move so many horizons in one step jump over what breaks on the way.
+/// Displacement of a grip in one step, in horizons, above which breaking within the step is not resolved.
 const LONGEST_STEP: f64 = 3.0;
-/// A point's volume as a cube or square, over the distance of its neighbour: between 1/4 and 4 in any even cloud.
+/// Largest edge of a point's volume over the distance of its neighbour, and its inverse, in an even cloud.
 const UNEVEN: f64 = 4.0;
 
-/// Distance from a crack, over the spacing, within which a particle lies on it.
+/// Distance from a crack within which a particle lies on it, in spacings.
 const ON_CRACK: f64 = 1e-6;
 
-/// One sentence for each.
-pub fn warnings<const D: usize>(source: &Source, scene: &Scene, body: &Body<D>) -> Vec<String> {
+/// Returns the warnings of a variant.
+pub fn warnings<const D: usize>(source: &Source, scene: &Scene, body: &DiscreteBody<D>) -> Vec<String> {
     let bonds = &*body.bonds;
     let cracks = body.cuts.iter().enumerate().filter_map(|(index, cut)| on_crack(bonds, index, cut));
     let voids = (0..body.operations.len()).filter_map(|index| bridged(bonds, &body.operations, index));
     let contact = (scene.contact.is_some() && !scene.output.section.is_empty())
-        .then(|| "the forces of `output.section` are those of bonds: contact is no part of them".to_owned());
-    let slip = scene.contact.as_ref().and_then(|contact| contact.slip_velocity).map(|_| {
-        "contact.slip_velocity is not used any more: friction holds what sticks by its elastic slip"
-            .to_owned()
-    });
+        .then(|| "the forces of `output.section` are those of bonds, without contact".to_owned());
+    let slip =
+        scene.contact.as_ref().and_then(|contact| contact.slip_velocity).map(|_| {
+            "contact.slip_velocity is ignored: sticking friction holds by its elastic slip".to_owned()
+        });
     let turns = super::rotation::chords(source, scene, body);
     let once = [
         volumes(scene, bonds, body.thickness),
@@ -43,7 +43,7 @@ pub fn warnings<const D: usize>(source: &Source, scene: &Scene, body: &Body<D>) 
         .collect()
 }
 
-/// Volumes of a plane cloud that lack the thickness.
+/// Warns of volumes of a plane cloud without the thickness.
 fn volumes<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>, thickness: f64) -> Option<String> {
     if D == 3 || !scene.body.has_points() {
         return None;
@@ -65,18 +65,19 @@ fn volumes<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>, thickness: f64) 
         });
         least.sqrt()
     };
-    // every tenth will do
+    // a tenth of the points suffices
     let distance = middle((0..places.len()).step_by(10).map(nearest).collect())?;
     let side = (volume / thickness).sqrt();
     (!(1.0 / UNEVEN..=UNEVEN).contains(&(side / distance))).then(|| {
         format!(
-            "a volume of {volume:.3e} m³ and a thickness of {thickness:.3e} m belong to points {side:.3e} m apart, but they are \
+            "a volume of {volume:.3e} m³ and a thickness of {thickness:.3e} m belong to points {side:.3e} m \
+             apart, but they are \
              {distance:.3e} m apart: do the volumes (in m³) include the thickness?"
         )
     })
 }
 
-/// Parts that are one particle wide: there the lattice, not the shape, decides how wide they are.
+/// Warns of parts that are one particle wide, whose width the lattice determines.
 fn thin<const D: usize>(bonds: &dyn Bonds<D>) -> Option<String> {
     let lattice = bonds.as_lattice()?;
     let spacing = lattice.spacing();
@@ -94,16 +95,17 @@ fn thin<const D: usize>(bonds: &dyn Bonds<D>) -> Option<String> {
         beside.contains(&false)
     };
     let count = bonds.particles().iter().filter(lonely).count();
-    // a body that is one particle thick all over is meant
+    // a body that is one particle thick everywhere is intended
     (count > 0 && 2 * count < bonds.particles().len()).then(|| {
         format!(
-            "{count} particles have no neighbour one spacing ({spacing:.3e} m) away along some axis: a part of the body is one \
+            "{count} particles have no neighbour one spacing ({spacing:.3e} m) away along some axis: a part \
+             of the body is one \
              particle wide, whatever width its shape has"
         )
     })
 }
 
-/// Particles on a crack: bonds that end on it stay.
+/// Warns of particles on a crack, whose bonds bridge it.
 fn on_crack<const D: usize>(bonds: &dyn Bonds<D>, index: usize, cut: &Cut<D>) -> Option<String> {
     let spacing = bonds.spacing();
     let places = bonds.particles().iter().map(|&site| (site, bonds.position(site as usize)));
@@ -120,14 +122,15 @@ fn on_crack<const D: usize>(bonds: &dyn Bonds<D>, index: usize, cut: &Cut<D>) ->
     }
     let place = first.map(|x| format!("{:.3}", x * 1e3)).join(", ");
     Some(format!(
-        "{} particles lie on body.cracks[{index}], the first at ({place}) mm, and keep their {kept} bonds to both of its sides: \
+        "{} particles lie on body.cracks[{index}], the first at ({place}) mm, and keep their {kept} bonds to \
+         both of its sides: \
          the crack is bridged; move it by half a spacing ({:.3} mm)",
         on.len(),
         0.5e3 * spacing
     ))
 }
 
-/// A shape cut out that is narrower than the horizon: bonds reach across it.
+/// Warns of bonds across a cut shape that is narrower than the horizon.
 fn bridged<const D: usize>(
     bonds: &dyn Bonds<D>,
     operations: &[Operation<D>],
@@ -159,7 +162,8 @@ fn bridged<const D: usize>(
     }
     (across > 0).then(|| {
         format!(
-            "body.shapes[{index}] cuts out {:.3} mm along {}, less than the horizon of {:.3} mm: {across} bonds cross it, \
+            "body.shapes[{index}] cuts out {:.3} mm along {}, less than the horizon of {:.3} mm: {across} \
+             bonds cross it, \
              as `bond_gaps` asks",
             width * 1e3,
             ["x", "y", "z"][axis],
@@ -168,6 +172,7 @@ fn bridged<const D: usize>(
     })
 }
 
+/// Warns of load steps that are too large to resolve breaking.
 fn long_steps<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<String> {
     if scene.material.critical.is_none() || scene.dynamics.is_some() {
         return None;
@@ -181,7 +186,8 @@ fn long_steps<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<Str
     let horizons = step / bonds.horizon();
     (horizons > LONGEST_STEP).then(|| {
         format!(
-            "a step moves a grip by {:.3} mm, {horizons:.0} horizons: breaking within the step is not resolved; `solver.steps` = {:.0} moves it \
+            "a step moves a grip by {:.3} mm, {horizons:.0} horizons: breaking within the step is not \
+             resolved; `solver.steps` = {:.0} moves it \
              by one spacing",
             step * 1e3,
             largest / bonds.spacing()

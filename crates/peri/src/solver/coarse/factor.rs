@@ -1,9 +1,9 @@
-//! Cholesky factors in single precision: a preconditioner needs no more.
+//! Cholesky factors in single precision, which suffices for a preconditioner.
 
 use polycore::numerics::cholesky::Cholesky;
 pub use polycore::numerics::cholesky::Pattern;
 
-/// The factors, and the analysis behind them.
+/// Factors and their symbolic analysis.
 pub struct Factor {
     cholesky: Cholesky,
     values: Vec<f32>,
@@ -13,9 +13,9 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// Factors the matrix with `entries` in the places of `pattern`, in the order of elimination that its rows are in;
-    /// goes on from `old` where the pattern has not changed. `None` where the matrix is not positive definite to
-    /// double precision, or too large for the memory.
+    /// Factors the matrix with `entries` at the positions of `pattern`, whose rows are in elimination order;
+    /// reuses `old` if the pattern has not changed. `None` if the matrix is not positive definite in double
+    /// precision, or too large for the memory.
     pub fn new(pattern: Pattern, entries: &[f64], old: Option<Self>) -> Option<Self> {
         let mut factor = match old {
             Some(old) if *old.cholesky.pattern() == pattern => old,
@@ -51,7 +51,7 @@ impl Factor {
     }
 }
 
-/// The power of 2 at or below the largest magnitude; 1 of nothing.
+/// Returns the power of 2 at or below the largest magnitude; 1 for no values.
 fn power_of_two(values: &[f64]) -> f64 {
     let largest = values.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     if largest > 0.0 && largest.is_finite() { largest.log2().floor().exp2() } else { 1.0 }
@@ -61,7 +61,7 @@ fn power_of_two(values: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// The five-point Laplacian of a 7 × 5 grid plus a shift, against its own product.
+    /// Compares with the product of the five-point Laplacian of a 7 × 5 grid plus a shift.
     #[test]
     fn solves_what_it_factors() {
         let (width, height) = (7_usize, 5);
@@ -94,7 +94,7 @@ mod tests {
             product
         };
         let mut factor = None;
-        // from the second time on the analysis is kept; no single number holds these scales
+        // the analysis is reused from the second time on; no single number holds these scales
         for scale in [1.0, 3e60, 3e-60] {
             let scaled: Vec<f64> = entries.iter().map(|x| scale * x).collect();
             let mut found = product(&scaled);

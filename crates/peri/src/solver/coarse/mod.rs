@@ -1,88 +1,88 @@
-//! The coarse level of a two-level preconditioner: P A_c⁻¹ Pᵀ with P the hat functions of [`space`], A_c their stiffness
-//! of [`stiffness`], factored by [`factor`].
+//! Coarse level of a two-level preconditioner: P A_c⁻¹ Pᵀ with P the hat functions of [`space`], A_c their
+//! stiffness of [`stiffness`], factored by [`factor`].
 
 mod factor;
 mod space;
 mod stiffness;
 mod transfer;
 
-pub use stiffness::Survey;
+pub use stiffness::BondCounts;
 
 use crate::bonds::BodyGeometry;
 use crate::field::Field;
 use crate::potential::BondPotential;
 use crate::solver::load::Loads;
-use crate::solver::places::in_order;
+use crate::solver::particle_map::in_order;
 use factor::{Factor, Pattern};
 use polycore::numerics::bounds;
 use pulp::Arch;
 use rayon::prelude::*;
-use space::{CORNERS, NONE, Space};
+use space::{CORNERS, CoarseSpace, NONE};
 use stiffness::{Assembly, ElementMatrix};
 use transfer::{Prolong, Restrict};
 
-/// Stiffness against rigid motion over that against the longest wave of the body: pieces that float free, and those that
-/// turn about one bond, have none of their own.
+/// Stiffness against rigid motion over that against the longest wave of the body: floating pieces, and pieces
+/// that rotate about one bond, have none of their own.
 const SHIFT: f64 = 0.01;
 /// Least diagonal entry over the mean one.
 const LEAST_DIAGONAL: f64 = 1e-9;
-/// Elements that are summed by one work item.
+/// Elements summed by one work item.
 const BATCH: usize = 64;
 
-/// What a coarse level is built for.
-pub struct Body<'a, const D: usize> {
+/// Body and law of a coarse level.
+pub struct CoarseBody<'a, const D: usize> {
     /// The bonds.
     pub bonds: &'a dyn BodyGeometry<D>,
-    /// The loads, for what they hold.
+    /// Loads, for the constrained components.
     pub loads: &'a Loads<D>,
-    /// Where the body is.
+    /// Present displacement.
     pub displacement: &'a Field<D>,
-    /// The law; kθ, N/m⁶, and λ of the volume in addition to that of bonds, Pa; the stretches that the law is fitted for.
+    /// Law; kθ, N/m⁶, and λ of the volume in excess of that of bonds, Pa; fitted stretches.
     pub law: (&'a dyn BondPotential, [f64; 2], [f64; 2]),
-    /// Stiffness density of each site, N/m⁵, which holds what is constrained.
+    /// Stiffness density of each site, N/m⁵, that holds constrained components.
     pub springs: &'a [f64],
-    /// The bonds' survey.
-    pub survey: &'a Survey,
+    /// Counts of the bonds.
+    pub survey: &'a BondCounts,
     /// Faces held by rigid planes.
-    pub anchors: &'a [Anchor<D>],
+    pub anchors: &'a [PlaneAnchor<D>],
 }
 
 /// A face held by a rigid plane.
-pub struct Anchor<const D: usize> {
-    /// The particle at the face: functions hardly change over what is below it.
+pub struct PlaneAnchor<const D: usize> {
+    /// Particle at the face: functions hardly change over the particles below it.
     pub site: u32,
-    /// Direction in which it is held; `None`: all.
+    /// Direction in which it is held; `None`: all directions.
     pub normal: Option<[f64; D]>,
     /// Stiffness, N/m.
     pub stiffness: f64,
 }
 
 /// A factored coarse level.
-pub struct Coarse<const D: usize> {
-    space: Space<D>,
+pub struct CoarseLevel<const D: usize> {
+    space: CoarseSpace<D>,
     factor: Factor,
-    /// Place of each particle among the elements' members; [`NONE`] for those without bonds.
+    /// Index of each particle among the elements' members; [`NONE`] for particles without bonds.
     places: Vec<u32>,
     /// P c of the members, in their order.
     moved: Field<D>,
-    /// Of each element: Pᵀg at its corners, component by component.
+    /// Pᵀg of each element at its corners, component by component.
     parts: Vec<f64>,
     /// Coefficients of the functions, D each.
     coefficients: Vec<f64>,
 }
 
-impl<const D: usize> Coarse<D> {
-    /// Functions with cells of about `edge` (m), `most` degrees of freedom; keeps the analysis of `old` where it can.
-    /// `None` where the body is too small or too broken for a coarse level.
-    pub fn new(body: &Body<D>, edge: f64, most: usize, old: Option<Self>) -> Option<Self> {
+impl<const D: usize> CoarseLevel<D> {
+    /// Builds functions with cells of about `edge` (m), at most `most` degrees of freedom; reuses the
+    /// analysis of `old` if possible. `None` if the body is too small or too broken for a coarse level.
+    pub fn new(body: &CoarseBody<D>, edge: f64, most: usize, old: Option<Self>) -> Option<Self> {
         // a lattice's particle with every bond has neighbours on all sides; a cloud's may still be at a gap
         let whole = if body.bonds.whole_family().is_some() { body.survey.most } else { u32::MAX };
-        let mut space = Space::new(body.bonds, &body.survey.bonded, whole, edge, most / D)?;
-        let Body { bonds, loads, displacement, law, springs, survey, anchors } = *body;
+        let mut space = CoarseSpace::new(body.bonds, &body.survey.bonded, whole, edge, most / D)?;
+        let CoarseBody { bonds, loads, displacement, law, springs, survey, anchors } = *body;
         let assembly = Assembly::new(bonds, loads, displacement, survey, law, springs, space.edge);
         let mut matrices: Vec<(ElementMatrix, [f64; CORNERS])> =
             space.elements.par_iter().map(|element| assembly.element(&space, element)).collect();
-        hold(&space, anchors, &mut matrices);
+        add_anchors(&space, anchors, &mut matrices);
         let extent = extent(body.bonds);
         let shift = SHIFT * assembly.stiffness() * (std::f64::consts::PI / extent).powi(2);
         let (pattern, blocks) = pattern::<D>(&space);
@@ -117,7 +117,7 @@ impl<const D: usize> Coarse<D> {
         }
         self.factor.solve(&mut self.coefficients);
         let (mut rest, mut at) = (self.moved.components_mut(), 0);
-        let cut = |elements: &'_ [space::Element]| {
+        let cut = |elements: &'_ [space::CoarseElement]| {
             let length = elements.last().map_or(at, |element| element.members[1]) - at;
             at += length;
             rest.each_mut().map(|rest| {
@@ -162,9 +162,9 @@ impl<const D: usize> Coarse<D> {
 }
 
 /// Adds k φ_a φ_b n⊗n of anchors to the matrices of their elements.
-fn hold<const D: usize>(
-    space: &Space<D>,
-    anchors: &[Anchor<D>],
+fn add_anchors<const D: usize>(
+    space: &CoarseSpace<D>,
+    anchors: &[PlaneAnchor<D>],
     matrices: &mut [(ElementMatrix, [f64; CORNERS])],
 ) {
     for anchor in anchors {
@@ -198,13 +198,13 @@ fn extent<const D: usize>(bonds: &dyn BodyGeometry<D>) -> f64 {
     (0..D).map(|d| (high[d] - low[d] + bonds.spacing()).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Functions that share an element with each function, up to itself.
-struct Blocks {
+/// Functions that share an element with each function, up to and including itself.
+struct FunctionBlocks {
     starts: Vec<usize>,
     others: Vec<u32>,
 }
 
-fn pattern<const D: usize>(space: &Space<D>) -> (Pattern, Blocks) {
+fn pattern<const D: usize>(space: &CoarseSpace<D>) -> (Pattern, FunctionBlocks) {
     let mut pairs: Vec<u64> = Vec::with_capacity(space.elements.len() * (1 << (2 * D)));
     for element in &space.elements {
         for &column in &element.functions[..1 << D] {
@@ -215,7 +215,7 @@ fn pattern<const D: usize>(space: &Space<D>) -> (Pattern, Blocks) {
     }
     pairs.sort_unstable();
     pairs.dedup();
-    let mut blocks = Blocks { starts: vec![0], others: Vec::with_capacity(pairs.len()) };
+    let mut blocks = FunctionBlocks { starts: vec![0], others: Vec::with_capacity(pairs.len()) };
     let mut pattern = Pattern { starts: vec![0], rows: Vec::with_capacity(pairs.len() * D * D) };
     let mut next = 0;
     for column in 0..space.functions {
@@ -236,11 +236,11 @@ fn pattern<const D: usize>(space: &Space<D>) -> (Pattern, Blocks) {
     (pattern, blocks)
 }
 
-/// The sum of the element matrices, and of the shift.
+/// Sums the element matrices and the shift.
 fn assemble<const D: usize>(
-    space: &Space<D>,
+    space: &CoarseSpace<D>,
     pattern: &Pattern,
-    blocks: &Blocks,
+    blocks: &FunctionBlocks,
     matrices: &[(ElementMatrix, [f64; CORNERS])],
     shift: f64,
 ) -> Vec<f64> {
@@ -256,7 +256,7 @@ fn assemble<const D: usize>(
                 let place = others.partition_point(|&other| other < row);
                 for i in 0..D {
                     for j in 0..D {
-                        // the upper triangle alone is kept
+                        // only the upper triangle is kept
                         if row as usize == column && i > j {
                             continue;
                         }
@@ -271,7 +271,7 @@ fn assemble<const D: usize>(
             }
         }
     }
-    // a function that its particles hardly see
+    // a function that its particles hardly reach
     let mean =
         (0..pattern.size()).map(|k| entries[pattern.starts[k + 1] - 1]).sum::<f64>() / pattern.size() as f64;
     for k in 0..pattern.size() {

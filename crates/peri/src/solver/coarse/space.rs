@@ -1,38 +1,41 @@
-//! A few smooth displacement fields for a whole body: multilinear hats on a background grid, split where the body is.
+//! A few smooth displacement fields for a whole body: multilinear hats on a background grid, divided where
+//! the body is.
 //!
-//! The hat of a node is cut into one function for each part of the body that hangs together by intact bonds within the
-//! hat's support, so that no function moves both flanks of a crack, or a fragment with what it has left.
+//! The hat of a node is divided into one function for each part of the body connected by intact bonds within
+//! the hat's support, so that no function moves both flanks of a crack, or a fragment together with the body
+//! it has left.
 
 use crate::bonds::BodyGeometry;
 use crate::field::Field;
-use polycore::numerics::{Groups, Sets, bounds};
+use polycore::numerics::{DisjointSets, Groups, bounds};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Corners of a cell in three dimensions.
 pub const CORNERS: usize = 8;
-/// Sites between those of a window whose bonds are followed one after the other.
+/// Stride between sites of a window whose bonds are followed one after the other.
 const STRIDE: usize = 32;
 /// Marks a site without element.
 pub const NONE: u32 = u32::MAX;
 
 /// Particles of one cell that share all functions.
 #[derive(Clone, Debug)]
-pub struct Element {
+pub struct CoarseElement {
     /// Function of each corner of the cell.
     pub functions: [u32; CORNERS],
-    /// Where its particles begin and end in [`Space::members`].
+    /// Start and end of its particles in [`CoarseSpace::members`].
     pub members: [usize; 2],
 }
 
-/// The functions, and the particles they move: by their sites, and by their numbers after [`Space::renumber`].
-pub struct Space<const D: usize> {
+/// The functions, and the particles they move: by their sites, and by their numbers after
+/// [`CoarseSpace::renumber`].
+pub struct CoarseSpace<const D: usize> {
     /// Edges of a cell, m.
     pub edge: [f64; D],
     /// Number of functions, in an order of elimination with little fill (nested dissection of the grid).
     pub functions: usize,
     /// The elements.
-    pub elements: Vec<Element>,
+    pub elements: Vec<CoarseElement>,
     /// Sites, element by element.
     pub members: Vec<u32>,
     /// Element of each site; particles without bonds have none.
@@ -42,14 +45,14 @@ pub struct Space<const D: usize> {
 }
 
 /// The cells over a body's bounding box.
-struct Grid<const D: usize> {
+struct BackgroundGrid<const D: usize> {
     low: [f64; D],
     edge: [f64; D],
     cells: [usize; D],
 }
 
-impl<const D: usize> Grid<D> {
-    /// Cells of about `edge`, which the box holds a whole number of.
+impl<const D: usize> BackgroundGrid<D> {
+    /// Divides the bounding box into a whole number of cells of about `edge`.
     fn new(bonds: &dyn BodyGeometry<D>, edge: f64) -> Self {
         let [low, high] = bounds(bonds.particles().iter().map(|&site| bonds.position(site as usize)));
         let cells: [usize; D] = std::array::from_fn(|d| ((high[d] - low[d]) / edge).ceil().max(1.0) as usize);
@@ -61,7 +64,7 @@ impl<const D: usize> Grid<D> {
         Self { low, edge, cells }
     }
 
-    /// Cell and coordinates in it.
+    /// Returns the cell of a position and the coordinates in it.
     fn locate(&self, position: [f64; D]) -> (usize, [f64; D]) {
         let mut index = 0;
         let mut local = [0.0; D];
@@ -110,17 +113,17 @@ impl<const D: usize> Grid<D> {
 }
 
 /// The bonded particles of each cell.
-struct Filled<const D: usize> {
+struct OccupiedCells<const D: usize> {
     /// Sites, ascending in each cell.
     members: Groups<u32>,
-    /// Whether every particle of a cell has all bonds around it.
+    /// True if every particle of a cell has all its bonds.
     is_whole: Vec<bool>,
     /// Coordinates of each site in its cell, 0 to 1.
     local: Field<D>,
 }
 
-impl<const D: usize> Filled<D> {
-    fn new(grid: &Grid<D>, bonds: &dyn BodyGeometry<D>, bonded: &[u32], whole: u32) -> Self {
+impl<const D: usize> OccupiedCells<D> {
+    fn new(grid: &BackgroundGrid<D>, bonds: &dyn BodyGeometry<D>, bonded: &[u32], whole: u32) -> Self {
         let mut local = Field::zeros(bonds.sites());
         let cells: usize = grid.cells.iter().product();
         let mut members = Vec::with_capacity(bonds.particles().len());
@@ -134,27 +137,28 @@ impl<const D: usize> Filled<D> {
         Self { members: Groups::new(cells, members.iter().copied()), is_whole, local }
     }
 
-    /// Whether a particle lies beside a node.
-    fn is_beside(&self, grid: &Grid<D>, node: usize) -> bool {
-        grid.cells_around(node).any(|cell| !self.members.of(cell).is_empty())
+    /// Returns true if a particle lies beside a node.
+    fn is_beside(&self, grid: &BackgroundGrid<D>, node: usize) -> bool {
+        grid.cells_around(node).any(|cell| !self.members.group(cell).is_empty())
     }
 
-    /// Nodes beside a particle: that many functions at least.
-    fn nodes(&self, grid: &Grid<D>) -> usize {
+    /// Number of nodes beside a particle, a lower bound of the number of functions.
+    fn nodes(&self, grid: &BackgroundGrid<D>) -> usize {
         let nodes: usize = grid.node_counts().iter().product();
         (0..nodes).filter(|&node| self.is_beside(grid, node)).count()
     }
 }
 
 /// Parts of a hat's support: the part of each site in it, sites ascending.
-struct Split {
+struct SupportParts {
     parts: u32,
     part_of: Vec<(u32, u32)>,
 }
 
-impl<const D: usize> Space<D> {
-    /// Cells of about `edge`, larger ones if there would be more than `most` functions; `None` where even that does not help.
-    /// `bonded` has the number of bonds of each site, `whole` that from which on nothing is missing around a particle.
+impl<const D: usize> CoarseSpace<D> {
+    /// Builds functions on cells of about `edge`, or larger ones if there would be more than `most`
+    /// functions; `None` if even that does not help. `bonded` has the number of bonds of each site, `whole`
+    /// the number of bonds of a complete family.
     pub fn new(
         bonds: &dyn BodyGeometry<D>,
         bonded: &[u32],
@@ -164,15 +168,15 @@ impl<const D: usize> Space<D> {
     ) -> Option<Self> {
         let mut edge = edge;
         for _ in 0..24 {
-            let grid = Grid::new(bonds, edge);
+            let grid = BackgroundGrid::new(bonds, edge);
             let nodes: f64 = grid.node_counts().iter().map(|&n| n as f64).product();
-            // bodies that fill little of their box may have more nodes than functions, but not without end
+            // bodies that fill little of their box may have more nodes than functions, but not without limit
             let mut excess = nodes / (64.0 * most as f64);
             if excess <= 1.0 {
-                let filled = Filled::new(&grid, bonds, bonded, whole);
+                let filled = OccupiedCells::new(&grid, bonds, bonded, whole);
                 let mut functions = filled.nodes(&grid);
                 if (1..=most).contains(&functions) {
-                    let space = Self::on(&grid, filled, bonds);
+                    let space = Self::on_grid(&grid, filled, bonds);
                     functions = space.functions;
                     if functions <= most {
                         return Some(space);
@@ -188,26 +192,28 @@ impl<const D: usize> Space<D> {
         None
     }
 
-    fn on(grid: &Grid<D>, filled: Filled<D>, bonds: &dyn BodyGeometry<D>) -> Self {
+    fn on_grid(grid: &BackgroundGrid<D>, filled: OccupiedCells<D>, bonds: &dyn BodyGeometry<D>) -> Self {
         let (sites, cells) = (bonds.sites(), filled.is_whole.len());
-        // what hangs together around each node
+        // connected parts around each node
         let nodes: usize = grid.node_counts().iter().product();
         let suspects: Vec<usize> =
             (0..nodes).filter(|&node| !grid.cells_around(node).all(|cell| filled.is_whole[cell])).collect();
-        // few batches: each looks sites up in a table of its own
+        // few batches: each needs a table of all sites
         let batch = suspects.len().div_ceil(4 * rayon::current_num_threads()).max(1);
-        let found: Vec<Vec<(usize, Split)>> = suspects
+        let found: Vec<Vec<(usize, SupportParts)>> = suspects
             .par_chunks(batch)
             .map(|batch| {
                 let mut place = vec![NONE; sites];
                 let window = |node: usize| -> Vec<u32> {
-                    grid.cells_around(node).flat_map(|cell| filled.members.of(cell).iter().copied()).collect()
+                    grid.cells_around(node)
+                        .flat_map(|cell| filled.members.group(cell).iter().copied())
+                        .collect()
                 };
                 let split = |&node: &usize| Some((node, split(bonds, window(node), &mut place)?));
                 batch.iter().filter_map(split).collect()
             })
             .collect();
-        let splits: BTreeMap<usize, Split> = found.into_iter().flatten().collect();
+        let splits: BTreeMap<usize, SupportParts> = found.into_iter().flatten().collect();
         let mut first = vec![0_u32; nodes];
         let mut functions = 0_u32;
         for node in elimination_order(grid.node_counts()) {
@@ -224,15 +230,15 @@ impl<const D: usize> Space<D> {
             element_of: vec![NONE; sites],
             local: Field::zeros(0),
         };
-        for cell in (0..cells).filter(|&cell| !filled.members.of(cell).is_empty()) {
-            space.add_cell(grid, cell, filled.members.of(cell), &splits, &first);
+        for cell in (0..cells).filter(|&cell| !filled.members.group(cell).is_empty()) {
+            space.add_cell(grid, cell, filled.members.group(cell), &splits, &first);
         }
         space.local = filled.local;
         space
     }
 
-    /// Names particles by their numbers instead of their sites, and orders coordinates as [`Self::members`]; the place of each particle
-    /// there.
+    /// Renames particles from sites to numbers, and orders coordinates as [`Self::members`]; returns the
+    /// index of each particle there.
     pub fn renumber(&mut self, particles: &[u32]) -> Vec<u32> {
         let mut number = vec![NONE; self.element_of.len()];
         particles.iter().enumerate().for_each(|(index, &site)| number[site as usize] = index as u32);
@@ -250,10 +256,10 @@ impl<const D: usize> Space<D> {
     /// Adds the elements of a cell: one, or one for each set of parts that its particles belong to.
     fn add_cell(
         &mut self,
-        grid: &Grid<D>,
+        grid: &BackgroundGrid<D>,
         cell: usize,
         sites: &[u32],
-        splits: &BTreeMap<usize, Split>,
+        splits: &BTreeMap<usize, SupportParts>,
         first: &[u32],
     ) {
         let mut groups: BTreeMap<[u32; CORNERS], Vec<u32>> = BTreeMap::new();
@@ -283,25 +289,25 @@ impl<const D: usize> Space<D> {
             let start = self.members.len();
             sites.iter().for_each(|&site| self.element_of[site as usize] = self.elements.len() as u32);
             self.members.extend(sites);
-            self.elements.push(Element { functions, members: [start, self.members.len()] });
+            self.elements.push(CoarseElement { functions, members: [start, self.members.len()] });
         }
     }
 }
 
-/// The parts of a window that hang together by bonds within it, numbered by their first site; `None` for one part.
-/// `place` holds [`NONE`] for every site, before and after.
+/// Finds the parts of a window connected by bonds within it, numbered by their first site; `None` for one
+/// part. `place` holds [`NONE`] for every site, before and after.
 fn split<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     mut window: Vec<u32>,
     place: &mut [u32],
-) -> Option<Split> {
+) -> Option<SupportParts> {
     window.sort_unstable();
     for (index, &site) in window.iter().enumerate() {
         place[site as usize] = index as u32;
     }
-    let mut joined = Sets::new(window.len());
+    let mut joined = DisjointSets::new(window.len());
     let mut parts = window.len();
-    // sites far from each other first: few families hold a window together
+    // distant sites first: few families then connect a window
     let far = |start: usize| (start..window.len()).step_by(STRIDE);
     for index in (0..STRIDE).flat_map(far) {
         if parts == 1 {
@@ -329,10 +335,10 @@ fn split<const D: usize>(
         }
         part_of.push((window[index], number[root]));
     }
-    Some(Split { parts: count, part_of })
+    Some(SupportParts { parts: count, part_of })
 }
 
-/// Nodes of a grid in nested dissection: both halves first, the plane between them last.
+/// Orders the nodes of a grid by nested dissection: both halves first, the plane between them last.
 fn elimination_order<const D: usize>(counts: [usize; D]) -> Vec<usize> {
     let mut order = Vec::with_capacity(counts.iter().product());
     dissect([0; D], counts, counts, &mut order);

@@ -1,8 +1,8 @@
-//! Stiffness of the body as the coarse functions see it: its particles as quadrature points of
-//! Σ_I V_I ∇φ_a : C_I : ∇φ_b, C_I = Σ_J kθ w V_J/|ξ| T ⊗ ξ ⊗ ξ, with T = t′ m⊗m + (t/λ)(1 − m⊗m) the tangent of a bond
-//! of direction m; the Hessian of the bonds' energy where the functions are linear within a horizon.
+//! Stiffness of the body in the space of the coarse functions, with its particles as quadrature points of Σ_I
+//! V_I ∇φ_a : C_I : ∇φ_b, C_I = Σ_J kθ w V_J/|ξ| T ⊗ ξ ⊗ ξ, with T = t′ m⊗m + (t/λ)(1 − m⊗m) the tangent of a
+//! bond of direction m: the Hessian of the bonds' energy for functions linear within a horizon.
 
-use super::space::{CORNERS, Element, Space};
+use super::space::{CORNERS, CoarseElement, CoarseSpace};
 use crate::bonds::{BodyGeometry, Bonds};
 use crate::field::Field;
 use crate::potential::BondPotential;
@@ -16,35 +16,36 @@ const PAIRS: usize = CORNERS * (CORNERS + 1) / 2;
 const NODES: usize = 1024;
 /// Least tangent of a bond, over that at rest: a matrix of soft bonds must stay positive definite.
 const LEAST: f64 = 0.05;
-/// Part of the stiffness of its particles that the empty part of a cell has (the finite cell method of Parvizian, Düster &
-/// Rank 2007, doi:10.1007/s00466-007-0173-y): a few particles in a cell do not hold all its functions.
+/// Stiffness of the empty part of a cell over that of its particles (the finite cell method of Parvizian,
+/// Düster & Rank 2007, doi:10.1007/s00466-007-0173-y): a few particles in a cell do not hold all its
+/// functions.
 const FICTITIOUS: f64 = 0.1;
-/// Particles of an element whose C is computed for all that have every bond.
+/// Particles of an element from which the C of all complete families is computed.
 const SAMPLES: usize = 4;
-/// Bonds that turn and stretch by less are taken as at rest.
+/// Relative rotation and stretch below which bonds count as undeformed.
 const SMALL: f64 = 0.1;
 
 /// C_I/kθ: pairs of components (i, j) by pairs of derivatives (k, l), off-diagonal pairs once.
 type Tangent = [[f64; SYMMETRIC]; SYMMETRIC];
 
 /// Σ V ∂φ_a ∂φ_b for each pair of corners a ≤ b, mixed pairs of derivatives both ways.
-type Products = [[f64; SYMMETRIC]; PAIRS];
+type GradientProducts = [[f64; SYMMETRIC]; PAIRS];
 
 /// Element stiffness: for each pair of corners a ≤ b, the matrix of components (i of a, j of b) at iD + j.
 pub type ElementMatrix = [[f64; 9]; PAIRS];
 
-/// What is known of all bonds before anything is built.
-pub struct Survey {
+/// Counts of all bonds before anything is built.
+pub struct BondCounts {
     /// Number of bonds of each site.
     pub bonded: Vec<u32>,
     /// The most bonds of any particle.
     pub most: u32,
-    /// Largest |η|/|ξ| of a lattice's bonds of one spacing: how much bonds have turned or stretched.
+    /// Largest |η|/|ξ| of a lattice's bonds of one spacing: the rotation or stretch of bonds.
     pub moved: f64,
 }
 
-impl Survey {
-    /// Counts the bonds of every particle, and looks at those of a lattice to the nearest particles.
+impl BondCounts {
+    /// Counts the bonds of every particle, and measures those of a lattice to the nearest particles.
     pub fn new<const D: usize>(bonds: &dyn Bonds<D>, displacement: &Field<D>) -> Self {
         let lattice = bonds.as_lattice();
         let is_unit = |offset: &[i32; D]| offset.iter().map(|o| o.abs()).sum::<i32>() == 1;
@@ -93,39 +94,39 @@ impl Tangents {
         Self { low, step, nodes: (0..NODES).map(node).collect() }
     }
 
-    fn at(&self, e: f64) -> [f64; 2] {
+    fn value_at(&self, e: f64) -> [f64; 2] {
         self.nodes[(((e - self.low) / self.step).max(0.0).round() as usize).min(NODES - 1)]
     }
 }
 
-/// What element matrices are made of.
+/// Data of the element matrices.
 pub struct Assembly<'a, const D: usize> {
     bonds: &'a dyn BodyGeometry<D>,
     loads: &'a Loads<D>,
     displacement: &'a Field<D>,
-    survey: &'a Survey,
+    survey: &'a BondCounts,
     tangents: Tangents,
     modulus: f64,
     /// Stiffness density M_I at constrained components, N/m⁵.
     springs: &'a [f64],
-    /// Whether the body is a lattice.
+    /// True if the body is a lattice.
     lattice: bool,
-    /// C of particles without a bond missing, where bonds are as at rest.
+    /// C of particles with complete families, if bonds are undeformed.
     interior: Option<Tangent>,
     /// Volume of a cell (2D: times the thickness), m³, and Σ V ∂φ_a ∂φ_b over all of it.
     cell: f64,
-    full: Products,
-    /// λ of the volume in addition to that of bonds, Pa.
+    full: GradientProducts,
+    /// λ of the volume in excess of that of bonds, Pa.
     volumetric: f64,
 }
 
 impl<'a, const D: usize> Assembly<'a, D> {
-    /// `law` comes with kθ and the λ of the volume beside it, and the stretches that it is fitted over.
+    /// Prepares the assembly; `law` comes with kθ and the excess λ of the volume, and the fitted stretches.
     pub fn new(
         bonds: &'a dyn BodyGeometry<D>,
         loads: &'a Loads<D>,
         displacement: &'a Field<D>,
-        survey: &'a Survey,
+        survey: &'a BondCounts,
         law: (&dyn BondPotential, [f64; 2], [f64; 2]),
         springs: &'a [f64],
         edge: [f64; D],
@@ -136,7 +137,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
         let thickness = volumes / bonds.particles().len().max(1) as f64 / bonds.spacing().powi(D as i32);
         let cell = thickness * edge.iter().product::<f64>();
         // Gauss' two points along each axis are exact
-        let mut full: Products = [[0.0; SYMMETRIC]; PAIRS];
+        let mut full: GradientProducts = [[0.0; SYMMETRIC]; PAIRS];
         for point in 0..1 << D {
             let local = std::array::from_fn(|d| 0.5 + [-0.5, 0.5][point >> d & 1] / 3.0_f64.sqrt());
             let (_, slopes) = hats::<D>(local, edge);
@@ -165,7 +166,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
         assembly
     }
 
-    /// C_I.
+    /// Computes C_I.
     fn tangent(&self, site: usize) -> Tangent {
         let own = self.displacement.get(site);
         let mut result = [[0.0; SYMMETRIC]; SYMMETRIC];
@@ -179,7 +180,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
                 square += zeta[d] * zeta[d];
                 e += eta * (2.0 * bond.bond[d] + eta);
             }
-            let [along, across] = self.tangents.at(e / (bond.length * bond.length));
+            let [along, across] = self.tangents.value_at(e / (bond.length * bond.length));
             let factor = self.modulus * bond.weight / bond.length;
             let difference = (along - across) / square.max(f64::MIN_POSITIVE);
             let mut pair = 0;
@@ -201,12 +202,13 @@ impl<'a, const D: usize> Assembly<'a, D> {
         result
     }
 
-    /// Whether the particle in a site has every bond of its lattice: its C is that of others beside it.
+    /// Returns true if the particle in a site has every bond of its lattice: its C equals that of others
+    /// beside it.
     fn is_full(&self, site: usize) -> bool {
         self.lattice && self.survey.bonded[site] == self.survey.most
     }
 
-    /// C that stands for the particles of an element that have every bond: that at rest, or the mean of a few.
+    /// C for the particles of an element with complete families: that at rest, or the mean of a few.
     fn shared(&self, members: &[u32]) -> Option<Tangent> {
         if self.interior.is_some() {
             return self.interior;
@@ -215,15 +217,19 @@ impl<'a, const D: usize> Assembly<'a, D> {
         let samples = full.len().min(SAMPLES);
         let mut mean = [[0.0; SYMMETRIC]; SYMMETRIC];
         for k in 0..samples {
-            // in the middle of each of the parts
+            // in the middle of each part
             let site = full[(2 * k + 1) * full.len() / (2 * samples)];
             add_tangent(&mut mean, &self.tangent(site), 1.0 / samples as f64);
         }
         (samples > 0).then_some(mean)
     }
 
-    /// Stiffness of an element, and for each corner Σ V φ over its particles.
-    pub fn element(&self, space: &Space<D>, element: &Element) -> (ElementMatrix, [f64; CORNERS]) {
+    /// Computes the stiffness of an element, and for each corner Σ V φ over its particles.
+    pub fn element(
+        &self,
+        space: &CoarseSpace<D>,
+        element: &CoarseElement,
+    ) -> (ElementMatrix, [f64; CORNERS]) {
         let corners = 1 << D;
         let mut matrix = [[0.0; 9]; PAIRS];
         let mut measure = [0.0; CORNERS];
@@ -254,7 +260,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
                 contract::<D>(&mut matrix, &tangent, &own);
                 add_tangent(&mut sum, &tangent, volume);
             }
-            self.hold(&mut matrix, site, volume, &values);
+            self.add_springs(&mut matrix, site, volume, &values);
         }
         if let Some(shared) = &shared {
             contract::<D>(&mut matrix, shared, &products);
@@ -268,8 +274,8 @@ impl<'a, const D: usize> Assembly<'a, D> {
         (matrix, measure)
     }
 
-    /// Adds the springs that hold what is constrained.
-    fn hold(&self, matrix: &mut ElementMatrix, site: usize, volume: f64, values: &[f64; CORNERS]) {
+    /// Adds the springs that hold constrained components.
+    fn add_springs(&self, matrix: &mut ElementMatrix, site: usize, volume: f64, values: &[f64; CORNERS]) {
         let constrained = self.loads.constrained(site);
         if constrained == 0 {
             return;
@@ -286,7 +292,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
         }
     }
 
-    /// Σ_I V_I C_1111 / Σ_I V_I, or so: how stiff the body is.
+    /// Mean stiffness of the body, about Σ_I V_I C_1111 / Σ_I V_I.
     pub fn stiffness(&self) -> f64 {
         let particles = self.bonds.particles();
         let site = particles.iter().max_by_key(|&&s| (self.survey.bonded[s as usize], u32::MAX - s));
@@ -298,7 +304,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
 }
 
 /// matrix += C : products, corner pair by corner pair.
-fn contract<const D: usize>(matrix: &mut ElementMatrix, tangent: &Tangent, products: &Products) {
+fn contract<const D: usize>(matrix: &mut ElementMatrix, tangent: &Tangent, products: &GradientProducts) {
     let pairs = D * (D + 1) / 2;
     let corners = 1 << D;
     for (result, products) in matrix.iter_mut().zip(products).take(corners * (corners + 1) / 2) {
@@ -319,8 +325,8 @@ fn contract<const D: usize>(matrix: &mut ElementMatrix, tangent: &Tangent, produ
     }
 }
 
-/// matrix += λV ∂_iφ_a ∂_jφ_b, in full: a coarse level that takes less than the body's own stiffness, as by one point a cell, makes
-/// solutions slower than none (K/μ = 1000: 809 iterations for 263; in full 189).
+/// matrix += λV ∂_iφ_a ∂_jφ_b, fully integrated: a coarse level softer than the body, as with one point a
+/// cell, makes solutions slower than none (K/μ = 1000: 809 iterations instead of 263; fully integrated 189).
 fn add_volumetric<const D: usize>(matrix: &mut ElementMatrix, stiffness: f64, slopes: &[[f64; D]; CORNERS]) {
     let mut at = 0;
     for a in 0..1 << D {
@@ -343,7 +349,7 @@ fn add_tangent(sum: &mut Tangent, tangent: &Tangent, volume: f64) {
 }
 
 /// products += V ∂φ_a ∂φ_b for each pair of corners a ≤ b; mixed pairs of derivatives both ways.
-fn add_products<const D: usize>(products: &mut Products, volume: f64, slopes: &[[f64; D]; CORNERS]) {
+fn add_products<const D: usize>(products: &mut GradientProducts, volume: f64, slopes: &[[f64; D]; CORNERS]) {
     let mut at = 0;
     for a in 0..1 << D {
         for b in a..1 << D {

@@ -1,17 +1,17 @@
-//! Between particles and the functions of an element.
+//! Transfer between particles and the functions of an element.
 
 use super::space::CORNERS;
 use pulp::NullaryFnOnce;
 
 /// Pᵀg of an element: Σ φ_a g over its members, component by component.
 pub struct Restrict<'a, const D: usize> {
-    /// Its members, as they are numbered in `gradient`.
+    /// Members of the element, as numbered in `gradient`.
     pub members: &'a [u32],
-    /// Their coordinates in the cell, 0 to 1.
+    /// Coordinates of the members in the cell, 0 to 1.
     pub local: [&'a [f64]; D],
     /// g.
     pub gradient: [&'a [f64]; D],
-    /// The sums: for each component, one a corner.
+    /// Sums: for each component, one per corner.
     pub part: &'a mut [f64],
 }
 
@@ -46,11 +46,11 @@ impl<const D: usize> NullaryFnOnce for Restrict<'_, D> {
 
 /// P c of an element's members.
 pub struct Prolong<'a, const D: usize> {
-    /// Their coordinates in the cell, 0 to 1.
+    /// Coordinates of the members in the cell, 0 to 1.
     pub local: [&'a [f64]; D],
     /// c of each component, at the corners.
     pub corners: [[f64; CORNERS]; D],
-    /// The members' values.
+    /// Values at the members.
     pub out: [&'a mut [f64]; D],
 }
 

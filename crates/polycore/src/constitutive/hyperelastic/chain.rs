@@ -1,6 +1,8 @@
 //! Langevin chain networks: three chains, eight chains, and eight chains with a √I₂ term.
 
-use super::descriptor::{ABSENT, Contained, Domain, Kind, ModelDescriptor, Parameter, Start, UNLIMITED};
+use super::descriptor::{
+    ABSENT, Contained, Domain, FitStart, ModelDescriptor, ModelKind, Parameter, UNLIMITED,
+};
 use super::polynomial::{first_invariant_excess, second_invariant_excess};
 use super::principal::InvariantDerivatives;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive};
@@ -8,7 +10,8 @@ use crate::langevin;
 use crate::tensor::Invariants;
 use crate::tensor::deformation::check_stretches;
 
-/// W = (Nkθ/3)√n Σᵢ [λᵢβᵢ + √n ln(βᵢ/sinh βᵢ)], βᵢ = 𝓛⁻¹(λᵢ/√n) (1.25)–(1.26); James & Guth, doi:10.1063/1.1723785.
+/// W = (Nkθ/3)√n Σᵢ [λᵢβᵢ + √n ln(βᵢ/sinh βᵢ)], βᵢ = 𝓛⁻¹(λᵢ/√n) (1.25)–(1.26); James & Guth,
+/// doi:10.1063/1.1723785.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThreeChain {
     modulus: f64,
@@ -23,8 +26,8 @@ pub struct EightChain {
     links: f64,
 }
 
-/// The eight-chain law plus c(√I₂ − √3): the term that general biaxial data ask for (formulation.md, "Beyond the
-/// thesis"; the term is that of Carroll, J. Elasticity 103 (2011) 173–187).
+/// Eight-chain law plus c(√I₂ − √3), a term that general biaxial data require (formulation.md, "Beyond the
+/// thesis"; Carroll, J. Elasticity 103 (2011) 173–187).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EightChainRootI2 {
     network: EightChain,
@@ -36,7 +39,7 @@ const LINKS: &str = "links";
 
 pub(super) const THREE_CHAIN: ModelDescriptor = ModelDescriptor {
     key: "three-chain",
-    kind: Kind::Micromechanical,
+    kind: ModelKind::Micromechanical,
     parameters: &[MODULUS, Parameter { name: LINKS, unit: "1", domain: Domain::Above(largest_square) }],
     build: |p| Ok(Box::new(ThreeChain::new(p[0], p[1])?)),
     example: &[0.3e6, 60.0],
@@ -48,7 +51,7 @@ pub(super) const THREE_CHAIN: ModelDescriptor = ModelDescriptor {
 
 pub(super) const EIGHT_CHAIN: ModelDescriptor = ModelDescriptor {
     key: "eight-chain",
-    kind: Kind::Micromechanical,
+    kind: ModelKind::Micromechanical,
     parameters: &[MODULUS, Parameter { name: LINKS, unit: "1", domain: Domain::Above(chain_square) }],
     build: |p| Ok(Box::new(EightChain::new(p[0], p[1])?)),
     example: &[0.27e6, 25.0],
@@ -60,7 +63,7 @@ pub(super) const EIGHT_CHAIN: ModelDescriptor = ModelDescriptor {
 
 pub(super) const EIGHT_CHAIN_ROOT_I2: ModelDescriptor = ModelDescriptor {
     key: "eight-chain-root-i2",
-    kind: Kind::Micromechanical,
+    kind: ModelKind::Micromechanical,
     parameters: &[
         MODULUS,
         Parameter { name: LINKS, unit: "1", domain: Domain::Above(chain_square) },
@@ -77,22 +80,22 @@ pub(super) const EIGHT_CHAIN_ROOT_I2: ModelDescriptor = ModelDescriptor {
     refine: None,
 };
 
-/// Chains so long that they never lock.
+/// Number of links from which on chains never lock in practice.
 const UNLOCKED: Contained =
     Contained { key: "neo-hookean", embed: |p, start| vec![vec![p[0], UNLIMITED * start.limits[1]]] };
 
-fn starts(start: &Start<'_>) -> Vec<Vec<f64>> {
+fn starts(start: &FitStart<'_>) -> Vec<Vec<f64>> {
     [1.02, 1.3, 3.0].map(|r| vec![0.8 * start.modulus, r * start.limits[1]]).to_vec()
 }
 
-/// n must exceed λ² of the longest chain.
+/// Lower limit of n: λ² of the longest chain.
 fn largest_square(stretches: [f64; 3]) -> f64 {
     stretches.iter().fold(1.0, |most, l| (l * l).max(most))
 }
 
-/// n must exceed I₁/3.
+/// Lower limit of n: I₁/3.
 fn chain_square(stretches: [f64; 3]) -> f64 {
-    (Invariants::of_stretches(stretches).first / 3.0).max(1.0)
+    (Invariants::from_stretches(stretches).first / 3.0).max(1.0)
 }
 
 fn checked(law: &'static str, modulus: f64, links: f64) -> Result<(f64, f64), Error> {
@@ -176,7 +179,7 @@ impl EightChain {
         Ok(Self { modulus, links })
     }
 
-    /// The law with the given small-strain shear modulus μ₀ = Nkθ √n 𝓛⁻¹(1/√n)/3.
+    /// Builds the law with the small-strain shear modulus μ₀ = Nkθ √n 𝓛⁻¹(1/√n)/3.
     ///
     /// # Errors
     /// [`Error::Parameter`].
@@ -191,7 +194,7 @@ impl EightChain {
         Extension::new(&stretches, self.links).ok_or(Error::Locked {
             law: Self::NAME,
             quantity: "chain stretch",
-            value: (Invariants::of_stretches(stretches).first / 3.0).sqrt(),
+            value: (Invariants::from_stretches(stretches).first / 3.0).sqrt(),
             limit: self.links.sqrt(),
         })
     }
@@ -229,7 +232,7 @@ impl Hyperelastic for EightChain {
     }
 
     fn response_at(&self, stretches: [f64; 3]) -> Result<PrincipalResponse, Error> {
-        PrincipalResponse::of_invariants(stretches, self.derivatives(stretches)?)
+        PrincipalResponse::from_invariants(stretches, self.derivatives(stretches)?)
             .finite(Self::NAME, stretches)
     }
 }
@@ -273,25 +276,27 @@ impl Hyperelastic for EightChainRootI2 {
     }
 
     fn response_at(&self, stretches: [f64; 3]) -> Result<PrincipalResponse, Error> {
-        let second = Invariants::of_stretches(stretches).second;
+        let second = Invariants::from_stretches(stretches).second;
         let w = InvariantDerivatives {
             second: 0.5 * self.constraint / second.sqrt(),
             second_second: -0.25 * self.constraint / (second * second.sqrt()),
             ..self.network.derivatives(stretches)?
         };
-        PrincipalResponse::of_invariants(stretches, w).finite(Self::NAME, stretches)
+        PrincipalResponse::from_invariants(stretches, w).finite(Self::NAME, stretches)
     }
 }
 
-/// One chain at relative extension x = λ/√n: β = 𝓛⁻¹(x) and the free energy f = xβ + ln(β/sinh β) per link and kθ.
+/// State of one chain at relative extension x = λ/√n: β = 𝓛⁻¹(x) and free energy f = xβ + ln(β/sinh β) per
+/// link and kθ.
 struct Extension {
     x: f64,
     beta: f64,
 }
 
 impl Extension {
-    /// A chain whose λ² is the mean square of the given stretches, or `None` at and beyond locking. Near locking the
-    /// complement 1 − x = (1 − λ²/n)/(1 + x) carries what x itself cannot; n − λ² is summed in doubled precision.
+    /// Computes the state of a chain whose λ² is the mean square of the given stretches; `None` at and beyond
+    /// locking. Near locking the complement 1 − x = (1 − λ²/n)/(1 + x) carries the digits that x loses; n −
+    /// λ² is summed in doubled precision.
     fn new(stretches: &[f64], links: f64) -> Option<Self> {
         let count = stretches.len() as f64;
         let full = count * links;
@@ -340,7 +345,7 @@ impl Extension {
         langevin::free_energy(self.beta)
     }
 
-    /// f(x) − f(x₀), with I₁ − 3 given exactly: near rest, where f is flat on the scale of its rounding, by
+    /// f(x) − f(x₀), from I₁ − 3 given exactly. Near rest, where f is flat compared with its rounding, it is
     /// the integral of β/(2nx·3) over I₁.
     fn energy_above(&self, rest: &Self, excess: f64) -> f64 {
         // x² − x₀² = (I₁ − 3)/3n and x₀² = 1/n

@@ -1,4 +1,4 @@
-//! Which columns of a table are strains and stresses, and of what kind.
+//! Strain and stress columns of a table, recognised by their headings.
 
 use super::data::Mode;
 use crate::table::{Heading, plainly};
@@ -22,41 +22,41 @@ pub enum StrainMeasure {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
-pub enum StressMeasure {
+pub enum TestStressMeasure {
     /// Force over undeformed area, P (PK1, "engineering").
     Nominal,
     /// Force over deformed area, σ = λP.
     True,
 }
 
-/// What a heading says of its column.
+/// Role of a column, read from its heading.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Role {
-    pub what: What,
-    /// Of stretch_1, stretch_2 …: 0, 1.
+    pub what: ColumnKind,
+    /// Index of the axis: 0 for `stretch_1`, 1 for `stretch_2`.
     pub axis: Option<usize>,
-    /// The axis is a number, which may also be that of a specimen.
+    /// True if the axis is a number, which may also number a specimen.
     pub numbered: bool,
-    /// Counted positive in compression.
+    /// True if stresses are positive in compression.
     pub compressive: bool,
-    /// Unit; nothing where the heading has none.
+    /// Unit; `None` if the heading has none.
     pub unit: Option<String>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum What {
-    /// A strain, of which the heading may name the measure.
+pub(super) enum ColumnKind {
+    /// Strain; the heading may name the measure.
     Strain(Option<StrainMeasure>),
-    /// A stress, of which the heading may name the measure.
-    Stress(Option<StressMeasure>),
-    /// The name of a test.
+    /// Stress; the heading may name the measure.
+    Stress(Option<TestStressMeasure>),
+    /// Name of a test.
     Mode,
-    /// A force or a displacement.
+    /// Force or displacement.
     Raw,
 }
 
-/// Words that make a column something derived from a strain or stress.
-const OTHERS: [&str; 14] = [
+/// Words that mark a quantity derived from a strain or stress.
+const DERIVED: [&str; 14] = [
     "rate",
     "modulus",
     "energy",
@@ -74,13 +74,13 @@ const OTHERS: [&str; 14] = [
 ];
 const STRETCHES: [&str; 7] = ["stretch", "lambda", "λ", "lambda1", "lambda2", "λ1", "λ2"];
 const STRAINS: [&str; 6] = ["strain", "dehnung", "ε", "eps", "epsilon", "stauchung"];
-const LENGTHENINGS: [&str; 5] = ["elongation", "extension", "displacement", "traverse", "verlängerung"];
+const ELONGATIONS: [&str; 5] = ["elongation", "extension", "displacement", "traverse", "verlängerung"];
 const STRESSES: [&str; 8] = ["stress", "nominal", "pk1", "p", "σ", "sigma", "spannung", "druckspannung"];
 const FORCES: [&str; 5] = ["force", "load", "kraft", "standardkraft", "prüfkraft"];
 const TRUE: [&str; 6] = ["true", "cauchy", "log", "logarithmic", "hencky", "wahre"];
 const NOMINAL: [&str; 8] = ["engineering", "eng", "nominal", "technical", "pk1", "p", "piola", "technische"];
 
-/// Headings of the names of tests; of all but the first only if the cells are such names.
+/// Headings of columns with names of tests; all but the first count only if the cells are such names.
 pub(super) const MODES: [&str; 9] = [
     "mode",
     "test",
@@ -94,8 +94,8 @@ pub(super) const MODES: [&str; 9] = [
 ];
 
 impl Role {
-    /// Nothing of a heading that is none of these.
-    pub fn of(heading: &Heading) -> Option<Self> {
+    /// Returns the role that a heading names, or `None` if it names none.
+    pub fn from_heading(heading: &Heading) -> Option<Self> {
         let (plain, unit) = suffixed(heading);
         let words: Vec<&str> = plain.split(' ').collect();
         let has = |list: &[&str]| words.iter().any(|word| list.contains(word));
@@ -107,29 +107,29 @@ impl Role {
         let ratio = unit
             .as_deref()
             .is_none_or(|unit| Unit::<RatioDimension>::parse(&crate::table::plain_unit(unit)).is_ok());
-        let lengthened = has(&LENGTHENINGS) && unit.is_some() && ratio;
-        let what = if has(&OTHERS) {
+        let lengthened = has(&ELONGATIONS) && unit.is_some() && ratio;
+        let what = if has(&DERIVED) {
             return None;
         } else if MODES.contains(&plain.as_str()) {
-            What::Mode
+            ColumnKind::Mode
         } else if has(&STRETCHES) {
-            What::Strain(Some(StrainMeasure::Stretch))
+            ColumnKind::Strain(Some(StrainMeasure::Stretch))
         } else if has(&STRAINS) || lengthened {
             let measure = match (has(&TRUE), has(&NOMINAL) || lengthened) {
                 (true, _) => Some(StrainMeasure::True),
                 (_, true) => Some(StrainMeasure::Engineering),
                 _ => None,
             };
-            What::Strain(measure)
+            ColumnKind::Strain(measure)
         } else if has(&STRESSES) {
             let measure = match (has(&TRUE), has(&NOMINAL)) {
-                (true, _) => Some(StressMeasure::True),
-                (_, true) => Some(StressMeasure::Nominal),
+                (true, _) => Some(TestStressMeasure::True),
+                (_, true) => Some(TestStressMeasure::Nominal),
                 _ => None,
             };
-            What::Stress(measure)
-        } else if has(&FORCES) || has(&LENGTHENINGS) {
-            What::Raw
+            ColumnKind::Stress(measure)
+        } else if has(&FORCES) || has(&ELONGATIONS) {
+            ColumnKind::Raw
         } else {
             return None;
         };
@@ -141,7 +141,7 @@ impl Role {
     }
 }
 
-/// The plain name and the unit, which may stand behind a `_`: `nominal_1_N/mm^2`.
+/// Splits the heading into its plain name and the unit, which may follow a `_`: `nominal_1_N/mm^2`.
 fn suffixed(heading: &Heading) -> (String, Option<String>) {
     for (at, _) in heading.text.match_indices('_') {
         let (name, unit) = (&heading.text[..at], &heading.text[at + 1..]);
@@ -153,7 +153,7 @@ fn suffixed(heading: &Heading) -> (String, Option<String>) {
     (heading.plain.clone(), heading.unit.clone())
 }
 
-/// The test that a cell names, and whether it is compression.
+/// Reads the name of a test from a cell; true if it is compression.
 pub(super) fn mode(cell: &str) -> Option<(Mode, bool)> {
     let plain = plainly(cell);
     let words: Vec<&str> = plain.split(' ').collect();

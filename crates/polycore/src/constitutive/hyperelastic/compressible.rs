@@ -15,17 +15,17 @@ pub struct Compressible<L> {
     volumetric: Volumetric,
 }
 
-/// Which g stands before ln J.
+/// Factor g before ln J.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Coupling {
-    /// The one that makes F = 1 stress free.
+    /// Value that makes F = 1 stress free.
     #[default]
     StressFree,
-    /// The one that the thesis prints in (1.19), (1.21), (1.23).
+    /// Value printed in (1.19), (1.21), (1.23).
     AsPublished,
 }
 
-/// The volumetric energy U(J).
+/// Volumetric energy U(J).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Volumetric {
     /// U = ½λ(J − 1)². Finite as J → 0: it does not resist collapse by itself, −g ln J does.
@@ -44,7 +44,8 @@ pub enum Volumetric {
         /// Lamé's λ, Pa.
         lame: f64,
     },
-    /// U = −p(J − 1): the reaction of an incompressible body under the pressure p (Pa), which no law determines.
+    /// U = −p(J − 1): the reaction of an incompressible body under the pressure p (Pa), which no law
+    /// determines.
     Pressure {
         /// p, positive in compression.
         pressure: f64,
@@ -56,7 +57,7 @@ pub enum Volumetric {
 impl<L: Hyperelastic> Compressible<L> {
     const NAME: &'static str = "compressible form";
 
-    /// The stress-free form of a law with a volumetric term.
+    /// Builds the stress-free form of a law with a volumetric term.
     ///
     /// # Errors
     /// [`Error::Parameter`] for λ < 0 or a pressure that is not finite.
@@ -64,7 +65,7 @@ impl<L: Hyperelastic> Compressible<L> {
         Self::with_coupling(law, volumetric, Coupling::StressFree)
     }
 
-    /// As [`Compressible::new`], with a choice of g.
+    /// Builds the law with a choice of g.
     ///
     /// # Errors
     /// Also [`Error::NotPublished`] if the thesis has no compressible form of that law.
@@ -95,7 +96,8 @@ impl<L: Hyperelastic> Compressible<L> {
     }
 
     /// Bulk modulus of the small-strain limit, (ℂ₁₁₁₁ + 2ℂ₁₁₂₂)/3 at F = 1. It is λ + 2μ/3 only for the
-    /// neo-Hookean law: the invariants of the full stretches add 4(W₁₁ + W₂ + …), 4C₂ for Mooney–Rivlin, 2μ/J_m for Gent.
+    /// neo-Hookean law: the invariants of the full stretches add 4(W₁₁ + W₂ + …), 4C₂ for Mooney–Rivlin,
+    /// 2μ/J_m for Gent.
     ///
     /// # Errors
     /// As [`Hyperelastic::response_at`].

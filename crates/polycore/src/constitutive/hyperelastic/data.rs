@@ -3,36 +3,36 @@
 use super::Error;
 use super::homogeneous::incompressible;
 
-/// A table of homogeneous states.
+/// Table of homogeneous states.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Table {
-    /// Where the numbers come from: the `# source:` line of the file; empty without one.
+pub struct TestData {
+    /// Source of the numbers: the `# source:` line of the file, or empty.
     pub source: String,
     /// The states, in the order of the file.
-    pub states: Vec<State>,
+    pub states: Vec<TestState>,
 }
 
-/// The test that a state is of.
+/// Type of test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
-    /// A bar: λ₂ = λ₃ = λ₁^{−1/2}.
+    /// Bar: λ₂ = λ₃ = λ₁^{−1/2}.
     Uniaxial,
-    /// A sheet, alike in both directions: λ₂ = λ₁.
+    /// Sheet stretched equally in both directions: λ₂ = λ₁.
     Equibiaxial,
-    /// A wide strip ("planar tension"): λ₂ = 1.
+    /// Wide strip ("planar tension"): λ₂ = 1.
     PureShear,
-    /// Any λ₁, λ₂; of tables, no test of its own.
+    /// General biaxial state, any λ₁, λ₂; a table, not a test with one stretch.
     #[serde(skip)]
     Biaxial,
 }
 
 impl Mode {
-    /// The tests that one stretch describes.
+    /// Tests that one stretch describes.
     pub const TESTS: [Self; 3] = [Self::Uniaxial, Self::Equibiaxial, Self::PureShear];
 
-    /// As tables and scenes write it.
+    /// Name of the test in tables and scenes.
     pub fn name(self) -> &'static str {
         match self {
             Self::Uniaxial => "uniaxial",
@@ -42,7 +42,7 @@ impl Mode {
         }
     }
 
-    /// λ₂ of a test at λ₁; of [`Mode::Biaxial`], which has none, λ₁ too.
+    /// λ₂ of a test at λ₁; for [`Mode::Biaxial`], which defines none, λ₁.
     pub fn second_stretch(self, first: f64) -> f64 {
         match self {
             Self::Uniaxial => first.recip().sqrt(),
@@ -54,8 +54,8 @@ impl Mode {
 
 /// Two principal stretches (λ₃ = 1/(λ₁λ₂)) and their nominal stresses.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct State {
-    /// Its test.
+pub struct TestState {
+    /// Type of test.
     pub mode: Mode,
     /// λ₁, λ₂.
     pub stretches: [f64; 2],
@@ -63,12 +63,12 @@ pub struct State {
     pub nominal: [f64; 2],
 }
 
-impl Table {
-    /// The states of one test.
+impl TestData {
+    /// Selects the states of one test.
     ///
     /// # Errors
-    /// [`Error::Data`] where no stress of it was measured.
-    pub fn of(&self, mode: Mode) -> Result<Self, Error> {
+    /// [`Error::Data`] if no stress of it was measured.
+    pub fn select(&self, mode: Mode) -> Result<Self, Error> {
         let states = self.states.iter().copied().filter(|state| state.mode == mode).collect();
         let table = Self { source: self.source.clone(), states };
         if table.measurements() == 0 {
@@ -78,13 +78,13 @@ impl Table {
         Ok(table)
     }
 
-    /// How many stresses were measured: those that are not exactly zero.
+    /// Number of measured stresses, i.e. of those that are not exactly zero.
     pub fn measurements(&self) -> usize {
         self.states.iter().flat_map(|state| state.nominal).filter(|nominal| *nominal != 0.0).count()
     }
 }
 
-impl State {
+impl TestState {
     /// λ₁, λ₂, λ₃.
     ///
     /// # Errors

@@ -1,83 +1,84 @@
-//! How a law is named, built from numbers, and started in a fit.
+//! Descriptors of laws: names, constructors, and starting points of fits.
 
-use super::data::Table;
+use super::data::TestData;
 use super::{Error, Hyperelastic};
 
 type Build = fn(&[f64]) -> Result<Box<dyn Hyperelastic>, Error>;
 
-/// A law as a function of its parameters. To add one: a file, and its name in [`super::MODELS`].
+/// Law as a function of its parameters. To add one: a file, and its name in [`super::MODELS`].
 #[derive(Debug, Clone, Copy)]
 pub struct ModelDescriptor {
     /// The name in scenes and reports.
     pub key: &'static str,
-    /// Where it comes from.
-    pub kind: Kind,
+    /// Category of the law.
+    pub kind: ModelKind,
     /// Names, units and domains of the parameters.
     pub parameters: &'static [Parameter],
-    /// The law with the given parameters, as many as [`ModelDescriptor::parameters`]; see [`ModelDescriptor::law`].
+    /// Constructor from as many parameters as [`ModelDescriptor::parameters`]; see [`ModelDescriptor::law`].
     pub(super) build: Build,
     /// Plausible values for a rubber.
     pub example: &'static [f64],
-    /// Where fits start.
-    pub(super) starts: fn(&Start<'_>) -> Vec<Vec<f64>>,
-    /// Laws that this one becomes at some parameters: it fits no worse than they do.
+    /// Starting points of fits.
+    pub(super) starts: fn(&FitStart<'_>) -> Vec<Vec<f64>>,
+    /// Laws that this one contains at some parameters: it fits no worse than they do.
     pub(super) contains: &'static [Contained],
-    /// Nominal stresses and their derivatives with respect to the parameters, where they are known in closed form.
+    /// Nominal stresses and their derivatives with respect to the parameters, if known in closed form.
     pub(super) slopes: Option<Slopes>,
-    /// Moves parameters along valleys in which the optimiser of all of them is slow.
+    /// Moves parameters along valleys in which the optimiser of all parameters is slow.
     pub(super) refine: Option<Refine>,
 }
 
-/// Of parameters, better ones.
-pub(super) type Refine = fn(&[f64], &Start<'_>) -> Vec<f64>;
+/// Maps parameters to better ones.
+pub(super) type Refine = fn(&[f64], &FitStart<'_>) -> Vec<f64>;
 
-/// A law inside another one.
+/// Law contained in another one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Contained {
-    /// Its name.
+    /// Key of the inner law.
     pub key: &'static str,
-    /// Of its best parameters: those of the outer law at which it is this one, or indistinguishable from it, and more starts.
-    pub embed: fn(&[f64], &Start<'_>) -> Vec<Vec<f64>>,
+    /// Maps the best parameters of the inner law to those of the outer law at which both agree (or cannot be
+    /// distinguished), followed by more starting points.
+    pub embed: fn(&[f64], &FitStart<'_>) -> Vec<Vec<f64>>,
 }
 
-/// Of parameters and λ₁, λ₂: P₁, P₂ and, for each parameter, their derivatives.
+/// Computes P₁, P₂ and their derivatives with respect to each parameter, from the parameters and λ₁, λ₂.
 pub(super) type Slopes = fn(&[f64], [f64; 2], &mut [[f64; 2]]) -> [f64; 2];
 
-/// Share of a modulus at which a term is absent.
+/// Share of the modulus below which a term is absent.
 pub(super) const ABSENT: f64 = 1e-17;
 
-/// Part by which a locking limit exceeds the least one where it is beyond what data can tell from infinity.
+/// Excess of a locking limit over its least value, relative, beyond which data cannot tell it from infinity.
 pub(super) const UNLIMITED: f64 = 1e6;
 
-/// The thesis' two categories of laws (§1.1).
+/// Category of a law in the thesis (§1.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// In invariants or stretches, chosen to fit.
+pub enum ModelKind {
+    /// Written in invariants or stretches, chosen to fit data.
     Phenomenological,
-    /// From the statistics of a network of chains.
+    /// Derived from the statistics of a network of chains.
     Micromechanical,
 }
 
-/// What is known before a fit.
-pub(super) struct Start<'a> {
+/// Data available before a fit.
+pub(super) struct FitStart<'a> {
     /// Lower limit of each parameter.
     pub limits: &'a [f64],
     /// The best neo-Hookean modulus, Pa.
     pub modulus: f64,
     /// The data.
-    pub table: &'a Table,
-    /// Whether the user asks the fit to end.
+    pub table: &'a TestData,
+    /// Returns true if the user asks the fit to stop.
     pub stop: &'a dyn Fn() -> bool,
 }
 
 /// A material parameter.
 #[derive(Debug, Clone, Copy)]
 pub struct Parameter {
-    /// Its name.
+    /// Name of the parameter.
     pub name: &'static str,
     /// `Pa` or `1`.
     pub unit: &'static str,
-    /// Where it may lie.
+    /// Admissible values.
     pub domain: Domain,
 }
 
@@ -88,12 +89,12 @@ pub enum Domain {
     Real,
     /// (0, ∞).
     Positive,
-    /// Above the largest value of this function of the stretches in the data: a locking limit.
+    /// Locking limit: above the largest value of this function of the stretches in the data.
     Above(fn([f64; 3]) -> f64),
 }
 
 impl ModelDescriptor {
-    /// The law with these parameters (SI, in the order of [`ModelDescriptor::parameters`]).
+    /// Builds the law with these parameters (SI, in the order of [`ModelDescriptor::parameters`]).
     ///
     /// # Errors
     /// [`Error::Parameter`]; [`Error::Data`] for a wrong number of parameters.

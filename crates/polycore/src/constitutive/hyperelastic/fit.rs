@@ -1,84 +1,87 @@
 //! Least-squares fit of a law to homogeneous states.
 //!
-//! Minimised is the sum of squares of the nominal-stress residuals, over every stress of the table that was measured
-//! (is not exactly zero; [`super::data::State::nominal`]). The figure of merit, `rms`, is the root of its mean.
-//! Levenberg–Marquardt in transformed parameters (ln p for positive ones, ln(p/limit − 1) for locking limits) keeps
-//! every iterate in the law's domain; several starts guard against local minima.
+//! The objective is the sum of squares of the nominal-stress residuals, over every measured stress of the
+//! table (those that are not exactly zero; [`super::data::TestState::nominal`]). The figure of merit, `rms`,
+//! is the root of its mean. Levenberg–Marquardt in transformed parameters (ln p for positive ones, ln(p/limit
+//! − 1) for locking limits) keeps every iterate in the law's domain; several starting points guard against
+//! local minima.
 
 use std::cell::Cell;
 
 use nalgebra::DVector;
 
-use super::data::Table;
-use super::descriptor::Start;
-use super::fit_map::{Map, REJECTED};
-pub use super::fit_map::{Standing, residuals};
+use super::data::TestData;
+use super::descriptor::FitStart;
+pub use super::fit_map::{Identifiability, residuals};
+use super::fit_map::{ParameterMap, REJECTED};
 use super::{Error, Hyperelastic, ModelDescriptor, homogeneous};
-use crate::numerics::least_squares::{Found, levenberg_marquardt};
+use crate::numerics::least_squares::{Optimum, levenberg_marquardt};
 
 /// A fitted law.
 pub struct Fit {
     /// The law.
     pub law: Box<dyn Hyperelastic>,
-    /// Its model.
+    /// Model that was fitted.
     pub model: &'static ModelDescriptor,
-    /// Its parameters.
-    pub parameters: Vec<Fitted>,
+    /// Parameters of the law.
+    pub parameters: Vec<FittedParameter>,
     /// Root mean square of the residuals over the measured stresses, Pa.
     pub rms: f64,
-    /// Draws of all parameters from their posterior ([`crate::posterior`]); those that the data do not determine stay at their
-    /// values. Empty where the data determine none.
+    /// Draws of all parameters from their posterior ([`crate::posterior`]); those that the data do not
+    /// determine keep their values. Empty if the data determine none.
     pub draws: Vec<Vec<f64>>,
-    /// Measured stresses.
+    /// Number of measured stresses.
     pub measurements: usize,
-    /// Evaluations of all residuals, over all starts (without those for derivatives).
+    /// Number of evaluations of all residuals, over all starts (without those for derivatives).
     pub iterations: usize,
-    /// Starts tried, and how many of them ended within 1e-4 of the best rms.
+    /// Number of starts, and of those that ended within 1e-4 of the best rms.
     pub starts: (usize, usize),
 }
 
 /// A fitted parameter.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Fitted {
-    /// Its name.
+pub struct FittedParameter {
+    /// Name of the parameter.
     pub name: &'static str,
     /// `Pa` or `1`.
     pub unit: &'static str,
-    /// In that unit.
+    /// Value in `unit`.
     pub value: f64,
-    /// From s²(JᵀJ)⁻¹ at the minimum, s² = Σr²/(m − k); `None` if the data do not determine the parameter: it sits at
-    /// an end of its domain, which for a locking limit is 1e6 × the least value allowed.
+    /// Standard error from s²(JᵀJ)⁻¹ at the minimum, s² = Σr²/(m − k). `None` if the data do not determine
+    /// the parameter: it lies at an end of its domain, which for a locking limit is 1e6 × the least
+    /// admissible value.
     pub standard_error: Option<f64>,
-    /// Whether the data say anything of it.
-    pub standing: Standing,
+    /// Verdict of the data on the parameter.
+    pub identifiability: Identifiability,
 }
 
 /// Root mean square of [`residuals`], Pa.
 ///
 /// # Errors
 /// As [`residuals`].
-pub fn rms<L: Hyperelastic + ?Sized>(law: &L, table: &Table) -> Result<f64, Error> {
+pub fn rms<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<f64, Error> {
     let residuals = residuals(law, table)?;
     Ok((residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64).sqrt())
 }
 
-/// How a law follows the measured stresses of a table.
+/// Agreement of a law with the measured stresses of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Agreement {
     /// Root mean square of the residuals, Pa.
     pub rms: f64,
     /// Mean of their absolute values, Pa.
     pub mae: f64,
-    /// 1 − Σr²/Σ(P − P̄)² with P̄ the mean of the measured stresses; none where they are all the same.
+    /// Coefficient of determination 1 − Σr²/Σ(P − P̄)², P̄ the mean of the measured stresses; `None` if they
+    /// are all equal.
     pub r2: Option<f64>,
 }
 
 impl Agreement {
-    /// Of a law and a table.
+    /// Compares a law with test data.
     ///
     /// # Errors
     /// As [`residuals`]: at a state beyond locking there is no stress to compare.
-    pub fn of<L: Hyperelastic + ?Sized>(law: &L, table: &Table) -> Result<Self, Error> {
+    pub fn new<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<Self, Error> {
         let residuals = residuals(law, table)?;
         let count = residuals.len() as f64;
         let measured = || table.states.iter().flat_map(|state| state.nominal).filter(|data| *data != 0.0);
@@ -93,22 +96,22 @@ impl Agreement {
     }
 }
 
-/// The best fit of a model to a table: never worse than that of a law that it contains.
+/// Finds the best fit of a model to a table: never worse than that of a law that it contains.
 ///
 /// # Errors
-/// [`Error::Data`] if the table has fewer measurements than the law has parameters, or a mean stiffness below zero;
-/// [`Error::NoConvergence`] if no start arrives anywhere.
-pub fn fit(model: &'static ModelDescriptor, table: &Table) -> Result<Fit, Error> {
+/// [`Error::Data`] if the table has fewer measurements than the law has parameters, or a mean stiffness below
+/// zero; [`Error::NoConvergence`] if no start converges.
+pub fn fit(model: &'static ModelDescriptor, table: &TestData) -> Result<Fit, Error> {
     fit_until(model, table, &|| false)
 }
 
-/// As [`fit`], which ends where `stop` says so.
+/// Fits as [`fit`] does, until `stop` returns true.
 ///
 /// # Errors
 /// As [`fit`]; [`Error::Stopped`].
 pub fn fit_until(
     model: &'static ModelDescriptor,
-    table: &Table,
+    table: &TestData,
     stop: &dyn Fn() -> bool,
 ) -> Result<Fit, Error> {
     let measurements = table.measurements();
@@ -119,7 +122,7 @@ pub fn fit_until(
         });
     }
     let modulus = neo_hookean_modulus(table)?;
-    let map = Map::new(model, table, modulus)?;
+    let map = ParameterMap::new(model, table, modulus)?;
     let mut ends: Vec<(f64, DVector<f64>)> = Vec::new();
     let iterations = Cell::new(0);
     let residuals = |q: &DVector<f64>| {
@@ -128,7 +131,7 @@ pub fn fit_until(
         let rejected = || DVector::from_element(measurements, REJECTED);
         Some(map.residuals(q, table).unwrap_or_else(rejected))
     };
-    let start = Start { limits: &map.limits, modulus, table, stop };
+    let start = FitStart { limits: &map.limits, modulus, table, stop };
     let mut starts = (model.starts)(&start);
     for contained in model.contains {
         let inner = super::model(contained.key).and_then(|inner| fit_until(inner, table, stop));
@@ -151,7 +154,7 @@ pub fn fit_until(
     let search = |from: &[f64], ends: &mut Vec<(f64, DVector<f64>)>| {
         // nothing ends the search
         let jacobian = |q: &DVector<f64>| if stop() { None } else { map.jacobian(q, table) };
-        let Found { at, objective } = levenberg_marquardt(map.inverse(from), 200, residuals, jacobian);
+        let Optimum { at, objective } = levenberg_marquardt(map.inverse(from), 200, residuals, jacobian);
         if objective < REJECTED && map.residuals(&at, table).is_some() {
             ends.push((objective, at));
         }
@@ -191,12 +194,12 @@ pub fn fit_until(
         .iter()
         .zip(values)
         .enumerate()
-        .map(|(i, (parameter, value))| Fitted {
+        .map(|(i, (parameter, value))| FittedParameter {
             name: parameter.name,
             unit: parameter.unit,
             value,
             standard_error: found.errors[i],
-            standing: found.standings[i],
+            identifiability: found.identifiability[i],
         })
         .collect();
     let starts = (starts.len(), agreeing.min(starts.len()));
@@ -204,11 +207,12 @@ pub fn fit_until(
     Ok(Fit { law, model, parameters, rms, draws: found.draws, measurements, iterations, starts })
 }
 
-/// The modulus of the best neo-Hookean law, in closed form: P is linear in μ. Scale and start of every fit. Pa.
+/// Modulus of the best neo-Hookean law, Pa, in closed form: P is linear in μ. It is the scale and the
+/// starting point of every fit.
 ///
 /// # Errors
-/// [`Error::Data`] where it is not above zero.
-pub fn neo_hookean_modulus(table: &Table) -> Result<f64, Error> {
+/// [`Error::Data`] if it is not above zero.
+pub fn neo_hookean_modulus(table: &TestData) -> Result<f64, Error> {
     let unit = super::NeoHookean::new(1.0)?;
     let (mut model_data, mut model_model) = (0.0, 0.0);
     for state in &table.states {
@@ -223,8 +227,8 @@ pub fn neo_hookean_modulus(table: &Table) -> Result<f64, Error> {
         return Ok(modulus);
     }
     let reason = format!(
-        "the data have a mean stiffness of {modulus:.6e} Pa, which must be positive: in tension (stretch above 1) stresses are \
-         positive, in compression negative; and a stretch is 1 at rest, a strain 0"
+        "the mean stiffness of the data is {modulus:.6e} Pa, but must be positive: in tension (stretch \
+         above 1) stresses are positive, in compression negative; and a stretch is 1 at rest, a strain 0"
     );
     Err(Error::Data { what: "fit".to_owned(), reason })
 }

@@ -1,27 +1,27 @@
-//! Fits in parameters without bounds: the optimiser's problem, and what the data say at its end.
+//! Unconstrained parameters of fits: the optimiser's problem, and the uncertainty at its minimum.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::data::{State, Table};
+use super::data::{TestData, TestState};
 use super::descriptor::UNLIMITED;
 use super::{Domain, Error, Hyperelastic, ModelDescriptor, homogeneous};
 
-/// What data say of a fitted parameter.
+/// Verdict of the data on a fitted parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Standing {
-    /// They determine it.
+pub enum Identifiability {
+    /// Determined by the data.
     Determined,
-    /// A modulus without any effect on the stresses, or the exponent of such a term: the term is absent.
+    /// Modulus without effect on the stresses, or the exponent of such a term: the term is absent.
     Absent,
-    /// It may have any value as large, as a locking limit far beyond the data.
+    /// Not bounded from above by the data, e.g. a locking limit far beyond them.
     Undetermined,
 }
 
-/// Model minus data for every measured stress, Pa, state by state.
+/// Computes model minus data for every measured stress, Pa, state by state.
 ///
 /// # Errors
-/// What the law refuses at a state of the table.
-pub fn residuals<L: Hyperelastic + ?Sized>(law: &L, table: &Table) -> Result<Vec<f64>, Error> {
+/// Errors of the law at a state of the table.
+pub fn residuals<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<Vec<f64>, Error> {
     let mut residuals = Vec::with_capacity(2 * table.states.len());
     for state in &table.states {
         let nominal = homogeneous::biaxial(law, state.stretches[0], state.stretches[1])?;
@@ -31,43 +31,43 @@ pub fn residuals<L: Hyperelastic + ?Sized>(law: &L, table: &Table) -> Result<Vec
     Ok(residuals)
 }
 
-/// The differences carry 1e-10, and an effect below 1e-6 of the stresses tells nothing.
-const EFFECT: f64 = 1e-6;
+/// Least effect on the stresses that counts: the differences carry 1e-10.
+const LEAST_EFFECT: f64 = 1e-6;
 
-/// What the data say at a minimum.
-pub(super) struct Uncertainty {
+/// Uncertainty of the parameters at a minimum.
+pub(super) struct FitUncertainty {
     /// Standard errors.
     pub errors: Vec<Option<f64>>,
-    /// Whether parameters are determined.
-    pub standings: Vec<Standing>,
+    /// Verdict on each parameter.
+    pub identifiability: Vec<Identifiability>,
     /// Draws of all parameters.
     pub draws: Vec<Vec<f64>>,
 }
 
 /// Axis, state and computed stresses of each measured stress, state by state.
 fn measured<'a>(
-    table: &'a Table,
-    mut nominal: impl FnMut(&State) -> [f64; 2] + 'a,
-) -> impl Iterator<Item = (usize, &'a State, [f64; 2])> + 'a {
+    table: &'a TestData,
+    mut nominal: impl FnMut(&TestState) -> [f64; 2] + 'a,
+) -> impl Iterator<Item = (usize, &'a TestState, [f64; 2])> + 'a {
     table.states.iter().flat_map(move |state| {
         let found = nominal(state);
         (0..2).filter(|&axis| state.nominal[axis] != 0.0).map(move |axis| (axis, state, found))
     })
 }
 
-/// Between the parameters p of a law and the unbounded q of the optimiser.
-pub(super) struct Map<'a> {
+/// Map between the parameters p of a law and the unbounded q of the optimiser.
+pub(super) struct ParameterMap<'a> {
     model: &'a ModelDescriptor,
     /// Lower limit of each p.
     pub limits: Vec<f64>,
     modulus: f64,
 }
 
-/// |q| beyond which a parameter is at its limit or at infinity for all purposes; e^±40 = 4e∓18.
-const FARTHEST: f64 = 40.0;
+/// Bound of |q|, beyond which a parameter is practically at its limit or at infinity; e^±40 = 4e∓18.
+const LARGEST_LOG: f64 = 40.0;
 
-impl<'a> Map<'a> {
-    pub fn new(model: &'a ModelDescriptor, table: &Table, modulus: f64) -> Result<Self, Error> {
+impl<'a> ParameterMap<'a> {
+    pub fn new(model: &'a ModelDescriptor, table: &TestData, modulus: f64) -> Result<Self, Error> {
         let mut limits = Vec::new();
         for parameter in model.parameters {
             limits.push(match parameter.domain {
@@ -95,12 +95,13 @@ impl<'a> Map<'a> {
 
     /// p and dp/dq.
     fn value(&self, i: usize, q: f64) -> (f64, f64) {
-        let exponential = q.clamp(-FARTHEST, FARTHEST).exp();
+        let exponential = q.clamp(-LARGEST_LOG, LARGEST_LOG).exp();
         match self.model.parameters[i].domain {
             Domain::Real => (q * self.scale(i), self.scale(i)),
             Domain::Positive => (exponential * self.scale(i), exponential * self.scale(i)),
             Domain::Above(_) => {
-                // never the limit itself, where the energy is infinite, nor beyond what data can tell from infinity
+                // never the limit itself, where the energy is infinite, nor beyond what data can tell from
+                // infinity
                 let excess = self.limits[i] * exponential.clamp(1e-12, UNLIMITED);
                 (self.limits[i] + excess, excess)
             }
@@ -116,7 +117,7 @@ impl<'a> Map<'a> {
     }
 
     /// Residuals in units of the modulus.
-    pub fn residuals(&self, q: &DVector<f64>, table: &Table) -> Option<DVector<f64>> {
+    pub fn residuals(&self, q: &DVector<f64>, table: &TestData) -> Option<DVector<f64>> {
         let p = self.parameters(q);
         let residuals = match self.model.slopes {
             Some(slopes) => {
@@ -132,7 +133,7 @@ impl<'a> Map<'a> {
     }
 
     /// dr/dq, in closed form or by central differences of step ∛ε, good to 1e-10.
-    pub(super) fn jacobian(&self, q: &DVector<f64>, table: &Table) -> Option<DMatrix<f64>> {
+    pub(super) fn jacobian(&self, q: &DVector<f64>, table: &TestData) -> Option<DMatrix<f64>> {
         if let Some(slopes) = self.model.slopes {
             let values: Vec<(f64, f64)> = (0..q.len()).map(|i| self.value(i, q[i])).collect();
             let p: Vec<f64> = values.iter().map(|value| value.0).collect();
@@ -162,12 +163,12 @@ impl<'a> Map<'a> {
         Some(DMatrix::from_columns(&columns))
     }
 
-    /// What the data say of the parameters. Without standard errors are those that the residuals do not depend on, and all if the
-    /// rest are collinear.
-    pub fn uncertainty(&self, q: &DVector<f64>, table: &Table) -> Uncertainty {
-        let mut found = Uncertainty {
+    /// Computes the uncertainty of the parameters. Those without effect on the residuals have no standard
+    /// error; none has if the others are collinear.
+    pub fn uncertainty(&self, q: &DVector<f64>, table: &TestData) -> FitUncertainty {
+        let mut found = FitUncertainty {
             errors: vec![None; q.len()],
-            standings: vec![Standing::Determined; q.len()],
+            identifiability: vec![Identifiability::Determined; q.len()],
             draws: Vec::new(),
         };
         let effects =
@@ -177,14 +178,18 @@ impl<'a> Map<'a> {
             let parameter = &self.model.parameters[i];
             let modulus = matches!(parameter.domain, Domain::Positive) && parameter.unit == "Pa";
             let unlimited = matches!(parameter.domain, Domain::Above(_)) && q[i].exp() > 0.1 * UNLIMITED;
-            found.standings[i] = match modulus {
-                true if *effect <= EFFECT => Standing::Absent,
+            found.identifiability[i] = match modulus {
+                true if *effect <= LEAST_EFFECT => Identifiability::Absent,
                 // the exponent of a term that is absent
-                false if *effect <= EFFECT && i > 0 && found.standings[i - 1] == Standing::Absent => {
-                    Standing::Absent
+                false
+                    if *effect <= LEAST_EFFECT
+                        && i > 0
+                        && found.identifiability[i - 1] == Identifiability::Absent =>
+                {
+                    Identifiability::Absent
                 }
-                false if *effect <= EFFECT || unlimited => Standing::Undetermined,
-                _ => Standing::Determined,
+                false if *effect <= LEAST_EFFECT || unlimited => Identifiability::Undetermined,
+                _ => Identifiability::Determined,
             };
         }
         let Some((live, covariance, degrees)) = self.covariance(q, table) else {
@@ -204,11 +209,11 @@ impl<'a> Map<'a> {
         found
     }
 
-    /// The q that the residuals determine, their covariance s²(JᵀJ)⁻¹ and the degrees of freedom.
-    fn covariance(&self, q: &DVector<f64>, table: &Table) -> Option<(Vec<usize>, DMatrix<f64>, usize)> {
+    /// Returns the q that the residuals determine, their covariance s²(JᵀJ)⁻¹ and the degrees of freedom.
+    fn covariance(&self, q: &DVector<f64>, table: &TestData) -> Option<(Vec<usize>, DMatrix<f64>, usize)> {
         let (residuals, jacobian) = (self.residuals(q, table)?, self.jacobian(q, table)?);
         let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
-        let live: Vec<usize> = (0..q.len()).filter(|&i| norms[i] > EFFECT).collect();
+        let live: Vec<usize> = (0..q.len()).filter(|&i| norms[i] > LEAST_EFFECT).collect();
         let columns: Vec<_> = live.iter().map(|&i| jacobian.column(i) / norms[i]).collect();
         if columns.is_empty() || residuals.len() <= live.len() {
             return None;
@@ -228,5 +233,5 @@ impl<'a> Map<'a> {
     }
 }
 
-/// A residual in units of the modulus that no step is accepted with.
+/// Residual in units of the modulus with which no step is accepted.
 pub(super) const REJECTED: f64 = 1e100;

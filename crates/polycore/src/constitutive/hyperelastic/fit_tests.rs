@@ -1,15 +1,15 @@
 use super::*;
-use crate::constitutive::hyperelastic::data::{Mode, State};
+use crate::constitutive::hyperelastic::data::{Mode, TestState};
 use crate::constitutive::hyperelastic::{MODELS, model};
 
-fn treloar() -> Table {
-    let text = include_str!("../../../../../cases/ch1/rubber-fits/treloar1944_uniaxial.csv");
-    Table::parse("treloar", text).unwrap()
+fn treloar() -> TestData {
+    let text = include_str!("../../../tests/data/treloar1944_uniaxial.csv");
+    TestData::parse("treloar", text).unwrap()
 }
 
-fn kawabata() -> Table {
-    let text = include_str!("../../../../../cases/ch1/rubber-fits/kawabata1981_biaxial.csv");
-    Table::parse("kawabata", text).unwrap()
+fn kawabata() -> TestData {
+    let text = include_str!("../../../tests/data/kawabata1981_biaxial.csv");
+    TestData::parse("kawabata", text).unwrap()
 }
 
 fn find(fit: &Fit, name: &str) -> f64 {
@@ -27,11 +27,11 @@ fn eight_chain_on_treloar() {
 }
 
 /// formulation.md: 0.0898 (8-chain, Kawabata), 0.0748 and 0.0254 MPa (8-chain + c√I₂, Treloar, Kawabata). On
-/// Kawabata the optimum is n → ∞ along a valley so flat that the printed values lie on it, a little short of the end
-/// (0.08966 and 0.02525): half a unit of the last digit below, no more above.
+/// Kawabata the optimum is n → ∞ along a valley so flat that the printed values lie on it, a little short of
+/// the end (0.08966 and 0.02525): half a unit of the last digit below, no more above.
 #[test]
 fn root_i2_is_what_kawabata_asks_for() {
-    let of = |key: &str, table: &Table| fit(model(key).unwrap(), table).unwrap().rms / 1e6;
+    let of = |key: &str, table: &TestData| fit(model(key).unwrap(), table).unwrap().rms / 1e6;
     let found = of("eight-chain", &kawabata());
     assert!(found > 0.0896 && found < 0.08985, "{found}");
     let found = of("eight-chain-root-i2", &treloar());
@@ -40,8 +40,8 @@ fn root_i2_is_what_kawabata_asks_for() {
     assert!(found > 0.0252 && found < 0.02545, "{found}");
 }
 
-/// Upper bounds: an exhaustive scan in numpy, exponents on grids of 0.7 (Treloar) and 0.23 (Kawabata), moduli ≥ 0
-/// solved exactly.
+/// Upper bounds: an exhaustive scan in numpy, exponents on grids of 0.7 (Treloar) and 0.23 (Kawabata), moduli
+/// ≥ 0 solved exactly.
 #[test]
 fn ogden_fits_find_the_global_minimum() {
     for (table, bounds) in
@@ -59,13 +59,13 @@ fn every_law_finds_back_its_own_parameters() {
     for model in MODELS {
         let law = model.law(model.example).unwrap();
         let states = [1.05, 1.2, 1.5, 2.0, 2.6, 3.3, 4.0].into_iter().flat_map(|l: f64| {
-            [l.recip().sqrt(), 1.0, l.sqrt(), l].map(|other| State {
+            [l.recip().sqrt(), 1.0, l.sqrt(), l].map(|other| TestState {
                 mode: Mode::Biaxial,
                 stretches: [l, other],
                 nominal: homogeneous::biaxial(&law, l, other).unwrap(),
             })
         });
-        let table = Table { source: "synthetic".into(), states: states.collect() };
+        let table = TestData { source: "synthetic".into(), states: states.collect() };
         let fit = fit(model, &table).unwrap();
         assert!(fit.rms < 1e-6 * law.shear_modulus(), "{} {}", model.key, fit.rms);
         // the terms of an Ogden sum may come back in another order
@@ -77,7 +77,7 @@ fn every_law_finds_back_its_own_parameters() {
     }
 }
 
-/// One parameter, linear: μ and its standard error in closed form, s/√Σg².
+/// Tests a law that is linear in one parameter: μ and its standard error in closed form, s/√Σg².
 #[test]
 fn standard_error_of_the_linear_law() {
     let table = treloar();
@@ -99,11 +99,12 @@ fn standard_error_of_the_linear_law() {
 
 #[test]
 fn hopeless_data_are_refused() {
-    let one = Table::parse("t", "stretch,nominal_MPa\n2,1\n").unwrap();
+    let one = TestData::parse("t", "stretch,nominal_MPa\n2,1\n").unwrap();
     let error = fit(model("gent").unwrap(), &one).err().unwrap().to_string();
     assert_eq!(error, "fit of `gent`: 1 measurements for 2 parameters");
     let pushed =
-        Table::parse("t", "stretch_1,stretch_2,nominal_1_MPa,nominal_2_MPa\n2,1,-1,0\n3,1,-1,0\n").unwrap();
+        TestData::parse("t", "stretch_1,stretch_2,nominal_1_MPa,nominal_2_MPa\n2,1,-1,0\n3,1,-1,0\n")
+            .unwrap();
     let error = fit(model("gent").unwrap(), &pushed).err().unwrap().to_string();
     assert!(error.contains("must be positive"), "{error}");
 }
@@ -111,14 +112,16 @@ fn hopeless_data_are_refused() {
 /// Independent values: closed forms and scipy's least_squares from many starts (`issue 39`).
 #[test]
 fn ordinary_data_fit_every_law() {
-    let of = |text: &str| Table::parse("t", text).unwrap();
+    let of = |text: &str| TestData::parse("t", text).unwrap();
     // exact neo-Hookean compression of 0.4 MPa
     let squeezed: String = [0.95, 0.9, 0.85, 0.8, 0.7, 0.6]
         .iter()
         .fold("stretch,nominal_MPa\n".into(), |text, l| format!("{text}{l},{}\n", 0.4 * (l - 1.0 / (l * l))));
     // one term suffices: corona radiata, Budday 2017, every fourth digitised point, rounded
-    let brain = "stretch,nominal_kPa\n0.9015,-0.7289\n0.9143,-0.5379\n0.9272,-0.3829\n0.9401,-0.2651\n0.953,-0.1766\n\
-                 0.9659,-0.1114\n0.9788,-0.0595\n0.9917,-0.0227\n1.0147,0.0281\n1.0375,0.0584\n1.0604,0.0851\n1.0832,0.1193\n";
+    let brain = "stretch,nominal_kPa\n0.9015,-0.7289\n0.9143,-0.5379\n0.9272,-0.3829\n0.9401,-0.2651\n\
+                 0.953,-0.1766\n\
+                 0.9659,-0.1114\n0.9788,-0.0595\n0.9917,-0.0227\n1.0147,0.0281\n1.0375,0.0584\n\
+                 1.0604,0.0851\n1.0832,0.1193\n";
     // exact one-term Ogden law in equibiaxial tension, α = 4, and a noisy bar of 300 Pa
     let biaxial: String = (1..12).fold("mode,stretch,nominal_Pa\n".into(), |text, i| {
         let l = 1.0 + 0.1 * f64::from(i);
@@ -161,49 +164,53 @@ fn ordinary_data_fit_every_law() {
 /// Dragon Skin FX Pro, 21 points: scipy from many starts has 0.0019264 MPa at α = −6.0815 and −0.5588.
 #[test]
 fn a_double_exponent_is_no_minimum() {
-    let text = "stretch,nominal_MPa\n1.091,0.0009719\n1.977,0.004658\n2.864,0.007998\n3.75,0.01168\n4.636,0.01662\n\
-                5.523,0.02263\n6.409,0.02936\n7.295,0.03838\n8.182,0.0483\n9.068,0.0599\n9.955,0.0728\n10.841,0.08561\n\
-                11.727,0.1008\n12.614,0.1175\n13.5,0.136\n14.386,0.1564\n15.273,0.1779\n16.159,0.1993\n17.045,0.2209\n\
+    let text = "stretch,nominal_MPa\n1.091,0.0009719\n1.977,0.004658\n2.864,0.007998\n3.75,0.01168\n\
+                4.636,0.01662\n\
+                5.523,0.02263\n6.409,0.02936\n7.295,0.03838\n8.182,0.0483\n9.068,0.0599\n9.955,0.0728\n\
+                10.841,0.08561\n\
+                11.727,0.1008\n12.614,0.1175\n13.5,0.136\n14.386,0.1564\n15.273,0.1779\n16.159,0.1993\n\
+                17.045,0.2209\n\
                 17.932,0.2426\n18.818,0.2613\n";
-    let table = Table::parse("slacker", text).unwrap();
+    let table = TestData::parse("slacker", text).unwrap();
     let found = fit(model("ogden-2").unwrap(), &table).unwrap();
     assert!(found.rms < 0.00192645e6, "{} {:?}", found.rms, found.parameters);
     let three = fit(model("ogden-3").unwrap(), &table).unwrap();
     assert!(three.rms <= found.rms, "{}", three.rms);
 }
 
-/// Treloar's bar in 24 points: scipy's projected search from 150 starts ends at 0.071481 MPa with two terms. With three it follows
-/// the last point to the exponent 159.7 (0.0367 MPa), whose modulus lies below the least one here, 4e-18 of the whole: 0.0482 MPa.
+/// Treloar's bar in 24 points: scipy's projected search from 150 starts ends at 0.071481 MPa with two terms.
+/// With three it follows the last point to the exponent 159.7 (0.0367 MPa), whose modulus lies below the
+/// least one here, 4e-18 of the whole: 0.0482 MPa.
 #[test]
 fn three_terms_on_a_bar() {
-    let text = include_str!("../../../../../cases/external/treloar-fits/treloar1944_20C.csv");
-    let table = Table::parse("treloar", text).unwrap().of(Mode::Uniaxial).unwrap();
+    let text = include_str!("../../../tests/data/treloar1944_20C.csv");
+    let table = TestData::parse("treloar", text).unwrap().select(Mode::Uniaxial).unwrap();
     let of = |key: &str| fit(model(key).unwrap(), &table).unwrap().rms / 1e6;
     assert!((of("ogden-2") - 0.071481).abs() < 1e-6);
     let found = of("ogden-3");
     assert!(found < 0.0483, "{found}");
 }
 
-/// Terms without an effect are said to be absent, locking limits beyond the data undetermined.
+/// Terms without effect are reported as absent, locking limits beyond the data as undetermined.
 #[test]
 fn what_data_do_not_determine() {
     let text: String = [1.2, 1.4, 1.6, 1.8, 2.0, 2.2, 2.4]
         .iter()
         .fold("stretch,nominal_Pa\n".into(), |text, l| format!("{text}{l},{}\n", 3.0 * (l - 1.0 / (l * l))));
-    let table = Table::parse("gel", &text).unwrap();
-    let standings = |key: &str| -> Vec<Standing> {
+    let table = TestData::parse("gel", &text).unwrap();
+    let identifiability = |key: &str| -> Vec<Identifiability> {
         fit(model(key).unwrap(), &table)
             .unwrap()
             .parameters
             .iter()
-            .map(|parameter| parameter.standing)
+            .map(|parameter| parameter.identifiability)
             .collect()
     };
-    use Standing::{Absent, Determined, Undetermined};
-    assert_eq!(standings("neo-hookean"), [Determined]);
-    assert_eq!(standings("mooney-rivlin"), [Determined, Absent]);
-    assert_eq!(standings("eight-chain"), [Determined, Undetermined]);
-    assert_eq!(standings("ogden-1"), [Determined, Determined]);
+    use Identifiability::{Absent, Determined, Undetermined};
+    assert_eq!(identifiability("neo-hookean"), [Determined]);
+    assert_eq!(identifiability("mooney-rivlin"), [Determined, Absent]);
+    assert_eq!(identifiability("eight-chain"), [Determined, Undetermined]);
+    assert_eq!(identifiability("ogden-1"), [Determined, Determined]);
     let stopped = fit_until(model("gent").unwrap(), &table, &|| true).err().unwrap();
     assert_eq!(stopped, Error::Stopped);
 }

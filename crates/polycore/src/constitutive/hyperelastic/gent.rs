@@ -1,6 +1,6 @@
 //! Gent's law of limited chain extensibility.
 
-use super::descriptor::{Contained, Domain, Kind, ModelDescriptor, Parameter, UNLIMITED};
+use super::descriptor::{Contained, Domain, ModelDescriptor, ModelKind, Parameter, UNLIMITED};
 use super::polynomial::first_invariant_excess;
 use super::principal::InvariantDerivatives;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, positive};
@@ -15,7 +15,7 @@ pub struct Gent {
 
 pub(super) const GENT: ModelDescriptor = ModelDescriptor {
     key: "gent",
-    kind: Kind::Phenomenological,
+    kind: ModelKind::Phenomenological,
     parameters: &[
         Parameter { name: "shear_modulus", unit: "Pa", domain: Domain::Positive },
         Parameter { name: "J_m", unit: "1", domain: Domain::Above(first_invariant_excess) },
@@ -80,7 +80,7 @@ impl Hyperelastic for Gent {
         let room = self.limit - self.excess(stretches)?;
         let first = 0.5 * self.shear_modulus * (self.limit / room);
         let w = InvariantDerivatives { first, first_first: first / room, ..Default::default() };
-        PrincipalResponse::of_invariants(stretches, w).finite(Self::NAME, stretches)
+        PrincipalResponse::from_invariants(stretches, w).finite(Self::NAME, stretches)
     }
 
     fn published_coupling(&self) -> Option<f64> {

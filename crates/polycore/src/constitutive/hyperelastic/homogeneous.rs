@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 /// Pᵢ = (λᵢ² − λ₃²)(Sᵢ + λ₃²ℂ_i3i3)/λᵢ so that small strains keep their digits.
 ///
 /// # Errors
-/// Stretches that are not positive and finite, and what the law refuses.
+/// Stretches that are not positive and finite; errors of the law.
 pub fn biaxial<L: Hyperelastic + ?Sized>(law: &L, stretch_1: f64, stretch_2: f64) -> Result<[f64; 2], Error> {
     let stretches = incompressible(stretch_1, stretch_2)?;
     let response = law.response_at(stretches)?;
@@ -23,7 +23,7 @@ pub fn biaxial<L: Hyperelastic + ?Sized>(law: &L, stretch_1: f64, stretch_2: f64
     });
     match nominal.iter().all(|stress| stress.is_finite()) {
         true => Ok(nominal),
-        // of a law whose name only its parameters tell
+        // for laws whose name depends on their parameters
         false => Err(Error::Overflow { law: "homogeneous test", stretches }),
     }
 }
@@ -44,8 +44,8 @@ pub fn equibiaxial<L: Hyperelastic + ?Sized>(law: &L, stretch: f64) -> Result<f6
     Ok(biaxial(law, stretch, stretch)?[0])
 }
 
-/// Nominal stresses of a wide strip stretched to λ ("pure shear", planar tension): along the load, and along the
-/// width that is held at its length; Pa.
+/// Nominal stresses of a wide strip stretched to λ ("pure shear", planar tension): along the load, and along
+/// the width, whose length is fixed; Pa.
 ///
 /// # Errors
 /// As [`biaxial`].
@@ -63,12 +63,12 @@ pub fn incompressible(stretch_1: f64, stretch_2: f64) -> Result<[f64; 3], Error>
     Ok(stretches)
 }
 
-/// The plane-stress state of a compressible law.
+/// Plane-stress state of a compressible law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaneStress {
     /// F with its thickness stretch.
     pub deformation: DeformationGradient,
-    /// In-plane PK2 [S₁₁, S₂₂, S₁₂], Pa.
+    /// PK2 stress in the plane, [S₁₁, S₂₂, S₁₂], Pa.
     pub stress: Vector3<f64>,
     /// ∂[S₁₁, S₂₂, S₁₂]/∂[E₁₁, E₂₂, 2E₁₂] at S₃₃ = 0 (ℂ₃₃₃₃ condensed out), Pa.
     pub tangent: Matrix3<f64>,
@@ -77,7 +77,7 @@ pub struct PlaneStress {
 /// Finds the thickness stretch with S₃₃ = 0 by Newton's method in ln λ₃, bracketed as it goes.
 ///
 /// # Errors
-/// An inadmissible in-plane gradient, what the law refuses, [`Error::NoConvergence`].
+/// An inadmissible in-plane gradient, errors of the law, [`Error::NoConvergence`].
 pub fn plane_stress<L: Hyperelastic + ?Sized>(law: &L, in_plane: &Tensor2) -> Result<PlaneStress, Error> {
     let mut log = DeformationGradient::plane_stress_incompressible(in_plane)?.matrix()[(2, 2)].ln();
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -87,7 +87,7 @@ pub fn plane_stress<L: Hyperelastic + ?Sized>(law: &L, in_plane: &Tensor2) -> Re
         let (stress, tangent) =
             match (law.second_piola_kirchhoff(&deformation), law.material_tangent(&deformation)) {
                 (Ok(stress), Ok(tangent)) => (voigt::from_stress(&stress), tangent),
-                // locked by too thick a trial: come back half way
+                // locked by too thick a trial: go back half way
                 (Err(error), _) | (_, Err(error)) => {
                     if !low.is_finite() {
                         return Err(error);
@@ -100,7 +100,7 @@ pub fn plane_stress<L: Hyperelastic + ?Sized>(law: &L, in_plane: &Tensor2) -> Re
         residual = stress[2];
         let slope = tangent[(2, 2)] * (2.0 * log).exp();
         let step = -residual / slope;
-        // what is left is rounding: of S₃₃ itself, a difference of terms as large as the tangent
+        // the rest is rounding of S₃₃ itself, a difference of terms as large as the tangent
         if residual.abs() <= 16.0 * f64::EPSILON * tangent.amax().max(stress.amax()) {
             return Ok(condensed(deformation, &stress, &tangent));
         }
@@ -123,19 +123,19 @@ pub fn plane_stress<L: Hyperelastic + ?Sized>(law: &L, in_plane: &Tensor2) -> Re
 
 const MAX_STEPS: usize = 100;
 
-/// Static condensation of E₃₃ at S₃₃ = 0. The out-of-plane shears do not couple: the law is isotropic and F is
-/// block-diagonal.
+/// Static condensation of E₃₃ at S₃₃ = 0. The out-of-plane shears do not couple: the law is isotropic and F
+/// is block-diagonal.
 fn condensed(
     deformation: DeformationGradient,
     stress: &voigt::Voigt,
     tangent: &voigt::Voigt6x6,
 ) -> PlaneStress {
-    const KEPT: [usize; 3] = [0, 1, 3];
+    const IN_PLANE: [usize; 3] = [0, 1, 3];
     PlaneStress {
         deformation,
-        stress: Vector3::from_fn(|i, _| stress[KEPT[i]]),
+        stress: Vector3::from_fn(|i, _| stress[IN_PLANE[i]]),
         tangent: Matrix3::from_fn(|i, j| {
-            let (a, b) = (KEPT[i], KEPT[j]);
+            let (a, b) = (IN_PLANE[i], IN_PLANE[j]);
             tangent[(a, b)] - tangent[(a, 2)] * tangent[(2, b)] / tangent[(2, 2)]
         }),
     }
@@ -171,7 +171,8 @@ mod tests {
         assert!(incompressible(f64::NAN, 1.0).is_err());
     }
 
-    /// The pressure makes an incompressible law's stress what the tension test has: S from W plus −pJC⁻¹ with S₃₃ = 0.
+    /// An incompressible law with its pressure has the stress of the tension test: S from W plus −pJC⁻¹ with
+    /// S₃₃ = 0.
     #[test]
     fn pressure_closes_the_incompressible_laws() {
         for model in MODELS {
@@ -190,8 +191,8 @@ mod tests {
         }
     }
 
-    /// A nearly incompressible sheet tends to the incompressible tension test, and its condensed tangent is the derivative
-    /// of its stress.
+    /// A nearly incompressible sheet tends to the incompressible tension test, and its condensed tangent is
+    /// the derivative of its stress.
     #[test]
     fn plane_stress_of_compressible_laws() {
         for model in MODELS {

@@ -35,7 +35,8 @@ fn locking_is_an_error_with_the_value_and_infinite_in_the_limit() {
     let message = gent.energy_at([5.0; 3]).unwrap_err().to_string();
     assert_eq!(message, "Gent: I1 - 3 = 72 has reached the locking value 72");
 
-    // towards locking, with c = 1 − λ/5: β → 1/c, f → ln(2/c) − 1, all finite to the last representable stretch
+    // towards locking, with c = 1 − λ/5: β → 1/c, f → ln(2/c) − 1, all finite to the last representable
+    // stretch
     let rest = three.energy_at([5.0 * (1.0 - 1e-9), 1.0, 1.0]).unwrap();
     let mut worst: f64 = 0.0;
     for c in [1e-3_f64, 1e-6, 1e-9, 1e-12, f64::EPSILON] {
@@ -120,7 +121,7 @@ fn bad_parameters_are_refused_with_the_value() {
         ("eight-chain", vec![f64::NAN, 9.0], "eight-chain: chain_modulus = NaN is outside (0, ∞)"),
         ("eight-chain-root-i2", vec![1.0, 9.0, -1.0], "eight-chain + c√I2: c = -1 is outside [0, ∞)"),
         ("gent", vec![1.0], "law `gent`: 1 parameters given, 2 needed"),
-        ("rubber", vec![1.0], "there is no hyperelastic law `rubber`"),
+        ("rubber", vec![1.0], "unknown hyperelastic law `rubber`"),
     ] {
         let error = model(key).and_then(|model| model.law(&p)).err().unwrap().to_string();
         assert!(error.starts_with(message), "{error}");

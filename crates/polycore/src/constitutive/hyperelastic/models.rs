@@ -1,9 +1,9 @@
-//! The list of laws: every one, for scenes, fits and checks.
+//! List of all laws, for scenes, fits and checks.
 
 use super::descriptor::ModelDescriptor;
 use super::{Compressible, Coupling, Error, Hyperelastic, Volumetric, chain, gent, ogden, polynomial, yeoh};
 
-/// Every law of Chapter 1, the √I₂ extension, and Yeoh's law.
+/// All laws of Chapter 1, the √I₂ extension, and Yeoh's law.
 pub const MODELS: &[ModelDescriptor] = &[
     polynomial::NEO_HOOKEAN,
     polynomial::MOONEY_RIVLIN,
@@ -17,7 +17,7 @@ pub const MODELS: &[ModelDescriptor] = &[
     yeoh::YEOH,
 ];
 
-/// The model of that name.
+/// Returns the model with this key.
 ///
 /// # Errors
 /// [`Error::UnknownLaw`].
@@ -25,11 +25,11 @@ pub fn model(key: &str) -> Result<&'static ModelDescriptor, Error> {
     MODELS.iter().find(|model| model.key == key).ok_or_else(|| Error::UnknownLaw { name: key.to_owned() })
 }
 
-/// Every law with its example parameters: the incompressible forms, then each with both volumetric terms, then the
-/// compressible forms as printed. The shared check runs over this list.
+/// Every law with its example parameters: the incompressible forms, then each with both volumetric terms,
+/// then the compressible forms as printed. The shared check runs over this list.
 ///
 /// # Errors
-/// None in practice: the examples are valid, and a test holds them to it.
+/// None in practice: a test checks that the examples are valid.
 pub fn all() -> Result<Vec<Box<dyn Hyperelastic>>, Error> {
     let mut laws: Vec<Box<dyn Hyperelastic>> = Vec::new();
     for model in MODELS {

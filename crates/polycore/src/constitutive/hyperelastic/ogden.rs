@@ -1,6 +1,6 @@
 //! Ogden's law in powers of the principal stretches.
 
-use super::descriptor::{Contained, Domain, Kind, ModelDescriptor, Parameter};
+use super::descriptor::{Contained, Domain, ModelDescriptor, ModelKind, Parameter};
 use super::ogden_project::projected;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, ogden_starts, parameter, positive};
 
@@ -12,7 +12,7 @@ pub struct Ogden {
     terms: Vec<(f64, f64)>,
 }
 
-/// How μᵢ enters the prefactor cᵢ.
+/// Convention for μᵢ in the prefactor cᵢ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum OgdenConvention {
     /// cᵢ = 2μᵢ/αᵢ, as (1.24) prints it: the shear modulus is Σμᵢαᵢ.
@@ -49,7 +49,7 @@ fn build(p: &[f64]) -> Result<Box<dyn Hyperelastic>, Error> {
 
 pub(super) const OGDEN_1: ModelDescriptor = ModelDescriptor {
     key: "ogden-1",
-    kind: Kind::Phenomenological,
+    kind: ModelKind::Phenomenological,
     parameters: PARAMETERS.as_flattened().split_at(2).0,
     build,
     example: &[0.4e6, 2.2],
@@ -61,7 +61,7 @@ pub(super) const OGDEN_1: ModelDescriptor = ModelDescriptor {
 
 pub(super) const OGDEN_2: ModelDescriptor = ModelDescriptor {
     key: "ogden-2",
-    kind: Kind::Phenomenological,
+    kind: ModelKind::Phenomenological,
     parameters: PARAMETERS.as_flattened().split_at(4).0,
     build,
     example: &[0.4e6, 1.3, 2e3, 5.0],
@@ -76,7 +76,7 @@ pub(super) const OGDEN_2: ModelDescriptor = ModelDescriptor {
 
 pub(super) const OGDEN_3: ModelDescriptor = ModelDescriptor {
     key: "ogden-3",
-    kind: Kind::Phenomenological,
+    kind: ModelKind::Phenomenological,
     parameters: PARAMETERS.as_flattened(),
     build,
     // Ogden's own values for Treloar's rubber (1.3, 5.0, −2.0; 0.63, 0.0012, −0.01 MPa), as μᵢαᵢ/2
@@ -90,7 +90,7 @@ pub(super) const OGDEN_3: ModelDescriptor = ModelDescriptor {
 impl Ogden {
     const NAME: &'static str = "Ogden";
 
-    /// Pairs (μᵢ in Pa, αᵢ ≠ 0); the shear modulus that they add up to must be positive.
+    /// Builds the law from pairs (μᵢ in Pa, αᵢ ≠ 0); the shear modulus, their sum, must be positive.
     ///
     /// # Errors
     /// [`Error::Parameter`], also for an empty list.
@@ -111,7 +111,7 @@ impl Ogden {
         Ok(law)
     }
 
-    /// The same law with its μᵢ in another convention.
+    /// Returns the same law with its μᵢ in another convention.
     pub fn in_convention(&self, convention: OgdenConvention) -> Self {
         let terms = self
             .terms

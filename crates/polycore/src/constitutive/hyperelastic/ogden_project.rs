@@ -1,15 +1,16 @@
-//! Ogden's law in its exponents alone: for given exponents the best moduli ≥ 0 follow by linear least squares, so that the search
-//! runs along the valleys in which a modulus and its exponent make up for each other ("variable projection"; Golub & Pereyra,
-//! doi:10.1137/0710036, with Kaufman's derivative, doi:10.1007/BF01932995).
+//! Ogden's law in its exponents alone: for given exponents the best moduli ≥ 0 follow by linear least
+//! squares, so that the search runs along the valleys in which a modulus and its exponent make up for each
+//! other ("variable projection"; Golub & Pereyra, doi:10.1137/0710036, with Kaufman's derivative,
+//! doi:10.1007/BF01932995).
 
 use nalgebra::{DMatrix, DVector};
 
-use super::descriptor::{ABSENT, Start};
+use super::descriptor::{ABSENT, FitStart};
 use super::ogden_starts::slopes;
 use crate::numerics::least_squares::levenberg_marquardt;
 
-/// A start, moved to where the exponents are best; itself where the search fails.
-pub(super) fn projected(p: &[f64], start: &Start<'_>) -> Vec<f64> {
+/// Moves a start to the best exponents; returns it unchanged if the search fails.
+pub(super) fn projected(p: &[f64], start: &FitStart<'_>) -> Vec<f64> {
     let data = start.table.states.iter().flat_map(|state| state.nominal).filter(|data| *data != 0.0);
     let data = DVector::from_iterator(start.table.measurements(), data) / start.modulus;
     let exponents = DVector::from_iterator(p.len() / 2, p.chunks_exact(2).map(|term| term[1]));
@@ -27,15 +28,15 @@ pub(super) fn projected(p: &[f64], start: &Start<'_>) -> Vec<f64> {
 }
 
 struct Projected<'a> {
-    start: &'a Start<'a>,
+    start: &'a FitStart<'a>,
     /// Measured stresses in units of the modulus.
     data: DVector<f64>,
 }
 
-/// The best moduli, in units of the modulus; 0 of terms that would only be of use below.
-struct Moduli {
+/// Best moduli, in units of the modulus; 0 for terms that only a negative modulus would improve.
+struct OgdenModuli {
     moduli: DVector<f64>,
-    /// An orthonormal basis of the stresses of the terms that are present.
+    /// Orthonormal basis of the stresses of the terms that are present.
     basis: DMatrix<f64>,
     residuals: DVector<f64>,
 }
@@ -61,10 +62,10 @@ impl Projected<'_> {
         all.iter().flat_map(|matrix| matrix.iter()).all(|value| value.is_finite()).then_some(all)
     }
 
-    fn solve(&self, exponents: &DVector<f64>) -> Option<Moduli> {
+    fn solve(&self, exponents: &DVector<f64>) -> Option<OgdenModuli> {
         let [columns, _] = self.columns(exponents)?;
         let terms = exponents.len();
-        let mut best: Option<(f64, Moduli)> = None;
+        let mut best: Option<(f64, OgdenModuli)> = None;
         for present in 1_usize..1 << terms {
             let those: Vec<usize> = (0..terms).filter(|i| present >> i & 1 == 1).collect();
             let norms: Vec<f64> = those.iter().map(|&i| columns.column(i).norm()).collect();
@@ -80,7 +81,7 @@ impl Projected<'_> {
             if best.as_ref().is_none_or(|(least, _)| misfit < *least) {
                 let mut moduli = DVector::zeros(terms);
                 those.iter().zip(&norms).enumerate().for_each(|(k, (&i, norm))| moduli[i] = solved[k] / norm);
-                best = Some((misfit, Moduli { moduli, basis, residuals }));
+                best = Some((misfit, OgdenModuli { moduli, basis, residuals }));
             }
         }
         best.map(|(_, found)| found)

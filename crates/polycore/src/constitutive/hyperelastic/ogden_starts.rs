@@ -1,21 +1,22 @@
-//! Where fits of Ogden's law start. The sum of squares has many minima in the exponents, but for given exponents the
-//! stress is linear in the moduli: all subsets of a grid of exponents are solved exactly, and the best become starts.
+//! Starting points for fits of Ogden's law. The sum of squares has many minima in the exponents, but for
+//! given exponents the stress is linear in the moduli: all subsets of a grid of exponents are solved exactly,
+//! and the best become starting points.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::descriptor::{ABSENT, Start};
+use super::descriptor::{ABSENT, FitStart};
 
-/// |α| of the grid; both signs are tried.
+/// Grid of |α|; both signs are tried.
 const EXPONENTS: [f64; 14] = [0.3, 0.6, 1.0, 1.5, 2.0, 2.7, 3.6, 4.8, 6.5, 9.0, 12.0, 17.0, 24.0, 34.0];
 
-/// Starts that are handed to the optimiser.
-const KEPT: usize = 8;
+/// Number of starts handed to the optimiser.
+const SELECTED_STARTS: usize = 8;
 
-/// Starts from the optimum of a law of one term less.
-const GROWN: usize = 3;
+/// Number of starts from the optimum of the law with one term less.
+const EXTENDED_STARTS: usize = 3;
 
 /// Parameter sets [μ₁, α₁, …] in Abaqus' convention, best first, no two of them neighbours on the grid.
-pub(super) fn starts<const TERMS: usize>(start: &Start<'_>) -> Vec<Vec<f64>> {
+pub(super) fn starts<const TERMS: usize>(start: &FitStart<'_>) -> Vec<Vec<f64>> {
     let (exponents, mut columns, data) = columns(start);
     if exponents.len() < TERMS {
         return Vec::new();
@@ -48,7 +49,7 @@ pub(super) fn starts<const TERMS: usize>(start: &Start<'_>) -> Vec<Vec<f64>> {
         if !kept.iter().any(|(other, _)| near(other)) {
             kept.push((subset, moduli));
         }
-        if kept.len() == KEPT {
+        if kept.len() == SELECTED_STARTS {
             break;
         }
     }
@@ -59,9 +60,9 @@ pub(super) fn starts<const TERMS: usize>(start: &Start<'_>) -> Vec<Vec<f64>> {
     parameters.collect()
 }
 
-/// A law of one term less as a start, its new term absent; and with a new term of an exponent of the grid that lowers the
-/// misfit, the best three.
-pub(super) fn grown(smaller: &[f64], start: &Start<'_>) -> Vec<Vec<f64>> {
+/// Starts from a law with one term less: its new term absent, and the best three with a new term whose
+/// exponent of the grid lowers the misfit.
+pub(super) fn grown(smaller: &[f64], start: &FitStart<'_>) -> Vec<Vec<f64>> {
     let total: f64 = smaller.chunks_exact(2).map(|term| term[0]).sum();
     let mut all = vec![[smaller, &[ABSENT * total, 1.0]].concat()];
     let present: Vec<usize> = (0..smaller.len() / 2).filter(|i| smaller[2 * i] > 1e-12 * total).collect();
@@ -92,12 +93,12 @@ pub(super) fn grown(smaller: &[f64], start: &Start<'_>) -> Vec<Vec<f64>> {
         found.push((-moduli.dot(&onto), parameters));
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    all.extend(found.into_iter().take(GROWN).map(|(_, parameters)| parameters));
+    all.extend(found.into_iter().take(EXTENDED_STARTS).map(|(_, parameters)| parameters));
     all
 }
 
-/// The stresses of one term of unit modulus, where they are finite.
-fn column(start: &Start<'_>, exponent: f64) -> Option<DVector<f64>> {
+/// Stresses of one term of unit modulus, if they are finite.
+fn column(start: &FitStart<'_>, exponent: f64) -> Option<DVector<f64>> {
     let mut values = Vec::with_capacity(start.table.measurements());
     for state in &start.table.states {
         let found = slopes(&[1.0, exponent], state.stretches, &mut [[0.0; 2]; 2]);
@@ -107,8 +108,9 @@ fn column(start: &Start<'_>, exponent: f64) -> Option<DVector<f64>> {
     Some(DVector::from_vec(values)).filter(|column| column.norm().is_finite() && column.norm() > 0.0)
 }
 
-/// The exponents whose stresses are finite in the data, those stresses of unit moduli, and the data in units of the modulus.
-fn columns(start: &Start<'_>) -> (Vec<f64>, Vec<DVector<f64>>, DVector<f64>) {
+/// Exponents whose stresses are finite in the data, those stresses of unit moduli, and the data in units of
+/// the modulus.
+fn columns(start: &FitStart<'_>) -> (Vec<f64>, Vec<DVector<f64>>, DVector<f64>) {
     let grid = EXPONENTS.iter().rev().map(|a| -a).chain(EXPONENTS);
     let (exponents, columns) =
         grid.filter_map(|exponent| column(start, exponent).map(|column| (exponent, column))).unzip();
@@ -117,7 +119,7 @@ fn columns(start: &Start<'_>) -> (Vec<f64>, Vec<DVector<f64>>, DVector<f64>) {
     (exponents, columns, data)
 }
 
-/// The next ascending choice out of `count`; false after the last.
+/// Advances to the next ascending choice out of `count`; returns false after the last.
 fn next_subset(chosen: &mut [usize], count: usize) -> bool {
     let terms = chosen.len();
     for i in (0..terms).rev() {

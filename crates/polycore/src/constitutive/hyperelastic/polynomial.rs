@@ -1,6 +1,6 @@
 //! Neo-Hookean and Mooney–Rivlin: linear in the invariants.
 
-use super::descriptor::{ABSENT, Contained, Domain, Kind, ModelDescriptor, Parameter};
+use super::descriptor::{ABSENT, Contained, Domain, ModelDescriptor, ModelKind, Parameter};
 use super::principal::InvariantDerivatives;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive};
 
@@ -19,7 +19,7 @@ pub struct MooneyRivlin {
 
 pub(super) const NEO_HOOKEAN: ModelDescriptor = ModelDescriptor {
     key: "neo-hookean",
-    kind: Kind::Phenomenological,
+    kind: ModelKind::Phenomenological,
     parameters: &[Parameter { name: "shear_modulus", unit: "Pa", domain: Domain::Positive }],
     build: |p| Ok(Box::new(NeoHookean::new(p[0])?)),
     example: &[0.4e6],
@@ -31,10 +31,10 @@ pub(super) const NEO_HOOKEAN: ModelDescriptor = ModelDescriptor {
 
 pub(super) const MOONEY_RIVLIN: ModelDescriptor = ModelDescriptor {
     key: "mooney-rivlin",
-    kind: Kind::Phenomenological,
+    kind: ModelKind::Phenomenological,
     parameters: &[
-        // fits keep to the polyconvex quadrant: the best fit to Treloar's bar, 0.39 and −0.72 MPa, has a negative
-        // shear modulus
+        // fits keep to the polyconvex quadrant: the best fit to Treloar's bar, 0.39 and −0.72 MPa, has a
+        // negative shear modulus
         Parameter { name: "C1", unit: "Pa", domain: Domain::Positive },
         Parameter { name: "C2", unit: "Pa", domain: Domain::Positive },
     ],
@@ -79,7 +79,7 @@ impl Hyperelastic for NeoHookean {
 
     fn response_at(&self, stretches: [f64; 3]) -> Result<PrincipalResponse, Error> {
         let w = InvariantDerivatives { first: 0.5 * self.shear_modulus, ..Default::default() };
-        PrincipalResponse::of_invariants(stretches, w).finite(Self::NAME, stretches)
+        PrincipalResponse::from_invariants(stretches, w).finite(Self::NAME, stretches)
     }
 
     fn published_coupling(&self) -> Option<f64> {
@@ -90,7 +90,7 @@ impl Hyperelastic for NeoHookean {
 impl MooneyRivlin {
     const NAME: &'static str = "Mooney-Rivlin";
 
-    /// C₁, C₂ in Pa, either of them may be negative, but C₁ + C₂ > 0.
+    /// Builds the law from C₁, C₂ in Pa; either may be negative, but C₁ + C₂ > 0.
     ///
     /// # Errors
     /// [`Error::Parameter`].
@@ -123,7 +123,7 @@ impl Hyperelastic for MooneyRivlin {
 
     fn response_at(&self, stretches: [f64; 3]) -> Result<PrincipalResponse, Error> {
         let w = InvariantDerivatives { first: self.first, second: self.second, ..Default::default() };
-        PrincipalResponse::of_invariants(stretches, w).finite(Self::NAME, stretches)
+        PrincipalResponse::from_invariants(stretches, w).finite(Self::NAME, stretches)
     }
 
     fn published_coupling(&self) -> Option<f64> {

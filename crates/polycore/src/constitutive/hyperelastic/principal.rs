@@ -1,9 +1,9 @@
-//! Stress and tangent in the principal frame, from the kinds of energy that occur in Chapter 1.
+//! Stress and tangent in the principal frame, for the forms of energy in Chapter 1.
 
 use super::Error;
 use crate::tensor::{Voigt6x6, deformation::check_stretches};
 
-/// The response of an isotropic law in the frame of the principal directions Nᵢ. With aᵢ = λᵢ²:
+/// Response of an isotropic law in the frame of the principal directions Nᵢ. With aᵢ = λᵢ²:
 /// Sᵢ = 2 ∂W/∂aᵢ, ℂ_iijj = 4 ∂²W/∂aᵢ∂aⱼ, ℂ_ijij = (Sᵢ − Sⱼ)/(aᵢ − aⱼ) for i ≠ j, all others zero.
 /// (Ogden, *Non-Linear Elastic Deformations*, 1984, §6.1.4.) Pa.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,7 +16,7 @@ pub struct PrincipalResponse {
     pub shear: [f64; 3],
 }
 
-/// W(I₁, I₂): its derivatives at a point.
+/// Derivatives of W(I₁, I₂) at a point.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct InvariantDerivatives {
     /// ∂W/∂I₁.
@@ -50,8 +50,8 @@ impl PrincipalResponse {
         self.shear[(i + j).saturating_sub(1).min(2)]
     }
 
-    /// W(I₁, I₂) without a mixed derivative. The shear quotient is −2 ∂W/∂I₂ exactly.
-    pub(super) fn of_invariants(stretches: [f64; 3], w: InvariantDerivatives) -> Self {
+    /// Response of W(I₁, I₂) without a mixed derivative. The shear quotient is −2 ∂W/∂I₂ exactly.
+    pub(super) fn from_invariants(stretches: [f64; 3], w: InvariantDerivatives) -> Self {
         let [a, b, c] = stretches.map(|l| l * l);
         let others = [b + c, c + a, a + b];
         Self {
@@ -66,7 +66,7 @@ impl PrincipalResponse {
         }
     }
 
-    /// W = Σ w(λᵢ). `law(λ)` returns (w′, w″), `room(λ)` a length over which w is smooth.
+    /// Response of W = Σ w(λᵢ). `law(λ)` returns (w′, w″), `room(λ)` a length over which w is smooth.
     pub(super) fn separable(
         stretches: [f64; 3],
         law: impl Fn(f64) -> (f64, f64),
@@ -80,10 +80,11 @@ impl PrincipalResponse {
         }
         let shear = SHEAR.map(|(i, j)| {
             let (x, y) = (stretches[i], stretches[j]);
-            let slope = if (x - y).abs() > NEAR * room(x.max(y)) {
+            let slope = if (x - y).abs() > NEAR_EQUAL * room(x.max(y)) {
                 (stress[i] - stress[j]) / (x - y)
             } else {
-                // mean of dS/dλ over [y, x]; the error of the rule is (NEAR)⁶ relative, far below rounding
+                // mean of dS/dλ over [y, x]; the error of the rule is NEAR_EQUAL⁶ relative, far below
+                // rounding
                 GAUSS
                     .iter()
                     .map(|(at, weight)| {
@@ -98,7 +99,7 @@ impl PrincipalResponse {
         Self { stress, normal, shear }
     }
 
-    /// A function of J alone with h(J) = J dU/dJ: Sᵢ = h/aᵢ. `slope` is J dh/dJ.
+    /// Response of a function of J alone with h(J) = J dU/dJ: Sᵢ = h/aᵢ. `slope` is J dh/dJ.
     pub(super) fn volumetric(stretches: [f64; 3], h: f64, slope: f64) -> Self {
         // one division at a time: 1/λ⁴ may overflow where h/λ⁴ does not
         let over = |value: f64, i: usize| value / stretches[i] / stretches[i];
@@ -111,7 +112,7 @@ impl PrincipalResponse {
         }
     }
 
-    /// The sum of two energies' responses.
+    /// Sum of two responses.
     pub(super) fn plus(mut self, other: &Self) -> Self {
         for i in 0..3 {
             self.stress[i] += other.stress[i];
@@ -123,7 +124,7 @@ impl PrincipalResponse {
         self
     }
 
-    /// Itself, or the error if a component is not finite.
+    /// Returns the response, or the error if a component is not finite.
     pub(super) fn finite(self, law: &'static str, stretches: [f64; 3]) -> Result<Self, Error> {
         check_stretches(&stretches)?;
         let mut all = self.stress.iter().chain(&self.shear).chain(self.normal.iter().flatten());
@@ -132,8 +133,8 @@ impl PrincipalResponse {
     }
 }
 
-/// Stretches closer than this, relative to the scale on which w varies, take the quadrature.
-const NEAR: f64 = 1e-3;
+/// Relative distance of stretches, on the scale on which w varies, below which the quadrature is used.
+const NEAR_EQUAL: f64 = 1e-3;
 
 /// Three-point Gauss–Legendre rule on [−1, 1], weights halved.
 const GAUSS: [(f64, f64); 3] =

@@ -1,22 +1,22 @@
-//! Whether a law stiffens against every further strain (Drucker), where tests have been and beyond.
+//! Drucker stability of a law, within the range of the tests and beyond.
 
-use super::data::{Mode, Table};
+use super::data::{Mode, TestData};
 use super::{Hyperelastic, homogeneous};
 
-/// Steps of a scan from rest to the end of a range.
+/// Number of steps of a scan from rest to the end of a range.
 const STEPS: usize = 200;
 /// Step of the differences in ln λ; their error is its square.
 const STEP: f64 = 1e-5;
 
 /// Least and largest first stretch of a table, 1 included.
-pub fn range(table: &Table) -> [f64; 2] {
+pub fn range(table: &TestData) -> [f64; 2] {
     let stretches = table.states.iter().map(|state| state.stretches[0]);
     stretches.fold([1.0, 1.0], |[low, high], l| [l.min(low), l.max(high)])
 }
 
-/// The stretch, going from rest to `to`, from which an incompressible law is unstable in a test: where
-/// ∂τᵢ/∂ln λⱼ, τᵢ = λᵢPᵢ at a free third face, is not positive definite (Drucker's postulate dτ : dε > 0 for all strains in the
-/// plane of the sheet). Nothing where it is stable up to there or up to its locking.
+/// Returns the stretch, between rest and `to`, from which an incompressible law is unstable in a test: there
+/// ∂τᵢ/∂ln λⱼ, τᵢ = λᵢPᵢ at a free third face, is not positive definite (Drucker's postulate dτ : dε > 0 for
+/// all strains in the plane of the sheet). `None` if it is stable up to `to` or up to its locking stretch.
 pub fn unstable_from<L: Hyperelastic + ?Sized>(law: &L, mode: Mode, to: f64) -> Option<f64> {
     let stress = |logs: [f64; 2]| {
         let [a, b] = logs.map(f64::exp);
@@ -48,8 +48,9 @@ mod tests {
     use super::*;
     use crate::constitutive::hyperelastic::{MODELS, MooneyRivlin, Ogden, OgdenConvention};
 
-    /// Laws with positive terms are stable everywhere; a Mooney–Rivlin law of C₂ < 0 in equibiaxial tension is not, and an
-    /// Ogden law with a softening term loses it where dτ/dln λ = 3C₁… has its zero in closed form.
+    /// Laws with positive terms are stable everywhere; a Mooney–Rivlin law of C₂ < 0 in equibiaxial tension
+    /// is not, and an Ogden law with a softening term loses it where dτ/dln λ = 3C₁… has its zero in closed
+    /// form.
     #[test]
     fn drucker_in_the_sheet() {
         for model in MODELS {
@@ -59,7 +60,8 @@ mod tests {
                 assert_eq!(unstable_from(&law, mode, 0.5), None, "{}", model.key);
             }
         }
-        // equibiaxial: τ = 2C₁(λ² − λ⁻⁴) + 2C₂(λ⁴ − λ⁻²); along the diagonal dτ/dln λ = 2C₁(2λ² + 4λ⁻⁴) + 2C₂(4λ⁴ + 2λ⁻²)
+        // equibiaxial: τ = 2C₁(λ² − λ⁻⁴) + 2C₂(λ⁴ − λ⁻²); along the diagonal dτ/dln λ = 2C₁(2λ² + 4λ⁻⁴) +
+        // 2C₂(4λ⁴ + 2λ⁻²)
         let law = MooneyRivlin::new(1e6, -0.05e6).unwrap();
         let slope =
             |l: f64| 2.0 * (2.0 * l.powi(2) + 4.0 * l.powi(-4)) - 0.1 * (4.0 * l.powi(4) + 2.0 * l.powi(-2));

@@ -1,86 +1,87 @@
-//! Tables of measured states, as files have them.
+//! Readers of test data in tables.
 
 use std::path::Path;
 
 use super::Error;
-use super::columns::{MODES, Role, StrainMeasure, StressMeasure, What, mode};
-use super::data::{Mode, State, Table};
-use super::plausible::{Row, plausible};
+use super::columns::{ColumnKind, MODES, Role, StrainMeasure, TestStressMeasure, mode};
+use super::data::{Mode, TestData, TestState};
+use super::plausible::{TestRow, plausible};
 use crate::table::{self, plain_unit, plainly};
 use crate::units::Unit;
 use crate::units::dimension::{RatioDimension, StressDimension};
 
-/// What the headings of a table leave open.
+/// Properties of a table that its headings do not state.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Meaning {
-    /// The test of all rows, where no column names it.
+pub struct TestFormat {
+    /// Test of all rows, if no column names it.
     pub mode: Option<Mode>,
     /// Measure of the strain.
     pub strain: Option<StrainMeasure>,
     /// Measure of the stress.
-    pub stress: Option<StressMeasure>,
-    /// Unit of a stress without one.
+    pub stress: Option<TestStressMeasure>,
+    /// Unit of stresses without one.
     pub stress_unit: Option<String>,
-    /// Heading of the strain, of several.
+    /// Heading of the strain, if there are several.
     pub strain_column: Option<String>,
-    /// Heading of the stress, of several.
+    /// Heading of the stress, if there are several.
     pub stress_column: Option<String>,
 }
 
-/// A table that was read.
+/// Result of reading a table.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Reading {
-    /// Its states.
-    pub table: Table,
-    /// One line: how the file was understood.
-    pub understood: String,
-    /// What was left out or turned round, a line each.
+pub struct ImportedTest {
+    /// States of the test.
+    pub table: TestData,
+    /// Description of the file's layout, one line.
+    pub description: String,
+    /// Rows left out and signs changed, one line each.
     pub notes: Vec<String>,
 }
 
-impl Table {
-    /// Reads a file; see [`Table::read_as`].
+impl TestData {
+    /// Reads a file; see [`TestData::read_as`].
     ///
     /// # Errors
-    /// As [`Table::read_as`].
+    /// As [`TestData::read_as`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, crate::Error> {
-        Self::read_as(path, &Meaning::default()).map(|reading| reading.table)
+        Self::read_as(path, &TestFormat::default()).map(|reading| reading.table)
     }
 
-    /// Reads a text; see [`Table::read_as`].
+    /// Reads a text; see [`TestData::read_as`].
     ///
     /// # Errors
-    /// As [`Table::read_as`].
+    /// As [`TestData::read_as`].
     pub fn parse(name: &str, text: &str) -> Result<Self, Error> {
-        Self::parse_as(name, text.as_bytes().to_vec(), &Meaning::default()).map(|reading| reading.table)
+        Self::parse_as(name, text.as_bytes().to_vec(), &TestFormat::default()).map(|reading| reading.table)
     }
 
-    /// Reads a table as [`crate::table`] does: a column of stretches or strains and one of stresses, with a column of the
-    /// [`Mode`] or for one test; or two of each (`stretch_1`, `stretch_2`, `nominal_1 [MPa]`, …). A strain is an engineering
-    /// one and a stress a nominal one where neither heading nor `meaning` says more. Blank stresses were not measured.
+    /// Reads a table as [`crate::table`] does: a column of stretches or strains and one of stresses, with a
+    /// column of the [`Mode`] or for one test; or two of each (`stretch_1`, `stretch_2`, `nominal_1 [MPa]`,
+    /// …). By default, strains are engineering strains and stresses nominal ones, unless the heading or
+    /// `format` says otherwise. Blank stresses were not measured.
     ///
     /// # Errors
-    /// [`crate::Error::Io`], and what [`Table::parse_as`] refuses.
-    pub fn read_as(path: impl AsRef<Path>, meaning: &Meaning) -> Result<Reading, crate::Error> {
+    /// [`crate::Error::Io`]; errors of [`TestData::parse_as`].
+    pub fn read_as(path: impl AsRef<Path>, format: &TestFormat) -> Result<ImportedTest, crate::Error> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(crate::Error::io("read", path))?;
-        Ok(Self::parse_as(&path.display().to_string(), bytes, meaning)?)
+        let bytes = std::fs::read(path).map_err(crate::Error::from_io("read", path))?;
+        Ok(Self::parse_as(&path.display().to_string(), bytes, format)?)
     }
 
-    /// As [`Table::read_as`], of what a file holds.
+    /// Parses the bytes of a file as [`TestData::read_as`] does.
     ///
     /// # Errors
-    /// [`Error::Data`] with line and column: headings, units and modes that are not known or leave several possibilities,
-    /// what is no number, a stretch that is not positive, strains that look like stretches or the other way round, a
+    /// [`Error::Data`] with line and column: headings, units and modes that are unknown or ambiguous, text
+    /// instead of numbers, a stretch that is not positive, strains that look like stretches or vice versa, a
     /// stiffness below zero, no measurement at all.
-    pub fn parse_as(name: &str, bytes: Vec<u8>, meaning: &Meaning) -> Result<Reading, Error> {
+    pub fn parse_as(name: &str, bytes: Vec<u8>, format: &TestFormat) -> Result<ImportedTest, Error> {
         let file = table::Table::parse(name, bytes).map_err(located)?;
-        let columns = Columns::of(&file, meaning).map_err(located)?;
-        columns.read(&file, meaning).map_err(located)
+        let columns = TestColumns::find(&file, format).map_err(located)?;
+        columns.read(&file, format).map_err(located)
     }
 }
 
-/// With the line in the reason.
+/// Converts an error, with the line in its reason.
 fn located(error: table::Error) -> Error {
     let table::Error { path, line, what, found, allowed } = error;
     let line = if line == 0 { String::new() } else { format!("line {line}: ") };
@@ -88,42 +89,45 @@ fn located(error: table::Error) -> Error {
     Error::Data { what: path.display().to_string(), reason }
 }
 
-/// A column and its measure.
+/// Column and its measure.
 #[derive(Clone)]
-struct Chosen<M> {
+struct TestColumn<M> {
     column: usize,
     measure: M,
-    /// The heading does not say which.
+    /// True if the heading does not name the measure.
     assumed: bool,
     compressive: bool,
     unit: Option<String>,
 }
 
-struct Columns {
+struct TestColumns {
     mode: Option<usize>,
-    strains: Vec<Chosen<StrainMeasure>>,
-    stresses: Vec<Chosen<StressMeasure>>,
+    strains: Vec<TestColumn<StrainMeasure>>,
+    stresses: Vec<TestColumn<TestStressMeasure>>,
 }
 
-const LAYOUTS: &str = "a strain (`stretch`, `strain [%]`) and a stress (`nominal [MPa]`), with a `mode` in each row if there are \
-                       several tests, or `stretch_1`, `stretch_2`, `nominal_1 [MPa]`, `nominal_2 [MPa]`";
+const LAYOUTS: &str = "a strain (`stretch`, `strain [%]`) and a stress (`nominal [MPa]`), with a `mode` in \
+                       each row if there are several tests, or `stretch_1`, `stretch_2`, `nominal_1 [MPa]`, \
+                       `nominal_2 [MPa]`";
 
-impl Columns {
-    fn of(file: &table::Table, meaning: &Meaning) -> Result<Self, table::Error> {
-        let roles: Vec<Option<Role>> = file.headings.iter().map(Role::of).collect();
-        let strain = |what: What| if let What::Strain(measure) = what { Some(measure) } else { None };
-        let stress = |what: What| if let What::Stress(measure) = what { Some(measure) } else { None };
+impl TestColumns {
+    fn find(file: &table::Table, format: &TestFormat) -> Result<Self, table::Error> {
+        let roles: Vec<Option<Role>> = file.headings.iter().map(Role::from_heading).collect();
+        let strain =
+            |what: ColumnKind| if let ColumnKind::Strain(measure) = what { Some(measure) } else { None };
+        let stress =
+            |what: ColumnKind| if let ColumnKind::Stress(measure) = what { Some(measure) } else { None };
         let mut strains = Vec::new();
         let mut stresses = Vec::new();
         let paired = |axis| {
-            let has = |test: &dyn Fn(What) -> bool| {
+            let has = |test: &dyn Fn(ColumnKind) -> bool| {
                 roles.iter().flatten().any(|role| role.axis == Some(axis) && test(role.what))
             };
             has(&|what| strain(what).is_some()) && has(&|what| stress(what).is_some())
         };
-        let biaxial = meaning.strain_column.is_none() && paired(0) && paired(1);
+        let biaxial = format.strain_column.is_none() && paired(0) && paired(1);
         // `strain 1, stress 1, strain 2, stress 2` are specimens side by side
-        let place = |axis, test: &dyn Fn(What) -> bool| {
+        let place = |axis, test: &dyn Fn(ColumnKind) -> bool| {
             roles.iter().position(|role| {
                 role.as_ref().is_some_and(|role| role.axis == Some(axis) && role.numbered && test(role.what))
             })
@@ -131,8 +135,9 @@ impl Columns {
         let (stress_1, strain_2) =
             (place(0, &|what| stress(what).is_some()), place(1, &|what| strain(what).is_some()));
         if biaxial && stress_1.zip(strain_2).is_some_and(|(stress, strain)| stress < strain) {
-            let allowed = "`strain_column` and `stress_column` in the data's entry, if these are specimens side by side (an entry \
-                           each); of a biaxial test both strains before both stresses";
+            let allowed = "`strain_column` and `stress_column` in the data's entry, if these are specimens \
+                           side by side (an entry each); for a biaxial test both strains before both \
+                           stresses";
             return Err(file.refuse_headings(allowed));
         }
         let axes = if biaxial { vec![Some(0), Some(1)] } else { vec![None] };
@@ -143,8 +148,8 @@ impl Columns {
                 axis,
                 &Wanted {
                     key: "strain",
-                    name: meaning.strain_column.as_deref(),
-                    measure: meaning.strain,
+                    name: format.strain_column.as_deref(),
+                    measure: format.strain,
                     of: &strain,
                     order: &[StrainMeasure::Stretch, StrainMeasure::Engineering, StrainMeasure::True],
                     assumed: StrainMeasure::Engineering,
@@ -156,17 +161,18 @@ impl Columns {
                 axis,
                 &Wanted {
                     key: "stress",
-                    name: meaning.stress_column.as_deref(),
-                    measure: meaning.stress,
+                    name: format.stress_column.as_deref(),
+                    measure: format.stress,
                     of: &stress,
-                    order: &[StressMeasure::Nominal, StressMeasure::True],
-                    assumed: StressMeasure::Nominal,
+                    order: &[TestStressMeasure::Nominal, TestStressMeasure::True],
+                    assumed: TestStressMeasure::Nominal,
                 },
             )?);
         }
         let (first, other) = (&strains[0], &stresses[0]);
-        if first.assumed && other.measure == StressMeasure::True && !other.assumed {
-            let allowed = "`strain = \"engineering\"` or `strain = \"true\"` in the data's entry: the stress is a true one";
+        if first.assumed && other.measure == TestStressMeasure::True && !other.assumed {
+            let allowed = "`strain = \"engineering\"` or `strain = \"true\"` in the data's entry: the \
+                           stress is a true one";
             return Err(file.refuse_headings(allowed));
         }
         if other.assumed && first.measure == StrainMeasure::True && !first.assumed {
@@ -175,7 +181,7 @@ impl Columns {
             return Err(file.refuse_headings(allowed));
         }
         let named = |(i, role): (usize, &Option<Role>)| {
-            let is_mode = role.as_ref().is_some_and(|role| role.what == What::Mode);
+            let is_mode = role.as_ref().is_some_and(|role| role.what == ColumnKind::Mode);
             let says = || (0..file.rows()).any(|row| mode(file.text(row, i)).is_some());
             (is_mode && (file.headings[i].plain == MODES[0] || says())).then_some(i)
         };
@@ -183,19 +189,22 @@ impl Columns {
         Ok(Self { mode, strains, stresses })
     }
 
-    fn read(&self, file: &table::Table, meaning: &Meaning) -> Result<Reading, table::Error> {
-        let unit = |chosen: &Chosen<StressMeasure>| {
-            let text = chosen.unit.as_deref().or(meaning.stress_unit.as_deref()).unwrap_or_default();
+    fn read(&self, file: &table::Table, format: &TestFormat) -> Result<ImportedTest, table::Error> {
+        let unit = |chosen: &TestColumn<TestStressMeasure>| {
+            let text = chosen.unit.as_deref().or(format.stress_unit.as_deref()).unwrap_or_default();
             Unit::<StressDimension>::parse(&plain_unit(text)).map_err(|error| {
-                let what = format!("unit of column {}, `{}`", chosen.column + 1, file.headings[chosen.column].text);
+                let what =
+                    format!("unit of column {}, `{}`", chosen.column + 1, file.headings[chosen.column].text);
                 let found = if text.is_empty() { "no unit" } else { text };
-                let allowed =
-                    format!("a unit of stress in the heading, as in `nominal [MPa]`, or `stress_unit = \"MPa\"`; {error}");
+                let allowed = format!(
+                    "a unit of stress in the heading, as in `nominal [MPa]`, or `stress_unit = \
+                             \"MPa\"`; {error}"
+                );
                 file.refuse(file.layout().heading_line, &what, found.to_owned(), &allowed)
             })
         };
         let units = self.stresses.iter().map(unit).collect::<Result<Vec<_>, _>>()?;
-        let ratio = |chosen: &Chosen<StrainMeasure>| {
+        let ratio = |chosen: &TestColumn<StrainMeasure>| {
             Unit::<RatioDimension>::parse(&plain_unit(chosen.unit.as_deref().unwrap_or_default())).map_err(
                 |error| {
                     let what = format!(
@@ -208,7 +217,7 @@ impl Columns {
                         file.layout().heading_line,
                         &what,
                         found,
-                        &format!("a strain, in % or without unit; {error}"),
+                        &format!("a strain, in % or without a unit; {error}"),
                     )
                 },
             )
@@ -217,8 +226,8 @@ impl Columns {
         let mut rows = Vec::with_capacity(file.rows());
         let mut blank = 0;
         for index in 0..file.rows() {
-            let (test, compression) = self.test(file, index, meaning)?;
-            let mut row = Row {
+            let (test, compression) = self.test(file, index, format)?;
+            let mut row = TestRow {
                 index,
                 mode: test,
                 compression,
@@ -229,7 +238,7 @@ impl Columns {
             let mut measured = 0;
             for (axis, (chosen, unit)) in self.stresses.iter().zip(&units).enumerate() {
                 let Some(number) = file.number_or_blank(index, chosen.column)? else { continue };
-                let si = unit.of(number).map(|stress| stress.si());
+                let si = unit.quantity(number).map(|stress| stress.si());
                 row.nominal[axis] =
                     si.map_err(|error| file.refuse_cell(index, chosen.column, &error.to_string()))?;
                 measured += 1;
@@ -240,7 +249,7 @@ impl Columns {
             }
             for (axis, (chosen, ratio)) in self.strains.iter().zip(&ratios).enumerate() {
                 let number = file.number(index, chosen.column)?;
-                row.written[axis] = ratio.of(number).map_or(number, |ratio| ratio.si());
+                row.written[axis] = ratio.quantity(number).map_or(number, |ratio| ratio.si());
             }
             rows.push(row);
         }
@@ -248,7 +257,7 @@ impl Columns {
         if blank > 0 {
             notes.push(format!("{blank} rows without a stress are left out"));
         }
-        self.turn(&mut rows, &mut notes);
+        self.make_compression_negative(&mut rows, &mut notes);
         for row in &mut rows {
             for (axis, chosen) in self.strains.iter().enumerate() {
                 let written = row.written[axis];
@@ -258,7 +267,9 @@ impl Columns {
                     StrainMeasure::True => written.exp(),
                 };
                 if !(stretch > 0.0 && stretch.is_finite()) {
-                    let strain = "a stretch above 0; if this is a strain, head it `strain` or write `strain = \"engineering\"`";
+                    let strain = "a stretch above 0; if this is a strain, use the heading `strain` or \
+                                  `strain \
+                                  = \"engineering\"`";
                     let allowed = if chosen.measure == StrainMeasure::Stretch {
                         strain
                     } else {
@@ -272,7 +283,7 @@ impl Columns {
                 row.stretches[1] = row.mode.second_stretch(row.stretches[0]);
             }
             for (axis, chosen) in self.stresses.iter().enumerate() {
-                if chosen.measure == StressMeasure::True {
+                if chosen.measure == TestStressMeasure::True {
                     // J = 1: σ = λP
                     row.nominal[axis] /= row.stretches[axis];
                 }
@@ -280,29 +291,30 @@ impl Columns {
         }
         if self.strains.len() == 1 {
             let chosen = &self.strains[0];
-            let said = meaning.strain.is_some() || meaning.strain_column.is_some();
+            let said = format.strain.is_some() || format.strain_column.is_some();
             plausible(&mut rows, &mut notes, chosen.measure, said, chosen.unit.is_some())
                 .map_err(|(row, allowed)| file.refuse_cell(row, chosen.column, &allowed))?;
         }
-        let state = |row: &Row| State { mode: row.mode, stretches: row.stretches, nominal: row.nominal };
+        let state =
+            |row: &TestRow| TestState { mode: row.mode, stretches: row.stretches, nominal: row.nominal };
         let source = file.remark("# source:").unwrap_or_default().to_owned();
-        let table = Table { source, states: rows.iter().map(state).collect() };
+        let table = TestData { source, states: rows.iter().map(state).collect() };
         if table.measurements() == 0 {
             let found = format!("{} rows", file.rows());
-            return Err(file.refuse(
-                0,
-                "table",
-                found,
-                "at least one row; it contains no stress other than zero",
-            ));
+            return Err(file.refuse(0, "table", found, "at least one row with a stress other than zero"));
         }
-        Ok(Reading { understood: self.understood(file, &table), table, notes })
+        Ok(ImportedTest { description: self.describe(file, &table), table, notes })
     }
 
-    /// The test of a row, and whether it is compression.
-    fn test(&self, file: &table::Table, row: usize, meaning: &Meaning) -> Result<(Mode, bool), table::Error> {
+    /// Returns the test of a row; true if it is compression.
+    fn test(
+        &self,
+        file: &table::Table,
+        row: usize,
+        format: &TestFormat,
+    ) -> Result<(Mode, bool), table::Error> {
         let Some(column) = self.mode else {
-            let one = meaning.mode.unwrap_or(Mode::Uniaxial);
+            let one = format.mode.unwrap_or(Mode::Uniaxial);
             return Ok((if self.strains.len() == 2 { Mode::Biaxial } else { one }, false));
         };
         mode(file.text(row, column)).ok_or_else(|| {
@@ -311,29 +323,29 @@ impl Columns {
         })
     }
 
-    /// Strains and stresses that headings or tests call compressive are below zero.
-    fn turn(&self, rows: &mut [Row], notes: &mut Vec<String>) {
+    /// Makes strains and stresses negative that headings or tests call compressive.
+    fn make_compression_negative(&self, rows: &mut [TestRow], notes: &mut Vec<String>) {
         let (strain, stress) = (&self.strains[0], &self.stresses[0]);
         if self.strains.len() == 2 {
             return;
         }
-        let strains: fn(&mut Row) -> &mut f64 = |row| &mut row.written[0];
-        let stresses: fn(&mut Row) -> &mut f64 = |row| &mut row.nominal[0];
+        let strains: fn(&mut TestRow) -> &mut f64 = |row| &mut row.written[0];
+        let stresses: fn(&mut TestRow) -> &mut f64 = |row| &mut row.nominal[0];
         let turned = strain.measure != StrainMeasure::Stretch;
         for (name, value, may, by_heading) in [
             ("strains", strains, turned, strain.compressive && turned),
             ("stresses", stresses, true, stress.compressive),
         ] {
-            let mut of: Vec<&mut Row> =
+            let mut of: Vec<&mut TestRow> =
                 rows.iter_mut().filter(|row| may && (by_heading || row.compression)).collect();
             if of.iter_mut().all(|row| *value(row) >= 0.0) && !of.is_empty() {
                 of.iter_mut().for_each(|row| *value(row) = 0.0 - *value(row));
-                notes.push(format!("{name} of compression, positive in the file, are taken as negative"));
+                notes.push(format!("{name} in compression, positive in the file, become negative"));
             }
         }
     }
 
-    fn understood(&self, file: &table::Table, table: &Table) -> String {
+    fn describe(&self, file: &table::Table, table: &TestData) -> String {
         let used: Vec<usize> =
             self.mode.into_iter().chain(self.strains.iter().map(|chosen| chosen.column)).collect();
         let used: Vec<usize> =
@@ -344,14 +356,14 @@ impl Columns {
             StrainMeasure::True => "true strain",
         };
         let stress = match self.stresses[0].measure {
-            StressMeasure::Nominal => "nominal stress",
-            StressMeasure::True => "true stress",
+            TestStressMeasure::Nominal => "nominal stress",
+            TestStressMeasure::True => "true stress",
         };
         let biaxial = if self.strains.len() == 2 { "biaxial, " } else { "" };
         let assumed = match (self.strains[0].assumed, self.stresses[0].assumed) {
-            (true, true) => " (the headings do not say which; keys `strain` and `stress`)",
-            (true, false) => " (the heading does not say which strain; key `strain`)",
-            (false, true) => " (the heading does not say which stress; key `stress`)",
+            (true, true) => " (assumed; the keys `strain` and `stress` set them)",
+            (true, false) => " (strain assumed; the key `strain` sets it)",
+            (false, true) => " (stress assumed; the key `stress` sets it)",
             (false, false) => "",
         };
         let stretches =
@@ -360,17 +372,17 @@ impl Columns {
             stretches.fold((f64::INFINITY, 0.0_f64), |(low, high), l| (low.min(l), high.max(l)));
         format!(
             "{}; {biaxial}{strain} and {stress}{assumed}; stretches {low:.4} to {high:.4}",
-            file.understood(&used)
+            file.describe(&used)
         )
     }
 }
 
-/// A column that is looked for.
+/// Column to be found.
 struct Wanted<'a, M> {
     key: &'static str,
     name: Option<&'a str>,
     measure: Option<M>,
-    of: &'a dyn Fn(What) -> Option<Option<M>>,
+    of: &'a dyn Fn(ColumnKind) -> Option<Option<M>>,
     order: &'a [M],
     assumed: M,
 }
@@ -380,9 +392,9 @@ fn choose<M: Copy + PartialEq>(
     roles: &[Option<Role>],
     axis: Option<usize>,
     wanted: &Wanted<M>,
-) -> Result<Chosen<M>, table::Error> {
+) -> Result<TestColumn<M>, table::Error> {
     let key = wanted.key;
-    let chosen = |column: usize, measure: Option<M>, role: Option<&Role>| Chosen {
+    let chosen = |column: usize, measure: Option<M>, role: Option<&Role>| TestColumn {
         column,
         measure: wanted.measure.or(measure).unwrap_or(wanted.assumed),
         assumed: wanted.measure.or(measure).is_none(),
@@ -415,7 +427,7 @@ fn choose<M: Copy + PartialEq>(
         .filter_map(|(i, role)| Some((i, (wanted.of)(role.what)?, role)))
         .collect();
     let of = |measure: Option<M>| all.iter().filter(move |one| one.1 == measure).collect::<Vec<_>>();
-    // named measures in their order, then those that name none, then the last; what the key says before all
+    // named measures in their order, then those that name none, then the last; the key before all
     let mut order: Vec<Option<M>> = wanted.order.iter().copied().map(Some).collect();
     order.insert(order.len() - 1, None);
     if let Some(asked) = wanted.measure {
@@ -425,12 +437,13 @@ fn choose<M: Copy + PartialEq>(
     match found[..] {
         [(column, measure, role)] => Ok(chosen(*column, *measure, Some(role))),
         [] => {
-            let raw = roles.iter().flatten().any(|role| role.what == What::Raw);
-            let advice = "; forces are divided by the undeformed area, displacements by the free length";
+            let raw = roles.iter().flatten().any(|role| role.what == ColumnKind::Raw);
+            let advice = "; divide forces by the undeformed area and displacements by the free length";
             Err(file.refuse_headings(format!("{LAYOUTS}{}", if raw { advice } else { "" })))
         }
         _ => Err(file.refuse_headings(format!(
-            "one {key}, or `{key}_column = \"…\"` in the data's entry with one of these headings, or its number"
+            "one {key}, or `{key}_column = \"…\"` in the data's entry with one of these headings, or its \
+             number"
         ))),
     }
 }

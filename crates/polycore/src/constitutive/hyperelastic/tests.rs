@@ -1,4 +1,4 @@
-//! One check for every law of [`all`], and closed forms for each.
+//! Checks common to all laws of [`all`], and closed forms for each.
 
 use super::*;
 use crate::constitutive::verify::deformations;
@@ -78,7 +78,8 @@ fn every_law_passes_the_shared_check() {
     evidence::at_most("energy at rest over the shear modulus, every law", at_rest, 1e-12);
 }
 
-/// Uniaxial nominal stress 3με(1 − ε + O(ε²)) for small ε, in tension and compression, for every incompressible law.
+/// Uniaxial nominal stress 3με(1 − ε + O(ε²)) for small ε, in tension and compression, for every
+/// incompressible law.
 #[test]
 fn small_strain_limit_of_the_incompressible_laws() {
     for model in MODELS {
@@ -92,7 +93,8 @@ fn small_strain_limit_of_the_incompressible_laws() {
     }
 }
 
-/// At F = 1 the tangent is λ* 1⊗1 + 2μ𝕀 and, in the stress-free forms, S = 0; λ* is λ only for laws linear in I₁.
+/// Tests F = 1: the tangent is λ* 1⊗1 + 2μ𝕀 and, in the stress-free forms, S = 0; λ* is λ only for laws
+/// linear in I₁.
 #[test]
 fn small_strain_limit_of_the_compressible_laws() {
     let lame = 1.7e6;
@@ -204,7 +206,8 @@ fn chain_stretch_is_that_of_a_half_diagonal() {
     }
 }
 
-/// W = ½ tr(E ℂ E) = 3/2 με² in isochoric uniaxial strain ε, also where ε² is below the rounding of the printed sum.
+/// W = ½ tr(E ℂ E) = 3/2 με² in isochoric uniaxial strain ε, also where ε² is below the rounding of the
+/// printed sum.
 #[test]
 fn energy_of_small_strains_keeps_its_digits() {
     for model in MODELS {
@@ -215,14 +218,16 @@ fn energy_of_small_strains_keeps_its_digits() {
         let l = (0.5 * gamma).hypot(1.0) + 0.5 * gamma;
         let expected = 0.5 * law.shear_modulus() * gamma * gamma;
         let energy = law.energy_at([l, 1.0 / l, 1.0]).unwrap();
-        // first-order terms cancel to rounding, ε/γ = 2e-11; the three-chain law subtracts energies of order n
+        // first-order terms cancel to rounding, ε/γ = 2e-11; the three-chain law subtracts energies of order
+        // n
         let tolerance = if model.key == "three-chain" { 1e-4 } else { 1e-9 };
         let error = (energy / expected - 1.0).abs();
         assert!(error < tolerance, "{}: {energy} {expected}", model.key);
     }
 }
 
-/// Textbook closed forms of the nominal stress in uniaxial tension (Treloar, *The Physics of Rubber Elasticity*).
+/// Textbook closed forms of the nominal stress in uniaxial tension (Treloar, *The Physics of Rubber
+/// Elasticity*).
 #[test]
 fn uniaxial_closed_forms() {
     let b = crate::langevin::inverse;
@@ -253,7 +258,8 @@ fn uniaxial_closed_forms() {
     }
 }
 
-/// formulation.md, "Test numbers" of the eight-chain network: uniaxial, pure shear, equibiaxial P₁/μ₀ at 1e-7.
+/// formulation.md, "Test numbers" of the eight-chain network: uniaxial, pure shear, equibiaxial P₁/μ₀ at
+/// 1e-7.
 #[test]
 fn eight_chain_reference_numbers() {
     for (links, stretch, expected) in [
@@ -294,8 +300,8 @@ fn long_chains_are_neo_hookean() {
     }
 }
 
-/// Ogden's constants for Treloar's rubber (0.63, 0.0012, −0.01 MPa; 1.3, 5, −2), shear modulus ½Σμα = 0.4225 MPa,
-/// as published; in (1.24)'s own convention the same constants are twice as stiff.
+/// Ogden's constants for Treloar's rubber (0.63, 0.0012, −0.01 MPa; 1.3, 5, −2), shear modulus ½Σμα = 0.4225
+/// MPa, as published; in (1.24)'s own convention the same constants are twice as stiff.
 #[test]
 fn ogden_conventions() {
     let terms = [(0.63e6, 1.3), (0.0012e6, 5.0), (-0.01e6, -2.0)];

@@ -1,6 +1,6 @@
 //! Yeoh's law, the reduced polynomial of third order.
 
-use super::descriptor::{Contained, Domain, Kind, ModelDescriptor, Parameter};
+use super::descriptor::{Contained, Domain, ModelDescriptor, ModelKind, Parameter};
 use super::polynomial::first_invariant_excess;
 use super::principal::InvariantDerivatives;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive};
@@ -13,7 +13,7 @@ pub struct Yeoh {
 
 pub(super) const YEOH: ModelDescriptor = ModelDescriptor {
     key: "yeoh",
-    kind: Kind::Phenomenological,
+    kind: ModelKind::Phenomenological,
     parameters: &[
         Parameter { name: "C1", unit: "Pa", domain: Domain::Positive },
         Parameter { name: "C2", unit: "Pa", domain: Domain::Real },
@@ -30,7 +30,7 @@ pub(super) const YEOH: ModelDescriptor = ModelDescriptor {
 impl Yeoh {
     const NAME: &'static str = "Yeoh";
 
-    /// C₁ > 0, C₂, C₃ of any sign, in Pa. Where W falls with I₁ the law is unstable.
+    /// Builds the law from C₁ > 0 and C₂, C₃ of any sign, in Pa. If W falls with I₁ the law is unstable.
     ///
     /// # Errors
     /// [`Error::Parameter`].
@@ -69,6 +69,6 @@ impl Hyperelastic for Yeoh {
             first_first: 2.0 * b + 6.0 * c * x,
             ..Default::default()
         };
-        PrincipalResponse::of_invariants(stretches, w).finite(Self::NAME, stretches)
+        PrincipalResponse::from_invariants(stretches, w).finite(Self::NAME, stretches)
     }
 }

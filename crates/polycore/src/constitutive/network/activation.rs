@@ -1,9 +1,9 @@
-//! What neurons do with their sums.
+//! Activation functions and their derivatives.
 
 use super::real::Real;
 use serde::{Deserialize, Serialize};
 
-/// What a neuron does with its sum; (3.11) and more.
+/// Activation function of a neuron; (3.11) and more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
@@ -25,24 +25,24 @@ pub enum Activation {
 }
 
 impl Activation {
-    /// All of them.
+    /// All activations.
     pub const ALL: [Self; 7] =
         [Self::Linear, Self::Relu, Self::Softplus, Self::Tanh, Self::Sigmoid, Self::Silu, Self::Elu];
 
     /// Value, first and second derivative.
-    pub fn at<T: Real>(self, x: T) -> [T; 3] {
+    pub fn derivatives<T: Real>(self, x: T) -> [T; 3] {
         match self {
-            Self::Linear => Linear::at::<T, false>(x),
-            Self::Relu => Relu::at::<T, false>(x),
-            Self::Softplus => Softplus::at::<T, false>(x),
-            Self::Tanh => Tanh::at::<T, false>(x),
-            Self::Sigmoid => Sigmoid::at::<T, false>(x),
-            Self::Silu => Silu::at::<T, false>(x),
-            Self::Elu => Elu::at::<T, false>(x),
+            Self::Linear => Linear::derivatives::<T, false>(x),
+            Self::Relu => Relu::derivatives::<T, false>(x),
+            Self::Softplus => Softplus::derivatives::<T, false>(x),
+            Self::Tanh => Tanh::derivatives::<T, false>(x),
+            Self::Sigmoid => Sigmoid::derivatives::<T, false>(x),
+            Self::Silu => Silu::derivatives::<T, false>(x),
+            Self::Elu => Elu::derivatives::<T, false>(x),
         }
     }
 
-    /// Values, first and second derivatives of a list; lists that are empty are not wanted.
+    /// Computes values, first and second derivatives of a list; empty lists are skipped.
     #[inline(always)]
     pub(super) fn fill<T: Real, const FUSED: bool>(
         self,
@@ -65,7 +65,7 @@ impl Activation {
 
 /// Plain loops without branches: the compiler turns them into vectors of the dispatched width.
 #[inline(always)]
-fn fill<F: Function, T: Real, const FUSED: bool>(
+fn fill<F: SmoothFunction, T: Real, const FUSED: bool>(
     sums: &[T],
     values: &mut [T],
     first: &mut [T],
@@ -76,23 +76,23 @@ fn fill<F: Function, T: Real, const FUSED: bool>(
     if second.len() >= count && first.len() >= count {
         let (first, second) = (&mut first[..count], &mut second[..count]);
         for k in 0..count {
-            [values[k], first[k], second[k]] = F::at::<T, FUSED>(sums[k]);
+            [values[k], first[k], second[k]] = F::derivatives::<T, FUSED>(sums[k]);
         }
     } else if first.len() >= count {
         let first = &mut first[..count];
         for k in 0..count {
-            [values[k], first[k], _] = F::at::<T, FUSED>(sums[k]);
+            [values[k], first[k], _] = F::derivatives::<T, FUSED>(sums[k]);
         }
     } else {
         for k in 0..count {
-            [values[k], _, _] = F::at::<T, FUSED>(sums[k]);
+            [values[k], _, _] = F::derivatives::<T, FUSED>(sums[k]);
         }
     }
 }
 
-/// A function of one variable with two derivatives, without branches.
-trait Function {
-    fn at<T: Real, const FUSED: bool>(x: T) -> [T; 3];
+/// Function of one variable with two derivatives, without branches.
+trait SmoothFunction {
+    fn derivatives<T: Real, const FUSED: bool>(x: T) -> [T; 3];
 }
 
 struct Linear;
@@ -103,25 +103,25 @@ struct Sigmoid;
 struct Silu;
 struct Elu;
 
-impl Function for Linear {
+impl SmoothFunction for Linear {
     #[inline(always)]
-    fn at<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
+    fn derivatives<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
         [x, T::ONE, T::ZERO]
     }
 }
 
-impl Function for Relu {
+impl SmoothFunction for Relu {
     #[inline(always)]
-    fn at<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
+    fn derivatives<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
         // NaN is not ≤ 0 and stays
         let off = x <= T::ZERO;
         [if off { T::ZERO } else { x }, if off { T::ZERO } else { T::ONE }, T::ZERO]
     }
 }
 
-impl Function for Softplus {
+impl SmoothFunction for Softplus {
     #[inline(always)]
-    fn at<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
+    fn derivatives<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
         let small = exp_of_minus_size::<T, FUSED>(x);
         let s = logistic(x, small);
         let positive = if x < T::ZERO { T::ZERO } else { x };
@@ -129,9 +129,9 @@ impl Function for Softplus {
     }
 }
 
-impl Function for Tanh {
+impl SmoothFunction for Tanh {
     #[inline(always)]
-    fn at<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
+    fn derivatives<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
         // (1 − e^{−2|x|})/(1 + e^{−2|x|}): to rounding of 1, not of small x
         let small = exp_of_minus_size::<T, FUSED>(x + x);
         let size = (T::ONE - small) / (T::ONE + small);
@@ -141,29 +141,29 @@ impl Function for Tanh {
     }
 }
 
-impl Function for Sigmoid {
+impl SmoothFunction for Sigmoid {
     #[inline(always)]
-    fn at<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
+    fn derivatives<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
         let s = logistic(x, exp_of_minus_size::<T, FUSED>(x));
         let first = s * (T::ONE - s);
         [s, first, first * (T::ONE - s - s)]
     }
 }
 
-impl Function for Silu {
+impl SmoothFunction for Silu {
     #[inline(always)]
-    fn at<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
+    fn derivatives<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
         let s = logistic(x, exp_of_minus_size::<T, FUSED>(x));
         let slope = s * (T::ONE - s);
-        // far out the slope is 0, and so is what it multiplies, also where x is infinite
+        // far out the slope is 0, and so is its product, also where x is infinite
         let bent = if slope == T::ZERO { T::ZERO } else { x * slope };
         [x * s, s + bent, (slope + slope) + bent * (T::ONE - s - s)]
     }
 }
 
-impl Function for Elu {
+impl SmoothFunction for Elu {
     #[inline(always)]
-    fn at<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
+    fn derivatives<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
         let e = exp_of_minus_size::<T, FUSED>(x);
         let on = x > T::ZERO;
         [if on { x } else { e - T::ONE }, if on { T::ONE } else { e }, if on { T::ZERO } else { e }]
@@ -191,21 +191,26 @@ mod tests {
         let step = 1e-5;
         for activation in Activation::ALL {
             for x in [-30.0, -2.0, -0.3, 0.4, 3.0, 30.0] {
-                let [low, at, high] = [x - step, x, x + step].map(|x| activation.at::<f64>(x));
+                let [low, at, high] = [x - step, x, x + step].map(|x| activation.derivatives::<f64>(x));
                 // central differences: rounding ε·|f|/h and truncation h²
                 assert!(((high[0] - low[0]) / (2.0 * step) - at[1]).abs() < 2e-9, "{activation:?} {x}");
                 assert!(((high[1] - low[1]) / (2.0 * step) - at[2]).abs() < 2e-9, "{activation:?} {x}");
             }
             for x in [f64::MAX, -f64::MAX, 1e4, -1e4, 0.0] {
-                assert!(activation.at(x).iter().all(|value| value.is_finite()), "{activation:?} {x}");
-                assert!(activation.at(x.clamp(-3e38, 3e38) as f32).iter().all(|value| value.is_finite()));
+                assert!(
+                    activation.derivatives(x).iter().all(|value| value.is_finite()),
+                    "{activation:?} {x}"
+                );
+                assert!(
+                    activation.derivatives(x.clamp(-3e38, 3e38) as f32).iter().all(|value| value.is_finite())
+                );
             }
-            // a fault is not swallowed
-            assert!(activation.at(f64::NAN)[0].is_nan(), "{activation:?}");
+            // NaN is not hidden
+            assert!(activation.derivatives(f64::NAN)[0].is_nan(), "{activation:?}");
         }
-        evidence::near("ReLU of −1", Activation::Relu.at(-1.0)[0], 0.0, 0.0);
+        evidence::near("ReLU of −1", Activation::Relu.derivatives(-1.0)[0], 0.0, 0.0);
         // ln 2, and ln(1 + e^-40) = e^-40 to 17 digits
-        assert!((Activation::Softplus.at(0.0)[0] - std::f64::consts::LN_2).abs() < 1e-16);
-        assert!((Activation::Softplus.at(-40.0)[0] / f64::exp(-40.0) - 1.0).abs() < 1e-15);
+        assert!((Activation::Softplus.derivatives(0.0)[0] - std::f64::consts::LN_2).abs() < 1e-16);
+        assert!((Activation::Softplus.derivatives(-40.0)[0] / f64::exp(-40.0) - 1.0).abs() < 1e-15);
     }
 }

@@ -1,32 +1,33 @@
 //! Weights in the order in which the kernel reads them, and the kernel.
 //!
-//! Outputs stand in panels of [`Lanes::PANEL`](super::real::Lanes::PANEL); within a panel come all inputs, one row of
-//! the panel's width each. A product goes through the inputs once, with the sums of a panel for several columns
-//! (a value and its slopes, or several points) in registers, and skips inputs that are 0 in all columns, as many are
-//! after a `relu`. Each sum is taken in the order of the inputs, whatever the number of columns: the same bits.
+//! Outputs stand in panels of [`SimdLanes::PANEL`](super::real::SimdLanes::PANEL); within a panel come all
+//! inputs, one row of the panel's width each. A product goes through the inputs once, with the sums of a
+//! panel for several columns (a value and its slopes, or several points) in registers, and skips inputs that
+//! are 0 in all columns, as many are after a `relu`. Each sum is taken in the order of the inputs, whatever
+//! the number of columns: the same bits.
 
-use super::real::{Lanes, Real};
+use super::real::{Real, SimdLanes};
 use aligned_vec::{AVec, ConstAlign};
 use pulp::Simd;
 use std::ops::Range;
 
-/// Numbers that begin where a cache line does: a vector that lies across two lines costs two loads.
-type Lines<T> = AVec<T, ConstAlign<64>>;
+/// Numbers aligned to cache lines: a vector that lies across two lines costs two loads.
+type AlignedVec<T> = AVec<T, ConstAlign<64>>;
 
-/// Most columns of one product: a value and eight slopes.
+/// Largest number of columns of one product: a value and eight slopes.
 pub(super) const MOST_COLUMNS: usize = 9;
 
 /// W and b of one layer, packed.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Packed<T> {
+pub(super) struct PackedMatrix<T> {
     inputs: usize,
     outputs: usize,
     padded: usize,
-    weights: Lines<T>,
-    bias: Lines<T>,
+    weights: AlignedVec<T>,
+    bias: AlignedVec<T>,
 }
 
-impl<T: Real> Packed<T> {
+impl<T: Real> PackedMatrix<T> {
     /// W, (outputs, inputs) row by row, and b.
     pub fn new(inputs: usize, weights: &[T], bias: &[T]) -> Self {
         Self::fill(inputs, bias.len(), bias, |k, j| weights[k * inputs + j])
@@ -66,8 +67,8 @@ impl<T: Real> Packed<T> {
         }
     }
 
-    /// W x + b for each column of x, b only in the first `biased` of them; columns lie `stride` apart, those of the
-    /// result as far as the padded number of outputs.
+    /// W x + b for each column of x, b only in the first `biased` of them; columns lie `stride` apart, those
+    /// of the result as far as the padded number of outputs.
     #[inline(always)]
     pub fn product<S: Simd>(
         &self,
@@ -82,8 +83,8 @@ impl<T: Real> Packed<T> {
             1 => self.columns::<S, 1>(simd, active, x, stride, biased, all, out),
             2..=4 => self.columns::<S, 4>(simd, active, x, stride, biased, all, out),
             5 | 6 => self.columns::<S, 6>(simd, active, x, stride, biased, all, out),
-            // sixteen registers: two vectors of outputs for six columns at most, or loads are the limit; two panels after one another,
-            // which further columns find in the nearest cache
+            // sixteen registers: two vectors of outputs for six columns at most, or loads are the limit; two
+            // panels after one another, which further columns find in the nearest cache
             _ if in_panel::<T, S>() == 4 => {
                 for panel in all.clone().step_by(2) {
                     let pair = panel..all.end.min(panel + 2);
@@ -229,13 +230,13 @@ const fn in_panel<T: Real, S: Simd>() -> usize {
     T::PANEL * size_of::<T>() / size_of::<T::Vector<S>>()
 }
 
-fn zeros<T: Real>(length: usize) -> Lines<T> {
-    let mut list = Lines::with_capacity(0, length);
+fn zeros<T: Real>(length: usize) -> AlignedVec<T> {
+    let mut list = AlignedVec::with_capacity(0, length);
     list.resize(length, T::ZERO);
     list
 }
 
 /// Outputs in whole panels.
-pub(super) fn padded<T: Lanes>(outputs: usize) -> usize {
+pub(super) fn padded<T: SimdLanes>(outputs: usize) -> usize {
     outputs.next_multiple_of(T::PANEL)
 }

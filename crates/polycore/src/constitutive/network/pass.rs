@@ -1,14 +1,14 @@
-//! One evaluation of a network: forwards with slopes, backwards for gradients.
+//! Evaluation of a network: forward with slopes, backward for gradients.
 
 use super::packed::{MOST_COLUMNS, padded};
 use super::real::Real;
 use super::{Activation, Layer, Network};
 use pulp::{Arch, Simd, WithSimd};
 
-/// Values whose being 0 is one word of bits.
+/// Number of values whose zeros are marked in one word of bits.
 const GROUP: usize = 64;
 
-/// Points that a batch takes side by side.
+/// Number of points of a batch.
 pub(in crate::constitutive) const BATCH: usize = 8;
 
 /// Memory for evaluations, reused between them: nothing is allocated while the widths stay the same.
@@ -17,7 +17,7 @@ pub struct Tape<T> {
     widths: Vec<usize>,
     /// Inputs, one column a point.
     input: Vec<T>,
-    layers: Vec<Record<T>>,
+    layers: Vec<LayerRecord<T>>,
     /// 0, 1, 2, …
     all: Vec<u32>,
     active: Vec<u32>,
@@ -26,9 +26,9 @@ pub struct Tape<T> {
     delta: Vec<T>,
 }
 
-/// What a layer did: columns, each padded to whole panels.
+/// Results of a layer: columns, each padded to whole panels.
 #[derive(Debug, Clone, Default)]
-struct Record<T> {
+struct LayerRecord<T> {
     outputs: usize,
     stride: usize,
     sums: Vec<T>,
@@ -37,9 +37,9 @@ struct Record<T> {
     second: Vec<T>,
 }
 
-/// What is wanted of a pass.
+/// Derivatives that a pass computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Want {
+pub(super) enum PassOutput {
     /// Outputs at 1 or more points; with gradients of the first output, or without.
     Points { count: usize, gradients: bool },
     /// Outputs and their slopes at one point.
@@ -59,7 +59,7 @@ impl<T: Real> Tape<T> {
         let record = |&outputs: &usize| {
             let stride = padded::<T>(outputs);
             let [sums, values, first, second] = [stride; 4].map(list);
-            Record { outputs, stride, sums, values, first, second }
+            LayerRecord { outputs, stride, sums, values, first, second }
         };
         self.layers = widths[1..].iter().map(record).collect();
         self.input = list(widths[0]);
@@ -78,7 +78,7 @@ impl<T: Real> Tape<T> {
         }
     }
 
-    /// The outputs (0) or their derivatives by input c − 1; of a batch those of point c.
+    /// Outputs (c = 0), or their derivatives with respect to input c − 1; in a batch, the outputs at point c.
     pub(super) fn output(&self, c: usize) -> &[T] {
         self.layers.last().map_or(&[], |last| &last.values[c * last.stride..c * last.stride + last.outputs])
     }
@@ -90,21 +90,22 @@ impl<T: Real> Tape<T> {
     }
 }
 
-/// Runs a pass with the widest instructions of this machine; returns the second derivatives, zero if not wanted.
-pub(super) fn run<T: Real>(network: &Network<T>, want: Want, tape: &mut Tape<T>) -> Curvature<T> {
-    Arch::new().dispatch(Pass { network, want, tape })
+/// Runs a pass with the widest instructions of this machine; returns the second derivatives, or zero if not
+/// requested.
+pub(super) fn run<T: Real>(network: &Network<T>, want: PassOutput, tape: &mut Tape<T>) -> Curvature<T> {
+    Arch::new().dispatch(NetworkPass { network, want, tape })
 }
 
-/// Second derivatives by up to eight inputs.
+/// Second derivatives with respect to up to eight inputs.
 pub(super) type Curvature<T> = [[T; MOST_COLUMNS - 1]; MOST_COLUMNS - 1];
 
-struct Pass<'a, T> {
+struct NetworkPass<'a, T> {
     network: &'a Network<T>,
-    want: Want,
+    want: PassOutput,
     tape: &'a mut Tape<T>,
 }
 
-impl<T: Real> WithSimd for Pass<'_, T> {
+impl<T: Real> WithSimd for NetworkPass<'_, T> {
     type Output = Curvature<T>;
 
     #[inline(always)]
@@ -117,7 +118,7 @@ impl<T: Real> WithSimd for Pass<'_, T> {
             forward::<T, S, false>(simd, network, want, tape);
         }
         let mut curvature = Curvature::<T>::default();
-        if matches!(want, Want::Curvature | Want::Points { gradients: true, .. }) {
+        if matches!(want, PassOutput::Curvature | PassOutput::Points { gradients: true, .. }) {
             backward(simd, network, want, tape, &mut curvature);
         }
         curvature
@@ -128,13 +129,13 @@ impl<T: Real> WithSimd for Pass<'_, T> {
 fn forward<T: Real, S: Simd, const FUSED: bool>(
     simd: S,
     network: &Network<T>,
-    want: Want,
+    want: PassOutput,
     tape: &mut Tape<T>,
 ) {
     let inputs = tape.widths[0];
     let (columns, points) = match want {
-        Want::Points { count, .. } => (count, count),
-        Want::Slopes | Want::Curvature => (1 + inputs, 1),
+        PassOutput::Points { count, .. } => (count, count),
+        PassOutput::Slopes | PassOutput::Curvature => (1 + inputs, 1),
     };
     for (index, (layer, packed)) in network.layers.iter().zip(&network.packed).enumerate() {
         let (before, after) = tape.layers.split_at_mut(index);
@@ -162,7 +163,7 @@ fn forward<T: Real, S: Simd, const FUSED: bool>(
     }
 }
 
-/// Inputs of a product that are not 0: after a `relu` at one point those that let through, else all.
+/// Inputs of a product that are not 0: after a `relu` at one point the active ones, else all.
 #[inline(always)]
 fn find_active<'a, T: Real>(values: &[T], sparse: bool, all: &'a [u32], active: &'a mut [u32]) -> &'a [u32] {
     let width = values.len();
@@ -188,17 +189,17 @@ fn find_active<'a, T: Real>(values: &[T], sparse: bool, all: &'a [u32], active: 
 #[inline(always)]
 fn activate<T: Real, const FUSED: bool>(
     layer: &Layer<T>,
-    want: Want,
+    want: PassOutput,
     points: usize,
     columns: usize,
-    record: &mut Record<T>,
+    record: &mut LayerRecord<T>,
 ) {
     let stride = record.stride;
     let all = points * stride;
     let (first, second) = match want {
-        Want::Points { gradients: false, .. } => (0, 0),
-        Want::Points { gradients: true, .. } | Want::Slopes => (all, 0),
-        Want::Curvature => (all, all),
+        PassOutput::Points { gradients: false, .. } => (0, 0),
+        PassOutput::Points { gradients: true, .. } | PassOutput::Slopes => (all, 0),
+        PassOutput::Curvature => (all, all),
     };
     layer.activation.fill::<T, FUSED>(
         &record.sums[..all],
@@ -216,17 +217,17 @@ fn activate<T: Real, const FUSED: bool>(
     }
 }
 
-/// With the sums a of each layer and the adjoints g = ∂out/∂y of its activations y = σ(a): the gradient by reverse mode,
-/// H = Σ g σ″(a) (∂a/∂x)(∂a/∂x)ᵀ over all neurons.
+/// Computes the gradient by reverse mode, from the sums a of each layer and the adjoints g = ∂out/∂y of its
+/// activations y = σ(a), and H = Σ g σ″(a) (∂a/∂x)(∂a/∂x)ᵀ over all neurons.
 #[inline(always)]
 fn backward<T: Real, S: Simd>(
     simd: S,
     network: &Network<T>,
-    want: Want,
+    want: PassOutput,
     tape: &mut Tape<T>,
     curvature: &mut Curvature<T>,
 ) {
-    let points = if let Want::Points { count, .. } = want { count } else { 1 };
+    let points = if let PassOutput::Points { count, .. } = want { count } else { 1 };
     let inputs = tape.widths[0];
     let last = tape.layers.last().map_or(0, |record| record.stride);
     for point in 0..points {
@@ -244,7 +245,7 @@ fn backward<T: Real, S: Simd>(
         }
         let sparse = layer.activation == Activation::Relu && points == 1;
         let active = find_active(&delta[..record.outputs], sparse, &tape.all, &mut tape.active);
-        if want == Want::Curvature {
+        if want == PassOutput::Curvature {
             add_curvature::<T, S>(simd, record, adjoint, inputs, curvature);
         }
         let x = (&tape.delta[..], stride);
@@ -256,7 +257,7 @@ fn backward<T: Real, S: Simd>(
 #[inline(always)]
 fn add_curvature<T: Real, S: Simd>(
     simd: S,
-    record: &mut Record<T>,
+    record: &mut LayerRecord<T>,
     adjoint: &[T],
     inputs: usize,
     curvature: &mut Curvature<T>,
@@ -304,26 +305,26 @@ mod tests {
     use super::*;
     use crate::constitutive::network::Architecture;
 
-    /// Machines without vectors, or with narrower ones, give the same numbers to rounding.
+    /// Machines without vectors, or with narrower ones, give the same numbers up to rounding.
     #[test]
     fn every_instruction_set_agrees() {
         let hidden = [(40, Activation::Relu), (33, Activation::Softplus), (20, Activation::Tanh)];
         let network = Network::<f64>::random(Architecture::new(7, &hidden, 1), 2).unwrap();
         for want in [
-            Want::Points { count: 1, gradients: false },
-            Want::Points { count: BATCH, gradients: true },
-            Want::Slopes,
-            Want::Curvature,
+            PassOutput::Points { count: 1, gradients: false },
+            PassOutput::Points { count: BATCH, gradients: true },
+            PassOutput::Slopes,
+            PassOutput::Curvature,
         ] {
             let mut results = Vec::new();
-            let points = if let Want::Points { count, .. } = want { count } else { 1 };
+            let points = if let PassOutput::Points { count, .. } = want { count } else { 1 };
             for set in 0..3 {
                 let mut tape = Tape::default();
                 tape.fit(&network);
                 for point in 0..points {
                     tape.set_input(point, &[0.3, -0.2, 0.5, 0.1, -0.7, 0.9, 0.1 * point as f64]);
                 }
-                let pass = Pass { network: &network, want, tape: &mut tape };
+                let pass = NetworkPass { network: &network, want, tape: &mut tape };
                 let curvature = match set {
                     0 => Arch::new().dispatch(pass),
                     1 => pass.with_simd(pulp::Scalar::new()),
@@ -338,7 +339,7 @@ mod tests {
                 let mut all = curvature.as_flattened().to_vec();
                 for point in 0..points {
                     all.extend_from_slice(tape.output(point));
-                    if matches!(want, Want::Curvature | Want::Points { gradients: true, .. }) {
+                    if matches!(want, PassOutput::Curvature | PassOutput::Points { gradients: true, .. }) {
                         all.extend_from_slice(tape.gradient(point));
                     }
                 }

@@ -4,13 +4,13 @@ use pulp::Simd;
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
-/// What the kernels ask of a precision: vectors of the machine's widest instructions.
-pub trait Lanes: Copy {
+/// Floating-point type with vectors of the machine's widest instructions.
+pub trait SimdLanes: Copy {
     /// A vector.
     type Vector<S: Simd>: Copy;
-    /// Outputs that stand side by side in packed weights: 128 bytes.
+    /// Number of adjacent outputs in packed weights: 128 bytes.
     const PANEL: usize;
-    /// All lanes alike.
+    /// Sets all lanes to a value.
     fn splat<S: Simd>(simd: S, value: Self) -> Self::Vector<S>;
     /// a·b + c.
     fn mul_add<S: Simd>(
@@ -21,15 +21,15 @@ pub trait Lanes: Copy {
     ) -> Self::Vector<S>;
     /// The sum of the lanes.
     fn sum<S: Simd>(simd: S, a: Self::Vector<S>) -> Self;
-    /// A list as whole vectors; a rest is left out.
+    /// List as whole vectors; the remainder is left out.
     fn vectors<S: Simd>(list: &[Self]) -> &[Self::Vector<S>];
-    /// A list as whole vectors to write; a rest is left out.
+    /// List as whole vectors to write; the remainder is left out.
     fn vectors_mut<S: Simd>(list: &mut [Self]) -> &mut [Self::Vector<S>];
 }
 
 /// The two precisions of inference.
 pub trait Real:
-    Lanes
+    SimdLanes
     + Copy
     + Default
     + Debug
@@ -50,27 +50,31 @@ pub trait Real:
     const ONE: Self;
     /// Rounded from f64.
     fn from_f64(value: f64) -> Self;
-    /// To f64, exact.
+    /// Converts to f64, exactly.
     fn to_f64(self) -> f64;
     /// a·b + c, in one rounding where the machine has an instruction for it.
     fn fused<const FUSED: bool>(self, b: Self, c: Self) -> Self;
     /// eˣ of x ≤ 0 without branches, 0 where it would be subnormal; NaN stays NaN.
     ///
-    /// x = n ln 2 + r, |r| ≤ ½ ln 2; the Taylor series of eʳ to its last term above ¼ ulp, times 2ⁿ by its bits.
+    /// x = n ln 2 + r, |r| ≤ ½ ln 2; the Taylor series of eʳ to its last term above ¼ ulp, times 2ⁿ by its
+    /// bits.
     fn exp_of_negative<const FUSED: bool>(self) -> Self;
     /// ln(1 + t) of 0 ≤ t ≤ 1 without branches.
     ///
-    /// 1 + t, or half of it, is 1 + f with f in [1/√2 − 1, √2 − 1]; ln(1 + f) = 2 artanh u, u = f/(2 + f), as a series.
+    /// 1 + t, or half of it, is 1 + f with f in [1/√2 − 1, √2 − 1]; ln(1 + f) = 2 artanh u, u = f/(2 + f), as
+    /// a series.
     fn ln_1p_of_unit<const FUSED: bool>(self) -> Self;
     /// √x.
     fn root(self) -> Self;
 }
 
 macro_rules! real {
-    ($type:ident, $bits:ident, vectors $vectors:ident, $lanes:ident, $splat:ident, $mul_add:ident, $sum:ident, $as:ident, $as_mut:ident,
-     panel $panel:literal, magic $magic:literal, mantissa $mantissa:literal, least $least:literal, bias $bias:literal,
+    ($type:ident, $bits:ident, vectors $vectors:ident, $lanes:ident, $splat:ident, $mul_add:ident, $sum:ident,
+     $as:ident, $as_mut:ident,
+     panel $panel:literal, magic $magic:literal, mantissa $mantissa:literal, least $least:literal,
+     bias $bias:literal,
      ln2 $high:literal + $low:literal, exp $exp:literal, artanh $artanh:literal) => {
-        impl Lanes for $type {
+        impl SimdLanes for $type {
             type Vector<S: Simd> = S::$vectors;
             const PANEL: usize = $panel;
             #[inline(always)]
@@ -163,12 +167,15 @@ macro_rules! real {
         }
     };
 }
-// magic: 1.5·2^mantissa, so that the low bits of x + magic are the integer next to x. ln 2 as the sum of a number with
-// trailing zeros (n·high is exact) and the rest. Terms: 0.3466^N/N! and 0.02944^N/(2N + 1) below a quarter ulp.
-real!(f32, u32, vectors f32s, F32_LANES, splat_f32s, mul_add_e_f32s, reduce_sum_f32s, as_simd_f32s, as_mut_simd_f32s,
+// magic: 1.5·2^mantissa, so that the low bits of x + magic are the integer next to x. ln 2 as the sum of a
+// number with trailing zeros (n·high is exact) and the rest. Terms: 0.3466^N/N! and 0.02944^N/(2N + 1) below
+// a quarter ulp.
+real!(f32, u32, vectors f32s, F32_LANES, splat_f32s, mul_add_e_f32s, reduce_sum_f32s,
+      as_simd_f32s, as_mut_simd_f32s,
       panel 32, magic 12_582_912.0, mantissa 23, least -87.0, bias 127,
       ln2 0.693_145_75 + 1.428_606_8e-6, exp 8, artanh 5);
-real!(f64, u64, vectors f64s, F64_LANES, splat_f64s, mul_add_e_f64s, reduce_sum_f64s, as_simd_f64s, as_mut_simd_f64s,
+real!(f64, u64, vectors f64s, F64_LANES, splat_f64s, mul_add_e_f64s, reduce_sum_f64s,
+      as_simd_f64s, as_mut_simd_f64s,
       panel 16, magic 6_755_399_441_055_744.0, mantissa 52, least -708.0, bias 1023,
       ln2 0.693_147_180_369_123_8 + 1.908_214_929_270_587_7e-10, exp 14, artanh 11);
 

@@ -1,6 +1,6 @@
-//! From C to a prediction: members, their mean, lists of points.
+//! Predictions at C: members, their mean, lists of points.
 
-use super::{Kind, Memory, Prediction, Rest, Surrogate, Workspace, back, product};
+use super::{Kind, Prediction, RestTerm, Surrogate, SurrogateScratch, Workspace, product, to_data_axes};
 use crate::constitutive::Error;
 use crate::constitutive::law::same_length;
 use crate::constitutive::network::{BATCH, LANES, Real, Tape};
@@ -8,17 +8,18 @@ use crate::tensor::Voigt;
 use crate::tensor::voigt::{self, NAMES};
 use nalgebra::{SMatrix, SVector};
 
-/// What the networks are given at a C.
+/// Inputs of the networks at a C.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Features {
-    /// Standardised inputs (3.8); the first of them count.
+    /// Standardised inputs (3.8); only as many as the network has.
     pub values: [f64; LANES],
-    /// Of an energy: derivatives of its invariants, not yet standardised, by the six components of C, C₁₂ counted once.
+    /// Derivatives of the invariants of an energy, not yet standardised, with respect to the six components
+    /// of C, C₁₂ counted once.
     pub slopes: [[f64; 6]; LANES],
 }
 
 impl Surrogate<f64> {
-    /// The inputs at `c`; those of an `ann` are the components of C themselves and have no slopes.
+    /// Inputs at `c`; those of an `ann` are the components of C and have no slopes.
     pub fn features(&self, c: &Voigt) -> Features {
         let mut features = Features { values: [0.0; LANES], slopes: [[0.0; 6]; LANES] };
         let local = self.input(&(*c).into(), &mut features.values);
@@ -26,7 +27,7 @@ impl Surrogate<f64> {
             for k in 0..invariants.count() {
                 let slope = invariants.gradient(&local, k);
                 features.slopes[k] = match &self.turn {
-                    Some(turn) => back(turn, &slope, &[[0.0; 6]; 6]).0,
+                    Some(turn) => to_data_axes(turn, &slope, &[[0.0; 6]; 6]).0,
                     None => slope,
                 };
             }
@@ -35,7 +36,7 @@ impl Surrogate<f64> {
     }
 }
 
-/// Energy, ∂W/∂c (or S of an `ann`) and their derivatives by c.
+/// Energy, ∂W/∂c (or S of an `ann`) and their derivatives with respect to c.
 pub(super) struct Member<T> {
     pub energy: T,
     pub first: [T; 6],
@@ -43,7 +44,7 @@ pub(super) struct Member<T> {
 }
 
 impl<T: Real + nalgebra::Scalar> Surrogate<T> {
-    /// S at each C with its uncertainty, to the same bits as one by one, at less cost.
+    /// Computes S at each C with its uncertainty, with the same bits as one by one, at less cost.
     ///
     /// # Errors
     /// Those of [`Surrogate::stress`], with the place in the list; a list of predictions of another length.
@@ -60,7 +61,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
     fn side_by_side(
         &self,
         c: &[SVector<T, 6>],
-        memory: &mut Memory<T>,
+        memory: &mut SurrogateScratch<T>,
         predictions: &mut [Prediction<T>],
     ) -> Result<(), Error> {
         let members = self.members.len();
@@ -94,8 +95,8 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         Ok(())
     }
 
-    /// S and the tangent 2 ∂S/∂C at each C with their uncertainty: the bits of [`Surrogate::tangent`], one after the other
-    /// (a tangent fills the registers by itself).
+    /// Computes S and the tangent 2 ∂S/∂C at each C with their uncertainty: the bits of
+    /// [`Surrogate::tangent`], one after the other (a tangent fills the registers by itself).
     ///
     /// # Errors
     /// Those of [`Surrogate::tangent`], with the place in the list; a list of predictions of another length.
@@ -116,7 +117,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         &self,
         c: &SVector<T, 6>,
         tangent: bool,
-        memory: &mut Memory<T>,
+        memory: &mut SurrogateScratch<T>,
     ) -> Result<Prediction<T>, Error> {
         check_deformation(c)?;
         let at: [T; 6] = (*c).into();
@@ -137,7 +138,8 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         self.combine(c, memory.parts.iter(), tangent.then_some(&slope))
     }
 
-    /// The mean of the members, each without its value and stress at rest; `slope`: the sum of their second derivatives.
+    /// The mean of the members, each without its value and stress at rest; `slope`: the sum of their second
+    /// derivatives.
     fn combine<'a>(
         &self,
         c: &SVector<T, 6>,
@@ -192,12 +194,12 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         })
     }
 
-    /// One member at c, without its correction at the identity.
+    /// Evaluates one member at c, without its correction at the identity.
     pub(super) fn member(
         &self,
         m: usize,
         c: &[T; 6],
-        rest: &Rest<T>,
+        rest: &RestTerm<T>,
         tangent: bool,
         tape: &mut Tape<T>,
     ) -> Member<T> {
@@ -252,11 +254,11 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         result
     }
 
-    /// W and its derivatives by c from those of a network by its inputs.
+    /// W and its derivatives with respect to c from those of a network with respect to its inputs.
     fn energetic(
         &self,
         local: &[T; 6],
-        rest: &Rest<T>,
+        rest: &RestTerm<T>,
         value: T,
         gradient: &[T; LANES],
         hessian: Option<&[[T; LANES]; LANES]>,
@@ -298,14 +300,14 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
             }
         }
         (first, second) = match &self.turn {
-            Some(turn) => back(turn, &first, &second),
+            Some(turn) => to_data_axes(turn, &first, &second),
             None => (first, second),
         };
         Member { energy, first, second }
     }
 }
 
-/// The error of one point of a list.
+/// Error of one point of a list.
 fn at_point(point: usize, error: Error) -> Error {
     match error {
         Error::Invalid { name, found, allowed } => {

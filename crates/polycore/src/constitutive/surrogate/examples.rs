@@ -1,21 +1,21 @@
-//! Models to test with.
+//! Models for tests.
 
 use super::{Header, Kind, Surrogate, Symmetry};
 use crate::constitutive::Error;
 use crate::constitutive::network::Activation::{Elu, Sigmoid, Silu, Softplus, Tanh};
 use nalgebra::Rotation3;
 
-/// Axes turned by 0.3, −0.5, 0.8 about x, y, z.
+/// Axes rotated by 0.3, −0.5, 0.8 about x, y, z.
 fn turned() -> [[f64; 3]; 3] {
     let q = Rotation3::from_euler_angles(0.3, -0.5, 0.8);
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| q[(i, j)]))
 }
 
-/// One model of every kind with random weights, with activations that are smooth, ensembles, turned axes, and inputs that
-/// are scaled: what holds by construction holds for them, and exporters can be tested with them.
+/// Builds a model of every kind with random weights, smooth activations, ensembles, rotated axes and scaled
+/// inputs: properties by construction hold for them, and exporters can be tested with them.
 ///
 /// # Errors
-/// None but those of [`Surrogate::random`].
+/// Only those of [`Surrogate::random`].
 pub fn examples() -> Result<Vec<(String, Surrogate<f64>)>, Error> {
     let mut headers = Vec::new();
     let mut add = |name: String, mut header: Header| {

@@ -1,7 +1,7 @@
 //! Models as files: safetensors with a header in JSON.
 //!
-//! Metadata `mdsurrogate law 1`: the [`Header`] as JSON. Tensors `member0.layer0.weight` (outputs, inputs) and
-//! `member0.layer0.bias` (outputs), F64 or F32, little endian, for each member and layer.
+//! Metadata `mdsurrogate law 1`: the [`Header`] as JSON. Tensors `member0.layer0.weight` (outputs, inputs)
+//! and `member0.layer0.bias` (outputs), F64 or F32, little endian, for each member and layer.
 
 use super::{Header, Surrogate};
 use crate::constitutive::Error;
@@ -11,14 +11,14 @@ use std::collections::HashMap;
 use std::io::Write;
 use std::path::Path;
 
-/// The key of the header, which is also the version of the format.
+/// Key of the header, and version of the format.
 const KEY: &str = "mdsurrogate law 1";
 
-/// A larger file is no law.
+/// Largest size of a file, bytes.
 const LARGEST: u64 = 4 << 30;
 
 impl Surrogate<f64> {
-    /// Writes the law, whole or not at all.
+    /// Writes the law; an error leaves no partial file.
     ///
     /// # Errors
     /// I/O errors.
@@ -28,25 +28,25 @@ impl Surrogate<f64> {
         crate::file::atomic_write(path, |file| file.write_all(&bytes))
     }
 
-    /// Reads a law; numbers come back to the bit.
+    /// Reads a law, to the bit.
     ///
     /// # Errors
-    /// [`Error::File`] for what is no safetensors file or has no header of ours, and for weights that do not fit the
-    /// architecture of the header; I/O errors.
+    /// [`Error::File`] for a file that is not safetensors or lacks our header, and for weights that do not
+    /// fit the architecture of the header; I/O errors.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, crate::Error> {
         let path = path.as_ref();
-        let size = std::fs::metadata(path).map_err(crate::Error::io("read", path))?.len();
+        let size = std::fs::metadata(path).map_err(crate::Error::from_io("read", path))?.len();
         if size > LARGEST {
             return Err(Error::file(path, format!("{size} bytes"), "laws up to 4 GiB").into());
         }
-        let bytes = std::fs::read(path).map_err(crate::Error::io("read", path))?;
+        let bytes = std::fs::read(path).map_err(crate::Error::from_io("read", path))?;
         Ok(Self::decode(&bytes).map_err(|(found, allowed)| Error::file(path, found, allowed))?)
     }
 
-    /// The law as the bytes of its file.
+    /// Serialises the law to the bytes of its file.
     ///
     /// # Errors
-    /// What is wrong with a law that cannot be written.
+    /// Reason for which the law cannot be written.
     pub fn to_bytes(&self) -> Result<Vec<u8>, String> {
         let mut data = Vec::new();
         for (m, member) in self.members.iter().enumerate() {
@@ -67,10 +67,10 @@ impl Surrogate<f64> {
         safetensors::serialize(views, Some(metadata)).map_err(|error| error.to_string())
     }
 
-    /// The law of the bytes of a file.
+    /// Reads a law from the bytes of a file.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for what [`Self::read`] refuses.
+    /// [`Error::Invalid`] for the errors of [`Self::read`].
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
         Self::decode(bytes).map_err(|(found, allowed)| Error::invalid("law", found, allowed))
     }
@@ -145,7 +145,7 @@ mod tests {
     fn law() -> Vec<u8> {
         let kind = Kind::polyconvex_energy(Symmetry::Transverse);
         let mut header = Header::new(kind, &[(3, Softplus), (2, Softplus)], 2);
-        header.support = Some(Support::of(&[Voigt::repeat(1.0), Voigt::repeat(2.0)], 2).unwrap());
+        header.support = Some(Support::from_rows(&[Voigt::repeat(1.0), Voigt::repeat(2.0)], 2).unwrap());
         header.spread_limit = Some(1e6);
         Surrogate::random(header, 3).unwrap().to_bytes().unwrap()
     }
@@ -162,7 +162,11 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+        #![proptest_config(ProptestConfig {
+            cases: 400,
+            failure_persistence: None,
+            ..ProptestConfig::default()
+        })]
 
         /// Changed, lost and surplus bytes, most of them in the header: an error or a law, never a panic.
         #[test]
@@ -173,7 +177,8 @@ mod tests {
             digits in any::<bool>(),
         ) {
             let mut bytes = law();
-            let length = if header { u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize + 8 } else { bytes.len() };
+            let header_length = u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize + 8;
+            let length = if header { header_length } else { bytes.len() };
             for (place, byte) in changes {
                 let at = (place * length as f64) as usize;
                 // digits for digits keep the JSON well formed
@@ -197,7 +202,8 @@ mod tests {
         assert!(text.contains("polyconvex") && text.contains("support"));
         // a file without the newer entries is the law it was
         let old = "{\"kind\":{\"energy\":{\"symmetry\":\"isotropic\",\"axes\":[[1,0,0],[0,1,0],[0,0,1]]}},\
-            \"architecture\":{\"widths\":[3,1],\"activations\":[\"linear\"]},\"members\":1,\"input_mean\":[0,0,0],\
+            \"architecture\":{\"widths\":[3,1],\"activations\":[\"linear\"]},\"members\":1,\
+             \"input_mean\":[0,0,0],\
             \"input_deviation\":[1,1,1],\"output_mean\":[0],\"output_deviation\":[1],\
             \"training_box\":[[1,1],[1,1],[1,1],[0,0],[0,0],[0,0]],\"spread_limit\":null}";
         let header: Header = serde_json::from_str(old).unwrap();

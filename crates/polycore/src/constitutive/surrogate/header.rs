@@ -1,19 +1,19 @@
-//! What a law is, without its weights.
+//! Metadata of a learnt law.
 
-use super::invariants::Invariants;
+use super::invariants::SymmetryInvariants;
 use super::{Softening, Support, Symmetry};
 use crate::constitutive::Error;
 use crate::constitutive::network::{Activation, Architecture};
 use crate::tensor::voigt::NAMES;
 use serde::{Deserialize, Serialize};
 
-/// The axes of the data.
+/// Axes of the data.
 const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// Convex functions that never fall.
+/// Convex functions that never decrease.
 const CONVEX: [Activation; 4] = [Activation::Linear, Activation::Relu, Activation::Softplus, Activation::Elu];
 
-/// What the networks of a law compute.
+/// Function that the networks compute.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
 pub enum Kind {
@@ -21,28 +21,28 @@ pub enum Kind {
     Ann,
     /// Invariants of C → W.
     Energy {
-        /// What W is invariant under.
+        /// Symmetry of W.
         symmetry: Symmetry,
         /// Material axes as rows, orthonormal and right-handed.
         axes: [[f64; 3]; 3],
-        /// Whether W is polyconvex by construction: see [`Kind::non_negative`].
+        /// True if W is polyconvex by construction: see [`Kind::non_negative`].
         #[serde(default)]
         polyconvex: bool,
-        /// Whether ‖F‖ = √I₁ and ‖cof F‖ = √I₂ are its inputs instead of their squares, of a polyconvex isotropic one:
-        /// convex in F and cof F too, and grows as slowly as with the first power of a stretch.
+        /// True if ‖F‖ = √I₁ and ‖cof F‖ = √I₂ replace their squares as inputs of a polyconvex isotropic
+        /// energy: it is convex in F and cof F too, and may grow as slowly as the first power of a stretch.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         norms: bool,
     },
 }
 
 impl Kind {
-    /// An energy in the axes of the data.
+    /// Creates an energy in the axes of the data.
     pub fn energy(symmetry: Symmetry) -> Self {
         Self::Energy { symmetry, axes: AXES, polyconvex: false, norms: false }
     }
 
-    /// A polyconvex energy in the axes of the data: convex in (F, cof F, J), and so elliptic everywhere; it cannot follow
-    /// data that soften (Ball 1976, <https://doi.org/10.1007/BF00279992>).
+    /// A polyconvex energy in the axes of the data: convex in (F, cof F, J), and so elliptic everywhere; it
+    /// cannot follow data that soften (Ball 1976, <https://doi.org/10.1007/BF00279992>).
     pub fn polyconvex_energy(symmetry: Symmetry) -> Self {
         Self::Energy { symmetry, axes: AXES, polyconvex: true, norms: false }
     }
@@ -52,33 +52,34 @@ impl Kind {
         Self::Energy { symmetry: Symmetry::Isotropic, axes: AXES, polyconvex: true, norms: true }
     }
 
-    /// Whether this is a polyconvex energy.
+    /// Returns true for a polyconvex energy.
     pub fn is_polyconvex(&self) -> bool {
         matches!(self, Self::Energy { polyconvex: true, .. })
     }
 
-    /// Whether a weight of `layer` (0 is the one after the inputs) for its input `input` must not be negative, so that a
-    /// polyconvex energy is convex and grows in all its inputs but J, the last one, which may come with any sign.
+    /// Returns true if the weight of `layer` (0 follows the inputs) for its input `input` must not be
+    /// negative, so that a polyconvex energy is convex and increasing in all its inputs but J, the last one,
+    /// whose weight may have any sign.
     ///
-    /// With convex growing activations (`softplus`, `relu`, `elu`, `linear`) a network of such weights is an
-    /// input-convex one (Amos et al. 2017, <https://arxiv.org/abs/1609.07152>).
+    /// With convex increasing activations (`softplus`, `relu`, `elu`, `linear`) a network of such weights is
+    /// input-convex (Amos et al. 2017, <https://arxiv.org/abs/1609.07152>).
     pub fn non_negative(&self, layer: usize, input: usize) -> bool {
         self.is_polyconvex() && (layer > 0 || input + 1 < self.inputs())
     }
 
     /// The invariants of an energy.
-    pub fn invariants(&self) -> Option<Invariants> {
+    pub fn invariants(&self) -> Option<SymmetryInvariants> {
         match self {
             Self::Ann => None,
             Self::Energy { symmetry, polyconvex, norms, .. } => {
-                Some(Invariants::new(*symmetry, *polyconvex, *norms))
+                Some(SymmetryInvariants::new(*symmetry, *polyconvex, *norms))
             }
         }
     }
 
     /// Inputs of its networks: 6, or the number of invariants.
     pub fn inputs(&self) -> usize {
-        self.invariants().map_or(6, Invariants::count)
+        self.invariants().map_or(6, SymmetryInvariants::count)
     }
 
     /// Outputs of its networks: 6 or 1.
@@ -90,13 +91,13 @@ impl Kind {
     }
 }
 
-/// Everything about a law but its weights.
+/// Metadata of a law: everything but its weights.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Header {
-    /// What the networks compute.
+    /// Function of the networks.
     pub kind: Kind,
-    /// Their widths and activations.
+    /// Widths and activations of the networks.
     pub architecture: Architecture,
     /// Networks in the ensemble.
     pub members: usize,
@@ -104,27 +105,31 @@ pub struct Header {
     pub input_mean: Vec<f64>,
     /// Standard deviation of each input (3.8); 0: the input had no variance and is mapped to 0.
     pub input_deviation: Vec<f64>,
-    /// Added to the outputs after scaling, Pa; of an energy it has no effect.
+    /// Added to the outputs after scaling, Pa; without effect on an energy.
     pub output_mean: Vec<f64>,
-    /// One unit of each output, Pa (J/m³).
+    /// Unit of each output, Pa (J/m³).
     pub output_deviation: Vec<f64>,
-    /// Least and greatest C of each component in the training data; equal where a component was never seen to change.
+    /// Least and greatest value of each component of C in the training data; equal for a component that never
+    /// changed.
     pub training_box: [[f64; 2]; 6],
-    /// Representatives of the training strains, farther from which than any training row a prediction is flagged.
+    /// Representatives of the training strains: a prediction is flagged if it is farther from them than any
+    /// training row.
     #[serde(default)]
     pub support: Option<Support>,
-    /// Spread of the ensemble, Pa, beyond which a prediction is flagged ([`super::Surrogate::with_spread_limit`]).
+    /// Spread of the ensemble, Pa, beyond which a prediction is flagged
+    /// ([`super::Surrogate::with_spread_limit`]).
     pub spread_limit: Option<f64>,
-    /// How the stress of an energy falls on unloading.
+    /// Softening of an energy on unloading.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub softening: Option<Softening>,
-    /// Where data and weights come from.
+    /// Sources of data and weights.
     #[serde(default)]
     pub provenance: Vec<String>,
 }
 
 impl Header {
-    /// A law with inputs as they are, outputs in MPa (or MJ/m³), and a box of nothing but C = I.
+    /// Creates the header of a law with unscaled inputs, outputs in MPa (or MJ/m³), and a box that contains C
+    /// = I alone.
     pub fn new(kind: Kind, hidden: &[(usize, Activation)], members: usize) -> Self {
         let (inputs, outputs) = (kind.inputs(), kind.outputs());
         Self {
@@ -143,6 +148,8 @@ impl Header {
         }
     }
 
+    /// Checks that the parts fit together.
+    ///
     /// # Errors
     /// [`Error::Invalid`] for parts that do not fit together or numbers that are not finite.
     pub fn check(&self) -> Result<(), Error> {

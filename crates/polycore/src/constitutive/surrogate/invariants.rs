@@ -6,16 +6,17 @@ use crate::constitutive::network::Real;
 
 /// The invariants of a symmetry, plain or polyconvex.
 #[derive(Debug, Clone, Copy)]
-pub struct Invariants {
+pub struct SymmetryInvariants {
     list: &'static [&'static [Monomial<'static>]],
     names: &'static [&'static str],
-    /// From this one on they are the roots of their polynomials: J = √det C is the last of the polyconvex ones.
+    /// Index of the first invariant that is the root of its polynomial: J = √det C is the last of the
+    /// polyconvex ones.
     first_root: usize,
 }
 
-impl Invariants {
-    /// Those of a symmetry; the polyconvex ones of those that have none are empty. `norms`: the roots of I₁ and I₂ in
-    /// their place, of a polyconvex isotropic energy.
+impl SymmetryInvariants {
+    /// Creates the invariants of a symmetry, or its polyconvex ones (empty if it has none). With `norms` the
+    /// roots of I₁ and I₂ replace them in a polyconvex isotropic energy.
     pub fn new(symmetry: Symmetry, polyconvex: bool, norms: bool) -> Self {
         let (list, names) = match polyconvex {
             true => (symmetry.polyconvex_invariants().unwrap_or_default(), symmetry.names(true)),
@@ -28,12 +29,12 @@ impl Invariants {
         }
     }
 
-    /// How many.
+    /// Number of invariants.
     pub fn count(self) -> usize {
         self.list.len()
     }
 
-    /// What invariant k is called.
+    /// Name of invariant k.
     pub fn name(self, k: usize) -> &'static str {
         self.names[k]
     }
@@ -106,7 +107,7 @@ fn sum<T: Real>(monomials: &[Monomial<'_>], c: &[T; 6]) -> T {
     sum
 }
 
-/// The product of a monomial's components but those at two places.
+/// Product of a monomial's components without those at two places.
 fn product<T: Real>(factors: &[usize], c: &[T; 6], without: usize, and: usize) -> T {
     let mut product = T::ONE;
     for (place, &a) in factors.iter().enumerate() {
@@ -117,7 +118,7 @@ fn product<T: Real>(factors: &[usize], c: &[T; 6], without: usize, and: usize) -
     product
 }
 
-/// The monomials of the derivative of a polynomial by the components `by`.
+/// Monomials of the derivative of a polynomial with respect to the components `by`.
 pub fn derivative(monomials: &[Monomial<'_>], by: &[usize]) -> Vec<(f64, Vec<usize>)> {
     let Some((&a, rest)) = by.split_first() else {
         return monomials.iter().map(|(coefficient, factors)| (*coefficient, factors.to_vec())).collect();

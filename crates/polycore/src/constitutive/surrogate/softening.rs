@@ -1,20 +1,21 @@
-//! A damage variable: the stress of an energy that is lower on unloading.
+//! Damage variable: lowers the stress of an energy on unloading.
 
 use super::{Prediction, Surrogate, Workspace};
 use crate::constitutive::{Error, Law};
 use crate::tensor::Voigt;
 use serde::{Deserialize, Serialize};
 
-/// (m/m₀)^c at most.
-const BEYOND: f64 = 1e12;
+/// Bound of (m/m₀)^c.
+const LARGEST_GROWTH: f64 = 1e12;
 
-/// Pseudo-elasticity (Ogden and Roxburgh 1999, <https://doi.org/10.1098/rspa.1999.0431>) with a monotone network in place of
-/// their error function: S = (1 − d) 2 ∂W/∂C with
+/// Pseudo-elasticity (Ogden and Roxburgh 1999, <https://doi.org/10.1098/rspa.1999.0431>) with a monotone
+/// network in place of their error function: S = (1 − d) 2 ∂W/∂C with
 ///
 /// > d = 1 − exp(−Σₖ aₖ tanh(bₖ (1 − W/m)) (m/m₀)^cₖ), aₖ, bₖ, cₖ ≥ 0,
 ///
-/// where m is the greatest W of the history. While W grows beyond it, d = 0; d grows as W falls, and with m at any W, so that
-/// no cycle gains work. A small c is damage from the first strain on, a large one that of chains which break near m₀.
+/// where m is the greatest W of the history. While W grows beyond it, d = 0; d grows as W falls, and with m
+/// at any W, so that no cycle gains work. A small c is damage from the first strain on, a large one that of
+/// chains which break near m₀.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Softening {
@@ -24,14 +25,16 @@ pub struct Softening {
     pub greatest: f64,
 }
 
-/// What a point has seen.
+/// Loading history of a point.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct History {
+pub struct SofteningHistory {
     /// m: the greatest W, J/m³; 0 at first.
     pub greatest: f64,
 }
 
 impl Softening {
+    /// Checks the units.
+    ///
     /// # Errors
     /// [`Error::Invalid`] for numbers that are negative or not finite, and for no unit.
     pub fn check(&self) -> Result<(), Error> {
@@ -47,7 +50,7 @@ impl Softening {
     }
 
     /// d and ∂d/∂W at an energy W below the greatest of the history.
-    pub fn damage(&self, energy: f64, history: History) -> [f64; 2] {
+    pub fn damage(&self, energy: f64, history: SofteningHistory) -> [f64; 2] {
         let most = history.greatest;
         if energy >= most {
             return [0.0; 2];
@@ -56,7 +59,7 @@ impl Softening {
         for [a, b, c] in &self.units {
             let fall = (b * (1.0 - energy / most)).tanh();
             // far beyond m₀ nothing is left, and no product is 0 · ∞
-            let reached = a * (most / self.greatest).powf(*c).min(BEYOND);
+            let reached = a * (most / self.greatest).powf(*c).min(LARGEST_GROWTH);
             sum += reached * fall;
             slope -= reached * (1.0 - fall * fall) * b / most;
         }
@@ -66,7 +69,7 @@ impl Softening {
 }
 
 impl Surrogate<f64> {
-    /// The same energy with softening.
+    /// Adds softening to the energy.
     ///
     /// # Errors
     /// [`Softening::check`]; [`Error::Invalid`] for a law without an energy.
@@ -76,8 +79,8 @@ impl Surrogate<f64> {
         Ok(self)
     }
 
-    /// S at C after a history, which it brings up to date; ℂ on unloading is (1 − d) ℂ₀ − S₀ ⊗ S₀ ∂d/∂W. As
-    /// [`Surrogate::stress`] and [`Surrogate::tangent`] for a law without softening.
+    /// Computes S at C after a history and updates the history; ℂ on unloading is (1 − d) ℂ₀ − S₀ ⊗ S₀ ∂d/∂W.
+    /// For a law without softening it equals [`Surrogate::stress`] and [`Surrogate::tangent`].
     ///
     /// # Errors
     /// Those of [`Surrogate::tangent`].
@@ -85,7 +88,7 @@ impl Surrogate<f64> {
         &self,
         c: &Voigt,
         tangent: bool,
-        history: &mut History,
+        history: &mut SofteningHistory,
         memory: &mut Workspace,
     ) -> Result<Prediction, Error> {
         let mut answer = if tangent { Law::tangent(self, c, memory) } else { Law::stress(self, c, memory) }?;
@@ -121,11 +124,11 @@ mod tests {
         Voigt::new(stretch * stretch, 1.0, 1.0, 0.05 * (stretch - 1.0), 0.0, 0.0)
     }
 
-    /// Loading is that of the energy; after it the stress is lower, in a cycle work is lost, and a second cycle below the
-    /// greatest energy follows one curve.
+    /// Loading is that of the energy; after it the stress is lower, in a cycle work is lost, and a second
+    /// cycle below the greatest energy follows one curve.
     #[test]
     fn unloads_below_the_curve_of_loading() {
-        let (law, mut memory, mut history) = (law(), Workspace::default(), History::default());
+        let (law, mut memory, mut history) = (law(), Workspace::default(), SofteningHistory::default());
         let stretches =
             |from: f64, to: f64| (0..=200).map(move |k| from + (to - from) * f64::from(k) / 200.0);
         for stretch in stretches(1.0, 1.3) {
@@ -144,18 +147,21 @@ mod tests {
             assert!((again - down).norm() <= 1e-9 * down.norm(), "{stretch}");
         }
         // the same point after more: more damage
-        let [before, _] = law.header().softening.as_ref().unwrap().damage(1e4, History { greatest: 2e4 });
-        let [after, _] = law.header().softening.as_ref().unwrap().damage(1e4, History { greatest: 3e4 });
+        let [before, _] =
+            law.header().softening.as_ref().unwrap().damage(1e4, SofteningHistory { greatest: 2e4 });
+        let [after, _] =
+            law.header().softening.as_ref().unwrap().damage(1e4, SofteningHistory { greatest: 3e4 });
         assert!(0.0 < before && before < after && after < 1.0);
         let far = Softening { units: vec![[1e3, 20.0, 80.0]], greatest: 1.0 };
-        assert_eq!(far.damage(1e5, History { greatest: 1e6 }).map(f64::abs), [1.0, 0.0]);
+        assert_eq!(far.damage(1e5, SofteningHistory { greatest: 1e6 }).map(f64::abs), [1.0, 0.0]);
     }
 
     /// Against central differences of S, 2 ∂S/∂C, on unloading.
     #[test]
     fn tangent_of_unloading() {
         let (law, mut memory) = (law(), Workspace::default());
-        let mut history = History { greatest: law.stress(&at(1.3), &mut memory).unwrap().energy.unwrap() };
+        let mut history =
+            SofteningHistory { greatest: law.stress(&at(1.3), &mut memory).unwrap().energy.unwrap() };
         let c = at(1.1);
         let tangent = law.follow(&c, true, &mut history, &mut memory).unwrap().tangent.unwrap();
         for b in 0..6 {

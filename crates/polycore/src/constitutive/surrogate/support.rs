@@ -1,8 +1,9 @@
-//! Where the training data lie: representatives of their strains, and how far a C is from them.
+//! Coverage of the training data: representatives of their strains, and the distance of a C from them.
 //!
-//! A box says nothing about the gaps in it: paths are lines through six dimensions. Representatives are training rows
-//! chosen one after the other, each the row farthest from those before it (Gonzalez 1985,
-//! <https://doi.org/10.1016/0304-3975(85)90224-5>), so that no row is farther from them than [`Support::radius`].
+//! A box says nothing about the gaps in it: paths are lines through six dimensions. Representatives are
+//! training rows chosen one after the other, each the row farthest from those before it (Gonzalez 1985,
+//! <https://doi.org/10.1016/0304-3975(85)90224-5>), so that no row is farther from them than
+//! [`Support::radius`].
 
 use crate::constitutive::Error;
 use crate::constitutive::network::Real;
@@ -11,33 +12,34 @@ use crate::tensor::voigt::NAMES;
 use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
-/// Most representatives that a law may have.
-pub const MOST: usize = 4096;
+/// Largest number of representatives of a law.
+pub const MOST_REPRESENTATIVES: usize = 4096;
 
-/// Representatives looked at side by side.
+/// Number of representatives compared at once.
 const BLOCK: usize = 16;
 
 /// Representatives of the training strains.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Support {
-    /// Their C.
+    /// C of each representative.
     pub points: Vec<[f64; 6]>,
     /// Inverse standard deviation of each component of C in the training data; 0 where it never changed.
     pub weights: [f64; 6],
-    /// The greatest distance of a training row from its nearest representative, in standard deviations; of few rows,
-    /// most of which are representatives, the greatest distance of a row from its nearest neighbour.
+    /// Greatest distance of a training row from its nearest representative, in standard deviations. For few
+    /// rows, most of which are representatives, it is the greatest distance of a row from its nearest
+    /// neighbour.
     pub radius: f64,
 }
 
 impl Support {
-    /// Of the strains of training rows, with up to `most` representatives.
+    /// Selects up to `most` representatives from the strains of training rows.
     ///
     /// # Errors
     /// [`Error::Invalid`] for no rows, rows that are not finite, or `most` outside of 1 to 4096.
-    pub fn of(rows: &[Voigt], most: usize) -> Result<Self, Error> {
-        if !(1..=MOST).contains(&most) {
-            return Err(Error::invalid("representatives", most, format!("1 to {MOST}")));
+    pub fn from_rows(rows: &[Voigt], most: usize) -> Result<Self, Error> {
+        if !(1..=MOST_REPRESENTATIVES).contains(&most) {
+            return Err(Error::invalid("representatives", most, format!("1 to {MOST_REPRESENTATIVES}")));
         }
         if let Some(row) = rows.iter().find(|row| !row.iter().all(|c| c.is_finite())) {
             return Err(Error::invalid("C", format!("{:?}", row.as_slice()), "finite components"));
@@ -50,8 +52,8 @@ impl Support {
         let mut weights = [0.0; 6];
         for (a, weight) in weights.iter_mut().enumerate() {
             let variance = rows.iter().map(|row| (row[a] - mean[a]).powi(2)).sum::<f64>() / count;
-            // the rest of a constant is rounding
-            if variance.sqrt() > super::UNSEEN {
+            // variance of a constant is rounding
+            if variance.sqrt() > super::CONSTANT_TOLERANCE {
                 *weight = 1.0 / variance.sqrt();
             }
         }
@@ -74,8 +76,8 @@ impl Support {
                 *distance = distance.min(square(row, &rows[farthest]));
             }
         }
-        // where most rows are representatives themselves, that distance is that of the closest rows, or none, and every
-        // new strain would be far: there the limit is the greatest distance of a row from its neighbour
+        // if most rows are representatives, that distance is that of the closest rows, or 0, and every new
+        // strain would be far: then the limit is the greatest distance of a row from its neighbour
         if 2 * points.len() > rows.len() {
             let others = |k: usize| rows.iter().enumerate().filter(move |(j, _)| *j != k).map(|(_, row)| row);
             let neighbour =
@@ -86,11 +88,17 @@ impl Support {
         Ok(Self { points: points.into_iter().map(Into::into).collect(), weights, radius: radius.sqrt() })
     }
 
+    /// Checks the representatives.
+    ///
     /// # Errors
     /// [`Error::Invalid`] for no or too many representatives, or numbers that are not finite.
     pub fn check(&self) -> Result<(), Error> {
-        if !(1..=MOST).contains(&self.points.len()) {
-            return Err(Error::invalid("representatives", self.points.len(), format!("1 to {MOST}")));
+        if !(1..=MOST_REPRESENTATIVES).contains(&self.points.len()) {
+            return Err(Error::invalid(
+                "representatives",
+                self.points.len(),
+                format!("1 to {MOST_REPRESENTATIVES}"),
+            ));
         }
         let numbers = self.points.as_flattened().iter().chain(&self.weights).chain([&self.radius]);
         if let Some(bad) = numbers.clone().find(|value| !value.is_finite()) {
@@ -110,13 +118,13 @@ impl Support {
     }
 }
 
-/// A [`Support`] in the order in which distances are taken.
+/// [`Support`] in the order in which distances are computed.
 #[derive(Debug, Clone)]
 pub(super) struct Nearest<T> {
     /// Weighted components of [`BLOCK`] representatives each.
     blocks: Vec<[[T; BLOCK]; 6]>,
     weights: [T; 6],
-    /// A little more than the radius: rounding moves no training row out.
+    /// Slightly more than the radius: rounding moves no training row out.
     pub limit: f64,
 }
 
@@ -142,16 +150,16 @@ impl<T: Real> Nearest<T> {
 
     /// Distance of the nearest representative, in standard deviations.
     pub fn distance(&self, c: &[T; 6]) -> f64 {
-        Arch::new().dispatch(Search { nearest: self, c }).to_f64().sqrt()
+        Arch::new().dispatch(NearestSearch { nearest: self, c }).to_f64().sqrt()
     }
 }
 
-struct Search<'a, T> {
+struct NearestSearch<'a, T> {
     nearest: &'a Nearest<T>,
     c: &'a [T; 6],
 }
 
-impl<T: Real> WithSimd for Search<'_, T> {
+impl<T: Real> WithSimd for NearestSearch<'_, T> {
     type Output = T;
 
     #[inline(always)]
@@ -200,7 +208,7 @@ mod tests {
             )
         };
         let rows: Vec<Voigt> = (0..202).map(row).collect();
-        let support = Support::of(&rows, 40).unwrap();
+        let support = Support::from_rows(&rows, 40).unwrap();
         assert_eq!((support.points.len(), support.weights[2]), (40, 0.0));
         let nearest = Nearest::<f64>::new(&support);
         let brute = |c: &Voigt| {
@@ -216,11 +224,11 @@ mod tests {
         let gap = Voigt::new(1.9, 1.9, 1.0, 0.0, 0.0, 0.0);
         assert!(nearest.distance(&gap.into()) > 5.0 * support.radius);
         // more representatives than rows: rows 0.01 apart, in deviations of √2/100
-        let few = Support::of(&rows[..5], 100).unwrap();
+        let few = Support::from_rows(&rows[..5], 100).unwrap();
         assert!(few.points.len() == 5 && (few.radius - 0.5f64.sqrt()).abs() < 1e-9);
-        assert_eq!(Support::of(&rows[..1], 100).unwrap().radius, 0.0);
-        assert!(Support::of(&[], 3).is_err() && Support::of(&rows, 0).is_err());
-        assert!(Support::of(&[Voigt::repeat(f64::NAN)], 3).is_err());
+        assert_eq!(Support::from_rows(&rows[..1], 100).unwrap().radius, 0.0);
+        assert!(Support::from_rows(&[], 3).is_err() && Support::from_rows(&rows, 0).is_err());
+        assert!(Support::from_rows(&[Voigt::repeat(f64::NAN)], 3).is_err());
         for bad in [
             Support { points: vec![], ..support.clone() },
             Support { radius: f64::NAN, ..support.clone() },

@@ -1,8 +1,9 @@
-//! What an energy may depend on under a material symmetry: polynomials in the six components of C.
+//! Invariants of each material symmetry, as polynomials in the six components of C.
 //!
-//! Invariants are written as sums of monomials in [C₁₁, C₂₂, C₃₃, C₁₂, C₁₃, C₂₃] in the material's own axes, whose
-//! derivatives are then exact by rule. Bases: Boehler 1987 (<https://doi.org/10.1007/978-3-7091-2810-7>),
-//! Smith 1962 (<https://doi.org/10.1007/BF00281203>) for monoclinic and orthotropic.
+//! Invariants are written as sums of monomials in [C₁₁, C₂₂, C₃₃, C₁₂, C₁₃, C₂₃] in the material's own axes,
+//! whose derivatives are then exact by rule. Bases: Boehler 1987
+//! (<https://doi.org/10.1007/978-3-7091-2810-7>), Smith 1962 (<https://doi.org/10.1007/BF00281203>) for
+//! monoclinic and orthotropic.
 
 use crate::constitutive::Error;
 use crate::tensor::{Tensor, Voigt6x6, voigt};
@@ -11,14 +12,15 @@ use serde::{Deserialize, Serialize};
 /// A monomial: coefficient, and the components that are multiplied.
 pub type Monomial<'a> = (f64, &'a [usize]);
 
-/// A symmetry of the crystal, the third of the material axes being the special one.
+/// Symmetry of the crystal; the third of the material axes is the special one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Symmetry {
     /// No symmetry: the six components of C.
     Triclinic,
-    /// A two-fold axis along the third material axis, as γ-PA12's unique axis b along the chains (point group 2/m).
+    /// A two-fold axis along the third material axis, as γ-PA12's unique axis b along the chains (point group
+    /// 2/m).
     Monoclinic,
     /// Three perpendicular two-fold axes.
     Orthotropic,
@@ -49,7 +51,7 @@ impl Symmetry {
     pub const ALL: [Self; 5] =
         [Self::Triclinic, Self::Monoclinic, Self::Orthotropic, Self::Transverse, Self::Isotropic];
 
-    /// The material axes about which half a turn changes nothing.
+    /// Material axes of two-fold symmetry.
     pub fn two_fold_axes(self) -> &'static [usize] {
         match self {
             Self::Triclinic => &[],
@@ -94,8 +96,8 @@ impl Symmetry {
         }
     }
 
-    /// The same in functions that are convex in (F, cof F, J): |F aᵢ|² = aᵢ·C aᵢ and |cof F aᵢ|² = aᵢ·cof C aᵢ or their
-    /// sums, and last J² (whose root is the input). None where too few are known: triclinic and monoclinic.
+    /// Invariants that are convex in (F, cof F, J): |F aᵢ|² = aᵢ·C aᵢ and |cof F aᵢ|² = aᵢ·cof C aᵢ or their
+    /// sums, and last J² (whose root is the input). `None` if too few are known: triclinic and monoclinic.
     ///
     /// Schröder & Neff 2003, <https://doi.org/10.1016/S0020-7683(02)00458-4>.
     pub fn polyconvex_invariants(self) -> Option<&'static [&'static [Monomial<'static>]]> {
@@ -129,7 +131,8 @@ impl Symmetry {
         }
     }
 
-    /// How a polyconvex energy takes away its stress at rest, which has the form p 1 + Σ s a⊗a in the material axes.
+    /// Terms with which a polyconvex energy removes its stress at rest, of the form p 1 + Σ s a⊗a in the
+    /// material axes.
     pub fn stress_at_rest(self) -> StressAtRest {
         match self {
             Self::Orthotropic => StressAtRest {
@@ -149,11 +152,11 @@ impl Symmetry {
 pub struct StressAtRest {
     /// p.
     pub spherical: [f64; 3],
-    /// Of each direction a: s, and the places of a·Ca and a·cof C a among the polyconvex invariants.
+    /// Factor s for each direction a, and the indices of a·Ca and a·cof C a among the polyconvex invariants.
     pub along: &'static [([f64; 3], usize, usize)],
 }
 
-/// The matrix T of C' = T C (as vectors), C' in the material axes, which are the rows of `axes`.
+/// Matrix T of C' = T C (as vectors), C' in the material axes, which are the rows of `axes`.
 ///
 /// # Errors
 /// [`Error::Invalid`] unless the axes are orthonormal to 1e-9 and right-handed.

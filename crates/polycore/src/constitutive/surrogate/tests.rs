@@ -1,4 +1,4 @@
-//! What holds for every kind of model by construction, beside [`crate::constitutive::verify`].
+//! Properties that every model has by construction, beside [`crate::constitutive::verify`].
 
 use super::*;
 use crate::constitutive::network::Activation::{Elu, Linear, Relu, Softplus, Tanh};
@@ -53,8 +53,8 @@ fn an_energy_does_no_work_in_cycles() {
     }
 }
 
-/// S(Q C Qᵀ) = Q S(C) Qᵀ for generators of each group (in its material axes), and not for a general rotation unless
-/// the material is isotropic.
+/// S(Q C Qᵀ) = Q S(C) Qᵀ for generators of each group (in its material axes), and not for a general rotation
+/// unless the material is isotropic.
 #[test]
 fn invariant_under_the_group_and_nothing_more() {
     use std::f64::consts::PI;

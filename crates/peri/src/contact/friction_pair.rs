@@ -1,0 +1,86 @@
+//! Coulomb friction with elastic slip: return mapping of Simo & Laursen (1992),
+//! doi:10.1016/0045-7949(92)90540-G.
+//!
+//! Two sides in contact hold each other by T = −k_t e with the elastic slip e, up to |T| = b = μN; the rest
+//! slides. For a given N the force is the gradient of the convex potential ½k_t|e*|² below b/k_t and b|e*| −
+//! b²/(2k_t) beyond, e* = Pe + Δu_t: equilibria exist, and minimisers find them.
+
+use crate::geometry::length;
+use serde::{Deserialize, Serialize};
+
+/// Two sides in contact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum ContactPair {
+    /// Two particles, by their sites.
+    Particles(u32, u32),
+    /// A plane and a face, by their numbers.
+    Face(u32, u32),
+    /// A plane, by its number, and a particle without a face, by its site.
+    Particle(u32, u32),
+}
+
+/// Friction of a pair.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FrictionPair {
+    /// The sides.
+    pub pair: ContactPair,
+    /// Elastic slip e, m.
+    pub slip: [f64; 3],
+    /// b = μN, N.
+    pub bound: f64,
+    /// k_t, N/m.
+    pub stiffness: f64,
+    /// Unit normal, towards the first side of two particles and the body of a plane.
+    pub normal: [f64; 3],
+    /// Fraction of the load step since the sides have touched.
+    pub share: f64,
+}
+
+/// Friction after a slip.
+#[derive(Clone, Copy, Debug)]
+pub struct Drag {
+    /// Force on the first side, N.
+    pub force: [f64; 3],
+    /// Elastic slip, m.
+    pub slip: [f64; 3],
+    /// Energy dissipated, J.
+    pub dissipated: f64,
+}
+
+impl FrictionPair {
+    /// Energy of the elastic slip, J.
+    pub fn energy(&self) -> f64 {
+        0.5 * self.stiffness * length(self.slip).powi(2)
+    }
+
+    /// Computes the friction after the first side has moved by `moved`, m, against the second.
+    pub fn drag(&self, moved: [f64; 3]) -> Drag {
+        let moved = across(&self.normal, moved);
+        let trial: [f64; 3] = std::array::from_fn(|d| self.slip[d] + self.share * moved[d]);
+        let (size, most) = (length(trial), self.bound / self.stiffness);
+        if size <= most {
+            return Drag { force: trial.map(|x| -self.stiffness * x), slip: trial, dissipated: 0.0 };
+        }
+        let direction = trial.map(|x| x / size);
+        Drag {
+            force: direction.map(|x| -self.bound * x),
+            slip: direction.map(|x| most * x),
+            dissipated: self.bound * (size - most),
+        }
+    }
+
+    /// Rotates the slip into the plane across a new normal, keeping its length, and shortens it to the bound.
+    pub fn project(&mut self) {
+        let old = length(self.slip);
+        let turned = across(&self.normal, self.slip);
+        let size = length(turned);
+        let wanted = old.min(self.bound / self.stiffness);
+        self.slip = if size > 0.0 { turned.map(|x| x * wanted / size) } else { [0.0; 3] };
+    }
+}
+
+/// Projects a vector onto the plane across a unit normal.
+pub fn across<const D: usize>(normal: &[f64; D], vector: [f64; D]) -> [f64; D] {
+    let along: f64 = normal.iter().zip(vector).map(|(n, v)| n * v).sum();
+    std::array::from_fn(|d| vector[d] - along * normal[d])
+}

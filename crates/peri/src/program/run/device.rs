@@ -1,0 +1,150 @@
+//! Choice of the device that takes the steps of a variant.
+
+use crate::bonds::Bonds;
+use crate::error::Error;
+use crate::program::scene::{DeviceChoice, Dynamics, Scene};
+use crate::solver::{Method, State, StepCallback, System, VelocityVerlet, Watch};
+use harness::scene::{SceneError, Source};
+
+/// Directed bonds below which launching kernels takes longer than the processor's forces.
+const FEWEST_BONDS: u64 = 5_000_000;
+
+/// A graphics card.
+#[cfg(feature = "gpu")]
+pub type Card = crate::gpu::Device;
+/// No graphics card in this build.
+#[cfg(not(feature = "gpu"))]
+pub enum Card {}
+
+/// Device of a variant.
+#[derive(Default)]
+pub struct Chosen {
+    /// The card; `None`: the processor.
+    pub card: Option<Card>,
+    /// Name of the device and its precision, or the reason for the processor, where the scene does not name
+    /// that.
+    pub note: Option<String>,
+}
+
+/// The device that a scene names for a variant.
+///
+/// # Errors
+/// `device = "gpu"` of a variant that no card can do, on a machine or in a build without one.
+pub fn choose<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    bonds: &dyn Bonds<D>,
+) -> Result<Chosen, SceneError> {
+    let Some(dynamics) = scene.dynamics.as_ref().filter(|own| own.device != DeviceChoice::Cpu) else {
+        return Ok(Chosen::default());
+    };
+    let only = dynamics.device == DeviceChoice::Gpu;
+    let on_processor = |why: String| {
+        let note = format!("`device = \"auto\"` takes the processor: {why}");
+        Ok(Chosen { card: None, note: Some(note) })
+    };
+    if let Some((key, found)) = beyond_cards(scene, bonds) {
+        let allowed = "nothing of it on a graphics card; `dynamics.device = \"cpu\"` for the processor";
+        return if only {
+            Err(source.error(&key, found, allowed))
+        } else {
+            on_processor(format!("{found}, `{key}`"))
+        };
+    }
+    let directed = bonds.directed_bonds();
+    if !only && directed < FEWEST_BONDS {
+        return on_processor(format!("{directed} directed bonds are too few to gain by a card"));
+    }
+    match open(dynamics) {
+        Ok((card, _)) if !only && !is_card(&card) => {
+            on_processor("this machine has no graphics card".to_owned())
+        }
+        Ok((card, name)) => Ok(Chosen { card: Some(card), note: Some(name) }),
+        Err(why) if only => {
+            let found = format!("\"gpu\", but {why}");
+            Err(source.error(
+                "dynamics.device",
+                found,
+                "`\"cpu\"`, or `\"auto\"` to take a card where there is one",
+            ))
+        }
+        Err(why) => on_processor(why),
+    }
+}
+
+/// Explicit dynamics on a card, or on the processor where there is none.
+///
+/// # Errors
+/// Those of the method.
+pub fn solve<const D: usize>(
+    card: Option<&Card>,
+    method: &VelocityVerlet,
+    system: &mut System<D>,
+    state: &mut State<D>,
+    watch: &mut Watch<D>,
+    finished: &mut StepCallback<D>,
+) -> Result<(), Error> {
+    match card {
+        #[cfg(feature = "gpu")]
+        Some(card) => method.solve_on(card, system, state, watch, finished),
+        #[cfg(not(feature = "gpu"))]
+        Some(card) => match *card {},
+        None => method.solve(system, state, watch, finished),
+    }
+}
+
+/// Key and content of what a card cannot do.
+fn beyond_cards<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<(String, &'static str)> {
+    let material = &scene.material;
+    let rotation = scene.boundary.iter().position(|boundary| boundary.rotation.is_some());
+    let rotation_key = format!("boundary[{}].rotation", rotation.unwrap_or(0));
+    let uniform = bonds.as_lattice().is_none_or(crate::bonds::LatticeBonds::is_uniform);
+    let faults = [
+        ("body.points", scene.body.points.is_some(), "a body of points"),
+        ("body.grid", scene.body.grid.is_some(), "a grid of cells"),
+        ("material.solid", material.solid.is_some(), "a solid"),
+        (
+            "material.fields",
+            material.is_prestrained() || !material.fields.is_empty(),
+            "fields of the material",
+        ),
+        ("material.inclusions", !material.inclusions.is_empty(), "inclusions"),
+        ("material.critical.convention", scene.softens(), "bonds that soften"),
+        ("material.surface_correction", !uniform, "bonds with surface factors"),
+        ("contact", scene.contact.is_some(), "contact"),
+        (rotation_key.as_str(), rotation.is_some(), "a rotation"),
+        ("dynamics.precision", scene.is_mixed(), "mixed precision"),
+    ];
+    faults.iter().find(|(_, given, _)| *given).map(|(key, _, found)| ((*key).to_owned(), *found))
+}
+
+#[cfg(feature = "gpu")]
+fn open(dynamics: &Dynamics) -> Result<(Card, String), String> {
+    use crate::program::scene::ForcePrecision;
+    let single = dynamics.precision == ForcePrecision::Single;
+    let precision = if single { crate::gpu::Precision::Single } else { crate::gpu::Precision::Double };
+    let none = |error: crate::Error| format!("this machine has no graphics card that can be used ({error})");
+    let card = Card::portable().map_err(none)?;
+    let name = card.name().to_owned();
+    let card = card.with_precision(precision).map_err(|_| {
+        format!("{name} does not compute in double precision; take `dynamics.precision = \"single\"`")
+    })?;
+    let digits = if single { "single" } else { "double" };
+    Ok((card, format!("steps on {name} in {digits} precision")))
+}
+
+#[cfg(not(feature = "gpu"))]
+fn open(_: &Dynamics) -> Result<(Card, String), String> {
+    Err("this program was built without graphics cards: `cargo build --release -p peri --features gpu`"
+        .to_owned())
+}
+
+#[cfg(feature = "gpu")]
+fn is_card(card: &Card) -> bool {
+    card.is_card()
+}
+
+#[cfg(not(feature = "gpu"))]
+fn is_card(card: &Card) -> bool {
+    match *card {}
+}

@@ -1,0 +1,73 @@
+//! Range of stretches of a fitted law, and its extension to observed stretches.
+
+use super::criterion::{least, most};
+use super::state::State;
+use super::system::System;
+use crate::bonds::stretch_range;
+use crate::error::Error;
+use crate::material::LawCover;
+use crate::potential::StretchRange;
+
+impl<const D: usize> System<'_, D> {
+    /// Restores bonds, law and loads of a state: at rest, or of an interrupted run.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] if the state belongs to another body, and errors of
+    /// [`crate::potential::KernelFit::new`].
+    pub fn restore(&mut self, state: &mut State<D>) -> Result<(), Error> {
+        state.fracture.restore(&mut *self.bonds)?;
+        if state.fracture.intact.is_some() {
+            let particles = self.bonds.particles().to_vec();
+            self.unload_detached(particles.iter().copied());
+        }
+        if !state.control.factors.is_empty() {
+            self.factors.to_mut().clone_from(&state.control.factors);
+        }
+        self.rebuild_contact(&state.displacement);
+        state.stretches.fitted[1] = state.stretches.fitted[1].min(most(self.breaking.as_ref()));
+        // a bound that depends on the displacement stays that of the previous run
+        let known = Some(state.stretches.tangent).filter(|&tangent| tangent > 0.0);
+        self.fit_law(state, known)
+    }
+
+    /// Returns true if every stretch of the state, `observed` if known, lies within the fit; widens the fit
+    /// otherwise.
+    pub(super) fn covers_stretches(
+        &mut self,
+        state: &mut State<D>,
+        observed: Option<StretchRange>,
+    ) -> Result<bool, Error> {
+        let observed = observed.unwrap_or_else(|| stretch_range(&*self.bonds, &state.displacement));
+        state.stretches.balanced = observed;
+        state.stretches.observe(observed);
+        Ok(!self.widen(state)?)
+    }
+
+    /// Widens the fitted range, and the tangent with it, if stretches have left it.
+    pub(super) fn widen(&mut self, state: &mut State<D>) -> Result<bool, Error> {
+        if !state.stretches.widen([least, most].map(|of| of(self.breaking.as_ref()))) {
+            return Ok(false);
+        }
+        self.fit_law(state, None)?;
+        Ok(true)
+    }
+
+    /// Part of a stretch range that the law itself covers; beyond it q is constant, and energies grow with e.
+    pub fn fitted_part(&self, observed: StretchRange) -> StretchRange {
+        if self.breaking.is_none() {
+            return observed;
+        }
+        let (least, most) = (least(self.breaking.as_ref()), most(self.breaking.as_ref()));
+        StretchRange {
+            low: observed.low.max(least * least - 1.0),
+            high: observed.high.min(most * most - 1.0),
+        }
+    }
+
+    pub(super) fn fit_law(&mut self, state: &mut State<D>, known: Option<f64>) -> Result<(), Error> {
+        let (bound, clamped) = (self.fit_bound, self.breaking.is_some());
+        let cover = LawCover { stretches: state.stretches.fitted, bound, clamped, known };
+        state.stretches.tangent = self.material.cover(&mut *self.bonds, &state.displacement, &cover)?;
+        Ok(())
+    }
+}

@@ -1,0 +1,139 @@
+//! Regions rotating about an axis: prescribed along the arc, not in proportion to the load factor.
+
+use super::load::Loads;
+use super::rotation::RotatingRegion;
+use super::system::System;
+use crate::bonds::BodyGeometry;
+use crate::field::{CHUNK, Field};
+use rayon::prelude::*;
+
+/// Particles of a region from which the first guess measures distances.
+const SAMPLES: usize = 256;
+
+/// A region that carries free particles: its rotation, its displacement at load factor 1, m, and positions of
+/// some of its particles.
+type Carrier<'a, const D: usize> = (Option<&'a RotatingRegion<D>>, [f64; D], Vec<[f64; D]>);
+
+impl<const D: usize> Loads<D> {
+    /// Rotates a region whose components are already constrained.
+    pub fn turn(&mut self, bonds: &dyn BodyGeometry<D>, turned: RotatingRegion<D>) {
+        self.turned.push(turned);
+        self.set_rates(bonds, 0.0, 0.0);
+    }
+
+    /// Sets [`Loads::displacement`] of rotating regions to the rate of their displacement over the load
+    /// factor between two factors: the secant, or the tangent at one factor.
+    pub(super) fn set_rates(&mut self, bonds: &dyn BodyGeometry<D>, before: f64, after: f64) {
+        let Some(field) = self.displacement.as_mut() else { return };
+        for turned in &self.turned {
+            for &site in &turned.sites {
+                let place = bonds.position(site as usize);
+                let rate = if before == after {
+                    let rate = turned.rotation.rate(place, after);
+                    std::array::from_fn(|d| rate[d] + turned.shift[d])
+                } else {
+                    let [old, new] = [before, after].map(|factor| turned.displacement(place, factor));
+                    std::array::from_fn(|d| (new[d] - old[d]) / (after - before))
+                };
+                turned.set(field, site, rate);
+            }
+        }
+    }
+
+    /// Sets the displacement of rotating regions at a load factor.
+    pub(super) fn place_turned(&self, bonds: &dyn BodyGeometry<D>, factor: f64, displacement: &mut Field<D>) {
+        for turned in &self.turned {
+            for &site in &turned.sites {
+                let moved = turned.displacement(bonds.position(site as usize), factor);
+                turned.set(displacement, site, moved);
+            }
+        }
+    }
+
+    /// Longest arc of rotating particles against the others, m; for regions rotating both ways, the sum of
+    /// both.
+    pub(super) fn arc(&self, bonds: &dyn BodyGeometry<D>) -> f64 {
+        let of = |turned: &RotatingRegion<D>| {
+            let each = turned.sites.iter().map(|&site| turned.rotation.radius(bonds.position(site as usize)));
+            each.fold(0.0, f64::max)
+        };
+        let radius = self.turned.iter().map(of).fold(0.0, f64::max);
+        let span = |d: usize| {
+            let angles = self.turned.iter().map(|turned| turned.rotation.angle * turned.rotation.axis[d]);
+            let (low, high) = angles.fold((0.0_f64, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
+            high - low
+        };
+        radius * (0..3).map(|d| span(d).powi(2)).sum::<f64>().sqrt()
+    }
+
+    /// Moves free particles with the regions of prescribed displacement from one load factor to another: each
+    /// region rotates a particle by a fraction of its rotation, in proportion to 1/distance.
+    pub(super) fn carry(
+        &self,
+        bonds: &dyn BodyGeometry<D>,
+        [before, after]: [f64; 2],
+        displacement: &mut Field<D>,
+    ) {
+        let increment = after - before;
+        let mean = |sites: &[u32]| {
+            let mut sum = [0.0; D];
+            let Some(field) = &self.displacement else { return sum };
+            for &site in sites {
+                let value = field.get(site as usize);
+                (0..D)
+                    .filter(|d| self.constrained(site as usize) >> d & 1 == 1)
+                    .for_each(|d| sum[d] += value[d]);
+            }
+            sum.map(|x| x / sites.len().max(1) as f64)
+        };
+        let regions: Vec<Carrier<D>> = self
+            .held_regions
+            .iter()
+            .enumerate()
+            .filter(|(_, sites)| !sites.is_empty())
+            .map(|(region, sites)| {
+                let turned = self.turned.iter().find(|turned| turned.region == region);
+                let shift = turned.map_or_else(|| mean(sites), |turned| turned.shift);
+                let step = sites.len().div_ceil(SAMPLES);
+                let sample = sites.iter().step_by(step).map(|&site| bonds.position(site as usize)).collect();
+                (turned, shift, sample)
+            })
+            .collect();
+        let moved = |&site: &u32| {
+            let (place, own) = (bonds.position(site as usize), displacement.get(site as usize));
+            let near = |sample: &Vec<[f64; D]>| {
+                let squares =
+                    sample.iter().map(|there| (0..D).map(|d| (there[d] - place[d]).powi(2)).sum::<f64>());
+                1.0 / squares.fold(f64::INFINITY, f64::min).sqrt().max(1e-9 * bonds.spacing())
+            };
+            let weights: Vec<f64> = regions.iter().map(|(_, _, sample)| near(sample)).collect();
+            let sum: f64 = weights.iter().sum();
+            let mut u = own;
+            for ((turned, shift, _), weight) in regions.iter().zip(weights) {
+                let part = weight / sum;
+                if let Some(RotatingRegion { rotation, shift, .. }) = turned {
+                    let from =
+                        std::array::from_fn(|d| place[d] + u[d] - rotation.centre[d] - before * shift[d]);
+                    let turn = rotation.turn(part * increment * rotation.angle, from);
+                    (0..D).for_each(|d| u[d] += turn[d]);
+                }
+                (0..D).for_each(|d| u[d] += part * increment * shift[d]);
+            }
+            u
+        };
+        let moved: Vec<Vec<[f64; D]>> =
+            bonds.particles().par_chunks(CHUNK).map(|sites| sites.iter().map(moved).collect()).collect();
+        for (&site, u) in bonds.particles().iter().zip(moved.into_iter().flatten()) {
+            displacement.set(site as usize, u);
+        }
+    }
+}
+
+impl<const D: usize> System<'_, D> {
+    /// Runs [`Loads::set_rates`] if any region rotates.
+    pub(super) fn set_rates(&mut self, before: f64, after: f64) {
+        if !self.loads.turned.is_empty() {
+            self.loads.to_mut().set_rates(&*self.bonds, before, after);
+        }
+    }
+}

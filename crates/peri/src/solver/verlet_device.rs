@@ -1,0 +1,311 @@
+//! Explicit dynamics on a graphics card: the host decides as [`VelocityVerlet`] does, from sums of each step.
+//!
+//! As long as no stretch can leave the fitted law or reach the critical one, several steps are taken before
+//! their sums are read; where the sums show that stretches were to be looked at on the way, the card goes
+//! back to that step. Otherwise a step is taken at a time, and the stretches that its forces meet are looked
+//! at.
+
+use super::criterion::Criterion;
+use super::method::{StepCallback, Watch};
+use super::motion::StretchLook;
+use super::state::State;
+use super::system::System;
+use super::verlet::VelocityVerlet;
+use super::verlet_step::VerletSums;
+use crate::bonds::{LatticeBonds, Overstretched, Property};
+use crate::error::Error;
+use crate::gpu::{Device, DeviceBody, DeviceLoads, DeviceStep, MOST_STEPS, StepSums};
+
+/// Strain of a step, over that of the last, that steps taken together allow for.
+const GROWTH: f64 = 1.5;
+
+/// A body on a card in a run.
+struct Run<const D: usize> {
+    body: DeviceBody<D>,
+    /// Greatest change of a stretch in the last step, at most; ∞ where it is not known.
+    strain: f64,
+}
+
+impl VelocityVerlet {
+    /// As [`Method::solve`](super::Method::solve), with steps on a device: of a lattice of a bond law,
+    /// without contact and turned regions. `watch` may keep the state after a row of history only.
+    ///
+    /// # Errors
+    /// As there; [`Error::Device`] for what the device cannot do, or where it fails.
+    pub fn solve_on<const D: usize>(
+        &self,
+        device: &Device,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        watch: &mut Watch<D>,
+        finished: &mut StepCallback<D>,
+    ) -> Result<(), Error> {
+        refuse(system)?;
+        self.open(system, state)?;
+        let mut run = Run { body: body_of(device, system, state)?, strain: f64::INFINITY };
+        while state.step < self.records {
+            let end = self.end_of_row(state);
+            while state.motion.steps.taken < state.motion.steps.planned {
+                self.advance_on(&mut run, system, state, end, watch)?;
+            }
+            [state.displacement, state.velocity, state.force] = run.body.state()?;
+            self.close_row(system, state)?;
+            finished(&*system.bonds, state)?;
+            watch(&self.status(state, true), state)?;
+        }
+        Ok(())
+    }
+
+    /// Some steps: many where no stretch has to be looked at, one otherwise.
+    fn advance_on<const D: usize>(
+        &self,
+        run: &mut Run<D>,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        end: f64,
+        watch: &mut Watch<D>,
+    ) -> Result<(), Error> {
+        let motion = &state.motion;
+        let room = motion.look.room(state.stretches.fitted, system.breaking_stretch());
+        let left = motion.steps.planned - motion.steps.taken;
+        // not a number, or none below 2: one
+        let many = (room / (GROWTH * run.strain)).min(left as f64).min(MOST_STEPS as f64);
+        if many >= 2.0 {
+            self.advance_many(run, system, state, (end, many as usize), watch)
+        } else {
+            self.advance_one(run, system, state, end)?;
+            watch(&self.status(state, false), state)
+        }
+    }
+
+    /// Constants of the step that begins `ahead` steps from now, and the time at its end.
+    fn step_ahead<const D: usize>(
+        &self,
+        system: &System<D>,
+        state: &State<D>,
+        ahead: usize,
+        end: f64,
+    ) -> (DeviceStep, f64) {
+        let mut steps = state.motion.steps;
+        steps.taken += ahead as u64;
+        let before = match ahead {
+            0 => state.motion.time,
+            _ => super::motion::EqualSteps { taken: steps.taken - 1, ..steps }.time_after(end),
+        };
+        let after = steps.time_after(end);
+        let (factor, rate) = self.factor(system, after);
+        let factors = [self.factor(system, before).0, factor];
+        let (time_step, density, damping) = (steps.time_step, self.density, self.damping);
+        (DeviceStep { time_step, density, damping, factors, rate }, after)
+    }
+
+    fn advance_many<const D: usize>(
+        &self,
+        run: &mut Run<D>,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        (end, many): (f64, usize),
+        watch: &mut Watch<D>,
+    ) -> Result<(), Error> {
+        let steps: Vec<(DeviceStep, f64)> =
+            (0..many).map(|ahead| self.step_ahead(system, state, ahead, end)).collect();
+        let constants: Vec<DeviceStep> = steps.iter().map(|(step, _)| *step).collect();
+        let before = run.body.time_step();
+        run.body.keep_state();
+        for (slot, step) in constants.iter().enumerate() {
+            run.step(step);
+            run.body.keep_sums(slot);
+        }
+        let sums = run.body.sums(&constants)?;
+        for (taken, (sums, (_, after))) in sums.iter().zip(&steps).enumerate() {
+            let strain = run.strain_of(state, sums);
+            let mut look = state.motion.look;
+            look.slack += strain;
+            if look.is_due(state.stretches.fitted, system.breaking_stretch()) {
+                run.body.take_back(before);
+                constants[..taken].iter().for_each(|step| run.step(step));
+                run.strain = f64::INFINITY;
+                return Ok(());
+            }
+            state.motion.look = look;
+            run.strain = strain;
+            system.count_evaluation(state);
+            self.count(state, *after, sums)?;
+            watch(&self.status(state, false), state)?;
+        }
+        Ok(())
+    }
+
+    fn advance_one<const D: usize>(
+        &self,
+        run: &mut Run<D>,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        end: f64,
+    ) -> Result<(), Error> {
+        let (step, after) = self.step_ahead(system, state, 0, end);
+        let factor = step.factors[1];
+        run.body.leap(&step);
+        run.body.pull(factor, true);
+        let (observed, listed) = run.body.look()?;
+        run.body.keep_sums(0);
+        let sums = run.body.sums(&[step])?[0];
+        run.strain = run.strain_of(state, &sums);
+        state.motion.look.slack += run.strain;
+        system.count_evaluation(state);
+        let look = state.motion.look.is_due(state.stretches.fitted, system.breaking_stretch());
+        if look {
+            state.stretches.observe(observed);
+            state.motion.look = StretchLook::new(observed);
+            if observed.high.is_finite() && system.widen(state)? {
+                run.take_law(system)?;
+                run.body.pull(factor, false);
+                system.count_evaluation(state);
+                self.cover(system, state);
+            }
+        }
+        run.body.kick(&step);
+        run.body.keep_sums(0);
+        let sums = run.body.sums(&[step])?[0];
+        self.count(state, after, &sums)?;
+        if look && system.is_overstretched(observed) {
+            let list = run.overstretched(system, state, listed)?;
+            let sites = system.sever(state, list, None);
+            run.take_severed(system, state, &sites, factor);
+        }
+        let motion = &mut state.motion;
+        if motion.limits.longest < (1.0 - 1e-9) * motion.steps.time_step
+            && motion.steps.taken < motion.steps.planned
+        {
+            motion.plan(end);
+        }
+        Ok(())
+    }
+
+    fn count<const D: usize>(&self, state: &mut State<D>, after: f64, sums: &StepSums) -> Result<(), Error> {
+        state.motion.time = after;
+        state.motion.steps.taken += 1;
+        state.counts.iterate();
+        let half =
+            |k: usize| VerletSums { work: sums.work[k], damped: sums.damped[k], ..VerletSums::default() };
+        let first = VerletSums { increment: sums.increment, ..half(0) };
+        self.account(state, first, VerletSums { kinetic: sums.kinetic, ..half(1) })
+    }
+}
+
+impl<const D: usize> Run<D> {
+    fn step(&mut self, step: &DeviceStep) {
+        self.body.leap(step);
+        self.body.pull(step.factors[1], false);
+        self.body.kick(step);
+    }
+
+    /// Greatest change of a stretch in a step, at most: two ends, √D components.
+    fn strain_of(&self, state: &State<D>, sums: &StepSums) -> f64 {
+        2.0 * (D as f64).sqrt() * sums.increment / state.motion.limits.bonds.shortest
+    }
+
+    fn take_law(&mut self, system: &System<D>) -> Result<(), Error> {
+        let Some((law, _)) = lattice(system).and_then(LatticeBonds::law) else { return Ok(()) };
+        self.body.set_law(law, limit(system))
+    }
+
+    /// Listed bonds that break, as the host finds them.
+    fn overstretched(
+        &self,
+        system: &System<D>,
+        state: &mut State<D>,
+        listed: usize,
+    ) -> Result<Vec<Overstretched>, Error> {
+        let Some(critical) = critical(system) else { return Ok(Vec::new()) };
+        let Some(listed) = self.body.listed(listed)? else {
+            [state.displacement, state.velocity, state.force] = self.body.state()?;
+            let scan = crate::bonds::StretchScan::default();
+            return Ok(crate::bonds::overstretched(&*system.bonds, &state.displacement, critical, &scan));
+        };
+        let each = listed.into_iter().filter_map(|(site, index, elongation)| {
+            let bond = system.bonds.bond(site as usize, index);
+            let least = critical.weaker(site as usize, bond.site).powi(2) - 1.0;
+            let (length, weight) = (bond.length, bond.weight);
+            (elongation > least).then_some(Overstretched { site, index, elongation, length, weight })
+        });
+        Ok(each.collect())
+    }
+
+    /// Takes the bonds left to sites, and their forces.
+    fn take_severed(&mut self, system: &System<D>, state: &State<D>, sites: &[u32], factor: f64) {
+        let Some(words) = state.fracture.intact.as_ref().filter(|_| !sites.is_empty()) else { return };
+        let all = system.bonds.sites();
+        let rows = words.len() / all;
+        let changed = sites.iter().flat_map(|&site| (0..rows).map(move |row| row * all + site as usize));
+        let changed: Vec<(usize, u64)> = changed.map(|at| (at, words[at])).collect();
+        self.body.replace(&changed);
+        if system.loads.body_force.is_some() {
+            // particles without bonds have lost theirs
+            self.body.set_loads(&loads(system));
+        }
+        self.body.pull_at(sites, factor);
+    }
+}
+
+fn body_of<const D: usize>(
+    device: &Device,
+    system: &System<D>,
+    state: &State<D>,
+) -> Result<DeviceBody<D>, Error> {
+    let Some((bonds, (law, modulus))) = lattice(system).and_then(|bonds| Some((bonds, bonds.law()?))) else {
+        return Err(Error::Device("expected a lattice with a law".to_owned()));
+    };
+    let mut body = DeviceBody::new(device, bonds, law, modulus)?;
+    body.set_law(law, limit(system))?;
+    body.set_loads(&loads(system));
+    let time_step = Some(state.motion.steps.time_step).filter(|&step| step > 0.0);
+    let fields = [&state.displacement, &state.velocity, &state.force];
+    body.set_state(bonds, fields, time_step.unwrap_or(state.motion.limits.longest))?;
+    Ok(body)
+}
+
+fn loads<'a, const D: usize>(system: &'a System<D>) -> DeviceLoads<'a, D> {
+    let loads = &system.loads;
+    DeviceLoads {
+        held: &loads.constrained,
+        displacement: loads.displacement.as_ref(),
+        body_force: loads.body_force.as_ref(),
+    }
+}
+
+fn lattice<'a, const D: usize>(system: &'a System<D>) -> Option<&'a LatticeBonds<D>> {
+    system.bonds.as_lattice()
+}
+
+fn critical<'a, const D: usize>(system: &'a System<D>) -> Option<&'a Property> {
+    match system.breaking.as_ref().map(|breaking| &breaking.criterion) {
+        Some(Criterion::Stretch(stretch)) => Some(stretch),
+        _ => None,
+    }
+}
+
+/// e from which bonds are listed: those that break, and some within rounding of them.
+fn limit<const D: usize>(system: &System<D>) -> f64 {
+    critical(system)
+        .map_or(f64::INFINITY, |critical| (critical.least() * critical.least() - 1.0) * (1.0 - 1e-6) - 1e-12)
+}
+
+/// Refuses what only the host can do.
+fn refuse<const D: usize>(system: &System<D>) -> Result<(), Error> {
+    let softens = matches!(
+        system.breaking.as_ref().map(|breaking| &breaking.criterion),
+        Some(Criterion::Energy(_) | Criterion::Softening(_))
+    );
+    let what = [
+        (system.bonds.as_lattice().is_none(), "a body of points"),
+        (!system.material.is_fitted_law(), "a solid, or bonds with prestrains, or that soften"),
+        (softens, "bonds that break by their energy"),
+        (system.contact.is_some(), "contact"),
+        (!system.loads.turned.is_empty(), "a rotation"),
+    ];
+    match what.iter().find(|(has, _)| *has) {
+        Some((_, what)) => Err(Error::Device(format!("unexpected {what}: only the processor does that"))),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,103 @@
+//! A scene whose steps a graphics card takes, or a program that stands for one: the report of the processor.
+
+use harness::case::{Case, Options, Run};
+use harness::scene::Source;
+use peri::Error;
+use peri::gpu::{Device, Precision};
+use peri::program::run::{self, FinishedScene, Peri};
+use peri::program::scene::Scene;
+
+/// A notched plate that is hit beside its notch, and torn.
+const SCENE: &str = r#"
+version = 1
+program = "peri"
+[body]
+space = "plane-stress"
+thickness = "1 mm"
+spacing = "1 mm"
+shapes = [{ add = "box", min = ["0 mm", "0 mm"], max = ["24 mm", "30 mm"] }]
+cracks = [{ from = ["-1 mm", "15 mm"], to = ["9.6 mm", "15 mm"] }]
+[material]
+youngs_modulus = "191 GPa"
+law = "linear"
+critical = { stretch = 1.01 }
+[[boundary]]
+name = "hit"
+min = ["0 mm", "15 mm"]
+max = ["2 mm", "30 mm"]
+displacement = ["0.5 mm", "free"]
+[[boundary]]
+name = "pushed"
+min = ["0 mm", "0 mm"]
+max = ["24 mm", "2 mm"]
+force = ["0 N", "50 N"]
+[solver]
+method = "verlet"
+[dynamics]
+density = "8000 kg/m^3"
+end_time = "20 us"
+ramp = "20 us"
+damping = "1000 1/s"
+records = 8
+device = "cpu"
+[[probe]]
+name = "crack"
+track = "crack"
+axis = "x"
+[output]
+pictures = false
+fields = false
+"#;
+
+fn run(name: &str, text: &str) -> Result<Finished, harness::scene::Failure<Error>> {
+    let folder = tempfile::tempdir().unwrap();
+    let source = Source::new(name, text);
+    let scene = source.parse::<Scene>()?;
+    let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(folder.path()));
+    peri::program::run::run(&source, &scene, &mut own)
+}
+
+#[test]
+fn gpu_scene_has_the_report_of_the_processor() {
+    let host = run("host.toml", SCENE).unwrap();
+    let broken = host.report.scalar("broken_bonds").unwrap();
+    assert!(broken > 10.0, "{broken} bonds broke");
+    let auto = run("auto.toml", &SCENE.replace("\"cpu\"", "\"auto\"")).unwrap();
+    let why = auto.outcomes[0].warnings.join("\n");
+    assert!(why.contains("directed bonds are too few"), "{why}");
+    let Ok(device) = Device::portable() else {
+        let error =
+            run("gpu.toml", &SCENE.replace("\"cpu\"", "\"gpu\"")).err().map(|error| error.to_string());
+        assert!(error.unwrap_or_default().contains("no graphics card"));
+        return evidence::skipped("a device behind Vulkan, Metal or DirectX 12");
+    };
+    for (precision, word) in [(Precision::Double, "double"), (Precision::Single, "single")] {
+        if Device::portable().and_then(|device| device.with_precision(precision)).is_err() {
+            continue;
+        }
+        let scene = SCENE.replace("device = \"cpu\"", &format!("device = \"gpu\"\nprecision = \"{word}\""));
+        let found = run("gpu.toml", &scene).unwrap();
+        let note = found.outcomes[0].warnings.join("\n");
+        assert!(note.contains(device.name()) && note.contains(word), "{note}");
+        if precision == Precision::Single {
+            // a bond at its limit may break a step earlier or later
+            for name in ["broken_bonds", "largest_displacement", "work_of_loads"] {
+                let [value, expected] = [&found, &host].map(|run| run.outcomes[0].get(name).unwrap());
+                assert!((value / expected - 1.0).abs() <= 0.02, "{name}: {value:e} {expected:e}");
+            }
+            continue;
+        }
+        for (name, expected, _) in &host.outcomes[0].values {
+            let value = found.outcomes[0].get(name).unwrap();
+            // errors are what rounding leaves
+            let bound = if name.ends_with("_error") { 1e-9 } else { 1e-9 * expected.abs().max(1e-12) };
+            assert!((value - expected).abs() <= bound, "{name}: {value:e} {expected:e}");
+        }
+        // rows without a crack have no number
+        let crack = |finished: &FinishedScene| {
+            let rows = finished.outcomes[0].history.iter();
+            format!("{:?}", rows.map(|row| (row.broken, row.seen.clone())).collect::<Vec<_>>())
+        };
+        assert_eq!(crack(&found), crack(&host));
+    }
+}
