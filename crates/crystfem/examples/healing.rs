@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// Returns the least and mean degree of healing of a bar with a layer every `interval`, s.
 pub fn healed(interval: f64) -> Result<Option<[f64; 2]>, crystfem::Error> {
     let part = PrintedPart::bar(&Bar::new([10e-3, 5e-3], 4, 0.5e-3), Semicrystalline::pa12()?)?;
-    let part = part.layer_every(interval).hold("bottom", 353.15).convection(15.0, 353.15);
+    let part = part.layer_every(interval).hold_surface("bottom", 353.15).convection(15.0, 353.15);
     let problem = Arc::new(part.problem()?);
     let mut simulation = Simulation::new(problem.clone(), Settings::adaptive(1e-3))?;
 

@@ -24,7 +24,7 @@ pub fn printed(later: f64) -> Result<Simulation, crystfem::Error> {
     let cells = CellSettings::new([1e-3, 1e-3, 0.25e-3]);
     let part = PrintedPart::along_path(path, &cells, Semicrystalline::pa12()?)?;
     let mut simulation =
-        part.hold("bottom", 373.15).convection(15.0, 353.15).simulate(Settings::adaptive(1e-3))?;
+        part.hold_surface("bottom", 373.15).convection(15.0, 353.15).simulate(Settings::adaptive(1e-3))?;
     simulation.run_until(end + later)?;
     Ok(simulation)
 }

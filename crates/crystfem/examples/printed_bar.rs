@@ -16,7 +16,7 @@ fn main() -> Result<(), crystfem::Error> {
         .substrate(glass, plate)
         .deposited_at(493.15)
         .layer_every(20.0)
-        .hold("bottom", plate)
+        .hold_surface("bottom", plate)
         .convection(15.0, air)
         .radiation(0.9, air);
     let mut simulation = part.simulate(Settings::adaptive(1e-3))?;

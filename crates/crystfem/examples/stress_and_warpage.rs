@@ -11,7 +11,8 @@ use std::sync::Arc;
 /// Returns the largest Mises stress on the bed and after the release, Pa, and the warpage, m.
 pub fn bar() -> Result<[f64; 3], crystfem::Error> {
     let part = PrintedPart::bar(&Bar::new([20e-3, 5e-3], 4, 0.5e-3), Semicrystalline::pa12()?)?;
-    let problem = Arc::new(part.layer_every(20.0).hold("bottom", 353.15).convection(15.0, 353.15).problem()?);
+    let problem =
+        Arc::new(part.layer_every(20.0).hold_surface("bottom", 353.15).convection(15.0, 353.15).problem()?);
     let mut simulation = Simulation::new(problem.clone(), Settings::adaptive(1e-3))?;
 
     let bears = vec![true; problem.mesh.element_count()];

@@ -14,7 +14,7 @@
 //! let bar = Bar::new([20e-3, 10e-3], 4, 0.5e-3);
 //! let part = PrintedPart::bar(&bar, Semicrystalline::pa12()?)?
 //!     .layer_every(20.0)
-//!     .hold("bottom", 353.15)
+//!     .hold_surface("bottom", 353.15)
 //!     .convection(15.0, 353.15);
 //! let mut simulation = part.simulate(Settings::adaptive(1e-3))?;
 //! simulation.run_until(200.0)?;

@@ -96,7 +96,7 @@ impl PrintedPart {
     }
 
     /// Holds a surface of the mesh at a temperature, K.
-    pub fn hold(mut self, surface: &str, kelvin: f64) -> Self {
+    pub fn hold_surface(mut self, surface: &str, kelvin: f64) -> Self {
         self.held.push((surface.to_owned(), kelvin));
         self
     }

@@ -340,9 +340,9 @@ impl Comparisons<'_> {
 
     /// Returns names of the scalars that they add to a report.
     pub fn names(&self) -> impl Iterator<Item = Named> {
-        let tables = self.convergence.iter().flat_map(|spec| [LIMIT, ORDER].map(|q| q.of(&[&spec.name])));
+        let tables = self.convergence.iter().flat_map(|spec| [LIMIT, ORDER].map(|q| q.named(&[&spec.name])));
         let curves = self.curves.iter().flat_map(|spec| spec.studies.iter().map(|study| (&spec.name, study)));
-        tables.chain(curves.map(|(curve, study)| ERROR_OF.of(&[curve, study])))
+        tables.chain(curves.map(|(curve, study)| ERROR_OF.named(&[curve, study])))
     }
 
     /// Adds their results to a report.

@@ -69,7 +69,7 @@ fn measure<const D: usize>(cells: u32, steps: u64) -> Result<(), Box<dyn std::er
                 for taken in 0..steps {
                     let slot = taken % MOST_STEPS;
                     if !pulls {
-                        body.leap(&step);
+                        body.half_kick_and_drift(&step);
                     }
                     body.pull(1.0, looks);
                     if !pulls {

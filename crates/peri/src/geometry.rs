@@ -168,13 +168,8 @@ pub fn lattice<const D: usize>(
     let total: usize = cells.iter().product();
     let occupied: Vec<bool> = (0..total)
         .map(|index| {
-            let mut rest = index;
-            let centre = std::array::from_fn(|d| {
-                let cell = rest % cells[d];
-                rest /= cells[d];
-                origin[d] + spacing * cell as f64
-            });
-            inside(operations, centre)
+            let cell = cell(index, cells);
+            inside(operations, std::array::from_fn(|d| origin[d] + spacing * cell[d] as f64))
         })
         .collect();
     if !occupied.contains(&true) {
@@ -183,6 +178,15 @@ pub fn lattice<const D: usize>(
         )));
     }
     Ok(Lattice { spacing, origin, cells, occupied, volume: spacing.powi(D as i32) * thickness })
+}
+
+/// Returns the cell along each axis of an index into cells of which the first axis varies fastest.
+pub(crate) fn cell<const D: usize>(mut index: usize, cells: [usize; D]) -> [usize; D] {
+    cells.map(|count| {
+        let cell = index % count;
+        index /= count;
+        cell
+    })
 }
 
 /// Largest number of cells of a body, whatever the memory: sites are counted in 32 bits.

@@ -39,7 +39,7 @@ fn ours(latent: bool) -> Vec<Vec<Option<f64>>> {
         seed: 0.0,
     });
     let part = PrintedPart::bar(&bar(), material.unwrap()).unwrap().layer_every(INTERVAL);
-    let part = part.hold("bottom", 353.15).convection(15.0, 353.15);
+    let part = part.hold_surface("bottom", 353.15).convection(15.0, 353.15);
     let mut simulation = part.simulate(Settings::adaptive(1e-4)).unwrap();
     let nodes = bar().mesh().unwrap().points.len() as u32;
     (1..=LAYERS)

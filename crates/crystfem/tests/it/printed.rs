@@ -22,7 +22,7 @@ fn equals_the_scene() {
     let bar = Bar { substrate: Some(substrate), ..Bar::new([0.04, 0.01], 8, 5e-4) };
     let part = PrintedPart::bar(&bar, Semicrystalline::pa12().unwrap()).unwrap();
     let part = part.substrate(glass(), 353.15).layer_every(20.0).deposited_at(493.15);
-    let part = part.hold("bottom", 353.15).convection(15.0, 353.15).radiation(0.9, 353.15);
+    let part = part.hold_surface("bottom", 353.15).convection(15.0, 353.15).radiation(0.9, 353.15);
     let part = part.problem().unwrap();
 
     let source = Source::new("case.toml", SCENE);
@@ -53,7 +53,7 @@ fn errors_name_the_parameter() {
         Err(Error::Parameter { name, .. }) => name.to_owned(),
         other => panic!("{:?}", other.map(|_| ())),
     };
-    assert!(fault(bar().hold("botom", 300.0)).starts_with("no surface `botom`; allowed: "));
+    assert!(fault(bar().hold_surface("botom", 300.0)).starts_with("no surface `botom`; allowed: "));
     assert_eq!(fault(bar().layer_every(0.0)), "time between layers");
     let mesh = Grid::uniform([0.0; 3], [1.0; 3], [2, 2, 2]).unwrap().mesh("block").unwrap();
     let half: Vec<u32> = (0..4).collect();

@@ -152,8 +152,10 @@ proptest! {
         let all: Vec<u32> = (0..mesh.element_count() as u32).collect();
         match path::parse(Path::new("a.gcode"), &bytes) {
             Ok(path) => {
-                prop_assert!(path.moves.windows(2).all(|pair| pair[0].end <= pair[1].start && pair[0].start <= pair[0].end));
-                if let Ok(mut activation) = path.activation_times(&mesh, &all, Bead { width: 4e-4, height: 3e-4 }) {
+                prop_assert!(path.moves.iter().all(|moved| moved.start <= moved.end));
+                prop_assert!(path.moves.windows(2).all(|pair| pair[0].end <= pair[1].start));
+                let bead = Bead { width: 4e-4, height: 3e-4 };
+                if let Ok(mut activation) = path.activation_times(&mesh, &all, bead) {
                     activation.fill(&mesh);
                     prop_assert!(activation.times.iter().all(|time| *time >= 0.0));
                 }

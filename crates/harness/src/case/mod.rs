@@ -77,7 +77,7 @@ pub trait Case {
 
     /// Keys of a scene that a sweep sets to `false`: what they name is large, and nobody looks at it run by
     /// run.
-    fn bulky(_source: &Source) -> &'static [&'static str] {
+    fn large_outputs(_source: &Source) -> &'static [&'static str] {
         &[]
     }
 

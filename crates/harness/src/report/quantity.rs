@@ -23,7 +23,7 @@ pub struct Named {
 
 impl Quantity {
     /// Returns the name with `parts` in place of its words in braces, in this order.
-    pub fn of(&self, parts: &[&str]) -> Named {
+    pub fn named(&self, parts: &[&str]) -> Named {
         debug_assert_eq!(parts.len(), self.name.matches('{').count(), "`{}`", self.name);
         let mut parts = parts.iter();
         let mut name = String::new();
@@ -40,7 +40,7 @@ impl Quantity {
 
     /// Returns the name with `*` for its words in braces.
     pub fn pattern(&self) -> String {
-        self.of(&vec!["*"; self.name.matches('{').count()]).name
+        self.named(&vec!["*"; self.name.matches('{').count()]).name
     }
 }
 
@@ -67,7 +67,7 @@ impl Named {
 
 impl From<Quantity> for Named {
     fn from(quantity: Quantity) -> Self {
-        quantity.of(&[])
+        quantity.named(&[])
     }
 }
 
@@ -80,7 +80,7 @@ impl From<Quantity> for Named {
 ///     PEAK_LOAD = "peak_load", "N", "greatest load of all steps";
 ///     REACTION = "reaction_{axis}", "N", "force on what is held";
 /// }
-/// assert_eq!(REACTION.of(&["x"]).name, "reaction_x");
+/// assert_eq!(REACTION.named(&["x"]).name, "reaction_x");
 /// assert_eq!(ALL.len(), 2);
 /// ```
 #[macro_export]

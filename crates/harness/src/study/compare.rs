@@ -55,7 +55,7 @@ impl Compare {
         for one in solved.iter().filter(|one| truth.is_none_or(|truth| truth.name() != one.name())) {
             let Some((value, _)) = one.scalar(&self.quantity) else { continue };
             let distance = (value / exact - 1.0).abs();
-            report.value(error.of(&[&self.quantity, one.name()]), distance);
+            report.value(error.named(&[&self.quantity, one.name()]), distance);
             let [seconds, errors] = curves.entry(method(one)).or_default();
             seconds.push(one.solve_seconds());
             errors.push(distance);

@@ -58,10 +58,10 @@ impl Convergence {
         let values = self.studies.each_ref().map(|name| of(name)?.scalar(&self.quantity));
         let [Some((coarse, unit)), Some((middle, _)), Some((fine, _))] = values else { return };
         let [limit, order] = self.limit_and_order([coarse, middle, fine]);
-        report.value(LIMIT.of(&[&self.name]).in_unit(unit), limit);
+        report.value(LIMIT.named(&[&self.name]).in_unit(unit), limit);
         // of equal values there is none
         if order.is_finite() {
-            report.value(ORDER.of(&[&self.name]), order);
+            report.value(ORDER.named(&[&self.name]), order);
         }
     }
 }

@@ -69,7 +69,7 @@ impl ErrorAgainstTime {
         let (mut seconds, mut errors) = (Vec::new(), Vec::new());
         for study in &self.studies {
             if let Some((own, error)) = of(study).and_then(|own| Some((own, self.error(own, truth)?))) {
-                report.value(ERROR_OF.of(&[&self.name, study]), error);
+                report.value(ERROR_OF.named(&[&self.name, study]), error);
                 seconds.push(own.solve_seconds());
                 errors.push(error);
             }

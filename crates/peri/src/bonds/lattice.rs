@@ -14,7 +14,7 @@ use super::{
 };
 use crate::error::Error;
 use crate::field::{Field, chunk_range};
-use crate::geometry::{Cut, Gaps, Lattice, refuse_too_large};
+use crate::geometry::{Cut, Gaps, Lattice, cell, refuse_too_large};
 use crate::potential::{EnergyTable, KernelFit, StretchRange, TangentTable};
 use mixed::Mixed;
 use rayon::prelude::*;
@@ -262,15 +262,7 @@ impl<const D: usize> LatticeBonds<D> {
         let cells = self.lattice.cells;
         let mut particles: Vec<u32> = (0..self.lattice.occupied.len())
             .filter(|&index| self.lattice.occupied[index])
-            .map(|index| {
-                let mut rest = index;
-                let cell = std::array::from_fn(|d| {
-                    let c = rest % cells[d];
-                    rest /= cells[d];
-                    c
-                });
-                self.site(cell) as u32
-            })
+            .map(|index| self.site(cell(index, cells)) as u32)
             .collect();
         particles.sort_unstable();
         particles

@@ -294,7 +294,7 @@ pub fn pull<F: Float>(
 /// `after` times the full displacement. Each thread writes its [`LEAP_SUMS`].
 #[cube(launch_unchecked)]
 #[allow(clippy::too_many_arguments)]
-pub fn leap<F: Float>(
+pub fn half_kick_and_drift<F: Float>(
     force: &[F],
     particles: &[u32],
     held: &[u32],

@@ -1,7 +1,9 @@
 //! Steps of velocity Verlet on a device: launches of its kernels, and what the host reads of them.
 
 use super::body::{DeviceBody, FOLDED, LANES, LISTED, MOST_STEPS, cubes, failed};
-use super::kernels::{CUBE, KernelForm, LEAP_SUMS, SUMS, copy, fold, kick, leap, pull, scatter};
+use super::kernels::{
+    CUBE, KernelForm, LEAP_SUMS, SUMS, copy, fold, half_kick_and_drift, kick, pull, scatter,
+};
 use crate::bonds::StretchRange;
 use crate::error::Error;
 use cubecl::ir::{ElemType, UIntKind};
@@ -41,7 +43,7 @@ pub type ListedBond = (u32, u32, f64);
 
 impl<const D: usize> DeviceBody<D> {
     /// The first half of a step: half a kick and the drift.
-    pub fn leap(&mut self, step: &DeviceStep) {
+    pub fn half_kick_and_drift(&mut self, step: &DeviceStep) {
         let half = 0.5 * step.damping * step.time_step;
         let push = 0.5 * step.time_step.powi(2) * self.unit / (step.density * self.spacing);
         let ratio = if self.time_step > 0.0 { step.time_step / self.time_step } else { 1.0 };
@@ -50,7 +52,7 @@ impl<const D: usize> DeviceBody<D> {
         let number = |x: f64| InputScalar::new(x, self.precision.element());
         // SAFETY: every buffer has the length named here, and the sites of particles lie inside
         unsafe {
-            leap::launch_unchecked(
+            half_kick_and_drift::launch_unchecked(
                 &self.client,
                 self.cubes_of(self.threads()),
                 CubeDim::new_1d(CUBE as u32),
@@ -165,7 +167,7 @@ impl<const D: usize> DeviceBody<D> {
     ///
     /// # Errors
     /// [`Error::Device`] where the device fails.
-    pub fn look(&self) -> Result<(StretchRange, usize), Error> {
+    pub fn stretch_range(&self) -> Result<(StretchRange, usize), Error> {
         let length = cubes(self.particles, self.form.tile) * CUBE;
         let lanes = length.min(FOLDED);
         self.fold([&self.ranges, &self.folded], length, lanes, (0, 1), (2, 2, 1));

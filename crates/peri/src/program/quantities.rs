@@ -185,7 +185,7 @@ pub const INTEGRALS: [Quantity; 8] = [
 
 /// Names the load at a displacement, m.
 pub fn load_at(displacement: f64) -> Named {
-    LOAD_AT.of(&[&((displacement * 1e9).round() / 1e6).to_string()])
+    LOAD_AT.named(&[&((displacement * 1e9).round() / 1e6).to_string()])
 }
 
 /// All scalars.

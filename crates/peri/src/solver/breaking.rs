@@ -79,11 +79,11 @@ impl<const D: usize> System<'_, D> {
             }
             _ => self.beyond(state),
         };
-        self.sever(state, list, softened)
+        self.sever_bonds(state, list, softened)
     }
 
     /// Severs bonds, and softens those on the way there; the sites of their ends.
-    pub(super) fn sever(
+    pub(super) fn sever_bonds(
         &mut self,
         state: &mut State<D>,
         mut list: Vec<Overstretched>,

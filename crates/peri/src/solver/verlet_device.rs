@@ -145,9 +145,9 @@ impl VelocityVerlet {
     ) -> Result<(), Error> {
         let (step, after) = self.step_ahead(system, state, 0, end);
         let factor = step.factors[1];
-        run.body.leap(&step);
+        run.body.half_kick_and_drift(&step);
         run.body.pull(factor, true);
-        let (observed, listed) = run.body.look()?;
+        let (observed, listed) = run.body.stretch_range()?;
         run.body.keep_sums(0);
         let sums = run.body.sums(&[step])?[0];
         run.strain = run.strain_of(state, &sums);
@@ -195,7 +195,7 @@ impl VelocityVerlet {
 
 impl<const D: usize> Run<D> {
     fn step(&mut self, step: &DeviceStep) {
-        self.body.leap(step);
+        self.body.half_kick_and_drift(step);
         self.body.pull(step.factors[1], false);
         self.body.kick(step);
     }

@@ -58,7 +58,7 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
             }
         }
         for (law, _) in &set.failed {
-            report.value(q::FAILED.of(&[&format!("{name}.{law}")]), 1.0);
+            report.value(q::FAILED.named(&[&format!("{name}.{law}")]), 1.0);
         }
         if let (true, false, Some((law, why))) = (set.fits.is_empty(), stopped, set.failed.first()) {
             let reason = format!("no law can be fitted; {law}: {why}");
@@ -119,7 +119,7 @@ fn record_cross(
         matches!(homogeneous::biaxial(law, a, b), Err(constitutive::Error::Locked { .. }))
     };
     let locked = table.states.iter().filter(locks).count();
-    report.value(q::LOCKED.of(&[key]), locked as f64);
+    report.value(q::LOCKED.named(&[key]), locked as f64);
     if locked > 0 {
         return Ok(None);
     }
@@ -129,26 +129,26 @@ fn record_cross(
 }
 
 fn record_agreement(report: &mut Report, key: &str, found: &Agreement) {
-    report.value(q::RMS.of(&[key]), found.rms / MPA);
-    report.value(q::MAE.of(&[key]), found.mae / MPA);
+    report.value(q::RMS.named(&[key]), found.rms / MPA);
+    report.value(q::MAE.named(&[key]), found.mae / MPA);
     if let Some(r2) = found.r2 {
-        report.value(q::R2.of(&[key]), r2);
+        report.value(q::R2.named(&[key]), r2);
     }
 }
 
 fn record_fit(report: &mut Report, data: &str, table: &TestData, fit: &Fit) -> Result<(), Error> {
     let key = format!("{data}.{}", fit.model.key);
-    report.value(q::SHEAR_MODULUS.of(&[&key]), fit.law.shear_modulus() / MPA);
+    report.value(q::SHEAR_MODULUS.named(&[&key]), fit.law.shear_modulus() / MPA);
     for parameter in &fit.parameters {
         let (value, unit) = scaled(parameter.value, parameter.unit);
-        report.value(q::PARAMETER.of(&[&key, parameter.name]).in_unit(unit), value);
+        report.value(q::PARAMETER.named(&[&key, parameter.name]).in_unit(unit), value);
         if let Some(error) = parameter.standard_error {
-            let quantity = q::STANDARD_ERROR.of(&[&key, parameter.name]).in_unit(unit);
+            let quantity = q::STANDARD_ERROR.named(&[&key, parameter.name]).in_unit(unit);
             report.value(quantity, scaled(error, parameter.unit).0);
         }
     }
     record_agreement(report, &key, &Agreement::new(&fit.law, table)?);
-    report.value(q::STABLE.of(&[&key]), f64::from(u8::from(find_instability(fit, table).is_none())));
+    report.value(q::STABLE.named(&[&key]), f64::from(u8::from(find_instability(fit, table).is_none())));
     report.work(&format!("{key}.evaluations"), fit.iterations as u64);
     report.work(&format!("{key}.starts"), fit.starts.0 as u64);
     report.work(&format!("{key}.starts_that_agree"), fit.starts.1 as u64);

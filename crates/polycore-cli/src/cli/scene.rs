@@ -199,13 +199,14 @@ impl FitCase {
             for model in &self.laws {
                 let fit = format!("{data}.{}", model.key);
                 let own = [q::RMS, q::MAE, q::R2, q::SHEAR_MODULUS, q::STABLE, q::FAILED];
-                names.extend(own.map(|quantity| quantity.of(&[&fit]).name));
+                names.extend(own.map(|quantity| quantity.named(&[&fit]).name));
                 let parameters = model.parameters.iter().map(|parameter| parameter.name);
-                names.extend(parameters.map(|parameter| q::PARAMETER.of(&[&fit, parameter]).name));
+                names.extend(parameters.map(|parameter| q::PARAMETER.named(&[&fit, parameter]).name));
                 for other in self.data.iter().filter(|other| self.cross && other.name != *data) {
                     let fit = format!("{fit}.{}", other.name);
-                    names
-                        .extend([q::RMS, q::MAE, q::R2, q::LOCKED].map(|quantity| quantity.of(&[&fit]).name));
+                    names.extend(
+                        [q::RMS, q::MAE, q::R2, q::LOCKED].map(|quantity| quantity.named(&[&fit]).name),
+                    );
                 }
             }
         }

@@ -74,8 +74,8 @@ impl FitTrial {
     pub fn quantities(&self) -> Vec<String> {
         let parameters = model(&self.law).map_or(&[][..], |model| model.parameters);
         let fixed = [q::NOMINAL, q::ENERGY, q::REFUSED, q::RMS, q::SHEAR_MODULUS];
-        let fixed = fixed.iter().map(|quantity| quantity.of(&[&self.name]));
-        let own = parameters.iter().map(|parameter| q::PARAMETER.of(&[&self.name, parameter.name]));
+        let fixed = fixed.iter().map(|quantity| quantity.named(&[&self.name]));
+        let own = parameters.iter().map(|parameter| q::PARAMETER.named(&[&self.name, parameter.name]));
         fixed.chain(own).map(|quantity| quantity.name).collect()
     }
 
@@ -179,7 +179,7 @@ pub fn check(source: &Source, trials: &[FitTrial]) -> Result<(), SceneError> {
 /// # Errors
 /// Unexpected failures.
 pub fn run(trial: &FitTrial, report: &mut Report) -> Result<(), Error> {
-    let of = |quantity: Quantity| quantity.of(&[&trial.name]);
+    let of = |quantity: Quantity| quantity.named(&[&trial.name]);
     let result = trial.evaluate();
     let mut passed = true;
     let text = match (result, &trial.refused) {
@@ -206,7 +206,7 @@ pub fn run(trial: &FitTrial, report: &mut Report) -> Result<(), Error> {
                     report.value(of(q::SHEAR_MODULUS), fit.law.shear_modulus() / MPA);
                     for parameter in &fit.parameters {
                         let (scale, unit) = if parameter.unit == "Pa" { (MPA, "MPa") } else { (1.0, "") };
-                        let quantity = q::PARAMETER.of(&[&trial.name, parameter.name]).in_unit(unit);
+                        let quantity = q::PARAMETER.named(&[&trial.name, parameter.name]).in_unit(unit);
                         report.value(quantity, parameter.value / scale);
                     }
                     format!("rms {:e} MPa", fit.rms / MPA)

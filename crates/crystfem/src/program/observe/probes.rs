@@ -143,12 +143,12 @@ impl<'a> ProbeObserver<'a> {
             };
             let (name, number) = (probe.name.as_str(), number.to_string());
             let rise = |_: &Simulation| seen.then(|| after(&probe.temperature, f64::max));
-            to.add_if(q::JUMP.of(&[name, &number]), rise);
+            to.add_if(q::JUMP.named(&[name, &number]), rise);
             for (field, values) in self.names.iter().zip(&probe.fields) {
                 let known = || seen.then(|| before(values)).flatten();
-                to.add_if(q::AT_BIRTH.of(&[name, field, &number]), |_| known());
+                to.add_if(q::AT_BIRTH.named(&[name, field, &number]), |_| known());
                 let lost = |_: &Simulation| known().map(|_| after(values, f64::min).abs());
-                to.add_if(q::LOST_AT_BIRTH.of(&[name, field, &number]), lost);
+                to.add_if(q::LOST_AT_BIRTH.named(&[name, field, &number]), lost);
             }
         }
     }
@@ -158,17 +158,17 @@ impl Observer<Simulation, Error> for ProbeObserver<'_> {
     fn scalars(&self, to: &mut Scalars<Simulation>) {
         for probe in &self.probes {
             let name = probe.name.as_str();
-            to.add(q::DISTANCE.of(&[name]), |_| probe.place.distance());
+            to.add(q::DISTANCE.named(&[name]), |_| probe.place.distance());
             // `record` has refused other non-finite values: NaN means that no material there has the field
             let last = |values: &[f64]| values.last().copied().filter(|last| !last.is_nan());
-            let at = q::AT_PROBE.of(&[name, "temperature"]).in_unit("degC");
+            let at = q::AT_PROBE.named(&[name, "temperature"]).in_unit("degC");
             to.add_if(at, |_| last(&probe.temperature));
             for (quantity, values) in self.names.iter().zip(&probe.fields) {
-                to.add_if(q::AT_PROBE.of(&[name, quantity]).in_unit(""), |_| last(values));
+                to.add_if(q::AT_PROBE.named(&[name, quantity]).in_unit(""), |_| last(values));
             }
             let extreme = |pick: fn(f64, f64) -> f64| probe.temperature.iter().copied().reduce(pick);
-            to.add_if(q::LOWEST_TEMPERATURE.of(&[name]), |_| extreme(f64::min));
-            to.add_if(q::HIGHEST_TEMPERATURE.of(&[name]), |_| extreme(f64::max));
+            to.add_if(q::LOWEST_TEMPERATURE.named(&[name]), |_| extreme(f64::min));
+            to.add_if(q::HIGHEST_TEMPERATURE.named(&[name]), |_| extreme(f64::max));
             if !self.task.layers.is_empty() {
                 self.births(probe, to);
             }

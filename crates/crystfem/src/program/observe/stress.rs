@@ -56,7 +56,7 @@ impl<'a> Observer<Simulation, Error> for StressObserver<'a> {
         let moved = self.coupling.as_ref().map(StressCoupling::displacement);
         for (probe, place) in self.scene.probe.iter().zip(&self.task.probes) {
             for (d, axis) in ["x", "y", "z"].into_iter().enumerate() {
-                to.add_if(q::DISPLACEMENT.of(&[&probe.name, axis]), |_| {
+                to.add_if(q::DISPLACEMENT.named(&[&probe.name, axis]), |_| {
                     let at = |node: u32| Some(moved.as_ref()?[3 * node as usize + d]).filter(|x| !x.is_nan());
                     place.value(at)
                 });

@@ -63,7 +63,7 @@ impl Observer<Simulation, Error> for ThermalObserver<'_> {
         for (column, (prefix, name)) in columns.enumerate() {
             let statistics = self.statistics.get(column).copied().flatten();
             let [unit, spread] = if name == "temperature" { ["degC", "K"] } else { [""; 2] };
-            let column = |quantity: Quantity, unit: &str| quantity.of(&[&prefix, name]).in_unit(unit);
+            let column = |quantity: Quantity, unit: &str| quantity.named(&[&prefix, name]).in_unit(unit);
             to.add_if(column(q::MEAN, unit), |_| Some(statistics?.mean));
             to.add_if(column(q::LEAST, unit), |_| Some(statistics?.least));
             to.add_if(column(q::LARGEST, unit), |_| Some(statistics?.largest));

@@ -193,13 +193,13 @@ fn stem(file: &Path) -> String {
 fn record(report: &mut Report, done: &FinishedFit) {
     let FinishedFit { name, fit, .. } = done;
     for estimate in &fit.estimates {
-        let value = |quantity: Quantity| quantity.of(&[name, estimate.name]).in_unit(&estimate.unit);
+        let value = |quantity: Quantity| quantity.named(&[name, estimate.name]).in_unit(&estimate.unit);
         report.value(value(q::CONSTANT), estimate.value);
         report.value(value(q::STANDARD_ERROR), estimate.standard_error);
         report.value(value(q::LOWER), estimate.interval[0]);
         report.value(value(q::UPPER), estimate.interval[1]);
     }
-    report.value(q::FIT_RMS.of(&[name]), fit.rms);
+    report.value(q::FIT_RMS.named(&[name]), fit.rms);
     report.work(&format!("{name}.measurements"), fit.measurements as u64);
     report.work(&format!("{name}.evaluations"), fit.evaluations as u64);
 }

@@ -14,9 +14,9 @@ pub fn record(report: &mut Report, spec: &FitSpec, peaks: &[MeasuredPeak]) {
     let perfect = spec.heat_flow.as_ref().and_then(|flow| flow.latent_heat);
     for (index, MeasuredPeak { peak, .. }) in peaks.iter().enumerate() {
         let run = (index + 1).to_string();
-        report.value(q::ENTHALPY.of(&[&spec.name, &run]), peak.enthalpy / 1e3);
+        report.value(q::ENTHALPY.named(&[&spec.name, &run]), peak.enthalpy / 1e3);
         if let Some(perfect) = perfect {
-            report.value(q::CRYSTALLINITY.of(&[&spec.name, &run]), peak.enthalpy / perfect.si());
+            report.value(q::CRYSTALLINITY.named(&[&spec.name, &run]), peak.enthalpy / perfect.si());
         }
     }
 }

@@ -117,9 +117,9 @@ pub fn run(
         let values: Vec<f64> = nodes.iter().map(value).filter(|value| value.is_finite()).collect();
         if values.len() == nodes.len() {
             let fold = |pick: fn(f64, f64) -> f64, first| values.iter().copied().fold(first, pick);
-            report.value(least.of(keys), fold(f64::min, f64::INFINITY));
-            report.value(mean.of(keys), values.iter().sum::<f64>() / values.len() as f64);
-            report.value(largest.of(keys), fold(f64::max, f64::NEG_INFINITY));
+            report.value(least.named(keys), fold(f64::min, f64::INFINITY));
+            report.value(mean.named(keys), values.iter().sum::<f64>() / values.len() as f64);
+            report.value(largest.named(keys), fold(f64::max, f64::NEG_INFINITY));
         }
     };
     for (field, quantity) in material.field_names().iter().enumerate() {

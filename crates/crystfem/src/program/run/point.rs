@@ -55,7 +55,7 @@ pub fn run(
                 None if point.non_finite => {
                     return Err(Error::Finite { place: format!("point `{name}`") }.into());
                 }
-                _ => report.value(q::NON_FINITE_ROWS.of(&[&name]), broken.len() as f64),
+                _ => report.value(q::NON_FINITE_ROWS.named(&[&name]), broken.len() as f64),
             };
             record(&mut report, &name, &course, &curves)?;
             phases.start("write");
@@ -168,7 +168,7 @@ fn record(report: &mut Report, name: &str, course: &PointProcess, curves: &Curve
     let key = |quantity: &str| format!("{name}.{quantity}");
     report.work(&key("steps"), last as u64).work(&key("rejected"), curves.rejected as u64);
     let span = |values: &[f64]| range(values.iter().copied());
-    let named = |quantity: Quantity| quantity.of(&[name]);
+    let named = |quantity: Quantity| quantity.named(&[name]);
     let [coldest, hottest] = span(&curves.temperature);
     report.value(named(q::COLDEST), coldest - CELSIUS);
     report.value(named(q::HOTTEST), hottest - CELSIUS);
@@ -178,18 +178,18 @@ fn record(report: &mut Report, name: &str, course: &PointProcess, curves: &Curve
     for (index, field) in course.material.field_names().iter().enumerate() {
         let values: Vec<f64> = curves.fields.iter().map(|f| f[index]).filter(|x| x.is_finite()).collect();
         let [least, most] = span(&values);
-        report.value(q::LOWEST.of(&[name, field]), least);
-        report.value(q::HIGHEST.of(&[name, field]), most);
+        report.value(q::LOWEST.named(&[name, field]), least);
+        report.value(q::HIGHEST.named(&[name, field]), most);
         if curves.fields[last][index].is_finite() {
-            report.value(q::FINAL.of(&[name, field]), curves.fields[last][index]);
+            report.value(q::FINAL.named(&[name, field]), curves.fields[last][index]);
         }
         if rows > 1 && curves.fields[1][index].is_finite() {
-            report.value(q::FIRST_STEP.of(&[name, field]), curves.fields[1][index]);
+            report.value(q::FIRST_STEP.named(&[name, field]), curves.fields[1][index]);
         }
     }
     let mut event = |what: &str, event: CurveEvent| {
-        report.value(q::TEMPERATURE_AT.of(&[name, what]), event.temperature - CELSIUS);
-        report.value(q::TIME_TO.of(&[name, what]), event.time - curves.time[0]);
+        report.value(q::TEMPERATURE_AT.named(&[name, what]), event.temperature - CELSIUS);
+        report.value(q::TIME_TO.named(&[name, what]), event.time - curves.time[0]);
         event
     };
     for degree in DEGREES {
@@ -199,7 +199,7 @@ fn record(report: &mut Report, name: &str, course: &PointProcess, curves: &Curve
     }
     if let Some(peak) = course.peak(curves)? {
         let rate = event("peak", peak).rate;
-        report.value(q::PEAK_RATE.of(&[name]), rate);
+        report.value(q::PEAK_RATE.named(&[name]), rate);
     }
     Ok(())
 }
@@ -211,13 +211,13 @@ fn compare(report: &mut Report, scene: &PointScene) {
             for degree in DEGREES {
                 let value = |quantity: Quantity, material: &str| {
                     let key = format!("{}.{material}", point.name);
-                    report.scalar(&quantity.of(&[&key, &degree.to_string()]).name)
+                    report.scalar(&quantity.named(&[&key, &degree.to_string()]).name)
                 };
                 let both = |quantity| Some([value(quantity, &pair.material)?, value(quantity, &pair.with)?]);
                 let (temperatures, times) = (both(q::TEMPERATURE_AT), both(q::TIME_TO));
                 if let (Some([a, b]), Some([c, d])) = (temperatures, times) {
-                    report.value(q::SHIFT_AT.of(&[&point.name, &degree.to_string()]), a - b);
-                    report.value(q::LONGER_TO.of(&[&point.name, &degree.to_string()]), c / d - 1.0);
+                    report.value(q::SHIFT_AT.named(&[&point.name, &degree.to_string()]), a - b);
+                    report.value(q::LONGER_TO.named(&[&point.name, &degree.to_string()]), c / d - 1.0);
                 }
             }
         }

@@ -33,7 +33,7 @@ impl Case for Crystfem {
         run(source, case)
     }
 
-    fn bulky(source: &Source) -> &'static [&'static str] {
+    fn large_outputs(source: &Source) -> &'static [&'static str] {
         match scene::kind(source) {
             Ok(SceneKind::Part) => &["output.pictures", "output.fields"],
             _ => &[],

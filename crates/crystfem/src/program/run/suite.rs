@@ -75,7 +75,7 @@ pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished
     // a study that must fail, but does not, fails the scene even without an expectation
     let mut survivors = String::new();
     for study in studies.iter().filter(|study| study.expect_error.is_some()) {
-        if report.scalar(&q::FAILED_AS_EXPECTED.of(&[&study.name]).name) == Some(0.0) {
+        if report.scalar(&q::FAILED_AS_EXPECTED.named(&[&study.name]).name) == Some(0.0) {
             report.passed = false;
             survivors += &format!("FAIL  study {} succeeded, but must fail\n", study.name);
         }
@@ -99,7 +99,7 @@ fn check_expectations(
     mut names: Vec<Named>,
 ) -> Result<(), SceneError> {
     let failing = studies.iter().filter(|study| study.expect_error.is_some());
-    names.extend(failing.map(|study| q::FAILED_AS_EXPECTED.of(&[&study.name])));
+    names.extend(failing.map(|study| q::FAILED_AS_EXPECTED.named(&[&study.name])));
     names.extend(scene.comparisons().names());
     let all = scene.variants(source, false)?;
     let absent: Vec<&str> = all.iter().map(|study| study.name.as_str()).collect();
@@ -112,7 +112,7 @@ fn together(source: &Source, scene: &PartScene, studies: &[Variant], rows: &Rows
     let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
     for (study, Row { name, outcome, .. }) in studies.iter().zip(&rows.rows) {
         if study.expect_error.is_some() {
-            report.value(q::FAILED_AS_EXPECTED.of(&[name]), f64::from(u8::from(outcome.is_err())));
+            report.value(q::FAILED_AS_EXPECTED.named(&[name]), f64::from(u8::from(outcome.is_err())));
         }
         let Ok(own) = outcome else { continue };
         for (key, value) in &own.values {

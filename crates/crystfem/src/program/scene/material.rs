@@ -433,9 +433,8 @@ impl<D: Dimension> schemars::JsonSchema for PropertySpec<D> {
             "anyOf": [constant, {
                 "type": "object",
                 "properties": {
-                     "temperature": {
-                                            "type": "array", "items": temperature, "description": "Temperatures, increasing.",
-                                        },
+                    "temperature": { "type": "array", "items": temperature, "description": "Temperatures, \
+                        increasing." },
                     "value": { "type": "array", "items": constant, "description": "Value at each \
                         temperature." },
                 },

@@ -327,9 +327,8 @@ fn an_export_of_netzsch() {
     let latin: Vec<u8> = text.chars().map(|c| u8::try_from(c).unwrap()).collect();
     std::fs::write(folder.path().join("proteus.csv"), latin).unwrap();
     let fit = "[[fit]]\nname = \"cool\"\nlaw = \"nakamura\"\nequilibrium_melting = \"193.2 degC\"\n\
-                   glass_transition = \"51 degC\"\n\
-               heat_flow = { exothermal = \"up\" }\n\
-               data = [{ file = \"proteus.csv\", rate = \"10 K/min\", from = \"185 degC\", to = \"155 degC\" }]\n";
+        glass_transition = \"51 degC\"\nheat_flow = { exothermal = \"up\" }\n\
+        data = [{ file = \"proteus.csv\", rate = \"10 K/min\", from = \"185 degC\", to = \"155 degC\" }]\n";
     let lines = check_output(&head(fit), folder.path());
     assert!(lines.ends_with("; peaks of 21.2694 J/g"), "{lines}");
     assert!(lines.contains("separator `;`, decimal comma, Latin-1, headings in line 5"), "{lines}");

@@ -27,7 +27,7 @@ impl Run {
         let each = keys.iter().zip(values.iter().flat_map(|value| divided(value, ';')));
         let mut set: Vec<String> =
             each.map(|(key, value)| format!("{} = {}", quoted(key), literal(&value))).collect();
-        for key in C::bulky(source) {
+        for key in C::large_outputs(source) {
             if !keys.iter().any(|other| other == key) {
                 set.push(format!("{} = false", quoted(key)));
             }

@@ -147,7 +147,7 @@ pub(super) fn bands(vary: &[Vary], rows: &Rows, output: &Path, report: &mut Repo
         let _ =
             writeln!(text, "{name}: median {median:.5}, 95 % within {low:.5} and {high:.5}, {count} samples");
         for (quantity, value) in [(LOWER, low), (MEDIAN, median), (UPPER, high)] {
-            report.value(quantity.of(&[&name]), value);
+            report.value(quantity.named(&[&name]), value);
         }
     }
     atomic_write(output.join("sweep_bands.csv"), |file| {

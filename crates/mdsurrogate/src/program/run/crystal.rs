@@ -23,9 +23,9 @@ pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result
     value(q::DENSITY.into(), cell.density());
     value(q::DENSITY_OF_FOUR.into(), 2.0 * cell.density());
     for (name, crystal) in [("cell", &cell), ("supercell", &supercell)] {
-        value(q::ATOMS.of(&[name]), crystal.atoms.len() as f64);
+        value(q::ATOMS.named(&[name]), crystal.atoms.len() as f64);
         for (axis, length) in ["x", "y", "z"].iter().zip(crystal.lengths) {
-            value(q::EDGE.of(&[name, axis]), length);
+            value(q::EDGE.named(&[name, axis]), length);
         }
     }
     let nitrogens = cell.atoms.iter().filter(|(element, _)| *element == ChemicalElement::N).count();
@@ -41,7 +41,10 @@ pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result
             };
             let found = cell.atoms.iter().zip(&neighbours).filter(matches).count();
             if found > 0 {
-                value(q::ATOMS_WITH_BONDS.of(&[&format!("{element:?}"), &count.to_string()]), found as f64);
+                value(
+                    q::ATOMS_WITH_BONDS.named(&[&format!("{element:?}"), &count.to_string()]),
+                    found as f64,
+                );
             }
         }
     }
@@ -57,11 +60,11 @@ pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result
     ] {
         let pair = format!("{first:?}{second:?}");
         let [shortest, longest] = cell.bond_lengths(first, second);
-        value(q::SHORTEST_BOND.of(&[&pair]), shortest);
-        value(q::LONGEST_BOND.of(&[&pair]), longest);
+        value(q::SHORTEST_BOND.named(&[&pair]), shortest);
+        value(q::LONGEST_BOND.named(&[&pair]), longest);
     }
     for (index, torsion) in amide_torsions(LATTICE.b / 2.0)?.into_iter().enumerate() {
-        value(q::TORSION.of(&[&(index + 1).to_string()]), torsion.abs());
+        value(q::TORSION.named(&[&(index + 1).to_string()]), torsion.abs());
     }
     let (protocol, grid) = (Protocol::default(), RateGrid { levels: spec.levels, ..RateGrid::default() });
     let runs = grid.runs(&protocol)?;
@@ -73,18 +76,18 @@ pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result
         let (Some(least), Some(greatest)) = (rates.first(), rates.last()) else { continue };
         // Table 3.2 prints the rates in 1e-6 per step of 0.5 fs, but states 1e-6/fs
         let printed = |rate: f64| rate * protocol.time_step * 1e6;
-        value(q::LEAST_RATE.of(&[axis]), printed(*least));
-        value(q::GREATEST_RATE.of(&[axis]), printed(*greatest));
+        value(q::LEAST_RATE.named(&[axis]), printed(*least));
+        value(q::GREATEST_RATE.named(&[axis]), printed(*greatest));
         let ends = greatest * steps * protocol.time_step;
-        value(q::GREATEST_STRAIN.of(&[axis]), ends);
+        value(q::GREATEST_STRAIN.named(&[axis]), ends);
         let per_fs = printed(*greatest) * 1e-6 * steps * protocol.time_step;
-        value(q::STRAIN_IF_PER_FS.of(&[axis]), per_fs);
+        value(q::STRAIN_IF_PER_FS.named(&[axis]), per_fs);
     }
     for number in 1..=4 {
         let network = Architecture::thesis(number)?;
         let name = format!("ANN-{number}");
-        value(q::PARAMETERS.of(&[&name]), network.parameters() as f64);
-        value(q::HIDDEN_LAYERS.of(&[&name]), (network.widths.len() - 2) as f64);
+        value(q::PARAMETERS.named(&[&name]), network.parameters() as f64);
+        value(q::HIDDEN_LAYERS.named(&[&name]), (network.widths.len() - 2) as f64);
     }
     for (name, crystal) in [("cell", &cell), ("supercell", &supercell)] {
         for (view, [across, up]) in [("xy", [0, 1]), ("yz", [1, 2])] {

@@ -244,11 +244,11 @@ pub fn describe(report: &mut Report, prefix: &str, set: &Dataset) {
     value(q::DUPLICATE_ROWS.into(), set.duplicate_rows() as f64);
     value(q::CONSTANT_COMPONENTS.into(), set.constant_components().len() as f64);
     for (kind, count) in set.kinds() {
-        value(q::PATHS_OF_KIND.of(&[kind]), count as f64);
+        value(q::PATHS_OF_KIND.named(&[kind]), count as f64);
     }
     for (name, [low, high]) in NAMES.iter().zip(set.strain_box()) {
-        value(q::LEAST_C.of(&[name]), low);
-        value(q::GREATEST_C.of(&[name]), high);
+        value(q::LEAST_C.named(&[name]), low);
+        value(q::GREATEST_C.named(&[name]), high);
     }
     let stretches = || set.rows().flat_map(|row| row.deformation.principal_stretches());
     value(q::LEAST_PRINCIPAL_STRETCH.into(), stretches().fold(f64::INFINITY, f64::min));
@@ -258,12 +258,12 @@ pub fn describe(report: &mut Report, prefix: &str, set: &Dataset) {
         let Some(noise) = noise else { continue };
         let Noise { deviation, floor, lag_1, lag_1_of_white_noise, .. } = noise;
         for (name, deviation) in NAMES.iter().zip(&deviation) {
-            value(q::NOISE.of(&[letter, name]), deviation / 1e6);
+            value(q::NOISE.named(&[letter, name]), deviation / 1e6);
         }
-        value(q::NOISE_FLOOR.of(&[letter]), floor / 1e12);
+        value(q::NOISE_FLOOR.named(&[letter]), floor / 1e12);
         if let Some(lag) = lag_1 {
-            value(q::LAG_1.of(&[letter]), lag);
-            value(q::LAG_1_IF_WHITE.of(&[letter]), lag_1_of_white_noise);
+            value(q::LAG_1.named(&[letter]), lag);
+            value(q::LAG_1_IF_WHITE.named(&[letter]), lag_1_of_white_noise);
         }
     }
 }
@@ -271,11 +271,11 @@ pub fn describe(report: &mut Report, prefix: &str, set: &Dataset) {
 fn measure_split(report: &mut Report, set: &Dataset, split: &DataSplit, standardisation: &Standardisation) {
     let sets = [("training", &split.train), ("validation", &split.validation), ("test", &split.test)];
     for (name, rows) in sets {
-        report.value(q::SET_ROWS.of(&[name]), rows.len() as f64);
+        report.value(q::SET_ROWS.named(&[name]), rows.len() as f64);
     }
     for (a, name) in NAMES.iter().enumerate() {
-        report.value(q::TRAINING_MEAN.of(&[name]), standardisation.mean[a]);
-        report.value(q::TRAINING_DEVIATION.of(&[name]), standardisation.deviation[a]);
+        report.value(q::TRAINING_MEAN.named(&[name]), standardisation.mean[a]);
+        report.value(q::TRAINING_DEVIATION.named(&[name]), standardisation.deviation[a]);
     }
     if let Some(leak) = leak(set, split, standardisation) {
         report.value(q::NEAREST_TRAINING_ROW, leak.across);

@@ -149,7 +149,7 @@ pub(super) fn binned(
                 let [low, high] = [bin, bin + 1].map(|k| 1.0 + k as f64 * width);
                 let mean = sum / *count as f64;
                 let range = [low, high].map(|end| format!("{end:.2}"));
-                report.value(q::BINNED.of(&[name, component, &range[0], &range[1]]), mean);
+                report.value(q::BINNED.named(&[name, component, &range[0], &range[1]]), mean);
                 centres.push(0.5 * (low + high));
                 means.push(mean);
                 counts.push(*count as f64);

@@ -101,7 +101,7 @@ pub fn judge_laws(
             let set = format!("heldout.{}", run.id);
             if law.header().softening.is_some() {
                 let ratio = errors(law, run.rows.iter())?.mean_square() / found.mean_square();
-                report.value(q::ERROR_WITHOUT_SOFTENING.of(&[name, &set]), ratio);
+                report.value(q::ERROR_WITHOUT_SOFTENING.named(&[name, &set]), ratio);
             }
             record(report, name, &set, &found, floor);
             record_uncertainty(
@@ -195,12 +195,12 @@ fn by_mode(
         record_uncertainty(report, name, &what, law, &uncertainty);
         let flagged = (uncertainty.caught[0] + uncertainty.alarms[0]) as f64
             / (uncertainty.bad + uncertainty.good) as f64;
-        report.value(q::SHARE_FLAGGED.of(&[name, &what]), flagged);
-        report.value(q::MEAN_ABSOLUTE_ERROR.of(&[name, &what]), found.absolute / 1e6);
+        report.value(q::SHARE_FLAGGED.named(&[name, &what]), flagged);
+        report.value(q::MEAN_ABSOLUTE_ERROR.named(&[name, &what]), found.absolute / 1e6);
         let rms = (found.squares / found.count as f64).sqrt() / 1e6;
-        report.value(q::RMS.of(&[name, &what]), rms);
+        report.value(q::RMS.named(&[name, &what]), rms);
         if let Some(r2) = found.r2 {
-            report.value(q::R2.of(&[name, &what]), r2);
+            report.value(q::R2.named(&[name, &what]), r2);
         }
         let learnt = paths.iter().all(|path| runs.is_empty() || runs.contains(&path.id));
         lines.push(format!(
@@ -224,7 +224,7 @@ fn leaks(laws: &[NamedLaw], unseen: &[f64], report: &mut Report) {
         };
         let reference = laws.iter().zip(unseen).find(|(law, _)| same(law));
         if let Some((law, own)) = reference.filter(|(_, own)| **own > 0.0) {
-            report.value(q::UNSEEN_ERROR_RATIO.of(&[other.name, law.name]), loss / own);
+            report.value(q::UNSEEN_ERROR_RATIO.named(&[other.name, law.name]), loss / own);
         }
     }
 }
@@ -238,21 +238,21 @@ fn record_bounds(report: &mut Report, held: &Heldout, floor: Option<f64>) {
     };
     let set = format!("heldout.{}", held.run.id);
     let zero_error = mean(percentages(&held.run.rows, &zero));
-    report.value(q::PERCENTAGE_ERROR.of(&["zero_stress", &set]), zero_error);
+    report.value(q::PERCENTAGE_ERROR.named(&["zero_stress", &set]), zero_error);
     if let Some(floor) = floor {
         let noise = held.run.rows.iter().map(|row| 100.0 * floor.sqrt() / row.s.norm()).collect();
-        report.value(q::PERCENTAGE_ERROR.of(&["noise", &set]), mean(noise));
+        report.value(q::PERCENTAGE_ERROR.named(&["noise", &set]), mean(noise));
     }
 }
 
 fn record(report: &mut Report, name: &str, set: &str, errors: &Errors, floor: Option<f64>) {
-    report.value(q::MEAN_SQUARE_ERROR.of(&[name, set]), errors.mean_square() / 1e12);
-    report.value(q::COMPONENT_ERROR.of(&[name, set]), errors.mean_square() / 6e12);
-    report.value(q::PERCENTAGE_ERROR.of(&[name, set]), errors.percentage);
+    report.value(q::MEAN_SQUARE_ERROR.named(&[name, set]), errors.mean_square() / 1e12);
+    report.value(q::COMPONENT_ERROR.named(&[name, set]), errors.mean_square() / 6e12);
+    report.value(q::PERCENTAGE_ERROR.named(&[name, set]), errors.percentage);
     let outside = errors.flagged as f64 / errors.rows.max(1) as f64;
-    report.value(q::SHARE_OUTSIDE.of(&[name, set]), outside);
+    report.value(q::SHARE_OUTSIDE.named(&[name, set]), outside);
     if let Some(floor) = floor {
-        report.value(q::ERROR_OVER_NOISE.of(&[name, set]), errors.mean_square() / floor);
+        report.value(q::ERROR_OVER_NOISE.named(&[name, set]), errors.mean_square() / floor);
     }
 }
 
@@ -266,25 +266,25 @@ fn record_uncertainty(
 ) {
     let share = |part: usize, all: usize| part as f64 / all.max(1) as f64;
     let rows = uncertainty.bad + uncertainty.good;
-    report.value(q::SHARE_BADLY_WRONG.of(&[name, set]), share(uncertainty.bad, rows));
+    report.value(q::SHARE_BADLY_WRONG.named(&[name, set]), share(uncertainty.bad, rows));
     let known = if law.header().spread_limit.is_some() { 4 } else { 3 };
     for (place, flag) in FLAGS.iter().enumerate().take(known) {
         let flag = &flag.trim_start_matches("the ").replace(' ', "_");
         if uncertainty.bad > 0 {
             let caught = share(uncertainty.caught[place], uncertainty.bad);
-            report.value(q::CAUGHT_BY.of(&[name, set, flag]), caught);
+            report.value(q::CAUGHT_BY.named(&[name, set, flag]), caught);
         }
         if uncertainty.good > 0 {
             let alarms = share(uncertainty.alarms[place], uncertainty.good);
-            report.value(q::FALSE_ALARMS.of(&[name, set, flag]), alarms);
+            report.value(q::FALSE_ALARMS.named(&[name, set, flag]), alarms);
         }
     }
     if let Some(correlation) = uncertainty.correlation {
-        report.value(q::RANK_CORRELATION.of(&[name, set]), correlation);
+        report.value(q::RANK_CORRELATION.named(&[name, set]), correlation);
     }
     for (component, within) in crate::kinematics::NAMES.iter().zip(uncertainty.within) {
         for (count, share) in ["1", "2"].into_iter().zip(within.into_iter().flatten()) {
-            report.value(q::WITHIN.of(&[name, set, count, component]), share);
+            report.value(q::WITHIN.named(&[name, set, count, component]), share);
         }
     }
 }
@@ -292,11 +292,11 @@ fn record_uncertainty(
 /// Reports the slowest wave; returns a warning if ellipticity is lost.
 fn record_ellipticity(report: &mut Report, name: &str, found: Option<Ellipticity>) -> Option<String> {
     let Ellipticity { states, lost, least, at, direction } = found?;
-    report.value(q::LEAST_WAVE.of(&[name]), least / 1e6);
+    report.value(q::LEAST_WAVE.named(&[name]), least / 1e6);
     for (component, value) in crate::kinematics::NAMES.iter().zip(&at) {
-        report.value(q::LEAST_WAVE_AT.of(&[name, component]), *value);
+        report.value(q::LEAST_WAVE_AT.named(&[name, component]), *value);
     }
-    report.value(q::NOT_ELLIPTIC.of(&[name]), lost as f64 / states as f64);
+    report.value(q::NOT_ELLIPTIC.named(&[name]), lost as f64 / states as f64);
     let numbers =
         |values: &[f64]| values.iter().map(|value| format!("{value:.4}")).collect::<Vec<_>>().join(", ");
     (lost > 0).then(|| {
@@ -311,14 +311,14 @@ fn record_ellipticity(report: &mut Report, name: &str, found: Option<Ellipticity
 }
 
 fn record_physics(report: &mut Report, name: &str, physics: &PhysicsChecks) {
-    report.value(q::STRESS_AT_REST.of(&[name]), physics.rest / 1e6);
-    report.value(q::ASYMMETRY.of(&[name]), physics.asymmetry);
-    report.value(q::LARGEST_ASYMMETRY.of(&[name]), physics.largest_asymmetry);
-    report.value(q::CYCLE.of(&[name]), physics.cycle);
-    report.value(q::OBJECTIVITY.of(&[name]), physics.objectivity);
-    report.value(q::UNSEEN_SHEAR.of(&[name]), physics.shear_stress / 1e6);
+    report.value(q::STRESS_AT_REST.named(&[name]), physics.rest / 1e6);
+    report.value(q::ASYMMETRY.named(&[name]), physics.asymmetry);
+    report.value(q::LARGEST_ASYMMETRY.named(&[name]), physics.largest_asymmetry);
+    report.value(q::CYCLE.named(&[name]), physics.cycle);
+    report.value(q::OBJECTIVITY.named(&[name]), physics.objectivity);
+    report.value(q::UNSEEN_SHEAR.named(&[name]), physics.shear_stress / 1e6);
     if let Some(share) = physics.shear_flagged {
-        report.value(q::SHEAR_FLAGGED.of(&[name]), share);
+        report.value(q::SHEAR_FLAGGED.named(&[name]), share);
     }
 }
 

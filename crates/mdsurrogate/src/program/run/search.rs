@@ -256,7 +256,7 @@ fn write(
         let own = || ranking.iter().filter(|t| t.method == *method && t.loss.is_some_and(|loss| loss > 0.0));
         let losses: Vec<f64> = own().filter_map(|trial| trial.loss).collect();
         if let Some(best) = losses.first() {
-            report.value(q::BEST_LOSS.of(&[method.name()]), *best);
+            report.value(q::BEST_LOSS.named(&[method.name()]), *best);
             let sizes: Vec<f64> = own().map(|trial| parameters(trial) as f64).collect();
             plot = plot.series(Series::markers(method.name(), &sizes, &losses));
         }

@@ -49,10 +49,10 @@ pub(super) fn against_time(spec: &SearchSpec, done: &[FinishedSearch], report: &
         }
         let name = method.name();
         report.work(&format!("epochs of {name}"), ends.iter().map(|end| end[0] as u64).sum());
-        report.value(q::MEDIAN_EPOCHS.of(&[name]), median(finite(0)));
-        report.value(q::MEDIAN_LOSS.of(&[name]), median(finite(2)));
+        report.value(q::MEDIAN_EPOCHS.named(&[name]), median(finite(0)));
+        report.value(q::MEDIAN_LOSS.named(&[name]), median(finite(2)));
         let worst = finite(2).into_iter().fold(f64::NEG_INFINITY, f64::max);
-        report.value(q::WORST_LOSS.of(&[name]), worst);
+        report.value(q::WORST_LOSS.named(&[name]), worst);
         let most = ends.iter().map(|end| end[0]).fold(0.0, f64::max);
         let mut columns = [Vec::new(), Vec::new(), Vec::new()];
         for point in 1..=POINTS {
@@ -72,11 +72,11 @@ pub(super) fn against_time(spec: &SearchSpec, done: &[FinishedSearch], report: &
             &[("epochs", "", epochs), ("seconds", "s", seconds), ("loss", "MPa²", losses)],
         );
     }
-    let value = |method: &str, report: &Report| report.scalar(&q::MEDIAN_LOSS.of(&[method]).name);
+    let value = |method: &str, report: &Report| report.scalar(&q::MEDIAN_LOSS.named(&[method]).name);
     if let Some(random) = value("random", report) {
         for name in ["hyperband", "bayesian"] {
             if let Some(own) = value(name, report) {
-                report.value(q::LOSS_OVER_RANDOM.of(&[name]), own / random);
+                report.value(q::LOSS_OVER_RANDOM.named(&[name]), own / random);
             }
         }
     }

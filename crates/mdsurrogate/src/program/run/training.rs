@@ -255,15 +255,15 @@ pub fn record(trained: &[Trained], output: &Path, report: &mut Report) -> Result
         let name = &model.name;
         let epochs: usize = model.states.iter().map(|state| state.history().len()).sum();
         report.work(&format!("epochs of {name}"), epochs as u64);
-        report.value(q::PARAMETERS.of(&[name]), model.law.header().architecture.parameters() as f64);
+        report.value(q::PARAMETERS.named(&[name]), model.law.header().architecture.parameters() as f64);
         report.seconds(&format!("training of {name}"), model.states.iter().map(TrainingState::seconds).sum());
         if let Some(limit) = model.law.header().spread_limit {
-            report.value(q::SPREAD_LIMIT.of(&[name]), limit / 1e6);
+            report.value(q::SPREAD_LIMIT.named(&[name]), limit / 1e6);
         }
         for (member, state) in model.states.iter().enumerate() {
             let quantity = match model.states.len() {
-                1 => q::BEST_EPOCH.of(&[name]),
-                _ => q::MEMBER_BEST_EPOCH.of(&[name, &(member + 1).to_string()]),
+                1 => q::BEST_EPOCH.named(&[name]),
+                _ => q::MEMBER_BEST_EPOCH.named(&[name, &(member + 1).to_string()]),
             };
             report.value(quantity, f64::from(state.best_epoch()));
         }

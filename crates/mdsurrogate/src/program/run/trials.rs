@@ -39,7 +39,7 @@ pub fn run(source: &Source, scene: &Scene, run: &Run, report: &mut Report) -> Re
                 (observed, trial.flagged.is_none_or(|asked| flagged == Some(asked)))
             }
         };
-        report.value(q::AS_EXPECTED.of(&[&trial.name]), f64::from(u8::from(passed)));
+        report.value(q::AS_EXPECTED.named(&[&trial.name]), f64::from(u8::from(passed)));
         report.trials.push(Trial {
             what: trial.name.clone(),
             description: trial.description.clone(),

@@ -21,22 +21,22 @@ pub(super) fn measure(report: &mut Report, set: &Dataset) {
         moduli[axis] = slope(&all, MODULUS);
         peaks[axis] = runs().filter_map(|run| peak(&curve(run, axis))).max_by(|a, b| a[1].total_cmp(&b[1]));
         if let Some(modulus) = moduli[axis] {
-            report.value(q::MODULUS.of(&[name]), modulus / 1e9);
+            report.value(q::MODULUS.named(&[name]), modulus / 1e9);
         }
         if let Some([strain, stress]) = peaks[axis] {
-            report.value(q::PEAK_STRESS.of(&[name]), stress / 1e9);
-            report.value(q::PEAK_STRAIN.of(&[name]), strain);
+            report.value(q::PEAK_STRESS.named(&[name]), stress / 1e9);
+            report.value(q::PEAK_STRAIN.named(&[name]), strain);
         }
         if let [Some(before), Some(after)] = STIFFENING.map(|range| slope(&all, range)) {
-            report.value(q::STIFFENING.of(&[name]), after / before);
+            report.value(q::STIFFENING.named(&[name]), after / before);
         }
     }
     for axis in [0, 1] {
         if let (Some(across), Some(along)) = (moduli[axis], moduli[2]) {
-            report.value(q::MODULUS_RATIO.of(&[AXES[axis]]), along / across);
+            report.value(q::MODULUS_RATIO.named(&[AXES[axis]]), along / across);
         }
         if let (Some([across, _]), Some([along, _])) = (peaks[axis], peaks[2]) {
-            report.value(q::PEAK_STRAIN_RATIO.of(&[AXES[axis]]), across / along);
+            report.value(q::PEAK_STRAIN_RATIO.named(&[AXES[axis]]), across / along);
         }
     }
 }

@@ -49,11 +49,11 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
         let name = plane.name(index);
         let resting = move |m: &Moment<D>| m.state.history.last()?.resting.get(index).copied();
         for (d, axis) in axes(scene).iter().enumerate() {
-            to.add_if(q::PLANE_FORCE.of(&[&name, axis]), |m| Some(resting(m)?.force[d]));
+            to.add_if(q::PLANE_FORCE.named(&[&name, axis]), |m| Some(resting(m)?.force[d]));
         }
         let sizes: [fn(PlaneReaction) -> f64; 3] = [|one| one.area, |one| one.spread, |one| one.width];
         for (quantity, get) in [q::PLANE_AREA, q::PLANE_SPREAD, q::PLANE_WIDTH].iter().zip(sizes) {
-            to.add_if(quantity.of(&[&name]), |m| resting(m).map(get));
+            to.add_if(quantity.named(&[&name]), |m| resting(m).map(get));
         }
     }
 }

@@ -56,7 +56,7 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for HoleErrors<'_> {
         }
         for &measure in &stress.measures {
             let (name, normal_stress) = (measure.name(), || self.normal(measure));
-            to.add_if(q::MEASURE_MAX.of(&[name]), |_| {
+            to.add_if(q::MEASURE_MAX.named(&[name]), |_| {
                 normal_stress().map(|(hole, normal)| hole.most(normal))
             });
             for kind in spec.errors() {
@@ -66,20 +66,20 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for HoleErrors<'_> {
                     "rmse_ring" => HoleRegion::Ring,
                     _ => HoleRegion::All,
                 };
-                to.add_if(q::MEASURE_ERROR.of(&[name, kind]), |_| {
+                to.add_if(q::MEASURE_ERROR.named(&[name, kind]), |_| {
                     let (hole, normal) = normal_stress()?;
                     let exact = if kind.ends_with("kirsch") { &hole.kirsch } else { &hole.exact };
                     Some(hole.error(normal, exact, region))
                 });
             }
-            to.add_if(q::MEASURE_PEAK.of(&[name]), |_| {
+            to.add_if(q::MEASURE_PEAK.named(&[name]), |_| {
                 normal_stress().and_then(|(hole, normal)| peak_value(hole, normal))
             });
-            to.add_if(q::MEASURE_PEAK_ERROR.of(&[name]), |_| {
+            to.add_if(q::MEASURE_PEAK_ERROR.named(&[name]), |_| {
                 let (hole, normal) = normal_stress()?;
                 Some(peak_value(hole, normal)? / first_value(hole, &hole.exact)? - 1.0)
             });
-            to.add_if(q::MEASURE_FIRST.of(&[name]), |_| {
+            to.add_if(q::MEASURE_FIRST.named(&[name]), |_| {
                 normal_stress().and_then(|(hole, normal)| first_value(hole, normal))
             });
         }

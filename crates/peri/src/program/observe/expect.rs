@@ -24,8 +24,8 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
             _ => {
                 for name in own {
                     let compared = scene.output.compare.as_ref().filter(|c| c.quantity == name).is_some();
-                    names.extend(compared.then(|| q::COMPARED.of(&[&name, &variant.name()]).name));
-                    names.extend(compared.then(|| q::SAME_EVENTS.of(&[&variant.name()]).name));
+                    names.extend(compared.then(|| q::COMPARED.named(&[&name, &variant.name()]).name));
+                    names.extend(compared.then(|| q::SAME_EVENTS.named(&[&variant.name()]).name));
                     let is_balance = q::BALANCES.iter().any(|balance| balance.name == name);
                     if is_balance && !names.contains(&name) {
                         names.push(name.clone());
@@ -40,10 +40,10 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
         }
     }
     for (family, _) in families.iter().filter(|(_, count)| *count > 1) {
-        names.push(q::PEAK_LOAD_CHANGE.of(&[family]).name);
+        names.push(q::PEAK_LOAD_CHANGE.named(&[family]).name);
         for measure in scene.stress.iter().flat_map(|stress| &stress.measures) {
             let kinds = scene.exact.iter().flat_map(|exact| exact.errors());
-            names.extend(kinds.map(|kind| q::MEASURE_ORDER.of(&[measure.name(), kind, family]).name));
+            names.extend(kinds.map(|kind| q::MEASURE_ORDER.named(&[measure.name(), kind, family]).name));
         }
     }
     names.extend(scene.comparisons().names().map(|quantity| quantity.name));

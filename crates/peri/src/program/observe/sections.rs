@@ -23,9 +23,9 @@ impl Sections<'_> {
         let (axes, about) = (&["x", "y", "z"][..if solid { 3 } else { 2 }], if solid { 0 } else { 2 });
         let mut first = columns(self.0).len();
         self.0.output.section.iter().map(move |section| {
-            let forces = axes.iter().map(|axis| q::SECTION_FORCE.of(&[&section.name, axis]));
+            let forces = axes.iter().map(|axis| q::SECTION_FORCE.named(&[&section.name, axis]));
             let moments = ["x", "y", "z"].into_iter().skip(about);
-            let moments = moments.map(|axis| q::SECTION_MOMENT.of(&[&section.name, axis]));
+            let moments = moments.map(|axis| q::SECTION_MOMENT.named(&[&section.name, axis]));
             let names: Vec<Named> = forces.chain(moments).collect();
             let own = first;
             first += names.len();

@@ -23,7 +23,7 @@ pub(super) fn followed_fields<const D: usize>(scene: &Scene, to: &mut Scalars<Mo
     for field in &scene.material.fields {
         for (index, quantity) in q::OF_A_FIELD.iter().enumerate() {
             // the unit of the field is known only after reading it
-            to.add_in_unit(quantity.of(&[field.of.value_name()]), |m| {
+            to.add_in_unit(quantity.named(&[field.of.value_name()]), |m| {
                 let one = m.physics.body.followed.iter().find(|one| one.parameter == field.of)?;
                 let [mean, least, largest] = one.field;
                 Some((one.unit, [mean, one.mesh_mean, least, largest][index]))
@@ -113,13 +113,13 @@ pub(super) fn responses<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D
     let loads = scene.boundary.iter().any(|boundary| boundary.traction.is_some() || boundary.force.is_some());
     for (d, axis) in axes(scene).iter().enumerate() {
         if holds {
-            to.add_if(q::REACTION.of(&[axis]), |m| {
+            to.add_if(q::REACTION.named(&[axis]), |m| {
                 let loads = &m.physics.loads;
                 (!loads.constrained.is_empty()).then(|| loads.reaction(m.bonds, &m.state.force)[d])
             });
         }
         if loads {
-            to.add_if(q::APPLIED.of(&[axis]), |m| {
+            to.add_if(q::APPLIED.named(&[axis]), |m| {
                 let loads = &m.physics.loads;
                 loads.body_force.is_some().then(|| loads.applied(m.bonds)[d])
             });

@@ -58,7 +58,7 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[VariantOutcome], quick
                     let errors = errors_of(kind);
                     if errors.len() == spacing.len() {
                         let order = exact::observed_order(&spacing, &errors);
-                        report.value(q::MEASURE_ORDER.of(&[name, kind, &family]), order);
+                        report.value(q::MEASURE_ORDER.named(&[name, kind, &family]), order);
                     }
                 }
                 let seconds: Vec<f64> = members.iter().map(|o| run_time(o, name)).collect();
@@ -91,7 +91,7 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[VariantOutcome], quick
     }
     scene.comparisons().add(&mut report, outcomes);
     for (family, change) in super::history::peak_changes(outcomes) {
-        report.value(q::PEAK_LOAD_CHANGE.of(&[&family]), change);
+        report.value(q::PEAK_LOAD_CHANGE.named(&[&family]), change);
     }
     let mut expectations = scene.expect.clone();
     expectations.extend(outcomes.iter().filter_map(|outcome| contact_expectation(scene, outcome, several)));
@@ -108,7 +108,7 @@ fn add_same_events(report: &mut Report, compare: &Compare, outcomes: &[VariantOu
     for outcome in compared().filter(|outcome| outcome.name != truth.name) {
         let pairs = outcome.events.iter().zip(&truth.events);
         let same = pairs.take_while(|(a, b)| (a.step, a.fingerprint) == (b.step, b.fingerprint)).count();
-        report.value(q::SAME_EVENTS.of(&[&outcome.name]), same as f64);
+        report.value(q::SAME_EVENTS.named(&[&outcome.name]), same as f64);
     }
 }
 

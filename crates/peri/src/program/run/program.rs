@@ -41,7 +41,7 @@ impl Case for Peri {
         Ok(Finished::new(finished.report, text).with_notes(&notes))
     }
 
-    fn bulky(_: &Source) -> &'static [&'static str] {
+    fn large_outputs(_: &Source) -> &'static [&'static str] {
         &["output.pictures", "output.fields"]
     }
 

@@ -86,7 +86,7 @@ impl AxisName {
 impl HistoryProbe {
     /// Names a quantity of this probe; `*` becomes the unit of the probe.
     pub fn named(&self, quantity: Quantity) -> Named {
-        let named = quantity.of(&[&self.name]);
+        let named = quantity.named(&[&self.name]);
         if named.unit == "*" { named.in_unit(self.track.unit()) } else { named }
     }
 
