@@ -88,9 +88,9 @@ fn an_insulated_layer_keeps_all_of_its_heat() {
     }
 }
 
-/// At Fo = 0.056, below the 1/6 that consistent capacity needs, the second node beyond the interface overshoots: the
-/// first step along a line solves c e_{i−1} + d e_i + c e_{i+1} = 0 with c = 1/6 − Fo, d = 2/3 + 2 Fo, e_i ~ λ^i,
-/// λ < 0. (formulation.md has +1.75 K for a scene that it does not describe.)
+/// At Fo = 0.056, below the 1/6 that consistent capacity needs, the second node beyond the interface
+/// overshoots: the first step along a line solves c e_{i−1} + d e_i + c e_{i+1} = 0 with c = 1/6 − Fo,
+/// d = 2/3 + 2 Fo, e_i ~ λ^i, λ < 0. (formulation.md has +1.75 K for a scene that it does not describe.)
 #[test]
 fn overshoot_at_birth() {
     let overshoot = |capacity| {
