@@ -81,7 +81,7 @@ fn a_printed_bar() {
     let told = crystfem("check bar.toml").with_code(0);
     told.shows("builds     3 births with 288 elements in total");
     told.shows("solver     after the last birth: not linear: Newton's iteration");
-    told.shows("leaves out conditions that change over time");
+    told.shows("leaves out time-dependent conditions");
     for threads in 1..=3 {
         crystfem(&format!("run bar.toml --output out{threads} --threads {threads}")).with_code(0);
         assert_same(&here.join("out1"), &here.join(format!("out{threads}")));
@@ -227,7 +227,7 @@ fn studies_of_a_part() {
     let crystfem = |arguments: &str| finish(command("crystfem", arguments, here).spawn().unwrap());
     let told = crystfem("check bar.toml").with_code(0);
     told.shows("study coupled");
-    told.shows("leaves out latent heat: temperature does not depend on crystallinity");
+    told.shows("leaves out latent heat: crystallinity does not affect the temperature");
     told.shows("  expects    an error that contains `no extent`");
     crystfem("run bar.toml --output out --verbose").with_code(0).shows("pass  coupled.least_alpha");
     let out = here.join("out");

@@ -33,7 +33,7 @@
 //! Data sets are tables of runs:
 //!
 //! ```
-//! use mdsurrogate::dataset::{Fractions, Method, ReadOptions, Standardisation, noise, read, split};
+//! use mdsurrogate::dataset::{Fractions, ReadOptions, SplitMethod, Standardisation, noise, read, split};
 //!
 //! // two runs of three rows, C and S in MPa
 //! let directory = tempfile::tempdir()?;
@@ -46,7 +46,7 @@
 //!
 //! // one run for training, one for the test
 //! let halves = Fractions { train: 0.5, validation: 0.0, test: 0.5 };
-//! let sets = split(&set, Method::Path, halves, 1)?;
+//! let sets = split(&set, SplitMethod::Path, halves, 1)?;
 //! assert_eq!((sets.train.len(), sets.test.len()), (3, 3));
 //!
 //! // C12, C13 and C23 are constant: (3.8) would divide by zero

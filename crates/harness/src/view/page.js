@@ -299,7 +299,10 @@ function curves() {
 function times_of(table) {
   const folder = (name) => name.replace(/[^/]*$/, ""), own = solid?.told.name;
   if (!solid || folder(table.name) !== folder(own)) return null;
-  if (!solid.told.particles) return table.times ?? null;
+  if (!solid.told.particles) {
+    const [first] = table.columns;
+    return table.times ?? (first.name === "time" ? first.data : null);
+  }
   const is_history = table.name === `${folder(own)}history_${own.slice(folder(own).length)}`;
   return is_history ? table.columns[0].data.map((_, row) => row * table.every + 1) : null;
 }

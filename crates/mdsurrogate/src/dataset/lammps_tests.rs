@@ -50,7 +50,7 @@ fn logs_of_lammps() {
     assert!((row.c - Voigt::new(1.03f64.powi(2), 0.994f64.powi(2), 1.0, 0.0, 0.0, 0.0)).amax() < 1e-12);
     assert!((row.time / 0.3e-12 - 1.0).abs() < 1e-12);
     let line = &set.provenance[0];
-    for part in ["1 of 2 blocks", "units metal", "σ = −p", "first row is undeformed", "1 lines"] {
+    for part in ["1 of 2 blocks", "units metal", "σ = −p", "first row is undeformed", "1 other lines"] {
         assert!(line.contains(part), "{line}");
     }
     let commented = lammps_log("units metal # eV, ps, bar\n", 1);
