@@ -40,7 +40,7 @@ pub(super) fn summary(
     }
     text += &format!("\n{}", verdict(report, style));
     for note in &finished.notes {
-        text += &match note.starts_with(' ') || note.contains('\n') {
+        text += &match note.starts_with(' ') {
             // a block to be copied
             true => format!("{note}\n"),
             false if note.starts_with("warning") => style.yellow(&style.wrapped(note)),

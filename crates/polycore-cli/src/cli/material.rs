@@ -90,7 +90,9 @@ pub fn best(data: &str, fits: &[Fit]) -> String {
     let best = usable().filter(chains).min_by(least);
     let best =
         best.or_else(|| usable().filter(|fit| known(fit)).min_by(least)).or_else(|| usable().min_by(least));
-    best.map_or_else(String::new, |fit| format!("for a scene of peri, from {data}:\n{}", block(fit)))
+    // indented lines are printed as they are
+    let indented = |fit: &Fit| block(fit).lines().map(|line| format!("  {line}\n")).collect::<String>();
+    best.map_or_else(String::new, |fit| format!("for a scene of peri, from {data}:\n{}", indented(fit)))
 }
 
 /// Writes `materials.toml`: the block of every fit, under comments.
