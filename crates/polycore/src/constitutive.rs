@@ -3,7 +3,8 @@
 //! - [`hyperelastic`]: the isotropic laws of Chapter 1 in closed form, and their fits to tests of rubber;
 //! - [`surrogate`]: models learnt from data (feature `surrogate`): networks, without a training framework;
 //! - your own: implement [`Law`], or [`hyperelastic::Hyperelastic`] for an isotropic law of the principal
-//!   stretches.
+//!   stretches;
+//! - [`viscoelastic`]: any of them as the equilibrium of a law with time, which has a state.
 //!
 //! [`verify`] measures how well any of them keeps what every law must keep.
 //!
@@ -23,6 +24,7 @@
 //! ```
 
 mod error;
+mod isochoric;
 mod law;
 
 #[cfg(feature = "ndarray")]
@@ -33,6 +35,8 @@ pub mod network;
 #[cfg(feature = "surrogate")]
 pub mod surrogate;
 pub mod verify;
+pub mod viscoelastic;
 
 pub use error::Error;
+pub use isochoric::IsochoricSplit;
 pub use law::{Flags, Law, Moduli, Prediction, Workspace};

@@ -2,6 +2,7 @@
 
 use super::branch::{BranchEnergies, BranchInput, BranchStep};
 use super::eigenstrain::SpecificVolume;
+use polycore::constitutive::viscoelastic::Shift;
 
 /// Stiffness over the sum of all moduli below which material flows instead of bearing stress.
 const MELT_STIFFNESS: f64 = 0.01;
@@ -13,56 +14,6 @@ pub struct Branch {
     pub modulus: f64,
     /// Relaxation time at the reference of the shift, s; infinite if elastic.
     pub time: f64,
-}
-
-/// Time-temperature shift ln a_T of the relaxation times of a phase.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shift {
-    /// Zero at all temperatures.
-    None,
-    /// −ln 10 · c₁(T − T_r)/(c₂ + T − T_r) above T_r (Williams, Landel and Ferry 1955); below, linear with
-    /// the slope at T_r, up to a = 1e12.
-    Wlf {
-        /// Reference temperature T_r, K.
-        reference: f64,
-        /// Constants c₁ and c₂ (K).
-        constants: [f64; 2],
-    },
-    /// Arrhenius, (H/R)(1/T − 1/T_r).
-    Arrhenius {
-        /// Reference temperature T_r, K.
-        reference: f64,
-        /// Activation energy H, J/mol.
-        energy: f64,
-    },
-}
-
-impl Shift {
-    /// ln a_T.
-    pub fn logarithm(&self, temperature: f64) -> f64 {
-        match *self {
-            Self::None => 0.0,
-            Self::Wlf { reference, constants: [first, second] } => {
-                let above = temperature - reference;
-                let slope = -first * std::f64::consts::LN_10;
-                if above >= 0.0 {
-                    slope * above / (second + above)
-                } else {
-                    (slope / second * above).min(1e12_f64.ln())
-                }
-            }
-            Self::Arrhenius { reference, energy } => {
-                energy / crate::kinetics::GAS_CONSTANT * (1.0 / temperature - 1.0 / reference)
-            }
-        }
-    }
-
-    /// Reduced time ∫dt/a_T of a linear temperature history, by two Gauss points: fourth order in the step.
-    pub fn reduced_time(&self, temperatures: [f64; 2], duration: f64) -> f64 {
-        let middle = 0.5 * (temperatures[0] + temperatures[1]);
-        let reach = 0.5 * (temperatures[1] - temperatures[0]) / 3.0_f64.sqrt();
-        0.5 * duration * [-reach, reach].map(|at| (-self.logarithm(middle + at)).exp()).iter().sum::<f64>()
-    }
 }
 
 /// Solidifying Maxwell body, σ = Ĉ(ν):[Σ_A E_i e_i + b(T) s(α) Σ_N E_i e_i], with the elastic strain e_i of

@@ -18,4 +18,5 @@ pub use branch::{BranchEnergies, BranchInput, BranchStep};
 pub use eigenstrain::SpecificVolume;
 pub use element::{GAUSS_POINTS, Hexahedron, stiffness};
 pub use element_kind::{MAX_NODES_PER_ELEMENT, MechanicalElement, is_supported, key, points, shares};
-pub use maxwell::{Branch, Shift, SolidifyingMaxwell};
+pub use maxwell::{Branch, SolidifyingMaxwell};
+pub use polycore::constitutive::viscoelastic::Shift;

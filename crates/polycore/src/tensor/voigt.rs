@@ -126,7 +126,7 @@ pub fn nominal_tangent(
     })
 }
 
-fn index(i: usize, j: usize) -> usize {
+pub(crate) fn index(i: usize, j: usize) -> usize {
     if i == j { i } else { i + j + 2 }
 }
 
