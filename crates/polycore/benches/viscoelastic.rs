@@ -78,5 +78,9 @@ fn cycles(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group! { name = viscoelastic; config = Criterion::default().sample_size(20); targets = steps, cycles }
+criterion_group! {
+    name = viscoelastic;
+    config = Criterion::default().sample_size(20);
+    targets = steps, cycles
+}
 criterion_main!(viscoelastic);

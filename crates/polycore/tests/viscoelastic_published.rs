@@ -92,8 +92,8 @@ fn vhb_4910_beside_its_measurements() {
     near("rms of all runs, kPa", (sum / count as f64).sqrt(), 3.31, 0.02);
 }
 
-/// Time, s; log strain; J; Cauchy stress, MPa; equilibrium and branch energy per deformed volume, MPa: tension
-/// at 0.05 /s to a stretch of 3 and back, computed by the authors for κ = 0.01462 MPa times 1e4 and 1
+/// Time, s; log strain; J; Cauchy stress, MPa; equilibrium and branch energy per deformed volume, MPa: in
+/// tension at 0.05 /s to a stretch of 3 and back, computed by the authors for κ = 0.01462 MPa times 1e4 and 1
 /// (Lefèvre, Sozio and Lopez-Pamies 2024, doi:10.1016/j.finel.2024.104114; few of their figures).
 const UNIAXIAL: [(f64, [[f64; 6]; 4]); 2] = [
     (

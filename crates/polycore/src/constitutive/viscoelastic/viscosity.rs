@@ -64,7 +64,7 @@ pub struct StrainSoftening {
 
 impl StrainSoftening {
     /// S_a R(γ).
-    pub fn at(&self, shear: f64) -> f64 {
+    pub fn logarithm(&self, shear: f64) -> f64 {
         let [r0, r1, r2] = self.shape;
         // ln(1 + (r₀e^γ)^r₁) without overflow
         let power = r1 * (r0.ln() + shear);
@@ -180,7 +180,7 @@ impl Viscosity {
     pub fn glassy(&self, pressure: f64, shear: f64) -> f64 {
         match *self {
             Self::Eyring { stress, pressure: sensitivity, softening, .. } => {
-                sensitivity * pressure / stress + softening.map_or(0.0, |soft| soft.at(shear))
+                sensitivity * pressure / stress + softening.map_or(0.0, |soft| soft.logarithm(shear))
             }
             _ => 0.0,
         }
