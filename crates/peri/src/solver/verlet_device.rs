@@ -170,7 +170,7 @@ impl VelocityVerlet {
         self.count(state, after, &sums)?;
         if look && system.is_overstretched(observed) {
             let list = run.overstretched(system, state, listed)?;
-            let sites = system.sever(state, list, None);
+            let sites = system.sever_bonds(state, list, None);
             run.take_severed(system, state, &sites, factor);
         }
         let motion = &mut state.motion;
