@@ -4,7 +4,7 @@ use harness::case::{Case, Options, Run};
 use harness::scene::Source;
 use peri::Error;
 use peri::gpu::{Device, Precision};
-use peri::program::run::{self, FinishedScene, Peri};
+use peri::program::run::{FinishedScene, Peri};
 use peri::program::scene::Scene;
 
 /// A notched plate that is hit beside its notch, and torn.
@@ -49,7 +49,7 @@ pictures = false
 fields = false
 "#;
 
-fn run(name: &str, text: &str) -> Result<Finished, harness::scene::Failure<Error>> {
+fn run(name: &str, text: &str) -> Result<FinishedScene, harness::scene::Failure<Error>> {
     let folder = tempfile::tempdir().unwrap();
     let source = Source::new(name, text);
     let scene = source.parse::<Scene>()?;
