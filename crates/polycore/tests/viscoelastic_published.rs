@@ -165,3 +165,48 @@ fn compressible_tension_beside_a_published_solution() {
         }
     }
 }
+
+/// Rate, 1/s; largest compression; nominal stress, MPa, of the model curve at the stretches 0.9, 0.8, 0.7, 0.6
+/// in loading, then in unloading: read from Fig. 4 of Kumar and Lopez-Pamies 2016 (± 0.03 MPa).
+const NITRILE_RUBBER: [(f64, f64, [[f64; 4]; 2]); 4] = [
+    (0.00023, 0.454, [[-0.433, -0.927, -1.547, -2.398], [-0.285, -0.685, -1.197, -1.899]]),
+    (0.001, 0.454, [[-0.46, -0.968, -1.606, -2.482], [-0.252, -0.638, -1.131, -1.805]]),
+    (0.01, 0.453, [[-0.515, -1.057, -1.736, -2.666], [-0.175, -0.525, -0.97, -1.58]]),
+    (0.1, 0.454, [[-0.589, -1.187, -1.93, -2.944], [-0.041, -0.329, -0.696, -1.194]]),
+];
+
+/// Nitrile rubber of Bergström and Boyce in compression, with the constants of Table 1.
+#[test]
+fn nitrile_rubber_beside_the_published_model() {
+    const STRETCHES: [f64; 4] = [0.9, 0.8, 0.7, 0.6];
+    let equilibrium = LopezPamies::new(vec![[1.08e6, 0.26], [0.017e6, 7.68]]).unwrap();
+    let spring = Spring::LopezPamies(LopezPamies::new(vec![[1.57e6, -10.0], [0.59e6, 7.53]]).unwrap());
+    near("least slope, MPa", spring.least_slope(1.0) / 1e6, 2.1, 0.1);
+    let viscosity = Viscosity::KumarLopezPamies {
+        start: 2.11e6,
+        end: 0.1e6,
+        thickening: 442e6,
+        thinning: 1289.49e-12,
+        exponents: [3.0, 1.929],
+    };
+    let branch = Branch::new(spring, viscosity).unwrap();
+    let law = Viscoelastic::new(Box::new(equilibrium), vec![branch]).unwrap();
+    for (rate, least, rows) in NITRILE_RUBBER {
+        let turn = (1.0 - least) / rate;
+        let strain = |t: f64| strain_of_test(Mode::Uniaxial, least + rate * (t - turn).abs());
+        let mut times: Vec<f64> = STRETCHES.map(|stretch| (1.0 - stretch) / rate).into();
+        times.push(turn);
+        times.extend(STRETCHES.iter().rev().map(|stretch| turn + (stretch - least) / rate));
+        times.insert(0, 0.0);
+        let reaction = Reaction::Test(Mode::Uniaxial);
+        let history = History { strain: &strain, temperature: &|_| 293.15, times: &times, reaction };
+        let trace = law.follow(&history, law.rest(), Pace::Within(1e3)).unwrap();
+        for (index, stretch) in STRETCHES.iter().enumerate() {
+            for (name, at, row) in [("load", index, rows[0]), ("unload", 8 - index, rows[1])] {
+                let point = &trace.points[at];
+                let nominal = nominal_of_test(&strain(point.time), &point.step.prediction.stress) / 1e6;
+                near(&format!("{rate} /s, {name} at {stretch}, MPa"), nominal, row[index], 0.03);
+            }
+        }
+    }
+}
