@@ -166,8 +166,8 @@ fn compressible_tension_beside_a_published_solution() {
     }
 }
 
-/// Rate, 1/s; largest compression; nominal stress, MPa, of the model curve at the stretches 0.9, 0.8, 0.7, 0.6
-/// in loading, then in unloading: read from Fig. 4 of Kumar and Lopez-Pamies 2016 (± 0.03 MPa).
+/// Rate, 1/s; largest compression; nominal stress, MPa, of the model curve at the stretches 0.9, 0.8, 0.7 and
+/// 0.6 in loading, then in unloading: read from Fig. 4 of Kumar and Lopez-Pamies 2016 (± 0.03 MPa).
 const NITRILE_RUBBER: [(f64, f64, [[f64; 4]; 2]); 4] = [
     (0.00023, 0.454, [[-0.433, -0.927, -1.547, -2.398], [-0.285, -0.685, -1.197, -1.899]]),
     (0.001, 0.454, [[-0.46, -0.968, -1.606, -2.482], [-0.252, -0.638, -1.131, -1.805]]),
