@@ -25,7 +25,7 @@ fn neo(modulus: f64) -> Spring {
     Spring::NeoHookean(NeoHookean::new(modulus).unwrap())
 }
 
-/// One branch beside an incompressible neo-Hookean law.
+/// Law of a branch beside an incompressible neo-Hookean law.
 fn one(modulus: f64, spring: Spring, viscosity: Viscosity) -> Viscoelastic {
     let law = Box::new(NeoHookean::new(modulus).unwrap());
     Viscoelastic::new(law, vec![Branch::new(spring, viscosity).unwrap()]).unwrap()
@@ -88,6 +88,22 @@ fn relaxation_at_a_held_stretch() {
             let trace = follow(&law, &|_| held, &[0.0, 1.0], Pace::Equal(row[0] as usize, scheme));
             near(&format!("{scheme:?}, {} steps", row[0]), stretch(&trace) / exact - 1.0, error, 1e-8);
             at_most("det C_v − 1", (voigt::to_stress(&viscous(&trace)).determinant() - 1.0).abs(), 1e-14);
+        }
+    }
+}
+
+/// Constant viscosity where C and C_v are not coaxial: shear to 2 within 1 s, then held for 1 s.
+#[test]
+fn orders_in_shear() {
+    let law = one(1.0, neo(1.0), Viscosity::Constant(1.0));
+    let strain = |t: f64| shear((2.0 * t).min(2.0));
+    let row = &table("shear_reference.csv")[1];
+    let reference = Voigt::new(row[1], row[2], row[3], row[4], 0.0, 0.0);
+    for row in table("shear_orders.csv") {
+        for (scheme, error) in [(Scheme::Euler, row[1]), (Scheme::Sdirk2, row[2])] {
+            let trace = follow(&law, &strain, &[0.0, 2.0], Pace::Equal(row[0] as usize, scheme));
+            let found = norm(&(viscous(&trace) - reference)) / norm(&reference);
+            near(&format!("{scheme:?} {}", row[0]), found / error, 1.0, 1e-3);
         }
     }
 }
@@ -204,7 +220,7 @@ fn glassy_flow() {
     }
 }
 
-/// One step of 1e-12 to 1e12 s, in closed form of the script; then far beyond.
+/// Single steps of 1e-12 to 1e12 s beside the script's, then far beyond.
 #[test]
 fn stiff_steps() {
     let bergstrom_boyce =
@@ -396,6 +412,12 @@ fn invalid_input() {
         memory,
     ));
     assert!(message.contains("states of branches: found 0"), "{message}");
+    // a sudden stretch beyond locking would dissipate without limit
+    let chains = Spring::EightChain(EightChain::new(1e6, 2.0).unwrap());
+    let locked = one(1.0, chains, Viscosity::Constant(1.0));
+    let beyond = strain_of_test(Mode::Uniaxial, 3.0);
+    let message = error(locked.advance(&locked.rest(), &Increment::new(REST, beyond, 1.0), memory));
+    assert!(message.contains("spring of a branch at the start of a step"), "{message}");
     let collapsed = Voigt::new(-1.0, 1.0, 1.0, 0.0, 0.0, 0.0);
     assert!(law.advance(&law.rest(), &Increment::new(REST, collapsed, 1.0), memory).is_err());
     let history = History {

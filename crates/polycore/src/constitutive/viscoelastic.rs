@@ -155,7 +155,8 @@ impl Viscoelastic {
     ///
     /// # Errors
     /// [`Error::Invalid`] for a duration below 0, a state of another law, or a C or C_v that is not positive
-    /// definite; errors of the equilibrium law.
+    /// definite; [`Error::Overflow`] for a step that locks a spring before it relaxes; errors of the
+    /// equilibrium law.
     pub fn advance(
         &self,
         start: &State,

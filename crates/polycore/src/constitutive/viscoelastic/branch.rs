@@ -1,4 +1,4 @@
-//! One step of one branch: C̄ and C_v at the start → C_v at the end, stress, tangent, energies.
+//! Step of a branch: C̄ and C_v at the start → C_v at the end, stress, tangent, energies.
 
 use super::flow::{Flow, ViscousTrace};
 use super::{Shift, Spring, Viscosity};
@@ -132,25 +132,38 @@ impl Branch {
         let trace = ViscousTrace::Start(viscous.trace());
         let flow = self.flow(conditions.duration, self.factor(start, conditions), trace);
         let strains = flow.solve(frame.trial)?;
-        let (tau, derivative) = flow.response(strains, frame.trial);
-        let volume = c.determinant().cbrt();
-        let response = principal(frame.trial, volume, tau, derivative);
-        let energy = self.spring.energy(strains);
-        Ok(BranchStep {
-            state: BranchState {
-                viscous: if strains == frame.trial {
-                    start.viscous
-                } else {
-                    voigt::from_stress(&frame.flowed(strains, 1.0))
-                },
-                shear: start.shear + frame.shear(strains),
+        let state = BranchState {
+            viscous: if strains == frame.trial {
+                start.viscous
+            } else {
+                voigt::from_stress(&frame.flowed(strains, 1.0))
             },
-            stress: voigt::stress_transformation(&frame.inverse)
-                * Voigt::from_fn(|a, _| if a < 3 { response.stress[a] } else { 0.0 }),
-            tangent: tangent.then(|| voigt::transform_tangent(&response.tangent(), &frame.inverse)),
-            energy,
-            dissipated: self.spring.energy(frame.trial) - energy,
-        })
+            shear: start.shear + frame.shear(strains),
+        };
+        let trial = self.spring.energy(frame.trial);
+        let response = principal(&frame, c, flow.response(strains, frame.trial));
+        let mut step = self.ended(&frame, state, strains, &response, trial)?;
+        step.tangent = tangent.then(|| voigt::transform_tangent(&response.tangent(), &frame.inverse));
+        Ok(step)
+    }
+
+    /// Result of a step without its tangent; `before` is W at the last C and the C_v at the start.
+    fn ended(
+        &self,
+        frame: &Frame,
+        state: BranchState,
+        strains: [f64; 3],
+        response: &PrincipalResponse,
+        before: f64,
+    ) -> Result<BranchStep, Error> {
+        let energy = self.spring.energy(strains);
+        if !before.is_finite() {
+            let stretches = frame.trial.map(f64::exp);
+            return Err(Error::Overflow { law: "spring of a branch at the start of a step", stretches });
+        }
+        let diagonal = Voigt::from_fn(|a, _| if a < 3 { response.stress[a] } else { 0.0 });
+        let stress = voigt::stress_transformation(&frame.inverse) * diagonal;
+        Ok(BranchStep { state, stress, tangent: None, energy, dissipated: before - energy })
     }
 
     /// Second order: two stages, the flows composed as exponentials, C̄ linear within the step. `euler` is
@@ -175,33 +188,30 @@ impl Branch {
         let share = (1.0 - GAMMA) / GAMMA;
         let (first, at_first) = stage(&between, &voigt::to_stress(&start.viscous))?;
         let (last, strains) = stage(isochoric, &first.flowed(at_first, share))?;
-        let (tau, derivative) = self.spring.response(strains);
-        let volume = c.determinant().cbrt();
-        let response = principal(last.trial, volume, tau, derivative);
-        let energy = self.spring.energy(strains);
         let ended = last.flowed(strains, 1.0);
+        let state = BranchState {
+            viscous: voigt::from_stress(&ended),
+            shear: start.shear + share * first.shear(at_first) + last.shear(strains),
+        };
+        let response = principal(&last, c, self.spring.response(strains));
+        let mut step = self.ended(&last, state, strains, &response, euler.energy + euler.dissipated)?;
         // half the release at the first C, half at the last: second order as well
-        let release = |viscous: &Tensor| -> Result<f64, Error> {
+        let at_first = |viscous: &Tensor| -> Result<f64, Error> {
             Ok(self.spring.energy(Frame::new(isochoric_before, viscous)?.trial))
         };
-        let before = release(&voigt::to_stress(&start.viscous))? - release(&ended)?;
-        Ok(BranchStep {
-            state: BranchState {
-                viscous: voigt::from_stress(&ended),
-                shear: start.shear + share * first.shear(at_first) + last.shear(strains),
-            },
-            stress: voigt::stress_transformation(&last.inverse)
-                * Voigt::from_fn(|a, _| if a < 3 { response.stress[a] } else { 0.0 }),
-            tangent: None,
-            energy,
-            dissipated: 0.5 * (before + euler.energy + euler.dissipated - energy),
-        })
+        let release = at_first(&voigt::to_stress(&start.viscous))? - at_first(&ended)?;
+        step.dissipated = 0.5 * (release + step.dissipated);
+        Ok(step)
     }
 }
 
+/// τ and dτ/de in principal axes, Pa.
+type PrincipalStress = ([f64; 3], [[f64; 3]; 3]);
+
 /// Response in the frame with aᵢ = J^(2/3) exp 2eᵢ from τ and dτ/de: Sᵢ = τᵢ/aᵢ, ℂ_iijj = (dτᵢ/deⱼ −
 /// 2δᵢⱼτᵢ)/(aᵢaⱼ), ℂ_ijij = (Sᵢ − Sⱼ)/(aᵢ − aⱼ) or its limit.
-fn principal(trial: [f64; 3], volume: f64, tau: [f64; 3], derivative: [[f64; 3]; 3]) -> PrincipalResponse {
+fn principal(frame: &Frame, c: &Tensor, (tau, derivative): PrincipalStress) -> PrincipalResponse {
+    let (trial, volume) = (frame.trial, c.determinant().cbrt());
     let squares = trial.map(|e| volume * (2.0 * e).exp());
     let stress: [f64; 3] = std::array::from_fn(|i| tau[i] / squares[i]);
     let normal: [[f64; 3]; 3] = std::array::from_fn(|i| {

@@ -83,12 +83,14 @@ impl Viscoelastic {
             let (mut time, mut done) = (begin, 0);
             let step = loop {
                 let (next, scheme) = match pace {
-                    Pace::Equal(count, _) if done + 1 >= count => (end, scheme_of(pace)),
                     Pace::Equal(count, scheme) => {
-                        (begin + (end - begin) * (done + 1) as f64 / count as f64, scheme)
+                        let next = begin + (end - begin) * (done + 1) as f64 / count as f64;
+                        (if done + 1 < count { next } else { end }, scheme)
                     }
-                    Pace::Within(_) if time + 1.000_001 * duration >= end => (end, Scheme::Sdirk2),
-                    Pace::Within(_) => (time + duration, Scheme::Sdirk2),
+                    Pace::Within(_) => {
+                        let is_last = time + 1.000_001 * duration >= end;
+                        (if is_last { end } else { time + duration }, Scheme::Sdirk2)
+                    }
                 };
                 let increment = Increment {
                     from: (history.strain)(time),
@@ -131,13 +133,6 @@ impl Viscoelastic {
             trace.points.push(TracePoint { time: end, step, dissipated, work });
         }
         Ok(trace)
-    }
-}
-
-fn scheme_of(pace: Pace) -> Scheme {
-    match pace {
-        Pace::Equal(_, scheme) => scheme,
-        Pace::Within(_) => Scheme::Sdirk2,
     }
 }
 
