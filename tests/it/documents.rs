@@ -262,7 +262,7 @@ fn every_page_is_in_the_summary() {
 fn shell_lines_are_cut_into_words() {
     let words = |line: &str| parts(line).iter().map(|part| part.join("|")).collect::<Vec<_>>();
     assert_eq!(
-        words("cargo run --release -p peri -- run a.toml  # main job"),
+        words("cargo run --release --bin peri -- run a.toml  # main job"),
         ["cargo|run|--release|-p|peri|--|run|a.toml"]
     );
     assert_eq!(

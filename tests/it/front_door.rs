@@ -2,7 +2,7 @@
 //! checkpoints. No panic, no hang, no memory beyond what the file justifies, and an error that names the
 //! place.
 //!
-//! 2000 mutations of each kind, always the same; `FRONT_DOOR=100000 cargo test --release -p tests front_door`
+//! 2000 mutations of each kind, always the same; `FRONT_DOOR=100000 cargo test --release --workspace --test it front_door`
 //! takes that many new ones. Failures are kept in tests/proptest-regressions and tried first.
 
 use crate::allocations;

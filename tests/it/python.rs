@@ -1,7 +1,7 @@
 //! The Python package: built with everything else, packed as a wheel, installed into its own environment, and
 //! tested there by pytest.
 
-use crate::program::{PACKAGES, executable, workspace};
+use crate::program::{executable, workspace};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::Instant;
@@ -10,16 +10,13 @@ use std::time::Instant;
 const NEEDED: [&str; 3] = ["maturin", "numpy", "pytest"];
 const USED: [&str; 4] = ["matplotlib", "mypy", "pandas", "xarray"];
 
-/// Builds `lib_polymech.so` with the packages that the other tests build, so that features of dependencies
-/// are the same.
+/// Builds `lib_polymech.so` with the whole workspace, whose features are those of the tests.
 fn library() -> PathBuf {
     let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
     let mut command = Command::new(cargo);
-    // examples too: their dependencies select features, and nothing is compiled twice
-    command.args(["build", "--release", "--quiet", "--lib", "--bins", "--examples"]);
+    command.args(["build", "--release", "--quiet", "--workspace", "--lib"]);
     command.arg("--message-format=json-render-diagnostics");
-    command.args(PACKAGES.map(|package| format!("--package={package}"))).current_dir(workspace());
-    let output = command.output().unwrap();
+    let output = command.current_dir(workspace()).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).unwrap();
     let messages = text.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());

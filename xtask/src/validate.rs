@@ -162,7 +162,7 @@ pub fn run(workspace: &Repository, options: &Options) -> Result<bool> {
 /// Command with which a user runs a case.
 fn command(outcome: &CaseOutcome, quick: bool) -> String {
     let quick = if quick { " --quick" } else { "" };
-    format!("cargo run --release -p {} -- run {}{quick}", outcome.program, outcome.file)
+    format!("cargo run --release --bin {} -- run {}{quick}", outcome.program, outcome.file)
 }
 
 /// Finds the requested cases, in alphabetical order, each after those whose results it reads.

@@ -62,13 +62,13 @@ impl Repository {
     /// Builds one of our programs; returns the path of its executable.
     pub fn build_program(&self, program: &str) -> Result<PathBuf> {
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-        let package = self.package(program).filter(|_| !program.is_empty() && program.chars().all(plain));
-        let Some(package) = package else {
+        if program.is_empty() || !program.chars().all(plain) || self.package(program).is_none() {
             let known = self.programs().join(", ");
             return Err(miette!("unknown program `{program}`; programs: {known}"));
-        };
-        if !self.cargo(&["build", "--release", "--quiet", "--package", &package], &[], &[])? {
-            return Err(miette!("`cargo build --release --package {package}` failed"));
+        }
+        // by its name, not by its package: features are those of the workspace, and tests share the build
+        if !self.cargo(&["build", "--release", "--quiet", "--bin", program], &[], &[])? {
+            return Err(miette!("`cargo build --release --bin {program}` failed"));
         }
         Ok(self.target.join("release").join(program).with_extension(std::env::consts::EXE_EXTENSION))
     }

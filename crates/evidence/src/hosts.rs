@@ -36,9 +36,8 @@ pub fn static_library(package: &str) -> PathBuf {
     let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
     let mut build = Command::new(cargo);
     build.args(["build", "--release", "--quiet", "--message-format=json-render-diagnostics"]);
-    // both in one build: their libraries have names without a hash, and the examples of one need the other as
-    // it was built with it
-    build.args(["--package=umatht", "--package=umat"]);
+    // libraries of the whole workspace in one build: names without a hash, features of the tests
+    build.args(["--workspace", "--lib"]);
     let text = run(build.current_dir(env!("CARGO_MANIFEST_DIR")));
     let messages = text.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
     let files = messages.flat_map(|message| message["filenames"].as_array().cloned().unwrap_or_default());

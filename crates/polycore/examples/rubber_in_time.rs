@@ -1,4 +1,4 @@
-//! Stretches a viscoelastic rubber, holds it, lets it go: `cargo run --release -p polycore --example
+//! Stretches a viscoelastic rubber, holds it, lets it go: `cargo run --release --example
 //! rubber_in_time`.
 
 use polycore::constitutive::hyperelastic::{LopezPamies, data::Mode};

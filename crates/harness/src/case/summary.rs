@@ -283,10 +283,10 @@ fn files(output: &Path, style: &TerminalStyle) -> String {
 /// Returns the words with which this program was called, without its arguments.
 fn invocation() -> String {
     let called = std::env::args().next().unwrap_or_default();
-    let name = Path::new(&called).file_stem().map(|name| name.to_string_lossy().into_owned());
-    match std::env::var("CARGO_PKG_NAME") {
-        Ok(package) => format!("cargo run --release -p {package} --"),
-        Err(_) => name.unwrap_or_default(),
+    let name = Path::new(&called).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    match std::env::var_os("CARGO_PKG_NAME") {
+        Some(_) => format!("cargo run --release --bin {name} --"),
+        None => name,
     }
 }
 
