@@ -8,10 +8,10 @@ use polycore::tensor::{DeformationGradient, StressMeasure, Tensor, Voigt, voigt}
 
 pub use polycore::tensor::voigt::{NAMES, cauchy_from_material, jaumann_tangent};
 
-/// One standard atmosphere, Pa (exact; the pressure unit of LAMMPS' `units real`).
+/// Standard atmosphere, Pa (exact; the pressure unit of LAMMPS' `units real`).
 pub const ATMOSPHERE: f64 = 101_325.0;
 
-/// One ångström, m.
+/// Ångström, m.
 pub const ANGSTROM: f64 = 1e-10;
 
 /// Edges and tilts of a periodic box as in LAMMPS, in one common unit.

@@ -50,7 +50,7 @@ pub fn fill(text: &str, value: impl Fn(&str, &str) -> Option<f64>) -> Result<Str
 /// Replaces what stands between `<!-- values: NAME -->` and `<!-- end -->`.
 ///
 /// # Errors
-/// One of the markers is missing.
+/// Error of a missing marker.
 pub fn replace(text: &str, name: &str, filled: &str) -> Result<String> {
     let begin = format!("<!-- values: {name} -->\n");
     let (before, rest) = text.split_once(&begin).ok_or_else(|| miette!("missing `{}`", begin.trim_end()))?;

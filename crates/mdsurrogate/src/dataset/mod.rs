@@ -36,7 +36,7 @@ pub const STRESSES: [f64; 2] = [1e2, 1e12];
 /// Smallest outlier: a stress so many times the 90th percentile.
 pub const OUTLIER: f64 = 1e3;
 
-/// One sample: a deformation and its stress.
+/// Sample: a deformation and its stress.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DataRow {
     /// Number of the sample in its run, as in the file.
@@ -98,7 +98,7 @@ impl DataRow {
     }
 }
 
-/// One run: rows along a deformation path, correlated with each other.
+/// Run: rows along a deformation path, correlated with each other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
     /// Name, unique in a set.
@@ -116,7 +116,7 @@ pub struct Path {
 pub struct Dataset {
     /// Runs, in order of appearance.
     pub paths: Vec<Path>,
-    /// One line per file: name, bytes, checksum, columns.
+    /// Files, a line each: name, bytes, checksum, columns.
     pub provenance: Vec<String>,
     /// Number of rows without averaged values (the state before a run).
     pub skipped: usize,

@@ -376,7 +376,7 @@ fn columns_without_shear() {
     assert!(!error.contains("did you mean"), "{error}");
 }
 
-/// One row of a million times the others is refused with its place; a steeply growing stress is not.
+/// A row of a million times the others is refused with its place; a steeply growing stress is not.
 #[test]
 fn an_outlier_is_named() {
     let rows = |last: f64| {

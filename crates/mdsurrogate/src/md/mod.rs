@@ -134,7 +134,7 @@ impl Protocol {
     }
 }
 
-/// One deformation run.
+/// Deformation run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MdRun {

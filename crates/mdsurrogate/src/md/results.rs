@@ -10,7 +10,7 @@ use std::path::Path;
 /// Number of columns in the files of LAMMPS, after the step.
 const COLUMNS: usize = 14;
 
-/// One line of `fix ave/time`.
+/// Line of `fix ave/time`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MdSample {
     /// Time step.

@@ -46,7 +46,7 @@ impl SearchMethod {
     }
 }
 
-/// One trial of a search.
+/// Trial of a search.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Trial {
     /// Search method.

@@ -37,7 +37,7 @@ impl Default for SearchSpace {
     }
 }
 
-/// One choice of hyperparameters.
+/// Hyperparameters of a trial.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SearchCandidate {
     /// Neurons and activation of each hidden layer.

@@ -17,7 +17,7 @@ pub trait TextOrTable: Sized {
     /// Parses the string.
     ///
     /// # Errors
-    /// Returns what is wrong with it.
+    /// Fails on a text that has neither form.
     fn from_text<E: Error>(text: &str) -> Result<Self, E>;
 
     /// Converts the table.
