@@ -76,8 +76,9 @@ pub fn text(page: &Page, outcomes: &[CaseOutcome]) -> String {
 
 fn meaning(kind: Kind) -> &'static str {
     match kind {
+        Kind::Measured => "a measurement",
         Kind::ClosedForm => "a formula, a series, or a count that follows from the problem",
-        Kind::Published => "a figure of the literature, of an experiment, of a benchmark",
+        Kind::Published => "a figure of the literature or of a benchmark",
         Kind::IndependentProgram => "a figure of a program that shares no code with ours",
         Kind::Convergence => "an observed order, a change under refinement",
         Kind::Bound => "an inequality that any correct result satisfies",

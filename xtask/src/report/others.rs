@@ -34,9 +34,7 @@ impl ExternalFigure {
 /// Comparisons of all cases in the folder with closed forms, publications and other programs. A regression
 /// among them keeps our own distance from a foreign figure, which is therefore missed.
 pub fn figures(outcomes: &[CaseOutcome]) -> Vec<ExternalFigure> {
-    let of_others = |kind| {
-        matches!(kind, Kind::ClosedForm | Kind::Published | Kind::IndependentProgram | Kind::Regression)
-    };
+    let of_others = |kind| !matches!(kind, Kind::Convergence | Kind::Bound);
     let mut figures = Vec::new();
     for outcome in outcomes.iter().filter(|outcome| outcome.case.starts_with(FOLDER)) {
         let name = outcome.case.strip_prefix(FOLDER).unwrap_or(&outcome.case);

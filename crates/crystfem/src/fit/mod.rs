@@ -1,6 +1,7 @@
 //! Fits of kinetic constants to measurements, by least squares in α, with 95 % confidence intervals.
 
 mod avrami;
+mod forecast;
 mod heat_flow;
 mod least_squares;
 mod nakamura;
@@ -10,6 +11,7 @@ mod student;
 mod thermogram;
 
 pub use avrami::avrami;
+pub use forecast::{ForecastRow, forecast};
 pub use heat_flow::{Baseline, Peak, interpolate};
 pub use nakamura::{FixedConstants, Run, nakamura};
 pub use ozawa::{Cooling, ozawa, rates_at};

@@ -62,7 +62,7 @@ impl Run {
     }
 
     /// z at each measurement.
-    fn z(&self, kinetics: &Kinetics) -> Vec<f64> {
+    pub(super) fn z(&self, kinetics: &Kinetics) -> Vec<f64> {
         let rows = self.times.iter().zip(&self.temperatures).map(|(&time, &temperature)| [time, temperature]);
         let mut all = self.history.iter().copied().chain(rows);
         let Some([mut time, mut temperature]) = all.next() else { return Vec::new() };

@@ -111,6 +111,8 @@ harness::quantities! {
     CRYSTALLINITY = "{fit}.run-{number}.crystallinity", "",
         "for heat flows: enthalpy over the `latent_heat` of the perfect crystal";
     FIT_RMS = "{fit}.rms", "", "root mean square of the residuals";
+    PREDICTED = "{fit}.prediction-{number}.temperature_at_{degree}", "degC",
+        "for `predict`: temperature at which α reaches 0.05, 0.1, 0.25, 0.5, 0.75, 0.9 or 0.95";
 }
 
 /// All scalars.

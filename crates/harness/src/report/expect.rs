@@ -43,9 +43,11 @@ pub struct Expect {
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
+    /// A measurement.
+    Measured,
     /// A formula, a series or a count that follows from the problem's statement.
     ClosedForm,
-    /// A figure of the literature, of an experiment or of a benchmark.
+    /// A figure of the literature or of a benchmark.
     Published,
     /// A figure of a program that shares no code with this one.
     IndependentProgram,
@@ -59,7 +61,8 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds, the strongest evidence first.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
+        Self::Measured,
         Self::ClosedForm,
         Self::Published,
         Self::IndependentProgram,
@@ -71,6 +74,7 @@ impl Kind {
     /// Returns its name in scenes.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Measured => "measured",
             Self::ClosedForm => "closed-form",
             Self::Published => "published",
             Self::IndependentProgram => "independent-program",
@@ -88,14 +92,7 @@ impl Kind {
 
 impl fmt::Display for Kind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::ClosedForm => "closed-form",
-            Self::Published => "published",
-            Self::IndependentProgram => "independent-program",
-            Self::Convergence => "convergence",
-            Self::Bound => "bound",
-            Self::Regression => "regression",
-        })
+        f.write_str(self.name())
     }
 }
 

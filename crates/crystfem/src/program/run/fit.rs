@@ -2,7 +2,7 @@
 
 use super::{fit_part, heat_flow};
 use crate::error::Error;
-use crate::fit::{FixedConstants, KineticFit, MeasuredPeak, avrami, nakamura, ozawa};
+use crate::fit::{FixedConstants, ForecastRow, KineticFit, MeasuredPeak, avrami, forecast, nakamura, ozawa};
 use crate::program::observe::celsius::{CELSIUS, to_celsius};
 use crate::program::quantities as q;
 use crate::program::scene::{FitLaw, FitScene, FitSpec, Job};
@@ -24,6 +24,8 @@ struct FinishedFit {
     series: Vec<(String, Vec<f64>, Vec<f64>)>,
     /// Prescribed constants of the kinetics, for `nakamura`.
     known: Option<FixedConstants>,
+    /// Predicted coolings: rate, K/s, and rows.
+    predicted: Vec<(f64, Vec<ForecastRow>)>,
 }
 
 impl FinishedFit {
@@ -80,6 +82,7 @@ pub fn run(
         record(&mut report, fit);
         write(output, fit)?;
         write_draws(output, fit)?;
+        write_predictions(output, fit)?;
         if scene.output.pictures {
             draw(output, fit)?;
         }
@@ -142,10 +145,22 @@ fn solve(spec: &FitSpec, job: Job, run: &mut harness::case::Run) -> Result<Vec<F
         Job::Avrami(times, degrees) => {
             let fit = avrami(&times, &degrees)?;
             let series = vec![("measured".to_owned(), times, degrees)];
-            Ok(vec![FinishedFit { name: name.clone(), fit, abscissa: ("time", "s"), series, known: None }])
+            Ok(vec![FinishedFit {
+                name: name.clone(),
+                fit,
+                abscissa: ("time", "s"),
+                series,
+                known: None,
+                predicted: Vec::new(),
+            }])
         }
         Job::Nakamura(runs, known) => {
             let fit = nakamura(&runs, &known)?;
+            let rates = spec.data.iter().filter_map(|data| Some(data.rate?.si()));
+            let measured: Vec<_> = rates.zip(&runs).collect();
+            let predict = |rate: f64| Ok((rate, forecast(&measured, &known, &fit, rate)?));
+            let predicted =
+                spec.predict.iter().map(|rate| predict(rate.si())).collect::<Result<_, Error>>()?;
             let series = runs
                 .into_iter()
                 .zip(&spec.data)
@@ -157,6 +172,7 @@ fn solve(spec: &FitSpec, job: Job, run: &mut harness::case::Run) -> Result<Vec<F
                 abscissa: ("temperature", "degC"),
                 series,
                 known: Some(known),
+                predicted,
             }])
         }
         Job::Part(part) => {
@@ -168,7 +184,14 @@ fn solve(spec: &FitSpec, job: Job, run: &mut harness::case::Run) -> Result<Vec<F
             let curves = part.curves.into_iter().zip(&spec.data);
             let series =
                 curves.map(|((_, times, degrees), data)| (stem(&data.file), times, degrees)).collect();
-            Ok(vec![FinishedFit { name: name.clone(), fit, abscissa: ("time", "s"), series, known: None }])
+            Ok(vec![FinishedFit {
+                name: name.clone(),
+                fit,
+                abscissa: ("time", "s"),
+                series,
+                known: None,
+                predicted: Vec::new(),
+            }])
         }
         Job::Ozawa(coolings, temperatures) => {
             let mut all = Vec::new();
@@ -178,7 +201,14 @@ fn solve(spec: &FitSpec, job: Job, run: &mut harness::case::Run) -> Result<Vec<F
                 let rates: Vec<f64> = rates.iter().map(|q| q * 60.0).collect();
                 let name = format!("{name}.{}_degC", ((temperature - CELSIUS) * 100.0).round() / 100.0);
                 let series = vec![("measured".to_owned(), rates, degrees)];
-                all.push(FinishedFit { name, fit, abscissa: ("cooling_rate", "K/min"), series, known: None });
+                all.push(FinishedFit {
+                    name,
+                    fit,
+                    abscissa: ("cooling_rate", "K/min"),
+                    series,
+                    known: None,
+                    predicted: Vec::new(),
+                });
             }
             Ok(all)
         }
@@ -200,6 +230,12 @@ fn record(report: &mut Report, done: &FinishedFit) {
         report.value(value(q::UPPER), estimate.interval[1]);
     }
     report.value(q::FIT_RMS.named(&[name]), fit.rms);
+    for (number, (_, rows)) in done.predicted.iter().enumerate() {
+        for row in rows {
+            let keys = [&name[..], &(number + 1).to_string(), &row.share.to_string()];
+            report.value(q::PREDICTED.named(&keys), row.temperature - CELSIUS);
+        }
+    }
     report.work(&format!("{name}.measurements"), fit.measurements as u64);
     report.work(&format!("{name}.evaluations"), fit.evaluations as u64);
 }
@@ -247,6 +283,31 @@ fn write_draws(output: &Path, done: &FinishedFit) -> Result<(), polycore::Error>
         .map(|(estimate, list)| (estimate.name, estimate.unit.as_str(), &list[..]))
         .collect();
     csv::write(output.join(format!("{}_posterior.csv", done.name)), &columns)
+}
+
+/// Writes NAME_prediction.csv: temperatures at which shares of α are reached at the predicted rates.
+fn write_predictions(output: &Path, done: &FinishedFit) -> Result<(), polycore::Error> {
+    if done.predicted.is_empty() {
+        return Ok(());
+    }
+    let column = |value: &dyn Fn(f64, &ForecastRow) -> f64| -> Vec<f64> {
+        let all = done.predicted.iter().flat_map(|(rate, rows)| rows.iter().map(move |row| (*rate, row)));
+        all.map(|(rate, row)| value(rate, row)).collect()
+    };
+    let rate = column(&|rate, _| rate * 60.0);
+    let share = column(&|_, row| row.share);
+    let temperature = column(&|_, row| row.temperature - CELSIUS);
+    let [lower, upper] = [0, 1].map(|end| column(&|_, row| row.band[end] - CELSIUS));
+    let law = column(&|_, row| row.law - CELSIUS);
+    let columns: [csv::Column; 6] = [
+        ("cooling_rate", "K/min", &rate),
+        ("alpha", "", &share),
+        ("temperature", "degC", &temperature),
+        ("lower_95", "degC", &lower),
+        ("upper_95", "degC", &upper),
+        ("law_alone", "degC", &law),
+    ];
+    csv::write(output.join(format!("{}_prediction.csv", done.name)), &columns)
 }
 
 /// Draws NAME.png: measurements as markers, the model as a dashed line.

@@ -93,6 +93,7 @@ impl FitSpec {
             ("frozen", self.frozen.is_some(), Nakamura),
             ("glass_transition", self.glass_transition.is_some(), Nakamura),
             ("activation_energy", self.activation_energy.is_some(), Nakamura),
+            ("predict", !self.predict.is_empty(), Nakamura),
             ("part", self.part.is_some(), Part),
             ("material", self.material.is_some(), Part),
         ];
@@ -114,6 +115,16 @@ impl FitSpec {
         if self.law == Part && self.heat_flow.is_some() {
             let why = "fits of a part use α, not heat flow; remove it";
             return Err(source.unexpected(&key("heat_flow"), why));
+        }
+        for (i, rate) in self.predict.iter().map(|rate| rate.si()).enumerate() {
+            let at = key(&format!("predict[{i}]"));
+            if !(rate > 0.0 && rate.is_finite()) {
+                return Err(source.error(&at, format!("{rate} K/s"), "a cooling rate above 0"));
+            }
+            if let Some(row) = self.data.iter().position(|data| data.rate.is_none()) {
+                let why = "a prediction needs the cooling rate of each run";
+                return Err(source.missing(&key(&format!("data[{row}].rate")), why));
+            }
         }
         for (i, data) in self.data.iter().enumerate() {
             if self.law != Part && data.probe.is_some() {

@@ -52,6 +52,9 @@ pub struct FitSpec {
     pub glass_transition: Option<Temperature>,
     /// Activation energy U, for `nakamura`; default 6270 J/mol.
     pub activation_energy: Option<MolarEnergy>,
+    /// Cooling rates to predict, for `nakamura` with a `rate` for all data.
+    #[serde(default)]
+    pub predict: Vec<TemperatureRate>,
     /// Scene of the part, relative to this scene, for `part`; its constants are the first trial.
     pub part: Option<PathBuf>,
     /// Material of the part whose constants are fitted, for `part`; default: the only one that crystallizes.
