@@ -24,6 +24,7 @@
 
 mod branch;
 mod control;
+pub mod fit;
 mod flow;
 mod mullins;
 mod shift;
