@@ -26,6 +26,7 @@ mod branch;
 mod control;
 pub mod fit;
 mod flow;
+pub mod linear;
 mod mullins;
 mod shift;
 mod spring;

@@ -1,7 +1,10 @@
 //! List of all laws, for scenes, fits and checks.
 
 use super::descriptor::ModelDescriptor;
-use super::{Compressible, Coupling, Error, Hyperelastic, Volumetric, chain, gent, lopez_pamies, ogden, polynomial, yeoh};
+use super::{
+    Compressible, Coupling, Error, Hyperelastic, Volumetric, chain, gent, lopez_pamies, ogden, polynomial,
+    yeoh,
+};
 
 /// All laws of Chapter 1, the √I₂ extension, and the laws of Yeoh and of Lopez-Pamies.
 pub const MODELS: &[ModelDescriptor] = &[

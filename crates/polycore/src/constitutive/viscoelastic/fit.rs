@@ -230,7 +230,7 @@ fn sorted([a, b]: [f64; 2]) -> [f64; 2] {
 
 /// Singular values of the Jacobian over the noise, and the standard error of each q from the directions of at
 /// least 1; `None` where a q lies in the others.
-fn uncertainty(jacobian: DMatrix<f64>) -> (Vec<f64>, Vec<Option<f64>>) {
+pub(super) fn uncertainty(jacobian: DMatrix<f64>) -> (Vec<f64>, Vec<Option<f64>>) {
     let count = jacobian.ncols();
     let found = jacobian.svd(false, true);
     let values: Vec<f64> = found.singular_values.iter().copied().collect();

@@ -42,8 +42,8 @@ impl<'a> Problem<'a> {
         let size = (measured.iter().map(|p| p * p).sum::<f64>() / measured.len().max(1) as f64).sqrt();
         let modulus = elastic::neo_hookean_modulus(&table)?;
         let durations = runs.iter().map(Run::duration);
-        let [shortest, longest] = durations
-            .fold([f64::INFINITY, 0.0_f64], |[least, most], t| [least.min(t), most.max(t)]);
+        let [shortest, longest] =
+            durations.fold([f64::INFINITY, 0.0_f64], |[least, most], t| [least.min(t), most.max(t)]);
         let mut limits = Vec::new();
         for parameter in form.equilibrium.parameters {
             let mut most = 0.0_f64;
@@ -120,8 +120,7 @@ impl<'a> Problem<'a> {
             there[i] += DIFFERENCE;
             there
         };
-        let points: Vec<DVector<f64>> =
-            [q.clone()].into_iter().chain((0..q.len()).map(moved)).collect();
+        let points: Vec<DVector<f64>> = [q.clone()].into_iter().chain((0..q.len()).map(moved)).collect();
         let mut found = self.residuals_at(&points).into_iter();
         let here = found.next()??;
         // a column without a law has no effect: the search turns elsewhere
@@ -252,4 +251,3 @@ impl Sequence {
         low + (high - low) * (0.5 + self.number as f64 * prime.sqrt()).fract()
     }
 }
-
