@@ -123,6 +123,15 @@ impl Form {
         Self { equilibrium, branches, fixed: Vec::new(), free: Vec::new() }
     }
 
+    /// Names of the constants, in the order of [`Form::law`].
+    pub fn names(&self) -> Vec<String> {
+        let limits = vec![0.0; self.equilibrium.parameters.len()];
+        let scales = Scales { modulus: 1.0, unit: 1.0, durations: [1.0; 2], limits };
+        let unnamed = Self { fixed: Vec::new(), free: Vec::new(), ..self.clone() };
+        let constants = unnamed.constants(&scales).unwrap_or_default();
+        constants.into_iter().map(|constant| constant.name).collect()
+    }
+
     /// Lists the constants in the order of [`Form::law`]. Those that no data determine are fixed, with the
     /// reason: γ̇₀ of `BergstromBoyce` (degenerate with τ̂), η_∞ and K₂ of `KumarLopezPamies` (nearly
     /// degenerate: only η₀/K₂^γ₂ and K₁/K₂^γ₂ are seen), ξ (acts on the first per cent of flow).
