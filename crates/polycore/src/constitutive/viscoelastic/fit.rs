@@ -251,3 +251,6 @@ pub(super) fn uncertainty(jacobian: DMatrix<f64>) -> (Vec<f64>, Vec<Option<f64>>
 fn least_slopes(law: &Viscoelastic, reach: f64) -> Vec<f64> {
     law.branches().iter().map(|branch| branch.spring.least_slope(reach)).collect()
 }
+
+#[cfg(test)]
+mod tests;
