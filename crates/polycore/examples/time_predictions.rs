@@ -137,6 +137,9 @@ enum Left {
     Runs(Vec<String>),
     /// All that follows the first cycle: a path of this strain.
     Later(f64),
+    /// Nothing: stresses at a rate between two, linear in its logarithm, over a path of this strain. A law
+    /// with a hole in its spectrum is far from them.
+    Between { rate: f64, path: f64 },
 }
 
 /// A fitted form and its errors.
@@ -213,6 +216,8 @@ fn groups(runs: &[Run]) -> Vec<Group> {
     if !counts {
         // 1, 2, 0.75, 1
         groups.push(Group { name: "second cycles".to_owned(), left: Left::Later(2.5), counts: true });
+        let left = Left::Between { rate: 8.6e-3, path: 2.5 };
+        groups.push(Group { name: "any between 0.00107 and 0.08333 /s".to_owned(), left, counts: true });
     }
     groups
 }
@@ -233,6 +238,7 @@ fn candidate(
                 leave_out(form, runs, |run| names.contains(&run.name), &warm, &|| false)?.pooled.rms
             }
             Left::Later(path) => later(form, runs, *path, &warm)?,
+            Left::Between { rate, path } => between(&found.law()?, runs, *rate, *path)?,
         });
     }
     let counted: Vec<f64> =
@@ -257,6 +263,31 @@ fn later(form: &Form, runs: &[Run], path: f64, settings: &FitSettings) -> Outcom
         }
     }
     Ok((sum / f64::from(count)).sqrt())
+}
+
+/// Root mean square of a law minus the interpolation between the slowest and the fastest run, Pa.
+fn between(law: &Viscoelastic, runs: &[Run], rate: f64, path: f64) -> Outcome<f64> {
+    let (slow, fast) = (&runs[0], &runs[runs.len() - 1]);
+    let share = (rate / slow.rate).ln() / (fast.rate / slow.rate).ln();
+    // strain and stress of a run after a path
+    let at = |run: &Run, path: f64| -> [f64; 2] {
+        let (points, time) = (run.points(), path / run.rate);
+        let after = points.partition_point(|point| point.time < time).clamp(1, points.len() - 1);
+        let [a, b] = [points[after - 1], points[after]];
+        let part = (time - a.time) / (b.time - a.time);
+        [a.strain + part * (b.strain - a.strain), a.nominal + part * (b.nominal - a.nominal)]
+    };
+    let mixed = |path: f64| {
+        let [slow, fast] = [at(slow, path), at(fast, path)];
+        [0, 1].map(|i| slow[i] + share * (fast[i] - slow[i]))
+    };
+    let point = |k: u32| {
+        let path = path * f64::from(k) / 100.0;
+        let [strain, nominal] = mixed(path);
+        Measurement { time: path / rate, strain, nominal }
+    };
+    let run = Run::new("between", rate, Test::Uniaxial, (1..=100).map(point).collect())?;
+    Ok(run.agreement(law, FINE)?.rms)
 }
 
 fn report(best: &Candidate, runs: &[Run]) {
