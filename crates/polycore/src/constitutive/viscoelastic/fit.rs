@@ -163,8 +163,8 @@ pub fn fit_until(
             Some((branch, slope)) => Error::Data {
                 what: what(),
                 reason: format!(
-                    "branch {branch} softens elastically below the log strain {}: least slope {slope:.3e} Pa; \
-                     fix an exponent of its spring at 0 or above",
+                    "branch {branch} softens elastically below the log strain {}: least slope {slope:.3e} \
+                     Pa; fix an exponent of its spring at 0 or above",
                     settings.reach
                 ),
             },
