@@ -199,6 +199,18 @@ impl TimeCase {
         }
         let form =
             Form { equilibrium, branches, fixed: settings.fix.into_iter().collect(), free: settings.free };
+        let known = form.names();
+        for (key, name) in form
+            .fixed
+            .iter()
+            .map(|(name, _)| ("fix", name))
+            .chain(form.free.iter().map(|name| ("free", name)))
+        {
+            if !known.contains(name) {
+                let known: Vec<&str> = known.iter().map(String::as_str).collect();
+                return Err(source.unknown(&format!("time.{key}"), name, &known));
+            }
+        }
         if settings.starts == 0 || settings.steps == 0 {
             let key = if settings.starts == 0 { "time.starts" } else { "time.steps" };
             return Err(source.error(key, 0, "at least 1"));
