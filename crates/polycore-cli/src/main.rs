@@ -21,6 +21,8 @@ mod cli {
     pub mod quantities;
     pub mod scene;
     pub mod table_fits;
+    pub mod time;
+    pub mod time_fits;
     pub mod trials;
 }
 

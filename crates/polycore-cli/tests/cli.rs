@@ -235,7 +235,7 @@ fn check_says_what_run_would_do() {
     let text = text(&result.stdout);
     assert!(text.contains("data treloar: 21 states, 20 measured stresses"), "{text}");
     assert!(text.contains("law eight-chain: chain_modulus, links"), "{text}");
-    assert!(text.contains("20 fits, 0 trials, 8 expectations"), "{text}");
+    assert!(text.contains("22 fits, 0 trials, 8 expectations"), "{text}");
 }
 
 #[test]
@@ -290,7 +290,7 @@ fn neo_hookean(unit: &str, modulus: f64, stretches: impl IntoIterator<Item = f64
 /// Compression, one-term data, gels: every law is fitted or reported, and written numbers have all digits.
 #[test]
 fn ordinary_tables_give_every_law() {
-    let laws = 10;
+    let laws = 11;
     let squeezed = neo_hookean("MPa", 0.4, [0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6]);
     let gel = neo_hookean("Pa", 5.123_45, (1..12).map(|i| 1.0 + 0.1 * f64::from(i)));
     let stiff = neo_hookean("GPa", 1.25, (1..12).map(|i| 1.0 + 0.01 * f64::from(i)));
@@ -410,7 +410,7 @@ fn laws_of_other_names_get_advice() {
     for (name, advice) in [
         ("arruda-boyce", "`eight-chain`, the law of Arruda and Boyce"),
         ("reduced-polynomial", "`yeoh`"),
-        ("prony", "rates and relaxation are not modelled"),
+        ("prony", "fitted by a `[time]` block"),
         ("poisson_ratio", "incompressible"),
         ("ogden", "by the number of terms"),
     ] {
@@ -420,5 +420,70 @@ fn laws_of_other_names_get_advice() {
         let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
         assert_eq!(result.status.code(), Some(2), "{error}");
         assert!(error.contains(advice), "{error}");
+    }
+}
+
+/// A fit with time: the table of the run, its files, and what a scene may not ask.
+#[test]
+fn a_law_with_time_is_fitted() {
+    let scene = r#"
+version = 1
+program = "polycore"
+[time]
+equilibrium = "neo-hookean"
+leave_out = "0.1 1/s"
+starts = 1
+[[time.branch]]
+spring = "neo-hookean"
+viscosity = "constant"
+[[time.data]]
+name = "bar"
+file = "bar.csv"
+runs = ["rate"]
+[[time.predict]]
+name = "hold"
+steps = [{ to = 1.5, rate = "0.1 1/s" }, { hold = "100 s" }]
+[[expect]]
+quantity = "time.all.rms"
+at_most = 0.001
+kind = "closed-form"
+source = "the data are elastic"
+"#;
+    // λ − λ⁻² times 0.5 MPa at both rates: a branch has no effect
+    let mut table = String::from("rate [1/s],stretch,nominal [MPa]\n");
+    for rate in [0.1, 0.01] {
+        for path in [0.1, 0.3, 0.5, 0.7, 0.9] {
+            let stretch: f64 = if path <= 0.5 { 1.0 + path } else { 2.0 - path };
+            table += &format!("{rate},{stretch},{}\n", 0.5 * (stretch - stretch.powi(-2)));
+        }
+    }
+    let (folder, path) = folder(scene);
+    std::fs::write(folder.path().join("bar.csv"), &table).unwrap();
+    let out = folder.path().join("out");
+    let result = run(&path, &out);
+    let shown = text(&result.stdout);
+    assert_eq!(result.status.code(), Some(0), "{shown}{}", text(&result.stderr));
+    for part in ["bar-0.1 ", "bar-0.01 ", "all ", "predicted by a fit to the other rates", "not determined"] {
+        assert!(shown.contains(part), "{part}: {shown}");
+    }
+    let report = Report::read(out.join("report.json")).unwrap();
+    assert!(report.scalar("time.left-out.rms").unwrap() < 1e-3);
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
+    assert!(read("time_runs.csv").lines().count() == 11, "{}", read("time_runs.csv"));
+    let constants: toml::Table = read("time_constants.toml").parse().unwrap();
+    assert_eq!(constants["law"]["equilibrium"].as_str(), Some("neo-hookean"));
+    assert_eq!(read("hold_prediction.csv").lines().count(), 83);
+    for (from, to, message) in [
+        ("\"0.1 1/s\"\nstarts", "\"0.2 1/s\"\nstarts", "0.01 /s, 0.1 /s"),
+        ("starts = 1", "starts = 0", "at least 1"),
+        ("starts = 1", "fix = { \"1.tau\" = 3.0 }", "1.nu, 1.eta"),
+        ("{ hold = \"100 s\" }", "{ hold = \"100 s\", to = 2.0 }", "`to` another strain"),
+        ("time.all.rms", "time.al.rms", "time.all.rms"),
+    ] {
+        std::fs::write(&path, scene.replace(from, to)).unwrap();
+        let result = run(&path, &out);
+        let error = text(&result.stderr).replace(['\n', '│'], " ");
+        let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(result.status.code() != Some(0) && error.contains(message), "{from}: {error}");
     }
 }

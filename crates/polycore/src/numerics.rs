@@ -9,6 +9,7 @@ pub mod conjugate_gradients;
 pub mod groups;
 pub mod hexahedron;
 pub mod least_squares;
+pub mod nonnegative;
 pub mod sets;
 
 pub use bisection::{bisect, bisected};

@@ -19,7 +19,7 @@ use super::material::{DIGITS, digits};
 use super::quantities as q;
 use super::scene::{DataSet, FitCase};
 use super::table_fits::{TableFits, unit_of};
-use super::{card, draw, material, trials};
+use super::{card, draw, material, time_fits, trials};
 
 /// Fits every law to every table; writes tables and pictures. A law that cannot be fitted is reported, the
 /// others are kept. If the run is stopped, finished fits are written.
@@ -79,6 +79,11 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     if stopped {
         return Err(run.interruption());
     }
+    let mut timed = String::new();
+    if let Some(time) = &case.time {
+        phases.start("fit with time");
+        timed = time_fits::run(time, run, &mut report)?;
+    }
     phases.start("trials");
     for trial in &case.trials {
         trials::run(trial, &mut report)?;
@@ -92,7 +97,7 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     phases.stop();
     report.phases(&phases).threads(1).judge(&case.expect, quick);
     trials::judge(&case.trials, &mut report);
-    let mut text = summary(case, &all, &report);
+    let mut text = summary(case, &all, &timed, &report);
     for name in &report.non_finite {
         let _ = writeln!(text, "FAIL  {name} is not finite");
     }
@@ -243,8 +248,8 @@ fn write_states(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) ->
 
 /// Summary of a run: layout of the files, rms by law and table, verdicts, parameters, a material block for
 /// `peri`, trials, then the expectations.
-fn summary(case: &FitCase, all: &[TableFits], report: &Report) -> String {
-    let mut text = format!("{}\n", case.title);
+fn summary(case: &FitCase, all: &[TableFits], timed: &str, report: &Report) -> String {
+    let mut text = format!("{}\n{timed}", case.title);
     for set in all {
         set.read.iter().for_each(|line| text += &format!("{}: {line}\n", set.name));
     }

@@ -1,8 +1,8 @@
 //! Scalars in reports of `polycore`.
 
 harness::quantities! {
-    /// Quantities of fits, `{fit}` = DATA.LAW or, for a fit judged on other data, DATA.LAW.OTHER; and of
-    /// trials, `{trial}`.
+    /// Quantities of fits, `{fit}` = DATA.LAW or, for a fit judged on other data, DATA.LAW.OTHER; of
+    /// fits with time; and of trials, `{trial}`.
     pub ALL:
     RMS = "{fit}.rms", "MPa", "root mean square of model − measurement";
     MAE = "{fit}.mae", "MPa", "mean of |model − measurement|";
@@ -15,6 +15,10 @@ harness::quantities! {
     SHEAR_MODULUS = "{fit}.shear_modulus", "MPa", "shear modulus at rest";
     PARAMETER = "{fit}.{parameter}", "*", "parameter of the fitted law, stresses in MPa";
     STANDARD_ERROR = "{fit}.{parameter}.standard_error", "*", "standard error of the parameter";
+    TIME_RMS = "time.{run}.rms", "MPa", "of a fit with time: root mean square of model − measurement; run \
+                                        `all`: all runs, `left-out`: the rate left out";
+    TIME_R2 = "time.{run}.r2", "", "of a fit with time: coefficient of determination";
+    TIME_CONSTANT = "time.{constant}", "*", "constant of a law with time, stresses in MPa";
     REFUSED = "{trial}.refused", "", "1 if a trial was refused with the message of its scene, else 0";
     NOMINAL = "{trial}.nominal", "MPa", "P₁ of a trial with `parameters`";
     ENERGY = "{trial}.energy", "MJ/m³", "W of a trial with `parameters`";

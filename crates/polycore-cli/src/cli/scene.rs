@@ -13,6 +13,7 @@ use polycore::constitutive::hyperelastic::{
 use serde::Deserialize;
 
 use super::quantities as q;
+use super::time::{TimeCase, TimeSettings};
 use super::trials::FitTrial;
 
 /// Scene as written in the file.
@@ -28,6 +29,8 @@ struct Scene {
     /// Fits.
     #[serde(default)]
     fit: FitSettings,
+    /// Fit of a law with time.
+    time: Option<TimeSettings>,
     /// Laws at single states and fits to a few states, with their expected behaviour.
     #[serde(default)]
     trial: Vec<FitTrial>,
@@ -99,6 +102,7 @@ pub struct FitCase {
     pub laws: Vec<&'static ModelDescriptor>,
     pub cross: bool,
     pub data: Vec<DataSet>,
+    pub time: Option<TimeCase>,
     pub trials: Vec<FitTrial>,
     pub expect: Vec<Expect>,
 }
@@ -106,7 +110,7 @@ pub struct FitCase {
 impl FitCase {
     /// Parses and checks a scene and the tables that it names.
     pub fn parse(source: &Source) -> Result<Self, SceneError> {
-        let Scene { _program: Program::Polycore, title, fit, trial, expect } = source.parse()?;
+        let Scene { _program: Program::Polycore, title, fit, time, trial, expect } = source.parse()?;
         let laws = match &fit.laws {
             None => MODELS.iter().collect(),
             Some(names) => select_laws(source, names)?,
@@ -153,16 +157,17 @@ impl FitCase {
             }
             data.push(DataSet { name: entry.name, table, read });
         }
-        if data.is_empty() && trial.is_empty() {
+        let time = time.map(|settings| TimeCase::new(source, settings)).transpose()?;
+        if data.is_empty() && trial.is_empty() && time.is_none() {
             return Err(source.error(
                 "fit.data",
                 "no data",
-                "at least one `[[fit.data]]` with `name` and `file`, or a `[[trial]]`",
+                "at least one `[[fit.data]]` with `name` and `file`, a `[time]` or a `[[trial]]`",
             ));
         }
         super::trials::check(source, &trial)?;
         let case =
-            Self { source: source.clone(), title, laws, cross: fit.cross, data, trials: trial, expect };
+            Self { source: source.clone(), title, laws, cross: fit.cross, data, time, trials: trial, expect };
         case.check_expectations()?;
         Ok(case)
     }
@@ -177,9 +182,12 @@ impl FitCase {
             let _ = writeln!(text, "data {name}: {states} states, {measured} measured stresses ({source})");
             read.iter().for_each(|line| text += &format!("  {line}\n"));
         }
-        for model in &self.laws {
+        for model in self.laws.iter().filter(|_| !self.data.is_empty()) {
             let names: Vec<_> = model.parameters.iter().map(|parameter| parameter.name).collect();
             let _ = writeln!(text, "law {}: {}", model.key, names.join(", "));
+        }
+        if let Some(time) = &self.time {
+            text += &time.plan();
         }
         let _ = writeln!(
             text,
@@ -212,6 +220,9 @@ impl FitCase {
         }
         for trial in &self.trials {
             names.extend(trial.quantities());
+        }
+        if let Some(time) = &self.time {
+            names.extend(time.quantities());
         }
         names
     }
@@ -262,7 +273,7 @@ fn advice(name: &str) -> Option<&'static str> {
         "neohooke" | "neohookean" | "neo" => "`neo-hookean`",
         "marlow" | "vanderwaals" | "extendedtube" => "`eight-chain-root-i2`, which behaves most similarly",
         "prony" | "viscoelastic" | "maxwell" | "creep" => {
-            "an elastic law; rates and relaxation are not modelled, so fit the curve of the slowest test"
+            "an elastic law; rates and relaxation are fitted by a `[time]` block"
         }
         "poissonratio" | "nu" => {
             "no such parameter: the rubber of a fit is incompressible; compressibility is `bulk_modulus` in \

@@ -24,7 +24,9 @@
 
 mod branch;
 mod control;
+pub mod fit;
 mod flow;
+pub mod linear;
 mod mullins;
 mod shift;
 mod spring;

@@ -1,5 +1,6 @@
 //! Lopez-Pamies' law: a sum of powers of I₁.
 
+use super::descriptor::{ABSENT, Contained, Domain, ModelDescriptor, ModelKind, Parameter};
 use super::polynomial::first_invariant_excess;
 use super::principal::InvariantDerivatives;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive};
@@ -10,6 +11,30 @@ use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive}
 pub struct LopezPamies {
     terms: Vec<[f64; 2]>,
 }
+
+/// The law of two terms.
+pub(super) const LOPEZ_PAMIES: ModelDescriptor = ModelDescriptor {
+    key: "lopez-pamies",
+    kind: ModelKind::Phenomenological,
+    parameters: &[
+        Parameter { name: "mu_1", unit: "Pa", domain: Domain::Positive },
+        Parameter { name: "alpha_1", unit: "1", domain: Domain::Real },
+        Parameter { name: "mu_2", unit: "Pa", domain: Domain::Positive },
+        Parameter { name: "alpha_2", unit: "1", domain: Domain::Real },
+    ],
+    build: |p| Ok(Box::new(LopezPamies::new(vec![[p[0], p[1]], [p[2], p[3]]])?)),
+    example: &[0.27e6, 0.7, 0.02e6, 3.0],
+    starts: |start| {
+        let shares = [[0.9, 1.0, 0.1, -2.0], [0.9, 0.8, 0.02, 3.0], [0.5, 0.5, 0.4, -5.0]];
+        shares.map(|[a, first, b, second]| vec![a * start.modulus, first, b * start.modulus, second]).to_vec()
+    },
+    contains: &[Contained {
+        key: "neo-hookean",
+        embed: |p, _| vec![vec![p[0], 1.0, ABSENT * p[0], 2.0], vec![0.9 * p[0], 1.0, 0.1 * p[0], 2.0]],
+    }],
+    slopes: None,
+    refine: None,
+};
 
 impl LopezPamies {
     const NAME: &'static str = "Lopez-Pamies";

@@ -1,9 +1,12 @@
 //! List of all laws, for scenes, fits and checks.
 
 use super::descriptor::ModelDescriptor;
-use super::{Compressible, Coupling, Error, Hyperelastic, Volumetric, chain, gent, ogden, polynomial, yeoh};
+use super::{
+    Compressible, Coupling, Error, Hyperelastic, Volumetric, chain, gent, lopez_pamies, ogden, polynomial,
+    yeoh,
+};
 
-/// All laws of Chapter 1, the √I₂ extension, and Yeoh's law.
+/// All laws of Chapter 1, the √I₂ extension, and the laws of Yeoh and of Lopez-Pamies.
 pub const MODELS: &[ModelDescriptor] = &[
     polynomial::NEO_HOOKEAN,
     polynomial::MOONEY_RIVLIN,
@@ -15,6 +18,7 @@ pub const MODELS: &[ModelDescriptor] = &[
     chain::EIGHT_CHAIN,
     chain::EIGHT_CHAIN_ROOT_I2,
     yeoh::YEOH,
+    lopez_pamies::LOPEZ_PAMIES,
 ];
 
 /// Returns the model with this key.

@@ -1,0 +1,41 @@
+use evidence::near;
+
+use super::problem::Problem;
+use super::{BranchForm, Form, Measurement, Run, SpringForm, Test, ViscosityForm, uncertainty};
+use crate::constitutive::hyperelastic::model;
+use crate::constitutive::viscoelastic::{Pace, Scheme};
+
+/// What three cycles of VHB 4910 to 3 determine of the published law with 1 kPa of noise on 123 points, as an
+/// independent script has it (formulation-time.md, section C): ln η₀ to 0.4, ln K₁ to 3.8, γ₁ to 140 %. The
+/// script's points are not known, these are equal steps of 0.1.
+#[test]
+fn uncertainty_of_a_published_law() {
+    let run = |rate: f64| {
+        let point = |k: u32| {
+            let path = 0.1 * f64::from(k);
+            let strain = if k <= 20 { 1.0 + path } else { 5.0 - path };
+            Measurement { time: path / rate, strain, nominal: 1e3 * path }
+        };
+        Run::new(&format!("{rate}"), rate, Test::Uniaxial, (0..=40).map(point).collect()).unwrap()
+    };
+    let runs = [0.01, 0.03, 0.05].map(run);
+    let branch =
+        BranchForm { spring: SpringForm::LopezPamies(2), viscosity: ViscosityForm::KumarLopezPamies };
+    let mut form = Form::new(model("lopez-pamies").unwrap(), vec![branch]);
+    form.fixed = vec![("1.eta_inf".to_owned(), 100.0), ("1.K_2".to_owned(), 1e-6)];
+    let problem = Problem::new(&form, &runs, Pace::Equal(4, Scheme::Sdirk2)).unwrap();
+    let published = [
+        13.54e3, 1.0, 1.08e3, -2.474, 5.42e3, -10.0, 20.78e3, 1.948, 7014e3, 100.0, 3507e3, 1e-6, 1.852, 0.26,
+    ];
+    let at = problem.inverse(&published);
+    let (_, jacobian) = problem.jacobian(&at).unwrap();
+    let scaled = jacobian / 1e3;
+    let covariance = scaled.tr_mul(&scaled).try_inverse().unwrap();
+    let interval = |k: usize| 1.96 * covariance[(k, k)].sqrt();
+    near("ln eta_0, 95 %", interval(8), 0.4, 0.1);
+    near("ln K_1, 95 %", interval(9), 3.8, 0.4);
+    near("gamma_1, relative, 95 %", interval(10), 1.4, 0.2);
+    let (values, errors) = uncertainty(scaled);
+    // the direction of K₁ and γ₁ is below the noise: no interval
+    assert!(values[11] < 1.0 && errors[9].is_none() && errors[8].is_some());
+}
