@@ -10,7 +10,7 @@ use polycore::table::Table;
 
 /// PDMS of the simulations of formulation-networks.md, section D.
 fn melt() -> Melt {
-    Melt { entanglement_modulus: 0.235e6, ..Melt::of("PDMS").unwrap() }
+    Melt { entanglement_modulus: 0.235e6, ..Melt::of_polymer("PDMS").unwrap() }
 }
 
 /// A melt whose strands need not be chains.
@@ -22,8 +22,8 @@ fn linked(functionality: u32, ratio: f64, conversion: f64) -> Result<PolymerNetw
     EndLinked::new(functionality, 10.0, Reacted::Conversion(conversion)).ratio(ratio).network(&beads())
 }
 
-/// f = 3: α = 1/s − 1; f = 4: α = √(1/s − 3/4) − 1/2 with s = p_A p_B; β from the recursion; both satisfy the
-/// undivided equation.
+/// f = 3: α = 1/s − 1; f = 4: α = √(1/s − 3/4) − 1/2 with s = p_A p_B; β from the recursion; both satisfy
+/// the undivided equation.
 #[test]
 fn closed_forms_of_three_and_four_groups() {
     let mut worst = 0.0_f64;
@@ -40,8 +40,8 @@ fn closed_forms_of_three_and_four_groups() {
     at_most("network_recursion_against_closed_forms", worst, 2e-15);
 }
 
-/// [B₂](1 − β)² = [A_f] Σ_{m≥2} (m/2) P_m: every strand that carries ends at two junctions. The left side gives
-/// s̄ν; the right side adds junctions of two ways, P₂ = C(f,2) α^(f−2) (1 − α)², to ν.
+/// [B₂](1 − β)² = [A_f] Σ_{m≥2} (m/2) P_m: every strand that carries ends at two junctions. The left side
+/// gives s̄ν; the right side adds junctions of two ways, P₂ = C(f,2) α^(f−2) (1 − α)², to ν.
 #[test]
 fn strands_counted_from_both_ends() {
     let mut worst = 0.0_f64;
@@ -70,7 +70,8 @@ fn gel_point() {
             let [alpha, _] = above.extinction;
             assert!((0.0..1e-4).contains(&(1.0 - alpha)) && above.phantom() >= 0.0, "{above:?}");
             assert!(above.sol.mass < 1.0 && above.sol.mass > 0.99);
-            // 1 − α = 2ε·2/(f − 2) to first order: s Σ α^k ≈ s (f − 1)(1 − (1 − α)(f − 2)/2), s = (1 + 2ε)/(f − 1)
+            // 1 − α = 2ε·2/(f − 2) to first order: s Σ α^k ≈ s (f − 1)(1 − (1 − α)(f − 2)/2), s = (1 +
+            // 2ε)/(f − 1)
             let expected = 4e-6 / f64::from(functionality - 2);
             assert!(((1.0 - alpha) / expected - 1.0).abs() < 1e-3, "{functionality} {alpha}");
             let below = linked(functionality, ratio, critical * (1.0 - 1e-6)).unwrap_err();
@@ -138,9 +139,9 @@ fn chains() {
     }
     let short = EndLinked::new(4, 0.5, Reacted::Complete).network(&melt()).unwrap_err();
     assert!(short.to_string().starts_with("1.312 Kuhn segments between junctions: too few"), "{short}");
-    let unknown = Melt::of("PDMZ").unwrap_err().to_string();
+    let unknown = Melt::of_polymer("PDMZ").unwrap_err().to_string();
     assert!(unknown.starts_with("unknown polymer `PDMZ`; known: PDMS, polyisoprene,"), "{unknown}");
-    let missing = Melt::of("PEO").unwrap_err().to_string();
+    let missing = Melt::of_polymer("PEO").unwrap_err().to_string();
     assert_eq!(missing, "the density of PEO is not in the table; give it");
 }
 
@@ -187,9 +188,10 @@ fn structure(case: &str) -> BTreeMap<&'static str, f64> {
     ])
 }
 
-/// All counts of random networks: f = 3, 4, 8, mixtures, chains with one group, both kinds of vulcanization.
-/// 144 deviations of a normal distribution in standard errors: rms 1 ± 0.06, the largest about 2.8; three
-/// beyond 2.0 and none beyond 3.0 are expected 6.6 and 0.4 times. The formulas of the reference, six digits.
+/// All counts of random networks: f = 3, 4, 8, mixtures, chains with one group, both kinds of
+/// vulcanization. 144 deviations of a normal distribution in standard errors: rms 1 ± 0.06, the largest
+/// about 2.8; three beyond 2.0 and none beyond 3.0 are expected 6.6 and 0.4 times. The formulas of the
+/// reference, six digits.
 #[test]
 fn counts_on_random_networks() {
     let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/networks_counted.csv");
@@ -228,8 +230,8 @@ fn example_of_the_formulation() {
     }
 }
 
-/// Conversion from the sol fraction and back, over compositions with mass everywhere; without loops the tree's
-/// conversion, with loops a larger one that the tree's bounds from below.
+/// Conversion from the sol fraction and back, over compositions with mass everywhere; without loops the
+/// tree's conversion, with loops a larger one that the tree's bounds from below.
 #[test]
 fn sol_fraction_both_ways() {
     let mut worst = 0.0_f64;
@@ -291,8 +293,8 @@ fn extraction() {
     }
 }
 
-/// Vulcanization of the most probable distribution is the recursion of f = 4 with p_A p_B → x/(1 + x); gel points
-/// at x = 1/2 and 1; the two distributions differ as section A states.
+/// Vulcanization of the most probable distribution is the recursion of f = 4 with p_A p_B → x/(1 + x); gel
+/// points at x = 1/2 and 1; the two distributions differ as section A states.
 #[test]
 fn vulcanization() {
     let of = |chains, units| Vulcanized::new(chains, 100.0, units).network(&melt());
@@ -368,7 +370,8 @@ fn extremes_and_refusals() {
         assert!(error.contains(message), "{error}\n{message}");
     }
     assert!(LinkerMix::new(&[]).is_err() && LinkerMix::new(&[(4, 0.0)]).is_err());
-    // 5.1 groups on average: nine of ten cross-linkers have five, and the groups are counted, not the linkers
+    // 5.1 groups on average: nine of ten cross-linkers have five, and the groups are counted, not the
+    // linkers
     let mean = LinkerMix::mean(5.1).unwrap();
     assert!((mean.per_group() - 1.0 / 5.1).abs() < 1e-15 && mean.shares()[0].0 == 5);
     assert!((mean.shares()[1].1 - 6.0 * 0.1 / 5.1).abs() < 1e-12);

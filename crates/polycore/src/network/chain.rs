@@ -3,9 +3,10 @@
 use super::{AVOGADRO, Error, positive};
 use crate::langevin::inverse;
 
-/// Energies of a backbone bond when a strand breaks, J/mol. 350 kJ/mol is the dissociation energy of C–C; about
-/// 60 kJ/mol is the energy stored per bond at scission, an estimate from force spectroscopy of single
-/// hydrocarbon chains (Wang, Panyukov, Rubinstein, Craig 2019, Macromolecules 52, 2772). Neither is for Si–O.
+/// Energies of a backbone bond when a strand breaks, J/mol. 350 kJ/mol is the dissociation energy of C–C;
+/// about 60 kJ/mol is the energy stored per bond at scission, an estimate from force spectroscopy of single
+/// hydrocarbon chains (Wang, Panyukov, Rubinstein, Craig 2019, Macromolecules 52, 2772). Neither is for
+/// Si–O.
 pub const BOND_ENERGIES: [f64; 2] = [60e3, 350e3];
 
 /// Kuhn segments below which a strand is refused: the stiffness of a Langevin chain diverges at one.
@@ -29,8 +30,8 @@ pub struct KnownPolymer {
     pub name: &'static str,
     /// Other names.
     pub aliases: &'static [&'static str],
-    /// Kuhn data of melts at 413 K: Rubinstein and Colby, Polymer Physics, table 2.1, as formulation-networks.md
-    /// quotes it; M_b from the repeat unit.
+    /// Kuhn data of melts at 413 K: Rubinstein and Colby, Polymer Physics, table 2.1, as
+    /// formulation-networks.md quotes it; M_b from the repeat unit.
     pub chain: KuhnChain,
     /// Density near 298 K, kg/m³.
     pub density: Option<f64>,
@@ -50,9 +51,9 @@ const fn known(
     KnownPolymer { name, aliases, chain, density, entanglement_modulus }
 }
 
-/// Polymers with their data: Kuhn length (nm), molar mass of a segment and of a backbone bond (g/mol), density,
-/// plateau modulus. That of PDMS, 0.20 MPa, is of Fetters and others (1994), doi:10.1021/ma00095a001, quoted
-/// from memory; it is ρRT/M_e of M_e = 12 kg/mol.
+/// Polymers with their data: Kuhn length (nm), molar mass of a segment and of a backbone bond (g/mol),
+/// density, plateau modulus. That of PDMS, 0.20 MPa, is of Fetters and others (1994),
+/// doi:10.1021/ma00095a001, quoted from memory; it is ρRT/M_e of M_e = 12 kg/mol.
 pub const KNOWN_POLYMERS: [KnownPolymer; 6] = [
     known("PDMS", &["polydimethylsiloxane", "silicone"], [1.3, 381.0, 37.0], Some(970.0), Some(0.20e6)),
     known("polyisoprene", &["PI", "natural rubber"], [0.82, 113.0, 17.0], Some(910.0), None),
@@ -77,8 +78,8 @@ pub fn known_polymer(name: &str) -> Result<&'static KnownPolymer, Error> {
 }
 
 impl KuhnChain {
-    /// Creates the statistics of a chain from Kuhn length (m), molar mass of a segment and of a backbone bond
-    /// (kg/mol).
+    /// Creates the statistics of a chain from Kuhn length (m), molar mass of a segment and of a backbone
+    /// bond (kg/mol).
     ///
     /// # Errors
     /// Numbers that are not positive.
@@ -107,9 +108,9 @@ impl KuhnChain {
         inverse(segments.sqrt().recip()) * segments.sqrt() / 3.0
     }
 
-    /// Returns the fracture energy of strands, J/m²: G₀ = ½ ν b√n N_b U with N_b = nM_K/M_b bonds per strand
-    /// (Lake and Thomas 1967, doi:10.1098/rspa.1967.0160); ν in mol/m³, U in J/mol. The factor ½ takes the root
-    /// mean square length of a strand; other averages give 0.46 to 0.61.
+    /// Returns the fracture energy of strands, J/m²: G₀ = ½ ν b√n N_b U with N_b = nM_K/M_b bonds per
+    /// strand (Lake and Thomas 1967, doi:10.1098/rspa.1967.0160); ν in mol/m³, U in J/mol. The factor ½
+    /// takes the root mean square length of a strand; other averages give 0.46 to 0.61.
     pub fn fracture_energy(&self, strands: f64, segments: f64, bond_energy: f64) -> f64 {
         let bonds = segments * self.mass / self.bond_mass;
         0.5 * strands * self.length * segments.sqrt() * bonds * bond_energy

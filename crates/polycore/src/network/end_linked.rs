@@ -3,9 +3,9 @@
 use super::{Error, LinkerMix, Melt, PolymerNetwork, SolFractions, not_negative, positive};
 use crate::numerics::bisected;
 
-/// Factor of the concentration of a strand's own end (Gaussian chain) in the probability of a loop. It is the
-/// only number here that is fitted: to the conversions of 15 simulated networks of f = 4, given their sol
-/// (doi:10.1021/acs.macromol.3c02544). No measured network was used.
+/// Factor of the concentration of a strand's own end (Gaussian chain) in the probability of a loop. It is
+/// the only number here that is fitted: to the conversions of 15 simulated networks of f = 4, given their
+/// sol (doi:10.1021/acs.macromol.3c02544). No measured network was used.
 pub const LOOP_FACTOR: f64 = 1.6;
 
 /// What is known about the reaction.
@@ -19,14 +19,14 @@ pub enum Reacted {
     Complete,
 }
 
-/// Composition of an end-linked network: strands B₂ with a group B at either end, cross-linkers with f groups A,
-/// and chains B₁ with one group B.
+/// Composition of an end-linked network: strands B₂ with a group B at either end, cross-linkers with f
+/// groups A, and chains B₁ with one group B.
 ///
 /// ```
 /// use polycore::network::{EndLinked, Melt, Reacted};
 ///
 /// let recipe = EndLinked::new(4, 11.3, Reacted::SolFraction(0.005)).ratio(1.33);
-/// let network = recipe.network(&Melt::of("PDMS")?.extracted())?;
+/// let network = recipe.network(&Melt::of_polymer("PDMS")?.extracted())?;
 /// // measured: 0.276 MPa (Gottlieb and others 1981)
 /// assert!((network.modulus() / 0.276e6 - 1.0).abs() < 0.1);
 /// # Ok::<(), polycore::network::Error>(())
@@ -46,8 +46,8 @@ pub struct EndLinked {
 }
 
 impl EndLinked {
-    /// Creates the composition of strands of a molar mass (kg/mol; of several lengths, the number average) and
-    /// cross-linkers of a functionality, in balance (r = 1), cross-linkers without mass.
+    /// Creates the composition of strands of a molar mass (kg/mol; of several lengths, the number average)
+    /// and cross-linkers of a functionality, in balance (r = 1), cross-linkers without mass.
     pub fn new(functionality: u32, strand_mass: f64, reacted: Reacted) -> Self {
         Self {
             linkers: LinkerMix::new(&[(functionality, 1.0)]),
@@ -81,7 +81,8 @@ impl EndLinked {
         Self { ends: (share, mass), ..self }
     }
 
-    /// Sets the factor of loops in a conversion from a sol fraction; 0 takes the conversion of the tree theory.
+    /// Sets the factor of loops in a conversion from a sol fraction; 0 takes the conversion of the tree
+    /// theory.
     pub fn loop_factor(self, loop_factor: f64) -> Self {
         Self { loop_factor, ..self }
     }
@@ -89,8 +90,8 @@ impl EndLinked {
     /// Computes the network.
     ///
     /// # Errors
-    /// A composition at or below the gel point, conversions above 1, a sol fraction below what the ratio allows,
-    /// numbers outside their range, strands of less than 1.5 Kuhn segments.
+    /// A composition at or below the gel point, conversions above 1, a sol fraction below what the ratio
+    /// allows, numbers outside their range, strands of less than 1.5 Kuhn segments.
     pub fn network(&self, melt: &Melt) -> Result<PolymerNetwork, Error> {
         melt.check()?;
         let recipe = self.checked()?;
@@ -178,13 +179,14 @@ impl Recipe<'_> {
         Error::NoGel { product, value, least: 1.0, advice }
     }
 
-    /// Returns the conversion of the tree theory for a measured sol fraction, and the one that allows for loops.
+    /// Returns the conversion of the tree theory for a measured sol fraction, and the one that allows for
+    /// loops.
     ///
     /// The sol falls with the conversion, so that the bracket from the gel point to the largest conversion
-    /// holds one root. Loops of single strands end ways that the tree theory takes for ways to the gel: with
-    /// a probability λ of such a loop 1 − √w = (1 − √w_tree)(1 − λ), λ = k (f − 1) p_A p_B c_own/[B], where c_own
-    /// is the concentration of a Gaussian strand's own end at its other end, [B] that of all groups B, k the
-    /// [`LOOP_FACTOR`]. Needs Kuhn data.
+    /// holds one root. Loops of single strands end ways that the tree theory takes for ways to the gel:
+    /// with a probability λ of such a loop 1 − √w = (1 − √w_tree)(1 − λ), λ = k (f − 1) p_A p_B c_own/[B],
+    /// where c_own is the concentration of a Gaussian strand's own end at its other end, [B] that of all
+    /// groups B, k the [`LOOP_FACTOR`]. Needs Kuhn data.
     fn conversions(&self, sol: f64, melt: &Melt, loop_factor: f64) -> Result<[f64; 2], Error> {
         if !(0.0..1.0).contains(&sol) {
             return Err(Error::Domain { quantity: "sol fraction", value: sol, allowed: "0 to 1, without 1" });

@@ -20,7 +20,8 @@ pub enum Error {
     },
     /// Conversion above one, of the groups A or of the groups B, which react in pairs.
     #[error(
-        "conversion p_A = {conversion} with r = {ratio}: p_B = r p_A = {:.4} is above 1; p_A is at most {:.4}",
+        "conversion p_A = {conversion} with r = {ratio}: p_B = r p_A = {:.4} is above 1; p_A is at most \
+         {:.4}",
         ratio * conversion, 1.0_f64.min(1.0 / ratio)
     )]
     TooManyReacted {
@@ -31,8 +32,8 @@ pub enum Error {
     },
     /// Sol fraction that no conversion gives.
     #[error(
-        "sol fraction {sol}: with r = {ratio} at least {least:.4} stays soluble (at p_A = {conversion:.4}, the \
-         largest); check r, the purity of the strands and the extraction"
+        "sol fraction {sol}: with r = {ratio} at least {least:.4} stays soluble (at p_A = {conversion:.4}, \
+         the largest); check r, the purity of the strands and the extraction"
     )]
     TooLittleSol {
         /// Measured sol fraction.

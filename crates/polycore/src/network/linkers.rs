@@ -72,9 +72,9 @@ impl LinkerMix {
         self.sum(|f| f64::from(f - 1))
     }
 
-    /// Returns α, the probability that the way out from a group A leads to a finite piece, for s = p_A p_B (1 −
-    /// b₁): the root below 1 of s Σ a_f (1 + α + … + α^(f−2)) = 1, the recursion divided by 1 − α. `None` if
-    /// there is none: no gel.
+    /// Returns α, the probability that the way out from a group A leads to a finite piece, for s = p_A p_B
+    /// (1 − b₁): the root below 1 of s Σ a_f (1 + α + … + α^(f−2)) = 1, the recursion divided by 1 − α.
+    /// `None` if there is none: no gel.
     pub(super) fn extinction(&self, s: f64) -> Option<f64> {
         if s * self.branching() <= 1.0 {
             return None;
@@ -100,8 +100,8 @@ impl LinkerMix {
         self.sum(|f| power(alpha, f) / f64::from(f))
     }
 
-    /// Returns strands that end at junctions of `least` or more ways to the gel, and these junctions, per group
-    /// A: Σ a_f/f Σ_m (m/2) P_m and Σ a_f/f Σ_m P_m with P_m = C(f,m) α^(f−m) (1 − α)^m.
+    /// Returns strands that end at junctions of `least` or more ways to the gel, and these junctions, per
+    /// group A: Σ a_f/f Σ_m (m/2) P_m and Σ a_f/f Σ_m P_m with P_m = C(f,m) α^(f−m) (1 − α)^m.
     pub(super) fn effective(&self, alpha: f64, least: u32) -> [f64; 2] {
         let mut found = [0.0; 2];
         for &(f, share) in &self.shares {

@@ -19,11 +19,12 @@ pub struct Melt {
 }
 
 impl Melt {
-    /// Creates the melt of a polymer that the [table](super::KNOWN_POLYMERS) knows, at 298.15 K, sol left in.
+    /// Creates the melt of a polymer that the [table](super::KNOWN_POLYMERS) knows, at 298.15 K, sol left
+    /// in.
     ///
     /// # Errors
     /// An unknown polymer, one whose density or plateau modulus the table lacks.
-    pub fn of(polymer: &str) -> Result<Self, Error> {
+    pub fn of_polymer(polymer: &str) -> Result<Self, Error> {
         let &KnownPolymer { name, chain, density, entanglement_modulus, .. } = known_polymer(polymer)?;
         let missing = |property| Error::Missing { polymer: name, property };
         Ok(Self {
@@ -77,8 +78,8 @@ pub struct PolymerNetwork {
     pub melt: Melt,
     /// Conversions p_A, p_B of the groups; of random cross-linking, the cross-linked units per chain twice.
     pub conversion: [f64; 2],
-    /// Conversion p_A of the tree theory if p_A comes from a sol fraction: a lower bound, since loops make a
-    /// sol of their own.
+    /// Conversion p_A of the tree theory if p_A comes from a sol fraction: a lower bound, since loops make
+    /// a sol of their own.
     pub least_conversion: Option<f64>,
     /// α, β: probabilities that the way out from a group A, B leads to a finite piece.
     pub extinction: [f64; 2],
@@ -104,13 +105,14 @@ impl PolymerNetwork {
         if self.melt.extracted { 1.0 - self.sol.mass } else { 1.0 }
     }
 
-    /// Returns the modulus of phantom strands and junctions, Pa: (ν − μ)RT; after extraction × (1 − w)^(−1/3):
-    /// more strands per volume, each less stretched.
+    /// Returns the modulus of phantom strands and junctions, Pa: (ν − μ)RT; after extraction × (1 −
+    /// w)^(−1/3): more strands per volume, each less stretched.
     pub fn phantom(&self) -> f64 {
         (self.strands - self.junctions) * self.melt.thermal_energy() * self.rest().powf(-1.0 / 3.0)
     }
 
-    /// Returns the modulus of strands whose junctions move affinely, νRT (Pa); extraction as for the phantom.
+    /// Returns the modulus of strands whose junctions move affinely, νRT (Pa); extraction as for the
+    /// phantom.
     pub fn affine(&self) -> f64 {
         self.strands * self.melt.thermal_energy() * self.rest().powf(-1.0 / 3.0)
     }
@@ -120,14 +122,16 @@ impl PolymerNetwork {
         self.melt.entanglement_modulus * self.trapped * self.rest().powi(-2)
     }
 
-    /// Returns the shear modulus, Pa: the phantom part, multiplied by the [stiffening](KuhnChain::stiffening) of
-    /// chains of n segments if n is known, and the trapped entanglements.
+    /// Returns the shear modulus, Pa: the phantom part, multiplied by the
+    /// [stiffening](KuhnChain::stiffening) of chains of n segments if n is known, and the trapped
+    /// entanglements.
     pub fn modulus(&self) -> f64 {
         let stiffening = self.segments().map_or(1.0, KuhnChain::stiffening);
         self.phantom() * stiffening + self.entangled()
     }
 
-    /// Returns s̄(2s̄ − 1), the mean square number of strands in series (they are distributed geometrically).
+    /// Returns s̄(2s̄ − 1), the mean square number of strands in series (they are distributed
+    /// geometrically).
     pub fn in_series_square(&self) -> f64 {
         self.in_series * (2.0 * self.in_series - 1.0)
     }
@@ -137,13 +141,15 @@ impl PolymerNetwork {
         self.melt.chain.and_then(|chain| chain.segments(self.strand_mass).ok())
     }
 
-    /// Returns the stretch √n at which strands that deform affinely lock; after extraction × (1 − w)^(−1/3). An
-    /// estimate: mean vectors of phantom strands are shorter and lock later, trapped entanglements earlier.
+    /// Returns the stretch √n at which strands that deform affinely lock; after extraction × (1 −
+    /// w)^(−1/3). An estimate: mean vectors of phantom strands are shorter and lock later, trapped
+    /// entanglements earlier.
     pub fn locking_stretch(&self) -> Option<f64> {
         self.segments().map(|segments| segments.sqrt() * self.rest().powf(-1.0 / 3.0))
     }
 
-    /// Returns the stretch √(nν/(ν − μ)) at which the mean vectors of phantom strands lock; extraction as above.
+    /// Returns the stretch √(nν/(ν − μ)) at which the mean vectors of phantom strands lock; extraction as
+    /// above.
     pub fn phantom_locking_stretch(&self) -> Option<f64> {
         let longer = self.strands / (self.strands - self.junctions);
         self.locking_stretch().map(|locking| locking * longer.sqrt())

@@ -17,7 +17,7 @@ pub enum PrimaryChains {
 /// ```
 /// use polycore::network::{Melt, PrimaryChains, Vulcanized};
 ///
-/// let melt = Melt { entanglement_modulus: 0.35e6, ..Melt::of("PDMS")? };
+/// let melt = Melt { entanglement_modulus: 0.35e6, ..Melt::of_polymer("PDMS")? };
 /// let [broad, narrow] = [PrimaryChains::MostProbable, PrimaryChains::OneLength]
 ///     .map(|chains| Vulcanized::new(chains, 100.0, 2.0).network(&melt));
 /// assert!((broad?.sol.mass - 0.134).abs() < 1e-3 && (narrow?.sol.mass - 0.203).abs() < 1e-3);
@@ -31,14 +31,15 @@ pub struct Vulcanized {
 }
 
 impl Vulcanized {
-    /// Creates chains of a number-average molar mass M_n (kg/mol) with x cross-linked units per number-average
-    /// chain: two units are one cross-link.
+    /// Creates chains of a number-average molar mass M_n (kg/mol) with x cross-linked units per
+    /// number-average chain: two units are one cross-link.
     pub fn new(chains: PrimaryChains, mass: f64, units: f64) -> Self {
         Self { chains, mass, units }
     }
 
-    /// Creates chains whose cross-linked units follow from the sol fraction w: w + √w = 1/x of the most probable
-    /// distribution (Charlesby and Pinner 1959, doi:10.1098/rspa.1959.0030), w = exp(−x(1 − w)) of one length.
+    /// Creates chains whose cross-linked units follow from the sol fraction w: w + √w = 1/x of the most
+    /// probable distribution (Charlesby and Pinner 1959, doi:10.1098/rspa.1959.0030), w = exp(−x(1 − w)) of
+    /// one length.
     ///
     /// # Errors
     /// A sol fraction outside 0 to 1.
@@ -59,13 +60,13 @@ impl Vulcanized {
         self.units
     }
 
-    /// Computes the network: ways along its chain from a cross-link that lead to the gel are 0, 1 or 2; two chains
-    /// meet in a junction, whose ways are the convolution; T_e is the square of the carrying share of the
-    /// length.
+    /// Computes the network: ways along its chain from a cross-link that lead to the gel are 0, 1 or 2; two
+    /// chains meet in a junction, whose ways are the convolution; T_e is the square of the carrying share
+    /// of the length.
     ///
     /// # Errors
-    /// Too few cross-links for a gel (x ≤ 1/2 or 1), numbers outside their range, strands of less than 1.5 Kuhn
-    /// segments.
+    /// Too few cross-links for a gel (x ≤ 1/2 or 1), numbers outside their range, strands of less than 1.5
+    /// Kuhn segments.
     pub fn network(&self, melt: &Melt) -> Result<PolymerNetwork, Error> {
         melt.check()?;
         positive("molar mass of the primary chains", self.mass)?;
@@ -94,8 +95,8 @@ impl Vulcanized {
         .checked()
     }
 
-    /// Returns the probabilities that 0, 1, 2 ways along its chain from a place lead to the gel; the first is the
-    /// sol fraction, too.
+    /// Returns the probabilities that 0, 1, 2 ways along its chain from a place lead to the gel; the first
+    /// is the sol fraction, too.
     fn ways(&self) -> Result<[f64; 3], Error> {
         let x = self.units;
         let no_gel = |least| Error::NoGel {
