@@ -15,10 +15,11 @@ pub const SIMULATED_ENTANGLEMENT_MODULUS: f64 = 0.235e6;
 const LARGEST_POINT: f64 = 100.0;
 
 /// Columns that predictions add to those of the compositions.
-const ADDED: [&str; 13] = [
+const ADDED: [&str; 14] = [
     "predicted_G_MPa",
     "predicted_phantom_MPa",
     "predicted_entangled_MPa",
+    "stiffening",
     "predicted_sol",
     "kuhn_segments",
     "locking_stretch",
@@ -197,6 +198,7 @@ pub fn to_csv(table: &CompositionTable, predictions: &[Result<NetworkPrediction,
                 cells.extend(
                     [network.modulus(), network.phantom(), network.entangled()].map(|g| digits(g / 1e6)),
                 );
+                cells.push(digits(network.stiffening()));
                 cells.push(digits(network.sol.mass));
                 cells.push(optional(network.segments()));
                 cells.push(optional(network.locking_stretch()));

@@ -122,12 +122,14 @@ impl PolymerNetwork {
         self.melt.entanglement_modulus * self.trapped * self.rest().powi(-2)
     }
 
-    /// Returns the shear modulus, Pa: the phantom part, multiplied by the
-    /// [stiffening](KuhnChain::stiffening) of chains of n segments if n is known, and the trapped
-    /// entanglements.
+    /// Returns the [stiffening](KuhnChain::stiffening) of strands of n segments; 1 if n is not known.
+    pub fn stiffening(&self) -> f64 {
+        self.segments().map_or(1.0, KuhnChain::stiffening)
+    }
+
+    /// Returns the shear modulus, Pa: stiffening × phantom part + trapped entanglements.
     pub fn modulus(&self) -> f64 {
-        let stiffening = self.segments().map_or(1.0, KuhnChain::stiffening);
-        self.phantom() * stiffening + self.entangled()
+        self.stiffening() * self.phantom() + self.entangled()
     }
 
     /// Returns s̄(2s̄ − 1), the mean square number of strands in series (they are distributed
