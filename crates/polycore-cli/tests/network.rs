@@ -122,7 +122,7 @@ fn bad_input_writes_nothing() {
         (&["--polymer", "PDMZ"], "`--polymer`: unknown polymer `PDMZ`; known: PDMS"),
         (&["--density", "0 kg/m^3"], "`--density`: found 0"),
         (&["--density", "970"], "970"),
-        (&["--entanglement-modulus", "-1 Pa"], "`--entanglement-modulus`: found -1 Pa"),
+        (&["--entanglement-modulus=-1 Pa"], "`--entanglement-modulus`: found -1 Pa"),
         (&["--loop-factor", "-1"], "`--loop-factor`: found -1"),
         (&["--conversion", "guess"], "possible values: best, given, sol"),
     ] {
@@ -166,7 +166,7 @@ fn bad_scenes() {
         ("[[network]]\nname = \"a\"\nfile = \"networks.csv\"\n", "a second time"),
         ("[[network]]\nname = \"b\"\nfile = \"none.csv\"\n", "none.csv"),
         (
-            "[[expect]]\nquantity = \"a.rms\"\nat_most = 1\nkind = \"bound\"\nsource = \"\"\n",
+            "[[expect]]\nquantity = \"a.rms\"\nat_most = 1\nkind = \"bound\"\nsource = \"none\"\n",
             "found `a.rms`; allowed: ",
         ),
     ] {
