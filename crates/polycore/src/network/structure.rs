@@ -158,12 +158,19 @@ impl PolymerNetwork {
     }
 
     /// Returns the range of the [fracture energy](KuhnChain::fracture_energy), J/m², for the two
-    /// [`BOND_ENERGIES`]: an estimate, never a measurement. Extraction shrinks a plane, not the number of
-    /// strands through it: × (1 − w)^(−2/3).
+    /// [`BOND_ENERGIES`]: an estimate, never a measurement.
     pub fn fracture_energy(&self) -> Option<[f64; 2]> {
         let (chain, segments) = (self.melt.chain?, self.segments()?);
-        let shrunk = self.rest().powf(-2.0 / 3.0);
-        Some(BOND_ENERGIES.map(|energy| chain.fracture_energy(self.strands, segments, energy) * shrunk))
+        Some(
+            BOND_ENERGIES
+                .map(|energy| chain.fracture_energy(self.strands, segments, energy) * self.shrinkage()),
+        )
+    }
+
+    /// Returns the factor of extraction in the fracture energy, (1 − w)^(−2/3): a plane shrinks, the number of
+    /// strands through it does not. 1 if nothing is extracted.
+    pub fn shrinkage(&self) -> f64 {
+        self.rest().powf(-2.0 / 3.0)
     }
 
     /// Checks that an effective strand is a chain, if Kuhn data are given.
