@@ -7,8 +7,8 @@ use pyo3::types::PyDict;
 
 /// Computes an end-linked network; molar masses in kg/mol, everything else in SI units.
 #[pyfunction]
-#[pyo3(signature = (*, functionality, strand_mass, ratio, conversion, sol_fraction, linker_mass, ends, extracted,
-    polymer, density, temperature, entanglement_modulus, loop_factor))]
+#[pyo3(signature = (*, functionality, strand_mass, ratio, conversion, sol_fraction, linker_mass, ends,
+    extracted, polymer, density, temperature, entanglement_modulus, loop_factor))]
 #[expect(clippy::too_many_arguments, reason = "the keywords of the function in Python")]
 pub fn network<'py>(
     py: Python<'py>,

@@ -1,5 +1,5 @@
-//! Predicted moduli of simulated and measured networks: the table of formulation-networks.md, section D, and what
-//! was added to it.
+//! Predicted moduli of simulated and measured networks: the table of formulation-networks.md, section D,
+//! and what was added to it.
 
 use evidence::{at_most, near};
 use polycore::network::prediction::{
@@ -25,8 +25,8 @@ fn predict(
     table.rows.iter().map(|row| settings.predict(row)).collect()
 }
 
-/// The formula of section D alone: no stiffening of short chains, no loops, the conversion that the reference
-/// takes (given, at most 1/r; else from the sol; else the largest).
+/// The formula of section D alone: no stiffening of short chains, no loops, the conversion that the
+/// reference takes (given, at most 1/r; else from the sol; else the largest).
 fn formula(row: &Composition) -> f64 {
     let ratio = row.ratio.unwrap();
     let reacted = match (row.conversion, row.sol) {
@@ -93,8 +93,8 @@ fn table_of_the_formulation() {
     near("networks_formula_rms_of_measured", all.rms, 0.86, 0.005);
 }
 
-/// The aims of issue 43, with nothing fitted to a measured network: plateau modulus of PDMS from the literature,
-/// loops and bead model from simulations, stiffening of short chains from theory.
+/// The aims of issue 43, with nothing fitted to a measured network: plateau modulus of PDMS from the
+/// literature, loops and bead model from simulations, stiffening of short chains from theory.
 #[test]
 fn predictions() {
     let settings = PredictionSettings::default();

@@ -24,7 +24,7 @@ harness::quantities! {
     /// Quantities of tables of networks, `{network}`: deviations are predicted/measured − 1 of shear moduli.
     pub NETWORKS:
     PREDICTED = "{network}.predicted", "", "rows with a prediction";
-    NOT_PREDICTED = "{network}.not_predicted", "", "rows to which the model does not apply, with their reason";
+    NOT_PREDICTED = "{network}.not_predicted", "", "rows to which the model does not apply";
     DEVIATION_MEAN = "{network}.deviation_mean", "", "mean of predicted/measured − 1";
     DEVIATION_MEDIAN = "{network}.deviation_median", "", "median of |predicted/measured − 1|";
     DEVIATION_RMS = "{network}.deviation_rms", "", "root mean square of predicted/measured − 1";

@@ -114,14 +114,15 @@ impl PredictionSettings {
         let strand_mass = given("M_strand_kg_mol", row.strand_mass)?;
         if functionality > LARGEST_POINT && row.linker_mass.is_none() {
             return Err(format!(
-                "`f` = {functionality} without `M_linker_kg_mol`: such a cross-linker is a chain itself, whose \
-                 mass and strands count"
+                "`f` = {functionality} without `M_linker_kg_mol`: such a cross-linker is a chain itself, \
+                 whose mass and strands count"
             ));
         }
         let ends = match (row.ends_mass, row.ends_share) {
             (Some(mass), None) if mass > 0.0 => {
                 return Err(format!(
-                    "`M_mono_kg_mol` = {mass}: the share of chains with one group is unknown; add a column `b1`"
+                    "`M_mono_kg_mol` = {mass}: the share of chains with one group is unknown; add a column \
+                     `b1`"
                 ));
             }
             (mass, share) => (share.unwrap_or(0.0), mass.unwrap_or(0.0)),

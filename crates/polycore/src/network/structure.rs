@@ -167,8 +167,8 @@ impl PolymerNetwork {
         )
     }
 
-    /// Returns the factor of extraction in the fracture energy, (1 − w)^(−2/3): a plane shrinks, the number of
-    /// strands through it does not. 1 if nothing is extracted.
+    /// Returns the factor of extraction in the fracture energy, (1 − w)^(−2/3): a plane shrinks, the number
+    /// of strands through it does not. 1 if nothing is extracted.
     pub fn shrinkage(&self) -> f64 {
         self.rest().powf(-2.0 / 3.0)
     }

@@ -9,7 +9,7 @@
 //! | `r` | groups of the cross-linkers per group of the chains |
 //! | `M_strand_kg_mol` | molar mass of the strands |
 //! | `M_linker_kg_mol` | molar mass of the cross-linker; none if empty |
-//! | `M_mono_kg_mol`, `b1` | molar mass of chains with one group, and their share of the groups of the chains |
+//! | `M_mono_kg_mol`, `b1` | molar mass of chains with one group, and their share of the chains' groups |
 //! | `p` | conversion of the groups of the cross-linkers; 1: all groups in deficit |
 //! | `w_sol` | measured sol fraction |
 //! | `sol` | `removed` (extracted) or `present` (left in; also if empty) |

@@ -204,8 +204,8 @@ pub fn explain_network(source: &Source, material: &Material) -> Result<Vec<Strin
     };
     let mut lines = vec![
         format!(
-            "a network: conversion {:.4} and {:.4}{least}; sol {:.4}; {:.1} mol/m³ effective strands of {:.3} \
-             kg/mol",
+            "a network: conversion {:.4} and {:.4}{least}; sol {:.4}; {:.1} mol/m³ effective strands of \
+             {:.3} kg/mol",
             network.conversion[0],
             network.conversion[1],
             network.sol.mass,
