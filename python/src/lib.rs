@@ -1,10 +1,11 @@
 //! `polymech._polymech`: the crates of this workspace as a Python module, in plain arrays and texts.
 //!
-//! Users see the package `polymech` in `python/package`: shapes of arrays, names, pictures and docstrings are
-//! there. This module contains the parts that need Rust: runs of scenes ([`scenes`]), fields of VTKHDF files
-//! ([`fields`]), laws at many points ([`laws`], [`surrogates`], by [`predict`]), models of `peri` ([`model`],
-//! [`bond`]) and the material of `crystfem` at a point ([`point`]). Work releases the interpreter's lock;
-//! [`watch`] handles signals and calls Python's functions.
+//! Users see the package `polymech` in `python/package`: shapes of arrays, names, pictures and docstrings
+//! are there. This module contains the parts that need Rust: runs of scenes ([`scenes`]), fields of VTKHDF
+//! files ([`fields`]), laws at many points ([`laws`], [`surrogates`], by [`predict`]), models of `peri`
+//! ([`model`], [`bond`]), polymer networks ([`network`]) and the material of `crystfem` at a point
+//! ([`point`]). Work releases the interpreter's lock; [`watch`] handles signals and calls Python's
+//! functions.
 
 use pyo3::prelude::*;
 
@@ -13,6 +14,7 @@ mod error;
 mod fields;
 mod laws;
 mod model;
+mod network;
 mod point;
 mod pool;
 mod predict;
@@ -31,6 +33,7 @@ mod _polymech {
         fields::{field, layout},
         laws::{Law, fit_law, langevin, langevin_methods, models},
         model::Simulation,
+        network::network,
         point::{course, fit_kinetics},
         scenes::{check, resume, run, schema, sweep, view},
         surrogates::LearntLaw,

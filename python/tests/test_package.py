@@ -24,7 +24,7 @@ def test_types(root, tmp_path):
     assert run.returncode == 0, run.stdout + run.stderr
 
 
-@pytest.mark.parametrize("name", ["crystfem", "peri", "_laws", "_surrogate", "_result"])
+@pytest.mark.parametrize("name", ["crystfem", "peri", "_laws", "_network", "_surrogate", "_result"])
 def test_docstrings(name):
     module = __import__(f"polymech.{name}", fromlist=["x"])
     assert doctest.testmod(module).failed == 0

@@ -1,4 +1,5 @@
-//! The `polycore` command line: fits hyperelastic laws to the data that a case names, and tabulates laws.
+//! The `polycore` command line: fits hyperelastic laws to the data that a case names, tabulates laws, and
+//! predicts polymer networks from their compositions.
 
 // harness::say! prints without a panic if the output is closed
 #![deny(clippy::print_stdout, clippy::print_stderr)]
@@ -18,6 +19,8 @@ mod cli {
     pub mod exact;
     pub mod fits;
     pub mod material;
+    pub mod network;
+    pub mod networks;
     pub mod quantities;
     pub mod scene;
     pub mod table_fits;
@@ -26,7 +29,7 @@ mod cli {
     pub mod trials;
 }
 
-use cli::{exact, fits, scene};
+use cli::{exact, fits, network, scene};
 
 /// Program that fits hyperelastic laws.
 struct Fits;
@@ -35,12 +38,13 @@ impl case::Case for Fits {
     const PROGRAM: Program = Program {
         name: "polycore",
         version: env!("CARGO_PKG_VERSION"),
-        about: "Hyperelastic laws: fits to data, tables, checks",
+        about: "Hyperelastic laws: fits to data, tables, checks; networks from their chemistry",
         examples: "  polycore check cases/ch1/rubber-fits/case.toml    which laws it fits to which data
   polycore run cases/ch1/rubber-fits/case.toml      fit, draw, judge; results in out/rubber-fits
-  polycore exact eight-chain \"0.27 MPa\" 25 --to 4  nominal stress against stretch, as CSV",
+  polycore exact eight-chain \"0.27 MPa\" 25 --to 4  nominal stress against stretch, as CSV
+  polycore network networks.csv -o predicted.csv    moduli of polymer networks from their chemistry",
         magic: b"poly-ck3",
-        columns: &["*.rms"],
+        columns: &["*.rms", "*.deviation_rms"],
     };
     type Error = Error;
 
@@ -61,12 +65,17 @@ impl case::Case for Fits {
 enum Command {
     /// Tabulate the nominal stress of an incompressible law, as CSV that a case can read back as data.
     Exact(exact::Arguments),
+    /// Predict modulus, sol, chain length and fracture energy of polymer networks from their compositions.
+    Network(network::Arguments),
 }
 
 fn main() -> ExitCode {
-    case::main::<Fits, _>(|Command::Exact(arguments)| {
-        let refused = |reason| Error::Option { option: "exact".to_owned(), reason };
-        terminal::print(exact::table(&arguments).map_err(refused)?);
-        Ok(true)
+    case::main::<Fits, _>(|command| match command {
+        Command::Exact(arguments) => {
+            let refused = |reason| Error::Option { option: "exact".to_owned(), reason };
+            terminal::print(exact::table(&arguments).map_err(refused)?);
+            Ok(true)
+        }
+        Command::Network(arguments) => Ok(network::run(&arguments)?),
     })
 }

@@ -235,7 +235,7 @@ fn check_says_what_run_would_do() {
     let text = text(&result.stdout);
     assert!(text.contains("data treloar: 21 states, 20 measured stresses"), "{text}");
     assert!(text.contains("law eight-chain: chain_modulus, links"), "{text}");
-    assert!(text.contains("22 fits, 0 trials, 8 expectations"), "{text}");
+    assert!(text.contains("22 fits, 0 trials, 0 tables of networks, 8 expectations"), "{text}");
 }
 
 #[test]

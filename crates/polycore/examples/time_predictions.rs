@@ -1,5 +1,5 @@
 //! Blind predictions of `docs/predictions`: fits laws with time of several forms to cycles, judges them on
-//! data left out, and predicts a test that none of them saw. `cargo run --release -p polycore --example
+//! data left out, and predicts a test that none of them saw. `cargo run --release --example
 //! time_predictions -- vhb4910 TABLE OUTPUT` (or `hnbr50`). The tables are not part of this repository; the
 //! README of `docs/predictions` says where they are from.
 

@@ -103,6 +103,9 @@ pub enum Error {
     /// Error of a constitutive law, its fit, table or file.
     #[error(transparent)]
     Constitutive(#[from] constitutive::Error),
+    /// Composition without a network.
+    #[error(transparent)]
+    Network(#[from] crate::network::Error),
     /// Table of numbers that cannot be read.
     #[cfg(feature = "tables")]
     #[error(transparent)]
@@ -140,7 +143,8 @@ impl Error {
             Self::Option { .. }
             | Self::OutputDirectory { .. }
             | Self::Checkpoint { .. }
-            | Self::Format { .. } => EXIT_BAD_INPUT,
+            | Self::Format { .. }
+            | Self::Network(_) => EXIT_BAD_INPUT,
             #[cfg(feature = "tables")]
             Self::Table(_) => EXIT_BAD_INPUT,
             Self::Constitutive(constitutive::Error::Invalid { .. } | constitutive::Error::File { .. }) => {

@@ -1,5 +1,5 @@
 //! Mathematics of the polymer-mechanics toolkit: tensors, Langevin statistics, constitutive laws and their
-//! fits, units, transfer of fields.
+//! fits, networks from their chemistry, units, transfer of fields.
 //!
 //! ```
 //! use polycore::constitutive::hyperelastic::{EightChain, homogeneous::uniaxial};
@@ -26,6 +26,7 @@ pub mod file;
 pub mod hdf5;
 pub mod langevin;
 pub mod memory;
+pub mod network;
 pub mod numerics;
 pub mod posterior;
 pub mod random;

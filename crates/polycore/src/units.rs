@@ -327,6 +327,8 @@ dimensions! {
         temperature", "1/K", "0.965 1/K";
     /// An energy per amount of substance.
     MolarEnergy, MolarEnergyDimension: exponents!(molar_energy), "a molar energy", "J/mol", "6270 J/mol";
+    /// A mass per amount of substance.
+    MolarMass, MolarMassDimension: exponents!(molar_mass), "a molar mass", "kg/mol", "10 kg/mol";
     /// An energy (a torque has the same dimension).
     Energy, EnergyDimension: exponents!(energy), "an energy", "J", "1 J";
     /// A power.

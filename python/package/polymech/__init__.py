@@ -5,17 +5,19 @@
 >>> result.history["load"], result.report["peak_load"]  # doctest: +SKIP
 
 `peri` (fracture of elastomers) and `crystfem` (heat and crystallization of prints) run scenes, as their command lines do.
-`Langevin`, `Law`, `Surrogate` and `fit` are constitutive laws as functions of arrays. All numbers are SI unless a name says
+`Langevin`, `Law`, `Surrogate` and `fit` are constitutive laws as functions of arrays, `network` gives modulus and chains of a network
+from its chemistry. All numbers are SI unless a name says
 otherwise (``temperature_degC``); `Result.report` and `Table` have units beside the numbers.
 """
 
 from . import crystfem, peri
 from ._laws import Fit, Langevin, Law, Prediction, fit
+from ._network import Network, network
 from ._polymech import Interrupted, RunError, SceneError, __version__
 from ._result import Report, Result, Table, Value
 from ._surrogate import Surrogate
 
 __all__ = [
-    "Fit", "Interrupted", "Langevin", "Law", "Prediction", "Report", "Result", "RunError", "SceneError", "Surrogate", "Table",
-    "Value", "__version__", "crystfem", "fit", "peri",
+    "Fit", "Interrupted", "Langevin", "Law", "Network", "Prediction", "Report", "Result", "RunError", "SceneError", "Surrogate", "Table",
+    "Value", "__version__", "crystfem", "fit", "network", "peri",
 ]

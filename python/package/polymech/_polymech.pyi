@@ -33,6 +33,22 @@ def langevin(function: str, x: Array, method: str) -> Array: ...
 def langevin_methods() -> list[tuple[str, str, str | None]]: ...
 def models() -> list[tuple[str, list[tuple[str, str, float]]]]: ...
 def fit_law(key: str, tests: list[tuple[str, Array]]) -> dict[str, Any]: ...
+def network(
+    *,
+    functionality: list[tuple[float, float]],
+    strand_mass: float,
+    ratio: float,
+    conversion: float | None,
+    sol_fraction: float | None,
+    linker_mass: float,
+    ends: tuple[float, float],
+    extracted: bool,
+    polymer: str,
+    density: float | None,
+    temperature: float,
+    entanglement_modulus: float | None,
+    loop_factor: float | None,
+) -> dict[str, Any]: ...
 def course(
     material: dict[str, Any], time: list[float], temperature: list[float], degree: float, kelvin: float
 ) -> dict[str, Array]: ...

@@ -88,6 +88,8 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     for trial in &case.trials {
         trials::run(trial, &mut report)?;
     }
+    let networks = case.networks.iter().map(|set| set.run(directory, &mut report));
+    let networks = networks.collect::<Result<Vec<_>, _>>()?;
     if !quick {
         phases.start("pictures");
         for set in &all {
@@ -98,6 +100,7 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     report.phases(&phases).threads(1).judge(&case.expect, quick);
     trials::judge(&case.trials, &mut report);
     let mut text = summary(case, &all, &timed, &report);
+    networks.iter().for_each(|network| text += network);
     for name in &report.non_finite {
         let _ = writeln!(text, "FAIL  {name} is not finite");
     }

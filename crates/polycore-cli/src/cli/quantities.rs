@@ -23,3 +23,14 @@ harness::quantities! {
     NOMINAL = "{trial}.nominal", "MPa", "P₁ of a trial with `parameters`";
     ENERGY = "{trial}.energy", "MJ/m³", "W of a trial with `parameters`";
 }
+
+harness::quantities! {
+    /// Quantities of tables of networks, `{network}`: deviations are predicted/measured − 1 of shear moduli.
+    pub NETWORKS:
+    PREDICTED = "{network}.predicted", "", "rows with a prediction";
+    NOT_PREDICTED = "{network}.not_predicted", "", "rows to which the model does not apply";
+    DEVIATION_MEAN = "{network}.deviation_mean", "", "mean of predicted/measured − 1";
+    DEVIATION_MEDIAN = "{network}.deviation_median", "", "median of |predicted/measured − 1|";
+    DEVIATION_RMS = "{network}.deviation_rms", "", "root mean square of predicted/measured − 1";
+    DEVIATION_LARGEST = "{network}.deviation_largest", "", "largest |predicted/measured − 1|";
+}

@@ -1,4 +1,4 @@
-//! Scenes of fits and trials: laws, data, trials, expectations.
+//! Scenes of fits, trials and networks: laws, data, expectations.
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -12,6 +12,7 @@ use polycore::constitutive::hyperelastic::{
 };
 use serde::Deserialize;
 
+use super::networks::{NetworkSet, NetworkSpec};
 use super::quantities as q;
 use super::time::{TimeCase, TimeSettings};
 use super::trials::FitTrial;
@@ -34,6 +35,9 @@ struct Scene {
     /// Laws at single states and fits to a few states, with their expected behaviour.
     #[serde(default)]
     trial: Vec<FitTrial>,
+    /// Tables of polymer networks to predict.
+    #[serde(default)]
+    network: Vec<NetworkSpec>,
     /// Expected results.
     #[serde(default)]
     expect: Vec<Expect>,
@@ -92,7 +96,9 @@ pub struct DataSet {
 
 /// JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
-    harness::scene::schema("polycore", &[q::ALL], |generator| vec![generator.subschema_for::<Scene>()])
+    harness::scene::schema("polycore", &[q::ALL, q::NETWORKS], |generator| {
+        vec![generator.subschema_for::<Scene>()]
+    })
 }
 
 /// Checked scene with its data.
@@ -104,13 +110,15 @@ pub struct FitCase {
     pub data: Vec<DataSet>,
     pub time: Option<TimeCase>,
     pub trials: Vec<FitTrial>,
+    pub networks: Vec<NetworkSet>,
     pub expect: Vec<Expect>,
 }
 
 impl FitCase {
     /// Parses and checks a scene and the tables that it names.
     pub fn parse(source: &Source) -> Result<Self, SceneError> {
-        let Scene { _program: Program::Polycore, title, fit, time, trial, expect } = source.parse()?;
+        let Scene { _program: Program::Polycore, title, fit, time, trial, network, expect } =
+            source.parse()?;
         let laws = match &fit.laws {
             None => MODELS.iter().collect(),
             Some(names) => select_laws(source, names)?,
@@ -158,16 +166,20 @@ impl FitCase {
             data.push(DataSet { name: entry.name, table, read });
         }
         let time = time.map(|settings| TimeCase::new(source, settings)).transpose()?;
-        if data.is_empty() && trial.is_empty() && time.is_none() {
+        if data.is_empty() && trial.is_empty() && network.is_empty() && time.is_none() {
             return Err(source.error(
                 "fit.data",
                 "no data",
-                "at least one `[[fit.data]]` with `name` and `file`, a `[time]` or a `[[trial]]`",
+                "at least one `[[fit.data]]` with `name` and `file`, a `[time]`, a `[[trial]]` or a `[[network]]`",
             ));
         }
         super::trials::check(source, &trial)?;
-        let case =
-            Self { source: source.clone(), title, laws, cross: fit.cross, data, time, trials: trial, expect };
+        let mut networks: Vec<NetworkSet> = Vec::new();
+        for (i, spec) in network.into_iter().enumerate() {
+            networks.push(spec.read(source, i, &networks)?);
+        }
+        let (source, cross) = (source.clone(), fit.cross);
+        let case = Self { source, title, laws, cross, data, time, trials: trial, networks, expect };
         case.check_expectations()?;
         Ok(case)
     }
@@ -182,6 +194,9 @@ impl FitCase {
             let _ = writeln!(text, "data {name}: {states} states, {measured} measured stresses ({source})");
             read.iter().for_each(|line| text += &format!("  {line}\n"));
         }
+        for set in &self.networks {
+            text += &format!("{}\n", set.plan());
+        }
         for model in self.laws.iter().filter(|_| !self.data.is_empty()) {
             let names: Vec<_> = model.parameters.iter().map(|parameter| parameter.name).collect();
             let _ = writeln!(text, "law {}: {}", model.key, names.join(", "));
@@ -189,13 +204,19 @@ impl FitCase {
         if let Some(time) = &self.time {
             text += &time.plan();
         }
+        let of_fits = "fits.csv, <data>_states.csv, materials.toml, pictures (not with --quick), ";
+        let mut files = if self.data.is_empty() { "" } else { of_fits }.to_owned();
+        if !self.networks.is_empty() {
+            files += "<network>_networks.csv, ";
+        }
         let _ = writeln!(
             text,
-            "{} fits, {} trials, {} expectations; writes fits.csv, <data>_states.csv, materials.toml, \
-             pictures (not with --quick), report.json",
+            "{} fits, {} trials, {} tables of networks, {} expectations; writes {}report.json",
             self.laws.len() * self.data.len(),
             self.trials.len(),
-            self.expect.len()
+            self.networks.len(),
+            self.expect.len(),
+            files
         );
         text
     }
@@ -223,6 +244,9 @@ impl FitCase {
         }
         if let Some(time) = &self.time {
             names.extend(time.quantities());
+        }
+        for set in &self.networks {
+            names.extend(set.quantities());
         }
         names
     }

@@ -44,6 +44,7 @@ fn definitions() {
     assert_eq!(si::<SquaredTemperatureDimension>("136235 K^2"), 136_235.0);
     assert_eq!(si::<PerTemperatureDimension>("0.965 /K"), 0.965);
     assert_eq!(si::<MolarEnergyDimension>("6.27 kJ/mol"), 6270.0);
+    assert_eq!(si::<MolarMassDimension>("113 g/mol"), 0.113);
     assert_eq!(si::<EnergyDimension>("1 N*m"), 1.0);
     assert_eq!(si::<EnergyDimension>("2 eV"), 2.0 * 1.602_176_634e-19);
     assert_eq!(si::<RatioDimension>("1 %"), 0.01);

@@ -246,7 +246,7 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         return super::solid::check(source, scene, solid);
     }
     let Some(youngs_modulus) = material.youngs_modulus else {
-        let why = "needed for a bond law; a [material.solid] takes its place";
+        let why = "needed for a bond law; a [material.network] gives it, a [material.solid] takes its place";
         return Err(source.missing("material.youngs_modulus", why));
     };
     positive(source, "material.youngs_modulus", youngs_modulus.si(), "Pa")?;

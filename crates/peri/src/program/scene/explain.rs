@@ -43,6 +43,7 @@ pub fn explain<const D: usize>(
         let states = (bonds.sites() * size_of::<SolidPoint<D>>()) as f64 / 1e6;
         builds(format!("a solid, `{}`: states of particles {states:.1} MB", solid.law.name()));
     }
+    super::explain_network(source, &scene.material)?.into_iter().for_each(&mut builds);
     for (crack, severed) in scene.body.cracks.iter().zip(&body.severed) {
         let corners: Vec<String> = [Some(&crack.from), Some(&crack.to), crack.and.as_ref()]
             .into_iter()

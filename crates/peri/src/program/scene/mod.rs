@@ -18,6 +18,7 @@ mod line;
 mod loads;
 mod memory;
 mod method;
+mod network;
 mod parts;
 mod placement;
 mod planes;
@@ -45,6 +46,7 @@ pub use line::{LineField, SectionSpec, line_fields};
 pub use loads::{loads_of, region_names, velocities_of};
 pub use memory::needed as memory_needed;
 pub use method::{DeviceChoice, Dynamics, ForcePrecision, SolverMethod, SolverSpec};
+pub use network::{ChemistrySpec, explain_network, resolve_network};
 pub use placement::{check_placement, exact_plate};
 pub use probe::{HistoryProbe, Track};
 pub use solid::{SolidKind, SolidLaw};
@@ -252,6 +254,8 @@ pub struct CrackSpec {
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Material {
+    /// Chemistry of the network, from which modulus and links follow.
+    pub network: Option<ChemistrySpec>,
     /// Young's modulus E of a bond law; ν follows from the space.
     pub youngs_modulus: Option<Stress>,
     /// Bond law; default: `chain-offset`.

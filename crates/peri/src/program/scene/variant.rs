@@ -50,7 +50,8 @@ pub struct SceneVariant {
 
 impl SceneVariant {
     fn new(of: study::Variant) -> Result<Self, SceneError> {
-        let scene: Scene = of.source.parse()?;
+        let mut scene: Scene = of.source.parse()?;
+        super::resolve_network(&of.source, &mut scene.material)?;
         Ok(Self {
             spacing: scene.body.spacing.map_or(0.0, |spacing| spacing.si()),
             horizon_ratio: scene.body.horizon_ratio.unwrap_or(HORIZON_RATIO),

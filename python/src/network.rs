@@ -1,0 +1,80 @@
+//! Polymer networks from their chemistry.
+
+use crate::error::value;
+use polycore::network::{EndLinked, LinkerMix, Melt, Reacted, known_polymer};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// Computes an end-linked network; molar masses in kg/mol, everything else in SI units.
+#[pyfunction]
+#[pyo3(signature = (*, functionality, strand_mass, ratio, conversion, sol_fraction, linker_mass, ends,
+    extracted, polymer, density, temperature, entanglement_modulus, loop_factor))]
+#[expect(clippy::too_many_arguments, reason = "the keywords of the function in Python")]
+pub fn network<'py>(
+    py: Python<'py>,
+    functionality: Vec<(f64, f64)>,
+    strand_mass: f64,
+    ratio: f64,
+    conversion: Option<f64>,
+    sol_fraction: Option<f64>,
+    linker_mass: f64,
+    ends: (f64, f64),
+    extracted: bool,
+    polymer: &str,
+    density: Option<f64>,
+    temperature: f64,
+    entanglement_modulus: Option<f64>,
+    loop_factor: Option<f64>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let refused = |error: polycore::network::Error| value(error.to_string());
+    let known = known_polymer(polymer).map_err(refused)?;
+    let missing = |what: &str| value(format!("{what}: not known of {}; give it", known.name));
+    let melt = Melt {
+        density: density.or(known.density).ok_or_else(|| missing("density"))?,
+        temperature,
+        entanglement_modulus: entanglement_modulus
+            .or(known.entanglement_modulus)
+            .ok_or_else(|| missing("entanglement_modulus"))?,
+        chain: Some(known.chain),
+        extracted,
+    };
+    let reacted = match (conversion, sol_fraction) {
+        (Some(conversion), None) => Reacted::Conversion(conversion),
+        (None, Some(sol)) => Reacted::SolFraction(sol),
+        _ => return Err(value("conversion, sol_fraction: exactly one is needed".to_owned())),
+    };
+    let linkers = match functionality[..] {
+        [(mean, _)] => LinkerMix::mean(mean),
+        _ => {
+            let whole = |(f, share): &(f64, f64)| match f.fract() == 0.0 && (1.0..=1e3).contains(f) {
+                true => Ok((*f as u32, *share)),
+                false => Err(value(format!("functionality: found {f}; allowed: whole numbers of 1 to 1000"))),
+            };
+            LinkerMix::new(&functionality.iter().map(whole).collect::<PyResult<Vec<_>>>()?)
+        }
+    };
+    let mut recipe = EndLinked::new(1, strand_mass, reacted)
+        .linkers(linkers.map_err(refused)?)
+        .ratio(ratio)
+        .linker_mass(linker_mass)
+        .ends(ends.0, ends.1);
+    if let Some(factor) = loop_factor {
+        recipe = recipe.loop_factor(factor);
+    }
+    let network = recipe.network(&melt).map_err(refused)?;
+    let found = PyDict::new(py);
+    found.set_item("modulus", network.modulus())?;
+    found.set_item("phantom", network.phantom())?;
+    found.set_item("entangled", network.entangled())?;
+    found.set_item("stiffening", network.stiffening())?;
+    found.set_item("sol", network.sol.mass)?;
+    found.set_item("conversion", network.conversion[0])?;
+    found.set_item("least_conversion", network.least_conversion)?;
+    found.set_item("strands", network.strands)?;
+    found.set_item("junctions", network.junctions)?;
+    found.set_item("segments", network.segments().unwrap_or(f64::NAN))?;
+    found.set_item("locking_stretch", network.locking_stretch().unwrap_or(f64::NAN))?;
+    let [low, high] = network.fracture_energy().unwrap_or([f64::NAN; 2]);
+    found.set_item("fracture_energy", (low, high))?;
+    Ok(found)
+}
