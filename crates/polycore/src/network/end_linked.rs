@@ -8,7 +8,7 @@ use crate::numerics::bisected;
 /// sol (doi:10.1021/acs.macromol.3c02544). No measured network was used.
 pub const LOOP_FACTOR: f64 = 1.6;
 
-/// What is known about the reaction.
+/// Extent of the reaction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reacted {
     /// Conversion p_A of the groups A; p_B = r p_A.
