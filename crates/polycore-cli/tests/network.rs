@@ -41,7 +41,9 @@ fn predictions_in_a_file() {
     let result = polycore(&["network", file.to_str().unwrap(), "-o", output.to_str().unwrap()]);
     assert_eq!(result.status.code(), Some(0), "{}", text(&result.stderr));
     let summary = text(&result.stdout);
-    for part in ["measured ", "all measured ", "line 3: no gel: (f - 1) p_A p_B = 0.7500", "predicted.csv"] {
+    for part in
+        ["measured ", "all measured ", "line 3: `p` = 0.5: no gel: (f - 1) p_A p_B = 0.7500", "predicted.csv"]
+    {
         assert!(summary.contains(part), "{summary}");
     }
     let table = Table::read(&output).unwrap();

@@ -135,7 +135,7 @@ impl PredictionSettings {
             .ends(ends.0, ends.1)
             .loop_factor(self.loop_factor);
         let network = self.melt(row).and_then(|melt| recipe.network(&melt));
-        Ok(NetworkPrediction { network: network.map_err(|error| error.to_string())?, origin })
+        Ok(NetworkPrediction { network: network.map_err(|error| with_column(&error, row))?, origin })
     }
 
     /// Returns what is known about the reaction, and in words from where.
@@ -163,6 +163,23 @@ impl PredictionSettings {
             (None, Some(sol)) => of_sol(sol),
             (None, None) => Err("neither `p` nor `w_sol` is given: the conversion is unknown".to_owned()),
         }
+    }
+}
+
+/// Formats an error with the column and the value that it is about.
+fn with_column(error: &Error, row: &Composition) -> String {
+    let (column, value) = match error {
+        Error::TooManyReacted { .. } => ("p", row.conversion),
+        Error::NoGel { .. } if row.conversion.is_some() => ("p", row.conversion),
+        Error::NoGel { .. } | Error::TooLittleSol { .. } => ("w_sol", row.sol),
+        Error::TooShort { .. } => ("M_strand_kg_mol", row.strand_mass),
+        Error::Domain { quantity: "sol fraction", .. } => ("w_sol", row.sol),
+        Error::Domain { quantity: "conversion p_A", .. } => ("p", row.conversion),
+        _ => ("", None),
+    };
+    match value {
+        Some(value) => format!("`{column}` = {value}: {error}"),
+        None => error.to_string(),
     }
 }
 
@@ -220,7 +237,10 @@ pub fn to_csv(table: &CompositionTable, predictions: &[Result<NetworkPrediction,
 /// Formats a number with six digits.
 fn format_digits(value: f64) -> String {
     let rounded = format!("{value:.5e}").parse::<f64>().unwrap_or(value);
-    format!("{rounded}")
+    match rounded == 0.0 || (1e-4..1e9).contains(&rounded.abs()) {
+        true => format!("{rounded}"),
+        false => format!("{rounded:e}"),
+    }
 }
 
 /// Deviations of predicted from measured moduli, predicted/measured − 1.
