@@ -8,7 +8,7 @@ use std::fs;
 
 use polycore::constitutive::hyperelastic::model;
 use polycore::constitutive::viscoelastic::fit::{
-    BranchForm, FitSettings, Form, Measurement, Run, SpringForm, Test, TimeFit, ViscosityForm, fit,
+    BranchForm, FitSettings, Form, MeasuredRun, Measurement, SpringForm, Test, TimeFit, ViscosityForm, fit,
     leave_out, rates,
 };
 use polycore::constitutive::viscoelastic::{Pace, Viscoelastic};
@@ -65,7 +65,7 @@ fn main() -> Outcome<()> {
 
 /// Runs of a table: VHB has the columns test, rate, largest stretch before time, stretch, stress (kPa); HNBR
 /// the rate (MPa).
-fn runs(path: &str, is_vhb: bool) -> Outcome<Vec<Run>> {
+fn runs(path: &str, is_vhb: bool) -> Outcome<Vec<MeasuredRun>> {
     let text = fs::read_to_string(path)?;
     let rows = text.lines().filter(|line| line.starts_with(if is_vhb { "cycle," } else { "0." }));
     let mut runs: Vec<(String, f64, Vec<Measurement>)> = Vec::new();
@@ -82,7 +82,8 @@ fn runs(path: &str, is_vhb: bool) -> Outcome<Vec<Run>> {
             run.2.push(Measurement { time: numbers[0], strain: numbers[1], nominal });
         }
     }
-    let built = runs.into_iter().map(|(name, rate, points)| Run::new(&name, rate, Test::Uniaxial, points));
+    let built =
+        runs.into_iter().map(|(name, rate, points)| MeasuredRun::new(&name, rate, Test::Uniaxial, points));
     Ok(built.collect::<Result<_, _>>()?)
 }
 
@@ -152,7 +153,7 @@ struct Candidate {
     score: f64,
 }
 
-fn predict(runs: &[Run], choices: &[Choice], output: &str, program: Program) -> Outcome<()> {
+fn predict(runs: &[MeasuredRun], choices: &[Choice], output: &str, program: Program) -> Outcome<()> {
     let groups = groups(runs);
     let names: Vec<&str> = groups.iter().map(|group| group.name.as_str()).collect();
     println!(
@@ -197,8 +198,8 @@ fn predict(runs: &[Run], choices: &[Choice], output: &str, program: Program) -> 
 
 /// Runs left out together: those of each rate, and those beyond two stretches where there are several; the
 /// second cycles where runs have two.
-fn groups(runs: &[Run]) -> Vec<Group> {
-    let named = |keep: &dyn Fn(&Run) -> bool| -> Vec<String> {
+fn groups(runs: &[MeasuredRun]) -> Vec<Group> {
+    let named = |keep: &dyn Fn(&MeasuredRun) -> bool| -> Vec<String> {
         runs.iter().filter(|run| keep(run)).map(|run| run.name.clone()).collect()
     };
     let rates = rates(runs);
@@ -206,7 +207,7 @@ fn groups(runs: &[Run]) -> Vec<Group> {
     let group = |name, names| Group { name, left: Left::Runs(names), counts };
     let mut groups: Vec<Group> =
         rates.iter().map(|rate| group(format!("{rate} /s"), named(&|run| run.rate == *rate))).collect();
-    let most = |run: &Run| run.points().iter().map(|point| point.strain).fold(1.0, f64::max);
+    let most = |run: &MeasuredRun| run.points().iter().map(|point| point.strain).fold(1.0, f64::max);
     for limit in [2.1, 2.6] {
         let beyond = named(&|run| most(run) > limit);
         if !beyond.is_empty() {
@@ -225,7 +226,7 @@ fn groups(runs: &[Run]) -> Vec<Group> {
 fn candidate(
     name: String,
     form: &Form,
-    runs: &[Run],
+    runs: &[MeasuredRun],
     groups: &[Group],
     settings: &FitSettings,
 ) -> Outcome<Candidate> {
@@ -248,11 +249,11 @@ fn candidate(
 }
 
 /// Root mean square of what follows a path of strain, from a fit to what precedes it, Pa.
-fn later(form: &Form, runs: &[Run], path: f64, settings: &FitSettings) -> Outcome<f64> {
-    let end = |run: &Run| path / run.rate;
+fn later(form: &Form, runs: &[MeasuredRun], path: f64, settings: &FitSettings) -> Outcome<f64> {
+    let end = |run: &MeasuredRun| path / run.rate;
     let early = runs.iter().map(|run| {
         let points = run.points().iter().filter(|point| point.time <= end(run)).copied().collect();
-        Run::new(&run.name, run.rate, run.test, points)
+        MeasuredRun::new(&run.name, run.rate, run.test, points)
     });
     let law = fit(form, &early.collect::<Result<Vec<_>, _>>()?, settings)?.law()?;
     let (mut sum, mut count) = (0.0, 0);
@@ -266,11 +267,11 @@ fn later(form: &Form, runs: &[Run], path: f64, settings: &FitSettings) -> Outcom
 }
 
 /// Root mean square of a law minus the interpolation between the slowest and the fastest run, Pa.
-fn between(law: &Viscoelastic, runs: &[Run], rate: f64, path: f64) -> Outcome<f64> {
+fn between(law: &Viscoelastic, runs: &[MeasuredRun], rate: f64, path: f64) -> Outcome<f64> {
     let (slow, fast) = (&runs[0], &runs[runs.len() - 1]);
     let share = (rate / slow.rate).ln() / (fast.rate / slow.rate).ln();
     // strain and stress of a run after a path
-    let at = |run: &Run, path: f64| -> [f64; 2] {
+    let at = |run: &MeasuredRun, path: f64| -> [f64; 2] {
         let (points, time) = (run.points(), path / run.rate);
         let after = points.partition_point(|point| point.time < time).clamp(1, points.len() - 1);
         let [a, b] = [points[after - 1], points[after]];
@@ -286,11 +287,11 @@ fn between(law: &Viscoelastic, runs: &[Run], rate: f64, path: f64) -> Outcome<f6
         let [strain, nominal] = mixed(path);
         Measurement { time: path / rate, strain, nominal }
     };
-    let run = Run::new("between", rate, Test::Uniaxial, (1..=100).map(point).collect())?;
+    let run = MeasuredRun::new("between", rate, Test::Uniaxial, (1..=100).map(point).collect())?;
     Ok(run.agreement(law, FINE)?.rms)
 }
 
-fn report(best: &Candidate, runs: &[Run]) {
+fn report(best: &Candidate, runs: &[MeasuredRun]) {
     let fit = &best.fit;
     println!("\nchosen: {}", best.name);
     for found in &fit.constants {

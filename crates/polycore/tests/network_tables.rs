@@ -144,8 +144,8 @@ fn reasons() {
     let reasons = [
         "`p` = 0.5: no gel: (f - 1) p_A p_B = 0.7500, and a network needs more than 1;",
         "conversion p_A = 0.9 with r = 1.2: p_B = r p_A = 1.0800 is above 1; p_A is at most 0.8333",
-        "`w_sol` = 0.0239: sol fraction 0.0239: with r = 0.836 at least 0.0282 stays soluble (at p_A = 1.0000, \
-         the largest)",
+        "`w_sol` = 0.0239: sol fraction 0.0239: with r = 0.836 at least 0.0282 stays soluble \
+         (at p_A = 1.0000, the largest)",
         "neither `p` nor `w_sol` is given: the conversion is unknown",
         "`f` = 300 without `M_linker_kg_mol`: such a cross-linker is a chain itself",
         "`M_mono_kg_mol` = 15: the share of chains with one group is unknown; add a column `b1`",

@@ -3,7 +3,8 @@
 use evidence::{at_most, near};
 use polycore::constitutive::hyperelastic::model;
 use polycore::constitutive::viscoelastic::fit::{
-    BranchForm, FitSettings, Form, Measurement, Run, SpringForm, Test, ViscosityForm, fit, leave_out, rates,
+    BranchForm, FitSettings, Form, MeasuredRun, Measurement, SpringForm, Test, ViscosityForm, fit, leave_out,
+    rates,
 };
 use polycore::constitutive::viscoelastic::{Pace, Scheme};
 
@@ -18,7 +19,7 @@ fn fixed(form: Form, constants: &[(&str, f64)]) -> Form {
 
 /// Cycles of VHB 4910 to 3 at three rates, integrated by Radau's method at 1e-10 with the constants of Kumar
 /// and Lopez-Pamies 2016.
-fn cycles() -> Vec<Run> {
+fn cycles() -> Vec<MeasuredRun> {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/time/vhb_uniaxial.csv");
     let text = std::fs::read_to_string(path).unwrap();
     ["0.01", "0.03", "0.05"]
@@ -30,7 +31,7 @@ fn cycles() -> Vec<Run> {
                     [cells[2].parse().unwrap(), cells[3].parse::<f64>().unwrap() * 1e3]
                 })
                 .collect();
-            Run::cycle(rate, rate.parse().unwrap(), Test::Uniaxial, &points).unwrap()
+            MeasuredRun::cycle(rate, rate.parse().unwrap(), Test::Uniaxial, &points).unwrap()
         })
         .to_vec()
 }
@@ -97,7 +98,7 @@ fn constants_of_steady_shear_come_back() {
             let strain = rate * time;
             Measurement { time, strain, nominal: modulus * strain + steady(rate) }
         };
-        Run::new(&format!("{rate} /s"), rate, Test::SimpleShear, (0..4).map(point).collect()).unwrap()
+        MeasuredRun::new(&format!("{rate} /s"), rate, Test::SimpleShear, (0..4).map(point).collect()).unwrap()
     };
     let runs = [0.05, 0.2, 0.5].map(run);
     let form = Form::new(
@@ -115,8 +116,9 @@ fn constants_of_steady_shear_come_back() {
 #[test]
 fn refusals() {
     let point = |time: f64, strain: f64, nominal: f64| Measurement { time, strain, nominal };
-    let refused =
-        |points: Vec<Measurement>| Run::new("bar", 1.0, Test::Uniaxial, points).unwrap_err().to_string();
+    let refused = |points: Vec<Measurement>| {
+        MeasuredRun::new("bar", 1.0, Test::Uniaxial, points).unwrap_err().to_string()
+    };
     assert!(refused(vec![point(1.0, 1.1, 1.0)]).contains("1 points"));
     assert!(refused(vec![point(0.0, 1.5, 1.0), point(1.0, 1.5, 0.9)]).contains("begin with the ramp"));
     assert!(refused(vec![point(2.0, 1.1, 1.0), point(1.0, 1.2, 1.0)]).contains("1 s follows 2 s"));

@@ -97,7 +97,7 @@ fn cooling(kinetics: &Kinetics, known: &FixedConstants, rate: f64) -> Result<Run
     let count = ((high - low) / STEP).ceil() as usize;
     let temperatures = (0..count).map(|row| high - row as f64 * STEP).collect();
     let mut run = Run::cooling(rate, temperatures, vec![0.0; count], known)?;
-    run.degrees = run.z(kinetics).into_iter().map(|z| kinetics.degree(z)).collect();
+    run.degrees = run.integrals(kinetics).into_iter().map(|z| kinetics.degree(z)).collect();
     Ok(run)
 }
 

@@ -62,7 +62,7 @@ impl Run {
     }
 
     /// z at each measurement.
-    pub(super) fn z(&self, kinetics: &Kinetics) -> Vec<f64> {
+    pub(super) fn integrals(&self, kinetics: &Kinetics) -> Vec<f64> {
         let rows = self.times.iter().zip(&self.temperatures).map(|(&time, &temperature)| [time, temperature]);
         let mut all = self.history.iter().copied().chain(rows);
         let Some([mut time, mut temperature]) = all.next() else { return Vec::new() };
@@ -150,7 +150,7 @@ pub fn nakamura(runs: &[Run], known: &FixedConstants) -> Result<KineticFit, Erro
     let logarithm = |q: &[f64]| q[0] + jump + q[1].exp() * barrier - LN_2.ln() / q[2].exp();
     let kinetics = |q: &[f64]| of(logarithm(q).exp(), q[1].exp(), q[2].exp()).ok();
     let model = |kinetics: &Kinetics| -> Vec<f64> {
-        runs.iter().flat_map(|run| run.z(kinetics)).map(|z| kinetics.degree(z)).collect()
+        runs.iter().flat_map(|run| run.integrals(kinetics)).map(|z| kinetics.degree(z)).collect()
     };
     let residuals = |q: &[f64]| -> Option<Vec<f64>> {
         let found = model(&kinetics(q)?);
@@ -165,7 +165,7 @@ pub fn nakamura(runs: &[Run], known: &FixedConstants) -> Result<KineticFit, Erro
     for nucleation in [0.1, 0.3, 0.6, 1.2, 2.4].map(|part: f64| part * scale) {
         let mut start = vec![0.0, nucleation.ln(), 2.5_f64.ln()];
         let Some(unit) = kinetics(&start) else { continue };
-        let z = runs.iter().flat_map(|run| run.z(&unit)).nth(half).unwrap_or(0.0);
+        let z = runs.iter().flat_map(|run| run.integrals(&unit)).nth(half).unwrap_or(0.0);
         if z > 0.0 && z.is_finite() {
             start[0] = (LN_2.powf(0.4) / z).ln();
             starts.push(start);

@@ -11,15 +11,15 @@ use polycore::constitutive::hyperelastic::{Hyperelastic, ModelKind, homogeneous}
 use super::MPA;
 
 /// Homogeneous test that may occur among general biaxial states.
-struct Test {
+struct TestPlot {
     key: &'static str,
     title: &'static str,
     holds: fn(&TestState) -> bool,
     nominal: fn(&dyn Hyperelastic, f64) -> Result<f64, polycore::constitutive::Error>,
 }
 
-const TESTS: [Test; 3] = [
-    Test {
+const TESTS: [TestPlot; 3] = [
+    TestPlot {
         key: "uniaxial",
         title: "uniaxial tension",
         holds: |state| match state.mode {
@@ -28,7 +28,7 @@ const TESTS: [Test; 3] = [
         },
         nominal: |law, stretch| homogeneous::uniaxial(law, stretch),
     },
-    Test {
+    TestPlot {
         key: "pure-shear",
         title: "pure shear",
         holds: |state| match state.mode {
@@ -37,7 +37,7 @@ const TESTS: [Test; 3] = [
         },
         nominal: |law, stretch| Ok(homogeneous::pure_shear(law, stretch)?[0]),
     },
-    Test {
+    TestPlot {
         key: "equibiaxial",
         title: "equibiaxial tension",
         holds: |state| match state.mode {
@@ -78,7 +78,7 @@ pub fn pictures(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) ->
 }
 
 /// Draws nominal stress over stretch.
-fn curves(name: &str, test: &Test, states: &[&TestState], fits: &[&Fit]) -> LinePlot {
+fn curves(name: &str, test: &TestPlot, states: &[&TestState], fits: &[&Fit]) -> LinePlot {
     let x: Vec<f64> = states.iter().map(|state| state.stretches[0]).collect();
     let y: Vec<f64> = states.iter().map(|state| state.nominal[0] / MPA).collect();
     let [low, high] = span(&x, 1.0).map(|l| 1.0 + 1.03 * (l - 1.0)).map(|l| l.max(0.01));

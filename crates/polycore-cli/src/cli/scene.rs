@@ -170,7 +170,7 @@ impl FitCase {
             return Err(source.error(
                 "fit.data",
                 "no data",
-                "at least one `[[fit.data]]` with `name` and `file`, a `[time]`, a `[[trial]]` or a `[[network]]`",
+                "at least one `[[fit.data]]` with `name` and `file`, `[time]`, `[[trial]]` or `[[network]]`",
             ));
         }
         super::trials::check(source, &trial)?;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use harness::scene::{SceneError, Source};
 use polycore::constitutive::hyperelastic::model;
 use polycore::constitutive::viscoelastic::fit::{
-    BranchForm, Form, Measurement, Run, SpringForm, Test, ViscosityForm, rates,
+    BranchForm, Form, MeasuredRun, Measurement, SpringForm, Test, ViscosityForm, rates,
 };
 use polycore::constitutive::viscoelastic::{Pace, Scheme};
 use polycore::table::Table;
@@ -163,7 +163,7 @@ struct ProgramStep {
 /// Checked fit with time.
 pub struct TimeCase {
     pub form: Form,
-    pub runs: Vec<Run>,
+    pub runs: Vec<MeasuredRun>,
     pub starts: usize,
     pub pace: Pace,
     pub leave_out: Option<f64>,
@@ -299,7 +299,7 @@ impl BranchSpec {
 
 impl RunTableSpec {
     /// Reads the runs: rows of equal cells in the columns `runs` that follow each other.
-    fn read(&self, path: &Path) -> Result<(Vec<Run>, String), polycore::Error> {
+    fn read(&self, path: &Path) -> Result<(Vec<MeasuredRun>, String), polycore::Error> {
         let table = Table::read(path)?;
         let strain = match self.test.test() {
             Test::Uniaxial => table.require_column(&["stretch", "lambda"])?,
@@ -337,7 +337,7 @@ impl RunTableSpec {
             let rate = rates.as_ref().map(|rates| rates[rows[0]]);
             let test = self.test.test();
             runs.push(match &times {
-                None => Run::cycle(&name, rate.unwrap_or_default(), test, &points)?,
+                None => MeasuredRun::cycle(&name, rate.unwrap_or_default(), test, &points)?,
                 Some(times) => {
                     let timed = rows.iter().zip(&points).map(|(&row, point)| Measurement {
                         time: times[row],
@@ -346,7 +346,7 @@ impl RunTableSpec {
                     });
                     let path: f64 = points.windows(2).map(|pair| (pair[1][0] - pair[0][0]).abs()).sum();
                     let duration = times[rows[rows.len() - 1]] - times[rows[0]];
-                    Run::new(&name, rate.unwrap_or(path / duration), test, timed.collect())?
+                    MeasuredRun::new(&name, rate.unwrap_or(path / duration), test, timed.collect())?
                 }
             });
         }

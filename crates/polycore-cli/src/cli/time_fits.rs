@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
 
-use harness::case::Run as CaseRun;
+use harness::case::Run;
 use harness::output;
 use harness::report::Report;
 use polycore::Error;
@@ -31,7 +31,7 @@ pub const LEFT_OUT: &str = "left-out";
 const ERROR: f64 = 1e-4;
 
 /// Fits the law, records values, writes files; returns the table of the run.
-pub fn run(case: &TimeCase, run: &mut CaseRun, report: &mut Report) -> Result<String, Error> {
+pub fn run(case: &TimeCase, run: &mut Run, report: &mut Report) -> Result<String, Error> {
     let settings = FitSettings { starts: case.starts, pace: case.pace, ..FitSettings::default() };
     let stop = run.options.interrupted;
     run.show(0.0, &|| "fit with time".to_owned());

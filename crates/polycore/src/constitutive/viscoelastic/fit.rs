@@ -8,7 +8,7 @@
 //! ```
 //! use polycore::constitutive::hyperelastic::model;
 //! use polycore::constitutive::viscoelastic::fit::{
-//!     BranchForm, FitSettings, Form, Measurement, Run, SpringForm, Test, ViscosityForm, fit,
+//!     BranchForm, FitSettings, Form, Measurement, MeasuredRun, SpringForm, Test, ViscosityForm, fit,
 //! };
 //!
 //! // ramp to a stretch of 1.02 in 1 s, held: E = 3μ falls from 6 to 3 MPa within some seconds
@@ -18,7 +18,7 @@
 //!     let strain = 1.0 + 0.02 * time.min(1.0);
 //!     Measurement { time, strain, nominal: relaxing(time) }
 //! };
-//! let run = Run::new("ramp", 0.02, Test::Uniaxial, (0..20).map(point).collect())?;
+//! let run = MeasuredRun::new("ramp", 0.02, Test::Uniaxial, (0..20).map(point).collect())?;
 //! let branch = BranchForm { spring: SpringForm::NeoHookean, viscosity: ViscosityForm::Constant };
 //! let form = Form::new(model("neo-hookean")?, vec![branch]);
 //! let found = fit(&form, &[run], &FitSettings::default())?;
@@ -33,7 +33,7 @@ mod runs;
 
 pub use form::{BranchForm, Constant, Form, SpringForm, ViscosityForm};
 pub use leave::{LeftOut, leave_out, rates};
-pub use runs::{Measurement, Run, Test};
+pub use runs::{MeasuredRun, Measurement, Test};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -122,7 +122,7 @@ impl TimeFit {
 /// [`Error::Data`] for no run, fewer stresses than constants, or a mean stiffness below zero;
 /// [`Error::Invalid`] for unknown names of constants; [`Error::NoConvergence`] if no start ends at a law;
 /// [`Error::Data`] if every end has a branch that is not monotone.
-pub fn fit(form: &Form, runs: &[Run], settings: &FitSettings) -> Result<TimeFit, Error> {
+pub fn fit(form: &Form, runs: &[MeasuredRun], settings: &FitSettings) -> Result<TimeFit, Error> {
     fit_until(form, runs, settings, &|| false)
 }
 
@@ -132,7 +132,7 @@ pub fn fit(form: &Form, runs: &[Run], settings: &FitSettings) -> Result<TimeFit,
 /// As [`fit`]; [`Error::Stopped`].
 pub fn fit_until(
     form: &Form,
-    runs: &[Run],
+    runs: &[MeasuredRun],
     settings: &FitSettings,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<TimeFit, Error> {

@@ -1,6 +1,6 @@
 //! Judgement of a form on runs that it was not fitted to.
 
-use super::{FitSettings, Form, Run, TimeFit, fit_until, runs};
+use super::{FitSettings, Form, MeasuredRun, TimeFit, fit_until, runs};
 use crate::constitutive::Error;
 use crate::constitutive::hyperelastic::fit::Agreement;
 
@@ -16,7 +16,7 @@ pub struct LeftOut {
 }
 
 /// Rates of runs, increasing, each once.
-pub fn rates(runs: &[Run]) -> Vec<f64> {
+pub fn rates(runs: &[MeasuredRun]) -> Vec<f64> {
     let mut rates: Vec<f64> = runs.iter().map(|run| run.rate).collect();
     rates.sort_by(f64::total_cmp);
     rates.dedup();
@@ -29,12 +29,12 @@ pub fn rates(runs: &[Run]) -> Vec<f64> {
 /// As [`fit_until`]; [`Error::Data`] if `left` selects no run or all; errors of the law at a run left out.
 pub fn leave_out(
     form: &Form,
-    all: &[Run],
-    left: impl Fn(&Run) -> bool,
+    all: &[MeasuredRun],
+    left: impl Fn(&MeasuredRun) -> bool,
     settings: &FitSettings,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<LeftOut, Error> {
-    let (out, kept): (Vec<Run>, Vec<Run>) = all.iter().cloned().partition(|run| left(run));
+    let (out, kept): (Vec<MeasuredRun>, Vec<MeasuredRun>) = all.iter().cloned().partition(|run| left(run));
     if out.is_empty() || kept.is_empty() {
         let reason = format!("{} of {} runs left out", out.len(), all.len());
         return Err(Error::Data { what: "fit without some runs".to_owned(), reason });

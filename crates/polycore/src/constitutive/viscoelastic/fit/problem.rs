@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::super::{Pace, Viscoelastic};
 use super::form::{Constant, Form, Scales};
-use super::runs::{self, Run};
+use super::runs::{self, MeasuredRun};
 use super::{SpringForm, ViscosityForm};
 use crate::constitutive::Error;
 use crate::constitutive::hyperelastic::{Domain, fit as elastic};
@@ -25,7 +25,7 @@ const ITERATIONS: usize = 60;
 /// Least-squares problem in the unbounded q of the constants that are fitted.
 pub(super) struct Problem<'a> {
     pub form: &'a Form,
-    pub runs: &'a [Run],
+    pub runs: &'a [MeasuredRun],
     pub constants: Vec<Constant>,
     pub scales: Scales,
     pace: Pace,
@@ -36,12 +36,12 @@ pub(super) struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    pub fn new(form: &'a Form, runs: &'a [Run], pace: Pace) -> Result<Self, Error> {
+    pub fn new(form: &'a Form, runs: &'a [MeasuredRun], pace: Pace) -> Result<Self, Error> {
         let table = runs::elastic(runs);
         let measured: Vec<f64> = runs.iter().flat_map(|run| run.points()).map(|p| p.nominal).collect();
         let size = (measured.iter().map(|p| p * p).sum::<f64>() / measured.len().max(1) as f64).sqrt();
         let modulus = elastic::neo_hookean_modulus(&table)?;
-        let durations = runs.iter().map(Run::duration);
+        let durations = runs.iter().map(MeasuredRun::duration);
         let [shortest, longest] =
             durations.fold([f64::INFINITY, 0.0_f64], |[least, most], t| [least.min(t), most.max(t)]);
         let mut limits = Vec::new();

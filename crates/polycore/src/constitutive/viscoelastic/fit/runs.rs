@@ -28,7 +28,7 @@ pub struct Measurement {
 
 /// Measured run: a body at rest at 0 s whose strain is linear between its points.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Run {
+pub struct MeasuredRun {
     /// Name in tables and messages.
     pub name: String,
     /// Rate of strain, 1/s: runs of one rate are left out together.
@@ -42,7 +42,7 @@ pub struct Run {
 /// Largest strain at 0 s, from rest.
 const AT_REST: f64 = 1e-3;
 
-impl Run {
+impl MeasuredRun {
     /// Creates a run.
     ///
     /// # Errors
@@ -81,7 +81,7 @@ impl Run {
     /// digitised out of order are put in the order of time.
     ///
     /// # Errors
-    /// As [`Run::new`].
+    /// As [`MeasuredRun::new`].
     pub fn cycle(name: &str, rate: f64, test: Test, points: &[[f64; 2]]) -> Result<Self, Error> {
         let away = |point: &[f64; 2]| (point[0] - test.rest()).abs();
         let turn = (0..points.len()).max_by(|a, b| away(&points[*a]).total_cmp(&away(&points[*b])));
@@ -128,7 +128,7 @@ impl Run {
     /// Compares a law with the measured stresses.
     ///
     /// # Errors
-    /// As [`Run::stresses`].
+    /// As [`MeasuredRun::stresses`].
     pub fn agreement(&self, law: &Viscoelastic, pace: Pace) -> Result<Agreement, Error> {
         Ok(agreement(&self.residuals(law, pace)?, self.points.iter().map(|point| point.nominal)))
     }
@@ -225,7 +225,7 @@ impl Test {
 }
 
 /// All points as elastic states, of which a law without time takes the mean.
-pub(super) fn elastic(runs: &[Run]) -> TestData {
+pub(super) fn elastic(runs: &[MeasuredRun]) -> TestData {
     let states = runs.iter().flat_map(|run| run.points.iter().map(|point| run.test.elastic_state(point)));
     TestData { source: String::new(), states: states.collect() }
 }

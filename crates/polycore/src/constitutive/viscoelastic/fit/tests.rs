@@ -1,7 +1,7 @@
 use evidence::near;
 
 use super::problem::Problem;
-use super::{BranchForm, Form, Measurement, Run, SpringForm, Test, ViscosityForm, uncertainty};
+use super::{BranchForm, Form, MeasuredRun, Measurement, SpringForm, Test, ViscosityForm, uncertainty};
 use crate::constitutive::hyperelastic::model;
 use crate::constitutive::viscoelastic::{Pace, Scheme};
 
@@ -16,7 +16,7 @@ fn uncertainty_of_a_published_law() {
             let strain = if k <= 20 { 1.0 + path } else { 5.0 - path };
             Measurement { time: path / rate, strain, nominal: 1e3 * path }
         };
-        Run::new(&format!("{rate}"), rate, Test::Uniaxial, (0..=40).map(point).collect()).unwrap()
+        MeasuredRun::new(&format!("{rate}"), rate, Test::Uniaxial, (0..=40).map(point).collect()).unwrap()
     };
     let runs = [0.01, 0.03, 0.05].map(run);
     let branch =

@@ -50,7 +50,7 @@ enum Modulus {
 }
 
 /// Measured value: what, at which time (s) or angular frequency (1/s).
-struct Value {
+struct ModulusPoint {
     kind: Modulus,
     at: f64,
     measured: f64,
@@ -58,7 +58,7 @@ struct Value {
     weight: f64,
 }
 
-impl Value {
+impl ModulusPoint {
     /// Value of a term of modulus 1, and its derivative by ln τ.
     fn unit(&self, time: f64) -> [f64; 2] {
         let x = self.at * time;
@@ -92,7 +92,7 @@ impl Value {
 pub fn fit_relaxation(data: &[[f64; 2]], settings: &PronySettings) -> Result<PronyFit, Error> {
     let points = data.iter().filter(|point| point[0] != 0.0);
     let values = points
-        .map(|&[at, measured]| Value { kind: Modulus::Relaxation, at, measured, weight: 1.0 })
+        .map(|&[at, measured]| ModulusPoint { kind: Modulus::Relaxation, at, measured, weight: 1.0 })
         .collect();
     fit(values, &[Modulus::Relaxation], settings)
 }
@@ -106,27 +106,27 @@ pub fn fit_oscillation(data: &[[f64; 3]], settings: &PronySettings) -> Result<Pr
     let mut values = Vec::new();
     for &[frequency, storage, loss] in data {
         let at = std::f64::consts::TAU * frequency;
-        values.push(Value { kind: Modulus::Storage, at, measured: storage, weight: 1.0 });
+        values.push(ModulusPoint { kind: Modulus::Storage, at, measured: storage, weight: 1.0 });
         if loss > 0.0 {
-            values.push(Value { kind: Modulus::Loss, at, measured: loss, weight: settings.loss });
+            values.push(ModulusPoint { kind: Modulus::Loss, at, measured: loss, weight: settings.loss });
         }
     }
     fit(values, &[Modulus::Storage, Modulus::Loss], settings)
 }
 
-fn fit(values: Vec<Value>, kinds: &[Modulus], settings: &PronySettings) -> Result<PronyFit, Error> {
+fn fit(values: Vec<ModulusPoint>, kinds: &[Modulus], settings: &PronySettings) -> Result<PronyFit, Error> {
     let refuse = |reason: String| Err(Error::Data { what: "fit of a Prony series".to_owned(), reason });
     if values.len() < 3 {
         return refuse(format!("{} values; it needs three or more", values.len()));
     }
-    for Value { at, measured, .. } in &values {
+    for ModulusPoint { at, measured, .. } in &values {
         if !(*at > 0.0 && at.is_finite() && *measured > 0.0 && measured.is_finite()) {
             return refuse(format!("the modulus {measured} Pa at {at}: both must be above 0 and finite"));
         }
     }
     let start = merged(on_grid(&values, settings.per_decade.max(1)), settings.most.min(values.len() / 2));
     let (series, jacobian) = refined(&values, start);
-    let deviation = |value: &Value| model(&series, value) / value.measured - 1.0;
+    let deviation = |value: &ModulusPoint| model(&series, value) / value.measured - 1.0;
     let rms = kinds.iter().map(|kind| {
         let own: Vec<f64> =
             values.iter().filter(|value| value.kind == *kind).map(|v| deviation(v).powi(2)).collect();
@@ -145,14 +145,14 @@ fn fit(values: Vec<Value>, kinds: &[Modulus], settings: &PronySettings) -> Resul
     Ok(PronyFit { series, rms, factors, singular_values })
 }
 
-fn model(series: &Prony, value: &Value) -> f64 {
+fn model(series: &Prony, value: &ModulusPoint) -> f64 {
     let terms = series.terms.iter().map(|term| term.modulus * value.unit(term.time)[0]);
     series.equilibrium * value.rest() + terms.sum::<f64>()
 }
 
 /// Series of a grid of times over those of the data, half a decade wider.
-fn on_grid(values: &[Value], per_decade: usize) -> Prony {
-    let time = |value: &Value| match value.kind {
+fn on_grid(values: &[ModulusPoint], per_decade: usize) -> Prony {
+    let time = |value: &ModulusPoint| match value.kind {
         Modulus::Relaxation => value.at,
         _ => value.at.recip(),
     };
@@ -215,7 +215,7 @@ fn merge(series: &mut Prony, k: usize) {
 }
 
 /// Refines the logarithms of all constants; returns the Jacobian of the relative deviations by them.
-fn refined(values: &[Value], start: Prony) -> (Prony, DMatrix<f64>) {
+fn refined(values: &[ModulusPoint], start: Prony) -> (Prony, DMatrix<f64>) {
     let has_rest = start.equilibrium > 0.0;
     let offset = usize::from(has_rest);
     let series = |q: &DVector<f64>| {
