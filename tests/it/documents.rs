@@ -263,7 +263,7 @@ fn shell_lines_are_cut_into_words() {
     let words = |line: &str| parts(line).iter().map(|part| part.join("|")).collect::<Vec<_>>();
     assert_eq!(
         words("cargo run --release --bin peri -- run a.toml  # main job"),
-        ["cargo|run|--release|-p|peri|--|run|a.toml"]
+        ["cargo|run|--release|--bin|peri|--|run|a.toml"]
     );
     assert_eq!(
         words("A=1 peri check 'a b.toml' > log && peri exact law | head"),

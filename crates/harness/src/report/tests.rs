@@ -101,7 +101,7 @@ fn bad_expectations() {
         let error = one(rest).unwrap_err();
         assert!(error.message().contains(part), "{rest}: {error}");
     }
-    for (kind, part) in [("", "missing field `kind`"), ("kind = 'measured'", "unknown variant `measured`")] {
+    for (kind, part) in [("", "missing field `kind`"), ("kind = 'guessed'", "unknown variant `guessed`")] {
         let text = format!("[[expect]]\nquantity = 'k'\nat_most = 2\nsource = 's'\n{kind}");
         let error = expectations(&text).unwrap_err();
         assert!(error.message().contains(part), "{kind}: {error}");
