@@ -2,8 +2,8 @@
 //! checkpoints. No panic, no hang, no memory beyond what the file justifies, and an error that names the
 //! place.
 //!
-//! 2000 mutations of each kind, always the same; `FRONT_DOOR=100000 cargo test --release --workspace front_door`
-//! takes that many new ones. Failures are kept in tests/proptest-regressions and tried first.
+//! 2000 mutations of each kind, always the same. The environment variable `FRONT_DOOR=100000` makes that many
+//! new ones. Failures are kept in tests/proptest-regressions and tried first.
 
 use crate::allocations;
 use crate::bad::write_bad_scenes;

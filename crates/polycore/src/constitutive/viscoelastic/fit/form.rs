@@ -11,9 +11,9 @@ pub struct Form {
     pub equilibrium: &'static ModelDescriptor,
     /// The branches; their constants have the names `1.nu`, `1.eta_0`, `2.nu`, ….
     pub branches: Vec<BranchForm>,
-    /// Constants that keep a value, by their names, SI. These replace the choices of [`Form::constants`].
+    /// Constants that keep a value, by their names, SI. These replace the choices of the fit.
     pub fixed: Vec<(String, f64)>,
-    /// Constants that are fitted although [`Form::constants`] would fix them.
+    /// Constants that are fitted although the fit would fix them.
     pub free: Vec<String>,
 }
 
