@@ -11,7 +11,7 @@ mod student;
 mod thermogram;
 
 pub use avrami::avrami;
-pub use forecast::{ForecastRow, forecast};
+pub use forecast::{ForecastRow, SHARES, forecast};
 pub use heat_flow::{Baseline, Peak, interpolate};
 pub use nakamura::{FixedConstants, Run, nakamura};
 pub use ozawa::{Cooling, ozawa, rates_at};
