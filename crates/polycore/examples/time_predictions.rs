@@ -129,7 +129,7 @@ fn cycle(law: &Viscoelastic) -> Outcome<(&'static str, f64, Vec<Row>)> {
 struct Group {
     name: String,
     left: Left,
-    /// Whether the choice of a form rests on them: two rates two decades apart do not determine a law of one.
+    /// True if the choice of a form rests on the runs left out: two rates two decades apart do not determine a law of one.
     counts: bool,
 }
 

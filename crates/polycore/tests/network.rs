@@ -145,7 +145,7 @@ fn chains() {
     assert_eq!(missing, "the density of PEO is not in the table; give it");
 }
 
-/// What a case of the counts is: `f 4 r 1 p 0.9 b1 0.2`, `random Flory x 2`.
+/// Parameters of a case of the counts: `f 4 r 1 p 0.9 b1 0.2`, `random Flory x 2`.
 fn structure(case: &str) -> BTreeMap<&'static str, f64> {
     let words: Vec<&str> = case.split(' ').collect();
     let number = |i: usize| words[i].parse::<f64>().unwrap();

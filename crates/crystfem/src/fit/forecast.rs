@@ -2,7 +2,7 @@
 
 use super::{FixedConstants, KineticFit, Run, quantile};
 use crate::error::Error;
-use crate::kinetics::{KineticConstants, Kinetics};
+use crate::kinetics::Kinetics;
 
 /// Shares α of a forecast.
 pub const SHARES: [f64; 7] = [0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95];
@@ -44,14 +44,8 @@ pub fn forecast(
     let estimate = |name: &str| {
         fit.get(name).map(|found| found.value).ok_or_else(|| refuse(format!("the fit has no `{name}`")))
     };
-    let kinetics = Kinetics::new(KineticConstants {
-        growth_rate: estimate("growth_rate")?,
-        nucleation: estimate("nucleation")?,
-        avrami_exponent: estimate("avrami_exponent")?,
-        activation_energy: known.activation_energy,
-        equilibrium_melting: known.equilibrium_melting,
-        frozen: known.frozen,
-    })?;
+    let kinetics =
+        known.kinetics(estimate("growth_rate")?, estimate("nucleation")?, estimate("avrami_exponent")?)?;
     let shares: Vec<f64> = SHARES
         .into_iter()
         .filter(|&share| runs.iter().all(|(_, run)| reached(run, share).is_some()))
@@ -125,6 +119,7 @@ fn line(x: &[f64], y: &[f64], place: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::fit::nakamura;
+    use crate::kinetics::KineticConstants;
 
     const KNOWN: FixedConstants =
         FixedConstants { equilibrium_melting: 466.35, frozen: 294.15, activation_energy: 6270.0 };

@@ -20,6 +20,28 @@ pub struct FixedConstants {
     pub activation_energy: f64,
 }
 
+impl FixedConstants {
+    /// Returns the kinetics with K₀, 1/s, K_G, K², and n.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for constants out of their domain.
+    pub fn kinetics(
+        &self,
+        growth_rate: f64,
+        nucleation: f64,
+        avrami_exponent: f64,
+    ) -> Result<Kinetics, Error> {
+        Kinetics::new(KineticConstants {
+            growth_rate,
+            nucleation,
+            activation_energy: self.activation_energy,
+            equilibrium_melting: self.equilibrium_melting,
+            frozen: self.frozen,
+            avrami_exponent,
+        })
+    }
+}
+
 /// A measurement: α along a temperature history that begins in the melt.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
@@ -125,17 +147,7 @@ pub fn nakamura(runs: &[Run], known: &FixedConstants) -> Result<KineticFit, Erro
     }
     let degrees: Vec<f64> = runs.iter().flat_map(|run| run.degrees.iter().copied()).collect();
     check(what, &degrees, 3)?;
-    let of = |growth_rate: f64, nucleation: f64, avrami_exponent: f64| {
-        Kinetics::new(KineticConstants {
-            growth_rate,
-            nucleation,
-            activation_energy: known.activation_energy,
-            equilibrium_melting: known.equilibrium_melting,
-            frozen: known.frozen,
-            avrami_exponent,
-        })
-    };
-    of(1.0, 1.0, 2.0)?;
+    known.kinetics(1.0, 1.0, 2.0)?;
     let Some(middle) = middle(runs, known) else {
         let reason =
             "no alpha between 0.01 and 0.99 at a temperature between that of frozen chains and melting";
@@ -148,7 +160,7 @@ pub fn nakamura(runs: &[Run], known: &FixedConstants) -> Result<KineticFit, Erro
     };
     let jump = known.activation_energy / (GAS_CONSTANT * (middle - known.frozen));
     let logarithm = |q: &[f64]| q[0] + jump + q[1].exp() * barrier - LN_2.ln() / q[2].exp();
-    let kinetics = |q: &[f64]| of(logarithm(q).exp(), q[1].exp(), q[2].exp()).ok();
+    let kinetics = |q: &[f64]| known.kinetics(logarithm(q).exp(), q[1].exp(), q[2].exp()).ok();
     let model = |kinetics: &Kinetics| -> Vec<f64> {
         runs.iter().flat_map(|run| run.integrals(kinetics)).map(|z| kinetics.degree(z)).collect()
     };

@@ -293,7 +293,7 @@ fn advice(name: &str) -> Option<&'static str> {
     Some(match plain.as_str() {
         "arrudaboyce" => "Arruda and Boyce's law is `eight-chain` here",
         "reducedpolynomial" => "the reduced polynomial of third order is `yeoh` here",
-        "prony" | "viscoelastic" => "rates and relaxation are not modelled: laws are elastic",
+        "prony" | "viscoelastic" => "laws of parts are elastic; `polycore` fits laws with time (`[time]`)",
         "poissonratio" | "poissonsratio" => {
             "Poisson's ratio follows from `bulk_modulus` and the shear modulus, ν = (3K − 2G)/(6K + 2G), or \
              from the law"

@@ -42,7 +42,7 @@ pub struct NetworkOptions {
     /// Plateau modulus that entanglements give if all are trapped [default: that of the polymer]
     #[arg(long, value_name = "QUANTITY")]
     pub entanglement_modulus: Option<Stress>,
-    /// What counts where both conversion and sol fraction are given [default: best]
+    /// Choice where both conversion and sol fraction are given [default: best]
     #[arg(long, value_enum)]
     pub conversion: Option<ConversionChoice>,
     /// Factor of loops in conversions from sol fractions; 0: none [default: 1.6]
@@ -50,7 +50,7 @@ pub struct NetworkOptions {
     pub loop_factor: Option<f64>,
 }
 
-/// Which of conversion and sol fraction counts.
+/// Choice between conversion and sol fraction where both are given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ConversionChoice {

@@ -22,9 +22,9 @@ pub struct NetworkSpec {
     name: String,
     /// Compositions (CSV), relative to the scene.
     file: PathBuf,
-    /// Take only rows whose source begins so.
+    /// Take only rows whose source begins with this text.
     source: Option<String>,
-    /// Leave out rows whose source begins so.
+    /// Leave out rows whose source begins with this text.
     without: Option<String>,
     /// Take only measured or only simulated rows.
     kind: Option<NetworkKind>,
@@ -36,7 +36,7 @@ pub struct NetworkSpec {
     temperature: Option<polycore::units::Temperature>,
     /// Plateau modulus that entanglements give if all are trapped [default: that of the polymer].
     entanglement_modulus: Option<polycore::units::Stress>,
-    /// What counts where both conversion and sol fraction are given [default: best].
+    /// Choice where both conversion and sol fraction are given [default: best].
     conversion: Option<ConversionChoice>,
     /// Factor of loops in conversions from sol fractions; 0: none [default: 1.6].
     loop_factor: Option<f64>,
@@ -70,11 +70,7 @@ impl NetworkSpec {
         others: &[NetworkSet],
     ) -> Result<NetworkSet, SceneError> {
         let key = |field: &str| format!("network[{index}].{field}");
-        let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-        if self.name.is_empty() || !self.name.chars().all(plain) {
-            let allowed = "letters, digits, `-` and `_`: it names files";
-            return Err(source.error(&key("name"), format!("`{}`", self.name), allowed));
-        }
+        harness::scene::check_name(source, &key("name"), &self.name)?;
         if others.iter().any(|other| other.name == self.name) {
             return Err(source.error(&key("name"), format!("`{}` a second time", self.name), "another name"));
         }

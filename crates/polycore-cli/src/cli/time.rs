@@ -73,7 +73,7 @@ struct BranchSpec {
 enum SpringName {
     /// Neo-Hookean.
     NeoHookean,
-    /// One power of I₁.
+    /// Power of I₁.
     #[serde(rename = "lopez-pamies-1")]
     LopezPamies1,
     /// Two powers of I₁.
@@ -217,6 +217,9 @@ impl TimeCase {
         }
         let (mut runs, mut read) = (Vec::new(), Vec::new());
         for (i, data) in settings.data.iter().enumerate() {
+            let key = format!("time.data[{i}].name");
+            let before = settings.data[..i].iter().map(|data| data.name.as_str());
+            check_own_name(source, &key, &data.name, before.chain([time_fits::ALL, time_fits::LEFT_OUT]))?;
             let path = source.file(&data.file);
             let found = data.read(&path);
             let (own, line) =
@@ -237,7 +240,10 @@ impl TimeCase {
         }
         let mut programs = Vec::new();
         for (i, program) in settings.predict.iter().enumerate() {
-            programs.push(program.path(source, &format!("time.predict[{i}]"))?);
+            let key = format!("time.predict[{i}]");
+            let before = settings.predict[..i].iter().map(|program| program.name.as_str());
+            check_own_name(source, &format!("{key}.name"), &program.name, before)?;
+            programs.push(program.path(source, &key)?);
         }
         Ok(Self {
             form,
@@ -249,6 +255,20 @@ impl TimeCase {
             read,
         })
     }
+}
+
+/// Checks a name of values and files that nothing else has.
+fn check_own_name<'a>(
+    source: &Source,
+    key: &str,
+    name: &str,
+    mut taken: impl Iterator<Item = &'a str>,
+) -> Result<(), SceneError> {
+    harness::scene::check_name(source, key, name)?;
+    if taken.any(|other| other == name) {
+        return Err(source.error(key, format!("`{name}`, which is taken"), "another name"));
+    }
+    Ok(())
 }
 
 impl TimeCase {
@@ -357,7 +377,6 @@ impl RunTableSpec {
 
 impl ProgramSpec {
     fn path(&self, source: &Source, key: &str) -> Result<StrainProgram, SceneError> {
-        harness::scene::check_name(source, key, &self.name)?;
         let test = self.test.test();
         let mut path = vec![[0.0, test.rest()]];
         for (i, step) in self.steps.iter().enumerate() {

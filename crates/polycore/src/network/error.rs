@@ -11,7 +11,7 @@ pub enum Error {
     NoGel {
         /// Product that the gel point limits, as it is written.
         product: &'static str,
-        /// Its value.
+        /// Value found.
         value: f64,
         /// Value at the gel point.
         least: f64,
@@ -50,7 +50,7 @@ pub enum Error {
     Domain {
         /// The quantity.
         quantity: &'static str,
-        /// Its value.
+        /// Value found.
         value: f64,
         /// Allowed values.
         allowed: &'static str,

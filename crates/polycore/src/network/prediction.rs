@@ -57,7 +57,7 @@ pub struct PredictionSettings {
     /// Entanglement modulus of all rows, Pa; if `None` that of the polymer and, of simulated PDMS, of its
     /// bead model.
     pub entanglement_modulus: Option<f64>,
-    /// Which conversion counts.
+    /// Choice between conversion and sol fraction.
     pub conversion: ConversionSource,
     /// Factor of loops in conversions from sol fractions; 0 for the tree theory.
     pub loop_factor: f64,
@@ -106,7 +106,7 @@ impl PredictionSettings {
     /// Predicts the network of a row; the error is the reason why the model does not apply.
     ///
     /// # Errors
-    /// What the row leaves open, and what [`EndLinked::network`] refuses.
+    /// Missing values of the row; as [`EndLinked::network`].
     pub fn predict(&self, row: &Composition) -> Result<NetworkPrediction, String> {
         let given = |name: &str, value: Option<f64>| value.ok_or_else(|| format!("`{name}` is not given"));
         let functionality = given("f", row.functionality)?;

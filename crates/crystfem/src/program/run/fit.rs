@@ -32,9 +32,7 @@ impl FinishedFit {
     /// Returns the fitted kinetics as a key of a material block.
     fn block(&self) -> Option<String> {
         let FixedConstants { equilibrium_melting, frozen, activation_energy } = self.known?;
-        let estimate = |name: &str| {
-            self.fit.estimates.iter().find(|estimate| estimate.name == name).map(|estimate| estimate.value)
-        };
+        let estimate = |name: &str| self.fit.get(name).map(|estimate| estimate.value);
         let [rate, nucleation, n] = ["growth_rate", "nucleation", "avrami_exponent"].map(estimate);
         Some(format!(
             "kinetics = {{ growth_rate = \"{:.6e} 1/s\", nucleation = \"{:.6e} K^2\", activation_energy = \

@@ -142,7 +142,7 @@ impl ChemistrySpec {
 /// an `eight-chain` solid; with a `bond_energy` also `critical.fracture_energy`.
 ///
 /// # Errors
-/// What [`ChemistrySpec::network`] refuses, and keys given beside it.
+/// As [`ChemistrySpec::network`]; keys given beside it.
 pub fn resolve_network(source: &Source, material: &mut Material) -> Result<(), SceneError> {
     let Some(spec) = &material.network else { return Ok(()) };
     let network = spec.network(source)?;

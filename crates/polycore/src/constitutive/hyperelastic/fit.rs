@@ -82,17 +82,21 @@ impl Agreement {
     /// # Errors
     /// As [`residuals`]: at a state beyond locking there is no stress to compare.
     pub fn new<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<Self, Error> {
-        let residuals = residuals(law, table)?;
+        let measured = table.states.iter().flat_map(|state| state.nominal).filter(|data| *data != 0.0);
+        Ok(Self::of_residuals(&residuals(law, table)?, measured))
+    }
+
+    /// Summarizes residuals of measured stresses, Pa, both of one length.
+    pub(crate) fn of_residuals(residuals: &[f64], measured: impl Iterator<Item = f64> + Clone) -> Self {
         let count = residuals.len() as f64;
-        let measured = || table.states.iter().flat_map(|state| state.nominal).filter(|data| *data != 0.0);
-        let mean = measured().sum::<f64>() / count;
-        let variation: f64 = measured().map(|data| (data - mean).powi(2)).sum();
+        let mean = measured.clone().sum::<f64>() / count;
+        let variation: f64 = measured.map(|data| (data - mean).powi(2)).sum();
         let squares: f64 = residuals.iter().map(|r| r * r).sum();
-        Ok(Self {
+        Self {
             rms: (squares / count).sqrt(),
             mae: residuals.iter().map(|r| r.abs()).sum::<f64>() / count,
             r2: (variation > 0.0).then(|| 1.0 - squares / variation),
-        })
+        }
     }
 }
 

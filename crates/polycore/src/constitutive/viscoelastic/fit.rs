@@ -65,7 +65,7 @@ impl Default for FitSettings {
 /// Fitted law with time.
 #[derive(Debug, Clone)]
 pub struct TimeFit {
-    /// Its form.
+    /// Form of the law.
     pub form: Form,
     /// The constants, in the order of [`Form::law`].
     pub constants: Vec<FittedConstant>,
@@ -202,7 +202,7 @@ pub fn fit_until(
     let each = runs.iter().map(|run| {
         let (own, others) = rest.split_at(run.points().len());
         rest = others;
-        runs::agreement(own, run.points().iter().map(|point| point.nominal))
+        Agreement::of_residuals(own, run.points().iter().map(|point| point.nominal))
     });
     let each: Vec<Agreement> = each.collect();
     let measured = runs.iter().flat_map(|run| run.points()).map(|point| point.nominal);
@@ -210,7 +210,7 @@ pub fn fit_until(
         form: form.clone(),
         constants,
         runs: each,
-        pooled: runs::agreement(residuals.as_slice(), measured),
+        pooled: Agreement::of_residuals(residuals.as_slice(), measured),
         singular_values,
         least_slopes: slopes.clone(),
         starts: (starts.len(), agreeing),

@@ -1,6 +1,6 @@
 //! Judgement of a form on runs that it was not fitted to.
 
-use super::{FitSettings, Form, MeasuredRun, TimeFit, fit_until, runs};
+use super::{FitSettings, Form, MeasuredRun, TimeFit, fit_until};
 use crate::constitutive::Error;
 use crate::constitutive::hyperelastic::fit::Agreement;
 
@@ -45,9 +45,9 @@ pub fn leave_out(
     let mut each = Vec::new();
     for run in &out {
         let own = run.residuals(&law, settings.pace)?;
-        each.push(runs::agreement(&own, run.points().iter().map(|point| point.nominal)));
+        each.push(Agreement::of_residuals(&own, run.points().iter().map(|point| point.nominal)));
         residuals.extend(own);
     }
     let measured = out.iter().flat_map(|run| run.points()).map(|point| point.nominal);
-    Ok(LeftOut { fit, runs: each, pooled: runs::agreement(&residuals, measured) })
+    Ok(LeftOut { fit, runs: each, pooled: Agreement::of_residuals(&residuals, measured) })
 }

@@ -16,7 +16,7 @@ const REJECTED: f64 = 1e6;
 /// Forward difference of q.
 const DIFFERENCE: f64 = 1e-5;
 
-/// Least relative decrease of Σr² in so many iterations that goes on.
+/// Relative decrease of Σr² over a number of iterations below which a search ends.
 const PROGRESS: (f64, usize) = (1e-5, 4);
 
 /// Most iterations from one start.

@@ -130,26 +130,14 @@ impl MeasuredRun {
     /// # Errors
     /// As [`MeasuredRun::stresses`].
     pub fn agreement(&self, law: &Viscoelastic, pace: Pace) -> Result<Agreement, Error> {
-        Ok(agreement(&self.residuals(law, pace)?, self.points.iter().map(|point| point.nominal)))
+        let measured = self.points.iter().map(|point| point.nominal);
+        Ok(Agreement::of_residuals(&self.residuals(law, pace)?, measured))
     }
 
     /// Model minus data at each point, Pa.
     pub(super) fn residuals(&self, law: &Viscoelastic, pace: Pace) -> Result<Vec<f64>, Error> {
         let found = self.stresses(law, pace)?;
         Ok(found.iter().zip(&self.points).map(|(model, point)| model - point.nominal).collect())
-    }
-}
-
-/// Agreement of residuals with the measured stresses.
-pub(super) fn agreement(residuals: &[f64], measured: impl Iterator<Item = f64> + Clone) -> Agreement {
-    let count = residuals.len() as f64;
-    let mean = measured.clone().sum::<f64>() / count;
-    let variation: f64 = measured.map(|data| (data - mean).powi(2)).sum();
-    let squares: f64 = residuals.iter().map(|r| r * r).sum();
-    Agreement {
-        rms: (squares / count).sqrt(),
-        mae: residuals.iter().map(|r| r.abs()).sum::<f64>() / count,
-        r2: (variation > 0.0).then(|| 1.0 - squares / variation),
     }
 }
 

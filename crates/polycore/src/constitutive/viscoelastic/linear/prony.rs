@@ -41,7 +41,7 @@ pub struct PronyFit {
     pub singular_values: Vec<f64>,
 }
 
-/// What a value measures.
+/// Measured quantity.
 #[derive(Clone, Copy, PartialEq)]
 enum Modulus {
     Relaxation,
