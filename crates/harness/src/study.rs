@@ -171,7 +171,7 @@ impl Naming {
             }
             (Self::Folders, Some(name)) => check_name(source, key, name),
             (Self::Brackets, Some(name)) if name.contains(stops) => {
-                let allowed = "a name without `/`, `\\`, `[`, `]`: files and values have it";
+                let allowed = "a name without `/`, `\\`, `[`, `]`: it names files and values";
                 Err(source.error(key, format!("`{name}`"), allowed))
             }
             (Self::Brackets, _) => Ok(()),

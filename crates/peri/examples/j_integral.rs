@@ -3,7 +3,7 @@
 
 use peri::calibrate::Space;
 use peri::geometry::{Cut, Shape};
-use peri::material::{EightChainSolid, NonlocalSolid};
+use peri::material::EightChainSolid;
 use peri::model::{Body, Model};
 use peri::probe::JIntegral;
 use peri::solver::Lbfgs;
@@ -14,7 +14,7 @@ fn main() -> Result<(), peri::Error> {
     let crack = Cut::segment([-81e-3, 0.0], [0.0, 0.0]);
     let body = Body::lattice(strip, 2e-3).plane_stress(2e-3).crack(crack);
     // incompressible in plane stress, and so many links that it is neo-Hookean
-    let rubber = NonlocalSolid(EightChainSolid::new(Space::PlaneStress, shear, 1e4, f64::INFINITY)?);
+    let rubber = EightChainSolid::new(Space::PlaneStress, shear, 1e4, f64::INFINITY)?;
     let model = Model::new(body, rubber)
         .clamp(|[_, y]| y < -20e-3)
         .displace(move |[_, y]| y > 20e-3, [0.0, (stretch - 1.0) * height]);

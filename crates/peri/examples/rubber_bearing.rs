@@ -4,7 +4,7 @@
 
 use peri::calibrate::Space;
 use peri::geometry::Shape;
-use peri::material::{EightChainSolid, NonlocalSolid};
+use peri::material::EightChainSolid;
 use peri::model::{Body, Model};
 use peri::solver::Lbfgs;
 
@@ -15,7 +15,7 @@ pub fn apparent_modulus(width: f64, height: f64, spacing: f64, bulk: f64) -> Res
     let plate = 6.0 * spacing;
     let strip = Shape::rectangle([0.0, -plate], [width, height + plate]);
     let body = Body::lattice(strip, spacing).plane_strain(1e-3);
-    let rubber = NonlocalSolid(EightChainSolid::new(Space::PlaneStrain, 0.4e6, 25.0, bulk)?);
+    let rubber = EightChainSolid::new(Space::PlaneStrain, 0.4e6, 25.0, bulk)?;
     let model = Model::new(body, rubber)
         .clamp(|[_, y]| y < 0.0)
         .displace(move |[_, y]| y > height, [0.0, -0.01 * height]);

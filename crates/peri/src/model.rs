@@ -3,6 +3,7 @@
 
 mod body;
 mod rubber;
+mod solid;
 
 pub use body::Body;
 pub use rubber::Rubber;
@@ -10,16 +11,16 @@ pub use rubber::Rubber;
 use crate::bonds::{BodyGeometry, LatticeBonds, Property, covered_stretches, fragments};
 use crate::contact::{Contact, RigidPlane};
 use crate::error::Error;
-use crate::material::{BondMaterial, Material, NonlocalSolid, PointLaw};
+use crate::material::{BondMaterial, Material};
 use crate::potential::KernelFit;
 use crate::probe::StressEvaluator;
 use crate::solver::{
     Breaking, Loads, Method, Policy, RotatingRegion, Rotation, State, Status, StepRecord, Support, System,
 };
 use crate::stress::{self, BallVolume, StressInput, StressMethod, StressTensor, SurfaceCompensation};
-use std::sync::Arc;
 
-/// A material of a body: a [`Material`], or a description that becomes one in a body, such as [`Rubber`].
+/// A material of a body: a [`Material`], or a description that becomes one in a body, such as [`Rubber`] or a
+/// [`Correspondence`](crate::material::Correspondence).
 pub trait IntoMaterial<const D: usize> {
     /// Resulting material.
     type Material: Material<D> + Clone;
@@ -268,14 +269,6 @@ impl<const D: usize> Simulation<D, BondMaterial<'static>> {
     /// Creates an evaluator of bond forces, see [`crate::probe`].
     pub fn evaluator(&self) -> StressEvaluator<D> {
         StressEvaluator::for_bonds(self.material.clone(), 1e-9, self.breaking.is_some())
-    }
-}
-
-impl<const D: usize, L: PointLaw<D> + Clone + 'static> Simulation<D, NonlocalSolid<L>> {
-    /// Creates an evaluator of forces, stresses and energy-momentum, see [`crate::probe`]; create it before
-    /// bonds break.
-    pub fn evaluator(&self) -> StressEvaluator<D> {
-        StressEvaluator::for_solid(Arc::new(self.material.0.clone()), false, &self.bonds)
     }
 }
 

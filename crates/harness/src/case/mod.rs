@@ -197,7 +197,7 @@ impl<'a> Options<'a> {
     }
 }
 
-/// A run that came to its end.
+/// Finished run.
 #[derive(Debug)]
 pub struct Finished {
     /// Content of `report.json`.

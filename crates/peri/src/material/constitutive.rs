@@ -19,7 +19,7 @@ use std::cell::RefCell;
 #[derive(Clone, Debug)]
 pub struct Correspondence<L, const D: usize> {
     law: L,
-    space: Space,
+    pub(crate) space: Space,
     shear: f64,
     bulk: f64,
     stabilisation: f64,

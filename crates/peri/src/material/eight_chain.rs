@@ -16,7 +16,7 @@ use polycore::langevin;
 /// the thickness follows from W; incompressible sheets have λ₃ = 1/J.
 #[derive(Clone, Copy, Debug)]
 pub struct EightChainSolid<const D: usize> {
-    space: Space,
+    pub(crate) space: Space,
     modulus: f64,
     links: f64,
     bulk: f64,

@@ -5,7 +5,7 @@ use peri::Error;
 use peri::bonds::{BodyGeometry, BondDamage, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::geometry::{Cut, Operation, Shape, lattice};
-use peri::material::BondMaterial;
+use peri::material::{BondMaterial, EightChainSolid};
 use peri::model::{Body, Model, Rubber};
 use peri::potential::{BondPotential, Law};
 use peri::solver::{
@@ -136,6 +136,34 @@ fn a_law_of_the_caller() {
     let slack = Model::new(sheet(), Rubber::with_law(Springs(0.0), 1e6)).build();
     let message = slack.err().map(|error| error.to_string()).unwrap_or_default();
     assert!(message.starts_with("t′(1) of the bond law: found 0"), "{message}");
+}
+
+/// A homogeneous stretch of a sheet of long chains has the stress of an incompressible neo-Hookean solid,
+/// σᵢ = μ(λᵢ² − λ₃²), in every particle.
+#[test]
+fn stress_of_a_solid() {
+    let (shear, [a, b]) = (0.4e6, [1.2_f64, 0.9_f64]);
+    let law = |space| EightChainSolid::new(space, shear, 1e6, f64::INFINITY);
+    let body = || Body::lattice(Shape::rectangle([0.0; 2], [10e-3, 8e-3]), 1e-3).plane_stress(1e-3);
+    let mut simulation = Model::new(body(), law(Space::PlaneStress).unwrap()).build().unwrap();
+    let moved: Vec<_> =
+        simulation.displacements().map(|([x, y], _)| [(a - 1.0) * x, (b - 1.0) * y]).collect();
+    for (&site, moved) in simulation.bonds.particles().to_vec().iter().zip(moved) {
+        simulation.state.displacement.set(site as usize, moved);
+    }
+    let thickness = 1.0 / (a * b);
+    let expected = [a, b].map(|stretch| shear * (stretch * stretch - thickness * thickness));
+    for stress in simulation.cauchy().unwrap() {
+        for d in 0..2 {
+            assert!((stress[d][d] / expected[d] - 1.0).abs() < 1e-5, "{stress:?}, {expected:?} Pa");
+        }
+    }
+    simulation.state.fracture.broken = 1;
+    let fault = simulation.piola().unwrap_err().to_string();
+    assert!(fault.starts_with("broken bonds: found 1; allowed: 0"), "{fault}");
+    let slab = Model::new(body().plane_strain(1e-3), law(Space::PlaneStress).unwrap()).build();
+    let fault = slab.map(|_| ()).unwrap_err().to_string();
+    assert_eq!(fault, "law: found PlaneStress; allowed: PlaneStrain, that of the body");
 }
 
 #[test]
