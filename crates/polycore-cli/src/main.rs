@@ -21,6 +21,8 @@ mod cli {
     pub mod material;
     pub mod network;
     pub mod networks;
+    pub mod prony;
+    pub mod prony_files;
     pub mod quantities;
     pub mod scene;
     pub mod table_fits;

@@ -410,7 +410,7 @@ fn laws_of_other_names_get_advice() {
     for (name, advice) in [
         ("arruda-boyce", "`eight-chain`, the law of Arruda and Boyce"),
         ("reduced-polynomial", "`yeoh`"),
-        ("prony", "fitted by a `[time]` block"),
+        ("prony", "fitted by `[time]` and `[[prony]]`"),
         ("poisson_ratio", "incompressible"),
         ("ogden", "by the number of terms"),
     ] {

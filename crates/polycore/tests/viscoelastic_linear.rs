@@ -152,3 +152,21 @@ fn isotherms_make_a_master_curve() {
     let expected: Vec<f64> = listed.iter().map(|shift| shift[1]).collect();
     near("decades from -27 to 100 °C", total(&found), total(&expected), 0.3);
 }
+
+/// Relaxation times stay within a decade of those of the data, where a faster term shows in its viscosity alone.
+#[test]
+fn times_stay_near_the_data() {
+    let fast = PronyTerm { modulus: 1e12, time: 1e-9 };
+    let series = Prony { equilibrium: 1e6, terms: vec![fast, PronyTerm { modulus: 1e6, time: 1.0 }] };
+    let sweep: Vec<[f64; 3]> = (0..40)
+        .map(|k| {
+            let frequency = 1e-2 * 10_f64.powf(0.1 * f64::from(k));
+            let [storage, loss] = series.oscillation(frequency);
+            [frequency, storage, loss]
+        })
+        .collect();
+    let found = fit_oscillation(&sweep, &PronySettings::default()).unwrap();
+    let least = 0.1 / (std::f64::consts::TAU * sweep[39][0]);
+    assert!(found.series.terms.iter().all(|term| term.time >= least), "{:?}", found.series);
+    at_most("rms of the storage modulus", found.rms[0], 0.1);
+}

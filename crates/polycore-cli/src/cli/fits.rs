@@ -84,6 +84,9 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
         phases.start("fit with time");
         timed = time_fits::run(time, run, &mut report)?;
     }
+    phases.start("prony");
+    let series = case.prony.iter().map(|set| set.run(directory, !quick, &mut report));
+    let series = series.collect::<Result<Vec<_>, _>>()?;
     phases.start("trials");
     for trial in &case.trials {
         trials::run(trial, &mut report)?;
@@ -100,7 +103,7 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     report.phases(&phases).threads(1).judge(&case.expect, quick);
     trials::judge(&case.trials, &mut report);
     let mut text = summary(case, &all, &timed, &report);
-    networks.iter().for_each(|network| text += network);
+    series.iter().chain(&networks).for_each(|part| text += part);
     for name in &report.non_finite {
         let _ = writeln!(text, "FAIL  {name} is not finite");
     }

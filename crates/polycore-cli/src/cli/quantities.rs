@@ -25,6 +25,20 @@ harness::quantities! {
 }
 
 harness::quantities! {
+    /// Quantities of Prony series, `{prony}`; moduli are those measured, in tension or in shear.
+    pub PRONY:
+    TERMS = "{prony}.terms", "", "terms of the series";
+    SERIES_RMS = "{prony}.rms", "", "root mean square of model/measurement − 1: relaxation modulus, or \
+                                     storage modulus";
+    LOSS_RMS = "{prony}.rms_loss", "", "root mean square of model/measurement − 1 of the loss modulus";
+    EQUILIBRIUM = "{prony}.equilibrium", "MPa", "modulus after a long time";
+    INSTANTANEOUS = "{prony}.instantaneous", "MPa", "modulus at once";
+    WLF_FIRST = "{prony}.wlf_1", "", "WLF constant c₁ of isotherms above the reference";
+    WLF_SECOND = "{prony}.wlf_2", "K", "WLF constant c₂";
+    WLF_RMS = "{prony}.wlf_rms", "", "root mean square of its log₁₀ a_T minus those of the isotherms";
+}
+
+harness::quantities! {
     /// Quantities of tables of networks, `{network}`: deviations are predicted/measured − 1 of shear moduli.
     pub NETWORKS:
     PREDICTED = "{network}.predicted", "", "rows with a prediction";

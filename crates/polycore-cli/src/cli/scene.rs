@@ -13,6 +13,7 @@ use polycore::constitutive::hyperelastic::{
 use serde::Deserialize;
 
 use super::networks::{NetworkSet, NetworkSpec};
+use super::prony::{PronySet, PronySpec};
 use super::quantities as q;
 use super::time::{TimeCase, TimeSettings};
 use super::trials::FitTrial;
@@ -35,6 +36,9 @@ struct Scene {
     /// Laws at single states and fits to a few states, with their expected behaviour.
     #[serde(default)]
     trial: Vec<FitTrial>,
+    /// Relaxation tests and oscillations, for Prony series.
+    #[serde(default)]
+    prony: Vec<PronySpec>,
     /// Tables of polymer networks to predict.
     #[serde(default)]
     network: Vec<NetworkSpec>,
@@ -96,7 +100,7 @@ pub struct DataSet {
 
 /// JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
-    harness::scene::schema("polycore", &[q::ALL, q::NETWORKS], |generator| {
+    harness::scene::schema("polycore", &[q::ALL, q::PRONY, q::NETWORKS], |generator| {
         vec![generator.subschema_for::<Scene>()]
     })
 }
@@ -109,6 +113,7 @@ pub struct FitCase {
     pub cross: bool,
     pub data: Vec<DataSet>,
     pub time: Option<TimeCase>,
+    pub prony: Vec<PronySet>,
     pub trials: Vec<FitTrial>,
     pub networks: Vec<NetworkSet>,
     pub expect: Vec<Expect>,
@@ -117,7 +122,7 @@ pub struct FitCase {
 impl FitCase {
     /// Parses and checks a scene and the tables that it names.
     pub fn parse(source: &Source) -> Result<Self, SceneError> {
-        let Scene { _program: Program::Polycore, title, fit, time, trial, network, expect } =
+        let Scene { _program: Program::Polycore, title, fit, time, prony, trial, network, expect } =
             source.parse()?;
         let laws = match &fit.laws {
             None => MODELS.iter().collect(),
@@ -166,11 +171,17 @@ impl FitCase {
             data.push(DataSet { name: entry.name, table, read });
         }
         let time = time.map(|settings| TimeCase::new(source, settings)).transpose()?;
-        if data.is_empty() && trial.is_empty() && network.is_empty() && time.is_none() {
+        let mut series: Vec<PronySet> = Vec::new();
+        for (i, spec) in prony.into_iter().enumerate() {
+            series.push(spec.read(source, i, &series)?);
+        }
+        let alone = trial.is_empty() && network.is_empty() && time.is_none() && series.is_empty();
+        if data.is_empty() && alone {
             return Err(source.error(
                 "fit.data",
                 "no data",
-                "at least one `[[fit.data]]` with `name` and `file`, `[time]`, `[[trial]]` or `[[network]]`",
+                "at least one `[[fit.data]]` with `name` and `file`, `[time]`, `[[prony]]`, `[[trial]]` or \
+                 `[[network]]`",
             ));
         }
         super::trials::check(source, &trial)?;
@@ -179,7 +190,8 @@ impl FitCase {
             networks.push(spec.read(source, i, &networks)?);
         }
         let (source, cross) = (source.clone(), fit.cross);
-        let case = Self { source, title, laws, cross, data, time, trials: trial, networks, expect };
+        let (prony, trials) = (series, trial);
+        let case = Self { source, title, laws, cross, data, time, prony, trials, networks, expect };
         case.check_expectations()?;
         Ok(case)
     }
@@ -204,10 +216,14 @@ impl FitCase {
         if let Some(time) = &self.time {
             text += &time.plan();
         }
+        self.prony.iter().for_each(|set| text += &format!("{}\n", set.plan()));
         let of_fits = "fits.csv, <data>_states.csv, materials.toml, pictures (not with --quick), ";
         let mut files = if self.data.is_empty() { "" } else { of_fits }.to_owned();
         if !self.networks.is_empty() {
             files += "<network>_networks.csv, ";
+        }
+        if !self.prony.is_empty() {
+            files += "<prony>_prony.csv, <prony>_curve.csv, <prony>_branches.toml, <prony>_prony.inp, ";
         }
         let _ = writeln!(
             text,
@@ -245,6 +261,7 @@ impl FitCase {
         if let Some(time) = &self.time {
             names.extend(time.quantities());
         }
+        names.extend(self.prony.iter().flat_map(PronySet::quantities));
         for set in &self.networks {
             names.extend(set.quantities());
         }
@@ -297,7 +314,7 @@ fn advice(name: &str) -> Option<&'static str> {
         "neohooke" | "neohookean" | "neo" => "`neo-hookean`",
         "marlow" | "vanderwaals" | "extendedtube" => "`eight-chain-root-i2`, which behaves most similarly",
         "prony" | "viscoelastic" | "maxwell" | "creep" => {
-            "an elastic law; rates and relaxation are fitted by a `[time]` block"
+            "an elastic law; rates and relaxation are fitted by `[time]` and `[[prony]]`"
         }
         "poissonratio" | "nu" => {
             "no such parameter: the rubber of a fit is incompressible; compressibility is `bulk_modulus` in \

@@ -258,7 +258,7 @@ impl TimeCase {
 }
 
 /// Checks a name of values and files that nothing else has.
-fn check_own_name<'a>(
+pub fn check_own_name<'a>(
     source: &Source,
     key: &str,
     name: &str,

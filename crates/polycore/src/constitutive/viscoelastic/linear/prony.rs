@@ -9,6 +9,9 @@ use crate::constitutive::viscoelastic::fit::uncertainty;
 use crate::numerics::least_squares::levenberg_marquardt;
 use crate::numerics::nonnegative::nonnegative_least_squares;
 
+/// Relative deviation of a trial whose relaxation times lie too far from the data.
+const REJECTED: f64 = 1e6;
+
 /// Settings of a fit of a Prony series.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PronySettings {
@@ -150,14 +153,18 @@ fn model(series: &Prony, value: &ModulusPoint) -> f64 {
     series.equilibrium * value.rest() + terms.sum::<f64>()
 }
 
-/// Series of a grid of times over those of the data, half a decade wider.
-fn on_grid(values: &[ModulusPoint], per_decade: usize) -> Prony {
+/// Shortest and longest time of the data, s; 1/ω of oscillations.
+fn times_of(values: &[ModulusPoint]) -> [f64; 2] {
     let time = |value: &ModulusPoint| match value.kind {
         Modulus::Relaxation => value.at,
         _ => value.at.recip(),
     };
-    let [least, most] =
-        values.iter().map(time).fold([f64::INFINITY, 0.0_f64], |[a, b], t| [a.min(t), b.max(t)]);
+    values.iter().map(time).fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], t| [a.min(t), b.max(t)])
+}
+
+/// Series of a grid of times over those of the data, half a decade wider.
+fn on_grid(values: &[ModulusPoint], per_decade: usize) -> Prony {
+    let [least, most] = times_of(values);
     let first = least.log10() - 0.5;
     let count = ((most.log10() + 0.5 - first) * per_decade as f64).ceil() as usize + 1;
     let times: Vec<f64> = (0..count).map(|k| 10_f64.powf(first + k as f64 / per_decade as f64)).collect();
@@ -214,7 +221,8 @@ fn merge(series: &mut Prony, k: usize) {
     series.terms.remove(k + 1);
 }
 
-/// Refines the logarithms of all constants; returns the Jacobian of the relative deviations by them.
+/// Refines the logarithms of all constants, relaxation times within a decade of those of the data: beyond, only
+/// ντ or ν of a term is determined. Returns the Jacobian of the relative deviations by the logarithms, too.
 fn refined(values: &[ModulusPoint], start: Prony) -> (Prony, DMatrix<f64>) {
     let has_rest = start.equilibrium > 0.0;
     let offset = usize::from(has_rest);
@@ -226,8 +234,13 @@ fn refined(values: &[ModulusPoint], start: Prony) -> (Prony, DMatrix<f64>) {
             terms: (0..(q.len() - offset) / 2).map(term).collect(),
         }
     };
+    let [least, most] = times_of(values);
+    let allowed = 0.1 * least..=10.0 * most;
     let residuals = |q: &DVector<f64>| {
         let series = series(q);
+        if !series.terms.iter().all(|term| allowed.contains(&term.time)) {
+            return Some(DVector::repeat(values.len(), REJECTED));
+        }
         let found = values.iter().map(|v| v.weight * (model(&series, v) / v.measured - 1.0));
         Some(DVector::from_iterator(values.len(), found))
     };
@@ -253,9 +266,10 @@ fn refined(values: &[ModulusPoint], start: Prony) -> (Prony, DMatrix<f64>) {
     let from = DVector::from_vec(q);
     let end = levenberg_marquardt(from.clone(), 5, residuals, jacobian).at;
     let after = residuals(&end).map_or(f64::NAN, |r| r.norm_squared());
-    let best = if after <= before { end } else { from };
+    let mut best = if after <= before { end } else { from };
+    let mut terms: Vec<[f64; 2]> = best.as_slice()[offset..].chunks_exact(2).map(|q| [q[0], q[1]]).collect();
+    terms.sort_by(|a, b| a[1].total_cmp(&b[1]));
+    best.as_mut_slice()[offset..].copy_from_slice(terms.as_flattened());
     let slopes = jacobian(&best).unwrap_or_else(|| DMatrix::zeros(values.len(), best.len()));
-    let mut found = series(&best);
-    found.terms.sort_by(|a, b| a.time.total_cmp(&b.time));
-    (found, slopes)
+    (series(&best), slopes)
 }
