@@ -27,6 +27,7 @@ mod cli {
     pub mod scene;
     pub mod table_fits;
     pub mod time;
+    pub mod time_block;
     pub mod time_fits;
     pub mod trials;
 }

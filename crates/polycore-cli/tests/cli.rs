@@ -470,8 +470,10 @@ source = "the data are elastic"
     assert!(report.scalar("time.left-out.rms").unwrap() < 1e-3);
     let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
     assert!(read("time_runs.csv").lines().count() == 11, "{}", read("time_runs.csv"));
-    let constants: toml::Table = read("time_constants.toml").parse().unwrap();
-    assert_eq!(constants["law"]["equilibrium"].as_str(), Some("neo-hookean"));
+    let block: toml::Table = read("time_material.toml").parse().unwrap();
+    let solid = &block["material"]["solid"];
+    assert_eq!(solid["constitutive"]["model"].as_str(), Some("neo-hookean"));
+    assert!(solid["branch"][0]["parameters"]["eta"].is_str());
     assert_eq!(read("hold_prediction.csv").lines().count(), 83);
     for (from, to, message) in [
         ("\"0.1 1/s\"\nstarts", "\"0.2 1/s\"\nstarts", "0.01 /s, 0.1 /s"),

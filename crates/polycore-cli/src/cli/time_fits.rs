@@ -20,6 +20,7 @@ use super::material::{DIGITS, digits, stress};
 use super::quantities as q;
 use super::table_fits::unit_of;
 use super::time::TimeCase;
+use super::time_block;
 
 /// Name of the values of all runs together.
 pub const ALL: &str = "all";
@@ -64,7 +65,8 @@ pub fn run(case: &TimeCase, run: &mut Run, report: &mut Report) -> Result<String
     text += &constants(&found);
     let directory = run.options.output;
     write_runs(directory, case, &found)?;
-    write_constants(directory, &found)?;
+    let block = time_block::block(&found)?;
+    atomic_write(directory.join("time_material.toml"), |file| file.write_all(block.as_bytes()))?;
     write_predictions(directory, case, &found)?;
     Ok(text)
 }
@@ -141,25 +143,6 @@ fn write_runs(directory: &Path, case: &TimeCase, found: &TimeFit) -> Result<(), 
         }
     }
     atomic_write(directory.join("time_runs.csv"), |file| file.write_all(text.as_bytes()))
-}
-
-/// Writes `time_constants.toml`: the form and its constants.
-fn write_constants(directory: &Path, found: &TimeFit) -> Result<(), Error> {
-    let mut text = format!("# law with time, rms {}\n", stress(found.pooled.rms, 5));
-    let _ = writeln!(text, "[law]\nequilibrium = \"{}\"", found.form.equilibrium.key);
-    text += "[law.constants]\n";
-    for constant in &found.constants {
-        let (value, unit) = in_megapascals(constant);
-        let number = digits(value, DIGITS);
-        let value = if unit.is_empty() { number } else { format!("\"{number} {unit}\"") };
-        let remark = match (constant.constant.fixed, constant.interval) {
-            (Some((_, reason)), _) => format!("fixed: {reason}"),
-            (None, None) => "the data do not determine it".to_owned(),
-            (None, Some(_)) => "fitted".to_owned(),
-        };
-        let _ = writeln!(text, "\"{}\" = {value} # {remark}", constant.constant.name);
-    }
-    atomic_write(directory.join("time_constants.toml"), |file| file.write_all(text.as_bytes()))
 }
 
 /// Writes `NAME_prediction.csv` of each program.
