@@ -54,6 +54,11 @@ fn rubber_designer() {
 }
 
 #[test]
+fn rubber_that_relaxes() {
+    follow("relaxation", &["out/fit/time_material.toml", "out/bushing/load_displacement.png"]);
+}
+
+#[test]
 fn fracture_researcher() {
     follow("fracture", &["out/calibrate-sweep/sweep.csv", "out/predict/load_displacement.png"]);
 }
