@@ -41,6 +41,11 @@ impl<'a> Observer<Simulation, Error> for StressObserver<'a> {
         to.add(q::WARPAGE, |_| self.value(StressCoupling::warpage));
         to.add(q::MISES_ON_BED, |_| self.value(StressCoupling::mises_on_bed));
         to.add(q::MISES, |_| self.value(StressCoupling::largest_mises));
+        if self.mechanics.settings.release_at.is_some() {
+            let at = |k: usize| self.value(|stress| stress.at_release().map_or(f64::NAN, |found| found[k]));
+            to.add(q::WARPAGE_AT_RELEASE, move |_| at(0));
+            to.add(q::MISES_AT_RELEASE, move |_| at(1));
+        }
         let strength = self.mechanics.settings.law.strength;
         if strength.is_finite() {
             let most = |stress: &StressCoupling<'a>| stress.mises_on_bed().max(stress.largest_mises());
