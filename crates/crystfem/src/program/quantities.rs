@@ -28,6 +28,9 @@ harness::quantities! {
         "with `mechanics.release_at`: flatness error right after the release";
     MISES_AT_RELEASE = "largest_mises_at_release", "Pa",
         "with `mechanics.release_at`: largest Mises stress right after the release";
+    COMPENSATION_RESIDUAL = "compensation_residual", "",
+        "with `mechanics.compensation`: largest distance of a node of the compensated print from its nominal \
+         place, over the largest displacement without compensation";
     MISES_OVER_STRENGTH = "largest_mises_over_strength", "",
         "with `[mechanics]`: largest Mises stress, before or after the release, over the tensile strength of \
          sheets; plasticity is not modelled";

@@ -34,6 +34,10 @@ pub struct MechanicsSpec {
     pub release_at: Option<Time>,
     /// Longest time between two solutions, for relaxation while the temperature rests; default: none.
     pub longest_step: Option<Time>,
+    /// Writes the compensation of the displacements, and prints the compensated shape in simulation; default
+    /// false.
+    #[serde(default)]
+    pub compensation: bool,
     /// Largest change of the linear free strain of an element between two solutions; default 2e-4.
     pub strain_step: Option<f64>,
 }
@@ -101,6 +105,8 @@ pub struct Mechanics {
     pub counts: [usize; 2],
     /// Matrix bytes of all shapes.
     pub matrices: f64,
+    /// True if displacements are compensated.
+    pub compensation: bool,
     /// True if all stressed elements are 4-node tetrahedra, which are too stiff.
     pub stiff: bool,
 }
@@ -203,7 +209,7 @@ impl PartScene {
             release_at: spec.release_at.map(|time| time.si()),
             ..settings
         };
-        Ok(Some(Mechanics { settings, counts, matrices, stiff }))
+        Ok(Some(Mechanics { settings, counts, matrices, compensation: spec.compensation, stiff }))
     }
 
     /// Refuses initial and deposition temperatures outside the range of the law.

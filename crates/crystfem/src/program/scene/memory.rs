@@ -124,7 +124,10 @@ impl PartScene {
                 bytes += nodes * 3.0 * FIELD + elements * 7.0 * FIELD;
             }
         }
-        bytes += system.rows.stored()[2] as f64 * ENTRY;
+        // simulation of the compensated shape beside the first
+        let copies = if mechanics.is_some_and(|mechanics| mechanics.compensation) { 2.0 } else { 1.0 };
+        bytes *= copies;
+        bytes += copies * system.rows.stored()[2] as f64 * ENTRY;
         let states = simulation.behaviours.iter().map(|behaviour| behaviour.states).max().unwrap_or(0) as f64;
         let fixed = matches!(simulation.settings.steps, Steps::Fixed { .. });
         if !fixed {
@@ -136,7 +139,7 @@ impl PartScene {
         let mass = if nodal.weighed { MASS } else { 0.0 };
         bytes += nodal.material.len() as f64 * (POINT + mass + numbers * number);
         bytes += system.general.points() as f64 * (POINT_IN_ELEMENT + (states + 1.0) * (STATE + NEW));
-        bytes += simulation.factors(end) * FACTOR;
+        bytes += copies * simulation.factors(end) * FACTOR;
         if self.output.fields || self.output.pictures {
             bytes += nodes * (WRITTEN_NODE + fields * FIELD) + elements * WRITTEN_ELEMENT;
         }
