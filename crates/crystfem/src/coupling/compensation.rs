@@ -89,3 +89,46 @@ pub fn residual(
     }
     Ok(if largest > 0.0 { left / largest } else { 0.0 })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{Bar, abaqus};
+    use evidence::near;
+
+    /// Layers that shrink by 1 and 2 % along x and are moved get the factors 1/0.99 and 1/0.98; the mesh with
+    /// the opposite displacement has the same elements and is read back from its file.
+    #[test]
+    fn layers_are_scaled_back() {
+        let mesh = Bar::new([20e-3, 5e-3], 2, 1e-3).mesh().unwrap();
+        let layers = crate::mesh::layers::Layers::from_sets(&mesh, "layer-").unwrap().elements;
+        for (layer, strain) in [(0, -0.01), (1, -0.02)] {
+            let mut moved = vec![f64::NAN; 3 * mesh.points.len()];
+            for &node in layers[layer].iter().flat_map(|&element| mesh.nodes(element)) {
+                let own = 3 * node as usize;
+                moved[own..own + 3].copy_from_slice(&[strain * mesh.points[own / 3][0] + 1e-4, 2e-4, 0.0]);
+            }
+            let scales = layer_scales(&mesh, &layers[layer..=layer], &moved);
+            near("compensation_scale", scales[0].factors[0], 1.0 / (1.0 + strain), 1e-12);
+            near("compensation_scale_y", scales[0].factors[1], 1.0, 1e-12);
+            near("compensation_shift", scales[0].shift[1], -2e-4, 1e-15);
+            let shape = opposite(&mesh, &moved);
+            let mut text = Vec::new();
+            abaqus::write(&shape, true, &mut text).unwrap();
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("compensated.inp");
+            std::fs::write(&path, text).unwrap();
+            let read = crate::mesh::read(&path, 1.0).unwrap().mesh;
+            assert_eq!((read.hexahedra, read.element_sets), (shape.hexahedra, shape.element_sets));
+            for ((found, own), (nominal, u)) in
+                read.points.iter().zip(&shape.points).zip(mesh.points.iter().zip(moved.chunks(3)))
+            {
+                for d in 0..3 {
+                    near("compensation_file", found[d], own[d], 1e-12);
+                    let expected = if u[d].is_nan() { nominal[d] } else { nominal[d] - u[d] };
+                    assert_eq!(own[d], expected);
+                }
+            }
+        }
+    }
+}

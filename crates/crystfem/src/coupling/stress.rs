@@ -102,8 +102,8 @@ impl<'a> StressCoupling<'a> {
     /// Starts with an empty part on the mesh of a simulation.
     ///
     /// # Errors
-    /// Errors of [`Body::new`] and [`SolidifyingMaxwell::check`]; [`Error::Mesh`] for fewer than three nodes on the bed, and elements that are
-    /// not connected to it.
+    /// Errors of [`Body::new`] and [`SolidifyingMaxwell::check`]; [`Error::Mesh`] for fewer than three nodes
+    /// on the bed, and elements that are not connected to it.
     pub fn new(mesh: &'a Mesh, settings: StressSettings) -> Result<Self, Error> {
         settings.law.check()?;
         let mut body = Body::new(mesh, settings.law.poisson)?;

@@ -157,7 +157,7 @@ pub(super) fn places(mesh: &Mesh, element: u32) -> Vec<[f64; 3]> {
 }
 
 /// Position of a Gauss point.
-pub(super) fn place(places: &[[f64; 3]], point: usize) -> [f64; 3] {
+pub(super) fn gauss_position(places: &[[f64; 3]], point: usize) -> [f64; 3] {
     let mut place = [0.0; 3];
     for (node, share) in places.iter().zip(element_kind::shares(places.len(), point)) {
         (0..3).for_each(|d| place[d] += share * node[d]);

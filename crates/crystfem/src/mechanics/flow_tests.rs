@@ -25,8 +25,8 @@ fn cube() -> (Mesh, Vec<FixedComponent>) {
     (Mesh { points, hexahedra: vec![[0, 1, 2, 3, 4, 5, 6, 7]], ..Mesh::default() }, supports)
 }
 
-/// Steady flow at four rates, `/work/shared/reference/time/eyring.csv`: √3 τ₀ asinh(√3 ε̇/γ̇₀), γ̇₀ = 1e-8 /s.
-/// The volume relaxes in 2.7e5 s, which lowers the stress by 5e-6.
+/// Steady flow at four rates, `/work/shared/reference/time/eyring.csv`: √3 τ₀ asinh(√3 ε̇/γ̇₀), γ̇₀ =
+/// 1e-8 /s. The volume relaxes in 2.7e5 s, which lowers the stress by 5e-6.
 #[test]
 fn a_bar_yields_at_four_rates() {
     let (mesh, supports) = cube();
@@ -147,8 +147,8 @@ fn energies_of_flow_close() {
     }
 }
 
-/// A bar at fixed length cooled at 1 K/s from 433.15 K with WLF: ∫Eα q e^{−(ξ(t) − ξ(s))/τ}ds by Simpson's rule.
-/// Second order in the step.
+/// A bar at fixed length cooled at 1 K/s from 433.15 K with WLF: ∫Eα q e^{−(ξ(t) − ξ(s))/τ}ds by
+/// Simpson's rule. Second order in the step.
 #[test]
 fn a_bar_vitrifies() {
     let shift = Shift::Wlf { reference: 373.15, constants: [17.44, 51.6] };

@@ -17,9 +17,9 @@ const MAX_ITERATIONS_PER_EQUATION: usize = 20;
 pub(super) const ROUNDING_RATIO: f64 = 1e-14;
 
 impl Body<'_> {
-    /// Solves to a relative residual by conjugate gradients with the inverse 3 × 3 blocks of the nodes and a coarse level of rigid
-    /// motions, on the existing nodes; adds its iterations to the state. `moduli` has the existing elements,
-    /// each with its tangent (default: K̂) and a factor on it.
+    /// Solves to a relative residual by conjugate gradients with the inverse 3 × 3 blocks of the nodes and a
+    /// coarse level of rigid motions, on the existing nodes; adds its iterations to the state. `moduli` has
+    /// the existing elements, each with its tangent (default: K̂) and a factor on it.
     ///
     /// # Errors
     /// [`Error::Parameter`] without convergence.

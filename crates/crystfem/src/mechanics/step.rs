@@ -1,6 +1,6 @@
 //! A step of a body: one linear solution, or Newton's method where branches flow.
 
-use super::body::{Body, FixedComponent, mechanical, place, places};
+use super::body::{Body, FixedComponent, gauss_position, mechanical, places};
 use super::branch::BranchEnergies;
 use super::element::{GAUSS_POINTS, ModalVector, VoigtVector};
 use super::element_kind::ElementTangent;
@@ -53,7 +53,7 @@ impl Body<'_> {
             let (increment, places) = (increment(element), places(self.mesh, element as u32));
             let mut free = [0.0; GAUSS_POINTS];
             for (point, free) in free.iter_mut().enumerate().take(self.points(element)) {
-                *free = free_strain(element, point, place(&places, point));
+                *free = free_strain(element, point, gauss_position(&places, point));
             }
             ElementStep { element, increment, free, modal: ModalVector::zeros(), flowing: None }
         };

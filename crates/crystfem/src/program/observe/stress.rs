@@ -41,7 +41,7 @@ impl<'a> StressObserver<'a> {
     fn write_compensation(&self, displacement: &[f64], to: &Outputs) -> Result<(), Error> {
         let mesh = &self.task.problem.mesh;
         let compensated = opposite(mesh, displacement);
-        atomic_write(&to.folder.join("compensated.inp"), |file| abaqus::write(&compensated, true, file))?;
+        atomic_write(to.folder.join("compensated.inp"), |file| abaqus::write(&compensated, true, file))?;
         let whole = [(0..mesh.element_count() as u32).collect()];
         let layers = if self.task.layers.is_empty() { &whole[..] } else { &self.task.layers };
         let scales = layer_scales(mesh, layers, displacement);

@@ -239,14 +239,17 @@ impl PartScene {
     ///
     /// # Errors
     /// Returns a [`SceneError`].
-    pub(super) fn check_release(&self, source: &Source, last: f64, end: f64) -> Result<(), SceneError> {
+    pub(super) fn check_release(
+        &self,
+        source: &Source,
+        last: Option<f64>,
+        end: f64,
+    ) -> Result<(), SceneError> {
         let release = self.mechanics.as_ref().and_then(|spec| spec.release_at).map(|time| time.si());
-        match release {
-            Some(time) if !(time > last && time <= end || time == last && last == 0.0) => {
-                let allowed = format!("after the last birth at {last} s, up to the end at {end} s");
-                Err(source.error("mechanics.release_at", format!("{time} s"), allowed))
-            }
-            _ => Ok(()),
-        }
+        let refused = |time: &f64| last.is_some_and(|last| *time <= last) || *time > end;
+        let Some(time) = release.filter(refused) else { return Ok(()) };
+        let first = last.map_or("from 0 s".to_owned(), |last| format!("after the last birth at {last} s,"));
+        let allowed = format!("{first} up to the end at {end} s");
+        Err(source.error("mechanics.release_at", format!("{time} s"), allowed))
     }
 }

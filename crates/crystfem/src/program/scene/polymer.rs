@@ -23,8 +23,8 @@ const KEYS: [(&str, &str); 10] = [
     ("upper end of the range, K", "range"),
 ];
 
-/// Solidifying Maxwell body σ = Ĉ(ν):[Σ_A E e + b(T) α Σ_N E e]: amorphous branches, and a network of crystals
-/// whose share is α.
+/// Solidifying Maxwell body σ = Ĉ(ν):[Σ_A E e + b(T) α Σ_N E e]: amorphous branches, and a network of
+/// crystals whose share is α.
 #[derive(Clone, Debug, PartialEq, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PolymerSpec {
