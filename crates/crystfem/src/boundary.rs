@@ -79,6 +79,11 @@ impl Schedule {
         self.values.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
+    /// Highest value.
+    pub fn highest(&self) -> f64 {
+        self.values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// Returns the value at a time, s.
     pub fn value_at(&self, time: f64) -> f64 {
         if let (Some(period), [low, high]) = (self.period, &self.values[..]) {

@@ -5,6 +5,7 @@
 //! checkpoints.
 
 mod bed;
+pub mod compensation;
 mod healing;
 mod stress;
 

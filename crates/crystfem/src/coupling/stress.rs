@@ -29,8 +29,13 @@ pub struct StressSettings {
     /// Largest change of the linear free strain in any element between two solutions; default
     /// [`STRAIN_STEP`].
     pub strain_step: f64,
-    /// Release of the part from the bed at the end; default true.
+    /// Longest time between two solutions, s; default infinite: a hold at one temperature is one step.
+    pub longest_step: f64,
+    /// Release of the part from the bed; default true.
     pub release: bool,
+    /// Release at the end of the first step that reaches this time, s; the free part then anneals. Default:
+    /// at the end.
+    pub release_at: Option<f64>,
 }
 
 impl StressSettings {
@@ -45,7 +50,16 @@ impl StressSettings {
         bed: Option<&str>,
     ) -> Result<Self, Error> {
         let bed = bed_nodes(mesh, &bears, bed)?;
-        Ok(Self { law, initial_alpha: 0.0, bears, bed, strain_step: STRAIN_STEP, release: true })
+        Ok(Self {
+            law,
+            initial_alpha: 0.0,
+            bears,
+            bed,
+            strain_step: STRAIN_STEP,
+            longest_step: f64::INFINITY,
+            release: true,
+            release_at: None,
+        })
     }
 }
 
@@ -69,6 +83,10 @@ pub struct StressState {
     last: Vec<Option<ElementThermalState>>,
     solutions: u64,
     mises_on_bed: f64,
+    /// Time of the last solution, s.
+    time: f64,
+    /// Warpage, m, and largest Mises stress, Pa, after the release.
+    released: Option<[f64; 2]>,
 }
 
 /// Quasi-static stress of a part whose free strain follows temperature and crystallization
@@ -84,9 +102,10 @@ impl<'a> StressCoupling<'a> {
     /// Starts with an empty part on the mesh of a simulation.
     ///
     /// # Errors
-    /// Errors of [`Body::new`]; [`Error::Mesh`] for fewer than three nodes on the bed, and elements that are
-    /// not connected to it.
+    /// Errors of [`Body::new`] and [`SolidifyingMaxwell::check`]; [`Error::Mesh`] for fewer than three nodes
+    /// on the bed, and elements that are not connected to it.
     pub fn new(mesh: &'a Mesh, settings: StressSettings) -> Result<Self, Error> {
+        settings.law.check()?;
         let mut body = Body::new(mesh, settings.law.poisson)?;
         body.tolerance = TOLERANCE;
         if settings.bed.len() < 3 {
@@ -115,30 +134,51 @@ impl<'a> StressCoupling<'a> {
     }
 
     /// Updates after an accepted step, and before the first: activates new elements; solves if the free
-    /// strain changed by more than the strain step, or if elements appear next.
+    /// strain changed by more than the strain step, if the longest step has passed, or if elements appear
+    /// next. Releases the part at its time.
     ///
     /// # Errors
-    /// Errors of [`Body::step`].
+    /// Errors of [`Body::step`]; [`Error::Parameter`] for a temperature outside the range of the law.
     pub fn after_step(&mut self, simulation: &Simulation) -> Result<(), Error> {
+        let due = self.settings.release_at.is_some_and(|time| time <= simulation.time());
+        if due && self.state.released.is_none() {
+            self.update(simulation, true)?;
+            return self.release();
+        }
         self.update(simulation, false)
     }
 
-    /// Solves at the end of a simulation; then releases the part from the bed, if set, by a step of no
-    /// duration with six supports.
+    /// Solves at the end of a simulation; then releases the part from the bed, if set and still to come, by a
+    /// step of no duration with six supports.
     ///
     /// # Errors
-    /// Errors of [`Body::step`].
+    /// Errors of [`Self::after_step`].
     pub fn finish(&mut self, simulation: &Simulation) -> Result<(), Error> {
         self.update(simulation, true)?;
-        self.state.mises_on_bed = self.largest_mises();
-        if self.settings.release {
-            let bed = self.present_bed(&self.displacement());
-            let present = self.state.last.clone();
-            self.solve(&present, &statically_determinate(self.mesh, &bed))?;
-            let bed = self.present_bed(&self.displacement());
-            remove_rigid_motion(self.mesh, &bed, &mut self.body.state.displacement);
+        if self.state.released.is_none() {
+            self.state.mises_on_bed = self.largest_mises();
+            return if self.settings.release { self.release() } else { Ok(()) };
         }
+        self.forget_rigid_motion();
         Ok(())
+    }
+
+    fn release(&mut self) -> Result<(), Error> {
+        self.state.mises_on_bed = self.largest_mises();
+        let present = self.state.last.clone();
+        self.solve(&present, &self.free_supports())?;
+        self.forget_rigid_motion();
+        self.state.released = Some([self.warpage(), self.largest_mises()]);
+        Ok(())
+    }
+
+    fn free_supports(&self) -> Vec<FixedComponent> {
+        statically_determinate(self.mesh, &self.present_bed(&self.displacement()))
+    }
+
+    fn forget_rigid_motion(&mut self) {
+        let bed = self.present_bed(&self.displacement());
+        remove_rigid_motion(self.mesh, &bed, &mut self.body.state.displacement);
     }
 
     fn update(&mut self, simulation: &Simulation, must: bool) -> Result<(), Error> {
@@ -165,6 +205,9 @@ impl<'a> StressCoupling<'a> {
                 continue;
             }
             present[element] = now(element);
+            if let Some(state) = &present[element] {
+                state.nodes[..state.count].iter().try_for_each(|&kelvin| law.check_temperature(kelvin))?;
+            }
             if self.state.last[element].is_none() {
                 // birth temperature: the exchange with neighbours at birth is part of the strain
                 let birth = (simulation.state().born[element] as usize).checked_sub(1);
@@ -189,10 +232,14 @@ impl<'a> StressCoupling<'a> {
         self.body.activate(born, law.branches());
         // elements born now have no part in the past step
         let about = births.get(simulation.state().births).is_some_and(|birth| birth.time <= time);
-        if must || about || change > self.settings.strain_step {
+        let long = time - self.state.time >= self.settings.longest_step;
+        if must || about || long || change > self.settings.strain_step {
             let bed = self.settings.bed.iter();
-            let supports: Vec<FixedComponent> =
-                bed.flat_map(|&node| (0..3).map(move |d| (node, d))).collect();
+            let supports = match self.state.released {
+                Some(_) => self.free_supports(),
+                None => bed.flat_map(|&node| (0..3).map(move |d| (node, d))).collect(),
+            };
+            self.state.time = time;
             self.solve(&present, &supports)?;
             self.state.last = present;
         }
@@ -289,6 +336,11 @@ impl<'a> StressCoupling<'a> {
     /// Largest Mises stress at the end of the print, before the release, Pa; 0 before [`Self::finish`].
     pub fn mises_on_bed(&self) -> f64 {
         self.state.mises_on_bed
+    }
+
+    /// Warpage, m, and largest Mises stress, Pa, right after the release.
+    pub fn at_release(&self) -> Option<[f64; 2]> {
+        self.state.released
     }
 
     /// Warpage, m: range of distances of the bed side from its least-squares plane.

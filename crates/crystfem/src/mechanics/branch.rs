@@ -122,18 +122,41 @@ impl BranchStep {
         Self { carried, gained, stiffness: softening[1] * share * forms.h, change, forms }
     }
 
+    /// Returns the step with another relaxation y.
+    pub fn with_relaxation(&self, relaxation: f64) -> Self {
+        Self::new(BranchInput { relaxation, ..self.change })
+    }
+
+    /// Input of the step.
+    pub fn input(&self) -> &BranchInput {
+        &self.change
+    }
+
+    /// Elastic strain after the first half of growth or melting, over that before.
+    fn first_half(&self) -> f64 {
+        let [before, after] = self.change.share;
+        match after >= before {
+            true if 0.5 * (before + after) > 0.0 => before / (0.5 * (before + after)),
+            true => 0.0,
+            false => 1.0,
+        }
+    }
+
+    /// Coefficients of e and Δε in the elastic strain after relaxation at s̄, before the last half of growth,
+    /// and their derivatives by ln y.
+    pub fn relaxed(&self) -> [[f64; 2]; 2] {
+        let (relaxation, first) = (self.change.relaxation, self.first_half());
+        let decay = (-relaxation).exp();
+        [[first * decay, self.forms.h], [-relaxation * first * decay, decay - self.forms.h]]
+    }
+
     /// Computes the energies from e:Ĉ:e, e:Ĉ:Δε and Δε:Ĉ:Δε with the initial elastic strain e: growth or
     /// melting to s̄, relaxation there, and the rest of growth or melting (Strang splitting).
     pub fn energies(&self, ee: f64, ed: f64, dd: f64) -> BranchEnergies {
         let BranchInput { share: [before, after], softening: [soft, hard], .. } = self.change;
         let (mean, growing) = (0.5 * (before + after), after >= before);
         let [a, b, c] = self.forms.loss;
-        // elastic strain after the first half: e times `first`
-        let first = match growing {
-            true if mean > 0.0 => before / mean,
-            true => 0.0,
-            false => 1.0,
-        };
+        let first = self.first_half();
         let (fee, fed) = (first * first * ee, first * ed);
         let decay = (-self.change.relaxation).exp();
         let after_relaxation =

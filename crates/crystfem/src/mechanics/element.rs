@@ -88,20 +88,16 @@ impl Hexahedron {
                 modes[point].fixed_columns_mut::<3>(3 * mode).copy_from(&strain_of(gradient.into()));
             }
         }
-        let mut full = SMatrix::<f64, 24, 24>::zeros();
-        let mut coupling = SMatrix::<f64, 24, 9>::zeros();
-        let mut own = SMatrix::<f64, 9, 9>::zeros();
-        for point in 0..GAUSS_POINTS {
-            let weighed = elastic * weights[point];
-            full += nodes[point].transpose() * weighed * nodes[point];
-            coupling += nodes[point].transpose() * weighed * modes[point];
-            own += modes[point].transpose() * weighed * modes[point];
-        }
-        let inverse = own.try_inverse()?;
-        let condensed = full - coupling * inverse * coupling.transpose();
+        let own = Condensed::new(&nodes, &modes, |point| elastic * weights[point])?;
+        let Condensed { stiffness: condensed, coupling, inverse } = own;
         let middle =
             slopes([0.0; 3]).map(|local| centre_inverse.transpose() * SVector::<f64, 3>::from(local));
         Some(Self { weights, nodes, modes, condensed, coupling, inverse, elastic, middle })
+    }
+
+    /// Condensed stiffness of moduli at the Gauss points; `None` if the modes have none.
+    pub(super) fn tangent(&self, moduli: &[SMatrix<f64, 6, 6>; GAUSS_POINTS]) -> Option<Condensed> {
+        Condensed::new(&self.nodes, &self.modes, |point| moduli[point] * self.weights[point])
     }
 
     /// Key of a shape: the edges to 1e-12 of their size; equal for elements of the same shape.
@@ -121,13 +117,22 @@ impl Hexahedron {
     /// Nodal forces of stresses at the Gauss points, with condensed modes, and the forces of the modes, an
     /// input of [`Self::strains`].
     pub fn forces(&self, stresses: &[VoigtVector; GAUSS_POINTS]) -> (HexahedronVector, SVector<f64, 9>) {
+        let (nodal, modal) = self.whole_forces(stresses);
+        (nodal - self.coupling * (self.inverse * modal), modal)
+    }
+
+    /// Forces of the nodes, without condensation, and of the modes.
+    pub(super) fn whole_forces(
+        &self,
+        stresses: &[VoigtVector; GAUSS_POINTS],
+    ) -> (HexahedronVector, SVector<f64, 9>) {
         let (mut nodal, mut modal) = (HexahedronVector::zeros(), SVector::<f64, 9>::zeros());
         for point in 0..GAUSS_POINTS {
             let weighed = stresses[point] * self.weights[point];
             nodal += self.nodes[point].transpose() * weighed;
             modal += self.modes[point].transpose() * weighed;
         }
-        (nodal - self.coupling * (self.inverse * modal), modal)
+        (nodal, modal)
     }
 
     /// Strain increments at the Gauss points from nodal displacements, with modes in equilibrium with the
@@ -139,6 +144,15 @@ impl Hexahedron {
         modulus: f64,
     ) -> [VoigtVector; GAUSS_POINTS] {
         let modes = -(self.inverse * (modal / modulus + self.coupling.transpose() * displacement));
+        self.strains_of(displacement, &modes)
+    }
+
+    /// Strains of nodal displacements and modes.
+    pub(super) fn strains_of(
+        &self,
+        displacement: &HexahedronVector,
+        modes: &SVector<f64, 9>,
+    ) -> [VoigtVector; GAUSS_POINTS] {
         std::array::from_fn(|point| self.nodes[point] * displacement + self.modes[point] * modes)
     }
 
@@ -155,6 +169,37 @@ impl Hexahedron {
     /// Shape functions of the corners at a Gauss point.
     pub fn shapes(point: usize) -> [f64; 8] {
         hexahedron::shapes(gauss(point))
+    }
+}
+
+/// Stiffness of a hexahedron after condensation of its modes.
+#[derive(Clone, Debug)]
+pub(super) struct Condensed {
+    pub stiffness: SMatrix<f64, 24, 24>,
+    /// Coupling of nodes and modes.
+    pub coupling: SMatrix<f64, 24, 9>,
+    /// Inverse of the modes' own block.
+    pub inverse: SMatrix<f64, 9, 9>,
+}
+
+impl Condensed {
+    /// Condenses from strains of nodes and modes, and moduli times volumes.
+    fn new(
+        nodes: &[SMatrix<f64, 6, 24>; GAUSS_POINTS],
+        modes: &[SMatrix<f64, 6, 9>; GAUSS_POINTS],
+        modulus: impl Fn(usize) -> SMatrix<f64, 6, 6>,
+    ) -> Option<Self> {
+        let mut full = SMatrix::<f64, 24, 24>::zeros();
+        let mut coupling = SMatrix::<f64, 24, 9>::zeros();
+        let mut own = SMatrix::<f64, 9, 9>::zeros();
+        for point in 0..GAUSS_POINTS {
+            let weighed = modulus(point);
+            full += nodes[point].transpose() * weighed * nodes[point];
+            coupling += nodes[point].transpose() * weighed * modes[point];
+            own += modes[point].transpose() * weighed * modes[point];
+        }
+        let inverse = own.try_inverse()?;
+        Some(Self { stiffness: full - coupling * inverse * coupling.transpose(), coupling, inverse })
     }
 }
 

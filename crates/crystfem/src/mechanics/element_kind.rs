@@ -1,7 +1,8 @@
 //! Element kinds of the mechanics.
 
-use super::element::{ElementVector, GAUSS_POINTS, Hexahedron, ModalVector, VoigtVector};
+use super::element::{Condensed, ElementVector, GAUSS_POINTS, Hexahedron, ModalVector, VoigtVector};
 use super::tetrahedron::{self, Tetrahedron};
+use nalgebra::SMatrix;
 
 /// Maximum number of nodes of an element.
 pub const MAX_NODES_PER_ELEMENT: usize = 10;
@@ -113,11 +114,68 @@ impl MechanicalElement {
         }
     }
 
+    /// Stiffness of moduli at the Gauss points; `None` if singular in the modes of a hexahedron.
+    pub(super) fn tangent(&self, moduli: &[SMatrix<f64, 6, 6>; GAUSS_POINTS]) -> Option<ElementTangent> {
+        match self {
+            Self::Hexahedron(own) => Some(ElementTangent::Hexahedron(Box::new(own.tangent(moduli)?))),
+            Self::Tetrahedron(own) => Some(ElementTangent::Tetrahedron(own.tangent(moduli))),
+        }
+    }
+
+    /// Nodal forces, condensed with a tangent, and modal forces.
+    pub(super) fn forces_with(
+        &self,
+        tangent: &ElementTangent,
+        stresses: &[VoigtVector; GAUSS_POINTS],
+    ) -> (ElementVector, ModalVector) {
+        let (Self::Hexahedron(own), ElementTangent::Hexahedron(tangent)) = (self, tangent) else {
+            return self.forces(stresses);
+        };
+        let (nodal, modal) = own.whole_forces(stresses);
+        let mut all = ElementVector::zeros();
+        all.fixed_rows_mut::<24>(0).copy_from(&(nodal - tangent.coupling * (tangent.inverse * modal)));
+        (all, modal)
+    }
+
+    /// Strain increments, with modes by a tangent.
+    pub(super) fn strains_with(
+        &self,
+        tangent: &ElementTangent,
+        displacement: &ElementVector,
+        modal: &ModalVector,
+    ) -> [VoigtVector; GAUSS_POINTS] {
+        let (Self::Hexahedron(own), ElementTangent::Hexahedron(tangent)) = (self, tangent) else {
+            return self.strains(displacement, modal, 1.0);
+        };
+        let displacement = displacement.fixed_rows::<24>(0).into_owned();
+        let modes = -(tangent.inverse * (modal + tangent.coupling.transpose() * displacement));
+        own.strains_of(&displacement, &modes)
+    }
+
     /// Rotation at the centre by nodal displacements, half their curl, rad.
     pub fn rotation(&self, displacement: &ElementVector) -> [f64; 3] {
         match self {
             Self::Hexahedron(own) => own.rotation(&displacement.fixed_rows::<24>(0).into_owned()),
             Self::Tetrahedron(own) => own.rotation(displacement),
+        }
+    }
+}
+
+/// Stiffness of an element of varying moduli.
+#[derive(Clone, Debug)]
+pub(super) enum ElementTangent {
+    /// With the condensation of the modes.
+    Hexahedron(Box<Condensed>),
+    /// Column by column.
+    Tetrahedron(Vec<f64>),
+}
+
+impl ElementTangent {
+    /// Stiffness, column by column, Pa m.
+    pub fn stiffness(&self) -> &[f64] {
+        match self {
+            Self::Hexahedron(own) => own.stiffness.as_slice(),
+            Self::Tetrahedron(own) => own,
         }
     }
 }

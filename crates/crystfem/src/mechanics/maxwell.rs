@@ -2,38 +2,30 @@
 
 use super::branch::{BranchEnergies, BranchInput, BranchStep};
 use super::eigenstrain::SpecificVolume;
+use super::phase::{Branch, Phase};
 use polycore::constitutive::viscoelastic::Shift;
 
 /// Stiffness over the sum of all moduli below which material flows instead of bearing stress.
 const MELT_STIFFNESS: f64 = 0.01;
 
-/// A Maxwell branch: a modulus that relaxes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Branch {
-    /// Modulus, Pa.
-    pub modulus: f64,
-    /// Relaxation time at the reference of the shift, s; infinite if elastic.
-    pub time: f64,
-}
-
 /// Solidifying Maxwell body, σ = Ĉ(ν):[Σ_A E_i e_i + b(T) s(α) Σ_N E_i e_i], with the elastic strain e_i of
 /// each branch, the stiffness Ĉ of modulus 1, one Poisson's ratio and s = α. New crystals are born without
-/// stress and melting ones lose theirs: no stress-free temperature is needed.
+/// stress and melting ones lose theirs: no stress-free temperature is needed. Shear may flow by Eyring's law.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolidifyingMaxwell {
     /// Free strain.
     pub volume: SpecificVolume,
-    /// Branches of the amorphous phase, and their shift.
-    pub amorphous: (Vec<Branch>, Shift),
-    /// Branches of the crystal network, and their shift.
-    pub network: (Vec<Branch>, Shift),
+    /// Amorphous phase.
+    pub amorphous: Phase,
+    /// Crystal network.
+    pub network: Phase,
     /// Temperatures, K, between which b(T) falls linearly from 1 to 0; `None` for b = 1.
     pub softening: Option<[f64; 2]>,
     /// Poisson's ratio ν.
     pub poisson: f64,
     /// Modulus of the melt over the sum of all others: acts on Δε − Δε* within a step and is then forgotten.
     pub floor: f64,
-    /// Tensile strength, Pa; plastic flow above it is not modelled.
+    /// Tensile strength, Pa: a value to compare with, unlike the flow of [`Phase::flow`].
     pub strength: f64,
 }
 
@@ -48,8 +40,21 @@ pub struct MaxwellIncrement {
     pub floor: f64,
     /// True for a stiffness below 1 % of the sum of all moduli.
     pub melt: bool,
-    /// Step of each branch, and its modulus times b₂ s₂ at the end.
-    branches: Vec<(BranchStep, f64, f64)>,
+    /// Branches of both phases.
+    pub(super) branches: Vec<BranchIncrement>,
+}
+
+/// Branch of an increment.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct BranchIncrement {
+    /// Step without flow.
+    pub step: BranchStep,
+    /// Modulus, Pa.
+    pub modulus: f64,
+    /// Modulus times b₂ s₂ at the end, Pa.
+    pub kept: f64,
+    /// τ₀ of Eyring flow, Pa.
+    pub flow: Option<f64>,
 }
 
 impl SolidifyingMaxwell {
@@ -60,11 +65,11 @@ impl SolidifyingMaxwell {
         let network = [(420e6, f64::INFINITY), (140e6, 10.0), (140e6, 1000.0)];
         Self {
             volume: SpecificVolume::PA12,
-            amorphous: (
+            amorphous: Phase::new(
                 [1.0, 10.0, 100.0].map(third).to_vec(),
                 Shift::Wlf { reference: 324.0, constants: [17.44, 51.6] },
             ),
-            network: (
+            network: Phase::new(
                 network.map(|(modulus, time)| Branch { modulus, time }).to_vec(),
                 Shift::Arrhenius { reference: 433.15, energy: 150e3 },
             ),
@@ -88,8 +93,8 @@ impl SolidifyingMaxwell {
         };
         Self {
             volume,
-            amorphous: (vec![Branch { modulus, time: f64::INFINITY }], Shift::None),
-            network: (Vec::new(), Shift::None),
+            amorphous: Phase::new(vec![Branch { modulus, time: f64::INFINITY }], Shift::None),
+            network: Phase::default(),
             softening: None,
             poisson,
             floor: 0.0,
@@ -101,15 +106,15 @@ impl SolidifyingMaxwell {
     /// without crystals there is no network.
     pub fn with_crystallinity(mut self, crystallinity: f64) -> Self {
         let factor = crystallinity / self.volume.crystallinity;
-        self.network.0.iter_mut().for_each(|branch| branch.modulus *= factor);
-        self.network.0.retain(|branch| branch.modulus > 0.0);
+        self.network.branches.iter_mut().for_each(|branch| branch.modulus *= factor);
+        self.network.branches.retain(|branch| branch.modulus > 0.0);
         self.volume.crystallinity = crystallinity;
         self
     }
 
     /// Number of branches of both phases, and of elastic strains of a point, all 0 at birth.
     pub fn branches(&self) -> usize {
-        self.amorphous.0.len() + self.network.0.len()
+        self.amorphous.branches.len() + self.network.branches.len()
     }
 
     /// Softening b(T).
@@ -122,14 +127,17 @@ impl SolidifyingMaxwell {
         let temperatures = [from[0], to[0]];
         let mut branches = Vec::with_capacity(self.branches());
         let (mut stiffness, mut whole) = (0.0, 0.0);
-        let mut add = |(list, shift): &(Vec<Branch>, Shift), share: [f64; 2], softening: [f64; 2]| {
-            let reduced = shift.reduced_time(temperatures, duration);
-            for branch in list {
+        let mut add = |phase: &Phase, share: [f64; 2], softening: [f64; 2]| {
+            let reduced = phase.reduced_time(temperatures, [from[1], to[1]], duration);
+            let flow = phase.flow.map(|flow| flow.stress_at(to[0]));
+            for branch in &phase.branches {
                 let step =
                     BranchStep::new(BranchInput { relaxation: reduced / branch.time, share, softening });
                 stiffness += branch.modulus * step.stiffness;
                 whole += branch.modulus;
-                branches.push((step, branch.modulus, branch.modulus * softening[1] * share[1]));
+                let kept = branch.modulus * softening[1] * share[1];
+                let flow = flow.filter(|_| branch.time.is_finite());
+                branches.push(BranchIncrement { step, modulus: branch.modulus, kept, flow });
             }
         };
         add(&self.amorphous, [1.0; 2], [1.0; 2]);
@@ -143,9 +151,9 @@ impl SolidifyingMaxwell {
     /// Stress over Ĉ after a hold, Σ E_i e_i, Pa, per strain, for example of a component under uniaxial
     /// stress.
     pub fn relaxation_modulus(&self, temperature: f64, degree: f64, time: f64) -> f64 {
-        let sum = |(list, shift): &(Vec<Branch>, Shift)| -> f64 {
-            let reduced = shift.reduced_time([temperature; 2], time);
-            list.iter().map(|branch| branch.modulus * (-reduced / branch.time).exp()).sum()
+        let sum = |phase: &Phase| -> f64 {
+            let reduced = phase.reduced_time([temperature; 2], [degree; 2], time);
+            phase.branches.iter().map(|branch| branch.modulus * (-reduced / branch.time).exp()).sum()
         };
         sum(&self.amorphous) + self.softness(temperature) * degree * sum(&self.network)
     }
@@ -155,7 +163,7 @@ impl MaxwellIncrement {
     /// Updates the elastic strains, of any components, from Δε of the same; `mechanical` is Δε − Δε* for a
     /// component with a free strain.
     pub fn advance<const N: usize>(&self, strains: &mut [[f64; N]], mechanical: &[f64; N]) {
-        for ((step, _, _), strain) in self.branches.iter().zip(strains) {
+        for (BranchIncrement { step, .. }, strain) in self.branches.iter().zip(strains) {
             for (e, d) in strain.iter_mut().zip(mechanical) {
                 *e = step.carried * *e + step.gained * d;
             }
@@ -165,8 +173,8 @@ impl MaxwellIncrement {
     /// Σ E b₂ s₂ e over the branches, Pa: the stress over Ĉ, from elastic strains at the end of the step.
     pub fn stress<const N: usize>(&self, strains: &[[f64; N]]) -> [f64; N] {
         let mut sum = [0.0; N];
-        for ((_, _, modulus), strain) in self.branches.iter().zip(strains) {
-            sum.iter_mut().zip(strain).for_each(|(sum, e)| *sum += modulus * e);
+        for (BranchIncrement { kept, .. }, strain) in self.branches.iter().zip(strains) {
+            sum.iter_mut().zip(strain).for_each(|(sum, e)| *sum += kept * e);
         }
         sum
     }
@@ -179,7 +187,7 @@ impl MaxwellIncrement {
         product: impl Fn(&[f64; N], &[f64; N]) -> f64,
     ) -> BranchEnergies {
         let mut sum = BranchEnergies::default();
-        for ((step, modulus, _), strain) in self.branches.iter().zip(strains) {
+        for (BranchIncrement { step, modulus, .. }, strain) in self.branches.iter().zip(strains) {
             let one = step.energies(
                 product(strain, strain),
                 product(strain, mechanical),
@@ -211,8 +219,8 @@ mod tests {
         };
         SolidifyingMaxwell {
             volume,
-            amorphous: (vec![branch(0.4e9, f64::INFINITY), branch(0.6e9, 30.0)], shift),
-            network: (Vec::new(), Shift::None),
+            amorphous: Phase::new(vec![branch(0.4e9, f64::INFINITY), branch(0.6e9, 30.0)], shift),
+            network: Phase::default(),
             softening: None,
             poisson: 0.3,
             floor: 0.0,
@@ -260,8 +268,8 @@ mod tests {
     #[test]
     fn a_held_cube_crystallizes() {
         let body = SolidifyingMaxwell {
-            amorphous: (Vec::new(), Shift::None),
-            network: (vec![Branch { modulus: 1e9, time: f64::INFINITY }], Shift::None),
+            amorphous: Phase::default(),
+            network: Phase::new(vec![Branch { modulus: 1e9, time: f64::INFINITY }], Shift::None),
             softening: None,
             floor: 0.0,
             ..SolidifyingMaxwell::pa12()
@@ -356,8 +364,8 @@ mod tests {
     #[test]
     fn a_plate_cools_with_residual_stress() {
         let elastic = SolidifyingMaxwell {
-            amorphous: (Vec::new(), Shift::None),
-            network: (vec![Branch { modulus: 1e9, time: f64::INFINITY }], Shift::None),
+            amorphous: Phase::default(),
+            network: Phase::new(vec![Branch { modulus: 1e9, time: f64::INFINITY }], Shift::None),
             softening: None,
             ..SolidifyingMaxwell::pa12()
         };

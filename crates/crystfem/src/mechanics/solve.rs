@@ -14,23 +14,25 @@ const NONE: u32 = u32::MAX;
 const MAX_ITERATIONS_PER_EQUATION: usize = 20;
 
 /// Relative size of a load, over its contributions, that is rounding.
-const ROUNDING_RATIO: f64 = 1e-14;
+pub(super) const ROUNDING_RATIO: f64 = 1e-14;
 
 impl Body<'_> {
-    /// Solves by conjugate gradients with the inverse 3 × 3 blocks of the nodes and a coarse level of rigid
-    /// motions, on the existing nodes; adds its iterations to the state.
+    /// Solves to a relative residual by conjugate gradients with the inverse 3 × 3 blocks of the nodes and a
+    /// coarse level of rigid motions, on the existing nodes; adds its iterations to the state. `moduli` has
+    /// the existing elements, each with its tangent (default: K̂) and a factor on it.
     ///
     /// # Errors
     /// [`Error::Parameter`] without convergence.
     pub(super) fn solve(
         &mut self,
-        moduli: &[(usize, f64)],
+        moduli: &[(usize, Option<&[f64]>, f64)],
         free: &[[bool; 3]],
-        load: NodalLoad,
+        load: &NodalLoad,
+        tolerance: f64,
     ) -> Result<Vec<Vector3<f64>>, Error> {
         // index of each node among the existing ones
         let mut number = vec![NONE; free.len()];
-        for &node in moduli.iter().flat_map(|&(element, _)| self.nodes(element)) {
+        for &node in moduli.iter().flat_map(|&(element, ..)| self.nodes(element)) {
             number[node as usize] = 0;
         }
         let mut nodes = Vec::new();
@@ -39,9 +41,10 @@ impl Body<'_> {
             nodes.push(node);
         }
         let points: Vec<[f64; 3]> = nodes.iter().map(|&node| self.mesh.points[node]).collect();
-        let stiff = moduli
-            .iter()
-            .map(|&(element, modulus)| (self.nodes(element), self.shape_of(element).condensed(), modulus));
+        let stiff = moduli.iter().map(|&(element, tangent, modulus)| {
+            let stiffness = tangent.unwrap_or_else(|| self.shape_of(element).condensed());
+            (self.nodes(element), stiffness, modulus)
+        });
         let mut elements = Elements::new(stiff, &number, nodes.iter().map(|&node| free[node]).collect());
         let free = elements.free();
         let mut residual: Vec<Vector3<f64>> = nodes.iter().map(|&node| load.sum[node]).collect();
@@ -62,8 +65,7 @@ impl Body<'_> {
         for (value, free) in residual.iter_mut().zip(free) {
             (0..3).filter(|&d| !free[d]).for_each(|d| value[d] = 0.0);
         }
-        let goal =
-            (self.tolerance * dot(&residual, &residual).sqrt()).max(ROUNDING_RATIO * load.parts.sqrt());
+        let goal = (tolerance * dot(&residual, &residual).sqrt()).max(ROUNDING_RATIO * load.parts.sqrt());
         if dot(&residual, &residual).sqrt() <= goal {
             return Ok(vec![Vector3::zeros(); number.len()]);
         }

@@ -1,7 +1,7 @@
 use super::*;
-use crate::mechanics::{Hexahedron, SolidifyingMaxwell};
+use crate::mechanics::{Branch, EyringFlow, Hexahedron, MaxwellIncrement, Phase, Shift, SolidifyingMaxwell};
 use evidence::{at_most, near};
-use nalgebra::SVector;
+use nalgebra::{SVector, Vector3};
 
 /// Returns an elastic body without expansion.
 fn elastic(modulus: f64) -> SolidifyingMaxwell {
@@ -260,4 +260,59 @@ fn unsupported_elements_are_refused() {
     assert!(Body::new(&twisted, 0.3).is_err());
     let wedge = crate::mesh::Cell::new(&[0, 1, 3, 4, 5, 7]).unwrap();
     assert!(Body::new(&Mesh { others: vec![wedge], ..mesh }, 0.3).is_err());
+}
+
+/// A bimetal creeps to Timoshenko's curvature of the moduli that remain, 3 and 0.5 GPa: 3.618421053 /m; if
+/// both layers relax alike its curvature stays and its stress falls by e^{−t/τ}. With flow both, and the
+/// yielding one in many steps, stay in balance.
+#[test]
+fn a_bimetal_creeps() {
+    let mesh = block([16, 1, 3], [0.04, 2e-3, 3e-3]);
+    let low = |element: usize| element < 16;
+    let law = |branches: &[(f64, f64)], stress: Option<f64>| {
+        let branches = branches.iter().map(|&(modulus, time)| Branch { modulus, time }).collect();
+        let flow = stress.map(|stress| EyringFlow { stress, reference: 300.0 });
+        let amorphous = Phase { flow, ..Phase::new(branches, Shift::None) };
+        SolidifyingMaxwell { amorphous, ..elastic(1.0) }
+    };
+    let shrink = |e: usize| if low(e) { -0.01 } else { -0.02 };
+    let bent = |lower: &SolidifyingMaxwell, upper: &SolidifyingMaxwell, times: &[f64]| {
+        let mut body = Body::new(&mesh, 0.0).unwrap();
+        body.activate(0..48, 2);
+        let law = |e: usize| if low(e) { lower } else { upper };
+        for (k, &time) in times.iter().enumerate() {
+            let free = |e: usize, _: usize, _: [f64; 3]| if k == 0 { shrink(e) } else { 0.0 };
+            let increment = |e: usize| law(e).increment([300.0, 0.0], [300.0, 0.0], time);
+            body.step(increment, free, &resting(&mesh)).unwrap();
+        }
+        (curvature(&mesh, &body).abs(), body.stress(8, 0)[0], body.state.balance)
+    };
+    let still = [(1.5e9, f64::INFINITY), (1.5e9, f64::INFINITY)];
+    let creeping = [(0.5e9, f64::INFINITY), (1e9, 10.0)];
+    // κ = 6ε(1 + m)²/(h(3(1 + m)² + (1 + mn)(m² + 1/(mn)))), m = t₁/t₂, n = E₁/E₂
+    let timoshenko = |m: f64, n: f64| {
+        let square = (1.0 + m) * (1.0 + m);
+        6.0 * 0.01 * square / (3e-3 * (3.0 * square + (1.0 + m * n) * (m * m + 1.0 / (m * n))))
+    };
+    let times: Vec<f64> = std::iter::once(0.0).chain((0..60).map(|_| 5.0)).collect();
+    let (found, ..) = bent(&law(&still, None), &law(&creeping, None), &times);
+    near("creeping_bimetal", found / timoshenko(0.5, 6.0), 1.0, 3e-4);
+    // τ₀ far above all stresses: the linear body
+    let (linear, stress, _) = bent(&law(&still, None), &law(&creeping, None), &times[..4]);
+    let (flowing, flowed, balance) = bent(&law(&still, Some(1e15)), &law(&creeping, Some(1e15)), &times[..4]);
+    near("creeping_bimetal_without_flow", flowing / linear, 1.0, 1e-9);
+    near("creeping_bimetal_stress", flowed / stress, 1.0, 1e-9);
+    at_most("creeping_bimetal_closure", balance.worst, 1e-12);
+    let alike = |modulus: f64| law(&[(0.5 * modulus, 10.0), (0.5 * modulus, 10.0)], None);
+    let (first, fresh, _) = bent(&alike(3e9), &alike(1.5e9), &[0.0]);
+    let (later, old, _) = bent(&alike(3e9), &alike(1.5e9), &[0.0, 7.0, 13.0]);
+    near("relaxing_bimetal", later / first, 1.0, 1e-9);
+    near("relaxing_bimetal_stress", old / fresh, (-2.0_f64).exp(), 1e-9);
+    // a layer that yields ends where its elastic part alone bends
+    let yields = [(0.5e9, f64::INFINITY), (1e9, 1e4)];
+    let times: Vec<f64> =
+        std::iter::once(0.0).chain((-10..=60).map(|k| 10.0_f64.powf(0.1 * f64::from(k)))).collect();
+    let (found, _, balance) = bent(&law(&still, None), &law(&yields, Some(1.6e6)), &times);
+    near("yielded_bimetal", found / timoshenko(0.5, 6.0), 1.0, 3e-4);
+    at_most("yielded_bimetal_closure", balance.worst, 1e-12);
 }

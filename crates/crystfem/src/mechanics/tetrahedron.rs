@@ -52,22 +52,13 @@ impl Tetrahedron {
             gradients.extend(own);
         }
         let middle = derivatives(places, [0.25; 3])?.0;
-        let mut stiffness = vec![0.0; 9 * nodes * nodes];
-        for (own, weight) in gradients.chunks_exact(nodes).zip(weights) {
-            let strains: Vec<SMatrix<f64, 6, 3>> = own.iter().map(|gradient| strain_of(*gradient)).collect();
-            for (column, strain) in strains.iter().enumerate() {
-                let stress = elastic * strain * weight;
-                for (row, other) in strains.iter().enumerate() {
-                    let block = other.transpose() * stress;
-                    for j in 0..3 {
-                        for i in 0..3 {
-                            stiffness[(3 * column + j) * 3 * nodes + 3 * row + i] += block[(i, j)];
-                        }
-                    }
-                }
-            }
-        }
+        let stiffness = assemble(nodes, &gradients, weights, |_| elastic);
         Some(Self { nodes, points, weights, gradients, middle, stiffness, elastic })
+    }
+
+    /// Stiffness of moduli at the Gauss points, column by column.
+    pub(super) fn tangent(&self, moduli: &[SMatrix<f64, 6, 6>; GAUSS_POINTS]) -> Vec<f64> {
+        assemble(self.nodes, &self.gradients, self.weights, |point| moduli[point])
     }
 
     /// Stress over the modulus, from an elastic strain.
@@ -112,6 +103,31 @@ impl Tetrahedron {
     pub fn points(&self) -> usize {
         self.points
     }
+}
+
+/// Σ w Bᵀ C B over the Gauss points, column by column.
+fn assemble(
+    nodes: usize,
+    gradients: &[[f64; 3]],
+    weights: [f64; 4],
+    modulus: impl Fn(usize) -> SMatrix<f64, 6, 6>,
+) -> Vec<f64> {
+    let mut stiffness = vec![0.0; 9 * nodes * nodes];
+    for (point, (own, weight)) in gradients.chunks_exact(nodes).zip(weights).enumerate() {
+        let strains: Vec<SMatrix<f64, 6, 3>> = own.iter().map(|gradient| strain_of(*gradient)).collect();
+        for (column, strain) in strains.iter().enumerate() {
+            let stress = modulus(point) * strain * weight;
+            for (row, other) in strains.iter().enumerate() {
+                let block = other.transpose() * stress;
+                for j in 0..3 {
+                    for i in 0..3 {
+                        stiffness[(3 * column + j) * 3 * nodes + 3 * row + i] += block[(i, j)];
+                    }
+                }
+            }
+        }
+    }
+    stiffness
 }
 
 /// Shape functions at a Gauss point.

@@ -22,8 +22,15 @@ harness::quantities! {
         "with `[mechanics]`: flatness error of the bed side at the end, about its least-squares plane";
     LARGEST_DISPLACEMENT = "largest_displacement", "m", "with `[mechanics]`: largest displacement at the end";
     MISES_ON_BED = "largest_mises_on_bed", "Pa",
-        "with `[mechanics]`: largest Mises stress at the end, before the release";
-    MISES = "largest_mises", "Pa", "with `[mechanics]`: largest Mises stress after the release";
+        "with `[mechanics]`: largest Mises stress before the release";
+    MISES = "largest_mises", "Pa", "with `[mechanics]`: largest Mises stress at the end, after the release";
+    WARPAGE_AT_RELEASE = "warpage_at_release", "m",
+        "with `mechanics.release_at`: flatness error right after the release";
+    MISES_AT_RELEASE = "largest_mises_at_release", "Pa",
+        "with `mechanics.release_at`: largest Mises stress right after the release";
+    COMPENSATION_RESIDUAL = "compensation_residual", "",
+        "with `mechanics.compensation`: largest distance of a node of the compensated print from its nominal \
+         place, over the largest displacement without compensation";
     MISES_OVER_STRENGTH = "largest_mises_over_strength", "",
         "with `[mechanics]`: largest Mises stress, before or after the release, over the tensile strength of \
          sheets; plasticity is not modelled";

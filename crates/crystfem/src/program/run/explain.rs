@@ -50,7 +50,11 @@ pub fn explain_scene(
             "builds     stress of {bearing} elements of {shapes} shapes, {} nodes on the bed{}; solved \
               whenever the free strain changes by {:e}, with about 45 matrix products per element",
             mechanics.settings.bed.len(),
-            if mechanics.settings.release { ", released at the end" } else { "" },
+            match (mechanics.settings.release, mechanics.settings.release_at) {
+                (false, _) => String::new(),
+                (true, None) => ", released at the end".to_owned(),
+                (true, Some(time)) => format!(", released at {time} s"),
+            },
             mechanics.settings.strain_step
         ));
     }

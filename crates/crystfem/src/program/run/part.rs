@@ -170,7 +170,15 @@ fn solve(
             }
             if result.is_err() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let flow = simulation.advance_unless(interrupted, until, &mut observe)?;
+        // the release comes at its time
+        let release = task.mechanics.as_ref().and_then(|mechanics| mechanics.settings.release_at);
+        let release = release.filter(|&time| time > simulation.time() && time < until);
+        let mut flow = ControlFlow::Continue(());
+        for stop in release.into_iter().chain([until]) {
+            if flow.is_continue() {
+                flow = simulation.advance_unless(interrupted, stop, &mut observe)?;
+            }
+        }
         result?;
         if flow.is_break() {
             // interrupted within a step

@@ -2,12 +2,13 @@
 
 use super::PartScene;
 use super::locate_error::located;
+use super::polymer::PolymerSpec;
 use crate::coupling::{STRAIN_STEP, StressSettings, loose_elements};
 use crate::mechanics::{SolidifyingMaxwell, is_supported, key};
 use crate::mesh::Mesh;
 use crate::mesh::path::ToolPath;
 use harness::scene::{SceneError, Source};
-use polycore::units::{PerTemperature, Ratio, Stress};
+use polycore::units::{PerTemperature, Ratio, Stress, Time};
 use serde::Deserialize;
 use std::collections::HashSet;
 
@@ -26,9 +27,17 @@ pub struct MechanicsSpec {
     /// Surface or side of the mesh whose nodes are fixed during printing; default: the nodes that the part
     /// shares with other materials.
     pub bed: Option<String>,
-    /// Releases the part from the bed at the end; default true.
+    /// Releases the part from the bed, at the end or at `release_at`; default true.
     #[serde(default = "super::default_true")]
     pub release: bool,
+    /// Time of the release, for annealing of the free part until the end of the run; default: the end.
+    pub release_at: Option<Time>,
+    /// Longest time between two solutions, for relaxation while the temperature rests; default: none.
+    pub longest_step: Option<Time>,
+    /// Writes the compensation of the displacements, and prints the compensated shape in simulation; default
+    /// false.
+    #[serde(default)]
+    pub compensation: bool,
     /// Largest change of the linear free strain of an element between two solutions; default 2e-4.
     pub strain_step: Option<f64>,
 }
@@ -41,6 +50,8 @@ pub enum MechanicsLaw {
     Pa12,
     /// Elastic, with thermal expansion, for any material.
     Elastic(ElasticSpec),
+    /// Relaxing, with shifts of the relaxation times and flow, for any material.
+    Polymer(Box<PolymerSpec>),
 }
 
 /// Linear thermoelasticity, σ = C:(ε − α ΔT 1).
@@ -60,8 +71,10 @@ pub struct ElasticSpec {
 impl MechanicsLaw {
     /// Returns the law of a material with this ultimate crystallinity.
     fn build(&self, source: &Source, crystallinity: f64) -> Result<SolidifyingMaxwell, SceneError> {
-        let Self::Elastic(spec) = self else {
-            return Ok(SolidifyingMaxwell::pa12().with_crystallinity(crystallinity));
+        let spec = match self {
+            Self::Pa12 => return Ok(SolidifyingMaxwell::pa12().with_crystallinity(crystallinity)),
+            Self::Polymer(spec) => return spec.build(source),
+            Self::Elastic(spec) => spec,
         };
         let wrong = |key: &str, found: f64, allowed: &str| {
             Err(source.error(&format!("mechanics.law.elastic.{key}"), found, allowed))
@@ -92,6 +105,8 @@ pub struct Mechanics {
     pub counts: [usize; 2],
     /// Matrix bytes of all shapes.
     pub matrices: f64,
+    /// True if displacements are compensated.
+    pub compensation: bool,
     /// True if all stressed elements are 4-node tetrahedra, which are too stiff.
     pub stiff: bool,
 }
@@ -120,6 +135,20 @@ impl PartScene {
             let found = format!("`{}`, a material that does not crystallize", spec.material);
             return Err(source.error("mechanics.material", found, "a semicrystalline material"));
         }
+        if let MechanicsLaw::Polymer(law) = &spec.law {
+            law.check_crystals(source, &spec.material, material.kinetics.is_some())?;
+        }
+        for (name, given) in [("release_at", spec.release_at), ("longest_step", spec.longest_step)] {
+            let first = if name == "release_at" { 0.0 } else { f64::MIN_POSITIVE };
+            if let Some(time) = given.map(|t| t.si()).filter(|t| !(*t >= first && t.is_finite())) {
+                let allowed = if first > 0.0 { "above 0 s, finite" } else { "0 s or later, finite" };
+                return Err(source.error(&format!("mechanics.{name}"), time, allowed));
+            }
+        }
+        if spec.release_at.is_some() && !spec.release {
+            let why = "`release = false` keeps the part on its bed; remove one";
+            return Err(source.conflict("mechanics.release_at", "mechanics.release", why));
+        }
         let strain_step = spec.strain_step.unwrap_or(STRAIN_STEP);
         if !(strain_step > 0.0 && strain_step.is_finite()) {
             return Err(source.error("mechanics.strain_step", strain_step, "above 0, finite"));
@@ -137,6 +166,7 @@ impl PartScene {
         }
         let share = |given: Option<Ratio>| given.map_or(0.0, |ratio| ratio.si());
         let law = spec.law.build(source, share(material.crystallinity))?;
+        self.check_temperatures(source, &spec.material, &law)?;
         let settings = StressSettings::new(mesh, law, bears, spec.bed.as_deref())
             .map_err(|error| located(source, "mechanics.bed", &error))?;
         let StressSettings { bears, bed, .. } = &settings;
@@ -174,9 +204,52 @@ impl PartScene {
         let settings = StressSettings {
             initial_alpha: share(material.initial_alpha),
             strain_step,
+            longest_step: spec.longest_step.map_or(f64::INFINITY, |time| time.si()),
             release: spec.release,
+            release_at: spec.release_at.map(|time| time.si()),
             ..settings
         };
-        Ok(Some(Mechanics { settings, counts, matrices, stiff }))
+        Ok(Some(Mechanics { settings, counts, matrices, compensation: spec.compensation, stiff }))
+    }
+
+    /// Refuses initial and deposition temperatures outside the range of the law.
+    fn check_temperatures(
+        &self,
+        source: &Source,
+        material: &str,
+        law: &SolidifyingMaxwell,
+    ) -> Result<(), SceneError> {
+        let check = |key: &str, kelvin: f64| {
+            law.check_temperature(kelvin).map_err(|error| located(source, key, &error))
+        };
+        for (index, region) in
+            self.region.iter().enumerate().filter(|(_, region)| region.material == material)
+        {
+            check(&format!("region[{index}].temperature"), region.temperature.si())?;
+        }
+        let printed = self.print.as_ref().and_then(|print| print.temperature.as_ref());
+        let printed = printed.map(|schedule| schedule.build(source, "print.temperature")).transpose()?;
+        for kelvin in printed.iter().flat_map(|schedule| [schedule.lowest(), schedule.highest()]) {
+            check("print.temperature", kelvin)?;
+        }
+        Ok(())
+    }
+
+    /// Refuses a release before the last birth or after the end.
+    ///
+    /// # Errors
+    /// Returns a [`SceneError`].
+    pub(super) fn check_release(
+        &self,
+        source: &Source,
+        last: Option<f64>,
+        end: f64,
+    ) -> Result<(), SceneError> {
+        let release = self.mechanics.as_ref().and_then(|spec| spec.release_at).map(|time| time.si());
+        let refused = |time: &f64| last.is_some_and(|last| *time <= last) || *time > end;
+        let Some(time) = release.filter(refused) else { return Ok(()) };
+        let first = last.map_or("from 0 s".to_owned(), |last| format!("after the last birth at {last} s,"));
+        let allowed = format!("{first} up to the end at {end} s");
+        Err(source.error("mechanics.release_at", format!("{time} s"), allowed))
     }
 }

@@ -27,6 +27,8 @@ const PRINTED: f64 = 300.0;
 /// checkpoint; per node: displacements, blocks and solver vectors.
 const STRESSED: f64 = 3.0 * 7.0 * 8.0 * 48.0 + 1800.0;
 const STRESSED_NODE: f64 = 450.0;
+/// Flow, per element: strains, their change and the tangent with its modes, in a Newton step.
+const FLOWING: f64 = 2.0 * 8.0 * 48.0 + (24.0 * 24.0 + 24.0 * 9.0 + 81.0) * 8.0 + 64.0;
 /// Nodes per group of the coarse level, which has six unknowns per group.
 const GROUP: f64 = 64.0;
 /// Entry of the conduction matrix during sorting.
@@ -111,6 +113,9 @@ impl PartScene {
         }
         if let Some(mechanics) = mechanics {
             let bearing = mechanics.counts[0] as f64;
+            if mechanics.settings.law.flows() {
+                bytes += bearing * FLOWING;
+            }
             bytes += bearing * STRESSED + mechanics.matrices + nodes * STRESSED_NODE;
             // band as wide as the section of a compact body
             let groups = nodes / GROUP + 1.0;
@@ -119,7 +124,10 @@ impl PartScene {
                 bytes += nodes * 3.0 * FIELD + elements * 7.0 * FIELD;
             }
         }
-        bytes += system.rows.stored()[2] as f64 * ENTRY;
+        // simulation of the compensated shape beside the first
+        let copies = if mechanics.is_some_and(|mechanics| mechanics.compensation) { 2.0 } else { 1.0 };
+        bytes *= copies;
+        bytes += copies * system.rows.stored()[2] as f64 * ENTRY;
         let states = simulation.behaviours.iter().map(|behaviour| behaviour.states).max().unwrap_or(0) as f64;
         let fixed = matches!(simulation.settings.steps, Steps::Fixed { .. });
         if !fixed {
@@ -131,7 +139,7 @@ impl PartScene {
         let mass = if nodal.weighed { MASS } else { 0.0 };
         bytes += nodal.material.len() as f64 * (POINT + mass + numbers * number);
         bytes += system.general.points() as f64 * (POINT_IN_ELEMENT + (states + 1.0) * (STATE + NEW));
-        bytes += simulation.factors(end) * FACTOR;
+        bytes += copies * simulation.factors(end) * FACTOR;
         if self.output.fields || self.output.pictures {
             bytes += nodes * (WRITTEN_NODE + fields * FIELD) + elements * WRITTEN_ELEMENT;
         }

@@ -106,6 +106,7 @@ impl PartScene {
             let allowed = format!("after the last birth at {last} s");
             return Err(source.error("time.end", format!("{end} s"), allowed));
         }
+        self.check_release(source, births.iter().map(|birth| birth.time).reduce(f64::max), end)?;
         for (spec, place) in self.probe.iter().zip(&probes) {
             if place.elements().iter().all(|element| absent.binary_search(element).is_ok()) {
                 notes
