@@ -9,6 +9,8 @@ harness::quantities! {
     R2 = "{fit}.r2", "", "coefficient of determination 1 − Σr²/Σ(P − P̄)²";
     LOCKED = "{fit}.locked", "", "with `cross`: number of states of the other data beyond the locking \
                                   stretch of the law; if there are any, other values are missing";
+    OUTSIDE = "{fit}.outside", "", "with `cross`: number of states of the other data out of distribution, i.e. \
+                                    outside the strains that the data of the fit cover";
     STABLE = "{fit}.stable", "", "1 if the law is stable (Drucker) in uniaxial, equibiaxial and pure shear \
                                   tests over the stretches of its data, else 0";
     FAILED = "{fit}.failed", "", "1 if the law could not be fitted; other values are missing";

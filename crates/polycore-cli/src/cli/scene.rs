@@ -56,7 +56,7 @@ enum Program {
 struct FitSettings {
     /// Names of laws; all laws if not given.
     laws: Option<Vec<String>>,
-    /// Judge a law fitted to one table on the other tables, too.
+    /// Judge a law fitted to one table on the other tables of the same `material`, too.
     #[serde(default)]
     cross: bool,
     /// Tables of measurements.
@@ -84,12 +84,20 @@ struct TestTableSpec {
     strain_column: Option<String>,
     /// Heading of the stress, if there are several.
     stress_column: Option<String>,
+    /// Material, in a table with one stress component in each row: a cell of its column `material` or
+    /// `source`.
+    material: Option<String>,
+    /// Tests of a table with one stress component in each row, as the file names them: `["UT", "UC"]`.
+    #[serde(default)]
+    tests: Vec<String>,
 }
 
 /// Table to be fitted.
 pub struct DataSet {
     pub name: String,
     pub table: TestData,
+    /// Material, if the scene names one.
+    pub material: Option<String>,
     /// Layout of the file, and the rows left out, one line each.
     pub read: Vec<String>,
 }
@@ -145,6 +153,8 @@ impl FitCase {
                 stress_unit: entry.stress_unit,
                 strain_column: entry.strain_column,
                 stress_column: entry.stress_column,
+                material: entry.material.clone(),
+                tests: entry.tests,
             };
             let reading = TestData::read_as(source.file(&entry.file), &format)
                 .map_err(|error| source.refused(&key("file"), error))?;
@@ -163,7 +173,7 @@ impl FitCase {
                     return Err(source.error(&key("file"), found, allowed));
                 }
             }
-            data.push(DataSet { name: entry.name, table, read });
+            data.push(DataSet { name: entry.name, table, material: entry.material, read });
         }
         let time = time.map(|settings| TimeCase::new(source, settings)).transpose()?;
         if data.is_empty() && trial.is_empty() && network.is_empty() && time.is_none() {
@@ -187,7 +197,7 @@ impl FitCase {
     /// Describes what a run will do, in lines.
     pub fn plan(&self) -> String {
         let mut text = format!("{}: {}\n", self.source.path.display(), self.title);
-        for DataSet { name, table, read } in &self.data {
+        for DataSet { name, table, read, .. } in &self.data {
             let (states, measured) = (table.states.len(), table.measurements());
             let source =
                 if table.source.is_empty() { "no line `# source: …` in it" } else { &table.source };
@@ -221,20 +231,27 @@ impl FitCase {
         text
     }
 
+    /// Tables on which a law that is fitted to `set` is judged, too.
+    pub fn others<'a>(&'a self, set: &DataSet) -> impl Iterator<Item = &'a DataSet> {
+        let (name, material) = (set.name.clone(), set.material.clone());
+        self.data.iter().filter(move |other| self.cross && other.name != name && other.material == material)
+    }
+
     /// Lists the names of all scalars of the report.
     fn quantities(&self) -> Vec<String> {
         let mut names = Vec::new();
-        for DataSet { name: data, .. } in &self.data {
+        for set @ DataSet { name: data, .. } in &self.data {
             for model in &self.laws {
                 let fit = format!("{data}.{}", model.key);
                 let own = [q::RMS, q::MAE, q::R2, q::SHEAR_MODULUS, q::STABLE, q::FAILED];
                 names.extend(own.map(|quantity| quantity.named(&[&fit]).name));
                 let parameters = model.parameters.iter().map(|parameter| parameter.name);
                 names.extend(parameters.map(|parameter| q::PARAMETER.named(&[&fit, parameter]).name));
-                for other in self.data.iter().filter(|other| self.cross && other.name != *data) {
+                for other in self.others(set) {
                     let fit = format!("{fit}.{}", other.name);
                     names.extend(
-                        [q::RMS, q::MAE, q::R2, q::LOCKED].map(|quantity| quantity.named(&[&fit]).name),
+                        [q::RMS, q::MAE, q::R2, q::LOCKED, q::OUTSIDE]
+                            .map(|quantity| quantity.named(&[&fit]).name),
                     );
                 }
             }
