@@ -35,7 +35,7 @@ fn a_table_of_components_needs_no_hand_work() {
         let result = run(&path, &folder.path().join("out"));
         assert_eq!(result.status.code(), Some(0), "{}{}", text(&result.stdout), text(&result.stderr));
         let report = Report::read(folder.path().join("out/report.json")).unwrap();
-        let best = report.values["new.eight-chain-root-i2.rms"].value;
+        let best = report.scalar("new.eight-chain-root-i2.rms").unwrap();
         assert!(best < rms, "{source}: {best}");
         assert!(!text(&result.stdout).contains("failed"), "{}", text(&result.stdout));
     }

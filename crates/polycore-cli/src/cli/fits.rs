@@ -105,6 +105,10 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     }
     let networks = case.networks.iter().map(|set| set.run(directory, &mut report));
     let networks = networks.collect::<Result<Vec<_>, _>>()?;
+    if !case.foams.is_empty() {
+        phases.start("foams");
+    }
+    let foams = case.foams.iter().map(|set| set.run(run, &mut report)).collect::<Result<Vec<_>, _>>()?;
     if !quick {
         phases.start("pictures");
         for set in &all {
@@ -115,7 +119,7 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     report.phases(&phases).threads(1).judge(&case.expect, quick);
     trials::judge(&case.trials, &mut report);
     let mut text = summary(case, &all, &timed, &report);
-    networks.iter().for_each(|network| text += network);
+    networks.iter().chain(&foams).for_each(|part| text += part);
     for name in &report.non_finite {
         let _ = writeln!(text, "FAIL  {name} is not finite");
     }

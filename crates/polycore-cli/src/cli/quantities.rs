@@ -36,3 +36,12 @@ harness::quantities! {
     DEVIATION_RMS = "{network}.deviation_rms", "", "root mean square of predicted/measured − 1";
     DEVIATION_LARGEST = "{network}.deviation_largest", "", "largest |predicted/measured − 1|";
 }
+
+harness::quantities! {
+    /// Quantities of foams, `{foam}` = NAME.LAW, by test.
+    pub FOAMS:
+    FOAM_RMS = "{foam}.{test}.rms", "MPa", "root mean square of model − measurement in a test";
+    FOAM_RELATIVE = "{foam}.{test}.relative", "", "the same over the largest measured stress of the test";
+    FOAM_END = "{foam}.{test}.end", "MPa", "stress of the law at the strain of the largest measured stress";
+    FOAM_PREDICTED = "{foam}.{test}.predicted", "", "as `relative`, of a law fitted to the other tests";
+}

@@ -12,6 +12,7 @@ use polycore::constitutive::hyperelastic::{
 };
 use serde::Deserialize;
 
+use super::foams::{FoamSet, FoamSpec};
 use super::networks::{NetworkSet, NetworkSpec};
 use super::quantities as q;
 use super::time::{TimeCase, TimeSettings};
@@ -38,6 +39,9 @@ struct Scene {
     /// Tables of polymer networks to predict.
     #[serde(default)]
     network: Vec<NetworkSpec>,
+    /// Foams to which compressible laws are fitted.
+    #[serde(default)]
+    foam: Vec<FoamSpec>,
     /// Expected results.
     #[serde(default)]
     expect: Vec<Expect>,
@@ -104,7 +108,7 @@ pub struct DataSet {
 
 /// JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
-    harness::scene::schema("polycore", &[q::ALL, q::NETWORKS], |generator| {
+    harness::scene::schema("polycore", &[q::ALL, q::NETWORKS, q::FOAMS], |generator| {
         vec![generator.subschema_for::<Scene>()]
     })
 }
@@ -119,13 +123,14 @@ pub struct FitCase {
     pub time: Option<TimeCase>,
     pub trials: Vec<FitTrial>,
     pub networks: Vec<NetworkSet>,
+    pub foams: Vec<FoamSet>,
     pub expect: Vec<Expect>,
 }
 
 impl FitCase {
     /// Parses and checks a scene and the tables that it names.
     pub fn parse(source: &Source) -> Result<Self, SceneError> {
-        let Scene { _program: Program::Polycore, title, fit, time, trial, network, expect } =
+        let Scene { _program: Program::Polycore, title, fit, time, trial, network, foam, expect } =
             source.parse()?;
         let laws = match &fit.laws {
             None => MODELS.iter().collect(),
@@ -176,11 +181,12 @@ impl FitCase {
             data.push(DataSet { name: entry.name, table, material: entry.material, read });
         }
         let time = time.map(|settings| TimeCase::new(source, settings)).transpose()?;
-        if data.is_empty() && trial.is_empty() && network.is_empty() && time.is_none() {
+        if data.is_empty() && trial.is_empty() && network.is_empty() && foam.is_empty() && time.is_none() {
             return Err(source.error(
                 "fit.data",
                 "no data",
-                "at least one `[[fit.data]]` with `name` and `file`, `[time]`, `[[trial]]` or `[[network]]`",
+                "at least one `[[fit.data]]` with `name` and `file`, `[time]`, `[[trial]]`, \
+                 `[[network]]` or `[[foam]]`",
             ));
         }
         super::trials::check(source, &trial)?;
@@ -188,8 +194,12 @@ impl FitCase {
         for (i, spec) in network.into_iter().enumerate() {
             networks.push(spec.read(source, i, &networks)?);
         }
+        let mut foams: Vec<FoamSet> = Vec::new();
+        for (i, spec) in foam.into_iter().enumerate() {
+            foams.push(spec.read(source, i, &foams)?);
+        }
         let (source, cross) = (source.clone(), fit.cross);
-        let case = Self { source, title, laws, cross, data, time, trials: trial, networks, expect };
+        let case = Self { source, title, laws, cross, data, time, trials: trial, networks, foams, expect };
         case.check_expectations()?;
         Ok(case)
     }
@@ -204,8 +214,8 @@ impl FitCase {
             let _ = writeln!(text, "data {name}: {states} states, {measured} measured stresses ({source})");
             read.iter().for_each(|line| text += &format!("  {line}\n"));
         }
-        for set in &self.networks {
-            text += &format!("{}\n", set.plan());
+        for line in self.networks.iter().map(NetworkSet::plan).chain(self.foams.iter().map(FoamSet::plan)) {
+            text += &format!("{line}\n");
         }
         for model in self.laws.iter().filter(|_| !self.data.is_empty()) {
             let names: Vec<_> = model.parameters.iter().map(|parameter| parameter.name).collect();
@@ -218,6 +228,9 @@ impl FitCase {
         let mut files = if self.data.is_empty() { "" } else { of_fits }.to_owned();
         if !self.networks.is_empty() {
             files += "<network>_networks.csv, ";
+        }
+        if !self.foams.is_empty() {
+            files += "<foam>_foam.csv, <foam>_foam.inp, ";
         }
         let _ = writeln!(
             text,
@@ -263,6 +276,9 @@ impl FitCase {
             names.extend(time.quantities());
         }
         for set in &self.networks {
+            names.extend(set.quantities());
+        }
+        for set in &self.foams {
             names.extend(set.quantities());
         }
         names
@@ -320,7 +336,9 @@ fn advice(name: &str) -> Option<&'static str> {
             "no such parameter: the rubber of a fit is incompressible; compressibility is `bulk_modulus` in \
              a scene of peri"
         }
-        "hyperfoam" | "ogdenfoam" | "blatzko" => "an incompressible law; foams are not modelled",
+        "hyperfoam" | "ogdenfoam" | "ogdenhill" | "blatzko" => {
+            "an incompressible law; foams are fitted by a block `[[foam]]`"
+        }
         _ => return None,
     })
 }

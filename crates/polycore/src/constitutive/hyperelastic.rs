@@ -42,6 +42,8 @@ mod coverage;
 pub mod data;
 pub mod fit;
 pub mod foam;
+#[cfg(feature = "tables")]
+mod foam_table;
 pub mod homogeneous;
 #[cfg(feature = "tables")]
 mod plausible;

@@ -1,13 +1,11 @@
 //! Fits of [`Hyperfoam`] to bars with free sides and to simple shear.
 
-use nalgebra::{DMatrix, DVector, Matrix3};
+use nalgebra::{DMatrix, DVector};
 
 use super::fit::Agreement;
 use super::fit_map::REJECTED;
-use super::homogeneous::free_bar;
-use super::{Error, FoamTerm, Hyperelastic, Hyperfoam};
+use super::{Error, FoamTerm, Hyperfoam};
 use crate::numerics::least_squares::levenberg_marquardt;
-use crate::tensor::DeformationGradient;
 
 /// Kind of a test of a foam.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,6 +55,9 @@ const EXPONENTS: [f64; 8] = [-16.0, -6.0, -2.0, 1.0, 2.0, 6.0, 12.0, 24.0];
 const BETAS: [f64; 3] = [0.055, 0.5, 2.0];
 /// Number of starts for the optimiser, those of the least misfit.
 const SELECTED: usize = 8;
+/// Length of the range of β in a fit, from −⅓, i.e. ν up to 0.45: with β → ∞ and α → 0 a term becomes a
+/// volumetric law of its own, along a valley without end.
+const BETA_RANGE: f64 = 5.0 + 1.0 / 3.0;
 /// Bounds of the logarithms of the optimiser.
 const LARGEST_LOG: f64 = 30.0;
 
@@ -66,20 +67,13 @@ impl FoamTest {
         self.states.iter().map(|state| state.nominal.abs()).fold(0.0, f64::max)
     }
 
-    /// Nominal and lateral stretch of a law; of simple shear 1.
+    /// Computes the nominal stress of a law, Pa, and its lateral stretch; of simple shear 1.
     ///
     /// # Errors
-    /// Errors of the law.
+    /// [`Error::NoConvergence`] of the lateral stretch.
     pub fn predict(&self, law: &Hyperfoam, strain: f64) -> Result<[f64; 2], Error> {
-        match self.kind {
-            FoamTestKind::Bar => free_bar(law, strain).map(|bar| [bar.nominal, bar.lateral]),
-            FoamTestKind::Shear => {
-                let mut matrix = Matrix3::identity();
-                matrix[(0, 1)] = strain;
-                let nominal = law.first_piola_kirchhoff(&DeformationGradient::new(matrix)?)?;
-                Ok([nominal[(0, 1)], 1.0])
-            }
-        }
+        let mut unused = vec![[0.0; 2]; 3 * law.terms().len()];
+        slopes(self.kind, law.terms(), strain, &mut unused)
     }
 
     /// Compares the stresses of a law with the test.
@@ -155,7 +149,7 @@ fn search(
         let factor = model_data / model_model;
         let terms: Vec<FoamTerm> =
             terms.iter().map(|term| FoamTerm { modulus: factor * term.modulus, ..*term }).collect();
-        let misfit = residuals(&terms, tests)?.norm_squared();
+        let misfit = weighted(&terms, tests)?.0.norm_squared();
         (factor > 0.0 && misfit.is_finite()).then_some((misfit, terms))
     };
     let mut starts: Vec<(f64, Vec<FoamTerm>)> = candidates.iter().filter_map(scaled).collect();
@@ -169,23 +163,26 @@ fn search(
         }
         let modulus: f64 = start.iter().map(|term| term.modulus).sum();
         let values = |q: &DVector<f64>| {
-            residuals(&law_terms(q, modulus), tests).unwrap_or_else(|| DVector::from_element(rows, REJECTED))
+            let found = weighted(&law_terms(q, modulus), tests).map(|found| found.0);
+            Some(found.unwrap_or_else(|| DVector::from_element(rows, REJECTED)))
         };
         let jacobian = |q: &DVector<f64>| {
-            let columns = (0..q.len()).map(|i| {
-                let step = f64::EPSILON.cbrt() * q[i].abs().max(1.0);
-                let (mut up, mut down) = (q.clone(), q.clone());
-                up[i] += step;
-                down[i] -= step;
-                (values(&up) - values(&down)) / (up[i] - down[i])
-            });
-            (!stop()).then(|| DMatrix::from_columns(&columns.collect::<Vec<_>>()))
+            let own = law_terms(q, modulus);
+            let (_, mut slopes) = weighted(&own, tests).filter(|_| !stop())?;
+            for (k, term) in own.iter().enumerate() {
+                slopes.column_mut(3 * k).scale_mut(term.modulus);
+                let part = (term.beta + 1.0 / 3.0) / BETA_RANGE;
+                slopes.column_mut(3 * k + 2).scale_mut(BETA_RANGE * part * (1.0 - part));
+            }
+            Some(slopes)
         };
-        let at = DVector::from_iterator(
-            3 * terms,
-            start.iter().flat_map(|t| [(t.modulus / modulus).ln(), t.exponent, (t.beta + 1.0 / 3.0).ln()]),
-        );
-        let end = levenberg_marquardt(at, 100, |q| Some(values(q)), jacobian);
+        let logarithms = |term: &FoamTerm| {
+            let part = (term.beta + 1.0 / 3.0) / BETA_RANGE;
+            let odds = (part / (1.0 - part)).clamp((-LARGEST_LOG).exp(), LARGEST_LOG.exp());
+            [(term.modulus / modulus).ln(), term.exponent, odds.ln()]
+        };
+        let at = DVector::from_iterator(3 * terms, start.iter().flat_map(logarithms));
+        let end = levenberg_marquardt(at, 100, values, jacobian);
         if end.objective < REJECTED {
             ends.push((end.objective, law_terms(&end.at, modulus)));
         }
@@ -202,13 +199,13 @@ fn search(
     })
 }
 
-/// Terms from ln(μ/M), α, ln(β + ⅓).
+/// Terms from ln(μ/M), α, and the logit of β in its range.
 fn law_terms(q: &DVector<f64>, modulus: f64) -> Vec<FoamTerm> {
     let exponential = |log: f64| log.clamp(-LARGEST_LOG, LARGEST_LOG).exp();
     let term = |q: &[f64]| FoamTerm {
         modulus: modulus * exponential(q[0]),
         exponent: q[1],
-        beta: exponential(q[2]) - 1.0 / 3.0,
+        beta: BETA_RANGE / (1.0 + exponential(-q[2])) - 1.0 / 3.0,
     };
     q.as_slice().chunks_exact(3).map(term).collect()
 }
@@ -224,27 +221,124 @@ fn residuals_count(tests: &[FoamTest]) -> usize {
     lateral.count() + tests.iter().map(|test| test.states.len()).sum::<usize>()
 }
 
-/// Weighted residuals of stresses and lateral stretches; `None` where the law has none.
-fn residuals(terms: &[FoamTerm], tests: &[FoamTest]) -> Option<DVector<f64>> {
-    let law = Hyperfoam::new(terms).ok()?;
-    let mut all = Vec::with_capacity(residuals_count(tests));
+/// Weighted residuals of stresses and lateral stretches, and their derivatives with respect to each μ, α, β;
+/// `None` where the law has none.
+fn weighted(terms: &[FoamTerm], tests: &[FoamTest]) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    let count = residuals_count(tests);
+    let (mut all, mut derivatives) = (DVector::zeros(count), DMatrix::zeros(count, 3 * terms.len()));
+    let (mut of, mut row) = (vec![[0.0; 2]; 3 * terms.len()], 0);
     for test in tests {
         let (root, largest, lateral) =
             ((test.states.len() as f64).sqrt(), test.largest(), lateral_scale(test));
         for state in &test.states {
-            let [nominal, second] = test.predict(&law, state.strain).ok()?;
-            all.push((nominal - state.nominal) / (largest * root));
+            let found = slopes(test.kind, terms, state.strain, &mut of).ok()?;
+            let mut add = |axis: usize, measured: f64, scale: f64| {
+                all[row] = (found[axis] - measured) / (scale * root);
+                of.iter().enumerate().for_each(|(i, of)| derivatives[(row, i)] = of[axis] / (scale * root));
+                row += 1;
+            };
+            add(0, state.nominal, largest);
             if let (Some(measured), true) = (state.lateral, lateral > 0.0) {
-                all.push((second - measured) / (lateral * root));
+                add(1, measured, lateral);
             }
         }
     }
-    all.iter().all(|value| value.is_finite()).then(|| DVector::from_vec(all))
+    let finite = all.iter().chain(derivatives.iter()).all(|value| value.is_finite());
+    finite.then_some((all, derivatives))
+}
+
+/// Nominal stress, lateral stretch, and their derivatives with respect to each μ, α, β.
+///
+/// Bar, J = λ₁λ₂²: λ₁P = g = Σ2μ/α (λ₁^α − J^(−αβ)) where f = Σ2μ/α (λ₂^α − J^(−αβ)) = 0. Simple shear by
+/// γ = 2 sinh t: P = Σ2μ/α sinh(αt)/cosh t.
+fn slopes(
+    kind: FoamTestKind,
+    terms: &[FoamTerm],
+    strain: f64,
+    slopes: &mut [[f64; 2]],
+) -> Result<[f64; 2], Error> {
+    if kind == FoamTestKind::Shear {
+        let t = (0.5 * strain).asinh();
+        let mut nominal = 0.0;
+        for (term, of) in terms.iter().zip(slopes.chunks_exact_mut(3)) {
+            let a = term.exponent;
+            let unit = 2.0 / a * (a * t).sinh() / t.cosh();
+            nominal += term.modulus * unit;
+            let by_exponent = 2.0 / a * t * (a * t).cosh() / t.cosh() - unit / a;
+            of.copy_from_slice(&[[unit, 0.0], [term.modulus * by_exponent, 0.0], [0.0; 2]]);
+        }
+        return Ok([nominal, 1.0]);
+    }
+    let along = strain.ln();
+    let across = lateral_log(terms, along)?;
+    let (lateral, volume) = (across.exp(), along + 2.0 * across);
+    let (mut nominal, mut steepness, mut coupling) = (0.0, 0.0, 0.0);
+    for (&FoamTerm { modulus, exponent: a, beta }, of) in terms.iter().zip(slopes.chunks_exact_mut(3)) {
+        let [first, second, bulk] = [a * along, a * across, -a * beta * volume].map(f64::exp);
+        // ∂g and ∂f with respect to μ, α, β
+        let by = |power: f64, log: f64| {
+            let unit = 2.0 / a * (power - bulk);
+            [unit, modulus * (2.0 / a * (log * power + beta * volume * bulk) - unit / a)]
+        };
+        let ([g_modulus, g_exponent], [f_modulus, f_exponent]) = (by(first, along), by(second, across));
+        let by_beta = 2.0 * modulus * volume * bulk;
+        of.copy_from_slice(&[[g_modulus, f_modulus], [g_exponent, f_exponent], [by_beta, by_beta]]);
+        nominal += modulus * g_modulus;
+        steepness += 2.0 * modulus * (second + 2.0 * beta * bulk);
+        coupling += 4.0 * modulus * beta * bulk;
+    }
+    for of in slopes {
+        let [g, f] = *of;
+        *of = [(g - coupling / steepness * f) / strain, -lateral * f / steepness];
+    }
+    Ok([nominal / strain, lateral])
+}
+
+/// ln λ₂ of a free bar from ln λ₁: the zero of f, which increases for positive moduli and β, by Newton's
+/// method, bracketed as it goes.
+fn lateral_log(terms: &[FoamTerm], along: f64) -> Result<f64, Error> {
+    const STEPS: usize = 200;
+    let (mut log, mut low, mut high, mut f) = (0.0_f64, f64::NEG_INFINITY, f64::INFINITY, f64::NAN);
+    for _ in 0..STEPS {
+        let mut slope = 0.0;
+        f = 0.0;
+        for &FoamTerm { modulus, exponent: a, beta } in terms {
+            let (power, bulk) = ((a * log).exp(), (-a * beta * (along + 2.0 * log)).exp());
+            f += 2.0 * modulus / a * (power - bulk);
+            slope += 2.0 * modulus * (power + 2.0 * beta * bulk);
+        }
+        if f > 0.0 {
+            high = high.min(log)
+        } else {
+            low = low.max(log)
+        }
+        let step = (f / slope).clamp(-0.5, 0.5);
+        if step.abs() <= 4.0 * f64::EPSILON * log.abs().max(0.1) || f == 0.0 {
+            return Ok(log);
+        }
+        let trial = log - step;
+        log = if slope > 0.0 && trial > low && trial < high {
+            trial
+        } else if low.is_finite() && high.is_finite() {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                return Ok(log);
+            }
+            middle
+        } else {
+            log - 0.5 * f.signum()
+        };
+    }
+    Err(Error::NoConvergence { iteration: "lateral stretch", steps: STEPS, residual: f })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::constitutive::hyperelastic::Hyperelastic;
+    use crate::constitutive::hyperelastic::homogeneous::free_bar;
+    use crate::tensor::DeformationGradient;
+    use nalgebra::Matrix3;
 
     fn tests_of(law: &Hyperfoam, with_lateral: bool) -> Vec<FoamTest> {
         let of = |name: &str, kind, strains: &[f64]| {
@@ -274,6 +368,44 @@ mod tests {
         for (a, b) in [(back.modulus, term.modulus), (back.exponent, 9.0), (back.beta, 0.15)] {
             assert!((a / b - 1.0).abs() < 1e-6, "{back:?}");
         }
+    }
+
+    /// Closed forms of both tests against the law in three dimensions, and their derivatives by differences of
+    /// step 1e-6: truncation 1e-10 of terms with α² ~ 60.
+    #[test]
+    fn closed_forms_of_tests() {
+        let term = |modulus, exponent, beta| FoamTerm { modulus, exponent, beta };
+        let terms = [term(0.1, 8.0, 0.1), term(0.05, -2.5, 0.6)];
+        let law = Hyperfoam::new(&terms).unwrap();
+        let (mut of, mut worst, mut difference) = (vec![[0.0; 2]; 6], 0.0_f64, 0.0_f64);
+        for (kind, strain) in [(FoamTestKind::Bar, 0.4), (FoamTestKind::Bar, 1.3), (FoamTestKind::Shear, 0.4)]
+        {
+            let found = slopes(kind, &terms, strain, &mut of).unwrap();
+            let expected = match kind {
+                FoamTestKind::Bar => free_bar(&law, strain).map(|bar| [bar.nominal, bar.lateral]).unwrap(),
+                FoamTestKind::Shear => {
+                    let mut matrix = Matrix3::identity();
+                    matrix[(0, 1)] = strain;
+                    let sheared = DeformationGradient::new(matrix).unwrap();
+                    [law.first_piola_kirchhoff(&sheared).unwrap()[(0, 1)], 1.0]
+                }
+            };
+            (0..2).for_each(|i| worst = worst.max((found[i] / expected[i] - 1.0).abs()));
+            for i in 0..6 {
+                let at = |step: f64| {
+                    let mut moved = terms;
+                    let one = &mut moved[i / 3];
+                    *[&mut one.modulus, &mut one.exponent, &mut one.beta][i % 3] += step;
+                    slopes(kind, &moved, strain, &mut vec![[0.0; 2]; 6]).unwrap()
+                };
+                let (up, down) = (at(1e-6), at(-1e-6));
+                (0..2).for_each(|k| {
+                    difference = difference.max(((up[k] - down[k]) / 2e-6 - of[i][k]).abs());
+                });
+            }
+        }
+        evidence::at_most("bar and shear of hyperfoam in closed form", worst, 1e-12);
+        evidence::at_most("derivatives of bar and shear by μ, α, β", difference, 1e-8);
     }
 
     #[test]
