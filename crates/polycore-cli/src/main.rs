@@ -19,6 +19,7 @@ mod cli {
     pub mod exact;
     pub mod fits;
     pub mod foams;
+    pub mod forecasts;
     pub mod material;
     pub mod network;
     pub mod networks;

@@ -109,6 +109,11 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
         phases.start("foams");
     }
     let foams = case.foams.iter().map(|set| set.run(run, &mut report)).collect::<Result<Vec<_>, _>>()?;
+    if !case.forecasts.is_empty() {
+        phases.start("forecasts");
+    }
+    let forecasts = case.forecasts.iter().map(|set| set.run(run, &mut report));
+    let forecasts = forecasts.collect::<Result<Vec<_>, _>>()?;
     if !quick {
         phases.start("pictures");
         for set in &all {
@@ -119,7 +124,7 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     report.phases(&phases).threads(1).judge(&case.expect, quick);
     trials::judge(&case.trials, &mut report);
     let mut text = summary(case, &all, &timed, &report);
-    networks.iter().chain(&foams).for_each(|part| text += part);
+    networks.iter().chain(&foams).chain(&forecasts).for_each(|part| text += part);
     for name in &report.non_finite {
         let _ = writeln!(text, "FAIL  {name} is not finite");
     }

@@ -45,3 +45,16 @@ harness::quantities! {
     FOAM_END = "{foam}.{test}.end", "MPa", "stress of the law at the strain of the largest measured stress";
     FOAM_PREDICTED = "{foam}.{test}.predicted", "", "as `relative`, of a law fitted to the other tests";
 }
+
+harness::quantities! {
+    /// Quantities of forecasts of curves, `{forecast}`.
+    pub FORECASTS:
+    FORECAST_CURVES = "{forecast}.curves_inside", "", "share of the curves that lie in their band as a whole";
+    FORECAST_POINTS = "{forecast}.points_inside", "", "share of the predicted points that lie in the band";
+    FORECAST_COVERAGE = "{forecast}.coverage", "", "share of whole curves that the band claims, 1 − 2/n of n curves";
+    FORECAST_WIDTH = "{forecast}.width", "", "median of the half width of the band at rupture, relative: √(high/low) − 1";
+    FORECAST_ERROR = "{forecast}.error", "", "root mean square of ln(predicted/measured) at rupture";
+    FORECAST_LOCKING = "{forecast}.locking", "", "curves whose beginning and whole determine a locking stretch";
+    FORECAST_LOCKING_INSIDE = "{forecast}.locking_inside", "", "share of these whose locking stretch lies in its band";
+    FORECAST_LOCKING_ABOVE = "{forecast}.locking_above", "", "share of the predicted locking stretches above rupture";
+}

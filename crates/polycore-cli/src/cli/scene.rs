@@ -13,6 +13,7 @@ use polycore::constitutive::hyperelastic::{
 use serde::Deserialize;
 
 use super::foams::{FoamSet, FoamSpec};
+use super::forecasts::{ForecastSet, ForecastSpec};
 use super::networks::{NetworkSet, NetworkSpec};
 use super::quantities as q;
 use super::time::{TimeCase, TimeSettings};
@@ -42,6 +43,9 @@ struct Scene {
     /// Foams to which compressible laws are fitted.
     #[serde(default)]
     foam: Vec<FoamSpec>,
+    /// Tension curves whose rest is predicted from their beginning.
+    #[serde(default)]
+    forecast: Vec<ForecastSpec>,
     /// Expected results.
     #[serde(default)]
     expect: Vec<Expect>,
@@ -108,7 +112,7 @@ pub struct DataSet {
 
 /// JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
-    harness::scene::schema("polycore", &[q::ALL, q::NETWORKS, q::FOAMS], |generator| {
+    harness::scene::schema("polycore", &[q::ALL, q::NETWORKS, q::FOAMS, q::FORECASTS], |generator| {
         vec![generator.subschema_for::<Scene>()]
     })
 }
@@ -124,17 +128,18 @@ pub struct FitCase {
     pub trials: Vec<FitTrial>,
     pub networks: Vec<NetworkSet>,
     pub foams: Vec<FoamSet>,
+    pub forecasts: Vec<ForecastSet>,
     pub expect: Vec<Expect>,
 }
 
 impl FitCase {
     /// Parses and checks a scene and the tables that it names.
     pub fn parse(source: &Source) -> Result<Self, SceneError> {
-        let Scene { _program: Program::Polycore, title, fit, time, trial, network, foam, expect } =
+        let Scene { _program: Program::Polycore, title, fit, time, trial, network, foam, forecast, expect } =
             source.parse()?;
         let laws = match &fit.laws {
             None => MODELS.iter().collect(),
-            Some(names) => select_laws(source, names)?,
+            Some(names) => select_laws(source, "fit.laws", names)?,
         };
         let mut data: Vec<DataSet> = Vec::new();
         for (i, entry) in fit.data.into_iter().enumerate() {
@@ -181,12 +186,18 @@ impl FitCase {
             data.push(DataSet { name: entry.name, table, material: entry.material, read });
         }
         let time = time.map(|settings| TimeCase::new(source, settings)).transpose()?;
-        if data.is_empty() && trial.is_empty() && network.is_empty() && foam.is_empty() && time.is_none() {
+        if data.is_empty()
+            && trial.is_empty()
+            && network.is_empty()
+            && foam.is_empty()
+            && forecast.is_empty()
+            && time.is_none()
+        {
             return Err(source.error(
                 "fit.data",
                 "no data",
                 "at least one `[[fit.data]]` with `name` and `file`, `[time]`, `[[trial]]`, \
-                 `[[network]]` or `[[foam]]`",
+                 `[[network]]`, `[[foam]]` or `[[forecast]]`",
             ));
         }
         super::trials::check(source, &trial)?;
@@ -198,8 +209,24 @@ impl FitCase {
         for (i, spec) in foam.into_iter().enumerate() {
             foams.push(spec.read(source, i, &foams)?);
         }
+        let mut forecasts: Vec<ForecastSet> = Vec::new();
+        for (i, spec) in forecast.into_iter().enumerate() {
+            forecasts.push(spec.read(source, i, &forecasts)?);
+        }
         let (source, cross) = (source.clone(), fit.cross);
-        let case = Self { source, title, laws, cross, data, time, trials: trial, networks, foams, expect };
+        let case = Self {
+            source,
+            title,
+            laws,
+            cross,
+            data,
+            time,
+            trials: trial,
+            networks,
+            foams,
+            forecasts,
+            expect,
+        };
         case.check_expectations()?;
         Ok(case)
     }
@@ -214,7 +241,13 @@ impl FitCase {
             let _ = writeln!(text, "data {name}: {states} states, {measured} measured stresses ({source})");
             read.iter().for_each(|line| text += &format!("  {line}\n"));
         }
-        for line in self.networks.iter().map(NetworkSet::plan).chain(self.foams.iter().map(FoamSet::plan)) {
+        for line in self
+            .networks
+            .iter()
+            .map(NetworkSet::plan)
+            .chain(self.foams.iter().map(FoamSet::plan))
+            .chain(self.forecasts.iter().map(ForecastSet::plan))
+        {
             text += &format!("{line}\n");
         }
         for model in self.laws.iter().filter(|_| !self.data.is_empty()) {
@@ -231,6 +264,9 @@ impl FitCase {
         }
         if !self.foams.is_empty() {
             files += "<foam>_foam.csv, <foam>_foam.inp, ";
+        }
+        if !self.forecasts.is_empty() {
+            files += "<forecast>_forecast.csv, ";
         }
         let _ = writeln!(
             text,
@@ -281,6 +317,9 @@ impl FitCase {
         for set in &self.foams {
             names.extend(set.quantities());
         }
+        for set in &self.forecasts {
+            names.extend(set.quantities());
+        }
         names
     }
 
@@ -296,11 +335,19 @@ impl FitCase {
     }
 }
 
-fn select_laws(source: &Source, names: &[String]) -> Result<Vec<&'static ModelDescriptor>, SceneError> {
+/// Finds laws by their names, each once.
+///
+/// # Errors
+/// An unknown name, one twice, none.
+pub fn select_laws(
+    source: &Source,
+    list: &str,
+    names: &[String],
+) -> Result<Vec<&'static ModelDescriptor>, SceneError> {
     let mut laws: Vec<&'static ModelDescriptor> = Vec::new();
     for (i, name) in names.iter().enumerate() {
         let all = || MODELS.iter().map(|model| model.key).collect::<Vec<_>>().join(", ");
-        let key = format!("fit.laws[{i}]");
+        let key = format!("{list}[{i}]");
         let model = hyperelastic::model(name).map_err(|_| match advice(name) {
             Some(advice) => source.error(&key, format!("`{name}`"), advice),
             None => source.error(&key, format!("`{name}`"), all()),
@@ -311,7 +358,7 @@ fn select_laws(source: &Source, names: &[String]) -> Result<Vec<&'static ModelDe
         laws.push(model);
     }
     if laws.is_empty() {
-        return Err(source.error("fit.laws", "no law", "at least one law; leave out `laws` to fit all"));
+        return Err(source.error(list, "no law", "at least one law; leave out `laws` to fit all"));
     }
     Ok(laws)
 }

@@ -39,11 +39,14 @@ mod columns;
 #[cfg(feature = "tables")]
 mod components;
 mod coverage;
+#[cfg(feature = "tables")]
+mod curves;
 pub mod data;
 pub mod fit;
 pub mod foam;
 #[cfg(feature = "tables")]
 mod foam_table;
+pub mod forecast;
 pub mod homogeneous;
 #[cfg(feature = "tables")]
 mod plausible;

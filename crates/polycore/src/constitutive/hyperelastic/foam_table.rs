@@ -130,9 +130,9 @@ mod tests {
         assert_eq!((tests[1].kind, tests[1].states[0].lateral), (FoamTestKind::Shear, None));
         let head = "mode,stretch,P_MPa\n";
         for (text, foam, part) in [
-            (text.to_owned(), None, "2 foams and none chosen; allowed: `material` = one of a, b"),
-            (text.to_owned(), Some("c"), "found `c`"),
-            (format!("{head}XX,1.2,0.1\n"), None, "line 2: column 1, `mode`: found `XX`"),
+            (text.to_owned(), None, "none chosen\"; allowed: `material` = one of a, b"),
+            (text.to_owned(), Some("c"), "found \"c\""),
+            (format!("{head}XX,1.2,0.1\n"), None, "column 1, `mode`: found \"XX\""),
             (format!("{head}UT,-1.2,0.1\n"), None, "a stretch above 0"),
             (format!("{head}UC,0.8,0.1\n"), None, "the sign of the strain"),
             (format!("{head}UT,1.2,x\n"), None, "column 3"),
