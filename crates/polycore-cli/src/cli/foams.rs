@@ -177,7 +177,7 @@ impl FoamSet {
         Ok(text)
     }
 
-    /// Writes `NAME_foam.csv`, the states measured and computed, and `NAME_foam.inp`, the laws as `*HYPERFOAM`.
+    /// Writes `NAME_foam.csv`, states measured and computed, and `NAME_foam.inp`, the laws as `*HYPERFOAM`.
     fn write(&self, directory: &Path, laws: &[FoamLaw]) -> Result<(), Error> {
         let mut text = "test,strain,measured_MPa,measured_lateral".to_owned();
         laws.iter().for_each(|law| {

@@ -156,7 +156,8 @@ impl ForecastSet {
 
     fn summary(&self, found: &[Forecast]) -> String {
         let mut text = format!(
-            "forecast {}: stress at rupture from the first {} of the strain; band of the other curves\n{:<30}{:<20}\
+            "forecast {}: stress at rupture from the first {} of the strain; band of the others\n\
+             {:<30}{:<20}\
              {:>10}{:>10}{:>20}{:>8}{:>16}\n",
             self.name,
             self.share,

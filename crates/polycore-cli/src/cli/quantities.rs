@@ -9,8 +9,8 @@ harness::quantities! {
     R2 = "{fit}.r2", "", "coefficient of determination 1 − Σr²/Σ(P − P̄)²";
     LOCKED = "{fit}.locked", "", "with `cross`: number of states of the other data beyond the locking \
                                   stretch of the law; if there are any, other values are missing";
-    OUTSIDE = "{fit}.outside", "", "with `cross`: number of states of the other data out of distribution, i.e. \
-                                    outside the strains that the data of the fit cover";
+    OUTSIDE = "{fit}.outside", "", "with `cross`: number of states of the other data out of \
+                                    distribution, i.e. outside the strains that the data of the fit cover";
     STABLE = "{fit}.stable", "", "1 if the law is stable (Drucker) in uniaxial, equibiaxial and pure shear \
                                   tests over the stretches of its data, else 0";
     FAILED = "{fit}.failed", "", "1 if the law could not be fitted; other values are missing";
@@ -51,10 +51,15 @@ harness::quantities! {
     pub FORECASTS:
     FORECAST_CURVES = "{forecast}.curves_inside", "", "share of the curves that lie in their band as a whole";
     FORECAST_POINTS = "{forecast}.points_inside", "", "share of the predicted points that lie in the band";
-    FORECAST_COVERAGE = "{forecast}.coverage", "", "share of whole curves that the band claims, 1 − 2/n of n curves";
-    FORECAST_WIDTH = "{forecast}.width", "", "median of the half width of the band at rupture, relative: √(high/low) − 1";
+    FORECAST_COVERAGE = "{forecast}.coverage", "", "share of whole curves that the band claims, \
+                                                      1 − 2/n of n curves";
+    FORECAST_WIDTH = "{forecast}.width", "", "median of the half width of the band at rupture, \
+                                                relative: √(high/low) − 1";
     FORECAST_ERROR = "{forecast}.error", "", "root mean square of ln(predicted/measured) at rupture";
-    FORECAST_LOCKING = "{forecast}.locking", "", "curves whose beginning and whole determine a locking stretch";
-    FORECAST_LOCKING_INSIDE = "{forecast}.locking_inside", "", "share of these whose locking stretch lies in its band";
-    FORECAST_LOCKING_ABOVE = "{forecast}.locking_above", "", "share of the predicted locking stretches above rupture";
+    FORECAST_LOCKING = "{forecast}.locking", "", "curves whose beginning and whole determine a \
+                                                    locking stretch";
+    FORECAST_LOCKING_INSIDE = "{forecast}.locking_inside", "", "share of these whose locking stretch \
+                                                                  lies in its band";
+    FORECAST_LOCKING_ABOVE = "{forecast}.locking_above", "", "share of the predicted locking \
+                                                                stretches above rupture";
 }

@@ -9,7 +9,7 @@ use crate::units::Unit;
 use crate::units::dimension::StressDimension;
 
 impl Curve {
-    /// Reads the curves of a table: a column of names, one of stretches or engineering strains, one of nominal
+    /// Reads the curves of a table: columns of names, of stretches or engineering strains, of nominal
     /// stresses. A curve ends at its largest stress; rows at rest and repeated ones are left out.
     ///
     /// # Errors

@@ -29,8 +29,8 @@ pub enum Mode {
     /// One stress of a general biaxial state; the other one was not measured.
     #[serde(skip)]
     Component,
-    /// σ₁ − σ₂ of a general biaxial state: as a pressure does not change it, it is the true stress along λ₁ of
-    /// the state whose second stretch is λ₃ and whose free face is that of λ₂. `nominal` is (σ₁ − σ₂)/λ₁.
+    /// σ₁ − σ₂ of a general biaxial state: as a pressure does not change it, it is the true stress along λ₁
+    /// of the state whose second stretch is λ₃ and whose free face is that of λ₂. `nominal` is (σ₁ − σ₂)/λ₁.
     #[serde(skip)]
     Difference,
 }
@@ -102,8 +102,8 @@ impl TestState {
         incompressible(self.stretches[0], self.stretches[1])
     }
 
-    /// Factor of P in residuals: 1, so that nominal stresses are compared; λ₁ of [`Mode::Difference`], so that
-    /// true ones are.
+    /// Factor of P in residuals: 1, so that nominal stresses are compared; λ₁ of [`Mode::Difference`], so
+    /// that true ones are.
     pub fn weight(&self) -> f64 {
         if self.mode == Mode::Difference { self.stretches[0] } else { 1.0 }
     }

@@ -370,8 +370,8 @@ mod tests {
         }
     }
 
-    /// Closed forms of both tests against the law in three dimensions, and their derivatives by differences of
-    /// step 1e-6: truncation 1e-10 of terms with α² ~ 60.
+    /// Closed forms of both tests against the law in three dimensions, and their derivatives by differences
+    /// of step 1e-6: truncation 1e-10 of terms with α² ~ 60.
     #[test]
     fn closed_forms_of_tests() {
         let term = |modulus, exponent, beta| FoamTerm { modulus, exponent, beta };

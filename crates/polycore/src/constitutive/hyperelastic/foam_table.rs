@@ -14,12 +14,12 @@ const NOISE_LEVEL: f64 = 0.02;
 
 impl FoamTest {
     /// Reads the tests of a foam: columns `mode` (UT, UC: bars with free sides; SS: simple shear), `stretch`
-    /// (of shear the amount of shear; also `stretch_or_shear`), `nominal [MPa]` or `P_MPa`, `lateral` (lateral
+    /// (of shear its amount; also `stretch_or_shear`), `nominal [MPa]` or `P_MPa`, `lateral` (lateral
     /// stretch, may be blank or absent), and `foam` or `material` if there are several.
     ///
     /// # Errors
-    /// [`crate::Error::Io`]; columns that are missing, several foams and none chosen, cells that are no number
-    /// or no test, stresses against the strain.
+    /// [`crate::Error::Io`]; columns that are missing, several foams and none chosen, cells that are no
+    /// number or no test, stresses against the strain.
     pub fn read(path: impl AsRef<Path>, foam: Option<&str>) -> Result<(Vec<Self>, String), crate::Error> {
         let file = Table::read(path)?;
         Ok(Self::of_table(&file, foam)?)

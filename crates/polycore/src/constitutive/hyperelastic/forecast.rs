@@ -1,11 +1,12 @@
 //! Forecast of the rest of tension curves from their beginning, with a band from other curves.
 //!
 //! Laws are fitted to the beginning of each curve, up to the stretch λₕ. With e = ln(P measured/P of the law)
-//! and x = (λ − λₕ)/(λₕ − 1), the extrapolation in lengths of the beginning, a curve has the slopes min e/x and
-//! max e/x. The band of a curve runs between the least and the largest slopes of the other curves: if the
-//! curves are exchangeable, a curve of n lies below with probability 1/n at most, and above likewise, so that
-//! a whole curve lies inside with 1 − 2/n (split conformal prediction, Vovk et al., *Algorithmic Learning in a
-//! Random World*, 2005). Among several laws that of the narrowest band is taken, by the other curves as well.
+//! and x = ¼ + (λ − λₕ)/(λₕ − 1), the extrapolation in lengths of the beginning and ¼ for the lack of fit at
+//! its end, a curve has the slopes min e/x and max e/x. The band of a curve runs between the least and the
+//! largest slopes of the other curves: if the n curves are exchangeable and the law is given, a curve has the
+//! least slope of all with probability 1/n, and the largest likewise, so that a whole curve lies inside with
+//! 1 − 2/n (Wilks, doi:10.1214/aoms/1177731788). Among several laws that of the narrowest band of the other
+//! curves is taken.
 
 use super::data::{Mode, TestData, TestState};
 use super::fit::{Identifiability, fit_until};
