@@ -4,7 +4,7 @@ use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive}
 use crate::tensor::deformation::check_stretches;
 
 /// W = Σᵢ 2μᵢ/αᵢ² [λ₁^αᵢ + λ₂^αᵢ + λ₃^αᵢ − 3 + (J^(−αᵢβᵢ) − 1)/βᵢ] (Hill, doi:10.1016/S0065-2156(08)70264-3;
-/// Storåkers, doi:10.1016/0022-5096(86)90033-5, Eq. 17; Abaqus Theory Guide 4.6.2). The shear modulus is
+/// Storåkers, doi:10.1016/0022-5096(86)90033-5; Abaqus Theory Guide 4.6.2). The shear modulus is
 /// Σμᵢ, the bulk modulus Σ2μᵢ(⅓ + βᵢ); with one β a free bar has λ₂ = λ₁^(−ν), ν = β/(1 + 2β).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hyperfoam {
