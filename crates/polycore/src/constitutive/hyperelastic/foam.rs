@@ -377,7 +377,7 @@ mod tests {
         let term = |modulus, exponent, beta| FoamTerm { modulus, exponent, beta };
         let terms = [term(0.1, 8.0, 0.1), term(0.05, -2.5, 0.6)];
         let law = Hyperfoam::new(&terms).unwrap();
-        let (mut of, mut worst, mut difference) = (vec![[0.0; 2]; 6], 0.0_f64, 0.0_f64);
+        let (mut of, mut worst, mut difference) = ([[0.0; 2]; 6], 0.0_f64, 0.0_f64);
         for (kind, strain) in [(FoamTestKind::Bar, 0.4), (FoamTestKind::Bar, 1.3), (FoamTestKind::Shear, 0.4)]
         {
             let found = slopes(kind, &terms, strain, &mut of).unwrap();
@@ -396,7 +396,7 @@ mod tests {
                     let mut moved = terms;
                     let one = &mut moved[i / 3];
                     *[&mut one.modulus, &mut one.exponent, &mut one.beta][i % 3] += step;
-                    slopes(kind, &moved, strain, &mut vec![[0.0; 2]; 6]).unwrap()
+                    slopes(kind, &moved, strain, &mut [[0.0; 2]; 6]).unwrap()
                 };
                 let (up, down) = (at(1e-6), at(-1e-6));
                 (0..2).for_each(|k| {
