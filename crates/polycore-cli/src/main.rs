@@ -18,6 +18,8 @@ mod cli {
     pub mod draw;
     pub mod exact;
     pub mod fits;
+    pub mod foams;
+    pub mod forecasts;
     pub mod material;
     pub mod network;
     pub mod networks;

@@ -12,7 +12,7 @@ use polycore::constitutive::hyperelastic::data::{Mode, TestData, TestState};
 use polycore::constitutive::hyperelastic::fit::{
     Agreement, Fit, FittedParameter, Identifiability, fit_until,
 };
-use polycore::constitutive::hyperelastic::{Hyperelastic, homogeneous, stability};
+use polycore::constitutive::hyperelastic::{Coverage, Hyperelastic, homogeneous, stability};
 
 use super::MPA;
 use super::material::{DIGITS, digits};
@@ -32,10 +32,17 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     let total = (case.data.len() * case.laws.len()).max(1) as f64;
     let mut done = 0.0;
     let mut stopped = false;
-    for DataSet { name, table, read } in &case.data {
+    for own @ DataSet { name, table, read, .. } in &case.data {
         phases.start("fit");
-        let mut set =
-            TableFits { name, table, read, fits: Vec::new(), failed: Vec::new(), crossed: Vec::new() };
+        let mut set = TableFits {
+            name,
+            table,
+            read,
+            fits: Vec::new(),
+            failed: Vec::new(),
+            crossed: Vec::new(),
+            outside: Vec::new(),
+        };
         for model in &case.laws {
             run.show(done / total, &|| format!("fit {name}  {}", model.key));
             match fit_until(model, table, run.options.interrupted) {
@@ -49,10 +56,18 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
             done += 1.0;
         }
         phases.start("output");
+        let coverage = Coverage::new(table)?;
+        for other in case.others(own) {
+            let stretches = other.table.states.iter().map(TestState::principal_stretches);
+            let stretches = stretches.collect::<Result<Vec<_>, _>>()?;
+            let outside = stretches.iter().filter(|stretches| !coverage.holds(**stretches)).count();
+            set.outside.push((&other.name, stretches.len(), outside));
+        }
         for fit in &set.fits {
             record_fit(&mut report, name, table, fit)?;
-            for other in case.data.iter().filter(|other| case.cross && other.name != *name) {
+            for (other, (_, _, outside)) in case.others(own).zip(&set.outside) {
                 let key = format!("{name}.{}.{}", fit.model.key, other.name);
+                report.value(q::OUTSIDE.named(&[&key]), *outside as f64);
                 let found = record_cross(&mut report, &key, &fit.law, &other.table)?;
                 set.crossed.push((fit.model.key, &other.name, found));
             }
@@ -93,6 +108,15 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     }
     let networks = case.networks.iter().map(|set| set.run(directory, &mut report));
     let networks = networks.collect::<Result<Vec<_>, _>>()?;
+    if !case.foams.is_empty() {
+        phases.start("foams");
+    }
+    let foams = case.foams.iter().map(|set| set.run(run, &mut report)).collect::<Result<Vec<_>, _>>()?;
+    if !case.forecasts.is_empty() {
+        phases.start("forecasts");
+    }
+    let forecasts = case.forecasts.iter().map(|set| set.run(run, &mut report));
+    let forecasts = forecasts.collect::<Result<Vec<_>, _>>()?;
     if !quick {
         phases.start("pictures");
         for set in &all {
@@ -103,7 +127,7 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     report.phases(&phases).threads(1).judge(&case.expect, quick);
     trials::judge(&case.trials, &mut report);
     let mut text = summary(case, &all, &timed, &report);
-    series.iter().chain(&networks).for_each(|part| text += part);
+    series.iter().chain(&networks).chain(&foams).chain(&forecasts).for_each(|part| text += part);
     for name in &report.non_finite {
         let _ = writeln!(text, "FAIL  {name} is not finite");
     }
@@ -336,6 +360,9 @@ fn verdicts(set: &TableFits) -> String {
          stretches {low:.3} to {high:.3}\n",
         set.name
     );
+    for (other, states, outside) in set.outside.iter().filter(|(_, _, outside)| *outside > 0) {
+        let _ = writeln!(text, "  out of distribution: {outside} of {states} states of {other}");
+    }
     for fit in &set.fits {
         let key = fit.model.key;
         let shown = |r2: Option<f64>| match r2 {

@@ -9,6 +9,8 @@ harness::quantities! {
     R2 = "{fit}.r2", "", "coefficient of determination 1 − Σr²/Σ(P − P̄)²";
     LOCKED = "{fit}.locked", "", "with `cross`: number of states of the other data beyond the locking \
                                   stretch of the law; if there are any, other values are missing";
+    OUTSIDE = "{fit}.outside", "", "with `cross`: number of states of the other data out of \
+                                    distribution, i.e. outside the strains that the data of the fit cover";
     STABLE = "{fit}.stable", "", "1 if the law is stable (Drucker) in uniaxial, equibiaxial and pure shear \
                                   tests over the stretches of its data, else 0";
     FAILED = "{fit}.failed", "", "1 if the law could not be fitted; other values are missing";
@@ -47,4 +49,31 @@ harness::quantities! {
     DEVIATION_MEDIAN = "{network}.deviation_median", "", "median of |predicted/measured − 1|";
     DEVIATION_RMS = "{network}.deviation_rms", "", "root mean square of predicted/measured − 1";
     DEVIATION_LARGEST = "{network}.deviation_largest", "", "largest |predicted/measured − 1|";
+}
+
+harness::quantities! {
+    /// Quantities of foams, `{foam}` = NAME.LAW, by test.
+    pub FOAMS:
+    FOAM_RMS = "{foam}.{test}.rms", "MPa", "root mean square of model − measurement in a test";
+    FOAM_RELATIVE = "{foam}.{test}.relative", "", "the same over the largest measured stress of the test";
+    FOAM_END = "{foam}.{test}.end", "MPa", "stress of the law at the strain of the largest measured stress";
+    FOAM_PREDICTED = "{foam}.{test}.predicted", "", "as `relative`, of a law fitted to the other tests";
+}
+
+harness::quantities! {
+    /// Quantities of forecasts of curves, `{forecast}`.
+    pub FORECASTS:
+    FORECAST_CURVES = "{forecast}.curves_inside", "", "share of the curves that lie in their band as a whole";
+    FORECAST_POINTS = "{forecast}.points_inside", "", "share of the predicted points that lie in the band";
+    FORECAST_COVERAGE = "{forecast}.coverage", "", "share of whole curves that the band claims, \
+                                                      1 − 2/n of n curves";
+    FORECAST_WIDTH = "{forecast}.width", "", "median of the half width of the band at rupture, \
+                                                relative: √(high/low) − 1";
+    FORECAST_ERROR = "{forecast}.error", "", "root mean square of ln(predicted/measured) at rupture";
+    FORECAST_LOCKING = "{forecast}.locking", "", "curves whose beginning and whole determine a \
+                                                    locking stretch";
+    FORECAST_LOCKING_INSIDE = "{forecast}.locking_inside", "", "share of these whose locking stretch \
+                                                                  lies in its band";
+    FORECAST_LOCKING_ABOVE = "{forecast}.locking_above", "", "share of the predicted locking \
+                                                                stretches above rupture";
 }

@@ -12,6 +12,8 @@ use polycore::constitutive::hyperelastic::{
 };
 use serde::Deserialize;
 
+use super::foams::{FoamSet, FoamSpec};
+use super::forecasts::{ForecastSet, ForecastSpec};
 use super::networks::{NetworkSet, NetworkSpec};
 use super::prony::{PronySet, PronySpec};
 use super::quantities as q;
@@ -42,6 +44,12 @@ struct Scene {
     /// Tables of polymer networks to predict.
     #[serde(default)]
     network: Vec<NetworkSpec>,
+    /// Foams to which compressible laws are fitted.
+    #[serde(default)]
+    foam: Vec<FoamSpec>,
+    /// Tension curves whose rest is predicted from their beginning.
+    #[serde(default)]
+    forecast: Vec<ForecastSpec>,
     /// Expected results.
     #[serde(default)]
     expect: Vec<Expect>,
@@ -60,7 +68,7 @@ enum Program {
 struct FitSettings {
     /// Names of laws; all laws if not given.
     laws: Option<Vec<String>>,
-    /// Judge a law fitted to one table on the other tables, too.
+    /// Judge a law fitted to one table on the other tables of the same `material`, too.
     #[serde(default)]
     cross: bool,
     /// Tables of measurements.
@@ -88,19 +96,28 @@ struct TestTableSpec {
     strain_column: Option<String>,
     /// Heading of the stress, if there are several.
     stress_column: Option<String>,
+    /// Material, in a table with one stress component in each row: a cell of its column `material` or
+    /// `source`.
+    material: Option<String>,
+    /// Tests of a table with one stress component in each row, as the file names them: `["UT", "UC"]`.
+    #[serde(default)]
+    tests: Vec<String>,
 }
 
 /// Table to be fitted.
 pub struct DataSet {
     pub name: String,
     pub table: TestData,
+    /// Material, if the scene names one.
+    pub material: Option<String>,
     /// Layout of the file, and the rows left out, one line each.
     pub read: Vec<String>,
 }
 
 /// JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
-    harness::scene::schema("polycore", &[q::ALL, q::PRONY, q::NETWORKS], |generator| {
+    let quantities = [q::ALL, q::PRONY, q::NETWORKS, q::FOAMS, q::FORECASTS];
+    harness::scene::schema("polycore", &quantities, |generator| {
         vec![generator.subschema_for::<Scene>()]
     })
 }
@@ -116,17 +133,19 @@ pub struct FitCase {
     pub prony: Vec<PronySet>,
     pub trials: Vec<FitTrial>,
     pub networks: Vec<NetworkSet>,
+    pub foams: Vec<FoamSet>,
+    pub forecasts: Vec<ForecastSet>,
     pub expect: Vec<Expect>,
 }
 
 impl FitCase {
     /// Parses and checks a scene and the tables that it names.
     pub fn parse(source: &Source) -> Result<Self, SceneError> {
-        let Scene { _program: Program::Polycore, title, fit, time, prony, trial, network, expect } =
+        let Scene { _program: Program::Polycore, title, fit, time, prony, trial, network, foam, forecast, expect } =
             source.parse()?;
         let laws = match &fit.laws {
             None => MODELS.iter().collect(),
-            Some(names) => select_laws(source, names)?,
+            Some(names) => select_laws(source, "fit.laws", names)?,
         };
         let mut data: Vec<DataSet> = Vec::new();
         for (i, entry) in fit.data.into_iter().enumerate() {
@@ -150,6 +169,8 @@ impl FitCase {
                 stress_unit: entry.stress_unit,
                 strain_column: entry.strain_column,
                 stress_column: entry.stress_column,
+                material: entry.material.clone(),
+                tests: entry.tests,
             };
             let reading = TestData::read_as(source.file(&entry.file), &format)
                 .map_err(|error| source.refused(&key("file"), error))?;
@@ -168,20 +189,23 @@ impl FitCase {
                     return Err(source.error(&key("file"), found, allowed));
                 }
             }
-            data.push(DataSet { name: entry.name, table, read });
+            data.push(DataSet { name: entry.name, table, material: entry.material, read });
         }
         let time = time.map(|settings| TimeCase::new(source, settings)).transpose()?;
         let mut series: Vec<PronySet> = Vec::new();
         for (i, spec) in prony.into_iter().enumerate() {
             series.push(spec.read(source, i, &series)?);
         }
-        let alone = trial.is_empty() && network.is_empty() && time.is_none() && series.is_empty();
-        if data.is_empty() && alone {
+        if data.is_empty()
+            && time.is_none()
+            && series.is_empty()
+            && [trial.is_empty(), network.is_empty(), foam.is_empty(), forecast.is_empty()] == [true; 4]
+        {
             return Err(source.error(
                 "fit.data",
                 "no data",
-                "at least one `[[fit.data]]` with `name` and `file`, `[time]`, `[[prony]]`, `[[trial]]` or \
-                 `[[network]]`",
+                "at least one `[[fit.data]]` with `name` and `file`, `[time]`, `[[prony]]`, `[[trial]]`, \
+                 `[[network]]`, `[[foam]]` or `[[forecast]]`",
             ));
         }
         super::trials::check(source, &trial)?;
@@ -189,9 +213,30 @@ impl FitCase {
         for (i, spec) in network.into_iter().enumerate() {
             networks.push(spec.read(source, i, &networks)?);
         }
+        let mut foams: Vec<FoamSet> = Vec::new();
+        for (i, spec) in foam.into_iter().enumerate() {
+            foams.push(spec.read(source, i, &foams)?);
+        }
+        let mut forecasts: Vec<ForecastSet> = Vec::new();
+        for (i, spec) in forecast.into_iter().enumerate() {
+            forecasts.push(spec.read(source, i, &forecasts)?);
+        }
         let (source, cross) = (source.clone(), fit.cross);
         let (prony, trials) = (series, trial);
-        let case = Self { source, title, laws, cross, data, time, prony, trials, networks, expect };
+        let case = Self {
+            source,
+            title,
+            laws,
+            cross,
+            data,
+            time,
+            prony,
+            trials,
+            networks,
+            foams,
+            forecasts,
+            expect,
+        };
         case.check_expectations()?;
         Ok(case)
     }
@@ -199,15 +244,21 @@ impl FitCase {
     /// Describes what a run will do, in lines.
     pub fn plan(&self) -> String {
         let mut text = format!("{}: {}\n", self.source.path.display(), self.title);
-        for DataSet { name, table, read } in &self.data {
+        for DataSet { name, table, read, .. } in &self.data {
             let (states, measured) = (table.states.len(), table.measurements());
             let source =
                 if table.source.is_empty() { "no line `# source: …` in it" } else { &table.source };
             let _ = writeln!(text, "data {name}: {states} states, {measured} measured stresses ({source})");
             read.iter().for_each(|line| text += &format!("  {line}\n"));
         }
-        for set in &self.networks {
-            text += &format!("{}\n", set.plan());
+        for line in self
+            .networks
+            .iter()
+            .map(NetworkSet::plan)
+            .chain(self.foams.iter().map(FoamSet::plan))
+            .chain(self.forecasts.iter().map(ForecastSet::plan))
+        {
+            text += &format!("{line}\n");
         }
         for model in self.laws.iter().filter(|_| !self.data.is_empty()) {
             let names: Vec<_> = model.parameters.iter().map(|parameter| parameter.name).collect();
@@ -222,8 +273,15 @@ impl FitCase {
         if !self.networks.is_empty() {
             files += "<network>_networks.csv, ";
         }
+        }
         if !self.prony.is_empty() {
             files += "<prony>_prony.csv, <prony>_curve.csv, <prony>_branches.toml, <prony>_prony.inp, ";
+        }
+        if !self.foams.is_empty() {
+            files += "<foam>_foam.csv, <foam>_foam.inp, ";
+        }
+        if !self.forecasts.is_empty() {
+            files += "<forecast>_forecast.csv, ";
         }
         let _ = writeln!(
             text,
@@ -237,20 +295,27 @@ impl FitCase {
         text
     }
 
+    /// Tables on which a law that is fitted to `set` is judged, too.
+    pub fn others<'a>(&'a self, set: &DataSet) -> impl Iterator<Item = &'a DataSet> {
+        let (name, material) = (set.name.clone(), set.material.clone());
+        self.data.iter().filter(move |other| self.cross && other.name != name && other.material == material)
+    }
+
     /// Lists the names of all scalars of the report.
     fn quantities(&self) -> Vec<String> {
         let mut names = Vec::new();
-        for DataSet { name: data, .. } in &self.data {
+        for set @ DataSet { name: data, .. } in &self.data {
             for model in &self.laws {
                 let fit = format!("{data}.{}", model.key);
                 let own = [q::RMS, q::MAE, q::R2, q::SHEAR_MODULUS, q::STABLE, q::FAILED];
                 names.extend(own.map(|quantity| quantity.named(&[&fit]).name));
                 let parameters = model.parameters.iter().map(|parameter| parameter.name);
                 names.extend(parameters.map(|parameter| q::PARAMETER.named(&[&fit, parameter]).name));
-                for other in self.data.iter().filter(|other| self.cross && other.name != *data) {
+                for other in self.others(set) {
                     let fit = format!("{fit}.{}", other.name);
                     names.extend(
-                        [q::RMS, q::MAE, q::R2, q::LOCKED].map(|quantity| quantity.named(&[&fit]).name),
+                        [q::RMS, q::MAE, q::R2, q::LOCKED, q::OUTSIDE]
+                            .map(|quantity| quantity.named(&[&fit]).name),
                     );
                 }
             }
@@ -263,6 +328,12 @@ impl FitCase {
         }
         names.extend(self.prony.iter().flat_map(PronySet::quantities));
         for set in &self.networks {
+            names.extend(set.quantities());
+        }
+        for set in &self.foams {
+            names.extend(set.quantities());
+        }
+        for set in &self.forecasts {
             names.extend(set.quantities());
         }
         names
@@ -280,11 +351,19 @@ impl FitCase {
     }
 }
 
-fn select_laws(source: &Source, names: &[String]) -> Result<Vec<&'static ModelDescriptor>, SceneError> {
+/// Finds laws by their names, each once.
+///
+/// # Errors
+/// An unknown name, one twice, none.
+pub fn select_laws(
+    source: &Source,
+    list: &str,
+    names: &[String],
+) -> Result<Vec<&'static ModelDescriptor>, SceneError> {
     let mut laws: Vec<&'static ModelDescriptor> = Vec::new();
     for (i, name) in names.iter().enumerate() {
         let all = || MODELS.iter().map(|model| model.key).collect::<Vec<_>>().join(", ");
-        let key = format!("fit.laws[{i}]");
+        let key = format!("{list}[{i}]");
         let model = hyperelastic::model(name).map_err(|_| match advice(name) {
             Some(advice) => source.error(&key, format!("`{name}`"), advice),
             None => source.error(&key, format!("`{name}`"), all()),
@@ -295,7 +374,7 @@ fn select_laws(source: &Source, names: &[String]) -> Result<Vec<&'static ModelDe
         laws.push(model);
     }
     if laws.is_empty() {
-        return Err(source.error("fit.laws", "no law", "at least one law; leave out `laws` to fit all"));
+        return Err(source.error(list, "no law", "at least one law; leave out `laws` to fit all"));
     }
     Ok(laws)
 }
@@ -320,7 +399,9 @@ fn advice(name: &str) -> Option<&'static str> {
             "no such parameter: the rubber of a fit is incompressible; compressibility is `bulk_modulus` in \
              a scene of peri"
         }
-        "hyperfoam" | "ogdenfoam" | "blatzko" => "an incompressible law; foams are not modelled",
+        "hyperfoam" | "ogdenfoam" | "ogdenhill" | "blatzko" => {
+            "an incompressible law; foams are fitted by a block `[[foam]]`"
+        }
         _ => return None,
     })
 }

@@ -14,6 +14,8 @@ pub struct TableFits<'a> {
     pub failed: Vec<(&'static str, String)>,
     /// Law, other table, agreement there; `None` if the law locks.
     pub crossed: Vec<(&'static str, &'a str, Option<Agreement>)>,
+    /// Other table, its number of states and of those outside the strains of this one.
+    pub outside: Vec<(&'a str, usize, usize)>,
 }
 
 impl TableFits<'_> {

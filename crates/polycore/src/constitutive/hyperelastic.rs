@@ -25,6 +25,7 @@ mod compressible;
 mod descriptor;
 mod fit_map;
 mod gent;
+mod hyperfoam;
 mod lopez_pamies;
 mod models;
 mod ogden;
@@ -35,8 +36,17 @@ mod principal;
 
 #[cfg(feature = "tables")]
 mod columns;
+#[cfg(feature = "tables")]
+mod components;
+mod coverage;
+#[cfg(feature = "tables")]
+mod curves;
 pub mod data;
 pub mod fit;
+pub mod foam;
+#[cfg(feature = "tables")]
+mod foam_table;
+pub mod forecast;
 pub mod homogeneous;
 #[cfg(feature = "tables")]
 mod plausible;
@@ -49,9 +59,11 @@ pub use chain::{EightChain, EightChainRootI2, ThreeChain};
 #[cfg(feature = "tables")]
 pub use columns::{StrainMeasure, TestStressMeasure};
 pub use compressible::{Compressible, Coupling, Volumetric};
+pub use coverage::Coverage;
 pub use descriptor::{Domain, ModelDescriptor, ModelKind, Parameter};
 pub use gent::Gent;
 pub use homogeneous::{PlaneStress, plane_stress};
+pub use hyperfoam::{FoamTerm, Hyperfoam};
 pub use lopez_pamies::LopezPamies;
 pub use models::{MODELS, all, model};
 pub use ogden::{Ogden, OgdenConvention};

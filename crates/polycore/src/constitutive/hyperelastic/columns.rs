@@ -142,7 +142,7 @@ impl Role {
 }
 
 /// Splits the heading into its plain name and the unit, which may follow a `_`: `nominal_1_N/mm^2`.
-fn suffixed(heading: &Heading) -> (String, Option<String>) {
+pub(super) fn suffixed(heading: &Heading) -> (String, Option<String>) {
     for (at, _) in heading.text.match_indices('_') {
         let (name, unit) = (&heading.text[..at], &heading.text[at + 1..]);
         let percent = unit == "%" || unit == "pct" || unit == "percent";

@@ -26,6 +26,13 @@ pub enum Mode {
     /// General biaxial state, any λ₁, λ₂; a table, not a test with one stretch.
     #[serde(skip)]
     Biaxial,
+    /// One stress of a general biaxial state; the other one was not measured.
+    #[serde(skip)]
+    Component,
+    /// σ₁ − σ₂ of a general biaxial state: as a pressure does not change it, it is the true stress along λ₁
+    /// of the state whose second stretch is λ₃ and whose free face is that of λ₂. `nominal` is (σ₁ − σ₂)/λ₁.
+    #[serde(skip)]
+    Difference,
 }
 
 impl Mode {
@@ -39,15 +46,17 @@ impl Mode {
             Self::Equibiaxial => "equibiaxial",
             Self::PureShear => "pure-shear",
             Self::Biaxial => "biaxial",
+            Self::Component => "biaxial, one stress",
+            Self::Difference => "biaxial, difference of true stresses",
         }
     }
 
-    /// λ₂ of a test at λ₁; for [`Mode::Biaxial`], which defines none, λ₁.
+    /// λ₂ of a test at λ₁; for biaxial states, which define none, λ₁.
     pub fn second_stretch(self, first: f64) -> f64 {
         match self {
             Self::Uniaxial => first.recip().sqrt(),
             Self::PureShear => 1.0,
-            Self::Equibiaxial | Self::Biaxial => first,
+            Self::Equibiaxial | Self::Biaxial | Self::Component | Self::Difference => first,
         }
     }
 }
@@ -80,7 +89,7 @@ impl TestData {
 
     /// Number of measured stresses, i.e. of those that are not exactly zero.
     pub fn measurements(&self) -> usize {
-        self.states.iter().flat_map(|state| state.nominal).filter(|nominal| *nominal != 0.0).count()
+        self.states.iter().flat_map(TestState::measured).count()
     }
 }
 
@@ -91,5 +100,17 @@ impl TestState {
     /// [`Error::Deformation`] if one is not positive and finite.
     pub fn principal_stretches(&self) -> Result<[f64; 3], Error> {
         incompressible(self.stretches[0], self.stretches[1])
+    }
+
+    /// Factor of P in residuals: 1, so that nominal stresses are compared; λ₁ of [`Mode::Difference`], so
+    /// that true ones are.
+    pub fn weight(&self) -> f64 {
+        if self.mode == Mode::Difference { self.stretches[0] } else { 1.0 }
+    }
+
+    /// Measured stresses times [`TestState::weight`], Pa.
+    pub fn measured(&self) -> impl Iterator<Item = f64> + Clone + use<> {
+        let weight = self.weight();
+        self.nominal.into_iter().filter(|nominal| *nominal != 0.0).map(move |nominal| weight * nominal)
     }
 }

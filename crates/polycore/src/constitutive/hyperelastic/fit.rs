@@ -10,7 +10,7 @@ use std::cell::Cell;
 
 use nalgebra::DVector;
 
-use super::data::TestData;
+use super::data::{TestData, TestState};
 use super::descriptor::FitStart;
 pub use super::fit_map::{Identifiability, residuals};
 use super::fit_map::{ParameterMap, REJECTED};
@@ -82,7 +82,7 @@ impl Agreement {
     /// # Errors
     /// As [`residuals`]: at a state beyond locking there is no stress to compare.
     pub fn new<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<Self, Error> {
-        let measured = table.states.iter().flat_map(|state| state.nominal).filter(|data| *data != 0.0);
+        let measured = table.states.iter().flat_map(TestState::measured);
         Ok(Self::of_residuals(&residuals(law, table)?, measured))
     }
 
@@ -221,9 +221,10 @@ pub fn neo_hookean_modulus(table: &TestData) -> Result<f64, Error> {
     let (mut model_data, mut model_model) = (0.0, 0.0);
     for state in &table.states {
         let model = homogeneous::biaxial(&unit, state.stretches[0], state.stretches[1])?;
+        let square = state.weight().powi(2);
         for (model, data) in model.into_iter().zip(state.nominal).filter(|(_, data)| *data != 0.0) {
-            model_data += model * data;
-            model_model += model * model;
+            model_data += square * model * data;
+            model_model += square * model * model;
         }
     }
     let modulus = model_data / model_model;

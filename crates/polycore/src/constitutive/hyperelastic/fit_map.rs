@@ -17,7 +17,7 @@ pub enum Identifiability {
     Undetermined,
 }
 
-/// Computes model minus data for every measured stress, Pa, state by state.
+/// Computes model minus data for every measured stress, Pa, state by state, times [`TestState::weight`].
 ///
 /// # Errors
 /// Errors of the law at a state of the table.
@@ -26,7 +26,7 @@ pub fn residuals<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<
     for state in &table.states {
         let nominal = homogeneous::biaxial(law, state.stretches[0], state.stretches[1])?;
         let measured = nominal.into_iter().zip(state.nominal).filter(|(_, data)| *data != 0.0);
-        residuals.extend(measured.map(|(model, data)| model - data));
+        residuals.extend(measured.map(|(model, data)| state.weight() * (model - data)));
     }
     Ok(residuals)
 }
@@ -123,7 +123,7 @@ impl<'a> ParameterMap<'a> {
             Some(slopes) => {
                 let mut unused = vec![[0.0; 2]; p.len()];
                 measured(table, |state| slopes(&p, state.stretches, &mut unused))
-                    .map(|(i, state, nominal)| nominal[i] - state.nominal[i])
+                    .map(|(i, state, nominal)| state.weight() * (nominal[i] - state.nominal[i]))
                     .collect()
             }
             None => residuals(&self.model.law(&p).ok()?, table).ok()?,
@@ -144,7 +144,7 @@ impl<'a> ParameterMap<'a> {
                 slopes(&p, state.stretches, &mut of);
                 for axis in (0..2).filter(|&axis| state.nominal[axis] != 0.0) {
                     for (i, value) in values.iter().enumerate() {
-                        rows[(row, i)] = of[i][axis] * value.1 / self.modulus;
+                        rows[(row, i)] = state.weight() * of[i][axis] * value.1 / self.modulus;
                     }
                     row += 1;
                 }

@@ -63,6 +63,48 @@ pub fn incompressible(stretch_1: f64, stretch_2: f64) -> Result<[f64; 3], Error>
     Ok(stretches)
 }
 
+/// Bar of a compressible law with free sides.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FreeBar {
+    /// λ₂ = λ₃.
+    pub lateral: f64,
+    /// P₁, Pa.
+    pub nominal: f64,
+}
+
+/// Finds the lateral stretch of a bar with S₂₂ = S₃₃ = 0, by Newton's method in ln λ₂, bracketed as it goes.
+///
+/// # Errors
+/// A stretch that is not positive and finite, errors of the law, [`Error::NoConvergence`].
+pub fn free_bar<L: Hyperelastic + ?Sized>(law: &L, stretch: f64) -> Result<FreeBar, Error> {
+    let (mut log, mut low, mut high) = (0.0_f64, f64::NEG_INFINITY, f64::INFINITY);
+    let mut residual = f64::NAN;
+    for _ in 0..MAX_STEPS {
+        let lateral = log.exp();
+        let response = law.response_at([stretch, lateral, lateral])?;
+        let slope = lateral * lateral * (response.normal[1][1] + response.normal[1][2]);
+        residual = response.stress[1];
+        let size = response.normal[1][1].abs().max(response.stress[0].abs());
+        if residual.abs() <= 16.0 * f64::EPSILON * size {
+            return Ok(FreeBar { lateral, nominal: stretch * response.stress[0] });
+        }
+        if residual > 0.0 {
+            high = high.min(log)
+        } else {
+            low = low.max(log)
+        }
+        let trial = log - (residual / slope).clamp(-1.0, 1.0);
+        log = if slope > 0.0 && trial > low && trial < high {
+            trial
+        } else if low.is_finite() && high.is_finite() {
+            0.5 * (low + high)
+        } else {
+            log - residual.signum()
+        };
+    }
+    Err(Error::NoConvergence { iteration: "lateral stretch", steps: MAX_STEPS, residual })
+}
+
 /// Plane-stress state of a compressible law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaneStress {

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::Error;
 use super::columns::{ColumnKind, MODES, Role, StrainMeasure, TestStressMeasure, mode};
+use super::components::ComponentColumns;
 use super::data::{Mode, TestData, TestState};
 use super::plausible::{TestRow, plausible};
 use crate::table::{self, plain_unit, plainly};
@@ -25,6 +26,10 @@ pub struct TestFormat {
     pub strain_column: Option<String>,
     /// Heading of the stress, if there are several.
     pub stress_column: Option<String>,
+    /// Material, in a table of components of several materials.
+    pub material: Option<String>,
+    /// Names of tests, in a table of components; all if empty.
+    pub tests: Vec<String>,
 }
 
 /// Result of reading a table.
@@ -58,7 +63,8 @@ impl TestData {
     /// Reads a table as [`crate::table`] does: a column of stretches or strains and one of stresses, with a
     /// column of the [`Mode`] or for one test; or two of each (`stretch_1`, `stretch_2`, `nominal_1 [MPa]`,
     /// …). By default, strains are engineering strains and stresses nominal ones, unless the heading or
-    /// `format` says otherwise. Blank stresses were not measured.
+    /// `format` says otherwise. Blank stresses were not measured. A table with a column `component` has one
+    /// stress in each row: `mode`, `lambda1`, `lambda2`, `component` (P1, P2, s1-s2), `unit`, `value`.
     ///
     /// # Errors
     /// [`crate::Error::Io`]; errors of [`TestData::parse_as`].
@@ -76,6 +82,13 @@ impl TestData {
     /// stiffness below zero, no measurement at all.
     pub fn parse_as(name: &str, bytes: Vec<u8>, format: &TestFormat) -> Result<ImportedTest, Error> {
         let file = table::Table::parse(name, bytes).map_err(located)?;
+        if let Some(components) = ComponentColumns::find(&file).map_err(located)? {
+            return components.read(&file, format).map_err(located);
+        }
+        if format.material.is_some() || !format.tests.is_empty() {
+            let allowed = "a column `component` where the keys `material` or `tests` choose rows";
+            return Err(located(file.refuse_headings(allowed)));
+        }
         let columns = TestColumns::find(&file, format).map_err(located)?;
         columns.read(&file, format).map_err(located)
     }
