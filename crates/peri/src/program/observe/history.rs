@@ -15,7 +15,7 @@ pub fn is_dynamic(history: &[StepRecord]) -> bool {
 
 /// Returns the damped energy, J; in quasi-static runs work less stored, released and friction energy.
 pub fn damped_energy(row: &StepRecord, dynamic: bool) -> f64 {
-    if dynamic { row.damped } else { row.work - row.stored - row.released - row.rubbed }
+    if dynamic { row.damped } else { row.work - row.stored - row.released - row.rubbed - row.dissipated }
 }
 
 /// Adds peak, first break, energies and balances.
