@@ -121,8 +121,7 @@ pub(super) fn check<const D: usize>(
 ) -> Result<Moduli, Error> {
     let mut memory = Workspace::default();
     let rest = Voigt::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0);
-    let wrong =
-        |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.into() });
+    let wrong = |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.into() });
     let found = (law.tangent(&rest, &mut memory), law.moduli(&mut memory));
     let (Ok(found), Ok(moduli)) = found else {
         return wrong("law", f64::NAN, "a law with a tangent at rest");
@@ -192,18 +191,13 @@ pub(super) fn at_thickness<const D: usize>(
 }
 
 /// √(‖A‖₁‖A‖∞) of A_iJkL = F_iM ℂ_MJNL F_kN + δ_ik S_JL: 3K at rest where K > 2μ/3.
-pub(super) fn tangent_norm<const D: usize>(
-    space: Space,
-    f: &BodyTensor<D>,
-    found: &Prediction,
-) -> f64 {
+pub(super) fn tangent_norm<const D: usize>(space: Space, f: &BodyTensor<D>, found: &Prediction) -> f64 {
     let Prediction { stress, tangent: Some(c), .. } = found else { return f64::NAN };
     let stress = voigt::to_stress(stress);
     // in plane stress the thickness adapts
     let thin = if space == Space::PlaneStress { 1.0 / c[(2, 2)] } else { 0.0 };
-    let material = |i, j, k, l| {
-        component(c, i, j, k, l) - thin * component(c, i, j, 2, 2) * component(c, 2, 2, k, l)
-    };
+    let material =
+        |i, j, k, l| component(c, i, j, k, l) - thin * component(c, i, j, 2, 2) * component(c, 2, 2, k, l);
     let entry = |i: usize, j: usize, k: usize, l: usize| {
         let mut sum = if i == k { stress[(j, l)] } else { 0.0 };
         for m in 0..D {

@@ -29,7 +29,8 @@ pub enum EnergyPart {
 }
 
 /// Energy of a law with branches that drives breaking.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Driving {
     /// Energy of the equilibrium law: the fracture energy is intrinsic (Shrimali and Lopez-Pamies 2023,

@@ -111,15 +111,13 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
     }
 
     /// Σ V `of` over the particles, of their points.
-    fn sum(
-        &mut self,
-        bonds: &dyn Bonds<D>,
-        of: impl Fn(&M, &mut M::Point) -> f64 + Sync,
-    ) -> f64 {
+    fn sum(&mut self, bonds: &dyn Bonds<D>, of: impl Fn(&M, &mut M::Point) -> f64 + Sync) -> f64 {
         let material = &self.material;
         let items = self.points.par_chunks_mut(CHUNK).enumerate().map(|(chunk, points)| {
             let sites = particles_of(bonds, chunk).iter().map(|&site| site as usize);
-            sites.map(|site| bonds.volume(site) * of(material, &mut points[site - chunk * CHUNK])).sum::<f64>()
+            sites
+                .map(|site| bonds.volume(site) * of(material, &mut points[site - chunk * CHUNK]))
+                .sum::<f64>()
         });
         ordered_sum(items)
     }

@@ -88,8 +88,9 @@ impl ViscousCorrespondence {
         branches.chain(self.law.softening().map(|_| state.peak))
     }
 
-    /// λ₃², the response of a part of the energy at that C, and the state at the end in the scratch memory;
-    /// `None` outside the law's domain.
+    /// λ₃², the response of a part of the energy there, and the state at the end in the scratch memory;
+    /// `None` outside the law's domain. In plane stress the equilibrium law alone has its own thickness: the
+    /// pressure that the branches need is no part of its stress.
     fn predict<const D: usize>(
         &self,
         deformation: &Deformation<D>,
@@ -102,25 +103,25 @@ impl ViscousCorrespondence {
         }
         let Scratch { memory, start, end } = scratch;
         let past = deformation.past.as_deref();
+        start.peak = 0.0;
         past.iter().for_each(|past| self.unpack(past, start));
-        let peak = past.map_or(0.0, |_| start.peak);
-        let mut whole = |c: &Voigt, tangent: bool| match past {
-            Some(past) => {
-                self.law.respond(start, &Increment::new(*c, *c, past.duration), tangent, end, memory).ok()
-            }
-            None => self.law.respond_relaxed(peak, c, tangent, end, memory).ok(),
-        };
+        let past = past.filter(|_| !self.drives_alone(part));
         let mut found = None;
         let (c, _) = at_thickness(self.space, &deformation.gradient(), tangent, |c, tangent| {
-            found = whole(c, tangent);
+            let response = match past {
+                Some(past) => {
+                    let increment = Increment::new(*c, *c, past.duration);
+                    self.law.respond(start, &increment, tangent, end, memory)
+                }
+                None => self.law.respond_relaxed(start.peak, c, tangent, end, memory),
+            };
+            found = response.ok();
             found.map(|found| found.prediction)
         })?;
-        if part == EnergyPart::Driving && self.driving == Driving::Equilibrium && past.is_some() {
-            found = self.law.respond_relaxed(peak, &c, tangent, end, memory).ok();
-        }
         found.map(|found| (c[2], found))
     }
 
+    /// Returns true for a part without branches.
     fn drives_alone(&self, part: EnergyPart) -> bool {
         part == EnergyPart::Driving && self.driving == Driving::Equilibrium
     }
@@ -158,16 +159,15 @@ impl<const D: usize> PointLaw<D> for ViscousCorrespondence {
     fn respond(&self, deformation: &Deformation<D>) -> PointStress<D> {
         let part = part_of(deformation);
         let found = SCRATCH.with_borrow_mut(|scratch| self.predict(deformation, part, false, scratch));
-        let stress = found.map_or(Matrix3::from_element(f64::NAN), |(_, found)| {
-            voigt::to_stress(&found.prediction.stress)
-        });
+        let stress = found
+            .map_or(Matrix3::from_element(f64::NAN), |(_, found)| voigt::to_stress(&found.prediction.stress));
         let plane = BodyTensor::<D>::from_fn(|a, b| stress[(a, b)]);
         PointStress { piola: deformation.gradient() * plane, stabilisation: self.shear_of(deformation) }
     }
 
     fn stiffness(&self, deformation: &Deformation<D>) -> f64 {
-        let found = SCRATCH
-            .with_borrow_mut(|scratch| self.predict(deformation, EnergyPart::Stored, true, scratch));
+        let found =
+            SCRATCH.with_borrow_mut(|scratch| self.predict(deformation, EnergyPart::Stored, true, scratch));
         found.map_or(f64::NAN, |(_, found)| {
             tangent_norm(self.space, &deformation.gradient(), &found.prediction)
         })
@@ -185,8 +185,8 @@ impl<const D: usize> PointLaw<D> for ViscousCorrespondence {
         if self.space != Space::PlaneStress {
             return 1.0;
         }
-        let found = SCRATCH
-            .with_borrow_mut(|scratch| self.predict(deformation, EnergyPart::Stored, false, scratch));
+        let found =
+            SCRATCH.with_borrow_mut(|scratch| self.predict(deformation, EnergyPart::Stored, false, scratch));
         found.map_or(f64::NAN, |(square, _)| square.sqrt())
     }
 

@@ -186,7 +186,8 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
             state.control.past.remove(0);
         }
     }
-    let time = |back: usize| system.time_at((state.step + 1).checked_sub(back).and_then(|s| s.checked_sub(1)));
+    let time =
+        |back: usize| system.time_at((state.step + 1).checked_sub(back).and_then(|s| s.checked_sub(1)));
     let length = |back: usize| time(back) - time(back + 1);
     let even = |back: usize| {
         (at(back) - at(back + 1) - increment).abs() <= 1e-6 * increment.abs()

@@ -382,7 +382,10 @@ impl VelocityVerlet {
         motion.energies.kinetic = second.kinetic;
         motion.energies.damped += first.damped + second.damped;
         state.work += first.work + second.work;
-        let gone = state.fracture.released + state.memory.dissipated + motion.energies.damped + motion.energies.rubbed;
+        let gone = state.fracture.released
+            + state.memory.dissipated
+            + motion.energies.damped
+            + motion.energies.rubbed;
         let available = state.work - gone - motion.energies.floor;
         motion.energies.turnover = motion.energies.turnover.max(available).max(gone);
         let most = available.max(0.0) + EXCESS * motion.energies.turnover;
