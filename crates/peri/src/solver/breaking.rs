@@ -128,10 +128,10 @@ impl<const D: usize> System<'_, D> {
             state.fracture.softened = softened;
         }
         match before {
-            Some([driving, trial]) => {
+            Some([driving, stored]) => {
                 let after = self.energies_at_break(state);
                 state.fracture.released += driving - after[0];
-                state.memory.dissipated += (trial - after[1]) - (driving - after[0]);
+                state.memory.dissipated += (stored - after[1]) - (driving - after[0]);
             }
             None => state.fracture.released += released.unwrap_or(0.0),
         }
@@ -150,11 +150,11 @@ impl<const D: usize> System<'_, D> {
         sites
     }
 
-    /// Energy that drives breaking, and all energy that the step began with, J: equal without a state.
+    /// Energy that drives breaking, and all stored energy, J: equal without a state.
     fn energies_at_break(&mut self, state: &State<D>) -> [f64; 2] {
         let mut of = |part| self.material.energy_of(&*self.bonds, &state.displacement, part);
-        match (of(EnergyPart::Driving), of(EnergyPart::Trial)) {
-            (Some(driving), Some(trial)) => [driving, trial],
+        match (of(EnergyPart::Driving), of(EnergyPart::Stored)) {
+            (Some(driving), Some(stored)) => [driving, stored],
             _ => [self.stored_energy(state, state.stretches.observed); 2],
         }
     }

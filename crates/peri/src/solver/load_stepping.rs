@@ -127,6 +127,7 @@ fn step_by_step<const D: usize>(
                 continue 'steps;
             }
             work_of_loads(system, state);
+            system.book_flow(state);
             if system.lower(state, shortest) {
                 continue;
             }

@@ -3,6 +3,7 @@
 use super::state::State;
 use super::system::System;
 use crate::error::Error;
+use crate::material::EnergyPart;
 
 impl<const D: usize> System<'_, D> {
     /// Time at the end of a step, s; 0 before the first one and without times.
@@ -40,13 +41,26 @@ impl<const D: usize> System<'_, D> {
         self.material.recall(&*self.bonds, duration, &[])
     }
 
-    /// Ends a step: histories change to those at its end.
+    /// Books the energy dissipated in the step so far, in its first equilibrium. What the jump to another one
+    /// after bonds broke dissipates is no flow of this step: work less all other energies has it.
+    pub(super) fn book_flow(&mut self, state: &mut State<D>) {
+        if self.times.is_empty() || state.control.round > 0 {
+            return;
+        }
+        let mut of = |part| self.material.energy_of(&*self.bonds, &state.displacement, part);
+        if let (Some(trial), Some(stored)) = (of(EnergyPart::Trial), of(EnergyPart::Stored)) {
+            state.memory.dissipated += trial - stored;
+        }
+    }
+
+    /// Ends a step: histories change to those at its end; returns the energy dissipated in it, J.
     ///
     /// # Errors
     /// As [`Self::begin_time_step`].
-    pub(super) fn end_time_step(&mut self, state: &mut State<D>) -> Result<(), Error> {
-        state.memory.dissipated += self.material.advance(&*self.bonds, &state.displacement);
+    pub(super) fn end_time_step(&mut self, state: &mut State<D>) -> Result<f64, Error> {
+        let dissipated = self.material.advance(&*self.bonds, &state.displacement);
         state.memory.values = self.material.memory(&*self.bonds);
-        self.set_duration(state, 0.0)
+        self.set_duration(state, 0.0)?;
+        Ok(dissipated)
     }
 }

@@ -355,7 +355,7 @@ impl VelocityVerlet {
         state.counts.iterate();
         self.account(state, first, second)?;
         let broken = look && self.break_overstretched(system, state, observed, factor);
-        system.end_time_step(state)?;
+        state.memory.dissipated += system.end_time_step(state)?;
         self.cover_contact(system, state);
         let follows = self.follows(system);
         if follows {

@@ -40,13 +40,20 @@ fn frozen_states_pass_the_battery() {
 }
 
 /// Pulls a strip with a notch in 40 steps to `rise` within a second, holds it for a second in 20.
-fn tear(rule: Driving, moving: bool, steps: [u32; 2], start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> State<2> {
+fn tear(
+    rule: Driving,
+    moving: bool,
+    steps: [u32; 2],
+    start: Option<&State<2>>,
+    saved: &mut Vec<State<2>>,
+) -> State<2> {
     let mut body = Body::<2>::solid([30, 24], 0.1, 3.015);
     body.slits = vec![Slit { at: 1.2, from: -1.0, to: 1.2 }];
     let mut built = body.build();
     let bonds = &mut built.lattice;
     let softening = Mullins { ratio: 2.0, offset: 0.2, slope: 0.1 };
-    let solid = solid::<2>(Space::PlaneStress, 20.0, rule, (rule == Driving::Equilibrium).then_some(softening));
+    let solid =
+        solid::<2>(Space::PlaneStress, 20.0, rule, (rule == Driving::Equilibrium).then_some(softening));
     let loads = hold(bonds, |[_, y]| match y {
         y if y < 0.3 => Some((3, [0.0; 2])),
         y if y > 2.1 => Some((3, [0.0, 0.6])),
@@ -70,8 +77,12 @@ fn tear(rule: Driving, moving: bool, steps: [u32; 2], start: Option<&State<2>>, 
     let finished = &mut |_: &dyn Bonds<2>, _: &_| Ok(());
     let solved = if moving {
         system.times = Vec::new().into();
-        VelocityVerlet { records: 20, ramp: 10.0, safety: 0.45, ..VelocityVerlet::new(1.0, 10.0) }
-            .solve(&mut system, &mut state, &mut watch, finished)
+        VelocityVerlet { records: 20, ramp: 10.0, safety: 0.45, ..VelocityVerlet::new(1.0, 10.0) }.solve(
+            &mut system,
+            &mut state,
+            &mut watch,
+            finished,
+        )
     } else {
         Lbfgs { tolerance: 1e-6, ..Default::default() }.solve(&mut system, &mut state, &mut watch, finished)
     };
@@ -128,9 +139,11 @@ fn the_ledger_closes_to_the_work_integral() {
         let mut places: Vec<(f64, f64)> = Vec::new();
         for (from, low, to, high) in legs {
             let count = steps[0];
-            places.extend((1..=count).map(|k| f64::from(k) / f64::from(count)).map(|part| {
-                (from + part * (to - from), low + part * (high - low))
-            }));
+            places.extend(
+                (1..=count)
+                    .map(|k| f64::from(k) / f64::from(count))
+                    .map(|part| (from + part * (to - from), low + part * (high - low))),
+            );
         }
         let (times, factors): (Vec<f64>, Vec<f64>) = places.into_iter().unzip();
         let mut state = State::new(bonds.sites());
