@@ -1,4 +1,4 @@
-//! Stretches a sheet of viscoelastic rubber in 0.1 s and holds it: `cargo run --release --example relax_sheet`.
+//! Stretches a sheet of viscoelastic rubber and holds it: `cargo run --release --example relax_sheet`.
 
 use peri::calibrate::Space;
 use peri::geometry::Shape;
@@ -30,7 +30,5 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for row in simulation.history() {
         println!("{:5.2} s  {:7.3} N  {:.5} J dissipated", row.time, row.load, row.dissipated);
     }
-    let [peak, end] = [9, 19].map(|row| simulation.history()[row].load);
-    assert!(end < 0.6 * peak);
     Ok(())
 }
