@@ -1,7 +1,6 @@
 //! Solids with a state: frozen forces, relaxation in closed form, ledgers with broken bonds, resumed runs.
 
-use crate::bodies::{Body, Slit};
-use crate::equilibria::hold;
+use crate::bodies::{Body, Slit, hold};
 use crate::materials::battery;
 use evidence::{at_most, near};
 use peri::bonds::Bonds;
