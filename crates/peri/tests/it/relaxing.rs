@@ -3,7 +3,7 @@
 use crate::bodies::{Body, Slit, hold};
 use crate::materials::battery;
 use evidence::{at_most, near};
-use peri::bonds::Bonds;
+use peri::bonds::{BodyGeometry, Bonds};
 use peri::calibrate::Space;
 use peri::material::{Driving, Material, NonlocalSolid, ViscousCorrespondence};
 use peri::solver::{Breaking, Criterion, Lbfgs, Method, Policy, State, Status, System, VelocityVerlet};
