@@ -28,6 +28,7 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
+mod branch;
 mod constitutive;
 mod error;
 mod failure;
@@ -39,6 +40,7 @@ mod schema;
 mod solid;
 
 pub use crate::stamp::{InputStamp, Stamp};
+pub use branch::{BranchConstant, BranchSpec, MullinsSpec, SpringKind, ViscosityKind};
 pub use constitutive::{Constant, ConstitutiveSpec};
 pub use error::SceneError;
 pub use failure::Failure;

@@ -9,7 +9,7 @@ pub use crossing::{Convention, Crossing};
 use crate::bonds::BodyGeometry;
 use crate::calibrate::Space;
 use crate::error::Error;
-use crate::material::{PointLaw, energy_at_strength};
+use crate::material::{Driving, PointLaw, energy_at_strength};
 use crate::potential::{BondPotential, NetworkStretch, softened_energy};
 use crate::solver::{Bilinear, Criterion};
 use polycore::numerics::{bisect, bisected};
@@ -37,6 +37,8 @@ pub struct Critical {
     /// Uniaxial tensile strength of a solid, force over the undeformed section, in addition to its fracture
     /// energy: bonds soften.
     pub strength: Option<Stress>,
+    /// Energy of a solid with branches that breaking has to release; default: `equilibrium`.
+    pub driving: Option<Driving>,
 }
 
 /// Interpretations of f√n̄, R1 to R4 in the documents (formulation.md, Critical stretch). (2.38) is the trace

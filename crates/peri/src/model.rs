@@ -58,6 +58,7 @@ pub struct Model<const D: usize, M> {
     /// Rotating regions, by their numbers.
     rotations: Vec<(usize, Rotation<D>)>,
     factors: Vec<f64>,
+    times: Vec<f64>,
     critical_stretch: Option<Property>,
     contact: Option<f64>,
     planes: Vec<RigidPlane<D>>,
@@ -66,9 +67,17 @@ pub struct Model<const D: usize, M> {
 impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
     /// Creates a body without loads: one load step, no breaking unless the material defines it, no contact.
     pub fn new(body: Body<D>, material: M) -> Self {
-        let (regions, rotations, factors) = (Vec::new(), Vec::new(), vec![1.0]);
-        let planes = Vec::new();
-        Self { body, material, regions, rotations, factors, critical_stretch: None, contact: None, planes }
+        Self {
+            body,
+            material,
+            regions: Vec::new(),
+            rotations: Vec::new(),
+            factors: vec![1.0],
+            times: Vec::new(),
+            critical_stretch: None,
+            contact: None,
+            planes: Vec::new(),
+        }
     }
 
     /// Fixes all components of a region.
@@ -112,6 +121,12 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
     /// Applies the loads in equal steps.
     pub fn steps(mut self, steps: usize) -> Self {
         self.factors = (1..=steps).map(|step| step as f64 / steps as f64).collect();
+        self
+    }
+
+    /// Follows a programme of times, s, and load factors at the ends of steps, for a material with a state.
+    pub fn programme(mut self, steps: impl IntoIterator<Item = [f64; 2]>) -> Self {
+        (self.times, self.factors) = steps.into_iter().map(|[time, factor]| (time, factor)).unzip();
         self
     }
 
@@ -185,7 +200,8 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
         let breaking =
             stretch.map(|stretch| Breaking { criterion: stretch.into(), policy: Policy::default() });
         let state = State::new(bonds.sites());
-        Ok(Simulation { bonds, material, loads, loaded, factors: self.factors, breaking, contact, state })
+        let (factors, times) = (self.factors, self.times);
+        Ok(Simulation { bonds, material, loads, loaded, factors, times, breaking, contact, state })
     }
 }
 
@@ -198,6 +214,8 @@ pub struct Simulation<const D: usize, M> {
     /// Load factor at the end of each step; more may be added for the next call of [`Self::solve`]. Not used
     /// in dynamics.
     pub factors: Vec<f64>,
+    /// Time at the end of each step, s, see [`Model::programme`]; empty: steps take no time.
+    pub times: Vec<f64>,
     material: M,
     loads: Loads<D>,
     /// True for sites with loads.
@@ -241,6 +259,7 @@ impl<const D: usize, M: Material<D> + Clone> Simulation<D, M> {
     ) -> Result<(), Error> {
         let mut system = System::new(&mut self.bonds, self.material.clone(), &self.loads, &self.factors);
         system.breaking.clone_from(&self.breaking);
+        system.times = (&self.times).into();
         system.contact = self.contact.take();
         let mut seen = |status: &Status, _: &State<D>| watch(status);
         let solved = method.solve(&mut system, &mut self.state, &mut seen, &mut |_, state| finished(state));

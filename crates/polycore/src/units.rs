@@ -302,6 +302,11 @@ dimensions! {
     Force, ForceDimension: exponents!(force), "a force", "N", "10 N";
     /// A stress, pressure or elastic modulus.
     Stress, StressDimension: exponents!(pressure), "a stress", "Pa", "0.6 N/mm^2";
+    /// A dynamic viscosity.
+    Viscosity, ViscosityDimension: exponents!(dynamic_viscosity), "a viscosity", "Pa s", "3 MPa s";
+    /// One over the square of a stress.
+    PerSquaredStress, PerSquaredStressDimension: [2, -2, 4, 0, 0, 0, 0, 0], "a number per squared \
+        stress", "1/Pa^2", "1 1/kPa^2";
     /// A mass density.
     Density, DensityDimension: exponents!(mass_density), "a mass density", "kg/m^3", "1010 kg/m^3";
     /// A speed.

@@ -5,7 +5,7 @@ use super::tensor::{BodyTensor, embed};
 use crate::calibrate::Space;
 use crate::error::Error;
 use nalgebra::Matrix3;
-use polycore::constitutive::{Flags, Law, Prediction, Workspace};
+use polycore::constitutive::{Flags, Law, Moduli, Prediction, Workspace};
 use polycore::tensor::voigt::{self, Voigt, component};
 use std::cell::RefCell;
 
@@ -45,42 +45,7 @@ impl<L: Law, const D: usize> Correspondence<L, D> {
     /// # Errors
     /// As [`Self::new`]; a below 0.
     pub fn stabilised(law: L, space: Space, stabilisation: f64) -> Result<Self, Error> {
-        let mut memory = Workspace::default();
-        let rest = Voigt::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0);
-        let wrong =
-            |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.into() });
-        let found = (law.tangent(&rest, &mut memory), law.moduli(&mut memory));
-        let (Ok(found), Ok(moduli)) = found else {
-            return wrong("law", f64::NAN, "a law with a tangent at rest");
-        };
-        if found.energy.is_none() {
-            return wrong("law", f64::NAN, "a law with an energy");
-        }
-        if !(moduli.shear > 0.0 && moduli.bulk > 0.0) {
-            return wrong("shear or bulk modulus of the law", moduli.shear.min(moduli.bulk), "above 0 Pa");
-        }
-        let tangent = found.tangent.unwrap_or_default();
-        let least = (0.5 * (tangent + tangent.transpose())).symmetric_eigenvalues().min();
-        if least.is_nan() || least <= 0.0 {
-            return wrong("least eigenvalue of the law's tangent at rest", least, "above 0 Pa");
-        }
-        let stress = found.stress.amax() / moduli.shear;
-        if stress.is_nan() || stress >= 1e-6 {
-            return wrong("stress at rest over the shear modulus", stress, "below 1e-6");
-        }
-        if (space == Space::Solid) != (D == 3) {
-            return Err(Error::geometry(format!("{space:?} in {D} dimensions")));
-        }
-        if D == 2 {
-            let shear = out_of_plane(&law, &mut memory) / moduli.shear;
-            if shear.is_nan() || shear >= 1e-6 {
-                let name = "shear stress out of the plane over the shear modulus";
-                return wrong(name, shear, "below 1e-6: z normal to a plane of symmetry of the law");
-            }
-        }
-        if !(stabilisation >= 0.0 && stabilisation.is_finite()) {
-            return wrong("stabilisation", stabilisation, "at least 0");
-        }
+        let moduli = check::<D>(&law, space, stabilisation)?;
         Ok(Self { law, space, shear: moduli.shear, bulk: moduli.bulk, stabilisation })
     }
 
@@ -97,31 +62,11 @@ impl<L: Law, const D: usize> Correspondence<L, D> {
 
     /// Computes λ₃² and the law's prediction at C, with ℂ if requested.
     fn predict(&self, gradient: &BodyTensor<D>, tangent: bool) -> Option<(f64, Prediction)> {
-        let mut c = voigt::from_stress(&embed(&(gradient.transpose() * gradient), 1.0));
         MEMORY.with_borrow_mut(|memory| {
-            if self.space == Space::PlaneStress {
-                // starts from the stretch of an isochoric body
-                c[2] = 1.0 / (c[0] * c[1] - c[3] * c[3]);
-                let mut change = f64::INFINITY;
-                for _ in 0..60 {
-                    let found = self.law.tangent(&c, memory).ok()?;
-                    let step = found.stress[2] / (0.5 * found.tangent?[(2, 2)]);
-                    let next = (c[2] - step).clamp(0.5 * c[2], 2.0 * c[2]);
-                    let before = change;
-                    change = (next - c[2]).abs() / next;
-                    c[2] = next;
-                    // otherwise only rounding is left
-                    if change <= 1e-15 || (change >= before && change < 1e-13) {
-                        break;
-                    }
-                }
-                // no stress-free thickness: not a solution
-                if change.is_nan() || change > 1e-9 {
-                    return None;
-                }
-            }
-            let found = if tangent { self.law.tangent(&c, memory) } else { self.law.stress(&c, memory) };
-            Some((c[2], found.ok()?))
+            let (c, found) = at_thickness(self.space, gradient, tangent, |c, tangent| {
+                if tangent { self.law.tangent(c, memory) } else { self.law.stress(c, memory) }.ok()
+            })?;
+            Some((c[2], found))
         })
     }
 }
@@ -139,31 +84,9 @@ impl<L: Law, const D: usize> PointLaw<D> for Correspondence<L, D> {
         PointStress { piola: deformation.gradient() * plane, stabilisation: self.stabilisation * self.shear }
     }
 
-    /// √(‖A‖₁‖A‖∞) of A_iJkL = F_iM ℂ_MJNL F_kN + δ_ik S_JL: 3K at rest where K > 2μ/3.
     fn stiffness(&self, deformation: &Deformation<D>) -> f64 {
         let f = deformation.gradient();
-        let Some((_, Prediction { stress, tangent: Some(c), .. })) = self.predict(&f, true) else {
-            return f64::NAN;
-        };
-        let stress = voigt::to_stress(&stress);
-        // in plane stress the thickness adapts
-        let thin = if self.space == Space::PlaneStress { 1.0 / c[(2, 2)] } else { 0.0 };
-        let material = |i, j, k, l| {
-            component(&c, i, j, k, l) - thin * component(&c, i, j, 2, 2) * component(&c, 2, 2, k, l)
-        };
-        let entry = |i: usize, j: usize, k: usize, l: usize| {
-            let mut sum = if i == k { stress[(j, l)] } else { 0.0 };
-            for m in 0..D {
-                for n in 0..D {
-                    sum += f[(i, m)] * material(m, j, n, l) * f[(k, n)];
-                }
-            }
-            sum
-        };
-        let pairs = || (0..D).flat_map(|i| (0..D).map(move |j| (i, j)));
-        let rows = pairs().map(|(i, j)| pairs().map(|(k, l)| entry(i, j, k, l).abs()).sum::<f64>());
-        let columns = pairs().map(|(k, l)| pairs().map(|(i, j)| entry(i, j, k, l).abs()).sum::<f64>());
-        (rows.fold(0.0, f64::max) * columns.fold(0.0, f64::max)).sqrt()
+        self.predict(&f, true).map_or(f64::NAN, |(_, found)| tangent_norm(self.space, &f, &found))
     }
 
     fn shear_modulus(&self) -> f64 {
@@ -190,9 +113,109 @@ impl<L: Law, const D: usize> PointLaw<D> for Correspondence<L, D> {
     }
 }
 
+/// Checks a law and its stabilisation; returns the moduli at rest.
+pub(super) fn check<const D: usize>(
+    law: &(impl Law + ?Sized),
+    space: Space,
+    stabilisation: f64,
+) -> Result<Moduli, Error> {
+    let mut memory = Workspace::default();
+    let rest = Voigt::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0);
+    let wrong = |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.into() });
+    let found = (law.tangent(&rest, &mut memory), law.moduli(&mut memory));
+    let (Ok(found), Ok(moduli)) = found else {
+        return wrong("law", f64::NAN, "a law with a tangent at rest");
+    };
+    if found.energy.is_none() {
+        return wrong("law", f64::NAN, "a law with an energy");
+    }
+    if !(moduli.shear > 0.0 && moduli.bulk > 0.0) {
+        return wrong("shear or bulk modulus of the law", moduli.shear.min(moduli.bulk), "above 0 Pa");
+    }
+    let tangent = found.tangent.unwrap_or_default();
+    let least = (0.5 * (tangent + tangent.transpose())).symmetric_eigenvalues().min();
+    if least.is_nan() || least <= 0.0 {
+        return wrong("least eigenvalue of the law's tangent at rest", least, "above 0 Pa");
+    }
+    let stress = found.stress.amax() / moduli.shear;
+    if stress.is_nan() || stress >= 1e-6 {
+        return wrong("stress at rest over the shear modulus", stress, "below 1e-6");
+    }
+    if (space == Space::Solid) != (D == 3) {
+        return Err(Error::geometry(format!("{space:?} in {D} dimensions")));
+    }
+    if D == 2 {
+        let shear = out_of_plane(law, &mut memory) / moduli.shear;
+        if shear.is_nan() || shear >= 1e-6 {
+            let name = "shear stress out of the plane over the shear modulus";
+            return wrong(name, shear, "below 1e-6: z normal to a plane of symmetry of the law");
+        }
+    }
+    if !(stabilisation >= 0.0 && stabilisation.is_finite()) {
+        return wrong("stabilisation", stabilisation, "at least 0");
+    }
+    Ok(moduli)
+}
+
+/// C of a deformation and the prediction there; in plane stress C₃₃ is found by S₃₃ = 0.
+#[inline]
+pub(super) fn at_thickness<const D: usize>(
+    space: Space,
+    gradient: &BodyTensor<D>,
+    tangent: bool,
+    mut law: impl FnMut(&Voigt, bool) -> Option<Prediction>,
+) -> Option<(Voigt, Prediction)> {
+    let mut c = voigt::from_stress(&embed(&(gradient.transpose() * gradient), 1.0));
+    if space == Space::PlaneStress {
+        // starts from the stretch of an isochoric body
+        c[2] = 1.0 / (c[0] * c[1] - c[3] * c[3]);
+        let mut change = f64::INFINITY;
+        for _ in 0..60 {
+            let found = law(&c, true)?;
+            let step = found.stress[2] / (0.5 * found.tangent?[(2, 2)]);
+            let next = (c[2] - step).clamp(0.5 * c[2], 2.0 * c[2]);
+            let before = change;
+            change = (next - c[2]).abs() / next;
+            c[2] = next;
+            // otherwise only rounding is left
+            if change <= 1e-15 || (change >= before && change < 1e-13) {
+                break;
+            }
+        }
+        // no stress-free thickness: not a solution
+        if change.is_nan() || change > 1e-9 {
+            return None;
+        }
+    }
+    Some((c, law(&c, tangent)?))
+}
+
+/// √(‖A‖₁‖A‖∞) of A_iJkL = F_iM ℂ_MJNL F_kN + δ_ik S_JL: 3K at rest where K > 2μ/3.
+pub(super) fn tangent_norm<const D: usize>(space: Space, f: &BodyTensor<D>, found: &Prediction) -> f64 {
+    let Prediction { stress, tangent: Some(c), .. } = found else { return f64::NAN };
+    let stress = voigt::to_stress(stress);
+    // in plane stress the thickness adapts
+    let thin = if space == Space::PlaneStress { 1.0 / c[(2, 2)] } else { 0.0 };
+    let material =
+        |i, j, k, l| component(c, i, j, k, l) - thin * component(c, i, j, 2, 2) * component(c, 2, 2, k, l);
+    let entry = |i: usize, j: usize, k: usize, l: usize| {
+        let mut sum = if i == k { stress[(j, l)] } else { 0.0 };
+        for m in 0..D {
+            for n in 0..D {
+                sum += f[(i, m)] * material(m, j, n, l) * f[(k, n)];
+            }
+        }
+        sum
+    };
+    let pairs = || (0..D).flat_map(|i| (0..D).map(move |j| (i, j)));
+    let rows = pairs().map(|(i, j)| pairs().map(|(k, l)| entry(i, j, k, l).abs()).sum::<f64>());
+    let columns = pairs().map(|(k, l)| pairs().map(|(i, j)| entry(i, j, k, l).abs()).sum::<f64>());
+    (rows.fold(0.0, f64::max) * columns.fold(0.0, f64::max)).sqrt()
+}
+
 /// Computes the largest of |S₁₃| and |S₂₃| at in-plane strains of 1, and of 2 % over 2 %, Pa: 0 if z is
 /// normal to a plane of symmetry.
-fn out_of_plane(law: &impl Law, memory: &mut Workspace) -> f64 {
+fn out_of_plane(law: &(impl Law + ?Sized), memory: &mut Workspace) -> f64 {
     let rest = Voigt::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0);
     let tangent = law.tangent(&rest, memory).ok().and_then(|found| found.tangent);
     let mut largest = f64::NAN;

@@ -19,6 +19,7 @@ mod family;
 mod filter;
 mod frequency;
 mod nonlocal_solid;
+mod past;
 mod point;
 mod point_law;
 mod pointwise;
@@ -31,12 +32,14 @@ mod spline_levels;
 mod strength;
 mod tensor;
 mod traction;
+mod viscous;
 
 pub use affine::{Affine, AffinePoint};
 pub use bonded::BondMaterial;
 pub use constitutive::Correspondence;
 pub use eight_chain::EightChainSolid;
 pub use family::{Bond, Family};
+pub use past::{Driving, EnergyPart, Memory, Past};
 pub use point::SolidPoint;
 pub use point_law::{Deformation, NonlocalSolid, PointLaw, PointStress};
 pub use pointwise::{Passes, Pointwise};
@@ -46,6 +49,7 @@ pub use response::{LawCover, LawRange, SolverMaterial};
 pub use strength::energy_at_strength;
 pub use tensor::BodyTensor;
 pub use traction::surface_load;
+pub use viscous::ViscousCorrespondence;
 
 pub use crate::bonds::Property;
 
@@ -65,7 +69,7 @@ pub trait Material<const D: usize>: Send + Sync {
     /// `()` for bond laws.
     ///
     /// A run resumed from a checkpoint computes it again, so it must follow from the reference state, the
-    /// displacement and the intact bonds only, not from any history.
+    /// displacement and the intact bonds only, not from any history but [`Self::past`].
     type Point: Default + Clone + Send + Sync;
 
     /// Computes the initial state of a particle, before any bond breaks: quantities of the whole family, such
@@ -118,6 +122,24 @@ pub trait Material<const D: usize>: Send + Sync {
     fn frequency_bound(&self, body: DeformedBody<D>, points: &mut [Self::Point], enough: f64) -> Option<f64> {
         let _ = (body, points, enough);
         None
+    }
+
+    /// History of a particle, if the material has a state: what checkpoints keep of its point.
+    fn past<'p>(&self, point: &'p mut Self::Point) -> Option<&'p mut Past> {
+        let _ = point;
+        None
+    }
+
+    /// Sets the stabilisation of a time step, s, after [`Self::prepare`] at its start.
+    fn stabilise(&self, point: &mut Self::Point, duration: f64) {
+        let _ = (point, duration);
+    }
+
+    /// Ends a time step, after [`Self::prepare`] at its end: updates the history; returns the energy
+    /// dissipated in the step, J/m³.
+    fn advance(&self, point: &mut Self::Point) -> f64 {
+        let _ = point;
+        0.0
     }
 
     /// Returns true if the intact bonds of a particle describe a deformation that crushes or inverts it, as

@@ -3,6 +3,7 @@
 
 use super::cloud_passes::CloudPasses;
 use super::compression::CRUSH_LIMIT;
+use super::past::Past;
 use super::point::{GRADIENT, ReliefTerms, SolidPoint};
 use super::point_law::{Deformation, NonlocalSolid, PointLaw};
 use super::solid_passes::SolidPasses;
@@ -19,7 +20,9 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         let zero = BodyTensor::zeros();
         let relief = || Box::new(ReliefTerms { gradient: zero, part: zero, piola: zero });
         let relief = family.is_relieved().then(relief);
-        SolidPoint { whole: family.sum(|bond| bond.volume), relief, ..SolidPoint::default() }
+        let mut point = SolidPoint { whole: family.sum(|bond| bond.volume), relief, ..SolidPoint::default() };
+        point.deformation.past = self.0.past().map(Box::new);
+        point
     }
 
     fn prepare(&self, family: &Family<D>, point: &mut SolidPoint<D>) {
@@ -133,6 +136,23 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         Some(super::frequency::bound(&self.0, body, points, enough))
     }
 
+    fn past<'p>(&self, point: &'p mut SolidPoint<D>) -> Option<&'p mut Past> {
+        point.deformation.past.as_deref_mut()
+    }
+
+    fn stabilise(&self, point: &mut SolidPoint<D>, duration: f64) {
+        if point.has_gradient() {
+            self.0.stabilise(&mut point.deformation, duration);
+        }
+    }
+
+    fn advance(&self, point: &mut SolidPoint<D>) -> f64 {
+        if !point.has_gradient() {
+            return 0.0;
+        }
+        point.integrity() * self.0.advance(&mut point.deformation)
+    }
+
     fn is_crushed(&self, point: &SolidPoint<D>) -> bool {
         let change = point.deformation().map_or(0.0, Deformation::volume_change);
         change.is_nan() || change < CRUSH_LIMIT - 1.0
@@ -148,7 +168,7 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         let at = |strain: f64| {
             let mut gradient = BodyTensor::<D>::zeros();
             gradient[(0, 0)] = strain;
-            self.0.respond(&Deformation { displacement_gradient: gradient, residual: 0.0 }).piola[(0, 0)]
+            self.0.respond(&Deformation::homogeneous(gradient)).piola[(0, 0)]
         };
         (at(1e-5) - at(-1e-5)) / 2e-5
     }

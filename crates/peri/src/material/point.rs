@@ -57,7 +57,7 @@ impl<const D: usize> Default for SolidPoint<D> {
             intact: 0.0,
             inverse: zero,
             shape: 0.0,
-            deformation: Deformation { displacement_gradient: zero, residual: 0.0 },
+            deformation: Deformation::homogeneous(zero),
             filtered: [0.0; 2],
             slope: 0.0,
             stress: zero,
@@ -153,7 +153,7 @@ impl<const D: usize> SolidPoint<D> {
         let residual = dimension * (square / self.intact - gradient.dot(&moment));
         // NaN stays: a state that is not finite is reported
         let residual = if residual < 0.0 { 0.0 } else { residual };
-        self.deformation = Deformation { displacement_gradient: gradient, residual };
+        (self.deformation.displacement_gradient, self.deformation.residual) = (gradient, residual);
         if let Some(relief) = &mut self.relief {
             relief.part = shifted / self.intact - moment * relief.gradient.transpose();
             self.deformation.displacement_gradient += relief.part;

@@ -1,21 +1,29 @@
 //! Laws of the mean deformation of a family.
 
+use super::past::Past;
 use super::tensor::{BodyTensor, embed};
 use polycore::constitutive::Flags;
 use std::sync::Arc;
 
 /// Mean deformation of a family: with ω_IJ = V_J/(|ξ|² Σ_K V_K) over the whole family, I = Σ_J V_J/Σ_K V_K
 /// over the intact bonds, M = Σ_J ω ξ⊗ξ/I and η = u_J − u_I.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Deformation<const D: usize> {
     /// H = F − 1 = (Σ_J ω η⊗ξ/I) M⁻¹, on clouds plus the part of [`super::relief`].
     pub displacement_gradient: BodyTensor<D>,
     /// D Σ_J ω|ζ − Fξ|²/I, F without that part: the part of the deformation that no gradient describes. 0 for
     /// a homogeneous deformation.
     pub residual: f64,
+    /// History of the particle, for a law with a state.
+    pub past: Option<Box<Past>>,
 }
 
 impl<const D: usize> Deformation<D> {
+    /// Creates a homogeneous deformation H = F − 1 without a past.
+    pub fn homogeneous(displacement_gradient: BodyTensor<D>) -> Self {
+        Self { displacement_gradient, residual: 0.0, past: None }
+    }
+
     /// F.
     pub fn gradient(&self) -> BodyTensor<D> {
         self.displacement_gradient + BodyTensor::identity()
@@ -89,6 +97,24 @@ pub trait PointLaw<const D: usize>: Send + Sync {
         let _ = change;
         None
     }
+
+    /// History of a virgin particle; `None` for a law without a state. It then answers at a deformation with
+    /// this history.
+    fn past(&self) -> Option<Past> {
+        None
+    }
+
+    /// Sets the stabilisation of a time step of this duration, s, at the deformation at its start.
+    fn stabilise(&self, deformation: &mut Deformation<D>, duration: f64) {
+        let _ = (deformation, duration);
+    }
+
+    /// Replaces the state of the history by that at the end of its step, which this deformation is; returns
+    /// the energy dissipated in the step, J/m³.
+    fn advance(&self, deformation: &mut Deformation<D>) -> f64 {
+        let _ = deformation;
+        0.0
+    }
 }
 
 impl<L: PointLaw<D> + ?Sized, const D: usize> PointLaw<D> for Arc<L> {
@@ -118,6 +144,15 @@ impl<L: PointLaw<D> + ?Sized, const D: usize> PointLaw<D> for Arc<L> {
     }
     fn filtered(&self, change: f64) -> Option<[f64; 2]> {
         (**self).filtered(change)
+    }
+    fn past(&self) -> Option<Past> {
+        (**self).past()
+    }
+    fn stabilise(&self, deformation: &mut Deformation<D>, duration: f64) {
+        (**self).stabilise(deformation, duration);
+    }
+    fn advance(&self, deformation: &mut Deformation<D>) -> f64 {
+        (**self).advance(deformation)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Materials by plain loops over families: any [`Material`] with the states of all particles.
 
-use super::{Bond, Family, LawCover, LawRange, Material, SolverMaterial};
+use super::{Bond, EnergyPart, Family, LawCover, LawRange, Material, Past, SolverMaterial};
 use crate::bonds::{Bonds, Overstretched, Property, StretchScan, overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
@@ -95,6 +95,44 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
         });
     }
 
+    /// Visits the histories of the particles in their order, if there are any.
+    fn pasts(&mut self, bonds: &dyn Bonds<D>, visit: &mut dyn FnMut(&mut Past)) {
+        for &site in bonds.particles() {
+            let Some(past) = self.material.past(&mut self.points[site as usize]) else { return };
+            visit(past);
+        }
+    }
+
+    /// Returns true for a material with a state; its energies then refer to a part.
+    fn refer_to(&mut self, bonds: &dyn Bonds<D>, part: EnergyPart) -> bool {
+        let mut any = false;
+        self.pasts(bonds, &mut |past| (past.part, any) = (part, true));
+        any
+    }
+
+    /// Σ V `of` over the particles, of their points.
+    fn sum(&mut self, bonds: &dyn Bonds<D>, of: impl Fn(&M, &mut M::Point) -> f64 + Sync) -> f64 {
+        let material = &self.material;
+        let items = self.points.par_chunks_mut(CHUNK).enumerate().map(|(chunk, points)| {
+            let sites = particles_of(bonds, chunk).iter().map(|&site| site as usize);
+            sites
+                .map(|site| bonds.volume(site) * of(material, &mut points[site - chunk * CHUNK]))
+                .sum::<f64>()
+        });
+        ordered_sum(items)
+    }
+
+    fn prepared_energy(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>) -> f64 {
+        let of = |sites: &[u32]| {
+            let each = sites.iter().map(|&site| {
+                let family = Family::new(bonds, displacement, site as usize);
+                family.volume() * self.material.energy(&family, &self.points[site as usize])
+            });
+            each.sum::<f64>()
+        };
+        ordered_sum(bonds.particles().par_chunks(CHUNK).map(of))
+    }
+
     /// The states, site by site.
     pub fn points(&self) -> &[M::Point] {
         &self.points
@@ -184,14 +222,63 @@ impl<M: Material<D>, const D: usize> SolverMaterial<D> for Pointwise<M, D> {
 
     fn energy(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, _met: StretchRange) -> f64 {
         self.prepare(bonds, displacement);
-        let of = |sites: &[u32]| {
-            let each = sites.iter().map(|&site| {
-                let family = Family::new(bonds, displacement, site as usize);
-                family.volume() * self.material.energy(&family, &self.points[site as usize])
-            });
-            each.sum::<f64>()
-        };
-        ordered_sum(bonds.particles().par_chunks(CHUNK).map(of))
+        self.prepared_energy(bonds, displacement)
+    }
+
+    fn memory(&mut self, bonds: &dyn Bonds<D>) -> Vec<f64> {
+        let mut values = Vec::new();
+        self.pasts(bonds, &mut |past| {
+            values.extend_from_slice(&past.state);
+            values.push(past.stabilisation);
+        });
+        values
+    }
+
+    fn recall(&mut self, bonds: &dyn Bonds<D>, duration: f64, values: &[f64]) -> Result<(), Error> {
+        let (mut rest, mut missing) = (values, false);
+        self.pasts(bonds, &mut |past| {
+            past.duration = duration;
+            let width = past.state.len();
+            if let Some((own, after)) = rest.split_at_checked(width + 1) {
+                past.state.copy_from_slice(&own[..width]);
+                (past.stabilisation, rest) = (own[width], after);
+            } else {
+                missing = !values.is_empty();
+            }
+        });
+        if missing || !rest.is_empty() {
+            return Err(Error::geometry(format!("a state of {} values of another body", values.len())));
+        }
+        Ok(())
+    }
+
+    fn stabilise(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, duration: f64) -> f64 {
+        if !self.refer_to(bonds, EnergyPart::Stored) {
+            return 0.0;
+        }
+        let before = self.energy(bonds, displacement, StretchRange::REST);
+        self.sum(bonds, |material, point| {
+            material.stabilise(point, duration);
+            0.0
+        });
+        before - self.prepared_energy(bonds, displacement)
+    }
+
+    fn advance(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) -> f64 {
+        if !self.refer_to(bonds, EnergyPart::Stored) {
+            return 0.0;
+        }
+        self.prepare(bonds, displacement);
+        self.sum(bonds, M::advance)
+    }
+
+    fn energy_of(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, part: EnergyPart) -> Option<f64> {
+        self.refer_to(bonds, part).then(|| {
+            self.prepare(bonds, displacement);
+            let energy = self.prepared_energy(bonds, displacement);
+            self.refer_to(bonds, EnergyPart::Stored);
+            energy
+        })
     }
 
     fn released(&self, _bonds: &dyn Bonds<D>, _list: &[Overstretched], _most: f64) -> Option<f64> {
@@ -239,6 +326,7 @@ impl<M: Material<D>, const D: usize> SolverMaterial<D> for Pointwise<M, D> {
         limit: f64,
         free: &(dyn Fn(usize) -> bool + Sync),
     ) -> Vec<(Overstretched, f64)> {
+        let remembers = self.refer_to(bonds, EnergyPart::Driving);
         self.prepare(bonds, displacement);
         let energy = |&site: &u32| {
             let family = Family::new(bonds, displacement, site as usize);
@@ -268,6 +356,10 @@ impl<M: Material<D>, const D: usize> SolverMaterial<D> for Pointwise<M, D> {
             found
         };
         let parts: Vec<Vec<(Overstretched, f64)>> = bonds.particles().par_chunks(CHUNK).map(of).collect();
+        if remembers {
+            self.refer_to(bonds, EnergyPart::Stored);
+            self.prepare(bonds, displacement);
+        }
         parts.concat()
     }
 

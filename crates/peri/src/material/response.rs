@@ -1,5 +1,6 @@
 //! Interface of a material to the solvers.
 
+use super::EnergyPart;
 use crate::bonds::{Bonds, Overstretched, Property, StretchScan, overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
@@ -140,6 +141,39 @@ pub trait SolverMaterial<const D: usize>: Send + Sync {
     fn crushed(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, sites: &[u32]) -> Vec<u32> {
         let _ = (bonds, displacement, sites);
         Vec::new()
+    }
+
+    /// Histories of the particles; no values without a material that has a state.
+    fn memory(&mut self, bonds: &dyn Bonds<D>) -> Vec<f64> {
+        let _ = bonds;
+        Vec::new()
+    }
+
+    /// Restores histories, or sets the duration of a step alone where there are no values.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] for the histories of another body.
+    fn recall(&mut self, bonds: &dyn Bonds<D>, duration: f64, values: &[f64]) -> Result<(), Error> {
+        let _ = (bonds, duration, values);
+        Ok(())
+    }
+
+    /// Sets the stabilisation of a time step, s, at its start; returns the energy lost by its change, J.
+    fn stabilise(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, duration: f64) -> f64 {
+        let _ = (bonds, displacement, duration);
+        0.0
+    }
+
+    /// Ends a time step: updates the histories; returns the energy dissipated in it, J.
+    fn advance(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) -> f64 {
+        let _ = (bonds, displacement);
+        0.0
+    }
+
+    /// Energy, J, of a part of [`Self::energy`]; `None` for a material without a state.
+    fn energy_of(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, part: EnergyPart) -> Option<f64> {
+        let _ = (bonds, displacement, part);
+        None
     }
 
     /// Tangents and energies over a range of stretches.

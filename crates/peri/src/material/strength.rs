@@ -16,7 +16,7 @@ fn pulled<const D: usize>(
     let at = |side: f64| {
         let entry = |a: usize| if a == 0 { stretch - 1.0 } else { side - 1.0 };
         let displacement_gradient = BodyTensor::from_fn(|a, b| if a == b { entry(a) } else { 0.0 });
-        let deformation = Deformation { displacement_gradient, residual: 0.0 };
+        let deformation = Deformation::homogeneous(displacement_gradient);
         let piola = law.respond(&deformation).piola;
         (deformation, piola)
     };

@@ -224,6 +224,8 @@ fn prepared<'a, const D: usize>(
     state: &State<D>,
 ) -> MutexGuard<'a, Pointwise<AnySolid<D>, D>> {
     let mut states = states.lock().unwrap_or_else(PoisonError::into_inner);
+    // histories of another body are those of no run; the stress is then that without
+    let _ = states.recall(bonds, state.memory.duration, &state.memory.values);
     states.prepare(bonds, &state.displacement);
     states
 }

@@ -6,6 +6,7 @@ use super::state::State;
 use super::system::System;
 use crate::bonds::{Neighbour, Overstretched, Softened, fingerprint};
 use crate::contact::Contact;
+use crate::material::EnergyPart;
 use crate::potential::StretchRange;
 
 /// Softening that an equilibrium may lag behind: its bonds carry up to this fraction of an intact bond's
@@ -94,7 +95,7 @@ impl<const D: usize> System<'_, D> {
         }
         let released = self.material.released(&*self.bonds, &list, most(self.breaking.as_ref()));
         // energies that do not follow bond by bond are the loss of the whole body
-        let before = released.is_none().then(|| self.stored_energy(state, state.stretches.observed));
+        let before = released.is_none().then(|| self.energies_at_break(state));
         let touches = self.contact.as_ref().is_some_and(Contact::repels);
         let pair =
             |bond: &Overstretched| [bond.site, self.bonds.bond(bond.site as usize, bond.index).site as u32];
@@ -126,8 +127,14 @@ impl<const D: usize> System<'_, D> {
             self.bonds.soften(softened.clone());
             state.fracture.softened = softened;
         }
-        state.fracture.released += released
-            .unwrap_or_else(|| before.unwrap_or(0.0) - self.stored_energy(state, state.stretches.observed));
+        match before {
+            Some([driving, stored]) => {
+                let after = self.energies_at_break(state);
+                state.fracture.released += driving - after[0];
+                state.memory.dissipated += (stored - after[1]) - (driving - after[0]);
+            }
+            None => state.fracture.released += released.unwrap_or(0.0),
+        }
         if let Some(contact) = self.contact.as_mut().filter(|_| touches) {
             contact.add_broken_pairs(&*self.bonds, &parted);
         }
@@ -141,6 +148,15 @@ impl<const D: usize> System<'_, D> {
         sites.dedup();
         state.fracture.detached += self.unload_detached(sites.iter().copied());
         sites
+    }
+
+    /// Energy that drives breaking, and all stored energy, J: equal without a state.
+    fn energies_at_break(&mut self, state: &State<D>) -> [f64; 2] {
+        let mut of = |part| self.material.energy_of(&*self.bonds, &state.displacement, part);
+        match (of(EnergyPart::Driving), of(EnergyPart::Stored)) {
+            (Some(driving), Some(stored)) => [driving, stored],
+            _ => [self.stored_energy(state, state.stretches.observed); 2],
+        }
     }
 
     /// Severs the bonds of particles that the bonds left after `list` crush, and adds them to it: otherwise

@@ -16,12 +16,14 @@ impl<const D: usize> System<'_, D> {
     /// [`crate::potential::KernelFit::new`].
     pub fn restore(&mut self, state: &mut State<D>) -> Result<(), Error> {
         state.fracture.restore(&mut *self.bonds)?;
+        self.material.recall(&*self.bonds, state.memory.duration, &state.memory.values)?;
         if state.fracture.intact.is_some() {
             let particles = self.bonds.particles().to_vec();
             self.unload_detached(particles.iter().copied());
         }
         if !state.control.factors.is_empty() {
             self.factors.to_mut().clone_from(&state.control.factors);
+            self.times.to_mut().clone_from(&state.control.times);
         }
         self.rebuild_contact(&state.displacement);
         state.stretches.fitted[1] = state.stretches.fitted[1].min(most(self.breaking.as_ref()));

@@ -101,6 +101,8 @@ fn step_by_step<const D: usize>(
             continue;
         }
         if !state.control.predicted {
+            let duration = system.time_at(Some(state.step)) - system.time_at(state.step.checked_sub(1));
+            system.begin_time_step(state, duration)?;
             predict(system, state, &predictor);
             state.control.predicted = true;
             // the step may leave the fitted range: its first force and mass must include it
@@ -125,6 +127,7 @@ fn step_by_step<const D: usize>(
                 continue 'steps;
             }
             work_of_loads(system, state);
+            system.book_flow(state);
             if system.lower(state, shortest) {
                 continue;
             }
@@ -146,6 +149,7 @@ fn step_by_step<const D: usize>(
             particles.iter().for_each(|&site| state.velocity.set(site as usize, [0.0; D]));
         }
         system.check_overlaps(state)?;
+        system.end_time_step(state)?;
         record(system, state);
         state.step += 1;
         state.control.predicted = false;
@@ -183,7 +187,13 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
             state.control.past.remove(0);
         }
     }
-    let even = |back: usize| (at(back) - at(back + 1) - increment).abs() <= 1e-6 * increment.abs();
+    let time =
+        |back: usize| system.time_at((state.step + 1).checked_sub(back).and_then(|s| s.checked_sub(1)));
+    let length = |back: usize| time(back) - time(back + 1);
+    let even = |back: usize| {
+        (at(back) - at(back + 1) - increment).abs() <= 1e-6 * increment.abs()
+            && (length(back) - length(0)).abs() <= 1e-6 * length(0)
+    };
     let weights: &[f64] = match state.control.past.len() {
         _ if !smooth => &[],
         3 if even(1) && even(2) => &[1.0, -3.0, 3.0],
@@ -251,7 +261,8 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     let stored = system.stored_energy(state, system.fitted_part(observed));
     let row = system.row(state, state.control.balanced, observed, stored);
     let (residual, rounds) = (state.convergence.residual, state.control.round);
-    state.history.push(StepRecord { residual, rounds, balance, time: 0.0, kinetic: 0.0, damped: 0.0, ..row });
+    let time = system.time_at(Some(state.step));
+    state.history.push(StepRecord { residual, rounds, balance, time, kinetic: 0.0, damped: 0.0, ..row });
 }
 
 /// Returns true if the load has fallen below the fraction of its largest value at which the run stops.

@@ -32,6 +32,7 @@ mod step_control;
 mod step_cuts;
 mod stiffness_control;
 mod system;
+mod time_program;
 mod time_step;
 mod unsupported;
 mod verlet;

@@ -36,11 +36,13 @@ pub struct StepRecord {
     pub work: f64,
     /// Energy of broken bonds when they broke, J.
     pub released: f64,
+    /// Energy dissipated by a law with a state so far, J, see [`Memory`](crate::material::Memory).
+    pub dissipated: f64,
     /// Smallest stretch of intact bonds.
     pub smallest_stretch: f64,
     /// Largest stretch of intact bonds.
     pub largest_stretch: f64,
-    /// Time, s; 0 without dynamics.
+    /// Time, s; 0 in equilibria without a programme of times.
     pub time: f64,
     /// Kinetic energy, J.
     pub kinetic: f64,

@@ -6,6 +6,7 @@ use super::record::{Status, StepRecord};
 use super::step_control::{Accepted, StepControl};
 use crate::contact::FrictionPair;
 use crate::field::Field;
+use crate::material::Memory;
 use crate::potential::StretchRange;
 use serde::{Deserialize, Serialize};
 
@@ -29,6 +30,8 @@ pub struct State<const D: usize> {
     pub convergence: ForceResiduals,
     /// Broken and softened bonds.
     pub fracture: Fracture,
+    /// Histories of the particles.
+    pub memory: Memory,
     /// Friction and moving planes.
     pub(super) contact: ContactState<D>,
     /// Load steps and their cuts.
@@ -162,6 +165,7 @@ impl<const D: usize> State<D> {
             stretches: BodyStretches::default(),
             convergence: ForceResiduals::default(),
             fracture: Fracture::default(),
+            memory: Memory::default(),
             contact: ContactState::default(),
             control: StepControl::default(),
             motion: Motion::default(),
@@ -197,6 +201,9 @@ impl<const D: usize> State<D> {
         (self.displacement, self.force) = (accepted.displacement, accepted.force);
         (self.fracture, self.stretches.balanced) = (accepted.fracture, accepted.stretches);
         self.work = self.history.last().map_or(0.0, |row| row.work);
+        // histories change at the end of a step only
+        self.memory.dissipated = self.history.last().map_or(0.0, |row| row.dissipated);
+        self.memory.duration = 0.0;
         (self.control.predicted, self.control.round) = (false, 0);
         (self.counts.iteration, self.counts.step_iterations) = (0, 0);
     }

@@ -17,8 +17,9 @@ pub struct StepControl<const D: usize> {
     pub(super) past: Vec<Field<D>>,
     /// Factor, and the loads' conjugate sums, at the last equilibrium.
     pub(super) balanced: [f64; 3],
-    /// Load factors of all steps, if steps have been cut …
+    /// Load factors and times of all steps, if steps have been cut …
     pub(super) factors: Vec<f64>,
+    pub(super) times: Vec<f64>,
     /// … which of them were inserted, and how often the present one was cut.
     pub(super) inserted: Vec<usize>,
     pub(super) cuts: u32,

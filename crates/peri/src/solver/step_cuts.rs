@@ -12,20 +12,20 @@ const TOUCH_MOTION: f64 = 0.5;
 const LEAST_REMAINDER: f64 = 0.25;
 
 impl<const D: usize> System<'_, D> {
-    /// Shortest load step: the least difference of two prescribed factors over [`Self::refine`].
+    /// Shortest step: the least difference of two prescribed factors, or times, over [`Self::refine`].
     pub(super) fn shortest(&self) -> f64 {
-        let before = [0.0].into_iter().chain(self.factors.iter().copied());
-        let steps = before.zip(self.factors.iter()).map(|(before, after)| (after - before).abs());
+        let steps = 0..self.factors.len();
+        let steps = steps.map(|at| (self.place(Some(at)) - self.place(at.checked_sub(1))).abs());
         steps.filter(|&step| step > 0.0).fold(f64::INFINITY, f64::min) / self.refine.max(1) as f64
     }
 
     /// Cuts a step if bonds would break in its first equilibrium and it may still be cut; returns whether it
-    /// did. The step then ends at factors `shortest` apart, between which stretches, assumed linear in the
-    /// load, become critical; `state` returns to the previous equilibrium.
+    /// did. The step then ends at factors, or times, `shortest` apart, between which stretches, assumed
+    /// linear in them, become critical; `state` returns to the previous equilibrium.
     pub(super) fn cut(&mut self, state: &mut State<D>, shortest: f64) -> bool {
         let at = state.step;
-        let before = at.checked_sub(1).map_or(0.0, |before| self.factors[before]);
-        let length = self.factors[at] - before;
+        let before = self.place(at.checked_sub(1));
+        let length = self.place(Some(at)) - before;
         let may =
             self.refine > 1 && state.control.round == 0 && length.abs() > (1.0 + LEAST_REMAINDER) * shortest;
         let stretched = self.is_overstretched(state.stretches.balanced);
@@ -34,7 +34,7 @@ impl<const D: usize> System<'_, D> {
         }
         let old = state.history.last().map_or(1.0, |record| record.largest_stretch);
         let new = if state.control.cuts < BY_STRETCH {
-            self.around([before, old], [self.factors[at], state.stretches.largest()], shortest)
+            self.around([before, old], [self.place(Some(at)), state.stretches.largest()], shortest)
         } else {
             vec![before + 0.5 * length]
         };
@@ -55,10 +55,10 @@ impl<const D: usize> System<'_, D> {
         if after.is_nan() || after <= most * (1.0 + 1e-6) {
             return false;
         }
-        let start = state.step.checked_sub(1).map_or(0.0, |before| self.factors[before]);
+        let start = self.place(state.step.checked_sub(1));
         let part = (most - before) / (after - before);
-        let factor = start + part * (self.factors[state.step] - start);
-        self.insert(state, &[factor]);
+        let place = start + part * (self.place(Some(state.step)) - start);
+        self.insert(state, &[place]);
         true
     }
 
@@ -82,9 +82,20 @@ impl<const D: usize> System<'_, D> {
         new
     }
 
-    /// Inserts load factors before that of the present step.
+    /// Inserts steps that end at load factors, or times, before the end of the present step.
     pub(super) fn insert(&mut self, state: &mut State<D>, new: &[f64]) {
-        state.control.insert(state.step, &self.factors, new);
+        let at = state.step;
+        if self.times.is_empty() {
+            state.control.insert(at, &self.factors, new);
+        } else {
+            let [start, end] = [at.checked_sub(1), Some(at)].map(|step| self.place(step));
+            let before = at.checked_sub(1).map_or(0.0, |before| self.factors[before]);
+            let factor = |time: &f64| before + (time - start) / (end - start) * (self.factors[at] - before);
+            let factors: Vec<f64> = new.iter().map(factor).collect();
+            state.control.insert(at, &self.factors, &factors);
+            self.times.to_mut().splice(at..at, new.iter().copied());
+            state.control.times = self.times.to_vec();
+        }
         self.factors.to_mut().clone_from(&state.control.factors);
     }
 }

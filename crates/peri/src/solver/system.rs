@@ -28,6 +28,8 @@ pub struct System<'a, const D: usize> {
     pub loads: Cow<'a, Loads<D>>,
     /// Load factor at the end of each step.
     pub factors: Cow<'a, [f64]>,
+    /// Time, s, at the end of each step, for a material with a state; empty: steps take no time.
+    pub times: Cow<'a, [f64]>,
     /// Fractions of a load step to which the load at which bonds break is found; 1: they break at the end of
     /// the step.
     pub refine: usize,
@@ -82,6 +84,7 @@ impl<'a, const D: usize> System<'a, D> {
             bonds,
             loads: Cow::Borrowed(loads),
             factors: Cow::Borrowed(factors),
+            times: Cow::Borrowed(&[]),
             refine: 1,
             snap_back: false,
             breaking: None,
@@ -310,6 +313,7 @@ impl<'a, const D: usize> System<'a, D> {
             contact: self.contact_summary(state),
             work: state.work,
             released: state.fracture.released,
+            dissipated: state.memory.dissipated,
             smallest_stretch: (1.0 + observed.low).max(0.0).sqrt(),
             largest_stretch: (1.0 + observed.high).sqrt(),
             time: state.motion.time,

@@ -219,7 +219,7 @@ impl VelocityVerlet {
         if state.force.non_finite().is_some() || !(kinetic + stored).is_finite() {
             return Err(system.not_finite(state));
         }
-        state.work = kinetic + stored + state.fracture.released;
+        state.work = kinetic + stored + state.fracture.released + state.memory.dissipated;
         (state.step, state.counts.iteration, state.counts.step_iterations) = (0, 0, 0);
         let bonds = BondSums::new(system);
         let frequency = largest_frequency_squared(system, state, volumes, self.density, bonds.shortest);
@@ -313,6 +313,7 @@ impl VelocityVerlet {
             let strain = 2.0 * (D as f64).sqrt() * first.increment / state.motion.limits.bonds.shortest;
             state.motion.look.slack = slack + strain;
             system.move_planes(factor, after);
+            system.set_duration(state, step)?;
             system.prepare(&state.displacement);
             let Some((displacement, velocity)) = &start else { break (after, leap, first) };
             cuts += 1;
@@ -354,6 +355,7 @@ impl VelocityVerlet {
         state.counts.iterate();
         self.account(state, first, second)?;
         let broken = look && self.break_overstretched(system, state, observed, factor);
+        state.memory.dissipated += system.end_time_step(state)?;
         self.cover_contact(system, state);
         let follows = self.follows(system);
         if follows {
@@ -380,7 +382,10 @@ impl VelocityVerlet {
         motion.energies.kinetic = second.kinetic;
         motion.energies.damped += first.damped + second.damped;
         state.work += first.work + second.work;
-        let gone = state.fracture.released + motion.energies.damped + motion.energies.rubbed;
+        let gone = state.fracture.released
+            + state.memory.dissipated
+            + motion.energies.damped
+            + motion.energies.rubbed;
         let available = state.work - gone - motion.energies.floor;
         motion.energies.turnover = motion.energies.turnover.max(available).max(gone);
         let most = available.max(0.0) + EXCESS * motion.energies.turnover;

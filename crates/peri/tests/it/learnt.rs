@@ -136,7 +136,7 @@ fn what_leaves_the_box_is_flagged() {
     fn outside<const D: usize>(space: Space, stretches: [f64; D]) -> [bool; 3] {
         let mut displacement_gradient = BodyTensor::<D>::zeros();
         (0..D).for_each(|d| displacement_gradient[(d, d)] = stretches[d] - 1.0);
-        let flags = solid(&trained(), space).0.flags(&Deformation { displacement_gradient, residual: 0.0 });
+        let flags = solid(&trained(), space).0.flags(&Deformation::homogeneous(displacement_gradient));
         std::array::from_fn(|d| flags.outside[d])
     }
     // the box ends at stretches of 0.81 to 0.82 and 1.49
@@ -155,7 +155,7 @@ fn what_leaves_the_box_is_flagged() {
         Space::PlaneStrain,
     );
     let displacement_gradient = BodyTensor::<2>::identity();
-    assert!(!closed.unwrap().flags(&Deformation { displacement_gradient, residual: 0.0 }).any());
+    assert!(!closed.unwrap().flags(&Deformation::homogeneous(displacement_gradient)).any());
 }
 
 fn scene_of(law: &str, more: &str) -> String {

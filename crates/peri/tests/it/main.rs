@@ -34,6 +34,7 @@ mod parts;
 mod pressed;
 mod prestrain;
 mod relaxation;
+mod relaxing;
 mod rigid;
 mod rotations;
 #[path = "../../examples/rubber_bearing.rs"]

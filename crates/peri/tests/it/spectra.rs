@@ -202,7 +202,7 @@ pub fn errors(bonds: &mut dyn Bonds<2>, n: usize, bulk: f64, volume: f64) -> [f6
         let columns = [0, 1].map(|k| derivative(|x| manufactured(x, volume), at, k, 1e-3));
         let gradient = BodyTensor::<2>::from_fn(|a, b| columns[b][a]);
         let displacement_gradient = gradient - BodyTensor::<2>::identity();
-        let stress = law.respond(&Deformation { displacement_gradient, residual: 0.0 }).piola;
+        let stress = law.respond(&Deformation::homogeneous(displacement_gradient)).piola;
         [stress[(0, 0)], stress[(0, 1)], stress[(1, 0)], stress[(1, 1)]]
     };
     let sites = bonds.sites();

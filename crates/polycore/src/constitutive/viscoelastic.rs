@@ -52,7 +52,7 @@ pub struct Viscoelastic {
 }
 
 /// State of a material point, at rest [`Viscoelastic::rest`].
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct State {
     /// State of each branch.
     pub branches: Vec<BranchState>,
@@ -110,6 +110,17 @@ pub struct Step {
     pub error: f64,
 }
 
+/// Result of a step without the new state: fields of [`Step`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Response {
+    /// S at the end, ℂ of the whole step (Euler), and the recoverable W.
+    pub prediction: Prediction,
+    /// Energy dissipated in the step, J/m³.
+    pub dissipated: f64,
+    /// Norm of the distance of S between both schemes, Pa; 0 for Euler.
+    pub error: f64,
+}
+
 impl Viscoelastic {
     /// Creates a law of an elastic law and branches.
     ///
@@ -135,6 +146,11 @@ impl Viscoelastic {
     /// The equilibrium law.
     pub fn equilibrium(&self) -> &dyn Law {
         &*self.equilibrium
+    }
+
+    /// Softening of the equilibrium law.
+    pub fn softening(&self) -> Option<&Mullins> {
+        self.softening.as_ref()
     }
 
     /// The branches.
@@ -188,6 +204,25 @@ impl Viscoelastic {
         tangent: bool,
         memory: &mut Workspace,
     ) -> Result<Step, Error> {
+        let mut state = State { branches: Vec::with_capacity(self.branches.len()), peak: 0.0 };
+        let Response { prediction, dissipated, error } =
+            self.respond(start, increment, tangent, &mut state, memory)?;
+        Ok(Step { prediction, state, dissipated, error })
+    }
+
+    /// Advances a point by a step, with its tangent or without. Writes the state at the end to `end`, and
+    /// allocates nothing once `end` and `memory` have served the same law.
+    ///
+    /// # Errors
+    /// As [`Viscoelastic::advance`].
+    pub fn respond(
+        &self,
+        start: &State,
+        increment: &Increment,
+        tangent: bool,
+        end: &mut State,
+        memory: &mut Workspace,
+    ) -> Result<Response, Error> {
         if !(increment.duration >= 0.0 && increment.duration.is_finite()) {
             return Err(Error::invalid("duration", increment.duration, "at least 0 s, finite"));
         }
@@ -195,17 +230,14 @@ impl Viscoelastic {
             let allowed = format!("{}, one for each branch", self.branches.len());
             return Err(Error::invalid("states of branches", start.branches.len(), allowed));
         }
-        let mut all = self.equilibrium_step(start, &increment.to, tangent, memory)?;
+        let mut all = self.respond_relaxed(start.peak, &increment.to, tangent, end, memory)?;
         let c = voigt::to_stress(&increment.to);
         let isochoric = c / c.determinant().cbrt();
         let before = voigt::to_stress(&increment.from);
         let before = before / before.determinant().cbrt();
-        let conditions = Conditions {
-            duration: increment.duration,
-            temperature: increment.temperature,
-            pressure: increment.pressure,
-        };
+        let conditions = Conditions::of(increment);
         let mut distance = Voigt::zeros();
+        end.branches.clear();
         for (branch, start) in self.branches.iter().zip(&start.branches) {
             let euler = branch.euler([&c, &isochoric], start, &conditions, tangent)?;
             let found = match increment.scheme {
@@ -217,29 +249,33 @@ impl Viscoelastic {
             all.prediction.tangent = all.prediction.tangent.zip(found.tangent).map(|(sum, own)| sum + own);
             all.prediction.energy = all.prediction.energy.map(|sum| sum + found.energy);
             all.dissipated += found.dissipated;
-            all.state.branches.push(found.state);
+            end.branches.push(found.state);
         }
         all.error = distance.norm();
         Ok(all)
     }
 
-    /// The equilibrium law with its softening; the branches are not yet in the state.
-    fn equilibrium_step(
+    /// Response of the equilibrium law with its softening, without branches, after a largest W₀ of `peak`;
+    /// writes the new one to `end`.
+    ///
+    /// # Errors
+    /// Errors of the equilibrium law; [`Error::Invalid`] for one without energy that softens.
+    pub fn respond_relaxed(
         &self,
-        start: &State,
+        peak: f64,
         c: &Voigt,
         tangent: bool,
+        end: &mut State,
         memory: &mut Workspace,
-    ) -> Result<Step, Error> {
+    ) -> Result<Response, Error> {
         let mut prediction = if tangent {
             self.equilibrium.tangent(c, memory)?
         } else {
             self.equilibrium.stress(c, memory)?
         };
-        let branches = Vec::with_capacity(self.branches.len());
+        end.peak = peak;
         let Some(softening) = &self.softening else {
-            let state = State { branches, peak: start.peak };
-            return Ok(Step { prediction, state, dissipated: 0.0, error: 0.0 });
+            return Ok(Response { prediction, dissipated: 0.0, error: 0.0 });
         };
         let found = isochoric(&*self.equilibrium, &voigt::to_stress(c), tangent, memory)?;
         let energy = found.energy.ok_or_else(|| {
@@ -249,19 +285,30 @@ impl Viscoelastic {
                 "a law with an energy, for Mullins softening",
             )
         })?;
-        let peak = start.peak.max(energy);
-        let (factor, slope) = softening.factor(energy, peak);
+        end.peak = peak.max(energy);
+        let (factor, slope) = softening.factor(energy, end.peak);
         // first loading has ζ = 1 all along
-        let slope = if energy < start.peak { slope } else { 0.0 };
+        let slope = if energy < peak { slope } else { 0.0 };
         prediction.stress -= (1.0 - factor) * found.stress;
         prediction.tangent = prediction
             .tangent
             .zip(found.tangent)
             .map(|(full, own)| full - (1.0 - factor) * own + slope * found.stress * found.stress.transpose());
-        let [recoverable, dissipated] = softening.energies(energy, peak);
-        let before = softening.energies(start.peak, start.peak)[1];
+        let [recoverable, dissipated] = softening.energies(energy, end.peak);
+        let before = softening.energies(peak, peak)[1];
         prediction.energy = prediction.energy.map(|full| full - energy + recoverable);
-        let state = State { branches, peak };
-        Ok(Step { prediction, state, dissipated: dissipated - before, error: 0.0 })
+        Ok(Response { prediction, dissipated: dissipated - before, error: 0.0 })
+    }
+
+    /// Σ 2W′/(1 + Δt 2W′/η), Pa: shear modulus of the branches in a step, from the C and C_v at its start.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for a C or C_v that is not positive definite.
+    pub fn step_modulus(&self, start: &State, increment: &Increment) -> Result<f64, Error> {
+        let c = voigt::to_stress(&increment.from);
+        let isochoric = c / c.determinant().cbrt();
+        let conditions = Conditions::of(increment);
+        let branches = self.branches.iter().zip(&start.branches);
+        branches.map(|(branch, start)| branch.step_modulus(&isochoric, start, &conditions)).sum()
     }
 }

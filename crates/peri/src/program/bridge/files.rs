@@ -213,7 +213,7 @@ impl<const D: usize> LammpsModel<'_, D> {
                 })
             })
             .collect();
-        let factors = scene.solver.factors();
+        let factors = scene.load_steps().0;
         serde_json::json!({
             "format": "peri-lammps 1", "dimension": D, "clamps": clamps, "regions": regions,
             "lengths_mm": self.types.iter().map(|kind| kind.length * MM).collect::<Vec<f64>>(),

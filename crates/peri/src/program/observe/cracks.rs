@@ -74,7 +74,7 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for NewCracks<'_> {
         let last = m.state.history.last().filter(|last| last.broken > 0);
         if let Some((last, cracks)) = last.zip(m.physics.cracks.as_ref()) {
             let area = cracks.area(m.bonds);
-            let spent = (last.work - last.stored - last.kinetic - last.rubbed) / area;
+            let spent = (last.work - last.stored - last.kinetic - last.rubbed - last.dissipated) / area;
             self.found = (area > 0.0 && area.is_finite()).then_some([area, spent]);
         }
         Ok(())

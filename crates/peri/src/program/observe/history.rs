@@ -3,26 +3,27 @@
 use super::moment::Moment;
 use crate::probe::load_at;
 use crate::program::quantities as q;
-use crate::program::scene::Scene;
+use crate::program::scene::{Scene, SolidLaw};
 use crate::solver::{Balance, StepRecord};
 use harness::observe::Scalars;
 use harness::report::Quantity;
 
-/// Returns true for a history of explicit dynamics.
-pub fn is_dynamic(history: &[StepRecord]) -> bool {
+/// Returns true for a history in time.
+pub fn has_times(history: &[StepRecord]) -> bool {
     history.iter().any(|row| row.time > 0.0)
 }
 
-/// Returns the damped energy, J; in quasi-static runs work less stored, released and friction energy.
+/// Returns the damped energy, J; in quasi-static runs work less stored, released, dissipated and
+/// friction energy.
 pub fn damped_energy(row: &StepRecord, dynamic: bool) -> f64 {
-    if dynamic { row.damped } else { row.work - row.stored - row.released - row.rubbed }
+    if dynamic { row.damped } else { row.work - row.stored - row.released - row.rubbed - row.dissipated }
 }
 
 /// Adds peak, first break, energies and balances.
 pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
     let dynamic = scene.dynamics.is_some();
     let breaks = scene.material.critical.is_some();
-    let records = scene.dynamics.as_ref().map_or(scene.solver.steps, |dynamics| dynamics.method().records);
+    let records = scene.dynamics.as_ref().map_or(scene.step_count(), |dynamics| dynamics.method().records);
     let peak = |get: fn(&StepRecord) -> f64| {
         move |m: &Moment<D>| {
             let peak = m.state.history.iter().max_by(|a, b| a.load.total_cmp(&b.load));
@@ -40,11 +41,17 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
     }
     if breaks {
         breaking_scalars(dynamic, to);
+        if dynamic || scene.time.is_some() {
+            to.add_if(q::FIRST_BREAK_TIME, |m| Some(m.state.history.iter().find(|row| row.broken > 0)?.time));
+        }
     }
     add_last(to, q::WORK_OF_LOADS, |row| row.work);
     add_last(to, q::STORED_ENERGY, |row| row.stored);
     if breaks {
         add_last(to, q::RELEASED_ENERGY, |row| row.released);
+    }
+    if scene.material.solid.as_ref().is_some_and(SolidLaw::has_state) {
+        add_last(to, q::DISSIPATED_ENERGY, |row| row.dissipated);
     }
     add_last(
         to,
@@ -55,8 +62,9 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
         // largest error of the energy balance over the largest work or kinetic energy
         to.add_if(q::ENERGY_ERROR, |m| {
             m.state.history.last()?;
-            let off =
-                |r: &StepRecord| (r.work - r.stored - r.released - r.damped - r.rubbed - r.kinetic).abs();
+            let off = |r: &StepRecord| {
+                (r.work - r.stored - r.released - r.damped - r.rubbed - r.kinetic - r.dissipated).abs()
+            };
             let most = m.each(|r| r.work.abs().max(r.kinetic)).fold(f64::MIN_POSITIVE, f64::max);
             Some(m.state.history.iter().map(off).fold(0.0, f64::max) / most)
         });

@@ -103,7 +103,7 @@ impl<const D: usize> BodyWithMaterial<D> {
             other => source.error("material.critical", other, "a critical stretch"),
         };
         if let Some(solid) = &spec.solid {
-            let law = solid.build::<D>(source, space, scene.is_beside_planes())?;
+            let law = solid.build::<D>(source, space, scene.is_beside_planes(), scene.driving())?;
             let criterion = spec.critical.map(|critical| critical.solid_criterion(&*law, &*body.bonds));
             return Ok(Self {
                 criterion: criterion.transpose().map_err(fault)?,

@@ -23,7 +23,7 @@ mod values;
 pub use expect::{check, quantities_of};
 pub use frames::FieldFrames;
 pub(crate) use frames::in_space;
-pub use history::{damped_energy, is_dynamic};
+pub use history::{damped_energy, has_times};
 pub use list::{observers, quantities};
 pub use material::{BodyWithMaterial, Physics, SceneMaterial};
 pub use moment::{Moment, SceneObservers};

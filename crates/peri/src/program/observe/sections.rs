@@ -1,6 +1,6 @@
 //! Scalars and tables of forces and moments across sections.
 
-use super::history::is_dynamic;
+use super::history::has_times;
 use super::moment::Moment;
 use super::rows::columns;
 use crate::calibrate::Space;
@@ -51,7 +51,7 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Sections<'_> {
                 ("displacement", "m", column(&|row| row.displacement)),
                 ("load", "N", column(&|row| row.load)),
             ];
-            table.extend(is_dynamic(&m.state.history).then(|| ("time", "s", column(&|row| row.time))));
+            table.extend(has_times(&m.state.history).then(|| ("time", "s", column(&|row| row.time))));
             let prefix = section.name.len() + 1;
             table.extend(names.iter().enumerate().map(|(k, named)| {
                 let own = column(&|row| row.seen.get(first + k).copied().unwrap_or(f64::NAN));

@@ -2,7 +2,7 @@
 
 use super::outcome::VariantOutcome;
 use crate::probe::envelope;
-use crate::program::observe::{damped_energy, is_dynamic};
+use crate::program::observe::{damped_energy, has_times};
 use crate::program::scene::Scene;
 use crate::solver::{BreakingEvent, StepRecord};
 use harness::output::csv;
@@ -17,10 +17,6 @@ const INNER_LEGEND: usize = 8;
 type HistoryColumn = (String, String, Vec<f64>);
 
 impl VariantOutcome {
-    pub(super) fn is_dynamic(&self) -> bool {
-        is_dynamic(&self.history)
-    }
-
     /// Returns the steps as columns.
     pub fn columns(&self) -> Vec<HistoryColumn> {
         let each = |get: &dyn Fn(&StepRecord) -> f64| self.history.iter().map(get).collect();
@@ -29,8 +25,10 @@ impl VariantOutcome {
             ("displacement".to_owned(), "m".to_owned(), each(&|r| r.displacement)),
             ("load".to_owned(), "N".to_owned(), each(&|r| r.load)),
         ]);
-        if self.is_dynamic() {
+        if has_times(&self.history) {
             columns.push(("time".to_owned(), "s".to_owned(), each(&|r| r.time)));
+        }
+        if self.dynamic {
             columns.push(("kinetic".to_owned(), "J".to_owned(), each(&|r| r.kinetic)));
         }
         for (index, region) in self.regions.iter().enumerate() {
@@ -52,8 +50,11 @@ impl VariantOutcome {
             ("work".to_owned(), "J".to_owned(), each(&|r| r.work)),
             ("stored".to_owned(), "J".to_owned(), each(&|r| r.stored)),
             ("released".to_owned(), "J".to_owned(), each(&|r| r.released)),
-            ("damped".to_owned(), "J".to_owned(), each(&|r| damped_energy(r, self.is_dynamic()))),
+            ("damped".to_owned(), "J".to_owned(), each(&|r| damped_energy(r, self.dynamic))),
         ]);
+        if self.history.iter().any(|r| r.dissipated != 0.0) {
+            columns.push(("dissipated".to_owned(), "J".to_owned(), each(&|r| r.dissipated)));
+        }
         if self.history.iter().any(|r| r.rubbed != 0.0) {
             columns.push(("friction_work".to_owned(), "J".to_owned(), each(&|r| r.rubbed)));
         }
@@ -122,7 +123,7 @@ pub fn peak_lines(outcomes: &[VariantOutcome]) -> String {
             }
             _ => gaps.iter().fold([0.0_f64, f64::INFINITY], |[a, l], gap| [a.max(gap[0]), l.min(gap[1])]),
         };
-        (apart > 0.0 && load > 0.0 && !outcome.is_dynamic()).then(|| {
+        (apart > 0.0 && load > 0.0 && !outcome.dynamic).then(|| {
             let (at, apart) = (at * 1e3, apart * 1e3);
             // with a load lowered after the peak, the step in which bonds broke has no row
             let lowered =
@@ -224,7 +225,8 @@ pub fn write(scene: &Scene, outcomes: &[VariantOutcome], output: &Path) -> Resul
         // a body in motion keeps moving after its loads stop
         let time = columns.iter().find(|c| c.0 == "time");
         let (label, x) = match time {
-            Some(time) => ("time (ms)", from_rest(&time.2, 1e3)),
+            Some(time) if outcome.dynamic => ("time (ms)", from_rest(&time.2, 1e3)),
+            Some(time) => ("time (s)", from_rest(&time.2, 1.0)),
             None => ("displacement (mm)", from_rest(&columns[0].2, 1e3)),
         };
         let mut plot = LinePlot::new(&format!("Energies, {}", outcome.name))
@@ -232,7 +234,16 @@ pub fn write(scene: &Scene, outcomes: &[VariantOutcome], output: &Path) -> Resul
             .axes(label, "energy (J)")
             .legend(LegendPlace::TopLeft);
         // `stored` includes the energy of contact
-        for name in ["work", "stored", "contact_energy", "kinetic", "released", "damped", "friction_work"] {
+        for name in [
+            "work",
+            "stored",
+            "contact_energy",
+            "kinetic",
+            "released",
+            "dissipated",
+            "damped",
+            "friction_work",
+        ] {
             if let Some(column) = columns.iter().find(|c| c.0 == name) {
                 plot = plot.series(Series::line(name, &x, &from_rest(&column.2, 1.0)));
             }

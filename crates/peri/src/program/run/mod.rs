@@ -261,7 +261,7 @@ fn solve<const D: usize>(
     (observers, frames): (&mut SceneObservers<D>, &mut FieldFrames),
 ) -> Result<(), PeriFailure> {
     let (material, loads) = (&physics.body.material, &physics.loads);
-    let factors = scene.solver.factors();
+    let (factors, times) = scene.load_steps();
     let mut watch = |status: &Status, state: &State<D>| variant_run.watch(status, state);
     let contact = match &scene.contact {
         Some(contact) => {
@@ -280,6 +280,7 @@ fn solve<const D: usize>(
     let row = |bonds: &dyn Bonds<D>, state: &State<D>| physics.row(bonds, state);
     let response = material.respond(&*body.bonds);
     let mut system = System::of_response(&mut *body.bonds, response, loads, &factors);
+    system.times = times.into();
     system.course = course.as_ref().map(|course| course as _);
     system.observer = Some(&row);
     system.fit_bound = scene.fit_bound();

@@ -29,6 +29,8 @@ pub struct VariantOutcome {
     pub events: Vec<BreakingEvent>,
     /// Fragments, the largest first.
     pub fragments: Vec<Fragment>,
+    /// True for explicit dynamics.
+    pub dynamic: bool,
     /// True if the load was lowered after bonds broke, see `solver.snap_back`.
     pub snaps_back: bool,
     /// Names of the regions of prescribed displacement.
@@ -81,6 +83,7 @@ impl VariantOutcome {
             history: Vec::new(),
             events: Vec::new(),
             fragments: Vec::new(),
+            dynamic: variant.scene.dynamics.is_some(),
             snaps_back: false,
             regions: Vec::new(),
             planes: Vec::new(),

@@ -42,6 +42,12 @@ pub fn explain<const D: usize>(
     if let Some(solid) = &scene.material.solid {
         let states = (bonds.sites() * size_of::<SolidPoint<D>>()) as f64 / 1e6;
         builds(format!("a solid, `{}`: states of particles {states:.1} MB", solid.law.name()));
+        let remembered = solid.memory_of_a_particle();
+        if remembered > 0 {
+            let megabytes = (8 * remembered * bonds.particles().len()) as f64 / 1e6;
+            let branches = solid.branch.len();
+            builds(format!("{branches} branches: {remembered} numbers a particle, {megabytes:.1} MB"));
+        }
     }
     super::explain_network(source, &scene.material)?.into_iter().for_each(&mut builds);
     for (crack, severed) in scene.body.cracks.iter().zip(&body.severed) {
@@ -80,6 +86,10 @@ pub fn explain<const D: usize>(
     }
     if scene.solver.snap_back {
         builds("loads that are lowered after bonds break, until no other bond would break".to_owned());
+    }
+    if scene.time.is_some() {
+        let (steps, times) = (scene.step_count(), scene.load_steps().1);
+        builds(format!("a programme of {steps} steps in {} s", plain(times.last().copied().unwrap_or(0.0))));
     }
     if let Some(dynamics) = &scene.dynamics {
         let method = dynamics.method();

@@ -207,7 +207,7 @@ fn refuse_inverted<const D: usize>(
         // a load curve may stay far below 1
         Some(dynamics) if dynamics.factor.is_some() => return Ok(()),
         Some(_) => vec![1.0],
-        None => scene.solver.factors(),
+        None => scene.load_steps().0,
     };
     match inverted(&*body.bonds, loads, &factors) {
         Some(found) => Err(source.error("boundary", found, INVERTS)),

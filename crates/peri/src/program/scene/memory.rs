@@ -5,7 +5,7 @@
 
 use super::{Scene, SolverMethod};
 use crate::bonds::{Bonds, Stencil, storage};
-use crate::material::SolidPoint;
+use crate::material::{Past, SolidPoint};
 use crate::solver::{Lbfgs, StepRecord};
 use harness::scene::{SceneError, Source};
 use polycore::constitutive::Flags;
@@ -66,7 +66,14 @@ fn bytes_of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> 
         }
         each += if contact.has_friction() { 3.0 * vector } else { 0.0 };
     }
-    if scene.material.solid.is_some() {
+    if let Some(solid) = &scene.material.solid {
+        // histories in points, in the state, in a checkpoint; a heap block each
+        let remembered = solid.memory_of_a_particle() as f64;
+        each += if remembered > 0.0 {
+            4.0 * 8.0 * remembered + 2.0 * (size_of::<Past>() as f64 + 32.0)
+        } else {
+            0.0
+        };
         // states of particles, while they are made, and another set for outputs
         let (state, passes) = (size_of::<SolidPoint<D>>() as f64, 8.0 * (1 + D * D) as f64 + 5.0);
         each += if scene.observes_forces() { 3.0 * state + 2.0 * passes } else { 2.0 * state + passes };
@@ -100,7 +107,7 @@ fn bytes_of_results<const D: usize>(scene: &Scene, particles: f64) -> f64 {
     }
     let rows = match &scene.dynamics {
         Some(dynamics) => dynamics.method().records,
-        None => scene.solver.steps,
+        None => scene.step_count(),
     };
     // a row of history and its copy in a checkpoint
     let row = size_of::<StepRecord>() + 24 * scene.boundary.len() + 48 * scene.output.section.len();

@@ -27,6 +27,7 @@ mod region;
 mod rotation;
 mod solid;
 mod tearing;
+mod time;
 mod values;
 mod variant;
 mod warn;
@@ -51,6 +52,7 @@ pub use placement::{check_placement, exact_plate};
 pub use probe::{HistoryProbe, Track};
 pub use solid::{SolidKind, SolidLaw};
 pub use tearing::{explain_tearing, tearing_warnings};
+pub use time::{TimeSpec, TimeStep};
 pub use values::{DiscreteBody, plain};
 pub use variant::{NAMING, SceneVariant, Study, variants};
 pub use warn::warnings;
@@ -58,6 +60,7 @@ pub use warn::warnings;
 use crate::bonds::VolumeCorrection;
 use crate::calibrate::{Calibration, Space};
 use crate::critical::{Convention, Critical};
+use crate::material::Driving;
 use crate::potential::Law;
 use crate::stress::{BallVolume, StressMethod};
 use harness::report::Expect;
@@ -86,6 +89,8 @@ pub struct Scene {
     /// Solver settings.
     #[serde(default)]
     pub solver: SolverSpec,
+    /// Ramps and holds of a quasi-static run in time, for a solid with branches or softening.
+    pub time: Option<TimeSpec>,
     /// Density and times of explicit dynamics.
     pub dynamics: Option<Dynamics>,
     /// Repulsion of particles without a bond, friction, rigid planes; default: none.
@@ -440,6 +445,11 @@ impl Scene {
     /// Returns true for a law learnt from data.
     pub fn is_learnt(&self) -> bool {
         self.material.solid.as_ref().is_some_and(SolidLaw::is_learnt)
+    }
+
+    /// Returns the energy that drives breaking.
+    pub fn driving(&self) -> Driving {
+        self.material.critical.and_then(|critical| critical.driving).unwrap_or_default()
     }
 
     /// Returns true if bonds soften before they break.

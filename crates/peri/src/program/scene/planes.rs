@@ -68,7 +68,7 @@ fn moments(scene: &Scene) -> Vec<(f64, f64)> {
         let factor = |time: f64| if time < ramp { time / ramp } else { 1.0 };
         return even.map(|part| (factor(part * end), part * end)).collect();
     }
-    let factors = scene.solver.factors();
+    let factors = scene.load_steps().0;
     std::iter::once(0.0).chain(factors).map(|factor| (factor, 0.0)).collect()
 }
 

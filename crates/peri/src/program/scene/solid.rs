@@ -6,10 +6,12 @@ use super::values::{plain, positive};
 use crate::bonds::VolumeCorrection;
 use crate::calibrate::{Calibration, Space};
 use crate::error::Error;
-use crate::material::{Correspondence, EightChainSolid, PointLaw};
+use crate::material::{Correspondence, Driving, EightChainSolid, PointLaw, ViscousCorrespondence};
 use crate::stress::StressMethod;
-use harness::scene::{ConstitutiveSpec, SceneError, Source};
+use harness::scene::{BranchSpec, ConstitutiveSpec, MullinsSpec, SceneError, Source};
+use polycore::constitutive::Law;
 use polycore::constitutive::surrogate::Kind;
+use polycore::constitutive::viscoelastic::Viscoelastic;
 use polycore::units::Stress;
 use serde::Deserialize;
 use std::sync::Arc;
@@ -34,6 +36,11 @@ pub struct SolidLaw {
     pub constitutive: Option<ConstitutiveSpec>,
     /// Factor on the stabilisation of `correspondence`; default: 1.
     pub stabilisation: Option<f64>,
+    /// Branches of `correspondence` that relax, beside `constitutive`, the law in equilibrium.
+    #[serde(default)]
+    pub branch: Vec<BranchSpec>,
+    /// Softening of the equilibrium law of `correspondence` by the largest strain so far.
+    pub mullins: Option<MullinsSpec>,
 }
 
 /// Kinds of solids.
@@ -70,6 +77,41 @@ impl SolidLaw {
         self.constitutive.as_ref().is_some_and(|spec| spec.learnt.is_some())
     }
 
+    /// Returns true for a law with a state.
+    pub fn has_state(&self) -> bool {
+        !self.branch.is_empty() || self.mullins.is_some()
+    }
+
+    /// Returns the numbers that a particle of this solid remembers.
+    pub fn memory_of_a_particle(&self) -> usize {
+        if self.has_state() { 6 * self.branch.len() + usize::from(self.mullins.is_some()) + 1 } else { 0 }
+    }
+
+    /// Adds branches and softening to the law in equilibrium.
+    fn with_state<const D: usize>(
+        &self,
+        source: &Source,
+        space: Space,
+        law: impl Law + 'static,
+        driving: Driving,
+    ) -> Result<Arc<dyn PointLaw<D>>, SceneError> {
+        let branches = self.branch.iter().enumerate();
+        let branches = branches.map(|(k, own)| own.branch(source, &format!("{KEY}.branch[{k}]")));
+        let branches = branches.collect::<Result<Vec<_>, _>>()?;
+        let wrong = |error: polycore::constitutive::Error| source.error(KEY, error, "a law with time");
+        let mut law = Viscoelastic::new(Box::new(law), branches).map_err(wrong)?;
+        if let Some(mullins) = &self.mullins {
+            law = law.with_softening(mullins.softening(source, &format!("{KEY}.mullins"))?).map_err(wrong)?;
+        }
+        let solid = ViscousCorrespondence::new::<D>(law, space, self.stabilisation.unwrap_or(1.0), driving);
+        Ok(Arc::new(solid.map_err(|error| match error {
+            Error::Parameter { name: "stabilisation", found, allowed } => {
+                source.error(&format!("{KEY}.stabilisation"), plain(found), allowed)
+            }
+            other => source.error(&format!("{KEY}.constitutive"), other, "a law with an energy"),
+        })?))
+    }
+
     /// Builds the law; `planes` is true on a lattice beside rigid planes.
     ///
     /// # Errors
@@ -79,6 +121,7 @@ impl SolidLaw {
         source: &Source,
         space: Space,
         planes: bool,
+        driving: Driving,
     ) -> Result<Arc<dyn PointLaw<D>>, SceneError> {
         let chains = self.law == SolidKind::EightChain;
         let other = if chains { SolidKind::Correspondence } else { SolidKind::EightChain }.name();
@@ -89,6 +132,8 @@ impl SolidLaw {
             ("pressure_filter", self.pressure_filter == Some(true), true),
             ("constitutive", self.constitutive.is_some(), false),
             ("stabilisation", self.stabilisation.is_some(), false),
+            ("branch", !self.branch.is_empty(), false),
+            ("mullins", self.mullins.is_some(), false),
         ] {
             if given && of_chains != chains {
                 let why = format!("`{}` does not use it, `{other}` does", self.law.name());
@@ -138,6 +183,9 @@ impl SolidLaw {
         let (key, stabilisation) = (format!("{KEY}.constitutive"), self.stabilisation.unwrap_or(1.0));
         let Some(learnt) = spec.learnt(source, &key)? else {
             let law = spec.law(source, &key)?;
+            if self.has_state() {
+                return self.with_state(source, space, law, driving);
+            }
             return Ok(Arc::new(Correspondence::stabilised(law, space, stabilisation).map_err(wrong)?));
         };
         if learnt.header().kind == Kind::Ann {
@@ -147,6 +195,9 @@ impl SolidLaw {
         if learnt.header().softening.is_some() {
             let allowed = "a law without: particles keep no history of it";
             return Err(source.error(&format!("{key}.learnt"), "a law with `softening`", allowed));
+        }
+        if self.has_state() {
+            return self.with_state(source, space, learnt, driving);
         }
         Ok(Arc::new(Correspondence::stabilised(learnt, space, stabilisation).map_err(wrong)?))
     }
@@ -179,6 +230,10 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         if critical.convention.is_some() {
             let why = "a convention of bond laws; a `solid` always takes its `fracture_energy` by tearing";
             return Err(source.unexpected("material.critical.convention", why));
+        }
+        if critical.driving.is_some() && (solid.branch.is_empty() || critical.fracture_energy.is_none()) {
+            let why = "needs `fracture_energy` beside it, and a solid with `branch`";
+            return Err(source.unexpected("material.critical.driving", why));
         }
         if let Some(strength) = critical.strength {
             let key = "material.critical.strength";
@@ -213,11 +268,12 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         let allowed = "`constitutive`, the stress of the law itself";
         return Err(source.error(&format!("stress.measures[{index}]"), "a measure of bond forces", allowed));
     }
+    let driving = scene.driving();
     match scene.body.space {
-        Space::Solid => solid.build::<3>(source, Space::Solid, planes).map(|_| ()),
+        Space::Solid => solid.build::<3>(source, Space::Solid, planes, driving).map(|_| ()),
         plane => {
             positive(source, "body.thickness", scene.body.thickness.map_or(1.0, |t| t.si()), "m")?;
-            solid.build::<2>(source, plane, planes).map(|_| ())
+            solid.build::<2>(source, plane, planes, driving).map(|_| ())
         }
     }
 }

@@ -182,7 +182,7 @@ fn long_steps<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<Str
         super::Prescribed::At(value) => most.max(value.abs()),
         super::Prescribed::Free => most,
     });
-    let step = largest / scene.solver.steps as f64;
+    let step = largest / scene.step_count() as f64;
     let horizons = step / bonds.horizon();
     (horizons > LONGEST_STEP).then(|| {
         format!(

@@ -1,7 +1,7 @@
 //! Step of a branch: C̄ and C_v at the start → C_v at the end, stress, tangent, energies.
 
 use super::flow::{Flow, ViscousTrace};
-use super::{Shift, Spring, Viscosity};
+use super::{Increment, Shift, Spring, Viscosity};
 use crate::constitutive::Error;
 use crate::constitutive::hyperelastic::PrincipalResponse;
 use crate::tensor::{DeformationGradient, Tensor, Voigt, Voigt6x6, voigt};
@@ -50,6 +50,13 @@ pub(super) struct Conditions {
     pub duration: f64,
     pub temperature: f64,
     pub pressure: f64,
+}
+
+impl Conditions {
+    pub fn of(increment: &Increment) -> Self {
+        let Increment { duration, temperature, pressure, .. } = *increment;
+        Self { duration, temperature, pressure }
+    }
 }
 
 /// Frame of a branch in a step: C_v = LLᵀ, L⁻¹C̄L⁻ᵀ = Q diag(exp 2e_tr) Qᵀ.
@@ -117,6 +124,20 @@ impl Branch {
 
     fn flow(&self, duration: f64, factor: f64, trace: ViscousTrace) -> Flow<'_> {
         Flow { spring: &self.spring, viscosity: &self.viscosity, duration, factor, trace }
+    }
+
+    /// 2W′/(1 + Δt 2W′/η) at the start of a step, Pa.
+    pub(super) fn step_modulus(
+        &self,
+        isochoric: &Tensor,
+        start: &BranchState,
+        conditions: &Conditions,
+    ) -> Result<f64, Error> {
+        let viscous = voigt::to_stress(&start.viscous);
+        let trial = Frame::new(isochoric, &viscous)?.trial;
+        let trace = ViscousTrace::Start(viscous.trace());
+        let flow = self.flow(conditions.duration, self.factor(start, conditions), trace);
+        Ok(self.spring.slopes(trial)[0] / (1.0 + 2.0 * flow.logarithm(trial, trial).exp()))
     }
 
     /// Backward Euler in exponential form.

@@ -74,7 +74,7 @@ impl Flow<'_> {
     }
 
     /// ln(Δt W′/η).
-    fn logarithm(&self, strains: [f64; 3], trial: [f64; 3]) -> f64 {
+    pub fn logarithm(&self, strains: [f64; 3], trial: [f64; 3]) -> f64 {
         let slope = self.spring.slopes(strains)[0];
         let fluidity = self.viscosity.fluidity(self.j2(strains), self.trace(strains, trial)).logarithm;
         (0.5 * self.duration).ln() + slope.ln() + fluidity - self.factor

@@ -1,0 +1,217 @@
+//! Branches of laws with time, and their softening, as a scene names them.
+
+use std::collections::BTreeMap;
+use std::str::FromStr;
+
+use serde::Deserialize;
+
+use super::{SceneError, Source};
+use polycore::constitutive::Error;
+use polycore::constitutive::hyperelastic::{EightChain, LopezPamies, NeoHookean};
+use polycore::constitutive::viscoelastic::{Branch, Mullins, Spring, Viscosity};
+use polycore::units::{PerSquaredStress, Rate, Stress, UnitError};
+
+/// Branch of a law with time: a spring in series with a dashpot.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BranchSpec {
+    /// The spring: `nu`; `nu_1`, `beta_1` …; `chain_modulus`, `links`.
+    pub spring: SpringKind,
+    /// The dashpot: `eta`; `eta_0`, `eta_inf`, `K_1`, `K_2`, `gamma_1`, `gamma_2`; `rate`, `stress`, `m`,
+    /// `c`, `xi`; `rate`, `stress`.
+    pub viscosity: ViscosityKind,
+    /// Constants by name: those with a unit as text, other numbers without.
+    pub parameters: BTreeMap<String, BranchConstant>,
+}
+
+/// Spring of a branch.
+#[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SpringKind {
+    /// Neo-Hookean.
+    NeoHookean,
+    /// One power of I₁.
+    #[serde(rename = "lopez-pamies-1")]
+    LopezPamies1,
+    /// Two powers of I₁.
+    #[serde(rename = "lopez-pamies-2")]
+    LopezPamies2,
+    /// Eight-chain law.
+    EightChain,
+}
+
+/// Dashpot of a branch.
+#[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ViscosityKind {
+    /// Constant.
+    Constant,
+    /// Kumar and Lopez-Pamies 2016.
+    KumarLopezPamies,
+    /// Bergström and Boyce 1998.
+    BergstromBoyce,
+    /// Eyring 1936.
+    Eyring,
+}
+
+/// Constant of a branch: a number, or a quantity such as "3 MPa s".
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(untagged)]
+pub enum BranchConstant {
+    /// A number.
+    Number(f64),
+    /// A quantity with its unit.
+    Text(String),
+}
+
+/// Softening of the equilibrium law by the largest strain so far (Ogden and Roxburgh 1999, Abaqus' form).
+#[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MullinsSpec {
+    /// r, above 1.
+    pub r: f64,
+    /// m, energy per volume.
+    pub m: Stress,
+    /// β.
+    #[serde(default)]
+    pub beta: f64,
+}
+
+/// Constants of a spring or dashpot with their units.
+type Names = &'static [(&'static str, &'static str)];
+
+impl SpringKind {
+    fn names(self) -> Names {
+        match self {
+            Self::NeoHookean => &[("nu", "Pa")],
+            Self::LopezPamies1 => &[("nu_1", "Pa"), ("beta_1", "1")],
+            Self::LopezPamies2 => &[("nu_1", "Pa"), ("beta_1", "1"), ("nu_2", "Pa"), ("beta_2", "1")],
+            Self::EightChain => &[("chain_modulus", "Pa"), ("links", "1")],
+        }
+    }
+}
+
+impl ViscosityKind {
+    fn names(self) -> Names {
+        match self {
+            Self::Constant => &[("eta", "Pa s")],
+            Self::KumarLopezPamies => &[
+                ("eta_0", "Pa s"),
+                ("eta_inf", "Pa s"),
+                ("K_1", "Pa s"),
+                ("K_2", "1/Pa^2"),
+                ("gamma_1", "1"),
+                ("gamma_2", "1"),
+            ],
+            Self::BergstromBoyce => &[("rate", "1/s"), ("stress", "Pa"), ("m", "1"), ("c", "1"), ("xi", "1")],
+            Self::Eyring => &[("rate", "1/s"), ("stress", "Pa")],
+        }
+    }
+}
+
+impl BranchSpec {
+    /// Builds the branch; `key` is where this block stands.
+    ///
+    /// # Errors
+    /// A [`SceneError`] for a constant that is missing, unknown, without its unit, or out of its range, and
+    /// for a spring that softens at large strains.
+    pub fn branch(&self, source: &Source, key: &str) -> Result<Branch, SceneError> {
+        let key = format!("{key}.parameters");
+        let all: Vec<_> = self.spring.names().iter().chain(self.viscosity.names()).collect();
+        let names: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
+        if let Some(other) = self.parameters.keys().find(|name| !names.contains(&name.as_str())) {
+            return Err(source.unknown(&format!("{key}.{other}"), other, &names));
+        }
+        let value = |&(name, unit): &(&str, &str)| {
+            let Some(given) = self.parameters.get(name) else {
+                return Err(source.error(&key, format!("no `{name}`"), names.join(", ")));
+            };
+            let path = format!("{key}.{name}");
+            match (given, unit) {
+                (BranchConstant::Number(value), "1") => Ok(*value),
+                (BranchConstant::Number(value), _) => {
+                    let allowed = format!("a text with a unit such as \"{value} {unit}\"");
+                    Err(source.error(&path, format!("{value} without a unit"), allowed))
+                }
+                (BranchConstant::Text(text), _) => {
+                    let read = |text: &str| match unit {
+                        "Pa" => si::<Stress>(text, Stress::si),
+                        "Pa s" => si::<polycore::units::Viscosity>(text, |eta| eta.si()),
+                        "1/s" => si::<Rate>(text, Rate::si),
+                        _ => si::<PerSquaredStress>(text, |k| k.si()),
+                    };
+                    match unit {
+                        "1" => Err(source.error(&path, format!("\"{text}\""), "a number")),
+                        _ => read(text).map_err(|error| source.error(&path, error, unit)),
+                    }
+                }
+            }
+        };
+        let constants: Vec<f64> = all.into_iter().map(value).collect::<Result<_, _>>()?;
+        let branch = self.build(&constants).map_err(|error| match error {
+            Error::Parameter { parameter, value, allowed, .. } => {
+                let name = if parameter == "viscosity" { "eta" } else { parameter.as_str() };
+                let known = names.contains(&name);
+                let path = if known { format!("{key}.{name}") } else { key.clone() };
+                source.error(&path, format!("{parameter} {value:?}"), allowed)
+            }
+            other => source.error(&key, other, "constants in their ranges"),
+        })?;
+        let least = branch.spring.least_slope(1.0);
+        if !(least > 0.0) {
+            let found =
+                format!("a spring whose stress falls at a slope of {least:.3e} Pa below log strains of 1");
+            return Err(source.error(&key, found, "a stress that grows with the strain"));
+        }
+        Ok(branch)
+    }
+
+    fn build(&self, p: &[f64]) -> Result<Branch, Error> {
+        let (spring, q) = p.split_at(self.spring.names().len());
+        let spring = match self.spring {
+            SpringKind::NeoHookean => Spring::NeoHookean(NeoHookean::new(spring[0])?),
+            SpringKind::LopezPamies1 | SpringKind::LopezPamies2 => {
+                Spring::LopezPamies(LopezPamies::new(spring.chunks_exact(2).map(|k| [k[0], k[1]]).collect())?)
+            }
+            SpringKind::EightChain => Spring::EightChain(EightChain::new(spring[0], spring[1])?),
+        };
+        let viscosity = match self.viscosity {
+            ViscosityKind::Constant => Viscosity::Constant(q[0]),
+            ViscosityKind::KumarLopezPamies => Viscosity::KumarLopezPamies {
+                start: q[0],
+                end: q[1],
+                thickening: q[2],
+                thinning: q[3],
+                exponents: [q[4], q[5]],
+            },
+            ViscosityKind::BergstromBoyce => {
+                Viscosity::BergstromBoyce { rate: q[0], stress: q[1], power: q[2], creep: q[3], offset: q[4] }
+            }
+            ViscosityKind::Eyring => {
+                Viscosity::Eyring { rate: q[0], stress: q[1], pressure: 0.0, softening: None }
+            }
+        };
+        Branch::new(spring, viscosity)
+    }
+}
+
+fn si<Q: FromStr<Err = UnitError>>(text: &str, value: impl Fn(Q) -> f64) -> Result<f64, UnitError> {
+    text.parse().map(value)
+}
+
+impl MullinsSpec {
+    /// Builds the softening; `key` is where this block stands.
+    ///
+    /// # Errors
+    /// A constant out of its range.
+    pub fn softening(&self, source: &Source, key: &str) -> Result<Mullins, SceneError> {
+        let softening = Mullins { ratio: self.r, offset: self.m.si(), slope: self.beta };
+        match softening.check() {
+            Err(Error::Parameter { parameter, value, allowed, .. }) => {
+                Err(source.error(&format!("{key}.{parameter}"), value, allowed))
+            }
+            Err(other) => Err(source.error(key, other, "constants in their ranges")),
+            Ok(()) => Ok(softening),
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! Correspondence with a law that has a state: branches of springs and dashpots, softening by the largest
+//! strain.
+
+use super::constitutive::{at_thickness, check, tangent_norm};
+use super::past::{Driving, EnergyPart, Past};
+use super::point_law::{Deformation, PointLaw, PointStress};
+use super::tensor::BodyTensor;
+use crate::calibrate::Space;
+use crate::error::Error;
+use nalgebra::Matrix3;
+use polycore::constitutive::viscoelastic::{
+    Branch, BranchState, Increment, Response, State, Viscoelastic, Viscosity,
+};
+use polycore::constitutive::{Moduli, Workspace};
+use polycore::tensor::voigt::{self, Voigt};
+use std::cell::RefCell;
+
+/// W = W_eq(C) + Σ_k W_k(C, C_v) + ½ g · residual: [`super::Correspondence`] whose law has a state. Each step
+/// minimises the energy of backward Euler in exponential form ([`Viscoelastic`]); g = a(μ + Σ_k ν_k/(1 + Δt
+/// ν_k/η_k)) with ν and η at its start.
+///
+/// A deformation without [`Past`] is one in equilibrium: it has the stress of W_eq alone.
+pub struct ViscousCorrespondence {
+    law: Viscoelastic,
+    space: Space,
+    moduli: Moduli,
+    stabilisation: f64,
+    driving: Driving,
+}
+
+/// Scratch memory: states of a point at both ends of a step.
+#[derive(Default)]
+struct Scratch {
+    memory: Workspace,
+    start: State,
+    end: State,
+}
+
+thread_local! {
+    static SCRATCH: RefCell<Scratch> = RefCell::default();
+}
+
+impl ViscousCorrespondence {
+    /// Creates the solid with a stabilisation a ≥ 0; the equilibrium law is subject to the conditions of
+    /// [`super::Correspondence::stabilised`].
+    ///
+    /// # Errors
+    /// [`Error::Parameter`]; also for a viscosity that depends on the pressure, which a particle does not
+    /// keep.
+    pub fn new<const D: usize>(
+        law: Viscoelastic,
+        space: Space,
+        stabilisation: f64,
+        driving: Driving,
+    ) -> Result<Self, Error> {
+        let moduli = check::<D>(law.equilibrium(), space, stabilisation)?;
+        for branch in law.branches() {
+            if let Viscosity::Eyring { pressure, .. } = branch.viscosity
+                && pressure != 0.0
+            {
+                let allowed = "0: particles keep no pressure".to_owned();
+                return Err(Error::Parameter { name: "pressure of a viscosity", found: pressure, allowed });
+            }
+        }
+        Ok(Self { law, space, moduli, stabilisation, driving })
+    }
+
+    fn unpack(&self, past: &Past, state: &mut State) {
+        let mut rest = &past.state[..];
+        let mut take = |count: usize| {
+            let (taken, left) = rest.split_at(count);
+            rest = left;
+            taken
+        };
+        state.branches.clear();
+        for branch in self.law.branches() {
+            let viscous = Voigt::from_column_slice(take(6));
+            let shear = if keeps_shear(branch) { take(1)[0] } else { 0.0 };
+            state.branches.push(BranchState { viscous, shear });
+        }
+        state.peak = if self.law.softening().is_some() { take(1)[0] } else { 0.0 };
+    }
+
+    fn pack(&self, state: &State) -> impl Iterator<Item = f64> {
+        let branches = self.law.branches().iter().zip(&state.branches).flat_map(|(branch, own)| {
+            own.viscous.iter().copied().chain(keeps_shear(branch).then_some(own.shear))
+        });
+        branches.chain(self.law.softening().map(|_| state.peak))
+    }
+
+    /// λ₃², the response of a part of the energy there, and the state at the end in the scratch memory;
+    /// `None` outside the law's domain. In plane stress the equilibrium law alone has its own thickness: the
+    /// pressure that the branches need is no part of its stress.
+    fn predict<const D: usize>(
+        &self,
+        deformation: &Deformation<D>,
+        part: EnergyPart,
+        tangent: bool,
+        scratch: &mut Scratch,
+    ) -> Option<(f64, Response)> {
+        if deformation.volume_change() <= -1.0 {
+            return None;
+        }
+        let Scratch { memory, start, end } = scratch;
+        let past = deformation.past.as_deref();
+        start.peak = 0.0;
+        past.iter().for_each(|past| self.unpack(past, start));
+        let past = past.filter(|_| !self.drives_alone(part));
+        let mut found = None;
+        let (c, _) = at_thickness(self.space, &deformation.gradient(), tangent, |c, tangent| {
+            let response = match past {
+                Some(past) => {
+                    let increment = Increment::new(*c, *c, past.duration);
+                    self.law.respond(start, &increment, tangent, end, memory)
+                }
+                None => self.law.respond_relaxed(start.peak, c, tangent, end, memory),
+            };
+            found = response.ok();
+            found.map(|found| found.prediction)
+        })?;
+        found.map(|found| (c[2], found))
+    }
+
+    /// Returns true for a part without branches.
+    fn drives_alone(&self, part: EnergyPart) -> bool {
+        part == EnergyPart::Driving && self.driving == Driving::Equilibrium
+    }
+
+    /// Modulus of the stabilisation.
+    fn shear_of<const D: usize>(&self, deformation: &Deformation<D>) -> f64 {
+        match deformation.past.as_deref() {
+            Some(past) if !self.drives_alone(past.part) => past.stabilisation,
+            _ => self.stabilisation * self.moduli.shear,
+        }
+    }
+}
+
+/// Returns true for a viscosity that depends on ∫ q/η dt.
+fn keeps_shear(branch: &Branch) -> bool {
+    matches!(branch.viscosity, Viscosity::Eyring { softening: Some(_), .. })
+}
+
+/// Part of the energy that a deformation refers to.
+fn part_of<const D: usize>(deformation: &Deformation<D>) -> EnergyPart {
+    deformation.past.as_ref().map_or(EnergyPart::Stored, |past| past.part)
+}
+
+impl<const D: usize> PointLaw<D> for ViscousCorrespondence {
+    fn energy(&self, deformation: &Deformation<D>) -> f64 {
+        let part = part_of(deformation);
+        let found = SCRATCH.with_borrow_mut(|scratch| self.predict(deformation, part, false, scratch));
+        let energy = found.and_then(|(_, found)| {
+            let trial = if part == EnergyPart::Trial { found.dissipated } else { 0.0 };
+            Some(found.prediction.energy? + trial)
+        });
+        energy.unwrap_or(f64::NAN) + 0.5 * self.shear_of(deformation) * deformation.residual
+    }
+
+    fn respond(&self, deformation: &Deformation<D>) -> PointStress<D> {
+        let part = part_of(deformation);
+        let found = SCRATCH.with_borrow_mut(|scratch| self.predict(deformation, part, false, scratch));
+        let stress = found
+            .map_or(Matrix3::from_element(f64::NAN), |(_, found)| voigt::to_stress(&found.prediction.stress));
+        let plane = BodyTensor::<D>::from_fn(|a, b| stress[(a, b)]);
+        PointStress { piola: deformation.gradient() * plane, stabilisation: self.shear_of(deformation) }
+    }
+
+    fn stiffness(&self, deformation: &Deformation<D>) -> f64 {
+        let found =
+            SCRATCH.with_borrow_mut(|scratch| self.predict(deformation, EnergyPart::Stored, true, scratch));
+        found.map_or(f64::NAN, |(_, found)| {
+            tangent_norm(self.space, &deformation.gradient(), &found.prediction)
+        })
+    }
+
+    fn shear_modulus(&self) -> f64 {
+        self.moduli.shear
+    }
+
+    fn bulk_modulus(&self) -> f64 {
+        if self.space == Space::PlaneStress { 0.0 } else { self.moduli.bulk }
+    }
+
+    fn thickness_stretch(&self, deformation: &Deformation<D>) -> f64 {
+        if self.space != Space::PlaneStress {
+            return 1.0;
+        }
+        let found =
+            SCRATCH.with_borrow_mut(|scratch| self.predict(deformation, EnergyPart::Stored, false, scratch));
+        found.map_or(f64::NAN, |(square, _)| square.sqrt())
+    }
+
+    fn past(&self) -> Option<Past> {
+        let state = self.pack(&self.law.rest()).collect();
+        let stabilisation = self.stabilisation * (self.moduli.shear + self.law.branch_modulus());
+        Some(Past { state, duration: 0.0, stabilisation, part: EnergyPart::Stored })
+    }
+
+    fn stabilise(&self, deformation: &mut Deformation<D>, duration: f64) {
+        let modulus = SCRATCH.with_borrow_mut(|scratch| {
+            // the thickness in equilibrium with the state at the start
+            let (square, _) = self.predict(deformation, EnergyPart::Stored, false, scratch)?;
+            let f = deformation.gradient();
+            let c = voigt::from_stress(&super::tensor::embed(&(f.transpose() * f), square));
+            self.unpack(deformation.past.as_deref()?, &mut scratch.start);
+            self.law.step_modulus(&scratch.start, &Increment::new(c, c, duration)).ok()
+        });
+        if let (Some(past), Some(modulus)) = (&mut deformation.past, modulus) {
+            past.stabilisation = self.stabilisation * (self.moduli.shear + modulus);
+        }
+    }
+
+    fn advance(&self, deformation: &mut Deformation<D>) -> f64 {
+        SCRATCH.with_borrow_mut(|scratch| {
+            let Some((_, found)) = self.predict(deformation, EnergyPart::Stored, false, scratch) else {
+                return 0.0;
+            };
+            if let Some(past) = &mut deformation.past {
+                past.state.iter_mut().zip(self.pack(&scratch.end)).for_each(|(old, new)| *old = new);
+            }
+            found.dissipated
+        })
+    }
+}
