@@ -117,9 +117,7 @@ pub struct DataSet {
 /// JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
     let quantities = [q::ALL, q::PRONY, q::NETWORKS, q::FOAMS, q::FORECASTS];
-    harness::scene::schema("polycore", &quantities, |generator| {
-        vec![generator.subschema_for::<Scene>()]
-    })
+    harness::scene::schema("polycore", &quantities, |generator| vec![generator.subschema_for::<Scene>()])
 }
 
 /// Checked scene with its data.
@@ -141,8 +139,18 @@ pub struct FitCase {
 impl FitCase {
     /// Parses and checks a scene and the tables that it names.
     pub fn parse(source: &Source) -> Result<Self, SceneError> {
-        let Scene { _program: Program::Polycore, title, fit, time, prony, trial, network, foam, forecast, expect } =
-            source.parse()?;
+        let Scene {
+            _program: Program::Polycore,
+            title,
+            fit,
+            time,
+            prony,
+            trial,
+            network,
+            foam,
+            forecast,
+            expect,
+        } = source.parse()?;
         let laws = match &fit.laws {
             None => MODELS.iter().collect(),
             Some(names) => select_laws(source, "fit.laws", names)?,
@@ -272,7 +280,6 @@ impl FitCase {
         let mut files = if self.data.is_empty() { "" } else { of_fits }.to_owned();
         if !self.networks.is_empty() {
             files += "<network>_networks.csv, ";
-        }
         }
         if !self.prony.is_empty() {
             files += "<prony>_prony.csv, <prony>_curve.csv, <prony>_branches.toml, <prony>_prony.inp, ";
