@@ -153,7 +153,7 @@ fn isotherms_make_a_master_curve() {
     near("decades from -27 to 100 °C", total(&found), total(&expected), 0.3);
 }
 
-/// Relaxation times stay within a decade of those of the data, where a faster term shows in its viscosity alone.
+/// Relaxation times stay within a decade of those of the data; a faster term shows in its viscosity alone.
 #[test]
 fn times_stay_near_the_data() {
     let fast = PronyTerm { modulus: 1e12, time: 1e-9 };

@@ -78,10 +78,10 @@ pub struct MullinsSpec {
 }
 
 /// Constants of a spring or dashpot with their units.
-type Names = &'static [(&'static str, &'static str)];
+type ConstantUnits = &'static [(&'static str, &'static str)];
 
 impl SpringKind {
-    fn names(self) -> Names {
+    fn names(self) -> ConstantUnits {
         match self {
             Self::NeoHookean => &[("nu", "Pa")],
             Self::LopezPamies1 => &[("nu_1", "Pa"), ("beta_1", "1")],
@@ -92,7 +92,7 @@ impl SpringKind {
 }
 
 impl ViscosityKind {
-    fn names(self) -> Names {
+    fn names(self) -> ConstantUnits {
         match self {
             Self::Constant => &[("eta", "Pa s")],
             Self::KumarLopezPamies => &[
@@ -158,7 +158,7 @@ impl BranchSpec {
             other => source.error(&key, other, "constants in their ranges"),
         })?;
         let least = branch.spring.least_slope(1.0);
-        if !(least > 0.0) {
+        if least.is_nan() || least <= 0.0 {
             let found =
                 format!("a spring whose stress falls at a slope of {least:.3e} Pa below log strains of 1");
             return Err(source.error(&key, found, "a stress that grows with the strain"));

@@ -30,14 +30,14 @@ pub struct ViscousCorrespondence {
 
 /// Scratch memory: states of a point at both ends of a step.
 #[derive(Default)]
-struct Scratch {
+struct StepStates {
     memory: Workspace,
     start: State,
     end: State,
 }
 
 thread_local! {
-    static SCRATCH: RefCell<Scratch> = RefCell::default();
+    static SCRATCH: RefCell<StepStates> = RefCell::default();
 }
 
 impl ViscousCorrespondence {
@@ -96,12 +96,12 @@ impl ViscousCorrespondence {
         deformation: &Deformation<D>,
         part: EnergyPart,
         tangent: bool,
-        scratch: &mut Scratch,
+        scratch: &mut StepStates,
     ) -> Option<(f64, Response)> {
         if deformation.volume_change() <= -1.0 {
             return None;
         }
-        let Scratch { memory, start, end } = scratch;
+        let StepStates { memory, start, end } = scratch;
         let past = deformation.past.as_deref();
         start.peak = 0.0;
         past.iter().for_each(|past| self.unpack(past, start));

@@ -25,7 +25,8 @@ harness::quantities! {
     WORK_OF_LOADS = "work_of_loads", "J", "work of the loads";
     STORED_ENERGY = "stored_energy", "J", "energy in bonds and contact at the end";
     DAMPED_ENERGY = "damped_energy", "J", "work less stored, released, dissipated and friction energy; in \
-        a quasi-static run only as exact as the trapezoidal rule of the work, about 1e-3 of the work, and possibly negative";
+        a quasi-static run only as exact as the trapezoidal rule of the work, about 1e-3 of the work, and \
+        possibly negative";
     RELEASED_ENERGY = "released_energy", "J", "with `material.critical`: energy of bonds at the moment they \
         broke";
     DISSIPATED_ENERGY = "dissipated_energy", "J", "with `branch` or `mullins` of a `solid`: energy \
@@ -42,8 +43,8 @@ harness::quantities! {
     NEW_CRACK_AREA = "new_crack_area", "m²", "with `material.critical`: area of new cracks, from pairs of \
         neighbours whose bond broke and that share no neighbour any more";
     DISSIPATED_PER_AREA = "dissipated_per_area", "J/m²", "work less stored, kinetic, friction and \
-        `dissipated_energy`, over `new_crack_area`: the energy of new cracks, including losses when bonds snap, at barriers of \
-        the lattice, and in bonds that broke elsewhere";
+        `dissipated_energy`, over `new_crack_area`: the energy of new cracks, including losses when bonds snap, at \
+        barriers of the lattice, and in bonds that broke elsewhere";
     DISSIPATION_BIAS = "dissipation_bias", "", "`dissipated_per_area` over `tearing_energy`, less 1: 0 if \
         the crack ran at G, positive if the load supplied more";
     FRAGMENTS = "fragments", "", "with `material.critical`: number of pieces of at least two particles \

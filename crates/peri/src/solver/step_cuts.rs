@@ -15,7 +15,7 @@ impl<const D: usize> System<'_, D> {
     /// Shortest step: the least difference of two prescribed factors, or times, over [`Self::refine`].
     pub(super) fn shortest(&self) -> f64 {
         let steps = 0..self.factors.len();
-        let steps = steps.map(|at| (self.place(Some(at)) - self.place(at.checked_sub(1))).abs());
+        let steps = steps.map(|at| (self.abscissa(Some(at)) - self.abscissa(at.checked_sub(1))).abs());
         steps.filter(|&step| step > 0.0).fold(f64::INFINITY, f64::min) / self.refine.max(1) as f64
     }
 
@@ -24,8 +24,8 @@ impl<const D: usize> System<'_, D> {
     /// linear in them, become critical; `state` returns to the previous equilibrium.
     pub(super) fn cut(&mut self, state: &mut State<D>, shortest: f64) -> bool {
         let at = state.step;
-        let before = self.place(at.checked_sub(1));
-        let length = self.place(Some(at)) - before;
+        let before = self.abscissa(at.checked_sub(1));
+        let length = self.abscissa(Some(at)) - before;
         let may =
             self.refine > 1 && state.control.round == 0 && length.abs() > (1.0 + LEAST_REMAINDER) * shortest;
         let stretched = self.is_overstretched(state.stretches.balanced);
@@ -34,7 +34,7 @@ impl<const D: usize> System<'_, D> {
         }
         let old = state.history.last().map_or(1.0, |record| record.largest_stretch);
         let new = if state.control.cuts < BY_STRETCH {
-            self.around([before, old], [self.place(Some(at)), state.stretches.largest()], shortest)
+            self.around([before, old], [self.abscissa(Some(at)), state.stretches.largest()], shortest)
         } else {
             vec![before + 0.5 * length]
         };
@@ -55,9 +55,9 @@ impl<const D: usize> System<'_, D> {
         if after.is_nan() || after <= most * (1.0 + 1e-6) {
             return false;
         }
-        let start = self.place(state.step.checked_sub(1));
+        let start = self.abscissa(state.step.checked_sub(1));
         let part = (most - before) / (after - before);
-        let place = start + part * (self.place(Some(state.step)) - start);
+        let place = start + part * (self.abscissa(Some(state.step)) - start);
         self.insert(state, &[place]);
         true
     }
@@ -88,7 +88,7 @@ impl<const D: usize> System<'_, D> {
         if self.times.is_empty() {
             state.control.insert(at, &self.factors, new);
         } else {
-            let [start, end] = [at.checked_sub(1), Some(at)].map(|step| self.place(step));
+            let [start, end] = [at.checked_sub(1), Some(at)].map(|step| self.abscissa(step));
             let before = at.checked_sub(1).map_or(0.0, |before| self.factors[before]);
             let factor = |time: &f64| before + (time - start) / (end - start) * (self.factors[at] - before);
             let factors: Vec<f64> = new.iter().map(factor).collect();

@@ -12,7 +12,7 @@ impl<const D: usize> System<'_, D> {
     }
 
     /// Position of the end of a step among steps: time, or load factor without times.
-    pub(super) fn place(&self, step: Option<usize>) -> f64 {
+    pub(super) fn abscissa(&self, step: Option<usize>) -> f64 {
         let places = if self.times.is_empty() { &self.factors } else { &self.times };
         step.and_then(|step| places.get(step)).copied().unwrap_or(0.0)
     }

@@ -60,7 +60,7 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
         for other in case.others(own) {
             let stretches = other.table.states.iter().map(TestState::principal_stretches);
             let stretches = stretches.collect::<Result<Vec<_>, _>>()?;
-            let outside = stretches.iter().filter(|stretches| !coverage.holds(**stretches)).count();
+            let outside = stretches.iter().filter(|stretches| !coverage.contains(**stretches)).count();
             set.outside.push((&other.name, stretches.len(), outside));
         }
         for fit in &set.fits {

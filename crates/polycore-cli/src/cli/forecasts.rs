@@ -10,7 +10,7 @@ use harness::report::Report;
 use harness::scene::{SceneError, Source};
 use polycore::Error;
 use polycore::constitutive::hyperelastic::forecast::{
-    Curve, Forecast, ForecastPoint, LEAST_CURVES, forecast,
+    Forecast, ForecastPoint, LEAST_CURVES, TensionCurve, forecast,
 };
 use polycore::constitutive::hyperelastic::{ModelDescriptor, model};
 use polycore::file::atomic_write;
@@ -53,7 +53,7 @@ const LAWS: [&str; 6] = ["mooney-rivlin", "gent", "eight-chain", "eight-chain-ro
 /// Checked curves of a scene.
 pub struct ForecastSet {
     name: String,
-    curves: Vec<Curve>,
+    curves: Vec<TensionCurve>,
     share: f64,
     laws: Vec<&'static ModelDescriptor>,
 }
@@ -82,7 +82,7 @@ impl ForecastSpec {
             Some(names) => select_laws(source, &key("laws"), names)?,
             None => LAWS.iter().filter_map(|name| model(name).ok()).collect(),
         };
-        let curves = Curve::read(source.file(&self.file), &self.curves)
+        let curves = TensionCurve::read(source.file(&self.file), &self.curves)
             .map_err(|error| source.refused(&key("file"), error))?;
         if curves.len() < LEAST_CURVES {
             let allowed = format!("at least {LEAST_CURVES}: the others give the band of one");

@@ -331,7 +331,8 @@ impl PronySet {
         let count = found.series.terms.len();
         let undetermined = found.factors.iter().filter(|factor| factor.is_none()).count();
         let mut text = format!(
-            "prony {}: {count} terms, rms of {kinds} {}; constants that the data do not determine: {undetermined}\n",
+            "prony {}: {count} terms, rms of {kinds} {}; constants that the data do not \
+             determine: {undetermined}\n",
             self.name,
             percent.join(" and ")
         );
@@ -344,8 +345,8 @@ impl PronySet {
                 let celsius = reference - CELSIUS;
                 let _ = writeln!(
                     text,
-                    "  WLF from {celsius:.1} degC on: c1 = {first:.3}, c2 = {second:.2} K, rms {rms:.3} decades, \
-                     {count} isotherms"
+                    "  WLF from {celsius:.1} degC on: c1 = {first:.3}, c2 = {second:.2} K, rms {rms:.3} \
+                     decades, {count} isotherms"
                 );
             }
             Some(_) => text += "  WLF: fewer than three isotherms above the reference\n",

@@ -86,8 +86,8 @@ impl PronySet {
             let [nu, eta] = [modulus, modulus * term.time].map(|value| digits(value, DIGITS));
             let _ = writeln!(
                 text,
-                "[[material.solid.branch]]\nspring = \"neo-hookean\"\nviscosity = \"constant\"\nparameters = {{ \
-                 nu = \"{nu} MPa\", eta = \"{eta} MPa s\" }}"
+                "[[material.solid.branch]]\nspring = \"neo-hookean\"\nviscosity = \"constant\"\n\
+                 parameters = {{ nu = \"{nu} MPa\", eta = \"{eta} MPa s\" }}"
             );
         }
         text
@@ -99,7 +99,8 @@ impl PronySet {
         let shear = self.share() * instantaneous / MPA;
         let name = self.name.to_uppercase();
         let mut text = format!(
-            "** units mm, N, MPa, s; K is {BULK_RATIO} times the shear modulus: the tests do not determine it\n\
+            "** units mm, N, MPa, s; K is {BULK_RATIO} times the shear modulus: the tests do not determine \
+             it\n\
              *MATERIAL, NAME={name}\n*HYPERELASTIC, NEO HOOKE, MODULI=INSTANTANEOUS\n{:.6e}, {:.6e}\n\
              *VISCOELASTIC, TIME=PRONY\n",
             0.5 * shear,

@@ -24,7 +24,7 @@ pub struct TimeSettings {
     /// Name of the equilibrium law.
     equilibrium: String,
     /// Branches.
-    branch: Vec<BranchSpec>,
+    branch: Vec<BranchFormSpec>,
     /// Constants that keep a value, SI: `"1.c" = -0.5`.
     #[serde(default)]
     fix: BTreeMap<String, f64>,
@@ -57,7 +57,7 @@ fn one() -> usize {
 /// Branch: a spring in series with a dashpot.
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct BranchSpec {
+struct BranchFormSpec {
     /// The spring.
     spring: SpringName,
     /// The dashpot.
@@ -298,7 +298,7 @@ impl TimeCase {
     }
 }
 
-impl BranchSpec {
+impl BranchFormSpec {
     fn form(&self) -> BranchForm {
         let spring = match self.spring {
             SpringName::NeoHookean => SpringForm::NeoHookean,

@@ -11,7 +11,7 @@ use super::MPA;
 use super::material::{BULK_RATIO, DIGITS, digits, stress};
 
 /// Name of a key, number with its unit.
-type Constant = (String, String);
+type ConstantText = (String, String);
 
 /// Formats `[material.solid]` with its branches; constants that the data do not determine are marked.
 ///
@@ -27,8 +27,8 @@ pub fn block(found: &TimeFit) -> Result<String, Error> {
         found.form.equilibrium.law(&values[..found.form.equilibrium.parameters.len()])?.shear_modulus();
     let _ = writeln!(
         text,
-        "model = \"{key}\"\nbulk_modulus = \"{}\" # {BULK_RATIO} times the modulus of a fast strain: these tests do \
-         not determine it\n[material.solid.constitutive.parameters]",
+        "model = \"{key}\"\nbulk_modulus = \"{}\" # {BULK_RATIO} times the modulus of a fast strain: these tests \
+         do not determine it\n[material.solid.constitutive.parameters]",
         stress(BULK_RATIO * (shear + law.branch_modulus()), DIGITS)
     );
     for (parameter, value) in found.form.equilibrium.parameters.iter().zip(&values) {
@@ -60,7 +60,7 @@ fn remark(found: &TimeFit, name: &str) -> String {
 }
 
 /// Names of spring and viscosity in scenes, and their constants.
-fn described(branch: &Branch) -> ([&'static str; 2], Vec<Constant>) {
+fn described(branch: &Branch) -> ([&'static str; 2], Vec<ConstantText>) {
     let (spring, law, names): (_, &dyn Hyperelastic, Vec<(String, &str)>) = match &branch.spring {
         Spring::NeoHookean(law) => ("neo-hookean", law, vec![("nu".to_owned(), "Pa")]),
         Spring::LopezPamies(law) => {
@@ -73,7 +73,7 @@ fn described(branch: &Branch) -> ([&'static str; 2], Vec<Constant>) {
         }
     };
     let values = law.parameters();
-    let mut constants: Vec<Constant> =
+    let mut constants: Vec<ConstantText> =
         names.iter().zip(values).map(|((name, unit), (_, value))| constant(name, value, unit)).collect();
     let (viscosity, own): (_, Vec<(&str, f64, &str)>) = match branch.viscosity {
         Viscosity::Constant(eta) => ("constant", vec![("eta", eta, "Pa s")]),
@@ -107,7 +107,7 @@ fn described(branch: &Branch) -> ([&'static str; 2], Vec<Constant>) {
 }
 
 /// Formats a constant, stresses in MPa.
-fn constant(name: &str, value: f64, unit: &str) -> Constant {
+fn constant(name: &str, value: f64, unit: &str) -> ConstantText {
     let (value, unit) = match unit {
         "Pa" => (value / MPA, "MPa"),
         "Pa s" => (value / MPA, "MPa s"),

@@ -235,7 +235,7 @@ impl Viscoelastic {
         let isochoric = c / c.determinant().cbrt();
         let before = voigt::to_stress(&increment.from);
         let before = before / before.determinant().cbrt();
-        let conditions = Conditions::of(increment);
+        let conditions = Conditions::new(increment);
         let mut distance = Voigt::zeros();
         end.branches.clear();
         for (branch, start) in self.branches.iter().zip(&start.branches) {
@@ -307,7 +307,7 @@ impl Viscoelastic {
     pub fn step_modulus(&self, start: &State, increment: &Increment) -> Result<f64, Error> {
         let c = voigt::to_stress(&increment.from);
         let isochoric = c / c.determinant().cbrt();
-        let conditions = Conditions::of(increment);
+        let conditions = Conditions::new(increment);
         let branches = self.branches.iter().zip(&start.branches);
         branches.map(|(branch, start)| branch.step_modulus(&isochoric, start, &conditions)).sum()
     }

@@ -52,7 +52,7 @@ pub use placement::{check_placement, exact_plate};
 pub use probe::{HistoryProbe, Track};
 pub use solid::{SolidKind, SolidLaw};
 pub use tearing::{explain_tearing, tearing_warnings};
-pub use time::{TimeSpec, TimeStep};
+pub use time::{TimeProgramSpec, TimeStep};
 pub use values::{DiscreteBody, plain};
 pub use variant::{NAMING, SceneVariant, Study, variants};
 pub use warn::warnings;
@@ -90,7 +90,7 @@ pub struct Scene {
     #[serde(default)]
     pub solver: SolverSpec,
     /// Ramps and holds of a quasi-static run in time, for a solid with branches or softening.
-    pub time: Option<TimeSpec>,
+    pub time: Option<TimeProgramSpec>,
     /// Density and times of explicit dynamics.
     pub dynamics: Option<Dynamics>,
     /// Repulsion of particles without a bond, friction, rigid planes; default: none.

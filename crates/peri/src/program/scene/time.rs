@@ -12,7 +12,7 @@ const MOST: usize = 1_000_000;
 /// Programme of a quasi-static run in time, from time 0 without load.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct TimeSpec {
+pub struct TimeProgramSpec {
     /// Ramps and holds, one after the other.
     pub step: Vec<TimeStep>,
 }

@@ -17,7 +17,7 @@ harness::study! {
         cracks: Vec<super::CrackSpec> = "body.cracks",
         boundary: Vec<super::Boundary> = "boundary",
         solver: super::SolverSpec = "solver",
-        time: super::TimeSpec = "time",
+        time: super::TimeProgramSpec = "time",
         dynamics: super::Dynamics = "dynamics",
         contact: super::ContactSpec = "contact",
     }

@@ -47,7 +47,7 @@ impl Coverage {
     }
 
     /// Returns true if principal stretches lie in the region, or within 2 % of its extent beside it.
-    pub fn holds(&self, stretches: [f64; 3]) -> bool {
+    pub fn contains(&self, stretches: [f64; 3]) -> bool {
         let at = place(stretches);
         let edges = || self.hull.iter().zip(self.hull.iter().cycle().skip(1));
         edges().count() > 2 && edges().all(|(a, b)| turn(*a, *b, at) >= 0.0)
@@ -93,7 +93,7 @@ mod tests {
     #[test]
     fn tests_cover_their_own_states() {
         let holds = |coverage: &Coverage, mode: Mode, l: f64| {
-            coverage.holds(incompressible(l, mode.second_stretch(l)).unwrap())
+            coverage.contains(incompressible(l, mode.second_stretch(l)).unwrap())
         };
         let bar = coverage(&[(Mode::Uniaxial, 1.5), (Mode::Uniaxial, 3.0)]);
         assert!(holds(&bar, Mode::Uniaxial, 1.2) && holds(&bar, Mode::Uniaxial, 3.0));

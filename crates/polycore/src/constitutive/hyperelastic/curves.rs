@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use super::columns::{ColumnKind, Role, StrainMeasure, TestStressMeasure};
-use super::forecast::Curve;
+use super::forecast::TensionCurve;
 use crate::table::{Error, Table, plain_unit};
 use crate::units::Unit;
 use crate::units::dimension::StressDimension;
 
-impl Curve {
+impl TensionCurve {
     /// Reads the curves of a table: columns of names, of stretches or engineering strains, of nominal
     /// stresses. A curve ends at its largest stress; rows at rest and repeated ones are left out.
     ///
@@ -83,7 +83,7 @@ mod tests {
     #[test]
     fn curves_of_a_table() {
         let parse = |text: &str| {
-            Curve::of_table(&Table::parse("c.csv", text.as_bytes().to_vec()).unwrap(), "material")
+            TensionCurve::of_table(&Table::parse("c.csv", text.as_bytes().to_vec()).unwrap(), "material")
         };
         let head = "material,strain,stress_MPa,mark\n";
         let rows = "a,0,0,\na,1,0.1,\na,2,0.3,max\na,2,0.3,end\nb,0.5,1,\nb,0.6,2,max\nb,0.7,1.9,end\n";

@@ -14,7 +14,7 @@ use super::{Error, Hyperelastic, ModelDescriptor, homogeneous};
 
 /// Tension curve to rupture.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Curve {
+pub struct TensionCurve {
     /// Name of the specimen or material.
     pub name: String,
     /// Stretches and nominal stresses (Pa), ascending; the last one is that of rupture.
@@ -65,7 +65,7 @@ pub const LEAST_CURVES: usize = 3;
 const LACK_OF_FIT: f64 = 0.25;
 
 /// Errors of a law beyond the beginning of a curve.
-struct Trial {
+struct LawTrial {
     /// Stress of the law at each point beyond the beginning.
     predicted: Vec<f64>,
     /// Least and largest e/x.
@@ -78,7 +78,7 @@ struct Trial {
 /// [`Error::Data`] for fewer than three curves, a curve without points before and after the end of its
 /// beginning, no law that can be continued on all curves; [`Error::Stopped`].
 pub fn forecast(
-    curves: &[Curve],
+    curves: &[TensionCurve],
     share: f64,
     laws: &[&'static ModelDescriptor],
     stop: &dyn Fn() -> bool,
@@ -87,7 +87,7 @@ pub fn forecast(
     if curves.len() < LEAST_CURVES {
         return Err(refused("forecast", format!("{} curves, {LEAST_CURVES} needed", curves.len())));
     }
-    let mut trials: Vec<Vec<Option<Trial>>> = Vec::new();
+    let mut trials: Vec<Vec<Option<LawTrial>>> = Vec::new();
     let mut lockings = Vec::new();
     let chain = super::model(CHAIN)?;
     for curve in curves {
@@ -145,7 +145,7 @@ pub fn forecast(
     Ok(found)
 }
 
-impl Curve {
+impl TensionCurve {
     /// Largest stretch.
     pub fn rupture(&self) -> f64 {
         self.points.last().map_or(1.0, |point| point[0])
@@ -179,7 +179,7 @@ fn extrapolation(stretch: f64, reached: f64) -> f64 {
 }
 
 /// Continues a law beyond the beginning; `None` if it locks there or has no stress above zero.
-fn trial<L: Hyperelastic + ?Sized>(law: &L, rest: &[[f64; 2]], reached: f64) -> Option<Trial> {
+fn trial<L: Hyperelastic + ?Sized>(law: &L, rest: &[[f64; 2]], reached: f64) -> Option<LawTrial> {
     let (mut predicted, mut slopes) = (Vec::new(), [f64::INFINITY, f64::NEG_INFINITY]);
     for &[stretch, measured] in rest {
         let nominal = homogeneous::uniaxial(law, stretch).ok()?;
@@ -190,7 +190,7 @@ fn trial<L: Hyperelastic + ?Sized>(law: &L, rest: &[[f64; 2]], reached: f64) -> 
         slopes = [slopes[0].min(slope), slopes[1].max(slope)];
         predicted.push(nominal);
     }
-    Some(Trial { predicted, slopes })
+    Some(LawTrial { predicted, slopes })
 }
 
 /// Locking stretch in tension, λ² + 2/λ = 3n, of the eight-chain law; `None` if the data do not determine n.
@@ -220,20 +220,20 @@ mod tests {
     use super::*;
     use crate::constitutive::hyperelastic::{EightChain, model};
 
-    fn curve(name: &str, modulus: f64, links: f64, rupture: f64) -> Curve {
+    fn curve(name: &str, modulus: f64, links: f64, rupture: f64) -> TensionCurve {
         let law = EightChain::new(modulus, links).unwrap();
         let point = |i: i32| {
             let stretch = 1.0 + (rupture - 1.0) * f64::from(i) / 12.0;
             [stretch, homogeneous::uniaxial(&law, stretch).unwrap()]
         };
-        Curve { name: name.to_owned(), points: (1..=12).map(point).collect() }
+        TensionCurve { name: name.to_owned(), points: (1..=12).map(point).collect() }
     }
 
     /// Curves of one law give it back: no error beyond the beginning, a band without width, the locking
     /// stretch of λ² + 2/λ = 3n.
     #[test]
     fn curves_of_the_law_itself() {
-        let curves: Vec<Curve> = [(0.2e6, 12.0, 5.0), (0.1e6, 30.0, 8.0), (0.4e6, 6.0, 3.8)]
+        let curves: Vec<TensionCurve> = [(0.2e6, 12.0, 5.0), (0.1e6, 30.0, 8.0), (0.4e6, 6.0, 3.8)]
             .iter()
             .map(|&(modulus, links, rupture)| curve("c", modulus, links, rupture))
             .collect();
@@ -251,7 +251,8 @@ mod tests {
 
     #[test]
     fn bands_hold_what_the_others_do() {
-        let mut curves: Vec<Curve> = (0..4).map(|i| curve("c", 0.2e6, 40.0, 5.0 + f64::from(i))).collect();
+        let mut curves: Vec<TensionCurve> =
+            (0..4).map(|i| curve("c", 0.2e6, 40.0, 5.0 + f64::from(i))).collect();
         let last = curves[0].points.len() - 1;
         curves[0].points[last][1] *= 1.3;
         let found = forecast(&curves, 0.5, &[model("eight-chain").unwrap()], &|| false).unwrap();

@@ -53,7 +53,7 @@ pub(super) struct Conditions {
 }
 
 impl Conditions {
-    pub fn of(increment: &Increment) -> Self {
+    pub fn new(increment: &Increment) -> Self {
         let Increment { duration, temperature, pressure, .. } = *increment;
         Self { duration, temperature, pressure }
     }
