@@ -13,7 +13,7 @@ use std::time::Duration;
 /// Stated is the allocation, used are the pages written: most sites of a thin body are not.
 const LARGE: f64 = 100e6;
 const FACTOR: f64 = 4.0;
-/// Memory that a program may take before it refuses a scene, bytes, beside [`TABLE`] times the text of tables.
+/// Memory that a program may take before it refuses a scene, bytes, beside [`TABLE`] times its tables' text.
 const REFUSED: f64 = 20e6;
 const TABLE: f64 = 10.0;
 

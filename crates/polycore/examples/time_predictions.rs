@@ -129,8 +129,8 @@ fn cycle(law: &Viscoelastic) -> Outcome<(&'static str, f64, Vec<Row>)> {
 struct Group {
     name: String,
     left: Left,
-    /// True if the choice of a form rests on the runs left out: two rates two decades apart do not determine a
-    /// law of one.
+    /// True if the choice of a form rests on the runs left out: two rates two decades apart do not determine
+    /// a law of one.
     counts: bool,
 }
 

@@ -43,8 +43,8 @@ harness::quantities! {
     NEW_CRACK_AREA = "new_crack_area", "m²", "with `material.critical`: area of new cracks, from pairs of \
         neighbours whose bond broke and that share no neighbour any more";
     DISSIPATED_PER_AREA = "dissipated_per_area", "J/m²", "work less stored, kinetic, friction and \
-        `dissipated_energy`, over `new_crack_area`: the energy of new cracks, including losses when bonds snap, at \
-        barriers of the lattice, and in bonds that broke elsewhere";
+        `dissipated_energy`, over `new_crack_area`: the energy of new cracks, including losses when bonds \
+        snap, at barriers of the lattice, and in bonds that broke elsewhere";
     DISSIPATION_BIAS = "dissipation_bias", "", "`dissipated_per_area` over `tearing_energy`, less 1: 0 if \
         the crack ran at G, positive if the load supplied more";
     FRAGMENTS = "fragments", "", "with `material.critical`: number of pieces of at least two particles \

@@ -27,8 +27,8 @@ pub fn block(found: &TimeFit) -> Result<String, Error> {
         found.form.equilibrium.law(&values[..found.form.equilibrium.parameters.len()])?.shear_modulus();
     let _ = writeln!(
         text,
-        "model = \"{key}\"\nbulk_modulus = \"{}\" # {BULK_RATIO} times the modulus of a fast strain: these tests \
-         do not determine it\n[material.solid.constitutive.parameters]",
+        "model = \"{key}\"\nbulk_modulus = \"{}\" # {BULK_RATIO} times the modulus of a fast strain: \
+         these tests do not determine it\n[material.solid.constitutive.parameters]",
         stress(BULK_RATIO * (shear + law.branch_modulus()), DIGITS)
     );
     for (parameter, value) in found.form.equilibrium.parameters.iter().zip(&values) {

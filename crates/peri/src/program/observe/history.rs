@@ -87,6 +87,24 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
     });
 }
 
+/// Largest share of the dissipated energy by which stored and dissipated energy may miss the work.
+const LARGEST_MISS: f64 = 0.1;
+
+/// Warns of increments too long for the energies of branches.
+pub(super) fn warnings<const D: usize>(m: &Moment<D>) -> Vec<String> {
+    let last = m.state.history.last().filter(|row| m.scene.dynamics.is_none() && row.broken == 0);
+    let off = last.filter(|row| damped_energy(row, false).abs() > LARGEST_MISS * row.dissipated);
+    let warning = |row: &StepRecord| {
+        format!(
+            "`dissipated_energy` {:.3e} J: with the stored energy it misses the work of the loads by {:.1e} J; \
+             increments are long beside a relaxation time, take more `increments`",
+            row.dissipated,
+            damped_energy(row, false).abs()
+        )
+    };
+    off.filter(|row| row.dissipated > 0.0).map(warning).into_iter().collect()
+}
+
 /// Adds first break, breaking events and the last load.
 fn breaking_scalars<const D: usize>(dynamic: bool, to: &mut Scalars<Moment<D>>) {
     let first = |history: &[StepRecord]| history.iter().position(|row| row.broken > 0);

@@ -22,7 +22,7 @@ pub fn observers<const D: usize>(scene: &Scene) -> SceneObservers<'_, D> {
         stateless(StatelessObserver { scalars: cracks::breaking, ..none }),
         stateless(StatelessObserver { scalars: values::motion, warnings: values::mixed_warnings, ..none }),
         stateless(StatelessObserver { scalars: values::responses, ..none }),
-        stateless(StatelessObserver { scalars: history::scalars, ..none }),
+        stateless(StatelessObserver { scalars: history::scalars, warnings: history::warnings, ..none }),
         Box::new(cracks::NewCracks::new(scene)),
         stateless(StatelessObserver { scalars: contact::scalars, warnings: contact::warnings, ..none }),
         stateless(StatelessObserver { scalars: probes::scalars, ..none }),

@@ -222,7 +222,8 @@ fn merge(series: &mut Prony, k: usize) {
 }
 
 /// Refines the logarithms of all constants, relaxation times within a decade of those of the data: beyond,
-/// only ντ or ν of a term is determined. Returns the Jacobian of the relative deviations by the logarithms, too.
+/// only ντ or ν of a term is determined. Returns the Jacobian of the relative deviations by the logarithms,
+/// too.
 fn refined(values: &[ModulusPoint], start: Prony) -> (Prony, DMatrix<f64>) {
     let has_rest = start.equilibrium > 0.0;
     let offset = usize::from(has_rest);
