@@ -96,8 +96,8 @@ pub(super) fn warnings<const D: usize>(m: &Moment<D>) -> Vec<String> {
     let off = last.filter(|row| damped_energy(row, false).abs() > LARGEST_MISS * row.dissipated);
     let warning = |row: &StepRecord| {
         format!(
-            "`dissipated_energy` {:.3e} J: with the stored energy it misses the work of the loads by {:.1e} J; \
-             increments are long beside a relaxation time, take more `increments`",
+            "`dissipated_energy` {:.3e} J: with the stored energy it misses the work of the loads by {:.1e} \
+             J; increments are long beside a relaxation time, take more `increments`",
             row.dissipated,
             damped_energy(row, false).abs()
         )

@@ -6,8 +6,8 @@ use crate::constitutive::hyperelastic::model;
 use crate::constitutive::viscoelastic::{Pace, Scheme};
 
 /// Determines from three cycles of VHB 4910 to 3 the constants of the published law with 1 kPa of noise on
-/// 123 points, as an independent script has it (formulation-time.md, section C): ln η₀ to 0.4, ln K₁ to 3.8, γ₁
-/// to 140 %. The script's points are not known, these are equal steps of 0.1.
+/// 123 points, as an independent script has it (formulation-time.md, section C): ln η₀ to 0.4, ln K₁ to 3.8,
+/// γ₁ to 140 %. The script's points are not known, these are equal steps of 0.1.
 #[test]
 fn uncertainty_of_a_published_law() {
     let run = |rate: f64| {
