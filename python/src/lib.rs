@@ -3,9 +3,9 @@
 //! Users see the package `polymech` in `python/package`: shapes of arrays, names, pictures and docstrings
 //! are there. This module contains the parts that need Rust: runs of scenes ([`scenes`]), fields of VTKHDF
 //! files ([`fields`]), laws at many points ([`laws`], [`surrogates`], by [`predict`]), models of `peri`
-//! ([`model`], [`bond`]), polymer networks ([`network`]) and the material of `crystfem` at a point
-//! ([`point`]). Work releases the interpreter's lock; [`watch`] handles signals and calls Python's
-//! functions.
+//! ([`model`], [`bond`]), polymer networks ([`network`]), laws with time ([`time`]) and the material of
+//! `crystfem` at a point ([`point`]). Work releases the interpreter's lock; [`watch`] handles signals and
+//! calls Python's functions.
 
 use pyo3::prelude::*;
 
@@ -20,6 +20,7 @@ mod pool;
 mod predict;
 mod scenes;
 mod surrogates;
+mod time;
 mod watch;
 
 #[pymodule(gil_used = false)]
@@ -37,6 +38,7 @@ mod _polymech {
         point::{course, fit_kinetics},
         scenes::{check, resume, run, schema, sweep, view},
         surrogates::LearntLaw,
+        time::{follow, prony},
     };
 
     #[pymodule_init]

@@ -6,7 +6,7 @@
 
 `peri` (fracture of elastomers) and `crystfem` (heat and crystallization of prints) run scenes, as their command lines do.
 `Langevin`, `Law`, `Surrogate` and `fit` are constitutive laws as functions of arrays, `network` gives modulus and chains of a network
-from its chemistry. All numbers are SI unless a name says
+from its chemistry, `Viscoelastic` and `prony` are laws with time. All numbers are SI unless a name says
 otherwise (``temperature_degC``); `Result.report` and `Table` have units beside the numbers.
 """
 
@@ -16,8 +16,9 @@ from ._network import Network, network
 from ._polymech import Interrupted, RunError, SceneError, __version__
 from ._result import Report, Result, Table, Value
 from ._surrogate import Surrogate
+from ._time import Branch, Prony, Viscoelastic, prony
 
 __all__ = [
-    "Fit", "Interrupted", "Langevin", "Law", "Network", "Prediction", "Report", "Result", "RunError", "SceneError", "Surrogate", "Table",
-    "Value", "__version__", "crystfem", "fit", "network", "peri",
+    "Branch", "Fit", "Interrupted", "Langevin", "Law", "Network", "Prediction", "Prony", "Report", "Result", "RunError", "SceneError",
+    "Surrogate", "Table", "Value", "Viscoelastic", "__version__", "crystfem", "fit", "network", "peri", "prony",
 ]

@@ -148,7 +148,7 @@ impl BranchSpec {
             }
         };
         let constants: Vec<f64> = all.into_iter().map(value).collect::<Result<_, _>>()?;
-        let branch = self.build(&constants).map_err(|error| match error {
+        let branch = Self::build(self.spring, self.viscosity, &constants).map_err(|error| match error {
             Error::Parameter { parameter, value, allowed, .. } => {
                 let name = if parameter == "viscosity" { "eta" } else { parameter.as_str() };
                 let known = names.contains(&name);
@@ -166,16 +166,43 @@ impl BranchSpec {
         Ok(branch)
     }
 
-    fn build(&self, p: &[f64]) -> Result<Branch, Error> {
-        let (spring, q) = p.split_at(self.spring.names().len());
-        let spring = match self.spring {
-            SpringKind::NeoHookean => Spring::NeoHookean(NeoHookean::new(spring[0])?),
-            SpringKind::LopezPamies1 | SpringKind::LopezPamies2 => {
-                Spring::LopezPamies(LopezPamies::new(spring.chunks_exact(2).map(|k| [k[0], k[1]]).collect())?)
-            }
-            SpringKind::EightChain => Spring::EightChain(EightChain::new(spring[0], spring[1])?),
+    /// Builds a branch from constants by name, in SI units.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for a constant that is missing or unknown; [`Error::Parameter`] for one out of its
+    /// range.
+    pub fn from_constants(
+        spring: SpringKind,
+        viscosity: ViscosityKind,
+        constants: &BTreeMap<String, f64>,
+    ) -> Result<Branch, Error> {
+        let names: Vec<&str> =
+            spring.names().iter().chain(viscosity.names()).map(|(name, _)| *name).collect();
+        let other = constants.keys().find(|name| !names.contains(&name.as_str()));
+        let missing = names.iter().find(|name| !constants.contains_key(**name));
+        let refuse = |found: String| {
+            let reason = format!("{found}; allowed: {}", names.join(", "));
+            Err(Error::Data { what: "constants of a branch".to_owned(), reason })
         };
-        let viscosity = match self.viscosity {
+        match (other, missing) {
+            (Some(other), _) => refuse(format!("unknown `{other}`")),
+            (None, Some(missing)) => refuse(format!("no `{missing}`")),
+            (None, None) => {
+                Self::build(spring, viscosity, &names.iter().map(|&name| constants[name]).collect::<Vec<_>>())
+            }
+        }
+    }
+
+    fn build(spring: SpringKind, viscosity: ViscosityKind, constants: &[f64]) -> Result<Branch, Error> {
+        let (p, q) = constants.split_at(spring.names().len());
+        let spring = match spring {
+            SpringKind::NeoHookean => Spring::NeoHookean(NeoHookean::new(p[0])?),
+            SpringKind::LopezPamies1 | SpringKind::LopezPamies2 => {
+                Spring::LopezPamies(LopezPamies::new(p.chunks_exact(2).map(|k| [k[0], k[1]]).collect())?)
+            }
+            SpringKind::EightChain => Spring::EightChain(EightChain::new(p[0], p[1])?),
+        };
+        let viscosity = match viscosity {
             ViscosityKind::Constant => Viscosity::Constant(q[0]),
             ViscosityKind::KumarLopezPamies => Viscosity::KumarLopezPamies {
                 start: q[0],

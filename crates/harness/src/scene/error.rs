@@ -293,7 +293,9 @@ fn advice(name: &str) -> Option<&'static str> {
     Some(match plain.as_str() {
         "arrudaboyce" => "Arruda and Boyce's law is `eight-chain` here",
         "reducedpolynomial" => "the reduced polynomial of third order is `yeoh` here",
-        "prony" | "viscoelastic" => "laws of parts are elastic; `polycore` fits laws with time (`[time]`)",
+        "prony" | "viscoelastic" => {
+            "relaxation is a `[[material.solid.branch]]` of `peri`; `polycore` fits its constants"
+        }
         "poissonratio" | "poissonsratio" => {
             "Poisson's ratio follows from `bulk_modulus` and the shear modulus, ν = (3K − 2G)/(6K + 2G), or \
              from the law"
