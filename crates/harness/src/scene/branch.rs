@@ -158,7 +158,7 @@ impl BranchSpec {
             other => source.error(&key, other, "constants in their ranges"),
         })?;
         let least = branch.spring.least_slope(1.0);
-        if !(least > 0.0) {
+        if least.is_nan() || least <= 0.0 {
             let found =
                 format!("a spring whose stress falls at a slope of {least:.3e} Pa below log strains of 1");
             return Err(source.error(&key, found, "a stress that grows with the strain"));
