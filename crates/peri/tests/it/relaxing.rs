@@ -38,7 +38,7 @@ fn frozen_states_pass_the_battery() {
     at_most("viscous_stiffness_over_bound", battery::<3>("solid", [4, 4, 3], &of), 2.0);
 }
 
-/// Pulls a strip with a notch in 40 steps to `rise` within a second, holds it for a second in 20.
+/// Pulls a strip with a notch for a second and holds it for another, in so many steps.
 fn tear(
     rule: Driving,
     moving: bool,
@@ -46,8 +46,8 @@ fn tear(
     start: Option<&State<2>>,
     saved: &mut Vec<State<2>>,
 ) -> State<2> {
-    let mut body = Body::<2>::solid([30, 24], 0.1, 3.015);
-    body.slits = vec![Slit { at: 1.2, from: -1.0, to: 1.2 }];
+    let mut body = Body::<2>::solid([20, 16], 0.1, 3.015);
+    body.slits = vec![Slit { at: 0.8, from: -1.0, to: 0.8 }];
     let mut built = body.build();
     let bonds = &mut built.lattice;
     let softening = Mullins { ratio: 2.0, offset: 0.2, slope: 0.1 };
@@ -55,7 +55,7 @@ fn tear(
         solid::<2>(Space::PlaneStress, 20.0, rule, (rule == Driving::Equilibrium).then_some(softening));
     let loads = hold(bonds, |[_, y]| match y {
         y if y < 0.3 => Some((3, [0.0; 2])),
-        y if y > 2.1 => Some((3, [0.0, 0.6])),
+        y if y > 1.3 => Some((3, [0.0, 0.5])),
         _ => None,
     });
     let mut state = start.cloned().unwrap_or_else(|| State::new(bonds.sites()));
@@ -68,7 +68,7 @@ fn tear(
     let mut seen = 0;
     let mut watch = |status: &Status, state: &State<2>| {
         seen += 1;
-        if status.restartable && state.fracture.broken > 0 && (!moving || seen % 50 == 0) {
+        if status.restartable && state.fracture.broken > 0 && (!moving || seen % 100 == 0) {
             saved.push(state.clone());
         }
         Ok(())
@@ -76,7 +76,7 @@ fn tear(
     let finished = &mut |_: &dyn Bonds<2>, _: &_| Ok(());
     let solved = if moving {
         system.times = Vec::new().into();
-        VelocityVerlet { records: 20, ramp: 10.0, safety: 0.45, ..VelocityVerlet::new(1.0, 10.0) }.solve(
+        VelocityVerlet { records: 20, ramp: 3.0, safety: 0.15, ..VelocityVerlet::new(1.0, 3.0) }.solve(
             &mut system,
             &mut state,
             &mut watch,
@@ -97,7 +97,7 @@ fn a_relaxing_strip_tears_and_its_ledger_closes() {
         [(Driving::Equilibrium, false), (Driving::Total, false), (Driving::Equilibrium, true)]
     {
         let mut saved = Vec::new();
-        let whole = tear(rule, moving, [40, 20], None, &mut saved);
+        let whole = tear(rule, moving, [20, 8], None, &mut saved);
         let last = whole.history.last().unwrap();
         eprintln!(
             "{rule:?}, moving {moving}: {} broken; work {:.5}, stored {:.5}, released {:.5}, dissipated \
@@ -112,32 +112,33 @@ fn a_relaxing_strip_tears_and_its_ledger_closes() {
             // the drop of the load in an equilibrium with broken bonds does no work, all else is balanced
             assert!(held <= 1.01 * last.work, "{last:?}");
         }
-        for state in saved.iter().step_by(saved.len().div_ceil(3)) {
-            let again = tear(rule, moving, [40, 20], Some(state), &mut Vec::new());
+        for state in saved.iter().step_by(saved.len().div_ceil(2)) {
+            let again = tear(rule, moving, [20, 8], Some(state), &mut Vec::new());
             assert!(again == whole, "{moving}: from step {}, round {}", state.step, state.control.round);
         }
     }
 }
 
-/// Without broken bonds the ledger closes to the error of the work integral, of second order in the steps.
+/// Without broken bonds the ledger closes but for the error of backward Euler: the exact release belongs to the
+/// stress at frozen C_v, ½ΔP:ΔF a step above the mean of both ends, hence of first order. Extrapolated to
+/// steps of no length nothing is left.
 #[test]
-fn the_ledger_closes_to_the_work_integral() {
-    let gap = |steps: [u32; 2]| {
-        let mut body = Body::<2>::solid([20, 14], 0.1, 3.015);
-        body.slits = vec![Slit { at: 0.7, from: -1.0, to: 0.8 }];
+fn the_ledger_closes_with_the_steps() {
+    let gap = |count: u32| {
+        let mut body = Body::<2>::solid([16, 12], 0.1, 3.015);
+        body.slits = vec![Slit { at: 0.6, from: -1.0, to: 0.7 }];
         let mut built = body.build();
         let bonds = &mut built.lattice;
         let softening = Mullins { ratio: 2.0, offset: 0.2, slope: 0.1 };
         let solid = solid::<2>(Space::PlaneStress, 20.0, Driving::Equilibrium, Some(softening));
         let loads = hold(bonds, |[_, y]| match y {
             y if y < 0.3 => Some((3, [0.0; 2])),
-            y if y > 1.1 => Some((3, [0.0, 0.6])),
+            y if y > 0.9 => Some((3, [0.0, 0.6])),
             _ => None,
         });
         let legs = [(0.0, 0.0, 1.0, 1.0), (1.0, 1.0, 3.0, 1.0), (3.0, 1.0, 3.5, 0.3)];
         let mut places: Vec<(f64, f64)> = Vec::new();
         for (from, low, to, high) in legs {
-            let count = steps[0];
             places.extend(
                 (1..=count)
                     .map(|k| f64::from(k) / f64::from(count))
@@ -148,13 +149,13 @@ fn the_ledger_closes_to_the_work_integral() {
         let mut state = State::new(bonds.sites());
         let mut system = System::new(bonds, solid, &loads, &factors);
         system.times = times.into();
-        let method = Lbfgs { tolerance: 1e-8, ..Default::default() };
+        let method = Lbfgs { tolerance: 1e-6, ..Default::default() };
         method.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
         let last = state.history.last().unwrap();
         (last.work - last.stored - last.dissipated) / last.work
     };
-    let [coarse, fine] = [gap([20, 20]), gap([40, 40])];
+    let [coarse, fine] = [gap(16), gap(32)];
     eprintln!("gaps {coarse:.3e}, {fine:.3e}");
-    at_most("viscous_ledger_gap", fine.abs(), 2e-3);
-    near("viscous_ledger_order", (coarse / fine).log2(), 2.0, 1.2);
+    near("viscous_ledger_order", (coarse / fine).log2(), 1.0, 0.1);
+    at_most("viscous_ledger_gap", (2.0 * fine - coarse).abs(), 2e-3);
 }
