@@ -119,8 +119,8 @@ fn a_relaxing_strip_tears_and_its_ledger_closes() {
     }
 }
 
-/// Without broken bonds the ledger closes but for the error of backward Euler: the exact release belongs to the
-/// stress at frozen C_v, ½ΔP:ΔF a step above the mean of both ends, hence of first order. Extrapolated to
+/// Without broken bonds the ledger closes but for the error of backward Euler: the exact release belongs to
+/// the stress at frozen C_v, ½ΔP:ΔF a step above the mean of both ends, hence of first order. Extrapolated to
 /// steps of no length nothing is left.
 #[test]
 fn the_ledger_closes_with_the_steps() {
