@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use harness::scene::{SceneError, Source};
+use harness::scene::{SceneError, Source, ViscosityKind};
 use polycore::constitutive::hyperelastic::model;
 use polycore::constitutive::viscoelastic::fit::{
     BranchForm, Form, MeasuredRun, Measurement, SpringForm, Test, ViscosityForm, rates,
@@ -61,7 +61,7 @@ struct BranchFormSpec {
     /// The spring.
     spring: SpringName,
     /// The dashpot.
-    viscosity: ViscosityName,
+    viscosity: ViscosityKind,
     /// Number of equal branches.
     #[serde(default = "one")]
     count: usize,
@@ -83,20 +83,6 @@ enum SpringName {
     EightChain,
     /// A multiple of the equilibrium law.
     Proportional,
-}
-
-/// Dashpot of a branch.
-#[derive(Clone, Copy, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-enum ViscosityName {
-    /// Constant.
-    Constant,
-    /// Kumar and Lopez-Pamies 2016.
-    KumarLopezPamies,
-    /// Bergström and Boyce 1998.
-    BergstromBoyce,
-    /// Eyring 1936.
-    Eyring,
 }
 
 /// Test of a table or a program.
@@ -308,10 +294,10 @@ impl BranchFormSpec {
             SpringName::Proportional => SpringForm::Proportional,
         };
         let viscosity = match self.viscosity {
-            ViscosityName::Constant => ViscosityForm::Constant,
-            ViscosityName::KumarLopezPamies => ViscosityForm::KumarLopezPamies,
-            ViscosityName::BergstromBoyce => ViscosityForm::BergstromBoyce,
-            ViscosityName::Eyring => ViscosityForm::Eyring,
+            ViscosityKind::Constant => ViscosityForm::Constant,
+            ViscosityKind::KumarLopezPamies => ViscosityForm::KumarLopezPamies,
+            ViscosityKind::BergstromBoyce => ViscosityForm::BergstromBoyce,
+            ViscosityKind::Eyring => ViscosityForm::Eyring,
         };
         BranchForm { spring, viscosity }
     }
