@@ -304,7 +304,7 @@ dimensions! {
     Stress, StressDimension: exponents!(pressure), "a stress", "Pa", "0.6 N/mm^2";
     /// A dynamic viscosity.
     Viscosity, ViscosityDimension: exponents!(dynamic_viscosity), "a viscosity", "Pa s", "3 MPa s";
-    /// One over the square of a stress.
+    /// Reciprocal of a squared stress.
     PerSquaredStress, PerSquaredStressDimension: [2, -2, 4, 0, 0, 0, 0, 0], "a number per squared \
         stress", "1/Pa^2", "1 1/kPa^2";
     /// A mass density.

@@ -83,7 +83,7 @@ fn crystals_shift_time() {
     }
 }
 
-/// One step of 1e-12 to 1e12 relaxation times leaves a finite stress that falls with its length.
+/// Steps of 1e-12 to 1e12 relaxation times leave a finite stress that falls with its length.
 #[test]
 fn steps_of_any_length_are_finite() {
     let law = law(&[(1.5e9, 1.0)], 0.25, true);

@@ -30,7 +30,7 @@ pub struct BranchSpec {
 pub enum SpringKind {
     /// Neo-Hookean.
     NeoHookean,
-    /// One power of I₁.
+    /// Power of I₁.
     #[serde(rename = "lopez-pamies-1")]
     LopezPamies1,
     /// Two powers of I₁.

@@ -8,6 +8,7 @@ use polycore::Error;
 use polycore::constitutive::hyperelastic::fit::{Fit, FittedParameter, Identifiability};
 use polycore::file::atomic_write;
 
+use super::MPA;
 use super::table_fits::{TableFits, unit_of};
 
 /// Laws whose block is printed in preference to others.
@@ -18,6 +19,17 @@ pub const BULK_RATIO: f64 = 100.0;
 
 /// Number of standard errors to either side of a value that hold 95 % of a normal distribution.
 const HALF_WIDTH: f64 = 1.96;
+
+/// Converts stresses in a value of a law with time to MPa; returns it with its unit.
+pub fn in_megapascals(value: f64, unit: &str) -> (f64, &'static str) {
+    match unit {
+        "Pa" => (value / MPA, "MPa"),
+        "Pa s" => (value / MPA, "MPa s"),
+        "1/Pa2" => (value * MPA * MPA, "1/MPa^2"),
+        "1/s" => (value, "1/s"),
+        _ => (value, ""),
+    }
+}
 
 /// Formats `[material.solid]` of `peri` for a fitted law, with its confidence intervals. For a law that the
 /// data do not determine it is a comment with advice.

@@ -7,8 +7,7 @@ use polycore::constitutive::hyperelastic::Hyperelastic;
 use polycore::constitutive::viscoelastic::fit::TimeFit;
 use polycore::constitutive::viscoelastic::{Branch, Spring, Viscosity};
 
-use super::MPA;
-use super::material::{BULK_RATIO, DIGITS, digits, stress};
+use super::material::{BULK_RATIO, DIGITS, digits, in_megapascals, stress};
 
 /// Name of a key, number with its unit.
 type ConstantText = (String, String);
@@ -83,7 +82,7 @@ fn described(branch: &Branch) -> ([&'static str; 2], Vec<ConstantText>) {
                 ("eta_0", start, "Pa s"),
                 ("eta_inf", end, "Pa s"),
                 ("K_1", thickening, "Pa s"),
-                ("K_2", thinning, "1/Pa^2"),
+                ("K_2", thinning, "1/Pa2"),
                 ("gamma_1", exponents[0], "1"),
                 ("gamma_2", exponents[1], "1"),
             ],
@@ -108,12 +107,7 @@ fn described(branch: &Branch) -> ([&'static str; 2], Vec<ConstantText>) {
 
 /// Formats a constant, stresses in MPa.
 fn constant(name: &str, value: f64, unit: &str) -> ConstantText {
-    let (value, unit) = match unit {
-        "Pa" => (value / MPA, "MPa"),
-        "Pa s" => (value / MPA, "MPa s"),
-        "1/Pa^2" => (value * MPA * MPA, "1/MPa^2"),
-        "1/s" => (value, "1/s"),
-        _ => return (name.to_owned(), digits(value, DIGITS)),
-    };
-    (name.to_owned(), format!("\"{} {unit}\"", digits(value, DIGITS)))
+    let (value, unit) = in_megapascals(value, unit);
+    let number = digits(value, DIGITS);
+    (name.to_owned(), if unit.is_empty() { number } else { format!("\"{number} {unit}\"") })
 }

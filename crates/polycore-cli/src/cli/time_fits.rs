@@ -16,7 +16,7 @@ use polycore::constitutive::viscoelastic::fit::{
 use polycore::file::atomic_write;
 
 use super::MPA;
-use super::material::{DIGITS, digits, stress};
+use super::material::{DIGITS, digits, in_megapascals, stress};
 use super::quantities as q;
 use super::table_fits::unit_of;
 use super::time::TimeCase;
@@ -46,7 +46,7 @@ pub fn run(case: &TimeCase, run: &mut Run, report: &mut Report) -> Result<String
     }
     record(report, ALL, &found.pooled);
     for constant in &found.constants {
-        let (value, unit) = in_megapascals(constant);
+        let (value, unit) = in_megapascals(constant.value, constant.constant.unit);
         report.value(q::TIME_CONSTANT.named(&[&constant.constant.name]).in_unit(unit), value);
     }
     report.work("time.evaluations", found.evaluations as u64);
@@ -78,17 +78,6 @@ fn record(report: &mut Report, name: &str, found: &Agreement) {
     }
 }
 
-/// Value of a constant, stresses in MPa, and its unit.
-fn in_megapascals(constant: &FittedConstant) -> (f64, &'static str) {
-    match constant.constant.unit {
-        "Pa" => (constant.value / MPA, "MPa"),
-        "Pa s" => (constant.value / MPA, "MPa s"),
-        "1/Pa2" => (constant.value * MPA * MPA, "1/MPa2"),
-        "1/s" => (constant.value, "1/s"),
-        _ => (constant.value, ""),
-    }
-}
-
 /// rms and R² of each run.
 fn table(case: &TimeCase, found: &TimeFit) -> String {
     let mut text = String::new();
@@ -114,7 +103,7 @@ fn constants(found: &TimeFit) -> String {
             (Some((_, reason)), _) => writeln!(text, "  {name} = {}, fixed: {reason}", shown(constant)),
             (None, None) => writeln!(text, "  {name} = {}, not determined", shown(constant)),
             (None, Some([low, high])) => {
-                let scale = constant.value / in_megapascals(constant).0;
+                let scale = constant.value / in_megapascals(constant.value, constant.constant.unit).0;
                 let [low, high] = [low / scale, high / scale].map(|end| digits(end, 4));
                 writeln!(text, "  {name} = {}, {low} to {high}", shown(constant))
             }
@@ -127,7 +116,7 @@ fn constants(found: &TimeFit) -> String {
 }
 
 fn shown(constant: &FittedConstant) -> String {
-    let (value, unit) = in_megapascals(constant);
+    let (value, unit) = in_megapascals(constant.value, constant.constant.unit);
     format!("{} {unit}", digits(value, DIGITS)).trim_end().to_owned()
 }
 

@@ -26,7 +26,7 @@ pub enum Mode {
     /// General biaxial state, any λ₁, λ₂; a table, not a test with one stretch.
     #[serde(skip)]
     Biaxial,
-    /// One stress of a general biaxial state; the other one was not measured.
+    /// General biaxial state of which a single stress was measured.
     #[serde(skip)]
     Component,
     /// σ₁ − σ₂ of a general biaxial state: as a pressure does not change it, it is the true stress along λ₁
