@@ -26,7 +26,7 @@ harness::quantities! {
     STORED_ENERGY = "stored_energy", "J", "energy in bonds and contact at the end";
     DAMPED_ENERGY = "damped_energy", "J", "work less stored, released, dissipated and friction energy; in \
         a quasi-static run only as exact as the trapezoidal rule of the work, about 1e-3 of the work, and \
-        possibly negative";
+        possibly negative; with `branch` an error of first order in the increments";
     RELEASED_ENERGY = "released_energy", "J", "with `material.critical`: energy of bonds at the moment they \
         broke";
     DISSIPATED_ENERGY = "dissipated_energy", "J", "with `branch` or `mullins` of a `solid`: energy \
