@@ -9,6 +9,7 @@ pub mod measurement;
 
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::io::Write;
 use std::panic::Location;
 use std::path::Path;
 
@@ -80,15 +81,19 @@ fn leave(key: &str, record: Value) {
     leave_in(Path::new(&folder), key, &record);
 }
 
-/// Writes a file by rename: tests of many processes write at once.
+/// Writes a file by rename: tests of many threads and processes write at once, some under one name.
 fn leave_in(folder: &Path, key: &str, record: &Value) {
     let mut hasher = DefaultHasher::new();
     key.hash(&mut hasher);
     let path = folder.join(format!("{:016x}.json", hasher.finish()));
-    let part = folder.join(format!("{:016x}.{}.part", hasher.finish(), std::process::id()));
-    let written = fs::create_dir_all(folder)
-        .and_then(|()| fs::write(&part, format!("{record}\n")))
-        .and_then(|()| fs::rename(&part, &path));
+    let write = || -> std::io::Result<()> {
+        fs::create_dir_all(folder)?;
+        let mut part = tempfile::Builder::new().suffix(".part").tempfile_in(folder)?;
+        writeln!(part, "{record}")?;
+        part.persist(&path)?;
+        Ok(())
+    };
+    let written = write();
     assert!(written.is_ok(), "{}: {written:?}", path.display());
 }
 
@@ -123,5 +128,19 @@ mod tests {
             .collect();
         texts.sort();
         assert_eq!(texts, ["{\"value\":2}\n", "{\"value\":3}\n"]);
+    }
+
+    #[test]
+    fn records_of_one_name_from_many_threads() {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::thread::scope(|scope| {
+            for thread in 0..8 {
+                let folder = folder.path();
+                scope
+                    .spawn(move || (0..200).for_each(|_| leave_in(folder, "a", &json!({ "value": thread }))));
+            }
+        });
+        let files = fs::read_dir(folder.path()).expect("a folder").count();
+        assert_eq!(files, 1);
     }
 }

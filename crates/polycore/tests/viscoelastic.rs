@@ -233,7 +233,7 @@ fn stiff_steps() {
         let viscous = found.state.branches[0].viscous;
         let conditioning = c[0] / c[2];
         let volume = voigt::to_stress(&viscous).determinant();
-        at_most("det C_v − 1", (volume - 1.0).abs(), 1e-15 * conditioning);
+        at_most("det C_v − 1, stiff steps", (volume - 1.0).abs(), 1e-15 * conditioning);
         assert!(found.dissipated >= 0.0 && found.prediction.stress.iter().all(|s| s.is_finite()));
         (c[0] / viscous[0]).sqrt()
     };
