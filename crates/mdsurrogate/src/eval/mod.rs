@@ -12,6 +12,8 @@ pub use uncertainty::{FLAGS, FlagStatistics};
 use crate::Error;
 use crate::dataset::{DataRow, Dataset, Path};
 use crate::surrogate::{Prediction, SofteningHistory, Surrogate, Workspace};
+use crate::train::overstress;
+use polycore::constitutive::viscoelastic::Branch;
 use polycore::numerics::range;
 use polycore::tensor::Voigt;
 use std::time::Instant;
@@ -50,13 +52,30 @@ pub fn errors<'a>(law: &Surrogate, rows: impl Iterator<Item = &'a DataRow>) -> R
     sum_errors(rows.map(|row| Ok((row, law.stress(&row.c, &mut memory)?))))
 }
 
-/// Computes the errors of a law along a whole run; the damage variable follows its history.
+/// Predicts the stress of a law and branches along a whole run; the damage variable follows its history.
 ///
 /// # Errors
-/// Returns the errors of [`Surrogate::stress`].
-pub fn errors_along(law: &Surrogate, run: &Path) -> Result<Errors, Error> {
+/// Returns the errors of [`Surrogate::stress`] and of [`overstress`].
+pub fn answers_along<'a>(
+    law: &Surrogate,
+    branches: &[Branch],
+    run: &'a Path,
+) -> Result<Vec<(&'a DataRow, Prediction)>, Error> {
     let (mut memory, mut history) = (Workspace::default(), SofteningHistory::default());
-    sum_errors(run.rows.iter().map(|row| Ok((row, law.follow(&row.c, false, &mut history, &mut memory)?))))
+    let answer = |(row, own): (&'a DataRow, Voigt)| {
+        let mut answer = law.follow(&row.c, false, &mut history, &mut memory)?;
+        answer.stress += own;
+        Ok((row, answer))
+    };
+    run.rows.iter().zip(overstress(branches, run)?).map(answer).collect()
+}
+
+/// Computes the errors of a law and branches along a whole run.
+///
+/// # Errors
+/// Returns the errors of [`answers_along`].
+pub fn errors_along(law: &Surrogate, branches: &[Branch], run: &Path) -> Result<Errors, Error> {
+    sum_errors(answers_along(law, branches, run)?.into_iter().map(Ok))
 }
 
 fn sum_errors<'a>(

@@ -34,6 +34,7 @@
 //! ```
 
 mod adam;
+mod branches;
 mod dataset;
 mod model;
 mod parameters;
@@ -43,6 +44,7 @@ mod state;
 #[cfg(test)]
 mod tests;
 
+pub use branches::{MOST_BRANCHES, fit_branches, overstress};
 pub use softening::{MOST_UNITS, loading, soften};
 pub use state::{Ending, Epoch, TrainingState};
 

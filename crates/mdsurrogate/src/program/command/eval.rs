@@ -40,7 +40,7 @@ impl Eval {
         let mut report = Report::new("mdsurrogate", env!("CARGO_PKG_VERSION"), &source.text);
         let named: Vec<NamedLaw> = laws
             .iter()
-            .map(|(name, law)| NamedLaw { name, law, runs: &[], seconds: None, split: None })
+            .map(|(name, law)| NamedLaw { name, law, branches: &[], runs: &[], seconds: None, split: None })
             .collect();
         let table = judge_laws(&named, &data, &output, &mut report)?;
         report.threads(1).write(&output)?;

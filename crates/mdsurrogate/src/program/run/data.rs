@@ -10,9 +10,10 @@ use crate::kinematics::{ANGSTROM, NAMES, PeriodicBox};
 use crate::program::quantities as q;
 use crate::program::scene::{DatasetSpec, Scene};
 use crate::surrogate::{Kind, Symmetry};
-use crate::train::loading;
+use crate::train::{loading, overstress};
 use harness::report::{Named, Report};
 use harness::scene::{Failure, Source};
+use polycore::constitutive::viscoelastic::Branch;
 use polycore::tensor::Voigt;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -71,6 +72,7 @@ pub fn load(
 }
 
 /// Data of a scene, with their split.
+#[derive(Clone)]
 pub struct Prepared {
     /// Runs of the split.
     pub set: Dataset,
@@ -143,20 +145,27 @@ impl Prepared {
                 }
             }
             let split = self.split_of(model.split);
-            if model.softening.is_some() {
+            let histories = [("softening", model.softening), ("branches", model.branches)];
+            for (key, _) in histories.into_iter().filter(|(_, count)| count.is_some()) {
                 let turned = |path: &&Path_| loading(path).contains(&false);
                 if self.set.is_nominal() {
-                    let found = "softening with nominal stresses";
-                    return Err(source.error(&at("softening"), found, "data with full stresses").into());
+                    let found = format!("{key} with nominal stresses");
+                    return Err(source.error(&at(key), found, "data with full stresses").into());
                 }
                 if split.method == SplitMethod::Random {
-                    let allowed = "`split = \"path\"`, because the damage of a row depends on its run";
-                    return Err(source.error(&at("softening"), "a random split of rows", allowed).into());
+                    let allowed = "`split = \"path\"`, because the stress of a row depends on its run";
+                    return Err(source.error(&at(key), "a random split of rows", allowed).into());
                 }
                 if !self.paths_of(&split.train, &model.runs).iter().any(turned) {
                     let allowed = "training runs with unloading (`md write --path z=6e-5,unload=0.6`)";
-                    return Err(source.error(&at("softening"), "no run with unloading", allowed).into());
+                    return Err(source.error(&at(key), "no run with unloading", allowed).into());
                 }
+            }
+            let timeless = |path: &&Path_| !path.rows.iter().map(|row| row.time).is_sorted_by(|a, b| a < b);
+            let all = self.set.paths.iter().chain(self.heldout.iter().flat_map(|set| &set.paths));
+            if let Some(path) = all.clone().find(timeless).filter(|_| model.branches.is_some()) {
+                let found = format!("the run `{}`, whose times are unknown or do not grow", path.id);
+                return Err(source.error(&at("branches"), found, "runs with a time for each row").into());
             }
             if self.rows_of(&split.train, &model.runs).is_empty() {
                 let found = "runs without training rows";
@@ -164,6 +173,21 @@ impl Prepared {
             }
         }
         Ok(())
+    }
+
+    /// Returns the data with S of the runs of the split without that of branches; their other fields, and
+    /// the held-out runs, are kept.
+    ///
+    /// # Errors
+    /// Errors of [`overstress`].
+    pub fn without_stress_of(&self, branches: &[Branch]) -> Result<Self, Error> {
+        let mut data = self.clone();
+        for path in &mut data.set.paths {
+            for (row, own) in overstress(branches, path)?.into_iter().enumerate() {
+                path.rows[row].s -= own;
+            }
+        }
+        Ok(data)
     }
 
     /// Returns rows by number, restricted to some runs; an empty list means all runs.

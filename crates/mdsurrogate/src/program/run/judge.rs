@@ -5,14 +5,15 @@ use super::{Prepared, draw, short};
 use crate::dataset::{DataRow, SplitMethod, noise};
 use crate::error::Error;
 use crate::eval::{
-    Ellipticity, Errors, FLAGS, FlagStatistics, PhysicsChecks, agreement, errors, errors_along,
-    time_per_stress, within_rates,
+    Ellipticity, Errors, FLAGS, FlagStatistics, PhysicsChecks, agreement, answers_along, errors,
+    errors_along, time_per_stress, within_rates,
 };
 use crate::program::quantities as q;
-use crate::surrogate::{SofteningHistory, Surrogate, Workspace};
+use crate::surrogate::{Prediction, Surrogate};
 use harness::output::csv;
 use harness::report::Report;
 use harness::scene::Failure;
+use polycore::constitutive::viscoelastic::Branch;
 use std::path::Path;
 
 /// Largest number of rows for the physics checks.
@@ -32,6 +33,8 @@ pub struct NamedLaw<'a> {
     pub name: &'a str,
     /// The law.
     pub law: &'a Surrogate,
+    /// Branches beside the law.
+    pub branches: &'a [Branch],
     /// Names of its training runs; empty for all.
     pub runs: &'a [String],
     /// Training time, s, if known.
@@ -72,7 +75,14 @@ pub fn judge_laws(
     let mut unseen = Vec::new();
     // noise of a row: root of the floor, which is a sum over components
     let chance = floor.unwrap_or(0.0).sqrt();
-    for NamedLaw { name, law, runs, seconds, split } in laws {
+    for NamedLaw { name, law, branches, runs, seconds, split } in laws {
+        let relieved;
+        let data = if branches.is_empty() {
+            data
+        } else {
+            relieved = data.without_stress_of(branches)?;
+            &relieved
+        };
         let split = data.split_of(*split);
         let test = data.rows(if split.test.is_empty() { &split.train } else { &split.test });
         let stress_square =
@@ -97,7 +107,7 @@ pub fn judge_laws(
             table.extend(by_mode(report, name, law, runs, data)?);
         }
         for run in data.heldout.iter().flat_map(|set| &set.paths) {
-            let found = errors_along(law, run)?;
+            let found = errors_along(law, branches, run)?;
             let set = format!("heldout.{}", run.id);
             if law.header().softening.is_some() {
                 let ratio = errors(law, run.rows.iter())?.mean_square() / found.mean_square();
@@ -323,18 +333,12 @@ fn record_physics(report: &mut Report, name: &str, physics: &PhysicsChecks) {
 }
 
 fn predict_heldout<'a>(laws: &[NamedLaw], data: &'a Prepared) -> Result<Vec<Heldout<'a>>, Error> {
-    let mut memory = Workspace::default();
     let mut seen = Vec::new();
     for run in data.heldout.iter().flat_map(|set| &set.paths) {
         let mut predicted = Vec::new();
-        for NamedLaw { law, .. } in laws {
-            let mut history = SofteningHistory::default();
-            let mut stress = |row: &DataRow, memory: &mut _| {
-                law.follow(&row.c, false, &mut history, memory)
-                    .map(|answer| row.compared(&answer.stress)[1].into())
-            };
-            let rows = run.rows.iter().map(|row| stress(row, &mut memory));
-            predicted.push(rows.collect::<Result<Vec<[f64; 6]>, polycore::constitutive::Error>>()?);
+        for NamedLaw { law, branches, .. } in laws {
+            let stress = |(row, answer): (&DataRow, Prediction)| row.compared(&answer.stress)[1].into();
+            predicted.push(answers_along(law, branches, run)?.into_iter().map(stress).collect());
         }
         let reach = |axis: usize| run.rows.iter().map(|row| (row.c[axis] - 1.0).abs()).fold(0.0, f64::max);
         let unknown = run.rates.iter().all(|rate| rate.is_nan());

@@ -7,13 +7,16 @@ use crate::error::Error;
 use crate::program::quantities as q;
 use crate::program::scene::{ModelSpec, Scene};
 use crate::surrogate::{Header, Surrogate};
-use crate::train::{Settings, Training, TrainingState, ensemble, loading, soften};
+use crate::train::{Settings, Training, TrainingState, ensemble, fit_branches, loading, soften};
 use harness::case::Run;
 use harness::output::csv;
 use harness::report::Report;
 use harness::scene::Failure;
+use polycore::constitutive::viscoelastic::{Branch, Viscosity};
+use polycore::file::atomic_write;
 use polycore::tensor::Voigt;
 use serde::{Deserialize, Serialize};
+use std::io::Write as _;
 use std::path::Path;
 
 /// Progress of the trainings: all members of all models in order; the last may be unfinished.
@@ -27,6 +30,7 @@ pub struct Trained {
     name: String,
     runs: Vec<String>,
     law: Surrogate,
+    branches: Vec<Branch>,
     states: Vec<TrainingState>,
     split: Option<SplitMethod>,
 }
@@ -38,6 +42,7 @@ impl Trained {
         NamedLaw {
             name: &self.name,
             law: &self.law,
+            branches: &self.branches,
             runs: &self.runs,
             seconds: Some(seconds),
             split: self.split,
@@ -64,6 +69,17 @@ pub fn train(
     let mut trained = Vec::new();
     for model in models {
         let split = data.split_of(model.split);
+        let branches = match model.branches {
+            Some(count) => fit_branches(&data.paths_of(&split.train, &model.runs), count)?,
+            None => Vec::new(),
+        };
+        let relieved;
+        let data = if branches.is_empty() {
+            data
+        } else {
+            relieved = data.without_stress_of(&branches)?;
+            &relieved
+        };
         let loading: Vec<bool> = data.set.paths.iter().flat_map(loading).collect();
         let learnt = |numbers: &[usize]| {
             let is_learnt = |row: &&usize| model.softening.is_none() || loading[**row];
@@ -113,8 +129,12 @@ pub fn train(
             law = soften(law, &data.paths_of(&split.train, &model.runs), units)?;
             law.write(output.join(format!("{}.safetensors", model.title())))?;
         }
+        if !branches.is_empty() {
+            let path = output.join(format!("{}_branches.toml", model.title()));
+            atomic_write(path, |file| file.write_all(branch_blocks(&branches).as_bytes()))?;
+        }
         let (name, runs, split) = (model.title(), model.runs.clone(), model.split);
-        trained.push(Trained { name, runs, law, states, split });
+        trained.push(Trained { name, runs, law, branches, states, split });
     }
     Ok(trained)
 }
@@ -270,4 +290,17 @@ pub fn record(trained: &[Trained], output: &Path, report: &mut Report) -> Result
     }
     let curves: Vec<_> = trained.iter().map(|model| (model.name.as_str(), &model.states[0])).collect();
     super::draw::learning(&curves, output)
+}
+
+/// Branches as blocks of a scene of `peri`, for the learnt law as its equilibrium.
+fn branch_blocks(branches: &[Branch]) -> String {
+    let block = |branch: &Branch| {
+        let eta = if let Viscosity::Constant(eta) = branch.viscosity { eta } else { f64::NAN };
+        format!(
+            "[[material.solid.branch]]\nspring = \"neo-hookean\"\nviscosity = \"constant\"\n\
+             parameters = {{ nu = \"{:e} Pa\", eta = \"{eta:e} Pa s\" }}\n",
+            branch.spring.shear_modulus()
+        )
+    };
+    branches.iter().map(block).collect()
 }

@@ -4,7 +4,7 @@ use super::memory::{MOST_PARAMETERS, parameters};
 use crate::dataset::SplitMethod;
 use crate::network::{Activation, Architecture};
 use crate::surrogate::{Header, Kind, Surrogate, Symmetry};
-use crate::train::{Loss, MOST_UNITS, Schedule, Settings};
+use crate::train::{Loss, MOST_BRANCHES, MOST_UNITS, Schedule, Settings};
 use harness::scene::{SceneError, Source};
 use serde::Deserialize;
 use std::collections::HashSet;
@@ -39,6 +39,9 @@ pub struct ModelSpec {
     /// Units of a damage variable of an energy, which lets runs unload below the loading curve; it alone is
     /// fitted to the rows of unloading. Default: none.
     pub softening: Option<usize>,
+    /// Branches of springs and dashpots beside the law, fitted to the hysteresis of runs with unloading; the
+    /// law learns the stress without theirs. Default: none.
+    pub branches: Option<usize>,
     /// Names of its training runs; the others are held out. Default: all.
     #[serde(default)]
     pub runs: Vec<String>,
@@ -225,6 +228,9 @@ pub fn check_models(source: &Source, models: &[ModelSpec], general: &TrainingSpe
         }
         if let Some(units) = model.softening.filter(|units| !(1..=MOST_UNITS).contains(units)) {
             return Err(source.error(&at("softening"), units, format!("1 to {MOST_UNITS} units")));
+        }
+        if let Some(count) = model.branches.filter(|count| !(1..=MOST_BRANCHES).contains(count)) {
+            return Err(source.error(&at("branches"), count, format!("1 to {MOST_BRANCHES} branches")));
         }
         if energy && model.network.is_some() {
             let why = "networks of Table 3.4 return a stress; use `hidden` for an energy";

@@ -117,6 +117,18 @@ impl Branch {
         Ok(Self { spring, viscosity, shift: Shift::None })
     }
 
+    /// Advances the branch alone by a step of [`Scheme::Euler`](super::Scheme::Euler): its S at the end, Pa,
+    /// and its state there.
+    ///
+    /// # Errors
+    /// As [`Viscoelastic::advance`](super::Viscoelastic::advance).
+    pub fn advance(&self, start: &BranchState, increment: &Increment) -> Result<(Voigt, BranchState), Error> {
+        let c = voigt::to_stress(&increment.to);
+        let isochoric = c / c.determinant().cbrt();
+        let step = self.euler([&c, &isochoric], start, &Conditions::new(increment), false)?;
+        Ok((step.stress, step.state))
+    }
+
     /// ln of the factor on η at the start of a step.
     fn factor(&self, start: &BranchState, conditions: &Conditions) -> f64 {
         self.shift.logarithm(conditions.temperature) + self.viscosity.glassy(conditions.pressure, start.shear)
