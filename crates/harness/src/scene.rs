@@ -40,7 +40,7 @@ mod schema;
 mod solid;
 
 pub use crate::stamp::{InputStamp, Stamp};
-pub use branch::{BranchConstant, BranchSpec, MullinsSpec, SpringKind, ViscosityKind};
+pub use branch::{BranchConstant, BranchSpec, MullinsSpec, ShiftSpec, SpringKind, ViscosityKind};
 pub use constitutive::{Constant, ConstitutiveSpec};
 pub use error::SceneError;
 pub use failure::Failure;

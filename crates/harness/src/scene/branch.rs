@@ -8,8 +8,10 @@ use serde::Deserialize;
 use super::{SceneError, Source};
 use polycore::constitutive::Error;
 use polycore::constitutive::hyperelastic::{EightChain, LopezPamies, NeoHookean};
-use polycore::constitutive::viscoelastic::{Branch, Mullins, Spring, Viscosity};
-use polycore::units::{PerSquaredStress, Rate, Stress, UnitError};
+use polycore::constitutive::viscoelastic::{Branch, Mullins, Shift, Spring, StrainSoftening, Viscosity};
+use polycore::units::{
+    MolarEnergy, PerSquaredStress, Rate, Stress, Temperature, TemperatureDifference, UnitError,
+};
 
 /// Branch of a law with time: a spring in series with a dashpot.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
@@ -18,10 +20,36 @@ pub struct BranchSpec {
     /// The spring: `nu`; `nu_1`, `beta_1` …; `chain_modulus`, `links`.
     pub spring: SpringKind,
     /// The dashpot: `eta`; `eta_0`, `eta_inf`, `K_1`, `K_2`, `gamma_1`, `gamma_2`; `rate`, `stress`, `m`,
-    /// `c`, `xi`; `rate`, `stress`.
+    /// `c`, `xi`; `rate`, `stress`; `rate`, `stress`, `S_a`, `r_0`, `r_1`, `r_2`.
     pub viscosity: ViscosityKind,
     /// Constants by name: those with a unit as text, other numbers without.
     pub parameters: BTreeMap<String, BranchConstant>,
+    /// Shift of the viscosity with temperature; default: none.
+    pub shift: Option<ShiftSpec>,
+}
+
+/// Shift of relaxation times with temperature.
+#[derive(Clone, Debug, PartialEq, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ShiftSpec {
+    /// Williams, Landel and Ferry: reference, C₁ and C₂; below the reference with its slope there.
+    Wlf(Temperature, f64, TemperatureDifference),
+    /// Arrhenius: reference and activation energy.
+    Arrhenius(Temperature, MolarEnergy),
+}
+
+impl ShiftSpec {
+    /// Returns the shift.
+    pub fn shift(&self) -> Shift {
+        match *self {
+            Self::Wlf(reference, first, second) => {
+                Shift::Wlf { reference: reference.si(), constants: [first, second.si()] }
+            }
+            Self::Arrhenius(reference, energy) => {
+                Shift::Arrhenius { reference: reference.si(), energy: energy.si() }
+            }
+        }
+    }
 }
 
 /// Spring of a branch.
@@ -41,7 +69,7 @@ pub enum SpringKind {
 }
 
 /// Dashpot of a branch.
-#[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ViscosityKind {
     /// Constant.
@@ -52,6 +80,8 @@ pub enum ViscosityKind {
     BergstromBoyce,
     /// Eyring 1936.
     Eyring,
+    /// Eyring with softening after yield, Klompen et al. 2005.
+    EyringSoftening,
 }
 
 /// Constant of a branch: a number, or a quantity such as "3 MPa s".
@@ -105,6 +135,9 @@ impl ViscosityKind {
             ],
             Self::BergstromBoyce => &[("rate", "1/s"), ("stress", "Pa"), ("m", "1"), ("c", "1"), ("xi", "1")],
             Self::Eyring => &[("rate", "1/s"), ("stress", "Pa")],
+            Self::EyringSoftening => {
+                &[("rate", "1/s"), ("stress", "Pa"), ("S_a", "1"), ("r_0", "1"), ("r_1", "1"), ("r_2", "1")]
+            }
         }
     }
 }
@@ -148,21 +181,23 @@ impl BranchSpec {
             }
         };
         let constants: Vec<f64> = all.into_iter().map(value).collect::<Result<_, _>>()?;
-        let branch = Self::build(self.spring, self.viscosity, &constants).map_err(|error| match error {
-            Error::Parameter { parameter, value, allowed, .. } => {
-                let name = if parameter == "viscosity" { "eta" } else { parameter.as_str() };
-                let known = names.contains(&name);
-                let path = if known { format!("{key}.{name}") } else { key.clone() };
-                source.error(&path, format!("{parameter} {value:?}"), allowed)
-            }
-            other => source.error(&key, other, "constants in their ranges"),
-        })?;
+        let mut branch =
+            Self::build(self.spring, self.viscosity, &constants).map_err(|error| match error {
+                Error::Parameter { parameter, value, allowed, .. } => {
+                    let name = if parameter == "viscosity" { "eta" } else { parameter.as_str() };
+                    let known = names.contains(&name);
+                    let path = if known { format!("{key}.{name}") } else { key.clone() };
+                    source.error(&path, format!("{parameter} {value:?}"), allowed)
+                }
+                other => source.error(&key, other, "constants in their ranges"),
+            })?;
         let least = branch.spring.least_slope(1.0);
         if least.is_nan() || least <= 0.0 {
             let found =
                 format!("a spring whose stress falls at a slope of {least:.3e} Pa below log strains of 1");
             return Err(source.error(&key, found, "a stress that grows with the strain"));
         }
+        branch.shift = self.shift.as_ref().map_or(Shift::None, ShiftSpec::shift);
         Ok(branch)
     }
 
@@ -216,6 +251,10 @@ impl BranchSpec {
             }
             ViscosityKind::Eyring => {
                 Viscosity::Eyring { rate: q[0], stress: q[1], pressure: 0.0, softening: None }
+            }
+            ViscosityKind::EyringSoftening => {
+                let softening = StrainSoftening { amount: q[2], shape: [q[3], q[4], q[5]] };
+                Viscosity::Eyring { rate: q[0], stress: q[1], pressure: 0.0, softening: Some(softening) }
             }
         };
         Branch::new(spring, viscosity)

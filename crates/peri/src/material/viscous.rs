@@ -26,6 +26,8 @@ pub struct ViscousCorrespondence {
     moduli: Moduli,
     stabilisation: f64,
     driving: Driving,
+    /// Temperature, K.
+    temperature: f64,
 }
 
 /// Scratch memory: states of a point at both ends of a step.
@@ -62,7 +64,19 @@ impl ViscousCorrespondence {
                 return Err(Error::Parameter { name: "pressure of a viscosity", found: pressure, allowed });
             }
         }
-        Ok(Self { law, space, moduli, stabilisation, driving })
+        Ok(Self { law, space, moduli, stabilisation, driving, temperature: 293.15 })
+    }
+
+    /// Sets the temperature, K, of branches with a shift; default 293.15.
+    #[must_use]
+    pub fn at_temperature(mut self, temperature: f64) -> Self {
+        self.temperature = temperature;
+        self
+    }
+
+    /// Step at a given C.
+    fn increment(&self, c: Voigt, duration: f64) -> Increment {
+        Increment { temperature: self.temperature, ..Increment::new(c, c, duration) }
     }
 
     fn unpack(&self, past: &Past, state: &mut State) {
@@ -110,7 +124,7 @@ impl ViscousCorrespondence {
         let (c, _) = at_thickness(self.space, &deformation.gradient(), tangent, |c, tangent| {
             let response = match past {
                 Some(past) => {
-                    let increment = Increment::new(*c, *c, past.duration);
+                    let increment = self.increment(*c, past.duration);
                     self.law.respond(start, &increment, tangent, end, memory)
                 }
                 None => self.law.respond_relaxed(start.peak, c, tangent, end, memory),
@@ -203,7 +217,7 @@ impl<const D: usize> PointLaw<D> for ViscousCorrespondence {
             let f = deformation.gradient();
             let c = voigt::from_stress(&super::tensor::embed(&(f.transpose() * f), square));
             self.unpack(deformation.past.as_deref()?, &mut scratch.start);
-            self.law.step_modulus(&scratch.start, &Increment::new(c, c, duration)).ok()
+            self.law.step_modulus(&scratch.start, &self.increment(c, duration)).ok()
         });
         if let (Some(past), Some(modulus)) = (&mut deformation.past, modulus) {
             past.stabilisation = self.stabilisation * (self.moduli.shear + modulus);

@@ -7,8 +7,12 @@ use peri::bonds::{BodyGeometry, Bonds};
 use peri::calibrate::Space;
 use peri::material::{Driving, Material, NonlocalSolid, ViscousCorrespondence};
 use peri::solver::{Breaking, Criterion, Lbfgs, Method, Policy, State, Status, System, VelocityVerlet};
+use polycore::constitutive::Workspace;
 use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric};
-use polycore::constitutive::viscoelastic::{Branch, Mullins, Spring, Viscoelastic, Viscosity};
+use polycore::constitutive::viscoelastic::{
+    Branch, BranchState, Increment, Mullins, Shift, Spring, StrainSoftening, Viscoelastic, Viscosity,
+};
+use polycore::tensor::Voigt;
 use std::sync::Arc;
 
 type Solid = NonlocalSolid<Arc<ViscousCorrespondence>>;
@@ -158,4 +162,62 @@ fn the_ledger_closes_with_the_steps() {
     eprintln!("gaps {coarse:.3e}, {fine:.3e}");
     near("viscous_ledger_order", (coarse / fine).log2(), 1.0, 0.1);
     at_most("viscous_ledger_gap", (2.0 * fine - coarse).abs(), 2e-3);
+}
+
+/// A sheet of glassy polymer that yields and softens, 45 K above the reference of its viscosity, stores and
+/// dissipates what the material point does.
+#[test]
+fn a_glassy_sheet_softens_as_its_material_point() {
+    let law = || {
+        let rubber = Compressible::new(NeoHookean::new(26.0).unwrap(), Volumetric::Ciarlet { lame: 2000.0 });
+        let softening = Some(StrainSoftening { amount: 5.0, shape: [0.965, 50.0, -5.0] });
+        let viscosity = Viscosity::Eyring { rate: 1e-5, stress: 1.0, pressure: 0.0, softening };
+        let spring = Spring::NeoHookean(NeoHookean::new(320.0).unwrap());
+        let mut branch = Branch::new(spring, viscosity).unwrap();
+        branch.shift = Shift::Arrhenius { reference: 293.15, energy: 60e3 };
+        Viscoelastic::new(Box::new(rubber.unwrap()), vec![branch]).unwrap()
+    };
+    let (steps, most, duration, temperature) = (40, 0.2, 0.5, 338.15);
+    let solid = ViscousCorrespondence::new::<2>(law(), Space::PlaneStress, 1.0, Driving::Equilibrium);
+    let solid: Solid = NonlocalSolid(Arc::new(solid.unwrap().at_temperature(temperature)));
+    let mut built = Body::<2>::solid([8, 8], 0.1, 3.015).build();
+    let bonds = &mut built.lattice;
+    let middle = bonds.particles().iter().position(|&site| site as usize == bonds.sites() / 2);
+    let middle = bonds.particles()[middle.unwrap_or(0)] as usize;
+    let free = bonds.position(middle);
+    let loads = hold(bonds, |[x, y]| ([x, y] != free).then_some((3, [most * x, 0.0])));
+    let factors: Vec<f64> = (1..=steps).map(|k| f64::from(k) / f64::from(steps)).collect();
+    let mut state = State::new(bonds.sites());
+    let mut system = System::new(bonds, solid, &loads, &factors);
+    system.times = factors.iter().map(|part| steps as f64 * duration * part).collect::<Vec<_>>().into();
+    let method = Lbfgs { tolerance: 1e-9, ..Default::default() };
+    method.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
+    let last = state.history.last().unwrap();
+
+    let (law, mut memory) = (law(), Workspace::default());
+    let (mut from, mut at, mut stresses) = (BranchState::REST.viscous, law.rest(), Vec::new());
+    let (mut stored, mut dissipated) = (0.0, 0.0);
+    for part in &factors {
+        let step = |thickness: f64, memory: &mut _| {
+            let to = Voigt::new((1.0 + most * part).powi(2), 1.0, thickness, 0.0, 0.0, 0.0);
+            let increment = Increment { temperature, ..Increment::new(from, to, duration) };
+            (to, law.advance(&at, &increment, memory).unwrap())
+        };
+        // S₃₃ = 0 by bisection
+        let (mut low, mut high) = (0.5, 1.5);
+        for _ in 0..60 {
+            let thickness = 0.5 * (low + high);
+            let negative = step(thickness, &mut memory).1.prediction.stress[2] < 0.0;
+            if negative { low = thickness } else { high = thickness }
+        }
+        let (to, found) = step(low, &mut memory);
+        (from, at, stored) = (to, found.state, found.prediction.energy.unwrap());
+        dissipated += found.dissipated;
+        stresses.push(found.prediction.stress[0]);
+    }
+    let falls = |k: usize| stresses[k + 1] < stresses[k];
+    assert!(!falls(0) && (0..39).any(falls), "the stress falls after yield: {stresses:?}");
+    let volume = last.stored / stored;
+    near("dissipation of a glassy sheet", last.dissipated / dissipated / volume, 1.0, 1e-6);
+    near("area of a glassy sheet", volume, 0.64, 1e-9);
 }

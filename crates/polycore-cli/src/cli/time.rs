@@ -181,7 +181,11 @@ impl TimeCase {
             if branch.count == 0 {
                 return Err(source.error(&format!("time.branch[{i}].count"), 0, "at least 1"));
             }
-            branches.extend(vec![branch.form(); branch.count]);
+            let form = branch.form().ok_or_else(|| {
+                let allowed = "a viscosity that tests before yield determine: eyring";
+                source.error(&format!("time.branch[{i}].viscosity"), "eyring-softening", allowed)
+            })?;
+            branches.extend(vec![form; branch.count]);
         }
         let form =
             Form { equilibrium, branches, fixed: settings.fix.into_iter().collect(), free: settings.free };
@@ -285,7 +289,8 @@ impl TimeCase {
 }
 
 impl BranchFormSpec {
-    fn form(&self) -> BranchForm {
+    /// Form of a fit; `None` for a viscosity that is not fitted.
+    fn form(&self) -> Option<BranchForm> {
         let spring = match self.spring {
             SpringName::NeoHookean => SpringForm::NeoHookean,
             SpringName::LopezPamies1 => SpringForm::LopezPamies(1),
@@ -298,8 +303,9 @@ impl BranchFormSpec {
             ViscosityKind::KumarLopezPamies => ViscosityForm::KumarLopezPamies,
             ViscosityKind::BergstromBoyce => ViscosityForm::BergstromBoyce,
             ViscosityKind::Eyring => ViscosityForm::Eyring,
+            ViscosityKind::EyringSoftening => return None,
         };
-        BranchForm { spring, viscosity }
+        Some(BranchForm { spring, viscosity })
     }
 }
 

@@ -33,7 +33,7 @@ pub use mechanics::{Mechanics, MechanicsLaw, MechanicsSpec};
 pub use mesh::{BarSpec, BrickSpec, MeshSpec, SubstrateSpec, TubeSpec};
 pub use part::{BoundarySpec, PartOutput, PartScene, PrintSpec, ProbeSpec, RegionSpec, SourceSpec, TimeSpec};
 pub use point::{CompareSpec, ExchangeSpec, LegSpec, NodesSpec, PointScene, PointSpec};
-pub use polymer::{FlowSpec, PhaseSpec, PolymerSpec, ShiftSpec};
+pub use polymer::{FlowSpec, PhaseSpec, PolymerSpec};
 pub use problem::PartTask;
 pub use schedule::{ScheduleSpec, TimesSpec};
 pub(crate) use selection::millimetres;

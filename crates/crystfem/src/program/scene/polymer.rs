@@ -2,8 +2,8 @@
 
 use super::locate_error::located_in;
 use crate::mechanics::{Branch, EyringFlow, Phase, Shift, SolidifyingMaxwell, SpecificVolume};
-use harness::scene::{SceneError, Source};
-use polycore::units::{MolarEnergy, PerTemperature, Stress, Temperature, TemperatureDifference, Time};
+use harness::scene::{SceneError, ShiftSpec, Source};
+use polycore::units::{PerTemperature, Stress, Temperature, Time};
 use serde::Deserialize;
 
 /// Stiffness of the melt over the sum of all moduli.
@@ -66,16 +66,6 @@ pub struct PhaseSpec {
     pub range: Option<[Temperature; 2]>,
 }
 
-/// Shift of relaxation times with temperature.
-#[derive(Clone, Debug, PartialEq, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum ShiftSpec {
-    /// Williams, Landel and Ferry: reference, C₁ and C₂; below the reference with its slope there.
-    Wlf(Temperature, f64, TemperatureDifference),
-    /// Arrhenius: reference and activation energy.
-    Arrhenius(Temperature, MolarEnergy),
-}
-
 /// Eyring flow: relaxation of shear is sinh(x)/x times as fast, x = √J₂/τ₀.
 #[derive(Clone, Debug, PartialEq, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -99,15 +89,7 @@ impl PhaseSpec {
         let relaxing = self.moduli.iter().zip(&self.times);
         let relaxing = relaxing.map(|(modulus, time)| Branch { modulus: modulus.si(), time: time.si() });
         let elastic = self.elastic.map(|modulus| Branch { modulus: modulus.si(), time: f64::INFINITY });
-        let shift = match self.shift {
-            None => Shift::None,
-            Some(ShiftSpec::Wlf(reference, first, second)) => {
-                Shift::Wlf { reference: reference.si(), constants: [first, second.si()] }
-            }
-            Some(ShiftSpec::Arrhenius(reference, energy)) => {
-                Shift::Arrhenius { reference: reference.si(), energy: energy.si() }
-            }
-        };
+        let shift = self.shift.as_ref().map_or(Shift::None, ShiftSpec::shift);
         let flow = self.flow.as_ref();
         let phase = Phase {
             branches: relaxing.chain(elastic).collect(),

@@ -8,11 +8,11 @@ use crate::calibrate::{Calibration, Space};
 use crate::error::Error;
 use crate::material::{Correspondence, Driving, EightChainSolid, PointLaw, ViscousCorrespondence};
 use crate::stress::StressMethod;
-use harness::scene::{BranchSpec, ConstitutiveSpec, MullinsSpec, SceneError, Source};
+use harness::scene::{BranchSpec, ConstitutiveSpec, MullinsSpec, SceneError, Source, ViscosityKind};
 use polycore::constitutive::Law;
 use polycore::constitutive::surrogate::Kind;
 use polycore::constitutive::viscoelastic::Viscoelastic;
-use polycore::units::Stress;
+use polycore::units::{Stress, Temperature};
 use serde::Deserialize;
 use std::sync::Arc;
 
@@ -39,6 +39,8 @@ pub struct SolidLaw {
     /// Branches of `correspondence` that relax, beside `constitutive`, the law in equilibrium.
     #[serde(default)]
     pub branch: Vec<BranchSpec>,
+    /// Temperature of the body, for branches with a `shift`.
+    pub temperature: Option<Temperature>,
     /// Softening of the equilibrium law of `correspondence` by the largest strain so far.
     pub mullins: Option<MullinsSpec>,
 }
@@ -68,6 +70,9 @@ impl SolidKind {
 /// bonds compensates for that.
 const FILTERED_RATIO: f64 = 50.0;
 
+/// Temperature of a body whose viscosities have no shift, K.
+const ROOM: f64 = 293.15;
+
 /// Key of the block.
 const KEY: &str = "material.solid";
 
@@ -84,7 +89,9 @@ impl SolidLaw {
 
     /// Returns the numbers that a particle of this solid remembers.
     pub fn memory_of_a_particle(&self) -> usize {
-        if self.has_state() { 6 * self.branch.len() + usize::from(self.mullins.is_some()) + 1 } else { 0 }
+        let numbers = |own: &BranchSpec| 6 + usize::from(own.viscosity == ViscosityKind::EyringSoftening);
+        let branches: usize = self.branch.iter().map(numbers).sum();
+        if self.has_state() { branches + usize::from(self.mullins.is_some()) + 1 } else { 0 }
     }
 
     /// Adds branches and softening to the law in equilibrium.
@@ -98,12 +105,20 @@ impl SolidLaw {
         let branches = self.branch.iter().enumerate();
         let branches = branches.map(|(k, own)| own.branch(source, &format!("{KEY}.branch[{k}]")));
         let branches = branches.collect::<Result<Vec<_>, _>>()?;
+        let key = format!("{KEY}.temperature");
+        let shifted = self.branch.iter().any(|own| own.shift.is_some());
+        let temperature = match self.temperature {
+            Some(_) if !shifted => return Err(source.unexpected(&key, "no branch has a `shift`")),
+            None if shifted => return Err(source.missing(&key, "needed for the `shift` of a branch")),
+            temperature => temperature.map_or(ROOM, |temperature| temperature.si()),
+        };
         let wrong = |error: polycore::constitutive::Error| source.error(KEY, error, "a law with time");
         let mut law = Viscoelastic::new(Box::new(law), branches).map_err(wrong)?;
         if let Some(mullins) = &self.mullins {
             law = law.with_softening(mullins.softening(source, &format!("{KEY}.mullins"))?).map_err(wrong)?;
         }
         let solid = ViscousCorrespondence::new::<D>(law, space, self.stabilisation.unwrap_or(1.0), driving);
+        let solid = solid.map(|solid| solid.at_temperature(temperature));
         Ok(Arc::new(solid.map_err(|error| match error {
             Error::Parameter { name: "stabilisation", found, allowed } => {
                 source.error(&format!("{KEY}.stabilisation"), plain(found), allowed)
@@ -133,6 +148,7 @@ impl SolidLaw {
             ("constitutive", self.constitutive.is_some(), false),
             ("stabilisation", self.stabilisation.is_some(), false),
             ("branch", !self.branch.is_empty(), false),
+            ("temperature", self.temperature.is_some(), false),
             ("mullins", self.mullins.is_some(), false),
         ] {
             if given && of_chains != chains {

@@ -124,7 +124,7 @@ impl Viscosity {
                 rule(law, "stress", stress, stress > 0.0, "(0, ∞)")?;
                 rule(law, "pressure", pressure, pressure >= 0.0, "[0, ∞)")?;
                 if let Some(StrainSoftening { amount, shape }) = softening {
-                    rule(law, "softening", amount, amount >= 0.0, "[0, ∞)")?;
+                    rule(law, "S_a", amount, amount >= 0.0, "[0, ∞)")?;
                     for (name, value) in [("r_0", shape[0]), ("r_1", shape[1])] {
                         rule(law, name, value, value > 0.0, "(0, ∞)")?;
                     }
