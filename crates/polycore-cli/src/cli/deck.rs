@@ -24,7 +24,12 @@ pub struct Arguments {
 /// # Errors
 /// A file that cannot be read, a material that is no law here.
 pub fn blocks(arguments: &Arguments) -> Result<String, Error> {
-    let materials = deck::read(&arguments.file)?;
+    let materials = deck::read(&arguments.file).map_err(|error| match error {
+        Error::Constitutive(reason) => {
+            Error::Option { option: "deck".to_owned(), reason: reason.to_string() }
+        }
+        other => other,
+    })?;
     Ok(materials.iter().map(|material| block(material, arguments.stress.si())).collect::<Vec<_>>().join("\n"))
 }
 

@@ -81,7 +81,7 @@ pub fn free_bar<L: Hyperelastic + ?Sized>(law: &L, stretch: f64) -> Result<FreeB
         let lateral = log.exp();
         let response = law.response_at([stretch, lateral, lateral])?;
         let size = response.normal[1][1].abs().max(response.stress[0].abs());
-        Ok(Trial {
+        Ok(TrialStretch {
             residual: response.stress[1],
             slope: lateral * lateral * (response.normal[1][1] + response.normal[1][2]),
             size,
@@ -91,7 +91,7 @@ pub fn free_bar<L: Hyperelastic + ?Sized>(law: &L, stretch: f64) -> Result<FreeB
 }
 
 /// State at a trial stretch.
-struct Trial<T> {
+struct TrialStretch<T> {
     /// Stress that must vanish, and its derivative by the logarithm of the stretch, Pa.
     residual: f64,
     slope: f64,
@@ -106,7 +106,7 @@ struct Trial<T> {
 fn balanced<T>(
     mut log: f64,
     iteration: &'static str,
-    trial: impl Fn(f64) -> Result<Trial<T>, Error>,
+    trial: impl Fn(f64) -> Result<TrialStretch<T>, Error>,
 ) -> Result<T, Error> {
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
     let mut residual = f64::NAN;
@@ -162,7 +162,7 @@ pub fn plane_stress<L: Hyperelastic + ?Sized>(law: &L, in_plane: &Tensor2) -> Re
         let deformation = DeformationGradient::plane_stress(in_plane, log.exp())?;
         let stress = voigt::from_stress(&law.second_piola_kirchhoff(&deformation)?);
         let tangent = law.material_tangent(&deformation)?;
-        Ok(Trial {
+        Ok(TrialStretch {
             residual: stress[2],
             slope: tangent[(2, 2)] * (2.0 * log).exp(),
             // the rest is rounding of S₃₃ itself, a difference of terms as large as the tangent
