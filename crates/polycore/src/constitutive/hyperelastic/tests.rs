@@ -280,9 +280,9 @@ fn eight_chain_reference_numbers() {
     }
 }
 
-/// P₁ in MPa by FElupe 10 with tensortrax, which differentiates the published energies, at (λ₁, λ₂): bar at
-/// 0.6 and 2, (4, ½), strip at 2, sheet at 2. Ten decimals. FElupe shifts equal stretches by 1.5e-8 and van der
-/// Waals' invariant by 1e-4 (6e-6 MPa): the last two rows are mpmath's derivatives of the energies.
+/// P₁ in MPa by FElupe 11.3 with tensortrax, which differentiates the published energies, at (λ₁, λ₂): bar at
+/// 0.6 and 2, (4, ½), strip at 2, sheet at 2. Ten decimals. FElupe shifts equal stretches by 1.5e-8 and van
+/// der Waals' invariant by 1e-4 (6e-6 MPa): the last two rows are mpmath's derivatives of the energies.
 #[test]
 fn laws_as_felupe_has_them() {
     let half = 0.5_f64.sqrt();
