@@ -7,7 +7,8 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, P
 use polycore::constitutive::Error;
 use polycore::constitutive::hyperelastic::data::{Mode, TestData, TestState};
 use polycore::constitutive::hyperelastic::{
-    self, Compressible, Coupling, Hyperelastic, MODELS, Volumetric, fit, homogeneous,
+    self, COMPRESSIBLE_MODELS, Compressible, Coupling, Hyperelastic, MODELS, ModelKind, Volumetric, fit,
+    homogeneous,
 };
 use polycore::langevin::{self as chain, Inverse};
 use polycore::tensor::{DeformationGradient, Tensor};
@@ -69,10 +70,10 @@ pub fn models() -> Vec<(&'static str, Vec<ParameterRow>)> {
     let parameters = |model: &hyperelastic::ModelDescriptor| {
         model.parameters.iter().zip(model.example).map(|(p, &example)| (p.name, p.unit, example)).collect()
     };
-    MODELS.iter().map(|model| (model.key, parameters(model))).collect()
+    MODELS.iter().chain(COMPRESSIBLE_MODELS).map(|model| (model.key, parameters(model))).collect()
 }
 
-/// Hyperelastic law of Chapter 1.
+/// Hyperelastic law.
 #[pyclass(frozen, module = "polymech._polymech")]
 pub struct Law {
     key: String,
@@ -91,9 +92,13 @@ impl Law {
         volumetric: Option<(String, f64)>,
         published: bool,
     ) -> PyResult<Self> {
-        let known: Vec<&str> = MODELS.iter().map(|model| model.key).collect();
+        let known: Vec<&str> = MODELS.iter().chain(COMPRESSIBLE_MODELS).map(|model| model.key).collect();
         let refused = |_| value(format!("law: found {key:?}; allowed: {}", known.join(", ")));
-        let law = hyperelastic::model(&key).map_err(refused)?.law(&values).map_err(value)?;
+        let model = hyperelastic::any_model(&key).map_err(refused)?;
+        if model.kind == ModelKind::Compressible && (volumetric.is_some() || published) {
+            return Err(value(format!("volumetric: allowed: none, {key} has its own")));
+        }
+        let law = model.law(&values).map_err(value)?;
         let term = match &volumetric {
             None => None,
             Some((name, lame)) => Some(match name.as_str() {
@@ -215,7 +220,7 @@ pub fn fit_law<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let mut states = Vec::new();
     for (name, rows) in &tests {
-        let known = [Mode::Uniaxial, Mode::Equibiaxial, Mode::PureShear, Mode::Biaxial];
+        let known = [Mode::Uniaxial, Mode::Equibiaxial, Mode::PureShear, Mode::SimpleShear, Mode::Biaxial];
         let mode = known.into_iter().find(|mode| mode.name() == name).ok_or_else(|| {
             value(format!("test: found {name:?}; allowed: {}", known.map(Mode::name).join(", ")))
         })?;
@@ -224,6 +229,7 @@ pub fn fit_law<'py>(
                 (Mode::Biaxial, Some(&[first, second, p, q])) => {
                     TestState { mode, stretches: [first, second], nominal: [p, q] }
                 }
+                (Mode::SimpleShear, Some(&[amount, stress])) => TestState::simple_shear(amount, stress),
                 (_, Some(&[stretch, nominal])) if mode != Mode::Biaxial => TestState {
                     mode,
                     stretches: [stretch, mode.second_stretch(stretch)],
@@ -241,7 +247,7 @@ pub fn fit_law<'py>(
         }
     }
     let table = TestData { source: String::new(), states };
-    let model = hyperelastic::model(key).map_err(value)?;
+    let model = hyperelastic::any_model(key).map_err(value)?;
     let found = stoppable(py, |stop| fit::fit_until(model, &table, &|| stop.load(Ordering::Relaxed)))?;
     let found = found.map_err(value)?;
     let answer = PyDict::new(py);

@@ -69,7 +69,7 @@ def test_laws_against_formulas():
 
 def test_names_of_parameters():
     models = Law.models()
-    assert len(models) == 11 and models["gent"]
+    assert len(models) == 20 and models["gent"]
     names = list(models["gent"])
     law = Law("gent", **{name: float(value) for name, value in models["gent"].items()})
     assert list(law.parameters) and names and law.shear_modulus > 0
@@ -77,6 +77,15 @@ def test_names_of_parameters():
         Law("gent", modulos=1e6)
     with pytest.raises(ValueError, match="found .gnt."):
         Law("gnt", 1.0)
+
+
+def test_a_foam_keeps_its_sides():
+    # ν = β/(1 + 2β) = 0 with β = 0: P = 2μ/α (λ^(α − 1) − 1/λ), no stress on the sides
+    foam = Law("hyperfoam-1", mu_1=1e5, alpha_1=8.0, beta_1=0.0)
+    stress = foam.first_piola_kirchhoff(np.diag([0.6, 1.0, 1.0]))
+    assert np.allclose(stress, np.diag([2e5 / 8 * (0.6**7 - 1 / 0.6), 0, 0]), atol=1e-9)
+    with pytest.raises(ValueError, match="has its own"):
+        Law("hyperfoam-1", 1e5, 8.0, 0.0, volumetric=("ciarlet", 1e6))
 
 
 def test_compressible_laws_in_three_dimensions():

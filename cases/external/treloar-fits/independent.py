@@ -97,6 +97,55 @@ def ogden_fit(terms, on):
     return columns, linear(columns, on)[1], list(found.x)
 
 
+def polynomial(exponents):
+    """Columns of W = Σ C (I1 − 3)^i (I2 − 3)^j."""
+    x, y = I1 - 3, I2 - 3
+    power = lambda z, n: z**n if n >= 0 else 0 * z
+    return [FIRST * i * power(x, i - 1) * y**j + SECOND * j * x**i * power(y, j - 1) for i, j in exponents]
+
+
+def free(columns, on):
+    """Columns and their coefficients of any sign."""
+    scale = [np.linalg.norm(c[on]) for c in columns]
+    found = np.linalg.lstsq(np.column_stack([c[on] / s for c, s in zip(columns, scale)]), P[on], rcond=None)[0]
+    return columns, [f / s for f, s in zip(found, scale)], ""
+
+
+def arruda_boyce(limit):
+    series = [0.5, 1 / 20, 11 / 1050, 19 / 7000, 519 / 673750]
+    return FIRST * sum(c * (k + 1) * I1**k / limit ** (2 * k) for k, c in enumerate(series))
+
+
+def searched(stress, starts, on):
+    """A law whose stress is `stress(q)`, from several starts."""
+    def residuals(q):
+        with np.errstate(all="ignore"):
+            found = (stress(q) - P)[on]
+        return np.where(np.isfinite(found), found, 1e3)
+
+    ends = [least_squares(residuals, q, x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=5000) for q in starts]
+    best = min(ends, key=lambda end: end.cost).x
+    with np.errstate(all="ignore"):
+        return [np.nan_to_num(stress(best))], [1.0], list(best)
+
+
+def extended_tube(q):
+    """ln G_c, ln δ, ln G_e, ln β."""
+    gc, d, ge, beta = np.exp(np.clip(q, -40, 40))
+    room = 1 - d**2 * (I1 - 3)
+    room = np.where(room > 0, room, np.nan)
+    return FIRST * gc / 2 * ((1 - d**2) / room**2 - d**2 / room) - 2 * ge / beta * (L ** (-beta - 1) - L3**-beta / L)
+
+
+def van_der_waals(q):
+    """μ, λ_m, a, and β as ¼q²."""
+    mu, limit, a, beta = q[0], q[1], q[2], min(0.25 * q[3] ** 2, 1)
+    x = (1 - beta) * I1 + beta * I2 - 3
+    eta = np.sqrt(x / (limit**2 - 3))
+    slope = mu / 2 * (1 / np.where(eta < 1, 1 - eta, np.nan) - a * np.sqrt(x / 2))
+    return slope * ((1 - beta) * FIRST + beta * SECOND)
+
+
 def main():
     sets = {m: MODE == m for m in ("uniaxial", "equibiaxial", "pure-shear")} | {"all": MODE != ""}
     for name, on in sets.items():
@@ -109,6 +158,29 @@ def main():
             "eight-chain": lambda: scanned(lambda n: [eight_chain(np.maximum(n, I1 / 3 * (1 + 1e-9)))], chain, on),
             "eight-chain-root-i2": lambda: scanned(
                 lambda n: [eight_chain(np.maximum(n, I1 / 3 * (1 + 1e-9))), SECOND / (2 * np.sqrt(I2))], chain, on
+            ),
+            "reduced-polynomial-2": lambda: free(polynomial([(1, 0), (2, 0)]), on),
+            "polynomial-2": lambda: free(polynomial([(1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]), on),
+            "biderman": lambda: free(polynomial([(1, 0), (0, 1), (2, 0), (3, 0)]), on),
+            "arruda-boyce": lambda: scanned(lambda m: [arruda_boyce(np.maximum(m, 1e-3))], 0.5, on),
+            "extended-tube": lambda: searched(
+                extended_tube,
+                [
+                    np.log([0.2, s / np.sqrt(3 * chain - 3), 0.2, b])
+                    for s in (0.5, 0.8, 0.95, 0.99)
+                    for b in (1e-3, 0.05, 0.2, 1)
+                ],
+                on,
+            ),
+            "van-der-waals": lambda: searched(
+                van_der_waals,
+                [
+                    [0.4, s * np.sqrt(3 * chain), a, b]
+                    for s in (1.02, 1.1, 1.3, 2)
+                    for a in (0, 0.2, 0.4)
+                    for b in (0.01, 0.3, 1)
+                ],
+                on,
             ),
             "ogden-1": lambda: ogden_fit(1, on),
             "ogden-2": lambda: ogden_fit(2, on),

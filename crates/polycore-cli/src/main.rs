@@ -15,6 +15,7 @@ mod cli {
     pub const MPA: f64 = 1e6;
 
     pub mod card;
+    pub mod deck;
     pub mod draw;
     pub mod exact;
     pub mod fits;
@@ -34,7 +35,7 @@ mod cli {
     pub mod trials;
 }
 
-use cli::{exact, fits, network, scene};
+use cli::{deck, exact, fits, network, scene};
 
 /// Program that fits hyperelastic laws.
 struct Fits;
@@ -70,6 +71,8 @@ impl case::Case for Fits {
 enum Command {
     /// Tabulate the nominal stress of an incompressible law, as CSV that a case can read back as data.
     Exact(exact::Arguments),
+    /// Print the hyperelastic laws of an Abaqus or CalculiX deck as blocks of scenes.
+    Deck(deck::Arguments),
     /// Predict modulus, sol, chain length and fracture energy of polymer networks from their compositions.
     Network(network::Arguments),
 }
@@ -79,6 +82,10 @@ fn main() -> ExitCode {
         Command::Exact(arguments) => {
             let refused = |reason| Error::Option { option: "exact".to_owned(), reason };
             terminal::print(exact::table(&arguments).map_err(refused)?);
+            Ok(true)
+        }
+        Command::Deck(arguments) => {
+            terminal::print(deck::blocks(&arguments)?);
             Ok(true)
         }
         Command::Network(arguments) => Ok(network::run(&arguments)?),

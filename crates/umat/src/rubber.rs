@@ -1,45 +1,51 @@
 //! Hyperelastic laws under the deformations of a host.
 
 use crate::Error;
-use polycore::constitutive::hyperelastic::{Compressible, Hyperelastic, MODELS, Volumetric, model};
+use polycore::constitutive::hyperelastic::{
+    COMPRESSIBLE_MODELS, Compressible, Hyperelastic, MODELS, ModelKind, Volumetric, any_model,
+};
 use polycore::constitutive::{Law, Workspace};
 use polycore::tensor::voigt::{self, Voigt, Voigt6x6};
 use polycore::tensor::{DeformationGradient, Tensor};
 
-/// Law of Chapter 1 with a bulk modulus: W₀(λ₁, λ₂, λ₃) − g ln J + ¼λ(J² − 1 − 2 ln J).
+/// Law with a bulk modulus, W₀(λ₁, λ₂, λ₃) − g ln J + ¼λ(J² − 1 − 2 ln J), or a foam.
 pub struct RubberMaterial {
     law: Compressible<Box<dyn Hyperelastic>>,
 }
 
 /// Keys of the laws.
 pub(crate) fn names() -> Vec<&'static str> {
-    MODELS.iter().map(|model| model.key).collect()
+    MODELS.iter().chain(COMPRESSIBLE_MODELS).map(|model| model.key).collect()
 }
 
 impl RubberMaterial {
     /// Creates a law by its key; constants are the bulk modulus K at small strains, then the parameters of
-    /// the law, stresses in the host's unit.
+    /// the law, stresses in the host's unit; of a foam its parameters alone.
     ///
     /// # Errors
     /// An unknown key; constants out of range, too few or too many; K below that of the law without a
     /// volumetric term.
     pub fn new(key: &str, constants: &[f64]) -> Result<Self, Error> {
         let wrong = |error: polycore::constitutive::Error| Error::new(key, format!("{constants:?}"), error);
-        let descriptor = model(key).map_err(wrong)?;
+        let descriptor = any_model(key).map_err(wrong)?;
         let names: Vec<&str> = descriptor.parameters.iter().map(|parameter| parameter.name).collect();
+        let law = |parameters: &[f64]| descriptor.law(parameters).map_err(wrong);
+        if descriptor.kind == ModelKind::Compressible {
+            let law = Compressible::new(law(constants)?, Volumetric::None).map_err(wrong)?;
+            return Ok(Self { law });
+        }
         let allowed = format!("K, {}", names.join(", "));
         let Some((&bulk, parameters)) = constants.split_first().filter(|(_, rest)| rest.len() == names.len())
         else {
             return Err(Error::new(format!("constants of {key}"), format!("{constants:?}"), allowed));
         };
-        let law = || descriptor.law(parameters).map_err(wrong);
-        let bare = Compressible::new(law()?, Volumetric::None).and_then(|law| law.bulk_modulus());
+        let bare = Compressible::new(law(parameters)?, Volumetric::None).and_then(|law| law.bulk_modulus());
         let bare = bare.map_err(wrong)?;
         let lame = bulk - bare;
         if !(lame.is_finite() && lame > 0.0) {
             return Err(Error::new("K", bulk, format!("above {bare}, that of the law alone")));
         }
-        let law = Compressible::new(law()?, Volumetric::Ciarlet { lame }).map_err(wrong)?;
+        let law = Compressible::new(law(parameters)?, Volumetric::Ciarlet { lame }).map_err(wrong)?;
         Ok(Self { law })
     }
 

@@ -113,6 +113,8 @@ fn tangent_by_differences() {
         ("NEO_HOOKEAN", &[20.0, 1.0][..]),
         ("EIGHT_CHAIN_ROOT_I2", &[30.0, 0.5, 12.0, 0.8][..]),
         ("GENT", &[30.0, 0.5, 60.0][..]),
+        ("VAN_DER_WAALS", &[30.0, 0.5, 9.0, 0.2, 0.1][..]),
+        ("HYPERFOAM_1", &[0.5, 4.0, 0.3][..]),
     ] {
         let kirchhoff = |f: Tensor| {
             let (stress, ..) = call(name, constants, f).umat(&mut []);

@@ -132,7 +132,8 @@ class Law:
     """A hyperelastic law of rubber: ``Law("eight-chain", modulus=0.27e6, links=25)``, parameters in SI, by name or in order.
 
     Laws are incompressible unless `volumetric` names an energy U(J) and its Lamé constant λ in Pa: ``("ciarlet", 10e6)``,
-    ``"quadratic"``, ``"logarithmic"``. `Law.models()` lists the laws and their parameters.
+    ``"quadratic"``, ``"logarithmic"``; foams (``"hyperfoam-1"`` to ``"hyperfoam-3"``) have their own. `Law.models()` lists the
+    laws and their parameters.
     """
 
     def __init__(
@@ -235,7 +236,7 @@ class Fit:
 def fit(model: str, tests: Mapping[str, tuple[ArrayLike, ...]]) -> Fit:
     """Fits a law to tests: ``fit("ogden-2", {"uniaxial": (stretch, stress), "equibiaxial": …, "pure-shear": …})``.
 
-    Nominal stresses in Pa, (N,), at stretches (N,); for ``"biaxial"`` tests four columns: λ₁, λ₂, P₁, P₂. A stress of exactly 0 is a
+    Nominal stresses in Pa, (N,), at stretches (N,), of ``"simple-shear"`` at amounts of shear; for ``"biaxial"`` tests four columns: λ₁, λ₂, P₁, P₂. A stress of exactly 0 is a
     condition, not a measurement. Least squares of the stresses by Levenberg–Marquardt from several starts.
     """
     rows = [(name, np.column_stack([np.asarray(c, dtype=np.float64) for c in columns])) for name, columns in tests.items()]

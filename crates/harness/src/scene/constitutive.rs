@@ -7,7 +7,10 @@ use serde::{Deserialize, Deserializer};
 
 use super::{SceneError, Source};
 use polycore::constitutive::Error;
-use polycore::constitutive::hyperelastic::{Compressible, Hyperelastic, MODELS, ModelDescriptor, Volumetric};
+use polycore::constitutive::hyperelastic::{
+    COMPRESSIBLE_MODELS, Compressible, Hyperelastic, MODELS, ModelDescriptor, ModelKind, Volumetric,
+    any_model,
+};
 #[cfg(feature = "surrogate")]
 use polycore::constitutive::surrogate::Surrogate;
 use polycore::units::Stress;
@@ -21,7 +24,7 @@ pub struct ConstitutiveSpec {
     pub model: Option<String>,
     /// Parameters by name: stresses with a unit, other numbers without.
     pub parameters: Option<BTreeMap<String, Constant>>,
-    /// Bulk modulus at rest.
+    /// Bulk modulus at rest; foams have their own.
     pub bulk_modulus: Option<Stress>,
     /// Instead of a model and parameters: file of a law learnt by `mdsurrogate`, relative to the scene.
     pub learnt: Option<PathBuf>,
@@ -132,18 +135,32 @@ impl ConstitutiveSpec {
     /// # Errors
     /// A [`SceneError`] that names the key, the value found and what is allowed.
     pub fn law(&self, source: &Source, key: &str) -> Result<Compressible<Box<dyn Hyperelastic>>, SceneError> {
-        let names: Vec<&str> = MODELS.iter().map(|model| model.key).collect();
+        let names: Vec<&str> = MODELS.iter().chain(COMPRESSIBLE_MODELS).map(|model| model.key).collect();
         let missing = |name: &str, why: &str| source.missing(&format!("{key}.{name}"), why);
         let Some(name) = &self.model else {
             return Err(missing("model", &format!("write one of {}, or `learnt`, a file", names.join(", "))));
         };
-        let Some(model) = MODELS.iter().find(|model| model.key == name) else {
+        let Ok(model) = any_model(name) else {
             return Err(source.unknown(&format!("{key}.model"), name, &names));
         };
         let parameters = self.parameters.clone().unwrap_or_default();
         let values = values(&parameters, source, &format!("{key}.parameters"), model)?;
         let wrong =
             |error: Error| source.error(&format!("{key}.parameters"), error, "values of their domains");
+        if model.kind == ModelKind::Compressible {
+            if let Some(bulk) = self.bulk_modulus {
+                let allowed = format!("none: `{}` has its own", model.key);
+                return Err(source.error(
+                    &format!("{key}.bulk_modulus"),
+                    format!("{} Pa", bulk.si()),
+                    allowed,
+                ));
+            }
+            return model
+                .law(&values)
+                .and_then(|law| Compressible::new(law, Volumetric::None))
+                .map_err(wrong);
+        }
         let compressible = |lame: f64| Compressible::new(model.law(&values)?, Volumetric::Ciarlet { lame });
         let least = compressible(0.0).and_then(|law| law.bulk_modulus()).map_err(wrong)?;
         let bulk = self

@@ -4,6 +4,7 @@ use std::io::Write as _;
 use std::path::Path;
 
 use polycore::Error;
+use polycore::constitutive::hyperelastic::deck::card;
 use polycore::file::atomic_write;
 
 use super::material::{BULK_RATIO, unusable};
@@ -36,7 +37,7 @@ pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
                         "**\n** {} fitted to {}\n{}",
                         fit.model.key,
                         set.name,
-                        card(fit.model.key, &scaled, bulk)
+                        card(fit.model.key, fit.model.key, &scaled, bulk)
                     )?;
                 }
             }
@@ -46,51 +47,9 @@ pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Formats the card of a law with its parameters and bulk modulus, stresses in the host's unit: *HYPERELASTIC
-/// if hosts have the law, with D₁ = 2/K, or the user material of crate `umat`.
-fn card(key: &str, parameters: &[f64], bulk: f64) -> String {
-    let name = key.to_uppercase().replace('-', "_");
-    let compliance = 2.0 / bulk;
-    let (kind, numbers) = match (key, parameters) {
-        ("neo-hookean", &[modulus]) => ("NEO HOOKE".to_owned(), vec![0.5 * modulus, compliance]),
-        ("mooney-rivlin", &[first, second]) => ("MOONEY-RIVLIN".to_owned(), vec![first, second, compliance]),
-        ("yeoh", &[first, second, third]) => {
-            ("YEOH".to_owned(), vec![first, second, third, compliance, 0.0, 0.0])
-        }
-        // five terms of the series of the inverse Langevin function: too soft near locking
-        ("eight-chain", &[modulus, links]) => {
-            ("ARRUDA-BOYCE".to_owned(), vec![modulus, links.sqrt(), compliance])
-        }
-        (_, terms) if key.starts_with("ogden-") => {
-            let count = terms.len() / 2;
-            let mut numbers = terms.to_vec();
-            numbers.push(compliance);
-            numbers.extend(std::iter::repeat_n(0.0, count - 1));
-            (format!("OGDEN, N={count}"), numbers)
-        }
-        _ => {
-            let numbers = std::iter::once(bulk).chain(parameters.iter().copied()).collect::<Vec<_>>();
-            let constants = numbers.len();
-            return format!(
-                "** of crate umat; in CalculiX NAME=USER_{name}\n*MATERIAL, NAME={name}\n*USER MATERIAL, \
-                 CONSTANTS={constants}\n{}",
-                lines(&numbers)
-            );
-        }
-    };
-    format!("*MATERIAL, NAME={name}\n*HYPERELASTIC, {kind}\n{}", lines(&numbers))
-}
-
-/// Formats eight numbers per line.
-fn lines(numbers: &[f64]) -> String {
-    let row = |row: &[f64]| row.iter().map(|x| format!("{x:.6e}")).collect::<Vec<_>>().join(", ") + "\n";
-    numbers.chunks(8).map(row).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::card;
-    use polycore::constitutive::hyperelastic::MODELS;
 
     #[test]
     fn hosts_have_their_own_forms() {
@@ -120,14 +79,8 @@ mod tests {
             ),
             ("gent", &[0.3, 75.0], "*USER MATERIAL, CONSTANTS=3\n4.000000e1, 3.000000e-1, 7.500000e1\n"),
         ] {
-            let found = card(key, parameters, 40.0);
+            let found = card(key, key, parameters, 40.0);
             assert!(found.ends_with(expected), "{found}");
         }
-        // a name of twelve numbers still has eight per line
-        assert!(
-            MODELS
-                .iter()
-                .all(|model| card(model.key, model.example, 1.0).lines().all(|line| line.len() < 256))
-        );
     }
 }

@@ -18,7 +18,7 @@ struct TestPlot {
     nominal: fn(&dyn Hyperelastic, f64) -> Result<f64, polycore::constitutive::Error>,
 }
 
-const TESTS: [TestPlot; 3] = [
+const TESTS: [TestPlot; 4] = [
     TestPlot {
         key: "uniaxial",
         title: "uniaxial tension",
@@ -35,6 +35,12 @@ const TESTS: [TestPlot; 3] = [
             Mode::Biaxial => state.stretches[1] == 1.0 && state.nominal[1] != 0.0,
             mode => mode == Mode::PureShear && first_or_rest(state),
         },
+        nominal: |law, stretch| Ok(homogeneous::pure_shear(law, stretch)?[0]),
+    },
+    TestPlot {
+        key: "simple-shear",
+        title: "simple shear, as the pure shear of its stretch",
+        holds: |state| state.mode == Mode::SimpleShear,
         nominal: |law, stretch| Ok(homogeneous::pure_shear(law, stretch)?[0]),
     },
     TestPlot {

@@ -384,6 +384,10 @@ fn verdicts(set: &TableFits) -> String {
             let verdict = if unsafe_there { "unsafe outside" } else { "safe outside" };
             let _ = write!(text, "; {verdict} {}", set.name);
         }
+        let lost = stability::count_states_without_ellipticity(&fit.law, set.table);
+        if lost > 0 {
+            let _ = write!(text, "; not elliptic at {lost} of {} states", set.table.states.len());
+        }
         match find_instability(fit, set.table) {
             Some((mode, stretch)) => {
                 let _ =

@@ -10,7 +10,7 @@ use harness::report::Report;
 use harness::scene::{SceneError, Source};
 use polycore::Error;
 use polycore::constitutive::hyperelastic::foam::{FoamFit, FoamTest, fit};
-use polycore::constitutive::hyperelastic::{Hyperelastic, Hyperfoam};
+use polycore::constitutive::hyperelastic::{Hyperelastic, Hyperfoam, deck};
 use polycore::file::atomic_write;
 use serde::Deserialize;
 
@@ -241,15 +241,10 @@ fn end_of(test: &FoamTest) -> f64 {
     by_stress.map_or(0.0, |state| state.strain)
 }
 
-/// Formats the law as `*HYPERFOAM`: μᵢ, αᵢ of all terms, then νᵢ, eight numbers per line.
+/// Formats the law as `*HYPERFOAM`, in MPa.
 fn card(key: &str, law: &Hyperfoam) -> String {
-    let terms = law.terms();
-    let moments = terms.iter().flat_map(|term| [term.modulus / MPA, term.exponent]);
-    let numbers: Vec<f64> = moments.chain(terms.iter().map(|term| term.poisson_ratio())).collect();
-    let line = |row: &[f64]| row.iter().map(|x| format!("{x:.6e}")).collect::<Vec<_>>().join(", ") + "\n";
-    let name = key.to_uppercase().replace('-', "_");
-    let lines: String = numbers.chunks(8).map(line).collect();
-    format!("**\n*MATERIAL, NAME={name}\n*HYPERFOAM, N={}\n{lines}", terms.len())
+    let values = law.terms().iter().flat_map(|term| [term.modulus / MPA, term.exponent, term.beta]);
+    format!("**\n{}", deck::card(key, key, &values.collect::<Vec<_>>(), f64::INFINITY))
 }
 
 #[cfg(test)]

@@ -390,15 +390,17 @@ pub fn select_laws(
 fn advice(name: &str) -> Option<&'static str> {
     let plain: String = name.to_lowercase().chars().filter(char::is_ascii_alphanumeric).collect();
     Some(match plain.as_str() {
-        "arrudaboyce" | "8chain" => "`eight-chain`, the law of Arruda and Boyce",
+        "8chain" => "`eight-chain`, or `arruda-boyce`, its five terms in finite-element programs",
         "ogden" => "`ogden-1`, `ogden-2` or `ogden-3`, by the number of terms",
-        "mooney" | "polynomial" | "polynomial1" => "`mooney-rivlin`, the polynomial of first order",
-        "reducedpolynomial" | "reducedpolynomial3" | "polynomial3" | "yeoh3" => {
+        "mooney" | "polynomial1" => "`mooney-rivlin`, the polynomial of first order",
+        "polynomial" | "polynomial3" => "`polynomial-2`, the polynomial of second order, or `biderman`",
+        "reducedpolynomial" | "reducedpolynomial3" | "yeoh3" => {
             "`yeoh`, the reduced polynomial of third order"
         }
-        "biderman" => "`yeoh`, a polynomial in I1 alone",
         "neohooke" | "neohookean" | "neo" => "`neo-hookean`",
-        "marlow" | "vanderwaals" | "extendedtube" => "`eight-chain-root-i2`, which behaves most similarly",
+        "kilian" => "`van-der-waals`, the law of Kilian",
+        "kaliskeheinrich" => "`extended-tube`, the law of Kaliske and Heinrich",
+        "marlow" => "`eight-chain-root-i2`, which behaves most similarly",
         "prony" | "viscoelastic" | "maxwell" | "creep" => {
             "an elastic law; rates and relaxation are fitted by `[time]` and `[[prony]]`"
         }
@@ -406,7 +408,7 @@ fn advice(name: &str) -> Option<&'static str> {
             "no such parameter: the rubber of a fit is incompressible; compressibility is `bulk_modulus` in \
              a scene of peri"
         }
-        "hyperfoam" | "ogdenfoam" | "ogdenhill" | "blatzko" => {
+        "hyperfoam" | "hyperfoam1" | "hyperfoam2" | "hyperfoam3" | "ogdenfoam" | "ogdenhill" | "blatzko" => {
             "an incompressible law; foams are fitted by a block `[[foam]]`"
         }
         _ => return None,

@@ -131,6 +131,10 @@ pub fn check(source: &Source, trials: &[FitTrial]) -> Result<(), SceneError> {
             let all: Vec<&str> = hyperelastic::MODELS.iter().map(|model| model.key).collect();
             return Err(source.error(&key("law"), format!("`{}`", trial.law), all.join(", ")));
         };
+        if trial.mode == Mode::SimpleShear {
+            let allowed = "uniaxial, equibiaxial, pure-shear: simple shear is pure shear but for a rotation";
+            return Err(source.error(&key("mode"), "simple-shear", allowed));
+        }
         match (&trial.data, &trial.parameters) {
             (Some(_), Some(_)) => {
                 let why = "a law is either evaluated with `parameters` or fitted to `data`";

@@ -20,10 +20,13 @@ use super::Error;
 use crate::tensor::deformation::check_stretches;
 use crate::tensor::{DeformationGradient, PrincipalFrame, Tensor, Voigt6x6, voigt};
 
+mod arruda_boyce;
 mod chain;
 mod compressible;
 mod descriptor;
+mod extended_tube;
 mod fit_map;
+mod general_polynomial;
 mod gent;
 mod hyperfoam;
 mod lopez_pamies;
@@ -42,6 +45,7 @@ mod coverage;
 #[cfg(feature = "tables")]
 mod curves;
 pub mod data;
+pub mod deck;
 pub mod fit;
 pub mod foam;
 #[cfg(feature = "tables")]
@@ -53,24 +57,29 @@ mod plausible;
 pub mod stability;
 #[cfg(feature = "tables")]
 mod table;
+mod van_der_waals;
 mod yeoh;
 
+pub use arruda_boyce::ArrudaBoyce;
 pub use chain::{EightChain, EightChainRootI2, ThreeChain};
 #[cfg(feature = "tables")]
 pub use columns::{StrainMeasure, TestStressMeasure};
 pub use compressible::{Compressible, Coupling, Volumetric};
 pub use coverage::Coverage;
 pub use descriptor::{Domain, ModelDescriptor, ModelKind, Parameter};
+pub use extended_tube::ExtendedTube;
+pub use general_polynomial::Polynomial;
 pub use gent::Gent;
 pub use homogeneous::{PlaneStress, plane_stress};
 pub use hyperfoam::{FoamTerm, Hyperfoam};
 pub use lopez_pamies::LopezPamies;
-pub use models::{MODELS, all, model};
+pub use models::{COMPRESSIBLE_MODELS, MODELS, all, any_model, model};
 pub use ogden::{Ogden, OgdenConvention};
 pub use polynomial::{MooneyRivlin, NeoHookean};
 pub use principal::PrincipalResponse;
 #[cfg(feature = "tables")]
 pub use table::{ImportedTest, TestFormat};
+pub use van_der_waals::VanDerWaals;
 pub use yeoh::Yeoh;
 
 /// An isotropic hyperelastic law. Stresses and moduli in Pa, energies in J/m³.

@@ -162,6 +162,8 @@ pub(super) fn mode(cell: &str) -> Option<(Mode, bool)> {
     let shear = has(&["shear", "ps"]);
     if has(&["planar", "plane", "pt", "ps", "strip", "constrained"]) || (shear && has(&["pure"])) {
         Some((Mode::PureShear, compression))
+    } else if shear && has(&["simple"]) || has(&["ss"]) {
+        Some((Mode::SimpleShear, false))
     } else if shear {
         None
     } else if has(&["equibiaxial", "equi", "biaxial", "eb", "et", "ebt", "bt", "inflation", "bulge"]) {

@@ -105,6 +105,9 @@ impl ComponentColumns {
         };
         let (test, _) = mode(file.text(row, self.mode))
             .ok_or_else(|| file.refuse_cell(row, self.mode, "a test: UT, UC, ET, PS, BT"))?;
+        if test == Mode::SimpleShear {
+            return Err(file.refuse_cell(row, self.mode, "a test with stretches: UT, UC, ET, PS, BT"));
+        }
         let first = positive(self.first, file.number(row, self.first)?)?;
         let given = match self.second {
             Some(column) => file.number_or_blank(row, column)?.map(|second| (column, second)),

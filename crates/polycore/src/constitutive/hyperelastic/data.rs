@@ -23,6 +23,9 @@ pub enum Mode {
     Equibiaxial,
     /// Wide strip ("planar tension"): λ₂ = 1.
     PureShear,
+    /// Simple shear by γ: but for a rotation pure shear to λ = ½γ + √(1 + ¼γ²). `nominal` is the P₁ of that,
+    /// (1 + λ⁻²) times the shear stress.
+    SimpleShear,
     /// General biaxial state, any λ₁, λ₂; a table, not a test with one stretch.
     #[serde(skip)]
     Biaxial,
@@ -45,6 +48,7 @@ impl Mode {
             Self::Uniaxial => "uniaxial",
             Self::Equibiaxial => "equibiaxial",
             Self::PureShear => "pure-shear",
+            Self::SimpleShear => "simple-shear",
             Self::Biaxial => "biaxial",
             Self::Component => "biaxial, one stress",
             Self::Difference => "biaxial, difference of true stresses",
@@ -55,7 +59,7 @@ impl Mode {
     pub fn second_stretch(self, first: f64) -> f64 {
         match self {
             Self::Uniaxial => first.recip().sqrt(),
-            Self::PureShear => 1.0,
+            Self::PureShear | Self::SimpleShear => 1.0,
             Self::Equibiaxial | Self::Biaxial | Self::Component | Self::Difference => first,
         }
     }
@@ -102,10 +106,21 @@ impl TestState {
         incompressible(self.stretches[0], self.stretches[1])
     }
 
+    /// State of simple shear by an amount γ at a shear stress τ = P₁₂ = σ₁₂, Pa: σ₁ − σ₃ = τ(λ + 1/λ).
+    pub fn simple_shear(amount: f64, stress: f64) -> Self {
+        let stretch = 0.5 * amount + (0.5 * amount).hypot(1.0);
+        let nominal = stress * (1.0 + stretch.powi(-2));
+        Self { mode: Mode::SimpleShear, stretches: [stretch, 1.0], nominal: [nominal, 0.0] }
+    }
+
     /// Factor of P in residuals: 1, so that nominal stresses are compared; λ₁ of [`Mode::Difference`], so
-    /// that true ones are.
+    /// that true ones are; of simple shear that of the shear stress.
     pub fn weight(&self) -> f64 {
-        if self.mode == Mode::Difference { self.stretches[0] } else { 1.0 }
+        match self.mode {
+            Mode::Difference => self.stretches[0],
+            Mode::SimpleShear => 1.0 / (1.0 + self.stretches[0].powi(-2)),
+            _ => 1.0,
+        }
     }
 
     /// Measured stresses times [`TestState::weight`], Pa.

@@ -50,13 +50,15 @@ pub(super) const ABSENT: f64 = 1e-17;
 /// Excess of a locking limit over its least value, relative, beyond which data cannot tell it from infinity.
 pub(super) const UNLIMITED: f64 = 1e6;
 
-/// Category of a law in the thesis (§1.1).
+/// Category of a law (§1.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ModelKind {
     /// Written in invariants or stretches, chosen to fit data.
     Phenomenological,
     /// Derived from the statistics of a network of chains.
     Micromechanical,
+    /// Foam: with a bulk modulus of its own.
+    Compressible,
 }
 
 /// Data available before a fit.

@@ -14,7 +14,7 @@ use super::data::{TestData, TestState};
 use super::descriptor::FitStart;
 pub use super::fit_map::{Identifiability, residuals};
 use super::fit_map::{ParameterMap, REJECTED};
-use super::{Error, Hyperelastic, ModelDescriptor, homogeneous};
+use super::{Error, Hyperelastic, ModelDescriptor, ModelKind, homogeneous};
 use crate::numerics::least_squares::{Optimum, levenberg_marquardt};
 
 /// A fitted law.
@@ -104,7 +104,7 @@ impl Agreement {
 ///
 /// # Errors
 /// [`Error::Data`] if the table has fewer measurements than the law has parameters, or a mean stiffness below
-/// zero; [`Error::NoConvergence`] if no start converges.
+/// zero, and for compressible laws; [`Error::NoConvergence`] if no start converges.
 pub fn fit(model: &'static ModelDescriptor, table: &TestData) -> Result<Fit, Error> {
     fit_until(model, table, &|| false)
 }
@@ -118,6 +118,10 @@ pub fn fit_until(
     table: &TestData,
     stop: &dyn Fn() -> bool,
 ) -> Result<Fit, Error> {
+    if model.kind == ModelKind::Compressible {
+        let reason = "tests at constant volume do not determine its volume; `foam::fit` fits it".to_owned();
+        return Err(Error::Data { what: format!("fit of `{}`", model.key), reason });
+    }
     let measurements = table.measurements();
     if measurements < model.parameters.len() {
         return Err(Error::Data {

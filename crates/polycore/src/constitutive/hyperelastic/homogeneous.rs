@@ -77,32 +77,68 @@ pub struct FreeBar {
 /// # Errors
 /// A stretch that is not positive and finite, errors of the law, [`Error::NoConvergence`].
 pub fn free_bar<L: Hyperelastic + ?Sized>(law: &L, stretch: f64) -> Result<FreeBar, Error> {
-    let (mut log, mut low, mut high) = (0.0_f64, f64::NEG_INFINITY, f64::INFINITY);
-    let mut residual = f64::NAN;
-    for _ in 0..MAX_STEPS {
+    balanced(0.0, "lateral stretch", |log| {
         let lateral = log.exp();
         let response = law.response_at([stretch, lateral, lateral])?;
-        let slope = lateral * lateral * (response.normal[1][1] + response.normal[1][2]);
-        residual = response.stress[1];
         let size = response.normal[1][1].abs().max(response.stress[0].abs());
-        if residual.abs() <= 16.0 * f64::EPSILON * size {
-            return Ok(FreeBar { lateral, nominal: stretch * response.stress[0] });
+        Ok(TrialStretch {
+            residual: response.stress[1],
+            slope: lateral * lateral * (response.normal[1][1] + response.normal[1][2]),
+            size,
+            state: FreeBar { lateral, nominal: stretch * response.stress[0] },
+        })
+    })
+}
+
+/// State at a trial stretch.
+struct TrialStretch<T> {
+    /// Stress that must vanish, and its derivative by the logarithm of the stretch, Pa.
+    residual: f64,
+    slope: f64,
+    /// Size of the terms whose difference the residual is, Pa.
+    size: f64,
+    state: T,
+}
+
+/// Finds the logarithm of a stretch whose stress vanishes, by Newton's method from `log`, bracketed as it
+/// goes; the stress grows with the stretch. A trial that locks, beyond a bound from below, goes back half
+/// way.
+fn balanced<T>(
+    mut log: f64,
+    iteration: &'static str,
+    trial: impl Fn(f64) -> Result<TrialStretch<T>, Error>,
+) -> Result<T, Error> {
+    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+    let mut residual = f64::NAN;
+    for _ in 0..MAX_STEPS {
+        let found = match trial(log) {
+            Err(error) if !low.is_finite() => return Err(error),
+            Err(_) => {
+                high = log;
+                log = 0.5 * (low + high);
+                continue;
+            }
+            Ok(found) => found,
+        };
+        residual = found.residual;
+        if residual.abs() <= 16.0 * f64::EPSILON * found.size {
+            return Ok(found.state);
         }
         if residual > 0.0 {
             high = high.min(log)
         } else {
             low = low.max(log)
         }
-        let trial = log - (residual / slope).clamp(-1.0, 1.0);
-        log = if slope > 0.0 && trial > low && trial < high {
-            trial
+        let next = log - (residual / found.slope).clamp(-1.0, 1.0);
+        log = if found.slope > 0.0 && next > low && next < high {
+            next
         } else if low.is_finite() && high.is_finite() {
             0.5 * (low + high)
         } else {
             log - residual.signum()
         };
     }
-    Err(Error::NoConvergence { iteration: "lateral stretch", steps: MAX_STEPS, residual })
+    Err(Error::NoConvergence { iteration, steps: MAX_STEPS, residual })
 }
 
 /// Plane-stress state of a compressible law.
@@ -121,46 +157,20 @@ pub struct PlaneStress {
 /// # Errors
 /// An inadmissible in-plane gradient, errors of the law, [`Error::NoConvergence`].
 pub fn plane_stress<L: Hyperelastic + ?Sized>(law: &L, in_plane: &Tensor2) -> Result<PlaneStress, Error> {
-    let mut log = DeformationGradient::plane_stress_incompressible(in_plane)?.matrix()[(2, 2)].ln();
-    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-    let mut residual = f64::NAN;
-    for _ in 0..MAX_STEPS {
+    let start = DeformationGradient::plane_stress_incompressible(in_plane)?.matrix()[(2, 2)].ln();
+    let (deformation, stress, tangent) = balanced(start, "plane-stress thickness", |log| {
         let deformation = DeformationGradient::plane_stress(in_plane, log.exp())?;
-        let (stress, tangent) =
-            match (law.second_piola_kirchhoff(&deformation), law.material_tangent(&deformation)) {
-                (Ok(stress), Ok(tangent)) => (voigt::from_stress(&stress), tangent),
-                // locked by too thick a trial: go back half way
-                (Err(error), _) | (_, Err(error)) => {
-                    if !low.is_finite() {
-                        return Err(error);
-                    }
-                    high = log;
-                    log = 0.5 * (low + high);
-                    continue;
-                }
-            };
-        residual = stress[2];
-        let slope = tangent[(2, 2)] * (2.0 * log).exp();
-        let step = -residual / slope;
-        // the rest is rounding of S₃₃ itself, a difference of terms as large as the tangent
-        if residual.abs() <= 16.0 * f64::EPSILON * tangent.amax().max(stress.amax()) {
-            return Ok(condensed(deformation, &stress, &tangent));
-        }
-        if residual > 0.0 {
-            high = high.min(log)
-        } else {
-            low = low.max(log)
-        }
-        let trial = log + step.clamp(-1.0, 1.0);
-        log = if slope > 0.0 && trial > low && trial < high {
-            trial
-        } else if low.is_finite() && high.is_finite() {
-            0.5 * (low + high)
-        } else {
-            log - residual.signum()
-        };
-    }
-    Err(Error::NoConvergence { iteration: "plane-stress thickness", steps: MAX_STEPS, residual })
+        let stress = voigt::from_stress(&law.second_piola_kirchhoff(&deformation)?);
+        let tangent = law.material_tangent(&deformation)?;
+        Ok(TrialStretch {
+            residual: stress[2],
+            slope: tangent[(2, 2)] * (2.0 * log).exp(),
+            // the rest is rounding of S₃₃ itself, a difference of terms as large as the tangent
+            size: tangent.amax().max(stress.amax()),
+            state: (deformation, stress, tangent),
+        })
+    })?;
+    Ok(condensed(deformation, &stress, &tangent))
 }
 
 const MAX_STEPS: usize = 100;

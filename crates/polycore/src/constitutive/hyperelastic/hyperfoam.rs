@@ -1,5 +1,6 @@
 //! Law of compressible foams by Ogden and Hill, in the form of Abaqus' `*HYPERFOAM`.
 
+use super::descriptor::{Domain, ModelDescriptor, ModelKind, Parameter};
 use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive};
 use crate::tensor::deformation::check_stretches;
 
@@ -21,6 +22,48 @@ pub struct FoamTerm {
     /// β > −1/3.
     pub beta: f64,
 }
+
+const PARAMETERS: [Parameter; 9] = [
+    Parameter { name: "mu_1", unit: "Pa", domain: Domain::Real },
+    Parameter { name: "alpha_1", unit: "1", domain: Domain::Real },
+    Parameter { name: "beta_1", unit: "1", domain: Domain::Real },
+    Parameter { name: "mu_2", unit: "Pa", domain: Domain::Real },
+    Parameter { name: "alpha_2", unit: "1", domain: Domain::Real },
+    Parameter { name: "beta_2", unit: "1", domain: Domain::Real },
+    Parameter { name: "mu_3", unit: "Pa", domain: Domain::Real },
+    Parameter { name: "alpha_3", unit: "1", domain: Domain::Real },
+    Parameter { name: "beta_3", unit: "1", domain: Domain::Real },
+];
+
+pub(super) const HYPERFOAM_1: ModelDescriptor = ModelDescriptor {
+    key: "hyperfoam-1",
+    kind: ModelKind::Compressible,
+    parameters: PARAMETERS.split_at(3).0,
+    build: |p| {
+        let term = |p: &[f64]| FoamTerm { modulus: p[0], exponent: p[1], beta: p[2] };
+        Ok(Box::new(Hyperfoam::new(&p.chunks_exact(3).map(term).collect::<Vec<_>>())?))
+    },
+    example: &[0.1e6, 8.0, 0.1],
+    // `foam` has its own
+    starts: |_| Vec::new(),
+    contains: &[],
+    slopes: None,
+    refine: None,
+};
+
+pub(super) const HYPERFOAM_2: ModelDescriptor = ModelDescriptor {
+    key: "hyperfoam-2",
+    parameters: PARAMETERS.split_at(6).0,
+    example: &[0.1e6, 8.0, 0.1, 0.05e6, -2.5, 0.6],
+    ..HYPERFOAM_1
+};
+
+pub(super) const HYPERFOAM_3: ModelDescriptor = ModelDescriptor {
+    key: "hyperfoam-3",
+    parameters: &PARAMETERS,
+    example: &[0.1e6, 8.0, 0.1, 0.05e6, -2.5, 0.6, 0.02e6, 3.0, 0.0],
+    ..HYPERFOAM_1
+};
 
 impl FoamTerm {
     /// ν = β/(1 + 2β), as Abaqus takes it; Poisson's ratio at rest of a law with one term.

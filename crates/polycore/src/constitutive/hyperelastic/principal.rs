@@ -27,6 +27,8 @@ pub(super) struct InvariantDerivatives {
     pub first_first: f64,
     /// ∂²W/∂I₂².
     pub second_second: f64,
+    /// ∂²W/∂I₁∂I₂.
+    pub mixed: f64,
 }
 
 /// ij of each entry of [`PrincipalResponse::shear`].
@@ -50,7 +52,7 @@ impl PrincipalResponse {
         self.shear[(i + j).saturating_sub(1).min(2)]
     }
 
-    /// Response of W(I₁, I₂) without a mixed derivative. The shear quotient is −2 ∂W/∂I₂ exactly.
+    /// Response of W(I₁, I₂). The shear quotient is −2 ∂W/∂I₂ exactly.
     pub(super) fn from_invariants(stretches: [f64; 3], w: InvariantDerivatives) -> Self {
         let [a, b, c] = stretches.map(|l| l * l);
         let others = [b + c, c + a, a + b];
@@ -58,8 +60,9 @@ impl PrincipalResponse {
             stress: others.map(|sum| 2.0 * (w.first + w.second * sum)),
             normal: std::array::from_fn(|i| {
                 std::array::from_fn(|j| {
-                    let mixed = if i == j { 0.0 } else { w.second };
-                    4.0 * (w.first_first + w.second_second * others[i] * others[j] + mixed)
+                    let second = if i == j { 0.0 } else { w.second };
+                    let mixed = w.mixed * (others[i] + others[j]);
+                    4.0 * (w.first_first + w.second_second * others[i] * others[j] + second + mixed)
                 })
             }),
             shear: [-2.0 * w.second; 3],
@@ -109,6 +112,35 @@ impl PrincipalResponse {
                 std::array::from_fn(|j| over(over(if i == j { slope - 2.0 * h } else { slope }, i), j))
             }),
             shear: SHEAR.map(|(i, j)| -over(over(h, i), j)),
+        }
+    }
+
+    /// Response of W(λ̄) with λ̄ᵢ = J^(−1/3) λᵢ, from that of W at λ̄: with tᵢ = āᵢS̄ᵢ and the deviator dev,
+    /// ∂W/∂ln λᵢ = dev t, ∂²W/∂ln λᵢ∂ln λⱼ = dev ∂t/∂ln λ̄ dev.
+    pub(super) fn isochoric(&self, stretches: [f64; 3]) -> Self {
+        let root = stretches.iter().map(|l| l.cbrt()).product::<f64>();
+        let (full, kept) = (stretches.map(|l| l * l), stretches.map(|l| (l / root) * (l / root)));
+        let t: [f64; 3] = std::array::from_fn(|i| kept[i] * self.stress[i]);
+        let mean = |of: [f64; 3]| of.iter().sum::<f64>() / 3.0;
+        let hessian: [[f64; 3]; 3] = std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                kept[i] * kept[j] * self.normal[i][j] + if i == j { 2.0 * t[i] } else { 0.0 }
+            })
+        });
+        let (rows, pressure) = (hessian.map(mean), mean(t));
+        let all = mean(rows);
+        Self {
+            stress: std::array::from_fn(|i| (t[i] - pressure) / full[i]),
+            normal: std::array::from_fn(|i| {
+                std::array::from_fn(|j| {
+                    let own = if i == j { 2.0 * (t[i] - pressure) } else { 0.0 };
+                    (hessian[i][j] - rows[i] - rows[j] + all - own) / full[i] / full[j]
+                })
+            }),
+            shear: std::array::from_fn(|k| {
+                let (i, j) = SHEAR[k];
+                (kept[i] * kept[j] * self.shear[k] + pressure) / full[i] / full[j]
+            }),
         }
     }
 

@@ -274,6 +274,11 @@ impl TestColumns {
         for row in &mut rows {
             for (axis, chosen) in self.strains.iter().enumerate() {
                 let written = row.written[axis];
+                if row.mode == Mode::SimpleShear {
+                    let state = TestState::simple_shear(written, row.nominal[0]);
+                    (row.stretches, row.nominal) = (state.stretches, state.nominal);
+                    continue;
+                }
                 let stretch = match chosen.measure {
                     StrainMeasure::Stretch => written,
                     StrainMeasure::Engineering => 1.0 + written,
@@ -296,7 +301,8 @@ impl TestColumns {
                 row.stretches[1] = row.mode.second_stretch(row.stretches[0]);
             }
             for (axis, chosen) in self.stresses.iter().enumerate() {
-                if chosen.measure == TestStressMeasure::True {
+                // the shear stress is both
+                if chosen.measure == TestStressMeasure::True && row.mode != Mode::SimpleShear {
                     // J = 1: σ = λP
                     row.nominal[axis] /= row.stretches[axis];
                 }
@@ -331,7 +337,8 @@ impl TestColumns {
             return Ok((if self.strains.len() == 2 { Mode::Biaxial } else { one }, false));
         };
         mode(file.text(row, column)).ok_or_else(|| {
-            let names = Mode::TESTS.map(|mode| format!("`{}`", mode.name())).join(", ");
+            let names = Mode::TESTS.into_iter().chain([Mode::SimpleShear]);
+            let names = names.map(|mode| format!("`{}`", mode.name())).collect::<Vec<_>>().join(", ");
             file.refuse_cell(row, column, &format!("a test: {names}"))
         })
     }

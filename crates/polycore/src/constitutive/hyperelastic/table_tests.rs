@@ -30,6 +30,24 @@ fn both_layouts_and_any_unit_of_stress() {
     assert!(biaxial.select(Mode::Uniaxial).is_err());
 }
 
+/// Of a neo-Hookean law τ = μγ, of a Mooney–Rivlin law 2(C₁ + C₂)γ, at any γ.
+#[test]
+fn simple_shear_is_data() {
+    let text = "mode,strain,stress_MPa\nsimple shear,0.5,0.2\nSS,1,0.4\nsimple-shear,2.5,1.0\n";
+    let table = plain(text).table;
+    assert!(table.states.iter().all(|state| state.mode == Mode::SimpleShear && state.stretches[1] == 1.0));
+    let golden = 0.5 + 1.25_f64.sqrt();
+    assert!((table.states[1].stretches[0] - golden).abs() < 1e-15);
+    let measured: Vec<f64> = table.states.iter().flat_map(TestState::measured).collect();
+    assert!(measured.iter().zip([0.2e6, 0.4e6, 1e6]).all(|(found, tau)| (found - tau).abs() < 1e-9));
+    for key in ["neo-hookean", "mooney-rivlin"] {
+        let found = super::super::fit::fit(super::super::model(key).unwrap(), &table).unwrap();
+        assert!((found.law.shear_modulus() / 0.4e6 - 1.0).abs() < 1e-8 && found.rms < 1e-3, "{key}");
+    }
+    let format = TestFormat { mode: Some(Mode::SimpleShear), ..TestFormat::default() };
+    assert_eq!(read("stretch,nominal_MPa\n-0.5,-0.2\n", &format).unwrap().table.measurements(), 1);
+}
+
 /// λ = 1.25 and 1.5 at 0.5 and 0.75 MPa, as laboratories write it.
 #[test]
 fn strains_and_stresses_of_laboratories() {
@@ -174,7 +192,7 @@ fn bad_tables_are_refused_with_the_line() {
         ("stretch,nominal_MPa\n1,0\n2,NaN\n", "line 3: column 2, `nominal_MPa`: found `NaN`"),
         ("stretch,nominal_MPa\n-2,1\n", "line 2: column 1, `stretch`: found `-2`"),
         ("stretch,nominal_MPa\n1,2,3\n", "3 cells"),
-        ("mode,stretch,nominal_MPa\nsimple-shear,1,0\n", "found `simple-shear`; allowed: a test: `uniaxial`"),
+        ("mode,stretch,nominal_MPa\ntorsion,1,0\n", "found `torsion`; allowed: a test: `uniaxial`"),
         ("stretch,nominal_MPa\n1,0\n", "a stress other than zero"),
         ("", "headings: found `an empty file`"),
         ("strain [mm],stress [MPa]\n1,0.1\n", "unit of column 1"),
