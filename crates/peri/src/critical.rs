@@ -7,10 +7,10 @@ pub use area::CrackArea;
 pub use crossing::{Convention, Crossing};
 
 use crate::bonds::BodyGeometry;
-use crate::calibrate::Space;
+use crate::calibrate::{Space, modulus};
 use crate::error::Error;
 use crate::material::{Driving, PointLaw, energy_at_strength};
-use crate::potential::{BondPotential, NetworkStretch, softened_energy};
+use crate::potential::{BondPotential, NetworkStretch, Softening};
 use crate::solver::{Bilinear, Criterion};
 use polycore::numerics::{bisect, bisected};
 use polycore::units::{EnergyPerArea, Stress};
@@ -34,9 +34,12 @@ pub struct Critical {
     /// Energy that the fracture energy of a bond law refers to; default: `tearing`; of an inclusion, that of
     /// the base material.
     pub convention: Option<Convention>,
-    /// Uniaxial tensile strength of a solid, force over the undeformed section, in addition to its fracture
-    /// energy: bonds soften.
+    /// Uniaxial tensile strength, force over the undeformed section, in addition to the fracture energy: bonds
+    /// soften. Of a solid, or of a `linear` law with `convention = "softening"`.
     pub strength: Option<Stress>,
+    /// Kink of the softening of a bond law with a strength: fraction of the strength, and of the opening at
+    /// which a crack is free; default: none. Concrete: [0.333, 0.222] (Petersson).
+    pub kink: Option<[f64; 2]>,
     /// Energy of a solid with branches that breaking has to release; default: `equilibrium`.
     pub driving: Option<Driving>,
 }
@@ -102,6 +105,8 @@ pub struct Context<'a> {
     pub crossing: Crossing,
     /// Default convention of a fracture energy.
     pub convention: Convention,
+    /// Softening of the convention of that name, see [`Critical::softening`].
+    pub softening: Softening,
 }
 
 /// Computes the energy density Y_c, J/m³, beyond which bonds of a solid with the fracture energy G, J/m²,
@@ -206,6 +211,28 @@ impl Critical {
         }
     }
 
+    /// Softening of bonds: with a strength they soften from λ₀ = 1 + strength/E on, and e_f follows from the
+    /// fracture energy G = kθΦ_f Σ_J w V_J |ξ_e||ξ|, as for [`fracture_energy`].
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a strength at which the bonds store more than the fracture energy.
+    pub fn softening(&self, context: &Context) -> Result<Softening, Error> {
+        let Some((strength, energy)) = self.strength.zip(self.fracture_energy) else {
+            return Ok(Softening::default());
+        };
+        let (strength, energy) = (strength.si(), energy.si());
+        let unit = modulus(context.space, 1.0, context.horizon, context.thickness);
+        let onset = 1.0 + strength * unit / context.modulus;
+        let rise = context.crossing.reach * context.modulus * context.law.energy(onset);
+        if strength > 0.0 && energy > rise {
+            return Ok(Softening::of_linear(energy / rise, self.kink));
+        }
+        let allowed = format!(
+            "above 0, and less or with a finer spacing: at it the bonds store {rise:.4e} of {energy:.4e} J/m²"
+        );
+        Err(Error::Parameter { name: "critical.strength", found: strength, allowed })
+    }
+
     /// Computes the critical bond stretch.
     ///
     /// # Errors
@@ -214,13 +241,6 @@ impl Critical {
     pub fn resolve(&self, context: &Context) -> Result<f64, Error> {
         let fault =
             |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.to_owned() });
-        if let Some(strength) = self.strength {
-            return fault(
-                "critical.strength",
-                strength.si(),
-                "only with `[material.solid]`: bond laws have no strength",
-            );
-        }
         match (self.percent_over_contour, self.stretch, self.fracture_energy) {
             (Some(factor), None, None) => match context.links {
                 Some(links) => {
@@ -259,7 +279,7 @@ impl Critical {
 /// zero load at this stretch.
 pub fn fracture_energy(context: &Context, convention: Convention, stretch: f64) -> f64 {
     let energy = match convention {
-        Convention::Softening => softened_energy(context.law, stretch, stretch),
+        Convention::Softening => context.softening.energy(context.law, stretch, stretch),
         _ => context.law.energy(stretch),
     } * context.modulus;
     match (convention, context.space) {
@@ -283,6 +303,8 @@ pub struct Toughness {
     pub bonds: f64,
     /// Bonds across a cut through the body.
     pub crossing: Crossing,
+    /// Softening, if that is the convention.
+    pub softening: Softening,
 }
 
 impl Toughness {
@@ -294,9 +316,9 @@ impl Toughness {
         let tearing = fracture_energy(context, tearing, stretch);
         let mut bonds = fracture_energy(context, Convention::Bonds, stretch);
         if soft {
-            bonds *= softened_energy(context.law, stretch, stretch) / context.law.energy(stretch);
+            bonds *= context.softening.energy(context.law, stretch, stretch) / context.law.energy(stretch);
         }
-        Self { convention: given, stretch, tearing, bonds, crossing: context.crossing }
+        Self { convention: given, stretch, tearing, bonds, crossing: context.crossing, softening: context.softening }
     }
 }
 
@@ -324,7 +346,6 @@ fn stretch_of_energy(context: &Context, convention: Convention, energy: f64) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::modulus;
     use crate::potential::Law;
 
     fn context<'a>(
@@ -336,7 +357,8 @@ mod tests {
     ) -> Context<'a> {
         let crossing = Crossing { reach: 2.0, short: 1.0, bonds: 28.0, loss: 1.4, whole: true };
         let convention = Convention::default();
-        Context { law, links: None, space, modulus, horizon, thickness, crossing, convention }
+        let softening = Softening::default();
+        Context { law, links: None, space, modulus, horizon, thickness, crossing, convention, softening }
     }
 
     /// Compares with formulation.md, table of the four examples, to its printed digits.
