@@ -211,8 +211,8 @@ impl Critical {
         }
     }
 
-    /// Softening of bonds: with a strength they soften from λ₀ = 1 + strength/E on, and e_f follows from the
-    /// fracture energy G = kθΦ_f Σ_J w V_J |ξ_e||ξ|, as for [`fracture_energy`].
+    /// Softening of bonds with a strength: λ₀ from [`Softening::uniaxial_strength`], e_f from the fracture energy
+    /// G = kθΦ_f Σ_J w V_J |ξ_e||ξ|, as for [`fracture_energy`]; default without one.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a strength at which the bonds store more than the fracture energy.
@@ -221,16 +221,25 @@ impl Critical {
             return Ok(Softening::default());
         };
         let (strength, energy) = (strength.si(), energy.si());
-        let unit = modulus(context.space, 1.0, context.horizon, context.thickness);
-        let onset = 1.0 + strength * unit / context.modulus;
-        let rise = context.crossing.reach * context.modulus * context.law.energy(onset);
-        if strength > 0.0 && energy > rise {
-            return Ok(Softening::of_linear(energy / rise, self.kink));
+        let space = if context.space == Space::Solid { Space::Solid } else { Space::PlaneStress };
+        let strain = strength * modulus(space, 1.0, context.horizon, context.thickness) / context.modulus;
+        let (mut ratio, mut softening) = (1.0, Softening::default());
+        for _ in 0..100 {
+            let rise = context.crossing.reach * context.modulus * context.law.energy(1.0 + strain / ratio);
+            if !(strength > 0.0 && energy > rise) {
+                let allowed = format!(
+                    "above 0, and less or with a finer spacing: at it bonds store {rise:.4e} of {energy:.4e} J/m²"
+                );
+                return Err(Error::Parameter { name: "critical.strength", found: strength, allowed });
+            }
+            softening = Softening::of_linear(energy / rise, self.kink);
+            let next = softening.uniaxial_strength(space);
+            if (next - ratio).abs() < 1e-12 {
+                break;
+            }
+            ratio = next;
         }
-        let allowed = format!(
-            "above 0, and less or with a finer spacing: at it the bonds store {rise:.4e} of {energy:.4e} J/m²"
-        );
-        Err(Error::Parameter { name: "critical.strength", found: strength, allowed })
+        Ok(softening)
     }
 
     /// Computes the critical bond stretch.
@@ -318,7 +327,14 @@ impl Toughness {
         if soft {
             bonds *= context.softening.energy(context.law, stretch, stretch) / context.law.energy(stretch);
         }
-        Self { convention: given, stretch, tearing, bonds, crossing: context.crossing, softening: context.softening }
+        Self {
+            convention: given,
+            stretch,
+            tearing,
+            bonds,
+            crossing: context.crossing,
+            softening: context.softening,
+        }
     }
 }
 

@@ -106,8 +106,17 @@ impl<const D: usize> IntoMaterial<D> for Rubber {
         let modulus = modulus(space, found, horizon, thickness) * lattice_factor(self.calibration, bonds);
         let (crossing, convention) = (Crossing::new(bonds, None), Convention::default());
         let softening = Softening::default();
-        let mut context =
-            Context { law: &*law, links, space, modulus, horizon, thickness, crossing, convention, softening };
+        let mut context = Context {
+            law: &*law,
+            links,
+            space,
+            modulus,
+            horizon,
+            thickness,
+            crossing,
+            convention,
+            softening,
+        };
         if let Some(critical) = self.critical {
             context.softening = critical.softening(&context)?;
         }

@@ -1,7 +1,15 @@
 //! Bonds that soften before they break, so that none breaks under load.
 
 use super::BondPotential;
+use crate::calibrate::Space;
 use crate::quadrature;
+use polycore::numerics::bisected;
+use std::f64::consts::FRAC_PI_2;
+
+/// Directions between the axis of tension and the plane across it.
+const DIRECTIONS: u32 = 90;
+/// Largest uniform strain that is searched, over λ₀ − 1: at it all bonds that can soften have done so.
+const WIDEST: f64 = 20.0;
 
 /// Fall of a bond's tension between λ₀ and λ_f.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +57,27 @@ impl Softening {
             tension * (1.0 - way) / (1.0 - place)
         };
         fall / e
+    }
+
+    /// Uniaxial strength of a body of linear bonds in all directions, over E(λ₀ − 1): greatest σ(ε) of uniform
+    /// small strains with free sides. Above 1, as bonds at an angle soften later than those along the axis.
+    pub fn uniaxial_strength(&self, space: Space) -> f64 {
+        let solid = space == Space::Solid;
+        let axes: Vec<[f64; 3]> = (0..DIRECTIONS)
+            .map(|k| (f64::from(k) + 0.5) / f64::from(DIRECTIONS) * FRAC_PI_2)
+            .map(|angle| [angle.cos().powi(2), angle.sin().powi(2), if solid { angle.sin() } else { 1.0 }])
+            .collect();
+        let force = |e: f64| e * self.integrity(1.0 + e, 1.0 + self.ductility);
+        let stress = |strain: f64, side: f64, part: usize| -> f64 {
+            axes.iter().map(|n| n[2] * n[part] * force(strain * n[0] + side * n[1])).sum()
+        };
+        let uniaxial = |strain: f64| {
+            let side = bisected(-strain, 0.0, 50, |side| stress(strain, side, 1) < 0.0);
+            stress(strain, side, 0)
+        };
+        let most = WIDEST.min(self.ductility);
+        let strains = (0..=100).map(|k| most.powf(f64::from(k) / 100.0));
+        strains.map(uniaxial).fold(0.0, f64::max) / uniaxial(1.0)
     }
 
     /// Stretch λ₀ at which bonds begin to soften.

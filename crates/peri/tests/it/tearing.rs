@@ -157,9 +157,9 @@ fn softened_bonds() {
     }
 }
 
-/// With a strength a linear law softens from 1 + strength/E on, and its energy across a cut is the fracture
-/// energy, straight and with Petersson's kink at a third of the strength; a strength whose bonds store more
-/// is refused.
+/// With a strength a linear law softens from 1 + strength/(R E) on, and its energy across a cut is the fracture
+/// energy, straight and with a kink; a strength whose bonds store more is refused. R by an integration over
+/// 4000 directions in Python.
 #[test]
 fn strengths_of_bonds() {
     let law = Law::Linear.build(0.0, 0.0, false).unwrap();
@@ -177,9 +177,22 @@ fn strengths_of_bonds() {
         let critical = strength(2e3);
         context.softening = critical.softening(&context).unwrap();
         let end = critical.resolve(&context).unwrap();
-        near("strength_onset", (context.softening.onset(end) - 1.0) * 1e3, 1.0, 1e-9);
+        let ratio = context.softening.uniaxial_strength(Space::PlaneStress);
+        near("strength_onset", (context.softening.onset(end) - 1.0) * 1e3 * ratio, 1.0, 1e-9);
         near("strength_energy", fracture_energy(&context, Convention::Softening, end) / 80.0, 1.0, 1e-9);
         assert!(strength(2e5).softening(&context).is_err());
+    }
+    let trilinear = Some([0.25, 0.107_142_857]);
+    for (ductility, kink, space, expected) in [
+        (2.0, None, Space::PlaneStress, 1.034_59),
+        (10.0, None, Space::PlaneStress, 1.182_78),
+        (100.0, None, Space::PlaneStress, 1.349_83),
+        (10.0, trilinear, Space::PlaneStress, 1.045_52),
+        (100.0, trilinear, Space::PlaneStress, 1.219_32),
+        (10.0, None, Space::Solid, 1.444_93),
+    ] {
+        let found = Softening { ductility, kink }.uniaxial_strength(space);
+        near("uniaxial_strength", found / expected, 1.0, 2e-3);
     }
 }
 

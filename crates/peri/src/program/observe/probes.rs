@@ -64,7 +64,8 @@ pub(super) fn probe_scalars<const D: usize>(
         });
     }
     for at in probe.load_at.iter().map(|at| at.si()) {
-        let path = |m: &Moment<D>| load_at(m.state.history.iter().map(|row| [row.seen[column], row.load]), at);
+        let path =
+            |m: &Moment<D>| load_at(m.state.history.iter().map(|row| [row.seen[column], row.load]), at);
         to.add_if(q::probe_load_at(&probe.name, at), path);
     }
     if probe.track == Track::Crack {

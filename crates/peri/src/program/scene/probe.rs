@@ -7,7 +7,7 @@ use super::{AxisName, Boundary, Scene, Side, SolverMethod};
 use crate::calibrate::Space;
 use harness::report::{Named, Quantity};
 use harness::scene::{SceneError, Source};
-use polycore::units::Length;
+use polycore::units::{Force, Length};
 use serde::{Deserialize, Serialize};
 
 /// Probe: a quantity recorded in every row of the history.
@@ -47,6 +47,9 @@ pub struct HistoryProbe {
     /// Openings at which the report has the load, as `NAME_load_at_0.1mm`.
     #[serde(default)]
     pub load_at: Vec<Length>,
+    /// Measured openings with the lowest and the highest load, drawn beside the computed ones.
+    #[serde(default)]
+    pub measured: Vec<(Length, Force, Force)>,
 }
 
 /// Quantities of a probe.
@@ -202,6 +205,7 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             ("across", probe.across.is_some(), of_crack, false),
             ("gauges", probe.gauges.is_some(), moving, false),
             ("threshold", probe.threshold.is_some(), track == Track::Front, false),
+            ("measured", !probe.measured.is_empty(), track == Track::Opening, false),
             ("load_at", !probe.load_at.is_empty(), track == Track::Opening, false),
         ] {
             if given && !belongs {

@@ -236,7 +236,9 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
             return Err(source.unexpected("material.critical.driving", why));
         }
         if critical.kink.is_some() {
-            return Err(source.unexpected("material.critical.kink", "only of a bond law: solids soften straight"));
+            return Err(
+                source.unexpected("material.critical.kink", "only of a bond law: solids soften straight")
+            );
         }
         if let Some(strength) = critical.strength {
             let key = "material.critical.strength";
