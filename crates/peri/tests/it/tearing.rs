@@ -144,9 +144,10 @@ fn bonds_are_what_they_were() {
 /// up to λ₀.
 #[test]
 fn softened_bonds() {
-    let law = Law::ChainOffset.build(50.0, 1200.0, false).unwrap();
     let end = 1.8;
-    for soft in [Softening::default(), Softening { ductility: 9.0, kink: Some([1.0 / 3.0, 2.0 / 9.0]) }] {
+    let kinked = Softening { ductility: 9.0, kink: Some([1.0 / 3.0, 2.0 / 9.0]) };
+    for (law, soft) in [(Law::ChainOffset, Softening::default()), (Law::Linear, kinked)] {
+        let law = law.build(if law.is_chain() { 50.0 } else { 0.0 }, 1200.0, false).unwrap();
         let onset = soft.onset(end);
         for stretch in [0.9, 1.05, onset - 1e-3, 1.2, 1.3, 1.5, 1.79, 1.9] {
             let energy = |stretch| soft.energy(&*law, stretch, end);
