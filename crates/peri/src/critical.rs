@@ -34,8 +34,8 @@ pub struct Critical {
     /// Energy that the fracture energy of a bond law refers to; default: `tearing`; of an inclusion, that of
     /// the base material.
     pub convention: Option<Convention>,
-    /// Uniaxial tensile strength, force over the undeformed section, in addition to the fracture energy: bonds
-    /// soften. Of a solid, or of a `linear` law with `convention = "softening"`.
+    /// Uniaxial tensile strength, force over the undeformed section, in addition to the fracture energy:
+    /// bonds soften. Of a solid, or of a `linear` law with `convention = "softening"`.
     pub strength: Option<Stress>,
     /// Kink of the softening of a bond law with a strength: fraction of the strength, and of the opening at
     /// which a crack is free; default: none. Concrete: [0.333, 0.222] (Petersson).
@@ -211,26 +211,31 @@ impl Critical {
         }
     }
 
-    /// Softening of bonds with a strength: λ₀ from [`Softening::uniaxial_strength`], e_f from the fracture energy
-    /// G = kθΦ_f Σ_J w V_J |ξ_e||ξ|, as for [`fracture_energy`]; default without one.
+    /// Softening of bonds with a strength: λ₀ from [`Softening::uniaxial_strength`], e_f from the fracture
+    /// energy G = kθΦ_f Σ_J w V_J |ξ_e||ξ|, as for [`fracture_energy`]; default without one.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a strength at which the bonds store more than the fracture energy.
+    /// [`Error::Parameter`] for a strength at which bonds store more than the fracture energy, or without
+    /// one.
     pub fn softening(&self, context: &Context) -> Result<Softening, Error> {
-        let Some((strength, energy)) = self.strength.zip(self.fracture_energy) else {
+        let Some(strength) = self.strength.map(|strength| strength.si()) else {
             return Ok(Softening::default());
         };
-        let (strength, energy) = (strength.si(), energy.si());
+        let fault = |allowed| Error::Parameter { name: "critical.strength", found: strength, allowed };
+        let soft = self.convention.unwrap_or(context.convention) == Convention::Softening;
+        let Some(energy) = self.fracture_energy.filter(|_| soft).map(|energy| energy.si()) else {
+            return Err(fault("none without a fracture energy by `softening`".to_owned()));
+        };
         let space = if context.space == Space::Solid { Space::Solid } else { Space::PlaneStress };
         let strain = strength * modulus(space, 1.0, context.horizon, context.thickness) / context.modulus;
         let (mut ratio, mut softening) = (1.0, Softening::default());
         for _ in 0..100 {
             let rise = context.crossing.reach * context.modulus * context.law.energy(1.0 + strain / ratio);
             if !(strength > 0.0 && energy > rise) {
-                let allowed = format!(
-                    "above 0, and less or with a finer spacing: at it bonds store {rise:.4e} of {energy:.4e} J/m²"
-                );
-                return Err(Error::Parameter { name: "critical.strength", found: strength, allowed });
+                return Err(fault(format!(
+                    "above 0, and less or with a finer spacing: at it bonds store {rise:.4e} of {energy:.4e} \
+                     J/m²"
+                )));
             }
             softening = Softening::of_linear(energy / rise, self.kink);
             let next = softening.uniaxial_strength(space);

@@ -219,8 +219,8 @@ fn refused_files() {
     assert_eq!(table.unused, ["Name"]);
 }
 
-/// Long chains cross-linked at random: sol of x = 2 by the table of formulation-networks.md, both ways, for both
-/// distributions; rows that contradict themselves have reasons.
+/// Long chains cross-linked at random: sol of x = 2 by the table of formulation-networks.md, both ways, for
+/// both distributions; rows that contradict themselves have reasons.
 #[test]
 fn chains_cross_linked_at_random() {
     let text = "chains,x,w_sol,M_strand_kg_mol,f\nmost-probable,2,,100,\none-length,2,,100,\n\

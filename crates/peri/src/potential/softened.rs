@@ -16,12 +16,13 @@ const WIDEST: f64 = 20.0;
 pub struct Softening {
     /// e_f: λ_f − 1 over λ₀ − 1.
     pub ductility: f64,
-    /// Kink of the fall: fraction of the tension at λ₀, and place between λ₀ (0) and λ_f (1); `None`: straight.
+    /// Kink of the fall: fraction of the tension at λ₀, and place between λ₀ (0) and λ_f (1); `None`:
+    /// straight.
     pub kink: Option<[f64; 2]>,
 }
 
-/// e_f = 4, straight: the crack of a strip runs at the energy of the bonds across it, to 2 % along an axis and
-/// at 45°, at m = 3 and 4; at 2 to 7 % (guide, theory/fracture.md).
+/// e_f = 4, straight: the crack of a strip runs at the energy of the bonds across it, to 2 % along an axis
+/// and at 45°, at m = 3 and 4; at 2 to 7 % (guide, theory/fracture.md).
 impl Default for Softening {
     fn default() -> Self {
         Self { ductility: 4.0, kink: None }
@@ -29,16 +30,17 @@ impl Default for Softening {
 }
 
 impl Softening {
-    /// e_f of a linear bond whose energy ∫₁^λf d t dλ is `energy` times that up to λ₀: 1 + (`energy` − 1)/(β +
-    /// x) with the kink (β, x), β + x = 1 without one.
+    /// e_f of a linear bond whose energy ∫₁^λf d t dλ is `energy` times that up to λ₀, with the kink (β, x):
+    /// 1 + (`energy` − 1)/(β + x), β + x = 1 without one.
     pub fn of_linear(energy: f64, kink: Option<[f64; 2]>) -> Self {
         let area = kink.map_or(1.0, |[tension, place]| tension + place);
         Self { ductility: 1.0 + (energy - 1.0) / area, kink }
     }
 
-    /// d, the fraction of the law's tension that a bond carries: 1 up to λ₀, then f(e)/e with e = (λ − 1)/(λ₀ −
-    /// 1) and f falling from 1 to 0 at e_f, straight or with a kink; 0 beyond `end` = λ_f. For a linear law d t
-    /// is bilinear or trilinear in λ. It depends on the present stretch: bonds unloaded before λ_f recover.
+    /// d, the fraction of the law's tension that a bond carries: 1 up to λ₀, then f(e)/e, 0 beyond λ_f =
+    /// `end`, with e = (λ − 1)/(λ₀ − 1) and f falling from 1 to 0 at e_f, straight or with a kink. For a
+    /// linear law d t is bilinear or trilinear in λ. It depends on the present stretch: bonds unloaded
+    /// before λ_f recover.
     pub fn integrity(&self, stretch: f64, end: f64) -> f64 {
         let last = self.ductility;
         let e = last * (stretch - 1.0) / (end - 1.0);
@@ -59,8 +61,9 @@ impl Softening {
         fall / e
     }
 
-    /// Uniaxial strength of a body of linear bonds in all directions, over E(λ₀ − 1): greatest σ(ε) of uniform
-    /// small strains with free sides. Above 1, as bonds at an angle soften later than those along the axis.
+    /// Uniaxial strength of a body of linear bonds in all directions, over E(λ₀ − 1): greatest σ(ε) of
+    /// uniform small strains with free sides. Above 1, as bonds at an angle soften later than those along
+    /// the axis.
     pub fn uniaxial_strength(&self, space: Space) -> f64 {
         let solid = space == Space::Solid;
         let axes: Vec<[f64; 3]> = (0..DIRECTIONS)

@@ -117,8 +117,8 @@ harness::quantities! {
         gauges";
     PROBE_ACROSS = "{probe}_across", "m", "of a crack: largest distance of its tip from 0 across its axis, \
         between the gauges if there are any";
-    PROBE_LOAD_AT = "{probe}_load_at_{opening}mm", "N", "of an opening: load at this value, if the run reaches \
-        it";
+    PROBE_LOAD_AT = "{probe}_load_at_{opening}mm", "N", "of an opening: load at this value, if the run \
+        reaches it";
     SECTION_FORCE = "{section}_force_{axis}", "N", "force along an axis that bonds across a section exert on \
         the part of the body behind it at the end";
     SECTION_MOMENT = "{section}_moment_{axis}", "N m", "moment of the forces across a section about its \

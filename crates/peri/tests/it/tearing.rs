@@ -158,9 +158,9 @@ fn softened_bonds() {
     }
 }
 
-/// With a strength a linear law softens from 1 + strength/(R E) on, and its energy across a cut is the fracture
-/// energy, straight and with a kink; a strength whose bonds store more is refused. R by an integration over
-/// 4000 directions in Python.
+/// With a strength a linear law softens from 1 + strength/(R E) on, and its energy across a cut is the
+/// fracture energy, straight and with a kink; a strength whose bonds store more is refused. R by an
+/// integration over 4000 directions in Python.
 #[test]
 fn strengths_of_bonds() {
     let law = Law::Linear.build(0.0, 0.0, false).unwrap();

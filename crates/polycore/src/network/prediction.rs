@@ -144,8 +144,8 @@ impl PredictionSettings {
         Ok(NetworkPrediction { network: network.map_err(|error| with_column(&error, row))?, origin })
     }
 
-    /// Predicts long chains that are cross-linked at random: a measured sol fraction counts before `x`, unless
-    /// the given value is asked for.
+    /// Predicts long chains that are cross-linked at random: a measured sol fraction counts before `x`,
+    /// unless the given value is asked for.
     fn at_random(&self, row: &Composition, chains: PrimaryChains) -> Result<NetworkPrediction, String> {
         for (name, value) in
             [("f", row.functionality), ("r", row.ratio), ("p", row.conversion), ("b1", row.ends_share)]

@@ -12,7 +12,7 @@
 //! | `M_mono_kg_mol`, `b1` | molar mass of chains with one group, and their share of the chains' groups |
 //! | `p` | conversion of the groups of the cross-linkers; 1: all groups in deficit |
 //! | `w_sol` | measured sol fraction |
-//! | `chains` | of long chains cross-linked at random: `most-probable` or `one-length`, M_n in `M_strand_kg_mol` |
+//! | `chains` | of chains of M_n `M_strand_kg_mol` cross-linked at random: `most-probable` or `one-length` |
 //! | `x` | cross-linked units per number-average chain |
 //! | `sol` | `removed` (extracted) or `present` (left in; also if empty) |
 //! | `kind` | `md` for simulated networks, whose `p` is known |
