@@ -7,10 +7,10 @@ pub use area::CrackArea;
 pub use crossing::{Convention, Crossing};
 
 use crate::bonds::BodyGeometry;
-use crate::calibrate::Space;
+use crate::calibrate::{Space, modulus};
 use crate::error::Error;
 use crate::material::{Driving, PointLaw, energy_at_strength};
-use crate::potential::{BondPotential, NetworkStretch, softened_energy};
+use crate::potential::{BondPotential, NetworkStretch, Softening};
 use crate::solver::{Bilinear, Criterion};
 use polycore::numerics::{bisect, bisected};
 use polycore::units::{EnergyPerArea, Stress};
@@ -34,9 +34,12 @@ pub struct Critical {
     /// Energy that the fracture energy of a bond law refers to; default: `tearing`; of an inclusion, that of
     /// the base material.
     pub convention: Option<Convention>,
-    /// Uniaxial tensile strength of a solid, force over the undeformed section, in addition to its fracture
-    /// energy: bonds soften.
+    /// Uniaxial tensile strength, force over the undeformed section, in addition to the fracture energy:
+    /// bonds soften. Of a solid, or of a `linear` law with `convention = "softening"`.
     pub strength: Option<Stress>,
+    /// Kink of the softening of a bond law with a strength: fraction of the strength, and of the opening at
+    /// which a crack is free; default: none. Concrete: [0.333, 0.222] (Petersson).
+    pub kink: Option<[f64; 2]>,
     /// Energy of a solid with branches that breaking has to release; default: `equilibrium`.
     pub driving: Option<Driving>,
 }
@@ -102,6 +105,8 @@ pub struct Context<'a> {
     pub crossing: Crossing,
     /// Default convention of a fracture energy.
     pub convention: Convention,
+    /// Softening of the convention of that name, see [`Critical::softening`].
+    pub softening: Softening,
 }
 
 /// Computes the energy density Y_c, J/m³, beyond which bonds of a solid with the fracture energy G, J/m²,
@@ -206,6 +211,42 @@ impl Critical {
         }
     }
 
+    /// Softening of bonds with a strength: λ₀ from [`Softening::uniaxial_strength`], e_f from the fracture
+    /// energy G = kθΦ_f Σ_J w V_J |ξ_e||ξ|, as for [`fracture_energy`]; default without one.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a strength at which bonds store more than the fracture energy, or without
+    /// one.
+    pub fn softening(&self, context: &Context) -> Result<Softening, Error> {
+        let Some(strength) = self.strength.map(|strength| strength.si()) else {
+            return Ok(Softening::default());
+        };
+        let fault = |allowed| Error::Parameter { name: "critical.strength", found: strength, allowed };
+        let soft = self.convention.unwrap_or(context.convention) == Convention::Softening;
+        let Some(energy) = self.fracture_energy.filter(|_| soft).map(|energy| energy.si()) else {
+            return Err(fault("none without a fracture energy by `softening`".to_owned()));
+        };
+        let space = if context.space == Space::Solid { Space::Solid } else { Space::PlaneStress };
+        let strain = strength * modulus(space, 1.0, context.horizon, context.thickness) / context.modulus;
+        let (mut ratio, mut softening) = (1.0, Softening::default());
+        for _ in 0..100 {
+            let rise = context.crossing.reach * context.modulus * context.law.energy(1.0 + strain / ratio);
+            if !(strength > 0.0 && energy > rise) {
+                return Err(fault(format!(
+                    "above 0, and less or with a finer spacing: at it bonds store {rise:.4e} of {energy:.4e} \
+                     J/m²"
+                )));
+            }
+            softening = Softening::of_linear(energy / rise, self.kink);
+            let next = softening.uniaxial_strength(space);
+            if (next - ratio).abs() < 1e-12 {
+                break;
+            }
+            ratio = next;
+        }
+        Ok(softening)
+    }
+
     /// Computes the critical bond stretch.
     ///
     /// # Errors
@@ -214,13 +255,6 @@ impl Critical {
     pub fn resolve(&self, context: &Context) -> Result<f64, Error> {
         let fault =
             |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.to_owned() });
-        if let Some(strength) = self.strength {
-            return fault(
-                "critical.strength",
-                strength.si(),
-                "only with `[material.solid]`: bond laws have no strength",
-            );
-        }
         match (self.percent_over_contour, self.stretch, self.fracture_energy) {
             (Some(factor), None, None) => match context.links {
                 Some(links) => {
@@ -259,7 +293,7 @@ impl Critical {
 /// zero load at this stretch.
 pub fn fracture_energy(context: &Context, convention: Convention, stretch: f64) -> f64 {
     let energy = match convention {
-        Convention::Softening => softened_energy(context.law, stretch, stretch),
+        Convention::Softening => context.softening.energy(context.law, stretch, stretch),
         _ => context.law.energy(stretch),
     } * context.modulus;
     match (convention, context.space) {
@@ -283,6 +317,8 @@ pub struct Toughness {
     pub bonds: f64,
     /// Bonds across a cut through the body.
     pub crossing: Crossing,
+    /// Softening, if that is the convention.
+    pub softening: Softening,
 }
 
 impl Toughness {
@@ -294,9 +330,16 @@ impl Toughness {
         let tearing = fracture_energy(context, tearing, stretch);
         let mut bonds = fracture_energy(context, Convention::Bonds, stretch);
         if soft {
-            bonds *= softened_energy(context.law, stretch, stretch) / context.law.energy(stretch);
+            bonds *= context.softening.energy(context.law, stretch, stretch) / context.law.energy(stretch);
         }
-        Self { convention: given, stretch, tearing, bonds, crossing: context.crossing }
+        Self {
+            convention: given,
+            stretch,
+            tearing,
+            bonds,
+            crossing: context.crossing,
+            softening: context.softening,
+        }
     }
 }
 
@@ -324,7 +367,6 @@ fn stretch_of_energy(context: &Context, convention: Convention, energy: f64) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::modulus;
     use crate::potential::Law;
 
     fn context<'a>(
@@ -336,7 +378,8 @@ mod tests {
     ) -> Context<'a> {
         let crossing = Crossing { reach: 2.0, short: 1.0, bonds: 28.0, loss: 1.4, whole: true };
         let convention = Convention::default();
-        Context { law, links: None, space, modulus, horizon, thickness, crossing, convention }
+        let softening = Softening::default();
+        Context { law, links: None, space, modulus, horizon, thickness, crossing, convention, softening }
     }
 
     /// Compares with formulation.md, table of the four examples, to its printed digits.

@@ -218,3 +218,28 @@ fn refused_files() {
     assert_eq!((table.rows[0].ratio, table.rows[1].line), (Some(1.1), 4));
     assert_eq!(table.unused, ["Name"]);
 }
+
+/// Long chains cross-linked at random: sol of x = 2 by the table of formulation-networks.md, both ways, for
+/// both distributions; rows that contradict themselves have reasons.
+#[test]
+fn chains_cross_linked_at_random() {
+    let text = "chains,x,w_sol,M_strand_kg_mol,f\nmost-probable,2,,100,\none-length,2,,100,\n\
+                most-probable,,0.134,100,\none-length,,0.203,100,\nmost-probable,0.4,,100,\n\
+                one-length,2,,100,4\none-length,,,100,\n,2,,100,4\n";
+    let table = from(text).unwrap();
+    let found = predict(&table, &PredictionSettings::default());
+    let network = |row: usize| &found[row].as_ref().unwrap().network;
+    for (row, sol) in [(0, 0.134), (1, 0.203)] {
+        assert!((network(row).sol.mass - sol).abs() < 5e-4, "{}", network(row).sol.mass);
+        assert!((network(row + 2).conversion[0] - 2.0).abs() < 0.01);
+    }
+    // ν per junction 0.883 and 0.444: the distribution decides
+    assert!((network(0).strands / network(1).strands / (0.883 / 0.444) - 1.0).abs() < 2e-3);
+    let reasons =
+        ["`x` = 0.4: no gel", "`f` = 4 beside `chains`", "neither `x` nor `w_sol`", "without `chains`"];
+    for (prediction, reason) in found[4..].iter().zip(reasons) {
+        let error = prediction.as_ref().unwrap_err();
+        assert!(error.contains(reason), "{error}\n{reason}");
+    }
+    assert!(from("chains,x,M_strand_kg_mol\nuniform,2,100\n").is_err());
+}

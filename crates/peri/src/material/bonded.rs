@@ -5,9 +5,7 @@ use super::{Bond, Family, LawCover, LawRange, Material, SolverMaterial};
 use crate::bonds::{BodyGeometry, Bonds, Overstretched, Property};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
-use crate::potential::{
-    BondPotential, EnergyTable, KernelFit, StretchRange, TangentTable, integrity, softened_energy,
-};
+use crate::potential::{BondPotential, EnergyTable, KernelFit, Softening, StretchRange, TangentTable};
 use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -25,19 +23,19 @@ const SAMPLES: u32 = 200;
 pub struct BondMaterial<'a> {
     law: Arc<dyn BondPotential + 'a>,
     modulus: f64,
-    /// λ_f of bonds that soften before they break.
-    end: Option<Property>,
+    /// Bonds that soften before they break, and their λ_f.
+    soft: Option<(Softening, Property)>,
 }
 
 impl<'a> BondMaterial<'a> {
     /// Creates the material of a law, or of a reference to one, in units of kθ = `modulus`, N/m⁶.
     pub fn new(law: impl BondPotential + 'a, modulus: f64) -> Self {
-        Self { law: Arc::new(law), modulus, end: None }
+        Self { law: Arc::new(law), modulus, soft: None }
     }
 
-    /// Makes bonds soften to zero load at a stretch λ_f, that of the weaker of their ends, see [`integrity`].
-    pub fn softening(self, end: Property) -> Self {
-        Self { end: Some(end), ..self }
+    /// Makes bonds soften to zero load at a stretch λ_f, that of the weaker of their ends.
+    pub fn softening(self, softening: Softening, end: Property) -> Self {
+        Self { soft: Some((softening, end)), ..self }
     }
 
     /// The law.
@@ -62,17 +60,19 @@ impl<const D: usize> Material<D> for BondMaterial<'_> {
     /// 2kθ t(λ) ζ/|ζ|, Eqs (2.6), (2.47).
     fn force(&self, bond: &Bond<D>, (): &(), (): &()) -> [f64; D] {
         let mut size = self.scale(bond) * self.law.tension_at_strain(bond.strain());
-        if let Some(end) = &self.end {
-            size *= integrity(bond.stretch(), end.weaker(bond.from, bond.to));
+        if let Some((softening, end)) = &self.soft {
+            size *= softening.integrity(bond.stretch(), end.weaker(bond.from, bond.to));
         }
         bond.direction().map(|x| size * x)
     }
 
     /// Σ_J kθ |ξ| φ w V_J, Eq. (2.39).
     fn energy(&self, family: &Family<D>, (): &()) -> f64 {
-        let energy = |bond: &Bond<D>| match &self.end {
+        let energy = |bond: &Bond<D>| match &self.soft {
             None => self.law.energy(bond.stretch()),
-            Some(end) => softened_energy(&*self.law, bond.stretch(), end.weaker(bond.from, bond.to)),
+            Some((softening, end)) => {
+                softening.energy(&*self.law, bond.stretch(), end.weaker(bond.from, bond.to))
+            }
         };
         self.modulus * family.sum(|bond| bond.weight * bond.length * energy(&bond))
     }
@@ -141,15 +141,15 @@ impl<const D: usize> SolverMaterial<D> for Kernels<'_> {
         }
         bonds.set_law(&fit, modulus);
         self.fitted = EnergyTable::of_fit(&fit, law.energy(1.0));
-        self.fit = self.material.end.is_some().then_some(fit);
+        self.fit = self.material.soft.is_some().then_some(fit);
         let tangent =
             |stretch: f64| law.tension_derivative(stretch).abs().max(law.tension(stretch).abs() / stretch);
         Ok(samples(cover.stretches).map(tangent).fold(0.0, f64::max) * modulus)
     }
 
     fn prepare(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
-        if let Some((end, fit)) = self.material.end.as_ref().zip(self.fit.as_ref()) {
-            self.lacking = SofteningLoss::new(&self.material, end, fit, bonds, displacement);
+        if let Some(((softening, end), fit)) = self.material.soft.as_ref().zip(self.fit.as_ref()) {
+            self.lacking = SofteningLoss::new(&self.material, (*softening, end), fit, bonds, displacement);
         }
     }
 
@@ -158,7 +158,7 @@ impl<const D: usize> SolverMaterial<D> for Kernels<'_> {
     }
 
     fn is_fitted_law(&self) -> bool {
-        self.material.end.is_none()
+        self.material.soft.is_none()
     }
 
     fn force(
@@ -170,7 +170,7 @@ impl<const D: usize> SolverMaterial<D> for Kernels<'_> {
         track: Option<&mut StretchRange>,
     ) {
         bonds.force(displacement, start, force, track);
-        if self.material.end.is_some() {
+        if self.material.soft.is_some() {
             self.lacking.add(start, force);
         }
     }
@@ -190,8 +190,9 @@ impl<const D: usize> SolverMaterial<D> for Kernels<'_> {
         };
         let lacking = self
             .material
-            .end
+            .soft
             .as_ref()
+            .map(|(softening, end)| (*softening, end))
             .map(|end| modulus * lacking_energy(&self.material, end, table, bonds, displacement));
         if let Some(sum) = bonds.energy_sum(displacement, table) {
             return modulus * sum + lacking.unwrap_or(0.0);
@@ -223,9 +224,9 @@ impl<const D: usize> SolverMaterial<D> for Kernels<'_> {
         let law = &*self.material.law;
         let energy = |bond: &Overstretched| {
             let stretch = (1.0 + bond.elongation).sqrt();
-            if let Some(end) = &self.material.end {
+            if let Some((softening, end)) = &self.material.soft {
                 let other = bonds.bond(bond.site as usize, bond.index).site;
-                let energy = softened_energy(law, stretch, end.weaker(bond.site as usize, other));
+                let energy = softening.energy(law, stretch, end.weaker(bond.site as usize, other));
                 return bonds.volume(bond.site as usize) * bond.weight * bond.length * energy;
             }
             let mut energy = law.energy(stretch.min(most));

@@ -4,7 +4,7 @@
 use super::{Bond, BondMaterial};
 use crate::bonds::{BondForces, Property};
 use crate::field::{CHUNK, Field, chunk_range};
-use crate::potential::{EnergyTable, KernelFit, integrity, onset, softened_energy};
+use crate::potential::{EnergyTable, KernelFit, Softening};
 use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
@@ -16,13 +16,13 @@ pub(super) struct SofteningLoss(Vec<Vec<(u32, [f64; 3])>>);
 /// Visits the bonds beyond the onset that a work item finds, with their stretch and λ_f; all items together
 /// find each bond from both ends.
 fn each<const D: usize>(
-    end: &Property,
+    (softening, end): (Softening, &Property),
     bonds: &dyn BondForces<D>,
     displacement: &Field<D>,
     chunk: usize,
     visit: &mut dyn FnMut(&Bond<D>, f64),
 ) {
-    let least = onset(end.least()).powi(2) - 1.0;
+    let least = softening.onset(end.least()).powi(2) - 1.0;
     let sites = chunk_range(chunk, bonds.sites());
     for [site, index] in bonds.suspects(displacement, sites, least * (1.0 - 1e-9) - 1e-12) {
         let bond = Bond::new(site as usize, &bonds.bond(site as usize, index), displacement);
@@ -34,17 +34,17 @@ impl SofteningLoss {
     /// Collects the losses of a displacement, with the fit of the kernels.
     pub fn new<const D: usize>(
         material: &BondMaterial,
-        end: &Property,
+        end: (Softening, &Property),
         fit: &KernelFit,
         bonds: &dyn BondForces<D>,
         displacement: &Field<D>,
     ) -> Self {
-        let (law, modulus) = (material.law(), material.modulus());
+        let (law, modulus, softening) = (material.law(), material.modulus(), end.0);
         let of = |chunk: usize| {
             let mut found: Vec<(u32, [f64; 3])> = Vec::new();
             each(end, bonds, displacement, chunk, &mut |bond, end| {
                 let stretch = bond.stretch();
-                let borne = integrity(stretch, end);
+                let borne = softening.integrity(stretch, end);
                 if borne < 1.0 {
                     let pull = borne * law.tension(stretch) / stretch - fit.value(bond.elongation());
                     let size = 2.0 * modulus * bond.weight / bond.length * pull;
@@ -78,18 +78,18 @@ impl SofteningLoss {
 /// Energy lost by softened bonds relative to `table`, over kθ.
 pub(super) fn lacking_energy<const D: usize>(
     material: &BondMaterial,
-    end: &Property,
+    end: (Softening, &Property),
     table: &EnergyTable,
     bonds: &dyn BondForces<D>,
     displacement: &Field<D>,
 ) -> f64 {
-    let law = material.law();
+    let (law, softening) = (material.law(), end.0);
     let of = |chunk: usize| {
         let mut sum = 0.0;
         each(end, bonds, displacement, chunk, &mut |bond, end| {
             let stretch = bond.stretch();
-            if integrity(stretch, end) < 1.0 {
-                let more = softened_energy(law, stretch, end) - table.value(bond.elongation());
+            if softening.integrity(stretch, end) < 1.0 {
+                let more = softening.energy(law, stretch, end) - table.value(bond.elongation());
                 sum += bonds.volume(bond.from) * bond.weight * bond.length * more;
             }
         });

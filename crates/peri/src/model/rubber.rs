@@ -6,7 +6,7 @@ use crate::calibrate::{Calibration, lattice_factor, modulus};
 use crate::critical::{Context, Convention, Critical, Crossing};
 use crate::error::Error;
 use crate::material::BondMaterial;
-use crate::potential::{BondPotential, Law, Scaled};
+use crate::potential::{BondPotential, Law, Scaled, Softening};
 use polycore::units::EnergyPerArea;
 use std::sync::Arc;
 
@@ -105,12 +105,27 @@ impl<const D: usize> IntoMaterial<D> for Rubber {
         let (space, horizon, thickness) = (body.space, bonds.horizon(), body.thickness);
         let modulus = modulus(space, found, horizon, thickness) * lattice_factor(self.calibration, bonds);
         let (crossing, convention) = (Crossing::new(bonds, None), Convention::default());
-        let context = Context { law: &*law, links, space, modulus, horizon, thickness, crossing, convention };
+        let softening = Softening::default();
+        let mut context = Context {
+            law: &*law,
+            links,
+            space,
+            modulus,
+            horizon,
+            thickness,
+            crossing,
+            convention,
+            softening,
+        };
+        if let Some(critical) = self.critical {
+            context.softening = critical.softening(&context)?;
+        }
+        let softening = context.softening;
         let critical = self.critical.map(|critical| critical.resolve(&context)).transpose()?;
         let material = BondMaterial::new(law, modulus);
         let soft = self.critical.and_then(|own| own.convention) == Some(Convention::Softening);
         match critical.filter(|_| soft) {
-            Some(end) => Ok((material.softening(end.into()), critical)),
+            Some(end) => Ok((material.softening(softening, end.into()), critical)),
             None => Ok((material, critical)),
         }
     }

@@ -15,7 +15,7 @@ pub use energy::{EnergyTable, TangentTable};
 pub use fit::KernelFit;
 pub use laws::{BondStretch, LinearBond, NetworkStretch, PublishedChain, Scaled, Shifted};
 pub use range::StretchRange;
-pub use softened::{DUCTILITY, integrity, onset, softened_energy};
+pub use softened::Softening;
 
 use crate::error::Error;
 use serde::Deserialize;

@@ -1,39 +1,106 @@
 //! Bonds that soften before they break, so that none breaks under load.
 
 use super::BondPotential;
+use crate::calibrate::Space;
 use crate::quadrature;
+use polycore::numerics::bisected;
+use std::f64::consts::FRAC_PI_2;
 
-/// λ_f − 1 over λ₀ − 1: bonds soften from λ₀ to zero load at λ_f. At 4 the crack of a strip runs at the
-/// energy of the bonds across it, to 2 % along an axis and at 45°, at m = 3 and 4; at 2 to 7 % (guide,
-/// theory/tearing.md).
-pub const DUCTILITY: f64 = 4.0;
+/// Directions between the axis of tension and the plane across it.
+const DIRECTIONS: u32 = 90;
+/// Largest uniform strain that is searched, over λ₀ − 1: at it all bonds that can soften have done so.
+const WIDEST: f64 = 20.0;
 
-/// d, the fraction of the law's tension that a bond carries: 1 up to λ₀, then (e_f − e)/[e(e_f − 1)] with e =
-/// (λ − 1)/(λ₀ − 1), 0 beyond `end` = λ_f. For a linear law d t is bilinear in λ. It depends on the present
-/// stretch: bonds unloaded before λ_f recover.
-pub fn integrity(stretch: f64, end: f64) -> f64 {
-    let e = DUCTILITY * (stretch - 1.0) / (end - 1.0);
-    if e <= 1.0 {
-        1.0
-    } else if e < DUCTILITY {
-        (DUCTILITY - e) / (e * (DUCTILITY - 1.0))
-    } else {
-        0.0
+/// Fall of a bond's tension between λ₀ and λ_f.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Softening {
+    /// e_f: λ_f − 1 over λ₀ − 1.
+    pub ductility: f64,
+    /// Kink of the fall: fraction of the tension at λ₀, and place between λ₀ (0) and λ_f (1); `None`:
+    /// straight.
+    pub kink: Option<[f64; 2]>,
+}
+
+/// e_f = 4, straight: the crack of a strip runs at the energy of the bonds across it, to 2 % along an axis
+/// and at 45°, at m = 3 and 4; at 2 to 7 % (guide, theory/fracture.md).
+impl Default for Softening {
+    fn default() -> Self {
+        Self { ductility: 4.0, kink: None }
     }
 }
 
-/// Stretch λ₀ at which bonds begin to soften.
-pub fn onset(end: f64) -> f64 {
-    1.0 + (end - 1.0) / DUCTILITY
-}
-
-/// Energy ∫₁^λ d t dλ/kθ of such a bond.
-pub fn softened_energy(law: &dyn BondPotential, stretch: f64, end: f64) -> f64 {
-    let start = onset(end);
-    if stretch <= start {
-        return law.energy(stretch);
+impl Softening {
+    /// e_f of a linear bond whose energy ∫₁^λf d t dλ is `energy` times that up to λ₀, with the kink (β, x):
+    /// 1 + (`energy` − 1)/(β + x), β + x = 1 without one.
+    pub fn of_linear(energy: f64, kink: Option<[f64; 2]>) -> Self {
+        let area = kink.map_or(1.0, |[tension, place]| tension + place);
+        Self { ductility: 1.0 + (energy - 1.0) / area, kink }
     }
-    let last = stretch.min(end);
-    let more = quadrature::mean(start, last, |stretch| integrity(stretch, end) * law.tension(stretch));
-    law.energy(start) + (last - start) * more
+
+    /// d, the fraction of the law's tension that a bond carries: 1 up to λ₀, then f(e)/e, 0 beyond λ_f =
+    /// `end`, with e = (λ − 1)/(λ₀ − 1) and f falling from 1 to 0 at e_f, straight or with a kink. For a
+    /// linear law d t is bilinear or trilinear in λ. It depends on the present stretch: bonds unloaded
+    /// before λ_f recover.
+    pub fn integrity(&self, stretch: f64, end: f64) -> f64 {
+        let last = self.ductility;
+        let e = last * (stretch - 1.0) / (end - 1.0);
+        if e <= 1.0 {
+            return 1.0;
+        } else if e >= last {
+            return 0.0;
+        }
+        let Some([tension, place]) = self.kink else {
+            return (last - e) / (e * (last - 1.0));
+        };
+        let way = (e - 1.0) / (last - 1.0);
+        let fall = if way < place {
+            1.0 - (1.0 - tension) * way / place
+        } else {
+            tension * (1.0 - way) / (1.0 - place)
+        };
+        fall / e
+    }
+
+    /// Uniaxial strength of a body of linear bonds in all directions, over E(λ₀ − 1): greatest σ(ε) of
+    /// uniform small strains with free sides. Above 1, as bonds at an angle soften later than those along
+    /// the axis.
+    pub fn uniaxial_strength(&self, space: Space) -> f64 {
+        let solid = space == Space::Solid;
+        let axes: Vec<[f64; 3]> = (0..DIRECTIONS)
+            .map(|k| (f64::from(k) + 0.5) / f64::from(DIRECTIONS) * FRAC_PI_2)
+            .map(|angle| [angle.cos().powi(2), angle.sin().powi(2), if solid { angle.sin() } else { 1.0 }])
+            .collect();
+        let force = |e: f64| e * self.integrity(1.0 + e, 1.0 + self.ductility);
+        let stress = |strain: f64, side: f64, part: usize| -> f64 {
+            axes.iter().map(|n| n[2] * n[part] * force(strain * n[0] + side * n[1])).sum()
+        };
+        let uniaxial = |strain: f64| {
+            let side = bisected(-strain, 0.0, 50, |side| stress(strain, side, 1) < 0.0);
+            stress(strain, side, 0)
+        };
+        let most = WIDEST.min(self.ductility);
+        let strains = (0..=100).map(|k| most.powf(f64::from(k) / 100.0));
+        strains.map(uniaxial).fold(0.0, f64::max) / uniaxial(1.0)
+    }
+
+    /// Stretch λ₀ at which bonds begin to soften.
+    pub fn onset(&self, end: f64) -> f64 {
+        1.0 + (end - 1.0) / self.ductility
+    }
+
+    /// Energy ∫₁^λ d t dλ/kθ of such a bond.
+    pub fn energy(&self, law: &dyn BondPotential, stretch: f64, end: f64) -> f64 {
+        let start = self.onset(end);
+        if stretch <= start {
+            return law.energy(stretch);
+        }
+        let bend = self.kink.map_or(end, |[_, place]| start + place * (end - start));
+        let part = |from: f64, to: f64| {
+            let tension = |stretch| self.integrity(stretch, end) * law.tension(stretch);
+            (to - from) * quadrature::mean(from, to, tension)
+        };
+        let last = stretch.min(end);
+        let first = law.energy(start) + part(start, last.min(bend));
+        if last > bend { first + part(bend, last) } else { first }
+    }
 }

@@ -11,6 +11,6 @@ mod section;
 pub use crack::{CrackTip, JIntegral};
 pub use evaluator::{AnySolid, StressEvaluator};
 pub use line::LineSampler;
-pub use motion::{WaveFront, mean_displacement, rotation, strain};
+pub use motion::{WaveFront, mark_distances, mean_displacement, rotation};
 pub use path::{crossing, envelope, first_swing, load_at, unwrapped};
 pub use section::Section;

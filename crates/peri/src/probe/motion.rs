@@ -25,8 +25,12 @@ pub fn rotation<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>, sites: &
     cross.atan2(dot)
 }
 
-/// Distance between the centres of two marks over that at rest, minus 1.
-pub fn strain<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>, marks: &[Vec<u32>; 2]) -> f64 {
+/// Distances between the centres of two marks, m: at rest, and now.
+pub fn mark_distances<const D: usize>(
+    bonds: &dyn Bonds<D>,
+    state: &State<D>,
+    marks: &[Vec<u32>; 2],
+) -> [f64; 2] {
     let mean = |sites: &[u32], moved: bool| -> [f64; D] {
         let mut sum = [0.0; D];
         for &site in sites {
@@ -41,7 +45,7 @@ pub fn strain<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>, marks: &[V
         let (from, to) = (mean(&marks[0], moved), mean(&marks[1], moved));
         (0..D).map(|d| (to[d] - from[d]).powi(2)).sum::<f64>().sqrt()
     };
-    length(true) / length(false) - 1.0
+    [length(false), length(true)]
 }
 
 /// Front of a wave that runs along an axis: the position where the largest velocity of a plane of particles

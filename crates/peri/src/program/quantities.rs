@@ -117,6 +117,8 @@ harness::quantities! {
         gauges";
     PROBE_ACROSS = "{probe}_across", "m", "of a crack: largest distance of its tip from 0 across its axis, \
         between the gauges if there are any";
+    PROBE_LOAD_AT = "{probe}_load_at_{opening}mm", "N", "of an opening: load at this value, if the run \
+        reaches it";
     SECTION_FORCE = "{section}_force_{axis}", "N", "force along an axis that bonds across a section exert on \
         the part of the body behind it at the end";
     SECTION_MOMENT = "{section}_moment_{axis}", "N m", "moment of the forces across a section about its \
@@ -191,7 +193,16 @@ pub const INTEGRALS: [Quantity; 8] = [
 
 /// Names the load at a displacement, m.
 pub fn load_at(displacement: f64) -> Named {
-    LOAD_AT.named(&[&((displacement * 1e9).round() / 1e6).to_string()])
+    LOAD_AT.named(&[&millimetres(displacement)])
+}
+
+/// Names the load at an opening, m, of a probe.
+pub fn probe_load_at(probe: &str, opening: f64) -> Named {
+    PROBE_LOAD_AT.named(&[probe, &millimetres(opening)])
+}
+
+fn millimetres(length: f64) -> String {
+    ((length * 1e9).round() / 1e6).to_string()
 }
 
 /// All scalars.

@@ -12,10 +12,10 @@ use peri::critical::{Context, Convention, CrackArea, Critical, Crossing, fractur
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
 use peri::material::{BondMaterial, Material};
-use peri::potential::{BondPotential, DUCTILITY, Law, StretchRange, integrity, onset, softened_energy};
+use peri::potential::{BondPotential, Law, Softening, StretchRange};
 use peri::program::run::explanation;
 use peri::program::scene::Scene;
-use polycore::units::EnergyPerArea;
+use polycore::units::{EnergyPerArea, Stress};
 use std::f64::consts::PI;
 use std::path::Path;
 
@@ -97,6 +97,7 @@ fn context<'a>(law: &'a dyn BondPotential, bonds: &LatticeBonds<2>, youngs: f64)
         thickness,
         crossing: Crossing::new::<2>(bonds, None),
         convention: Convention::default(),
+        softening: Softening::default(),
     }
 }
 
@@ -118,7 +119,8 @@ fn critical_stretches_of_the_conventions() {
     let ratio = (stretch(Convention::Bonds) - 1.0) / (stretch(Convention::Tearing) - 1.0);
     near("tearing_stretch_ratio", ratio / c.sqrt(), 1.0, 1e-6);
     let end = stretch(Convention::Softening);
-    let brittle = 1.5 * (onset(end) - 1.0).powi(2) * DUCTILITY;
+    let soft = Softening::default();
+    let brittle = 1.5 * (soft.onset(end) - 1.0).powi(2) * soft.ductility;
     near("softening_stretch", context.crossing.reach * context.modulus * brittle / 80.0, 1.0, 1e-9);
     near("softening_energy", fracture_energy(&context, Convention::Softening, end) / 80.0, 1.0, 1e-9);
 }
@@ -142,15 +144,57 @@ fn bonds_are_what_they_were() {
 /// up to λ₀.
 #[test]
 fn softened_bonds() {
-    let law = Law::ChainOffset.build(50.0, 1200.0, false).unwrap();
     let end = 1.8;
-    for stretch in [0.9, 1.1, onset(end) - 1e-3, 1.3, 1.5, 1.79, 1.9] {
-        let slope = (softened_energy(&*law, stretch + 1e-5, end)
-            - softened_energy(&*law, stretch - 1e-5, end))
-            / 2e-5;
-        near("softened_tension", slope, integrity(stretch, end) * law.tension(stretch), 1e-6);
+    let kinked = Softening { ductility: 9.0, kink: Some([1.0 / 3.0, 2.0 / 9.0]) };
+    for (law, soft) in [(Law::ChainOffset, Softening::default()), (Law::Linear, kinked)] {
+        let law = law.build(if law.is_chain() { 50.0 } else { 0.0 }, 1200.0, false).unwrap();
+        let onset = soft.onset(end);
+        for stretch in [0.9, 1.05, onset - 1e-3, 1.2, 1.3, 1.5, 1.79, 1.9] {
+            let energy = |stretch| soft.energy(&*law, stretch, end);
+            let slope = (energy(stretch + 1e-5) - energy(stretch - 1e-5)) / 2e-5;
+            near("softened_tension", slope, soft.integrity(stretch, end) * law.tension(stretch), 1e-6);
+        }
+        assert_eq!([soft.integrity(onset - 1e-12, end), soft.integrity(end, end)], [1.0, 0.0]);
     }
-    assert_eq!([integrity(onset(end) - 1e-12, end), integrity(end, end)], [1.0, 0.0]);
+}
+
+/// With a strength a linear law softens from 1 + strength/(R E) on, and its energy across a cut is the
+/// fracture energy, straight and with a kink; a strength whose bonds store more is refused. R by an
+/// integration over 4000 directions in Python.
+#[test]
+fn strengths_of_bonds() {
+    let law = Law::Linear.build(0.0, 0.0, false).unwrap();
+    let bonds = sheet(3.015, VolumeCorrection::None);
+    let energy = Some(EnergyPerArea::from_si(80.0));
+    for kink in [None, Some([1.0 / 3.0, 2.0 / 9.0])] {
+        let strength = |strength| Critical {
+            fracture_energy: energy,
+            convention: Some(Convention::Softening),
+            strength: Some(Stress::from_si(strength)),
+            kink,
+            ..Critical::default()
+        };
+        let mut context = context(&*law, &bonds, 2e6);
+        let critical = strength(2e3);
+        context.softening = critical.softening(&context).unwrap();
+        let end = critical.resolve(&context).unwrap();
+        let ratio = context.softening.uniaxial_strength(Space::PlaneStress);
+        near("strength_onset", (context.softening.onset(end) - 1.0) * 1e3 * ratio, 1.0, 1e-9);
+        near("strength_energy", fracture_energy(&context, Convention::Softening, end) / 80.0, 1.0, 1e-9);
+        assert!(strength(2e5).softening(&context).is_err());
+    }
+    let trilinear = Some([0.25, 0.107_142_857]);
+    for (ductility, kink, space, expected) in [
+        (2.0, None, Space::PlaneStress, 1.034_59),
+        (10.0, None, Space::PlaneStress, 1.182_78),
+        (100.0, None, Space::PlaneStress, 1.349_83),
+        (10.0, trilinear, Space::PlaneStress, 1.045_52),
+        (100.0, trilinear, Space::PlaneStress, 1.219_32),
+        (10.0, None, Space::Solid, 1.444_93),
+    ] {
+        let found = Softening { ductility, kink }.uniaxial_strength(space);
+        near("uniaxial_strength", found / expected, 1.0, 2e-3);
+    }
 }
 
 /// Forces of a body with softening bonds are slopes of its energy, in the kernels of a lattice and of a
@@ -164,7 +208,7 @@ fn forces_of_soft_bonds_are_slopes() {
         CloudBonds::new(&points, &vec![0.5; points.len()], 0.5, 3.015, VolumeCorrection::None, &[]).unwrap();
     for mut bonds in [Box::new(lattice) as Box<dyn Bonds<2>>, Box::new(cloud)] {
         let law = Law::Linear.build(0.0, 0.0, false).unwrap();
-        let material = BondMaterial::new(law, 2.0).softening(1.06.into());
+        let material = BondMaterial::new(law, 2.0).softening(Softening::default(), 1.06.into());
         let mut response = material.respond(&*bonds);
         let mut displacement = Field::<2>::zeros(bonds.sites());
         let sites: Vec<usize> = bonds.particles().iter().map(|&site| site as usize).collect();

@@ -4,8 +4,8 @@
 //! a row leaves open, with the reason. No number is fitted to a measured modulus.
 
 use super::table::{Composition, CompositionTable};
-use super::{EndLinked, Error, KnownPolymer, LOOP_FACTOR, LinkerMix, Melt, PolymerNetwork, Reacted};
-use super::{KNOWN_POLYMERS, known_polymer};
+use super::{EndLinked, Error, KnownPolymer, LOOP_FACTOR, LinkerMix, Melt, PolymerNetwork, PrimaryChains};
+use super::{KNOWN_POLYMERS, Reacted, Vulcanized, known_polymer};
 
 /// Entanglement modulus of the bead model of the simulated PDMS networks, Pa (94.79 mol/m³ RT,
 /// doi:10.1021/acspolymersau.5c00036).
@@ -108,6 +108,12 @@ impl PredictionSettings {
     /// # Errors
     /// Missing values of the row; as [`EndLinked::network`].
     pub fn predict(&self, row: &Composition) -> Result<NetworkPrediction, String> {
+        if let Some(chains) = row.primary_chains {
+            return self.at_random(row, chains);
+        }
+        if let Some(units) = row.units {
+            return Err(format!("`x` = {units} without `chains`: the distribution of the chains decides"));
+        }
         let given = |name: &str, value: Option<f64>| value.ok_or_else(|| format!("`{name}` is not given"));
         let functionality = given("f", row.functionality)?;
         let ratio = given("r", row.ratio)?;
@@ -134,6 +140,30 @@ impl PredictionSettings {
             .linker_mass(row.linker_mass.unwrap_or(0.0))
             .ends(ends.0, ends.1)
             .loop_factor(self.loop_factor);
+        let network = self.melt(row).and_then(|melt| recipe.network(&melt));
+        Ok(NetworkPrediction { network: network.map_err(|error| with_column(&error, row))?, origin })
+    }
+
+    /// Predicts long chains that are cross-linked at random: a measured sol fraction counts before `x`,
+    /// unless the given value is asked for.
+    fn at_random(&self, row: &Composition, chains: PrimaryChains) -> Result<NetworkPrediction, String> {
+        for (name, value) in
+            [("f", row.functionality), ("r", row.ratio), ("p", row.conversion), ("b1", row.ends_share)]
+        {
+            if let Some(value) = value {
+                return Err(format!("`{name}` = {value} beside `chains`: of end-linked networks only"));
+            }
+        }
+        let mass = row.strand_mass.ok_or("`M_strand_kg_mol` is not given")?;
+        let sol = row.sol.filter(|_| row.units.is_none() || self.conversion != ConversionSource::Given);
+        let (recipe, origin) = match (row.units, sol) {
+            (_, Some(sol)) => (
+                Vulcanized::with_sol(chains, mass, sol).map_err(|error| with_column(&error, row))?,
+                "x from w_sol, without loops: a lower bound",
+            ),
+            (Some(units), None) => (Vulcanized::new(chains, mass, units), "x"),
+            (None, None) => return Err("neither `x` nor `w_sol` is given".to_owned()),
+        };
         let network = self.melt(row).and_then(|melt| recipe.network(&melt));
         Ok(NetworkPrediction { network: network.map_err(|error| with_column(&error, row))?, origin })
     }
@@ -170,6 +200,7 @@ impl PredictionSettings {
 fn with_column(error: &Error, row: &Composition) -> String {
     let (column, value) = match error {
         Error::TooManyReacted { .. } => ("p", row.conversion),
+        Error::NoGel { .. } if row.units.is_some() => ("x", row.units),
         Error::NoGel { .. } if row.conversion.is_some() => ("p", row.conversion),
         Error::NoGel { .. } | Error::TooLittleSol { .. } => ("w_sol", row.sol),
         Error::TooShort { .. } => ("M_strand_kg_mol", row.strand_mass),

@@ -1,7 +1,7 @@
 //! Tables of compositions: one network a row, measured or to be predicted.
 //!
 //! Columns, by name, in any order; further columns are kept and not used. Only the first three must be
-//! there, and cells may be empty.
+//! there (the third alone beside `chains`), and cells may be empty.
 //!
 //! | column | content |
 //! |---|---|
@@ -12,6 +12,8 @@
 //! | `M_mono_kg_mol`, `b1` | molar mass of chains with one group, and their share of the chains' groups |
 //! | `p` | conversion of the groups of the cross-linkers; 1: all groups in deficit |
 //! | `w_sol` | measured sol fraction |
+//! | `chains` | of chains of M_n `M_strand_kg_mol` cross-linked at random: `most-probable` or `one-length` |
+//! | `x` | cross-linked units per number-average chain |
 //! | `sol` | `removed` (extracted) or `present` (left in; also if empty) |
 //! | `kind` | `md` for simulated networks, whose `p` is known |
 //! | `source` | author, by which the summary is sorted |
@@ -20,11 +22,11 @@
 
 use std::path::Path;
 
-use super::{KnownPolymer, known_polymer};
+use super::{KnownPolymer, PrimaryChains, known_polymer};
 use crate::table::{Error, Table};
 
 /// Columns that are read.
-const COLUMNS: [&str; 13] = [
+const COLUMNS: [&str; 15] = [
     "source",
     "kind",
     "sol",
@@ -37,6 +39,8 @@ const COLUMNS: [&str; 13] = [
     "b1",
     "p",
     "w_sol",
+    "chains",
+    "x",
     "G_MPa",
 ];
 
@@ -69,6 +73,10 @@ pub struct Composition {
     pub conversion: Option<f64>,
     /// Measured sol fraction.
     pub sol: Option<f64>,
+    /// Distribution of long chains that are cross-linked at random.
+    pub primary_chains: Option<PrimaryChains>,
+    /// Cross-linked units per such chain.
+    pub units: Option<f64>,
     /// Measured shear modulus, Pa.
     pub modulus: Option<f64>,
     /// Texts of all cells.
@@ -121,7 +129,8 @@ impl CompositionTable {
             ("r", "groups of the cross-linkers per group of the chains"),
             ("M_strand_kg_mol", "molar mass of the strands, kg/mol"),
         ] {
-            if table.find(name).is_none() {
+            let at_random = name != "M_strand_kg_mol" && table.find("chains").is_some();
+            if table.find(name).is_none() && !at_random {
                 return Err(table.refuse_headings(format!("a column `{name}`: {what}")));
             }
         }
@@ -163,6 +172,14 @@ impl Composition {
         };
         let sol = [("", false), ("present", false), ("removed", true), ("left", false), ("extracted", true)];
         let kind = [("", false), ("exp", false), ("md", true), ("measured", false), ("simulated", true)];
+        let primary_chains = match (text("chains"), table.find("chains")) {
+            ("most-probable", _) => Some(PrimaryChains::MostProbable),
+            ("one-length", _) => Some(PrimaryChains::OneLength),
+            (found, Some(column)) if !found.is_empty() => {
+                return Err(table.refuse_cell(row, column, "`most-probable` or `one-length`"));
+            }
+            _ => None,
+        };
         let polymer = match text("polymer") {
             "" => None,
             name => Some(known_polymer(name).map_err(|error| {
@@ -183,6 +200,8 @@ impl Composition {
             ends_share: number("b1", &SHARE)?,
             conversion: number("p", &CONVERSION)?,
             sol: number("w_sol", &SHARE)?,
+            primary_chains,
+            units: number("x", &POSITIVE)?,
             modulus: number("G_MPa", &POSITIVE)?.map(|modulus| modulus * 1e6),
             cells: (0..table.headings.len()).map(|column| table.text(row, column).to_owned()).collect(),
         })

@@ -8,7 +8,7 @@ use crate::critical::{Context, CrackArea, Critical, Crossing, Toughness};
 use crate::error::Error;
 use crate::exact::Plate;
 use crate::material::{BondMaterial, Material, NonlocalSolid, Prestrained, SolverMaterial, relief};
-use crate::potential::BondPotential;
+use crate::potential::{BondPotential, Softening};
 use crate::probe::{AnySolid, LineSampler, StressEvaluator};
 use crate::program::scene::{
     self, DiscreteBody, Inclusions, ParameterField, Scene, SceneVariant, SurfaceCorrection,
@@ -131,12 +131,16 @@ impl<const D: usize> BodyWithMaterial<D> {
         let context = |stiffness: f64, crossing: Crossing| {
             let (links, modulus) = (spec.links, stiffness * modulus);
             let convention = spec.critical.and_then(|critical| critical.convention).unwrap_or_default();
-            Context { law: &*law, links, space, modulus, horizon, thickness, crossing, convention }
+            let softening = Softening::default();
+            Context { law: &*law, links, space, modulus, horizon, thickness, crossing, convention, softening }
         };
         let (mut criterion, mut toughness): (Option<Criterion>, _) = (None, None);
+        let mut softening = Softening::default();
         if let Some((critical, crossing)) = spec.critical.zip(crossing) {
-            let rest = context(1.0, crossing);
+            let mut rest = context(1.0, crossing);
+            rest.softening = critical.softening(&rest).map_err(fault)?;
             let stretch = critical.resolve(&rest).map_err(fault)?;
+            softening = rest.softening;
             toughness = Some(Toughness::new(&critical, &rest, stretch));
             let own = |critical: Critical, stiffness| critical.resolve(&context(stiffness, crossing));
             criterion = Some(inclusions.critical_stretch(source, &*body.bonds, stretch, &own)?.into());
@@ -145,7 +149,7 @@ impl<const D: usize> BodyWithMaterial<D> {
         if scene.softens()
             && let Some(Criterion::Stretch(end)) = &criterion
         {
-            bonded = bonded.softening(end.clone());
+            bonded = bonded.softening(softening, end.clone());
         }
         let material = match inclusions.prestrain {
             Some(strain) => {

@@ -2,7 +2,7 @@
 
 use super::moment::Moment;
 use super::rows::width;
-use crate::probe::{crossing, first_swing, unwrapped};
+use crate::probe::{crossing, first_swing, load_at, unwrapped};
 use crate::program::quantities as q;
 use crate::program::scene::{HistoryProbe, Scene, Track};
 use harness::observe::Scalars;
@@ -62,6 +62,11 @@ pub(super) fn probe_scalars<const D: usize>(
         add(q::PROBE_BACKSTEP, &|rows| {
             Some(between(rows)?.windows(2).map(|pair| pair[0] - pair[1]).fold(0.0, f64::max))
         });
+    }
+    for at in probe.load_at.iter().map(|at| at.si()) {
+        let path =
+            |m: &Moment<D>| load_at(m.state.history.iter().map(|row| [row.seen[column], row.load]), at);
+        to.add_if(q::probe_load_at(&probe.name, at), path);
     }
     if probe.track == Track::Crack {
         let [from, until] = gauges.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);

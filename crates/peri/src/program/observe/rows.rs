@@ -2,7 +2,7 @@
 
 use crate::bonds::Bonds;
 use crate::probe::{
-    CrackTip, JIntegral, Section, StressEvaluator, WaveFront, mean_displacement, rotation, strain,
+    CrackTip, JIntegral, Section, StressEvaluator, WaveFront, mark_distances, mean_displacement, rotation,
 };
 use crate::program::quantities as q;
 use crate::program::scene::{DiscreteBody, HistoryProbe, Scene, Track};
@@ -66,7 +66,17 @@ fn probe<const D: usize>(
         }
         Track::Strain => {
             let marks = spec.marks(source, key, body)?;
-            Box::new(move |bonds, state, _| vec![strain(bonds, state, &marks)])
+            Box::new(move |bonds, state, _| {
+                let [rest, present] = mark_distances(bonds, state, &marks);
+                vec![present / rest - 1.0]
+            })
+        }
+        Track::Opening => {
+            let marks = spec.marks(source, key, body)?;
+            Box::new(move |bonds, state, _| {
+                let [rest, present] = mark_distances(bonds, state, &marks);
+                vec![present - rest]
+            })
         }
         Track::Crack => {
             let tip = CrackTip {

@@ -3,7 +3,7 @@
 use super::outcome::VariantOutcome;
 use crate::probe::envelope;
 use crate::program::observe::{damped_energy, has_times};
-use crate::program::scene::Scene;
+use crate::program::scene::{Scene, Track};
 use crate::solver::{BreakingEvent, StepRecord};
 use harness::output::csv;
 use harness::output::picture::{LegendPlace, LinePlot, Series};
@@ -163,6 +163,32 @@ fn draw_peaks(outcomes: &[VariantOutcome], output: &Path) -> Result<(), Error> {
     if any { plot.write(output.join("peak_load.png")) } else { Ok(()) }
 }
 
+/// Draws the load over each opening, beside the measured band.
+fn draw_openings(scene: &Scene, several: &[&VariantOutcome], output: &Path) -> Result<(), Error> {
+    for probe in scene.probe.iter().filter(|probe| probe.track == Track::Opening) {
+        let mut plot = LinePlot::new(if scene.title.is_empty() { "Load" } else { &scene.title })
+            .size(900.0, 560.0)
+            .axes("opening (mm)", "load (N)");
+        let at: Vec<f64> = probe.measured.iter().map(|row| row.0.si() * 1e3).collect();
+        let bounds: [Vec<f64>; 2] =
+            probe.measured.iter().map(|row| (row.1.si(), row.2.si())).unzip::<_, _, Vec<_>, Vec<_>>().into();
+        for (name, loads) in ["measured, lowest", "measured, highest"].iter().zip(&bounds) {
+            if !loads.is_empty() {
+                plot = plot.series(Series::reference(name, &at, loads));
+            }
+        }
+        for outcome in several {
+            let columns = outcome.columns();
+            if let Some(opening) = columns.iter().find(|column| column.0 == probe.name) {
+                let x: Vec<f64> = opening.2.iter().map(|value| value * 1e3).collect();
+                plot = plot.series(Series::line(&outcome.name, &x, &columns[1].2));
+            }
+        }
+        plot.write(output.join(format!("load_{}.png", probe.name)))?;
+    }
+    Ok(())
+}
+
 /// Writes the tables of every variant, a plot of all loads, and a plot of energies for each variant with
 /// broken bonds.
 pub fn write(scene: &Scene, outcomes: &[VariantOutcome], output: &Path) -> Result<(), Error> {
@@ -220,6 +246,7 @@ pub fn write(scene: &Scene, outcomes: &[VariantOutcome], output: &Path) -> Resul
         plot.write(output.join("load_displacement.png"))?;
     }
     draw_peaks(outcomes, output)?;
+    draw_openings(scene, &several, output)?;
     for outcome in several.iter().filter(|o| o.history.iter().any(|r| r.broken > 0)) {
         let columns = outcome.columns();
         // a body in motion keeps moving after its loads stop

@@ -283,10 +283,6 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         }
     }
     if let Some(critical) = &material.critical {
-        if critical.strength.is_some() {
-            let why = "bond laws have no strength; [material.solid] has";
-            return Err(source.unexpected("material.critical.strength", why));
-        }
         let given = critical.alternatives();
         if given.len() != 1 {
             let found = given.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" and ");

@@ -4,7 +4,8 @@ use super::values::plain;
 use super::{Material, SolidKind};
 use harness::scene::{SceneError, Source};
 use polycore::network::{
-    EndLinked, Error, KnownPolymer, KuhnChain, LinkerMix, Melt, PolymerNetwork, Reacted, known_polymer,
+    EndLinked, Error, KnownPolymer, KuhnChain, LinkerMix, Melt, PolymerNetwork, PrimaryChains, Reacted,
+    Vulcanized, known_polymer,
 };
 use polycore::units::{
     Density, EnergyPerArea, Length, MolarEnergy, MolarMass, Quantity, Stress, Temperature,
@@ -14,8 +15,18 @@ use serde::Deserialize;
 /// Key of the block.
 const KEY: &str = "material.network";
 
-/// End-linked network whose chemistry gives `youngs_modulus` and `links` of a bond law, or `shear_modulus`
-/// and `links` of an `eight-chain` solid.
+/// Distribution of the lengths of long chains that are cross-linked at random.
+#[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ChainsSpec {
+    /// Flory's most probable distribution, M_w = 2 M_n.
+    MostProbable,
+    /// One length.
+    OneLength,
+}
+
+/// Network, end-linked or vulcanized, whose chemistry gives `youngs_modulus` and `links` of a bond law, or
+/// `shear_modulus` and `links` of an `eight-chain` solid.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ChemistrySpec {
@@ -28,12 +39,17 @@ pub struct ChemistrySpec {
     pub kuhn_mass: Option<MolarMass>,
     /// Molar mass per backbone bond M_b.
     pub bond_mass: Option<MolarMass>,
-    /// Molar mass of the strands, number average.
+    /// Long chains cross-linked at random, in place of strands linked at their ends: their distribution.
+    pub primary_chains: Option<ChainsSpec>,
+    /// Cross-linked units per number-average chain, with `primary_chains`.
+    pub units: Option<f64>,
+    /// Molar mass of the strands, or of the `primary_chains`, number average.
     pub strand_mass: MolarMass,
     /// Molar mass of the cross-linkers; default: none.
     pub linker_mass: Option<MolarMass>,
-    /// Functionality of the cross-linkers; a mean is made of the two whole numbers beside it.
-    pub functionality: f64,
+    /// Functionality of the cross-linkers; a mean is made of the two whole numbers beside it; not with
+    /// `primary_chains`.
+    pub functionality: Option<f64>,
     /// Groups of the cross-linkers per group of the chains; default: 1.
     pub ratio: Option<f64>,
     /// Conversion of the groups of the cross-linkers.
@@ -69,6 +85,15 @@ impl ChemistrySpec {
             Some(name) => Some(known_polymer(name).map_err(|error| source.refused(&key("polymer"), error))?),
             None => None,
         };
+        if let Some(chains) = self.primary_chains {
+            return self.vulcanized(source, chains, &self.melt(source, known)?);
+        }
+        if self.units.is_some() {
+            return Err(source.unexpected(&key("units"), "needs `primary_chains` beside it"));
+        }
+        let Some(functionality) = self.functionality else {
+            return Err(source.missing(&key("functionality"), "needed without `primary_chains`"));
+        };
         let reacted = match (self.conversion, self.sol_fraction) {
             (Some(_), Some(_)) => {
                 let why = "one follows from the other";
@@ -81,8 +106,8 @@ impl ChemistrySpec {
                 return Err(source.missing(&key("conversion"), why));
             }
         };
-        let linkers = LinkerMix::mean(self.functionality)
-            .map_err(|error| source.refused(&key("functionality"), error))?;
+        let linkers =
+            LinkerMix::mean(functionality).map_err(|error| source.refused(&key("functionality"), error))?;
         let recipe = EndLinked::new(1, self.strand_mass.si(), reacted)
             .linkers(linkers)
             .ratio(self.ratio.unwrap_or(1.0))
@@ -103,6 +128,45 @@ impl ChemistrySpec {
             };
             source.refused(&key(field), error)
         })
+    }
+
+    /// Computes the network of long chains that are cross-linked at random.
+    fn vulcanized(
+        &self,
+        source: &Source,
+        chains: ChainsSpec,
+        melt: &Melt,
+    ) -> Result<PolymerNetwork, SceneError> {
+        let key = |field: &str| format!("{KEY}.{field}");
+        for (field, given) in [
+            ("functionality", self.functionality.is_some()),
+            ("ratio", self.ratio.is_some()),
+            ("conversion", self.conversion.is_some()),
+            ("linker_mass", self.linker_mass.is_some()),
+            ("monofunctional_share", self.monofunctional_share.is_some()),
+            ("monofunctional_mass", self.monofunctional_mass.is_some()),
+        ] {
+            if given {
+                return Err(source.conflict(&key(field), "primary_chains", "of end-linked networks only"));
+            }
+        }
+        let chains = match chains {
+            ChainsSpec::MostProbable => PrimaryChains::MostProbable,
+            ChainsSpec::OneLength => PrimaryChains::OneLength,
+        };
+        let mass = self.strand_mass.si();
+        let (field, recipe) = match (self.units, self.sol_fraction) {
+            (Some(_), Some(_)) => {
+                return Err(source.conflict(&key("sol_fraction"), "units", "one follows from the other"));
+            }
+            (Some(units), None) => ("units", Ok(Vulcanized::new(chains, mass, units))),
+            (None, Some(sol)) => ("sol_fraction", Vulcanized::with_sol(chains, mass, sol)),
+            (None, None) => {
+                let why = "needed: cross-linked units per chain, or the measured `sol_fraction`";
+                return Err(source.missing(&key("units"), why));
+            }
+        };
+        recipe.and_then(|recipe| recipe.network(melt)).map_err(|error| source.refused(&key(field), error))
     }
 
     /// Returns the melt: keys before the data of the polymer.
@@ -202,15 +266,15 @@ pub fn explain_network(source: &Source, material: &Material) -> Result<Vec<Strin
         Some(least) => format!(", without loops at least {least:.4}"),
         None => String::new(),
     };
+    let reacted = match spec.primary_chains {
+        Some(_) => format!("{:.4} cross-linked units per chain", network.conversion[0]),
+        None => format!("conversion {:.4} and {:.4}{least}", network.conversion[0], network.conversion[1]),
+    };
     let mut lines = vec![
         format!(
-            "a network: conversion {:.4} and {:.4}{least}; sol {:.4}; {:.1} mol/m³ effective strands of \
+            "a network: {reacted}; sol {:.4}; {:.1} mol/m³ effective strands of \
              {:.3} kg/mol",
-            network.conversion[0],
-            network.conversion[1],
-            network.sol.mass,
-            network.strands,
-            network.strand_mass
+            network.sol.mass, network.strands, network.strand_mass
         ),
         format!(
             "its shear modulus {}: phantom {} × {:.4}, entangled {}; E = 3G = {}",
@@ -266,6 +330,30 @@ mod tests {
         let source = Source::new("material.toml", format!("version = 1\nlaw = \"linear\"\n{NETWORK}"));
         let lines = explain_network(&source, &source.parse().unwrap()).unwrap().join("\n");
         assert!(lines.contains("26.25 Kuhn segments") && lines.contains("5.238 to 30.555 J/m²"), "{lines}");
+    }
+
+    /// Vulcanized chains: E = 3G of the library, and compositions without a network.
+    #[test]
+    fn vulcanized_rubber() {
+        let chains = |rest: &str| {
+            resolved(&format!(
+                "law = \"linear\"\n[network]\npolymer = \"PDMS\"\nstrand_mass = \"100 kg/mol\"\n\
+                 primary_chains = \"one-length\"\n{rest}\n"
+            ))
+        };
+        let found = chains("units = 2").unwrap().youngs_modulus.unwrap().si();
+        let melt = Melt::of_polymer("PDMS").unwrap();
+        let network = Vulcanized::new(PrimaryChains::OneLength, 100.0, 2.0).network(&melt).unwrap();
+        assert!((found / (3.0 * network.modulus()) - 1.0).abs() < 1e-12);
+        for (rest, message) in [
+            ("units = 0.9", "no gel"),
+            ("units = 2\nfunctionality = 4", "of end-linked networks only"),
+            ("units = 2\nsol_fraction = 0.1", "one follows from the other"),
+            ("", "missing `material.network.units`"),
+        ] {
+            let error = chains(rest).unwrap_err().plain();
+            assert!(error.contains(message), "{error}\n{message}");
+        }
     }
 
     /// Keys given twice, missing ones, and compositions without a network.

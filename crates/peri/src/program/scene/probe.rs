@@ -7,7 +7,7 @@ use super::{AxisName, Boundary, Scene, Side, SolverMethod};
 use crate::calibrate::Space;
 use harness::report::{Named, Quantity};
 use harness::scene::{SceneError, Source};
-use polycore::units::Length;
+use polycore::units::{Force, Length};
 use serde::{Deserialize, Serialize};
 
 /// Probe: a quantity recorded in every row of the history.
@@ -28,7 +28,7 @@ pub struct HistoryProbe {
     pub min: Option<Vec<Length>>,
     /// … and upper corner.
     pub max: Option<Vec<Length>>,
-    /// Marks of a strain.
+    /// Marks of a strain or an opening.
     pub from: Option<Vec<Length>>,
     /// The other mark.
     pub to: Option<Vec<Length>>,
@@ -44,6 +44,12 @@ pub struct HistoryProbe {
     pub tip: Option<Vec<Length>>,
     /// Inner and outer radius of the integration ring about the tip.
     pub radii: Option<[Length; 2]>,
+    /// Openings at which the report has the load, as `NAME_load_at_0.1mm`.
+    #[serde(default)]
+    pub load_at: Vec<Length>,
+    /// Measured openings with the lowest and the highest load, drawn beside the computed ones.
+    #[serde(default)]
+    pub measured: Vec<(Length, Force, Force)>,
 }
 
 /// Quantities of a probe.
@@ -54,6 +60,8 @@ pub enum Track {
     Displacement,
     /// Distance of two marks over that at rest, less 1.
     Strain,
+    /// Distance of two marks less that at rest, m.
+    Opening,
     /// Rotation of the region about the axis through the origin, rad.
     Rotation,
     /// Farthest position along the axis with damage in a range, m.
@@ -68,7 +76,7 @@ impl Track {
     /// Returns the unit of its column.
     pub fn unit(self) -> &'static str {
         match self {
-            Self::Displacement | Self::Crack | Self::Front => "m",
+            Self::Displacement | Self::Opening | Self::Crack | Self::Front => "m",
             Self::Rotation => "rad",
             Self::Strain => "",
             Self::JIntegral => "J/m²",
@@ -117,7 +125,7 @@ impl HistoryProbe {
         Ok(members)
     }
 
-    /// Returns the particles nearest to each of the two marks of a strain.
+    /// Returns the particles nearest to each of the two marks of a strain or an opening.
     ///
     /// # Errors
     /// Marks outside the body or at the same particles.
@@ -182,11 +190,12 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         let of_crack = track == Track::Crack;
         let moving = of_crack || track == Track::Front;
         let of_j = track == Track::JIntegral;
-        let in_region = track != Track::Strain && !of_j;
+        let marked = matches!(track, Track::Strain | Track::Opening);
+        let in_region = !marked && !of_j;
         for (name, given, belongs, needed) in [
-            ("axis", probe.axis.is_some(), track != Track::Strain, track != Track::Strain),
-            ("from", probe.from.is_some(), track == Track::Strain, track == Track::Strain),
-            ("to", probe.to.is_some(), track == Track::Strain, track == Track::Strain),
+            ("axis", probe.axis.is_some(), !marked, !marked),
+            ("from", probe.from.is_some(), marked, marked),
+            ("to", probe.to.is_some(), marked, marked),
             ("side", probe.side.is_some(), in_region, false),
             ("min", probe.min.is_some(), in_region, false),
             ("max", probe.max.is_some(), in_region, false),
@@ -196,6 +205,8 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             ("across", probe.across.is_some(), of_crack, false),
             ("gauges", probe.gauges.is_some(), moving, false),
             ("threshold", probe.threshold.is_some(), track == Track::Front, false),
+            ("measured", !probe.measured.is_empty(), track == Track::Opening, false),
+            ("load_at", !probe.load_at.is_empty(), track == Track::Opening, false),
         ] {
             if given && !belongs {
                 let why = format!("a probe of `{}` does not use it", name_of(track));
@@ -250,6 +261,9 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         {
             return Err(source.error(&key("threshold"), threshold, "between 0 and 1"));
         }
+        if let Some(at) = probe.load_at.iter().find(|at| !(at.si() > 0.0 && at.si().is_finite())) {
+            return Err(source.error(&key("load_at"), format!("{} m", at.si()), "above 0"));
+        }
         if let Some([from, to]) = probe.gauges
             && from.si() >= to.si()
         {
@@ -264,6 +278,7 @@ fn name_of(track: Track) -> &'static str {
     match track {
         Track::Displacement => "displacement",
         Track::Strain => "strain",
+        Track::Opening => "opening",
         Track::Rotation => "rotation",
         Track::Crack => "crack",
         Track::Front => "front",

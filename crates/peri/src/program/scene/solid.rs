@@ -251,6 +251,11 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
             let why = "needs `fracture_energy` beside it, and a solid with `branch`";
             return Err(source.unexpected("material.critical.driving", why));
         }
+        if critical.kink.is_some() {
+            return Err(
+                source.unexpected("material.critical.kink", "only of a bond law: solids soften straight")
+            );
+        }
         if let Some(strength) = critical.strength {
             let key = "material.critical.strength";
             positive(source, key, strength.si(), "Pa")?;

@@ -3,9 +3,9 @@
 use super::{DiscreteBody, Scene, plain};
 use crate::bonds::Bonds;
 use crate::calibrate::Space;
-use crate::critical::{Convention, Toughness};
+use crate::critical::{Convention, Critical, Toughness};
 use crate::geometry::Cut;
-use crate::potential::onset;
+use crate::potential::Law;
 use harness::scene::{SceneError, Source};
 
 /// Horizon ratio below which cracks follow the axes of the lattice.
@@ -32,6 +32,7 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         .filter_map(|(index, one)| Some((format!("material.inclusions[{index}].critical"), one.critical?)))
         .chain(material.critical.map(|own| ("material.critical".to_owned(), own)));
     for (key, critical) in criticals {
+        strength(source, scene, &key, &critical)?;
         let Some(convention) = critical.convention else { continue };
         let key = format!("{key}.convention");
         if critical.fracture_energy.is_none() {
@@ -60,7 +61,7 @@ pub fn explain_tearing<const D: usize>(
         Convention::Softening => format!(
             "λf = {:.6}, soft from λ0 = {:.6} on: {tearing} J/m² by `softening`; c = S = {c:.4}",
             own.stretch,
-            onset(own.stretch)
+            own.softening.onset(own.stretch)
         ),
         Convention::Tearing => format!(
             "λc = {:.6}: {tearing} J/m² by `tearing`, {bonds} J/m² by `bonds`; c = {c:.4} (κ = {loss:.4} of \
@@ -77,6 +78,39 @@ pub fn explain_tearing<const D: usize>(
     std::iter::once(format!("  fracture   {text}"))
         .chain(warnings.map(|text| format!("  warning    {text}")))
         .collect()
+}
+
+/// Checks the strength of a bond law.
+fn strength(source: &Source, scene: &Scene, key: &str, critical: &Critical) -> Result<(), SceneError> {
+    let material = &scene.material;
+    if let Some(kink) = critical.kink {
+        let key = format!("{key}.kink");
+        if critical.strength.is_none() {
+            return Err(source.unexpected(&key, "needs `strength` beside it"));
+        }
+        if !kink.iter().all(|part| *part > 0.0 && *part < 1.0) {
+            return Err(source.error(&key, format!("{kink:?}"), "two numbers above 0 and below 1"));
+        }
+    }
+    if critical.strength.is_none() {
+        return Ok(());
+    }
+    let key = format!("{key}.strength");
+    if critical.convention != Some(Convention::Softening) || critical.fracture_energy.is_none() {
+        let why = "bond laws need `fracture_energy` and `convention = \"softening\"` beside it";
+        return Err(source.unexpected(&key, why));
+    }
+    if material.law != Some(Law::Linear) {
+        return Err(source.unexpected(&key, "only for `law = \"linear\"` or [material.solid]"));
+    }
+    for (other, given) in
+        [("fields", material.fields.is_empty()), ("inclusions", material.inclusions.is_empty())]
+    {
+        if !given {
+            return Err(source.conflict(&key, other, "bonds of one body soften alike"));
+        }
+    }
+    Ok(())
 }
 
 fn digits(value: f64) -> String {
