@@ -5,8 +5,8 @@ use evidence::{at_most, near, within};
 use polycore::constitutive::hyperelastic::data::Mode;
 use polycore::constitutive::hyperelastic::{Compressible, EightChain, LopezPamies, NeoHookean, Volumetric};
 use polycore::constitutive::viscoelastic::{
-    Branch, History, Increment, Mullins, Pace, Reaction, Scheme, Shift, Spring, State, StrainSoftening,
-    Trace, Viscoelastic, Viscosity, nominal_of_test, strain_of_test,
+    Branch, BranchState, History, Increment, Mullins, Pace, Reaction, Scheme, Shift, Spring, State,
+    StrainSoftening, Trace, Viscoelastic, Viscosity, nominal_of_test, strain_of_test,
 };
 use polycore::constitutive::{Law, Workspace};
 use polycore::tensor::{Tensor, Voigt, Voigt6x6, voigt};
@@ -441,4 +441,29 @@ fn invalid_input() {
     let own = elastic.advance(&elastic.rest(), &Increment::new(REST, c, 1.0), memory).unwrap().prediction;
     assert_eq!(own, elastic.equilibrium().tangent(&c, memory).unwrap());
     let _: &dyn Law = elastic.equilibrium();
+}
+
+/// A glassy branch has a step at any strain, duration and temperature: Newton's method alone jumps between
+/// both sides of the kink of ln sinh for some of them.
+#[test]
+fn glassy_steps_at_any_strain() {
+    let spring = Spring::NeoHookean(NeoHookean::new(320.0).unwrap());
+    let eyring = Viscosity::Eyring { rate: 1e-5, stress: 1.0, pressure: 0.0, softening: None };
+    let mut branch = Branch::new(spring, eyring).unwrap();
+    branch.shift = Shift::Arrhenius { reference: 293.15, energy: 60e3 };
+    let rest = BranchState::REST;
+    for thickness in (0..21).map(|k| 0.5 + 0.05 * f64::from(k)) {
+        for stretch in [1.01_f64, 1.05, 1.1, 1.2] {
+            let to = Voigt::new(stretch * stretch, 1.0, thickness, 0.0, 0.0, 0.0);
+            for temperature in (0..12).map(|k| 240.0 + 10.0 * f64::from(k)) {
+                let mut stress = f64::INFINITY;
+                for duration in (-6..7).map(|k| 10f64.powf(0.5 * f64::from(k))) {
+                    let increment = Increment { temperature, ..Increment::new(rest.viscous, to, duration) };
+                    let (found, _) = branch.advance(&rest, &increment).unwrap();
+                    assert!(found.norm() <= stress, "{thickness} {stretch} {temperature} {duration}");
+                    stress = found.norm() * (1.0 + 1e-12);
+                }
+            }
+        }
+    }
 }

@@ -177,15 +177,15 @@ fn a_glassy_sheet_softens_as_its_material_point() {
         branch.shift = Shift::Arrhenius { reference: 293.15, energy: 60e3 };
         Viscoelastic::new(Box::new(rubber.unwrap()), vec![branch]).unwrap()
     };
-    let (steps, most, duration, temperature) = (40, 0.2, 0.5, 338.15);
+    let (steps, most, duration, temperature) = (20, 0.2, 1.0, 338.15);
     let solid = ViscousCorrespondence::new::<2>(law(), Space::PlaneStress, 1.0, Driving::Equilibrium);
     let solid: Solid = NonlocalSolid(Arc::new(solid.unwrap().at_temperature(temperature)));
-    let mut built = Body::<2>::solid([8, 8], 0.1, 3.015).build();
+    let mut built = Body::<2>::solid([14, 14], 0.1, 3.015).build();
     let bonds = &mut built.lattice;
-    let middle = bonds.particles().iter().position(|&site| site as usize == bonds.sites() / 2);
-    let middle = bonds.particles()[middle.unwrap_or(0)] as usize;
-    let free = bonds.position(middle);
-    let loads = hold(bonds, |[x, y]| ([x, y] != free).then_some((3, [most * x, 0.0])));
+    // a free particle two horizons from the surface, where a homogeneous deformation is an equilibrium
+    let is_free = |place: [f64; 2]| place.iter().all(|x| (0.65..0.75).contains(x));
+    assert_eq!(bonds.particles().iter().filter(|&&site| is_free(bonds.position(site as usize))).count(), 1);
+    let loads = hold(bonds, |[x, y]| (!is_free([x, y])).then_some((3, [most * x, 0.0])));
     let factors: Vec<f64> = (1..=steps).map(|k| f64::from(k) / f64::from(steps)).collect();
     let mut state = State::new(bonds.sites());
     let mut system = System::new(bonds, solid, &loads, &factors);
@@ -216,8 +216,8 @@ fn a_glassy_sheet_softens_as_its_material_point() {
         stresses.push(found.prediction.stress[0]);
     }
     let falls = |k: usize| stresses[k + 1] < stresses[k];
-    assert!(!falls(0) && (0..39).any(falls), "the stress falls after yield: {stresses:?}");
+    assert!(!falls(0) && (0..19).any(falls), "the stress falls after yield: {stresses:?}");
     let volume = last.stored / stored;
     near("dissipation of a glassy sheet", last.dissipated / dissipated / volume, 1.0, 1e-6);
-    near("area of a glassy sheet", volume, 0.64, 1e-9);
+    near("area of a glassy sheet", volume, 1.96, 1e-6);
 }

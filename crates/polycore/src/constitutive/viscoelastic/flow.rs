@@ -31,6 +31,8 @@ pub(super) struct Flow<'a> {
 /// Greatest ln α: exp(−650) is still a number.
 const MOST: f64 = 650.0;
 const STEPS: usize = 200;
+/// Newton steps of ln α below this converge, or move by rounding.
+const NEAR: f64 = 1e-8;
 
 impl Flow<'_> {
     /// Solves for the elastic strains e; `trial` is e_tr with the sum 0.
@@ -45,7 +47,7 @@ impl Flow<'_> {
         let mut x = if start.is_finite() { start.min(60.0) } else { 0.0 };
         let (mut low, mut high, mut stride) = (f64::NEG_INFINITY, f64::INFINITY, 0.05);
         let mut strains = [0.0; 3];
-        let mut residual = f64::NAN;
+        let (mut residual, mut before) = (f64::NAN, f64::INFINITY);
         for _ in 0..STEPS {
             let alpha = x.min(MOST).exp();
             strains = relaxed(trial, alpha, strains)?;
@@ -56,9 +58,13 @@ impl Flow<'_> {
                 low = x
             }
             let newton = x - residual / self.derivative(strains, trial, alpha);
-            let next = if newton > low && newton < high {
+            // Newton steps that do not shrink can jump between both sides of a kink for ever
+            let step = (newton - x).abs();
+            let bracketed = low.is_finite() && high.is_finite();
+            let shrinks = !bracketed || step <= 0.5 * before || step < NEAR;
+            let next = if newton > low && newton < high && shrinks {
                 newton
-            } else if low.is_finite() && high.is_finite() {
+            } else if bracketed {
                 0.5 * (low + high)
             } else {
                 stride *= 2.0;
@@ -68,6 +74,7 @@ impl Flow<'_> {
             if residual.abs() <= scale || (next - x).abs() <= scale || (x > MOST && residual < 0.0) {
                 return Ok(strains);
             }
+            before = (next - x).abs();
             x = next;
         }
         Err(Error::NoConvergence { iteration: "the flow of a branch", steps: STEPS, residual })
