@@ -110,7 +110,7 @@ impl<const D: usize> System<'_, D> {
         let bonds = list.len() as u64 / 2;
         state.fracture.broken += bonds;
         let [factor, pull, push] = state.control.balanced;
-        let load = self.response(factor, (pull, push)).0;
+        let load = self.response(state, factor, (pull, push)).0;
         if bonds > 0 {
             state.fracture.events.push(BreakingEvent {
                 step: state.step,

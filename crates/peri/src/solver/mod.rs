@@ -8,6 +8,7 @@ mod balance;
 mod breaking;
 mod coarse;
 mod criterion;
+mod curves;
 mod dynamic_relaxation;
 mod fit_range;
 mod force_scale;
@@ -42,6 +43,7 @@ mod verlet_friction;
 mod verlet_step;
 
 pub use criterion::{Bilinear, Breaking, Criterion, Policy};
+pub use curves::{Course, CurvedLoads, CurvedRegion};
 pub use dynamic_relaxation::{DynamicRelaxation, RelaxationSolver};
 pub use force_scale::Balance;
 pub use fracture::{BreakingEvent, Fracture};

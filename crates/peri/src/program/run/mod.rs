@@ -275,13 +275,12 @@ fn solve<const D: usize>(
         }
         None => None,
     };
-    let course = scene.dynamics.as_ref().and_then(|dynamics| dynamics.factor.as_ref());
-    let course = course.map(|formula| |time: f64| formula.value_and_rate(time));
+    let course = scene.course();
     let row = |bonds: &dyn Bonds<D>, state: &State<D>| physics.row(bonds, state);
     let response = material.respond(&*body.bonds);
     let mut system = System::of_response(&mut *body.bonds, response, loads, &factors);
     system.times = times.into();
-    system.course = course.as_ref().map(|course| course as _);
+    system.course = course.as_deref();
     system.observer = Some(&row);
     system.fit_bound = scene.fit_bound();
     let criterion = physics.body.criterion.clone();

@@ -1,6 +1,7 @@
 //! Boundaries of a scene: regions of the body with loads or supports.
 
 use super::ShapeSpec;
+use super::curve::{CurveSpec, Curves};
 use super::formula::Formula;
 use polycore::units::{Angle, Force, Length, Speed, Stress};
 use serde::Deserialize;
@@ -36,6 +37,9 @@ pub struct Boundary {
     pub rotation: Option<RotationSpec>,
     /// Displacement at the end of the last step as formulas of the position, m.
     pub displacement_field: Option<Vec<PrescribedField>>,
+    /// Curve of time that multiplies displacement, rotation, force and traction, or one for each component;
+    /// default: the load factor.
+    pub curve: Option<Curves>,
     /// Velocity at the start as formulas of the position, m/s.
     pub velocity_field: Option<Vec<Formula>>,
 }
@@ -77,6 +81,8 @@ pub struct RotationSpec {
     pub axis: Option<Vec<f64>>,
     /// Angle at the end of the last step, right-handed about the axis; in the plane from x to y.
     pub angle: Angle,
+    /// Curve of time that multiplies the angle; default: that of the boundary.
+    pub curve: Option<CurveSpec>,
 }
 
 /// Sides of the bounding box.

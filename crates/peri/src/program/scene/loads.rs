@@ -9,6 +9,9 @@ use crate::material::{BodyTensor, surface_load};
 use crate::solver::{ContactStops, INVERTS, Loads, Support, Unsupported, find_unsupported, inverted};
 use harness::scene::{SceneError, Source};
 
+/// Times at which the balance of forces with curves is checked.
+const BALANCES: usize = 64;
+
 /// Returns the loads and supports of a body, and by site whether a load or support acts there.
 ///
 /// # Errors
@@ -35,20 +38,39 @@ pub fn loads_of<const D: usize>(
         let by_area = scene.material.solid.is_some() && boundary.layers.is_none() && boundary.depth.is_none();
         let support = support(source, &key, boundary, body, &members, depth.filter(|_| !by_area))?;
         if let (Some(side), Some(traction), true) = (boundary.side, &boundary.traction, by_area) {
-            tractions.push((side, std::array::from_fn(|d| traction[d].si())));
+            tractions.push((index, side, std::array::from_fn(|d| traction[d].si())));
         }
         regions.push((members, support));
     }
     let mut loads = Loads::new(body.bonds.sites(), &regions);
-    for (side, traction) in tractions {
+    let courses = super::curve::courses(source, scene)?;
+    let mut surfaces = Vec::new();
+    for (index, side, traction) in tractions {
+        let mut alone = Loads::default();
+        if !courses.is_empty() {
+            add_traction(body, side, traction, &mut alone, &mut loaded);
+        }
+        surfaces.extend(alone.body_force.map(|field| (index, field)));
         add_traction(body, side, traction, &mut loads, &mut loaded);
     }
     apply_formulas(source, scene, body, &regions, &mut loads)?;
-    super::rotation::turn(source, scene, body, &regions, &mut loads)?;
+    super::rotation::turn(source, scene, body, &regions, &courses, &mut loads)?;
+    if !courses.is_empty() {
+        let rotates = |index: usize| scene.boundary[index].rotation.is_some();
+        super::curve::follow(&regions, rotates, &surfaces, courses, &mut loads);
+    }
     refuse_inverted(source, scene, body, &loads)?;
     if scene.method() == SolverMethod::Verlet {
         // explicit dynamics needs neither balance nor supports
         return Ok((loads, loaded));
+    }
+    if loads.curved.is_some() {
+        let (parts, _) = scene.load_steps();
+        for &part in parts.iter().step_by(parts.len().div_ceil(BALANCES)) {
+            loads.set_forces([part; 2]);
+            refuse_unbalanced(source, scene, body, &loads)?;
+        }
+        loads.set_forces([1.0; 2]);
     }
     refuse_unbalanced(source, scene, body, &loads)?;
     let all = (1_u8 << D) - 1;

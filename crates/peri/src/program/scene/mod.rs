@@ -8,6 +8,7 @@ mod check;
 mod cloud;
 mod contact;
 mod crack;
+mod curve;
 mod explain;
 mod field;
 mod followed;
@@ -37,6 +38,7 @@ pub use build::{body_of, least_memory};
 pub use check::{check, check_variant};
 pub use contact::{ContactSpec, PlaneSpec, tied_grips};
 pub use crack::{cuts_of, severed_of_each};
+pub use curve::{CurveSpec, CurveTable, Curves};
 pub use explain::explain;
 pub use field::{FieldSpec, VaryingParameter};
 pub use followed::{ParameterField, followed};
@@ -89,7 +91,7 @@ pub struct Scene {
     /// Solver settings.
     #[serde(default)]
     pub solver: SolverSpec,
-    /// Ramps and holds of a quasi-static run in time, for a solid with branches or softening.
+    /// Ramps and holds of a quasi-static run in time, for a solid with branches or softening, or curves.
     pub time: Option<TimeProgramSpec>,
     /// Density and times of explicit dynamics.
     pub dynamics: Option<Dynamics>,
