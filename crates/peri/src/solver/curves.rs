@@ -53,18 +53,34 @@ pub struct CurvedRegion<const D: usize> {
     pub courses: [Course; D],
     /// Bit d: component d is prescribed.
     pub components: u8,
+    /// Displacement of each site at a multiple of 0, m; empty: none.
+    pub(super) offsets: Vec<[f64; D]>,
+    /// Bit d: component d stays where a step begins.
+    pub kept: u8,
 }
 
 impl<const D: usize> CurvedRegion<D> {
+    /// Creates a region that begins at rest.
+    pub fn new(sites: Vec<u32>, values: Vec<[f64; D]>, courses: [Course; D], components: u8) -> Self {
+        Self { sites, values, courses, components, offsets: Vec::new(), kept: 0 }
+    }
+
     /// Values of all sites, times one multiple for each component.
     fn scaled(&self, multiples: [f64; D]) -> impl Iterator<Item = (usize, [f64; D])> + '_ {
         let values = self.values.iter().map(move |value| std::array::from_fn(|d| multiples[d] * value[d]));
         self.sites.iter().map(|&site| site as usize).zip(values)
     }
 
-    /// Sets the prescribed components of a field to multiples of the values.
-    fn set(&self, field: &mut Field<D>, multiples: [f64; D]) {
-        for (site, value) in self.scaled(multiples) {
+    /// Displacements of all sites at τ.
+    fn placed(&self, part: f64) -> impl Iterator<Item = (usize, [f64; D])> + '_ {
+        let offsets = self.offsets.iter().copied().chain(std::iter::repeat([0.0; D]));
+        let each = self.scaled(self.multiples(part)).zip(offsets);
+        each.map(|((site, value), offset)| (site, std::array::from_fn(|d| offset[d] + value[d])))
+    }
+
+    /// Sets the prescribed components of a field.
+    fn set(&self, field: &mut Field<D>, values: impl Iterator<Item = (usize, [f64; D])>) {
+        for (site, value) in values {
             let old = field.get(site);
             let prescribed = |d: usize| self.components >> d & 1 == 1;
             field.set(site, std::array::from_fn(|d| if prescribed(d) { value[d] } else { old[d] }));
@@ -105,7 +121,7 @@ impl<const D: usize> Loads<D> {
                 true => course.rate(after),
                 false => (course.at(after) - course.at(before)) / (after - before),
             };
-            region.set(field, region.courses.each_ref().map(rate));
+            region.set(field, region.scaled(region.courses.each_ref().map(rate)));
         }
     }
 
@@ -113,14 +129,15 @@ impl<const D: usize> Loads<D> {
     pub(super) fn set_curved_ends(&mut self, after: f64) {
         let (Some(field), Some(curved)) = (self.displacement.as_mut(), &self.curved) else { return };
         for region in &curved.held {
-            region.set(field, region.multiples(after).map(|multiple| multiple / after));
+            let ends = region.placed(after).map(|(site, u)| (site, u.map(|x| x / after)));
+            region.set(field, ends);
         }
     }
 
     /// Sets the displacement of curved regions at τ.
     pub(super) fn place_curved(&self, part: f64, displacement: &mut Field<D>) {
         for region in self.curved.iter().flat_map(|curved| &curved.held) {
-            region.set(displacement, region.multiples(part));
+            region.set(displacement, region.placed(part));
         }
     }
 
@@ -136,7 +153,7 @@ impl<const D: usize> Loads<D> {
                         |most: f64, multiple| if multiple.abs() > most.abs() { multiple } else { most },
                     )
                 };
-                region.set(field, region.courses.each_ref().map(size));
+                region.set(field, region.scaled(region.courses.each_ref().map(size)));
             }
         }
         self.set_forces([1.0; 2]);
@@ -166,7 +183,7 @@ impl<const D: usize> Loads<D> {
     pub(super) fn curved_reach(&self, part: f64) -> f64 {
         let mut span = [[0.0_f64; 2]; D];
         for region in self.curved.iter().flat_map(|curved| &curved.held) {
-            for (_, value) in region.scaled(region.multiples(part)) {
+            for (_, value) in region.placed(part) {
                 for d in (0..D).filter(|d| region.components >> d & 1 == 1) {
                     span[d] = [span[d][0].min(value[d]), span[d][1].max(value[d])];
                 }

@@ -269,7 +269,7 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     let stored = system.stored_energy(state, system.fitted_part(observed));
     let row = system.row(state, state.control.balanced, observed, stored);
     let (residual, rounds) = (state.convergence.residual, state.control.round);
-    let time = system.time_at(Some(state.step));
+    let time = state.stage.time + system.time_at(Some(state.step));
     state.history.push(StepRecord { residual, rounds, balance, time, kinetic: 0.0, damped: 0.0, ..row });
 }
 

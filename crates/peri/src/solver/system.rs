@@ -320,7 +320,7 @@ impl<'a, const D: usize> System<'a, D> {
             dissipated: state.memory.dissipated,
             smallest_stretch: (1.0 + observed.low).max(0.0).sqrt(),
             largest_stretch: (1.0 + observed.high).sqrt(),
-            time: state.motion.time,
+            time: state.stage.time + state.motion.time,
             kinetic: state.motion.energies.kinetic,
             damped: state.motion.energies.damped,
             rubbed: state.motion.energies.rubbed,

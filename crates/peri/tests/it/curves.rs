@@ -1,12 +1,17 @@
-//! Loads that follow curves of time: work against stored energy, resumed runs, a force against Newton's law.
+//! Loads that follow curves of time, and steps in sequence: work against stored energy, resumed runs, cracks
+//! that appear in a stretched sheet.
 
 use crate::bodies::Body;
 use evidence::{at_most, near};
+use harness::case::{Case, Options, Run};
+use harness::scene::Source;
 use peri::bonds::{BodyGeometry, Bonds};
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::material::EightChainSolid;
 use peri::material::NonlocalSolid;
+use peri::program::run::{FinishedScene, Peri, run};
+use peri::program::scene::Scene;
 use peri::solver::{
     Course, CurvedLoads, CurvedRegion, Lbfgs, Loads, Method, State, Status, System, VelocityVerlet,
 };
@@ -25,7 +30,7 @@ fn region(
     let within = |site: &u32| inside(bonds.position(*site as usize));
     let sites: Vec<u32> = bonds.particles().iter().copied().filter(within).collect();
     let values = vec![value; sites.len()];
-    CurvedRegion { sites, values, courses, components }
+    CurvedRegion::new(sites, values, courses, components)
 }
 
 /// Loads of regions, the first ones held, the others pushed.
@@ -65,6 +70,7 @@ fn load(moving: bool, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> St
     let loads = loads_of(&*bonds, held, pushed);
     let factors: Vec<f64> = (1..=STEPS).map(|step| step as f64 / STEPS as f64).collect();
     let mut state = start.cloned().unwrap_or_else(|| State::new(bonds.sites()));
+    let course = |time: f64| (time / 20.0, 1.0 / 20.0);
     let mut system = System::new(bonds, solid, &loads, &factors);
     let mut seen = 0;
     let mut watch = |status: &Status, state: &State<2>| {
@@ -75,7 +81,6 @@ fn load(moving: bool, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> St
         Ok(())
     };
     let finished = &mut |_: &dyn Bonds<2>, _: &_| Ok(());
-    let course = |time: f64| (time / 20.0, 1.0 / 20.0);
     let solved = if moving {
         system.course = Some(&course);
         let method = VelocityVerlet { records: 20, safety: 0.5, ..VelocityVerlet::new(1.0, 20.0) };
@@ -109,4 +114,68 @@ fn work_of_curves_is_stored_and_runs_resume() {
             assert!(again == whole, "moving {moving}: from step {}", state.step);
         }
     }
+}
+
+fn solve(text: &str) -> FinishedScene {
+    let directory = tempfile::tempdir().unwrap();
+    let source = Source::new("scene.toml", text);
+    let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
+    let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(directory.path()));
+    run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A sheet that is stretched and then cut is the sheet that is cut and then stretched; a grip that is held, and
+/// one that the next step moves on, go on from where they are.
+#[test]
+fn a_stretched_sheet_is_cut() {
+    let crack = "[{ from = [\"-1 mm\", \"5 mm\"], to = [\"5 mm\", \"5 mm\"] }]";
+    let scene = |cracks: &str, steps: &str| {
+        format!(
+            r#"version = 1
+program = "peri"
+[body]
+space = "plane-stress"
+thickness = "1 mm"
+spacing = "0.5 mm"
+shapes = [{{ add = "box", min = ["0 mm", "0 mm"], max = ["20 mm", "10 mm"] }}]
+{cracks}
+[material]
+youngs_modulus = "1 MPa"
+law = "linear"
+[[boundary]]
+name = "low"
+side = "y-"
+displacement = ["0 mm", "0 mm"]
+[[boundary]]
+name = "high"
+side = "y+"
+displacement = ["0 mm", "0.2 mm"]
+[solver]
+tolerance = 1e-8
+[output]
+pictures = false
+fields = false
+{steps}"#
+        )
+    };
+    let low = "{ name = \"low\", side = \"y-\", displacement = [\"0 mm\", \"0 mm\"] }";
+    let high = |u: &str| format!("{{ name = \"high\", side = \"y+\", displacement = [{u}] }}");
+    let solver = "solver = { tolerance = 1e-8 }";
+    let hold = high("\"hold\", \"hold\"");
+    let cut = format!("[[step]]\nboundary = [{low}, {hold}]\ncracks = {crack}\n{solver}\n");
+    let before = solve(&scene(&format!("cracks = {crack}"), ""));
+    let after = solve(&scene("", &cut));
+    let [before, after] = [&before, &after].map(|run| run.outcomes[0].history.last().unwrap().clone());
+    near("cut_energy", after.stored / before.stored, 1.0, 1e-6);
+    near("cut_force", after.reactions[1][1] / before.reactions[1][1], 1.0, 1e-6);
+    // the grip moves on by as much again, in two increments of equal work
+    let further = high("\"0 mm\", \"0.4 mm\"");
+    let text =
+        format!("[[step]]\nboundary = [{low}, {further}]\nsolver = {{ steps = 2, tolerance = 1e-8 }}\n");
+    let twice = solve(&scene("", &text));
+    let history = &twice.outcomes[0].history;
+    assert_eq!(history.len(), 3);
+    near("continued_reach", history[1].displacement, 0.3e-3, 1e-12);
+    near("continued_reach", history[2].displacement, 0.4e-3, 1e-12);
+    at_most("continued_balance", (history[2].stored / history[2].work - 1.0).abs(), 1e-2);
 }

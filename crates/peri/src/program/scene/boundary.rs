@@ -31,7 +31,8 @@ pub struct Boundary {
     pub force: Option<Vec<Force>>,
     /// Velocity at the start, in explicit dynamics.
     pub velocity: Option<Vec<Speed>>,
-    /// Displacement at the end of the last step, component by component: a length or `"free"`.
+    /// Displacement at the end of the last step, component by component: a length, `"free"` or, in a later
+    /// step, `"hold"`.
     pub displacement: Option<Vec<Prescribed>>,
     /// Rotation about an axis, along the arc; `displacement` adds to it.
     pub rotation: Option<RotationSpec>,
@@ -136,6 +137,8 @@ pub enum Prescribed {
     Free,
     /// Prescribed, m.
     At(f64),
+    /// Stays where the step begins.
+    Hold,
 }
 
 impl schemars::JsonSchema for Prescribed {
@@ -146,8 +149,8 @@ impl schemars::JsonSchema for Prescribed {
     fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
         let length = generator.subschema_for::<Length>();
         schemars::json_schema!({
-            "description": "a length, or `free`: not prescribed",
-            "anyOf": [{ "const": "free" }, length],
+            "description": "a length; `free`: not prescribed; `hold`: as at the start of a later step",
+            "anyOf": [{ "const": "free" }, { "const": "hold" }, length],
         })
     }
 }
@@ -157,6 +160,9 @@ impl<'de> Deserialize<'de> for Prescribed {
         let text = String::deserialize(from)?;
         if text.trim() == "free" {
             return Ok(Self::Free);
+        }
+        if text.trim() == "hold" {
+            return Ok(Self::Hold);
         }
         let length = text.parse::<Length>().map_err(|error| {
             serde::de::Error::custom(format!("{error}; a component that is not prescribed is \"free\""))

@@ -133,9 +133,9 @@ impl Boundary {
 }
 
 impl Scene {
-    /// Returns true if any boundary follows a curve of its own.
+    /// Returns true if loads follow curves: those of boundaries, or any in a later step.
     pub fn has_curves(&self) -> bool {
-        self.boundary.iter().any(Boundary::has_curve)
+        self.later || self.boundary.iter().any(Boundary::has_curve)
     }
 
     /// Returns the load factor of explicit dynamics and its rate over the time, s; `None` for a ramp. With
@@ -175,7 +175,11 @@ impl CurveTime {
             return Self { end, explicit: true, moments, common };
         }
         let (factors, times) = scene.programme();
-        let end = times.last().copied().unwrap_or(1.0);
+        let Some(&end) = times.last() else {
+            // a later step without times: the load factor itself
+            let common = Course::new(|part| (part, 1.0));
+            return Self { end: 1.0, explicit: false, moments: Vec::new(), common };
+        };
         let moments: Vec<f64> = std::iter::once(0.0).chain(times).collect();
         let factors = std::iter::once(0.0).chain(factors).collect();
         Self { end, explicit: false, common: of_rows(moments.clone(), factors, end), moments }
@@ -299,7 +303,7 @@ impl Multiplied {
             boundary.rotation.iter().filter(|rotation| component.is_none() && rotation.curve.is_none());
         let length = |held: &Prescribed| match held {
             Prescribed::At(value) => *value,
-            Prescribed::Free => 0.0,
+            Prescribed::Free | Prescribed::Hold => 0.0,
         };
         Self {
             lengths: moved.map(|(_, held)| length(held)).collect(),
@@ -403,27 +407,32 @@ pub(super) fn courses<const D: usize>(
     scene.boundary.iter().enumerate().map(of).collect()
 }
 
+/// Returns the course of what has no curve.
+pub fn common_course(scene: &Scene) -> Course {
+    CurveTime::new(scene).common
+}
+
 /// Lets the loads of all boundaries follow their courses; `surfaces` are the tractions of solids, by
 /// boundary.
 pub(super) fn follow<const D: usize>(
     regions: &[(Vec<u32>, Support<D>)],
     rotates: impl Fn(usize) -> bool,
+    kept: impl Fn(usize) -> u8,
     surfaces: &[(usize, Field<D>)],
     courses: Vec<(Course, [Course; D])>,
     loads: &mut Loads<D>,
 ) {
     let mut curved = CurvedLoads::default();
     for (index, ((members, support), (_, courses))) in regions.iter().zip(courses).enumerate() {
-        let region = |sites: Vec<u32>, values: Vec<[f64; D]>, components: u8| CurvedRegion {
-            sites,
-            values,
-            courses: courses.clone(),
-            components,
+        let region = |sites: Vec<u32>, values: Vec<[f64; D]>, components: u8| {
+            CurvedRegion::new(sites, values, courses.clone(), components)
         };
         let components = (0..D).map(|d| u8::from(support.displacement[d].is_some()) << d).sum();
         if let Some(field) = loads.displacement.as_ref().filter(|_| components != 0 && !rotates(index)) {
             let values = members.iter().map(|&site| field.get(site as usize)).collect();
-            curved.held.push(region(members.clone(), values, components));
+            let mut held = region(members.clone(), values, components);
+            held.kept = kept(index);
+            curved.held.push(held);
         }
         if support.body_force != [0.0; D] {
             curved.pushed.push(region(members.clone(), vec![support.body_force; members.len()], 0));

@@ -44,6 +44,7 @@ pub fn loads_of<const D: usize>(
     }
     let mut loads = Loads::new(body.bonds.sites(), &regions);
     let courses = super::curve::courses(source, scene)?;
+    super::overlap::refuse(source, scene, body, &regions, &courses)?;
     let mut surfaces = Vec::new();
     for (index, side, traction) in tractions {
         let mut alone = Loads::default();
@@ -57,7 +58,11 @@ pub fn loads_of<const D: usize>(
     super::rotation::turn(source, scene, body, &regions, &courses, &mut loads)?;
     if !courses.is_empty() {
         let rotates = |index: usize| scene.boundary[index].rotation.is_some();
-        super::curve::follow(&regions, rotates, &surfaces, courses, &mut loads);
+        let kept = |index: usize| {
+            let components = scene.boundary[index].displacement.iter().flatten().enumerate();
+            components.map(|(d, held)| u8::from(*held == Prescribed::Hold) << d).sum()
+        };
+        super::curve::follow(&regions, rotates, kept, &surfaces, courses, &mut loads);
     }
     refuse_inverted(source, scene, body, &loads)?;
     if scene.method() == SolverMethod::Verlet {
@@ -240,7 +245,26 @@ fn refuse_inverted<const D: usize>(
 /// Returns the names of the regions of prescribed displacement.
 pub fn region_names(scene: &Scene) -> Vec<String> {
     let constrained = scene.boundary.iter().enumerate().filter(|(_, b)| b.prescribes_displacement());
-    constrained.map(|(index, boundary)| name_of(index, boundary)).collect()
+    let mut names: Vec<String> = constrained.map(|(index, boundary)| name_of(index, boundary)).collect();
+    for step in &scene.step {
+        let constrained = step.boundary.iter().enumerate().filter(|(_, b)| b.prescribes_displacement());
+        for name in constrained.map(|(index, boundary)| name_of(index, boundary)) {
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+    }
+    names
+}
+
+/// Orders the regions of prescribed displacement of a step as `names`, those of all steps; a region that the
+/// step lacks is empty.
+pub fn order_regions<const D: usize>(scene: &Scene, names: &[String], loads: &mut Loads<D>) {
+    let own = region_names(&Scene { step: Vec::new(), ..scene.clone() });
+    let find = |name: &String| own.iter().position(|own| own == name);
+    let old = std::mem::take(&mut loads.held_regions);
+    let each = names.iter().map(|name| find(name).and_then(|at| old.get(at).cloned()).unwrap_or_default());
+    loads.held_regions = each.collect();
 }
 
 /// Returns lines for `peri check`: the particles of each boundary, and the free length between two grips.
@@ -363,6 +387,7 @@ fn support<const D: usize>(
         support.displacement = std::array::from_fn(|d| match displacement[d] {
             Prescribed::Free => None,
             Prescribed::At(value) => Some(value),
+            Prescribed::Hold => Some(0.0),
         });
     }
     if super::rotation::rotation_of::<D>(source, key, boundary)?.is_some() {
