@@ -141,8 +141,8 @@ impl<const D: usize> Loads<D> {
         }
     }
 
-    /// Sets [`Loads::displacement`] of curved regions to their largest ones, for scales, and the body forces to
-    /// those at the end.
+    /// Sets [`Loads::displacement`] of curved regions to their largest ones, for scales, and the body forces
+    /// to those at the end.
     pub fn set_peaks(&mut self) {
         if let (Some(field), Some(curved)) = (self.displacement.as_mut(), &self.curved) {
             for region in &curved.held {

@@ -27,8 +27,8 @@ pub struct Stage<const D: usize> {
 }
 
 impl<const D: usize> State<D> {
-    /// Begins the next step, after one of a `duration`, s; with `body_force`, N/m³, at its end. Velocities stay
-    /// if both steps are explicit dynamics (`moving`).
+    /// Begins the next step, after one of a `duration`, s, that ended with `body_force`, N/m³. Velocities
+    /// stay if both are explicit dynamics (`moving`).
     pub fn begin_stage(&mut self, duration: f64, body_force: Option<Field<D>>, moving: bool) {
         self.stage = Stage {
             finished: self.stage.finished + 1,
@@ -66,8 +66,8 @@ impl Fracture {
 }
 
 impl<const D: usize> Loads<D> {
-    /// Lets loads that follow curves begin at the start of a step: displacements go from there to their values,
-    /// former body forces fade as the load factor `common` grows.
+    /// Lets loads that follow curves begin at the start of a step: displacements go from there to their
+    /// values, former body forces fade as the load factor `common` grows.
     pub fn continue_from(&mut self, stage: &Stage<D>, common: &super::Course) {
         let Some(curved) = &mut self.curved else { return };
         let start =

@@ -124,8 +124,8 @@ fn solve(text: &str) -> FinishedScene {
     run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// A sheet that is stretched and then cut is the sheet that is cut and then stretched; a grip that is held, and
-/// one that the next step moves on, go on from where they are.
+/// A sheet that is stretched and then cut is the sheet that is cut and then stretched; a grip that is held,
+/// and one that the next step moves on, go on from where they are.
 #[test]
 fn a_stretched_sheet_is_cut() {
     let crack = "[{ from = [\"-1 mm\", \"5 mm\"], to = [\"5 mm\", \"5 mm\"] }]";

@@ -1,7 +1,7 @@
 //! Boundaries of a scene: regions of the body with loads or supports.
 
 use super::ShapeSpec;
-use super::curve::{CurveSpec, Curves};
+use super::curve_spec::{CurveSpec, Curves};
 use super::formula::Formula;
 use polycore::units::{Angle, Force, Length, Speed, Stress};
 use serde::Deserialize;

@@ -53,7 +53,8 @@ pub(super) fn refuse<const D: usize>(
                         };
                         let at: Vec<String> = place.iter().map(|x| plain((x * 1e9).round() / 1e6)).collect();
                         let found = format!(
-                            "{} m along {} of the particle at ({}) mm{when}, for which boundary[{other}] prescribes {} m",
+                            "{} m along {} of the particle at ({}) mm{when}, for which boundary[{other}] \
+                             prescribes {} m",
                             plain(own),
                             ["x", "y", "z"][d],
                             at.join(", "),
