@@ -75,7 +75,7 @@ fn load(moving: bool, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> St
     let mut seen = 0;
     let mut watch = |status: &Status, state: &State<2>| {
         seen += 1;
-        if status.restartable && state.step > 0 && seen % 40 == 0 {
+        if status.restartable && state.step > 0 && seen % 7 == 0 {
             saved.push(state.clone());
         }
         Ok(())

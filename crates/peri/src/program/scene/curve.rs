@@ -5,7 +5,7 @@ use super::formula::Formula;
 use super::values::plain;
 use super::{Boundary, Prescribed, Scene};
 use crate::field::Field;
-use crate::solver::{Course, CurvedLoads, CurvedRegion, Loads, Support};
+use crate::solver::{Course, CurvedLoads, CurvedRegion, LoadCurve, Loads, Support};
 use harness::scene::{SceneError, Source};
 use polycore::table::{Table, plain_unit};
 use polycore::units::dimension::{
@@ -39,7 +39,7 @@ impl Scene {
 
     /// Returns the load factor of explicit dynamics and its rate over the time, s; `None` for a ramp. With
     /// curves the factor is the part of the whole time.
-    pub fn course(&self) -> Option<Box<dyn Fn(f64) -> (f64, f64) + Sync + '_>> {
+    pub fn course(&self) -> Option<Box<LoadCurve<'_>>> {
         let dynamics = self.dynamics.as_ref()?;
         if self.has_curves() {
             let end = dynamics.end_time.si();
