@@ -27,6 +27,14 @@ impl Source {
         source
     }
 
+    /// Returns the same scene as [`Source::with_replaced`], before all other replacements of this key.
+    #[must_use]
+    pub fn with_replaced_first(&self, key: &str, by: &str) -> Self {
+        let mut source = self.clone();
+        source.overlays.insert(0, Overlay::Replace { key: key.to_owned(), by: by.to_owned() });
+        source
+    }
+
     /// Returns the same scene with the table at `by` over it. Its keys are paths (`"boundary[1].film"`, or
     /// nested tables); tables are merged, all else is replaced, and what is not there yet is added.
     #[must_use]

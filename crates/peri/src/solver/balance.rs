@@ -94,7 +94,7 @@ impl Balance {
     /// Sums the forces of a state in equilibrium.
     pub(super) fn new<const D: usize>(system: &System<D>, state: &State<D>) -> Self {
         let (bonds, factor) = (&*system.bonds, system.factors[state.step]);
-        let particles = bonds.particles();
+        let (particles, loading) = (bonds.particles(), system.loads.force_factor(factor));
         let middle: [f64; D] = match (particles.first(), particles.last()) {
             (Some(&a), Some(&b)) => {
                 let ends = [a, b].map(|site| bonds.position(site as usize));
@@ -114,12 +114,12 @@ impl Balance {
                     (state.force.get(site), bonds.position(site), state.displacement.get(site));
                 let plane = rigid.as_ref().map_or([0.0; D], |field| field.get(site));
                 let internal: [f64; D] =
-                    std::array::from_fn(|d| volume * (total[d] - factor * body[d] - plane[d]));
+                    std::array::from_fn(|d| volume * (total[d] - loading * body[d] - plane[d]));
                 let arm: [f64; D] = std::array::from_fn(|d| position[d] + moved[d] - middle[d]);
                 for d in 0..D {
                     sums[d] += internal[d];
                     let reaction = if constrained >> d & 1 == 1 { total[d] } else { 0.0 };
-                    sums[3 + d] += volume * (factor * body[d] + plane[d] - reaction);
+                    sums[3 + d] += volume * (loading * body[d] + plane[d] - reaction);
                     for e in 0..d {
                         sums[5 + d + e] += arm[e] * internal[d] - arm[d] * internal[e];
                     }

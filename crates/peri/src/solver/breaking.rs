@@ -6,6 +6,7 @@ use super::state::State;
 use super::system::System;
 use crate::bonds::{Neighbour, Overstretched, Softened, fingerprint};
 use crate::contact::Contact;
+use crate::field::Field;
 use crate::material::EnergyPart;
 use crate::potential::StretchRange;
 
@@ -110,7 +111,7 @@ impl<const D: usize> System<'_, D> {
         let bonds = list.len() as u64 / 2;
         state.fracture.broken += bonds;
         let [factor, pull, push] = state.control.balanced;
-        let load = self.response(factor, (pull, push)).0;
+        let load = self.response(state, factor, (pull, push)).0;
         if bonds > 0 {
             state.fracture.events.push(BreakingEvent {
                 step: state.step,
@@ -207,7 +208,9 @@ impl<const D: usize> System<'_, D> {
         for site in sites {
             if self.bonds.is_alone(site as usize) {
                 count += 1;
-                if self.loads.body_force.as_ref().is_some_and(|b| b.get(site as usize) != [0.0; D]) {
+                // a force that follows a curve may vanish now and return
+                let bears = |force: &Field<D>| force.get(site as usize) != [0.0; D];
+                if self.loads.curved.is_some() || self.loads.body_force.as_ref().is_some_and(bears) {
                     self.loads.to_mut().unload(site as usize);
                 }
             }

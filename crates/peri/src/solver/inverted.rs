@@ -27,7 +27,7 @@ pub fn inverted<const D: usize>(
 ) -> Option<String> {
     loads.displacement.as_ref()?;
     // a rotation is not proportional to its end
-    if !loads.turned.is_empty() {
+    if !loads.is_proportional() {
         return None;
     }
     passing(bonds, loads, factors).or_else(|| turned(bonds, loads, factors))

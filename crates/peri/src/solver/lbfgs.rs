@@ -189,7 +189,7 @@ impl<const D: usize> LbfgsSolver<D> {
 
     /// Computes forces at the present displacement; their gradient goes to `self.trial`.
     fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> LinePoint {
-        let factor = system.factors[state.step];
+        let factor = system.loads.force_factor(system.factors[state.step]);
         system.prepare(&state.displacement);
         let body = (&self.places, self.preconditioner.volumes());
         let (sums, observed, slope) =

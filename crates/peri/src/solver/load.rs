@@ -1,6 +1,7 @@
 //! Loads and supports: body forces and prescribed displacement components, proportional to one load factor
-//! except in rotating regions.
+//! except in rotating regions and with curves.
 
+use super::curves::CurvedLoads;
 use super::rotation::RotatingRegion;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
@@ -29,6 +30,8 @@ pub struct Loads<const D: usize> {
     pub held_regions: Vec<Vec<u32>>,
     /// Regions that rotate about an axis.
     pub turned: Vec<RotatingRegion<D>>,
+    /// Loads that follow curves; absent: all follow the load factor.
+    pub curved: Option<Box<CurvedLoads<D>>>,
 }
 
 impl<const D: usize> Loads<D> {
@@ -73,6 +76,7 @@ impl<const D: usize> Loads<D> {
         if let Some(field) = &mut self.body_force {
             field.set(site, [0.0; D]);
         }
+        self.unload_curved(site as u32);
     }
 
     /// Sums of the loads' conjugate quantities, N·m: Σ −F V·d over constrained components with d the rate of
@@ -214,7 +218,7 @@ impl<const D: usize> Loads<D> {
 
     /// Least-squares fit, of least norm, to the prescribed displacements: moves the whole body with its
     /// grips.
-    fn affine_closest(&self, bonds: &dyn BodyGeometry<D>) -> [[f64; 4]; D] {
+    pub(super) fn affine_closest(&self, bonds: &dyn BodyGeometry<D>) -> [[f64; 4]; D] {
         let mut result = [[0.0; 4]; D];
         let Some(field) = &self.displacement else { return result };
         for d in 0..D {

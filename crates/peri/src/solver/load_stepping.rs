@@ -88,6 +88,7 @@ fn step_by_step<const D: usize>(
     let shortest = system.shortest();
     system.restore(state)?;
     let (tolerance, forced) = (method.tolerance(), system.loads.body_force.is_some());
+    system.set_forces(system.factors.get(state.step).copied().unwrap_or(1.0));
     system.refuse_unsupported(state, tolerance)?;
     'steps: while state.step < system.factors.len() {
         if !state.control.predicted && system.friction().is_some() {
@@ -195,11 +196,13 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
             && (length(back) - length(0)).abs() <= 1e-6 * length(0)
     };
     let weights: &[f64] = match state.control.past.len() {
-        _ if !smooth => &[],
+        _ if !smooth || system.loads.curved.is_some() => &[],
         3 if even(1) && even(2) => &[1.0, -3.0, 3.0],
         2 | 3 if even(1) => &[-1.0, 2.0],
         _ => &[],
     };
+    let of_curves = system.loads.curved.as_ref().map(|_| system.loads.curved_predictor(&*system.bonds));
+    let predictor = of_curves.as_ref().unwrap_or(predictor);
     let past = &state.control.past[state.control.past.len() - weights.len()..];
     if !system.loads.turned.is_empty() {
         system.loads.carry(&*system.bonds, [at(1), factor], &mut state.displacement);
@@ -230,10 +233,15 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
 }
 
 /// Adds the work of the loads since the last equilibrium, by the trapezoidal rule.
-fn work_of_loads<const D: usize>(system: &System<D>, state: &mut State<D>) {
+fn work_of_loads<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     let factor = system.factors[state.step];
     if let Some(contact) = system.friction() {
         state.contact.plane_friction = contact.slide(&state.displacement).2;
+    }
+    if system.loads.curved.is_some() {
+        let before = state.step.checked_sub(1).map_or(0.0, |before| system.factors[before]);
+        state.work += system.work_of_curves(state, [before, factor]);
+        return;
     }
     let (pull, push) = system.conjugates(state);
     let [old_factor, old_pull, old_push] = state.control.balanced;
@@ -261,7 +269,7 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     let stored = system.stored_energy(state, system.fitted_part(observed));
     let row = system.row(state, state.control.balanced, observed, stored);
     let (residual, rounds) = (state.convergence.residual, state.control.round);
-    let time = system.time_at(Some(state.step));
+    let time = state.stage.time + system.time_at(Some(state.step));
     state.history.push(StepRecord { residual, rounds, balance, time, kinetic: 0.0, damped: 0.0, ..row });
 }
 

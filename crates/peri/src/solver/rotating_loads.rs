@@ -24,13 +24,13 @@ impl<const D: usize> Loads<D> {
     /// Sets [`Loads::displacement`] of rotating regions to the rate of their displacement over the load
     /// factor between two factors: the secant, or the tangent at one factor.
     pub(super) fn set_rates(&mut self, bonds: &dyn BodyGeometry<D>, before: f64, after: f64) {
+        self.set_curved_rates(before, after);
         let Some(field) = self.displacement.as_mut() else { return };
         for turned in &self.turned {
             for &site in &turned.sites {
                 let place = bonds.position(site as usize);
                 let rate = if before == after {
-                    let rate = turned.rotation.rate(place, after);
-                    std::array::from_fn(|d| rate[d] + turned.shift[d])
+                    turned.rate(place, after)
                 } else {
                     let [old, new] = [before, after].map(|factor| turned.displacement(place, factor));
                     std::array::from_fn(|d| (new[d] - old[d]) / (after - before))
@@ -40,8 +40,25 @@ impl<const D: usize> Loads<D> {
         }
     }
 
-    /// Sets the displacement of rotating regions at a load factor.
+    /// Sets [`Loads::displacement`] of regions that are not proportional to the load factor so that the factor
+    /// times it is their displacement there.
+    pub(super) fn set_ends(&mut self, bonds: &dyn BodyGeometry<D>, factor: f64) {
+        if factor == 0.0 {
+            return self.set_rates(bonds, factor, factor);
+        }
+        self.set_curved_ends(factor);
+        let Some(field) = self.displacement.as_mut() else { return };
+        for turned in &self.turned {
+            for &site in &turned.sites {
+                let moved = turned.displacement(bonds.position(site as usize), factor);
+                turned.set(field, site, moved.map(|x| x / factor));
+            }
+        }
+    }
+
+    /// Sets the displacement of regions that are not proportional to the load factor.
     pub(super) fn place_turned(&self, bonds: &dyn BodyGeometry<D>, factor: f64, displacement: &mut Field<D>) {
+        self.place_curved(factor, displacement);
         for turned in &self.turned {
             for &site in &turned.sites {
                 let moved = turned.displacement(bonds.position(site as usize), factor);
@@ -111,13 +128,17 @@ impl<const D: usize> Loads<D> {
             let mut u = own;
             for ((turned, shift, _), weight) in regions.iter().zip(weights) {
                 let part = weight / sum;
-                if let Some(RotatingRegion { rotation, shift, .. }) = turned {
+                let mut moves = [increment; D];
+                if let Some(region) = turned {
+                    let (rotation, shift) = (&region.rotation, &region.shift);
+                    let [(old_angle, old), (angle, new)] = [before, after].map(|at| region.multiples(at));
                     let from =
-                        std::array::from_fn(|d| place[d] + u[d] - rotation.centre[d] - before * shift[d]);
-                    let turn = rotation.turn(part * increment * rotation.angle, from);
+                        std::array::from_fn(|d| place[d] + u[d] - rotation.centre[d] - old[d] * shift[d]);
+                    let turn = rotation.turn(part * (angle - old_angle) * rotation.angle, from);
                     (0..D).for_each(|d| u[d] += turn[d]);
+                    moves = std::array::from_fn(|d| new[d] - old[d]);
                 }
-                (0..D).for_each(|d| u[d] += part * increment * shift[d]);
+                (0..D).for_each(|d| u[d] += part * moves[d] * shift[d]);
             }
             u
         };
@@ -130,10 +151,17 @@ impl<const D: usize> Loads<D> {
 }
 
 impl<const D: usize> System<'_, D> {
-    /// Runs [`Loads::set_rates`] if any region rotates.
+    /// Runs [`Loads::set_rates`] if any region rotates or follows a curve.
     pub(super) fn set_rates(&mut self, before: f64, after: f64) {
-        if !self.loads.turned.is_empty() {
+        if !self.loads.is_proportional() {
             self.loads.to_mut().set_rates(&*self.bonds, before, after);
+        }
+    }
+
+    /// Runs [`Loads::set_ends`] if any region rotates or follows a curve.
+    pub(super) fn set_ends(&mut self, factor: f64) {
+        if !self.loads.is_proportional() {
+            self.loads.to_mut().set_ends(&*self.bonds, factor);
         }
     }
 }

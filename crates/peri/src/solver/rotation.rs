@@ -1,5 +1,6 @@
 //! Rotations about an axis, and rotating regions.
 
+use super::curves::Course;
 use crate::field::Field;
 use crate::geometry::length;
 
@@ -60,6 +61,8 @@ pub struct RotatingRegion<const D: usize> {
     pub rotation: Rotation<D>,
     /// Additional displacement at load factor 1, m.
     pub shift: [f64; D],
+    /// Courses of the angle and of each component of `shift`; absent: the load factor.
+    pub courses: Option<(Course, [Course; D])>,
     /// Bit d: component d is prescribed.
     pub components: u8,
     /// Index of the region among [`Loads::held_regions`](super::Loads::held_regions).
@@ -75,9 +78,29 @@ impl<const D: usize> RotatingRegion<D> {
         field.set(site as usize, std::array::from_fn(|d| if prescribed(d) { value[d] } else { old[d] }));
     }
 
+    /// Multiples of the angle and of each component of the shift at a load factor.
+    pub(super) fn multiples(&self, factor: f64) -> (f64, [f64; D]) {
+        match &self.courses {
+            Some((angle, shift)) => (angle.at(factor), shift.each_ref().map(|course| course.at(factor))),
+            None => (factor, [factor; D]),
+        }
+    }
+
     pub(super) fn displacement(&self, place: [f64; D], factor: f64) -> [f64; D] {
-        let turned = self.rotation.displacement(place, factor);
-        std::array::from_fn(|d| turned[d] + factor * self.shift[d])
+        let (angle, shift) = self.multiples(factor);
+        let turned = self.rotation.displacement(place, angle);
+        std::array::from_fn(|d| turned[d] + shift[d] * self.shift[d])
+    }
+
+    /// Rate of the displacement over the load factor, m.
+    pub(super) fn rate(&self, place: [f64; D], factor: f64) -> [f64; D] {
+        let rate = self.rotation.rate(place, self.multiples(factor).0);
+        match &self.courses {
+            Some((angle, shift)) => {
+                std::array::from_fn(|d| angle.rate(factor) * rate[d] + shift[d].rate(factor) * self.shift[d])
+            }
+            None => std::array::from_fn(|d| rate[d] + self.shift[d]),
+        }
     }
 }
 

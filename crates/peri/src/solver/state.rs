@@ -3,6 +3,7 @@
 use super::fracture::Fracture;
 use super::motion::Motion;
 use super::record::{Status, StepRecord};
+use super::stage::Stage;
 use super::step_control::{Accepted, StepControl};
 use crate::contact::FrictionPair;
 use crate::field::Field;
@@ -38,6 +39,8 @@ pub struct State<const D: usize> {
     pub control: StepControl<D>,
     /// Time and energies of explicit dynamics.
     pub motion: Motion,
+    /// Start of the present step of a programme.
+    pub stage: Stage<D>,
     /// Work of the loads so far, J.
     pub work: f64,
     /// Finished steps.
@@ -169,6 +172,7 @@ impl<const D: usize> State<D> {
             contact: ContactState::default(),
             control: StepControl::default(),
             motion: Motion::default(),
+            stage: Stage::default(),
             work: 0.0,
             history: Vec::new(),
         }

@@ -118,10 +118,11 @@ impl<'a, const D: usize> System<'a, D> {
 
     /// Moves rigid planes to the end of a load step, sets the rates of rotating regions there, and starts
     /// friction.
-    pub(super) fn begin_step(&mut self, state: &State<D>) {
+    pub(super) fn begin_step(&mut self, state: &mut State<D>) {
         let before = state.step.checked_sub(1).map_or(0.0, |before| self.factors[before]);
         let after = self.factors[state.step];
         self.set_rates(after, after);
+        self.begin_curved_step(state, [before, after]);
         self.move_planes(before, 0.0);
         self.move_planes(after, 0.0);
         if let Some(start) = &state.contact.start
@@ -181,8 +182,11 @@ impl<'a, const D: usize> System<'a, D> {
         (pull + contact.planes().zip(&resting).map(work).sum::<f64>(), push)
     }
 
-    /// Load and displacement, see [`Loads::response`].
-    pub(super) fn response(&self, factor: f64, conjugates: (f64, f64)) -> (f64, f64) {
+    /// Load and displacement, see [`Loads::response`] and [`Self::curved_response`].
+    pub(super) fn response(&self, state: &State<D>, factor: f64, conjugates: (f64, f64)) -> (f64, f64) {
+        if self.loads.curved.is_some() {
+            return self.curved_response(state, factor);
+        }
         let planes = self.contact.iter().flat_map(Contact::planes);
         let rigid: Vec<[f64; D]> = planes.map(|plane| plane.displacement).collect();
         self.loads.response(&*self.bonds, factor, conjugates, &rigid)
@@ -297,7 +301,7 @@ impl<'a, const D: usize> System<'a, D> {
         observed: StretchRange,
         stored: f64,
     ) -> StepRecord {
-        let (load, displacement) = self.response(factor, (pull, push));
+        let (load, displacement) = self.response(state, factor, (pull, push));
         StepRecord {
             factor,
             load,
@@ -316,7 +320,7 @@ impl<'a, const D: usize> System<'a, D> {
             dissipated: state.memory.dissipated,
             smallest_stretch: (1.0 + observed.low).max(0.0).sqrt(),
             largest_stretch: (1.0 + observed.high).sqrt(),
-            time: state.motion.time,
+            time: state.stage.time + state.motion.time,
             kinetic: state.motion.energies.kinetic,
             damped: state.motion.energies.damped,
             rubbed: state.motion.energies.rubbed,

@@ -137,8 +137,10 @@ impl VelocityVerlet {
         let volumes = volumes(system);
         system.contact.iter_mut().for_each(Contact::end_friction);
         if state.motion.begun {
-            system.move_planes(self.factor(system, state.motion.time).0, state.motion.time);
+            let factor = self.factor(system, state.motion.time).0;
+            system.move_planes(factor, state.motion.time);
             system.restore(state)?;
+            system.set_forces(factor);
             system.contact.iter_mut().for_each(|contact| contact.resume_friction(&state.contact.grips));
         } else {
             self.begin(system, state, &volumes)?;
@@ -187,6 +189,7 @@ impl VelocityVerlet {
         let (factor, rate) = self.factor(system, 0.0);
         system.move_planes(factor, 0.0);
         system.set_rates(factor, factor);
+        system.set_forces(factor);
         (state.contact.friction, state.contact.start) = (None, None);
         (state.contact.plane_friction, state.contact.plane_push) = (Vec::new(), Vec::new());
         for &site in system.bonds.particles() {
@@ -306,7 +309,7 @@ impl VelocityVerlet {
             let step = state.motion.steps.time_step;
             let leap = VerletStep { step, density, damping, factors: [before, factor], rate };
             // the drift goes to the factor times this, the kick takes its increment
-            system.set_rates(0.0, factor);
+            system.set_ends(factor);
             let first = leap_pass(&system.loads, state, volumes, &leap);
             system.set_rates(before, factor);
             // two ends, √D components
@@ -327,6 +330,7 @@ impl VelocityVerlet {
             state.motion.plan(end);
         };
         let factor = leap.factors[1];
+        system.set_forces(factor);
         let (friction, rubbing, rubs) = (
             state.contact.friction.take(),
             state.contact.plane_friction.clone(),

@@ -64,6 +64,7 @@ pub fn leap_pass<const D: usize>(
     let force = state.force.components();
     let keep = 1.0 - 0.5 * leap.damping * leap.step;
     let push = 0.5 * leap.step / leap.density;
+    let loading = loads.force_factor(leap.factors[0]);
     let (displacement, velocity) = (state.displacement.chunks_mut(), state.velocity.chunks_mut());
     let of = |(chunk, (u, v)): (usize, FieldPair<D>)| {
         let range = chunk_range(chunk, volumes.len());
@@ -89,7 +90,7 @@ pub fn leap_pass<const D: usize>(
                     sums.damped += 0.5 * leap.damping * leap.density * before * increment * at.volumes[k];
                     increment
                 };
-                sums.work += 0.5 * leap.factors[0] * at.body(k) * increment * at.volumes[k];
+                sums.work += 0.5 * loading * at.body(k) * increment * at.volumes[k];
                 sums.increment = sums.increment.max(increment.abs());
             }
         }
@@ -194,6 +195,7 @@ pub fn refresh<const D: usize>(
 /// Adds the body forces of the sites from `start` on.
 fn load<const D: usize>(loads: &Loads<D>, start: usize, factor: f64, force: &mut [&mut [f64]; D]) {
     let Some(body) = &loads.body_force else { return };
+    let factor = loads.force_factor(factor);
     for (force, body) in force.iter_mut().zip(body.components()) {
         force.iter_mut().zip(&body[start..]).for_each(|(f, b)| *f += factor * b);
     }
@@ -211,6 +213,7 @@ fn kick<const D: usize>(
     let push = 0.5 * leap.step / leap.density;
     let keep = 1.0 / (1.0 + 0.5 * leap.damping * leap.step);
     let [before, after] = leap.factors;
+    let loading = loads.force_factor(after);
     let mut sums = VerletSums::default();
     let mut square = 0.0;
     for d in 0..D {
@@ -235,7 +238,7 @@ fn kick<const D: usize>(
                 sums.damped += 0.5 * leap.damping * leap.density * v[k] * increment * volume;
                 increment
             };
-            sums.work += 0.5 * after * at.body(k) * increment * volume;
+            sums.work += 0.5 * loading * at.body(k) * increment * volume;
             square += v[k] * v[k] * volume;
         }
     }

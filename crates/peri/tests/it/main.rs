@@ -9,6 +9,7 @@ mod bodies;
 mod clouds;
 mod contact;
 mod cracks;
+mod curves;
 mod dynamics;
 mod equilibria;
 mod fields;

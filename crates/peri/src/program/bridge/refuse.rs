@@ -76,6 +76,7 @@ pub(super) fn refuse(source: &Source, scene: &Scene, variant: &SceneVariant) -> 
             ("traction", boundary.traction.is_some(), "a traction"),
             ("force", boundary.force.is_some(), "a force"),
             ("rotation", boundary.rotation.is_some(), "a rotation"),
+            ("curve", boundary.has_curve(), "a curve of time"),
             ("displacement_field", boundary.displacement_field.is_some(), "a field of displacements"),
         ];
         if let Some((name, _, found)) = loads.into_iter().find(|(_, given, _)| *given) {

@@ -118,10 +118,10 @@ impl FieldFrames {
         let (Some(every), state) = (m.scene.output.every, m.state) else { return Ok(()) };
         if is_stage(state.control.round) {
             let equilibrium = state.control.round as f64;
-            self.write(observers, m, state.step as f64 + equilibrium / (equilibrium + 1.0))?;
+            self.write(observers, m, state.history.len() as f64 + equilibrium / (equilibrium + 1.0))?;
         } else if state.control.round == 0 && is_written(every, state, state.history.len()) {
-            self.write(observers, m, state.step as f64)?;
-            self.written = Some(state.step);
+            self.write(observers, m, state.history.len() as f64)?;
+            self.written = Some(state.history.len());
         }
         Ok(())
     }
@@ -136,7 +136,7 @@ impl FieldFrames {
         m: &Moment<D>,
     ) -> Result<(), Error> {
         if self.written != Some(m.state.history.len()) {
-            self.write(observers, m, m.state.step as f64)?;
+            self.write(observers, m, m.state.history.len() as f64)?;
         }
         if let Some(series) = self.series {
             series.finish()?;

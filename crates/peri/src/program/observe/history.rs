@@ -13,10 +13,14 @@ pub fn has_times(history: &[StepRecord]) -> bool {
     history.iter().any(|row| row.time > 0.0)
 }
 
-/// Returns the damped energy, J; in quasi-static runs work less stored, released, dissipated and
+/// Returns the damped energy, J; in equilibria work less stored, released, dissipated and
 /// friction energy.
 pub fn damped_energy(row: &StepRecord, dynamic: bool) -> f64 {
-    if dynamic { row.damped } else { row.work - row.stored - row.released - row.rubbed - row.dissipated }
+    if dynamic || row.kinetic > 0.0 {
+        row.damped
+    } else {
+        row.work - row.stored - row.released - row.rubbed - row.dissipated
+    }
 }
 
 /// Adds peak, first break, energies and balances.

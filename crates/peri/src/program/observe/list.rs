@@ -41,6 +41,7 @@ pub fn observers<const D: usize>(scene: &Scene) -> SceneObservers<'_, D> {
 /// Returns the scalars that a run of a scene without studies can report; some depend on events, such as
 /// `first_break`.
 pub fn quantities(scene: &Scene) -> Vec<Named> {
+    let scene = &*scene.at_end();
     match scene.body.space {
         Space::Solid => names(&observers::<3>(scene)),
         _ => names(&observers::<2>(scene)),

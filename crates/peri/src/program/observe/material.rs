@@ -1,6 +1,7 @@
 //! Physics of a variant: its body, material and loads, and the data that its outputs need.
 
 use super::rows::{RowPart, rows};
+use super::stage::SceneStage;
 use crate::bonds::{Bonds, Property};
 use crate::calibrate;
 use crate::correction::{bond_factors, surface_factors};
@@ -173,6 +174,8 @@ pub struct Physics<const D: usize> {
     pub body: BodyWithMaterial<D>,
     /// Loads and supports.
     pub loads: Loads<D>,
+    /// Later steps.
+    pub stages: Vec<SceneStage<D>>,
     /// Sites on which a load or support acts.
     pub loaded: Vec<bool>,
     /// Grips that are tied at their surface, by site.
@@ -211,7 +214,8 @@ impl<const D: usize> Physics<D> {
         {
             body.bonds.set_relief(theta);
         }
-        let (loads, loaded) = scene::loads_of(source, scene, &body)?;
+        let (mut loads, loaded) = scene::loads_of(source, scene, &body)?;
+        let stages = SceneStage::all(source, scene, &body, &mut loads)?;
         scene::check_placement(source, scene, &body, &loads)?;
         let held = scene::tied_grips(source, scene, &*body.bonds, &loads)?;
         if let Some(held) = &held {
@@ -225,6 +229,7 @@ impl<const D: usize> Physics<D> {
             name: String::new(),
             body: with,
             loads,
+            stages,
             loaded,
             held,
             rows,

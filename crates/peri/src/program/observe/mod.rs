@@ -17,6 +17,7 @@ mod rows;
 mod scale;
 mod sections;
 mod solid;
+mod stage;
 mod stages;
 mod values;
 

@@ -2,7 +2,7 @@
 
 use crate::bonds::Bonds;
 use crate::error::Error;
-use crate::program::scene::{DeviceChoice, Dynamics, Scene};
+use crate::program::scene::{Boundary, DeviceChoice, Dynamics, Scene};
 use crate::solver::{Method, State, StepCallback, System, VelocityVerlet, Watch};
 use harness::scene::{SceneError, Source};
 
@@ -97,6 +97,8 @@ pub fn solve<const D: usize>(
 fn beyond_cards<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<(String, &'static str)> {
     let material = &scene.material;
     let rotation = scene.boundary.iter().position(|boundary| boundary.rotation.is_some());
+    let curve = scene.boundary.iter().position(Boundary::has_curve);
+    let curve_key = format!("boundary[{}].curve", curve.unwrap_or(0));
     let rotation_key = format!("boundary[{}].rotation", rotation.unwrap_or(0));
     let uniform = bonds.as_lattice().is_none_or(crate::bonds::LatticeBonds::is_uniform);
     let faults = [
@@ -113,6 +115,7 @@ fn beyond_cards<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<(
         ("material.surface_correction", !uniform, "bonds with surface factors"),
         ("contact", scene.contact.is_some(), "contact"),
         (rotation_key.as_str(), rotation.is_some(), "a rotation"),
+        (curve_key.as_str(), curve.is_some(), "a curve of time"),
         ("dynamics.precision", scene.is_mixed(), "mixed precision"),
     ];
     faults.iter().find(|(_, given, _)| *given).map(|(key, _, found)| ((*key).to_owned(), *found))

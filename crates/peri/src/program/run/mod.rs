@@ -16,6 +16,7 @@ use variants::VariantRun;
 use crate::bonds::{Bonds, Property};
 use crate::calibrate::Space;
 use crate::error::Error;
+use crate::field::Field;
 use crate::program::observe::{self, FieldFrames, Moment, Physics, SceneObservers, in_space};
 use crate::program::quantities as q;
 use crate::program::scene::{self, NAMING, Scene, SceneVariant};
@@ -177,21 +178,36 @@ fn run_variant<const D: usize>(
     outcome.warnings.extend(device.note);
     outcome.snaps_back = scene.solver.snap_back;
     let mut state = initial_state((source, scene), &body, state, output)?;
-    let mut observers = observe::observers::<D>(scene);
+    let last = scene.at_end();
+    let mut observers = observe::observers::<D>(&last);
     let mut frames = FieldFrames::new(scene, &state, &output.join(physics.field_file()))?;
-    let ended = match solve(
-        (source, scene, device.card.as_ref()),
-        &physics,
-        variant_run,
-        &mut body,
-        &mut state,
-        &phases,
-        (&mut observers, &mut frames),
-    ) {
+    let mut solved = Ok(None);
+    for index in state.stage.finished..=scene.step.len() {
+        let (own_source, own_scene) = (scene.source_of(source, index), scene.stage(index));
+        if let Some(before) = index.checked_sub(1) {
+            // bonds of the whole body, as in a run that is resumed here
+            body = Physics::<D>::new(source, scene, variant)?.0;
+            let stage = &physics.stages[before];
+            if state.stage.finished < index {
+                let force = solved.unwrap_or_default();
+                stage.begin([&scene.stage(before), &own_scene], &body, force, &mut state);
+            }
+            physics.loads = stage.loads(&own_scene, &state);
+        }
+        let watched = (&mut observers, &mut frames);
+        let own = (&*own_source, &*own_scene, device.card.as_ref().filter(|_| index == 0));
+        solved = solve(own, &physics, variant_run, &mut body, &mut state, &phases, watched);
+        if solved.is_err() {
+            break;
+        }
+    }
+    outcome.regions = scene::region_names(scene);
+    let scene = &*last;
+    let ended = match solved {
         Err(PeriFailure::Run(error @ Error::NoEquilibrium { .. })) if !state.history.is_empty() => {
             Some(error)
         }
-        other => other.map(|()| None)?,
+        other => other.map(|_| None)?,
     };
     if let Some(error) = &ended {
         // bonds of the last equilibrium have broken since
@@ -217,7 +233,6 @@ fn run_variant<const D: usize>(
     outcome.history.clone_from(&state.history);
     outcome.events.clone_from(&state.fracture.events);
     outcome.fragments = moment.fragments().to_vec();
-    outcome.regions = scene::region_names(scene);
     let planes = scene.contact.iter().flat_map(|contact| contact.plane.iter().enumerate());
     outcome.planes = planes.map(|(index, plane)| plane.name(index)).collect();
     outcome.probes = observe::columns(scene);
@@ -251,6 +266,7 @@ fn initial_state<const D: usize>(
     Ok(state)
 }
 
+/// Solves a step; returns the body forces at its end if another one follows.
 fn solve<const D: usize>(
     (source, scene, card): (&Source, &Scene, Option<&device::Card>),
     physics: &Physics<D>,
@@ -259,7 +275,7 @@ fn solve<const D: usize>(
     state: &mut State<D>,
     phases: &RefCell<Phases>,
     (observers, frames): (&mut SceneObservers<D>, &mut FieldFrames),
-) -> Result<(), PeriFailure> {
+) -> Result<Option<Field<D>>, PeriFailure> {
     let (material, loads) = (&physics.body.material, &physics.loads);
     let (factors, times) = scene.load_steps();
     let mut watch = |status: &Status, state: &State<D>| variant_run.watch(status, state);
@@ -275,13 +291,12 @@ fn solve<const D: usize>(
         }
         None => None,
     };
-    let course = scene.dynamics.as_ref().and_then(|dynamics| dynamics.factor.as_ref());
-    let course = course.map(|formula| |time: f64| formula.value_and_rate(time));
+    let course = scene.course();
     let row = |bonds: &dyn Bonds<D>, state: &State<D>| physics.row(bonds, state);
     let response = material.respond(&*body.bonds);
     let mut system = System::of_response(&mut *body.bonds, response, loads, &factors);
     system.times = times.into();
-    system.course = course.as_ref().map(|course| course as _);
+    system.course = course.as_deref();
     system.observer = Some(&row);
     system.fit_bound = scene.fit_bound();
     let criterion = physics.body.criterion.clone();
@@ -308,7 +323,9 @@ fn solve<const D: usize>(
         None => load_stepping(&mut *scene.equilibria(), &mut system, state, &mut watch, &mut finished),
     };
     phases.borrow_mut().stop();
-    Ok(solved?)
+    solved?;
+    let later = state.stage.finished < physics.stages.len();
+    Ok(if later { system.body_force_at_end(state) } else { None })
 }
 
 /// Returns the data of a finished step for a callback: positions and displacements in three components.

@@ -83,7 +83,7 @@ impl VariantOutcome {
             history: Vec::new(),
             events: Vec::new(),
             fragments: Vec::new(),
-            dynamic: variant.scene.dynamics.is_some(),
+            dynamic: variant.scene.at_end().dynamics.is_some(),
             snaps_back: false,
             regions: Vec::new(),
             planes: Vec::new(),
@@ -123,7 +123,7 @@ impl VariantOutcome {
         for (name, count) in [
             ("particles", bonds.particles().len() as u64),
             ("directed_bonds", directed),
-            ("steps", state.step as u64),
+            ("steps", if state.stage.finished > 0 { state.history.len() } else { state.step } as u64),
             ("iterations", state.counts.total_iterations),
             ("unconverged_searches", state.counts.unconverged),
             ("force_evaluations", state.counts.evaluations),

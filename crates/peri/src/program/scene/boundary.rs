@@ -1,6 +1,7 @@
 //! Boundaries of a scene: regions of the body with loads or supports.
 
 use super::ShapeSpec;
+use super::curve_spec::{CurveSpec, Curves};
 use super::formula::Formula;
 use polycore::units::{Angle, Force, Length, Speed, Stress};
 use serde::Deserialize;
@@ -30,12 +31,16 @@ pub struct Boundary {
     pub force: Option<Vec<Force>>,
     /// Velocity at the start, in explicit dynamics.
     pub velocity: Option<Vec<Speed>>,
-    /// Displacement at the end of the last step, component by component: a length or `"free"`.
+    /// Displacement at the end of the last step, component by component: a length, `"free"` or, in a later
+    /// step, `"hold"`.
     pub displacement: Option<Vec<Prescribed>>,
     /// Rotation about an axis, along the arc; `displacement` adds to it.
     pub rotation: Option<RotationSpec>,
     /// Displacement at the end of the last step as formulas of the position, m.
     pub displacement_field: Option<Vec<PrescribedField>>,
+    /// Curve of time that multiplies displacement, rotation, force and traction, or one for each component;
+    /// default: the load factor.
+    pub curve: Option<Curves>,
     /// Velocity at the start as formulas of the position, m/s.
     pub velocity_field: Option<Vec<Formula>>,
 }
@@ -77,6 +82,8 @@ pub struct RotationSpec {
     pub axis: Option<Vec<f64>>,
     /// Angle at the end of the last step, right-handed about the axis; in the plane from x to y.
     pub angle: Angle,
+    /// Curve of time that multiplies the angle; default: that of the boundary.
+    pub curve: Option<CurveSpec>,
 }
 
 /// Sides of the bounding box.
@@ -130,6 +137,8 @@ pub enum Prescribed {
     Free,
     /// Prescribed, m.
     At(f64),
+    /// Stays where the step begins.
+    Hold,
 }
 
 impl schemars::JsonSchema for Prescribed {
@@ -140,8 +149,8 @@ impl schemars::JsonSchema for Prescribed {
     fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
         let length = generator.subschema_for::<Length>();
         schemars::json_schema!({
-            "description": "a length, or `free`: not prescribed",
-            "anyOf": [{ "const": "free" }, length],
+            "description": "a length; `free`: not prescribed; `hold`: as at the start of a later step",
+            "anyOf": [{ "const": "free" }, { "const": "hold" }, length],
         })
     }
 }
@@ -151,6 +160,9 @@ impl<'de> Deserialize<'de> for Prescribed {
         let text = String::deserialize(from)?;
         if text.trim() == "free" {
             return Ok(Self::Free);
+        }
+        if text.trim() == "hold" {
+            return Ok(Self::Hold);
         }
         let length = text.parse::<Length>().map_err(|error| {
             serde::de::Error::custom(format!("{error}; a component that is not prescribed is \"free\""))

@@ -79,6 +79,8 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         }
     }
     dynamics(source, scene)?;
+    super::step::check(source, scene)?;
+    super::curve::check(source, scene)?;
     super::time::check(source, scene)?;
     super::contact::check(source, scene)?;
     super::probe::check(source, scene)?;

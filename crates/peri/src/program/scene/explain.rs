@@ -95,6 +95,10 @@ pub fn explain<const D: usize>(
         let method = dynamics.method();
         builds(format!("explicit dynamics up to {} s, {} rows of history", method.end_time, method.records));
     }
+    if !scene.step.is_empty() {
+        let count = scene.step.len();
+        builds(format!("{count} later steps, each from the state at the end of the one before"));
+    }
     if let Some(contact) = &scene.contact {
         builds(if contact.has_pairs() {
             let stiffness = match contact.short_range {

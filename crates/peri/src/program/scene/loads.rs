@@ -9,6 +9,9 @@ use crate::material::{BodyTensor, surface_load};
 use crate::solver::{ContactStops, INVERTS, Loads, Support, Unsupported, find_unsupported, inverted};
 use harness::scene::{SceneError, Source};
 
+/// Times at which the balance of forces with curves is checked.
+const BALANCES: usize = 64;
+
 /// Returns the loads and supports of a body, and by site whether a load or support acts there.
 ///
 /// # Errors
@@ -35,20 +38,44 @@ pub fn loads_of<const D: usize>(
         let by_area = scene.material.solid.is_some() && boundary.layers.is_none() && boundary.depth.is_none();
         let support = support(source, &key, boundary, body, &members, depth.filter(|_| !by_area))?;
         if let (Some(side), Some(traction), true) = (boundary.side, &boundary.traction, by_area) {
-            tractions.push((side, std::array::from_fn(|d| traction[d].si())));
+            tractions.push((index, side, std::array::from_fn(|d| traction[d].si())));
         }
         regions.push((members, support));
     }
     let mut loads = Loads::new(body.bonds.sites(), &regions);
-    for (side, traction) in tractions {
+    let courses = super::curve::courses(source, scene)?;
+    super::overlap::refuse(source, scene, body, &regions, &courses)?;
+    let mut surfaces = Vec::new();
+    for (index, side, traction) in tractions {
+        let mut alone = Loads::default();
+        if !courses.is_empty() {
+            add_traction(body, side, traction, &mut alone, &mut loaded);
+        }
+        surfaces.extend(alone.body_force.map(|field| (index, field)));
         add_traction(body, side, traction, &mut loads, &mut loaded);
     }
     apply_formulas(source, scene, body, &regions, &mut loads)?;
-    super::rotation::turn(source, scene, body, &regions, &mut loads)?;
+    super::rotation::turn(source, scene, body, &regions, &courses, &mut loads)?;
+    if !courses.is_empty() {
+        let rotates = |index: usize| scene.boundary[index].rotation.is_some();
+        let kept = |index: usize| {
+            let components = scene.boundary[index].displacement.iter().flatten().enumerate();
+            components.map(|(d, held)| u8::from(*held == Prescribed::Hold) << d).sum()
+        };
+        super::curve::follow(&regions, rotates, kept, &surfaces, courses, &mut loads);
+    }
     refuse_inverted(source, scene, body, &loads)?;
     if scene.method() == SolverMethod::Verlet {
         // explicit dynamics needs neither balance nor supports
         return Ok((loads, loaded));
+    }
+    if loads.curved.is_some() {
+        let (parts, _) = scene.load_steps();
+        for &part in parts.iter().step_by(parts.len().div_ceil(BALANCES)) {
+            loads.set_forces([part; 2]);
+            refuse_unbalanced(source, scene, body, &loads)?;
+        }
+        loads.set_forces([1.0; 2]);
     }
     refuse_unbalanced(source, scene, body, &loads)?;
     let all = (1_u8 << D) - 1;
@@ -218,7 +245,26 @@ fn refuse_inverted<const D: usize>(
 /// Returns the names of the regions of prescribed displacement.
 pub fn region_names(scene: &Scene) -> Vec<String> {
     let constrained = scene.boundary.iter().enumerate().filter(|(_, b)| b.prescribes_displacement());
-    constrained.map(|(index, boundary)| name_of(index, boundary)).collect()
+    let mut names: Vec<String> = constrained.map(|(index, boundary)| name_of(index, boundary)).collect();
+    for step in &scene.step {
+        let constrained = step.boundary.iter().enumerate().filter(|(_, b)| b.prescribes_displacement());
+        for name in constrained.map(|(index, boundary)| name_of(index, boundary)) {
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+    }
+    names
+}
+
+/// Orders the regions of prescribed displacement of a step as `names`, those of all steps; a region that the
+/// step lacks is empty.
+pub fn order_regions<const D: usize>(scene: &Scene, names: &[String], loads: &mut Loads<D>) {
+    let own = region_names(&Scene { step: Vec::new(), ..scene.clone() });
+    let find = |name: &String| own.iter().position(|own| own == name);
+    let old = std::mem::take(&mut loads.held_regions);
+    let each = names.iter().map(|name| find(name).and_then(|at| old.get(at).cloned()).unwrap_or_default());
+    loads.held_regions = each.collect();
 }
 
 /// Returns lines for `peri check`: the particles of each boundary, and the free length between two grips.
@@ -341,6 +387,7 @@ fn support<const D: usize>(
         support.displacement = std::array::from_fn(|d| match displacement[d] {
             Prescribed::Free => None,
             Prescribed::At(value) => Some(value),
+            Prescribed::Hold => Some(0.0),
         });
     }
     if super::rotation::rotation_of::<D>(source, key, boundary)?.is_some() {

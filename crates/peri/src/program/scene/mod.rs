@@ -8,6 +8,8 @@ mod check;
 mod cloud;
 mod contact;
 mod crack;
+mod curve;
+mod curve_spec;
 mod explain;
 mod field;
 mod followed;
@@ -19,6 +21,7 @@ mod loads;
 mod memory;
 mod method;
 mod network;
+mod overlap;
 mod parts;
 mod placement;
 mod planes;
@@ -26,6 +29,7 @@ mod probe;
 mod region;
 mod rotation;
 mod solid;
+mod step;
 mod tearing;
 mod time;
 mod values;
@@ -37,6 +41,8 @@ pub use build::{body_of, least_memory};
 pub use check::{check, check_variant};
 pub use contact::{ContactSpec, PlaneSpec, tied_grips};
 pub use crack::{cuts_of, severed_of_each};
+pub use curve::common_course;
+pub use curve_spec::{CurveSpec, CurveTable, Curves};
 pub use explain::explain;
 pub use field::{FieldSpec, VaryingParameter};
 pub use followed::{ParameterField, followed};
@@ -44,13 +50,14 @@ pub use formula::Formula;
 pub use grips::free_lengths;
 pub use inclusion::{Inclusion, Inclusions};
 pub use line::{LineField, SectionSpec, line_fields};
-pub use loads::{loads_of, region_names, velocities_of};
+pub use loads::{loads_of, order_regions, region_names, velocities_of};
 pub use memory::needed as memory_needed;
 pub use method::{DeviceChoice, Dynamics, ForcePrecision, SolverMethod, SolverSpec};
 pub use network::{ChemistrySpec, explain_network, resolve_network};
 pub use placement::{check_placement, exact_plate};
 pub use probe::{HistoryProbe, Track};
 pub use solid::{SolidKind, SolidLaw};
+pub use step::{StepSpec, step_cuts};
 pub use tearing::{explain_tearing, tearing_warnings};
 pub use time::{TimeProgramSpec, TimeStep};
 pub use values::{DiscreteBody, plain};
@@ -89,10 +96,16 @@ pub struct Scene {
     /// Solver settings.
     #[serde(default)]
     pub solver: SolverSpec,
-    /// Ramps and holds of a quasi-static run in time, for a solid with branches or softening.
+    /// Ramps and holds of a quasi-static run in time, for a solid with branches or softening, or curves.
     pub time: Option<TimeProgramSpec>,
     /// Density and times of explicit dynamics.
     pub dynamics: Option<Dynamics>,
+    /// Later steps, each from the state at the end of the one before.
+    #[serde(default)]
+    pub step: Vec<StepSpec>,
+    /// True for the scene of a later step, see [`Scene::stage`].
+    #[serde(skip)]
+    pub later: bool,
     /// Repulsion of particles without a bond, friction, rigid planes; default: none.
     pub contact: Option<ContactSpec>,
     /// Quantities recorded in every row of the history.

@@ -5,7 +5,7 @@ use super::region::region;
 use super::values::{DiscreteBody, ONE_OF_THEM, plain, vector};
 use super::{Boundary, Prescribed, PrescribedField, Scene};
 use crate::bonds::Bonds;
-use crate::solver::{Loads, RotatingRegion, Rotation, Support};
+use crate::solver::{Course, Loads, RotatingRegion, Rotation, Support};
 use harness::scene::{SceneError, Source};
 use nalgebra::{DMatrix, SMatrix};
 
@@ -25,7 +25,7 @@ pub(super) fn rotation_of<const D: usize>(
     key: &str,
     boundary: &Boundary,
 ) -> Result<Option<Rotation<D>>, SceneError> {
-    let Some(RotationSpec { point, axis, angle }) = &boundary.rotation else { return Ok(None) };
+    let Some(RotationSpec { point, axis, angle, .. }) = &boundary.rotation else { return Ok(None) };
     let key = format!("{key}.rotation");
     let centre = vector::<D>(source, &format!("{key}.point"), point)?;
     let axis: [f64; 3] = match (axis, D) {
@@ -75,6 +75,7 @@ pub(super) fn turn<const D: usize>(
     scene: &Scene,
     body: &DiscreteBody<D>,
     regions: &[(Vec<u32>, Support<D>)],
+    courses: &[(Course, [Course; D])],
     loads: &mut Loads<D>,
 ) -> Result<(), SceneError> {
     let mut number = 0;
@@ -91,6 +92,7 @@ pub(super) fn turn<const D: usize>(
             let turned = RotatingRegion {
                 rotation,
                 shift: support.displacement.map(|component| component.unwrap_or(0.0)),
+                courses: courses.get(index).cloned(),
                 components: (0..D).map(bit).sum(),
                 region: number,
                 sites: members.iter().copied().filter(|&site| !later[site as usize]).collect(),

@@ -58,8 +58,18 @@ impl TimeStep {
 }
 
 impl Scene {
-    /// Returns the load factor at the end of each step, and its time, s; no times without a programme.
+    /// Returns the load factor at the end of each step, and its time, s; no times without a programme. With
+    /// curves the factor is the part of the whole time.
     pub fn load_steps(&self) -> (Vec<f64>, Vec<f64>) {
+        let (factors, times) = self.programme();
+        match times.last() {
+            Some(end) if self.has_curves() => (times.iter().map(|time| time / end).collect(), times),
+            _ => (factors, times),
+        }
+    }
+
+    /// Returns the load factor of what has no curve at the end of each step, and its time, s.
+    pub(super) fn programme(&self) -> (Vec<f64>, Vec<f64>) {
         let Some(time) = &self.time else { return (self.solver.factors(), Vec::new()) };
         let (mut factors, mut times) = (Vec::new(), Vec::new());
         let (mut factor, mut start) = (0.0, 0.0);
@@ -97,8 +107,9 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         }
         return Ok(());
     };
-    if !remembers {
-        let why = "only a `solid` with `branch` or `mullins` depends on the time";
+    if !remembers && !scene.has_curves() {
+        let why =
+            "only a `solid` with `branch` or `mullins`, or a `curve` of a boundary, depends on the time";
         return Err(source.unexpected("time", why));
     }
     if scene.dynamics.is_some() {

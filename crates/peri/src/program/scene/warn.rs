@@ -180,7 +180,7 @@ fn long_steps<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<Str
     let prescribed = scene.boundary.iter().flat_map(|boundary| boundary.displacement.iter().flatten());
     let largest = prescribed.fold(0.0_f64, |most, held| match held {
         super::Prescribed::At(value) => most.max(value.abs()),
-        super::Prescribed::Free => most,
+        super::Prescribed::Free | super::Prescribed::Hold => most,
     });
     let step = largest / scene.step_count() as f64;
     let horizons = step / bonds.horizon();

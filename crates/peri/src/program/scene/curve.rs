@@ -1,0 +1,414 @@
+//! Curves of time that multiply what a boundary prescribes: formulas, or tables of files.
+
+use super::curve_spec::{CurveSpec, CurveTable, Curves};
+use super::formula::Formula;
+use super::values::plain;
+use super::{Boundary, Prescribed, Scene};
+use crate::field::Field;
+use crate::solver::{Course, CurvedLoads, CurvedRegion, LoadCurve, Loads, Support};
+use harness::scene::{SceneError, Source};
+use polycore::table::{Table, plain_unit};
+use polycore::units::dimension::{
+    AngleDimension, ForceDimension, LengthDimension, StressDimension, TimeDimension,
+};
+use polycore::units::{Dimension, Unit};
+use std::fmt;
+
+/// Parts of the time of a run at which a formula is checked.
+const MOMENTS: u32 = 256;
+/// Largest multiple at the start of a quasi-static programme, which begins without load.
+const START: f64 = 1e-9;
+
+impl Boundary {
+    /// Returns true if a curve multiplies what the boundary prescribes, or a part of it.
+    pub fn has_curve(&self) -> bool {
+        self.curve.is_some() || self.rotation.as_ref().is_some_and(|rotation| rotation.curve.is_some())
+    }
+
+    /// Returns true if the boundary prescribes a displacement or a force.
+    fn loads(&self) -> bool {
+        self.prescribes_displacement() || self.traction.is_some() || self.force.is_some()
+    }
+}
+
+impl Scene {
+    /// Returns true if loads follow curves: those of boundaries, or any in a later step.
+    pub fn has_curves(&self) -> bool {
+        self.later || self.boundary.iter().any(Boundary::has_curve)
+    }
+
+    /// Returns the load factor of explicit dynamics and its rate over the time, s; `None` for a ramp. With
+    /// curves the factor is the part of the whole time.
+    pub fn course(&self) -> Option<Box<LoadCurve<'_>>> {
+        let dynamics = self.dynamics.as_ref()?;
+        if self.has_curves() {
+            let end = dynamics.end_time.si();
+            return Some(Box::new(move |time| (time / end, 1.0 / end)));
+        }
+        let factor = dynamics.factor.as_ref()?;
+        Some(Box::new(|time| factor.value_and_rate(time)))
+    }
+}
+
+/// Time of a run with curves: its end, s, and the load factor of boundaries without a curve.
+struct CurveTime {
+    end: f64,
+    explicit: bool,
+    /// Times at which curves are checked, s.
+    moments: Vec<f64>,
+    common: Course,
+}
+
+impl CurveTime {
+    fn new(scene: &Scene) -> Self {
+        if let Some(dynamics) = &scene.dynamics {
+            let (end, ramp) = (dynamics.method().end_time, dynamics.method().ramp);
+            let common = match dynamics.factor.clone() {
+                Some(factor) => of_formula(factor, end),
+                None => Course::new(move |part| {
+                    let time = part * end;
+                    if time < ramp { (time / ramp, end / ramp) } else { (1.0, 0.0) }
+                }),
+            };
+            let moments = (0..=MOMENTS).map(|k| end * f64::from(k) / f64::from(MOMENTS)).collect();
+            return Self { end, explicit: true, moments, common };
+        }
+        let (factors, times) = scene.programme();
+        let Some(&end) = times.last() else {
+            // a later step without times: the load factor itself
+            let common = Course::new(|part| (part, 1.0));
+            return Self { end: 1.0, explicit: false, moments: Vec::new(), common };
+        };
+        let moments: Vec<f64> = std::iter::once(0.0).chain(times).collect();
+        let factors = std::iter::once(0.0).chain(factors).collect();
+        Self { end, explicit: false, common: of_rows(moments.clone(), factors, end), moments }
+    }
+
+    /// Converts and checks the curve at a key; `values` are those that it multiplies.
+    fn course(
+        &self,
+        source: &Source,
+        key: &str,
+        curve: &CurveSpec,
+        values: &Multiplied,
+    ) -> Result<Course, SceneError> {
+        let course = match curve {
+            CurveSpec::Formula(formula) => {
+                if let Some(found) = formula.find_variable_except("t") {
+                    let found = format!("`{found}` in `{}`", formula.text());
+                    return Err(source.error(key, found, "a formula of `t`, the time in s"));
+                }
+                of_formula(formula.clone(), self.end)
+            }
+            CurveSpec::Table(table) => self.of_table(source, key, table, values)?,
+        };
+        for &time in &self.moments {
+            let (value, rate) = (course.at(time / self.end), course.rate(time / self.end) / self.end);
+            if !value.is_finite() || self.explicit && !rate.is_finite() {
+                let found = format!("{value}, rising at {rate} 1/s, at {} s", plain(time));
+                let allowed = format!("finite values and rates from 0 s to {} s", plain(self.end));
+                return Err(source.error(key, found, allowed));
+            }
+        }
+        let start = course.at(0.0);
+        if !self.explicit && values.moves() && start.abs() > START {
+            let found = format!("{start} at 0 s");
+            return Err(source.error(key, found, "0 at 0 s: a quasi-static run begins at rest"));
+        }
+        Ok(course)
+    }
+
+    fn of_table(
+        &self,
+        source: &Source,
+        key: &str,
+        spec: &CurveTable,
+        values: &Multiplied,
+    ) -> Result<Course, SceneError> {
+        let refused = |error: &dyn fmt::Display| source.refused(&format!("{key}.file"), error);
+        let table = Table::read(source.file(&spec.file)).map_err(|error| refused(&error))?;
+        let column = |name: &str| table.require_column(&[name]).map_err(|error| refused(&error));
+        let [at, of] = [column(&spec.time)?, column(&spec.value)?];
+        let times = table.column::<TimeDimension>(at, None).map_err(|error| refused(&error))?;
+        let rows = (0..table.rows()).map(|row| table.number(row, of)).collect::<Result<Vec<f64>, _>>();
+        let rows = rows.map_err(|error| refused(&error))?;
+        if let Some(row) = (1..times.len()).find(|&row| times[row] <= times[row - 1]) {
+            let before = plain(times[row - 1]);
+            return Err(refused(&table.refuse_cell(
+                row,
+                at,
+                &format!("a time above {before} s, as in a curve"),
+            )));
+        }
+        let unit = table.headings[of].unit.as_deref().map(plain_unit).unwrap_or_default();
+        if let Some((found, allowed)) = values.misfit(&unit) {
+            let allowed = format!("{allowed}, as column `{}` multiplies it", table.headings[of].text);
+            return Err(source.error(&format!("{key}.value"), found, allowed));
+        }
+        let whole = format!("times from 0 s to {} s, the whole run", plain(self.end));
+        match (times.first(), times.last()) {
+            (Some(&first), Some(&last)) if first <= 0.0 && last >= self.end * (1.0 - 1e-9) => {
+                Ok(of_rows(times, rows, self.end))
+            }
+            (Some(first), Some(last)) => {
+                let found = format!("times from {} s to {} s", plain(*first), plain(*last));
+                Err(source.error(&format!("{key}.file"), found, whole))
+            }
+            _ => Err(source.error(&format!("{key}.file"), "no row", whole)),
+        }
+    }
+}
+
+/// Course of a formula of the time in a run that ends at `end`, s.
+fn of_formula(formula: Formula, end: f64) -> Course {
+    Course::new(move |part| {
+        let (value, rate) = formula.value_and_rate(part * end);
+        (value, rate * end)
+    })
+}
+
+/// Course that is linear between points of time, s; at a point it has the rate after it.
+fn of_rows(times: Vec<f64>, values: Vec<f64>, end: f64) -> Course {
+    Course::new(move |part| {
+        let after = times.partition_point(|&time| time <= part * end);
+        let after = after.min(times.len() - 1).max(usize::from(times.len() > 1));
+        let before = after.saturating_sub(1);
+        let length = times[after] - times[before];
+        let rise = if length > 0.0 { (values[after] - values[before]) / length } else { 0.0 };
+        let within = (part * end).clamp(times[before], times[after]) - times[before];
+        // the end of a line to the bit
+        let value = if within == length { values[after] } else { values[before] + rise * within };
+        (value, rise * end)
+    })
+}
+
+/// Values that a curve multiplies, SI, by their dimension.
+struct Multiplied {
+    lengths: Vec<f64>,
+    forces: Vec<f64>,
+    stresses: Vec<f64>,
+    angles: Vec<f64>,
+    fields: bool,
+}
+
+impl Multiplied {
+    /// Values of a boundary, of one component or of all.
+    fn new(boundary: &Boundary, component: Option<usize>) -> Self {
+        let own = |d: usize| component.is_none_or(|component| component == d);
+        let moved = boundary.displacement.iter().flatten().enumerate().filter(|(d, _)| own(*d));
+        let forces = boundary.force.iter().flatten().enumerate().filter(|(d, _)| own(*d));
+        let stresses = boundary.traction.iter().flatten().enumerate().filter(|(d, _)| own(*d));
+        let turned =
+            boundary.rotation.iter().filter(|rotation| component.is_none() && rotation.curve.is_none());
+        let length = |held: &Prescribed| match held {
+            Prescribed::At(value) => *value,
+            Prescribed::Free | Prescribed::Hold => 0.0,
+        };
+        Self {
+            lengths: moved.map(|(_, held)| length(held)).collect(),
+            forces: forces.map(|(_, force)| force.si()).collect(),
+            stresses: stresses.map(|(_, stress)| stress.si()).collect(),
+            angles: turned.map(|rotation| rotation.angle.si()).collect(),
+            fields: boundary.displacement_field.is_some(),
+        }
+    }
+
+    /// Returns true if any value is a displacement.
+    fn moves(&self) -> bool {
+        self.fields || self.lengths.iter().chain(&self.angles).any(|value| *value != 0.0)
+    }
+
+    /// Returns true if any value is not 0.
+    fn is_load(&self) -> bool {
+        self.moves() || self.forces.iter().chain(&self.stresses).any(|value| *value != 0.0)
+    }
+
+    /// Returns what does not suit a column with a unit, and what would.
+    fn misfit(&self, unit: &str) -> Option<(String, String)> {
+        if unit.is_empty() {
+            return None;
+        }
+        let fields = self.fields.then(|| {
+            let allowed = "a column without a unit".to_owned();
+            (format!("a column in {unit} for formulas of the position"), allowed)
+        });
+        fields
+            .or_else(|| misfit_of::<LengthDimension>(unit, &self.lengths, "m"))
+            .or_else(|| misfit_of::<ForceDimension>(unit, &self.forces, "N"))
+            .or_else(|| misfit_of::<StressDimension>(unit, &self.stresses, "Pa"))
+            .or_else(|| misfit_of::<AngleDimension>(unit, &self.angles, "rad"))
+    }
+}
+
+fn misfit_of<D: Dimension>(unit: &str, values: &[f64], si: &str) -> Option<(String, String)> {
+    let one =
+        Unit::<D>::parse(unit).ok().and_then(|unit| unit.quantity(1.0).ok()).map_or(f64::NAN, |one| one.si());
+    let fits = |value: &&f64| (value.abs() / one - 1.0).abs() < 1e-9;
+    let value = values.iter().filter(|value| **value != 0.0).find(|value| !fits(value))?;
+    Some((
+        format!("a column in {unit} for {} {si}", plain(*value)),
+        format!("values of 0, 1 {unit} or -1 {unit}"),
+    ))
+}
+
+/// Courses of the angle and of each component of every boundary; none without curves.
+///
+/// # Errors
+/// A curve that is not defined over the run, that has another variable than `t` or a unit that does not suit
+/// the values, and files that cannot be read.
+pub(super) fn courses<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+) -> Result<Vec<(Course, [Course; D])>, SceneError> {
+    if !scene.has_curves() {
+        return Ok(Vec::new());
+    }
+    let time = CurveTime::new(scene);
+    let of = |(index, boundary): (usize, &Boundary)| {
+        let key = format!("boundary[{index}].curve");
+        let each: Vec<Course> = match &boundary.curve {
+            None => vec![time.common.clone(); D],
+            Some(Curves::All(curve)) => {
+                vec![time.course(source, &key, curve, &Multiplied::new(boundary, None))?; D]
+            }
+            Some(Curves::Each(curves)) => {
+                let each = curves.iter().enumerate().map(|(d, curve)| {
+                    time.course(source, &format!("{key}[{d}]"), curve, &Multiplied::new(boundary, Some(d)))
+                });
+                each.collect::<Result<_, _>>()?
+            }
+        };
+        let found = each.len();
+        let each = <[Course; D]>::try_from(each).map_err(|_| {
+            source.error(&key, format!("{found} curves"), format!("one, or {D}: one for each component"))
+        })?;
+        let angle = match boundary.rotation.as_ref().and_then(|rotation| rotation.curve.as_ref()) {
+            Some(curve) => {
+                let angle = boundary.rotation.iter().map(|rotation| rotation.angle.si()).collect();
+                let none = Vec::new;
+                let values = Multiplied {
+                    lengths: none(),
+                    forces: none(),
+                    stresses: none(),
+                    angles: angle,
+                    fields: false,
+                };
+                time.course(source, &format!("boundary[{index}].rotation.curve"), curve, &values)?
+            }
+            None if boundary.rotation.is_some() && matches!(boundary.curve, Some(Curves::Each(_))) => {
+                let why = "needed beside a curve for each component: the curve of the angle";
+                return Err(source.missing(&format!("boundary[{index}].rotation.curve"), why));
+            }
+            None => each[0].clone(),
+        };
+        Ok((angle, each))
+    };
+    scene.boundary.iter().enumerate().map(of).collect()
+}
+
+/// Returns the course of what has no curve.
+pub fn common_course(scene: &Scene) -> Course {
+    CurveTime::new(scene).common
+}
+
+/// Lets the loads of all boundaries follow their courses; `surfaces` are the tractions of solids, by
+/// boundary.
+pub(super) fn follow<const D: usize>(
+    regions: &[(Vec<u32>, Support<D>)],
+    rotates: impl Fn(usize) -> bool,
+    kept: impl Fn(usize) -> u8,
+    surfaces: &[(usize, Field<D>)],
+    courses: Vec<(Course, [Course; D])>,
+    loads: &mut Loads<D>,
+) {
+    let mut curved = CurvedLoads::default();
+    for (index, ((members, support), (_, courses))) in regions.iter().zip(courses).enumerate() {
+        let region = |sites: Vec<u32>, values: Vec<[f64; D]>, components: u8| {
+            CurvedRegion::new(sites, values, courses.clone(), components)
+        };
+        let components = (0..D).map(|d| u8::from(support.displacement[d].is_some()) << d).sum();
+        if let Some(field) = loads.displacement.as_ref().filter(|_| components != 0 && !rotates(index)) {
+            let values = members.iter().map(|&site| field.get(site as usize)).collect();
+            let mut held = region(members.clone(), values, components);
+            held.kept = kept(index);
+            curved.held.push(held);
+        }
+        if support.body_force != [0.0; D] {
+            curved.pushed.push(region(members.clone(), vec![support.body_force; members.len()], 0));
+        }
+        for (_, field) in surfaces.iter().filter(|(own, _)| *own == index) {
+            let each = (0..field.sites()).map(|site| (site as u32, field.get(site)));
+            let (sites, values) = each.filter(|(_, value)| *value != [0.0; D]).unzip();
+            curved.pushed.push(region(sites, values, 0));
+        }
+    }
+    loads.curved = Some(Box::new(curved));
+    loads.set_peaks();
+}
+
+/// Checks the keys that exclude curves, and what curves need.
+///
+/// # Errors
+/// A [`SceneError`] that names the key.
+pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    let Some(first) = scene.boundary.iter().position(Boundary::has_curve) else { return Ok(()) };
+    for (index, boundary) in scene.boundary.iter().enumerate() {
+        if boundary.has_curve() && !boundary.loads() {
+            let why =
+                "a curve multiplies displacements, rotations, forces and tractions; this boundary has none";
+            return Err(source.unexpected(&format!("boundary[{index}].curve"), why));
+        }
+    }
+    let planes = scene.contact.iter().flat_map(|contact| &contact.plane);
+    if let Some(index) = planes.clone().position(|plane| plane.displacement.is_some()) {
+        let why = "the plane moves with the load factor, which runs with curves do not have";
+        return Err(source.conflict(&format!("contact.plane[{index}].displacement"), "boundary.curve", why));
+    }
+    let Some(time) = scene.time.as_ref().filter(|_| scene.dynamics.is_none()) else {
+        return if scene.dynamics.is_some() {
+            Ok(())
+        } else {
+            let why =
+                format!("needed for `boundary[{first}].curve`: the steps of a programme, or [dynamics]");
+            Err(source.missing("time", why))
+        };
+    };
+    let idle = |boundary: &Boundary| !boundary.has_curve() && Multiplied::new(boundary, None).is_load();
+    match scene.boundary.iter().position(idle) {
+        Some(index) if time.step.iter().all(|step| step.factor.is_none()) => {
+            let found = "a load without `curve`, in a programme whose factor stays 0";
+            let allowed = "a `curve` here, or a `factor` in [[time.step]]";
+            Err(source.error(&format!("boundary[{index}]"), found, allowed))
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_joined_by_lines() {
+        let course = of_rows(vec![0.0, 2.0, 3.0], vec![0.0, 4.0, 4.0], 3.0);
+        let found = [0.0, 1.0, 2.0, 2.5, 3.0].map(|time| (course.at(time / 3.0), course.rate(time / 3.0)));
+        let near = |(a, b): ((f64, f64), (f64, f64))| (a.0 - b.0).abs() < 1e-14 && (a.1 - b.1).abs() < 1e-14;
+        let expected = [(0.0, 6.0), (2.0, 6.0), (4.0, 0.0), (4.0, 0.0), (4.0, 0.0)];
+        assert!(found.into_iter().zip(expected).all(near), "{found:?}");
+    }
+
+    #[test]
+    fn units_multiply_one() {
+        let of = |lengths: &[f64]| Multiplied {
+            lengths: lengths.to_vec(),
+            forces: Vec::new(),
+            stresses: Vec::new(),
+            angles: Vec::new(),
+            fields: false,
+        };
+        assert!(of(&[0.0, 1e-3, -1e-3]).misfit("mm").is_none() && of(&[2e-3]).misfit("").is_none());
+        let (found, allowed) = of(&[0.0, 2e-3]).misfit("mm").unwrap();
+        assert_eq!((&*found, &*allowed), ("a column in mm for 0.002 m", "values of 0, 1 mm or -1 mm"));
+        assert!(of(&[1.0]).misfit("N").is_some());
+    }
+}

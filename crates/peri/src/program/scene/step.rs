@@ -1,0 +1,128 @@
+//! Steps of a programme in sequence: the scene's own blocks are the first, each `[[step]]` is a later one.
+
+use super::check::check_variant;
+use super::{Boundary, CrackSpec, DeviceChoice, Dynamics, Prescribed, Scene, SolverMethod, SolverSpec};
+use super::{TimeProgramSpec, crack};
+use crate::bonds::Bonds;
+use crate::geometry::Cut;
+use harness::scene::{SceneError, Source};
+use serde::Deserialize;
+use std::borrow::Cow;
+
+/// Later step, from the state at the end of the one before.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StepSpec {
+    /// Loads and supports; a region that the step does not name is free.
+    #[serde(default)]
+    pub boundary: Vec<Boundary>,
+    /// Solver settings; default: those of a scene without.
+    pub solver: Option<SolverSpec>,
+    /// Ramps and holds of a quasi-static step in time.
+    pub time: Option<TimeProgramSpec>,
+    /// Explicit dynamics in this step.
+    pub dynamics: Option<Dynamics>,
+    /// Cracks that appear at the start.
+    #[serde(default)]
+    pub cracks: Vec<CrackSpec>,
+}
+
+/// Keys of a step and the keys of the scene in whose place they are.
+const KEYS: [[&str; 2]; 5] = [
+    ["boundary", "boundary"],
+    ["solver", "solver"],
+    ["time", "time"],
+    ["dynamics", "dynamics"],
+    ["cracks", "body.cracks"],
+];
+
+impl Scene {
+    /// Returns a source whose errors about a step, from 0, point at it.
+    pub fn source_of<'a>(&self, source: &'a Source, index: usize) -> Cow<'a, Source> {
+        let Some(at) = index.checked_sub(1) else { return Cow::Borrowed(source) };
+        let replaced =
+            |own: Source, [name, key]: [&str; 2]| own.with_replaced_first(key, &format!("step[{at}].{name}"));
+        Cow::Owned(KEYS.into_iter().fold(source.clone(), replaced))
+    }
+
+    /// Returns the scene of a step, from 0.
+    pub fn stage(&self, index: usize) -> Cow<'_, Self> {
+        let Some(step) = index.checked_sub(1).and_then(|at| self.step.get(at)) else {
+            return Cow::Borrowed(self);
+        };
+        let mut scene = self.clone();
+        let StepSpec { boundary, solver, time, dynamics, cracks } = step.clone();
+        let explicit = dynamics.is_some().then_some(SolverMethod::Verlet);
+        (scene.boundary, scene.time, scene.dynamics) = (boundary, time, dynamics);
+        scene.solver = solver.unwrap_or_default();
+        scene.solver.method = scene.solver.method.or(explicit);
+        (scene.body.cracks, scene.step, scene.later) = (cracks, Vec::new(), true);
+        Cow::Owned(scene)
+    }
+
+    /// Returns the scene of the last step.
+    pub fn at_end(&self) -> Cow<'_, Self> {
+        self.stage(self.step.len())
+    }
+
+    /// Returns the duration of a quasi-static programme or of explicit dynamics, s; 0 without times.
+    pub fn duration(&self) -> f64 {
+        let end = self.load_steps().1.last().copied().unwrap_or(0.0);
+        self.dynamics.as_ref().map_or(end, |dynamics| dynamics.end_time.si())
+    }
+}
+
+/// Returns the cuts of a later step.
+///
+/// # Errors
+/// As [`super::body_of`], and a crack that severs no bond.
+pub fn step_cuts<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    bonds: &dyn Bonds<D>,
+) -> Result<Vec<Cut<D>>, SceneError> {
+    let cuts = crack::cracks(source, scene)?;
+    crack::severed(source, bonds, &cuts)?;
+    Ok(cuts)
+}
+
+/// Checks the steps of a scene.
+///
+/// # Errors
+/// A [`SceneError`] that names the key, the value found and what is allowed.
+pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    let held = |boundary: &Boundary| boundary.displacement.iter().flatten().any(|u| *u == Prescribed::Hold);
+    if let Some(index) = scene.boundary.iter().position(held).filter(|_| !scene.later) {
+        let key = format!("boundary[{index}].displacement");
+        return Err(source.error(&key, "`hold`", "a length or `free`; `hold` is for a later [[step]]"));
+    }
+    if scene.step.is_empty() {
+        return Ok(());
+    }
+    if let Some(contact) = &scene.contact
+        && (contact.has_friction() || !contact.plane.is_empty())
+    {
+        let why = "friction and rigid planes do not continue from one step in the next";
+        return Err(source.conflict("contact", "step", why));
+    }
+    for index in 0..=scene.step.len() {
+        let (source, scene) = (scene.source_of(source, index), scene.stage(index));
+        if scene.solver.refine > 1 || scene.solver.snap_back {
+            let name = if scene.solver.snap_back { "snap_back" } else { "refine" };
+            let why = "available without [[step]] only";
+            return Err(source.unexpected(&format!("solver.{name}"), why));
+        }
+        if index == 0 {
+            continue;
+        }
+        if let Some(at) = scene.boundary.iter().position(|boundary| boundary.rotation.is_some()) {
+            let why = "a rotation starts from the undeformed body: write it in the first step";
+            return Err(source.unexpected(&format!("boundary[{at}].rotation"), why));
+        }
+        if scene.dynamics.as_ref().is_some_and(|dynamics| dynamics.device != DeviceChoice::Cpu) {
+            return Err(source.error("dynamics.device", "a graphics card in a later step", "`cpu`"));
+        }
+        check_variant(&source, &scene)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,250 @@
+//! Loads that follow curves of time, each region its own, instead of one load factor.
+//!
+//! The load factor of a system with curves is the part τ = t/T of its whole time T. Prescribed displacements
+//! are u(X, τ) = c_d(τ) a_d(X); as in rotating regions, [`Loads::displacement`] is their rate over τ. Body
+//! forces Σ c_d(τ) b_d(X) are computed anew at each τ and act in full.
+
+use super::load::Loads;
+use super::state::State;
+use super::system::System;
+use crate::bonds::BodyGeometry;
+use crate::field::Field;
+use std::fmt;
+use std::sync::Arc;
+
+/// Parts of the time at which the largest multiple is sought.
+const MOMENTS: u32 = 256;
+
+/// Multiple of a load over τ, and its rate.
+#[derive(Clone)]
+pub struct Course(Arc<dyn Fn(f64) -> (f64, f64) + Send + Sync>);
+
+impl fmt::Debug for Course {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Course(0: {:?}, 1: {:?})", self.at(0.0), self.at(1.0))
+    }
+}
+
+impl Course {
+    /// Creates a course from a function of τ.
+    pub fn new(course: impl Fn(f64) -> (f64, f64) + Send + Sync + 'static) -> Self {
+        Self(Arc::new(course))
+    }
+
+    /// Multiple of the load at τ.
+    pub fn at(&self, part: f64) -> f64 {
+        (self.0)(part).0
+    }
+
+    /// Rate of the multiple at τ.
+    pub fn rate(&self, part: f64) -> f64 {
+        (self.0)(part).1
+    }
+}
+
+/// Displacement or body force of a region whose components follow courses.
+#[derive(Clone, Debug)]
+pub struct CurvedRegion<const D: usize> {
+    /// Sites of the region.
+    pub sites: Vec<u32>,
+    /// Displacement, m, or body force density, N/m³, of each site at a multiple of 1.
+    pub values: Vec<[f64; D]>,
+    /// Course of each component.
+    pub courses: [Course; D],
+    /// Bit d: component d is prescribed.
+    pub components: u8,
+    /// Displacement of each site at a multiple of 0, m; empty: none.
+    pub(super) offsets: Vec<[f64; D]>,
+    /// Bit d: component d stays where a step begins.
+    pub kept: u8,
+}
+
+impl<const D: usize> CurvedRegion<D> {
+    /// Creates a region that begins at rest.
+    pub fn new(sites: Vec<u32>, values: Vec<[f64; D]>, courses: [Course; D], components: u8) -> Self {
+        Self { sites, values, courses, components, offsets: Vec::new(), kept: 0 }
+    }
+
+    /// Values of all sites, times one multiple for each component.
+    fn scaled(&self, multiples: [f64; D]) -> impl Iterator<Item = (usize, [f64; D])> + '_ {
+        let values = self.values.iter().map(move |value| std::array::from_fn(|d| multiples[d] * value[d]));
+        self.sites.iter().map(|&site| site as usize).zip(values)
+    }
+
+    /// Displacements of all sites at τ.
+    fn placed(&self, part: f64) -> impl Iterator<Item = (usize, [f64; D])> + '_ {
+        let offsets = self.offsets.iter().copied().chain(std::iter::repeat([0.0; D]));
+        let each = self.scaled(self.multiples(part)).zip(offsets);
+        each.map(|((site, value), offset)| (site, std::array::from_fn(|d| offset[d] + value[d])))
+    }
+
+    /// Sets the prescribed components of a field.
+    fn set(&self, field: &mut Field<D>, values: impl Iterator<Item = (usize, [f64; D])>) {
+        for (site, value) in values {
+            let old = field.get(site);
+            let prescribed = |d: usize| self.components >> d & 1 == 1;
+            field.set(site, std::array::from_fn(|d| if prescribed(d) { value[d] } else { old[d] }));
+        }
+    }
+
+    fn multiples(&self, part: f64) -> [f64; D] {
+        self.courses.each_ref().map(|course| course.at(part))
+    }
+}
+
+/// Loads that follow courses; of overlapping displacements the last applies, forces add up.
+#[derive(Clone, Debug, Default)]
+pub struct CurvedLoads<const D: usize> {
+    /// Prescribed displacements.
+    pub held: Vec<CurvedRegion<D>>,
+    /// Body forces.
+    pub pushed: Vec<CurvedRegion<D>>,
+}
+
+impl<const D: usize> Loads<D> {
+    /// Returns true if all loads are proportional to the load factor.
+    pub fn is_proportional(&self) -> bool {
+        self.turned.is_empty() && self.curved.is_none()
+    }
+
+    /// First guess of a load step from the rates of its curves, as [`Loads::affine_predictor`].
+    pub(super) fn curved_predictor(&self, bonds: &dyn BodyGeometry<D>) -> [[f64; 4]; D] {
+        if self.displacement.is_some() { self.affine_closest(bonds) } else { [[0.0; 4]; D] }
+    }
+
+    /// Sets [`Loads::displacement`] of curved regions to the rate over τ: the secant between two τ, or the
+    /// tangent at one.
+    pub(super) fn set_curved_rates(&mut self, before: f64, after: f64) {
+        let (Some(field), Some(curved)) = (self.displacement.as_mut(), &self.curved) else { return };
+        for region in &curved.held {
+            let rate = |course: &Course| match before == after {
+                true => course.rate(after),
+                false => (course.at(after) - course.at(before)) / (after - before),
+            };
+            region.set(field, region.scaled(region.courses.each_ref().map(rate)));
+        }
+    }
+
+    /// Sets [`Loads::displacement`] of curved regions so that τ times it is the displacement at τ.
+    pub(super) fn set_curved_ends(&mut self, after: f64) {
+        let (Some(field), Some(curved)) = (self.displacement.as_mut(), &self.curved) else { return };
+        for region in &curved.held {
+            let ends = region.placed(after).map(|(site, u)| (site, u.map(|x| x / after)));
+            region.set(field, ends);
+        }
+    }
+
+    /// Sets the displacement of curved regions at τ.
+    pub(super) fn place_curved(&self, part: f64, displacement: &mut Field<D>) {
+        for region in self.curved.iter().flat_map(|curved| &curved.held) {
+            region.set(displacement, region.placed(part));
+        }
+    }
+
+    /// Sets [`Loads::displacement`] of curved regions to their largest ones, for scales, and the body forces
+    /// to those at the end.
+    pub fn set_peaks(&mut self) {
+        if let (Some(field), Some(curved)) = (self.displacement.as_mut(), &self.curved) {
+            for region in &curved.held {
+                let size = |course: &Course| {
+                    let each = (0..=MOMENTS).map(|k| course.at(f64::from(k) / f64::from(MOMENTS)));
+                    each.fold(
+                        0.0,
+                        |most: f64, multiple| if multiple.abs() > most.abs() { multiple } else { most },
+                    )
+                };
+                region.set(field, region.scaled(region.courses.each_ref().map(size)));
+            }
+        }
+        self.set_forces([1.0; 2]);
+    }
+
+    /// Computes the body forces at the mean of two τ, each with half of its multiples.
+    pub fn set_forces(&mut self, parts: [f64; 2]) {
+        let (Some(field), Some(curved)) = (self.body_force.as_mut(), &self.curved) else { return };
+        for site in curved.pushed.iter().flat_map(|region| &region.sites) {
+            field.set(*site as usize, [0.0; D]);
+        }
+        for region in &curved.pushed {
+            let [before, after] = parts.map(|part| region.multiples(part));
+            for (site, value) in region.scaled(std::array::from_fn(|d| 0.5 * (before[d] + after[d]))) {
+                let old = field.get(site);
+                field.set(site, std::array::from_fn(|d| old[d] + value[d]));
+            }
+        }
+    }
+
+    /// Factor of [`Loads::body_force`] at a load factor: 1 with curves.
+    pub(super) fn force_factor(&self, factor: f64) -> f64 {
+        if self.curved.is_some() { 1.0 } else { factor }
+    }
+
+    /// Relative prescribed displacement at τ, m: √Σ_d (max − min)², counted from the body at rest.
+    pub(super) fn curved_reach(&self, part: f64) -> f64 {
+        let mut span = [[0.0_f64; 2]; D];
+        for region in self.curved.iter().flat_map(|curved| &curved.held) {
+            for (_, value) in region.placed(part) {
+                for d in (0..D).filter(|d| region.components >> d & 1 == 1) {
+                    span[d] = [span[d][0].min(value[d]), span[d][1].max(value[d])];
+                }
+            }
+        }
+        span.iter().map(|[low, high]| (high - low).powi(2)).sum::<f64>().sqrt()
+    }
+
+    /// Removes the body force of curves from a site.
+    pub(super) fn unload_curved(&mut self, site: u32) {
+        for region in self.curved.iter_mut().flat_map(|curved| &mut curved.pushed) {
+            let found = region.sites.iter().zip(&mut region.values).filter(|(own, _)| **own == site);
+            found.for_each(|(_, value)| *value = [0.0; D]);
+        }
+    }
+}
+
+impl<const D: usize> System<'_, D> {
+    /// Sets body forces of curves at τ.
+    pub(super) fn set_forces(&mut self, part: f64) {
+        if self.loads.curved.is_some() {
+            self.loads.to_mut().set_forces([part; 2]);
+        }
+    }
+
+    /// Begins a load step with curves: the loads move from the last equilibrium along the secant of the step,
+    /// with its mean forces.
+    pub(super) fn begin_curved_step(&mut self, state: &mut State<D>, [before, after]: [f64; 2]) {
+        if self.loads.curved.is_none() {
+            return;
+        }
+        self.set_rates(before, after);
+        if !state.control.predicted {
+            self.loads.to_mut().set_forces([before, after]);
+            let (pull, push) = self.conjugates(state);
+            // after a cut, forces are those of the step given up
+            let pull = if state.control.cuts == 0 { pull } else { state.control.balanced[1] };
+            state.control.balanced = [before, pull, push];
+        }
+        self.set_forces(after);
+    }
+
+    /// Work of curved loads since the last equilibrium, J, by the trapezoidal rule.
+    pub(super) fn work_of_curves(&mut self, state: &mut State<D>, [before, after]: [f64; 2]) -> f64 {
+        let [old_factor, old_pull, old_push] = state.control.balanced;
+        let first = state.control.round == 0;
+        self.loads.to_mut().set_forces(if first { [before, after] } else { [after; 2] });
+        let (pull, push) = self.conjugates(state);
+        self.set_forces(after);
+        let present = self.conjugates(state).1;
+        state.control.balanced = [after, pull, present];
+        0.5 * (pull + old_pull) * (after - old_factor) + push - old_push
+    }
+
+    /// Load, N, and displacement, m, of a row of history with curves: the reaction of the regions of
+    /// prescribed displacement, or without any the applied force, and [`Loads::curved_reach`].
+    pub(super) fn curved_response(&self, state: &State<D>, part: f64) -> (f64, f64) {
+        let force = match self.loads.displacement {
+            Some(_) => self.loads.reaction(&*self.bonds, &state.force),
+            None => self.loads.applied(&*self.bonds),
+        };
+        (force.iter().map(|x| x * x).sum::<f64>().sqrt(), self.loads.curved_reach(part))
+    }
+}
