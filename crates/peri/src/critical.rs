@@ -10,7 +10,7 @@ use crate::bonds::BodyGeometry;
 use crate::calibrate::{Space, modulus};
 use crate::error::Error;
 use crate::material::{Driving, PointLaw, energy_at_strength};
-use crate::potential::{BondPotential, NetworkStretch, Softening};
+use crate::potential::{BondPotential, BondSoftening, NetworkStretch};
 use crate::solver::{Bilinear, Criterion};
 use polycore::numerics::{bisect, bisected};
 use polycore::units::{EnergyPerArea, Stress};
@@ -106,7 +106,7 @@ pub struct Context<'a> {
     /// Default convention of a fracture energy.
     pub convention: Convention,
     /// Softening of the convention of that name, see [`Critical::softening`].
-    pub softening: Softening,
+    pub softening: BondSoftening,
 }
 
 /// Computes the energy density Y_c, J/m³, beyond which bonds of a solid with the fracture energy G, J/m²,
@@ -211,15 +211,15 @@ impl Critical {
         }
     }
 
-    /// Softening of bonds with a strength: λ₀ from [`Softening::uniaxial_strength`], e_f from the fracture
-    /// energy G = kθΦ_f Σ_J w V_J |ξ_e||ξ|, as for [`fracture_energy`]; default without one.
+    /// Softening of bonds with a strength: λ₀ by [`BondSoftening::uniaxial_strength`], e_f from the
+    /// fracture energy G = kθΦ_f Σ_J w V_J |ξ_e||ξ|, as for [`fracture_energy`]; default without one.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a strength at which bonds store more than the fracture energy, or without
     /// one.
-    pub fn softening(&self, context: &Context) -> Result<Softening, Error> {
+    pub fn softening(&self, context: &Context) -> Result<BondSoftening, Error> {
         let Some(strength) = self.strength.map(|strength| strength.si()) else {
-            return Ok(Softening::default());
+            return Ok(BondSoftening::default());
         };
         let fault = |allowed| Error::Parameter { name: "critical.strength", found: strength, allowed };
         let soft = self.convention.unwrap_or(context.convention) == Convention::Softening;
@@ -228,7 +228,7 @@ impl Critical {
         };
         let space = if context.space == Space::Solid { Space::Solid } else { Space::PlaneStress };
         let strain = strength * modulus(space, 1.0, context.horizon, context.thickness) / context.modulus;
-        let (mut ratio, mut softening) = (1.0, Softening::default());
+        let (mut ratio, mut softening) = (1.0, BondSoftening::default());
         for _ in 0..100 {
             let rise = context.crossing.reach * context.modulus * context.law.energy(1.0 + strain / ratio);
             if !(strength > 0.0 && energy > rise) {
@@ -237,7 +237,7 @@ impl Critical {
                      J/m²"
                 )));
             }
-            softening = Softening::of_linear(energy / rise, self.kink);
+            softening = BondSoftening::of_linear(energy / rise, self.kink);
             let next = softening.uniaxial_strength(space);
             if (next - ratio).abs() < 1e-12 {
                 break;
@@ -318,7 +318,7 @@ pub struct Toughness {
     /// Bonds across a cut through the body.
     pub crossing: Crossing,
     /// Softening, if that is the convention.
-    pub softening: Softening,
+    pub softening: BondSoftening,
 }
 
 impl Toughness {
@@ -378,7 +378,7 @@ mod tests {
     ) -> Context<'a> {
         let crossing = Crossing { reach: 2.0, short: 1.0, bonds: 28.0, loss: 1.4, whole: true };
         let convention = Convention::default();
-        let softening = Softening::default();
+        let softening = BondSoftening::default();
         Context { law, links: None, space, modulus, horizon, thickness, crossing, convention, softening }
     }
 

@@ -185,7 +185,10 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
         for (number, rotation) in self.rotations {
             let region = regions[..number].iter().filter(|(_, support)| holds(support)).count();
             let (shift, components, sites) = ([0.0; D], (1 << D) - 1, regions[number].0.clone());
-            loads.turn(&bonds, RotatingRegion { rotation, shift, courses: None, components, region, sites });
+            loads.turn(
+                &bonds,
+                RotatingRegion { rotation, shift, amplitudes: None, components, region, sites },
+            );
         }
         let modulus = material.longitudinal_modulus(&bonds);
         let contact = match (self.contact, self.planes.is_empty()) {

@@ -5,7 +5,7 @@ use super::{Bond, Family, LawCover, LawRange, Material, SolverMaterial};
 use crate::bonds::{BodyGeometry, Bonds, Overstretched, Property};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
-use crate::potential::{BondPotential, EnergyTable, KernelFit, Softening, StretchRange, TangentTable};
+use crate::potential::{BondPotential, BondSoftening, EnergyTable, KernelFit, StretchRange, TangentTable};
 use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -24,7 +24,7 @@ pub struct BondMaterial<'a> {
     law: Arc<dyn BondPotential + 'a>,
     modulus: f64,
     /// Bonds that soften before they break, and their λ_f.
-    soft: Option<(Softening, Property)>,
+    soft: Option<(BondSoftening, Property)>,
 }
 
 impl<'a> BondMaterial<'a> {
@@ -34,7 +34,7 @@ impl<'a> BondMaterial<'a> {
     }
 
     /// Makes bonds soften to zero load at a stretch λ_f, that of the weaker of their ends.
-    pub fn softening(self, softening: Softening, end: Property) -> Self {
+    pub fn softening(self, softening: BondSoftening, end: Property) -> Self {
         Self { soft: Some((softening, end)), ..self }
     }
 

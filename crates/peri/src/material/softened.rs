@@ -4,7 +4,7 @@
 use super::{Bond, BondMaterial};
 use crate::bonds::{BondForces, Property};
 use crate::field::{CHUNK, Field, chunk_range};
-use crate::potential::{EnergyTable, KernelFit, Softening};
+use crate::potential::{BondSoftening, EnergyTable, KernelFit};
 use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
@@ -16,7 +16,7 @@ pub(super) struct SofteningLoss(Vec<Vec<(u32, [f64; 3])>>);
 /// Visits the bonds beyond the onset that a work item finds, with their stretch and λ_f; all items together
 /// find each bond from both ends.
 fn each<const D: usize>(
-    (softening, end): (Softening, &Property),
+    (softening, end): (BondSoftening, &Property),
     bonds: &dyn BondForces<D>,
     displacement: &Field<D>,
     chunk: usize,
@@ -34,7 +34,7 @@ impl SofteningLoss {
     /// Collects the losses of a displacement, with the fit of the kernels.
     pub fn new<const D: usize>(
         material: &BondMaterial,
-        end: (Softening, &Property),
+        end: (BondSoftening, &Property),
         fit: &KernelFit,
         bonds: &dyn BondForces<D>,
         displacement: &Field<D>,
@@ -78,7 +78,7 @@ impl SofteningLoss {
 /// Energy lost by softened bonds relative to `table`, over kθ.
 pub(super) fn lacking_energy<const D: usize>(
     material: &BondMaterial,
-    end: (Softening, &Property),
+    end: (BondSoftening, &Property),
     table: &EnergyTable,
     bonds: &dyn BondForces<D>,
     displacement: &Field<D>,

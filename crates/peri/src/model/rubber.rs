@@ -6,7 +6,7 @@ use crate::calibrate::{Calibration, lattice_factor, modulus};
 use crate::critical::{Context, Convention, Critical, Crossing};
 use crate::error::Error;
 use crate::material::BondMaterial;
-use crate::potential::{BondPotential, Law, Scaled, Softening};
+use crate::potential::{BondPotential, BondSoftening, Law, Scaled};
 use polycore::units::EnergyPerArea;
 use std::sync::Arc;
 
@@ -105,7 +105,7 @@ impl<const D: usize> IntoMaterial<D> for Rubber {
         let (space, horizon, thickness) = (body.space, bonds.horizon(), body.thickness);
         let modulus = modulus(space, found, horizon, thickness) * lattice_factor(self.calibration, bonds);
         let (crossing, convention) = (Crossing::new(bonds, None), Convention::default());
-        let softening = Softening::default();
+        let softening = BondSoftening::default();
         let mut context = Context {
             law: &*law,
             links,

@@ -15,7 +15,7 @@ pub use energy::{EnergyTable, TangentTable};
 pub use fit::KernelFit;
 pub use laws::{BondStretch, LinearBond, NetworkStretch, PublishedChain, Scaled, Shifted};
 pub use range::StretchRange;
-pub use softened::Softening;
+pub use softened::BondSoftening;
 
 use crate::error::Error;
 use serde::Deserialize;

@@ -13,7 +13,7 @@ const WIDEST: f64 = 20.0;
 
 /// Fall of a bond's tension between λ₀ and λ_f.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Softening {
+pub struct BondSoftening {
     /// e_f: λ_f − 1 over λ₀ − 1.
     pub ductility: f64,
     /// Kink of the fall: fraction of the tension at λ₀, and place between λ₀ (0) and λ_f (1); `None`:
@@ -23,13 +23,13 @@ pub struct Softening {
 
 /// e_f = 4, straight: the crack of a strip runs at the energy of the bonds across it, to 2 % along an axis
 /// and at 45°, at m = 3 and 4; at 2 to 7 % (guide, theory/fracture.md).
-impl Default for Softening {
+impl Default for BondSoftening {
     fn default() -> Self {
         Self { ductility: 4.0, kink: None }
     }
 }
 
-impl Softening {
+impl BondSoftening {
     /// e_f of a linear bond whose energy ∫₁^λf d t dλ is `energy` times that up to λ₀, with the kink (β, x):
     /// 1 + (`energy` − 1)/(β + x), β + x = 1 without one.
     pub fn of_linear(energy: f64, kink: Option<[f64; 2]>) -> Self {

@@ -17,22 +17,22 @@ const MOMENTS: u32 = 256;
 
 /// Multiple of a load over τ, and its rate.
 #[derive(Clone)]
-pub struct Course(Arc<dyn Fn(f64) -> (f64, f64) + Send + Sync>);
+pub struct Amplitude(Arc<dyn Fn(f64) -> (f64, f64) + Send + Sync>);
 
-impl fmt::Debug for Course {
+impl fmt::Debug for Amplitude {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Course(0: {:?}, 1: {:?})", self.at(0.0), self.at(1.0))
+        write!(f, "Amplitude(0: {:?}, 1: {:?})", self.multiple(0.0), self.multiple(1.0))
     }
 }
 
-impl Course {
-    /// Creates a course from a function of τ.
-    pub fn new(course: impl Fn(f64) -> (f64, f64) + Send + Sync + 'static) -> Self {
-        Self(Arc::new(course))
+impl Amplitude {
+    /// Creates a amplitude from a function of τ.
+    pub fn new(amplitude: impl Fn(f64) -> (f64, f64) + Send + Sync + 'static) -> Self {
+        Self(Arc::new(amplitude))
     }
 
     /// Multiple of the load at τ.
-    pub fn at(&self, part: f64) -> f64 {
+    pub fn multiple(&self, part: f64) -> f64 {
         (self.0)(part).0
     }
 
@@ -42,15 +42,15 @@ impl Course {
     }
 }
 
-/// Displacement or body force of a region whose components follow courses.
+/// Displacement or body force of a region whose components follow amplitudes.
 #[derive(Clone, Debug)]
 pub struct CurvedRegion<const D: usize> {
     /// Sites of the region.
     pub sites: Vec<u32>,
     /// Displacement, m, or body force density, N/m³, of each site at a multiple of 1.
     pub values: Vec<[f64; D]>,
-    /// Course of each component.
-    pub courses: [Course; D],
+    /// Amplitude of each component.
+    pub amplitudes: [Amplitude; D],
     /// Bit d: component d is prescribed.
     pub components: u8,
     /// Displacement of each site at a multiple of 0, m; empty: none.
@@ -61,8 +61,8 @@ pub struct CurvedRegion<const D: usize> {
 
 impl<const D: usize> CurvedRegion<D> {
     /// Creates a region that begins at rest.
-    pub fn new(sites: Vec<u32>, values: Vec<[f64; D]>, courses: [Course; D], components: u8) -> Self {
-        Self { sites, values, courses, components, offsets: Vec::new(), kept: 0 }
+    pub fn new(sites: Vec<u32>, values: Vec<[f64; D]>, amplitudes: [Amplitude; D], components: u8) -> Self {
+        Self { sites, values, amplitudes, components, offsets: Vec::new(), kept: 0 }
     }
 
     /// Values of all sites, times one multiple for each component.
@@ -88,11 +88,11 @@ impl<const D: usize> CurvedRegion<D> {
     }
 
     fn multiples(&self, part: f64) -> [f64; D] {
-        self.courses.each_ref().map(|course| course.at(part))
+        self.amplitudes.each_ref().map(|amplitude| amplitude.multiple(part))
     }
 }
 
-/// Loads that follow courses; of overlapping displacements the last applies, forces add up.
+/// Loads that follow amplitudes; of overlapping displacements the last applies, forces add up.
 #[derive(Clone, Debug, Default)]
 pub struct CurvedLoads<const D: usize> {
     /// Prescribed displacements.
@@ -117,11 +117,11 @@ impl<const D: usize> Loads<D> {
     pub(super) fn set_curved_rates(&mut self, before: f64, after: f64) {
         let (Some(field), Some(curved)) = (self.displacement.as_mut(), &self.curved) else { return };
         for region in &curved.held {
-            let rate = |course: &Course| match before == after {
-                true => course.rate(after),
-                false => (course.at(after) - course.at(before)) / (after - before),
+            let rate = |amplitude: &Amplitude| match before == after {
+                true => amplitude.rate(after),
+                false => (amplitude.multiple(after) - amplitude.multiple(before)) / (after - before),
             };
-            region.set(field, region.scaled(region.courses.each_ref().map(rate)));
+            region.set(field, region.scaled(region.amplitudes.each_ref().map(rate)));
         }
     }
 
@@ -146,14 +146,14 @@ impl<const D: usize> Loads<D> {
     pub fn set_peaks(&mut self) {
         if let (Some(field), Some(curved)) = (self.displacement.as_mut(), &self.curved) {
             for region in &curved.held {
-                let size = |course: &Course| {
-                    let each = (0..=MOMENTS).map(|k| course.at(f64::from(k) / f64::from(MOMENTS)));
+                let size = |amplitude: &Amplitude| {
+                    let each = (0..=MOMENTS).map(|k| amplitude.multiple(f64::from(k) / f64::from(MOMENTS)));
                     each.fold(
                         0.0,
                         |most: f64, multiple| if multiple.abs() > most.abs() { multiple } else { most },
                     )
                 };
-                region.set(field, region.scaled(region.courses.each_ref().map(size)));
+                region.set(field, region.scaled(region.amplitudes.each_ref().map(size)));
             }
         }
         self.set_forces([1.0; 2]);

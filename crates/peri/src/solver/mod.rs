@@ -44,7 +44,7 @@ mod verlet_friction;
 mod verlet_step;
 
 pub use criterion::{Bilinear, Breaking, Criterion, Policy};
-pub use curves::{Course, CurvedLoads, CurvedRegion};
+pub use curves::{Amplitude, CurvedLoads, CurvedRegion};
 pub use dynamic_relaxation::{DynamicRelaxation, RelaxationSolver};
 pub use force_scale::Balance;
 pub use fracture::{BreakingEvent, Fracture};
@@ -56,7 +56,7 @@ pub use method::{Method, StepCallback, Watch};
 pub use motion::{DynamicEnergies, EqualSteps, Motion, StepLimits};
 pub use record::{Status, StepRecord};
 pub use rotation::{RotatingRegion, Rotation};
-pub use stage::Stage;
+pub use stage::StepOrigin;
 pub use state::{BodyStretches, Counts, ForceResiduals, State};
 pub use step_control::StepControl;
 pub use system::{LoadCurve, StateObserver, System};

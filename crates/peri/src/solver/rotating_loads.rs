@@ -40,7 +40,7 @@ impl<const D: usize> Loads<D> {
         }
     }
 
-    /// Sets [`Loads::displacement`] of regions that are not proportional to the load factor so that the factor
+    /// Sets [`Loads::displacement`] of regions not proportional to the load factor so that the factor
     /// times it is their displacement there.
     pub(super) fn set_ends(&mut self, bonds: &dyn BodyGeometry<D>, factor: f64) {
         if factor == 0.0 {

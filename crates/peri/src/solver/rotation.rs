@@ -1,6 +1,6 @@
 //! Rotations about an axis, and rotating regions.
 
-use super::curves::Course;
+use super::curves::Amplitude;
 use crate::field::Field;
 use crate::geometry::length;
 
@@ -62,7 +62,7 @@ pub struct RotatingRegion<const D: usize> {
     /// Additional displacement at load factor 1, m.
     pub shift: [f64; D],
     /// Courses of the angle and of each component of `shift`; absent: the load factor.
-    pub courses: Option<(Course, [Course; D])>,
+    pub amplitudes: Option<(Amplitude, [Amplitude; D])>,
     /// Bit d: component d is prescribed.
     pub components: u8,
     /// Index of the region among [`Loads::held_regions`](super::Loads::held_regions).
@@ -80,8 +80,10 @@ impl<const D: usize> RotatingRegion<D> {
 
     /// Multiples of the angle and of each component of the shift at a load factor.
     pub(super) fn multiples(&self, factor: f64) -> (f64, [f64; D]) {
-        match &self.courses {
-            Some((angle, shift)) => (angle.at(factor), shift.each_ref().map(|course| course.at(factor))),
+        match &self.amplitudes {
+            Some((angle, shift)) => {
+                (angle.multiple(factor), shift.each_ref().map(|amplitude| amplitude.multiple(factor)))
+            }
             None => (factor, [factor; D]),
         }
     }
@@ -95,7 +97,7 @@ impl<const D: usize> RotatingRegion<D> {
     /// Rate of the displacement over the load factor, m.
     pub(super) fn rate(&self, place: [f64; D], factor: f64) -> [f64; D] {
         let rate = self.rotation.rate(place, self.multiples(factor).0);
-        match &self.courses {
+        match &self.amplitudes {
             Some((angle, shift)) => {
                 std::array::from_fn(|d| angle.rate(factor) * rate[d] + shift[d].rate(factor) * self.shift[d])
             }

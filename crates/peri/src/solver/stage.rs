@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 /// Start of the present step of a programme.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
-pub struct Stage<const D: usize> {
+pub struct StepOrigin<const D: usize> {
     /// Steps finished.
     pub finished: usize,
     /// Time at the start, s.
@@ -30,7 +30,7 @@ impl<const D: usize> State<D> {
     /// Begins the next step, after one of a `duration`, s, that ended with `body_force`, N/m³. Velocities
     /// stay if both are explicit dynamics (`moving`).
     pub fn begin_stage(&mut self, duration: f64, body_force: Option<Field<D>>, moving: bool) {
-        self.stage = Stage {
+        self.stage = StepOrigin {
             finished: self.stage.finished + 1,
             time: self.stage.time + duration,
             displacement: Some(self.displacement.clone()),
@@ -68,7 +68,7 @@ impl Fracture {
 impl<const D: usize> Loads<D> {
     /// Lets loads that follow curves begin at the start of a step: displacements go from there to their
     /// values, former body forces fade as the load factor `common` grows.
-    pub fn continue_from(&mut self, stage: &Stage<D>, common: &super::Course) {
+    pub fn continue_from(&mut self, stage: &StepOrigin<D>, common: &super::Amplitude) {
         let Some(curved) = &mut self.curved else { return };
         let start =
             |site: u32| stage.displacement.as_ref().map_or([0.0; D], |field| field.get(site as usize));
@@ -83,9 +83,9 @@ impl<const D: usize> Loads<D> {
             let each = (0..force.sites()).map(|site| (site as u32, force.get(site)));
             let (sites, values) = each.filter(|(_, value)| *value != [0.0; D]).unzip();
             let common = common.clone();
-            let fading = super::Course::new(move |part| (1.0 - common.at(part), -common.rate(part)));
-            let courses = std::array::from_fn(|_| fading.clone());
-            curved.pushed.push(super::CurvedRegion::new(sites, values, courses, 0));
+            let fading = super::Amplitude::new(move |part| (1.0 - common.multiple(part), -common.rate(part)));
+            let amplitudes = std::array::from_fn(|_| fading.clone());
+            curved.pushed.push(super::CurvedRegion::new(sites, values, amplitudes, 0));
             self.body_force.get_or_insert_with(|| Field::zeros(force.sites()));
         }
         self.set_peaks();

@@ -3,7 +3,7 @@
 use super::fracture::Fracture;
 use super::motion::Motion;
 use super::record::{Status, StepRecord};
-use super::stage::Stage;
+use super::stage::StepOrigin;
 use super::step_control::{Accepted, StepControl};
 use crate::contact::FrictionPair;
 use crate::field::Field;
@@ -40,7 +40,7 @@ pub struct State<const D: usize> {
     /// Time and energies of explicit dynamics.
     pub motion: Motion,
     /// Start of the present step of a programme.
-    pub stage: Stage<D>,
+    pub stage: StepOrigin<D>,
     /// Work of the loads so far, J.
     pub work: f64,
     /// Finished steps.
@@ -172,7 +172,7 @@ impl<const D: usize> State<D> {
             contact: ContactState::default(),
             control: StepControl::default(),
             motion: Motion::default(),
-            stage: Stage::default(),
+            stage: StepOrigin::default(),
             work: 0.0,
             history: Vec::new(),
         }

@@ -49,7 +49,7 @@ pub struct System<'a, const D: usize> {
     /// Reference scale of out-of-balance forces.
     pub(super) scale: ForceScale,
     /// Load factor and its rate over the time, s, in explicit dynamics, instead of the ramp.
-    pub course: Option<&'a LoadCurve<'a>>,
+    pub amplitude: Option<&'a LoadCurve<'a>>,
     /// Values recorded in every row of the history, see [`StepRecord::seen`](super::StepRecord::seen).
     pub observer: Option<&'a StateObserver<'a, D>>,
 }
@@ -93,7 +93,7 @@ impl<'a, const D: usize> System<'a, D> {
             contact: None,
             seen_stretches: StretchScan::default(),
             scale: ForceScale::default(),
-            course: None,
+            amplitude: None,
             observer: None,
         }
     }

@@ -1,6 +1,6 @@
 //! Explicit dynamics: velocity Verlet, with all energies that the integrator exchanges.
 //!
-//! ρü = f + F(t)b − cρu̇ with the load factor F rising linearly over a ramp, or given by [`System::course`];
+//! ρü = f + F(t)b − cρu̇ with the load factor F, a linear ramp or [`System::amplitude`];
 //! constrained components follow F(t)d and its rate. v₊ = v + ½Δt a, u ← u + Δt v₊, v ← v₊ + ½Δt a, the new
 //! a = (f + Fb)/ρ − cv; Swope et al. (1982), doi:10.1063/1.442716, Hairer, Lubich & Wanner (2003),
 //! doi:10.1017/S0962492902000144. Works are sums of ½(force before + force after)·Δu, which change ½ρ(v² −
@@ -131,7 +131,7 @@ impl VelocityVerlet {
         state: &mut State<D>,
     ) -> Result<Vec<f64>, Error> {
         self.check()?;
-        if !state.motion.begun && system.course.is_none() {
+        if !state.motion.begun && system.amplitude.is_none() {
             system.refuse_inverted(&[1.0])?;
         }
         let volumes = volumes(system);
@@ -173,8 +173,8 @@ impl VelocityVerlet {
 
     /// Load factor at a time, and its rate from then on.
     pub(super) fn factor<const D: usize>(&self, system: &System<D>, time: f64) -> (f64, f64) {
-        if let Some(course) = system.course {
-            return course(time);
+        if let Some(amplitude) = system.amplitude {
+            return amplitude(time);
         }
         if time < self.ramp { (time / self.ramp, 1.0 / self.ramp) } else { (1.0, 0.0) }
     }

@@ -13,7 +13,7 @@ use peri::material::NonlocalSolid;
 use peri::program::run::{FinishedScene, Peri, run};
 use peri::program::scene::Scene;
 use peri::solver::{
-    Course, CurvedLoads, CurvedRegion, Lbfgs, Loads, Method, State, Status, System, VelocityVerlet,
+    Amplitude, CurvedLoads, CurvedRegion, Lbfgs, Loads, Method, State, Status, System, VelocityVerlet,
 };
 use std::f64::consts::PI;
 
@@ -25,12 +25,12 @@ fn region(
     inside: impl Fn([f64; 2]) -> bool,
     value: [f64; 2],
     components: u8,
-    courses: [Course; 2],
+    amplitudes: [Amplitude; 2],
 ) -> CurvedRegion<2> {
     let within = |site: &u32| inside(bonds.position(*site as usize));
     let sites: Vec<u32> = bonds.particles().iter().copied().filter(within).collect();
     let values = vec![value; sites.len()];
-    CurvedRegion::new(sites, values, courses, components)
+    CurvedRegion::new(sites, values, amplitudes, components)
 }
 
 /// Loads of regions, the first ones held, the others pushed.
@@ -48,8 +48,8 @@ fn loads_of(bonds: &dyn Bonds<2>, held: Vec<CurvedRegion<2>>, pushed: Vec<Curved
 }
 
 /// Multiple that rises smoothly from 0 to 1 between two τ.
-fn rise(from: f64, to: f64) -> Course {
-    Course::new(move |part| {
+fn rise(from: f64, to: f64) -> Amplitude {
+    Amplitude::new(move |part| {
         let place = ((part - from) / (to - from)).clamp(0.0, 1.0);
         let rate = 0.5 * PI * (PI * place).sin() / (to - from);
         (0.5 - 0.5 * (PI * place).cos(), rate)
@@ -61,7 +61,7 @@ fn load(moving: bool, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> St
     let mut built = Body::<2>::solid([12, 12], 0.1, 3.015).build();
     let bonds = &mut built.lattice;
     let solid = NonlocalSolid(EightChainSolid::new(Space::PlaneStrain, 1.0, 1e6, 5.0).unwrap());
-    let rest = || Course::new(|_| (0.0, 0.0));
+    let rest = || Amplitude::new(|_| (0.0, 0.0));
     let held = vec![
         region(&*bonds, |[_, y]| y < 0.3, [0.0; 2], 3, [rest(), rest()]),
         region(&*bonds, |[_, y]| y > 0.9, [0.3, -0.1], 3, [rise(0.4, 1.0), rise(0.0, 0.5)]),
@@ -70,7 +70,7 @@ fn load(moving: bool, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> St
     let loads = loads_of(&*bonds, held, pushed);
     let factors: Vec<f64> = (1..=STEPS).map(|step| step as f64 / STEPS as f64).collect();
     let mut state = start.cloned().unwrap_or_else(|| State::new(bonds.sites()));
-    let course = |time: f64| (time / 20.0, 1.0 / 20.0);
+    let amplitude = |time: f64| (time / 20.0, 1.0 / 20.0);
     let mut system = System::new(bonds, solid, &loads, &factors);
     let mut seen = 0;
     let mut watch = |status: &Status, state: &State<2>| {
@@ -82,7 +82,7 @@ fn load(moving: bool, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> St
     };
     let finished = &mut |_: &dyn Bonds<2>, _: &_| Ok(());
     let solved = if moving {
-        system.course = Some(&course);
+        system.amplitude = Some(&amplitude);
         let method = VelocityVerlet { records: 20, safety: 0.5, ..VelocityVerlet::new(1.0, 20.0) };
         method.solve(&mut system, &mut state, &mut watch, finished)
     } else {

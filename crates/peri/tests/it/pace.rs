@@ -127,7 +127,7 @@ fn pulled<const D: usize, M: Material<D> + 'static>(name: &str, cells: [usize; D
         })
     });
     let end = 4.0 * length;
-    let course = move |time: f64| {
+    let amplitude = move |time: f64| {
         let (rise, fall) = (0.35 * end, 0.6 * end);
         if time < rise {
             (time / rise, 1.0 / rise)
@@ -139,7 +139,7 @@ fn pulled<const D: usize, M: Material<D> + 'static>(name: &str, cells: [usize; D
     };
     let response = material.respond(&bonds);
     let mut system = System::of_response(&mut bonds, response, &loads, &[]);
-    system.course = Some(&course);
+    system.amplitude = Some(&amplitude);
     let solver = VelocityVerlet { damping: 0.1, records: 12, ..VelocityVerlet::new(1.0, end) };
     let mut state = State::new(system.bonds.sites());
     solver.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();

@@ -12,7 +12,7 @@ use peri::critical::{Context, Convention, CrackArea, Critical, Crossing, fractur
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
 use peri::material::{BondMaterial, Material};
-use peri::potential::{BondPotential, Law, Softening, StretchRange};
+use peri::potential::{BondPotential, BondSoftening, Law, StretchRange};
 use peri::program::run::explanation;
 use peri::program::scene::Scene;
 use polycore::units::{EnergyPerArea, Stress};
@@ -97,7 +97,7 @@ fn context<'a>(law: &'a dyn BondPotential, bonds: &LatticeBonds<2>, youngs: f64)
         thickness,
         crossing: Crossing::new::<2>(bonds, None),
         convention: Convention::default(),
-        softening: Softening::default(),
+        softening: BondSoftening::default(),
     }
 }
 
@@ -119,7 +119,7 @@ fn critical_stretches_of_the_conventions() {
     let ratio = (stretch(Convention::Bonds) - 1.0) / (stretch(Convention::Tearing) - 1.0);
     near("tearing_stretch_ratio", ratio / c.sqrt(), 1.0, 1e-6);
     let end = stretch(Convention::Softening);
-    let soft = Softening::default();
+    let soft = BondSoftening::default();
     let brittle = 1.5 * (soft.onset(end) - 1.0).powi(2) * soft.ductility;
     near("softening_stretch", context.crossing.reach * context.modulus * brittle / 80.0, 1.0, 1e-9);
     near("softening_energy", fracture_energy(&context, Convention::Softening, end) / 80.0, 1.0, 1e-9);
@@ -145,8 +145,8 @@ fn bonds_are_what_they_were() {
 #[test]
 fn softened_bonds() {
     let end = 1.8;
-    let kinked = Softening { ductility: 9.0, kink: Some([1.0 / 3.0, 2.0 / 9.0]) };
-    for (law, soft) in [(Law::ChainOffset, Softening::default()), (Law::Linear, kinked)] {
+    let kinked = BondSoftening { ductility: 9.0, kink: Some([1.0 / 3.0, 2.0 / 9.0]) };
+    for (law, soft) in [(Law::ChainOffset, BondSoftening::default()), (Law::Linear, kinked)] {
         let law = law.build(if law.is_chain() { 50.0 } else { 0.0 }, 1200.0, false).unwrap();
         let onset = soft.onset(end);
         for stretch in [0.9, 1.05, onset - 1e-3, 1.2, 1.3, 1.5, 1.79, 1.9] {
@@ -192,7 +192,7 @@ fn strengths_of_bonds() {
         (100.0, trilinear, Space::PlaneStress, 1.219_32),
         (10.0, None, Space::Solid, 1.444_93),
     ] {
-        let found = Softening { ductility, kink }.uniaxial_strength(space);
+        let found = BondSoftening { ductility, kink }.uniaxial_strength(space);
         near("uniaxial_strength", found / expected, 1.0, 2e-3);
     }
 }
@@ -208,7 +208,7 @@ fn forces_of_soft_bonds_are_slopes() {
         CloudBonds::new(&points, &vec![0.5; points.len()], 0.5, 3.015, VolumeCorrection::None, &[]).unwrap();
     for mut bonds in [Box::new(lattice) as Box<dyn Bonds<2>>, Box::new(cloud)] {
         let law = Law::Linear.build(0.0, 0.0, false).unwrap();
-        let material = BondMaterial::new(law, 2.0).softening(Softening::default(), 1.06.into());
+        let material = BondMaterial::new(law, 2.0).softening(BondSoftening::default(), 1.06.into());
         let mut response = material.respond(&*bonds);
         let mut displacement = Field::<2>::zeros(bonds.sites());
         let sites: Vec<usize> = bonds.particles().iter().map(|&site| site as usize).collect();

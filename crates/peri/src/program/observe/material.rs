@@ -9,7 +9,7 @@ use crate::critical::{Context, CrackArea, Critical, Crossing, Toughness};
 use crate::error::Error;
 use crate::exact::Plate;
 use crate::material::{BondMaterial, Material, NonlocalSolid, Prestrained, SolverMaterial, relief};
-use crate::potential::{BondPotential, Softening};
+use crate::potential::{BondPotential, BondSoftening};
 use crate::probe::{AnySolid, LineSampler, StressEvaluator};
 use crate::program::scene::{
     self, DiscreteBody, Inclusions, ParameterField, Scene, SceneVariant, SurfaceCorrection,
@@ -132,11 +132,11 @@ impl<const D: usize> BodyWithMaterial<D> {
         let context = |stiffness: f64, crossing: Crossing| {
             let (links, modulus) = (spec.links, stiffness * modulus);
             let convention = spec.critical.and_then(|critical| critical.convention).unwrap_or_default();
-            let softening = Softening::default();
+            let softening = BondSoftening::default();
             Context { law: &*law, links, space, modulus, horizon, thickness, crossing, convention, softening }
         };
         let (mut criterion, mut toughness): (Option<Criterion>, _) = (None, None);
-        let mut softening = Softening::default();
+        let mut softening = BondSoftening::default();
         if let Some((critical, crossing)) = spec.critical.zip(crossing) {
             let mut rest = context(1.0, crossing);
             rest.softening = critical.softening(&rest).map_err(fault)?;

@@ -291,12 +291,12 @@ fn solve<const D: usize>(
         }
         None => None,
     };
-    let course = scene.course();
+    let amplitude = scene.amplitude();
     let row = |bonds: &dyn Bonds<D>, state: &State<D>| physics.row(bonds, state);
     let response = material.respond(&*body.bonds);
     let mut system = System::of_response(&mut *body.bonds, response, loads, &factors);
     system.times = times.into();
-    system.course = course.as_deref();
+    system.amplitude = amplitude.as_deref();
     system.observer = Some(&row);
     system.fit_bound = scene.fit_bound();
     let criterion = physics.body.criterion.clone();

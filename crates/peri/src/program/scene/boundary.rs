@@ -1,7 +1,7 @@
 //! Boundaries of a scene: regions of the body with loads or supports.
 
 use super::ShapeSpec;
-use super::curve_spec::{CurveSpec, Curves};
+use super::curve_spec::{CurveList, CurveSpec};
 use super::formula::Formula;
 use polycore::units::{Angle, Force, Length, Speed, Stress};
 use serde::Deserialize;
@@ -40,7 +40,7 @@ pub struct Boundary {
     pub displacement_field: Option<Vec<PrescribedField>>,
     /// Curve of time that multiplies displacement, rotation, force and traction, or one for each component;
     /// default: the load factor.
-    pub curve: Option<Curves>,
+    pub curve: Option<CurveList>,
     /// Velocity at the start as formulas of the position, m/s.
     pub velocity_field: Option<Vec<Formula>>,
 }

@@ -1,11 +1,11 @@
-//! Curves of time that multiply what a boundary prescribes: formulas, or tables of files.
+//! CurveList of time that multiply what a boundary prescribes: formulas, or tables of files.
 
-use super::curve_spec::{CurveSpec, CurveTable, Curves};
+use super::curve_spec::{CurveList, CurveSpec, CurveTable};
 use super::formula::Formula;
 use super::values::plain;
 use super::{Boundary, Prescribed, Scene};
 use crate::field::Field;
-use crate::solver::{Course, CurvedLoads, CurvedRegion, LoadCurve, Loads, Support};
+use crate::solver::{Amplitude, CurvedLoads, CurvedRegion, LoadCurve, Loads, Support};
 use harness::scene::{SceneError, Source};
 use polycore::table::{Table, plain_unit};
 use polycore::units::dimension::{
@@ -39,7 +39,7 @@ impl Scene {
 
     /// Returns the load factor of explicit dynamics and its rate over the time, s; `None` for a ramp. With
     /// curves the factor is the part of the whole time.
-    pub fn course(&self) -> Option<Box<LoadCurve<'_>>> {
+    pub fn amplitude(&self) -> Option<Box<LoadCurve<'_>>> {
         let dynamics = self.dynamics.as_ref()?;
         if self.has_curves() {
             let end = dynamics.end_time.si();
@@ -56,7 +56,7 @@ struct CurveTime {
     explicit: bool,
     /// Times at which curves are checked, s.
     moments: Vec<f64>,
-    common: Course,
+    common: Amplitude,
 }
 
 impl CurveTime {
@@ -65,7 +65,7 @@ impl CurveTime {
             let (end, ramp) = (dynamics.method().end_time, dynamics.method().ramp);
             let common = match dynamics.factor.clone() {
                 Some(factor) => of_formula(factor, end),
-                None => Course::new(move |part| {
+                None => Amplitude::new(move |part| {
                     let time = part * end;
                     if time < ramp { (time / ramp, end / ramp) } else { (1.0, 0.0) }
                 }),
@@ -76,7 +76,7 @@ impl CurveTime {
         let (factors, times) = scene.programme();
         let Some(&end) = times.last() else {
             // a later step without times: the load factor itself
-            let common = Course::new(|part| (part, 1.0));
+            let common = Amplitude::new(|part| (part, 1.0));
             return Self { end: 1.0, explicit: false, moments: Vec::new(), common };
         };
         let moments: Vec<f64> = std::iter::once(0.0).chain(times).collect();
@@ -85,14 +85,14 @@ impl CurveTime {
     }
 
     /// Converts and checks the curve at a key; `values` are those that it multiplies.
-    fn course(
+    fn amplitude(
         &self,
         source: &Source,
         key: &str,
         curve: &CurveSpec,
         values: &Multiplied,
-    ) -> Result<Course, SceneError> {
-        let course = match curve {
+    ) -> Result<Amplitude, SceneError> {
+        let amplitude = match curve {
             CurveSpec::Formula(formula) => {
                 if let Some(found) = formula.find_variable_except("t") {
                     let found = format!("`{found}` in `{}`", formula.text());
@@ -103,19 +103,20 @@ impl CurveTime {
             CurveSpec::Table(table) => self.of_table(source, key, table, values)?,
         };
         for &time in &self.moments {
-            let (value, rate) = (course.at(time / self.end), course.rate(time / self.end) / self.end);
+            let (value, rate) =
+                (amplitude.multiple(time / self.end), amplitude.rate(time / self.end) / self.end);
             if !value.is_finite() || self.explicit && !rate.is_finite() {
                 let found = format!("{value}, rising at {rate} 1/s, at {} s", plain(time));
                 let allowed = format!("finite values and rates from 0 s to {} s", plain(self.end));
                 return Err(source.error(key, found, allowed));
             }
         }
-        let start = course.at(0.0);
+        let start = amplitude.multiple(0.0);
         if !self.explicit && values.moves() && start.abs() > START {
             let found = format!("{start} at 0 s");
             return Err(source.error(key, found, "0 at 0 s: a quasi-static run begins at rest"));
         }
-        Ok(course)
+        Ok(amplitude)
     }
 
     fn of_table(
@@ -124,7 +125,7 @@ impl CurveTime {
         key: &str,
         spec: &CurveTable,
         values: &Multiplied,
-    ) -> Result<Course, SceneError> {
+    ) -> Result<Amplitude, SceneError> {
         let refused = |error: &dyn fmt::Display| source.refused(&format!("{key}.file"), error);
         let table = Table::read(source.file(&spec.file)).map_err(|error| refused(&error))?;
         let column = |name: &str| table.require_column(&[name]).map_err(|error| refused(&error));
@@ -159,17 +160,17 @@ impl CurveTime {
     }
 }
 
-/// Course of a formula of the time in a run that ends at `end`, s.
-fn of_formula(formula: Formula, end: f64) -> Course {
-    Course::new(move |part| {
+/// Amplitude of a formula of the time in a run that ends at `end`, s.
+fn of_formula(formula: Formula, end: f64) -> Amplitude {
+    Amplitude::new(move |part| {
         let (value, rate) = formula.value_and_rate(part * end);
         (value, rate * end)
     })
 }
 
-/// Course that is linear between points of time, s; at a point it has the rate after it.
-fn of_rows(times: Vec<f64>, values: Vec<f64>, end: f64) -> Course {
-    Course::new(move |part| {
+/// Amplitude that is linear between points of time, s; at a point it has the rate after it.
+fn of_rows(times: Vec<f64>, values: Vec<f64>, end: f64) -> Amplitude {
+    Amplitude::new(move |part| {
         let after = times.partition_point(|&time| time <= part * end);
         let after = after.min(times.len() - 1).max(usize::from(times.len() > 1));
         let before = after.saturating_sub(1);
@@ -256,30 +257,30 @@ fn misfit_of<D: Dimension>(unit: &str, values: &[f64], si: &str) -> Option<(Stri
 /// # Errors
 /// A curve that is not defined over the run, that has another variable than `t` or a unit that does not suit
 /// the values, and files that cannot be read.
-pub(super) fn courses<const D: usize>(
+pub(super) fn amplitudes<const D: usize>(
     source: &Source,
     scene: &Scene,
-) -> Result<Vec<(Course, [Course; D])>, SceneError> {
+) -> Result<Vec<(Amplitude, [Amplitude; D])>, SceneError> {
     if !scene.has_curves() {
         return Ok(Vec::new());
     }
     let time = CurveTime::new(scene);
     let of = |(index, boundary): (usize, &Boundary)| {
         let key = format!("boundary[{index}].curve");
-        let each: Vec<Course> = match &boundary.curve {
+        let each: Vec<Amplitude> = match &boundary.curve {
             None => vec![time.common.clone(); D],
-            Some(Curves::All(curve)) => {
-                vec![time.course(source, &key, curve, &Multiplied::new(boundary, None))?; D]
+            Some(CurveList::All(curve)) => {
+                vec![time.amplitude(source, &key, curve, &Multiplied::new(boundary, None))?; D]
             }
-            Some(Curves::Each(curves)) => {
+            Some(CurveList::Each(curves)) => {
                 let each = curves.iter().enumerate().map(|(d, curve)| {
-                    time.course(source, &format!("{key}[{d}]"), curve, &Multiplied::new(boundary, Some(d)))
+                    time.amplitude(source, &format!("{key}[{d}]"), curve, &Multiplied::new(boundary, Some(d)))
                 });
                 each.collect::<Result<_, _>>()?
             }
         };
         let found = each.len();
-        let each = <[Course; D]>::try_from(each).map_err(|_| {
+        let each = <[Amplitude; D]>::try_from(each).map_err(|_| {
             source.error(&key, format!("{found} curves"), format!("one, or {D}: one for each component"))
         })?;
         let angle = match boundary.rotation.as_ref().and_then(|rotation| rotation.curve.as_ref()) {
@@ -293,9 +294,9 @@ pub(super) fn courses<const D: usize>(
                     angles: angle,
                     fields: false,
                 };
-                time.course(source, &format!("boundary[{index}].rotation.curve"), curve, &values)?
+                time.amplitude(source, &format!("boundary[{index}].rotation.curve"), curve, &values)?
             }
-            None if boundary.rotation.is_some() && matches!(boundary.curve, Some(Curves::Each(_))) => {
+            None if boundary.rotation.is_some() && matches!(boundary.curve, Some(CurveList::Each(_))) => {
                 let why = "needed beside a curve for each component: the curve of the angle";
                 return Err(source.missing(&format!("boundary[{index}].rotation.curve"), why));
             }
@@ -306,25 +307,25 @@ pub(super) fn courses<const D: usize>(
     scene.boundary.iter().enumerate().map(of).collect()
 }
 
-/// Returns the course of what has no curve.
-pub fn common_course(scene: &Scene) -> Course {
+/// Returns the amplitude of what has no curve.
+pub fn common_course(scene: &Scene) -> Amplitude {
     CurveTime::new(scene).common
 }
 
-/// Lets the loads of all boundaries follow their courses; `surfaces` are the tractions of solids, by
+/// Lets the loads of all boundaries follow their amplitudes; `surfaces` are the tractions of solids, by
 /// boundary.
 pub(super) fn follow<const D: usize>(
     regions: &[(Vec<u32>, Support<D>)],
     rotates: impl Fn(usize) -> bool,
     kept: impl Fn(usize) -> u8,
     surfaces: &[(usize, Field<D>)],
-    courses: Vec<(Course, [Course; D])>,
+    amplitudes: Vec<(Amplitude, [Amplitude; D])>,
     loads: &mut Loads<D>,
 ) {
     let mut curved = CurvedLoads::default();
-    for (index, ((members, support), (_, courses))) in regions.iter().zip(courses).enumerate() {
+    for (index, ((members, support), (_, amplitudes))) in regions.iter().zip(amplitudes).enumerate() {
         let region = |sites: Vec<u32>, values: Vec<[f64; D]>, components: u8| {
-            CurvedRegion::new(sites, values, courses.clone(), components)
+            CurvedRegion::new(sites, values, amplitudes.clone(), components)
         };
         let components = (0..D).map(|d| u8::from(support.displacement[d].is_some()) << d).sum();
         if let Some(field) = loads.displacement.as_ref().filter(|_| components != 0 && !rotates(index)) {
@@ -390,8 +391,9 @@ mod tests {
 
     #[test]
     fn rows_are_joined_by_lines() {
-        let course = of_rows(vec![0.0, 2.0, 3.0], vec![0.0, 4.0, 4.0], 3.0);
-        let found = [0.0, 1.0, 2.0, 2.5, 3.0].map(|time| (course.at(time / 3.0), course.rate(time / 3.0)));
+        let amplitude = of_rows(vec![0.0, 2.0, 3.0], vec![0.0, 4.0, 4.0], 3.0);
+        let found = [0.0, 1.0, 2.0, 2.5, 3.0]
+            .map(|time| (amplitude.multiple(time / 3.0), amplitude.rate(time / 3.0)));
         let near = |(a, b): ((f64, f64), (f64, f64))| (a.0 - b.0).abs() < 1e-14 && (a.1 - b.1).abs() < 1e-14;
         let expected = [(0.0, 6.0), (2.0, 6.0), (4.0, 0.0), (4.0, 0.0), (4.0, 0.0)];
         assert!(found.into_iter().zip(expected).all(near), "{found:?}");

@@ -1,4 +1,4 @@
-//! Curves of time as a scene writes them.
+//! CurveList of time as a scene writes them.
 
 use super::formula::Formula;
 use serde::Deserialize;
@@ -29,7 +29,7 @@ pub struct CurveTable {
 
 /// One curve, or one for each component.
 #[derive(Clone, Debug)]
-pub enum Curves {
+pub enum CurveList {
     /// The same for all components.
     All(CurveSpec),
     /// One for each component.
@@ -39,7 +39,7 @@ pub enum Curves {
 struct CurveVisitor;
 
 impl<'de> serde::de::Visitor<'de> for CurveVisitor {
-    type Value = Curves;
+    type Value = CurveList;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(
@@ -47,21 +47,21 @@ impl<'de> serde::de::Visitor<'de> for CurveVisitor {
         )
     }
 
-    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Curves, E> {
-        Formula::parse(text).map(|formula| Curves::All(CurveSpec::Formula(formula))).map_err(E::custom)
+    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<CurveList, E> {
+        Formula::parse(text).map(|formula| CurveList::All(CurveSpec::Formula(formula))).map_err(E::custom)
     }
 
-    fn visit_map<A: serde::de::MapAccess<'de>>(self, map: A) -> Result<Curves, A::Error> {
+    fn visit_map<A: serde::de::MapAccess<'de>>(self, map: A) -> Result<CurveList, A::Error> {
         let table = CurveTable::deserialize(MapAccessDeserializer::new(map))?;
-        Ok(Curves::All(CurveSpec::Table(table)))
+        Ok(CurveList::All(CurveSpec::Table(table)))
     }
 
-    fn visit_seq<A: serde::de::SeqAccess<'de>>(self, list: A) -> Result<Curves, A::Error> {
-        Vec::deserialize(SeqAccessDeserializer::new(list)).map(Curves::Each)
+    fn visit_seq<A: serde::de::SeqAccess<'de>>(self, list: A) -> Result<CurveList, A::Error> {
+        Vec::deserialize(SeqAccessDeserializer::new(list)).map(CurveList::Each)
     }
 }
 
-impl<'de> Deserialize<'de> for Curves {
+impl<'de> Deserialize<'de> for CurveList {
     fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         from.deserialize_any(CurveVisitor)
     }
@@ -69,9 +69,11 @@ impl<'de> Deserialize<'de> for Curves {
 
 impl<'de> Deserialize<'de> for CurveSpec {
     fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        match Curves::deserialize(from)? {
-            Curves::All(curve) => Ok(curve),
-            Curves::Each(_) => Err(serde::de::Error::custom("found a list; allowed: a formula or a table")),
+        match CurveList::deserialize(from)? {
+            CurveList::All(curve) => Ok(curve),
+            CurveList::Each(_) => {
+                Err(serde::de::Error::custom("found a list; allowed: a formula or a table"))
+            }
         }
     }
 }
@@ -91,9 +93,9 @@ impl schemars::JsonSchema for CurveSpec {
     }
 }
 
-impl schemars::JsonSchema for Curves {
+impl schemars::JsonSchema for CurveList {
     fn schema_name() -> std::borrow::Cow<'static, str> {
-        "Curves".into()
+        "CurveList".into()
     }
 
     fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {

@@ -43,26 +43,26 @@ pub fn loads_of<const D: usize>(
         regions.push((members, support));
     }
     let mut loads = Loads::new(body.bonds.sites(), &regions);
-    let courses = super::curve::courses(source, scene)?;
-    super::overlap::refuse(source, scene, body, &regions, &courses)?;
+    let amplitudes = super::curve::amplitudes(source, scene)?;
+    super::overlap::refuse(source, scene, body, &regions, &amplitudes)?;
     let mut surfaces = Vec::new();
     for (index, side, traction) in tractions {
         let mut alone = Loads::default();
-        if !courses.is_empty() {
+        if !amplitudes.is_empty() {
             add_traction(body, side, traction, &mut alone, &mut loaded);
         }
         surfaces.extend(alone.body_force.map(|field| (index, field)));
         add_traction(body, side, traction, &mut loads, &mut loaded);
     }
     apply_formulas(source, scene, body, &regions, &mut loads)?;
-    super::rotation::turn(source, scene, body, &regions, &courses, &mut loads)?;
-    if !courses.is_empty() {
+    super::rotation::turn(source, scene, body, &regions, &amplitudes, &mut loads)?;
+    if !amplitudes.is_empty() {
         let rotates = |index: usize| scene.boundary[index].rotation.is_some();
         let kept = |index: usize| {
             let components = scene.boundary[index].displacement.iter().flatten().enumerate();
             components.map(|(d, held)| u8::from(*held == Prescribed::Hold) << d).sum()
         };
-        super::curve::follow(&regions, rotates, kept, &surfaces, courses, &mut loads);
+        super::curve::follow(&regions, rotates, kept, &surfaces, amplitudes, &mut loads);
     }
     refuse_inverted(source, scene, body, &loads)?;
     if scene.method() == SolverMethod::Verlet {

@@ -42,7 +42,7 @@ pub use check::{check, check_variant};
 pub use contact::{ContactSpec, PlaneSpec, tied_grips};
 pub use crack::{cuts_of, severed_of_each};
 pub use curve::common_course;
-pub use curve_spec::{CurveSpec, CurveTable, Curves};
+pub use curve_spec::{CurveList, CurveSpec, CurveTable};
 pub use explain::explain;
 pub use field::{FieldSpec, VaryingParameter};
 pub use followed::{ParameterField, followed};

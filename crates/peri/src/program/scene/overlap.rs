@@ -3,7 +3,7 @@
 use super::rotation::rotation_of;
 use super::values::{DiscreteBody, plain};
 use super::{Boundary, Prescribed, PrescribedField, Scene};
-use crate::solver::{Course, Support};
+use crate::solver::{Amplitude, Support};
 use harness::scene::{SceneError, Source};
 
 /// Parts of the time at which displacements with curves are compared.
@@ -22,9 +22,9 @@ pub(super) fn refuse<const D: usize>(
     scene: &Scene,
     body: &DiscreteBody<D>,
     regions: &[(Vec<u32>, Support<D>)],
-    courses: &[(Course, [Course; D])],
+    amplitudes: &[(Amplitude, [Amplitude; D])],
 ) -> Result<(), SceneError> {
-    let moments: &[f64] = if courses.is_empty() { &MOMENTS[2..] } else { &MOMENTS };
+    let moments: &[f64] = if amplitudes.is_empty() { &MOMENTS[2..] } else { &MOMENTS };
     if scene.boundary.iter().filter(|boundary| boundary.prescribes_displacement()).count() < 2 {
         return Ok(());
     }
@@ -41,12 +41,12 @@ pub(super) fn refuse<const D: usize>(
                 for &part in moments {
                     let of = |index: usize| {
                         let (key, boundary) = (format!("boundary[{index}]"), &scene.boundary[index]);
-                        displacement(source, &key, boundary, courses.get(index), (place, part))
+                        displacement(source, &key, boundary, amplitudes.get(index), (place, part))
                     };
                     let [own, before] = [of(index)?[d], of(other)?[d]];
                     // what is held in place is unknown before the run
                     if (own - before).abs() > EQUAL * own.abs().max(before.abs()) {
-                        let when = if courses.is_empty() {
+                        let when = if amplitudes.is_empty() {
                             String::new()
                         } else {
                             format!(" at {part} of the time")
@@ -75,7 +75,7 @@ fn displacement<const D: usize>(
     source: &Source,
     key: &str,
     boundary: &Boundary,
-    courses: Option<&(Course, [Course; D])>,
+    amplitudes: Option<&(Amplitude, [Amplitude; D])>,
     (place, part): ([f64; D], f64),
 ) -> Result<[f64; D], SceneError> {
     let value = |d: usize| {
@@ -88,10 +88,11 @@ fn displacement<const D: usize>(
             _ => 0.0,
         }
     };
-    let multiple = |course: Option<&Course>| course.map_or(1.0, |course| course.at(part));
-    let mut u: [f64; D] = std::array::from_fn(|d| value(d) * multiple(courses.map(|(_, each)| &each[d])));
+    let multiple =
+        |amplitude: Option<&Amplitude>| amplitude.map_or(1.0, |amplitude| amplitude.multiple(part));
+    let mut u: [f64; D] = std::array::from_fn(|d| value(d) * multiple(amplitudes.map(|(_, each)| &each[d])));
     if let Some(rotation) = rotation_of::<D>(source, key, boundary)? {
-        let turned = rotation.displacement(place, multiple(courses.map(|(angle, _)| angle)));
+        let turned = rotation.displacement(place, multiple(amplitudes.map(|(angle, _)| angle)));
         (0..D).for_each(|d| u[d] += turned[d]);
     }
     Ok(u)

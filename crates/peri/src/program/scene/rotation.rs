@@ -5,7 +5,7 @@ use super::region::region;
 use super::values::{DiscreteBody, ONE_OF_THEM, plain, vector};
 use super::{Boundary, Prescribed, PrescribedField, Scene};
 use crate::bonds::Bonds;
-use crate::solver::{Course, Loads, RotatingRegion, Rotation, Support};
+use crate::solver::{Amplitude, Loads, RotatingRegion, Rotation, Support};
 use harness::scene::{SceneError, Source};
 use nalgebra::{DMatrix, SMatrix};
 
@@ -75,7 +75,7 @@ pub(super) fn turn<const D: usize>(
     scene: &Scene,
     body: &DiscreteBody<D>,
     regions: &[(Vec<u32>, Support<D>)],
-    courses: &[(Course, [Course; D])],
+    amplitudes: &[(Amplitude, [Amplitude; D])],
     loads: &mut Loads<D>,
 ) -> Result<(), SceneError> {
     let mut number = 0;
@@ -92,7 +92,7 @@ pub(super) fn turn<const D: usize>(
             let turned = RotatingRegion {
                 rotation,
                 shift: support.displacement.map(|component| component.unwrap_or(0.0)),
-                courses: courses.get(index).cloned(),
+                amplitudes: amplitudes.get(index).cloned(),
                 components: (0..D).map(bit).sum(),
                 region: number,
                 sites: members.iter().copied().filter(|&site| !later[site as usize]).collect(),
