@@ -12,8 +12,7 @@ pub use uncertainty::{FLAGS, FlagStatistics};
 use crate::Error;
 use crate::dataset::{DataRow, Dataset, Path};
 use crate::surrogate::{Prediction, SofteningHistory, Surrogate, Workspace};
-use crate::train::overstress;
-use polycore::constitutive::viscoelastic::Branch;
+use polycore::constitutive::viscoelastic::{Branch, BranchState, Increment};
 use polycore::numerics::range;
 use polycore::tensor::Voigt;
 use std::time::Instant;
@@ -50,6 +49,26 @@ impl Errors {
 pub fn errors<'a>(law: &Surrogate, rows: impl Iterator<Item = &'a DataRow>) -> Result<Errors, Error> {
     let mut memory = Workspace::default();
     sum_errors(rows.map(|row| Ok((row, law.stress(&row.c, &mut memory)?))))
+}
+
+/// Computes the sum of the stresses S of branches along a run from rest, Pa; C is linear between rows.
+///
+/// # Errors
+/// Errors of [`Branch::advance`]: times that go backwards.
+pub fn overstress(branches: &[Branch], path: &Path) -> Result<Vec<Voigt>, Error> {
+    let mut states = vec![BranchState::REST; branches.len()];
+    let mut from = BranchState::REST.viscous;
+    let mut time = 0.0;
+    let mut row = |row: &DataRow| {
+        let increment = Increment::new(from, row.c, row.time - time);
+        (from, time) = (row.c, row.time);
+        branches.iter().zip(&mut states).try_fold(Voigt::zeros(), |sum, (branch, state)| {
+            let (stress, end) = branch.advance(state, &increment)?;
+            *state = end;
+            Ok(sum + stress)
+        })
+    };
+    path.rows.iter().map(&mut row).collect()
 }
 
 /// Predicts the stress of a law and branches along a whole run; the damage variable follows its history.

@@ -2,10 +2,11 @@
 
 use crate::Error;
 use crate::dataset::{DataRow, Path};
+use crate::eval::overstress;
 use crate::train::loading;
 use nalgebra::{DMatrix, DVector};
 use polycore::constitutive::hyperelastic::NeoHookean;
-use polycore::constitutive::viscoelastic::{Branch, BranchState, Increment, Spring, Viscosity};
+use polycore::constitutive::viscoelastic::{Branch, BranchState, Spring, Viscosity};
 use polycore::numerics::least_squares::levenberg_marquardt;
 use polycore::tensor::Voigt;
 
@@ -14,26 +15,6 @@ pub const MOST_BRANCHES: usize = 3;
 
 /// Weight of a prior that pulls the logarithm of each constant to its start value, as for damage.
 const PRIOR: f64 = 0.03;
-
-/// Computes the sum of the stresses S of branches along a run from rest, Pa; C is linear between rows.
-///
-/// # Errors
-/// Errors of [`Branch::advance`]: times that go backwards.
-pub fn overstress(branches: &[Branch], path: &Path) -> Result<Vec<Voigt>, Error> {
-    let mut states = vec![BranchState::REST; branches.len()];
-    let mut from = BranchState::REST.viscous;
-    let mut time = 0.0;
-    let mut row = |row: &DataRow| {
-        let increment = Increment::new(from, row.c, row.time - time);
-        (from, time) = (row.c, row.time);
-        branches.iter().zip(&mut states).try_fold(Voigt::zeros(), |sum, (branch, state)| {
-            let (stress, end) = branch.advance(state, &increment)?;
-            *state = end;
-            Ok(sum + stress)
-        })
-    };
-    path.rows.iter().map(&mut row).collect()
-}
 
 /// Fits neo-Hookean branches with constant viscosities to the hysteresis of runs: least squares of the
 /// stress of unloading rows minus that of loading at the same strain of the same run. What the loading and

@@ -44,7 +44,7 @@ mod state;
 #[cfg(test)]
 mod tests;
 
-pub use branches::{MOST_BRANCHES, fit_branches, overstress};
+pub use branches::{MOST_BRANCHES, fit_branches};
 pub use softening::{MOST_UNITS, loading, soften};
 pub use state::{Ending, Epoch, TrainingState};
 

@@ -6,11 +6,12 @@ use crate::dataset::{
     noise, read, split,
 };
 use crate::error::Error;
+use crate::eval::overstress;
 use crate::kinematics::{ANGSTROM, NAMES, PeriodicBox};
 use crate::program::quantities as q;
 use crate::program::scene::{DatasetSpec, Scene};
 use crate::surrogate::{Kind, Symmetry};
-use crate::train::{loading, overstress};
+use crate::train::loading;
 use harness::report::{Named, Report};
 use harness::scene::{Failure, Source};
 use polycore::constitutive::viscoelastic::Branch;
