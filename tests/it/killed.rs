@@ -115,6 +115,18 @@ fn killed_while_it_rubs() {
     survives_kills(&scene.replace("end_time = \"0.5 s\"", "end_time = \"0.2 s\""));
 }
 
+/// Steps in sequence: statics, dynamics from there, statics again with a crack that appears.
+#[test]
+fn killed_between_and_within_steps() {
+    let case = concat!(env!("CARGO_MANIFEST_DIR"), "/../cases/time/let-go/case.toml");
+    let scene = fs::read_to_string(case).unwrap();
+    let (scene, _) = scene.split_once("[[study]]").unwrap();
+    let again = "[[step]]\nboundary = [{ side = \"x-\", traction = [\"-5 kPa\", \"0 kPa\"] }, \
+                 { side = \"x+\", traction = [\"5 kPa\", \"0 kPa\"] }]\nsolver = { steps = 4, tolerance = 1e-8 }\n\
+                 cracks = [{ from = [\"50 mm\", \"-1 mm\"], to = [\"50 mm\", \"1.5 mm\"] }]\n";
+    survives_kills(&format!("{scene}{again}"));
+}
+
 /// Layers, crystallization with its latent heat, probes and fields.
 #[test]
 fn killed_while_it_prints() {

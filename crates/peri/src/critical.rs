@@ -228,23 +228,23 @@ impl Critical {
         };
         let space = if context.space == Space::Solid { Space::Solid } else { Space::PlaneStress };
         let strain = strength * modulus(space, 1.0, context.horizon, context.thickness) / context.modulus;
-        let (mut ratio, mut softening) = (1.0, BondSoftening::default());
+        let mut ratio = 1.0;
         for _ in 0..100 {
             let rise = context.crossing.reach * context.modulus * context.law.energy(1.0 + strain / ratio);
             if !(strength > 0.0 && energy > rise) {
                 return Err(fault(format!(
-                    "above 0, and less or with a finer spacing: at it bonds store {rise:.4e} of {energy:.4e} \
-                     J/m²"
+                    "above 0, and a lower strength or a finer spacing: at this strength bonds already store \
+                     {rise:.4e} of the {energy:.4e} J/m²"
                 )));
             }
-            softening = BondSoftening::of_linear(energy / rise, self.kink);
+            let softening = BondSoftening::of_linear(energy / rise, self.kink);
             let next = softening.uniaxial_strength(space);
             if (next - ratio).abs() < 1e-12 {
-                break;
+                return Ok(softening);
             }
             ratio = next;
         }
-        Ok(softening)
+        Err(fault("a lower strength: no softening was found that has it".to_owned()))
     }
 
     /// Computes the critical bond stretch.

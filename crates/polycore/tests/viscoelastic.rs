@@ -443,7 +443,7 @@ fn invalid_input() {
     let _: &dyn Law = elastic.equilibrium();
 }
 
-/// A glassy branch has a step at any strain, duration and temperature: Newton's method alone jumps between
+/// The flow of a glassy branch converges at any strain, duration and temperature: Newton's method alone jumps between
 /// both sides of the kink of ln sinh for some of them.
 #[test]
 fn glassy_steps_at_any_strain() {

@@ -25,10 +25,13 @@ const PRIOR: f64 = 0.03;
 pub fn fit_branches(paths: &[&Path], count: usize) -> Result<Vec<Branch>, Error> {
     let runs = paths.iter().map(|path| Unloading::new(path)).filter(|run| !run.falls.is_empty());
     let runs: Vec<Unloading> = runs.collect();
-    let scale = runs.iter().map(|run| run.scale).reduce(f64::min).ok_or_else(|| {
-        let (found, allowed) = ("no unloading rows".into(), "runs with unloading".into());
-        Error::Data { what: "branches", found, allowed }
-    })?;
+    let scale =
+        runs.iter().map(|run| run.scale / (run.falls.len() as f64).sqrt()).reduce(f64::min).ok_or_else(
+            || {
+                let (found, allowed) = ("no unloading rows".into(), "runs with unloading".into());
+                Error::Data { what: "branches", found, allowed }
+            },
+        )?;
     let of_rows = |value: fn(&DataRow) -> f64| {
         runs.iter().flat_map(|run| run.path.rows.iter().map(value)).fold(0.0, f64::max)
     };
@@ -62,6 +65,11 @@ pub fn fit_branches(paths: &[&Path], count: usize) -> Result<Vec<Branch>, Error>
         Some(DMatrix::from_columns(&(0..at.len()).map(column).collect::<Option<Vec<_>>>()?))
     };
     let found = levenberg_marquardt(start.clone(), 100, residuals, jacobian);
+    if !found.objective.is_finite() {
+        let (found, allowed) =
+            (format!("a misfit of {}", found.objective), "finite strains and stresses".into());
+        return Err(Error::Data { what: "branches", found, allowed });
+    }
     branches(&found.at)
 }
 
@@ -109,7 +117,7 @@ impl<'a> Unloading<'a> {
         let fall = |row: usize| {
             let after = (1..=peak).find(|&after| strain(after) >= strain(row))?;
             let [a, b] = [strain(after - 1), strain(after)];
-            let share = ((strain(row) - a) / (b - a)).clamp(0.0, 1.0);
+            let share = if b > a { ((strain(row) - a) / (b - a)).clamp(0.0, 1.0) } else { 0.0 };
             Some(Fall { row, loading: [after - 1, after], share })
         };
         let falls: Vec<_> =

@@ -8,8 +8,8 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Directions between the axis of tension and the plane across it.
 const DIRECTIONS: u32 = 90;
-/// Largest uniform strain that is searched, over λ₀ − 1: at it all bonds that can soften have done so.
-const WIDEST: f64 = 20.0;
+/// Uniform strains between λ₀ − 1 and λ_f − 1 that are searched for the greatest stress.
+const STRAINS: u32 = 100;
 
 /// Fall of a bond's tension between λ₀ and λ_f.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,23 +21,23 @@ pub struct BondSoftening {
     pub kink: Option<[f64; 2]>,
 }
 
-/// e_f = 4, straight: the crack of a strip runs at the energy of the bonds across it, to 2 % along an axis
-/// and at 45°, at m = 3 and 4; at 2 to 7 % (guide, theory/fracture.md).
 impl Default for BondSoftening {
+    /// Uses e_f = 4, straight: the crack of a strip runs at the energy of the bonds across it, to 2 % along an
+    /// axis and at 45°, at m = 3 and 4; at 2 to 7 % (guide, theory/fracture.md).
     fn default() -> Self {
         Self { ductility: 4.0, kink: None }
     }
 }
 
 impl BondSoftening {
-    /// e_f of a linear bond whose energy ∫₁^λf d t dλ is `energy` times that up to λ₀, with the kink (β, x):
+    /// Computes e_f of a linear bond whose energy ∫₁^λf d t dλ is `energy` times that up to λ₀, with the kink (β, x):
     /// 1 + (`energy` − 1)/(β + x), β + x = 1 without one.
     pub fn of_linear(energy: f64, kink: Option<[f64; 2]>) -> Self {
         let area = kink.map_or(1.0, |[tension, place]| tension + place);
         Self { ductility: 1.0 + (energy - 1.0) / area, kink }
     }
 
-    /// d, the fraction of the law's tension that a bond carries: 1 up to λ₀, then f(e)/e, 0 beyond λ_f =
+    /// Returns the fraction d of the law's tension that a bond carries: 1 up to λ₀, then f(e)/e, 0 beyond λ_f =
     /// `end`, with e = (λ − 1)/(λ₀ − 1) and f falling from 1 to 0 at e_f, straight or with a kink. For a
     /// linear law d t is bilinear or trilinear in λ. It depends on the present stretch: bonds unloaded
     /// before λ_f recover.
@@ -78,8 +78,7 @@ impl BondSoftening {
             let side = bisected(-strain, 0.0, 50, |side| stress(strain, side, 1) < 0.0);
             stress(strain, side, 0)
         };
-        let most = WIDEST.min(self.ductility);
-        let strains = (0..=100).map(|k| most.powf(f64::from(k) / 100.0));
+        let strains = (0..=STRAINS).map(|k| self.ductility.powf(f64::from(k) / f64::from(STRAINS)));
         strains.map(uniaxial).fold(0.0, f64::max) / uniaxial(1.0)
     }
 

@@ -114,7 +114,7 @@ impl<const D: usize> System<'_, D> {
         let load = self.response(state, factor, (pull, push)).0;
         if bonds > 0 {
             state.fracture.events.push(BreakingEvent {
-                step: state.step,
+                step: state.stage.rows + state.step,
                 bonds,
                 fingerprint: fingerprint(&list),
                 load,

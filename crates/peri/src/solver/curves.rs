@@ -26,7 +26,7 @@ impl fmt::Debug for Amplitude {
 }
 
 impl Amplitude {
-    /// Creates a amplitude from a function of τ.
+    /// Creates an amplitude from a function of τ.
     pub fn new(amplitude: impl Fn(f64) -> (f64, f64) + Send + Sync + 'static) -> Self {
         Self(Arc::new(amplitude))
     }
@@ -55,7 +55,7 @@ pub struct CurvedRegion<const D: usize> {
     pub components: u8,
     /// Displacement of each site at a multiple of 0, m; empty: none.
     pub(super) offsets: Vec<[f64; D]>,
-    /// Bit d: component d stays where a step begins.
+    /// Bit d: component d keeps its value at the start of a step.
     pub kept: u8,
 }
 

@@ -273,9 +273,10 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     state.history.push(StepRecord { residual, rounds, balance, time, kinetic: 0.0, damped: 0.0, ..row });
 }
 
-/// Returns true if the load has fallen below the fraction of its largest value at which the run stops.
+/// Returns true if the load has fallen below the fraction of its largest value in this step of a programme
+/// at which the step stops.
 fn severed<const D: usize>(system: &System<D>, state: &State<D>) -> bool {
-    let largest = state.history.iter().map(|r| r.load.abs()).fold(0.0, f64::max);
+    let largest = state.history[state.stage.rows..].iter().map(|r| r.load.abs()).fold(0.0, f64::max);
     let last = state.history.last().map_or(0.0, |r| r.load.abs());
     system.stop_below > 0.0 && state.fracture.broken > 0 && last < system.stop_below * largest
 }

@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 pub struct Motion {
     /// True once dynamics has begun.
     pub(super) begun: bool,
+    /// Time steps of the run before it.
+    pub(super) earlier: u64,
     /// Time, s.
     pub time: f64,
     /// Present sequence of equal time steps.

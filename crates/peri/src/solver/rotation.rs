@@ -61,7 +61,7 @@ pub struct RotatingRegion<const D: usize> {
     pub rotation: Rotation<D>,
     /// Additional displacement at load factor 1, m.
     pub shift: [f64; D],
-    /// Courses of the angle and of each component of `shift`; absent: the load factor.
+    /// Amplitudes of the angle and of each component of `shift`; absent: the load factor.
     pub amplitudes: Option<(Amplitude, [Amplitude; D])>,
     /// Bit d: component d is prescribed.
     pub components: u8,

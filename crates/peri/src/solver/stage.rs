@@ -20,6 +20,8 @@ pub struct StepOrigin<const D: usize> {
     pub finished: usize,
     /// Time at the start, s.
     pub time: f64,
+    /// Rows of the history at the start.
+    pub rows: usize,
     /// Displacement at the start, m; none in the first step.
     pub displacement: Option<Field<D>>,
     /// Body force density at the start, N/m³, if there was any.
@@ -27,12 +29,19 @@ pub struct StepOrigin<const D: usize> {
 }
 
 impl<const D: usize> State<D> {
-    /// Begins the next step, after one of a `duration`, s, that ended with `body_force`, N/m³. Velocities
-    /// stay if both are explicit dynamics (`moving`).
-    pub fn begin_stage(&mut self, duration: f64, body_force: Option<Field<D>>, moving: bool) {
+    /// Begins the next step, after one that ended with `body_force`, N/m³, and severs the bonds across some
+    /// cuts. Velocities stay if both steps are explicit dynamics (`moving`).
+    pub fn begin_stage(
+        &mut self,
+        bonds: &dyn Bonds<D>,
+        cuts: &[Cut<D>],
+        body_force: Option<Field<D>>,
+        moving: bool,
+    ) {
         self.stage = StepOrigin {
             finished: self.stage.finished + 1,
-            time: self.stage.time + duration,
+            time: self.history.last().map_or(0.0, |row| row.time),
+            rows: self.history.len(),
             displacement: Some(self.displacement.clone()),
             body_force,
         };
@@ -40,6 +49,9 @@ impl<const D: usize> State<D> {
         (self.control, self.motion) = (StepControl::default(), Motion::default());
         if !moving {
             self.velocity = Field::zeros(self.velocity.sites());
+        }
+        if !cuts.is_empty() {
+            self.fracture.cut(bonds, cuts);
         }
         self.accept();
     }

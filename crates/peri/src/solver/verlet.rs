@@ -232,7 +232,8 @@ impl VelocityVerlet {
         let limits =
             StepLimits { critical_step: critical(frequency), contact, bonds, ..StepLimits::default() };
         let energies = DynamicEnergies { kinetic, turnover: state.work, ..DynamicEnergies::default() };
-        state.motion = Motion { begun: true, limits, energies, ..Motion::default() };
+        let earlier = state.counts.total_iterations;
+        state.motion = Motion { begun: true, earlier, limits, energies, ..Motion::default() };
         if let Some(found) = self.time_step.filter(|&found| found > state.motion.limits.critical_step) {
             return Err(Error::TimeStep { found, critical: state.motion.limits.critical_step });
         }
@@ -393,7 +394,8 @@ impl VelocityVerlet {
         let available = state.work - gone - motion.energies.floor;
         motion.energies.turnover = motion.energies.turnover.max(available).max(gone);
         let most = available.max(0.0) + EXCESS * motion.energies.turnover;
-        let grown = motion.energies.kinetic > most && state.counts.total_iterations > EARLY_STEPS;
+        let grown =
+            motion.energies.kinetic > most && state.counts.total_iterations > motion.earlier + EARLY_STEPS;
         if grown || !motion.energies.kinetic.is_finite() || !available.is_finite() {
             return Err(Error::Unstable {
                 time: motion.time,

@@ -149,7 +149,7 @@ fn softened_bonds() {
     for (law, soft) in [(Law::ChainOffset, BondSoftening::default()), (Law::Linear, kinked)] {
         let law = law.build(if law.is_chain() { 50.0 } else { 0.0 }, 1200.0, false).unwrap();
         let onset = soft.onset(end);
-        for stretch in [0.9, 1.05, onset - 1e-3, 1.2, 1.3, 1.5, 1.79, 1.9] {
+        for stretch in [0.9, 1.05, onset - 1e-3, onset + 1e-3, 1.3, 1.5, 1.79, 1.9] {
             let energy = |stretch| soft.energy(&*law, stretch, end);
             let slope = (energy(stretch + 1e-5) - energy(stretch - 1e-5)) / 2e-5;
             near("softened_tension", slope, soft.integrity(stretch, end) * law.tension(stretch), 1e-6);
@@ -191,6 +191,7 @@ fn strengths_of_bonds() {
         (10.0, trilinear, Space::PlaneStress, 1.045_52),
         (100.0, trilinear, Space::PlaneStress, 1.219_32),
         (10.0, None, Space::Solid, 1.444_93),
+        (800.0, None, Space::Solid, 1.879),
     ] {
         let found = BondSoftening { ductility, kink }.uniaxial_strength(space);
         near("uniaxial_strength", found / expected, 1.0, 2e-3);

@@ -48,6 +48,7 @@ pub(super) fn refuse(source: &Source, scene: &Scene, variant: &SceneVariant) -> 
             "parameters that follow fields, different for each pair",
             "none: LAMMPS has a table for each bond length",
         ),
+        (!scene.step.is_empty(), "step", "steps in sequence", "one step: the driver knows the first alone"),
         (scene.contact.is_some(), "contact", "contact", "none: the tables act between bonded particles only"),
         (
             scene.dynamics.is_some() || scene.method() == SolverMethod::Verlet,

@@ -52,10 +52,7 @@ impl<const D: usize> SceneStage<D> {
         state: &mut State<D>,
     ) {
         let moving = before.dynamics.is_some() && own.dynamics.is_some();
-        state.begin_stage(before.duration(), body_force, moving);
-        if !self.cuts.is_empty() {
-            state.fracture.cut(&*body.bonds, &self.cuts);
-        }
+        state.begin_stage(&*body.bonds, &self.cuts, body_force, moving);
         for site in 0..self.velocity.as_ref().map_or(0, Field::sites) {
             let prescribed = self.velocity.as_ref().map_or([0.0; D], |field| field.get(site));
             if prescribed != [0.0; D] {

@@ -137,7 +137,7 @@ pub enum Prescribed {
     Free,
     /// Prescribed, m.
     At(f64),
-    /// Stays where the step begins.
+    /// Keeps its value at the start of the step.
     Hold,
 }
 

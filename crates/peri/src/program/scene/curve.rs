@@ -252,7 +252,7 @@ fn misfit_of<D: Dimension>(unit: &str, values: &[f64], si: &str) -> Option<(Stri
     ))
 }
 
-/// Courses of the angle and of each component of every boundary; none without curves.
+/// Amplitudes of the angle and of each component of every boundary; none without curves.
 ///
 /// # Errors
 /// A curve that is not defined over the run, that has another variable than `t` or a unit that does not suit

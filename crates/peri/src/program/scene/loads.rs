@@ -10,7 +10,7 @@ use crate::solver::{ContactStops, INVERTS, Loads, Support, Unsupported, find_uns
 use harness::scene::{SceneError, Source};
 
 /// Times at which the balance of forces with curves is checked.
-const BALANCES: usize = 64;
+const BALANCES: usize = 1024;
 
 /// Returns the loads and supports of a body, and by site whether a load or support acts there.
 ///

@@ -44,6 +44,12 @@ pub(super) fn refuse<const D: usize>(
                         displacement(source, &key, boundary, amplitudes.get(index), (place, part))
                     };
                     let [own, before] = [of(index)?[d], of(other)?[d]];
+                    if own.is_nan() != before.is_nan() {
+                        let found =
+                            format!("`hold` or a displacement of particles that boundary[{other}] moves");
+                        let allowed = "`hold` in both where regions overlap, or `free` in one of them";
+                        return Err(source.error(&format!("boundary[{index}]"), found, allowed));
+                    }
                     // what is held in place is unknown before the run
                     if (own - before).abs() > EQUAL * own.abs().max(before.abs()) {
                         let when = if amplitudes.is_empty() {

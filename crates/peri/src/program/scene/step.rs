@@ -16,7 +16,7 @@ pub struct StepSpec {
     /// Loads and supports; a region that the step does not name is free.
     #[serde(default)]
     pub boundary: Vec<Boundary>,
-    /// Solver settings; default: those of a scene without.
+    /// Solver settings; default: as in a scene without `[solver]`.
     pub solver: Option<SolverSpec>,
     /// Ramps and holds of a quasi-static step in time.
     pub time: Option<TimeProgramSpec>,
@@ -102,18 +102,35 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     if let Some(contact) = &scene.contact
         && (contact.has_friction() || !contact.plane.is_empty())
     {
-        let why = "friction and rigid planes do not continue from one step in the next";
+        let why = "friction and rigid planes are not carried over to the next step";
         return Err(source.conflict("contact", "step", why));
     }
     for index in 0..=scene.step.len() {
         let (source, scene) = (scene.source_of(source, index), scene.stage(index));
         if scene.solver.refine > 1 || scene.solver.snap_back {
             let name = if scene.solver.snap_back { "snap_back" } else { "refine" };
-            let why = "available without [[step]] only";
+            let why = "not available with [[step]]";
             return Err(source.unexpected(&format!("solver.{name}"), why));
+        }
+        if scene.is_mixed() {
+            let why = "all steps of a run have one precision";
+            return Err(source.error("dynamics.precision", why, "`double` with [[step]]"));
+        }
+        if let Some(at) = scene.boundary.iter().position(|own| own.name.is_none() && own.side.is_none()) {
+            let why = "needed with [[step]], where regions of several steps are told apart by name";
+            return Err(source.missing(&format!("boundary[{at}].name"), why));
         }
         if index == 0 {
             continue;
+        }
+        if let Some(time) = &scene.time
+            && scene.load_steps().0.last() != Some(&1.0)
+        {
+            let key = format!("time.step[{}].factor", time.step.len().max(1) - 1);
+            let found = "a load factor that does not end at 1";
+            let allowed = "1 at the end: loads of the step reach their values and those of the step before \
+                           end with it";
+            return Err(source.error(&key, found, allowed));
         }
         if let Some(at) = scene.boundary.iter().position(|boundary| boundary.rotation.is_some()) {
             let why = "a rotation starts from the undeformed body: write it in the first step";

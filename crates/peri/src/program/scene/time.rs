@@ -1,4 +1,4 @@
-//! Programmes of times: quasi-static runs of solids with a state.
+//! Programmes of times: quasi-static runs of solids with a state, or with curves.
 
 use super::Scene;
 use super::values::plain;

@@ -160,8 +160,12 @@ pub fn parse(name: &str, text: &str) -> Result<Vec<DeckMaterial>, Error> {
         let mut numbers = Vec::new();
         let rows = all[at + 1..].iter().take_while(|(_, row)| !row.starts_with('*') || row.starts_with("**"));
         for &(line, row) in rows.filter(|(_, row)| is_data(row)) {
-            for cell in row.split(',').map(str::trim).filter(|cell| !cell.is_empty()) {
-                numbers.push(cell.parse::<f64>().map_err(|_| refused(line, cell, "a number"))?);
+            // a blank is 0, that after a comma at the end is none
+            let row = row.strip_suffix(',').unwrap_or(row);
+            for cell in row.split(',').map(str::trim) {
+                let number = if cell.is_empty() { Ok(0.0) } else { cell.parse::<f64>() };
+                let finite = number.ok().filter(|number| number.is_finite());
+                numbers.push(finite.ok_or_else(|| refused(line, cell, "a finite number"))?);
             }
         }
         let order =
@@ -289,6 +293,9 @@ mod tests {
         assert_eq!(shown, expected);
         assert_eq!(found[0].parameters, [0.4, 1.3, 2e-3, 5.0]);
         assert_eq!(found[2].parameters, [0.2, 7.0, 0.5]);
+        // C10, a blank C01, D1
+        let blank = parse("deck", "*HYPERELASTIC, MOONEY-RIVLIN\n0.5, , 0.02,\n").unwrap();
+        assert_eq!((&blank[0].parameters[..], blank[0].bulk), (&[0.5, 0.0][..], Some(100.0)));
     }
 
     #[test]
@@ -297,7 +304,9 @@ mod tests {
             ("*HYPERELASTIC, MARLOW\n1\n", "line 1: found `*HYPERELASTIC, MARLOW`; allowed: NEO HOOKE; "),
             ("*HYPERELASTIC, OGDEN, N=4\n1\n", "OGDEN, N=3"),
             ("*HYPERELASTIC, YEOH, TEST DATA INPUT\n", "[[fit.data]]"),
-            ("*MATERIAL, NAME=A\n*HYPERELASTIC, YEOH\n1, x\n", "line 3: found `x`; allowed: a number"),
+            ("*MATERIAL, NAME=A\n*HYPERELASTIC, YEOH\n1, x\n", "line 3: found `x`; allowed: a finite number"),
+            ("*HYPERELASTIC, NEO HOOKE\n1, nan\n", "line 2: found `nan`"),
+            ("*HYPERELASTIC, NEO HOOKE\n1.0,,20\n", "of one temperature; 3 given"),
             ("*HYPERELASTIC, NEO HOOKE\n1, 0, 20\n2, 0, 40\n", "1 to 2 numbers, of one temperature; 6 given"),
             ("*HYPERELASTIC, NEO HOOKE\n", "0 given"),
             ("*HYPERELASTIC, NEO HOOKE\n-1, 0\n", "shear_modulus = -2 is outside"),

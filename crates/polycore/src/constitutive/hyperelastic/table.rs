@@ -272,6 +272,13 @@ impl TestColumns {
         }
         self.make_compression_negative(&mut rows, &mut notes);
         for row in &mut rows {
+            if let (Mode::SimpleShear, [_, second, ..]) = (row.mode, &self.strains[..]) {
+                return Err(file.refuse_cell(
+                    row.index,
+                    second.column,
+                    "one strain column, γ, for simple shear",
+                ));
+            }
             for (axis, chosen) in self.strains.iter().enumerate() {
                 let written = row.written[axis];
                 if row.mode == Mode::SimpleShear {
