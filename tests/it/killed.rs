@@ -122,7 +122,8 @@ fn killed_between_and_within_steps() {
     let scene = fs::read_to_string(case).unwrap();
     let (scene, _) = scene.split_once("[[study]]").unwrap();
     let again = "[[step]]\nboundary = [{ side = \"x-\", traction = [\"-5 kPa\", \"0 kPa\"] }, \
-                 { side = \"x+\", traction = [\"5 kPa\", \"0 kPa\"] }]\nsolver = { steps = 4, tolerance = 1e-8 }\n\
+                 { side = \"x+\", traction = [\"5 kPa\", \"0 kPa\"] }]\n\
+                 solver = { steps = 4, tolerance = 1e-8 }\n\
                  cracks = [{ from = [\"50 mm\", \"-1 mm\"], to = [\"50 mm\", \"1.5 mm\"] }]\n";
     survives_kills(&format!("{scene}{again}"));
 }

@@ -443,8 +443,8 @@ fn invalid_input() {
     let _: &dyn Law = elastic.equilibrium();
 }
 
-/// The flow of a glassy branch converges at any strain, duration and temperature: Newton's method alone jumps between
-/// both sides of the kink of ln sinh for some of them.
+/// The flow of a glassy branch converges at any strain, duration and temperature: Newton's method alone jumps
+/// between both sides of the kink of ln sinh for some of them.
 #[test]
 fn glassy_steps_at_any_strain() {
     let spring = Spring::NeoHookean(NeoHookean::new(320.0).unwrap());

@@ -22,24 +22,24 @@ pub struct BondSoftening {
 }
 
 impl Default for BondSoftening {
-    /// Uses e_f = 4, straight: the crack of a strip runs at the energy of the bonds across it, to 2 % along an
-    /// axis and at 45°, at m = 3 and 4; at 2 to 7 % (guide, theory/fracture.md).
+    /// Uses e_f = 4, straight: the crack of a strip runs at the energy of the bonds across it, to 2 % along
+    /// an axis and at 45°, at m = 3 and 4; at 2 to 7 % (guide, theory/fracture.md).
     fn default() -> Self {
         Self { ductility: 4.0, kink: None }
     }
 }
 
 impl BondSoftening {
-    /// Computes e_f of a linear bond whose energy ∫₁^λf d t dλ is `energy` times that up to λ₀, with the kink (β, x):
-    /// 1 + (`energy` − 1)/(β + x), β + x = 1 without one.
+    /// Computes e_f of a linear bond whose energy ∫₁^λf d t dλ is `energy` times that up to λ₀, with the kink
+    /// (β, x): 1 + (`energy` − 1)/(β + x), β + x = 1 without one.
     pub fn of_linear(energy: f64, kink: Option<[f64; 2]>) -> Self {
         let area = kink.map_or(1.0, |[tension, place]| tension + place);
         Self { ductility: 1.0 + (energy - 1.0) / area, kink }
     }
 
-    /// Returns the fraction d of the law's tension that a bond carries: 1 up to λ₀, then f(e)/e, 0 beyond λ_f =
-    /// `end`, with e = (λ − 1)/(λ₀ − 1) and f falling from 1 to 0 at e_f, straight or with a kink. For a
-    /// linear law d t is bilinear or trilinear in λ. It depends on the present stretch: bonds unloaded
+    /// Returns the fraction d of the law's tension that a bond carries: 1 up to λ₀, then f(e)/e, 0 beyond
+    /// λ_f = `end`, with e = (λ − 1)/(λ₀ − 1) and f falling from 1 to 0 at e_f, straight or with a kink. For
+    /// a linear law d t is bilinear or trilinear in λ. It depends on the present stretch: bonds unloaded
     /// before λ_f recover.
     pub fn integrity(&self, stretch: f64, end: f64) -> f64 {
         let last = self.ductility;

@@ -124,7 +124,7 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             continue;
         }
         if let Some(time) = &scene.time
-            && scene.load_steps().0.last() != Some(&1.0)
+            && scene.programme().0.last() != Some(&1.0)
         {
             let key = format!("time.step[{}].factor", time.step.len().max(1) - 1);
             let found = "a load factor that does not end at 1";
