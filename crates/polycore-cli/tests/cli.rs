@@ -404,29 +404,6 @@ fn cross_ends_in_a_verdict() {
     assert!(fits.contains("bar,ogden-1,r2.sheet,-"), "{fits}");
 }
 
-/// Cards of a run return as the blocks of `materials.toml`, to their seven digits.
-#[test]
-fn cards_return_as_blocks() {
-    let (folder, scene) = folder(SCENE);
-    assert!(run(&scene, &folder.path().join("out")).status.success());
-    let cards = folder.path().join("out/materials_mm.inp");
-    let result = polycore(&["deck", cards.to_str().unwrap()]);
-    assert!(result.status.success(), "{}", text(&result.stderr));
-    let shown = text(&result.stdout);
-    let blocks = std::fs::read_to_string(folder.path().join("out/materials.toml")).unwrap();
-    let value = |text: &str, key: &str| -> f64 {
-        let line = text.lines().find(|line| line.starts_with(key)).unwrap_or_else(|| panic!("{key}: {text}"));
-        line.split('"').nth(1).unwrap().split(' ').next().unwrap().parse().unwrap()
-    };
-    for key in ["shear_modulus", "bulk_modulus"] {
-        let (found, expected) = (value(&shown, key), value(&blocks, key));
-        assert!((found / expected - 1.0).abs() < 2e-6, "{key}: {found} {expected}");
-    }
-    let result = polycore(&["deck", scene.to_str().unwrap()]);
-    assert_eq!(result.status.code(), Some(2));
-    assert!(text(&result.stderr).contains("no `*HYPERELASTIC`"), "{}", text(&result.stderr));
-}
-
 /// Names used by other programs lead to the law of this one.
 #[test]
 fn laws_of_other_names_get_advice() {

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::{SceneError, Source};
 use polycore::constitutive::Error;
-use polycore::constitutive::hyperelastic::{EightChain, LopezPamies, NeoHookean};
+use polycore::constitutive::hyperelastic::{EightChain, Hyperelastic, LopezPamies, NeoHookean};
 use polycore::constitutive::viscoelastic::{Branch, Mullins, Shift, Spring, StrainSoftening, Viscosity};
 use polycore::units::{
     MolarEnergy, PerSquaredStress, Rate, Stress, Temperature, TemperatureDifference, UnitError,
@@ -106,6 +106,9 @@ pub struct MullinsSpec {
     #[serde(default)]
     pub beta: f64,
 }
+
+/// Name of a constant, its value in the unit, and the unit; "1" for none.
+pub type NamedConstant = (&'static str, f64, &'static str);
 
 /// Constants of a spring or dashpot with their units.
 type ConstantUnits = &'static [(&'static str, &'static str)];
@@ -228,6 +231,43 @@ impl BranchSpec {
         }
     }
 
+    /// Returns spring and viscosity of a branch as scenes name them, and its constants with their units.
+    pub fn constants(branch: &Branch) -> ([&'static str; 2], Vec<NamedConstant>) {
+        let (spring, kind, law): (_, _, &dyn Hyperelastic) = match &branch.spring {
+            Spring::NeoHookean(law) => ("neo-hookean", SpringKind::NeoHookean, law),
+            Spring::LopezPamies(law) if law.parameters().len() == 2 => {
+                ("lopez-pamies-1", SpringKind::LopezPamies1, law)
+            }
+            Spring::LopezPamies(law) => ("lopez-pamies-2", SpringKind::LopezPamies2, law),
+            Spring::EightChain(law) => ("eight-chain", SpringKind::EightChain, law),
+        };
+        let (viscosity, names, own) = match branch.viscosity {
+            Viscosity::Constant(eta) => ("constant", ViscosityKind::Constant, vec![eta]),
+            Viscosity::KumarLopezPamies { start, end, thickening, thinning, exponents: [first, second] } => (
+                "kumar-lopez-pamies",
+                ViscosityKind::KumarLopezPamies,
+                vec![start, end, thickening, thinning, first, second],
+            ),
+            Viscosity::BergstromBoyce { rate, stress, power, creep, offset } => {
+                ("bergstrom-boyce", ViscosityKind::BergstromBoyce, vec![rate, stress, power, creep, offset])
+            }
+            Viscosity::Eyring { rate, stress, softening: None, .. } => {
+                ("eyring", ViscosityKind::Eyring, vec![rate, stress])
+            }
+            Viscosity::Eyring { rate, stress, softening: Some(soft), .. } => {
+                let [r0, r1, r2] = soft.shape;
+                (
+                    "eyring-softening",
+                    ViscosityKind::EyringSoftening,
+                    vec![rate, stress, soft.amount, r0, r1, r2],
+                )
+            }
+        };
+        let values = law.parameters().into_iter().map(|(_, value)| value).chain(own);
+        let all = kind.names().iter().chain(names.names()).zip(values);
+        ([spring, viscosity], all.map(|(&(name, unit), value)| (name, value, unit)).collect())
+    }
+
     fn build(spring: SpringKind, viscosity: ViscosityKind, constants: &[f64]) -> Result<Branch, Error> {
         let (p, q) = constants.split_at(spring.names().len());
         let spring = match spring {
@@ -278,6 +318,51 @@ impl MullinsSpec {
             }
             Err(other) => Err(source.error(key, other, "constants in their ranges")),
             Ok(()) => Ok(softening),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Constants of a branch lead back to it, by their names and units.
+    #[test]
+    fn branches_return_from_their_constants() {
+        let springs = [
+            SpringKind::NeoHookean,
+            SpringKind::LopezPamies1,
+            SpringKind::LopezPamies2,
+            SpringKind::EightChain,
+        ];
+        let viscosities = [
+            ViscosityKind::Constant,
+            ViscosityKind::KumarLopezPamies,
+            ViscosityKind::BergstromBoyce,
+            ViscosityKind::Eyring,
+            ViscosityKind::EyringSoftening,
+        ];
+        for (spring, viscosity) in springs.into_iter().flat_map(|s| viscosities.map(|v| (s, v))) {
+            let names: Vec<_> = spring.names().iter().chain(viscosity.names()).collect();
+            let value = |k: usize, name: &str| match name {
+                "c" => -0.5,
+                "r_2" => -5.0,
+                "eta_0" => 100.0,
+                _ => 2.0 + k as f64,
+            };
+            let given: BTreeMap<String, f64> =
+                names.iter().enumerate().map(|(k, (name, _))| ((*name).to_owned(), value(k, name))).collect();
+            let branch = BranchSpec::from_constants(spring, viscosity, &given).expect("a branch");
+            let (kinds, found) = BranchSpec::constants(&branch);
+            let text = format!("spring = \"{}\"\nviscosity = \"{}\"\n[parameters]\n", kinds[0], kinds[1]);
+            let spec: BranchSpec = toml::from_str(&text).expect("a block");
+            assert_eq!(std::mem::discriminant(&spec.spring), std::mem::discriminant(&spring));
+            assert_eq!(spec.viscosity, viscosity);
+            assert_eq!(found.len(), names.len());
+            for ((name, value, unit), (own, own_unit)) in found.into_iter().zip(names) {
+                assert_eq!((name, unit), (*own, *own_unit));
+                assert_eq!(value, given[name], "{name}");
+            }
         }
     }
 }

@@ -188,12 +188,9 @@ impl<const D: usize> SolverMaterial<D> for Kernels<'_> {
         let Some(table) = self.fitted.as_ref().or(self.table.as_ref().map(|(_, table)| table)) else {
             return 0.0;
         };
-        let lacking = self
-            .material
-            .soft
-            .as_ref()
-            .map(|(softening, end)| (*softening, end))
-            .map(|end| modulus * lacking_energy(&self.material, end, table, bonds, displacement));
+        let lacking = self.material.soft.as_ref().map(|(softening, end)| {
+            modulus * lacking_energy(&self.material, (*softening, end), table, bonds, displacement)
+        });
         if let Some(sum) = bonds.energy_sum(displacement, table) {
             return modulus * sum + lacking.unwrap_or(0.0);
         }

@@ -34,15 +34,15 @@ impl SofteningLoss {
     /// Collects the losses of a displacement, with the fit of the kernels.
     pub fn new<const D: usize>(
         material: &BondMaterial,
-        end: (BondSoftening, &Property),
+        soft: (BondSoftening, &Property),
         fit: &KernelFit,
         bonds: &dyn BondForces<D>,
         displacement: &Field<D>,
     ) -> Self {
-        let (law, modulus, softening) = (material.law(), material.modulus(), end.0);
+        let (law, modulus, softening) = (material.law(), material.modulus(), soft.0);
         let of = |chunk: usize| {
             let mut found: Vec<(u32, [f64; 3])> = Vec::new();
-            each(end, bonds, displacement, chunk, &mut |bond, end| {
+            each(soft, bonds, displacement, chunk, &mut |bond, end| {
                 let stretch = bond.stretch();
                 let borne = softening.integrity(stretch, end);
                 if borne < 1.0 {
@@ -78,15 +78,15 @@ impl SofteningLoss {
 /// Energy lost by softened bonds relative to `table`, over kθ.
 pub(super) fn lacking_energy<const D: usize>(
     material: &BondMaterial,
-    end: (BondSoftening, &Property),
+    soft: (BondSoftening, &Property),
     table: &EnergyTable,
     bonds: &dyn BondForces<D>,
     displacement: &Field<D>,
 ) -> f64 {
-    let (law, softening) = (material.law(), end.0);
+    let (law, softening) = (material.law(), soft.0);
     let of = |chunk: usize| {
         let mut sum = 0.0;
-        each(end, bonds, displacement, chunk, &mut |bond, end| {
+        each(soft, bonds, displacement, chunk, &mut |bond, end| {
             let stretch = bond.stretch();
             if softening.integrity(stretch, end) < 1.0 {
                 let more = softening.energy(law, stretch, end) - table.value(bond.elongation());

@@ -61,4 +61,4 @@ pub use state::{BodyStretches, Counts, ForceResiduals, State};
 pub use step_control::StepControl;
 pub use system::{LoadCurve, StateObserver, System};
 pub use unsupported::{ContactStops, Unsupported, find_unsupported};
-pub use verlet::VelocityVerlet;
+pub use verlet::{VelocityVerlet, ramped};

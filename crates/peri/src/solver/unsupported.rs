@@ -80,16 +80,16 @@ struct PartLoads<const D: usize> {
 }
 
 /// Finds the first part of a body whose forces along an axis sum to more than `tolerance` of their sizes and
-/// which nothing can hold.
+/// which nothing can hold; `roots` are the parts, as [`components`] has them.
 pub fn find_unsupported<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
+    roots: &[u32],
     loads: &Loads<D>,
     displacement: Option<&Field<D>>,
     stops: &ContactStops<D>,
     tolerance: f64,
 ) -> Option<Unsupported> {
     let body = loads.body_force.as_ref()?;
-    let roots = components(bonds, |_, _| true);
     let mut pieces: BTreeMap<u32, PartLoads<D>> = BTreeMap::new();
     for &site in bonds.particles() {
         let (site, root) = (site as usize, roots[site as usize]);
@@ -171,8 +171,9 @@ impl<const D: usize> System<'_, D> {
                 "every particle that bore a force has lost all its bonds".to_owned(),
             ));
         }
-        match find_unsupported(&*self.bonds, &self.loads, Some(&state.displacement), &self.stops(), tolerance)
-        {
+        let roots = components(&*self.bonds, |_, _| true);
+        let (bonds, moved, stops) = (&*self.bonds, Some(&state.displacement), self.stops());
+        match find_unsupported(bonds, &roots, &self.loads, moved, &stops, tolerance) {
             Some(part) => Err(self.no_equilibrium(state, part.to_string())),
             None => Ok(()),
         }

@@ -57,6 +57,11 @@ pub struct VelocityVerlet {
     pub records: usize,
 }
 
+/// Load factor of a linear ramp from 0 to 1 at a time, and its rate from then on.
+pub fn ramped(time: f64, ramp: f64) -> (f64, f64) {
+    if time < ramp { (time / ramp, 1.0 / ramp) } else { (1.0, 0.0) }
+}
+
 impl VelocityVerlet {
     /// Uses steps of 0.9 of the critical one up to `end_time`, no damping, full loads at once, 100 rows of
     /// history.
@@ -176,7 +181,7 @@ impl VelocityVerlet {
         if let Some(amplitude) = system.amplitude {
             return amplitude(time);
         }
-        if time < self.ramp { (time / self.ramp, 1.0 / self.ramp) } else { (1.0, 0.0) }
+        ramped(time, self.ramp)
     }
 
     /// Computes loads at time 0, forces, energies and the critical time step.

@@ -4,7 +4,7 @@
 use crate::bodies::{Body, MODULUS, hold};
 use harness::case::Fault;
 use peri::Error;
-use peri::bonds::{BodyGeometry, BondDamage, Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, BondDamage, Bonds, LatticeBonds, VolumeCorrection, components};
 use peri::field::Field;
 use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::BondMaterial;
@@ -184,7 +184,10 @@ fn parts_and_stops() {
     let free = ContactStops::default();
     let pairs = ContactStops { pairs: true, ..ContactStops::default() };
     let plane = |normal: f64| ContactStops { normals: vec![[0.0, normal]], ..ContactStops::default() };
-    let of = |loads: &Loads<2>, stops: &ContactStops<2>| find_unsupported(&bonds, loads, None, stops, 1e-3);
+    let roots = components(&bonds, |_, _| true);
+    let of = |loads: &Loads<2>, stops: &ContactStops<2>| {
+        find_unsupported(&bonds, &roots, loads, None, stops, 1e-3)
+    };
     let Some(Unsupported { particles, total: all, middle, axis, force }) = of(&up, &free) else { panic!() };
     assert_eq!((particles, all, axis), (48, 96, "y"));
     assert!(

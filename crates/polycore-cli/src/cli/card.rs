@@ -37,7 +37,7 @@ pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
                         "**\n** {} fitted to {}\n{}",
                         fit.model.key,
                         set.name,
-                        card(fit.model.key, fit.model.key, &scaled, bulk)
+                        card(fit.model.key, &scaled, bulk)
                     )?;
                 }
             }
@@ -79,7 +79,7 @@ mod tests {
             ),
             ("gent", &[0.3, 75.0], "*USER MATERIAL, CONSTANTS=3\n4.000000e1, 3.000000e-1, 7.500000e1\n"),
         ] {
-            let found = card(key, key, parameters, 40.0);
+            let found = card(key, parameters, 40.0);
             assert!(found.ends_with(expected), "{found}");
         }
     }

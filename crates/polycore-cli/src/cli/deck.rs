@@ -22,7 +22,7 @@ pub struct Arguments {
 /// Formats a block `[material.solid]` of each material.
 ///
 /// # Errors
-/// A file that cannot be read, a material that is no law here.
+/// [`Error::Io`]; [`Error::Option`] for a material without a law in this crate.
 pub fn blocks(arguments: &Arguments) -> Result<String, Error> {
     let materials = deck::read(&arguments.file).map_err(|error| match error {
         Error::Constitutive(reason) => {

@@ -25,7 +25,7 @@ pub fn in_megapascals(value: f64, unit: &str) -> (f64, &'static str) {
     match unit {
         "Pa" => (value / MPA, "MPa"),
         "Pa s" => (value / MPA, "MPa s"),
-        "1/Pa2" => (value * MPA * MPA, "1/MPa^2"),
+        "1/Pa^2" => (value * MPA * MPA, "1/MPa^2"),
         "1/s" => (value, "1/s"),
         _ => (value, ""),
     }

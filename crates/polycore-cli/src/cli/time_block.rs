@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
+use harness::scene::BranchSpec;
 use polycore::constitutive::Error;
 use polycore::constitutive::hyperelastic::Hyperelastic;
 use polycore::constitutive::viscoelastic::fit::TimeFit;
-use polycore::constitutive::viscoelastic::{Branch, Spring, Viscosity};
 
 use super::material::{BULK_RATIO, DIGITS, digits, in_megapascals, stress};
 
@@ -35,13 +35,14 @@ pub fn block(found: &TimeFit) -> Result<String, Error> {
         let _ = writeln!(text, "{name} = {value}{}", remark(found, &name));
     }
     for (k, branch) in (1..).zip(law.branches()) {
-        let ([spring, viscosity], constants) = described(branch);
+        let ([spring, viscosity], constants) = BranchSpec::constants(branch);
         let _ = writeln!(
             text,
             "[[material.solid.branch]]\nspring = \"{spring}\"\nviscosity = \"{viscosity}\"\n\
              [material.solid.branch.parameters]"
         );
-        for (name, value) in constants {
+        for (name, value, unit) in constants {
+            let (name, value) = constant(name, value, unit);
             let _ = writeln!(text, "{name} = {value}{}", remark(found, &format!("{k}.{name}")));
         }
     }
@@ -56,53 +57,6 @@ fn remark(found: &TimeFit, name: &str) -> String {
         Some((None, None)) => " # the data do not determine it".to_owned(),
         _ => String::new(),
     }
-}
-
-/// Names of spring and viscosity in scenes, and their constants.
-fn described(branch: &Branch) -> ([&'static str; 2], Vec<ConstantText>) {
-    let (spring, law, names): (_, &dyn Hyperelastic, Vec<(String, &str)>) = match &branch.spring {
-        Spring::NeoHookean(law) => ("neo-hookean", law, vec![("nu".to_owned(), "Pa")]),
-        Spring::LopezPamies(law) => {
-            let count = law.parameters().len() / 2;
-            let named = (1..=count).flat_map(|r| [(format!("nu_{r}"), "Pa"), (format!("beta_{r}"), "1")]);
-            (if count == 1 { "lopez-pamies-1" } else { "lopez-pamies-2" }, law, named.collect())
-        }
-        Spring::EightChain(law) => {
-            ("eight-chain", law, vec![("chain_modulus".to_owned(), "Pa"), ("links".to_owned(), "1")])
-        }
-    };
-    let values = law.parameters();
-    let mut constants: Vec<ConstantText> =
-        names.iter().zip(values).map(|((name, unit), (_, value))| constant(name, value, unit)).collect();
-    let (viscosity, own): (_, Vec<(&str, f64, &str)>) = match branch.viscosity {
-        Viscosity::Constant(eta) => ("constant", vec![("eta", eta, "Pa s")]),
-        Viscosity::KumarLopezPamies { start, end, thickening, thinning, exponents } => (
-            "kumar-lopez-pamies",
-            vec![
-                ("eta_0", start, "Pa s"),
-                ("eta_inf", end, "Pa s"),
-                ("K_1", thickening, "Pa s"),
-                ("K_2", thinning, "1/Pa2"),
-                ("gamma_1", exponents[0], "1"),
-                ("gamma_2", exponents[1], "1"),
-            ],
-        ),
-        Viscosity::BergstromBoyce { rate, stress, power, creep, offset } => (
-            "bergstrom-boyce",
-            vec![
-                ("rate", rate, "1/s"),
-                ("stress", stress, "Pa"),
-                ("m", power, "1"),
-                ("c", creep, "1"),
-                ("xi", offset, "1"),
-            ],
-        ),
-        Viscosity::Eyring { rate, stress, .. } => {
-            ("eyring", vec![("rate", rate, "1/s"), ("stress", stress, "Pa")])
-        }
-    };
-    constants.extend(own.into_iter().map(|(name, value, unit)| constant(name, value, unit)));
-    ([spring, viscosity], constants)
 }
 
 /// Formats a constant, stresses in MPa.

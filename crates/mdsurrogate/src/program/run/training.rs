@@ -11,8 +11,8 @@ use crate::train::{Settings, Training, TrainingState, ensemble, fit_branches, lo
 use harness::case::Run;
 use harness::output::csv;
 use harness::report::Report;
-use harness::scene::Failure;
-use polycore::constitutive::viscoelastic::{Branch, Viscosity};
+use harness::scene::{BranchSpec, Failure};
+use polycore::constitutive::viscoelastic::Branch;
 use polycore::file::atomic_write;
 use polycore::tensor::Voigt;
 use serde::{Deserialize, Serialize};
@@ -295,11 +295,16 @@ pub fn record(trained: &[Trained], output: &Path, report: &mut Report) -> Result
 /// Branches as blocks of a scene of `peri`, for the learnt law as its equilibrium.
 fn branch_blocks(branches: &[Branch]) -> String {
     let block = |branch: &Branch| {
-        let eta = if let Viscosity::Constant(eta) = branch.viscosity { eta } else { f64::NAN };
+        let ([spring, viscosity], constants) = BranchSpec::constants(branch);
+        let constant = |&(name, value, unit): &(&str, f64, &str)| match unit {
+            "1" => format!("{name} = {value:e}"),
+            _ => format!("{name} = \"{value:e} {unit}\""),
+        };
+        let constants: Vec<String> = constants.iter().map(constant).collect();
         format!(
-            "[[material.solid.branch]]\nspring = \"neo-hookean\"\nviscosity = \"constant\"\n\
-             parameters = {{ nu = \"{:e} Pa\", eta = \"{eta:e} Pa s\" }}\n",
-            branch.spring.shear_modulus()
+            "[[material.solid.branch]]\nspring = \"{spring}\"\nviscosity = \"{viscosity}\"\n\
+             parameters = {{ {} }}\n",
+            constants.join(", ")
         )
     };
     branches.iter().map(block).collect()

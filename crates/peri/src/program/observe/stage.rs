@@ -30,11 +30,11 @@ impl<const D: usize> SceneStage<D> {
             return Ok(Vec::new());
         }
         let names = scene::region_names(scene);
-        scene::order_regions(scene, &names, first);
+        scene::order_regions(&scene.boundary, &names, first);
         let of = |index: usize| {
             let (source, scene) = (scene.source_of(source, index), scene.stage(index));
             let (mut loads, _) = scene::loads_of(&source, &scene, body)?;
-            scene::order_regions(&scene, &names, &mut loads);
+            scene::order_regions(&scene.boundary, &names, &mut loads);
             let cuts = scene::step_cuts(&source, &scene, &*body.bonds)?;
             let moves = scene.boundary.iter().any(scene::Boundary::prescribes_velocity);
             let velocity = moves.then(|| scene::velocities_of(&source, &scene, body)).transpose()?;
@@ -64,7 +64,7 @@ impl<const D: usize> SceneStage<D> {
     /// Loads of the step, which continue those of a state that has begun it.
     pub fn loads(&self, own: &Scene, state: &State<D>) -> Loads<D> {
         let mut loads = self.loads.clone();
-        loads.continue_from(&state.stage, &scene::common_course(own));
+        loads.continue_from(&state.stage, &scene::common_amplitude(own));
         loads
     }
 }

@@ -1,11 +1,11 @@
-//! CurveList of time that multiply what a boundary prescribes: formulas, or tables of files.
+//! Curves of time that multiply what a boundary prescribes: formulas, or tables of files.
 
 use super::curve_spec::{CurveList, CurveSpec, CurveTable};
 use super::formula::Formula;
 use super::values::plain;
 use super::{Boundary, Prescribed, Scene};
 use crate::field::Field;
-use crate::solver::{Amplitude, CurvedLoads, CurvedRegion, LoadCurve, Loads, Support};
+use crate::solver::{Amplitude, CurvedLoads, CurvedRegion, LoadCurve, Loads, Support, ramped};
 use harness::scene::{SceneError, Source};
 use polycore::table::{Table, plain_unit};
 use polycore::units::dimension::{
@@ -66,8 +66,8 @@ impl CurveTime {
             let common = match dynamics.factor.clone() {
                 Some(factor) => of_formula(factor, end),
                 None => Amplitude::new(move |part| {
-                    let time = part * end;
-                    if time < ramp { (time / ramp, end / ramp) } else { (1.0, 0.0) }
+                    let (value, rate) = ramped(part * end, ramp);
+                    (value, rate * end)
                 }),
             };
             let moments = (0..=MOMENTS).map(|k| end * f64::from(k) / f64::from(MOMENTS)).collect();
@@ -308,7 +308,7 @@ pub(super) fn amplitudes<const D: usize>(
 }
 
 /// Returns the amplitude of what has no curve.
-pub fn common_course(scene: &Scene) -> Amplitude {
+pub fn common_amplitude(scene: &Scene) -> Amplitude {
     CurveTime::new(scene).common
 }
 

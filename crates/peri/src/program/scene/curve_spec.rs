@@ -1,4 +1,4 @@
-//! CurveList of time as a scene writes them.
+//! Curves of time as a scene writes them.
 
 use super::formula::Formula;
 use serde::Deserialize;
@@ -27,12 +27,12 @@ pub struct CurveTable {
     pub value: String,
 }
 
-/// One curve, or one for each component.
+/// Curve of all components, or of each.
 #[derive(Clone, Debug)]
 pub enum CurveList {
     /// The same for all components.
     All(CurveSpec),
-    /// One for each component.
+    /// Curves of the components.
     Each(Vec<CurveSpec>),
 }
 

@@ -4,6 +4,7 @@ use super::formula::Formula;
 use super::region::region;
 use super::values::{DiscreteBody, ONE_OF_THEM};
 use super::{Boundary, ContactSpec, Prescribed, PrescribedField, Scene, Side, SolverMethod};
+use crate::bonds::components;
 use crate::field::Field;
 use crate::material::{BodyTensor, surface_load};
 use crate::solver::{ContactStops, INVERTS, Loads, Support, Unsupported, find_unsupported, inverted};
@@ -69,15 +70,18 @@ pub fn loads_of<const D: usize>(
         // explicit dynamics needs neither balance nor supports
         return Ok((loads, loaded));
     }
-    if loads.curved.is_some() {
-        let (parts, _) = scene.load_steps();
-        for &part in parts.iter().step_by(parts.len().div_ceil(BALANCES)) {
-            loads.set_forces([part; 2]);
-            refuse_unbalanced(source, scene, body, &loads)?;
+    if loads.body_force.is_some() {
+        let roots = components(&*body.bonds, |_, _| true);
+        if loads.curved.is_some() {
+            let (parts, _) = scene.load_steps();
+            for &part in parts.iter().step_by(parts.len().div_ceil(BALANCES)) {
+                loads.set_forces([part; 2]);
+                refuse_unbalanced(source, scene, body, &roots, &loads)?;
+            }
+            loads.set_forces([1.0; 2]);
         }
-        loads.set_forces([1.0; 2]);
+        refuse_unbalanced(source, scene, body, &roots, &loads)?;
     }
-    refuse_unbalanced(source, scene, body, &loads)?;
     let all = (1_u8 << D) - 1;
     if body.bonds.particles().iter().all(|&site| loads.constrained(site as usize) == all) {
         return Err(source.error(
@@ -199,6 +203,7 @@ fn refuse_unbalanced<const D: usize>(
     source: &Source,
     scene: &Scene,
     body: &DiscreteBody<D>,
+    roots: &[u32],
     loads: &Loads<D>,
 ) -> Result<(), SceneError> {
     let planes =
@@ -210,7 +215,7 @@ fn refuse_unbalanced<const D: usize>(
         rubs: scene.contact.as_ref().is_some_and(ContactSpec::has_friction)
             || planes.iter().any(|plane| plane.bonded),
     };
-    let Some(part) = find_unsupported(&*body.bonds, loads, None, &stops, scene.tolerance()) else {
+    let Some(part) = find_unsupported(&*body.bonds, roots, loads, None, &stops, scene.tolerance()) else {
         return Ok(());
     };
     let Unsupported { particles, total, force, axis, .. } = &part;
@@ -242,25 +247,27 @@ fn refuse_inverted<const D: usize>(
     }
 }
 
-/// Returns the names of the regions of prescribed displacement.
+/// Returns the names of the regions of prescribed displacement, those of later steps last.
 pub fn region_names(scene: &Scene) -> Vec<String> {
-    let constrained = scene.boundary.iter().enumerate().filter(|(_, b)| b.prescribes_displacement());
-    let mut names: Vec<String> = constrained.map(|(index, boundary)| name_of(index, boundary)).collect();
-    for step in &scene.step {
-        let constrained = step.boundary.iter().enumerate().filter(|(_, b)| b.prescribes_displacement());
-        for name in constrained.map(|(index, boundary)| name_of(index, boundary)) {
-            if !names.contains(&name) {
-                names.push(name);
-            }
+    let mut names = own_region_names(&scene.boundary);
+    for name in scene.step.iter().flat_map(|step| own_region_names(&step.boundary)) {
+        if !names.contains(&name) {
+            names.push(name);
         }
     }
     names
 }
 
+/// Returns the names of the regions of prescribed displacement among the boundaries of a step.
+pub(super) fn own_region_names(boundaries: &[Boundary]) -> Vec<String> {
+    let constrained = boundaries.iter().enumerate().filter(|(_, b)| b.prescribes_displacement());
+    constrained.map(|(index, boundary)| name_of(index, boundary)).collect()
+}
+
 /// Orders the regions of prescribed displacement of a step as `names`, those of all steps; a region that the
 /// step lacks is empty.
-pub fn order_regions<const D: usize>(scene: &Scene, names: &[String], loads: &mut Loads<D>) {
-    let own = region_names(&Scene { step: Vec::new(), ..scene.clone() });
+pub fn order_regions<const D: usize>(boundaries: &[Boundary], names: &[String], loads: &mut Loads<D>) {
+    let own = own_region_names(boundaries);
     let find = |name: &String| own.iter().position(|own| own == name);
     let old = std::mem::take(&mut loads.held_regions);
     let each = names.iter().map(|name| find(name).and_then(|at| old.get(at).cloned()).unwrap_or_default());

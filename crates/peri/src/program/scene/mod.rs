@@ -41,7 +41,7 @@ pub use build::{body_of, least_memory};
 pub use check::{check, check_variant};
 pub use contact::{ContactSpec, PlaneSpec, tied_grips};
 pub use crack::{cuts_of, severed_of_each};
-pub use curve::common_course;
+pub use curve::common_amplitude;
 pub use curve_spec::{CurveList, CurveSpec, CurveTable};
 pub use explain::explain;
 pub use field::{FieldSpec, VaryingParameter};

@@ -21,7 +21,7 @@ const KEY: &str = "material.network";
 pub enum ChainsSpec {
     /// Flory's most probable distribution, M_w = 2 M_n.
     MostProbable,
-    /// One length.
+    /// Chains of equal length.
     OneLength,
 }
 

@@ -3,7 +3,7 @@
 use super::rotation::rotation_of;
 use super::values::{DiscreteBody, plain};
 use super::{Boundary, Prescribed, PrescribedField, Scene};
-use crate::solver::{Amplitude, Support};
+use crate::solver::{Amplitude, Rotation, Support};
 use harness::scene::{SceneError, Source};
 
 /// Parts of the time at which displacements with curves are compared.
@@ -24,51 +24,24 @@ pub(super) fn refuse<const D: usize>(
     regions: &[(Vec<u32>, Support<D>)],
     amplitudes: &[(Amplitude, [Amplitude; D])],
 ) -> Result<(), SceneError> {
-    let moments: &[f64] = if amplitudes.is_empty() { &MOMENTS[2..] } else { &MOMENTS };
     if scene.boundary.iter().filter(|boundary| boundary.prescribes_displacement()).count() < 2 {
         return Ok(());
     }
+    let motion = |(index, boundary)| -> Result<BoundaryMotion<D>, SceneError> {
+        let rotation = rotation_of::<D>(source, &format!("boundary[{index}]"), boundary)?;
+        Ok(BoundaryMotion { boundary, rotation, amplitudes: amplitudes.get(index) })
+    };
+    let motions: Vec<BoundaryMotion<D>> =
+        scene.boundary.iter().enumerate().map(motion).collect::<Result<_, _>>()?;
     let mut owners = vec![[NONE; D]; body.bonds.sites()];
     for (index, (members, support)) in regions.iter().enumerate() {
         for &site in members {
+            let place = body.bonds.position(site as usize);
             for d in (0..D).filter(|&d| support.displacement[d].is_some()) {
                 let other = std::mem::replace(&mut owners[site as usize][d], index as u32);
-                if other == NONE {
-                    continue;
-                }
-                let other = other as usize;
-                let place = body.bonds.position(site as usize);
-                for &part in moments {
-                    let of = |index: usize| {
-                        let (key, boundary) = (format!("boundary[{index}]"), &scene.boundary[index]);
-                        displacement(source, &key, boundary, amplitudes.get(index), (place, part))
-                    };
-                    let [own, before] = [of(index)?[d], of(other)?[d]];
-                    if own.is_nan() != before.is_nan() {
-                        let found =
-                            format!("`hold` or a displacement of particles that boundary[{other}] moves");
-                        let allowed = "`hold` in both where regions overlap, or `free` in one of them";
-                        return Err(source.error(&format!("boundary[{index}]"), found, allowed));
-                    }
-                    // what is held in place is unknown before the run
-                    if (own - before).abs() > EQUAL * own.abs().max(before.abs()) {
-                        let when = if amplitudes.is_empty() {
-                            String::new()
-                        } else {
-                            format!(" at {part} of the time")
-                        };
-                        let at: Vec<String> = place.iter().map(|x| plain((x * 1e9).round() / 1e6)).collect();
-                        let found = format!(
-                            "{} m along {} of the particle at ({}) mm{when}, for which boundary[{other}] \
-                             prescribes {} m",
-                            plain(own),
-                            ["x", "y", "z"][d],
-                            at.join(", "),
-                            plain(before)
-                        );
-                        let allowed = "equal displacements where regions overlap, or `free` in one of them";
-                        return Err(source.error(&format!("boundary[{index}]"), found, allowed));
-                    }
+                let Some(before) = motions.get(other as usize) else { continue };
+                if let Some((found, allowed)) = motions[index].disagreement(before, other, place, d) {
+                    return Err(source.error(&format!("boundary[{index}]"), found, allowed));
                 }
             }
         }
@@ -76,30 +49,64 @@ pub(super) fn refuse<const D: usize>(
     Ok(())
 }
 
-/// Displacement of a particle by a boundary at a part of the time, m; NaN where it is not known.
-fn displacement<const D: usize>(
-    source: &Source,
-    key: &str,
-    boundary: &Boundary,
-    amplitudes: Option<&(Amplitude, [Amplitude; D])>,
-    (place, part): ([f64; D], f64),
-) -> Result<[f64; D], SceneError> {
-    let value = |d: usize| {
-        let held = boundary.displacement.as_ref().and_then(|held| held.get(d));
-        let field = boundary.displacement_field.as_ref().and_then(|field| field.get(d));
-        match (held, field) {
-            (Some(Prescribed::At(value)), _) => *value,
-            (Some(Prescribed::Hold), _) => f64::NAN,
-            (_, Some(PrescribedField::By(formula))) => formula.value_at(place),
-            _ => 0.0,
+/// Prescribed motion of a boundary.
+struct BoundaryMotion<'a, const D: usize> {
+    boundary: &'a Boundary,
+    rotation: Option<Rotation<D>>,
+    amplitudes: Option<&'a (Amplitude, [Amplitude; D])>,
+}
+
+impl<const D: usize> BoundaryMotion<'_, D> {
+    /// Returns how component `d` of a particle differs from that by boundary `other`, and what is allowed.
+    fn disagreement(
+        &self,
+        before: &Self,
+        other: u32,
+        place: [f64; D],
+        d: usize,
+    ) -> Option<(String, &'static str)> {
+        let moments: &[f64] = if self.amplitudes.is_some() { &MOMENTS } else { &MOMENTS[2..] };
+        for &part in moments {
+            let [own, before] = [self, before].map(|motion| motion.displacement(place, part)[d]);
+            if own.is_nan() != before.is_nan() {
+                let found = format!("`hold` or a displacement of particles that boundary[{other}] moves");
+                return Some((found, "`hold` in both where regions overlap, or `free` in one of them"));
+            }
+            // what is held in place is unknown before the run
+            if (own - before).abs() > EQUAL * own.abs().max(before.abs()) {
+                let when = self.amplitudes.map_or(String::new(), |_| format!(" at {part} of the time"));
+                let at: Vec<String> = place.iter().map(|x| plain((x * 1e9).round() / 1e6)).collect();
+                let found = format!(
+                    "{} m along {} of the particle at ({}) mm{when}, for which boundary[{other}] prescribes \
+                     {} m",
+                    plain(own),
+                    ["x", "y", "z"][d],
+                    at.join(", "),
+                    plain(before)
+                );
+                return Some((found, "equal displacements where regions overlap, or `free` in one of them"));
+            }
         }
-    };
-    let multiple =
-        |amplitude: Option<&Amplitude>| amplitude.map_or(1.0, |amplitude| amplitude.multiple(part));
-    let mut u: [f64; D] = std::array::from_fn(|d| value(d) * multiple(amplitudes.map(|(_, each)| &each[d])));
-    if let Some(rotation) = rotation_of::<D>(source, key, boundary)? {
-        let turned = rotation.displacement(place, multiple(amplitudes.map(|(angle, _)| angle)));
-        (0..D).for_each(|d| u[d] += turned[d]);
+        None
     }
-    Ok(u)
+
+    /// Displacement of a particle at a part of the time, m; NaN where it is not known.
+    fn displacement(&self, place: [f64; D], part: f64) -> [f64; D] {
+        let value = |d: usize| {
+            let held = self.boundary.displacement.as_ref().and_then(|held| held.get(d));
+            let field = self.boundary.displacement_field.as_ref().and_then(|field| field.get(d));
+            match (held, field) {
+                (Some(Prescribed::At(value)), _) => *value,
+                (Some(Prescribed::Hold), _) => f64::NAN,
+                (_, Some(PrescribedField::By(formula))) => formula.value_at(place),
+                _ => 0.0,
+            }
+        };
+        let multiple =
+            |amplitude: Option<&Amplitude>| amplitude.map_or(1.0, |amplitude| amplitude.multiple(part));
+        let turned = self.rotation.as_ref().map_or([0.0; D], |rotation| {
+            rotation.displacement(place, multiple(self.amplitudes.map(|(angle, _)| angle)))
+        });
+        std::array::from_fn(|d| value(d) * multiple(self.amplitudes.map(|(_, each)| &each[d])) + turned[d])
+    }
 }

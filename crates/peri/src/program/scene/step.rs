@@ -2,7 +2,7 @@
 
 use super::check::check_variant;
 use super::{Boundary, CrackSpec, DeviceChoice, Dynamics, Prescribed, Scene, SolverMethod, SolverSpec};
-use super::{TimeProgramSpec, crack};
+use super::{TimeProgramSpec, crack, loads::own_region_names};
 use crate::bonds::Bonds;
 use crate::geometry::Cut;
 use harness::scene::{SceneError, Source};
@@ -64,12 +64,6 @@ impl Scene {
     pub fn at_end(&self) -> Cow<'_, Self> {
         self.stage(self.step.len())
     }
-
-    /// Returns the duration of a quasi-static programme or of explicit dynamics, s; 0 without times.
-    pub fn duration(&self) -> f64 {
-        let end = self.load_steps().1.last().copied().unwrap_or(0.0);
-        self.dynamics.as_ref().map_or(end, |dynamics| dynamics.end_time.si())
-    }
 }
 
 /// Returns the cuts of a later step.
@@ -117,8 +111,15 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             return Err(source.error("dynamics.precision", why, "`double` with [[step]]"));
         }
         if let Some(at) = scene.boundary.iter().position(|own| own.name.is_none() && own.side.is_none()) {
-            let why = "needed with [[step]], where regions of several steps are told apart by name";
+            let why = "needed with [[step]]: the name identifies a region in all steps";
             return Err(source.missing(&format!("boundary[{at}].name"), why));
+        }
+        let names = own_region_names(&scene.boundary);
+        if let Some(name) =
+            names.iter().enumerate().find_map(|(k, name)| names[..k].contains(name).then_some(name))
+        {
+            let found = format!("two regions `{name}`");
+            return Err(source.error("boundary", found, "different names within a step"));
         }
         if index == 0 {
             continue;

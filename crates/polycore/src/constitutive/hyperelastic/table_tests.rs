@@ -30,7 +30,7 @@ fn both_layouts_and_any_unit_of_stress() {
     assert!(biaxial.select(Mode::Uniaxial).is_err());
 }
 
-/// Of a neo-Hookean law τ = μγ, of a Mooney–Rivlin law 2(C₁ + C₂)γ, at any γ.
+/// Stress in simple shear: μγ of a neo-Hookean law, 2(C₁ + C₂)γ of a Mooney–Rivlin law.
 #[test]
 fn simple_shear_is_data() {
     let text = "mode,strain,stress_MPa\nsimple shear,0.5,0.2\nSS,1,0.4\nsimple-shear,2.5,1.0\n";

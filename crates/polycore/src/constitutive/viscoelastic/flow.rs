@@ -58,7 +58,7 @@ impl Flow<'_> {
                 low = x
             }
             let newton = x - residual / self.derivative(strains, trial, alpha);
-            // Newton steps that do not shrink can jump between both sides of a kink for ever
+            // Newton steps that do not shrink may cycle between both sides of a kink
             let step = (newton - x).abs();
             let bracketed = low.is_finite() && high.is_finite();
             let shrinks = !bracketed || step <= 0.5 * before || step < NEAR;

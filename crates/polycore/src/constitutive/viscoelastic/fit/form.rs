@@ -57,7 +57,7 @@ pub enum ViscosityForm {
 pub struct Constant {
     /// Name: `mu_1`, `1.eta_0`.
     pub name: String,
-    /// `Pa`, `Pa s`, `1/Pa2`, `1/s` or `1`.
+    /// `Pa`, `Pa s`, `1/Pa^2`, `1/s` or `1`.
     pub unit: &'static str,
     /// Map to the unbounded q of the search.
     pub(super) map: Map,
@@ -171,7 +171,7 @@ impl Form {
                     add(named("eta_inf"), "Pa s", POSITIVE, Some((0.0, "without effect on the stresses")));
                     add(named("K_1"), "Pa s", POSITIVE, None);
                     let thinning = (scales.unit.powi(-2), "trades with eta_0 and K_1");
-                    add(named("K_2"), "1/Pa2", POSITIVE, Some(thinning));
+                    add(named("K_2"), "1/Pa^2", POSITIVE, Some(thinning));
                     add(named("gamma_1"), "1", POSITIVE, None);
                     add(named("gamma_2"), "1", POSITIVE, None);
                 }
