@@ -3,25 +3,50 @@
 use crate::program::{executable, workspace};
 use std::process::Command;
 
-/// Packages of a crate's build.
-fn tree(package: &str, flags: &[&str]) -> Vec<String> {
+/// Lines of `cargo tree` with flags, separated by blanks.
+fn lines(flags: &str) -> Vec<String> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let arguments =
-        ["tree", "--offline", "--edges", "normal,build", "--prefix", "none", "--package", package];
-    let output = Command::new(cargo).args(arguments).args(flags).current_dir(workspace()).output().unwrap();
+    let arguments = ["tree", "--offline", "--prefix", "none"];
+    let output = Command::new(cargo)
+        .args(arguments)
+        .args(flags.split_whitespace())
+        .current_dir(workspace())
+        .output()
+        .unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).unwrap();
-    text.lines().filter_map(|line| Some(line.split_whitespace().next()?.to_owned())).collect()
+    text.lines().map(|line| line.trim_end_matches(" (*)").to_owned()).collect()
+}
+
+/// Packages of a crate's build.
+fn tree(package: &str, flags: &str) -> Vec<String> {
+    let lines = lines(&format!("--edges normal,build --package {package} {flags}"));
+    lines.iter().filter_map(|line| Some(line.split_whitespace().next()?.to_owned())).collect()
+}
+
+/// `cargo xtask` and the check of the libraries alone (`.ci/run`) build packages as the whole workspace does: a
+/// feature that another package asks for belongs into crates/workspace-hack.
+#[test]
+fn one_build_serves_all_commands() {
+    let with_features = |flags: &str| lines(&format!("--format {{p}}[{{f}}] --edges normal,build{flags}"));
+    let all = with_features(",dev --workspace");
+    let own = with_features(" --package xtask");
+    let libraries = "polycore -p peri -p crystfem -p mdsurrogate -p workspace-hack";
+    let libraries = with_features(&format!(" --no-default-features -p {libraries}"));
+    let foreign = libraries.iter().filter(|line| !line.contains(" (/"));
+    for line in own.iter().chain(foreign) {
+        assert!(all.contains(line), "{line} is built twice: add its features to crates/workspace-hack");
+    }
 }
 
 /// The siblings depend on `polycore` only, and only `mdsurrogate` on the training framework.
 #[test]
 fn no_crate_is_built_with_what_it_does_not_need() {
     let framework = |name: &String| name == "burn" || name.starts_with("burn-");
-    assert!(tree("mdsurrogate", &[]).iter().any(framework));
-    assert!(!tree("polymech", &[]).iter().any(framework), "the Python module is built with burn");
+    assert!(tree("mdsurrogate", "").iter().any(framework));
+    assert!(!tree("polymech", "").iter().any(framework), "the Python module is built with burn");
     for package in ["polycore", "peri", "crystfem"] {
-        let tree = tree(package, &[]);
+        let tree = tree(package, "");
         assert!(tree.iter().any(|name| name == "polycore"), "{tree:?}");
         assert!(!tree.iter().any(framework), "{package} is built with burn");
         // learnt laws are a feature of polycore, for scenes of peri; arrays are for polycore itself
@@ -40,7 +65,7 @@ fn no_crate_is_built_with_what_it_does_not_need() {
 #[test]
 fn libraries_bring_no_shell() {
     for package in ["polycore", "peri", "crystfem", "mdsurrogate"] {
-        let tree = tree(package, &["--no-default-features"]);
+        let tree = tree(package, "--no-default-features");
         for name in [
             "harness",
             "miette",

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use harness::case::Shard;
 use harness::scene::Source;
@@ -27,7 +29,7 @@ pub struct Options {
     /// Only cases in this folder of cases/, for example `ch2`; may be repeated.
     #[arg(long, value_name = "CHAPTER")]
     only: Vec<String>,
-    /// Leave out everything marked `quick = false`.
+    /// Leave out everything marked `quick = false`, and run a case on each core, with one thread.
     #[arg(long)]
     quick: bool,
     /// Only this case: its folder or file, also one outside cases/; may be repeated.
@@ -113,9 +115,8 @@ fn chains(cases: &[CaseFile]) -> Vec<usize> {
 pub fn run(workspace: &Repository, options: &Options) -> Result<bool> {
     let mut cases = find(workspace, options)?;
     if let Some(shard) = options.shard {
-        let chains = chains(&cases);
-        let mut chains = chains.iter();
-        cases.retain(|_| chains.next().is_some_and(|&chain| shard.contains(chain)));
+        let mut chains = chains(&cases).into_iter();
+        cases.retain(|_| chains.next().is_some_and(|chain| shard.contains(chain)));
     }
     // read before the long run begins
     let map = report::Sources::read(workspace, options.baseline.as_deref())?;
@@ -125,28 +126,7 @@ pub fn run(workspace: &Repository, options: &Options) -> Result<bool> {
         resume: options.resume || options.shard.is_some(),
         timeout: options.timeout,
     };
-    let mut built = BTreeMap::new();
-    let mut release = |program: &str| {
-        let build = || workspace.build_program(program).map_err(|error| error.to_string());
-        let executable = built.entry(program.to_owned()).or_insert_with(build).clone();
-        executable.map_err(|reason| miette!("{reason}"))
-    };
-    let short = |path: &Path| workspace.short(path).to_string();
-    let mut outcomes = Vec::new();
-    for case in &cases {
-        let mut outcome = run_case(&settings, case, &mut release);
-        outcome.file = short(&case.file);
-        outcome.href = report::link(workspace, &case.file);
-        outcome.command = command(&outcome, options.quick);
-        let verdict = if outcome.passed() { "passed" } else { "FAILED" };
-        let kept = if outcome.kept { " (kept)" } else { "" };
-        eprintln!("{verdict}  {:<40} {:8.1} s{kept}", outcome.case, outcome.seconds);
-        if !outcome.passed() {
-            eprintln!("{}", outcome.complaint(short));
-            show_tail(&outcome.log);
-        }
-        outcomes.push(outcome);
-    }
+    let outcomes = run_cases(workspace, &settings, &cases);
     print(&format!("{}\n", summary::text(&outcomes)));
     if options.shard.is_some() {
         return Ok(outcomes.iter().all(CaseOutcome::passed));
@@ -157,6 +137,54 @@ pub fn run(workspace: &Repository, options: &Options) -> Result<bool> {
         print(&format!("written: {}\n", workspace.short(&path)));
     }
     Ok(outcomes.iter().all(CaseOutcome::passed))
+}
+
+/// Runs the cases and prints their verdicts. The quick tier, whose run times are no figures, runs a case on
+/// each core, a case after those whose results it reads.
+fn run_cases(workspace: &Repository, settings: &Settings, cases: &[CaseFile]) -> Vec<CaseOutcome> {
+    let built = Mutex::new(BTreeMap::new());
+    let release = |program: &str| {
+        let build = || workspace.build_program(program).map_err(|error| error.to_string());
+        let mut built = built.lock().unwrap_or_else(PoisonError::into_inner);
+        let executable = built.entry(program.to_owned()).or_insert_with(build).clone();
+        executable.map_err(|reason| miette!("{reason}"))
+    };
+    let run = |case: &CaseFile| {
+        let mut outcome = run_case(settings, case, &mut |program| release(program));
+        outcome.file = workspace.short(&case.file).to_string();
+        outcome.href = report::link(workspace, &case.file);
+        outcome.command = command(&outcome, settings.quick);
+        let verdict = if outcome.passed() { "passed" } else { "FAILED" };
+        let kept = if outcome.kept { " (kept)" } else { "" };
+        eprintln!("{verdict}  {:<40} {:8.1} s{kept}", outcome.case, outcome.seconds);
+        if !outcome.passed() {
+            eprintln!("{}", outcome.complaint(|path| workspace.short(path).to_string()));
+            show_tail(&outcome.log);
+        }
+        outcome
+    };
+    let chains = chains(cases);
+    let workers =
+        if settings.quick { std::thread::available_parallelism().map_or(1, usize::from) } else { 1 };
+    let outcomes: Vec<OnceLock<CaseOutcome>> = cases.iter().map(|_| OnceLock::new()).collect();
+    let next = AtomicUsize::new(0);
+    std::thread::scope(|scope| {
+        for _ in 0..workers {
+            scope.spawn(|| {
+                loop {
+                    let chain = next.fetch_add(1, Ordering::Relaxed);
+                    if chain >= cases.len() {
+                        return;
+                    }
+                    for (index, case) in cases.iter().enumerate().filter(|(index, _)| chains[*index] == chain)
+                    {
+                        outcomes[index].get_or_init(|| run(case));
+                    }
+                }
+            });
+        }
+    });
+    outcomes.into_iter().filter_map(OnceLock::into_inner).collect()
 }
 
 /// Command with which a user runs a case.

@@ -186,6 +186,10 @@ fn start(
             command.arg("--input").arg(placed);
         }
     }
+    if settings.quick {
+        // cases run side by side
+        command.args(["--threads", "1"]);
+    }
     command.stdin(Stdio::null()).stdout(log.try_clone().into_diagnostic()?).stderr(log);
     let child = command.spawn().into_diagnostic();
     let child = child.wrap_err_with(|| format!("cannot start {}", executable.display()))?;

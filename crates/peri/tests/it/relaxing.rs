@@ -50,8 +50,8 @@ fn tear(
     start: Option<&State<2>>,
     saved: &mut Vec<State<2>>,
 ) -> State<2> {
-    let mut body = Body::<2>::solid([20, 16], 0.1, 3.015);
-    body.slits = vec![Slit { at: 0.8, from: -1.0, to: 0.8 }];
+    let mut body = Body::<2>::solid([14, 12], 0.1, 3.015);
+    body.slits = vec![Slit { at: 0.6, from: -1.0, to: 0.6 }];
     let mut built = body.build();
     let bonds = &mut built.lattice;
     let softening = Mullins { ratio: 2.0, offset: 0.2, slope: 0.1 };
@@ -59,7 +59,7 @@ fn tear(
         solid::<2>(Space::PlaneStress, 20.0, rule, (rule == Driving::Equilibrium).then_some(softening));
     let loads = hold(bonds, |[_, y]| match y {
         y if y < 0.3 => Some((3, [0.0; 2])),
-        y if y > 1.3 => Some((3, [0.0, 0.5])),
+        y if y > 0.9 => Some((3, [0.0, 0.4])),
         _ => None,
     });
     let mut state = start.cloned().unwrap_or_else(|| State::new(bonds.sites()));
@@ -93,15 +93,15 @@ fn tear(
     state
 }
 
-/// Work = stored + dissipated + released (+ kinetic) while a strip tears; a run resumed from any saved state
-/// has equal bits.
+/// Work = stored + dissipated + released (+ kinetic) while a strip tears; a run resumed halfway has equal
+/// bits.
 #[test]
 fn a_relaxing_strip_tears_and_its_ledger_closes() {
     for (rule, moving) in
         [(Driving::Equilibrium, false), (Driving::Total, false), (Driving::Equilibrium, true)]
     {
         let mut saved = Vec::new();
-        let whole = tear(rule, moving, [20, 8], None, &mut saved);
+        let whole = tear(rule, moving, [15, 5], None, &mut saved);
         let last = whole.history.last().unwrap();
         eprintln!(
             "{rule:?}, moving {moving}: {} broken; work {:.5}, stored {:.5}, released {:.5}, dissipated \
@@ -116,10 +116,9 @@ fn a_relaxing_strip_tears_and_its_ledger_closes() {
             // the drop of the load in an equilibrium with broken bonds does no work, all else is balanced
             assert!(held <= 1.01 * last.work, "{last:?}");
         }
-        for state in saved.iter().step_by(saved.len().div_ceil(2)) {
-            let again = tear(rule, moving, [20, 8], Some(state), &mut Vec::new());
-            assert!(again == whole, "{moving}: from step {}, round {}", state.step, state.control.round);
-        }
+        let state = &saved[saved.len() / 2];
+        let again = tear(rule, moving, [15, 5], Some(state), &mut Vec::new());
+        assert!(again == whole, "{moving}: from step {}, round {}", state.step, state.control.round);
     }
 }
 
