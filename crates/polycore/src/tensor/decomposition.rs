@@ -60,21 +60,59 @@ pub(super) fn adjugate(a: &Tensor) -> Tensor {
     })
 }
 
+/// Pivoted QR decomposition of a matrix with its rows in decreasing size: rows and columns are numbers of those
+/// of the matrix.
+struct SortedFactors {
+    rows: [usize; 3],
+    columns: [usize; 3],
+    q: Tensor,
+    r: Tensor,
+}
+
+impl SortedFactors {
+    fn new(f: &Tensor) -> Self {
+        let mut rows = [0, 1, 2];
+        rows.sort_by(|&i, &j| f.row(j).amax().total_cmp(&f.row(i).amax()));
+        let qr = Tensor::from_fn(|i, j| f[(rows[i], j)]).col_piv_qr();
+        let mut columns = nalgebra::Vector3::new(0, 1, 2);
+        qr.p().permute_rows(&mut columns);
+        Self { rows, columns: columns.into(), q: qr.q(), r: qr.r() }
+    }
+
+    /// Factors of a matrix that keeps the plane and its normal.
+    fn plane(f: &Tensor) -> Self {
+        let row = |i: usize| f[(i, 0)].abs().max(f[(i, 1)].abs());
+        let column = |j: usize| f[(0, j)].hypot(f[(1, j)]);
+        let sorted = |swap: bool| if swap { [1, 0, 2] } else { [0, 1, 2] };
+        let (rows, columns) = (sorted(row(1) > row(0)), sorted(column(1) > column(0)));
+        let m = |i: usize, j: usize| f[(rows[i], columns[j])];
+        let first = m(0, 0).hypot(m(1, 0));
+        let [cosine, sine] = [m(0, 0) / first, m(1, 0) / first];
+        let off = cosine * m(0, 1) + sine * m(1, 1);
+        let last = difference_of_products(m(0, 0), m(1, 1), m(1, 0), m(0, 1)) / first;
+        Self {
+            rows,
+            columns,
+            q: Tensor::new(cosine, -sine, 0.0, sine, cosine, 0.0, 0.0, 0.0, 1.0),
+            r: Tensor::new(first, off, 0.0, 0.0, last, 0.0, 0.0, 0.0, f[(2, 2)]),
+        }
+    }
+}
+
 /// F = Σ λᵢ nᵢ ⊗ Nᵢ by one-sided Jacobi rotations of the triangular factor of a pivoted QR decomposition
 /// (Drmač & Veselić, doi:10.1137/050639193): errors scale with the condition of F after scaling of its rows
 /// and columns, so strongly graded F (diag(1e8, 1, 1e-8)) keep every digit.
 pub(super) fn principal_frame(f: &Tensor) -> PrincipalFrame {
-    // rows in decreasing size make the pivoted factorisation row-wise stable
-    let mut rows = [0, 1, 2];
-    rows.sort_by(|&i, &j| f.row(j).amax().total_cmp(&f.row(i).amax()));
-    let sorted = Tensor::from_fn(|i, j| f[(rows[i], j)]);
-    let qr = sorted.col_piv_qr();
-    // sorted · Π = Q R and Rᵀ W = V Σ, hence sorted = (Q W) Σ (Π V)ᵀ
-    let mut columns = qr.r().transpose();
+    let is_plane = [f[(0, 2)], f[(1, 2)], f[(2, 0)], f[(2, 1)]] == [0.0; 4];
+    // F = Q R Πᵀ with sorted rows, and Rᵀ W = V Σ, hence F = (Q W) Σ (Π V)ᵀ
+    let SortedFactors { rows, columns: places, q, r } =
+        if is_plane { SortedFactors::plane(f) } else { SortedFactors::new(f) };
+    let mut columns = r.transpose();
     let mut rotation = Tensor::identity();
+    let pairs: &[(usize, usize)] = if is_plane { &[(0, 1)] } else { &[(0, 1), (0, 2), (1, 2)] };
     for _ in 0..MAX_SWEEPS {
         let mut turned = false;
-        for (i, j) in [(0, 1), (0, 2), (1, 2)] {
+        for &(i, j) in pairs {
             turned |= orthogonalise(&mut columns, &mut rotation, i, j);
         }
         if !turned {
@@ -85,12 +123,13 @@ pub(super) fn principal_frame(f: &Tensor) -> PrincipalFrame {
     let mut order = [0, 1, 2];
     order.sort_by(|&i, &j| norms[j].total_cmp(&norms[i]));
 
-    let mut right = Tensor::from_fn(|i, j| columns[(i, order[j])] / norms[order[j]]);
-    qr.p().inv_permute_rows(&mut right);
-    let left_sorted = qr.q() * Tensor::from_fn(|i, j| rotation[(i, order[j])]);
-    let mut left = Tensor::zeros();
-    for (i, &row) in rows.iter().enumerate() {
-        left.set_row(row, &left_sorted.row(i));
+    let left_sorted = q * Tensor::from_fn(|i, j| rotation[(i, order[j])]);
+    let [mut left, mut right] = [Tensor::zeros(); 2];
+    for i in 0..3 {
+        left.set_row(rows[i], &left_sorted.row(i));
+        for j in 0..3 {
+            right[(places[i], j)] = columns[(i, order[j])] / norms[order[j]];
+        }
     }
     PrincipalFrame { stretches: order.map(|i| norms[i]), referential: right, spatial: left }
 }

@@ -93,6 +93,12 @@ impl Frame {
         0.5 * (full + full.transpose())
     }
 
+    /// Principal values aᵢ = J^(2/3) exp 2eᵢ of C in the frame.
+    fn squares(&self, c: &Tensor) -> [f64; 3] {
+        let volume = c.determinant().cbrt();
+        self.trial.map(|e| volume * (2.0 * e).exp())
+    }
+
     /// mᵢ of I₁ᵛ = Σ mᵢ exp 2(e_tr − e)ᵢ.
     fn weights(&self) -> [f64; 3] {
         [0, 1, 2].map(|i| self.forward.column(i).norm_squared())
@@ -174,9 +180,11 @@ impl Branch {
             shear: start.shear + frame.shear(strains),
         };
         let trial = self.spring.energy(frame.trial);
-        let response = principal(&frame, c, flow.response(strains, frame.trial));
-        let mut step = self.ended(&frame, state, strains, &response, trial)?;
-        step.tangent = tangent.then(|| voigt::transform_tangent(&response.tangent(), &frame.inverse));
+        let mut step = self.ended(&frame, c, state, strains, trial)?;
+        step.tangent = tangent.then(|| {
+            let response = principal(&frame, c, flow.response(strains, frame.trial));
+            voigt::transform_tangent(&response.tangent(), &frame.inverse)
+        });
         Ok(step)
     }
 
@@ -184,9 +192,9 @@ impl Branch {
     fn ended(
         &self,
         frame: &Frame,
+        c: &Tensor,
         state: BranchState,
         strains: [f64; 3],
-        response: &PrincipalResponse,
         before: f64,
     ) -> Result<BranchStep, Error> {
         let energy = self.spring.energy(strains);
@@ -194,8 +202,10 @@ impl Branch {
             let stretches = frame.trial.map(f64::exp);
             return Err(Error::Overflow { law: "spring of a branch at the start of a step", stretches });
         }
-        let diagonal = Voigt::from_fn(|a, _| if a < 3 { response.stress[a] } else { 0.0 });
-        let stress = voigt::stress_transformation(&frame.inverse) * diagonal;
+        let (tau, squares) = (self.spring.stress(strains), frame.squares(c));
+        let diagonal = [0, 1, 2].map(|i| tau[i] / squares[i]);
+        let stress = frame.inverse * Tensor::from_diagonal(&diagonal.into()) * frame.inverse.transpose();
+        let stress = voigt::from_stress(&stress);
         Ok(BranchStep { state, stress, tangent: None, energy, dissipated: before - energy })
     }
 
@@ -226,8 +236,7 @@ impl Branch {
             viscous: voigt::from_stress(&ended),
             shear: start.shear + share * first.shear(at_first) + last.shear(strains),
         };
-        let response = principal(&last, c, self.spring.response(strains));
-        let mut step = self.ended(&last, state, strains, &response, euler.energy + euler.dissipated)?;
+        let mut step = self.ended(&last, c, state, strains, euler.energy + euler.dissipated)?;
         // half the release at the first C, half at the last: second order as well
         let at_first = |viscous: &Tensor| -> Result<f64, Error> {
             Ok(self.spring.energy(Frame::new(isochoric_before, viscous)?.trial))
@@ -241,11 +250,10 @@ impl Branch {
 /// τ and dτ/de in principal axes, Pa.
 type PrincipalStress = ([f64; 3], [[f64; 3]; 3]);
 
-/// Response in the frame with aᵢ = J^(2/3) exp 2eᵢ from τ and dτ/de: Sᵢ = τᵢ/aᵢ, ℂ_iijj = (dτᵢ/deⱼ −
+/// Response in the frame with its squares aᵢ from τ and dτ/de: Sᵢ = τᵢ/aᵢ, ℂ_iijj = (dτᵢ/deⱼ −
 /// 2δᵢⱼτᵢ)/(aᵢaⱼ), ℂ_ijij = (Sᵢ − Sⱼ)/(aᵢ − aⱼ) or its limit.
 fn principal(frame: &Frame, c: &Tensor, (tau, derivative): PrincipalStress) -> PrincipalResponse {
-    let (trial, volume) = (frame.trial, c.determinant().cbrt());
-    let squares = trial.map(|e| volume * (2.0 * e).exp());
+    let (trial, squares) = (frame.trial, frame.squares(c));
     let stress: [f64; 3] = std::array::from_fn(|i| tau[i] / squares[i]);
     let normal: [[f64; 3]; 3] = std::array::from_fn(|i| {
         std::array::from_fn(|j| {

@@ -4,7 +4,7 @@
 //! unknown is: for a given α = Δt W′/η the strains minimise ½|e − e_tr|² + ½α Σ exp 2eᵢ on Σe = 0, strictly
 //! convex, and ln α = ln(Δt W′(e(α))/η(e(α))) always has a root, one if τ(e) is monotone.
 
-use super::spring::deviator;
+use super::spring::{deviator, squares_above_one};
 use super::{Spring, Viscosity};
 use crate::constitutive::Error;
 
@@ -46,12 +46,17 @@ impl Flow<'_> {
         }
         let mut x = if start.is_finite() { start.min(60.0) } else { 0.0 };
         let (mut low, mut high, mut stride) = (f64::NEG_INFINITY, f64::INFINITY, 0.05);
-        let mut strains = [0.0; 3];
+        // linear in small strains
+        let mut strains = trial.map(|e| e / (1.0 + 2.0 * x.exp()));
         let (mut residual, mut before) = (f64::NAN, f64::INFINITY);
         for _ in 0..STEPS {
             let alpha = x.min(MOST).exp();
             strains = relaxed(trial, alpha, strains)?;
             residual = x - self.logarithm(strains, trial);
+            let scale = 4.0 * f64::EPSILON * x.abs().max(1.0);
+            if residual.abs() <= scale || (x > MOST && residual < 0.0) {
+                return Ok(strains);
+            }
             if residual > 0.0 {
                 high = x
             } else {
@@ -70,8 +75,7 @@ impl Flow<'_> {
                 stride *= 2.0;
                 if residual > 0.0 { x - stride } else { x + stride }
             };
-            let scale = 4.0 * f64::EPSILON * x.abs().max(1.0);
-            if residual.abs() <= scale || (next - x).abs() <= scale || (x > MOST && residual < 0.0) {
+            if (next - x).abs() <= scale {
                 return Ok(strains);
             }
             before = (next - x).abs();
@@ -189,29 +193,31 @@ fn newton_step(gradient: [f64; 3], squares: [f64; 3], alpha: f64) -> [f64; 3] {
 /// e(α): e + α dev exp 2e = e_tr on Σe = 0, the minimum of a strictly convex function, from a first guess:
 /// Newton's method, halved until the slope along the step has fallen.
 fn relaxed(trial: [f64; 3], alpha: f64, guess: [f64; 3]) -> Result<[f64; 3], Error> {
-    let gradient = |e: [f64; 3]| -> [f64; 3] {
-        let deviator = deviator(e);
-        std::array::from_fn(|i| e[i] - trial[i] + alpha * deviator[i])
+    // gradient, and exp 2e for its derivative
+    let gradient = |e: [f64; 3]| -> ([f64; 3], [f64; 3]) {
+        let squares = squares_above_one(e);
+        let mean = squares.iter().sum::<f64>() / 3.0;
+        (std::array::from_fn(|i| e[i] - trial[i] + alpha * (squares[i] - mean)), squares.map(|x| 1.0 + x))
     };
     let largest = |e: [f64; 3]| e.iter().fold(0.0_f64, |most, e| most.max(e.abs()));
     let (mut strains, mut here) = (guess, gradient(guess));
     let mut moved = f64::INFINITY;
     for _ in 0..STEPS {
-        let step = newton_step(here, strains.map(|e| (2.0 * e).exp()), alpha);
+        let step = newton_step(here.0, here.1, alpha);
         moved = largest(step);
         let size = largest(strains);
         // rounding, of the strains or of the trial strains over the stiffness
         if moved <= 4.0 * f64::EPSILON * (size + largest(trial) / (1.0 + 2.0 * alpha)) {
             return Ok(strains);
         }
-        let slope = dot(here, step).abs();
+        let slope = dot(here.0, step).abs();
         let mut part = 1.0;
         loop {
             let next: [f64; 3] = std::array::from_fn(|i| strains[i] + part * step[i]);
             let there = gradient(next);
             // a change of 1e-9 leaves an error of its square
             let last = part == 1.0 && moved <= 1e-9 * size;
-            if last || dot(there, step).abs() <= 0.9 * slope || part < 1e-12 {
+            if last || dot(there.0, step).abs() <= 0.9 * slope || part < 1e-12 {
                 (strains, here) = (next, there);
                 if last {
                     return Ok(strains);

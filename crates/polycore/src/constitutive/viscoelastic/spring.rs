@@ -48,7 +48,13 @@ impl Spring {
         }
     }
 
-    /// τ = 2W′ dev exp 2e, and dτ/de on Σe = 0, Pa.
+    /// τ = 2W′ dev exp 2e, Pa.
+    pub(super) fn stress(&self, strains: [f64; 3]) -> [f64; 3] {
+        let slope = self.slopes(strains)[0];
+        deviator(strains).map(|b| slope * b)
+    }
+
+    /// τ, and dτ/de on Σe = 0, Pa.
     pub(super) fn response(&self, strains: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
         let [slope, second] = self.slopes(strains);
         let deviator = deviator(strains);
@@ -88,12 +94,17 @@ impl Spring {
 
 /// I₁ − 3 of principal log strains, without cancellation.
 fn excess(strains: [f64; 3]) -> f64 {
-    strains.iter().map(|e| (2.0 * e).exp_m1()).sum::<f64>().max(0.0)
+    squares_above_one(strains).iter().sum::<f64>().max(0.0)
+}
+
+/// exp 2eᵢ − 1.
+pub(super) fn squares_above_one(strains: [f64; 3]) -> [f64; 3] {
+    strains.map(|e| (2.0 * e).exp_m1())
 }
 
 /// exp 2eᵢ minus the mean.
 pub(super) fn deviator(strains: [f64; 3]) -> [f64; 3] {
-    let squares = strains.map(|e| (2.0 * e).exp_m1());
+    let squares = squares_above_one(strains);
     let mean = squares.iter().sum::<f64>() / 3.0;
     squares.map(|x| x - mean)
 }
