@@ -76,21 +76,21 @@ impl Frame {
         let strain = isochoric.cholesky().ok_or_else(|| refuse("C", isochoric))?.l();
         let inverse = factor.try_inverse().ok_or_else(|| refuse("C_v", viscous))?;
         // A = GᵀG with G = Uᵀ-factor of C̄ times L⁻ᵀ: principal stretches without squaring
-        let frame = DeformationGradient::new(strain.transpose() * inverse.transpose())?.principal_frame();
+        let gradient = product(&inverse, &strain).transpose();
+        let frame = DeformationGradient::new(gradient)?.principal_frame();
         let logarithms = frame.stretches.map(f64::ln);
         let mean = logarithms.iter().sum::<f64>() / 3.0;
         Ok(Self {
             trial: logarithms.map(|e| e - mean),
-            forward: factor * frame.referential,
-            inverse: inverse.transpose() * frame.referential,
+            forward: product(&factor, &frame.referential),
+            inverse: product(&inverse.transpose(), &frame.referential),
         })
     }
 
     /// C_v after the flow `rate`·(e_tr − e).
     fn flowed(&self, strains: [f64; 3], rate: f64) -> Tensor {
         let grown: [f64; 3] = std::array::from_fn(|i| (2.0 * rate * (self.trial[i] - strains[i])).exp());
-        let full = self.forward * Tensor::from_diagonal(&grown.into()) * self.forward.transpose();
-        0.5 * (full + full.transpose())
+        diagonal_in(&self.forward, grown)
     }
 
     /// Principal values aᵢ = J^(2/3) exp 2eᵢ of C in the frame.
@@ -108,6 +108,31 @@ impl Frame {
     fn shear(&self, strains: [f64; 3]) -> f64 {
         (2.0 * (0..3).map(|i| (self.trial[i] - strains[i]).powi(2)).sum::<f64>()).sqrt()
     }
+}
+
+/// A B in loops, which the compiler unrolls; nalgebra's product calls a function for each column.
+fn product(a: &Tensor, b: &Tensor) -> Tensor {
+    let mut product = Tensor::zeros();
+    for j in 0..3 {
+        for i in 0..3 {
+            product[(i, j)] = a[(i, 0)] * b[(0, j)] + a[(i, 1)] * b[(1, j)] + a[(i, 2)] * b[(2, j)];
+        }
+    }
+    product
+}
+
+/// A diag(v) Aᵀ, symmetric to the last bit.
+fn diagonal_in(a: &Tensor, values: [f64; 3]) -> Tensor {
+    let mut sum = Tensor::zeros();
+    for i in 0..3 {
+        for j in 0..=i {
+            for k in 0..3 {
+                sum[(i, j)] += values[k] * (a[(i, k)] * a[(j, k)]);
+            }
+            sum[(j, i)] = sum[(i, j)];
+        }
+    }
+    sum
 }
 
 /// γ of the L-stable SDIRK method of two stages, 1 − 1/√2.
@@ -204,8 +229,7 @@ impl Branch {
         }
         let (tau, squares) = (self.spring.stress(strains), frame.squares(c));
         let diagonal = [0, 1, 2].map(|i| tau[i] / squares[i]);
-        let stress = frame.inverse * Tensor::from_diagonal(&diagonal.into()) * frame.inverse.transpose();
-        let stress = voigt::from_stress(&stress);
+        let stress = voigt::from_stress(&diagonal_in(&frame.inverse, diagonal));
         Ok(BranchStep { state, stress, tangent: None, energy, dissipated: before - energy })
     }
 
