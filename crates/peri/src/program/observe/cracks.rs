@@ -33,6 +33,17 @@ pub(super) fn breaking<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>
     });
 }
 
+/// Adds the broken share of each interface.
+pub(super) fn interfaces<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
+    for (index, interface) in scene.interface.iter().enumerate() {
+        to.add_if(q::BROKEN_ACROSS.named(&[&interface.name()]), |m| {
+            let across = m.physics.body.interfaces.get(index)?;
+            let intact = |bond: &&[u32; 2]| m.bonds.is_bonded(bond[0] as usize, bond[1] as usize);
+            Some(1.0 - across.iter().filter(intact).count() as f64 / across.len() as f64)
+        });
+    }
+}
+
 /// Adds the damage if there are cracks or bonds break.
 pub(super) fn damage_field<const D: usize>(scene: &Scene, to: &mut Fields<Moment<D>>) {
     if scene.breaks() || !scene.body.cracks.is_empty() {

@@ -77,6 +77,8 @@ pub struct BodyWithMaterial<const D: usize> {
     pub followed: Vec<ParameterField>,
     /// Stiffness over that without inclusions.
     pub stiffness: Property,
+    /// Bonds across each interface of the scene, by their sites.
+    pub interfaces: Vec<Vec<[u32; 2]>>,
 }
 
 impl<const D: usize> BodyWithMaterial<D> {
@@ -122,6 +124,7 @@ impl<const D: usize> BodyWithMaterial<D> {
                 toughness: None,
                 followed: Vec::new(),
                 stiffness: 1.0.into(),
+                interfaces: body.interfaces.clone(),
             });
         }
         let law: Arc<dyn BondPotential> = Arc::from(spec.bond_law()?);
@@ -177,7 +180,8 @@ impl<const D: usize> BodyWithMaterial<D> {
             }
             None => SceneMaterial::Bonds(bonded),
         };
-        Ok(Self { material, criterion, toughness, followed, stiffness: inclusions.micromodulus })
+        let (stiffness, interfaces) = (inclusions.micromodulus, body.interfaces.clone());
+        Ok(Self { material, criterion, toughness, followed, stiffness, interfaces })
     }
 }
 

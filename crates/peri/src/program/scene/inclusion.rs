@@ -47,7 +47,7 @@ impl Inclusion {
 /// Region of an inclusion.
 enum Region<const D: usize> {
     Shape(Shape<D>),
-    Part(Parts<D>, u32),
+    Part { parts: Parts<D>, part: u32, bounds: ([f64; D], [f64; D]) },
 }
 
 impl<const D: usize> Region<D> {
@@ -68,8 +68,10 @@ impl<const D: usize> Region<D> {
                 Ok(Self::Shape(shape::<D>(source, &key, kind, spec)?))
             }
             (None, Some(name)) => {
-                let number = part_number(source, scene, &format!("{key}.part"), name)?;
-                Ok(Self::Part(parts_of(scene, body), number))
+                let part = part_number(source, scene, &format!("{key}.part"), name)?;
+                let parts = parts_of(scene, body);
+                let bounds = parts.bounds(part).unwrap_or(body.bounds);
+                Ok(Self::Part { parts, part, bounds })
             }
             (shape, _) => {
                 let found = if shape.is_some() { "both `shape` and `part`" } else { "no region" };
@@ -81,26 +83,24 @@ impl<const D: usize> Region<D> {
     fn contains(&self, point: [f64; D]) -> bool {
         match self {
             Self::Shape(shape) => shape.contains(point),
-            Self::Part(parts, part) => parts.part_at(point) == Some(*part),
+            Self::Part { parts, part, .. } => parts.part_at(point) == Some(*part),
         }
     }
 
     /// Returns true if a box about the region reaches to `reach` from a point.
     fn is_near(&self, point: [f64; D], reach: f64) -> bool {
-        let bounds = match self {
-            Self::Shape(shape) => Some(shape.bounds()),
-            Self::Part(parts, part) => parts.bounds(*part),
+        let (low, high) = match self {
+            Self::Shape(shape) => shape.bounds(),
+            Self::Part { bounds, .. } => *bounds,
         };
-        bounds.is_some_and(|(low, high)| {
-            (0..D).all(|d| low[d] - reach <= point[d] && point[d] <= high[d] + reach)
-        })
+        (0..D).all(|d| low[d] - reach <= point[d] && point[d] <= high[d] + reach)
     }
 
     /// Fractions of the segment from `a` to `b` between which it is inside or outside.
     fn passages(&self, a: [f64; D], b: [f64; D]) -> Vec<f64> {
         match self {
             Self::Shape(shape) => shape.span(a, b).into_iter().flatten().collect(),
-            Self::Part(parts, _) => parts.passages(a, b).chain([0.0, 1.0]).collect(),
+            Self::Part { parts, .. } => parts.passages(a, b).chain([0.0, 1.0]).collect(),
         }
     }
 }

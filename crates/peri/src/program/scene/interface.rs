@@ -1,4 +1,4 @@
-//! Interfaces between parts of a body.
+//! Interfaces between parts of a body, and particles whose bonds never break.
 
 use super::build::operations;
 use super::values::{DiscreteBody, ONE_OF_THEM, plain};
@@ -52,8 +52,8 @@ impl Scene {
 /// Checks unbreakable shapes, and the names and limits of interfaces.
 ///
 /// # Errors
-/// Unbreakable shapes where nothing breaks, a body without parts, unknown or equal names, a pair named twice, none or both of `critical` and
-/// `unbonded`, and a limit that the material does not take.
+/// Unbreakable shapes where nothing breaks, a body without parts, unknown or equal names, a pair named twice,
+/// none or both of `critical` and `unbonded`, and a limit that the material does not take.
 pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     if !scene.material.unbreakable.is_empty() {
         let key = "material.unbreakable";

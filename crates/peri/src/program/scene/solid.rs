@@ -244,7 +244,6 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         }
     }
     if let Some(critical) = &material.critical {
-        check_limit(source, "material.critical", critical)?;
         if critical.driving.is_some() && (solid.branch.is_empty() || critical.fracture_energy.is_none()) {
             let why = "needs `fracture_energy` beside it, and a solid with `branch`";
             return Err(source.unexpected("material.critical.driving", why));
@@ -256,6 +255,7 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
                 return Err(source.unexpected(key, "needs `fracture_energy` beside it"));
             }
         }
+        check_limit(source, "material.critical", critical)?;
     }
     let planes = scene.is_beside_planes();
     if solid.pressure_filter == Some(true) && scene.body.points.is_some() {
