@@ -97,7 +97,7 @@ pub fn overstretched<const D: usize, B: BondForces<D> + ?Sized>(
 }
 
 /// Severs the intact bonds among pairs of sites.
-pub fn sever<const D: usize>(bonds: &mut dyn Bonds<D>, pairs: &[[u32; 2]]) {
+pub fn sever_pairs<const D: usize>(bonds: &mut dyn Bonds<D>, pairs: &[[u32; 2]]) {
     let mut list = Vec::new();
     for [site, other] in pairs.iter().flat_map(|&[a, b]| [[a, b], [b, a]]) {
         bonds.neighbours(site as usize, &mut |bond| {

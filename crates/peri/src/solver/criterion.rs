@@ -19,8 +19,9 @@ pub enum Criterion {
     /// ends.
     Stretch(Property),
     /// Energy that breaking a bond releases, over its share of the family, J/m³: the mean of both ends; its
-    /// limits as those of stretches. For materials with [`crate::material::Material::released_energy`]. Bonds of constrained particles do not
-    /// break: grips do not tear.
+    /// limits as those of stretches. For materials with
+    /// [`crate::material::Material::released_energy`]. Bonds of constrained particles do not break: grips do
+    /// not tear.
     Energy(Property),
     /// The same for bonds with a strength: they soften before they break.
     Softening(Bilinear),

@@ -3,7 +3,7 @@
 use super::build::operations;
 use super::values::{DiscreteBody, ONE_OF_THEM, plain};
 use super::{Scene, tearing};
-use crate::bonds::{Property, sever};
+use crate::bonds::{Property, sever_pairs};
 use crate::critical::{Convention, Critical, ONE_OF};
 use crate::error::Error;
 use crate::geometry::{Parts, inside};
@@ -188,13 +188,13 @@ pub(super) fn cross_interfaces<const D: usize>(
             return Err(source.error(&format!("interface[{index}].between"), found, allowed));
         }
         if interface.unbonded {
-            sever(&mut *body.bonds, bonds);
+            sever_pairs(&mut *body.bonds, bonds);
         }
     }
     Ok(())
 }
 
-/// Gives bonds across interfaces their own limits in place of `rest`, and those of unbreakable particles none.
+/// Gives bonds across interfaces their own limits in place of `rest`, bonds of unbreakable particles none.
 /// `own` computes a limit from the
 /// criterion and the stiffness of a bond, the mean of `stiffness` at its ends.
 ///
