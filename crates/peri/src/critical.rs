@@ -194,7 +194,7 @@ impl Critical {
         let energy = self.fracture_energy.map_or(f64::NAN, |energy| energy.si());
         match (self.stretch, self.strength.map(|strength| strength.si())) {
             (Some(stretch), _) => Ok(stretch.into()),
-            (None, None) => Ok(Criterion::Energy(energy_limit(bonds, energy))),
+            (None, None) => Ok(Criterion::Energy(energy_limit(bonds, energy).into())),
             (None, Some(strength)) => {
                 let fault =
                     |allowed| Error::Parameter { name: "critical.strength", found: strength, allowed };

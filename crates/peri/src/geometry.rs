@@ -3,10 +3,12 @@
 
 mod cuts;
 mod gaps;
+mod parts;
 
 pub(crate) use cuts::length;
 pub use cuts::{Cut, cuts_within, severed};
 pub use gaps::Gaps;
+pub use parts::Parts;
 
 use crate::error::Error;
 use polycore::memory::{available, gib};

@@ -1,6 +1,6 @@
 //! Finds bonds beyond their critical stretch, and the fragments that broken bonds leave.
 
-use super::{BodyGeometry, BondForces, Property};
+use super::{BodyGeometry, BondForces, Bonds, Property};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::StretchRange;
 use rayon::prelude::*;
@@ -94,6 +94,21 @@ pub fn overstretched<const D: usize, B: BondForces<D> + ?Sized>(
     let mut found = found.concat();
     found.par_sort_unstable_by_key(|bond| (bond.site, bond.index));
     found
+}
+
+/// Severs the intact bonds among pairs of sites.
+pub fn sever_pairs<const D: usize>(bonds: &mut dyn Bonds<D>, pairs: &[[u32; 2]]) {
+    let mut list = Vec::new();
+    for [site, other] in pairs.iter().flat_map(|&[a, b]| [[a, b], [b, a]]) {
+        bonds.neighbours(site as usize, &mut |bond| {
+            if bond.site == other as usize {
+                let (index, length, weight) = (bond.index, bond.length, bond.weight);
+                list.push(Overstretched { site, index, elongation: 0.0, length, weight });
+            }
+        });
+    }
+    list.sort_unstable_by_key(|bond| (bond.site, bond.index));
+    bonds.break_bonds(&list);
 }
 
 /// Hashes a set of bonds to one number: FNV-1a over their ends, in the order of [`overstretched`].

@@ -21,7 +21,9 @@ mod traits;
 
 pub use crate::geometry::Lattice;
 pub use crate::potential::StretchRange;
-pub use breaking::{Fragment, Overstretched, StretchScan, components, fingerprint, fragments, overstretched};
+pub use breaking::{
+    Fragment, Overstretched, StretchScan, components, fingerprint, fragments, overstretched, sever_pairs,
+};
 pub use cells::CellGrid;
 pub use cloud::CloudBonds;
 pub use cloud_kernel::GROUP;

@@ -257,7 +257,7 @@ impl<const D: usize> NearbyGaps<'_, D> {
 }
 
 impl<const D: usize> Operation<D> {
-    fn shape(&self) -> &Shape<D> {
+    pub(super) fn shape(&self) -> &Shape<D> {
         let (Self::Add(shape) | Self::Cut(shape)) = self;
         shape
     }

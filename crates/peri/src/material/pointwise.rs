@@ -323,7 +323,7 @@ impl<M: Material<D>, const D: usize> SolverMaterial<D> for Pointwise<M, D> {
         &mut self,
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
-        limit: f64,
+        limit: &Property,
         free: &(dyn Fn(usize) -> bool + Sync),
     ) -> Vec<(Overstretched, f64)> {
         let remembers = self.refer_to(bonds, EnergyPart::Driving);
@@ -346,7 +346,7 @@ impl<M: Material<D>, const D: usize> SolverMaterial<D> for Pointwise<M, D> {
                     let elongation = bond.elongation();
                     if elongation > 0.0 && free(bond.to) {
                         let energy = 0.5 * (released(&bond, bond.from) + released(&bond, bond.to));
-                        if energy > limit {
+                        if energy > limit.weaker(bond.from, bond.to) {
                             let (index, length, weight) = (neighbour.index, bond.length, bond.weight);
                             found.push((Overstretched { site, index, elongation, length, weight }, energy));
                         }

@@ -110,7 +110,7 @@ pub trait SolverMaterial<const D: usize>: Send + Sync {
         &mut self,
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
-        limit: f64,
+        limit: &Property,
         free: &(dyn Fn(usize) -> bool + Sync),
     ) -> Vec<(Overstretched, f64)> {
         let _ = (bonds, displacement, limit, free);

@@ -18,7 +18,7 @@ pub struct StressEvaluator<const D: usize>(EvaluatorKind<D>);
 enum EvaluatorKind<const D: usize> {
     /// A bond law, with the solver's fit: bonds then carry the solver's forces.
     Bonds {
-        material: BondMaterial<'static>,
+        material: Box<BondMaterial<'static>>,
         /// Largest relative error of the fit.
         bound: f64,
         /// True if the law is constant beyond the fitted stretches.
@@ -44,7 +44,8 @@ impl<const D: usize> StressEvaluator<D> {
     /// Creates an evaluator of a bond law that is fitted to a relative error of `bound`; the law is `clamped`
     /// beyond the fitted stretches if bonds break.
     pub fn for_bonds(material: BondMaterial<'static>, bound: f64, clamped: bool) -> Self {
-        Self(EvaluatorKind::Bonds { material, bound, clamped, last: Mutex::new(None) })
+        let (material, last) = (Box::new(material), Mutex::new(None));
+        Self(EvaluatorKind::Bonds { material, bound, clamped, last })
     }
 
     /// Creates an evaluator of a solid; `bonds` are those of the reference state. A law `learnt` from data

@@ -51,6 +51,8 @@ harness::quantities! {
         joined by intact bonds";
     LARGEST_FRAGMENT = "largest_fragment", "", "with `material.critical`: volume of the largest fragment \
         over that of the body";
+    BROKEN_ACROSS = "broken_across_{interface}", "", "with `[[interface]]`: share of the bonds across the \
+        interface of two parts that are broken or severed";
     FIRST_BREAK = "first_break", "m", "displacement of the grips in the step of the first broken bond";
     LOAD_AT_FIRST_BREAK = "load_at_first_break", "N", "load of the last step before the first broken bond";
     LOAD_OF_FIRST_EVENT = "load_of_first_event", "N", "without `[dynamics]`: load of the equilibrium, within \

@@ -52,16 +52,13 @@ impl<const D: usize> System<'_, D> {
                 let seen = std::mem::take(&mut self.seen_stretches);
                 self.material.overstretched(&*self.bonds, &state.displacement, stretch, &seen)
             }
-            Some(&Criterion::Energy(limit)) => {
-                self.overloaded(state, limit).into_iter().map(|(bond, _)| bond).collect()
+            Some(Criterion::Energy(limit)) => {
+                let free = |site: usize| self.loads.constrained(site) == 0;
+                let found = self.material.overloaded(&*self.bonds, &state.displacement, limit, &free);
+                found.into_iter().map(|(bond, _)| bond).collect()
             }
             _ => Vec::new(),
         }
-    }
-
-    fn overloaded(&mut self, state: &State<D>, limit: f64) -> Vec<(Overstretched, f64)> {
-        let free = |site: usize| self.loads.constrained(site) == 0;
-        self.material.overloaded(&*self.bonds, &state.displacement, limit, &free)
     }
 
     /// Severs all bonds beyond their limit, and softens those beyond the onset; returns the sites of their
@@ -70,7 +67,9 @@ impl<const D: usize> System<'_, D> {
         let mut softened = None;
         let list = match self.breaking.as_ref().map(|breaking| &breaking.criterion) {
             Some(&Criterion::Softening(law)) => {
-                let found = self.overloaded(state, law.onset);
+                let free = |site: usize| self.loads.constrained(site) == 0;
+                let (bonds, onset) = (&*self.bonds, law.onset.into());
+                let found = self.material.overloaded(bonds, &state.displacement, &onset, &free);
                 // in dynamics forces follow at once
                 let lag = if state.motion.begun { 0.0 } else { SOFTENING_LAG };
                 let changed = soften(law, &state.fracture.softened, found, lag);

@@ -15,12 +15,14 @@ pub struct Breaking {
 /// Limit of a bond.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Criterion {
-    /// Critical bond stretch λ_c of the particles; a bond breaks at that of the weaker of its ends.
+    /// Critical bond stretch λ_c of the particles; a bond breaks at its own, else that of the weaker of its
+    /// ends.
     Stretch(Property),
-    /// Energy that breaking a bond releases, over its share of the family, J/m³: the mean of both ends. For
-    /// materials with [`crate::material::Material::released_energy`]. Bonds of constrained particles do not
-    /// break: grips do not tear.
-    Energy(f64),
+    /// Energy that breaking a bond releases, over its share of the family, J/m³: the mean of both ends; its
+    /// limits as those of stretches. For materials with
+    /// [`crate::material::Material::released_energy`]. Bonds of constrained particles do not break: grips do
+    /// not tear.
+    Energy(Property),
     /// The same for bonds with a strength: they soften before they break.
     Softening(Bilinear),
 }
@@ -69,6 +71,14 @@ impl From<f64> for Criterion {
 }
 
 impl Criterion {
+    /// Least limit of any bond: a stretch, or an energy, J/m³.
+    pub fn least(&self) -> f64 {
+        match self {
+            Self::Stretch(limits) | Self::Energy(limits) => limits.least(),
+            Self::Softening(law) => law.limit,
+        }
+    }
+
     /// Stretch below which no bond breaks.
     pub fn least_stretch(&self) -> f64 {
         match self {

@@ -193,7 +193,8 @@ fn torn(pause: Option<u64>) -> State<2> {
         let state = state.get_or_insert_with(|| State::new(bonds.sites()));
         let response = rubber::<2>(Space::PlaneStress, f64::INFINITY).respond(&bonds);
         let mut system = System::of_response(&mut bonds, response, &loads, &[]);
-        system.breaking = Some(Breaking { criterion: Criterion::Energy(1.0), policy: Policy::default() });
+        system.breaking =
+            Some(Breaking { criterion: Criterion::Energy(1.0.into()), policy: Policy::default() });
         let mut watch = |_: &Status, state: &State<2>| match pause
             .is_some_and(|steps| state.counts.total_iterations == steps)
         {

@@ -68,7 +68,8 @@ fn tear(
     let (times, factors): (Vec<f64>, Vec<f64>) = ramp.chain(holds).unzip();
     let mut system = System::new(bonds, solid, &loads, &factors);
     system.times = times.into();
-    system.breaking = Some(Breaking { criterion: Criterion::Energy(0.5), policy: Policy::AtEquilibrium });
+    system.breaking =
+        Some(Breaking { criterion: Criterion::Energy(0.5.into()), policy: Policy::AtEquilibrium });
     let mut seen = 0;
     let mut watch = |status: &Status, state: &State<2>| {
         seen += 1;

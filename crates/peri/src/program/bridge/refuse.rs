@@ -48,6 +48,18 @@ pub(super) fn refuse(source: &Source, scene: &Scene, variant: &SceneVariant) -> 
             "parameters that follow fields, different for each pair",
             "none: LAMMPS has a table for each bond length",
         ),
+        (
+            !material.unbreakable.is_empty(),
+            "material.unbreakable",
+            "particles whose bonds never break",
+            "none: the tables end where bonds break at once",
+        ),
+        (
+            !scene.interface.is_empty(),
+            "interface",
+            "interfaces, whose bonds have limits of their own",
+            "none: LAMMPS has a table for each bond length",
+        ),
         (!scene.step.is_empty(), "step", "steps in sequence", "one step: the driver knows the first alone"),
         (scene.contact.is_some(), "contact", "contact", "none: the tables act between bonded particles only"),
         (

@@ -4,24 +4,24 @@ use super::moment::Moment;
 use crate::error::Error;
 use crate::program::quantities as q;
 use crate::program::scene::Scene;
-use crate::solver::{Bilinear, Criterion};
+use crate::solver::Criterion;
 use harness::observe::{Fields, Observer, Place, Scalars};
 
 /// Returns true if bonds break by their energy.
 fn breaks_by_energy(scene: &Scene) -> bool {
-    let energy = scene.material.critical.is_some_and(|critical| critical.fracture_energy.is_some());
+    let energy = scene.limits().next().is_some_and(|limit| limit.fracture_energy.is_some());
     scene.material.solid.is_some() && energy
 }
 
 /// Adds the critical stretch or energy, and fragments.
 pub(super) fn breaking<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
-    if scene.material.critical.is_none() {
+    if !scene.breaks() {
         return;
     }
     if breaks_by_energy(scene) {
         to.add_if(q::CRITICAL_ENERGY, |m| match m.physics.body.criterion.as_ref()? {
-            Criterion::Energy(limit) | Criterion::Softening(Bilinear { limit, .. }) => Some(*limit),
             Criterion::Stretch(_) => None,
+            energy => Some(energy.least()),
         });
     } else {
         to.add_if(q::CRITICAL_STRETCH, |m| m.physics.body.criterion.as_ref().map(Criterion::least_stretch));
@@ -33,9 +33,20 @@ pub(super) fn breaking<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>
     });
 }
 
+/// Adds the broken share of each interface.
+pub(super) fn interfaces<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
+    for (index, interface) in scene.interface.iter().enumerate() {
+        to.add_if(q::BROKEN_ACROSS.named(&[&interface.name()]), |m| {
+            let across = m.physics.body.interfaces.get(index)?;
+            let intact = |bond: &&[u32; 2]| m.bonds.is_bonded(bond[0] as usize, bond[1] as usize);
+            Some(1.0 - across.iter().filter(intact).count() as f64 / across.len() as f64)
+        });
+    }
+}
+
 /// Adds the damage if there are cracks or bonds break.
 pub(super) fn damage_field<const D: usize>(scene: &Scene, to: &mut Fields<Moment<D>>) {
-    if scene.material.critical.is_some() || !scene.body.cracks.is_empty() {
+    if scene.breaks() || !scene.body.cracks.is_empty() {
         to.add("damage", 1, Place::Points, |m| m.damage().unwrap_or_default());
     }
 }
@@ -56,7 +67,7 @@ impl<'s> NewCracks<'s> {
 
 impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for NewCracks<'_> {
     fn scalars(&self, to: &mut Scalars<Moment<'m, D>>) {
-        if self.scene.material.critical.is_none() {
+        if !self.scene.breaks() {
             return;
         }
         let tears = self.scene.material.solid.is_none() || breaks_by_energy(self.scene);

@@ -26,7 +26,7 @@ pub fn damped_energy(row: &StepRecord, dynamic: bool) -> f64 {
 /// Adds peak, first break, energies and balances.
 pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
     let dynamic = scene.dynamics.is_some();
-    let breaks = scene.material.critical.is_some();
+    let breaks = scene.breaks();
     let records = scene.dynamics.as_ref().map_or(scene.step_count(), |dynamics| dynamics.method().records);
     let peak = |get: fn(&StepRecord) -> f64| {
         move |m: &Moment<D>| {

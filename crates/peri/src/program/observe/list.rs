@@ -20,6 +20,7 @@ pub fn observers<const D: usize>(scene: &Scene) -> SceneObservers<'_, D> {
         stateless(StatelessObserver { scalars: values::stretches, ..none }),
         Box::new(values::FitError::new(scene)),
         stateless(StatelessObserver { scalars: cracks::breaking, ..none }),
+        stateless(StatelessObserver { scalars: cracks::interfaces, ..none }),
         stateless(StatelessObserver { scalars: values::motion, warnings: values::mixed_warnings, ..none }),
         stateless(StatelessObserver { scalars: values::responses, ..none }),
         stateless(StatelessObserver { scalars: history::scalars, warnings: history::warnings, ..none }),

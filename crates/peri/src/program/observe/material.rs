@@ -77,6 +77,8 @@ pub struct BodyWithMaterial<const D: usize> {
     pub followed: Vec<ParameterField>,
     /// Stiffness over that without inclusions.
     pub stiffness: Property,
+    /// Bonds across each interface of the scene, by their sites.
+    pub interfaces: Vec<Vec<[u32; 2]>>,
 }
 
 impl<const D: usize> BodyWithMaterial<D> {
@@ -105,13 +107,24 @@ impl<const D: usize> BodyWithMaterial<D> {
         };
         if let Some(solid) = &spec.solid {
             let law = solid.build::<D>(source, space, scene.is_beside_planes(), scene.driving())?;
-            let criterion = spec.critical.map(|critical| critical.solid_criterion(&*law, &*body.bonds));
+            let limit = |critical: Critical| critical.solid_criterion(&*law, &*body.bonds);
+            let across = |rest: Property| {
+                let least = |critical, _| limit(critical).map(|own| own.least());
+                scene::limits_of_bonds(source, scene, body, rest, &1.0.into(), &least)
+            };
+            let rest = |limits| if spec.critical.is_some() { limits } else { f64::INFINITY.into() };
+            let criterion = match scene.limits().next().map(limit).transpose().map_err(fault)? {
+                Some(Criterion::Stretch(limits)) => Some(Criterion::Stretch(across(rest(limits))?)),
+                Some(Criterion::Energy(limits)) => Some(Criterion::Energy(across(rest(limits))?)),
+                other => other,
+            };
             return Ok(Self {
-                criterion: criterion.transpose().map_err(fault)?,
+                criterion,
                 material: SceneMaterial::Solid(NonlocalSolid(law)),
                 toughness: None,
                 followed: Vec::new(),
                 stiffness: 1.0.into(),
+                interfaces: body.interfaces.clone(),
             });
         }
         let law: Arc<dyn BondPotential> = Arc::from(spec.bond_law()?);
@@ -123,7 +136,7 @@ impl<const D: usize> BodyWithMaterial<D> {
         let surface = (variant.surface == SurfaceCorrection::Energy).then(|| {
             surface_factors(&*body.bonds, modulus, calibrate::stiffness_1111(space, youngs_modulus))
         });
-        let crossing = spec.critical.map(|_| Crossing::new(&*body.bonds, surface.as_ref()));
+        let crossing = scene.breaks().then(|| Crossing::new(&*body.bonds, surface.as_ref()));
         let followed = scene::followed(source, scene, body)?;
         let inclusions = Inclusions::new(source, scene, body, &followed)?;
         if let Some(factors) = bond_factors(&*body.bonds, surface, &inclusions.micromodulus) {
@@ -131,20 +144,25 @@ impl<const D: usize> BodyWithMaterial<D> {
         }
         let context = |stiffness: f64, crossing: Crossing| {
             let (links, modulus) = (spec.links, stiffness * modulus);
-            let convention = spec.critical.and_then(|critical| critical.convention).unwrap_or_default();
+            let convention = scene.convention().unwrap_or_default();
             let softening = BondSoftening::default();
             Context { law: &*law, links, space, modulus, horizon, thickness, crossing, convention, softening }
         };
         let (mut criterion, mut toughness): (Option<Criterion>, _) = (None, None);
         let mut softening = BondSoftening::default();
-        if let Some((critical, crossing)) = spec.critical.zip(crossing) {
-            let mut rest = context(1.0, crossing);
-            rest.softening = critical.softening(&rest).map_err(fault)?;
-            let stretch = critical.resolve(&rest).map_err(fault)?;
-            softening = rest.softening;
-            toughness = Some(Toughness::new(&critical, &rest, stretch));
+        if let Some(crossing) = crossing {
+            let mut stretch = f64::INFINITY;
+            if let Some(critical) = &spec.critical {
+                let mut rest = context(1.0, crossing);
+                rest.softening = critical.softening(&rest).map_err(fault)?;
+                stretch = critical.resolve(&rest).map_err(fault)?;
+                softening = rest.softening;
+                toughness = Some(Toughness::new(critical, &rest, stretch));
+            }
             let own = |critical: Critical, stiffness| critical.resolve(&context(stiffness, crossing));
-            criterion = Some(inclusions.critical_stretch(source, &*body.bonds, stretch, &own)?.into());
+            let limits = inclusions.critical_stretch(source, &*body.bonds, stretch, &own)?;
+            let stiffness = &inclusions.micromodulus;
+            criterion = Some(scene::limits_of_bonds(source, scene, body, limits, stiffness, &own)?.into());
         }
         let mut bonded = BondMaterial::new(law, modulus);
         if scene.softens()
@@ -162,7 +180,8 @@ impl<const D: usize> BodyWithMaterial<D> {
             }
             None => SceneMaterial::Bonds(bonded),
         };
-        Ok(Self { material, criterion, toughness, followed, stiffness: inclusions.micromodulus })
+        let (stiffness, interfaces) = (inclusions.micromodulus, body.interfaces.clone());
+        Ok(Self { material, criterion, toughness, followed, stiffness, interfaces })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::cloud::cloud;
 use super::crack::{cracks, severed};
+use super::interface::cross_interfaces;
 use super::memory;
 use super::values::{DiscreteBody, ONE_OF_THEM, check_order, required, vector};
 use super::variant::SceneVariant;
@@ -33,6 +34,7 @@ pub fn body_of<const D: usize>(
     };
     body.severed = severed(source, &*body.bonds, &cuts)?;
     body.cuts = cuts;
+    cross_interfaces(source, scene, &mut body)?;
     Ok(body)
 }
 
@@ -79,7 +81,8 @@ fn build_lattice_body<const D: usize>(
     memory::refuse_too_large(source, scene, spacing_key(scene), &bonds)?;
     let (severed, cuts) = (Vec::new(), Vec::new());
     let bonds = Box::new(bonds);
-    Ok(DiscreteBody { bonds, bounds: (low, high), thickness, severed, cuts, gaps, operations })
+    let interfaces = Vec::new();
+    Ok(DiscreteBody { bonds, bounds: (low, high), thickness, severed, cuts, gaps, operations, interfaces })
 }
 
 /// Returns a lower bound of the memory of a variant before it is built, bytes; 0 for a cloud.
@@ -189,6 +192,11 @@ pub(super) fn shape<const D: usize>(
         if belongs && !is_given {
             return Err(source.missing(&path, format!("needed for a {}", kind.name())));
         }
+    }
+    if spec.part.is_some() && (spec.cut.is_some() || !key.starts_with("body.shapes")) {
+        return Err(
+            source.unexpected(&format!("{key}.part"), "only shapes that `body.shapes` adds are parts")
+        );
     }
     let positive = |name: &str, value: Option<Length>| {
         let path = format!("{key}.{name}");

@@ -41,6 +41,7 @@ pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<SceneVar
 pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     body(source, scene)?;
     material(source, scene)?;
+    super::interface::check(source, scene)?;
     solver(source, scene)?;
     if scene.boundary.is_empty() {
         return Err(source.missing("boundary", "needed for loads and supports: at least one [[boundary]]"));
@@ -287,8 +288,7 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     if let Some(critical) = &material.critical {
         let given = critical.alternatives();
         if given.len() != 1 {
-            let found = given.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" and ");
-            let found = if found.is_empty() { "none of them".to_owned() } else { found };
+            let found = super::tearing::listed(&given);
             return Err(source.error("material.critical", found, crate::critical::ONE_OF));
         }
     }
@@ -363,7 +363,7 @@ fn solver(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     }
     within("refine", solver.refine as f64, 1.0, 1e6)?;
     let refuses = [
-        (scene.material.critical.is_none(), "bonds that never break"),
+        (!scene.breaks(), "bonds that never break"),
         (scene.method() == SolverMethod::Verlet, "explicit dynamics"),
         (solver.breaking == Policy::EachIteration, "`breaking = \"each-iteration\"`"),
         (scene.material.critical.is_some_and(|critical| critical.strength.is_some()), "bonds that soften"),

@@ -73,6 +73,7 @@ pub fn cloud<const D: usize>(
         cuts: Vec::new(),
         gaps,
         operations: Vec::new(),
+        interfaces: Vec::new(),
     })
 }
 
@@ -105,6 +106,7 @@ fn recognise_lattice<const D: usize>(
         cuts: Vec::new(),
         gaps,
         operations: Vec::new(),
+        interfaces: Vec::new(),
     })
 }
 

@@ -215,7 +215,7 @@ pub fn tied_grips<const D: usize>(
         let allowed = "false: only solids (`[material.solid]`) on a lattice have faces to tie";
         return Err(source.error("contact.tied_grips", "true", allowed));
     }
-    let default = can && !contact.plane.is_empty() && scene.material.critical.is_none();
+    let default = can && !contact.plane.is_empty() && !scene.breaks();
     let Some(lattice) = bonds.as_lattice().filter(|_| contact.tied_grips.unwrap_or(default)) else {
         return Ok(None);
     };

@@ -58,6 +58,7 @@ pub fn explain<const D: usize>(
             .collect();
         builds(format!("a crack, ({}) mm: {severed} bonds broken", corners.join(") – (")));
     }
+    super::interface::explain(scene, body, criterion).into_iter().for_each(&mut builds);
     lines.extend(super::parts::explain(body));
     lines.extend(super::loads::explain(source, scene, body)?);
     lines.push(format!("  needs      {}", polycore::memory::needs(super::memory_needed(scene, bonds))));
@@ -65,7 +66,7 @@ pub fn explain<const D: usize>(
     if let Some(criterion) = criterion {
         let limit = match criterion {
             Criterion::Stretch(stretch) => format!("at a stretch of {:.6}", stretch.least()),
-            Criterion::Energy(limit) => format!("when they release more than {limit:.4e} J/m³"),
+            Criterion::Energy(limit) => format!("when they release more than {:.4e} J/m³", limit.least()),
             Criterion::Softening(law) => format!(
                 "when they have taken {:.4e} J/m³, and soften from {:.4e} J/m³ on (e_f = {:.3})",
                 law.limit,

@@ -1,13 +1,14 @@
 //! Inclusions and fields of other scenes: stiffness, critical stretch and prestrain of each particle.
 
 use super::build::shape;
+use super::interface::{part_number, parts_of};
 use super::values::DiscreteBody;
 use super::{Material, ParameterField, Scene, ShapeSpec, VaryingParameter, plain};
 use crate::bonds::{Bonds, Property};
 use crate::calibrate::{Space, poisson_ratio};
 use crate::critical::Critical;
 use crate::error::Error;
-use crate::geometry::Shape;
+use crate::geometry::{Parts, Shape};
 use harness::scene::{SceneError, Source};
 use polycore::units::{EnergyPerArea, Ratio};
 use serde::Deserialize;
@@ -18,8 +19,10 @@ use std::collections::HashMap;
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Inclusion {
-    /// Shape of the inclusion, with `add`.
-    pub shape: ShapeSpec,
+    /// Shape of the inclusion, with `add`; or `part`.
+    pub shape: Option<ShapeSpec>,
+    /// Name of a part of the body, see `body.shapes`.
+    pub part: Option<String>,
     /// Stiffness over that of the rest; default: 1.
     #[serde(default = "default_stiffness")]
     pub stiffness: f64,
@@ -32,6 +35,74 @@ pub struct Inclusion {
 
 fn default_stiffness() -> f64 {
     1.0
+}
+
+impl Inclusion {
+    /// Returns the key of its region.
+    fn key(&self, index: usize) -> String {
+        format!("material.inclusions[{index}].{}", if self.part.is_some() { "part" } else { "shape" })
+    }
+}
+
+/// Region of an inclusion.
+enum Region<const D: usize> {
+    Shape(Shape<D>),
+    Part { parts: Parts<D>, part: u32, bounds: ([f64; D], [f64; D]) },
+}
+
+impl<const D: usize> Region<D> {
+    fn new(
+        source: &Source,
+        scene: &Scene,
+        index: usize,
+        inclusion: &Inclusion,
+        body: &DiscreteBody<D>,
+    ) -> Result<Self, SceneError> {
+        let key = format!("material.inclusions[{index}]");
+        match (&inclusion.shape, &inclusion.part) {
+            (Some(spec), None) => {
+                let key = format!("{key}.shape");
+                let Some(kind) = spec.add.filter(|_| spec.cut.is_none()) else {
+                    return Err(source.error(&key, "no `add`", "`add` with the kind of shape"));
+                };
+                Ok(Self::Shape(shape::<D>(source, &key, kind, spec)?))
+            }
+            (None, Some(name)) => {
+                let part = part_number(source, scene, &format!("{key}.part"), name)?;
+                let parts = parts_of(scene, body);
+                let bounds = parts.bounds(part).unwrap_or(body.bounds);
+                Ok(Self::Part { parts, part, bounds })
+            }
+            (shape, _) => {
+                let found = if shape.is_some() { "both `shape` and `part`" } else { "no region" };
+                Err(source.error(&key, found, "one of `shape` and `part`"))
+            }
+        }
+    }
+
+    fn contains(&self, point: [f64; D]) -> bool {
+        match self {
+            Self::Shape(shape) => shape.contains(point),
+            Self::Part { parts, part, .. } => parts.part_at(point) == Some(*part),
+        }
+    }
+
+    /// Returns true if a box about the region reaches to `reach` from a point.
+    fn is_near(&self, point: [f64; D], reach: f64) -> bool {
+        let (low, high) = match self {
+            Self::Shape(shape) => shape.bounds(),
+            Self::Part { bounds, .. } => *bounds,
+        };
+        (0..D).all(|d| low[d] - reach <= point[d] && point[d] <= high[d] + reach)
+    }
+
+    /// Fractions of the segment from `a` to `b` between which it is inside or outside.
+    fn passages(&self, a: [f64; D], b: [f64; D]) -> Vec<f64> {
+        match self {
+            Self::Shape(shape) => shape.span(a, b).into_iter().flatten().collect(),
+            Self::Part { parts, .. } => parts.passages(a, b).chain([0.0, 1.0]).collect(),
+        }
+    }
 }
 
 /// Returns the prestrain ε* = −S:σ with which a body of bonds has the stress σ while it is held in its shape.
@@ -56,8 +127,8 @@ pub struct Inclusions<'a, const D: usize> {
     fracture_energy: Option<Property>,
     /// Prestrain ε* by site, if there is any.
     pub prestrain: Option<Vec<[[f64; D]; D]>>,
-    /// Inclusions with their shapes and the sites of their particles.
-    each: Vec<(&'a Inclusion, Shape<D>, Vec<u32>)>,
+    /// Inclusions with their regions and the sites of their particles.
+    each: Vec<(&'a Inclusion, Region<D>, Vec<u32>)>,
 }
 
 impl<'a, const D: usize> Inclusions<'a, D> {
@@ -93,24 +164,21 @@ impl<'a, const D: usize> Inclusions<'a, D> {
                 .for_each(|&site| prestrain[site as usize] = values.value_at(site as usize));
         }
         for (index, inclusion) in scene.material.inclusions.iter().enumerate() {
-            let key = format!("material.inclusions[{index}].shape");
-            let Some(kind) = inclusion.shape.add.filter(|_| inclusion.shape.cut.is_none()) else {
-                return Err(source.error(&key, "no `add`", "`add` with the kind of shape"));
-            };
-            let shape = shape::<D>(source, &key, kind, &inclusion.shape)?;
-            let inside = |&site: &u32| shape.contains(bonds.position(site as usize));
+            let region = Region::new(source, scene, index, inclusion, body)?;
+            let inside = |&site: &u32| region.contains(bonds.position(site as usize));
             let members: Vec<u32> = bonds.particles().iter().copied().filter(inside).collect();
             // a layer between particles may still be a weak one
             let acts =
                 inclusion.stiffness != 1.0 || inclusion.prestrain.is_some() || inclusion.critical.is_none();
             if members.is_empty() && acts {
+                let key = inclusion.key(index);
                 return Err(source.error(&key, "a shape without particles", "a shape with at least one"));
             }
             members.iter().for_each(|&site| stiffness[site as usize] *= inclusion.stiffness);
             if let Some(strain) = inclusion.prestrain {
                 members.iter().for_each(|&site| prestrain[site as usize] += strain.si());
             }
-            each.push((inclusion, shape, members));
+            each.push((inclusion, region, members));
         }
         let factor = |site: usize, _| stiffness.get(site).copied().unwrap_or(1.0);
         let fracture_energy = following(VaryingParameter::FractureEnergy).cloned();
@@ -180,7 +248,7 @@ impl<'a, const D: usize> Inclusions<'a, D> {
         let weak = self.weakened_bonds(source, bonds, resolve)?;
         for (index, (_, _, members)) in self.each.iter().enumerate() {
             if members.is_empty() && !weak.iter().any(|one| one.0.contains(&index)) {
-                let key = format!("material.inclusions[{index}].shape");
+                let key = self.each[index].0.key(index);
                 let found = "a shape without particles, and without bonds that pass through it";
                 return Err(source.error(&key, found, "a shape with at least one"));
             }
@@ -201,11 +269,8 @@ impl<'a, const D: usize> Inclusions<'a, D> {
         let mut found = Vec::new();
         for &site in bonds.particles() {
             let here = bonds.position(site as usize);
-            let near = |shape: &Shape<D>| {
-                let (low, high) = shape.bounds();
-                (0..D).all(|d| low[d] - reach <= here[d] && here[d] <= high[d] + reach)
-            };
-            let near: Vec<usize> = (0..self.each.len()).filter(|&index| near(&self.each[index].1)).collect();
+            let near = |&index: &usize| self.each[index].1.is_near(here, reach);
+            let near: Vec<usize> = (0..self.each.len()).filter(near).collect();
             if near.iter().all(|&index| self.each[index].0.critical.is_none()) {
                 continue;
             }
@@ -222,7 +287,7 @@ impl<'a, const D: usize> Inclusions<'a, D> {
             for other in others {
                 let there = bonds.position(other as usize);
                 let mut ends: Vec<f64> =
-                    near.iter().filter_map(|&index| self.each[index].1.span(here, there)).flatten().collect();
+                    near.iter().flat_map(|&index| self.each[index].1.passages(here, there)).collect();
                 ends.sort_by(f64::total_cmp);
                 let mut passing = (Vec::new(), [site, other], f64::INFINITY);
                 for pair in ends.windows(2).filter(|pair| pair[1] - pair[0] > THIN) {

@@ -45,7 +45,7 @@ pub fn line_fields(scene: &Scene) -> Vec<(LineField, String, &'static str)> {
     for (d, axis) in ["x", "y", "z"].into_iter().take(dimension).enumerate() {
         fields.push((LineField::Displacement(d), format!("displacement_{axis}"), "m"));
     }
-    if scene.material.critical.is_some() {
+    if scene.breaks() {
         fields.push((LineField::Damage, "damage".to_owned(), ""));
     }
     for (piola, kind) in [(false, "cauchy"), (true, "piola")] {

@@ -52,7 +52,7 @@ fn bytes_of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> 
     let vector = 8.0 * D as f64;
     // occupancy bits, site number, surface factors twice during their computation
     let mut each = masks + 8.0 + 2.0 * vector;
-    each += FIELDS * vector + if scene.material.critical.is_some() { PAST * vector } else { 8.0 };
+    each += FIELDS * vector + if scene.breaks() { PAST * vector } else { 8.0 };
     if scene.method() == SolverMethod::Lbfgs {
         // both fields of a pair are in single precision
         each += (FIELDS_OF_LBFGS + Lbfgs::default().memory as f64) * vector + COARSE;
@@ -78,7 +78,7 @@ fn bytes_of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> 
         let (state, passes) = (size_of::<SolidPoint<D>>() as f64, 8.0 * (1 + D * D) as f64 + 5.0);
         each += if scene.observes_forces() { 3.0 * state + 2.0 * passes } else { 2.0 * state + passes };
     }
-    if scene.material.critical.is_some() {
+    if scene.breaks() {
         // the bonds at the start and at the end, a sum of each particle, for the area of cracks
         each += BREAKING + 2.0 * masks + 8.0;
     }
@@ -152,7 +152,7 @@ pub(super) fn bytes_of_cloud<const D: usize>(particles: f64, bonds: f64) -> f64 
 /// sums.
 fn bytes_of_pairs<const D: usize>(scene: &Scene, particles: f64) -> f64 {
     let pairs = if D == 2 { 4.0 } else { 13.0 };
-    if scene.material.critical.is_some() { particles * pairs * (16.0 + 8.0) } else { 0.0 }
+    if scene.breaks() { particles * pairs * (16.0 + 8.0) } else { 0.0 }
 }
 
 /// Returns the additional bytes of a solid in a cloud: θ, its part of the states, and the kernels' data of

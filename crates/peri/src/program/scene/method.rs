@@ -111,7 +111,7 @@ impl Scene {
     /// Returns the tolerance; default: 1e-3; with breaking bonds 1e-4 of L-BFGS and 1e-5 of relaxation, with
     /// which the bonds break as in exact equilibrium (`cases/ch2/dent-events`).
     pub fn tolerance(&self) -> f64 {
-        let plain = match (self.material.critical.is_some(), self.method()) {
+        let plain = match (self.breaks(), self.method()) {
             (false, _) => 1e-3,
             (true, SolverMethod::Lbfgs) => 1e-4,
             (true, _) => 1e-5,

@@ -16,6 +16,7 @@ mod followed;
 mod formula;
 mod grips;
 mod inclusion;
+mod interface;
 mod line;
 mod loads;
 mod memory;
@@ -49,6 +50,7 @@ pub use followed::{ParameterField, followed};
 pub use formula::Formula;
 pub use grips::free_lengths;
 pub use inclusion::{Inclusion, Inclusions};
+pub use interface::{InterfaceSpec, limits_of_bonds};
 pub use line::{LineField, SectionSpec, line_fields};
 pub use loads::{loads_of, order_regions, region_names, velocities_of};
 pub use memory::needed as memory_needed;
@@ -90,6 +92,9 @@ pub struct Scene {
     pub body: BodySpec,
     /// Bond law.
     pub material: Material,
+    /// Interfaces between parts of the body.
+    #[serde(default)]
+    pub interface: Vec<InterfaceSpec>,
     /// Loads and supports.
     #[serde(default)]
     pub boundary: Vec<Boundary>,
@@ -215,6 +220,8 @@ pub struct ShapeSpec {
     pub length: Option<Length>,
     /// Axis of a cylinder.
     pub axis: Option<AxisName>,
+    /// Name of the part to which a shape of the body belongs; of shapes that overlap, the last one counts.
+    pub part: Option<String>,
 }
 
 /// Kinds of shapes.
@@ -297,6 +304,9 @@ pub struct Material {
     pub surface_correction: SurfaceCorrection,
     /// Critical stretch, beyond which bonds break; default: no bond breaks.
     pub critical: Option<Critical>,
+    /// Shapes whose particles keep all their bonds, whatever the limits: guard zones about grips and loads.
+    #[serde(default)]
+    pub unbreakable: Vec<ShapeSpec>,
     /// Parts of the body that are stiffer or softer.
     #[serde(default)]
     pub inclusions: Vec<Inclusion>,
@@ -467,14 +477,14 @@ impl Scene {
 
     /// Returns true if bonds soften before they break.
     pub fn softens(&self) -> bool {
-        self.material.critical.and_then(|own| own.convention) == Some(Convention::Softening)
+        self.convention() == Some(Convention::Softening)
     }
 
     /// Returns the largest relative error of the fitted bond law.
     pub fn fit_bound(&self) -> f64 {
         let single =
             self.dynamics.as_ref().is_some_and(|dynamics| dynamics.precision == ForcePrecision::Single);
-        let rough = self.material.critical.is_some() || self.is_mixed() || single;
+        let rough = self.breaks() || self.is_mixed() || single;
         self.solver.fit_bound.unwrap_or(if rough { 1e-6 } else { 1e-9 })
     }
 

@@ -84,6 +84,7 @@ pub(super) fn explain<const D: usize>(body: &DiscreteBody<D>) -> Vec<String> {
             1 => {
                 format!("  parts      no bond crosses the cuts narrower than the horizon of {horizon:.4} mm")
             }
+            _ if !body.interfaces.is_empty() => "  parts      none is bonded to another".to_owned(),
             _ => "  parts      none is bonded to another (`body.bond_gaps = true` bonds them)".to_owned(),
         });
     }

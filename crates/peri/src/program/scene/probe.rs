@@ -225,7 +225,7 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         if track == Track::Rotation && dimension == 2 && probe.axis != Some(AxisName::Z) {
             return Err(source.error(&key("axis"), "an axis in the plane", "`z` in a plane body"));
         }
-        if of_crack && scene.material.critical.is_none() {
+        if of_crack && !scene.breaks() {
             return Err(
                 source.unexpected(&key("track"), "`crack` needs `material.critical`, so that bonds break")
             );

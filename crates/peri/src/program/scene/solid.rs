@@ -5,6 +5,7 @@ use super::SurfaceCorrection;
 use super::values::{plain, positive};
 use crate::bonds::VolumeCorrection;
 use crate::calibrate::{Calibration, Space};
+use crate::critical::Critical;
 use crate::error::Error;
 use crate::material::{Correspondence, Driving, EightChainSolid, PointLaw, ViscousCorrespondence};
 use crate::stress::StressMethod;
@@ -243,18 +244,9 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         }
     }
     if let Some(critical) = &material.critical {
-        if critical.convention.is_some() {
-            let why = "a convention of bond laws; a `solid` always takes its `fracture_energy` by tearing";
-            return Err(source.unexpected("material.critical.convention", why));
-        }
         if critical.driving.is_some() && (solid.branch.is_empty() || critical.fracture_energy.is_none()) {
             let why = "needs `fracture_energy` beside it, and a solid with `branch`";
             return Err(source.unexpected("material.critical.driving", why));
-        }
-        if critical.kink.is_some() {
-            return Err(
-                source.unexpected("material.critical.kink", "only of a bond law: solids soften straight")
-            );
         }
         if let Some(strength) = critical.strength {
             let key = "material.critical.strength";
@@ -263,17 +255,7 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
                 return Err(source.unexpected(key, "needs `fracture_energy` beside it"));
             }
         }
-        let allowed = "either `stretch`, above 1, or `fracture_energy`, above 0";
-        let found = match (critical.alternatives().len(), critical.stretch, critical.fracture_energy) {
-            (1, Some(stretch), _) if stretch > 1.0 && stretch.is_finite() => None,
-            (1, _, Some(energy)) if energy.si() > 0.0 && energy.si().is_finite() => None,
-            (1, Some(stretch), _) => Some(format!("a stretch of {}", plain(stretch))),
-            (1, _, Some(energy)) => Some(format!("{} J/m²", plain(energy.si()))),
-            _ => Some(format!("`{}` of a solid", critical.alternatives().join("` and `"))),
-        };
-        if let Some(found) = found {
-            return Err(source.error("material.critical", found, allowed));
-        }
+        check_limit(source, "material.critical", critical)?;
     }
     let planes = scene.is_beside_planes();
     if solid.pressure_filter == Some(true) && scene.body.points.is_some() {
@@ -297,4 +279,28 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
             solid.build::<2>(source, plane, planes, driving).map(|_| ())
         }
     }
+}
+
+/// Checks a limit of bonds of a solid.
+///
+/// # Errors
+/// A key of bond laws, or none or several of the alternatives of a solid.
+pub(super) fn check_limit(source: &Source, key: &str, critical: &Critical) -> Result<(), SceneError> {
+    if critical.convention.is_some() {
+        let why = "a convention of bond laws; a `solid` always takes its `fracture_energy` by tearing";
+        return Err(source.unexpected(&format!("{key}.convention"), why));
+    }
+    if critical.kink.is_some() {
+        let why = "only of a bond law: solids soften straight";
+        return Err(source.unexpected(&format!("{key}.kink"), why));
+    }
+    let allowed = "either `stretch`, above 1, or `fracture_energy`, above 0";
+    let found = match (critical.alternatives().len(), critical.stretch, critical.fracture_energy) {
+        (1, Some(stretch), _) if stretch > 1.0 && stretch.is_finite() => return Ok(()),
+        (1, _, Some(energy)) if energy.si() > 0.0 && energy.si().is_finite() => return Ok(()),
+        (1, Some(stretch), _) => format!("a stretch of {}", plain(stretch)),
+        (1, _, Some(energy)) => format!("{} J/m²", plain(energy.si())),
+        _ => format!("`{}` of a solid", critical.alternatives().join("` and `")),
+    };
+    Err(source.error(key, found, allowed))
 }

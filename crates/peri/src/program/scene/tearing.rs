@@ -28,8 +28,13 @@ const LAYERS: f64 = 10.5;
 pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let material = &scene.material;
     let inclusions = material.inclusions.iter().enumerate();
+    let interfaces = scene.interface.iter().enumerate();
     let criticals = inclusions
         .filter_map(|(index, one)| Some((format!("material.inclusions[{index}].critical"), one.critical?)))
+        .chain(
+            interfaces
+                .filter_map(|(index, one)| Some((format!("interface[{index}].critical"), one.critical?))),
+        )
         .chain(material.critical.map(|own| ("material.critical".to_owned(), own)));
     for (key, critical) in criticals {
         strength(source, scene, &key, &critical)?;
@@ -80,6 +85,12 @@ pub fn explain_tearing<const D: usize>(
         .collect()
 }
 
+/// Lists the alternatives of a limit that were found.
+pub(super) fn listed(names: &[&str]) -> String {
+    let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    if names.is_empty() { "none of them".to_owned() } else { names.join(" and ") }
+}
+
 /// Checks the strength of a bond law.
 fn strength(source: &Source, scene: &Scene, key: &str, critical: &Critical) -> Result<(), SceneError> {
     let material = &scene.material;
@@ -103,10 +114,13 @@ fn strength(source: &Source, scene: &Scene, key: &str, critical: &Critical) -> R
     if material.law != Some(Law::Linear) {
         return Err(source.unexpected(&key, "only for `law = \"linear\"` or [material.solid]"));
     }
-    for (other, given) in
-        [("fields", material.fields.is_empty()), ("inclusions", material.inclusions.is_empty())]
-    {
-        if !given {
+    let has_limits = scene.interface.iter().any(|one| one.critical.is_some());
+    for (other, given) in [
+        ("fields", !material.fields.is_empty()),
+        ("inclusions", !material.inclusions.is_empty()),
+        ("interface", has_limits),
+    ] {
+        if given {
             return Err(source.conflict(&key, other, "bonds of one body soften alike"));
         }
     }

@@ -28,6 +28,8 @@ pub struct DiscreteBody<const D: usize> {
     pub gaps: Option<Gaps<D>>,
     /// Added and cut shapes; empty for points and grids.
     pub operations: Vec<Operation<D>>,
+    /// Bonds across each `[[interface]]`, by their sites.
+    pub interfaces: Vec<Vec<[u32; 2]>>,
 }
 
 impl<const D: usize> DiscreteBody<D> {

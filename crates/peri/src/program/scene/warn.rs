@@ -174,7 +174,7 @@ fn bridged<const D: usize>(
 
 /// Warns of load steps that are too large to resolve breaking.
 fn long_steps<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<String> {
-    if scene.material.critical.is_none() || scene.dynamics.is_some() {
+    if !scene.breaks() || scene.dynamics.is_some() {
         return None;
     }
     let prescribed = scene.boundary.iter().flat_map(|boundary| boundary.displacement.iter().flatten());

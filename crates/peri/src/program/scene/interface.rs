@@ -1,0 +1,272 @@
+//! Interfaces between parts of a body, and particles whose bonds never break.
+
+use super::build::operations;
+use super::values::{DiscreteBody, ONE_OF_THEM, plain};
+use super::{Scene, tearing};
+use crate::bonds::{Property, sever_pairs};
+use crate::critical::{Convention, Critical, ONE_OF};
+use crate::error::Error;
+use crate::geometry::{Parts, inside};
+use crate::solver::Criterion;
+use harness::scene::{SceneError, Source};
+use serde::Deserialize;
+
+/// Interface between two parts of a body of shapes, see `body.shapes`.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InterfaceSpec {
+    /// Names of the two parts.
+    pub between: [String; 2],
+    /// Limit of the bonds from one part to the other, in place of those of the parts: it may be lower or
+    /// higher. A bond across several interfaces takes the lowest.
+    pub critical: Option<Critical>,
+    /// True: no bond crosses the interface.
+    #[serde(default)]
+    pub unbonded: bool,
+}
+
+impl InterfaceSpec {
+    /// Returns its name in reports and messages.
+    pub fn name(&self) -> String {
+        self.between.join("-")
+    }
+}
+
+impl Scene {
+    /// Lists the limits of bonds: that of the material, then those of interfaces.
+    pub fn limits(&self) -> impl Iterator<Item = Critical> {
+        self.material.critical.into_iter().chain(self.interface.iter().filter_map(|one| one.critical))
+    }
+
+    /// Returns the convention of the first limit, which the others follow unless they have their own.
+    pub fn convention(&self) -> Option<Convention> {
+        self.limits().next().and_then(|limit| limit.convention)
+    }
+
+    /// Returns true if bonds may break.
+    pub fn breaks(&self) -> bool {
+        self.limits().next().is_some()
+    }
+}
+
+/// Checks unbreakable shapes, and the names and limits of interfaces.
+///
+/// # Errors
+/// Unbreakable shapes where nothing breaks, a body without parts, unknown or equal names, a pair named twice,
+/// none or both of `critical` and `unbonded`, and a limit that the material does not take.
+pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    if !scene.material.unbreakable.is_empty() {
+        let key = "material.unbreakable";
+        if !scene.breaks() {
+            return Err(source.unexpected(key, "needs `material.critical`, or no bond breaks at all"));
+        }
+        let strength = scene.material.critical.and_then(|critical| critical.strength);
+        if strength.is_some() && scene.material.solid.is_some() {
+            return Err(source.conflict(
+                key,
+                "material.critical.strength",
+                "bonds of one solid soften alike",
+            ));
+        }
+    }
+    for (index, interface) in scene.interface.iter().enumerate() {
+        let key = format!("interface[{index}]");
+        let [one, other] = &interface.between;
+        for (end, name) in [one, other].into_iter().enumerate() {
+            part_number(source, scene, &format!("{key}.between[{end}]"), name)?;
+        }
+        if one == other {
+            return Err(source.error(&format!("{key}.between"), format!("`{one}` twice"), "two parts"));
+        }
+        let same = |before: &InterfaceSpec| before.between.contains(one) && before.between.contains(other);
+        if let Some(before) = scene.interface[..index].iter().position(same) {
+            let found = format!("`{one}` and `{other}`, which interface[{before}] joins");
+            return Err(source.error(&format!("{key}.between"), found, "each pair once"));
+        }
+        match (&interface.critical, interface.unbonded) {
+            (None, false) => {
+                let allowed = "`critical`, the limit of its bonds, or `unbonded = true`";
+                return Err(source.error(&key, "neither `critical` nor `unbonded`", allowed));
+            }
+            (Some(_), true) => {
+                return Err(source.conflict(&format!("{key}.critical"), "unbonded", ONE_OF_THEM));
+            }
+            (Some(critical), false) => check_limit(source, scene, &format!("{key}.critical"), critical)?,
+            (None, true) => {}
+        }
+    }
+    Ok(())
+}
+
+fn check_limit(source: &Source, scene: &Scene, key: &str, critical: &Critical) -> Result<(), SceneError> {
+    if scene.material.solid.is_none() {
+        let given = critical.alternatives();
+        return match given.len() {
+            1 => Ok(()),
+            _ => Err(source.error(key, tearing::listed(&given), ONE_OF)),
+        };
+    }
+    super::solid::check_limit(source, key, critical)?;
+    if let Some(name) = [("strength", critical.strength.is_some()), ("driving", critical.driving.is_some())]
+        .iter()
+        .find_map(|(name, given)| given.then_some(name))
+    {
+        let why = "an interface of a `solid` takes `stretch` or `fracture_energy` alone";
+        return Err(source.unexpected(&format!("{key}.{name}"), why));
+    }
+    if scene.material.critical.is_some_and(|own| own.strength.is_some()) {
+        return Err(source.conflict(key, "material.critical.strength", "bonds of one solid soften alike"));
+    }
+    let energy = |critical: &Critical| critical.fracture_energy.is_some();
+    if scene.limits().any(|other| energy(&other) != energy(critical)) {
+        let found = if energy(critical) { "`fracture_energy`" } else { "`stretch`" };
+        return Err(source.error(key, found, "the same kind of limit as all other bonds of a `solid`"));
+    }
+    Ok(())
+}
+
+/// Returns the names of the parts of a body, each once.
+fn part_names(scene: &Scene) -> Vec<&str> {
+    let mut names: Vec<&str> = Vec::new();
+    for name in scene.body.shapes().iter().filter_map(|shape| shape.part.as_deref()) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names
+}
+
+/// Returns the number of a part by its name.
+///
+/// # Errors
+/// A body without parts, or an unknown name.
+pub(super) fn part_number(source: &Source, scene: &Scene, key: &str, name: &str) -> Result<u32, SceneError> {
+    let names = part_names(scene);
+    if names.is_empty() {
+        let found = format!("`{name}` of a body without named parts");
+        return Err(source.error(key, found, "a name that shapes of the body have as their `part`"));
+    }
+    let number = names.iter().position(|known| *known == name);
+    number.map(|number| number as u32).ok_or_else(|| source.unknown(key, name, &names))
+}
+
+/// Returns the parts of a body, numbered as their names; shapes without one form another part.
+pub(super) fn parts_of<const D: usize>(scene: &Scene, body: &DiscreteBody<D>) -> Parts<D> {
+    let names = part_names(scene);
+    let number = |name: &str| names.iter().position(|known| *known == name).unwrap_or(names.len()) as u32;
+    let each =
+        scene.body.shapes().iter().map(|shape| shape.part.as_deref().map_or(names.len() as u32, number));
+    Parts::new(&body.operations, &each.collect::<Vec<u32>>())
+}
+
+/// Finds the bonds across each interface, and severs those of unbonded ones.
+///
+/// # Errors
+/// An interface that no bond crosses.
+pub(super) fn cross_interfaces<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &mut DiscreteBody<D>,
+) -> Result<(), SceneError> {
+    if scene.interface.is_empty() {
+        return Ok(());
+    }
+    let mut pairs = Vec::new();
+    for (index, InterfaceSpec { between: [one, other], .. }) in scene.interface.iter().enumerate() {
+        let number = |name| part_number(source, scene, &format!("interface[{index}].between"), name);
+        pairs.push([number(one)?, number(other)?]);
+    }
+    body.interfaces = parts_of(scene, body).bonds_across(&*body.bonds, &pairs);
+    for (index, (interface, bonds)) in scene.interface.iter().zip(&body.interfaces).enumerate() {
+        if bonds.is_empty() {
+            let [one, other] = &interface.between;
+            let spacing = plain((body.bonds.spacing() * 1e9).round() / 1e6);
+            let found = format!(
+                "`{one}` and `{other}`, between which no bond of particles {spacing} mm apart passes"
+            );
+            let allowed = "parts that touch and are not separated by cracks";
+            return Err(source.error(&format!("interface[{index}].between"), found, allowed));
+        }
+        if interface.unbonded {
+            sever_pairs(&mut *body.bonds, bonds);
+        }
+    }
+    Ok(())
+}
+
+/// Gives bonds across interfaces their own limits in place of `rest`, bonds of unbreakable particles none.
+/// `own` computes a limit from the
+/// criterion and the stiffness of a bond, the mean of `stiffness` at its ends.
+///
+/// # Errors
+/// A limit out of its domain, and unbreakable shapes without particles.
+pub fn limits_of_bonds<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &DiscreteBody<D>,
+    rest: Property,
+    stiffness: &Property,
+    own: &dyn Fn(Critical, f64) -> Result<f64, Error>,
+) -> Result<Property, SceneError> {
+    let mut limits = Vec::new();
+    for (index, (interface, bonds)) in scene.interface.iter().zip(&body.interfaces).enumerate() {
+        let Some(critical) = interface.critical else { continue };
+        let key = format!("interface[{index}].critical");
+        let fault = |error| match error {
+            Error::Parameter { found, allowed, .. } => source.error(&key, plain(found), allowed),
+            other => source.error(&key, other, "a limit that bonds can have"),
+        };
+        // neighbours of equal stiffness share one bisection
+        let mut last = None;
+        for &[a, b] in bonds {
+            let mean = 0.5 * (stiffness.value_at(a as usize) + stiffness.value_at(b as usize));
+            let limit = match last {
+                Some((before, limit)) if before == mean => limit,
+                _ => own(critical, mean).map_err(fault)?,
+            };
+            limits.push(([a, b], limit));
+            last = Some((mean, limit));
+        }
+    }
+    let guarded = unbreakable(source, scene, body)?;
+    Ok(rest.with_bonds(limits).guarded(&guarded, body.bonds.sites()))
+}
+
+/// Finds the particles whose bonds never break.
+fn unbreakable<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &DiscreteBody<D>,
+) -> Result<Vec<u32>, SceneError> {
+    let key = "material.unbreakable";
+    let shapes = operations::<D>(source, key, &scene.material.unbreakable)?;
+    let within = |&site: &u32| inside(&shapes, body.bonds.position(site as usize));
+    let sites: Vec<u32> = body.bonds.particles().iter().copied().filter(within).collect();
+    if sites.is_empty() && !shapes.is_empty() {
+        return Err(source.error(key, "shapes without particles", "shapes with at least one"));
+    }
+    Ok(sites)
+}
+
+/// Returns lines for `peri check`.
+pub(super) fn explain<const D: usize>(
+    scene: &Scene,
+    body: &DiscreteBody<D>,
+    criterion: Option<&Criterion>,
+) -> Vec<String> {
+    let of = |(interface, bonds): (&InterfaceSpec, &Vec<[u32; 2]>)| {
+        let least = |limits: &Property| {
+            bonds.iter().map(|&[a, b]| limits.weaker(a as usize, b as usize)).fold(f64::INFINITY, f64::min)
+        };
+        let limit = match criterion {
+            _ if interface.unbonded => "severed".to_owned(),
+            Some(Criterion::Stretch(limits)) => format!("that break at a stretch of {:.6}", least(limits)),
+            Some(Criterion::Energy(limits)) => {
+                format!("that break when they release more than {:.4e} J/m³", least(limits))
+            }
+            _ => "that never break".to_owned(),
+        };
+        format!("an interface, {}: {} bonds {limit}", interface.name(), bonds.len())
+    };
+    scene.interface.iter().zip(&body.interfaces).map(of).collect()
+}
