@@ -22,7 +22,10 @@ mod inverse;
 mod table;
 
 pub use approximant::Inverse;
-pub use inverse::{inverse, inverse_derivative, inverse_derivative_from_complement, inverse_from_complement};
+pub use inverse::{
+    inverse, inverse_derivative, inverse_derivative_from_complement, inverse_from_complement,
+    inverse_with_derivative,
+};
 
 /// Below this |β| the functions are ratios of power series with positive terms; above, exponentials.
 const SERIES_BELOW: f64 = 3.0;

@@ -279,6 +279,29 @@ fn free_sides_follow_the_bulk_modulus() {
     }
 }
 
+/// The thickness of a sheet balances P₃₃ of the solid with this third stretch, to rounding, also of chains that
+/// are locked or nearly incompressible; the other stresses are the same.
+#[test]
+fn thickness_balances_to_rounding() {
+    let (mut worst, mut unbalanced) = (0.0_f64, 0.0_f64);
+    for (links, bulk) in [1.5, 25.0, 400.0].into_iter().flat_map(|n| [3.0, 100.0, 1e6].map(|k| (n, k))) {
+        let sheet = EightChainSolid::<2>::new(Space::PlaneStress, 1.0, links, bulk).unwrap();
+        let solid = EightChainSolid::<3>::new(Space::Solid, 1.0, links, bulk).unwrap();
+        for place in 0..400 {
+            let [a, b] = [place % 20, place / 20].map(|k| 0.3 + 0.16 * f64::from(k));
+            let plane = homogeneous([a, b]);
+            let whole = homogeneous([a, b, sheet.thickness_stretch(&plane)]);
+            let (flat, full) = (sheet.respond(&plane).piola, solid.respond(&whole).piola);
+            let size = solid.stiffness(&whole);
+            unbalanced = unbalanced.max(full[(2, 2)].abs() / size);
+            worst = worst.max((0..2).map(|d| (flat[(d, d)] - full[(d, d)]).abs() / size).fold(0.0, f64::max));
+        }
+    }
+    // a dozen roundings
+    at_most("eight_chain_thickness_balance", unbalanced, 1e-14);
+    at_most("eight_chain_sheet_and_solid", worst, 1e-14);
+}
+
 /// F and S are exact in every particle of a homogeneous deformation, edges, holes and cracks included, and
 /// rest has no force.
 #[test]

@@ -53,6 +53,12 @@ pub fn inverse_derivative(x: f64) -> f64 {
     super::reciprocal_derivative(inverse(x))
 }
 
+/// 𝓛⁻¹(x) and its derivative, as [`inverse`] and [`inverse_derivative`] give them.
+pub fn inverse_with_derivative(x: f64) -> [f64; 2] {
+    let beta = inverse(x);
+    [beta, super::reciprocal_derivative(beta)]
+}
+
 /// d𝓛⁻¹/dx at |x| = 1 − c for a given c ∈ [0, 1]; ∞ at c = 0, NaN outside.
 pub fn inverse_derivative_from_complement(complement: f64) -> f64 {
     super::reciprocal_derivative(inverse_from_complement(complement))

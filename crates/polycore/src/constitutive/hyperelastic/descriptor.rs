@@ -1,5 +1,7 @@
 //! Descriptors of laws: names, constructors, and starting points of fits.
 
+use std::cell::Cell;
+
 use super::data::TestData;
 use super::{Error, Hyperelastic};
 
@@ -71,6 +73,8 @@ pub(super) struct FitStart<'a> {
     pub table: &'a TestData,
     /// Returns true if the user asks the fit to stop.
     pub stop: &'a dyn Fn() -> bool,
+    /// Number of evaluations of all residuals so far.
+    pub evaluations: &'a Cell<usize>,
 }
 
 /// A material parameter.

@@ -129,74 +129,12 @@ pub fn fit_until(
             reason: format!("{measurements} measurements for {} parameters", model.parameters.len()),
         });
     }
-    let modulus = neo_hookean_modulus(table)?;
-    let map = ParameterMap::new(model, table, modulus)?;
-    let mut ends: Vec<(f64, DVector<f64>)> = Vec::new();
-    let iterations = Cell::new(0);
-    let residuals = |q: &DVector<f64>| {
-        iterations.set(iterations.get() + 1);
-        // a trial where the law overflows must be rejected; `None` would end the search
-        let rejected = || DVector::from_element(measurements, REJECTED);
-        Some(map.residuals(q, table).unwrap_or_else(rejected))
-    };
-    let start = FitStart { limits: &map.limits, modulus, table, stop };
-    let mut starts = (model.starts)(&start);
-    for contained in model.contains {
-        let inner = super::model(contained.key).and_then(|inner| fit_until(inner, table, stop));
-        let inner = match inner {
-            Ok(inner) => inner,
-            Err(Error::Stopped) => return Err(Error::Stopped),
-            // the outer law has starts of its own
-            Err(_) => continue,
-        };
-        let values: Vec<f64> = inner.parameters.iter().map(|parameter| parameter.value).collect();
-        let grown = (contained.embed)(&values, &start);
-        if let Some(embedded) = grown.first() {
-            let at = map.inverse(embedded);
-            if let Some(residuals) = map.residuals(&at, table) {
-                ends.push((0.5 * residuals.norm_squared(), at));
-            }
-        }
-        starts.extend(grown);
-    }
-    let search = |from: &[f64], ends: &mut Vec<(f64, DVector<f64>)>| {
-        // nothing ends the search
-        let jacobian = |q: &DVector<f64>| if stop() { None } else { map.jacobian(q, table) };
-        let Optimum { at, objective } = levenberg_marquardt(map.inverse(from), 200, residuals, jacobian);
-        if objective < REJECTED && map.residuals(&at, table).is_some() {
-            ends.push((objective, at));
-        }
-    };
-    for from in &starts {
-        if stop() {
-            return Err(Error::Stopped);
-        }
-        search(from, &mut ends);
-        if let Some(refine) = model.refine {
-            search(&refine(from, &start), &mut ends);
-        }
-    }
-    let by_misfit = |a: &&(f64, DVector<f64>), b: &&(f64, DVector<f64>)| a.0.total_cmp(&b.0);
-    let end = ends.iter().min_by(by_misfit).map(|end| map.parameters(&end.1));
-    if let (Some(refine), Some(end)) = (model.refine, end) {
-        search(&refine(&end, &start), &mut ends);
-    }
-    if stop() {
-        return Err(Error::Stopped);
-    }
-    let Some((least, best)) = ends.iter().min_by(by_misfit) else {
-        return Err(Error::NoConvergence {
-            iteration: model.key,
-            steps: iterations.get(),
-            residual: f64::NAN,
-        });
-    };
-    let values = map.parameters(best);
+    let map = ParameterMap::new(model, table, neo_hookean_modulus(table)?)?;
+    let FitMinimum { at, starts, iterations } = minimum(&map, table, stop)?;
+    let values = map.parameters(&at);
     let law = model.law(&values)?;
     let rms = rms(&law, table)?;
-    // objective = ½Σr², so 1e-4 in rms is 2e-4 in the objective
-    let agreeing = ends.iter().filter(|(objective, _)| *objective <= least * (1.0 + 2e-4)).count();
-    let found = map.uncertainty(best, table);
+    let found = map.uncertainty(&at, table);
     let parameters = model
         .parameters
         .iter()
@@ -210,9 +148,94 @@ pub fn fit_until(
             identifiability: found.identifiability[i],
         })
         .collect();
-    let starts = (starts.len(), agreeing.min(starts.len()));
-    let iterations = iterations.get();
     Ok(Fit { law, model, parameters, rms, draws: found.draws, measurements, iterations, starts })
+}
+
+/// Best parameters of a model.
+struct FitMinimum {
+    /// Parameters in the optimiser's variables.
+    at: DVector<f64>,
+    /// As [`Fit::starts`] and [`Fit::iterations`].
+    starts: (usize, usize),
+    iterations: usize,
+}
+
+/// Evaluations of a search per parameter.
+const PATIENCE: usize = 200;
+/// The same from parameters that [`ModelDescriptor::refine`] has found: it would follow a flat valley.
+const REFINED_PATIENCE: usize = 20;
+
+fn minimum(map: &ParameterMap<'_>, table: &TestData, stop: &dyn Fn() -> bool) -> Result<FitMinimum, Error> {
+    let model = map.model;
+    let measurements = table.measurements();
+    let mut ends: Vec<(f64, DVector<f64>)> = Vec::new();
+    let evaluations = Cell::new(0);
+    let residuals = |q: &DVector<f64>| {
+        evaluations.update(|count| count + 1);
+        // a trial where the law overflows must be rejected; `None` would end the search
+        let rejected = || DVector::from_element(measurements, REJECTED);
+        Some(map.residuals(q, table).unwrap_or_else(rejected))
+    };
+    let start =
+        FitStart { limits: &map.limits, modulus: map.modulus, table, stop, evaluations: &evaluations };
+    let mut starts = (model.starts)(&start);
+    for contained in model.contains {
+        let inner = super::model(contained.key).and_then(|inner| {
+            let map = ParameterMap::new(inner, table, map.modulus)?;
+            Ok(map.parameters(&minimum(&map, table, stop)?.at))
+        });
+        let values = match inner {
+            Ok(values) => values,
+            Err(Error::Stopped) => return Err(Error::Stopped),
+            // the outer law has starts of its own
+            Err(_) => continue,
+        };
+        let grown = (contained.embed)(&values, &start);
+        if let Some(embedded) = grown.first() {
+            let at = map.inverse(embedded);
+            if let Some(residuals) = map.residuals(&at, table) {
+                ends.push((0.5 * residuals.norm_squared(), at));
+            }
+        }
+        starts.extend(grown);
+    }
+    let patience = if model.refine.is_some() { REFINED_PATIENCE } else { PATIENCE };
+    let search = |from: &[f64], ends: &mut Vec<(f64, DVector<f64>)>| {
+        // nothing ends the search
+        let jacobian = |q: &DVector<f64>| if stop() { None } else { map.jacobian(q, table) };
+        let Optimum { at, objective } = levenberg_marquardt(map.inverse(from), patience, residuals, jacobian);
+        if objective < REJECTED && map.residuals(&at, table).is_some() {
+            ends.push((objective, at));
+        }
+    };
+    for from in &starts {
+        if stop() {
+            return Err(Error::Stopped);
+        }
+        match model.refine {
+            Some(refine) => search(&refine(from, &start), &mut ends),
+            None => search(from, &mut ends),
+        }
+    }
+    let by_misfit = |a: &&(f64, DVector<f64>), b: &&(f64, DVector<f64>)| a.0.total_cmp(&b.0);
+    let end = ends.iter().min_by(by_misfit).map(|end| map.parameters(&end.1));
+    if let (Some(refine), Some(end)) = (model.refine, end) {
+        search(&refine(&end, &start), &mut ends);
+    }
+    if stop() {
+        return Err(Error::Stopped);
+    }
+    let Some((least, best)) = ends.iter().min_by(by_misfit) else {
+        return Err(Error::NoConvergence {
+            iteration: model.key,
+            steps: evaluations.get(),
+            residual: f64::NAN,
+        });
+    };
+    // objective = ½Σr², so 1e-4 in rms is 2e-4 in the objective
+    let agreeing = ends.iter().filter(|(objective, _)| *objective <= least * (1.0 + 2e-4)).count();
+    let starts = (starts.len(), agreeing.min(starts.len()));
+    Ok(FitMinimum { at: best.clone(), starts, iterations: evaluations.get() })
 }
 
 /// Modulus of the best neo-Hookean law, Pa, in closed form: P is linear in μ. It is the scale and the

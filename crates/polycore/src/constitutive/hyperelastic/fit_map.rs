@@ -57,14 +57,15 @@ fn measured<'a>(
 
 /// Map between the parameters p of a law and the unbounded q of the optimiser.
 pub(super) struct ParameterMap<'a> {
-    model: &'a ModelDescriptor,
+    pub model: &'a ModelDescriptor,
     /// Lower limit of each p.
     pub limits: Vec<f64>,
-    modulus: f64,
+    /// Unit of stresses, Pa.
+    pub modulus: f64,
 }
 
 /// Bound of |q|, beyond which a parameter is practically at its limit or at infinity; e^±40 = 4e∓18.
-const LARGEST_LOG: f64 = 40.0;
+pub(super) const LARGEST_LOG: f64 = 40.0;
 
 impl<'a> ParameterMap<'a> {
     pub fn new(model: &'a ModelDescriptor, table: &TestData, modulus: f64) -> Result<Self, Error> {

@@ -3,10 +3,14 @@
 //! other ("variable projection"; Golub & Pereyra, doi:10.1137/0710036, with Kaufman's derivative,
 //! doi:10.1007/BF01932995).
 
+use std::cell::RefCell;
+use std::rc::Rc;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::data::TestState;
 use super::descriptor::{ABSENT, FitStart};
+use super::fit_map::LARGEST_LOG;
 use super::ogden_starts::slopes;
 use crate::numerics::least_squares::levenberg_marquardt;
 
@@ -15,12 +19,10 @@ pub(super) fn projected(p: &[f64], start: &FitStart<'_>) -> Vec<f64> {
     let data = start.table.states.iter().flat_map(TestState::measured);
     let data = DVector::from_iterator(start.table.measurements(), data) / start.modulus;
     let exponents = DVector::from_iterator(p.len() / 2, p.chunks_exact(2).map(|term| term[1]));
-    let problem = Projected { start, data };
+    let problem = Projected { start, data, last: RefCell::default() };
     let (residuals, jacobian) = (|at: &_| Some(problem.residuals(at)), |at: &_| problem.jacobian(at));
     let exponents = levenberg_marquardt(exponents, 100, residuals, jacobian).at;
-    let Some(best) =
-        problem.solve(&exponents).filter(|best| best.moduli.iter().any(|modulus| *modulus > 0.0))
-    else {
+    let Some(best) = problem.solve(&exponents) else {
         return p.to_vec();
     };
     let least = ABSENT * best.moduli.sum();
@@ -32,13 +34,17 @@ struct Projected<'a> {
     start: &'a FitStart<'a>,
     /// Measured stresses in units of the modulus.
     data: DVector<f64>,
+    /// Exponents of the last residuals, whose derivatives are asked for next.
+    last: RefCell<(DVector<f64>, Option<Rc<OgdenModuli>>)>,
 }
 
-/// Best moduli, in units of the modulus; 0 for terms that only a negative modulus would improve.
+/// Best moduli, in units of the modulus.
 struct OgdenModuli {
     moduli: DVector<f64>,
-    /// Orthonormal basis of the stresses of the terms that are present.
+    /// Orthonormal basis of the stresses of the terms above the least modulus.
     basis: DMatrix<f64>,
+    /// Derivatives of the stresses of unit moduli with respect to the exponents.
+    slopes: DMatrix<f64>,
     residuals: DVector<f64>,
 }
 
@@ -63,34 +69,46 @@ impl Projected<'_> {
         all.iter().flat_map(|matrix| matrix.iter()).all(|value| value.is_finite()).then_some(all)
     }
 
-    fn solve(&self, exponents: &DVector<f64>) -> Option<OgdenModuli> {
-        let [columns, _] = self.columns(exponents)?;
+    fn solve(&self, exponents: &DVector<f64>) -> Option<Rc<OgdenModuli>> {
+        let mut last = self.last.borrow_mut();
+        if last.0 != *exponents {
+            *last = (exponents.clone(), self.solved(exponents).map(Rc::new));
+        }
+        last.1.clone()
+    }
+
+    /// Solves for the best moduli above the least one of the search in all parameters. Each subset of terms may lie above it; the problem is
+    /// convex, so the least misfit is the solution. Columns enter by their triangular factor alone.
+    fn solved(&self, exponents: &DVector<f64>) -> Option<OgdenModuli> {
+        self.start.evaluations.update(|count| count + 1);
+        let [mut columns, slopes] = self.columns(exponents)?;
         let terms = exponents.len();
-        let mut best: Option<(f64, OgdenModuli)> = None;
-        for present in 1_usize..1 << terms {
+        let norms: Vec<f64> = columns.column_iter_mut().map(|mut column| column.normalize_mut()).collect();
+        let (all, triangle) = columns.qr().unpack();
+        let bound = DVector::from_fn(terms, |i, _| (-LARGEST_LOG).exp() * norms[i]);
+        let onto = all.tr_mul(&self.data) - &triangle * &bound;
+        let mut best: Option<(f64, DVector<f64>, DMatrix<f64>)> = None;
+        for present in 0_usize..1 << terms {
             let those: Vec<usize> = (0..terms).filter(|i| present >> i & 1 == 1).collect();
-            let norms: Vec<f64> = those.iter().map(|&i| columns.column(i).norm()).collect();
-            let scaled: Vec<DVector<f64>> =
-                those.iter().zip(&norms).map(|(&i, norm)| columns.column(i) / *norm).collect();
-            let (basis, triangle) = DMatrix::from_columns(&scaled).qr().unpack();
-            let Some(solved) = triangle.solve_upper_triangular(&basis.tr_mul(&self.data)) else { continue };
-            if solved.iter().any(|modulus| modulus.is_nan() || *modulus <= 0.0) {
-                continue;
-            }
-            let residuals = &basis * basis.tr_mul(&self.data) - &self.data;
-            let misfit = residuals.norm_squared();
-            if best.as_ref().is_none_or(|(least, _)| misfit < *least) {
-                let mut moduli = DVector::zeros(terms);
-                those.iter().zip(&norms).enumerate().for_each(|(k, (&i, norm))| moduli[i] = solved[k] / norm);
-                best = Some((misfit, OgdenModuli { moduli, basis, residuals }));
+            let (basis, factor) = triangle.select_columns(&those).qr().unpack();
+            let Some(excess) = factor.solve_upper_triangular(&basis.tr_mul(&onto)) else { continue };
+            let misfit = (&basis * basis.tr_mul(&onto) - &onto).norm_squared();
+            let feasible = excess.iter().all(|excess| *excess > 0.0);
+            if feasible && best.as_ref().is_none_or(|(least, ..)| misfit < *least) {
+                let mut loads = bound.clone();
+                those.iter().zip(&excess).for_each(|(&i, excess)| loads[i] += excess);
+                best = Some((misfit, loads, basis));
             }
         }
-        best.map(|(_, found)| found)
+        let (_, loads, basis) = best?;
+        let residuals = &all * (triangle * &loads) - &self.data;
+        let moduli = DVector::from_fn(terms, |i, _| loads[i] / norms[i]);
+        Some(OgdenModuli { moduli, basis: all * basis, slopes, residuals })
     }
 
     fn residuals(&self, exponents: &DVector<f64>) -> DVector<f64> {
-        // nothing fits: as without any term, so that a trial there is rejected
-        self.solve(exponents).map_or_else(|| -&self.data, |found| found.residuals)
+        // stresses overflow: as without any term, so that a trial there is rejected
+        self.solve(exponents).map_or_else(|| -&self.data, |found| found.residuals.clone())
     }
 
     fn jacobian(&self, exponents: &DVector<f64>) -> Option<DMatrix<f64>> {
@@ -98,8 +116,8 @@ impl Projected<'_> {
         if (self.start.stop)() {
             return None;
         }
-        let [_, mut slopes] = self.columns(exponents)?;
         let found = self.solve(exponents)?;
+        let mut slopes = found.slopes.clone();
         for (i, mut column) in slopes.column_iter_mut().enumerate() {
             column *= found.moduli[i];
         }
