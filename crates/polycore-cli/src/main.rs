@@ -15,6 +15,7 @@ mod cli {
     pub const MPA: f64 = 1e6;
 
     pub mod card;
+    pub mod data;
     pub mod deck;
     pub mod draw;
     pub mod exact;
@@ -27,6 +28,7 @@ mod cli {
     pub mod prony;
     pub mod prony_files;
     pub mod quantities;
+    pub mod ranking;
     pub mod scene;
     pub mod table_fits;
     pub mod time;

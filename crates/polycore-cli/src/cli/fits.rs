@@ -17,9 +17,10 @@ use polycore::constitutive::hyperelastic::{Coverage, Hyperelastic, homogeneous, 
 use super::MPA;
 use super::material::{DIGITS, digits};
 use super::quantities as q;
-use super::scene::{DataSet, FitCase};
+use super::data::DataSet;
+use super::scene::FitCase;
 use super::table_fits::{TableFits, unit_of};
-use super::{card, draw, material, time_fits, trials};
+use super::{card, draw, material, ranking, time_fits, trials};
 
 /// Fits every law to every table; writes tables and pictures. A law that cannot be fitted is reported, the
 /// others are kept. If the run is stopped, finished fits are written.
@@ -42,6 +43,7 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
             failed: Vec::new(),
             crossed: Vec::new(),
             outside: Vec::new(),
+            ranked: Vec::new(),
         };
         for model in &case.laws {
             run.show(done / total, &|| format!("fit {name}  {}", model.key));
@@ -54,6 +56,14 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
                 break;
             }
             done += 1.0;
+        }
+        if !own.modes.is_empty() && !stopped {
+            phases.start("ranking");
+            run.show(done / total, &|| format!("rank the laws on {name}"));
+            match ranking::rank(own, &set.fits, run) {
+                Ok(laws) => set.ranked = laws,
+                Err(_) => stopped = true,
+            }
         }
         phases.start("output");
         let coverage = Coverage::new(table)?;
@@ -78,6 +88,10 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
         if let (true, false, Some((law, why))) = (set.fits.is_empty(), stopped, set.failed.first()) {
             let reason = format!("no law can be fitted; {law}: {why}");
             return Err(constitutive::Error::Data { what: (*name).clone(), reason }.into());
+        }
+        if !set.ranked.is_empty() {
+            ranking::record(own, &set.ranked, &mut report);
+            ranking::write(directory, own, &set.ranked)?;
         }
         write_states(directory, name, table, &set.fits)?;
         set.fits.iter().try_for_each(|fit| write_draws(directory, name, fit))?;
@@ -133,7 +147,7 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     }
     let mut finished = Finished::new(report, text);
     finished.table = (!all.is_empty()).then(|| errors(case, &all));
-    Ok(finished.with_notes(&remarks(&all)))
+    Ok(finished.with_notes(&remarks(case, &all)))
 }
 
 /// Converts a value to the unit of the tables: stresses to MPa, numbers unchanged.
@@ -191,7 +205,7 @@ fn record_fit(report: &mut Report, data: &str, table: &TestData, fit: &Fit) -> R
 }
 
 /// Finds the test and the stretch at which a law first becomes unstable, within the stretches of a table.
-fn find_instability(fit: &Fit, table: &TestData) -> Option<(Mode, f64)> {
+pub fn find_instability(fit: &Fit, table: &TestData) -> Option<(Mode, f64)> {
     let ends = stability::range(table);
     let all = Mode::TESTS.into_iter().flat_map(|mode| ends.map(|end| (mode, end)));
     all.filter(|(_, end)| *end != 1.0)
@@ -291,8 +305,12 @@ fn summary(case: &FitCase, all: &[TableFits], timed: &str, report: &Report) -> S
             let _ = writeln!(text, "failed  {law} on {}: {why}", set.name);
         }
     }
-    for set in all {
+    for (own, set) in case.data.iter().zip(all) {
         text += &verdicts(set);
+        if !set.ranked.is_empty() {
+            text += &ranking::table(own, &set.ranked);
+            text += &ranking::advice(own, &set.ranked);
+        }
         let _ = writeln!(text, "parameters on {} (± standard error, if the data determine it)", set.name);
         for fit in &set.fits {
             let list: Vec<String> = fit.parameters.iter().map(format_parameter).collect();
@@ -337,10 +355,11 @@ fn errors(case: &FitCase, all: &[TableFits]) -> String {
     text
 }
 
-/// Returns the laws that failed and the block of the best law, by table.
-fn remarks(all: &[TableFits]) -> String {
+/// Returns the laws that failed, the law to take and the block of the best law, by table.
+fn remarks(case: &FitCase, all: &[TableFits]) -> String {
     let mut text = String::new();
-    for set in all {
+    for (own, set) in case.data.iter().zip(all) {
+        text += &ranking::advice(own, &set.ranked);
         for (law, why) in &set.failed {
             let _ = writeln!(text, "failed  {law} on {}: {why}", set.name);
         }

@@ -1,17 +1,13 @@
 //! Scenes of fits, trials and networks: laws, data, expectations.
 
 use std::fmt::Write;
-use std::path::PathBuf;
 
 use harness::report::Expect;
 use harness::scene::{SceneError, Source};
-use polycore::constitutive::hyperelastic::data::{Mode, TestData};
-use polycore::constitutive::hyperelastic::fit::neo_hookean_modulus;
-use polycore::constitutive::hyperelastic::{
-    self, MODELS, ModelDescriptor, StrainMeasure, TestFormat, TestStressMeasure,
-};
+use polycore::constitutive::hyperelastic::{self, MODELS, ModelDescriptor};
 use serde::Deserialize;
 
+use super::data::{DataSet, TestTableSpec};
 use super::foams::{FoamSet, FoamSpec};
 use super::forecasts::{ForecastSet, ForecastSpec};
 use super::networks::{NetworkSet, NetworkSpec};
@@ -76,44 +72,6 @@ struct FitSettings {
     data: Vec<TestTableSpec>,
 }
 
-/// Table of homogeneous states.
-#[derive(Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct TestTableSpec {
-    /// Name in the report.
-    name: String,
-    /// CSV file, relative to the scene.
-    file: PathBuf,
-    /// Test whose states are used; for a table without a column of tests, the test of all states.
-    mode: Option<Mode>,
-    /// Measure of the strain, if its heading does not name it.
-    strain: Option<StrainMeasure>,
-    /// Measure of the stress, if its heading does not name it.
-    stress: Option<TestStressMeasure>,
-    /// Unit of a stress whose heading has none: `MPa`.
-    stress_unit: Option<String>,
-    /// Heading of the strain, if there are several.
-    strain_column: Option<String>,
-    /// Heading of the stress, if there are several.
-    stress_column: Option<String>,
-    /// Material, in a table with one stress component in each row: a cell of its column `material` or
-    /// `source`.
-    material: Option<String>,
-    /// Tests of a table with one stress component in each row, as the file names them: `["UT", "UC"]`.
-    #[serde(default)]
-    tests: Vec<String>,
-}
-
-/// Table to be fitted.
-pub struct DataSet {
-    pub name: String,
-    pub table: TestData,
-    /// Material, if the scene names one.
-    pub material: Option<String>,
-    /// Layout of the file, and the rows left out, one line each.
-    pub read: Vec<String>,
-}
-
 /// JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
     let quantities = [q::ALL, q::PRONY, q::NETWORKS, q::FOAMS, q::FORECASTS];
@@ -157,47 +115,15 @@ impl FitCase {
         };
         let mut data: Vec<DataSet> = Vec::new();
         for (i, entry) in fit.data.into_iter().enumerate() {
-            let key = |field: &str| format!("fit.data[{i}].{field}");
-            let valid = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-            if entry.name.is_empty() || !entry.name.chars().all(valid) {
-                let allowed = "letters, digits, `-` and `_`: it names files";
-                return Err(source.error(&key("name"), format!("`{}`", entry.name), allowed));
-            }
-            if data.iter().any(|other| other.name == entry.name) {
-                return Err(source.error(
-                    &key("name"),
-                    format!("`{}` a second time", entry.name),
-                    "another name",
-                ));
-            }
-            let format = TestFormat {
-                mode: entry.mode,
-                strain: entry.strain,
-                stress: entry.stress,
-                stress_unit: entry.stress_unit,
-                strain_column: entry.strain_column,
-                stress_column: entry.stress_column,
-                material: entry.material.clone(),
-                tests: entry.tests,
-            };
-            let reading = TestData::read_as(source.file(&entry.file), &format)
-                .map_err(|error| source.refused(&key("file"), error))?;
-            let read = [vec![reading.description], reading.notes].concat();
-            let mut table = reading.table;
-            if let Some(mode) = entry.mode {
-                table = table.select(mode).map_err(|error| {
-                    source.error(&key("mode"), error, "a test with a stress in the table")
-                })?;
-            }
-            neo_hookean_modulus(&table).map_err(|error| source.refused(&key("file"), error))?;
+            let set = entry.read(source, i, &data)?;
             for model in laws.iter().filter(|_| fit.laws.is_some()) {
-                if table.measurements() < model.parameters.len() {
-                    let found = format!("{} measured stresses", table.measurements());
+                if set.table.measurements() < model.parameters.len() {
+                    let found = format!("{} measured stresses", set.table.measurements());
                     let allowed = format!("at least {} for `{}`", model.parameters.len(), model.key);
-                    return Err(source.error(&key("file"), found, allowed));
+                    return Err(source.error(&format!("fit.data[{i}].{}", set.place()), found, allowed));
                 }
             }
-            data.push(DataSet { name: entry.name, table, material: entry.material, read });
+            data.push(set);
         }
         let time = time.map(|settings| TimeCase::new(source, settings)).transpose()?;
         let mut series: Vec<PronySet> = Vec::new();
@@ -252,12 +178,16 @@ impl FitCase {
     /// Describes what a run will do, in lines.
     pub fn plan(&self) -> String {
         let mut text = format!("{}: {}\n", self.source.path.display(), self.title);
-        for DataSet { name, table, read, .. } in &self.data {
+        for DataSet { name, table, read, modes, .. } in &self.data {
             let (states, measured) = (table.states.len(), table.measurements());
             let source =
                 if table.source.is_empty() { "no line `# source: …` in it" } else { &table.source };
             let _ = writeln!(text, "data {name}: {states} states, {measured} measured stresses ({source})");
             read.iter().for_each(|line| text += &format!("  {line}\n"));
+            let names: Vec<&str> = modes.iter().map(|mode| mode.mode).collect();
+            if !names.is_empty() {
+                let _ = writeln!(text, "  laws ranked by predictions of {}, each left out", names.join(", "));
+            }
         }
         for line in self
             .networks
@@ -278,6 +208,9 @@ impl FitCase {
         self.prony.iter().for_each(|set| text += &format!("{}\n", set.plan()));
         let of_fits = "fits.csv, <data>_states.csv, materials.toml, pictures (not with --quick), ";
         let mut files = if self.data.is_empty() { "" } else { of_fits }.to_owned();
+        if self.data.iter().any(|set| !set.modes.is_empty()) {
+            files += "<data>_ranking.csv, ";
+        }
         if !self.networks.is_empty() {
             files += "<network>_networks.csv, ";
         }
@@ -318,6 +251,7 @@ impl FitCase {
                 names.extend(own.map(|quantity| quantity.named(&[&fit]).name));
                 let parameters = model.parameters.iter().map(|parameter| parameter.name);
                 names.extend(parameters.map(|parameter| q::PARAMETER.named(&[&fit, parameter]).name));
+                names.extend(super::ranking::quantities(set, model.key));
                 for other in self.others(set) {
                     let fit = format!("{fit}.{}", other.name);
                     names.extend(

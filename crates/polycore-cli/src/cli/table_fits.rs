@@ -3,6 +3,8 @@
 use polycore::constitutive::hyperelastic::data::TestData;
 use polycore::constitutive::hyperelastic::fit::{Agreement, Fit};
 
+use super::ranking::RankedLaw;
+
 /// Fits to one table.
 pub struct TableFits<'a> {
     pub name: &'a str,
@@ -16,6 +18,8 @@ pub struct TableFits<'a> {
     pub crossed: Vec<(&'static str, &'a str, Option<Agreement>)>,
     /// Other table, its number of states and of those outside the strains of this one.
     pub outside: Vec<(&'a str, usize, usize)>,
+    /// Laws by their predictions of modes left out; none without `rank`.
+    pub ranked: Vec<RankedLaw>,
 }
 
 impl TableFits<'_> {

@@ -54,6 +54,7 @@ pub mod forecast;
 pub mod homogeneous;
 #[cfg(feature = "tables")]
 mod plausible;
+pub mod ranking;
 pub mod stability;
 #[cfg(feature = "tables")]
 mod table;
