@@ -108,9 +108,9 @@ impl TestTableSpec {
         let read = [vec![reading.description], reading.notes].concat();
         let mut table = reading.table;
         if let Some(mode) = self.mode {
-            table = table.select(mode).map_err(|error| {
-                source.error(&key("mode"), error, "a test with a stress in the table")
-            })?;
+            table = table
+                .select(mode)
+                .map_err(|error| source.error(&key("mode"), error, "a test with a stress in the table"))?;
         }
         let (parts, modes) = (Vec::new(), Vec::new());
         Ok(DataSet { name: self.name, table, material: self.material, read, parts, modes })

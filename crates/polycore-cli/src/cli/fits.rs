@@ -15,9 +15,9 @@ use polycore::constitutive::hyperelastic::fit::{
 use polycore::constitutive::hyperelastic::{Coverage, Hyperelastic, homogeneous, stability};
 
 use super::MPA;
+use super::data::DataSet;
 use super::material::{DIGITS, digits};
 use super::quantities as q;
-use super::data::DataSet;
 use super::scene::FitCase;
 use super::table_fits::{TableFits, unit_of};
 use super::{card, draw, material, ranking, time_fits, trials};
@@ -316,7 +316,7 @@ fn summary(case: &FitCase, all: &[TableFits], timed: &str, report: &Report) -> S
             let list: Vec<String> = fit.parameters.iter().map(format_parameter).collect();
             let _ = writeln!(text, "  {:<22}{}", fit.model.key, list.join(", "));
         }
-        text += &material::best(set.name, &set.fits);
+        text += &material::best(set.name, &set.fits, ranking::best(&set.ranked).map(|law| law.key));
     }
     for trial in &report.trials {
         let verdict = if trial.passed { "pass" } else { "FAIL" };
@@ -363,7 +363,7 @@ fn remarks(case: &FitCase, all: &[TableFits]) -> String {
         for (law, why) in &set.failed {
             let _ = writeln!(text, "failed  {law} on {}: {why}", set.name);
         }
-        text += &material::best(set.name, &set.fits);
+        text += &material::best(set.name, &set.fits, ranking::best(&set.ranked).map(|law| law.key));
     }
     text
 }
@@ -419,7 +419,7 @@ fn verdicts(set: &TableFits) -> String {
 }
 
 /// Formats a parameter: `links 25.46 ± 0.13`; without a standard error only its value.
-fn format_parameter(parameter: &FittedParameter) -> String {
+pub fn format_parameter(parameter: &FittedParameter) -> String {
     let name = parameter.name;
     let (unit, scale) = if parameter.unit == "Pa" { unit_of(parameter.value) } else { ("", 1.0) };
     let number = |value: f64| digits(value / scale, 6);

@@ -87,9 +87,10 @@ pub fn unusable(fit: &Fit) -> Option<String> {
     })
 }
 
-/// Formats the block of the eight-chain law with the least rms or, without such a law, of the best law. Laws
-/// whose parameters are all known to half of their size come first.
-pub fn best(data: &str, fits: &[Fit]) -> String {
+/// Formats the block of the law that a ranking puts first; without one, that of the eight-chain law with the
+/// least rms or, without such a law, of the best law. Laws whose parameters are all known to half of their
+/// size come first.
+pub fn best(data: &str, fits: &[Fit], ranked: Option<&str>) -> String {
     let known = |fit: &Fit| {
         let sure = |parameter: &FittedParameter| {
             parameter.standard_error.is_some_and(|error| HALF_WIDTH * error < parameter.value.abs())
@@ -99,7 +100,8 @@ pub fn best(data: &str, fits: &[Fit]) -> String {
     let usable = || fits.iter().filter(|fit| unusable(fit).is_none());
     let least = |a: &&Fit, b: &&Fit| a.rms.total_cmp(&b.rms);
     let chains = |fit: &&Fit| fit.model.key.starts_with(EIGHT_CHAINS) && known(fit);
-    let best = usable().filter(chains).min_by(least);
+    let best = usable().find(|fit| ranked == Some(fit.model.key));
+    let best = best.or_else(|| usable().filter(chains).min_by(least));
     let best =
         best.or_else(|| usable().filter(|fit| known(fit)).min_by(least)).or_else(|| usable().min_by(least));
     // indented lines are printed as they are

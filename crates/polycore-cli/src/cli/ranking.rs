@@ -6,15 +6,15 @@ use std::path::Path;
 
 use harness::case::Run;
 use harness::report::Report;
-use polycore::constitutive::hyperelastic::fit::Fit;
+use polycore::constitutive::hyperelastic::fit::{Fit, FittedParameter, Identifiability};
 use polycore::constitutive::hyperelastic::ranking::CrossValidation;
 use polycore::constitutive::hyperelastic::stability;
 use polycore::file::atomic_write;
 use polycore::{Error, constitutive};
 
 use super::data::DataSet;
-use super::fits::find_instability;
-use super::material::{digits, unusable};
+use super::fits::{find_instability, format_parameter};
+use super::material::digits;
 use super::quantities as q;
 
 /// Law with its errors in modes of deformation, relative to the largest stress of each.
@@ -35,11 +35,7 @@ const SAFE_ERROR: f64 = 0.1;
 ///
 /// # Errors
 /// [`constitutive::Error::Stopped`].
-pub fn rank(
-    set: &DataSet,
-    fits: &[Fit],
-    run: &Run,
-) -> Result<Vec<RankedLaw>, constitutive::Error> {
+pub fn rank(set: &DataSet, fits: &[Fit], run: &Run) -> Result<Vec<RankedLaw>, constitutive::Error> {
     let mut laws = Vec::new();
     for fit in fits.iter().filter(|_| !set.modes.is_empty()) {
         laws.push(RankedLaw {
@@ -55,15 +51,19 @@ pub fn rank(
     Ok(laws)
 }
 
+/// Finds a term that is absent, a parameter that the data do not determine, or an instability.
 fn obstacle(fit: &Fit, set: &DataSet) -> Option<String> {
-    let lost = stability::count_states_without_ellipticity(&fit.law, &set.table);
-    let unstable = || {
-        let (mode, stretch) = find_instability(fit, &set.table)?;
-        Some(format!("unstable in {} tests from {stretch:.3} on", mode.name()))
-    };
-    unusable(fit)
-        .or_else(|| (lost > 0).then(|| format!("not elliptic at {lost} of {} states", set.table.states.len())))
-        .or_else(unstable)
+    let open = |parameter: &&FittedParameter| parameter.identifiability != Identifiability::Determined;
+    if let Some(parameter) = fit.parameters.iter().find(open) {
+        return Some(format_parameter(parameter));
+    }
+    let (lost, states) =
+        (stability::count_states_without_ellipticity(&fit.law, &set.table), set.table.states.len());
+    if lost > 0 {
+        return Some(format!("not elliptic at {lost} of {states} states"));
+    }
+    let (mode, stretch) = find_instability(fit, &set.table)?;
+    Some(format!("unstable in {} tests from {stretch:.3} on", mode.name()))
 }
 
 /// Records the errors and the rank of each law.
@@ -131,9 +131,14 @@ pub fn table(set: &DataSet, laws: &[RankedLaw]) -> String {
     text
 }
 
+/// Returns the first law that predicts every mode and passes the checks.
+pub fn best(laws: &[RankedLaw]) -> Option<&RankedLaw> {
+    laws.iter().find(|law| law.obstacle.is_none() && law.found.worst().is_some())
+}
+
 /// Says which law to take, and which are safe after tests of one mode.
 pub fn advice(set: &DataSet, laws: &[RankedLaw]) -> String {
-    let Some(best) = laws.iter().find(|law| law.obstacle.is_none() && law.found.worst().is_some()) else {
+    let Some(best) = best(laws) else {
         return match laws {
             [] => String::new(),
             _ => format!("{}: no law to take: each fails a mode left out or a check\n", set.name),
