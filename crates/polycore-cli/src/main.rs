@@ -35,6 +35,7 @@ mod cli {
     pub mod time_block;
     pub mod time_fits;
     pub mod trials;
+    pub mod volumetric;
 }
 
 use cli::{deck, exact, fits, network, scene};

@@ -31,7 +31,7 @@ pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
                     let parameters = fit.parameters.iter();
                     let scale = |unit: &str| if unit == "Pa" { pascals } else { 1.0 };
                     let scaled: Vec<f64> = parameters.map(|of| of.value / scale(of.unit)).collect();
-                    let bulk = BULK_RATIO * fit.law.shear_modulus() / pascals;
+                    let bulk = set.bulk.modulus(fit.law.shear_modulus()) / pascals;
                     write!(
                         file,
                         "**\n** {} fitted to {}\n{}",

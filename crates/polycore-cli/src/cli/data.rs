@@ -6,7 +6,7 @@ use harness::scene::{SceneError, Source};
 use polycore::constitutive::hyperelastic::data::{Mode, TestData};
 use polycore::constitutive::hyperelastic::fit::neo_hookean_modulus;
 use polycore::constitutive::hyperelastic::ranking::{ModeTable, modes};
-use polycore::constitutive::hyperelastic::{StrainMeasure, TestFormat, TestStressMeasure};
+use polycore::constitutive::hyperelastic::{Deviation, StrainMeasure, TestFormat, TestStressMeasure};
 use serde::Deserialize;
 
 /// Table of homogeneous states.
@@ -41,6 +41,16 @@ pub struct TestTableSpec {
     /// Tests of a table with one stress component in each row, as the file names them: `["UT", "UC"]`.
     #[serde(default)]
     tests: Vec<String>,
+    /// Heading of the standard deviations of the stresses, in a unit of stress or in % of each: squares are
+    /// weighted by their reciprocal squares.
+    deviation_column: Option<String>,
+    /// Standard deviation of all stresses, `"0.02 MPa"`, of each as a share of it, `"2 %"`, or the root of the
+    /// sum of both squares, `"0.02 MPa + 2 %"`.
+    deviation: Option<String>,
+    /// Heading of weights of the squares.
+    weight_column: Option<String>,
+    /// Weight of the squares of this table among `tables` that are fitted at once.
+    weight: Option<f64>,
 }
 
 /// Table to be fitted.
@@ -53,6 +63,8 @@ pub struct DataSet {
     pub read: Vec<String>,
     /// Names of the tables of which it consists; none if it has a file.
     pub parts: Vec<String>,
+    /// Weight among tables that are fitted at once.
+    weight: f64,
     /// Modes of deformation that are left out in turn; none without `rank`.
     pub modes: Vec<ModeTable>,
 }
@@ -74,6 +86,9 @@ impl TestTableSpec {
             return Err(source.error(&key("name"), format!("`{}` a second time", self.name), "another name"));
         }
         let rank = self.rank;
+        if let Some(weight) = self.weight.filter(|weight| !(*weight > 0.0 && weight.is_finite())) {
+            return Err(source.error(&key("weight"), weight, "a number above 0"));
+        }
         let mut set = match &self.file {
             Some(_) if !self.tables.is_empty() => {
                 return Err(source.error(&key("tables"), "a `file`, too", "`file` or `tables`"));
@@ -93,6 +108,12 @@ impl TestTableSpec {
     }
 
     fn read_file(self, source: &Source, key: &dyn Fn(&str) -> String) -> Result<DataSet, SceneError> {
+        let deviation = |text: &String| {
+            Deviation::parse(text)
+                .map_err(|allowed| source.error(&key("deviation"), format!("`{text}`"), allowed))
+        };
+        let column = self.weight_column.as_ref().or(self.deviation_column.as_ref());
+        let weights = column.map(|name| format!("`{name}`")).or(self.deviation.clone());
         let format = TestFormat {
             mode: self.mode,
             strain: self.strain,
@@ -102,18 +123,24 @@ impl TestTableSpec {
             stress_column: self.stress_column,
             material: self.material.clone(),
             tests: self.tests,
+            weight_column: self.weight_column,
+            deviation_column: self.deviation_column,
+            deviation: self.deviation.as_ref().map(deviation).transpose()?,
         };
         let reading = TestData::read_as(source.file(&self.file.unwrap_or_default()), &format)
             .map_err(|error| source.refused(&key("file"), error))?;
-        let read = [vec![reading.description], reading.notes].concat();
+        let mut read = [vec![reading.description], reading.notes].concat();
         let mut table = reading.table;
+        if let Some(weights) = weights {
+            read.push(format!("squares weighted by {weights}"));
+        }
         if let Some(mode) = self.mode {
             table = table
                 .select(mode)
                 .map_err(|error| source.error(&key("mode"), error, "a test with a stress in the table"))?;
         }
-        let (parts, modes) = (Vec::new(), Vec::new());
-        Ok(DataSet { name: self.name, table, material: self.material, read, parts, modes })
+        let (parts, modes, weight) = (Vec::new(), Vec::new(), self.weight.unwrap_or(1.0));
+        Ok(DataSet { name: self.name, table, material: self.material, read, parts, weight, modes })
     }
 
     fn join(
@@ -131,6 +158,10 @@ impl TestTableSpec {
             self.stress_column.is_some(),
             self.material.is_some(),
             !self.tests.is_empty(),
+            self.weight_column.is_some(),
+            self.deviation_column.is_some(),
+            self.deviation.is_some(),
+            self.weight.is_some(),
         ];
         if self.tables.is_empty() || read.contains(&true) {
             let allowed = "the `file` of a table, or `tables` alone, names of tables above to fit at once";
@@ -153,13 +184,14 @@ impl TestTableSpec {
             }
             parts.push(part);
         }
-        let states = parts.iter().flat_map(|part| part.table.states.iter().copied()).collect();
+        let tables: Vec<(&TestData, f64)> = parts.iter().map(|part| (&part.table, part.weight)).collect();
         Ok(DataSet {
             name: self.name,
-            table: TestData { source: parts[0].table.source.clone(), states },
+            table: TestData::join(&tables).map_err(|error| source.refused(&key("tables"), error))?,
             material: parts[0].material.clone(),
             read: vec![format!("rows of {}", self.tables.join(", "))],
             parts: self.tables,
+            weight: 1.0,
             modes: Vec::new(),
         })
     }

@@ -44,6 +44,7 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
             crossed: Vec::new(),
             outside: Vec::new(),
             ranked: Vec::new(),
+            bulk: case.bulk(own),
         };
         for model in &case.laws {
             run.show(done / total, &|| format!("fit {name}  {}", model.key));
@@ -120,6 +121,8 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     for trial in &case.trials {
         trials::run(trial, &mut report)?;
     }
+    let volumes = case.volumetric.iter().map(|set| set.run(directory, &mut report));
+    let volumes = volumes.collect::<Result<Vec<_>, _>>()?;
     let networks = case.networks.iter().map(|set| set.run(directory, &mut report));
     let networks = networks.collect::<Result<Vec<_>, _>>()?;
     if !case.foams.is_empty() {
@@ -133,15 +136,19 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     let forecasts = forecasts.collect::<Result<Vec<_>, _>>()?;
     if !quick {
         phases.start("pictures");
-        for set in &all {
+        for (own, set) in case.data.iter().zip(&all) {
             draw::pictures(directory, set.name, set.table, &set.fits)?;
+            let best = ranking::best(&set.ranked).map(|law| law.key);
+            if let Some(fit) = set.fits.iter().find(|fit| Some(fit.model.key) == best) {
+                draw::every_mode(directory, set.name, &own.modes, fit, set.table.deviation)?;
+            }
         }
     }
     phases.stop();
     report.phases(&phases).threads(1).judge(&case.expect, quick);
     trials::judge(&case.trials, &mut report);
     let mut text = summary(case, &all, &timed, &report);
-    series.iter().chain(&networks).chain(&foams).chain(&forecasts).for_each(|part| text += part);
+    series.iter().chain(&volumes).chain(&networks).chain(&foams).chain(&forecasts).for_each(|part| text += part);
     for name in &report.non_finite {
         let _ = writeln!(text, "FAIL  {name} is not finite");
     }
@@ -197,6 +204,9 @@ fn record_fit(report: &mut Report, data: &str, table: &TestData, fit: &Fit) -> R
         }
     }
     record_agreement(report, &key, &Agreement::new(&fit.law, table)?);
+    if let Some(chi) = fit.chi {
+        report.value(q::CHI.named(&[&key]), chi);
+    }
     report.value(q::STABLE.named(&[&key]), f64::from(u8::from(find_instability(fit, table).is_none())));
     report.work(&format!("{key}.evaluations"), fit.iterations as u64);
     report.work(&format!("{key}.starts"), fit.starts.0 as u64);
@@ -226,6 +236,9 @@ fn write_fits(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
                 let _ = writeln!(text, "{data},{law},{quantity},{value},{error},{shown}");
             };
             line("rms", fit.rms, None, "Pa");
+            if let Some(chi) = fit.chi {
+                line("chi", chi, None, "");
+            }
             if let Some(r2) = Agreement::new(&fit.law, set.table)?.r2 {
                 line("r2", r2, None, "");
             }
@@ -316,7 +329,7 @@ fn summary(case: &FitCase, all: &[TableFits], timed: &str, report: &Report) -> S
             let list: Vec<String> = fit.parameters.iter().map(format_parameter).collect();
             let _ = writeln!(text, "  {:<22}{}", fit.model.key, list.join(", "));
         }
-        text += &material::best(set.name, &set.fits, ranking::best(&set.ranked).map(|law| law.key));
+        text += &material::best(set);
     }
     for trial in &report.trials {
         let verdict = if trial.passed { "pass" } else { "FAIL" };
@@ -363,7 +376,7 @@ fn remarks(case: &FitCase, all: &[TableFits]) -> String {
         for (law, why) in &set.failed {
             let _ = writeln!(text, "failed  {law} on {}: {why}", set.name);
         }
-        text += &material::best(set.name, &set.fits, ranking::best(&set.ranked).map(|law| law.key));
+        text += &material::best(set);
     }
     text
 }
@@ -402,6 +415,9 @@ fn verdicts(set: &TableFits) -> String {
             let unsafe_there = crossed.iter().any(|(_, _, found)| bad(found));
             let verdict = if unsafe_there { "unsafe outside" } else { "safe outside" };
             let _ = write!(text, "; {verdict} {}", set.name);
+        }
+        if let Some(chi) = fit.chi {
+            let _ = write!(text, "; χ {}", digits(chi, 3));
         }
         let lost = stability::count_states_without_ellipticity(&fit.law, set.table);
         if lost > 0 {

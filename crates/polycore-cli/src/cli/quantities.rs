@@ -5,6 +5,8 @@ harness::quantities! {
     /// fits with time; and of trials, `{trial}`.
     pub ALL:
     RMS = "{fit}.rms", "MPa", "root mean square of model − measurement";
+    CHI = "{fit}.chi", "", "with standard deviations of the stresses: root of χ² over the degrees of freedom; \
+                            far above 1, the law misses the tests";
     MAE = "{fit}.mae", "MPa", "mean of |model − measurement|";
     R2 = "{fit}.r2", "", "coefficient of determination 1 − Σr²/Σ(P − P̄)²";
     LOCKED = "{fit}.locked", "", "with `cross`: number of states of the other data beyond the locking \
@@ -65,6 +67,15 @@ harness::quantities! {
     FOAM_RELATIVE = "{foam}.{test}.relative", "", "the same over the largest measured stress of the test";
     FOAM_END = "{foam}.{test}.end", "MPa", "stress of the law at the strain of the largest measured stress";
     FOAM_PREDICTED = "{foam}.{test}.predicted", "", "as `relative`, of a law fitted to the other tests";
+}
+
+harness::quantities! {
+    /// Quantities of volumetric tests, `{volumetric}`.
+    pub VOLUMETRIC:
+    BULK = "{volumetric}.bulk_modulus", "MPa", "bulk modulus 2/D₁ of a volumetric test";
+    BULK_ERROR = "{volumetric}.bulk_modulus.standard_error", "MPa", "its standard error";
+    BULK_RMS = "{volumetric}.rms", "MPa", "root mean square of the pressure of the fit − measurement";
+    COMPLIANCE = "{volumetric}.D{i}", "1/MPa", "Dᵢ of the energy Σ (J − 1)²ⁱ/Dᵢ";
 }
 
 harness::quantities! {

@@ -15,6 +15,7 @@ use super::prony::{PronySet, PronySpec};
 use super::quantities as q;
 use super::time::{TimeCase, TimeSettings};
 use super::trials::FitTrial;
+use super::volumetric::{Bulk, VolumetricSet, VolumetricSpec};
 
 /// Scene as written in the file.
 #[derive(Deserialize, schemars::JsonSchema)]
@@ -40,6 +41,9 @@ struct Scene {
     /// Tables of polymer networks to predict.
     #[serde(default)]
     network: Vec<NetworkSpec>,
+    /// Volumetric tests, which give bulk moduli.
+    #[serde(default)]
+    volumetric: Vec<VolumetricSpec>,
     /// Foams to which compressible laws are fitted.
     #[serde(default)]
     foam: Vec<FoamSpec>,
@@ -74,7 +78,7 @@ struct FitSettings {
 
 /// JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
-    let quantities = [q::ALL, q::PRONY, q::NETWORKS, q::FOAMS, q::FORECASTS];
+    let quantities = [q::ALL, q::PRONY, q::NETWORKS, q::VOLUMETRIC, q::FOAMS, q::FORECASTS];
     harness::scene::schema("polycore", &quantities, |generator| vec![generator.subschema_for::<Scene>()])
 }
 
@@ -89,6 +93,7 @@ pub struct FitCase {
     pub prony: Vec<PronySet>,
     pub trials: Vec<FitTrial>,
     pub networks: Vec<NetworkSet>,
+    pub volumetric: Vec<VolumetricSet>,
     pub foams: Vec<FoamSet>,
     pub forecasts: Vec<ForecastSet>,
     pub expect: Vec<Expect>,
@@ -105,6 +110,7 @@ impl FitCase {
             prony,
             trial,
             network,
+            volumetric,
             foam,
             forecast,
             expect,
@@ -133,19 +139,24 @@ impl FitCase {
         if data.is_empty()
             && time.is_none()
             && series.is_empty()
+            && volumetric.is_empty()
             && [trial.is_empty(), network.is_empty(), foam.is_empty(), forecast.is_empty()] == [true; 4]
         {
             return Err(source.error(
                 "fit.data",
                 "no data",
                 "at least one `[[fit.data]]` with `name` and `file`, `[time]`, `[[prony]]`, `[[trial]]`, \
-                 `[[network]]`, `[[foam]]` or `[[forecast]]`",
+                 `[[network]]`, `[[volumetric]]`, `[[foam]]` or `[[forecast]]`",
             ));
         }
         super::trials::check(source, &trial)?;
         let mut networks: Vec<NetworkSet> = Vec::new();
         for (i, spec) in network.into_iter().enumerate() {
             networks.push(spec.read(source, i, &networks)?);
+        }
+        let mut volumes: Vec<VolumetricSet> = Vec::new();
+        for (i, spec) in volumetric.into_iter().enumerate() {
+            volumes.push(spec.read(source, i, &volumes)?);
         }
         let mut foams: Vec<FoamSet> = Vec::new();
         for (i, spec) in foam.into_iter().enumerate() {
@@ -156,7 +167,7 @@ impl FitCase {
             forecasts.push(spec.read(source, i, &forecasts)?);
         }
         let (source, cross) = (source.clone(), fit.cross);
-        let (prony, trials) = (series, trial);
+        let (prony, trials, volumetric) = (series, trial, volumes);
         let case = Self {
             source,
             title,
@@ -167,6 +178,7 @@ impl FitCase {
             prony,
             trials,
             networks,
+            volumetric,
             foams,
             forecasts,
             expect,
@@ -193,6 +205,7 @@ impl FitCase {
             .networks
             .iter()
             .map(NetworkSet::plan)
+            .chain(self.volumetric.iter().map(VolumetricSet::plan))
             .chain(self.foams.iter().map(FoamSet::plan))
             .chain(self.forecasts.iter().map(ForecastSet::plan))
         {
@@ -209,13 +222,16 @@ impl FitCase {
         let of_fits = "fits.csv, <data>_states.csv, materials.toml, pictures (not with --quick), ";
         let mut files = if self.data.is_empty() { "" } else { of_fits }.to_owned();
         if self.data.iter().any(|set| !set.modes.is_empty()) {
-            files += "<data>_ranking.csv, ";
+            files += "<data>_ranking.csv, <data>_modes.png (not with --quick), ";
         }
         if !self.networks.is_empty() {
             files += "<network>_networks.csv, ";
         }
         if !self.prony.is_empty() {
             files += "<prony>_prony.csv, <prony>_curve.csv, <prony>_branches.toml, <prony>_prony.inp, ";
+        }
+        if !self.volumetric.is_empty() {
+            files += "<volumetric>_volumetric.csv, ";
         }
         if !self.foams.is_empty() {
             files += "<foam>_foam.csv, <foam>_foam.inp, ";
@@ -241,16 +257,25 @@ impl FitCase {
         self.data.iter().filter(move |other| self.cross && other.name != name && other.material == material)
     }
 
+    /// Bulk modulus of laws fitted to `set`: of a volumetric test of its material, or assumed.
+    pub fn bulk(&self, set: &DataSet) -> Bulk<'_> {
+        let own = self.volumetric.iter().find(|test| test.material == set.material);
+        own.map_or(Bulk::Assumed, Bulk::Measured)
+    }
+
     /// Lists the names of all scalars of the report.
     fn quantities(&self) -> Vec<String> {
         let mut names = Vec::new();
-        for set @ DataSet { name: data, .. } in &self.data {
+        for set @ DataSet { name: data, table, .. } in &self.data {
             for model in &self.laws {
                 let fit = format!("{data}.{}", model.key);
                 let own = [q::RMS, q::MAE, q::R2, q::SHEAR_MODULUS, q::STABLE, q::FAILED];
                 names.extend(own.map(|quantity| quantity.named(&[&fit]).name));
+                names.extend(table.deviation.map(|_| q::CHI.named(&[&fit]).name));
                 let parameters = model.parameters.iter().map(|parameter| parameter.name);
-                names.extend(parameters.map(|parameter| q::PARAMETER.named(&[&fit, parameter]).name));
+                for quantity in [q::PARAMETER, q::STANDARD_ERROR] {
+                    names.extend(parameters.clone().map(|parameter| quantity.named(&[&fit, parameter]).name));
+                }
                 names.extend(super::ranking::quantities(set, model.key));
                 for other in self.others(set) {
                     let fit = format!("{fit}.{}", other.name);
@@ -271,6 +296,7 @@ impl FitCase {
         for set in &self.networks {
             names.extend(set.quantities());
         }
+        names.extend(self.volumetric.iter().flat_map(VolumetricSet::quantities));
         for set in &self.foams {
             names.extend(set.quantities());
         }

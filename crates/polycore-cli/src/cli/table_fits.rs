@@ -4,6 +4,7 @@ use polycore::constitutive::hyperelastic::data::TestData;
 use polycore::constitutive::hyperelastic::fit::{Agreement, Fit};
 
 use super::ranking::RankedLaw;
+use super::volumetric::Bulk;
 
 /// Fits to one table.
 pub struct TableFits<'a> {
@@ -20,6 +21,8 @@ pub struct TableFits<'a> {
     pub outside: Vec<(&'a str, usize, usize)>,
     /// Laws by their predictions of modes left out; none without `rank`.
     pub ranked: Vec<RankedLaw>,
+    /// Bulk modulus of its blocks and cards.
+    pub bulk: Bulk<'a>,
 }
 
 impl TableFits<'_> {

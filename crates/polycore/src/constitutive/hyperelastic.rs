@@ -41,6 +41,7 @@ mod principal;
 mod columns;
 #[cfg(feature = "tables")]
 mod components;
+pub mod bulk;
 mod coverage;
 #[cfg(feature = "tables")]
 mod curves;
@@ -59,6 +60,8 @@ pub mod stability;
 #[cfg(feature = "tables")]
 mod table;
 mod van_der_waals;
+#[cfg(feature = "tables")]
+mod weights;
 mod yeoh;
 
 pub use arruda_boyce::ArrudaBoyce;
@@ -81,6 +84,8 @@ pub use principal::PrincipalResponse;
 #[cfg(feature = "tables")]
 pub use table::{ImportedTest, TestFormat};
 pub use van_der_waals::VanDerWaals;
+#[cfg(feature = "tables")]
+pub use weights::Deviation;
 pub use yeoh::Yeoh;
 
 /// An isotropic hyperelastic law. Stresses and moduli in Pa, energies in J/m³.

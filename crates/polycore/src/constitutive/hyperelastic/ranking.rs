@@ -40,7 +40,7 @@ pub fn modes(table: &TestData) -> Vec<ModeTable> {
         match found.iter_mut().find(|one| one.mode == mode) {
             Some(one) => one.table.states.push(*state),
             None => {
-                let table = TestData { source: table.source.clone(), states: vec![*state] };
+                let table = TestData { states: vec![*state], ..table.clone() };
                 found.push(ModeTable { mode, table });
             }
         }
@@ -84,7 +84,7 @@ impl CrossValidation {
                 modes.iter().enumerate().filter(move |(i, _)| fitted(*i) == wanted).map(|(_, mode)| mode)
             };
             let states = part(true).flat_map(|mode| mode.table.states.iter().copied()).collect();
-            let table = TestData { source: String::new(), states };
+            let table = TestData::new(String::new(), states);
             match fit_until(model, &table, stop) {
                 Ok(fit) => Ok(worst(part(false).map(|mode| mode.error(&fit.law)))),
                 Err(Error::Stopped) => Err(Error::Stopped),
@@ -115,7 +115,7 @@ mod tests {
     use crate::constitutive::hyperelastic::{homogeneous, model};
 
     fn state(mode: Mode, stretches: [f64; 2], nominal: [f64; 2]) -> TestState {
-        TestState { mode, stretches, nominal }
+        TestState::new(mode, stretches, nominal)
     }
 
     #[test]
@@ -132,10 +132,8 @@ mod tests {
             (Mode::Biaxial, [2.0, 1.5], [1.0, 0.5], "biaxial"),
             (Mode::Difference, [2.0, 1.0], [1.0, 0.0], "biaxial"),
         ];
-        let table = TestData {
-            source: String::new(),
-            states: states.iter().map(|(mode, l, p, _)| state(*mode, *l, *p)).collect(),
-        };
+        let states = states.iter().map(|(mode, l, p, _)| state(*mode, *l, *p)).collect();
+        let table = TestData::new(String::new(), states);
         let found = modes(&table);
         let shown: Vec<_> = found.iter().map(|one| (one.mode, one.table.states.len())).collect();
         let expected =
@@ -156,7 +154,7 @@ mod tests {
                 state(Mode::Equibiaxial, [l, l], [sheet(l), 0.0]),
             ]
         });
-        let table = TestData { source: String::new(), states: states.collect() };
+        let table = TestData::new(String::new(), states.collect());
         let modes = modes(&table);
         let found = CrossValidation::new(model("neo-hookean").unwrap(), &modes, &|| false).unwrap();
         let rms = |a: f64, b: f64| (0.5 * (a * a + b * b)).sqrt();
