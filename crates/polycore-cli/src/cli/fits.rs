@@ -105,6 +105,7 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
         write_fits(directory, &all)?;
         material::write(directory, &all)?;
         card::write(directory, &all)?;
+        card::write_hosts(directory, &all, &case.cards)?;
     }
     if stopped {
         return Err(run.interruption());
@@ -148,7 +149,13 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     report.phases(&phases).threads(1).judge(&case.expect, quick);
     trials::judge(&case.trials, &mut report);
     let mut text = summary(case, &all, &timed, &report);
-    series.iter().chain(&volumes).chain(&networks).chain(&foams).chain(&forecasts).for_each(|part| text += part);
+    series
+        .iter()
+        .chain(&volumes)
+        .chain(&networks)
+        .chain(&foams)
+        .chain(&forecasts)
+        .for_each(|part| text += part);
     for name in &report.non_finite {
         let _ = writeln!(text, "FAIL  {name} is not finite");
     }

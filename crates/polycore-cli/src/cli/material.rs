@@ -44,12 +44,8 @@ fn block(fit: &Fit, bulk: Bulk) -> String {
     let mut text = format!("[material.solid] # {}, rms {rms}\n", fit.model.key);
     let _ = writeln!(text, "law = \"correspondence\"");
     let _ = writeln!(text, "[material.solid.constitutive]\nmodel = \"{}\"", fit.model.key);
-    let _ = writeln!(
-        text,
-        "bulk_modulus = \"{}\" # {}",
-        stress(bulk.modulus(shear), DIGITS),
-        bulk.origin(shear)
-    );
+    let _ =
+        writeln!(text, "bulk_modulus = \"{}\" # {}", stress(bulk.modulus(shear), DIGITS), bulk.origin(shear));
     text += "[material.solid.constitutive.parameters]\n";
     for parameter in &fit.parameters {
         let is_stress = parameter.unit == "Pa";
@@ -109,7 +105,8 @@ pub fn best(set: &TableFits) -> String {
     let best =
         best.or_else(|| usable().filter(|fit| known(fit)).min_by(least)).or_else(|| usable().min_by(least));
     // indented lines are printed as they are
-    let indented = |fit: &Fit| block(fit, set.bulk).lines().map(|line| format!("  {line}\n")).collect::<String>();
+    let indented =
+        |fit: &Fit| block(fit, set.bulk).lines().map(|line| format!("  {line}\n")).collect::<String>();
     best.map_or_else(String::new, |fit| format!("for a scene of peri, from {data}:\n{}", indented(fit)))
 }
 

@@ -15,7 +15,7 @@ harness::quantities! {
                                     distribution, i.e. outside the strains that the data of the fit cover";
     STABLE = "{fit}.stable", "", "1 if the law is stable (Drucker) in uniaxial, equibiaxial and pure shear \
                                   tests over the stretches of its data, else 0";
-    RANK = "{fit}.rank", "", "with `rank`: place of the law by its largest error in a mode of deformation left out";
+    RANK = "{fit}.rank", "", "with `rank`: place of the law by its largest error in a mode left out";
     LEFT_OUT = "{fit}.left_out", "", "with `rank`: that largest error";
     MODE_LEFT_OUT = "{fit}.{mode}.left_out", "", "with `rank`: error in a mode of a fit to all others, \
                                                   rms over the largest stress of the mode";

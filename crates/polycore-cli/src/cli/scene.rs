@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use harness::report::Expect;
 use harness::scene::{SceneError, Source};
+use polycore::constitutive::hyperelastic::host::Host;
 use polycore::constitutive::hyperelastic::{self, MODELS, ModelDescriptor};
 use serde::Deserialize;
 
@@ -71,6 +72,9 @@ struct FitSettings {
     /// Judge a law fitted to one table on the other tables of the same `material`, too.
     #[serde(default)]
     cross: bool,
+    /// Programs for which materials are written beside those of Abaqus and CalculiX.
+    #[serde(default)]
+    cards: Vec<Host>,
     /// Tables of measurements.
     #[serde(default)]
     data: Vec<TestTableSpec>,
@@ -88,6 +92,8 @@ pub struct FitCase {
     pub title: String,
     pub laws: Vec<&'static ModelDescriptor>,
     pub cross: bool,
+    /// Programs for which materials are written.
+    pub cards: Vec<Host>,
     pub data: Vec<DataSet>,
     pub time: Option<TimeCase>,
     pub prony: Vec<PronySet>,
@@ -166,13 +172,14 @@ impl FitCase {
         for (i, spec) in forecast.into_iter().enumerate() {
             forecasts.push(spec.read(source, i, &forecasts)?);
         }
-        let (source, cross) = (source.clone(), fit.cross);
+        let (source, cross, cards) = (source.clone(), fit.cross, fit.cards);
         let (prony, trials, volumetric) = (series, trial, volumes);
         let case = Self {
             source,
             title,
             laws,
             cross,
+            cards,
             data,
             time,
             prony,
@@ -221,6 +228,9 @@ impl FitCase {
         self.prony.iter().for_each(|set| text += &format!("{}\n", set.plan()));
         let of_fits = "fits.csv, <data>_states.csv, materials.toml, pictures (not with --quick), ";
         let mut files = if self.data.is_empty() { "" } else { of_fits }.to_owned();
+        for host in &self.cards {
+            files += &format!("materials_mm.{0}, materials_si.{0}, ", host.extension());
+        }
         if self.data.iter().any(|set| !set.modes.is_empty()) {
             files += "<data>_ranking.csv, <data>_modes.png (not with --quick), ";
         }

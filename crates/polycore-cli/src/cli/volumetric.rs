@@ -109,13 +109,19 @@ impl Bulk<'_> {
 impl VolumetricSet {
     /// Describes what a run will do, in a line.
     pub fn plan(&self) -> String {
-        format!("volumetric {}: {} states, {} terms", self.name, self.states.len(), self.fit.compliances.len())
+        format!(
+            "volumetric {}: {} states, {} terms",
+            self.name,
+            self.states.len(),
+            self.fit.compliances.len()
+        )
     }
 
     /// Lists the names of its scalars.
     pub fn quantities(&self) -> Vec<String> {
         let own = [q::BULK, q::BULK_ERROR, q::BULK_RMS].map(|quantity| quantity.named(&[&self.name]).name);
-        let terms = (1..=self.fit.compliances.len()).map(|i| q::COMPLIANCE.named(&[&self.name, &i.to_string()]).name);
+        let terms =
+            (1..=self.fit.compliances.len()).map(|i| q::COMPLIANCE.named(&[&self.name, &i.to_string()]).name);
         own.into_iter().chain(terms).collect()
     }
 
@@ -140,8 +146,8 @@ impl VolumetricSet {
         atomic_write(directory.join(format!("{}_volumetric.csv", self.name)), |file| {
             writeln!(file, "J,pressure_MPa,fitted_MPa")?;
             self.states.iter().try_for_each(|state| {
-                let [measured, fitted] =
-                    [state.pressure, fit.pressure(state.ratio)].map(|pressure| digits(pressure / MPA, DIGITS));
+                let [measured, fitted] = [state.pressure, fit.pressure(state.ratio)]
+                    .map(|pressure| digits(pressure / MPA, DIGITS));
                 writeln!(file, "{},{measured},{fitted}", state.ratio)
             })
         })?;

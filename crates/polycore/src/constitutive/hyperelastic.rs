@@ -37,11 +37,11 @@ mod ogden_starts;
 mod polynomial;
 mod principal;
 
+pub mod bulk;
 #[cfg(feature = "tables")]
 mod columns;
 #[cfg(feature = "tables")]
 mod components;
-pub mod bulk;
 mod coverage;
 #[cfg(feature = "tables")]
 mod curves;
@@ -53,6 +53,7 @@ pub mod foam;
 mod foam_table;
 pub mod forecast;
 pub mod homogeneous;
+pub mod host;
 #[cfg(feature = "tables")]
 mod plausible;
 pub mod ranking;

@@ -46,12 +46,14 @@ impl VolumetricFit {
             return Err(refused(format!("{} states away from rest for {terms} terms", states.len())));
         }
         let column = |i: usize| {
-            let power = |state: &&VolumetricState| -2.0 * i as f64 * (state.ratio - 1.0).powi(2 * i as i32 - 1);
+            let power =
+                |state: &&VolumetricState| -2.0 * i as f64 * (state.ratio - 1.0).powi(2 * i as i32 - 1);
             DVector::from_iterator(states.len(), states.iter().map(power))
         };
         let columns: Vec<DVector<f64>> = (1..=terms).map(column).collect();
         let norms: Vec<f64> = columns.iter().map(|column| column.norm()).collect();
-        let scaled: Vec<DVector<f64>> = columns.iter().zip(&norms).map(|(column, norm)| column / *norm).collect();
+        let scaled: Vec<DVector<f64>> =
+            columns.iter().zip(&norms).map(|(column, norm)| column / *norm).collect();
         let (matrix, data) = (
             DMatrix::from_columns(&scaled),
             DVector::from_iterator(states.len(), states.iter().map(|state| state.pressure)),
@@ -111,7 +113,11 @@ impl VolumetricState {
             let share = ratios.quantity(value(column)?).map(|ratio| ratio.si());
             let ratio = rest + share.map_err(|error| file.refuse_cell(row, column, &error.to_string()))?;
             if ratio <= 0.0 {
-                return Err(file.refuse_cell(row, column, "a ratio of volumes above 0, a strain above −100 %"));
+                return Err(file.refuse_cell(
+                    row,
+                    column,
+                    "a ratio of volumes above 0, a strain above −100 %",
+                ));
             }
             states.push(Self { ratio, pressure });
         }
@@ -132,11 +138,16 @@ mod tests {
     fn one_term_in_closed_form() {
         let points = [(1.0, 0.0), (0.995, 10.2e6), (0.99, 19.9e6), (0.98, 40.3e6), (1.002, -4.1e6)];
         let found = VolumetricFit::new(&states(&points), 1).unwrap();
-        let sum = |of: &dyn Fn(f64, f64) -> f64| points[1..].iter().map(|(j, p)| of(j - 1.0, *p)).sum::<f64>();
+        let sum =
+            |of: &dyn Fn(f64, f64) -> f64| points[1..].iter().map(|(j, p)| of(j - 1.0, *p)).sum::<f64>();
         let squares = sum(&|x, _| x * x);
         let bulk = -sum(&|x, p| x * p) / squares;
         let error = (sum(&|x, p| (p + bulk * x).powi(2)) / 3.0 / squares).sqrt();
-        let worst = [found.bulk / bulk - 1.0, found.bulk_error.unwrap() / error - 1.0, found.compliances[0] * bulk / 2.0 - 1.0];
+        let worst = [
+            found.bulk / bulk - 1.0,
+            found.bulk_error.unwrap() / error - 1.0,
+            found.compliances[0] * bulk / 2.0 - 1.0,
+        ];
         let worst = worst.into_iter().map(f64::abs).fold(0.0, f64::max);
         evidence::at_most("bulk modulus of a volumetric test against its closed form, relative", worst, 1e-9);
         assert!((found.pressure(0.99) / (0.01 * bulk) - 1.0).abs() < 1e-12);
@@ -178,7 +189,10 @@ mod tests {
         let expected = states(&[(0.98, 4e7)]);
         for text in ["J,pressure [MPa]\n0.98,40\n", "pressure/kPa;volumetric strain [%]\n40000;-2\n"] {
             let found = read(text).unwrap();
-            assert!((found[0].ratio - 0.98).abs() < 1e-12 && found[0].pressure == expected[0].pressure, "{found:?}");
+            assert!(
+                (found[0].ratio - 0.98).abs() < 1e-12 && found[0].pressure == expected[0].pressure,
+                "{found:?}"
+            );
         }
         for (text, part) in [
             ("J,pressure\n1,1\n", "unit of column 2, `pressure`"),

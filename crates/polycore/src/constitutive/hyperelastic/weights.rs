@@ -198,7 +198,10 @@ mod tests {
         assert!((both.deviation.unwrap() / both.states[3].roots[0] / 45e3 - 1.0).abs() < 1e-12);
         let one = TestFormat { deviation: Deviation::parse("3 kPa").ok(), ..TestFormat::default() };
         let same = read(&one);
-        assert!((same.deviation.unwrap() / 3e3 - 1.0).abs() < 1e-12 && (same.states[3].roots[0] - 1.0).abs() < 1e-15);
+        assert!(
+            (same.deviation.unwrap() / 3e3 - 1.0).abs() < 1e-12
+                && (same.states[3].roots[0] - 1.0).abs() < 1e-15
+        );
     }
 
     /// Tables of one law and two moduli: the mean that the weights give.
