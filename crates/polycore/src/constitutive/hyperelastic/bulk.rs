@@ -196,9 +196,9 @@ mod tests {
         }
         for (text, part) in [
             ("J,pressure\n1,1\n", "unit of column 2, `pressure`"),
-            ("J,pressure [MPa]\n0,1\n", "line 2: column 1, `J`: found `0`"),
+            ("J,pressure [MPa]\n0,1\n", "v.csv:2: column 1, `J`: found \"0\""),
             ("ratio,pressure [MPa]\n1,1\n", "one column `J [unit]`"),
-            ("J,pressure [MPa]\nx,1\n", "line 2"),
+            ("J,pressure [MPa]\nx,1\n", "v.csv:2: column 1, `J`: found \"x\""),
         ] {
             let error = read(text).unwrap_err();
             assert!(error.contains(part), "{error}");

@@ -95,29 +95,18 @@ impl WeightSource {
     /// # Errors
     /// A cell that is no number, or not above 0.
     pub fn root(&self, file: &Table, row: usize, stress: f64) -> Result<f64, Error> {
-        let (column, allowed, deviation) = match self {
+        let above = "a standard deviation above 0";
+        let (column, allowed, root) = match self {
             Self::One(deviation) => return Ok(deviation.of(stress).recip()),
-            Self::Weights(column) => (*column, "a weight above 0", None),
+            Self::Weights(column) => (*column, "a weight above 0", file.number(row, *column)?.sqrt()),
             Self::Stresses(column, unit) => {
-                let size = unit.quantity(file.number(row, *column)?).map(|stress| stress.si());
-                (
-                    *column,
-                    "a standard deviation above 0",
-                    size.ok().map(|stress| Deviation { stress, share: 0.0 }),
-                )
+                let size = unit.quantity(file.number(row, *column)?).map_or(f64::NAN, |size| size.si());
+                (*column, above, size.recip())
             }
             Self::Shares(column, unit) => {
-                let size = unit.quantity(file.number(row, *column)?).map(|ratio| ratio.si());
-                (
-                    *column,
-                    "a standard deviation above 0",
-                    size.ok().map(|share| Deviation { stress: 0.0, share }),
-                )
+                let share = unit.quantity(file.number(row, *column)?).map_or(f64::NAN, |share| share.si());
+                (*column, above, (share * stress.abs()).recip())
             }
-        };
-        let root = match deviation {
-            Some(deviation) => deviation.of(stress).recip(),
-            None => file.number(row, column)?.sqrt(),
         };
         let valid = root > 0.0 && root.is_finite();
         if valid { Ok(root) } else { Err(file.refuse_cell(row, column, allowed)) }
