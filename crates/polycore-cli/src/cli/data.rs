@@ -127,7 +127,7 @@ impl TestTableSpec {
             deviation_column: self.deviation_column,
             deviation: self.deviation.as_ref().map(deviation).transpose()?,
         };
-        let reading = TestData::read_as(source.file(&self.file.unwrap_or_default()), &format)
+        let reading = TestData::read_as(source.file(self.file.unwrap_or_default()), &format)
             .map_err(|error| source.refused(&key("file"), error))?;
         let mut read = [vec![reading.description], reading.notes].concat();
         let mut table = reading.table;
