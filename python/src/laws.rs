@@ -227,14 +227,12 @@ pub fn fit_law<'py>(
         for row in rows.as_array().rows() {
             let state = match (mode, row.as_slice()) {
                 (Mode::Biaxial, Some(&[first, second, p, q])) => {
-                    TestState { mode, stretches: [first, second], nominal: [p, q] }
+                    TestState::new(mode, [first, second], [p, q])
                 }
                 (Mode::SimpleShear, Some(&[amount, stress])) => TestState::simple_shear(amount, stress),
-                (_, Some(&[stretch, nominal])) if mode != Mode::Biaxial => TestState {
-                    mode,
-                    stretches: [stretch, mode.second_stretch(stretch)],
-                    nominal: [nominal, 0.0],
-                },
+                (_, Some(&[stretch, nominal])) if mode != Mode::Biaxial => {
+                    TestState::new(mode, [stretch, mode.second_stretch(stretch)], [nominal, 0.0])
+                }
                 _ => {
                     return Err(value(format!(
                         "{name}: found {} columns; allowed: 2, of biaxial tests 4",
@@ -246,7 +244,7 @@ pub fn fit_law<'py>(
             states.push(state);
         }
     }
-    let table = TestData { source: String::new(), states };
+    let table = TestData::new(String::new(), states);
     let model = hyperelastic::any_model(key).map_err(value)?;
     let found = stoppable(py, |stop| fit::fit_until(model, &table, &|| stop.load(Ordering::Relaxed)))?;
     let found = found.map_err(value)?;

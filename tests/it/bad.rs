@@ -1,8 +1,8 @@
 //! Malformed and absurd input: exit code 2, the message that helps, nothing written, no panic.
 //!
-//! Each scene is a patch of a valid one, with its fault and its message: `tests/bad/peri.txt` and
-//! `crystfem.txt`, whose heads describe the format; the valid scenes are in `tests/bad/peri/` and
-//! `crystfem/`.
+//! Each scene is a patch of a valid one, with its fault and its message: `tests/bad/peri.txt`, `crystfem.txt`
+//! and `polycore.txt`, whose heads describe the format; the valid scenes are in `tests/bad/peri/`, `crystfem/`
+//! and `polycore/`.
 
 use crate::program::{Ended, command, executable, finish, peri, workspace};
 use crate::scenes;
@@ -19,6 +19,11 @@ fn every_bad_scene_gets_its_message() {
 #[test]
 fn every_bad_scene_of_a_part_gets_its_message() {
     judge_all("crystfem", 123);
+}
+
+#[test]
+fn every_bad_scene_of_a_fit_gets_its_message() {
+    judge_all("polycore", 20);
 }
 
 /// Scene with one fault.

@@ -15,6 +15,7 @@ mod cli {
     pub const MPA: f64 = 1e6;
 
     pub mod card;
+    pub mod data;
     pub mod deck;
     pub mod draw;
     pub mod exact;
@@ -27,12 +28,14 @@ mod cli {
     pub mod prony;
     pub mod prony_files;
     pub mod quantities;
+    pub mod ranking;
     pub mod scene;
     pub mod table_fits;
     pub mod time;
     pub mod time_block;
     pub mod time_fits;
     pub mod trials;
+    pub mod volumetric;
 }
 
 use cli::{deck, exact, fits, network, scene};

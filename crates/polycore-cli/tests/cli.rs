@@ -404,6 +404,42 @@ fn cross_ends_in_a_verdict() {
     assert!(fits.contains("bar,ogden-1,r2.sheet,-"), "{fits}");
 }
 
+/// `rank` on two files fitted at once: of bodies of one modulus the neo-Hookean law predicts each mode left
+/// out, and is taken for its single parameter.
+#[test]
+fn laws_are_ranked_by_modes_left_out() {
+    let scene = "version = 1\nprogram = \"polycore\"\n[fit]\nlaws = [\"yeoh\", \"neo-hookean\"]\n\
+                 [[fit.data]]\nname = \"bar\"\nfile = \"bar.csv\"\n\
+                 [[fit.data]]\nname = \"sheet\"\nfile = \"sheet.csv\"\nmode = \"equibiaxial\"\n\
+                 [[fit.data]]\nname = \"both\"\ntables = [\"bar\", \"sheet\"]\nrank = true\n";
+    let (folder, scene) = folder(scene);
+    let bar = neo_hookean("MPa", 0.5, [1.5, 2.0, 3.0, 4.0]);
+    // 1 % stiffer as a sheet
+    let sheet = [1.5_f64, 2.0, 3.0].iter().fold("stretch,nominal_MPa\n".to_owned(), |text, l| {
+        format!("{text}{l},{}\n", 0.505 * (l - l.powi(-5)))
+    });
+    std::fs::write(folder.path().join("bar.csv"), bar).unwrap();
+    std::fs::write(folder.path().join("sheet.csv"), sheet).unwrap();
+    let result = run(&scene, &folder.path().join("out"));
+    let shown = text(&result.stdout);
+    assert_eq!(result.status.code(), Some(0), "{shown}{}", text(&result.stderr));
+    for part in ["both: take neo-hookean", "laws ranked on both", "both: rows of bar, sheet"] {
+        assert!(shown.contains(part), "{shown}");
+    }
+    let report = Report::read(folder.path().join("out/report.json")).unwrap();
+    assert_eq!(report.scalar("both.neo-hookean.rank"), Some(1.0));
+    // a modulus 1 % off, over the largest of three stresses
+    let stresses = [1.5_f64, 2.0, 3.0].map(|l| l - l.powi(-5));
+    let rms = (stresses.iter().map(|p| p * p).sum::<f64>() / 3.0).sqrt() / stresses[2];
+    let found = report.scalar("both.neo-hookean.equibiaxial.left_out").unwrap();
+    assert!((found / (0.005 / 0.505 * rms) - 1.0).abs() < 1e-4, "{found}");
+    assert_eq!(report.scalar("both.neo-hookean.uniaxial.alone"), Some(found));
+    assert_eq!(report.scalar("bar.neo-hookean.rank"), None);
+    let csv = std::fs::read_to_string(folder.path().join("out/both_ranking.csv")).unwrap();
+    assert!(csv.starts_with("rank,law,parameters,left_out_largest,left_out_uniaxial"), "{csv}");
+    assert_eq!(csv.lines().nth(1).map(|line| line.starts_with("1,neo-hookean,1,")), Some(true), "{csv}");
+}
+
 /// Names used by other programs lead to the law of this one.
 #[test]
 fn laws_of_other_names_get_advice() {

@@ -37,6 +37,57 @@ fn cards_return_as_blocks() {
     }
 }
 
+/// The bulk modulus of a volumetric test, 20 MPa at J = 0.99: 2 GPa, in block, card and deck.
+#[test]
+fn a_volumetric_test_gives_the_bulk_modulus() {
+    let folder = tempfile::tempdir().unwrap();
+    let [scene, output, cards] = ["case.toml", "out", "out/materials_mm.inp"]
+        .map(|name| folder.path().join(name).display().to_string());
+    std::fs::write(&scene, format!("{SCENE}[[volumetric]]\nname = \"bulk\"\nfile = \"bulk.csv\"\n")).unwrap();
+    std::fs::write(folder.path().join("bar.csv"), BAR).unwrap();
+    std::fs::write(folder.path().join("bulk.csv"), "pressure [MPa],J\n0,1\n20,0.99\n40,0.98\n").unwrap();
+    let result = polycore(&["run", &scene, "--output", &output, "--verbose"]);
+    let shown = String::from_utf8_lossy(&result.stdout);
+    assert!(result.status.success(), "{}", String::from_utf8_lossy(&result.stderr));
+    assert!(shown.contains("volumetric bulk: K 2.000000 GPa ± "), "{shown}");
+    let read = |name: &str| std::fs::read_to_string(folder.path().join("out").join(name)).unwrap();
+    assert!(read("materials.toml").contains("bulk_modulus = \"2.000000 GPa\" # volumetric test `bulk`"));
+    assert!(read("materials_mm.inp").contains("; K: volumetric test `bulk`"), "{}", read("materials_mm.inp"));
+    assert_eq!(read("bulk_volumetric.csv").lines().count(), 4);
+    let shown = polycore(&["deck", &cards]);
+    assert_eq!(value(&String::from_utf8_lossy(&shown.stdout), "bulk_modulus"), 2.0);
+}
+
+/// Materials of other programs, in both units, and a law that LS-DYNA does not have.
+#[test]
+fn materials_of_other_programs() {
+    let folder = tempfile::tempdir().unwrap();
+    let [scene, output] = ["case.toml", "out"].map(|name| folder.path().join(name).display().to_string());
+    let laws = "cards = [\"ansys\", \"ls-dyna\", \"febio\"]\nlaws = [\"neo-hookean\", \"arruda-boyce\"]";
+    std::fs::write(&scene, SCENE.replace("laws = [\"neo-hookean\"]", laws)).unwrap();
+    let law = |l: f64| 0.5 * (l - l.powi(-2)) * (1.0 + 0.02 * (l * l + 2.0 / l - 3.0));
+    let rows: String = [1.5, 2.0, 3.0, 4.0].iter().map(|l| format!("{l},{}\n", law(*l))).collect();
+    std::fs::write(folder.path().join("bar.csv"), format!("stretch,nominal_MPa\n{rows}")).unwrap();
+    let result = polycore(&["run", &scene, "--output", &output]);
+    assert!(result.status.success(), "{}", String::from_utf8_lossy(&result.stderr));
+    let read = |name: &str| std::fs::read_to_string(folder.path().join("out").join(name)).unwrap();
+    for (name, parts) in [
+        ("materials_mm.mac", &["! units mm, N, MPa", "TB,HYPER,1,1,1,NEO", "TB,HYPER,2,1,1,BOYCE"][..]),
+        ("materials_si.mac", &["! units m, N, Pa", "100 times the shear modulus"]),
+        ("materials_mm.k", &["*MAT_077_H+", "$ LS-DYNA has no law `arruda-boyce`"]),
+        ("materials_si.feb", &["type=\"Mooney-Rivlin\"", "<!-- FEBio has no law `arruda-boyce` -->"]),
+    ] {
+        let text = read(name);
+        assert!(parts.iter().all(|part| text.contains(part)), "{name}: {text}");
+    }
+    let modulus = |name: &str| -> f64 {
+        let text = read(name);
+        let line = text.lines().find(|line| line.starts_with("TBDATA,1,")).unwrap().to_owned();
+        line.split(',').nth(2).unwrap().parse().unwrap()
+    };
+    assert!((modulus("materials_si.mac") / modulus("materials_mm.mac") / 1e6 - 1.0).abs() < 1e-6);
+}
+
 #[test]
 fn files_without_a_law_are_refused() {
     let folder = tempfile::tempdir().unwrap();

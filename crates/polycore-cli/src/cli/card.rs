@@ -1,14 +1,16 @@
-//! Fitted laws as materials of Abaqus and CalculiX.
+//! Fitted laws as materials of finite-element programs.
 
 use std::io::Write as _;
 use std::path::Path;
 
 use polycore::Error;
 use polycore::constitutive::hyperelastic::deck::card;
+use polycore::constitutive::hyperelastic::host::Host;
 use polycore::file::atomic_write;
 
 use super::material::{BULK_RATIO, unusable};
 use super::table_fits::TableFits;
+use super::volumetric::Bulk;
 
 /// Files by system of units: name, description, and the host's unit of stress, Pa.
 const FILES: [(&str, &str, f64); 2] =
@@ -19,22 +21,30 @@ const FILES: [(&str, &str, f64); 2] =
 /// # Errors
 /// A file that cannot be written.
 pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
+    let measured = all.iter().any(|set| matches!(set.bulk, Bulk::Measured(_)));
     for (name, units, pascals) in FILES {
         atomic_write(directory.join(name), |file| {
-            writeln!(
-                file,
-                "** units {units}; K is {BULK_RATIO} times the shear modulus: tests at constant volume do \
-                 not determine it"
-            )?;
+            match measured {
+                true => writeln!(file, "** units {units}")?,
+                false => writeln!(
+                    file,
+                    "** units {units}; K is {BULK_RATIO} times the shear modulus: tests at constant volume \
+                     do not determine it"
+                )?,
+            }
             for set in all {
                 for fit in set.fits.iter().filter(|fit| unusable(fit).is_none()) {
                     let parameters = fit.parameters.iter();
                     let scale = |unit: &str| if unit == "Pa" { pascals } else { 1.0 };
                     let scaled: Vec<f64> = parameters.map(|of| of.value / scale(of.unit)).collect();
-                    let bulk = BULK_RATIO * fit.law.shear_modulus() / pascals;
+                    let bulk = set.bulk.modulus(fit.law.shear_modulus()) / pascals;
+                    let origin = match measured {
+                        true => format!("; K: {}", set.bulk.origin(fit.law.shear_modulus())),
+                        false => String::new(),
+                    };
                     write!(
                         file,
-                        "**\n** {} fitted to {}\n{}",
+                        "**\n** {} fitted to {}{origin}\n{}",
                         fit.model.key,
                         set.name,
                         card(fit.model.key, &scaled, bulk)
@@ -43,6 +53,33 @@ pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
             }
             Ok(())
         })?;
+    }
+    Ok(())
+}
+
+/// Writes `materials_mm` and `materials_si` of each program, with a material of every fit; a law that a program
+/// does not have is named in a comment.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_hosts(directory: &Path, all: &[TableFits], hosts: &[Host]) -> Result<(), Error> {
+    for (host, (name, units, pascals)) in hosts.iter().flat_map(|host| FILES.map(|file| (*host, file))) {
+        let mut text = host.comment(&format!("units {units}"));
+        let usable = all.iter().flat_map(|set| set.fits.iter().map(move |fit| (set, fit)));
+        for (id, (set, fit)) in (1..).zip(usable.filter(|(_, fit)| unusable(fit).is_none())) {
+            let (key, shear) = (fit.model.key, fit.law.shear_modulus());
+            let scale = |unit: &str| if unit == "Pa" { pascals } else { 1.0 };
+            let scaled: Vec<f64> = fit.parameters.iter().map(|of| of.value / scale(of.unit)).collect();
+            text += &match host.card(id, key, &scaled, set.bulk.modulus(shear) / pascals) {
+                Some(card) => {
+                    let origin = set.bulk.origin(shear);
+                    host.comment(&format!("{key} fitted to {}; K: {origin}", set.name)) + &card
+                }
+                None => host.comment(&format!("{} has no law `{key}`", host.name())),
+            };
+        }
+        let name = Path::new(name).with_extension(host.extension());
+        atomic_write(directory.join(name), |file| file.write_all(text.as_bytes()))?;
     }
     Ok(())
 }

@@ -6,6 +6,7 @@ use harness::output::picture::{LinePlot, Series};
 use polycore::Error;
 use polycore::constitutive::hyperelastic::data::{Mode, TestData, TestState};
 use polycore::constitutive::hyperelastic::fit::{self, Fit};
+use polycore::constitutive::hyperelastic::ranking::ModeTable;
 use polycore::constitutive::hyperelastic::{Hyperelastic, ModelKind, homogeneous};
 
 use super::MPA;
@@ -78,7 +79,7 @@ pub fn pictures(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) ->
             let states: Vec<&TestState> = table.states.iter().filter(|state| (test.holds)(state)).collect();
             if states.len() >= 3 {
                 let path = directory.join(format!("{name}_{}_{suffix}.png", test.key));
-                curves(name, test, &states, &fits).write(path)?;
+                curves(name, test, &states, &fits, table.deviation).write(path)?;
             }
         }
         let is_general = |state: &TestState| {
@@ -94,26 +95,81 @@ pub fn pictures(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) ->
 }
 
 /// Draws nominal stress over stretch.
-fn curves(name: &str, test: &TestPlot, states: &[&TestState], fits: &[&Fit]) -> LinePlot {
+fn curves(
+    name: &str,
+    test: &TestPlot,
+    states: &[&TestState],
+    fits: &[&Fit],
+    deviation: Option<f64>,
+) -> LinePlot {
     let x: Vec<f64> = states.iter().map(|state| state.stretches[0]).collect();
     let y: Vec<f64> = states.iter().map(|state| state.nominal[0] / MPA).collect();
     let [low, high] = span(&x, 1.0).map(|l| 1.0 + 1.03 * (l - 1.0)).map(|l| l.max(0.01));
     let [least, most] = span(&y, 0.0).map(|nominal| 1.1 * nominal);
-    let stretches: Vec<f64> = (0..=POINTS).map(|i| low + (high - low) * i as f64 / POINTS as f64).collect();
     let mut plot = LinePlot::new(&format!("{name}: {}", test.title))
         .axes("stretch", "nominal stress, MPa")
         .x_range(low, high)
         .y_range(least, most)
         .series(Series::markers("measured", &x, &y));
+    if let Some(deviation) = deviation {
+        plot = plot.series(bars(states, deviation).joined());
+    }
     for fit in fits {
-        // beyond locking a curve ends
-        let nominal: Vec<f64> = stretches
-            .iter()
-            .map(|l| (test.nominal)(&fit.law, *l).map_or(f64::NAN, |nominal| nominal / MPA))
-            .collect();
+        let [stretches, nominal] = curve(test, &fit.law, [low, high]);
         plot = plot.series(Series::line(fit.model.key, &stretches, &nominal));
     }
     plot
+}
+
+/// Draws `<data>_modes.png`: a law over the measurements of every mode of deformation that one stretch
+/// describes, with bars of one standard deviation if it is known.
+pub fn every_mode(
+    directory: &Path,
+    name: &str,
+    modes: &[ModeTable],
+    fit: &Fit,
+    deviation: Option<f64>,
+) -> Result<(), Error> {
+    let mut plot =
+        LinePlot::new(&format!("{name}: {}", fit.model.key)).axes("stretch", "nominal stress, MPa");
+    let mut empty = true;
+    for mode in modes {
+        let test = TESTS.iter().find(|test| test.key == mode.mode || (test.key, mode.mode) == COMPRESSION);
+        let states: Vec<&TestState> =
+            mode.table.states.iter().filter(|state| state.nominal[0] != 0.0).collect();
+        let (Some(test), false) = (test, states.is_empty()) else { continue };
+        let x: Vec<f64> = states.iter().map(|state| state.stretches[0]).collect();
+        let y: Vec<f64> = states.iter().map(|state| state.nominal[0] / MPA).collect();
+        empty = false;
+        plot = plot.series(Series::markers(mode.mode, &x, &y));
+        if let Some(deviation) = deviation {
+            plot = plot.series(bars(&states, deviation).joined());
+        }
+        let [stretches, nominal] = curve(test, &fit.law, span(&x, 1.0));
+        plot = plot.series(Series::line("", &stretches, &nominal).joined());
+    }
+    if empty { Ok(()) } else { plot.write(directory.join(format!("{name}_modes.png"))) }
+}
+
+/// Test that the mode of compression belongs to.
+const COMPRESSION: (&str, &str) = ("uniaxial", "compression");
+
+/// Stretches of a range and nominal stresses there, MPa; beyond locking the curve ends.
+fn curve(test: &TestPlot, law: &dyn Hyperelastic, [low, high]: [f64; 2]) -> [Vec<f64>; 2] {
+    let stretches: Vec<f64> = (0..=POINTS).map(|i| low + (high - low) * i as f64 / POINTS as f64).collect();
+    let nominal =
+        stretches.iter().map(|l| (test.nominal)(law, *l).map_or(f64::NAN, |nominal| nominal / MPA)).collect();
+    [stretches, nominal]
+}
+
+/// Bars of one standard deviation, given that of a stress of weight 1, Pa.
+fn bars(states: &[&TestState], deviation: f64) -> Series {
+    let x: Vec<f64> = states.iter().map(|state| state.stretches[0]).collect();
+    let end = |sign: f64| -> Vec<f64> {
+        let size = |state: &TestState| deviation / state.roots[0] / state.ratio();
+        states.iter().map(|state| (state.nominal[0] + sign * size(state)) / MPA).collect()
+    };
+    Series::bars(&x, &end(-1.0), &end(1.0))
 }
 
 /// Draws every stress of the table, model over measurement.
@@ -128,7 +184,13 @@ fn parity(name: &str, table: &TestData, fits: &[&Fit]) -> Result<LinePlot, Error
         .series(Series::reference("equal", &[lowest, highest], &[lowest, highest]));
     for fit in fits {
         let residuals = fit::residuals(&fit.law, table)?;
-        let model: Vec<f64> = residuals.iter().zip(&measured).map(|(r, data)| r / MPA + data).collect();
+        let roots = table.states.iter().flat_map(TestState::measured_roots);
+        let model: Vec<f64> = residuals
+            .iter()
+            .zip(roots)
+            .zip(&measured)
+            .map(|((r, root), data)| r / root / MPA + data)
+            .collect();
         plot = plot.series(Series::markers(fit.model.key, &measured, &model));
     }
     Ok(plot)

@@ -15,11 +15,12 @@ use polycore::constitutive::hyperelastic::fit::{
 use polycore::constitutive::hyperelastic::{Coverage, Hyperelastic, homogeneous, stability};
 
 use super::MPA;
+use super::data::DataSet;
 use super::material::{DIGITS, digits};
 use super::quantities as q;
-use super::scene::{DataSet, FitCase};
+use super::scene::FitCase;
 use super::table_fits::{TableFits, unit_of};
-use super::{card, draw, material, time_fits, trials};
+use super::{card, draw, material, ranking, time_fits, trials};
 
 /// Fits every law to every table; writes tables and pictures. A law that cannot be fitted is reported, the
 /// others are kept. If the run is stopped, finished fits are written.
@@ -42,6 +43,8 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
             failed: Vec::new(),
             crossed: Vec::new(),
             outside: Vec::new(),
+            ranked: Vec::new(),
+            bulk: case.bulk(own),
         };
         for model in &case.laws {
             run.show(done / total, &|| format!("fit {name}  {}", model.key));
@@ -54,6 +57,14 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
                 break;
             }
             done += 1.0;
+        }
+        if !own.modes.is_empty() && !stopped {
+            phases.start("ranking");
+            run.show(done / total, &|| format!("rank the laws on {name}"));
+            match ranking::rank(own, &set.fits, run) {
+                Ok(laws) => set.ranked = laws,
+                Err(_) => stopped = true,
+            }
         }
         phases.start("output");
         let coverage = Coverage::new(table)?;
@@ -79,6 +90,10 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
             let reason = format!("no law can be fitted; {law}: {why}");
             return Err(constitutive::Error::Data { what: (*name).clone(), reason }.into());
         }
+        if !set.ranked.is_empty() {
+            ranking::record(own, &set.ranked, &mut report);
+            ranking::write(directory, own, &set.ranked)?;
+        }
         write_states(directory, name, table, &set.fits)?;
         set.fits.iter().try_for_each(|fit| write_draws(directory, name, fit))?;
         all.push(set);
@@ -90,6 +105,7 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
         write_fits(directory, &all)?;
         material::write(directory, &all)?;
         card::write(directory, &all)?;
+        card::write_hosts(directory, &all, &case.cards)?;
     }
     if stopped {
         return Err(run.interruption());
@@ -106,6 +122,8 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     for trial in &case.trials {
         trials::run(trial, &mut report)?;
     }
+    let volumes = case.volumetric.iter().map(|set| set.run(directory, &mut report));
+    let volumes = volumes.collect::<Result<Vec<_>, _>>()?;
     let networks = case.networks.iter().map(|set| set.run(directory, &mut report));
     let networks = networks.collect::<Result<Vec<_>, _>>()?;
     if !case.foams.is_empty() {
@@ -119,21 +137,31 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     let forecasts = forecasts.collect::<Result<Vec<_>, _>>()?;
     if !quick {
         phases.start("pictures");
-        for set in &all {
+        for (own, set) in case.data.iter().zip(&all) {
             draw::pictures(directory, set.name, set.table, &set.fits)?;
+            let best = ranking::best(&set.ranked).map(|law| law.key);
+            if let Some(fit) = set.fits.iter().find(|fit| Some(fit.model.key) == best) {
+                draw::every_mode(directory, set.name, &own.modes, fit, set.table.deviation)?;
+            }
         }
     }
     phases.stop();
     report.phases(&phases).threads(1).judge(&case.expect, quick);
     trials::judge(&case.trials, &mut report);
     let mut text = summary(case, &all, &timed, &report);
-    series.iter().chain(&networks).chain(&foams).chain(&forecasts).for_each(|part| text += part);
+    series
+        .iter()
+        .chain(&volumes)
+        .chain(&networks)
+        .chain(&foams)
+        .chain(&forecasts)
+        .for_each(|part| text += part);
     for name in &report.non_finite {
         let _ = writeln!(text, "FAIL  {name} is not finite");
     }
     let mut finished = Finished::new(report, text);
     finished.table = (!all.is_empty()).then(|| errors(case, &all));
-    Ok(finished.with_notes(&remarks(&all)))
+    Ok(finished.with_notes(&remarks(case, &all)))
 }
 
 /// Converts a value to the unit of the tables: stresses to MPa, numbers unchanged.
@@ -183,6 +211,9 @@ fn record_fit(report: &mut Report, data: &str, table: &TestData, fit: &Fit) -> R
         }
     }
     record_agreement(report, &key, &Agreement::new(&fit.law, table)?);
+    if let Some(chi) = fit.chi {
+        report.value(q::CHI.named(&[&key]), chi);
+    }
     report.value(q::STABLE.named(&[&key]), f64::from(u8::from(find_instability(fit, table).is_none())));
     report.work(&format!("{key}.evaluations"), fit.iterations as u64);
     report.work(&format!("{key}.starts"), fit.starts.0 as u64);
@@ -191,7 +222,7 @@ fn record_fit(report: &mut Report, data: &str, table: &TestData, fit: &Fit) -> R
 }
 
 /// Finds the test and the stretch at which a law first becomes unstable, within the stretches of a table.
-fn find_instability(fit: &Fit, table: &TestData) -> Option<(Mode, f64)> {
+pub fn find_instability(fit: &Fit, table: &TestData) -> Option<(Mode, f64)> {
     let ends = stability::range(table);
     let all = Mode::TESTS.into_iter().flat_map(|mode| ends.map(|end| (mode, end)));
     all.filter(|(_, end)| *end != 1.0)
@@ -212,6 +243,9 @@ fn write_fits(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
                 let _ = writeln!(text, "{data},{law},{quantity},{value},{error},{shown}");
             };
             line("rms", fit.rms, None, "Pa");
+            if let Some(chi) = fit.chi {
+                line("chi", chi, None, "");
+            }
             if let Some(r2) = Agreement::new(&fit.law, set.table)?.r2 {
                 line("r2", r2, None, "");
             }
@@ -291,14 +325,18 @@ fn summary(case: &FitCase, all: &[TableFits], timed: &str, report: &Report) -> S
             let _ = writeln!(text, "failed  {law} on {}: {why}", set.name);
         }
     }
-    for set in all {
+    for (own, set) in case.data.iter().zip(all) {
         text += &verdicts(set);
+        if !set.ranked.is_empty() {
+            text += &ranking::table(own, &set.ranked);
+            text += &ranking::advice(own, &set.ranked);
+        }
         let _ = writeln!(text, "parameters on {} (± standard error, if the data determine it)", set.name);
         for fit in &set.fits {
             let list: Vec<String> = fit.parameters.iter().map(format_parameter).collect();
             let _ = writeln!(text, "  {:<22}{}", fit.model.key, list.join(", "));
         }
-        text += &material::best(set.name, &set.fits);
+        text += &material::best(set);
     }
     for trial in &report.trials {
         let verdict = if trial.passed { "pass" } else { "FAIL" };
@@ -337,14 +375,15 @@ fn errors(case: &FitCase, all: &[TableFits]) -> String {
     text
 }
 
-/// Returns the laws that failed and the block of the best law, by table.
-fn remarks(all: &[TableFits]) -> String {
+/// Returns the laws that failed, the law to take and the block of the best law, by table.
+fn remarks(case: &FitCase, all: &[TableFits]) -> String {
     let mut text = String::new();
-    for set in all {
+    for (own, set) in case.data.iter().zip(all) {
+        text += &ranking::advice(own, &set.ranked);
         for (law, why) in &set.failed {
             let _ = writeln!(text, "failed  {law} on {}: {why}", set.name);
         }
-        text += &material::best(set.name, &set.fits);
+        text += &material::best(set);
     }
     text
 }
@@ -384,6 +423,9 @@ fn verdicts(set: &TableFits) -> String {
             let verdict = if unsafe_there { "unsafe outside" } else { "safe outside" };
             let _ = write!(text, "; {verdict} {}", set.name);
         }
+        if let Some(chi) = fit.chi {
+            let _ = write!(text, "; χ {}", digits(chi, 3));
+        }
         let lost = stability::count_states_without_ellipticity(&fit.law, set.table);
         if lost > 0 {
             let _ = write!(text, "; not elliptic at {lost} of {} states", set.table.states.len());
@@ -400,7 +442,7 @@ fn verdicts(set: &TableFits) -> String {
 }
 
 /// Formats a parameter: `links 25.46 ± 0.13`; without a standard error only its value.
-fn format_parameter(parameter: &FittedParameter) -> String {
+pub fn format_parameter(parameter: &FittedParameter) -> String {
     let name = parameter.name;
     let (unit, scale) = if parameter.unit == "Pa" { unit_of(parameter.value) } else { ("", 1.0) };
     let number = |value: f64| digits(value / scale, 6);

@@ -9,7 +9,9 @@ use polycore::constitutive::hyperelastic::fit::{Fit, FittedParameter, Identifiab
 use polycore::file::atomic_write;
 
 use super::MPA;
+use super::ranking;
 use super::table_fits::{TableFits, unit_of};
+use super::volumetric::Bulk;
 
 /// Laws whose block is printed in preference to others.
 const EIGHT_CHAINS: &str = "eight-chain";
@@ -33,7 +35,7 @@ pub fn in_megapascals(value: f64, unit: &str) -> (f64, &'static str) {
 
 /// Formats `[material.solid]` of `peri` for a fitted law, with its confidence intervals. For a law that the
 /// data do not determine it is a comment with advice.
-fn block(fit: &Fit) -> String {
+fn block(fit: &Fit, bulk: Bulk) -> String {
     let rms = stress(fit.rms, 5);
     if let Some(why) = unusable(fit) {
         return format!("# {}, rms {rms}: no block, {why}\n", fit.model.key);
@@ -42,12 +44,8 @@ fn block(fit: &Fit) -> String {
     let mut text = format!("[material.solid] # {}, rms {rms}\n", fit.model.key);
     let _ = writeln!(text, "law = \"correspondence\"");
     let _ = writeln!(text, "[material.solid.constitutive]\nmodel = \"{}\"", fit.model.key);
-    let _ = writeln!(
-        text,
-        "bulk_modulus = \"{}\" # {BULK_RATIO} times the shear modulus of {}: these tests do not determine it",
-        stress(BULK_RATIO * shear, DIGITS),
-        stress(shear, DIGITS)
-    );
+    let _ =
+        writeln!(text, "bulk_modulus = \"{}\" # {}", stress(bulk.modulus(shear), DIGITS), bulk.origin(shear));
     text += "[material.solid.constitutive.parameters]\n";
     for parameter in &fit.parameters {
         let is_stress = parameter.unit == "Pa";
@@ -87,9 +85,12 @@ pub fn unusable(fit: &Fit) -> Option<String> {
     })
 }
 
-/// Formats the block of the eight-chain law with the least rms or, without such a law, of the best law. Laws
-/// whose parameters are all known to half of their size come first.
-pub fn best(data: &str, fits: &[Fit]) -> String {
+/// Formats the block of the law that a ranking puts first; without one, that of the eight-chain law with the
+/// least rms or, without such a law, of the best law. Laws whose parameters are all known to half of their
+/// size come first.
+pub fn best(set: &TableFits) -> String {
+    let (data, fits) = (set.name, &set.fits);
+    let ranked = ranking::best(&set.ranked).map(|law| law.key);
     let known = |fit: &Fit| {
         let sure = |parameter: &FittedParameter| {
             parameter.standard_error.is_some_and(|error| HALF_WIDTH * error < parameter.value.abs())
@@ -99,11 +100,13 @@ pub fn best(data: &str, fits: &[Fit]) -> String {
     let usable = || fits.iter().filter(|fit| unusable(fit).is_none());
     let least = |a: &&Fit, b: &&Fit| a.rms.total_cmp(&b.rms);
     let chains = |fit: &&Fit| fit.model.key.starts_with(EIGHT_CHAINS) && known(fit);
-    let best = usable().filter(chains).min_by(least);
+    let best = usable().find(|fit| ranked == Some(fit.model.key));
+    let best = best.or_else(|| usable().filter(chains).min_by(least));
     let best =
         best.or_else(|| usable().filter(|fit| known(fit)).min_by(least)).or_else(|| usable().min_by(least));
     // indented lines are printed as they are
-    let indented = |fit: &Fit| block(fit).lines().map(|line| format!("  {line}\n")).collect::<String>();
+    let indented =
+        |fit: &Fit| block(fit, set.bulk).lines().map(|line| format!("  {line}\n")).collect::<String>();
     best.map_or_else(String::new, |fit| format!("for a scene of peri, from {data}:\n{}", indented(fit)))
 }
 
@@ -113,7 +116,7 @@ pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
         writeln!(file, "# Use one block; docs/guide/src/how-to/fit.md describes its limits.")?;
         for set in all {
             for fit in &set.fits {
-                write!(file, "\n# fitted to {}\n{}", set.name, block(fit))?;
+                write!(file, "\n# fitted to {}\n{}", set.name, block(fit, set.bulk))?;
             }
         }
         Ok(())

@@ -5,6 +5,8 @@ harness::quantities! {
     /// fits with time; and of trials, `{trial}`.
     pub ALL:
     RMS = "{fit}.rms", "MPa", "root mean square of model − measurement";
+    CHI = "{fit}.chi", "", "with standard deviations of the stresses: root of χ² over the degrees of freedom; \
+                            far above 1, the law misses the tests";
     MAE = "{fit}.mae", "MPa", "mean of |model − measurement|";
     R2 = "{fit}.r2", "", "coefficient of determination 1 − Σr²/Σ(P − P̄)²";
     LOCKED = "{fit}.locked", "", "with `cross`: number of states of the other data beyond the locking \
@@ -13,6 +15,13 @@ harness::quantities! {
                                     distribution, i.e. outside the strains that the data of the fit cover";
     STABLE = "{fit}.stable", "", "1 if the law is stable (Drucker) in uniaxial, equibiaxial and pure shear \
                                   tests over the stretches of its data, else 0";
+    RANK = "{fit}.rank", "", "with `rank`: place of the law by its largest error in a mode left out";
+    LEFT_OUT = "{fit}.left_out", "", "with `rank`: that largest error";
+    MODE_LEFT_OUT = "{fit}.{mode}.left_out", "", "with `rank`: error in a mode of a fit to all others, \
+                                                  rms over the largest stress of the mode";
+    MODE_FITTED = "{fit}.{mode}.fitted", "", "with `rank`: error in a mode of the fit to all";
+    MODE_ALONE = "{fit}.{mode}.alone", "", "with `rank`: largest error in the other modes of a fit to this \
+                                            mode alone";
     FAILED = "{fit}.failed", "", "1 if the law could not be fitted; other values are missing";
     SHEAR_MODULUS = "{fit}.shear_modulus", "MPa", "shear modulus at rest";
     PARAMETER = "{fit}.{parameter}", "*", "parameter of the fitted law, stresses in MPa";
@@ -58,6 +67,15 @@ harness::quantities! {
     FOAM_RELATIVE = "{foam}.{test}.relative", "", "the same over the largest measured stress of the test";
     FOAM_END = "{foam}.{test}.end", "MPa", "stress of the law at the strain of the largest measured stress";
     FOAM_PREDICTED = "{foam}.{test}.predicted", "", "as `relative`, of a law fitted to the other tests";
+}
+
+harness::quantities! {
+    /// Quantities of volumetric tests, `{volumetric}`.
+    pub VOLUMETRIC:
+    BULK = "{volumetric}.bulk_modulus", "MPa", "bulk modulus 2/D₁ of a volumetric test";
+    BULK_ERROR = "{volumetric}.bulk_modulus.standard_error", "MPa", "its standard error";
+    BULK_RMS = "{volumetric}.rms", "MPa", "root mean square of the pressure of the fit − measurement";
+    COMPLIANCE = "{volumetric}.D{i}", "1/MPa", "Dᵢ of the energy Σ (J − 1)²ⁱ/Dᵢ";
 }
 
 harness::quantities! {

@@ -1,17 +1,14 @@
 //! Scenes of fits, trials and networks: laws, data, expectations.
 
 use std::fmt::Write;
-use std::path::PathBuf;
 
 use harness::report::Expect;
 use harness::scene::{SceneError, Source};
-use polycore::constitutive::hyperelastic::data::{Mode, TestData};
-use polycore::constitutive::hyperelastic::fit::neo_hookean_modulus;
-use polycore::constitutive::hyperelastic::{
-    self, MODELS, ModelDescriptor, StrainMeasure, TestFormat, TestStressMeasure,
-};
+use polycore::constitutive::hyperelastic::host::Host;
+use polycore::constitutive::hyperelastic::{self, MODELS, ModelDescriptor};
 use serde::Deserialize;
 
+use super::data::{DataSet, TestTableSpec};
 use super::foams::{FoamSet, FoamSpec};
 use super::forecasts::{ForecastSet, ForecastSpec};
 use super::networks::{NetworkSet, NetworkSpec};
@@ -19,6 +16,7 @@ use super::prony::{PronySet, PronySpec};
 use super::quantities as q;
 use super::time::{TimeCase, TimeSettings};
 use super::trials::FitTrial;
+use super::volumetric::{Bulk, VolumetricSet, VolumetricSpec};
 
 /// Scene as written in the file.
 #[derive(Deserialize, schemars::JsonSchema)]
@@ -44,6 +42,9 @@ struct Scene {
     /// Tables of polymer networks to predict.
     #[serde(default)]
     network: Vec<NetworkSpec>,
+    /// Volumetric tests, which give bulk moduli.
+    #[serde(default)]
+    volumetric: Vec<VolumetricSpec>,
     /// Foams to which compressible laws are fitted.
     #[serde(default)]
     foam: Vec<FoamSpec>,
@@ -71,52 +72,17 @@ struct FitSettings {
     /// Judge a law fitted to one table on the other tables of the same `material`, too.
     #[serde(default)]
     cross: bool,
+    /// Programs for which materials are written beside those of Abaqus and CalculiX.
+    #[serde(default)]
+    cards: Vec<Host>,
     /// Tables of measurements.
     #[serde(default)]
     data: Vec<TestTableSpec>,
 }
 
-/// Table of homogeneous states.
-#[derive(Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct TestTableSpec {
-    /// Name in the report.
-    name: String,
-    /// CSV file, relative to the scene.
-    file: PathBuf,
-    /// Test whose states are used; for a table without a column of tests, the test of all states.
-    mode: Option<Mode>,
-    /// Measure of the strain, if its heading does not name it.
-    strain: Option<StrainMeasure>,
-    /// Measure of the stress, if its heading does not name it.
-    stress: Option<TestStressMeasure>,
-    /// Unit of a stress whose heading has none: `MPa`.
-    stress_unit: Option<String>,
-    /// Heading of the strain, if there are several.
-    strain_column: Option<String>,
-    /// Heading of the stress, if there are several.
-    stress_column: Option<String>,
-    /// Material, in a table with one stress component in each row: a cell of its column `material` or
-    /// `source`.
-    material: Option<String>,
-    /// Tests of a table with one stress component in each row, as the file names them: `["UT", "UC"]`.
-    #[serde(default)]
-    tests: Vec<String>,
-}
-
-/// Table to be fitted.
-pub struct DataSet {
-    pub name: String,
-    pub table: TestData,
-    /// Material, if the scene names one.
-    pub material: Option<String>,
-    /// Layout of the file, and the rows left out, one line each.
-    pub read: Vec<String>,
-}
-
 /// JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
-    let quantities = [q::ALL, q::PRONY, q::NETWORKS, q::FOAMS, q::FORECASTS];
+    let quantities = [q::ALL, q::PRONY, q::NETWORKS, q::VOLUMETRIC, q::FOAMS, q::FORECASTS];
     harness::scene::schema("polycore", &quantities, |generator| vec![generator.subschema_for::<Scene>()])
 }
 
@@ -126,11 +92,14 @@ pub struct FitCase {
     pub title: String,
     pub laws: Vec<&'static ModelDescriptor>,
     pub cross: bool,
+    /// Programs for which materials are written.
+    pub cards: Vec<Host>,
     pub data: Vec<DataSet>,
     pub time: Option<TimeCase>,
     pub prony: Vec<PronySet>,
     pub trials: Vec<FitTrial>,
     pub networks: Vec<NetworkSet>,
+    pub volumetric: Vec<VolumetricSet>,
     pub foams: Vec<FoamSet>,
     pub forecasts: Vec<ForecastSet>,
     pub expect: Vec<Expect>,
@@ -147,6 +116,7 @@ impl FitCase {
             prony,
             trial,
             network,
+            volumetric,
             foam,
             forecast,
             expect,
@@ -157,47 +127,15 @@ impl FitCase {
         };
         let mut data: Vec<DataSet> = Vec::new();
         for (i, entry) in fit.data.into_iter().enumerate() {
-            let key = |field: &str| format!("fit.data[{i}].{field}");
-            let valid = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-            if entry.name.is_empty() || !entry.name.chars().all(valid) {
-                let allowed = "letters, digits, `-` and `_`: it names files";
-                return Err(source.error(&key("name"), format!("`{}`", entry.name), allowed));
-            }
-            if data.iter().any(|other| other.name == entry.name) {
-                return Err(source.error(
-                    &key("name"),
-                    format!("`{}` a second time", entry.name),
-                    "another name",
-                ));
-            }
-            let format = TestFormat {
-                mode: entry.mode,
-                strain: entry.strain,
-                stress: entry.stress,
-                stress_unit: entry.stress_unit,
-                strain_column: entry.strain_column,
-                stress_column: entry.stress_column,
-                material: entry.material.clone(),
-                tests: entry.tests,
-            };
-            let reading = TestData::read_as(source.file(&entry.file), &format)
-                .map_err(|error| source.refused(&key("file"), error))?;
-            let read = [vec![reading.description], reading.notes].concat();
-            let mut table = reading.table;
-            if let Some(mode) = entry.mode {
-                table = table.select(mode).map_err(|error| {
-                    source.error(&key("mode"), error, "a test with a stress in the table")
-                })?;
-            }
-            neo_hookean_modulus(&table).map_err(|error| source.refused(&key("file"), error))?;
+            let set = entry.read(source, i, &data)?;
             for model in laws.iter().filter(|_| fit.laws.is_some()) {
-                if table.measurements() < model.parameters.len() {
-                    let found = format!("{} measured stresses", table.measurements());
+                if set.table.measurements() < model.parameters.len() {
+                    let found = format!("{} measured stresses", set.table.measurements());
                     let allowed = format!("at least {} for `{}`", model.parameters.len(), model.key);
-                    return Err(source.error(&key("file"), found, allowed));
+                    return Err(source.error(&format!("fit.data[{i}].{}", set.place()), found, allowed));
                 }
             }
-            data.push(DataSet { name: entry.name, table, material: entry.material, read });
+            data.push(set);
         }
         let time = time.map(|settings| TimeCase::new(source, settings)).transpose()?;
         let mut series: Vec<PronySet> = Vec::new();
@@ -207,19 +145,24 @@ impl FitCase {
         if data.is_empty()
             && time.is_none()
             && series.is_empty()
+            && volumetric.is_empty()
             && [trial.is_empty(), network.is_empty(), foam.is_empty(), forecast.is_empty()] == [true; 4]
         {
             return Err(source.error(
                 "fit.data",
                 "no data",
                 "at least one `[[fit.data]]` with `name` and `file`, `[time]`, `[[prony]]`, `[[trial]]`, \
-                 `[[network]]`, `[[foam]]` or `[[forecast]]`",
+                 `[[network]]`, `[[volumetric]]`, `[[foam]]` or `[[forecast]]`",
             ));
         }
         super::trials::check(source, &trial)?;
         let mut networks: Vec<NetworkSet> = Vec::new();
         for (i, spec) in network.into_iter().enumerate() {
             networks.push(spec.read(source, i, &networks)?);
+        }
+        let mut volumes: Vec<VolumetricSet> = Vec::new();
+        for (i, spec) in volumetric.into_iter().enumerate() {
+            volumes.push(spec.read(source, i, &volumes)?);
         }
         let mut foams: Vec<FoamSet> = Vec::new();
         for (i, spec) in foam.into_iter().enumerate() {
@@ -229,18 +172,20 @@ impl FitCase {
         for (i, spec) in forecast.into_iter().enumerate() {
             forecasts.push(spec.read(source, i, &forecasts)?);
         }
-        let (source, cross) = (source.clone(), fit.cross);
-        let (prony, trials) = (series, trial);
+        let (source, cross, cards) = (source.clone(), fit.cross, fit.cards);
+        let (prony, trials, volumetric) = (series, trial, volumes);
         let case = Self {
             source,
             title,
             laws,
             cross,
+            cards,
             data,
             time,
             prony,
             trials,
             networks,
+            volumetric,
             foams,
             forecasts,
             expect,
@@ -252,17 +197,22 @@ impl FitCase {
     /// Describes what a run will do, in lines.
     pub fn plan(&self) -> String {
         let mut text = format!("{}: {}\n", self.source.path.display(), self.title);
-        for DataSet { name, table, read, .. } in &self.data {
+        for DataSet { name, table, read, modes, .. } in &self.data {
             let (states, measured) = (table.states.len(), table.measurements());
             let source =
                 if table.source.is_empty() { "no line `# source: …` in it" } else { &table.source };
             let _ = writeln!(text, "data {name}: {states} states, {measured} measured stresses ({source})");
             read.iter().for_each(|line| text += &format!("  {line}\n"));
+            let names: Vec<&str> = modes.iter().map(|mode| mode.mode).collect();
+            if !names.is_empty() {
+                let _ = writeln!(text, "  laws ranked by predictions of {}, each left out", names.join(", "));
+            }
         }
         for line in self
             .networks
             .iter()
             .map(NetworkSet::plan)
+            .chain(self.volumetric.iter().map(VolumetricSet::plan))
             .chain(self.foams.iter().map(FoamSet::plan))
             .chain(self.forecasts.iter().map(ForecastSet::plan))
         {
@@ -278,11 +228,20 @@ impl FitCase {
         self.prony.iter().for_each(|set| text += &format!("{}\n", set.plan()));
         let of_fits = "fits.csv, <data>_states.csv, materials.toml, pictures (not with --quick), ";
         let mut files = if self.data.is_empty() { "" } else { of_fits }.to_owned();
+        for host in &self.cards {
+            files += &format!("materials_mm.{0}, materials_si.{0}, ", host.extension());
+        }
+        if self.data.iter().any(|set| !set.modes.is_empty()) {
+            files += "<data>_ranking.csv, <data>_modes.png (not with --quick), ";
+        }
         if !self.networks.is_empty() {
             files += "<network>_networks.csv, ";
         }
         if !self.prony.is_empty() {
             files += "<prony>_prony.csv, <prony>_curve.csv, <prony>_branches.toml, <prony>_prony.inp, ";
+        }
+        if !self.volumetric.is_empty() {
+            files += "<volumetric>_volumetric.csv, ";
         }
         if !self.foams.is_empty() {
             files += "<foam>_foam.csv, <foam>_foam.inp, ";
@@ -308,16 +267,26 @@ impl FitCase {
         self.data.iter().filter(move |other| self.cross && other.name != name && other.material == material)
     }
 
+    /// Bulk modulus of laws fitted to `set`: of a volumetric test of its material, or assumed.
+    pub fn bulk(&self, set: &DataSet) -> Bulk<'_> {
+        let own = self.volumetric.iter().find(|test| test.material == set.material);
+        own.map_or(Bulk::Assumed, Bulk::Measured)
+    }
+
     /// Lists the names of all scalars of the report.
     fn quantities(&self) -> Vec<String> {
         let mut names = Vec::new();
-        for set @ DataSet { name: data, .. } in &self.data {
+        for set @ DataSet { name: data, table, .. } in &self.data {
             for model in &self.laws {
                 let fit = format!("{data}.{}", model.key);
                 let own = [q::RMS, q::MAE, q::R2, q::SHEAR_MODULUS, q::STABLE, q::FAILED];
                 names.extend(own.map(|quantity| quantity.named(&[&fit]).name));
+                names.extend(table.deviation.map(|_| q::CHI.named(&[&fit]).name));
                 let parameters = model.parameters.iter().map(|parameter| parameter.name);
-                names.extend(parameters.map(|parameter| q::PARAMETER.named(&[&fit, parameter]).name));
+                for quantity in [q::PARAMETER, q::STANDARD_ERROR] {
+                    names.extend(parameters.clone().map(|parameter| quantity.named(&[&fit, parameter]).name));
+                }
+                names.extend(super::ranking::quantities(set, model.key));
                 for other in self.others(set) {
                     let fit = format!("{fit}.{}", other.name);
                     names.extend(
@@ -337,6 +306,7 @@ impl FitCase {
         for set in &self.networks {
             names.extend(set.quantities());
         }
+        names.extend(self.volumetric.iter().flat_map(VolumetricSet::quantities));
         for set in &self.foams {
             names.extend(set.quantities());
         }

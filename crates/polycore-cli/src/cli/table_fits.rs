@@ -3,6 +3,9 @@
 use polycore::constitutive::hyperelastic::data::TestData;
 use polycore::constitutive::hyperelastic::fit::{Agreement, Fit};
 
+use super::ranking::RankedLaw;
+use super::volumetric::Bulk;
+
 /// Fits to one table.
 pub struct TableFits<'a> {
     pub name: &'a str,
@@ -16,6 +19,10 @@ pub struct TableFits<'a> {
     pub crossed: Vec<(&'static str, &'a str, Option<Agreement>)>,
     /// Other table, its number of states and of those outside the strains of this one.
     pub outside: Vec<(&'a str, usize, usize)>,
+    /// Laws by their predictions of modes left out; none without `rank`.
+    pub ranked: Vec<RankedLaw>,
+    /// Bulk modulus of its blocks and cards.
+    pub bulk: Bulk<'a>,
 }
 
 impl TableFits<'_> {

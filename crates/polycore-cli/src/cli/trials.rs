@@ -82,12 +82,11 @@ impl FitTrial {
     fn evaluate(&self) -> Result<TrialResult, constitutive::Error> {
         let model = model(&self.law)?;
         if let Some(data) = &self.data {
-            let state = |(stretch, nominal): &(f64, Stress)| TestState {
-                mode: self.mode,
-                stretches: [*stretch, self.mode.second_stretch(*stretch)],
-                nominal: [nominal.si(), 0.0],
+            let state = |(stretch, nominal): &(f64, Stress)| {
+                let stretches = [*stretch, self.mode.second_stretch(*stretch)];
+                TestState::new(self.mode, stretches, [nominal.si(), 0.0])
             };
-            let table = TestData { source: String::new(), states: data.iter().map(state).collect() };
+            let table = TestData::new(String::new(), data.iter().map(state).collect());
             return Ok(TrialResult::Fit(Box::new(fit(model, &table)?)));
         }
         let values: Vec<f64> = self.parameters.iter().flatten().map(ParameterValue::si).collect();

@@ -79,11 +79,11 @@ impl TestData {
         same_length(stretch.len(), nominal.len())?;
         let state = |(&stretch, &nominal): (&f64, &f64)| {
             let stretches = [stretch, mode.second_stretch(stretch)];
-            let state = TestState { mode, stretches, nominal: [nominal, 0.0] };
+            let state = TestState::new(mode, stretches, [nominal, 0.0]);
             state.principal_stretches().map(|_| state)
         };
         let states = stretch.iter().zip(nominal).map(state).collect::<Result<_, Error>>()?;
-        Self { source: String::new(), states }.select(mode)
+        Self::new(String::new(), states).select(mode)
     }
 }
 

@@ -37,6 +37,7 @@ mod ogden_starts;
 mod polynomial;
 mod principal;
 
+pub mod bulk;
 #[cfg(feature = "tables")]
 mod columns;
 #[cfg(feature = "tables")]
@@ -52,12 +53,16 @@ pub mod foam;
 mod foam_table;
 pub mod forecast;
 pub mod homogeneous;
+pub mod host;
 #[cfg(feature = "tables")]
 mod plausible;
+pub mod ranking;
 pub mod stability;
 #[cfg(feature = "tables")]
 mod table;
 mod van_der_waals;
+#[cfg(feature = "tables")]
+mod weights;
 mod yeoh;
 
 pub use arruda_boyce::ArrudaBoyce;
@@ -80,6 +85,8 @@ pub use principal::PrincipalResponse;
 #[cfg(feature = "tables")]
 pub use table::{ImportedTest, TestFormat};
 pub use van_der_waals::VanDerWaals;
+#[cfg(feature = "tables")]
+pub use weights::Deviation;
 pub use yeoh::Yeoh;
 
 /// An isotropic hyperelastic law. Stresses and moduli in Pa, energies in J/m³.

@@ -45,6 +45,8 @@ pub struct Series {
     pub(super) name: String,
     points: Vec<(f64, f64)>,
     pub(super) style: SeriesStyle,
+    /// True for a series that belongs to the one before it.
+    pub(super) joined: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,7 +83,21 @@ impl Series {
         let count = x.len().max(y.len());
         let at = |values: &[f64], index: usize| values.get(index).copied().unwrap_or(f64::NAN);
         let points = (0..count).map(|index| (at(x, index), at(y, index))).collect();
-        Self { name: name.to_owned(), points, style }
+        Self { name: name.to_owned(), points, style, joined: false }
+    }
+
+    /// Returns vertical bars from `low` to `high`: errors of measurements.
+    pub fn bars(x: &[f64], low: &[f64], high: &[f64]) -> Self {
+        let ends = |((x, low), high): ((&f64, &f64), &f64)| [(*x, *low), (*x, *high), (f64::NAN, f64::NAN)];
+        let points = x.iter().zip(low).zip(high).flat_map(ends).collect();
+        Self { name: String::new(), points, style: SeriesStyle::Line, joined: false }
+    }
+
+    /// Gives a series the colour and the name of the series before it.
+    #[must_use]
+    pub fn joined(mut self) -> Self {
+        self.joined = true;
+        self
     }
 
     /// Returns the runs between undefined points.

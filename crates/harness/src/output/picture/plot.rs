@@ -10,7 +10,7 @@ use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
 
 use super::axis::PlotAxis;
 use super::canvas::{Canvas, LabelAnchor, Text};
-use super::line::{LegendPlace, LinePlot, SeriesStyle};
+use super::line::{LegendPlace, LinePlot, Series, SeriesStyle};
 use super::picture_error;
 use polycore::Error;
 use polycore::file::atomic_write;
@@ -90,11 +90,12 @@ fn scene(plot: &LinePlot) -> Result<(Scene, UprightLabel), String> {
     let x = PlotAxis::new(values(|point| point.0), plot.x_range, plot.log[0], (width / 90.0) as usize);
     let y = PlotAxis::new(values(|point| point.1), plot.y_range, plot.log[1], (height / 60.0) as usize);
     let mut legend = 0.0f64;
-    for series in &plot.series {
+    let entries = plot.series.iter().filter(|series| !series.joined);
+    for series in entries.clone() {
         legend = legend.max(measure(&series.name, TICK)?);
     }
     let named = legend > 0.0;
-    let legend = [legend + LEGEND_SAMPLE + 3.0 * PADDING, plot.series.len() as f64 * LEGEND_ROW + PADDING];
+    let legend = [legend + LEGEND_SAMPLE + 3.0 * PADDING, entries.count() as f64 * LEGEND_ROW + PADDING];
     let mut widest = 0.0f64;
     for (_, label) in &y.ticks {
         widest = widest.max(measure(label, TICK)?);
@@ -232,7 +233,8 @@ fn key(scene: &mut Scene, plot: &LinePlot, [x, y]: [f64; 2], [width, height]: [f
         stroke_width: Some(0.8),
         opacity: Some(0.9),
     });
-    for (index, (series, (color, shape))) in plot.series.iter().zip(looks(plot)).enumerate() {
+    let entries = plot.series.iter().zip(looks(plot)).filter(|(series, _)| !series.joined);
+    for (index, (series, (color, shape))) in entries.enumerate() {
         let row = y + PADDING / 2.0 + LEGEND_ROW * (index as f64 + 0.5);
         let ends = vec![(x + PADDING, row), (x + PADDING + LEGEND_SAMPLE, row)];
         let middle = (x + PADDING + LEGEND_SAMPLE / 2.0, row);
@@ -254,14 +256,14 @@ fn key(scene: &mut Scene, plot: &LinePlot, [x, y]: [f64; 2], [width, height]: [f
 /// Colour and shape of each series; references are black and do not count.
 fn looks(plot: &LinePlot) -> Vec<(&'static str, usize)> {
     let mut colored = 0;
-    let look = |style: SeriesStyle| {
-        if style == SeriesStyle::Reference {
+    let look = |series: &Series| {
+        if series.style == SeriesStyle::Reference {
             return ("black", 0);
         }
-        colored += 1;
+        colored += usize::from(!series.joined || colored == 0);
         (COLORS[(colored - 1) % COLORS.len()], (colored - 1) % 5)
     };
-    plot.series.iter().map(|series| series.style).map(look).collect()
+    plot.series.iter().map(look).collect()
 }
 
 /// Cuts a polyline by its length, so that dashes do not depend on how densely it was sampled.

@@ -3,6 +3,7 @@
 use super::columns::mode;
 use super::data::{Mode, TestData, TestState};
 use super::table::{ImportedTest, TestFormat};
+use super::weights::WeightSource;
 use crate::table::{Error, Table, plain_unit, plainly};
 use crate::units::Unit;
 use crate::units::dimension::StressDimension;
@@ -83,10 +84,12 @@ impl ComponentColumns {
             format.tests.is_empty() || format.tests.iter().any(|other| other == test)
         };
         rows.retain(|&row| asked(row));
-        let states = rows.iter().map(|&row| self.state(file, row, format)).collect::<Result<Vec<_>, _>>()?;
+        let weights = WeightSource::find(file, format)?;
+        let state = |&row: &usize| self.state(file, row, format, weights.as_ref());
+        let states = rows.iter().map(state).collect::<Result<Vec<_>, _>>()?;
         let count = states.len();
         let source = file.remark("# Source:").or(file.remark("# source:")).unwrap_or_default().to_owned();
-        let table = TestData { source, states };
+        let table = TestData::weighted(source, states, weights.is_some_and(|weights| weights.is_absolute()));
         if table.measurements() == 0 {
             let found = format!("{count} rows");
             return Err(file.refuse(0, "table", found, "at least one row with a stress other than zero"));
@@ -98,7 +101,13 @@ impl ComponentColumns {
         Ok(ImportedTest { description, table, notes: Vec::new() })
     }
 
-    fn state(&self, file: &Table, row: usize, format: &TestFormat) -> Result<TestState, Error> {
+    fn state(
+        &self,
+        file: &Table,
+        row: usize,
+        format: &TestFormat,
+        weights: Option<&WeightSource>,
+    ) -> Result<TestState, Error> {
         let positive = |column: usize, stretch: f64| match stretch > 0.0 {
             true => Ok(stretch),
             false => Err(file.refuse_cell(row, column, "a stretch above 0")),
@@ -138,14 +147,12 @@ impl ComponentColumns {
         let stress = unit.quantity(file.number(row, self.value)?).map(|stress| stress.si());
         let stress = stress.map_err(|error| file.refuse_cell(row, self.value, &error.to_string()))?;
         let mode = if is_general { Mode::Component } else { test };
-        let state = match plainly(file.text(row, self.component)).as_str() {
-            "p1" => TestState { mode, stretches: [first, second], nominal: [stress, 0.0] },
-            "p2" if test != Mode::Uniaxial => {
-                TestState { mode, stretches: [first, second], nominal: [0.0, stress] }
-            }
+        let mut state = match plainly(file.text(row, self.component)).as_str() {
+            "p1" => TestState::new(mode, [first, second], [stress, 0.0]),
+            "p2" if test != Mode::Uniaxial => TestState::new(mode, [first, second], [0.0, stress]),
             "s1 s2" => {
                 let stretches = [first, 1.0 / (first * second)];
-                TestState { mode: Mode::Difference, stretches, nominal: [stress / first, 0.0] }
+                TestState::new(Mode::Difference, stretches, [stress / first, 0.0])
             }
             _ => {
                 let allowed = "P1, P2 (nominal, P2 not of a bar), s1-s2 (difference of true stresses)";
@@ -154,6 +161,9 @@ impl ComponentColumns {
         };
         if !is_general && state.mode != Mode::Difference && (first - 1.0) * stress < 0.0 {
             return Err(file.refuse_cell(row, self.value, "a stress with the sign of the strain"));
+        }
+        if let Some(weights) = weights.filter(|_| stress != 0.0) {
+            state.roots = [weights.root(file, row, stress)?; 2];
         }
         Ok(state)
     }

@@ -85,9 +85,9 @@ mod tests {
     fn coverage(tests: &[(Mode, f64)]) -> Coverage {
         let state = |&(mode, l): &(Mode, f64)| {
             let stretches = [l, mode.second_stretch(l)];
-            TestState { mode, stretches, nominal: [1.0, 0.0] }
+            TestState::new(mode, stretches, [1.0, 0.0])
         };
-        Coverage::new(&TestData { source: String::new(), states: tests.iter().map(state).collect() }).unwrap()
+        Coverage::new(&TestData::new(String::new(), tests.iter().map(state).collect())).unwrap()
     }
 
     #[test]

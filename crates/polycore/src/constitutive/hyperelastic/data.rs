@@ -10,6 +10,9 @@ pub struct TestData {
     pub source: String,
     /// The states, in the order of the file.
     pub states: Vec<TestState>,
+    /// Standard deviation of a stress whose root of the weight is 1, Pa; that of another is this over its
+    /// root. `None`: not known.
+    pub deviation: Option<f64>,
 }
 
 /// Type of test.
@@ -74,21 +77,67 @@ pub struct TestState {
     pub stretches: [f64; 2],
     /// P₁, P₂ in Pa. **Exactly zero means a free face or a body at rest: a condition, not a measurement.**
     pub nominal: [f64; 2],
+    /// Roots of the weights of P₁, P₂: 1, or on average of the squares 1.
+    pub roots: [f64; 2],
 }
 
 impl TestData {
+    /// Creates a table of unknown standard deviations.
+    pub fn new(source: String, states: Vec<TestState>) -> Self {
+        Self { source, states, deviation: None }
+    }
+
+    /// Scales the roots of the weights, in 1/Pa if they are reciprocals of standard deviations (`absolute`),
+    /// so that the mean of the weights is 1.
+    pub(super) fn weighted(source: String, states: Vec<TestState>, absolute: bool) -> Self {
+        let mut table = Self::new(source, states);
+        let scale = (table.weight_sum() / table.measurements().max(1) as f64).sqrt();
+        if scale > 0.0 {
+            table.states.iter_mut().flat_map(|state| &mut state.roots).for_each(|root| *root /= scale);
+            table.deviation = absolute.then_some(1.0 / scale);
+        }
+        table
+    }
+
+    /// Joins tables, whose measurements have these weights beside their own.
+    ///
+    /// # Errors
+    /// [`Error::Data`] if the standard deviations of some are known, those of others not.
+    pub fn join(tables: &[(&Self, f64)]) -> Result<Self, Error> {
+        let known = tables.iter().filter(|(table, _)| table.deviation.is_some()).count();
+        if known > 0 && known < tables.len() {
+            let reason = "standard deviations of all tables, or of none".to_owned();
+            return Err(Error::Data { what: "tables fitted at once".to_owned(), reason });
+        }
+        let weighted = |(table, weight): &(&Self, f64)| {
+            let scale = weight.sqrt() / table.deviation.unwrap_or(1.0);
+            table
+                .states
+                .iter()
+                .map(move |state| TestState { roots: state.roots.map(|root| scale * root), ..*state })
+                .collect::<Vec<_>>()
+        };
+        let source = tables.first().map_or_else(String::new, |(table, _)| table.source.clone());
+        Ok(Self::weighted(source, tables.iter().flat_map(weighted).collect(), known > 0))
+    }
+
     /// Selects the states of one test.
     ///
     /// # Errors
     /// [`Error::Data`] if no stress of it was measured.
     pub fn select(&self, mode: Mode) -> Result<Self, Error> {
         let states = self.states.iter().copied().filter(|state| state.mode == mode).collect();
-        let table = Self { source: self.source.clone(), states };
+        let table = Self { states, ..self.clone() };
         if table.measurements() == 0 {
             let reason = "contains no stress other than zero".to_owned();
             return Err(Error::Data { what: format!("mode `{}`", mode.name()), reason });
         }
         Ok(table)
+    }
+
+    /// Sum of the weights of the measured stresses: their number without weights.
+    pub fn weight_sum(&self) -> f64 {
+        self.states.iter().flat_map(TestState::measured_roots).map(|root| root * root).sum()
     }
 
     /// Number of measured stresses, i.e. of those that are not exactly zero.
@@ -98,6 +147,11 @@ impl TestData {
 }
 
 impl TestState {
+    /// Creates a state of weight 1.
+    pub fn new(mode: Mode, stretches: [f64; 2], nominal: [f64; 2]) -> Self {
+        Self { mode, stretches, nominal, roots: [1.0; 2] }
+    }
+
     /// λ₁, λ₂, λ₃.
     ///
     /// # Errors
@@ -110,12 +164,12 @@ impl TestState {
     pub fn simple_shear(amount: f64, stress: f64) -> Self {
         let stretch = 0.5 * amount + (0.5 * amount).hypot(1.0);
         let nominal = stress * (1.0 + stretch.powi(-2));
-        Self { mode: Mode::SimpleShear, stretches: [stretch, 1.0], nominal: [nominal, 0.0] }
+        Self::new(Mode::SimpleShear, [stretch, 1.0], [nominal, 0.0])
     }
 
-    /// Factor of P in residuals: 1, so that nominal stresses are compared; λ₁ of [`Mode::Difference`], so
-    /// that true ones are; of simple shear that of the shear stress.
-    pub fn weight(&self) -> f64 {
+    /// Ratio of the stress that is compared to P: 1, so that nominal stresses are; λ₁ of
+    /// [`Mode::Difference`], so that true ones are; of simple shear that of the shear stress.
+    pub fn ratio(&self) -> f64 {
         match self.mode {
             Mode::Difference => self.stretches[0],
             Mode::SimpleShear => 1.0 / (1.0 + self.stretches[0].powi(-2)),
@@ -123,9 +177,24 @@ impl TestState {
         }
     }
 
-    /// Measured stresses times [`TestState::weight`], Pa.
+    /// Factor of P₁ or P₂ in residuals: [`TestState::ratio`] times the root of the weight.
+    pub(super) fn factor(&self, axis: usize) -> f64 {
+        self.ratio() * self.roots[axis]
+    }
+
+    /// Measured stresses times [`TestState::ratio`], Pa.
     pub fn measured(&self) -> impl Iterator<Item = f64> + Clone + use<> {
-        let weight = self.weight();
-        self.nominal.into_iter().filter(|nominal| *nominal != 0.0).map(move |nominal| weight * nominal)
+        let ratio = self.ratio();
+        self.nominal.into_iter().filter(|nominal| *nominal != 0.0).map(move |nominal| ratio * nominal)
+    }
+
+    /// Roots of the weights of the measured stresses.
+    pub fn measured_roots(&self) -> impl Iterator<Item = f64> + Clone + use<> {
+        self.nominal.into_iter().zip(self.roots).filter(|(nominal, _)| *nominal != 0.0).map(|(_, root)| root)
+    }
+
+    /// Measured stresses as residuals count them, times the roots of their weights, Pa.
+    pub(super) fn targets(&self) -> impl Iterator<Item = f64> + use<> {
+        self.measured().zip(self.measured_roots()).map(|(stress, root)| root * stress)
     }
 }

@@ -1,8 +1,8 @@
 //! Least-squares fit of a law to homogeneous states.
 //!
-//! The objective is the sum of squares of the nominal-stress residuals, over every measured stress of the
-//! table (those that are not exactly zero; [`super::data::TestState::nominal`]). The figure of merit, `rms`,
-//! is the root of its mean. Levenberg–Marquardt in transformed parameters (ln p for positive ones, ln(p/limit
+//! The objective is the weighted sum of squares of the nominal-stress residuals, over every measured stress of
+//! the table (those that are not exactly zero; [`super::data::TestState::nominal`]); weights are 1 unless a
+//! table has others. The figure of merit, `rms`, is the root of its mean. Levenberg–Marquardt in transformed parameters (ln p for positive ones, ln(p/limit
 //! − 1) for locking limits) keeps every iterate in the law's domain; several starting points guard against
 //! local minima.
 
@@ -10,7 +10,7 @@ use std::cell::Cell;
 
 use nalgebra::DVector;
 
-use super::data::{TestData, TestState};
+use super::data::TestData;
 use super::descriptor::FitStart;
 pub use super::fit_map::{Identifiability, residuals};
 use super::fit_map::{ParameterMap, REJECTED};
@@ -25,8 +25,11 @@ pub struct Fit {
     pub model: &'static ModelDescriptor,
     /// Parameters of the law.
     pub parameters: Vec<FittedParameter>,
-    /// Root mean square of the residuals over the measured stresses, Pa.
+    /// Root mean square of the residuals over the measured stresses, weighted, Pa.
     pub rms: f64,
+    /// Root of χ² over the degrees of freedom, 1 on average if the errors of the tests are all: `None` if
+    /// their standard deviations are not known.
+    pub chi: Option<f64>,
     /// Draws of all parameters from their posterior ([`crate::posterior`]); those that the data do not
     /// determine keep their values. Empty if the data determine none.
     pub draws: Vec<Vec<f64>>,
@@ -55,13 +58,13 @@ pub struct FittedParameter {
     pub identifiability: Identifiability,
 }
 
-/// Root mean square of [`residuals`], Pa.
+/// Root mean square of model minus data, with the weights of the table, Pa.
 ///
 /// # Errors
 /// As [`residuals`].
 pub fn rms<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<f64, Error> {
     let residuals = residuals(law, table)?;
-    Ok((residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64).sqrt())
+    Ok((residuals.iter().map(|r| r * r).sum::<f64>() / table.weight_sum()).sqrt())
 }
 
 /// Agreement of a law with the measured stresses of a table.
@@ -82,19 +85,26 @@ impl Agreement {
     /// # Errors
     /// As [`residuals`]: at a state beyond locking there is no stress to compare.
     pub fn new<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<Self, Error> {
-        let measured = table.states.iter().flat_map(TestState::measured);
-        Ok(Self::of_residuals(&residuals(law, table)?, measured))
+        let measured = table.states.iter().flat_map(|state| state.measured().zip(state.measured_roots()));
+        Ok(Self::of_weighted_residuals(&residuals(law, table)?, measured))
     }
 
     /// Summarizes residuals of measured stresses, Pa, both of one length.
     pub(crate) fn of_residuals(residuals: &[f64], measured: impl Iterator<Item = f64> + Clone) -> Self {
-        let count = residuals.len() as f64;
-        let mean = measured.clone().sum::<f64>() / count;
-        let variation: f64 = measured.map(|data| (data - mean).powi(2)).sum();
+        Self::of_weighted_residuals(residuals, measured.map(|data| (data, 1.0)))
+    }
+
+    /// Summarizes residuals that are multiplied by the roots of their weights, of measured stresses with these
+    /// roots.
+    fn of_weighted_residuals(residuals: &[f64], measured: impl Iterator<Item = (f64, f64)> + Clone) -> Self {
+        let count: f64 = measured.clone().map(|(_, root)| root * root).sum();
+        let mean = measured.clone().map(|(data, root)| root * root * data).sum::<f64>() / count;
+        let variation: f64 = measured.clone().map(|(data, root)| (root * (data - mean)).powi(2)).sum();
         let squares: f64 = residuals.iter().map(|r| r * r).sum();
+        let sizes = residuals.iter().zip(measured).map(|(residual, (_, root))| root * residual.abs());
         Self {
             rms: (squares / count).sqrt(),
-            mae: residuals.iter().map(|r| r.abs()).sum::<f64>() / count,
+            mae: sizes.sum::<f64>() / count,
             r2: (variation > 0.0).then(|| 1.0 - squares / variation),
         }
     }
@@ -135,6 +145,11 @@ pub fn fit_until(
     let law = model.law(&values)?;
     let rms = rms(&law, table)?;
     let found = map.uncertainty(&at, table);
+    let degrees = measurements - model.parameters.len();
+    let chi = table
+        .deviation
+        .filter(|_| degrees > 0)
+        .map(|deviation| rms / deviation * (table.weight_sum() / degrees as f64).sqrt());
     let parameters = model
         .parameters
         .iter()
@@ -148,7 +163,7 @@ pub fn fit_until(
             identifiability: found.identifiability[i],
         })
         .collect();
-    Ok(Fit { law, model, parameters, rms, draws: found.draws, measurements, iterations, starts })
+    Ok(Fit { law, model, parameters, rms, chi, draws: found.draws, measurements, iterations, starts })
 }
 
 /// Best parameters of a model.
@@ -248,10 +263,10 @@ pub fn neo_hookean_modulus(table: &TestData) -> Result<f64, Error> {
     let (mut model_data, mut model_model) = (0.0, 0.0);
     for state in &table.states {
         let model = homogeneous::biaxial(&unit, state.stretches[0], state.stretches[1])?;
-        let square = state.weight().powi(2);
-        for (model, data) in model.into_iter().zip(state.nominal).filter(|(_, data)| *data != 0.0) {
-            model_data += square * model * data;
-            model_model += square * model * model;
+        for axis in (0..2).filter(|&axis| state.nominal[axis] != 0.0) {
+            let square = state.factor(axis).powi(2);
+            model_data += square * model[axis] * state.nominal[axis];
+            model_model += square * model[axis] * model[axis];
         }
     }
     let modulus = model_data / model_model;

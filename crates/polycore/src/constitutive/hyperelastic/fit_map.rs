@@ -17,7 +17,8 @@ pub enum Identifiability {
     Undetermined,
 }
 
-/// Computes model minus data for every measured stress, Pa, state by state, times [`TestState::weight`].
+/// Computes model minus data for every measured stress, Pa, state by state, times [`TestState::ratio`] and the
+/// root of its weight.
 ///
 /// # Errors
 /// Errors of the law at a state of the table.
@@ -25,8 +26,8 @@ pub fn residuals<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<
     let mut residuals = Vec::with_capacity(2 * table.states.len());
     for state in &table.states {
         let nominal = homogeneous::biaxial(law, state.stretches[0], state.stretches[1])?;
-        let measured = nominal.into_iter().zip(state.nominal).filter(|(_, data)| *data != 0.0);
-        residuals.extend(measured.map(|(model, data)| state.weight() * (model - data)));
+        let measured = (0..2).filter(|&axis| state.nominal[axis] != 0.0);
+        residuals.extend(measured.map(|axis| state.factor(axis) * (nominal[axis] - state.nominal[axis])));
     }
     Ok(residuals)
 }
@@ -124,7 +125,7 @@ impl<'a> ParameterMap<'a> {
             Some(slopes) => {
                 let mut unused = vec![[0.0; 2]; p.len()];
                 measured(table, |state| slopes(&p, state.stretches, &mut unused))
-                    .map(|(i, state, nominal)| state.weight() * (nominal[i] - state.nominal[i]))
+                    .map(|(i, state, nominal)| state.factor(i) * (nominal[i] - state.nominal[i]))
                     .collect()
             }
             None => residuals(&self.model.law(&p).ok()?, table).ok()?,
@@ -145,7 +146,7 @@ impl<'a> ParameterMap<'a> {
                 slopes(&p, state.stretches, &mut of);
                 for axis in (0..2).filter(|&axis| state.nominal[axis] != 0.0) {
                     for (i, value) in values.iter().enumerate() {
-                        rows[(row, i)] = state.weight() * of[i][axis] * value.1 / self.modulus;
+                        rows[(row, i)] = state.factor(axis) * of[i][axis] * value.1 / self.modulus;
                     }
                     row += 1;
                 }

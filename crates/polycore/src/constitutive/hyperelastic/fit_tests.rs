@@ -59,13 +59,12 @@ fn every_law_finds_back_its_own_parameters() {
     for model in MODELS {
         let law = model.law(model.example).unwrap();
         let states = [1.05, 1.2, 1.5, 2.0, 2.6, 3.3, 4.0].into_iter().flat_map(|l: f64| {
-            [l.recip().sqrt(), 1.0, l.sqrt(), l].map(|other| TestState {
-                mode: Mode::Biaxial,
-                stretches: [l, other],
-                nominal: homogeneous::biaxial(&law, l, other).unwrap(),
+            [l.recip().sqrt(), 1.0, l.sqrt(), l].map(|other| {
+                let nominal = homogeneous::biaxial(&law, l, other).unwrap();
+                TestState::new(Mode::Biaxial, [l, other], nominal)
             })
         });
-        let table = TestData { source: "synthetic".into(), states: states.collect() };
+        let table = TestData::new("synthetic".into(), states.collect());
         let fit = fit(model, &table).unwrap();
         assert!(fit.rms < 1e-6 * law.shear_modulus(), "{} {}", model.key, fit.rms);
         // the terms of an Ogden sum may come back in another order

@@ -165,12 +165,10 @@ fn extremes(pairs: Vec<[f64; 2]>) -> Option<[f64; 2]> {
 
 fn table(points: &[[f64; 2]]) -> TestData {
     let mode = Mode::Uniaxial;
-    let state = |&[stretch, nominal]: &[f64; 2]| TestState {
-        mode,
-        stretches: [stretch, mode.second_stretch(stretch)],
-        nominal: [nominal, 0.0],
+    let state = |&[stretch, nominal]: &[f64; 2]| {
+        TestState::new(mode, [stretch, mode.second_stretch(stretch)], [nominal, 0.0])
     };
-    TestData { source: String::new(), states: points.iter().map(state).collect() }
+    TestData::new(String::new(), points.iter().map(state).collect())
 }
 
 /// x of a stretch beyond the end of the beginning.

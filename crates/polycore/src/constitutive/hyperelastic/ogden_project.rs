@@ -16,7 +16,7 @@ use crate::numerics::least_squares::levenberg_marquardt;
 
 /// Moves a start to the best exponents; returns it unchanged if the search fails.
 pub(super) fn projected(p: &[f64], start: &FitStart<'_>) -> Vec<f64> {
-    let data = start.table.states.iter().flat_map(TestState::measured);
+    let data = start.table.states.iter().flat_map(TestState::targets);
     let data = DVector::from_iterator(start.table.measurements(), data) / start.modulus;
     let exponents = DVector::from_iterator(p.len() / 2, p.chunks_exact(2).map(|term| term[1]));
     let problem = Projected { start, data, last: RefCell::default() };
@@ -60,8 +60,8 @@ impl Projected<'_> {
             slopes(&unit, state.stretches, &mut found);
             for axis in (0..2).filter(|&axis| state.nominal[axis] != 0.0) {
                 for term in 0..terms {
-                    all[0][(row, term)] = state.weight() * found[2 * term][axis];
-                    all[1][(row, term)] = state.weight() * found[2 * term + 1][axis];
+                    all[0][(row, term)] = state.factor(axis) * found[2 * term][axis];
+                    all[1][(row, term)] = state.factor(axis) * found[2 * term + 1][axis];
                 }
                 row += 1;
             }

@@ -103,8 +103,8 @@ fn column(start: &FitStart<'_>, exponent: f64) -> Option<DVector<f64>> {
     let mut values = Vec::with_capacity(start.table.measurements());
     for state in &start.table.states {
         let found = slopes(&[1.0, exponent], state.stretches, &mut [[0.0; 2]; 2]);
-        let pairs = found.into_iter().zip(state.nominal).filter(|(_, data)| *data != 0.0);
-        values.extend(pairs.map(|(value, _)| state.weight() * value));
+        let measured = (0..2).filter(|&axis| state.nominal[axis] != 0.0);
+        values.extend(measured.map(|axis| state.factor(axis) * found[axis]));
     }
     Some(DVector::from_vec(values)).filter(|column| column.norm().is_finite() && column.norm() > 0.0)
 }
@@ -115,7 +115,7 @@ fn columns(start: &FitStart<'_>) -> (Vec<f64>, Vec<DVector<f64>>, DVector<f64>) 
     let grid = EXPONENTS.iter().rev().map(|a| -a).chain(EXPONENTS);
     let (exponents, columns) =
         grid.filter_map(|exponent| column(start, exponent).map(|column| (exponent, column))).unzip();
-    let data = start.table.states.iter().flat_map(TestState::measured);
+    let data = start.table.states.iter().flat_map(TestState::targets);
     let data = DVector::from_iterator(start.table.measurements(), data) / start.modulus;
     (exponents, columns, data)
 }

@@ -14,6 +14,8 @@ pub(super) struct TestRow {
     pub written: [f64; 2],
     pub stretches: [f64; 2],
     pub nominal: [f64; 2],
+    /// Roots of the weights.
+    pub roots: [f64; 2],
 }
 
 /// Share of the largest stress below which stresses are noise around zero.

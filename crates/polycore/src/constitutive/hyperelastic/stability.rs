@@ -122,8 +122,8 @@ mod tests {
         }
         evidence::at_most("least ρc² of a softening Yeoh law over μ, against its parabola", worst, 2e-2);
         let softer = crate::constitutive::hyperelastic::Yeoh::new([1.0, -0.2, 0.015]).unwrap();
-        let state = |l: f64| TestState { mode: Mode::PureShear, stretches: [l, 1.0], nominal: [1.0, 0.0] };
-        let table = TestData { source: String::new(), states: [1.2, 1.6, 2.0].map(state).to_vec() };
+        let state = |l: f64| TestState::new(Mode::PureShear, [l, 1.0], [1.0, 0.0]);
+        let table = TestData::new(String::new(), [1.2, 1.6, 2.0].map(state).to_vec());
         let lost = |l: f64| {
             let (x, d) = (l * l + l.powi(-2) - 2.0, l * l - l.powi(-2));
             let (slope, curvature) = (1.0 - 0.4 * x + 0.045 * x * x, -0.4 + 0.09 * x);

@@ -7,6 +7,7 @@ use super::columns::{ColumnKind, MODES, Role, StrainMeasure, TestStressMeasure, 
 use super::components::ComponentColumns;
 use super::data::{Mode, TestData, TestState};
 use super::plausible::{TestRow, plausible};
+use super::weights::{Deviation, WeightSource};
 use crate::table::{self, plain_unit, plainly};
 use crate::units::Unit;
 use crate::units::dimension::{RatioDimension, StressDimension};
@@ -30,6 +31,12 @@ pub struct TestFormat {
     pub material: Option<String>,
     /// Names of tests, in a table of components; all if empty.
     pub tests: Vec<String>,
+    /// Heading of the weights of squares.
+    pub weight_column: Option<String>,
+    /// Heading of the standard deviations, in a unit of stress or in per cent of each stress.
+    pub deviation_column: Option<String>,
+    /// Standard deviation of all stresses.
+    pub deviation: Option<Deviation>,
 }
 
 /// Result of reading a table.
@@ -236,6 +243,8 @@ impl TestColumns {
             )
         };
         let ratios = self.strains.iter().map(ratio).collect::<Result<Vec<_>, _>>()?;
+        let weights = WeightSource::find(file, format)?;
+        let absolute = weights.as_ref().is_some_and(WeightSource::is_absolute);
         let mut rows = Vec::with_capacity(file.rows());
         let mut blank = 0;
         for index in 0..file.rows() {
@@ -247,6 +256,7 @@ impl TestColumns {
                 written: [0.0; 2],
                 stretches: [0.0; 2],
                 nominal: [0.0; 2],
+                roots: [1.0; 2],
             };
             let mut measured = 0;
             for (axis, (chosen, unit)) in self.stresses.iter().zip(&units).enumerate() {
@@ -255,6 +265,9 @@ impl TestColumns {
                 row.nominal[axis] =
                     si.map_err(|error| file.refuse_cell(index, chosen.column, &error.to_string()))?;
                 measured += 1;
+                if let Some(weights) = weights.as_ref().filter(|_| row.nominal[axis] != 0.0) {
+                    row.roots[axis] = weights.root(file, index, row.nominal[axis])?;
+                }
             }
             if measured == 0 {
                 blank += 1;
@@ -312,6 +325,7 @@ impl TestColumns {
                 if chosen.measure == TestStressMeasure::True && row.mode != Mode::SimpleShear {
                     // J = 1: σ = λP
                     row.nominal[axis] /= row.stretches[axis];
+                    row.roots[axis] *= if absolute { row.stretches[axis] } else { 1.0 };
                 }
             }
         }
@@ -321,10 +335,12 @@ impl TestColumns {
             plausible(&mut rows, &mut notes, chosen.measure, said, chosen.unit.is_some())
                 .map_err(|(row, allowed)| file.refuse_cell(row, chosen.column, &allowed))?;
         }
-        let state =
-            |row: &TestRow| TestState { mode: row.mode, stretches: row.stretches, nominal: row.nominal };
+        let state = |row: &TestRow| TestState {
+            roots: row.roots,
+            ..TestState::new(row.mode, row.stretches, row.nominal)
+        };
         let source = file.remark("# source:").unwrap_or_default().to_owned();
-        let table = TestData { source, states: rows.iter().map(state).collect() };
+        let table = TestData::weighted(source, rows.iter().map(state).collect(), absolute);
         if table.measurements() == 0 {
             let found = format!("{} rows", file.rows());
             return Err(file.refuse(0, "table", found, "at least one row with a stress other than zero"));

@@ -13,7 +13,7 @@ fn plain(text: &str) -> ImportedTest {
 fn both_layouts_and_any_unit_of_stress() {
     let uniaxial = TestData::parse("t", "# source: me, 2024\nstretch,nominal_kPa\n1,0\n4, 1500\n").unwrap();
     assert_eq!(uniaxial.source, "me, 2024");
-    let expected = TestState { mode: Mode::Uniaxial, stretches: [4.0, 0.5], nominal: [1.5e6, 0.0] };
+    let expected = TestState::new(Mode::Uniaxial, [4.0, 0.5], [1.5e6, 0.0]);
     assert_eq!(uniaxial.states[1], expected);
     assert_eq!(uniaxial.measurements(), 1);
     let text = "stretch_1,stretch_2,nominal_1_MPa,nominal_2_N/mm^2\n2,1,0.5,0.25\n";

@@ -200,13 +200,13 @@ impl Test {
             Self::Uniaxial => {
                 let second = Mode::Uniaxial.second_stretch(point.strain);
                 let stretches = [point.strain, second];
-                TestState { mode: Mode::Uniaxial, stretches, nominal: [point.nominal, 0.0] }
+                TestState::new(Mode::Uniaxial, stretches, [point.nominal, 0.0])
             }
             Self::SimpleShear => {
                 let half = 0.5 * point.strain;
                 let stretch = half + half.hypot(1.0);
                 let nominal = point.nominal * (1.0 + stretch.powi(-2));
-                TestState { mode: Mode::PureShear, stretches: [stretch, 1.0], nominal: [nominal, 0.0] }
+                TestState::new(Mode::PureShear, [stretch, 1.0], [nominal, 0.0])
             }
         }
     }
@@ -215,5 +215,5 @@ impl Test {
 /// All points as elastic states, of which a law without time takes the mean.
 pub(super) fn elastic(runs: &[MeasuredRun]) -> TestData {
     let states = runs.iter().flat_map(|run| run.points.iter().map(|point| run.test.elastic_state(point)));
-    TestData { source: String::new(), states: states.collect() }
+    TestData::new(String::new(), states.collect())
 }

@@ -1,0 +1,253 @@
+//! Fitted laws as materials of Ansys, LS-DYNA and FEBio; those of Abaqus and CalculiX are in [`super::deck`].
+
+use super::any_model;
+
+/// Finite-element program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum Host {
+    /// Mechanical APDL, `TB,HYPER`.
+    Ansys,
+    /// `*MAT_077_H`, `*MAT_077_O`, in long format.
+    LsDyna,
+    /// Uncoupled materials of version 3 and later.
+    Febio,
+}
+
+impl Host {
+    /// Name in messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ansys => "Ansys",
+            Self::LsDyna => "LS-DYNA",
+            Self::Febio => "FEBio",
+        }
+    }
+
+    /// Ending of its files.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Ansys => "mac",
+            Self::LsDyna => "k",
+            Self::Febio => "feb",
+        }
+    }
+
+    /// Formats a line as a comment.
+    pub fn comment(self, text: &str) -> String {
+        match self {
+            Self::Ansys => format!("! {text}\n"),
+            Self::LsDyna => format!("$ {text}\n"),
+            Self::Febio => format!("<!-- {} -->\n", text.replace("--", "- -")),
+        }
+    }
+
+    /// Formats a law as material number `id`, stresses in the host's unit; `None` if the program has no such
+    /// law. Energies are those of the Ansys Material Reference, 4.6 and Structural Analysis Guide, 8.4.1.2
+    /// (d = 2/K; Ogden's Σ μᵢ/αᵢ (Σ λ^αᵢ − 3)), of the LS-DYNA manual, volume II (the same of Ogden; K from
+    /// Poisson's ratio), and of FEBio's sources (Σ cᵢ/mᵢ² (Σ λ^mᵢ − 3), ½k ln²J). Its Arruda–Boyce differs
+    /// between versions, and none is written.
+    pub fn card(self, id: usize, key: &str, parameters: &[f64], bulk: f64) -> Option<String> {
+        match self {
+            Self::Ansys => ansys(id, key, parameters, bulk),
+            Self::LsDyna => ls_dyna(id, key, parameters, bulk),
+            Self::Febio => febio(id, key, parameters, bulk),
+        }
+    }
+}
+
+/// C₁₀, C₀₁, C₂₀, C₁₁, C₀₂, C₃₀ of a polynomial in I₁ − 3 and I₂ − 3.
+fn polynomial(key: &str, parameters: &[f64]) -> Option<[f64; 6]> {
+    Some(match (key, parameters) {
+        ("neo-hookean", &[modulus]) => [0.5 * modulus, 0.0, 0.0, 0.0, 0.0, 0.0],
+        ("mooney-rivlin", &[a, b]) => [a, b, 0.0, 0.0, 0.0, 0.0],
+        ("reduced-polynomial-2", &[a, b]) => [a, 0.0, b, 0.0, 0.0, 0.0],
+        ("yeoh", &[a, b, c]) => [a, 0.0, b, 0.0, 0.0, c],
+        ("polynomial-2", &[a, b, c, d, e]) => [a, b, c, d, e, 0.0],
+        ("biderman", &[a, b, c, d]) => [a, b, c, 0.0, 0.0, d],
+        _ => return None,
+    })
+}
+
+/// Terms (μ, α) of Ogden's law, Σ 2μ/α² (Σ λ^α − 3).
+fn ogden(key: &str, parameters: &[f64]) -> Option<Vec<[f64; 2]>> {
+    key.starts_with("ogden-").then(|| parameters.chunks_exact(2).map(|term| [term[0], term[1]]).collect())
+}
+
+fn ansys(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
+    let d = 2.0 / bulk;
+    let (terms, option, mut constants) = match (key, p) {
+        ("neo-hookean", _) => (1, "NEO", p.to_vec()),
+        ("arruda-boyce", _) => (1, "BOYCE", p.to_vec()),
+        ("gent", _) => (1, "GENT", p.to_vec()),
+        ("extended-tube", _) => (1, "ETUBE", p.to_vec()),
+        ("reduced-polynomial-2" | "yeoh", _) => (p.len(), "YEOH", p.to_vec()),
+        ("mooney-rivlin", _) => (2, "MOONEY", p.to_vec()),
+        ("polynomial-2", _) => (5, "MOONEY", p.to_vec()),
+        ("biderman", &[a, b, c, d]) => (9, "MOONEY", vec![a, b, c, 0.0, 0.0, d, 0.0, 0.0, 0.0]),
+        _ => {
+            let own = ogden(key, p)?;
+            (own.len(), "OGDEN", own.iter().flat_map(|[mu, alpha]| [2.0 * mu / alpha, *alpha]).collect())
+        }
+    };
+    constants.push(d);
+    let rows = constants.chunks(6).enumerate().map(|(i, row)| {
+        let numbers: String = row.iter().map(|number| format!(",{number:.6e}")).collect();
+        format!("TBDATA,{}{numbers}\n", 6 * i + 1)
+    });
+    Some(format!("TB,HYPER,{id},1,{terms},{option}\n{}", rows.collect::<String>()))
+}
+
+fn ls_dyna(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
+    let shear = any_model(key).ok()?.law(p).ok()?.shear_modulus();
+    let poisson = (3.0 * bulk - 2.0 * shear) / (6.0 * bulk + 2.0 * shear);
+    let row = |numbers: &[f64]| numbers.iter().map(|number| format!("{number:>20.6e}")).collect::<String>();
+    let (keyword, rows) = match polynomial(key, p) {
+        // C10 C01 C11 C20 C02 C30
+        Some([a, b, c, d, e, f]) => ("*MAT_077_H+", vec![row(&[a, b, d, c, e, f])]),
+        None => {
+            let terms = ogden(key, p)?;
+            let moduli: Vec<f64> = terms.iter().map(|[mu, alpha]| 2.0 * mu / alpha).collect();
+            let exponents: Vec<f64> = terms.iter().map(|[_, alpha]| *alpha).collect();
+            ("*MAT_077_O+", vec![row(&moduli), row(&exponents)])
+        }
+    };
+    let density = "&rho";
+    Some(format!("{keyword}\n{id:>20}{density:>20}{poisson:>20.12}{:>20}\n{}\n", 0, rows.join("\n")))
+}
+
+fn febio(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
+    let tags = |name: &str, values: &[f64]| -> Vec<(String, f64)> {
+        (1..).zip(values).map(|(i, value)| (format!("{name}{i}"), *value)).collect()
+    };
+    let (kind, mut constants) = match (key, p) {
+        ("neo-hookean", &[modulus]) => ("Mooney-Rivlin", tags("c", &[0.5 * modulus, 0.0])),
+        ("mooney-rivlin", _) => ("Mooney-Rivlin", tags("c", p)),
+        ("reduced-polynomial-2" | "yeoh", _) => ("Yeoh", tags("c", p)),
+        ("gent", &[modulus, limit]) => ("Gent", vec![("G".to_owned(), modulus), ("Jm".to_owned(), limit)]),
+        _ => {
+            let terms = ogden(key, p)?;
+            let moduli: Vec<f64> = terms.iter().map(|[mu, _]| 2.0 * mu).collect();
+            let exponents: Vec<f64> = terms.iter().map(|[_, alpha]| *alpha).collect();
+            ("Ogden", [tags("c", &moduli), tags("m", &exponents)].concat())
+        }
+    };
+    constants.push(("k".to_owned(), bulk));
+    let lines = constants.iter().map(|(tag, value)| format!("  <{tag}>{value:.6e}</{tag}>\n"));
+    let lines: String = lines.collect();
+    Some(format!("<material id=\"{id}\" name=\"{key}\" type=\"{kind}\">\n{lines}</material>\n"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::constitutive::hyperelastic::MODELS;
+
+    const STRETCHES: [f64; 3] = [1.8, 0.7, 1.0 / (1.8 * 0.7)];
+
+    /// All numbers of some lines, separated by `,`, blanks or tags.
+    fn numbers(text: &str) -> Vec<f64> {
+        let cells = text.split(|c: char| c == ',' || c == '<' || c == '>' || c.is_whitespace());
+        cells.filter_map(|cell| cell.parse().ok()).collect()
+    }
+
+    fn invariants() -> [f64; 2] {
+        [2, -2].map(|power| STRETCHES.iter().map(|l| l.powi(power)).sum::<f64>() - 3.0)
+    }
+
+    fn powers(exponent: f64) -> f64 {
+        STRETCHES.iter().map(|l| l.powf(exponent)).sum::<f64>() - 3.0
+    }
+
+    /// Energy of a card by the formula of its program's manual, at constant volume.
+    fn energy(host: Host, card: &str) -> f64 {
+        let [x, y] = invariants();
+        let head = card.lines().next().unwrap();
+        let series = |c: &[f64]| (1..).zip(c).map(|(i, c)| c * x.powi(i)).sum::<f64>();
+        match host {
+            Host::Ansys => {
+                // the first number of each line is the place of the next constant
+                let c: Vec<f64> = card.lines().skip(1).flat_map(|line| numbers(line)[1..].to_vec()).collect();
+                match head.rsplit(',').next().unwrap() {
+                    "NEO" => 0.5 * c[0] * x,
+                    "YEOH" => series(&c[..c.len() - 1]),
+                    "GENT" => -0.5 * c[0] * c[1] * (1.0 - x / c[1]).ln(),
+                    "BOYCE" => {
+                        let (i, l) = (x + 3.0, c[1]);
+                        let term = |(k, a): (i32, f64)| a / l.powi(2 * k - 2) * (i.powi(k) - 3.0_f64.powi(k));
+                        let factors = [0.5, 1.0 / 20.0, 11.0 / 1050.0, 19.0 / 7000.0, 519.0 / 673_750.0];
+                        c[0] * (1..).zip(factors).map(term).sum::<f64>()
+                    }
+                    "ETUBE" => {
+                        let room = 1.0 - c[1] * c[1] * x;
+                        0.5 * c[0] * ((1.0 - c[1] * c[1]) * x / room + room.ln())
+                            + 2.0 * c[2] / (c[3] * c[3]) * powers(-c[3])
+                    }
+                    "OGDEN" => {
+                        c[..c.len() - 1].chunks(2).map(|term| term[0] / term[1] * powers(term[1])).sum()
+                    }
+                    _ => {
+                        let terms = [x, y, x * x, x * y, y * y, x.powi(3), x * x * y, x * y * y, y.powi(3)];
+                        c[..c.len() - 1].iter().zip(terms).map(|(c, term)| c * term).sum()
+                    }
+                }
+            }
+            Host::LsDyna => {
+                let rows: Vec<Vec<f64>> = card.lines().skip(2).map(numbers).collect();
+                match head {
+                    "*MAT_077_H+" => {
+                        let terms = [x, y, x * y, x * x, y * y, x.powi(3)];
+                        rows[0].iter().zip(terms).map(|(c, term)| c * term).sum()
+                    }
+                    _ => rows[0].iter().zip(&rows[1]).map(|(mu, alpha)| mu / alpha * powers(*alpha)).sum(),
+                }
+            }
+            Host::Febio => {
+                let c = numbers(&card[head.len()..]);
+                match head.split("type=\"").nth(1).unwrap().split('"').next().unwrap() {
+                    "Mooney-Rivlin" => c[0] * x + c[1] * y,
+                    "Yeoh" => series(&c[..c.len() - 1]),
+                    "Gent" => -0.5 * c[0] * c[1] * (1.0 - x / c[1]).ln(),
+                    _ => {
+                        let (moduli, exponents) = c[..c.len() - 1].split_at((c.len() - 1) / 2);
+                        moduli.iter().zip(exponents).map(|(c, m)| c / (m * m) * powers(*m)).sum()
+                    }
+                }
+            }
+        }
+    }
+
+    /// Energies of all cards, by the manuals' formulas, are those of the laws; seven digits are written.
+    #[test]
+    fn cards_have_the_energies_of_their_laws() {
+        let mut worst: f64 = 0.0;
+        for (host, expected) in [(Host::Ansys, 12), (Host::LsDyna, 9), (Host::Febio, 8)] {
+            let mut count = 0;
+            for model in MODELS {
+                let Some(card) = host.card(3, model.key, model.example, 4e7) else { continue };
+                let law = model.law(model.example).unwrap().energy_at(STRETCHES).unwrap();
+                worst = worst.max((energy(host, &card) / law - 1.0).abs());
+                count += 1;
+            }
+            assert_eq!(count, expected, "{}", host.name());
+        }
+        evidence::at_most("energies of cards by their programs' formulas, relative", worst, 5e-6);
+    }
+
+    /// K = 40 MPa: d = 2/K; ν from K and μ = 0.4 MPa.
+    #[test]
+    fn bulk_moduli_in_the_form_of_each_program() {
+        let card = |host: Host| host.card(1, "neo-hookean", &[0.4], 40.0).unwrap();
+        assert_eq!(card(Host::Ansys), "TB,HYPER,1,1,1,NEO\nTBDATA,1,4.000000e-1,5.000000e-2\n");
+        let poisson = numbers(card(Host::LsDyna).lines().nth(1).unwrap())[1];
+        assert!((poisson - (120.0 - 0.8) / 240.8).abs() < 1e-12, "{poisson}");
+        assert!(card(Host::Febio).contains("<k>4.000000e1</k>"), "{}", card(Host::Febio));
+        for (host, key) in
+            [(Host::Febio, "arruda-boyce"), (Host::LsDyna, "gent"), (Host::Ansys, "van-der-waals")]
+        {
+            let model = any_model(key).unwrap();
+            assert_eq!(host.card(1, key, model.example, 1e9), None);
+        }
+    }
+}
