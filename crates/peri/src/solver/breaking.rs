@@ -60,7 +60,8 @@ impl<const D: usize> System<'_, D> {
     }
 
     fn overloaded(&mut self, state: &State<D>, limit: f64) -> Vec<(Overstretched, f64)> {
-        let free = |site: usize| self.loads.constrained(site) == 0;
+        let bound = self.loads.bound();
+        let free = |site: usize| bound.get(site).is_none_or(|bits| *bits == 0);
         self.material.overloaded(&*self.bonds, &state.displacement, limit, &free)
     }
 

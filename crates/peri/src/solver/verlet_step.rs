@@ -161,6 +161,7 @@ pub fn refresh<const D: usize>(
     sites: Option<&[u32]>,
 ) {
     system.prepare(&state.displacement);
+    system.follow(&state.displacement);
     // states of particles change beyond their own bonds
     let sites = sites.filter(|_| !system.material.has_points());
     let system = &*system;
@@ -190,6 +191,7 @@ pub fn refresh<const D: usize>(
             of(first + start, f.each_mut().map(|f| &mut f[start..end]));
         }
     });
+    system.level_forces(state);
 }
 
 /// Adds the body forces of the sites from `start` on.

@@ -1,5 +1,6 @@
 //! The scene of a peridynamic problem, as written in TOML. Only what a scene names is built.
 
+mod body_force;
 mod boundary;
 mod bridges;
 mod build;
@@ -32,10 +33,12 @@ mod solid;
 mod step;
 mod tearing;
 mod time;
+mod traction_field;
 mod values;
 mod variant;
 mod warn;
 
+pub use body_force::{BodyForceSpec, SpinSpec};
 pub use boundary::{Boundary, Prescribed, PrescribedField, RotationSpec, Side};
 pub use build::{body_of, least_memory};
 pub use check::{check, check_variant};
@@ -93,6 +96,9 @@ pub struct Scene {
     /// Loads and supports.
     #[serde(default)]
     pub boundary: Vec<Boundary>,
+    /// Gravity, centrifugal and other body forces.
+    #[serde(default)]
+    pub body_force: Vec<BodyForceSpec>,
     /// Solver settings.
     #[serde(default)]
     pub solver: SolverSpec,
@@ -447,6 +453,11 @@ impl Scene {
     /// Returns the comparisons of its variants.
     pub fn comparisons(&self) -> Comparisons<'_> {
         Comparisons { convergence: &self.convergence, curves: &self.error_against_time }
+    }
+
+    /// Returns true if forces are prescribed.
+    pub fn has_forces(&self) -> bool {
+        !self.body_force.is_empty() || self.boundary.iter().any(Boundary::prescribes_force)
     }
 
     /// Returns true if outputs need forces, stresses or flags.
