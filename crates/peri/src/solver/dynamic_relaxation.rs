@@ -122,10 +122,7 @@ impl RelaxationSolver {
         self.level(&system.loads);
         let shared = system.shared_forces(state);
         let (mut sums, observed) = force_pass(system, state, self.masses(system, own), mass, factor, look);
-        if !shared.is_empty() {
-            let masses: Vec<f64> = self.masses(system, own).iter().map(|unit| unit * mass).collect();
-            system.add_shared(state, &shared, &masses, &mut sums);
-        }
+        system.add_shared(state, &shared, self.masses(system, own), mass, &mut sums);
         system.count_evaluation(state);
         if !sums.is_finite() {
             return Err(system.not_finite(state));
@@ -156,6 +153,7 @@ impl RelaxationSolver {
         if state.is_balanced(&goal, broken)? {
             return Ok(true);
         }
+        system.level_forces(state);
         move_pass(&system.loads, state, self.masses(system, own), mass, damping);
         if let Some(contact) = system.repulsion() {
             contact.stop_detached(&mut state.velocity);

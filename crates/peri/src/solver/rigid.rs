@@ -99,52 +99,51 @@ impl<const D: usize> System<'_, D> {
         }
     }
 
-    /// Forces of the regions in shared components, N/m³, as [`Self::level_forces`] has left them.
+    /// Mean forces of the regions, N/m³.
     pub(super) fn shared_forces(&self, state: &State<D>) -> Vec<[f64; D]> {
-        let first = |region: &RigidRegion| region.sites.first().map_or(0, |&site| site as usize);
-        self.loads.rigid.iter().map(|region| state.force.get(first(region))).collect()
+        self.loads.rigid.iter().map(|region| region.mean(&*self.bonds, &state.force)).collect()
     }
 
-    /// Levels the forces of dynamic relaxation and adds those of the regions to its sums; `before` are the
-    /// forces of the last iteration.
+    /// Adds the forces of regions to the sums of dynamic relaxation; `before` are those of the last
+    /// iteration.
     pub(super) fn add_shared(
         &self,
-        state: &mut State<D>,
+        state: &State<D>,
         before: &[[f64; D]],
         masses: &[f64],
+        mass: f64,
         sums: &mut ForceSums,
     ) {
-        self.level_forces(state);
-        for (region, before) in self.loads.rigid.iter().zip(before) {
+        let forces = self.shared_forces(state);
+        for ((region, before), force) in self.loads.rigid.iter().zip(before).zip(&forces) {
             for &site in &region.sites {
-                let site = site as usize;
-                let (force, v) = (state.force.get(site), state.velocity.get(site));
+                let v = state.velocity.get(site as usize);
                 for d in (0..D).filter(|&d| region.shares(d)) {
                     sums.free += force[d] * force[d];
                     sums.quotient_top += v[d] * (force[d] - before[d]);
-                    sums.quotient_bottom += v[d] * v[d] * masses[site];
+                    sums.quotient_bottom += v[d] * v[d] * masses[site as usize] * mass;
                 }
             }
         }
     }
 
-    /// Levels the forces and sets the gradient −V f of the energy in shared components; adds them to the sum
-    /// of squares, and returns the slope along a direction.
+    /// Sets the gradient −V f of the energy in shared components, adds f to the sum of squares, and returns the
+    /// slope along a direction.
     pub(super) fn shared_gradient(
         &self,
-        state: &mut State<D>,
+        state: &State<D>,
         places: &ParticleMap,
         direction: &Field<D>,
         gradient: &mut Field<D>,
         sums: &mut ForceSums,
     ) -> f64 {
-        self.level_forces(state);
         let mut slope = 0.0;
-        for (region, (_, particles)) in self.loads.rigid.iter().zip(places.shared()) {
+        let forces = self.shared_forces(state);
+        for ((region, (_, particles)), force) in self.loads.rigid.iter().zip(places.shared()).zip(&forces) {
             let volumes = region.sites.iter().map(|&site| self.bonds.volume(site as usize));
             let volume = volumes.sum::<f64>() / particles.len() as f64;
-            for (&site, &particle) in region.sites.iter().zip(particles) {
-                let (force, along) = (state.force.get(site as usize), direction.get(particle));
+            for &particle in particles {
+                let along = direction.get(particle);
                 let mut value = gradient.get(particle);
                 for d in (0..D).filter(|&d| region.shares(d)) {
                     value[d] = -volume * force[d];

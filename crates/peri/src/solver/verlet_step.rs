@@ -162,8 +162,9 @@ pub fn refresh<const D: usize>(
 ) {
     system.prepare(&state.displacement);
     system.follow(&state.displacement);
-    // states of particles change beyond their own bonds
-    let sites = sites.filter(|_| !system.material.has_points());
+    // states of particles change beyond their own bonds, and forces of a region with all of them
+    let whole = system.material.has_points() || !system.loads.rigid.is_empty();
+    let sites = sites.filter(|_| !whole);
     let system = &*system;
     let piece = if sites.is_some() { system.piece() } else { CHUNK };
     let pieces = sites.map(|sites| {

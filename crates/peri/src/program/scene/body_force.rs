@@ -5,7 +5,7 @@ use super::curve_spec::CurveSpec;
 use super::formula::{Formula, VectorFormula};
 use super::rotation::direction;
 use super::values::{DiscreteBody, ONE_OF_THEM, plain, positive, vector};
-use super::Scene;
+use super::{Scene, SolverMethod};
 use crate::field::Field;
 use crate::solver::{Centrifugal, CurvedRegion, ForceField, Loads, PlacedForce};
 use harness::scene::{SceneError, Source};
@@ -154,6 +154,13 @@ pub(super) fn add<const D: usize>(
             let centre = vector::<D>(source, &key("spin.point"), &spin.point)?;
             let axis = direction::<D>(source, &key("spin.axis"), spin.axis.as_deref())?;
             let angular_velocity = spin.angular_velocity.si();
+            let held = |d: usize| loads.constrained.iter().any(|bits| bits >> d & 1 == 1);
+            let across = (0..D).find(|&d| axis[d].abs() < 1.0 - 1e-9 && !held(d));
+            if let Some(d) = across.filter(|_| scene.method() != SolverMethod::Verlet) {
+                let found = format!("a body that nothing holds along {}", ["x", "y", "z"][d]);
+                let allowed = "a `displacement` of some region there: a free body leaves the axis";
+                return Err(source.error(&key("spin"), found, allowed));
+            }
             add_field(body, loads, Centrifugal { density, angular_velocity, centre, axis, amplitude });
             continue;
         } else {

@@ -29,6 +29,8 @@ pub struct Boundary {
     pub traction: Option<Vec<Stress>>,
     /// Traction on the side as formulas of the reference position on it (m) and `t` (s), Pa.
     pub traction_field: Option<Vec<Formula>>,
+    /// Pressure on the faces of the body in the region, across the deformed surface.
+    pub pressure: Option<Stress>,
     /// Total force on the region, spread over its volume.
     pub force: Option<Vec<Force>>,
     /// Velocity at the start, in explicit dynamics.
@@ -59,7 +61,8 @@ impl Boundary {
 
     /// Returns true if the boundary prescribes forces.
     pub fn prescribes_force(&self) -> bool {
-        self.traction.is_some() || self.traction_field.is_some() || self.force.is_some()
+        let surface = self.traction.is_some() || self.traction_field.is_some() || self.pressure.is_some();
+        surface || self.force.is_some()
     }
 
     /// Returns the number of layers of particles that it takes at a side.

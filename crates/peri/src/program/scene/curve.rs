@@ -42,7 +42,7 @@ impl Scene {
     /// Returns true if loads follow curves: those of boundaries, or any in a later step.
     pub fn has_curves(&self) -> bool {
         self.later
-            || self.boundary.iter().any(|boundary| boundary.timed().is_some())
+            || self.boundary.iter().any(|own| own.timed().is_some() || own.pressure.is_some())
             || self.body_force.iter().any(BodyForceSpec::is_curved)
     }
 
@@ -213,6 +213,7 @@ impl Multiplied {
         let moved = boundary.displacement.iter().flatten().enumerate().filter(|(d, _)| own(*d));
         let forces = boundary.force.iter().flatten().enumerate().filter(|(d, _)| own(*d));
         let stresses = boundary.traction.iter().flatten().enumerate().filter(|(d, _)| own(*d));
+        let stresses = stresses.map(|(_, stress)| stress).chain(&boundary.pressure);
         let turned =
             boundary.rotation.iter().filter(|rotation| component.is_none() && rotation.curve.is_none());
         let length = |held: &Prescribed| match held {
@@ -222,7 +223,7 @@ impl Multiplied {
         Self {
             lengths: moved.map(|(_, held)| length(held)).collect(),
             forces: forces.map(|(_, force)| force.si()).collect(),
-            stresses: stresses.map(|(_, stress)| stress.si()).collect(),
+            stresses: stresses.map(|stress| stress.si()).collect(),
             angles: turned.map(|rotation| rotation.angle.si()).collect(),
             fields: boundary.displacement_field.is_some(),
             ..Self::default()

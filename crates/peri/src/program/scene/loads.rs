@@ -65,6 +65,7 @@ pub fn loads_of<const D: usize>(
         };
         super::curve::follow(&regions, rotates, kept, &surfaces, &amplitudes, &mut loads);
     }
+    super::pressure::add(source, scene, body, &amplitudes, &mut loads)?;
     super::traction_field::add(source, scene, body, &amplitudes, &mut loads, &mut loaded)?;
     super::body_force::add(source, scene, body, &mut loads)?;
     let rest = Field::zeros(body.bonds.sites());

@@ -26,6 +26,7 @@ mod overlap;
 mod parts;
 mod placement;
 mod planes;
+mod pressure;
 mod probe;
 mod region;
 mod rotation;
