@@ -56,9 +56,8 @@ impl ParticleMap {
         let each = particles.iter().map(bound).enumerate();
         places.held = each.filter(|&(_, components)| components != 0).collect();
         let place = |site: &u32| particles.binary_search(site).ok();
-        let of_region = |region: &RigidRegion| {
-            (region.components, region.sites.iter().filter_map(place).collect())
-        };
+        let of_region =
+            |region: &RigidRegion| (region.components, region.sites.iter().filter_map(place).collect());
         places.shared = loads.rigid.iter().map(of_region).collect();
         places
     }

@@ -115,8 +115,7 @@ pub fn gradient_pass<const D: usize>(
     gradient: &mut Field<D>,
 ) -> (ForceSums, StretchRange, f64) {
     let (sites, loads, displacement) = (system.bonds.sites(), &*system.loads, &state.displacement);
-    let along = direction;
-    let direction = direction.components();
+    let directions = direction.components();
     let items = state.force.chunks_mut().into_par_iter().zip(places.parts_mut(gradient)).enumerate();
     // one work item at a time if there are hardly any
     let items = items.with_min_len(if sites <= 2 * CHUNK && D == 2 { 2 } else { 1 });
@@ -141,7 +140,7 @@ pub fn gradient_pass<const D: usize>(
                     sums.constrained += *force * *force;
                     *force = 0.0;
                 }
-                let (volumes, direction) = (&volumes[particles.clone()], &direction[d][particles.clone()]);
+                let (volumes, direction) = (&volumes[particles.clone()], &directions[d][particles.clone()]);
                 let [free, along] = Arch::new().dispatch(EnergyGradient { force: g, volumes, direction });
                 sums.free += free;
                 slope += along;
@@ -154,7 +153,7 @@ pub fn gradient_pass<const D: usize>(
         (sums.add(item.0), observed.join(item.1), slope + item.2)
     });
     if !loads.rigid.is_empty() {
-        slope += system.shared_gradient(state, places, along, gradient, &mut sums);
+        slope += system.shared_gradient(state, places, direction, gradient, &mut sums);
     }
     // planes hold a body, too
     sums.constrained += system.repulsion().map_or(0.0, |contact| contact.plane_force_square());

@@ -94,7 +94,9 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             (Some("formula"), None) => {}
             (Some(_), None) => match (force.density, &scene.dynamics) {
                 (Some(density), None) => positive(source, &key("density"), density.si(), "kg/m³")?,
-                (Some(_), Some(_)) => return Err(source.conflict(&key("density"), "dynamics.density", ONE_OF_THEM)),
+                (Some(_), Some(_)) => {
+                    return Err(source.conflict(&key("density"), "dynamics.density", ONE_OF_THEM));
+                }
                 (None, None) => return Err(source.missing(&key("density"), "needed without [dynamics]")),
                 (None, Some(_)) => {}
             },

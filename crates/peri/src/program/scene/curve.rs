@@ -46,6 +46,12 @@ impl Scene {
             || self.body_force.iter().any(BodyForceSpec::is_curved)
     }
 
+    /// Returns true if forces depend on the displacement.
+    pub fn has_followers(&self) -> bool {
+        self.boundary.iter().any(|own| own.pressure.is_some())
+            || self.body_force.iter().any(|force| force.spin.is_some())
+    }
+
     /// Returns the load factor of explicit dynamics and its rate over the time, s; `None` for a ramp. With
     /// curves the factor is the part of the whole time.
     pub fn amplitude(&self) -> Option<Box<LoadCurve<'_>>> {
@@ -226,6 +232,7 @@ impl Multiplied {
             stresses: stresses.map(|stress| stress.si()).collect(),
             angles: turned.map(|rotation| rotation.angle.si()).collect(),
             fields: boundary.displacement_field.is_some(),
+            formulas: boundary.traction_field.is_some(),
             ..Self::default()
         }
     }
@@ -237,7 +244,7 @@ impl Multiplied {
 
     /// Returns true if any value is not 0.
     fn is_load(&self) -> bool {
-        self.moves() || self.forces.iter().chain(&self.stresses).any(|value| *value != 0.0)
+        self.moves() || self.formulas || self.forces.iter().chain(&self.stresses).any(|value| *value != 0.0)
     }
 
     /// Returns what does not suit a column with a unit, and what would.
@@ -364,8 +371,7 @@ pub(super) fn follow<const D: usize>(
 /// A [`SceneError`] that names the key.
 pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let mut boundaries = scene.boundary.iter().enumerate();
-    let of_boundary =
-        boundaries.find_map(|(index, own)| Some(format!("boundary[{index}].{}", own.timed()?)));
+    let of_boundary = boundaries.find_map(|(index, own)| Some(format!("boundary[{index}].{}", own.timed()?)));
     let planes = scene.contact.iter().flat_map(|contact| &contact.plane);
     let runs = of_boundary.is_some() || scene.time.is_some() || scene.dynamics.is_some();
     if let Some(index) = planes.clone().position(|plane| plane.displacement.is_some())
@@ -374,7 +380,12 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     {
         let why = "the plane moves with the load factor, which runs with curves do not have";
         let key = format!("contact.plane[{index}].displacement");
-        let other = if of_boundary.is_some() { "boundary.curve" } else { "body_force" };
+        let pressed = scene.boundary.iter().any(|own| own.pressure.is_some());
+        let other = match &of_boundary {
+            Some(_) => "boundary.curve",
+            None if pressed => "boundary.pressure",
+            None => "body_force",
+        };
         return Err(source.conflict(&key, other, why));
     }
     let mut forces = scene.body_force.iter().enumerate();

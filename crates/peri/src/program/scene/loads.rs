@@ -7,7 +7,9 @@ use super::{Boundary, ContactSpec, Prescribed, PrescribedField, Scene, Side, Sol
 use crate::bonds::components;
 use crate::field::Field;
 use crate::material::{BodyTensor, surface_load};
-use crate::solver::{ContactStops, INVERTS, Loads, RigidRegion, Support, Unsupported, find_unsupported, inverted};
+use crate::solver::{
+    ContactStops, INVERTS, Loads, RigidRegion, Support, Unsupported, find_unsupported, inverted,
+};
 use harness::scene::{SceneError, Source};
 
 /// Times at which the balance of forces with curves is checked.
@@ -30,8 +32,7 @@ pub fn loads_of<const D: usize>(
         if members.is_empty() {
             return Err(source.error(&key, "a region without particles", "a region with at least one"));
         }
-        let forced =
-            boundary.prescribes_force() || boundary.displacement.is_some();
+        let forced = boundary.prescribes_force() || boundary.displacement.is_some();
         let forced = forced || boundary.rotation.is_some() || boundary.rigid;
         for &site in members.iter().filter(|_| forced) {
             loaded[site as usize] = true;

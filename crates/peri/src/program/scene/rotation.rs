@@ -63,14 +63,11 @@ pub(super) fn direction<const D: usize>(
         (Some(axis), 3) => {
             let size = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
             let three = <[f64; 3]>::try_from(axis).ok().filter(|_| size > 0.0 && size.is_finite());
-            let three = three.ok_or_else(|| {
-                source.error(key, format!("{axis:?}"), "three numbers, not all of them 0")
-            })?;
+            let three = three
+                .ok_or_else(|| source.error(key, format!("{axis:?}"), "three numbers, not all of them 0"))?;
             Ok(three.map(|x| x / size))
         }
-        (None, _) => {
-            Err(source.missing(key, "needed in a solid: the direction of the axis, e.g. [0, 0, 1]"))
-        }
+        (None, _) => Err(source.missing(key, "needed in a solid: the direction of the axis, e.g. [0, 0, 1]")),
         (Some(_), _) => Err(source.unexpected(key, "a plane body turns in its plane")),
     }
 }

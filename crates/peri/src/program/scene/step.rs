@@ -1,7 +1,9 @@
 //! Steps of a programme in sequence: the scene's own blocks are the first, each `[[step]]` is a later one.
 
 use super::check::check_variant;
-use super::{BodyForceSpec, Boundary, CrackSpec, DeviceChoice, Dynamics, Prescribed, Scene, SolverMethod, SolverSpec};
+use super::{
+    BodyForceSpec, Boundary, CrackSpec, DeviceChoice, Dynamics, Prescribed, Scene, SolverMethod, SolverSpec,
+};
 use super::{TimeProgramSpec, crack, loads::own_region_names};
 use crate::bonds::Bonds;
 use crate::geometry::Cut;
