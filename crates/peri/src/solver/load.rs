@@ -34,7 +34,7 @@ pub struct Loads<const D: usize> {
     /// Regions that move as a whole, see [`Self::join`].
     pub rigid: Vec<RigidRegion>,
     /// With such regions: bit d of a site: component d is constrained or shared.
-    pub(super) bound: Vec<u8>,
+    pub joined: Vec<u8>,
     /// Loads that follow curves; absent: all follow the load factor.
     pub curved: Option<Box<CurvedLoads<D>>>,
 }

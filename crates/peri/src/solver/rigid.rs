@@ -51,16 +51,16 @@ impl<const D: usize> Loads<D> {
     /// set.
     pub fn join(&mut self, region: RigidRegion, sites: usize) {
         if self.rigid.is_empty() {
-            self.bound.clone_from(&self.constrained);
-            self.bound.resize(sites, 0);
+            self.joined.clone_from(&self.constrained);
+            self.joined.resize(sites, 0);
         }
-        region.sites.iter().for_each(|&site| self.bound[site as usize] |= region.components);
+        region.sites.iter().for_each(|&site| self.joined[site as usize] |= region.components);
         self.rigid.push(region);
     }
 
     /// Bits of the components of each site that are constrained or shared; empty without any.
     pub(super) fn bound(&self) -> &[u8] {
-        if self.rigid.is_empty() { &self.constrained } else { &self.bound }
+        if self.rigid.is_empty() { &self.constrained } else { &self.joined }
     }
 
     /// Gives the particles of each region the largest of their masses.
