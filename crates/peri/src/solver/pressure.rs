@@ -1,4 +1,5 @@
-//! Pressure that follows the surface: −p cof(F) N per reference area (Nanson's formula), in faces of the body.
+//! Pressure that follows the surface: −p cof(F) N per reference area (Nanson's formula), in faces of the
+//! body.
 
 use super::curves::Amplitude;
 use super::force_fields::ForceField;

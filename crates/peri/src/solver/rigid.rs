@@ -127,8 +127,8 @@ impl<const D: usize> System<'_, D> {
         }
     }
 
-    /// Sets the gradient −V f of the energy in shared components, adds f to the sum of squares, and returns the
-    /// slope along a direction.
+    /// Sets the gradient −V f of the energy in shared components, adds f to the sum of squares, and returns
+    /// the slope along a direction.
     pub(super) fn shared_gradient(
         &self,
         state: &State<D>,

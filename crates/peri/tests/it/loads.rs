@@ -70,7 +70,8 @@ fn spin(solver: Solver, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> 
     let mut seen = 0;
     let mut watch = |status: &Status, state: &State<2>| {
         seen += 1;
-        if status.restartable && state.step > 0 && seen % 7 == 0 {
+        // of equilibria by L-BFGS few states can be resumed
+        if status.restartable && state.step > 0 && (seen % 7 == 0 || solver == Solver::Lbfgs) {
             saved.push(state.clone());
         }
         Ok(())
