@@ -69,7 +69,7 @@ pub fn loads_of<const D: usize>(
     super::pressure::add(source, scene, body, &amplitudes, &mut loads)?;
     super::traction_field::add(source, scene, body, &amplitudes, &mut loads, &mut loaded)?;
     super::body_force::add(source, scene, body, &mut loads)?;
-    let rest = Field::zeros(body.bonds.sites());
+    let rest = Field::zeros(loads.curved.as_ref().map_or(0, |_| body.bonds.sites()));
     if loads.curved.is_some() {
         loads.set_peaks();
         loads.update_forces([1.0; 2], &*body.bonds, &rest);
