@@ -313,6 +313,9 @@ dimensions! {
     Speed, SpeedDimension: exponents!(velocity), "a speed", "m/s", "5 mm/s";
     /// An acceleration.
     Acceleration, AccelerationDimension: exponents!(acceleration), "an acceleration", "m/s^2", "9.81 m/s^2";
+    /// An angular velocity.
+    AngularVelocity, AngularVelocityDimension: [0, 0, -1, 0, 0, 0, 0, 1], "an angular velocity", "rad/s",
+        "100 rad/s";
     /// A rate or frequency.
     Rate, RateDimension: exponents!(frequency), "a rate", "1/s", "5e-5 /s";
     /// An absolute temperature; the only quantity that may be given in `degC`.

@@ -42,6 +42,7 @@ use crate::bonds::{BodyGeometry, Bonds, LatticeBonds, Property};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::surface::BodySurface;
+pub(crate) use faces::Faces;
 pub use friction::SlidingFriction;
 pub use friction_pair::{ContactPair, Drag, FrictionPair};
 use list::{ContactList, ListedParticle, NearbyParticle};

@@ -48,6 +48,7 @@ pub use relief::relief;
 pub use response::{LawCover, LawRange, SolverMaterial};
 pub use strength::energy_at_strength;
 pub use tensor::BodyTensor;
+pub(crate) use tensor::cofactor;
 pub use traction::surface_load;
 pub use viscous::ViscousCorrespondence;
 

@@ -25,7 +25,7 @@ pub(super) fn invert<const D: usize>(shape: &BodyTensor<D>) -> (BodyTensor<D>, f
 }
 
 /// cof F = J F⁻ᵀ.
-pub(super) fn cofactor<const D: usize>(gradient: &BodyTensor<D>) -> BodyTensor<D> {
+pub(crate) fn cofactor<const D: usize>(gradient: &BodyTensor<D>) -> BodyTensor<D> {
     if D == 2 {
         let sign = |i: usize, k: usize| if i == k { 1.0 } else { -1.0 };
         return BodyTensor::from_fn(|i, k| sign(i, k) * gradient[(1 - i, 1 - k)]);

@@ -53,7 +53,8 @@ impl<const D: usize> System<'_, D> {
                 self.material.overstretched(&*self.bonds, &state.displacement, stretch, &seen)
             }
             Some(Criterion::Energy(limit)) => {
-                let free = |site: usize| self.loads.constrained(site) == 0;
+                let bound = self.loads.bound();
+                let free = |site: usize| bound.get(site).is_none_or(|bits| *bits == 0);
                 let found = self.material.overloaded(&*self.bonds, &state.displacement, limit, &free);
                 found.into_iter().map(|(bond, _)| bond).collect()
             }
@@ -67,7 +68,8 @@ impl<const D: usize> System<'_, D> {
         let mut softened = None;
         let list = match self.breaking.as_ref().map(|breaking| &breaking.criterion) {
             Some(&Criterion::Softening(law)) => {
-                let free = |site: usize| self.loads.constrained(site) == 0;
+                let bound = self.loads.bound();
+                let free = |site: usize| bound.get(site).is_none_or(|bits| *bits == 0);
                 let (bonds, onset) = (&*self.bonds, law.onset.into());
                 let found = self.material.overloaded(bonds, &state.displacement, &onset, &free);
                 // in dynamics forces follow at once

@@ -4,6 +4,7 @@
 //! are u(X, τ) = c_d(τ) a_d(X); as in rotating regions, [`Loads::displacement`] is their rate over τ. Body
 //! forces Σ c_d(τ) b_d(X) are computed anew at each τ and act in full.
 
+use super::force_fields::ForceField;
 use super::load::Loads;
 use super::state::State;
 use super::system::System;
@@ -99,6 +100,12 @@ pub struct CurvedLoads<const D: usize> {
     pub held: Vec<CurvedRegion<D>>,
     /// Body forces.
     pub pushed: Vec<CurvedRegion<D>>,
+    /// Body forces that depend on the displacement, or on place and time at once.
+    pub fields: Vec<Arc<dyn ForceField<D>>>,
+    /// Sites without bonds, on which no field acts.
+    pub bare: Vec<u32>,
+    /// τ of the present body forces, the later one of two.
+    pub part: f64,
 }
 
 impl<const D: usize> Loads<D> {
@@ -160,8 +167,13 @@ impl<const D: usize> Loads<D> {
     }
 
     /// Computes the body forces at the mean of two τ, each with half of its multiples.
+    /// Fields are left out.
     pub fn set_forces(&mut self, parts: [f64; 2]) {
-        let (Some(field), Some(curved)) = (self.body_force.as_mut(), &self.curved) else { return };
+        let (Some(field), Some(curved)) = (self.body_force.as_mut(), &mut self.curved) else { return };
+        curved.part = parts[1];
+        if !curved.fields.is_empty() {
+            field.components_mut().into_iter().for_each(|component| component.fill(0.0));
+        }
         for site in curved.pushed.iter().flat_map(|region| &region.sites) {
             field.set(*site as usize, [0.0; D]);
         }
@@ -194,7 +206,11 @@ impl<const D: usize> Loads<D> {
 
     /// Removes the body force of curves from a site.
     pub(super) fn unload_curved(&mut self, site: u32) {
-        for region in self.curved.iter_mut().flat_map(|curved| &mut curved.pushed) {
+        let Some(curved) = &mut self.curved else { return };
+        if !curved.fields.is_empty() {
+            curved.bare.push(site);
+        }
+        for region in &mut curved.pushed {
             let found = region.sites.iter().zip(&mut region.values).filter(|(own, _)| **own == site);
             found.for_each(|(_, value)| *value = [0.0; D]);
         }
@@ -202,13 +218,6 @@ impl<const D: usize> Loads<D> {
 }
 
 impl<const D: usize> System<'_, D> {
-    /// Sets body forces of curves at τ.
-    pub(super) fn set_forces(&mut self, part: f64) {
-        if self.loads.curved.is_some() {
-            self.loads.to_mut().set_forces([part; 2]);
-        }
-    }
-
     /// Begins a load step with curves: the loads move from the last equilibrium along the secant of the step,
     /// with its mean forces.
     pub(super) fn begin_curved_step(&mut self, state: &mut State<D>, [before, after]: [f64; 2]) {
@@ -217,25 +226,31 @@ impl<const D: usize> System<'_, D> {
         }
         self.set_rates(before, after);
         if !state.control.predicted {
-            self.loads.to_mut().set_forces([before, after]);
+            if self.loads.follows() && state.control.pushed.is_none() {
+                self.set_forces(before, &state.displacement);
+                self.keep_forces(state);
+            }
+            self.set_mean_forces([before, after], &state.displacement);
             let (pull, push) = self.conjugates(state);
             // after a cut, forces are those of the step given up
             let pull = if state.control.cuts == 0 { pull } else { state.control.balanced[1] };
             state.control.balanced = [before, pull, push];
         }
-        self.set_forces(after);
+        self.set_forces(after, &state.displacement);
     }
 
     /// Work of curved loads since the last equilibrium, J, by the trapezoidal rule.
     pub(super) fn work_of_curves(&mut self, state: &mut State<D>, [before, after]: [f64; 2]) -> f64 {
         let [old_factor, old_pull, old_push] = state.control.balanced;
         let first = state.control.round == 0;
-        self.loads.to_mut().set_forces(if first { [before, after] } else { [after; 2] });
+        self.set_mean_forces(if first { [before, after] } else { [after; 2] }, &state.displacement);
         let (pull, push) = self.conjugates(state);
-        self.set_forces(after);
+        self.set_forces(after, &state.displacement);
         let present = self.conjugates(state).1;
         state.control.balanced = [after, pull, present];
-        0.5 * (pull + old_pull) * (after - old_factor) + push - old_push
+        let pushed = if self.loads.follows() { self.work_of_followers(state) } else { push - old_push };
+        self.keep_forces(state);
+        0.5 * (pull + old_pull) * (after - old_factor) + pushed
     }
 
     /// Load, N, and displacement, m, of a row of history with curves: the reaction of the regions of

@@ -5,6 +5,7 @@
 //! negative stiffness in many iterations).
 
 use super::balance::SearchLimits;
+use super::load::Loads;
 use super::load_stepping::{Equilibrium, QuasiStatic};
 use super::mass::{has_own_mass, own_mass, update_unit_mass};
 use super::method::Watch;
@@ -84,6 +85,15 @@ impl RelaxationSolver {
         }
     }
 
+    /// Gives particles that move as a whole the same mass.
+    fn level<const D: usize>(&mut self, loads: &Loads<D>) {
+        for masses in [&mut self.unit_mass, &mut self.own_mass, &mut self.contact_mass] {
+            if !masses.is_empty() {
+                loads.level_masses(masses);
+            }
+        }
+    }
+
     /// Runs one iteration; returns true if the forces balance (the displacement then stays).
     fn iterate<const D: usize>(
         &mut self,
@@ -98,6 +108,7 @@ impl RelaxationSolver {
             || state.counts.iteration.is_multiple_of(CHECK_INTERVAL);
         let factor = system.loads.force_factor(system.factors[state.step]);
         system.prepare(&state.displacement);
+        system.follow(&state.displacement);
         let own = has_own_mass(system, state);
         if own && (state.counts.iteration.is_multiple_of(REFRESH) || self.own_mass.is_empty()) {
             own_mass(system, state, &mut self.own_mass);
@@ -108,7 +119,10 @@ impl RelaxationSolver {
             contact.add_stiffness(&*system.bonds, &state.displacement, tangent, &mut self.contact_mass);
         }
         let mass = 0.5 * settings.mass_safety * tangent;
-        let (sums, observed) = force_pass(system, state, self.masses(system, own), mass, factor, look);
+        self.level(&system.loads);
+        let shared = system.shared_forces(state);
+        let (mut sums, observed) = force_pass(system, state, self.masses(system, own), mass, factor, look);
+        system.add_shared(state, &shared, self.masses(system, own), mass, &mut sums);
         system.count_evaluation(state);
         if !sums.is_finite() {
             return Err(system.not_finite(state));
@@ -139,6 +153,7 @@ impl RelaxationSolver {
         if state.is_balanced(&goal, broken)? {
             return Ok(true);
         }
+        system.level_forces(state);
         move_pass(&system.loads, state, self.masses(system, own), mass, damping);
         if let Some(contact) = system.repulsion() {
             contact.stop_detached(&mut state.velocity);

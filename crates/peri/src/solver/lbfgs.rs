@@ -191,6 +191,7 @@ impl<const D: usize> LbfgsSolver<D> {
     fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> LinePoint {
         let factor = system.loads.force_factor(system.factors[state.step]);
         system.prepare(&state.displacement);
+        system.follow(&state.displacement);
         let body = (&self.places, self.preconditioner.volumes());
         let (sums, observed, slope) =
             gradient_pass(system, state, body, &self.direction, factor, &mut self.trial);

@@ -2,6 +2,7 @@
 //! except in rotating regions and with curves.
 
 use super::curves::CurvedLoads;
+use super::rigid::RigidRegion;
 use super::rotation::RotatingRegion;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
@@ -30,6 +31,10 @@ pub struct Loads<const D: usize> {
     pub held_regions: Vec<Vec<u32>>,
     /// Regions that rotate about an axis.
     pub turned: Vec<RotatingRegion<D>>,
+    /// Regions that move as a whole, see [`Self::join`].
+    pub rigid: Vec<RigidRegion>,
+    /// With such regions: bit d of a site: component d is constrained or shared.
+    pub joined: Vec<u8>,
     /// Loads that follow curves; absent: all follow the load factor.
     pub curved: Option<Box<CurvedLoads<D>>>,
 }

@@ -88,7 +88,7 @@ fn step_by_step<const D: usize>(
     let shortest = system.shortest();
     system.restore(state)?;
     let (tolerance, forced) = (method.tolerance(), system.loads.body_force.is_some());
-    system.set_forces(system.factors.get(state.step).copied().unwrap_or(1.0));
+    system.set_forces(system.factors.get(state.step).copied().unwrap_or(1.0), &state.displacement);
     system.refuse_unsupported(state, tolerance)?;
     'steps: while state.step < system.factors.len() {
         if !state.control.predicted && system.friction().is_some() {
@@ -208,6 +208,7 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
         system.loads.carry(&*system.bonds, [at(1), factor], &mut state.displacement);
     }
     let carried = !system.loads.turned.is_empty();
+    let before = (!system.loads.rigid.is_empty()).then(|| state.displacement.clone());
     for &site in system.bonds.particles() {
         let site = site as usize;
         let position = system.bonds.position(site);
@@ -230,6 +231,9 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
         state.velocity.set(site, [0.0; D]);
     }
     system.loads.place_turned(&*system.bonds, factor, &mut state.displacement);
+    if let Some(before) = before {
+        system.level_move(state, &before);
+    }
 }
 
 /// Adds the work of the loads since the last equilibrium, by the trapezoidal rule.

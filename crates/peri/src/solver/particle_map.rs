@@ -5,6 +5,7 @@
 //! that each item has its own part.
 
 use super::load::Loads;
+use super::rigid::RigidRegion;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
 use rayon::prelude::*;
@@ -26,8 +27,10 @@ pub struct ParticleMap {
     /// The runs of each work item, its first particle, and the number of particles at the end.
     items: Vec<Range<usize>>,
     first: Vec<usize>,
-    /// Constrained particles with the bits of their components.
+    /// Particles with constrained or shared components, and the bits of these.
     held: Vec<(usize, u8)>,
+    /// Regions that move as a whole: bits of the shared components, particles.
+    shared: Vec<(u8, Vec<usize>)>,
 }
 
 impl ParticleMap {
@@ -49,12 +52,22 @@ impl ParticleMap {
             places.items.push(begin..places.runs.len());
             places.first.push(next);
         }
-        let constrained = particles.iter().map(|&site| loads.constrained(site as usize)).enumerate();
-        places.held = constrained.filter(|&(_, components)| components != 0).collect();
+        let bound = |&site: &u32| loads.bound().get(site as usize).copied().unwrap_or(0);
+        let each = particles.iter().map(bound).enumerate();
+        places.held = each.filter(|&(_, components)| components != 0).collect();
+        let place = |site: &u32| particles.binary_search(site).ok();
+        let of_region =
+            |region: &RigidRegion| (region.components, region.sites.iter().filter_map(place).collect());
+        places.shared = loads.rigid.iter().map(of_region).collect();
         places
     }
 
-    /// Constrained particles of a range, with the bits of their components.
+    /// Bits of the shared components and particles of each region that moves as a whole.
+    pub fn shared(&self) -> &[(u8, Vec<usize>)] {
+        &self.shared
+    }
+
+    /// Particles of a range with constrained or shared components, with the bits of these.
     pub fn constrained(&self, particles: Range<usize>) -> &[(usize, u8)] {
         let place = |particle: usize| self.held.partition_point(|held| held.0 < particle);
         &self.held[place(particles.start)..place(particles.end)]

@@ -63,7 +63,7 @@ pub fn force_pass<const D: usize>(
                 let mut observed = StretchRange::REST;
                 system.internal_force(displacement, chunk * CHUNK, &mut new, look.then_some(&mut observed));
                 let mut sums = ForceSums::default();
-                let constrained = loads.constrained.get(range.clone()).unwrap_or_default();
+                let constrained = loads.bound().get(range.clone()).unwrap_or_default();
                 for d in 0..D {
                     if let Some(body) = &loads.body_force {
                         for (f, b) in new[d].iter_mut().zip(&body.components()[d][range.clone()]) {
@@ -115,7 +115,7 @@ pub fn gradient_pass<const D: usize>(
     gradient: &mut Field<D>,
 ) -> (ForceSums, StretchRange, f64) {
     let (sites, loads, displacement) = (system.bonds.sites(), &*system.loads, &state.displacement);
-    let direction = direction.components();
+    let directions = direction.components();
     let items = state.force.chunks_mut().into_par_iter().zip(places.parts_mut(gradient)).enumerate();
     // one work item at a time if there are hardly any
     let items = items.with_min_len(if sites <= 2 * CHUNK && D == 2 { 2 } else { 1 });
@@ -140,7 +140,7 @@ pub fn gradient_pass<const D: usize>(
                     sums.constrained += *force * *force;
                     *force = 0.0;
                 }
-                let (volumes, direction) = (&volumes[particles.clone()], &direction[d][particles.clone()]);
+                let (volumes, direction) = (&volumes[particles.clone()], &directions[d][particles.clone()]);
                 let [free, along] = Arch::new().dispatch(EnergyGradient { force: g, volumes, direction });
                 sums.free += free;
                 slope += along;
@@ -149,9 +149,12 @@ pub fn gradient_pass<const D: usize>(
         })
         .collect();
     let start = (ForceSums::default(), StretchRange::REST, 0.0);
-    let (mut sums, observed, slope) = results.into_iter().fold(start, |(sums, observed, slope), item| {
+    let (mut sums, observed, mut slope) = results.into_iter().fold(start, |(sums, observed, slope), item| {
         (sums.add(item.0), observed.join(item.1), slope + item.2)
     });
+    if !loads.rigid.is_empty() {
+        slope += system.shared_gradient(state, places, direction, gradient, &mut sums);
+    }
     // planes hold a body, too
     sums.constrained += system.repulsion().map_or(0.0, |contact| contact.plane_force_square());
     (sums, observed, slope)

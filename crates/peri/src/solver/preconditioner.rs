@@ -113,7 +113,7 @@ impl<const D: usize> Preconditioner<D> {
     }
 
     /// Computes z = B g over particles, or its local part only; g and z are zero where components are
-    /// constrained.
+    /// constrained, equal over a region where they are shared.
     pub fn apply(
         &mut self,
         places: &ParticleMap,
@@ -149,6 +149,21 @@ impl<const D: usize> Preconditioner<D> {
                 }
             }
         });
+        for (components, particles) in places.shared() {
+            let of = |particle: usize| {
+                let (g, value) = (gradient.get(particle), coarse.map_or([0.0; D], |own| own.value(particle)));
+                std::array::from_fn::<f64, D, _>(|d| g[d] * local[particle] + value[d])
+            };
+            let each = particles.iter().map(|&particle| of(particle));
+            let sum = each.fold([0.0; D], |sum, z| std::array::from_fn(|d| sum[d] + z[d]));
+            for &particle in particles {
+                let mut z = result.get(particle);
+                (0..D)
+                    .filter(|d| components >> d & 1 == 1)
+                    .for_each(|d| z[d] = sum[d] / particles.len() as f64);
+                result.set(particle, z);
+            }
+        }
     }
 
     /// Volume of each particle, m³.

@@ -108,7 +108,7 @@ impl<const D: usize> System<'_, D> {
     /// Body force density in a state at the end of a step, N/m³.
     pub fn body_force_at_end(&mut self, state: &State<D>) -> Option<Field<D>> {
         let factor = state.history.last().map_or(0.0, |row| row.factor);
-        self.set_forces(factor);
+        self.set_forces(factor, &state.displacement);
         let factor = self.loads.force_factor(factor);
         let mut force = self.loads.body_force.clone()?;
         for &site in self.bonds.particles() {

@@ -145,7 +145,7 @@ impl VelocityVerlet {
             let factor = self.factor(system, state.motion.time).0;
             system.move_planes(factor, state.motion.time);
             system.restore(state)?;
-            system.set_forces(factor);
+            system.set_forces(factor, &state.displacement);
             system.contact.iter_mut().for_each(|contact| contact.resume_friction(&state.contact.grips));
         } else {
             self.begin(system, state, &volumes)?;
@@ -194,7 +194,7 @@ impl VelocityVerlet {
         let (factor, rate) = self.factor(system, 0.0);
         system.move_planes(factor, 0.0);
         system.set_rates(factor, factor);
-        system.set_forces(factor);
+        system.set_forces(factor, &state.displacement);
         (state.contact.friction, state.contact.start) = (None, None);
         (state.contact.plane_friction, state.contact.plane_push) = (Vec::new(), Vec::new());
         for &site in system.bonds.particles() {
@@ -209,6 +209,7 @@ impl VelocityVerlet {
             state.velocity.set(site, v);
         }
         system.loads.place_turned(&*system.bonds, factor, &mut state.displacement);
+        system.level_velocities(state);
         if state.displacement.non_finite().is_some() || state.velocity.non_finite().is_some() {
             return Err(system.not_finite(state));
         }
@@ -336,14 +337,16 @@ impl VelocityVerlet {
             state.motion.plan(end);
         };
         let factor = leap.factors[1];
-        system.set_forces(factor);
+        system.set_forces(factor, &state.displacement);
         let (friction, rubbing, rubs) = (
             state.contact.friction.take(),
             state.contact.plane_friction.clone(),
             system.friction().is_some(),
         );
         let look = state.motion.look.is_due(state.stretches.fitted, system.breaking_stretch());
-        let (mut second, observed) = force_pass(system, state, volumes, &leap, look, !look && !rubs);
+        // forces that are not final yet
+        let late = look || rubs || !system.loads.rigid.is_empty();
+        let (mut second, observed) = force_pass(system, state, volumes, &leap, look, !late);
         system.count_evaluation(state);
         if look {
             state.stretches.observe(observed);
@@ -354,8 +357,9 @@ impl VelocityVerlet {
                 self.cover(system, state);
             }
         }
-        if look || rubs {
+        if late {
             friction_pass(system, state, volumes, &leap, friction);
+            system.level_forces(state);
             second = kick_pass(&system.loads, state, volumes, &leap);
         }
         plane_pass(system, state, &rubbing);

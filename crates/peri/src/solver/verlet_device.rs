@@ -303,6 +303,7 @@ fn refuse<const D: usize>(system: &System<D>) -> Result<(), Error> {
         (softens, "bonds that break by their energy"),
         (system.contact.is_some(), "contact"),
         (!system.loads.turned.is_empty(), "a rotation"),
+        (!system.loads.rigid.is_empty(), "a region that moves as a whole"),
         (system.loads.curved.is_some(), "a curve of time"),
     ];
     match what.iter().find(|(has, _)| *has) {

@@ -161,8 +161,10 @@ pub fn refresh<const D: usize>(
     sites: Option<&[u32]>,
 ) {
     system.prepare(&state.displacement);
-    // states of particles change beyond their own bonds
-    let sites = sites.filter(|_| !system.material.has_points());
+    system.follow(&state.displacement);
+    // states of particles change beyond their own bonds, and forces of a region with all of them
+    let whole = system.material.has_points() || !system.loads.rigid.is_empty();
+    let sites = sites.filter(|_| !whole);
     let system = &*system;
     let piece = if sites.is_some() { system.piece() } else { CHUNK };
     let pieces = sites.map(|sites| {
@@ -190,6 +192,7 @@ pub fn refresh<const D: usize>(
             of(first + start, f.each_mut().map(|f| &mut f[start..end]));
         }
     });
+    system.level_forces(state);
 }
 
 /// Adds the body forces of the sites from `start` on.

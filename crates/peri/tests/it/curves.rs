@@ -42,7 +42,7 @@ fn loads_of(bonds: &dyn Bonds<2>, held: Vec<CurvedRegion<2>>, pushed: Vec<Curved
         region.sites.iter().for_each(|&site| loads.constrained[site as usize] |= region.components);
         loads.held_regions.push(region.sites.clone());
     }
-    loads.curved = Some(Box::new(CurvedLoads { held, pushed }));
+    loads.curved = Some(Box::new(CurvedLoads { held, pushed, ..CurvedLoads::default() }));
     loads.set_peaks();
     loads
 }

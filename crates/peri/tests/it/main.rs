@@ -27,6 +27,7 @@ mod limits;
 #[path = "../../examples/linear_solid.rs"]
 mod linear_solid;
 mod load_steps;
+mod loads;
 mod looks;
 mod materials;
 mod model;

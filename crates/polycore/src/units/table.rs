@@ -58,6 +58,8 @@ static TABLE: LazyLock<UnitTable> = LazyLock::new(|| {
             table.entry(alias).or_insert(entry);
         }
     }
+    // a turn a minute
+    table.entry("rpm").or_insert(([std::f64::consts::TAU, 60.0], [0, 0, -1, 0, 0, 0, 0, 1]));
     // ab initio programs print pressures in kbar
     if let Some(&([bar, one], exponents)) = table.get("bar") {
         table.entry("kbar").or_insert(([1000.0 * bar, one], exponents));

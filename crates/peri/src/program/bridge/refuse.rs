@@ -61,6 +61,12 @@ pub(super) fn refuse(source: &Source, scene: &Scene, variant: &SceneVariant) -> 
             "none: LAMMPS has a table for each bond length",
         ),
         (!scene.step.is_empty(), "step", "steps in sequence", "one step: the driver knows the first alone"),
+        (
+            !scene.body_force.is_empty(),
+            "body_force",
+            "a body force",
+            "prescribed displacements: the driver moves clamps",
+        ),
         (scene.contact.is_some(), "contact", "contact", "none: the tables act between bonded particles only"),
         (
             scene.dynamics.is_some() || scene.method() == SolverMethod::Verlet,
@@ -89,6 +95,7 @@ pub(super) fn refuse(source: &Source, scene: &Scene, variant: &SceneVariant) -> 
             ("traction", boundary.traction.is_some(), "a traction"),
             ("force", boundary.force.is_some(), "a force"),
             ("rotation", boundary.rotation.is_some(), "a rotation"),
+            ("rigid", boundary.rigid, "a region that moves as a whole"),
             ("curve", boundary.has_curve(), "a curve of time"),
             ("displacement_field", boundary.displacement_field.is_some(), "a field of displacements"),
         ];

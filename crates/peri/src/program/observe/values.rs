@@ -110,7 +110,6 @@ pub(super) fn responses<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D
         m.sites().map(length).fold(0.0, f64::max)
     });
     let holds = scene.boundary.iter().any(|boundary| boundary.prescribes_displacement());
-    let loads = scene.boundary.iter().any(|boundary| boundary.traction.is_some() || boundary.force.is_some());
     for (d, axis) in axes(scene).iter().enumerate() {
         if holds {
             to.add_if(q::REACTION.named(&[axis]), |m| {
@@ -118,7 +117,7 @@ pub(super) fn responses<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D
                 (!loads.constrained.is_empty()).then(|| loads.reaction(m.bonds, &m.state.force)[d])
             });
         }
-        if loads {
+        if scene.has_forces() {
             to.add_if(q::APPLIED.named(&[axis]), |m| {
                 let loads = &m.physics.loads;
                 loads.body_force.is_some().then(|| loads.applied(m.bonds)[d])

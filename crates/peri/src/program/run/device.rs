@@ -99,6 +99,8 @@ fn beyond_cards<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<(
     let rotation = scene.boundary.iter().position(|boundary| boundary.rotation.is_some());
     let curve = scene.boundary.iter().position(Boundary::has_curve);
     let curve_key = format!("boundary[{}].curve", curve.unwrap_or(0));
+    let rigid = scene.boundary.iter().position(|boundary| boundary.rigid);
+    let rigid_key = format!("boundary[{}].rigid", rigid.unwrap_or(0));
     let rotation_key = format!("boundary[{}].rotation", rotation.unwrap_or(0));
     let uniform = bonds.as_lattice().is_none_or(crate::bonds::LatticeBonds::is_uniform);
     let faults = [
@@ -115,7 +117,9 @@ fn beyond_cards<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<(
         ("material.surface_correction", !uniform, "bonds with surface factors"),
         ("contact", scene.contact.is_some(), "contact"),
         (rotation_key.as_str(), rotation.is_some(), "a rotation"),
+        (rigid_key.as_str(), rigid.is_some(), "a region that moves as a whole"),
         (curve_key.as_str(), curve.is_some(), "a curve of time"),
+        ("body_force", scene.has_curves(), "a centrifugal force, or one that follows a curve"),
         ("dynamics.precision", scene.is_mixed(), "mixed precision"),
     ];
     faults.iter().find(|(_, given, _)| *given).map(|(key, _, found)| ((*key).to_owned(), *found))

@@ -27,6 +27,10 @@ pub struct Boundary {
     pub shapes: Vec<ShapeSpec>,
     /// Traction on the side, applied as a uniform body force over its layers.
     pub traction: Option<Vec<Stress>>,
+    /// Traction on the side as formulas of the reference position on it (m) and `t` (s), Pa.
+    pub traction_field: Option<Vec<Formula>>,
+    /// Pressure on the faces of the body in the region, across the deformed surface.
+    pub pressure: Option<Stress>,
     /// Total force on the region, spread over its volume.
     pub force: Option<Vec<Force>>,
     /// Velocity at the start, in explicit dynamics.
@@ -34,6 +38,10 @@ pub struct Boundary {
     /// Displacement at the end of the last step, component by component: a length, `"free"` or, in a later
     /// step, `"hold"`.
     pub displacement: Option<Vec<Prescribed>>,
+    /// Moves the region as a whole, without rotation: components that `displacement` leaves free share one
+    /// displacement, which follows from the forces on the region.
+    #[serde(default)]
+    pub rigid: bool,
     /// Rotation about an axis, along the arc; `displacement` adds to it.
     pub rotation: Option<RotationSpec>,
     /// Displacement at the end of the last step as formulas of the position, m.
@@ -49,6 +57,12 @@ impl Boundary {
     /// Returns true if the boundary prescribes displacements.
     pub fn prescribes_displacement(&self) -> bool {
         self.displacement.is_some() || self.displacement_field.is_some() || self.rotation.is_some()
+    }
+
+    /// Returns true if the boundary prescribes forces.
+    pub fn prescribes_force(&self) -> bool {
+        let surface = self.traction.is_some() || self.traction_field.is_some() || self.pressure.is_some();
+        surface || self.force.is_some()
     }
 
     /// Returns the number of layers of particles that it takes at a side.

@@ -43,7 +43,7 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     material(source, scene)?;
     super::interface::check(source, scene)?;
     solver(source, scene)?;
-    if scene.boundary.is_empty() {
+    if scene.boundary.is_empty() && scene.body_force.is_empty() {
         return Err(source.missing("boundary", "needed for loads and supports: at least one [[boundary]]"));
     }
     if let Some(stress) = &scene.stress
@@ -81,6 +81,7 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     }
     dynamics(source, scene)?;
     super::step::check(source, scene)?;
+    super::body_force::check(source, scene)?;
     super::curve::check(source, scene)?;
     super::time::check(source, scene)?;
     super::contact::check(source, scene)?;

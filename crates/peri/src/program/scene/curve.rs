@@ -3,13 +3,14 @@
 use super::curve_spec::{CurveList, CurveSpec, CurveTable};
 use super::formula::Formula;
 use super::values::plain;
-use super::{Boundary, Prescribed, Scene};
+use super::{BodyForceSpec, Boundary, Prescribed, Scene};
 use crate::field::Field;
 use crate::solver::{Amplitude, CurvedLoads, CurvedRegion, LoadCurve, Loads, Support, ramped};
 use harness::scene::{SceneError, Source};
 use polycore::table::{Table, plain_unit};
 use polycore::units::dimension::{
-    AngleDimension, ForceDimension, LengthDimension, StressDimension, TimeDimension,
+    AccelerationDimension, AngleDimension, AngularVelocityDimension, ForceDimension, LengthDimension,
+    StressDimension, TimeDimension,
 };
 use polycore::units::{Dimension, Unit};
 use std::fmt;
@@ -25,16 +26,30 @@ impl Boundary {
         self.curve.is_some() || self.rotation.as_ref().is_some_and(|rotation| rotation.curve.is_some())
     }
 
+    /// Returns the key that needs a programme of times or dynamics.
+    fn timed(&self) -> Option<&'static str> {
+        let keys = [("curve", self.has_curve()), ("traction_field", self.depends_on_time())];
+        keys.into_iter().find_map(|(key, given)| given.then_some(key))
+    }
+
     /// Returns true if the boundary prescribes a displacement or a force.
     fn loads(&self) -> bool {
-        self.prescribes_displacement() || self.traction.is_some() || self.force.is_some()
+        self.prescribes_displacement() || self.prescribes_force()
     }
 }
 
 impl Scene {
     /// Returns true if loads follow curves: those of boundaries, or any in a later step.
     pub fn has_curves(&self) -> bool {
-        self.later || self.boundary.iter().any(Boundary::has_curve)
+        self.later
+            || self.boundary.iter().any(|own| own.timed().is_some() || own.pressure.is_some())
+            || self.body_force.iter().any(BodyForceSpec::is_curved)
+    }
+
+    /// Returns true if forces depend on the displacement.
+    pub fn has_followers(&self) -> bool {
+        self.boundary.iter().any(|own| own.pressure.is_some())
+            || self.body_force.iter().any(|force| force.spin.is_some())
     }
 
     /// Returns the load factor of explicit dynamics and its rate over the time, s; `None` for a ramp. With
@@ -51,16 +66,16 @@ impl Scene {
 }
 
 /// Time of a run with curves: its end, s, and the load factor of boundaries without a curve.
-struct CurveTime {
-    end: f64,
+pub(super) struct CurveTime {
+    pub(super) end: f64,
     explicit: bool,
     /// Times at which curves are checked, s.
     moments: Vec<f64>,
-    common: Amplitude,
+    pub(super) common: Amplitude,
 }
 
 impl CurveTime {
-    fn new(scene: &Scene) -> Self {
+    pub(super) fn new(scene: &Scene) -> Self {
         if let Some(dynamics) = &scene.dynamics {
             let (end, ramp) = (dynamics.method().end_time, dynamics.method().ramp);
             let common = match dynamics.factor.clone() {
@@ -85,7 +100,7 @@ impl CurveTime {
     }
 
     /// Converts and checks the curve at a key; `values` are those that it multiplies.
-    fn amplitude(
+    pub(super) fn amplitude(
         &self,
         source: &Source,
         key: &str,
@@ -184,12 +199,17 @@ fn of_rows(times: Vec<f64>, values: Vec<f64>, end: f64) -> Amplitude {
 }
 
 /// Values that a curve multiplies, SI, by their dimension.
-struct Multiplied {
-    lengths: Vec<f64>,
-    forces: Vec<f64>,
-    stresses: Vec<f64>,
-    angles: Vec<f64>,
-    fields: bool,
+#[derive(Default)]
+pub(super) struct Multiplied {
+    pub(super) lengths: Vec<f64>,
+    pub(super) forces: Vec<f64>,
+    pub(super) stresses: Vec<f64>,
+    pub(super) angles: Vec<f64>,
+    pub(super) fields: bool,
+    pub(super) accelerations: Vec<f64>,
+    pub(super) speeds: Vec<f64>,
+    /// True for forces that are formulas of the position.
+    pub(super) formulas: bool,
 }
 
 impl Multiplied {
@@ -199,6 +219,7 @@ impl Multiplied {
         let moved = boundary.displacement.iter().flatten().enumerate().filter(|(d, _)| own(*d));
         let forces = boundary.force.iter().flatten().enumerate().filter(|(d, _)| own(*d));
         let stresses = boundary.traction.iter().flatten().enumerate().filter(|(d, _)| own(*d));
+        let stresses = stresses.map(|(_, stress)| stress).chain(&boundary.pressure);
         let turned =
             boundary.rotation.iter().filter(|rotation| component.is_none() && rotation.curve.is_none());
         let length = |held: &Prescribed| match held {
@@ -208,9 +229,11 @@ impl Multiplied {
         Self {
             lengths: moved.map(|(_, held)| length(held)).collect(),
             forces: forces.map(|(_, force)| force.si()).collect(),
-            stresses: stresses.map(|(_, stress)| stress.si()).collect(),
+            stresses: stresses.map(|stress| stress.si()).collect(),
             angles: turned.map(|rotation| rotation.angle.si()).collect(),
             fields: boundary.displacement_field.is_some(),
+            formulas: boundary.traction_field.is_some(),
+            ..Self::default()
         }
     }
 
@@ -221,7 +244,7 @@ impl Multiplied {
 
     /// Returns true if any value is not 0.
     fn is_load(&self) -> bool {
-        self.moves() || self.forces.iter().chain(&self.stresses).any(|value| *value != 0.0)
+        self.moves() || self.formulas || self.forces.iter().chain(&self.stresses).any(|value| *value != 0.0)
     }
 
     /// Returns what does not suit a column with a unit, and what would.
@@ -229,7 +252,7 @@ impl Multiplied {
         if unit.is_empty() {
             return None;
         }
-        let fields = self.fields.then(|| {
+        let fields = (self.fields || self.formulas).then(|| {
             let allowed = "a column without a unit".to_owned();
             (format!("a column in {unit} for formulas of the position"), allowed)
         });
@@ -238,6 +261,8 @@ impl Multiplied {
             .or_else(|| misfit_of::<ForceDimension>(unit, &self.forces, "N"))
             .or_else(|| misfit_of::<StressDimension>(unit, &self.stresses, "Pa"))
             .or_else(|| misfit_of::<AngleDimension>(unit, &self.angles, "rad"))
+            .or_else(|| misfit_of::<AccelerationDimension>(unit, &self.accelerations, "m/s²"))
+            .or_else(|| misfit_of::<AngularVelocityDimension>(unit, &self.speeds, "rad/s"))
     }
 }
 
@@ -286,14 +311,7 @@ pub(super) fn amplitudes<const D: usize>(
         let angle = match boundary.rotation.as_ref().and_then(|rotation| rotation.curve.as_ref()) {
             Some(curve) => {
                 let angle = boundary.rotation.iter().map(|rotation| rotation.angle.si()).collect();
-                let none = Vec::new;
-                let values = Multiplied {
-                    lengths: none(),
-                    forces: none(),
-                    stresses: none(),
-                    angles: angle,
-                    fields: false,
-                };
+                let values = Multiplied { angles: angle, ..Multiplied::default() };
                 time.amplitude(source, &format!("boundary[{index}].rotation.curve"), curve, &values)?
             }
             None if boundary.rotation.is_some() && matches!(boundary.curve, Some(CurveList::Each(_))) => {
@@ -319,7 +337,7 @@ pub(super) fn follow<const D: usize>(
     rotates: impl Fn(usize) -> bool,
     kept: impl Fn(usize) -> u8,
     surfaces: &[(usize, Field<D>)],
-    amplitudes: Vec<(Amplitude, [Amplitude; D])>,
+    amplitudes: &[(Amplitude, [Amplitude; D])],
     loads: &mut Loads<D>,
 ) {
     let mut curved = CurvedLoads::default();
@@ -352,7 +370,27 @@ pub(super) fn follow<const D: usize>(
 /// # Errors
 /// A [`SceneError`] that names the key.
 pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
-    let Some(first) = scene.boundary.iter().position(Boundary::has_curve) else { return Ok(()) };
+    let mut boundaries = scene.boundary.iter().enumerate();
+    let of_boundary = boundaries.find_map(|(index, own)| Some(format!("boundary[{index}].{}", own.timed()?)));
+    let planes = scene.contact.iter().flat_map(|contact| &contact.plane);
+    let runs = of_boundary.is_some() || scene.time.is_some() || scene.dynamics.is_some();
+    if let Some(index) = planes.clone().position(|plane| plane.displacement.is_some())
+        && scene.has_curves()
+        && runs
+    {
+        let why = "the plane moves with the load factor, which runs with curves do not have";
+        let key = format!("contact.plane[{index}].displacement");
+        let pressed = scene.boundary.iter().any(|own| own.pressure.is_some());
+        let other = match &of_boundary {
+            Some(_) => "boundary.curve",
+            None if pressed => "boundary.pressure",
+            None => "body_force",
+        };
+        return Err(source.conflict(&key, other, why));
+    }
+    let mut forces = scene.body_force.iter().enumerate();
+    let of_force = forces.find_map(|(index, force)| Some(format!("body_force[{index}].{}", force.timed()?)));
+    let Some(first) = of_boundary.or(of_force) else { return Ok(()) };
     for (index, boundary) in scene.boundary.iter().enumerate() {
         if boundary.has_curve() && !boundary.loads() {
             let why =
@@ -360,26 +398,21 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             return Err(source.unexpected(&format!("boundary[{index}].curve"), why));
         }
     }
-    let planes = scene.contact.iter().flat_map(|contact| &contact.plane);
-    if let Some(index) = planes.clone().position(|plane| plane.displacement.is_some()) {
-        let why = "the plane moves with the load factor, which runs with curves do not have";
-        return Err(source.conflict(&format!("contact.plane[{index}].displacement"), "boundary.curve", why));
+    if scene.dynamics.is_some() {
+        return Ok(());
     }
-    let Some(time) = scene.time.as_ref().filter(|_| scene.dynamics.is_none()) else {
-        return if scene.dynamics.is_some() {
-            Ok(())
-        } else {
-            let why =
-                format!("needed for `boundary[{first}].curve`: the steps of a programme, or [dynamics]");
-            Err(source.missing("time", why))
-        };
+    let Some(time) = &scene.time else {
+        let why = format!("needed for `{first}`: the steps of a programme, or [dynamics]");
+        return Err(source.missing("time", why));
     };
-    let idle = |boundary: &Boundary| !boundary.has_curve() && Multiplied::new(boundary, None).is_load();
-    match scene.boundary.iter().position(idle) {
-        Some(index) if time.step.iter().all(|step| step.factor.is_none()) => {
+    let idle = |boundary: &Boundary| boundary.timed().is_none() && Multiplied::new(boundary, None).is_load();
+    let boundary = scene.boundary.iter().position(idle).map(|index| format!("boundary[{index}]"));
+    let force = scene.body_force.iter().position(|force| force.timed().is_none());
+    match boundary.or(force.map(|index| format!("body_force[{index}]"))) {
+        Some(key) if time.step.iter().all(|step| step.factor.is_none()) => {
             let found = "a load without `curve`, in a programme whose factor stays 0";
             let allowed = "a `curve` here, or a `factor` in [[time.step]]";
-            Err(source.error(&format!("boundary[{index}]"), found, allowed))
+            Err(source.error(&key, found, allowed))
         }
         _ => Ok(()),
     }
@@ -401,13 +434,7 @@ mod tests {
 
     #[test]
     fn units_multiply_one() {
-        let of = |lengths: &[f64]| Multiplied {
-            lengths: lengths.to_vec(),
-            forces: Vec::new(),
-            stresses: Vec::new(),
-            angles: Vec::new(),
-            fields: false,
-        };
+        let of = |lengths: &[f64]| Multiplied { lengths: lengths.to_vec(), ..Multiplied::default() };
         assert!(of(&[0.0, 1e-3, -1e-3]).misfit("mm").is_none() && of(&[2e-3]).misfit("").is_none());
         let (found, allowed) = of(&[0.0, 2e-3]).misfit("mm").unwrap();
         assert_eq!((&*found, &*allowed), ("a column in mm for 0.002 m", "values of 0, 1 mm or -1 mm"));

@@ -122,7 +122,6 @@ pub fn explain<const D: usize>(
         let when = if scene.output.every.is_some() { "in each written step" } else { "once per variant" };
         builds(format!("stress {when}: {}", names.join(", ")));
     }
-    let pulled = scene.boundary.iter().any(|b| b.traction.is_some() || b.force.is_some());
     let left_out: Vec<&str> = [
         (bonds.as_lattice().is_none(), "neighbour lists"),
         (variant.surface == SurfaceCorrection::Energy, "surface correction"),
@@ -134,7 +133,7 @@ pub fn explain<const D: usize>(
         (criterion.is_some(), "damage and bond breaking (needs `material.critical`)"),
         (scene.output.every.is_some(), "fields of earlier steps (need `output.every`)"),
         (scene.boundary.iter().any(Boundary::prescribes_displacement), "prescribed displacements"),
-        (pulled, "body forces"),
+        (scene.has_forces(), "body forces"),
         (scene.output.fields, "VTKHDF fields"),
         (scene.output.pictures, "pictures"),
     ]

@@ -3,6 +3,7 @@
 //! They have sums, products, powers (`^`), brackets, `pi`, and the functions of [`FormulaFunction`]. A
 //! formula is evaluated together with its exact rate, by dual numbers.
 
+use harness::scene::{SceneError, Source};
 use serde::Deserialize;
 use std::f64::consts::PI;
 
@@ -76,7 +77,12 @@ impl Formula {
 
     /// Returns the value at a position.
     pub fn value_at<const D: usize>(&self, place: [f64; D]) -> f64 {
-        let mut values = [[0.0; 2]; 4];
+        self.value_at_time(place, 0.0)
+    }
+
+    /// Returns the value at a position and a time.
+    pub fn value_at_time<const D: usize>(&self, place: [f64; D], time: f64) -> f64 {
+        let mut values = [[0.0; 2], [0.0; 2], [0.0; 2], [time, 0.0]];
         for (value, x) in values.iter_mut().zip(place) {
             value[0] = x;
         }
@@ -107,6 +113,52 @@ impl Formula {
     /// Returns the text as written.
     pub fn text(&self) -> &str {
         &self.text
+    }
+}
+
+/// Components of a vector as formulas of position and time.
+#[derive(Clone, Debug)]
+pub(super) struct VectorFormula<const D: usize>([Formula; D]);
+
+impl<const D: usize> VectorFormula<D> {
+    /// Checks number and variables of the components at a key.
+    pub(super) fn new(source: &Source, key: &str, formulas: &[Formula]) -> Result<Self, SceneError> {
+        let all = if D == 2 { "xyt" } else { "xyzt" };
+        let mut each = formulas.iter().enumerate();
+        if let Some((d, name)) = each.find_map(|(d, own)| Some((d, own.find_variable_except(all)?))) {
+            let allowed = if D == 2 { "`x`, `y` and `t`" } else { "`x`, `y`, `z` and `t`" };
+            let found = format!("`{name}` in `{}`", formulas[d].text());
+            return Err(source.error(&format!("{key}[{d}]"), found, allowed));
+        }
+        let found = format!("{} components", formulas.len());
+        let each = formulas.to_vec().try_into();
+        each.map(Self).map_err(|_| source.error(key, found, format!("{D} components")))
+    }
+
+    /// Refuses values that are not finite at some positions and times up to `end`, s.
+    pub(super) fn check(
+        &self,
+        source: &Source,
+        key: &str,
+        places: impl Iterator<Item = [f64; D]>,
+        end: f64,
+    ) -> Result<(), SceneError> {
+        for place in places {
+            for time in [0.0, 0.25, 0.5, 0.75, 1.0].map(|part| part * end) {
+                let value = self.value(place, time);
+                if let Some(d) = value.iter().position(|x| !x.is_finite()) {
+                    let found = format!("{} of `{}` at {place:?} m and {time} s", value[d], self.0[d].text());
+                    let allowed = "a finite value at every particle and time";
+                    return Err(source.error(&format!("{key}[{d}]"), found, allowed));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the vector at a position and a time.
+    pub(super) fn value(&self, place: [f64; D], time: f64) -> [f64; D] {
+        self.0.each_ref().map(|formula| formula.value_at_time(place, time))
     }
 }
 

@@ -7,7 +7,9 @@ use super::{Boundary, ContactSpec, Prescribed, PrescribedField, Scene, Side, Sol
 use crate::bonds::components;
 use crate::field::Field;
 use crate::material::{BodyTensor, surface_load};
-use crate::solver::{ContactStops, INVERTS, Loads, Support, Unsupported, find_unsupported, inverted};
+use crate::solver::{
+    ContactStops, INVERTS, Loads, RigidRegion, Support, Unsupported, find_unsupported, inverted,
+};
 use harness::scene::{SceneError, Source};
 
 /// Times at which the balance of forces with curves is checked.
@@ -30,9 +32,8 @@ pub fn loads_of<const D: usize>(
         if members.is_empty() {
             return Err(source.error(&key, "a region without particles", "a region with at least one"));
         }
-        let forced =
-            boundary.traction.is_some() || boundary.force.is_some() || boundary.displacement.is_some();
-        let forced = forced || boundary.rotation.is_some();
+        let forced = boundary.prescribes_force() || boundary.displacement.is_some();
+        let forced = forced || boundary.rotation.is_some() || boundary.rigid;
         for &site in members.iter().filter(|_| forced) {
             loaded[site as usize] = true;
         }
@@ -63,8 +64,17 @@ pub fn loads_of<const D: usize>(
             let components = scene.boundary[index].displacement.iter().flatten().enumerate();
             components.map(|(d, held)| u8::from(*held == Prescribed::Hold) << d).sum()
         };
-        super::curve::follow(&regions, rotates, kept, &surfaces, amplitudes, &mut loads);
+        super::curve::follow(&regions, rotates, kept, &surfaces, &amplitudes, &mut loads);
     }
+    super::pressure::add(source, scene, body, &amplitudes, &mut loads)?;
+    super::traction_field::add(source, scene, body, &amplitudes, &mut loads, &mut loaded)?;
+    super::body_force::add(source, scene, body, &mut loads)?;
+    let rest = Field::zeros(loads.curved.as_ref().map_or(0, |_| body.bonds.sites()));
+    if loads.curved.is_some() {
+        loads.set_peaks();
+        loads.update_forces([1.0; 2], &*body.bonds, &rest);
+    }
+    join(source, scene, &regions, &mut loads, body.bonds.sites())?;
     refuse_inverted(source, scene, body, &loads)?;
     if scene.method() == SolverMethod::Verlet {
         // explicit dynamics needs neither balance nor supports
@@ -75,10 +85,10 @@ pub fn loads_of<const D: usize>(
         if loads.curved.is_some() {
             let (parts, _) = scene.load_steps();
             for &part in parts.iter().step_by(parts.len().div_ceil(BALANCES)) {
-                loads.set_forces([part; 2]);
+                loads.update_forces([part; 2], &*body.bonds, &rest);
                 refuse_unbalanced(source, scene, body, &roots, &loads)?;
             }
-            loads.set_forces([1.0; 2]);
+            loads.update_forces([1.0; 2], &*body.bonds, &rest);
         }
         refuse_unbalanced(source, scene, body, &roots, &loads)?;
     }
@@ -91,6 +101,37 @@ pub fn loads_of<const D: usize>(
         ));
     }
     Ok((loads, loaded))
+}
+
+/// Lets the particles of `rigid` boundaries share their free components.
+///
+/// # Errors
+/// A particle of two regions that both prescribe or share one component.
+fn join<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    regions: &[(Vec<u32>, Support<D>)],
+    loads: &mut Loads<D>,
+    sites: usize,
+) -> Result<(), SceneError> {
+    let mut taken = vec![0; sites];
+    for (index, (boundary, (members, support))) in scene.boundary.iter().zip(regions).enumerate() {
+        if !boundary.rigid {
+            continue;
+        }
+        let components = (0..D).map(|d| u8::from(support.displacement[d].is_none()) << d).sum();
+        for &site in members {
+            let others = loads.constrained(site as usize) | taken[site as usize];
+            if others & components != 0 {
+                let found = "a particle whose displacement another region prescribes or shares";
+                let allowed = "regions that move as a whole apart from others";
+                return Err(source.error(&format!("boundary[{index}].rigid"), found, allowed));
+            }
+            taken[site as usize] |= components;
+        }
+        loads.join(RigidRegion { sites: members.clone(), components }, sites);
+    }
+    Ok(())
 }
 
 /// Adds a traction on a side of a solid: t (n·h_I)/V_I with area vectors h, which balances a uniform stress
@@ -301,7 +342,8 @@ pub(super) fn explain<const D: usize>(
         };
         let what = [
             ("constrained", boundary.prescribes_displacement()),
-            ("loaded", boundary.traction.is_some() || boundary.force.is_some()),
+            ("loaded", boundary.prescribes_force()),
+            ("moving as a whole", boundary.rigid),
             ("moving at the start", boundary.prescribes_velocity()),
         ];
         let what: Vec<&str> = what.iter().filter(|(_, given)| *given).map(|(what, _)| *what).collect();
@@ -403,6 +445,14 @@ fn support<const D: usize>(
             *component = if free { None } else { Some(component.unwrap_or(0.0)) };
         }
     }
+    if boundary.rigid {
+        refuse_both("rigid", boundary.rotation.is_some(), "rotation")?;
+        refuse_both("rigid", boundary.displacement_field.is_some(), "displacement_field")?;
+        if support.displacement.iter().all(Option::is_some) {
+            let allowed = "a component of `displacement` that is `free`, or `rigid = false`";
+            return Err(source.error(&format!("{key}.rigid"), "no free component", allowed));
+        }
+    }
     if let Some(field) = &boundary.displacement_field {
         count("displacement_field", field.len())?;
         refuse_both("displacement_field", boundary.displacement.is_some(), "displacement")?;
@@ -423,10 +473,10 @@ fn support<const D: usize>(
             of_place(&format!("velocity_field[{d}]"), formula)?;
         }
     }
-    if boundary.traction.is_none()
-        && boundary.force.is_none()
+    if !boundary.prescribes_force()
         && !boundary.prescribes_displacement()
         && !boundary.prescribes_velocity()
+        && !boundary.rigid
     {
         return Err(source.missing(
             &format!("{key}.displacement"),

@@ -57,6 +57,10 @@ fn bytes_of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> 
         // both fields of a pair are in single precision
         each += (FIELDS_OF_LBFGS + Lbfgs::default().memory as f64) * vector + COARSE;
     }
+    if scene.has_followers() {
+        // body force and displacement of the last equilibrium, in a checkpoint as well
+        each += 4.0 * vector;
+    }
     if let Some(contact) = &scene.contact {
         each += CONTACT;
         if !contact.plane.is_empty() {

@@ -1,5 +1,6 @@
 //! The scene of a peridynamic problem, as written in TOML. Only what a scene names is built.
 
+mod body_force;
 mod boundary;
 mod bridges;
 mod build;
@@ -26,6 +27,7 @@ mod overlap;
 mod parts;
 mod placement;
 mod planes;
+mod pressure;
 mod probe;
 mod region;
 mod rotation;
@@ -33,10 +35,12 @@ mod solid;
 mod step;
 mod tearing;
 mod time;
+mod traction_field;
 mod values;
 mod variant;
 mod warn;
 
+pub use body_force::{BodyForceSpec, SpinSpec};
 pub use boundary::{Boundary, Prescribed, PrescribedField, RotationSpec, Side};
 pub use build::{body_of, least_memory};
 pub use check::{check, check_variant};
@@ -98,6 +102,9 @@ pub struct Scene {
     /// Loads and supports.
     #[serde(default)]
     pub boundary: Vec<Boundary>,
+    /// Gravity, centrifugal and other body forces.
+    #[serde(default)]
+    pub body_force: Vec<BodyForceSpec>,
     /// Solver settings.
     #[serde(default)]
     pub solver: SolverSpec,
@@ -457,6 +464,11 @@ impl Scene {
     /// Returns the comparisons of its variants.
     pub fn comparisons(&self) -> Comparisons<'_> {
         Comparisons { convergence: &self.convergence, curves: &self.error_against_time }
+    }
+
+    /// Returns true if forces are prescribed.
+    pub fn has_forces(&self) -> bool {
+        !self.body_force.is_empty() || self.boundary.iter().any(Boundary::prescribes_force)
     }
 
     /// Returns true if outputs need forces, stresses or flags.

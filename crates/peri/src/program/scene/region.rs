@@ -4,7 +4,7 @@ use super::Boundary;
 use super::build::operations;
 use super::values::{DiscreteBody, ONE_OF_THEM, check_order, vector};
 use crate::bonds::Bonds;
-use crate::geometry::inside;
+use crate::geometry::{Operation, inside};
 use harness::scene::{SceneError, Source};
 
 /// Returns the number of layers of particles that a boundary takes at a side.
@@ -12,13 +12,13 @@ pub(super) fn layers<const D: usize>(boundary: &Boundary, bonds: &dyn Bonds<D>) 
     boundary.layers_of(bonds.spacing(), bonds.horizon() / bonds.spacing())
 }
 
-/// Returns the particles of a boundary, and its depth from a side, m.
-pub(super) fn region<const D: usize>(
+/// Returns the region of a boundary, and its depth from a side, m.
+pub(super) fn extent<const D: usize>(
     source: &Source,
     key: &str,
     boundary: &Boundary,
     body: &DiscreteBody<D>,
-) -> Result<(Vec<u32>, Option<f64>), SceneError> {
+) -> Result<(BoundaryExtent<D>, Option<f64>), SceneError> {
     let spacing = body.bonds.spacing();
     let (low, high, depth) = match (boundary.side, &boundary.min, &boundary.max) {
         (Some(side), None, None) if boundary.shapes.is_empty() => {
@@ -85,10 +85,32 @@ pub(super) fn region<const D: usize>(
         }
     };
     let shapes = operations(source, &format!("{key}.shapes"), &boundary.shapes)?;
-    let inside = |&site: &u32| {
-        let position = body.bonds.position(site as usize);
-        let boxed = (0..D).all(|d| low[d] <= position[d] && position[d] <= high[d]);
-        boxed && (shapes.is_empty() || inside(&shapes, position))
-    };
+    Ok((BoundaryExtent { low, high, shapes }, depth))
+}
+
+/// Region of a boundary: a box that may be unbounded, and shapes.
+pub(super) struct BoundaryExtent<const D: usize> {
+    low: [f64; D],
+    high: [f64; D],
+    shapes: Vec<Operation<D>>,
+}
+
+impl<const D: usize> BoundaryExtent<D> {
+    /// Returns true if the region contains a point, edges included.
+    pub(super) fn contains(&self, place: [f64; D]) -> bool {
+        let boxed = (0..D).all(|d| self.low[d] <= place[d] && place[d] <= self.high[d]);
+        boxed && (self.shapes.is_empty() || inside(&self.shapes, place))
+    }
+}
+
+/// Returns the particles of a boundary, and its depth from a side, m.
+pub(super) fn region<const D: usize>(
+    source: &Source,
+    key: &str,
+    boundary: &Boundary,
+    body: &DiscreteBody<D>,
+) -> Result<(Vec<u32>, Option<f64>), SceneError> {
+    let (extent, depth) = extent(source, key, boundary, body)?;
+    let inside = |&site: &u32| extent.contains(body.bonds.position(site as usize));
     Ok((body.bonds.particles().iter().copied().filter(inside).collect(), depth))
 }

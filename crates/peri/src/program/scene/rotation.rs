@@ -28,24 +28,7 @@ pub(super) fn rotation_of<const D: usize>(
     let Some(RotationSpec { point, axis, angle, .. }) = &boundary.rotation else { return Ok(None) };
     let key = format!("{key}.rotation");
     let centre = vector::<D>(source, &format!("{key}.point"), point)?;
-    let axis: [f64; 3] = match (axis, D) {
-        (None, 2) => [0.0, 0.0, 1.0],
-        (Some(axis), 3) => {
-            let size = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
-            let three = <[f64; 3]>::try_from(axis.as_slice()).ok().filter(|_| size > 0.0 && size.is_finite());
-            let three = three.ok_or_else(|| {
-                source.error(&format!("{key}.axis"), format!("{axis:?}"), "three numbers, not all of them 0")
-            })?;
-            three.map(|x| x / size)
-        }
-        (None, _) => {
-            let why = "needed in a solid: the direction of the axis, e.g. [0, 0, 1]";
-            return Err(source.missing(&format!("{key}.axis"), why));
-        }
-        (Some(_), _) => {
-            return Err(source.unexpected(&format!("{key}.axis"), "a plane body turns in its plane"));
-        }
-    };
+    let axis = direction::<D>(source, &format!("{key}.axis"), axis.as_deref())?;
     if angle.si() == 0.0 {
         return Err(source.error(&format!("{key}.angle"), "0", "an angle other than 0"));
     }
@@ -64,6 +47,29 @@ pub(super) fn rotation_of<const D: usize>(
         }
     }
     Ok(Some(Rotation { centre, axis, angle: angle.si() }))
+}
+
+/// Converts the direction of an axis to one of length 1.
+///
+/// # Errors
+/// No direction in a solid, or one in a plane body.
+pub(super) fn direction<const D: usize>(
+    source: &Source,
+    key: &str,
+    axis: Option<&[f64]>,
+) -> Result<[f64; 3], SceneError> {
+    match (axis, D) {
+        (None, 2) => Ok([0.0, 0.0, 1.0]),
+        (Some(axis), 3) => {
+            let size = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let three = <[f64; 3]>::try_from(axis).ok().filter(|_| size > 0.0 && size.is_finite());
+            let three = three
+                .ok_or_else(|| source.error(key, format!("{axis:?}"), "three numbers, not all of them 0"))?;
+            Ok(three.map(|x| x / size))
+        }
+        (None, _) => Err(source.missing(key, "needed in a solid: the direction of the axis, e.g. [0, 0, 1]")),
+        (Some(_), _) => Err(source.unexpected(key, "a plane body turns in its plane")),
+    }
 }
 
 /// Adds the rotations to the loads; where regions overlap, the last one wins.

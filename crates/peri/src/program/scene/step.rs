@@ -1,7 +1,9 @@
 //! Steps of a programme in sequence: the scene's own blocks are the first, each `[[step]]` is a later one.
 
 use super::check::check_variant;
-use super::{Boundary, CrackSpec, DeviceChoice, Dynamics, Prescribed, Scene, SolverMethod, SolverSpec};
+use super::{
+    BodyForceSpec, Boundary, CrackSpec, DeviceChoice, Dynamics, Prescribed, Scene, SolverMethod, SolverSpec,
+};
 use super::{TimeProgramSpec, crack, loads::own_region_names};
 use crate::bonds::Bonds;
 use crate::geometry::Cut;
@@ -16,6 +18,9 @@ pub struct StepSpec {
     /// Loads and supports; a region that the step does not name is free.
     #[serde(default)]
     pub boundary: Vec<Boundary>,
+    /// Gravity, centrifugal and other body forces.
+    #[serde(default)]
+    pub body_force: Vec<BodyForceSpec>,
     /// Solver settings; default: as in a scene without `[solver]`.
     pub solver: Option<SolverSpec>,
     /// Ramps and holds of a quasi-static step in time.
@@ -28,8 +33,9 @@ pub struct StepSpec {
 }
 
 /// Keys of a step and the keys of the scene in whose place they are.
-const KEYS: [[&str; 2]; 5] = [
+const KEYS: [[&str; 2]; 6] = [
     ["boundary", "boundary"],
+    ["body_force", "body_force"],
     ["solver", "solver"],
     ["time", "time"],
     ["dynamics", "dynamics"],
@@ -51,9 +57,10 @@ impl Scene {
             return Cow::Borrowed(self);
         };
         let mut scene = self.clone();
-        let StepSpec { boundary, solver, time, dynamics, cracks } = step.clone();
+        let StepSpec { boundary, body_force, solver, time, dynamics, cracks } = step.clone();
         let explicit = dynamics.is_some().then_some(SolverMethod::Verlet);
-        (scene.boundary, scene.time, scene.dynamics) = (boundary, time, dynamics);
+        (scene.boundary, scene.body_force) = (boundary, body_force);
+        (scene.time, scene.dynamics) = (time, dynamics);
         scene.solver = solver.unwrap_or_default();
         scene.solver.method = scene.solver.method.or(explicit);
         (scene.body.cracks, scene.step, scene.later) = (cracks, Vec::new(), true);

@@ -16,6 +16,7 @@ harness::study! {
         shapes: Vec<super::ShapeSpec> = "body.shapes",
         cracks: Vec<super::CrackSpec> = "body.cracks",
         boundary: Vec<super::Boundary> = "boundary",
+        body_force: Vec<super::BodyForceSpec> = "body_force",
         solver: super::SolverSpec = "solver",
         time: super::TimeProgramSpec = "time",
         dynamics: super::Dynamics = "dynamics",
