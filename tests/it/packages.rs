@@ -24,8 +24,8 @@ fn tree(package: &str, flags: &str) -> Vec<String> {
     lines.iter().filter_map(|line| Some(line.split_whitespace().next()?.to_owned())).collect()
 }
 
-/// `cargo xtask` and the check of the libraries alone (`.ci/run`) build packages as the whole workspace does: a
-/// feature that another package asks for belongs into crates/workspace-hack.
+/// `cargo xtask` and the check of the libraries alone (`.ci/run`) build packages as the whole workspace does;
+/// a feature that another package asks for belongs into crates/workspace-hack.
 #[test]
 fn one_build_serves_all_commands() {
     let with_features = |flags: &str| lines(&format!("--format {{p}}[{{f}}] --edges normal,build{flags}"));

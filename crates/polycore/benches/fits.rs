@@ -13,9 +13,9 @@ fn bar() -> TestData {
         let noise = 1.0 + 0.02 * (12.9898 * f64::from(i)).sin();
         let stress = homogeneous::uniaxial(&law, stretch).unwrap();
         let stretches = [stretch, Mode::Uniaxial.second_stretch(stretch)];
-        TestState { mode: Mode::Uniaxial, stretches, nominal: [noise * stress, 0.0] }
+        TestState::new(Mode::Uniaxial, stretches, [noise * stress, 0.0])
     };
-    TestData { source: "bar".to_owned(), states: (1..=705).map(state).collect() }
+    TestData::new("bar".to_owned(), (1..=705).map(state).collect())
 }
 
 fn fits(criterion: &mut Criterion) {

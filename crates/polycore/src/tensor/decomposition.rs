@@ -60,8 +60,8 @@ pub(super) fn adjugate(a: &Tensor) -> Tensor {
     })
 }
 
-/// Pivoted QR decomposition of a matrix with its rows in decreasing size: rows and columns are numbers of those
-/// of the matrix.
+/// Pivoted QR decomposition of a matrix whose rows are sorted by decreasing size; `rows` and `columns` are
+/// their places in the matrix.
 struct SortedFactors {
     rows: [usize; 3],
     columns: [usize; 3],

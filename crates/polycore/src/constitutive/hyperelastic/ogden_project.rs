@@ -77,8 +77,9 @@ impl Projected<'_> {
         last.1.clone()
     }
 
-    /// Solves for the best moduli above the least one of the search in all parameters. Each subset of terms may lie above it; the problem is
-    /// convex, so the least misfit is the solution. Columns enter by their triangular factor alone.
+    /// Solves for the best moduli above the least one of the search in all parameters. Each subset of terms
+    /// may lie above it; the problem is convex, so the least misfit is the solution. Columns enter by their
+    /// triangular factor alone.
     fn solved(&self, exponents: &DVector<f64>) -> Option<OgdenModuli> {
         self.start.evaluations.update(|count| count + 1);
         let [mut columns, slopes] = self.columns(exponents)?;
