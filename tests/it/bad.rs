@@ -1,8 +1,8 @@
 //! Malformed and absurd input: exit code 2, the message that helps, nothing written, no panic.
 //!
 //! Each scene is a patch of a valid one, with its fault and its message: `tests/bad/peri.txt`, `crystfem.txt`
-//! and `polycore.txt`, whose heads describe the format; the valid scenes are in `tests/bad/peri/`, `crystfem/`
-//! and `polycore/`.
+//! and `polycore.txt`, whose heads describe the format; the valid scenes are in `tests/bad/peri/`,
+//! `crystfem/` and `polycore/`.
 
 use crate::program::{Ended, command, executable, finish, peri, workspace};
 use crate::scenes;

@@ -279,8 +279,8 @@ fn free_sides_follow_the_bulk_modulus() {
     }
 }
 
-/// The thickness of a sheet balances P₃₃ of the solid with this third stretch, to rounding, also of chains that
-/// are locked or nearly incompressible; the other stresses are the same.
+/// The thickness of a sheet balances P₃₃ of the solid with this third stretch, to rounding, also of chains
+/// that are locked or nearly incompressible; the other stresses are the same.
 #[test]
 fn thickness_balances_to_rounding() {
     let (mut worst, mut unbalanced) = (0.0_f64, 0.0_f64);

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use polycore::Error;
 use polycore::constitutive::hyperelastic::deck::card;
-use polycore::constitutive::hyperelastic::host::Host;
+use polycore::constitutive::hyperelastic::host::CardProgram;
 use polycore::file::atomic_write;
 
 use super::material::{BULK_RATIO, unusable};
@@ -57,12 +57,12 @@ pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Writes `materials_mm` and `materials_si` of each program, with a material of every fit; a law that a program
-/// does not have is named in a comment.
+/// Writes `materials_mm` and `materials_si` of each program, with a material of every fit; a law that a
+/// program does not have is named in a comment.
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write_hosts(directory: &Path, all: &[TableFits], hosts: &[Host]) -> Result<(), Error> {
+pub fn write_hosts(directory: &Path, all: &[TableFits], hosts: &[CardProgram]) -> Result<(), Error> {
     for (host, (name, units, pascals)) in hosts.iter().flat_map(|host| FILES.map(|file| (*host, file))) {
         let mut text = host.comment(&format!("units {units}"));
         let usable = all.iter().flat_map(|set| set.fits.iter().map(move |fit| (set, fit)));

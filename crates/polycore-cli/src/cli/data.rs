@@ -44,8 +44,8 @@ pub struct TestTableSpec {
     /// Heading of the standard deviations of the stresses, in a unit of stress or in % of each: squares are
     /// weighted by their reciprocal squares.
     deviation_column: Option<String>,
-    /// Standard deviation of all stresses, `"0.02 MPa"`, of each as a share of it, `"2 %"`, or the root of the
-    /// sum of both squares, `"0.02 MPa + 2 %"`.
+    /// Standard deviation of all stresses, `"0.02 MPa"`, of each as a share of it, `"2 %"`, or the root of
+    /// the sum of both squares, `"0.02 MPa + 2 %"`.
     deviation: Option<String>,
     /// Heading of weights of the squares.
     weight_column: Option<String>,
@@ -96,7 +96,7 @@ impl TestTableSpec {
             Some(_) => self.read_file(source, &key)?,
             None => self.join(source, &key, above)?,
         };
-        neo_hookean_modulus(&set.table).map_err(|error| source.refused(&key(set.place()), error))?;
+        neo_hookean_modulus(&set.table).map_err(|error| source.refused(&key(set.source_key()), error))?;
         if rank {
             set.modes = modes(&set.table);
             if let [only] = &set.modes[..] {
@@ -199,7 +199,7 @@ impl TestTableSpec {
 
 impl DataSet {
     /// Key of the scene that names its states.
-    pub fn place(&self) -> &'static str {
+    pub fn source_key(&self) -> &'static str {
         if self.parts.is_empty() { "file" } else { "tables" }
     }
 }

@@ -5,8 +5,8 @@ harness::quantities! {
     /// fits with time; and of trials, `{trial}`.
     pub ALL:
     RMS = "{fit}.rms", "MPa", "root mean square of model − measurement";
-    CHI = "{fit}.chi", "", "with standard deviations of the stresses: root of χ² over the degrees of freedom; \
-                            far above 1, the law misses the tests";
+    CHI = "{fit}.chi", "", "with standard deviations of the stresses: root of χ² over the degrees of \
+                            freedom; far above 1, the law misses the tests";
     MAE = "{fit}.mae", "MPa", "mean of |model − measurement|";
     R2 = "{fit}.r2", "", "coefficient of determination 1 − Σr²/Σ(P − P̄)²";
     LOCKED = "{fit}.locked", "", "with `cross`: number of states of the other data beyond the locking \

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use harness::report::Expect;
 use harness::scene::{SceneError, Source};
-use polycore::constitutive::hyperelastic::host::Host;
+use polycore::constitutive::hyperelastic::host::CardProgram;
 use polycore::constitutive::hyperelastic::{self, MODELS, ModelDescriptor};
 use serde::Deserialize;
 
@@ -74,7 +74,7 @@ struct FitSettings {
     cross: bool,
     /// Programs for which materials are written beside those of Abaqus and CalculiX.
     #[serde(default)]
-    cards: Vec<Host>,
+    cards: Vec<CardProgram>,
     /// Tables of measurements.
     #[serde(default)]
     data: Vec<TestTableSpec>,
@@ -93,7 +93,7 @@ pub struct FitCase {
     pub laws: Vec<&'static ModelDescriptor>,
     pub cross: bool,
     /// Programs for which materials are written.
-    pub cards: Vec<Host>,
+    pub cards: Vec<CardProgram>,
     pub data: Vec<DataSet>,
     pub time: Option<TimeCase>,
     pub prony: Vec<PronySet>,
@@ -132,7 +132,7 @@ impl FitCase {
                 if set.table.measurements() < model.parameters.len() {
                     let found = format!("{} measured stresses", set.table.measurements());
                     let allowed = format!("at least {} for `{}`", model.parameters.len(), model.key);
-                    return Err(source.error(&format!("fit.data[{i}].{}", set.place()), found, allowed));
+                    return Err(source.error(&format!("fit.data[{i}].{}", set.source_key()), found, allowed));
                 }
             }
             data.push(set);

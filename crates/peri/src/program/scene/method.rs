@@ -1,7 +1,7 @@
 //! Solver settings of a scene: quasi-static methods and explicit dynamics.
 
-use super::Scene;
 use super::formula::Formula;
+use super::Scene;
 use crate::solver::{
     DynamicRelaxation, Equilibrium, Lbfgs, LbfgsSolver, Policy, RelaxationSolver, VelocityVerlet,
 };
@@ -98,6 +98,19 @@ impl SolverMethod {
 }
 
 impl Scene {
+    /// Returns the largest relative error of the fitted bond law.
+    pub fn fit_bound(&self) -> f64 {
+        let single =
+            self.dynamics.as_ref().is_some_and(|dynamics| dynamics.precision == ForcePrecision::Single);
+        let rough = self.breaks() || self.is_mixed() || single;
+        self.solver.fit_bound.unwrap_or(if rough { 1e-6 } else { 1e-9 })
+    }
+
+    /// Returns true if bond forces are in mixed precision.
+    pub fn is_mixed(&self) -> bool {
+        self.dynamics.as_ref().is_some_and(|dynamics| dynamics.precision == ForcePrecision::Mixed)
+    }
+
     /// Returns the method; default: L-BFGS, with contact dynamic relaxation, because the coarse level of
     /// L-BFGS does not include contact.
     pub fn method(&self) -> SolverMethod {

@@ -491,17 +491,4 @@ impl Scene {
     pub fn softens(&self) -> bool {
         self.convention() == Some(Convention::Softening)
     }
-
-    /// Returns the largest relative error of the fitted bond law.
-    pub fn fit_bound(&self) -> f64 {
-        let single =
-            self.dynamics.as_ref().is_some_and(|dynamics| dynamics.precision == ForcePrecision::Single);
-        let rough = self.breaks() || self.is_mixed() || single;
-        self.solver.fit_bound.unwrap_or(if rough { 1e-6 } else { 1e-9 })
-    }
-
-    /// Returns true if bond forces are in mixed precision.
-    pub fn is_mixed(&self) -> bool {
-        self.dynamics.as_ref().is_some_and(|dynamics| dynamics.precision == ForcePrecision::Mixed)
-    }
 }

@@ -34,7 +34,8 @@ pub struct VolumetricFit {
 }
 
 impl VolumetricFit {
-    /// Fits p = −dU/dJ = −Σ 2i (J − 1)²ⁱ⁻¹/Dᵢ, linear in 1/Dᵢ, by least squares. States at J = 1 do not count.
+    /// Fits p = −dU/dJ = −Σ 2i (J − 1)²ⁱ⁻¹/Dᵢ, linear in 1/Dᵢ, by least squares. States at J = 1 do not
+    /// count.
     ///
     /// # Errors
     /// [`Error::Data`] for fewer states than terms, and for a bulk modulus that is not above 0 or a term that

@@ -1,10 +1,10 @@
 //! Least-squares fit of a law to homogeneous states.
 //!
-//! The objective is the weighted sum of squares of the nominal-stress residuals, over every measured stress of
-//! the table (those that are not exactly zero; [`super::data::TestState::nominal`]); weights are 1 unless a
-//! table has others. The figure of merit, `rms`, is the root of its mean. Levenberg–Marquardt in transformed parameters (ln p for positive ones, ln(p/limit
-//! − 1) for locking limits) keeps every iterate in the law's domain; several starting points guard against
-//! local minima.
+//! The objective is the weighted sum of squares of the nominal-stress residuals, over every measured stress
+//! of the table (those that are not exactly zero; [`super::data::TestState::nominal`]); weights are 1 unless
+//! a table has others. The figure of merit, `rms`, is the root of its mean. Levenberg–Marquardt in
+//! transformed parameters (ln p for positive ones, ln(p/limit − 1) for locking limits) keeps every iterate in
+//! the law's domain; several starting points guard against local minima.
 
 use std::cell::Cell;
 
@@ -94,8 +94,8 @@ impl Agreement {
         Self::of_weighted_residuals(residuals, measured.map(|data| (data, 1.0)))
     }
 
-    /// Summarizes residuals that are multiplied by the roots of their weights, of measured stresses with these
-    /// roots.
+    /// Summarizes residuals that are multiplied by the roots of their weights, of measured stresses with
+    /// these roots.
     fn of_weighted_residuals(residuals: &[f64], measured: impl Iterator<Item = (f64, f64)> + Clone) -> Self {
         let count: f64 = measured.clone().map(|(_, root)| root * root).sum();
         let mean = measured.clone().map(|(data, root)| root * root * data).sum::<f64>() / count;

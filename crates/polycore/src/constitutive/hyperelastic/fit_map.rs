@@ -17,8 +17,8 @@ pub enum Identifiability {
     Undetermined,
 }
 
-/// Computes model minus data for every measured stress, Pa, state by state, times [`TestState::ratio`] and the
-/// root of its weight.
+/// Computes model minus data for every measured stress, Pa, state by state, times [`TestState::ratio`] and
+/// the root of its weight.
 ///
 /// # Errors
 /// Errors of the law at a state of the table.

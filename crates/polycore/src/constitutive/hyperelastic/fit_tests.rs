@@ -190,8 +190,8 @@ fn three_terms_on_a_bar() {
     assert!(found < 0.0483, "{found}");
 }
 
-/// Wide strip in 13 points, where three terms follow a flat valley to the least modulus, e⁻⁴⁰ of the whole, at
-/// the exponent −26.445. scipy's `least_squares` with that bound, from 300 random starts: 4955.84673 Pa. A
+/// Wide strip in 13 points, where three terms follow a flat valley to the least modulus, e⁻⁴⁰ of the whole,
+/// at the exponent −26.445. scipy's `least_squares` with that bound, from 300 random starts: 4955.84673 Pa. A
 /// search in all parameters at once takes 26 000 evaluations.
 #[test]
 fn few_evaluations_along_a_valley() {

@@ -6,7 +6,7 @@ use super::any_model;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
-pub enum Host {
+pub enum CardProgram {
     /// Mechanical APDL, `TB,HYPER`.
     Ansys,
     /// `*MAT_077_H`, `*MAT_077_O`, in long format.
@@ -15,7 +15,7 @@ pub enum Host {
     Febio,
 }
 
-impl Host {
+impl CardProgram {
     /// Name in messages.
     pub fn name(self) -> &'static str {
         match self {
@@ -161,12 +161,12 @@ mod tests {
     }
 
     /// Energy of a card by the formula of its program's manual, at constant volume.
-    fn energy(host: Host, card: &str) -> f64 {
+    fn energy(host: CardProgram, card: &str) -> f64 {
         let [x, y] = invariants();
         let head = card.lines().next().unwrap();
         let series = |c: &[f64]| (1..).zip(c).map(|(i, c)| c * x.powi(i)).sum::<f64>();
         match host {
-            Host::Ansys => {
+            CardProgram::Ansys => {
                 // the first number of each line is the place of the next constant
                 let c: Vec<f64> = card.lines().skip(1).flat_map(|line| numbers(line)[1..].to_vec()).collect();
                 match head.rsplit(',').next().unwrap() {
@@ -193,7 +193,7 @@ mod tests {
                     }
                 }
             }
-            Host::LsDyna => {
+            CardProgram::LsDyna => {
                 let rows: Vec<Vec<f64>> = card.lines().skip(2).map(numbers).collect();
                 match head {
                     "*MAT_077_H+" => {
@@ -203,7 +203,7 @@ mod tests {
                     _ => rows[0].iter().zip(&rows[1]).map(|(mu, alpha)| mu / alpha * powers(*alpha)).sum(),
                 }
             }
-            Host::Febio => {
+            CardProgram::Febio => {
                 let c = numbers(&card[head.len()..]);
                 match head.split("type=\"").nth(1).unwrap().split('"').next().unwrap() {
                     "Mooney-Rivlin" => c[0] * x + c[1] * y,
@@ -222,7 +222,8 @@ mod tests {
     #[test]
     fn cards_have_the_energies_of_their_laws() {
         let mut worst: f64 = 0.0;
-        for (host, expected) in [(Host::Ansys, 12), (Host::LsDyna, 9), (Host::Febio, 8)] {
+        for (host, expected) in [(CardProgram::Ansys, 12), (CardProgram::LsDyna, 9), (CardProgram::Febio, 8)]
+        {
             let mut count = 0;
             for model in MODELS {
                 let Some(card) = host.card(3, model.key, model.example, 4e7) else { continue };
@@ -238,14 +239,16 @@ mod tests {
     /// K = 40 MPa: d = 2/K; ν from K and μ = 0.4 MPa.
     #[test]
     fn bulk_moduli_in_the_form_of_each_program() {
-        let card = |host: Host| host.card(1, "neo-hookean", &[0.4], 40.0).unwrap();
-        assert_eq!(card(Host::Ansys), "TB,HYPER,1,1,1,NEO\nTBDATA,1,4.000000e-1,5.000000e-2\n");
-        let poisson = numbers(card(Host::LsDyna).lines().nth(1).unwrap())[1];
+        let card = |host: CardProgram| host.card(1, "neo-hookean", &[0.4], 40.0).unwrap();
+        assert_eq!(card(CardProgram::Ansys), "TB,HYPER,1,1,1,NEO\nTBDATA,1,4.000000e-1,5.000000e-2\n");
+        let poisson = numbers(card(CardProgram::LsDyna).lines().nth(1).unwrap())[1];
         assert!((poisson - (120.0 - 0.8) / 240.8).abs() < 1e-12, "{poisson}");
-        assert!(card(Host::Febio).contains("<k>4.000000e1</k>"), "{}", card(Host::Febio));
-        for (host, key) in
-            [(Host::Febio, "arruda-boyce"), (Host::LsDyna, "gent"), (Host::Ansys, "van-der-waals")]
-        {
+        assert!(card(CardProgram::Febio).contains("<k>4.000000e1</k>"), "{}", card(CardProgram::Febio));
+        for (host, key) in [
+            (CardProgram::Febio, "arruda-boyce"),
+            (CardProgram::LsDyna, "gent"),
+            (CardProgram::Ansys, "van-der-waals"),
+        ] {
             let model = any_model(key).unwrap();
             assert_eq!(host.card(1, key, model.example, 1e9), None);
         }

@@ -141,8 +141,8 @@ mod tests {
         assert_eq!(shown, expected);
     }
 
-    /// μ fitted to tension of a body of 1 Pa errs in equibiaxial tension of one of 2 Pa by half of each stress,
-    /// and twice as much the other way round; of two modes, one left out is the other alone.
+    /// μ fitted to tension of a body of 1 Pa errs in equibiaxial tension of one of 2 Pa by half of each
+    /// stress, and twice as much the other way round; of two modes, one left out is the other alone.
     #[test]
     fn errors_in_closed_form() {
         let law = model("neo-hookean").unwrap().law(&[1.0]).unwrap();

@@ -41,8 +41,8 @@ impl Deviation {
     }
 }
 
-const ALLOWED: &str = "standard deviations above 0: of all stresses, \"0.02 MPa\", as a share of each, \"2 %\", or \
-                       \"0.02 MPa + 2 %\"";
+const ALLOWED: &str = "standard deviations above 0: of all stresses, \"0.02 MPa\", as a share of each, \
+                       \"2 %\", or \"0.02 MPa + 2 %\"";
 
 /// Source of the weights of a table.
 pub(super) enum WeightSource {
@@ -120,8 +120,8 @@ mod tests {
     use crate::constitutive::hyperelastic::fit::{Agreement, Fit, fit};
     use crate::constitutive::hyperelastic::model;
 
-    const TABLE: &str = "stretch,nominal_MPa,weight,sd_kPa,cv [%]\n1,0,1,1,1\n1.5,0.46,4,20,4.347826086956522\n\
-                         2,0.70,1,40,5.714285714285714\n3,1.20,0.25,80,6.666666666666667\n";
+    const TABLE: &str = "stretch,nominal_MPa,weight,sd_kPa,cv [%]\n1,0,1,1,1\n\
+                         1.5,0.46,4,20,4.347826086956522\n2,0.70,1,40,5.714285714285714\n3,1.20,0.25,80,6.666666666666667\n";
 
     fn format(weight: &str, deviation: &str) -> TestFormat {
         let some = |name: &str| (!name.is_empty()).then(|| name.to_owned());
