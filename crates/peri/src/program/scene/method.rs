@@ -1,7 +1,7 @@
 //! Solver settings of a scene: quasi-static methods and explicit dynamics.
 
-use super::formula::Formula;
 use super::Scene;
+use super::formula::Formula;
 use crate::solver::{
     DynamicRelaxation, Equilibrium, Lbfgs, LbfgsSolver, Policy, RelaxationSolver, VelocityVerlet,
 };
