@@ -13,7 +13,7 @@ const MARK: &str = "# <- here";
 
 #[test]
 fn every_bad_scene_gets_its_message() {
-    judge_all("peri", 358);
+    judge_all("peri", 363);
 }
 
 #[test]
@@ -23,7 +23,7 @@ fn every_bad_scene_of_a_part_gets_its_message() {
 
 #[test]
 fn every_bad_scene_of_a_fit_gets_its_message() {
-    judge_all("polycore", 20);
+    judge_all("polycore", 22);
 }
 
 /// Scene with one fault.

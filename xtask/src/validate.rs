@@ -29,7 +29,7 @@ pub struct Options {
     /// Only cases in this folder of cases/, for example `ch2`; may be repeated.
     #[arg(long, value_name = "CHAPTER")]
     only: Vec<String>,
-    /// Leave out everything marked `quick = false`, and run a case on each core, with one thread.
+    /// Skip everything marked `quick = false`; run as many cases at once as there are cores.
     #[arg(long)]
     quick: bool,
     /// Only this case: its folder or file, also one outside cases/; may be repeated.

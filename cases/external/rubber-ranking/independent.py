@@ -71,7 +71,8 @@ def kawabata():
     x, y = a**2 + b**2 + c**2 - 3, a**-2 + b**-2 + c**-2 - 3
     mode = np.where(b == 1, "pure-shear", np.where(b == a, "equibiaxial", "biaxial"))
     mode = np.where(stresses[:, 1] == 0, "uniaxial", mode)
-    mode = np.where((mode == "uniaxial") & (a < 1), "compression", mode)
+    # an incompressible bar in compression is in equibiaxial tension under a pressure
+    mode = np.where((mode == "uniaxial") & (a < 1), "equibiaxial", mode)
     power = lambda z, n: z**n if n >= 0 else 0 * z
     data = np.concatenate([stresses[:, 0], stresses[:, 1]])
     modes, measured = np.concatenate([mode, mode]), data != 0

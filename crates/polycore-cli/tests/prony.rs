@@ -1,4 +1,4 @@
-//! Prony series from the command line: relaxation, isotherms, and what a scene may not ask.
+//! Prony series and fits with time from the command line: relaxation, isotherms, runs at two rates, bad scenes.
 
 use std::path::Path;
 use std::process::Command;
@@ -23,7 +23,8 @@ reference = "20 degC"
 fn run(folder: &Path, scene: &str) -> (Option<i32>, String) {
     std::fs::write(folder.join("scene.toml"), scene).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_polycore"));
-    let ended = command.current_dir(folder).args(["run", "scene.toml", "--output", "out"]).output().unwrap();
+    command.current_dir(folder).args(["run", "scene.toml", "--output", "out", "--verbose"]);
+    let ended = command.output().unwrap();
     let text = String::from_utf8([ended.stdout, ended.stderr].concat()).unwrap();
     (ended.status.code(), text.replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" "))
 }
@@ -122,5 +123,68 @@ fn faults_are_named() {
         let (code, shown) = run(folder, &SCENE.replacen(from, to, 1));
         assert_eq!(code, Some(2), "{from}: {shown}");
         assert!(shown.contains(message), "{message}: {shown}");
+    }
+}
+
+/// A fit with time: the table of the run, its files, and what a scene may not ask.
+#[test]
+fn a_law_with_time_is_fitted() {
+    let scene = r#"
+version = 1
+program = "polycore"
+[time]
+equilibrium = "neo-hookean"
+leave_out = "0.1 1/s"
+starts = 1
+[[time.branch]]
+spring = "neo-hookean"
+viscosity = "constant"
+[[time.data]]
+name = "bar"
+file = "bar.csv"
+runs = ["rate"]
+[[time.predict]]
+name = "hold"
+steps = [{ to = 1.5, rate = "0.1 1/s" }, { hold = "100 s" }]
+[[expect]]
+quantity = "time.all.rms"
+at_most = 0.001
+kind = "closed-form"
+source = "the data are elastic"
+"#;
+    // λ − λ⁻² times 0.5 MPa at both rates: a branch has no effect
+    let mut table = String::from("rate [1/s],stretch,nominal [MPa]\n");
+    for rate in [0.1, 0.01] {
+        for path in [0.1, 0.3, 0.5, 0.7, 0.9] {
+            let stretch: f64 = if path <= 0.5 { 1.0 + path } else { 2.0 - path };
+            table += &format!("{rate},{stretch},{}\n", 0.5 * (stretch - stretch.powi(-2)));
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("bar.csv"), &table).unwrap();
+    let out = folder.path().join("out");
+    let (code, shown) = run(folder.path(), scene);
+    assert_eq!(code, Some(0), "{shown}");
+    for part in ["bar-0.1 ", "bar-0.01 ", "all ", "predicted by a fit to the other rates", "not determined"] {
+        assert!(shown.contains(part), "{part}: {shown}");
+    }
+    let report = Report::read(out.join("report.json")).unwrap();
+    assert!(report.scalar("time.left-out.rms").unwrap() < 1e-3);
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
+    assert!(read("time_runs.csv").lines().count() == 11, "{}", read("time_runs.csv"));
+    let block: toml::Table = read("time_material.toml").parse().unwrap();
+    let solid = &block["material"]["solid"];
+    assert_eq!(solid["constitutive"]["model"].as_str(), Some("neo-hookean"));
+    assert!(solid["branch"][0]["parameters"]["eta"].is_str());
+    assert_eq!(read("hold_prediction.csv").lines().count(), 83);
+    for (from, to, message) in [
+        ("\"0.1 1/s\"\nstarts", "\"0.2 1/s\"\nstarts", "0.01 /s, 0.1 /s"),
+        ("starts = 1", "starts = 0", "at least 1"),
+        ("starts = 1", "fix = { \"1.tau\" = 3.0 }", "allowed: `shear_modulus`, `1.nu`, `1.eta`"),
+        ("{ hold = \"100 s\" }", "{ hold = \"100 s\", to = 2.0 }", "`to` another strain"),
+        ("time.all.rms", "time.al.rms", "time.all.rms"),
+    ] {
+        let (code, error) = run(folder.path(), &scene.replace(from, to));
+        assert!(code != Some(0) && error.contains(message), "{from}: {error}");
     }
 }

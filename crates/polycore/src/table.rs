@@ -247,6 +247,19 @@ impl Table {
         if blank { Ok(None) } else { self.number(row, column).map(Some) }
     }
 
+    /// Refuses a column without a unit in its heading, whose numbers could be meant in several.
+    ///
+    /// # Errors
+    /// A heading without a unit.
+    pub fn require_unit(&self, column: usize, allowed: &str) -> Result<(), Error> {
+        let heading = &self.headings[column];
+        if heading.unit.is_some() {
+            return Ok(());
+        }
+        let what = format!("unit of column {}, `{}`", column + 1, heading.text);
+        Err(self.refuse(self.layout.heading_line, &what, "no unit".to_owned(), allowed))
+    }
+
     /// Unit of a column: that of its heading, or `default` for headings without.
     ///
     /// # Errors

@@ -27,29 +27,29 @@ harness::quantities! {
     DAMPED_ENERGY = "damped_energy", "J", "work less stored, released, dissipated and friction energy; in \
         a quasi-static run only as exact as the trapezoidal rule of the work, about 1e-3 of the work, and \
         possibly negative; with `branch` an error of first order in the increments";
-    RELEASED_ENERGY = "released_energy", "J", "with `material.critical`: energy of bonds at the moment they \
+    RELEASED_ENERGY = "released_energy", "J", "where bonds break: energy of bonds at the moment they \
         broke";
     DISSIPATED_ENERGY = "dissipated_energy", "J", "with `branch` or `mullins` of a `solid`: energy \
         dissipated in branches, by softening, and by what broken bonds stored beside the energy that drives \
         breaking";
     FIRST_BREAK_TIME = "first_break_time", "s", "with `[time]` or `[dynamics]`: time at the end of the step \
         of the first broken bond";
-    CRITICAL_STRETCH = "critical_stretch", "", "with `material.critical`: smallest stretch at which a bond \
+    CRITICAL_STRETCH = "critical_stretch", "", "where bonds break: smallest stretch at which a bond \
         of the body breaks";
     CRITICAL_ENERGY = "critical_energy", "J/m³", "with `fracture_energy` of a `solid`: energy over its share \
         of a family above which a bond breaks";
     TEARING_ENERGY = "tearing_energy", "J/m²", "with `material.critical`: energy per area at which a crack \
         runs in equilibrium; for a bond law κB of the critical stretch, for a `solid` its `fracture_energy`";
-    NEW_CRACK_AREA = "new_crack_area", "m²", "with `material.critical`: area of new cracks, from pairs of \
+    NEW_CRACK_AREA = "new_crack_area", "m²", "where bonds break: area of new cracks, from pairs of \
         neighbours whose bond broke and that share no neighbour any more";
     DISSIPATED_PER_AREA = "dissipated_per_area", "J/m²", "work less stored, kinetic, friction and \
         `dissipated_energy`, over `new_crack_area`: the energy of new cracks, including losses when bonds \
         snap, at barriers of the lattice, and in bonds that broke elsewhere";
     DISSIPATION_BIAS = "dissipation_bias", "", "`dissipated_per_area` over `tearing_energy`, less 1: 0 if \
         the crack ran at G, positive if the load supplied more";
-    FRAGMENTS = "fragments", "", "with `material.critical`: number of pieces of at least two particles \
+    FRAGMENTS = "fragments", "", "where bonds break: number of pieces of at least two particles \
         joined by intact bonds";
-    LARGEST_FRAGMENT = "largest_fragment", "", "with `material.critical`: volume of the largest fragment \
+    LARGEST_FRAGMENT = "largest_fragment", "", "where bonds break: volume of the largest fragment \
         over that of the body";
     BROKEN_ACROSS = "broken_across_{interface}", "", "with `[[interface]]`: share of the bonds across the \
         interface of two parts that are broken or severed";

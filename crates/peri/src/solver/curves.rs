@@ -106,6 +106,19 @@ pub struct CurvedLoads<const D: usize> {
     pub bare: Vec<u32>,
     /// τ of the present body forces, the later one of two.
     pub part: f64,
+    /// Body forces that do not depend on the displacement, if others do.
+    pub fixed: Option<FixedForces<D>>,
+}
+
+/// Body forces that do not depend on the displacement, N/m³.
+#[derive(Clone, Debug)]
+pub struct FixedForces<const D: usize> {
+    /// Both τ of which they are the mean.
+    pub parts: [f64; 2],
+    /// Number of sites without bonds at that time.
+    pub bare: usize,
+    /// Their sum.
+    pub force: Field<D>,
 }
 
 impl<const D: usize> Loads<D> {
@@ -166,8 +179,7 @@ impl<const D: usize> Loads<D> {
         self.set_forces([1.0; 2]);
     }
 
-    /// Computes the body forces at the mean of two τ, each with half of its multiples.
-    /// Fields are left out.
+    /// Computes the body forces at the mean of two τ, each with half of its multiples, without fields.
     pub fn set_forces(&mut self, parts: [f64; 2]) {
         let (Some(field), Some(curved)) = (self.body_force.as_mut(), &mut self.curved) else { return };
         curved.part = parts[1];

@@ -155,9 +155,7 @@ impl RelaxationSolver {
         }
         system.level_forces(state);
         move_pass(&system.loads, state, self.masses(system, own), mass, damping);
-        if let Some(contact) = system.repulsion() {
-            contact.stop_detached(&mut state.velocity);
-        }
+        system.stop_detached(state);
         state.counts.iterate();
         // masses are rebuilt from the state alone
         let restartable = state.counts.iteration.is_multiple_of(REFRESH);
@@ -186,6 +184,10 @@ impl<const D: usize> Equilibrium<D> for RelaxationSolver {
 
     fn bonds_broke(&mut self, system: &System<D>, sites: &[u32]) {
         update_unit_mass(&*system.bonds, sites, &mut self.unit_mass);
+        // regions that move as a whole get the largest of their masses anew
+        for region in &system.loads.rigid {
+            update_unit_mass(&*system.bonds, &region.sites, &mut self.unit_mass);
+        }
     }
 
     fn tolerance(&self) -> f64 {

@@ -1,7 +1,7 @@
 //! Body forces that depend on the displacement, or on place and time at once: they are computed anew, with
 //! the loads that follow curves, and act in full.
 
-use super::curves::Amplitude;
+use super::curves::{Amplitude, FixedForces};
 use super::load::Loads;
 use super::state::State;
 use super::system::System;
@@ -9,6 +9,9 @@ use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
 use rayon::prelude::*;
 use std::fmt;
+
+/// Points of a work item.
+const BATCH: usize = 256;
 
 /// Body force as a function of the part τ of the whole time and of the displacement.
 pub trait ForceField<const D: usize>: fmt::Debug + Send + Sync {
@@ -94,9 +97,13 @@ impl<const D: usize> fmt::Debug for PlacedForce<D> {
 
 impl<const D: usize> ForceField<D> for PlacedForce<D> {
     fn add(&self, _: &dyn BodyGeometry<D>, _: &Field<D>, part: f64, share: f64, force: &mut Field<D>) {
-        for (site, place, own) in &self.points {
-            let (old, density) = (force.get(*site as usize), (self.density)(*place, part));
-            force.set(*site as usize, std::array::from_fn(|d| old[d] + share * own * density[d]));
+        let value = |(_, place, own): &(u32, [f64; D], f64)| {
+            (self.density)(*place, part).map(|density| share * own * density)
+        };
+        let values: Vec<[f64; D]> = self.points.par_iter().with_min_len(BATCH).map(value).collect();
+        for (&(site, ..), value) in self.points.iter().zip(values) {
+            let old = force.get(site as usize);
+            force.set(site as usize, std::array::from_fn(|d| old[d] + value[d]));
         }
     }
 }
@@ -126,13 +133,31 @@ impl<const D: usize> Loads<D> {
 
     /// Computes the body forces at a displacement, at the mean of two τ as [`Self::set_forces`].
     pub fn update_forces(&mut self, parts: [f64; 2], bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
-        self.set_forces(parts);
-        let (Some(force), Some(curved)) = (self.body_force.as_mut(), &self.curved) else { return };
-        for field in &curved.fields {
-            match parts {
-                [before, after] if before == after => field.add(bonds, displacement, after, 1.0, force),
-                parts => parts.iter().for_each(|&part| field.add(bonds, displacement, part, 0.5, force)),
+        let add = |field: &dyn ForceField<D>, force: &mut Field<D>| match parts {
+            [before, after] if before == after => field.add(bonds, displacement, after, 1.0, force),
+            parts => parts.iter().for_each(|&part| field.add(bonds, displacement, part, 0.5, force)),
+        };
+        // what does not follow the displacement is computed once at a time
+        let fixed = self.curved.as_mut().and_then(|curved| curved.fixed.take());
+        let fixed = fixed.filter(|fixed| {
+            fixed.parts == parts && self.curved.as_ref().is_some_and(|own| own.bare.len() == fixed.bare)
+        });
+        if fixed.is_none() {
+            self.set_forces(parts);
+        }
+        let follows = self.follows();
+        let (Some(force), Some(curved)) = (self.body_force.as_mut(), &mut self.curved) else { return };
+        curved.part = parts[1];
+        match &fixed {
+            Some(fixed) => force.clone_from(&fixed.force),
+            None => {
+                curved.fields.iter().filter(|field| !field.follows()).for_each(|field| add(&**field, force))
             }
+        }
+        if follows {
+            let new = || FixedForces { parts, bare: curved.bare.len(), force: force.clone() };
+            curved.fixed = Some(fixed.unwrap_or_else(new));
+            curved.fields.iter().filter(|field| field.follows()).for_each(|field| add(&**field, force));
         }
         if !curved.fields.is_empty() {
             curved.bare.iter().for_each(|&site| force.set(site as usize, [0.0; D]));

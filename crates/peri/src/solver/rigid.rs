@@ -36,12 +36,11 @@ impl RigidRegion {
         sum.map(|x| x / total)
     }
 
-    /// Replaces the shared components of a field by their means.
-    fn level<const D: usize>(&self, bonds: &dyn BodyGeometry<D>, field: &mut Field<D>) {
-        let mean = self.mean(bonds, field);
+    /// Sets the shared components of a field.
+    fn set<const D: usize>(&self, value: [f64; D], field: &mut Field<D>) {
         for &site in &self.sites {
             let own = field.get(site as usize);
-            field.set(site as usize, std::array::from_fn(|d| if self.shares(d) { mean[d] } else { own[d] }));
+            field.set(site as usize, std::array::from_fn(|d| if self.shares(d) { value[d] } else { own[d] }));
         }
     }
 }
@@ -76,14 +75,25 @@ impl<const D: usize> System<'_, D> {
     /// Replaces forces in shared components by their means.
     pub(super) fn level_forces(&self, state: &mut State<D>) {
         for region in &self.loads.rigid {
-            region.level(&*self.bonds, &mut state.force);
+            region.set(region.mean(&*self.bonds, &state.force), &mut state.force);
         }
     }
 
     /// Replaces velocities in shared components by their means.
     pub(super) fn level_velocities(&self, state: &mut State<D>) {
         for region in &self.loads.rigid {
-            region.level(&*self.bonds, &mut state.velocity);
+            region.set(region.mean(&*self.bonds, &state.velocity), &mut state.velocity);
+        }
+    }
+
+    /// Stops particles without bonds in a search for equilibrium, but not in shared components.
+    pub(super) fn stop_detached(&self, state: &mut State<D>) {
+        let Some(contact) = self.repulsion() else { return };
+        let means: Vec<[f64; D]> =
+            self.loads.rigid.iter().map(|region| region.mean(&*self.bonds, &state.velocity)).collect();
+        contact.stop_detached(&mut state.velocity);
+        for (region, mean) in self.loads.rigid.iter().zip(means) {
+            region.set(mean, &mut state.velocity);
         }
     }
 

@@ -14,6 +14,7 @@ use super::system::System;
 use crate::bonds::{BodyGeometry, components};
 use crate::error::Error;
 use crate::field::Field;
+use polycore::numerics::DisjointSets;
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -115,6 +116,9 @@ pub fn find_unsupported<const D: usize>(
             piece.extent[d] = [piece.extent[d][0].min(place), piece.extent[d][1].max(place)];
         }
     }
+    for d in 0..D {
+        join_pieces(roots, loads, d, &mut pieces);
+    }
     let holds = |piece: &PartLoads<D>, d: usize| {
         let sign = piece.force[d].signum();
         let middle = piece.middle[d] / piece.particles as f64;
@@ -141,6 +145,36 @@ pub fn find_unsupported<const D: usize>(
         }
     }
     None
+}
+
+/// Gives parts that share component d in regions that move as a whole the forces and supports of all of
+/// them along d.
+fn join_pieces<const D: usize>(
+    roots: &[u32],
+    loads: &Loads<D>,
+    d: usize,
+    pieces: &mut BTreeMap<u32, PartLoads<D>>,
+) {
+    let places: Vec<u32> = pieces.keys().copied().collect();
+    let mut sets = DisjointSets::new(places.len());
+    for region in loads.rigid.iter().filter(|region| region.components >> d & 1 == 1) {
+        let mut parts =
+            region.sites.iter().filter_map(|&site| places.binary_search(&roots[site as usize]).ok());
+        let Some(first) = parts.next() else { continue };
+        parts.for_each(|other| {
+            sets.join(first as u32, other as u32);
+        });
+    }
+    let mut sums = vec![(0.0, 0.0, 0); places.len()];
+    for (number, piece) in (0..).zip(pieces.values()) {
+        let sum = &mut sums[sets.root(number) as usize];
+        *sum = (sum.0 + piece.force[d], sum.1 + piece.size[d], sum.2 | piece.held & 1 << d);
+    }
+    for (number, piece) in (0..).zip(pieces.values_mut()) {
+        let (force, size, held) = sums[sets.root(number) as usize];
+        (piece.force[d], piece.size[d]) = (force, size);
+        piece.held |= held;
+    }
 }
 
 impl<const D: usize> System<'_, D> {

@@ -263,22 +263,28 @@ pub fn deformation_gradients<const D: usize>(
     if let Some(chunks) = chunks {
         return chunks.concat();
     }
-    let one = |&site: &u32| {
-        let own = displacement.get(site as usize);
-        let (mut shape, mut change) = ([[0.0; D]; D], [[0.0; D]; D]);
-        bonds.neighbours(site as usize, &mut |bond| {
-            let other = displacement.get(bond.site);
-            let weight = bond.volume / (bond.length * bond.length);
-            for a in 0..D {
-                for b in 0..D {
-                    shape[a][b] += weight * bond.bond[a] * bond.bond[b];
-                    change[a][b] += weight * (other[a] - own[a]) * bond.bond[b];
-                }
+    particles.par_iter().map(|&site| deformation_gradient(bonds, displacement, site as usize)).collect()
+}
+
+/// Computes the nonlocal deformation gradient of one particle, as [`deformation_gradients`].
+pub fn deformation_gradient<const D: usize>(
+    bonds: &(impl BodyGeometry<D> + ?Sized),
+    displacement: &Field<D>,
+    site: usize,
+) -> StressTensor<D> {
+    let own = displacement.get(site);
+    let (mut shape, mut change) = ([[0.0; D]; D], [[0.0; D]; D]);
+    bonds.neighbours(site, &mut |bond| {
+        let other = displacement.get(bond.site);
+        let weight = bond.volume / (bond.length * bond.length);
+        for a in 0..D {
+            for b in 0..D {
+                shape[a][b] += weight * bond.bond[a] * bond.bond[b];
+                change[a][b] += weight * (other[a] - own[a]) * bond.bond[b];
             }
-        });
-        gradient(&GradientSums { shape, change })
-    };
-    particles.par_iter().map(one).collect()
+        }
+    });
+    gradient(&GradientSums { shape, change })
 }
 
 /// Computes 1 + change·shape⁻¹; the identity if there is no inverse.

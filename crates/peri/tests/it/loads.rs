@@ -1,15 +1,17 @@
 //! Loads that depend on the displacement, and regions that move as a whole under a force.
 
-use crate::bodies::Body;
+use crate::bodies::{Body, Slit};
 use evidence::{at_most, near};
-use peri::bonds::{BodyGeometry, Bonds};
+use peri::bonds::{BodyGeometry, Bonds, components, sever_pairs};
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::material::{EightChainSolid, NonlocalSolid};
 use peri::solver::{
-    Amplitude, Centrifugal, CurvedLoads, CurvedRegion, DynamicRelaxation, Lbfgs, Loads, Method, RigidRegion,
-    State, Status, System, VelocityVerlet,
+    Amplitude, Centrifugal, ContactStops, CurvedLoads, CurvedRegion, DynamicRelaxation, FollowingPressure,
+    ForceField, Lbfgs, Loads, Method, PlacedForce, RigidRegion, State, Status, System, VelocityVerlet,
+    find_unsupported,
 };
+use peri::surface::{BodySurface, SurfaceFace};
 use std::sync::Arc;
 
 /// Steps of the programme.
@@ -27,9 +29,12 @@ fn rise() -> Amplitude {
     Amplitude::new(|part| (part * part * (3.0 - 2.0 * part), 6.0 * part * (1.0 - part)))
 }
 
-/// Spins a block that is held below, and pushes its upper end, which moves as a whole.
+/// Spins a block that is held below, presses on its right side, pushes its middle by a force of place and
+/// time, and its upper end, which moves as a whole.
 fn spin(solver: Solver, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> (State<2>, Vec<u32>, f64) {
-    let mut built = Body::<2>::solid([12, 12], 0.1, 3.015).build();
+    let body = Body::<2>::solid([12, 12], 0.1, 3.015);
+    let surface = BodySurface::of_shapes(&body.operations, body.spacing);
+    let mut built = body.build();
     let bonds = &mut built.lattice;
     let solid = NonlocalSolid(EightChainSolid::new(Space::PlaneStrain, 1.0, 1e6, 5.0).unwrap());
     let all = bonds.particles().to_vec();
@@ -55,10 +60,15 @@ fn spin(solver: Solver, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> 
         axis: [0.0, 0.0, 1.0],
         amplitude: rise(),
     };
+    let right = |face: &SurfaceFace<2>| face.normal[0] > 0.5;
+    let pressed = FollowingPressure::new(bonds, &surface, right, 0.02, rise()).unwrap();
+    let middle = within(&|[_, y]| (0.3..0.9).contains(&y)).into_iter();
+    let points = middle.map(|site| (site, bonds.position(site as usize), 1.0)).collect();
+    let travelling = PlacedForce::new(points, |[x, _], part| [0.0, 0.05 * part * (x - part).sin()]);
     loads.curved = Some(Box::new(CurvedLoads {
         held: vec![CurvedRegion::new(low, rest, amplitudes.clone(), 3)],
         pushed: vec![CurvedRegion::new(high.clone(), push, amplitudes, 0)],
-        fields: vec![Arc::new(spun)],
+        fields: vec![Arc::new(spun), Arc::new(pressed), Arc::new(travelling)],
         ..CurvedLoads::default()
     }));
     loads.join(RigidRegion { sites: high.clone(), components: 3 }, bonds.sites());
@@ -130,4 +140,69 @@ fn work_of_followers_is_stored_and_rigid_regions_balance() {
         }
     }
     near("rigid_region_by_two_methods", places[1][1] / places[0][1], 1.0, 1e-5);
+}
+
+/// The force on a side of a wall of four horizons is that of its area, and a gap between two halves that have
+/// come apart is no pressed area.
+#[test]
+fn gaps_are_not_pressed() {
+    let body = Body::<2>::solid([12, 12], 0.1, 3.015);
+    let surface = BodySurface::of_shapes(&body.operations, body.spacing);
+    let mut bonds = body.build().lattice;
+    let top = |face: &SurfaceFace<2>| face.normal[1] > 0.5;
+    let pressed = FollowingPressure::new(&bonds, &surface, top, 1.0, Amplitude::new(|_| (1.0, 0.0))).unwrap();
+    let mut apart = Field::zeros(bonds.sites());
+    for &site in bonds.particles() {
+        let x = bonds.position(site as usize)[0];
+        apart.set(site as usize, [0.3 * (x - 0.6).signum(), 0.0]);
+    }
+    let force = |bonds: &dyn Bonds<2>, displacement: &Field<2>| -> f64 {
+        let mut field = Field::zeros(bonds.sites());
+        pressed.add(bonds, displacement, 1.0, 1.0, &mut field);
+        let each = bonds.particles().iter().map(|&site| site as usize);
+        each.map(|site| bonds.volume(site) * field.get(site)[1]).sum()
+    };
+    let rest = force(&bonds, &Field::zeros(bonds.sites()));
+    near("pressure_on_a_side", rest, -1.2 * bonds.volume(bonds.particles()[0] as usize) / 0.01, 1e-12);
+    assert!(force(&bonds, &apart) / rest > 1.2, "bonds across the gap stretch the face");
+    let mut across = Vec::new();
+    for &site in bonds.particles() {
+        let left = bonds.position(site as usize)[0] < 0.6;
+        bonds.neighbours(site as usize, &mut |bond| {
+            if left && bonds.position(bond.site)[0] > 0.6 {
+                across.push([site, bond.site as u32]);
+            }
+        });
+    }
+    sever_pairs(&mut bonds, &across);
+    near("pressure_beside_a_gap", force(&bonds, &apart) / rest, 1.0, 1e-12);
+}
+
+/// A part that shares its displacement with a held one is held; along the components that they share.
+#[test]
+fn parts_of_one_grip_are_held() {
+    let mut body = Body::<2>::solid([12, 6], 0.1, 3.015);
+    body.slits = vec![Slit { at: 0.3, from: -1.0, to: 2.0 }];
+    let bonds = body.build().lattice;
+    let places = |inside: &dyn Fn([f64; 2]) -> bool| -> Vec<u32> {
+        let each = bonds.particles().iter().copied();
+        each.filter(|&site| inside(bonds.position(site as usize))).collect()
+    };
+    let mut loads = Loads { constrained: vec![0; bonds.sites()], ..Loads::default() };
+    places(&|[x, y]| x < 0.3 && y < 0.3).iter().for_each(|&site| loads.constrained[site as usize] = 3);
+    let mut force = Field::zeros(bonds.sites());
+    let grip = places(&|[x, _]| x > 0.9);
+    grip.iter().for_each(|&site| force.set(site as usize, [1.0, 1.0]));
+    loads.body_force = Some(force);
+    let roots = components(&bonds, |_, _| true);
+    let axis = |loads: &Loads<2>| {
+        find_unsupported(&bonds, &roots, loads, None, &ContactStops::default(), 1e-6).map(|part| part.axis)
+    };
+    assert_eq!(axis(&loads), Some("x"));
+    let join = |components: u8| {
+        let mut joined = loads.clone();
+        joined.join(RigidRegion { sites: grip.clone(), components }, bonds.sites());
+        axis(&joined)
+    };
+    assert_eq!([join(1), join(3)], [Some("y"), None]);
 }

@@ -63,8 +63,8 @@ pub struct DataSet {
     pub read: Vec<String>,
     /// Names of the tables of which it consists; none if it has a file.
     pub parts: Vec<String>,
-    /// Weight among tables that are fitted at once.
-    weight: f64,
+    /// Weight among tables that are fitted at once, if the scene gives one.
+    weight: Option<f64>,
     /// Modes of deformation that are left out in turn; none without `rank`.
     pub modes: Vec<ModeTable>,
 }
@@ -139,7 +139,7 @@ impl TestTableSpec {
                 .select(mode)
                 .map_err(|error| source.error(&key("mode"), error, "a test with a stress in the table"))?;
         }
-        let (parts, modes, weight) = (Vec::new(), Vec::new(), self.weight.unwrap_or(1.0));
+        let (parts, modes, weight) = (Vec::new(), Vec::new(), self.weight);
         Ok(DataSet { name: self.name, table, material: self.material, read, parts, weight, modes })
     }
 
@@ -184,16 +184,33 @@ impl TestTableSpec {
             }
             parts.push(part);
         }
-        let tables: Vec<(&TestData, f64)> = parts.iter().map(|part| (&part.table, part.weight)).collect();
+        let tables: Vec<(&TestData, f64)> =
+            parts.iter().map(|part| (&part.table, part.weight.unwrap_or(1.0))).collect();
         Ok(DataSet {
             name: self.name,
             table: TestData::join(&tables).map_err(|error| source.refused(&key("tables"), error))?,
             material: parts[0].material.clone(),
             read: vec![format!("rows of {}", self.tables.join(", "))],
             parts: self.tables,
-            weight: 1.0,
+            weight: None,
             modes: Vec::new(),
         })
+    }
+}
+
+/// Refuses the weight of a table that is not fitted together with others.
+///
+/// # Errors
+/// A [`SceneError`] at the weight.
+pub fn check_weights(source: &Source, data: &[DataSet]) -> Result<(), SceneError> {
+    let is_joined = |name: &String| data.iter().any(|set| set.parts.contains(name));
+    let idle = |set: &DataSet| set.weight.is_some() && !is_joined(&set.name);
+    match data.iter().position(idle) {
+        None => Ok(()),
+        Some(index) => {
+            let why = "needs another table whose `tables` name this one";
+            Err(source.unexpected(&format!("fit.data[{index}].weight"), why))
+        }
     }
 }
 

@@ -137,6 +137,7 @@ impl FitCase {
             }
             data.push(set);
         }
+        super::data::check_weights(source, &data)?;
         let time = time.map(|settings| TimeCase::new(source, settings)).transpose()?;
         let mut series: Vec<PronySet> = Vec::new();
         for (i, spec) in prony.into_iter().enumerate() {
@@ -162,7 +163,13 @@ impl FitCase {
         }
         let mut volumes: Vec<VolumetricSet> = Vec::new();
         for (i, spec) in volumetric.into_iter().enumerate() {
-            volumes.push(spec.read(source, i, &volumes)?);
+            let set = spec.read(source, i, &volumes)?;
+            if !data.is_empty() && data.iter().all(|other| other.material != set.material) {
+                let found = set.material.as_deref().unwrap_or("none");
+                let allowed = "the `material` of some [[fit.data]], which takes its bulk modulus";
+                return Err(source.error(&format!("volumetric[{i}].material"), found, allowed));
+            }
+            volumes.push(set);
         }
         let mut foams: Vec<FoamSet> = Vec::new();
         for (i, spec) in foam.into_iter().enumerate() {

@@ -79,7 +79,7 @@ impl VolumetricSpec {
 /// Bulk modulus of a fit.
 #[derive(Clone, Copy)]
 pub enum Bulk<'a> {
-    /// That of a volumetric test.
+    /// Modulus of a volumetric test.
     Measured(&'a VolumetricSet),
     /// Multiple of the shear modulus: tests at constant volume do not determine it.
     Assumed,

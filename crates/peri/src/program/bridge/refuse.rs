@@ -93,6 +93,8 @@ pub(super) fn refuse(source: &Source, scene: &Scene, variant: &SceneVariant) -> 
     for (index, boundary) in scene.boundary.iter().enumerate() {
         let loads = [
             ("traction", boundary.traction.is_some(), "a traction"),
+            ("traction_field", boundary.traction_field.is_some(), "a traction by formulas"),
+            ("pressure", boundary.pressure.is_some(), "a pressure"),
             ("force", boundary.force.is_some(), "a force"),
             ("rotation", boundary.rotation.is_some(), "a rotation"),
             ("rigid", boundary.rigid, "a region that moves as a whole"),

@@ -143,7 +143,17 @@ fn what_tables_cannot_represent_is_refused() {
         (
             "[[boundary]]",
             "[[boundary]]\nside = \"x+\"\ntraction = [\"1 kPa\", \"0 kPa\"]\n[[boundary]]",
-            "boundary[0].traction",
+            "boundary[0].traction`",
+        ),
+        (
+            "[[boundary]]",
+            "[[boundary]]\nside = \"x+\"\ntraction_field = [\"y\", \"0\"]\n[[boundary]]",
+            "boundary[0].traction_field`: found a traction by formulas",
+        ),
+        (
+            "[body]\nspace = \"plane-stress\"",
+            "[[boundary]]\nside = \"x+\"\npressure = \"1 kPa\"\n[body]\nspace = \"plane-strain\"",
+            "boundary[0].pressure`: found a pressure",
         ),
         ("\"3 mm\"]", "\"0 mm\"]", "no displacement"),
     ] {

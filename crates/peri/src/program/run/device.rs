@@ -2,7 +2,7 @@
 
 use crate::bonds::Bonds;
 use crate::error::Error;
-use crate::program::scene::{Boundary, DeviceChoice, Dynamics, Scene};
+use crate::program::scene::{BodyForceSpec, Boundary, DeviceChoice, Dynamics, Scene};
 use crate::solver::{Method, State, StepCallback, System, VelocityVerlet, Watch};
 use harness::scene::{SceneError, Source};
 
@@ -101,6 +101,12 @@ fn beyond_cards<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<(
     let curve_key = format!("boundary[{}].curve", curve.unwrap_or(0));
     let rigid = scene.boundary.iter().position(|boundary| boundary.rigid);
     let rigid_key = format!("boundary[{}].rigid", rigid.unwrap_or(0));
+    let pressure = scene.boundary.iter().position(|boundary| boundary.pressure.is_some());
+    let pressure_key = format!("boundary[{}].pressure", pressure.unwrap_or(0));
+    let formula = scene.boundary.iter().position(Boundary::depends_on_time);
+    let formula_key = format!("boundary[{}].traction_field", formula.unwrap_or(0));
+    let force = scene.body_force.iter().position(BodyForceSpec::is_curved);
+    let force_key = format!("body_force[{}]", force.unwrap_or(0));
     let rotation_key = format!("boundary[{}].rotation", rotation.unwrap_or(0));
     let uniform = bonds.as_lattice().is_none_or(crate::bonds::LatticeBonds::is_uniform);
     let faults = [
@@ -119,7 +125,9 @@ fn beyond_cards<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<(
         (rotation_key.as_str(), rotation.is_some(), "a rotation"),
         (rigid_key.as_str(), rigid.is_some(), "a region that moves as a whole"),
         (curve_key.as_str(), curve.is_some(), "a curve of time"),
-        ("body_force", scene.has_curves(), "a centrifugal force, or one that follows a curve"),
+        (pressure_key.as_str(), pressure.is_some(), "a pressure"),
+        (formula_key.as_str(), formula.is_some(), "a formula of `t`"),
+        (force_key.as_str(), force.is_some(), "a centrifugal force, or one that follows a curve"),
         ("dynamics.precision", scene.is_mixed(), "mixed precision"),
     ];
     faults.iter().find(|(_, given, _)| *given).map(|(key, _, found)| ((*key).to_owned(), *found))

@@ -55,7 +55,7 @@ impl BodyForceSpec {
     }
 
     /// Returns true if it is not proportional to the load factor.
-    pub(super) fn is_curved(&self) -> bool {
+    pub fn is_curved(&self) -> bool {
         self.spin.is_some() || self.timed().is_some()
     }
 
@@ -132,7 +132,7 @@ pub(super) fn add<const D: usize>(
             Some(curve) => time.amplitude(source, &key("curve"), curve, &force.multiplied())?,
             None => time.common.clone(),
         };
-        let places = particles.iter().map(|&site| (site, body.bonds.position(site as usize)));
+        let places = particles.iter().map(|&site| body.bonds.position(site as usize));
         let values: Vec<[f64; D]> = if let Some(acceleration) = &force.acceleration {
             let value: Vec<f64> = acceleration.iter().map(|value| density * value.si()).collect();
             let value = <[f64; D]>::try_from(value.as_slice()).map_err(|_| {
@@ -142,16 +142,16 @@ pub(super) fn add<const D: usize>(
             vec![value; particles.len()]
         } else if let Some(formula) = &force.formula {
             let formula = VectorFormula::new(source, &key("formula"), formula)?;
-            let places: Vec<(u32, [f64; D])> = places.collect();
-            formula.check(source, &key("formula"), places.iter().map(|(_, place)| *place), time.end)?;
+            let places: Vec<[f64; D]> = places.collect();
+            formula.check(source, &key("formula"), &places, (time.end, time.moments()))?;
             if force.depends_on_time() {
                 let end = time.end;
                 let density = move |place, part| formula.value(place, part * end);
-                let points = places.into_iter().map(|(site, place)| (site, place, 1.0)).collect();
+                let points = particles.iter().zip(places).map(|(&site, place)| (site, place, 1.0)).collect();
                 add_field(body, loads, PlacedForce::new(points, density));
                 continue;
             }
-            places.iter().map(|(_, place)| formula.value(*place, 0.0)).collect()
+            places.iter().map(|place| formula.value(*place, 0.0)).collect()
         } else if let Some(spin) = &force.spin {
             let centre = vector::<D>(source, &key("spin.point"), &spin.point)?;
             let axis = direction::<D>(source, &key("spin.axis"), spin.axis.as_deref())?;

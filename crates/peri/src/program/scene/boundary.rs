@@ -46,8 +46,8 @@ pub struct Boundary {
     pub rotation: Option<RotationSpec>,
     /// Displacement at the end of the last step as formulas of the position, m.
     pub displacement_field: Option<Vec<PrescribedField>>,
-    /// Curve of time that multiplies displacement, rotation, force and traction, or one for each component;
-    /// default: the load factor.
+    /// Curve of time that multiplies displacement, rotation, force, traction and pressure, or one for each
+    /// component; default: the load factor.
     pub curve: Option<CurveList>,
     /// Velocity at the start as formulas of the position, m/s.
     pub velocity_field: Option<Vec<Formula>>,

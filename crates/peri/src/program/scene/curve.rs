@@ -69,7 +69,6 @@ impl Scene {
 pub(super) struct CurveTime {
     pub(super) end: f64,
     explicit: bool,
-    /// Times at which curves are checked, s.
     moments: Vec<f64>,
     pub(super) common: Amplitude,
 }
@@ -97,6 +96,11 @@ impl CurveTime {
         let moments: Vec<f64> = std::iter::once(0.0).chain(times).collect();
         let factors = std::iter::once(0.0).chain(factors).collect();
         Self { end, explicit: false, common: of_rows(moments.clone(), factors, end), moments }
+    }
+
+    /// Times at which curves and formulas are checked, s.
+    pub(super) fn moments(&self) -> &[f64] {
+        &self.moments
     }
 
     /// Converts and checks the curve at a key; `values` are those that it multiplies.

@@ -130,7 +130,10 @@ pub fn explain<const D: usize>(
         (scene.dynamics.is_some(), "inertia"),
         (!scene.body.cracks.is_empty(), "pre-cut cracks"),
         (scene.contact.is_some(), "contact (needs [contact])"),
-        (criterion.is_some(), "damage and bond breaking (needs `material.critical`)"),
+        (
+            criterion.is_some(),
+            "damage and bond breaking (needs `material.critical` or that of an [[interface]])",
+        ),
         (scene.output.every.is_some(), "fields of earlier steps (need `output.every`)"),
         (scene.boundary.iter().any(Boundary::prescribes_displacement), "prescribed displacements"),
         (scene.has_forces(), "body forces"),

@@ -135,16 +135,21 @@ impl<const D: usize> VectorFormula<D> {
         each.map(Self).map_err(|_| source.error(key, found, format!("{D} components")))
     }
 
-    /// Refuses values that are not finite at some positions and times up to `end`, s.
+    /// Refuses values that are not finite: at all positions at five times up to `end`, s, at the first and
+    /// the last one at each of `moments`, s.
     pub(super) fn check(
         &self,
         source: &Source,
         key: &str,
-        places: impl Iterator<Item = [f64; D]>,
-        end: f64,
+        places: &[[f64; D]],
+        (end, moments): (f64, &[f64]),
     ) -> Result<(), SceneError> {
-        for place in places {
-            for time in [0.0, 0.25, 0.5, 0.75, 1.0].map(|part| part * end) {
+        let quarters = [0.0, 0.25, 0.5, 0.75, 1.0].map(|part| part * end);
+        let at_all = places.iter().map(|place| (place, &quarters[..]));
+        let ends = places.first().into_iter().chain(places.last());
+        for (place, times) in at_all.chain(ends.map(|place| (place, moments))) {
+            for &time in times {
+                let place = *place;
                 let value = self.value(place, time);
                 if let Some(d) = value.iter().position(|x| !x.is_finite()) {
                     let found = format!("{} of `{}` at {place:?} m and {time} s", value[d], self.0[d].text());

@@ -176,8 +176,17 @@ pub(super) fn cross_interfaces<const D: usize>(
         let number = |name| part_number(source, scene, &format!("interface[{index}].between"), name);
         pairs.push([number(one)?, number(other)?]);
     }
-    body.interfaces = parts_of(scene, body).bonds_across(&*body.bonds, &pairs);
-    for (index, (interface, bonds)) in scene.interface.iter().zip(&body.interfaces).enumerate() {
+    let mut across = parts_of(scene, body).bonds_across(&*body.bonds, &pairs);
+    for (interface, bonds) in scene.interface.iter().zip(&across) {
+        if interface.unbonded {
+            sever_pairs(&mut *body.bonds, bonds);
+        }
+    }
+    for (index, (interface, bonds)) in scene.interface.iter().zip(&mut across).enumerate() {
+        if !interface.unbonded {
+            // those that also cross an unbonded interface have no limit
+            bonds.retain(|&[a, b]| body.bonds.is_bonded(a as usize, b as usize));
+        }
         if bonds.is_empty() {
             let [one, other] = &interface.between;
             let spacing = plain((body.bonds.spacing() * 1e9).round() / 1e6);
@@ -187,16 +196,13 @@ pub(super) fn cross_interfaces<const D: usize>(
             let allowed = "parts that touch and are not separated by cracks";
             return Err(source.error(&format!("interface[{index}].between"), found, allowed));
         }
-        if interface.unbonded {
-            sever_pairs(&mut *body.bonds, bonds);
-        }
     }
+    body.interfaces = across;
     Ok(())
 }
 
 /// Gives bonds across interfaces their own limits in place of `rest`, bonds of unbreakable particles none.
-/// `own` computes a limit from the
-/// criterion and the stiffness of a bond, the mean of `stiffness` at its ends.
+/// `own` computes a limit from the criterion and the stiffness of a bond, the mean of `stiffness` at its ends.
 ///
 /// # Errors
 /// A limit out of its domain, and unbreakable shapes without particles.

@@ -448,6 +448,7 @@ fn support<const D: usize>(
     if boundary.rigid {
         refuse_both("rigid", boundary.rotation.is_some(), "rotation")?;
         refuse_both("rigid", boundary.displacement_field.is_some(), "displacement_field")?;
+        refuse_both("rigid", boundary.velocity_field.is_some(), "velocity_field")?;
         if support.displacement.iter().all(Option::is_some) {
             let allowed = "a component of `displacement` that is `free`, or `rigid = false`";
             return Err(source.error(&format!("{key}.rigid"), "no free component", allowed));
@@ -480,9 +481,8 @@ fn support<const D: usize>(
     {
         return Err(source.missing(
             &format!("{key}.displacement"),
-            "needed for a boundary: `displacement`, `rotation`, `traction`, `force` or, in explicit \
-             dynamics, \
-             `velocity`",
+            "needed for a boundary: `displacement`, `rotation`, `rigid`, `traction`, `traction_field`, \
+             `force`, `pressure` or, in explicit dynamics, `velocity`",
         ));
     }
     Ok(support)

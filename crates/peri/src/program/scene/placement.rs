@@ -50,6 +50,10 @@ fn plate_frame<const D: usize>(
         let found = format!("a body from {low:?} to {high:?} m");
         return Err(source.error("exact.problem", found, "a rectangle about the origin"));
     }
+    let only = "the sides x+ and x- with tractions ± `exact.remote_stress` along x, and no other condition";
+    if !scene.body_force.is_empty() {
+        return Err(source.error("body_force", "a force that `plate-with-hole` does not have", only));
+    }
     let mut widths = [0.0; 2];
     for (index, boundary) in scene.boundary.iter().enumerate() {
         let sign = match boundary.side {
@@ -59,14 +63,15 @@ fn plate_frame<const D: usize>(
         };
         let traction = boundary.traction.iter().flatten().map(|t| t.si());
         let wanted = [sign * exact.hole().1, 0.0];
-        if !traction.eq(wanted) || boundary.force.is_some() || boundary.displacement.is_some() {
-            let allowed =
-                "the sides x+ and x- with tractions ± `exact.remote_stress` along x, and no other condition";
-            return Err(source.error(
-                &format!("boundary[{index}]"),
-                "a condition that `plate-with-hole` does not have",
-                allowed,
-            ));
+        let has_more = boundary.force.is_some()
+            || boundary.traction_field.is_some()
+            || boundary.pressure.is_some()
+            || boundary.rigid
+            || boundary.prescribes_displacement()
+            || boundary.prescribes_velocity();
+        if !traction.eq(wanted) || has_more {
+            let found = "a condition that `plate-with-hole` does not have";
+            return Err(source.error(&format!("boundary[{index}]"), found, only));
         }
         widths[usize::from(sign < 0.0)] = layers(boundary, &*body.bonds) as f64 * body.bonds.spacing();
     }

@@ -37,6 +37,9 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         )
         .chain(material.critical.map(|own| ("material.critical".to_owned(), own)));
     for (key, critical) in criticals {
+        if critical.driving.is_some() {
+            return Err(source.unexpected(&format!("{key}.driving"), "only for a `solid` with `branch`"));
+        }
         strength(source, scene, &key, &critical)?;
         let Some(convention) = critical.convention else { continue };
         let key = format!("{key}.convention");

@@ -13,7 +13,7 @@ use harness::scene::{SceneError, Source};
 
 impl Boundary {
     /// Returns true if its formulas depend on the time.
-    pub(super) fn depends_on_time(&self) -> bool {
+    pub fn depends_on_time(&self) -> bool {
         self.traction_field.iter().flatten().any(|formula| formula.find_variable_except("xyz").is_some())
     }
 }
@@ -43,8 +43,10 @@ pub(super) fn add<const D: usize>(
         }
         let formula = VectorFormula::new(source, &key, formulas)?;
         let points = points(source, scene, (index, boundary, side), body)?;
-        let end = CurveTime::new(scene).end;
-        formula.check(source, &key, points.iter().map(|point| point.1), end)?;
+        let time = CurveTime::new(scene);
+        let places: Vec<[f64; D]> = points.iter().map(|point| point.1).collect();
+        formula.check(source, &key, &places, (time.end, time.moments()))?;
+        let end = time.end;
         points.iter().for_each(|point| loaded[point.0 as usize] = true);
         if boundary.depends_on_time() {
             let traction = move |place, part| formula.value(place, part * end);

@@ -102,7 +102,10 @@ impl VolumetricState {
         let unit = file.unit::<StressDimension>(pressure, None)?;
         let strain = file.matching(&["volumetric strain", "volume strain"]).first().copied();
         let (column, rest) = match strain {
-            Some(column) => (column, 1.0),
+            Some(column) => {
+                file.require_unit(column, "`volumetric strain [%]` or `volumetric strain [mm/mm]`")?;
+                (column, 1.0)
+            }
             None => (file.require_column(&["J", "volume ratio", "relative volume"])?, 0.0),
         };
         let ratios = file.unit::<RatioDimension>(column, None)?;
@@ -134,7 +137,7 @@ mod tests {
         points.iter().map(|&(ratio, pressure)| VolumetricState { ratio, pressure }).collect()
     }
 
-    /// One term: K = −Σ(J − 1)p/Σ(J − 1)², with the standard error of a line through rest.
+    /// Fit of one term: K = −Σ(J − 1)p/Σ(J − 1)², with the standard error of a line through rest.
     #[test]
     fn one_term_in_closed_form() {
         let points = [(1.0, 0.0), (0.995, 10.2e6), (0.99, 19.9e6), (0.98, 40.3e6), (1.002, -4.1e6)];
@@ -188,7 +191,11 @@ mod tests {
             VolumetricState::of_table(&file).map_err(|error| error.to_string())
         };
         let expected = states(&[(0.98, 4e7)]);
-        for text in ["J,pressure [MPa]\n0.98,40\n", "pressure/kPa;volumetric strain [%]\n40000;-2\n"] {
+        for text in [
+            "J,pressure [MPa]\n0.98,40\n",
+            "pressure/kPa;volumetric strain [%]\n40000;-2\n",
+            "volumetric strain [mm/mm],pressure [MPa]\n-0.02,40\n",
+        ] {
             let found = read(text).unwrap();
             assert!(
                 (found[0].ratio - 0.98).abs() < 1e-12 && found[0].pressure == expected[0].pressure,
@@ -197,6 +204,7 @@ mod tests {
         }
         for (text, part) in [
             ("J,pressure\n1,1\n", "unit of column 2, `pressure`"),
+            ("volumetric strain,pressure [MPa]\n-2,40\n", "unit of column 1, `volumetric strain`"),
             ("J,pressure [MPa]\n0,1\n", "v.csv:2: column 1, `J`: found \"0\""),
             ("ratio,pressure [MPa]\n1,1\n", "one column `J [unit]`"),
             ("J,pressure [MPa]\nx,1\n", "v.csv:2: column 1, `J`: found \"x\""),

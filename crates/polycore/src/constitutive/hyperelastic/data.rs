@@ -132,7 +132,8 @@ impl TestData {
             let reason = "contains no stress other than zero".to_owned();
             return Err(Error::Data { what: format!("mode `{}`", mode.name()), reason });
         }
-        Ok(table)
+        // the mean of the weights of the rows left is 1 again
+        Self::join(&[(&table, 1.0)])
     }
 
     /// Sum of the weights of the measured stresses: their number without weights.

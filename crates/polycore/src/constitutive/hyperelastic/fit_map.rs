@@ -17,8 +17,8 @@ pub enum Identifiability {
     Undetermined,
 }
 
-/// Computes model minus data for every measured stress, Pa, state by state, times [`TestState::ratio`] and
-/// the root of its weight.
+/// Residuals of the fit, Pa, state by state: √w r (P − P_measured) of each measured stress, with r of
+/// [`TestState::ratio`] and the weight w.
 ///
 /// # Errors
 /// Errors of the law at a state of the table.

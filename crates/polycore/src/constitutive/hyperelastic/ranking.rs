@@ -16,27 +16,30 @@ pub struct ModeTable {
 /// Relative difference of stretches within which a general biaxial state counts as one of a simpler test.
 const SAME: f64 = 1e-6;
 
-/// Returns the mode of deformation of a state. Compression of a bar is another one than its tension; simple
-/// shear is pure shear but for a rotation.
-fn mode_of(state: &TestState) -> &'static str {
+/// Returns the mode of deformation of a state of an incompressible body, to which a pressure adds nothing:
+/// compression of a bar is equibiaxial tension, compression of a sheet along both sides is uniaxial tension;
+/// simple shear is pure shear but for a rotation.
+fn mode_of(state: &TestState) -> Mode {
     let [first, second] = state.stretches;
     let same = |other: f64| (second / other - 1.0).abs() < SAME;
-    let test = match state.mode {
-        Mode::Biaxial if state.nominal[1] == 0.0 => Mode::Uniaxial,
+    let bar = |along: f64| if along < 1.0 { Mode::Equibiaxial } else { Mode::Uniaxial };
+    match state.mode {
+        Mode::Uniaxial => bar(first),
+        Mode::Biaxial if state.nominal[1] == 0.0 => bar(first),
+        Mode::Biaxial if state.nominal[0] == 0.0 => bar(second),
         Mode::Biaxial | Mode::Component if same(1.0) => Mode::PureShear,
-        Mode::Biaxial | Mode::Component if same(first) => Mode::Equibiaxial,
-        Mode::SimpleShear => Mode::PureShear,
-        Mode::Component | Mode::Difference => Mode::Biaxial,
-        mode => mode,
-    };
-    if test == Mode::Uniaxial && first < 1.0 { "compression" } else { test.name() }
+        Mode::Biaxial | Mode::Component if same(first) => bar(first.powi(-2)),
+        Mode::Equibiaxial => bar(first.powi(-2)),
+        Mode::SimpleShear | Mode::PureShear => Mode::PureShear,
+        Mode::Biaxial | Mode::Component | Mode::Difference => Mode::Biaxial,
+    }
 }
 
 /// Splits a table by mode of deformation, in the order in which they appear.
 pub fn modes(table: &TestData) -> Vec<ModeTable> {
     let mut found: Vec<ModeTable> = Vec::new();
     for state in table.states.iter().filter(|state| state.measured().next().is_some()) {
-        let mode = mode_of(state);
+        let mode = mode_of(state).name();
         match found.iter_mut().find(|one| one.mode == mode) {
             Some(one) => one.table.states.push(*state),
             None => {
@@ -49,12 +52,14 @@ pub fn modes(table: &TestData) -> Vec<ModeTable> {
 }
 
 impl ModeTable {
-    /// Root mean square of the residuals of a law over the largest measured stress; `None` where the law has
-    /// no stress, beyond locking.
+    /// Root mean square of the residuals of a law, without weights, over the largest measured stress; `None`
+    /// where the law has no stress, beyond locking.
     pub fn error<L: Hyperelastic + ?Sized>(&self, law: &L) -> Option<f64> {
         let largest = self.table.states.iter().flat_map(TestState::measured);
         let largest = largest.map(f64::abs).fold(0.0, f64::max);
-        Agreement::new(law, &self.table).ok().map(|found| found.rms / largest)
+        let states = self.table.states.iter().map(|state| TestState { roots: [1.0; 2], ..*state });
+        let plain = TestData::new(String::new(), states.collect());
+        Agreement::new(law, &plain).ok().map(|found| found.rms / largest)
     }
 }
 
@@ -124,7 +129,9 @@ mod tests {
             (Mode::Uniaxial, [2.0, 0.5_f64.sqrt()], [1.0, 0.0], "uniaxial"),
             (Mode::Uniaxial, [1.0, 1.0], [0.0, 0.0], "at rest"),
             (Mode::Biaxial, [2.0, 0.7], [1.0, 0.0], "uniaxial"),
-            (Mode::Uniaxial, [0.5, 2.0_f64.sqrt()], [-1.0, 0.0], "compression"),
+            (Mode::Uniaxial, [0.5, 2.0_f64.sqrt()], [-1.0, 0.0], "equibiaxial"),
+            (Mode::Biaxial, [2.0_f64.sqrt(), 0.5], [0.0, -1.0], "equibiaxial"),
+            (Mode::Equibiaxial, [0.8, 0.8], [-1.0, 0.0], "uniaxial"),
             (Mode::Biaxial, [2.0, 1.0], [1.0, 0.5], "pure-shear"),
             (Mode::Component, [2.0, 1.0], [0.0, 0.5], "pure-shear"),
             (Mode::SimpleShear, [2.0, 1.0], [1.0, 0.0], "pure-shear"),
@@ -136,8 +143,7 @@ mod tests {
         let table = TestData::new(String::new(), states);
         let found = modes(&table);
         let shown: Vec<_> = found.iter().map(|one| (one.mode, one.table.states.len())).collect();
-        let expected =
-            [("uniaxial", 2), ("compression", 1), ("pure-shear", 3), ("equibiaxial", 1), ("biaxial", 2)];
+        let expected = [("uniaxial", 3), ("equibiaxial", 3), ("pure-shear", 3), ("biaxial", 2)];
         assert_eq!(shown, expected);
     }
 

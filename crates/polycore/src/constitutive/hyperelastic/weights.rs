@@ -121,7 +121,8 @@ mod tests {
     use crate::constitutive::hyperelastic::model;
 
     const TABLE: &str = "stretch,nominal_MPa,weight,sd_kPa,cv [%]\n1,0,1,1,1\n\
-                         1.5,0.46,4,20,4.347826086956522\n2,0.70,1,40,5.714285714285714\n3,1.20,0.25,80,6.666666666666667\n";
+                         1.5,0.46,4,20,4.347826086956522\n2,0.70,1,40,5.714285714285714\n\
+                         3,1.20,0.25,80,6.666666666666667\n";
 
     fn format(weight: &str, deviation: &str) -> TestFormat {
         let some = |name: &str| (!name.is_empty()).then(|| name.to_owned());
