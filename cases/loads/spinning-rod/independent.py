@@ -10,7 +10,7 @@ r = R Σ aₖ (R/R₀)^2k, k < 6, by Gauss quadrature.
 import numpy as np
 from scipy.optimize import root
 
-MU, BULK, DENSITY, SPEED, RADIUS, GAUGE = 0.4e6, 20e6, 1000.0, 2313.67, 9e-3, 6.75e-3
+MU, BULK, DENSITY, SPEED, RADIUS, GAUGE = 0.4e6, 20e6, 1000.0, 2313.67, 9e-3, 3.6e-3
 POWERS = 2 * np.arange(6)
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(40)
 POINTS, WEIGHTS = (POINTS + 1) / 2, WEIGHTS / 2
