@@ -310,6 +310,8 @@ fn a_sweep_keeps_what_is_finished() {
     assert_same(&here.join("one"), &here.join("two"));
     let rows = fs::read_to_string(here.join("one/sweep.csv")).unwrap();
     assert_eq!(rows.lines().count(), 3, "{rows}");
+    assert!(rows.starts_with("run,print.layer_time [s],boundary[1].film [W/m^2/K],"), "{rows}");
+    assert!(rows.lines().nth(1).is_some_and(|row| row.contains(",5,10,")), "{rows}");
     assert!(here.join("one/sweep_deviation_of_alpha.png").is_file());
     // another sweep in the same folder would overwrite its table
     crystfem("sweep bar.toml --vary print.layer_time=5s --output one")

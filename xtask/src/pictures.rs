@@ -8,15 +8,16 @@ use std::process::{Command, Stdio};
 
 use harness::report::{FILE_NAME, Report};
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
-use crate::stamp::SourceStamp;
+use crate::stamp::{SourceStamp, hash_bytes};
 use crate::table::print;
 use crate::workspace::Repository;
 
 mod compose;
 mod fill;
 mod include;
+mod page;
 
 use compose::Image;
 
@@ -50,7 +51,7 @@ struct List {
 }
 
 /// A PNG file made of panels side by side.
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct Picture {
     file: PathBuf,
@@ -60,18 +61,18 @@ struct Picture {
 }
 
 /// A part of a picture that a case draws.
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct Panel {
     case: String,
-    /// File in the results of the case.
+    /// File in the results of the case; `view.html`: its result page, photographed by a browser.
     from: PathBuf,
     /// Left, top, width and height of the part that is used, pixels; all by default.
     crop: Option<[usize; 4]>,
 }
 
 /// A part of a Markdown file that values of reports fill.
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct Block {
     file: PathBuf,
@@ -81,6 +82,15 @@ struct Block {
     text: String,
 }
 
+/// State in which a picture or table was drawn last.
+#[derive(Deserialize, Serialize)]
+struct DrawnEntry {
+    /// Hash of its entry in the list.
+    entry: String,
+    #[serde(flatten)]
+    stamp: SourceStamp,
+}
+
 impl Picture {
     fn cases(&self) -> Vec<&str> {
         self.panel.iter().map(|panel| panel.case.as_str()).collect()
@@ -88,6 +98,16 @@ impl Picture {
 
     fn key(&self) -> String {
         self.file.display().to_string()
+    }
+
+    fn shows_page(&self) -> bool {
+        self.panel.iter().any(Panel::is_page)
+    }
+}
+
+impl Panel {
+    fn is_page(&self) -> bool {
+        self.from == Path::new(page::FILE)
     }
 }
 
@@ -113,15 +133,41 @@ impl List {
         pictures.chain(self.table.iter().map(|table| (table.key(), table.cases()))).collect()
     }
 
+    fn picture(&self, key: &str) -> Option<&Picture> {
+        self.picture.iter().find(|picture| picture.key() == key)
+    }
+
+    fn block(&self, key: &str) -> Option<&Block> {
+        self.table.iter().find(|block| block.key() == key)
+    }
+
+    /// Hashes the entry of a picture or table.
+    fn hash(&self, key: &str) -> Result<String> {
+        let text = match (self.picture(key), self.block(key)) {
+            (Some(picture), _) => toml::to_string(picture),
+            (None, block) => toml::to_string(&block),
+        };
+        Ok(hash_bytes(text.into_diagnostic()?.as_bytes()))
+    }
+
+    /// Returns true if neither the entry nor its sources have changed since it was drawn.
+    fn is_fresh(&self, root: &Path, key: &str, drawn: Option<&DrawnEntry>) -> bool {
+        drawn.is_some_and(|drawn| {
+            self.hash(key).is_ok_and(|hash| hash == drawn.entry) && drawn.stamp.fresh(root)
+        })
+    }
+
     fn case(&self, name: &str) -> Result<&Path> {
         let file = self.cases.get(name).ok_or_else(|| miette!("{LIST}: unknown case `{name}`"))?;
         Ok(file)
     }
 
-    /// Files and folders that determine how an entry looks: the scenes, the list and the code that draws.
+    /// Files and folders that determine how an entry looks: the scenes and the code that draws.
     /// Code of the programs is not among them: it changes daily, and tests judge its values.
-    fn sources(&self, cases: &[&str]) -> Result<Vec<String>> {
-        let mut all = vec!["crates/harness/src/output".to_owned(), LIST.to_owned()];
+    fn sources(&self, key: &str, cases: &[&str]) -> Result<Vec<String>> {
+        let page = self.picture(key).is_some_and(Picture::shows_page);
+        let code = if page { "crates/harness/src/view" } else { "crates/harness/src/output" };
+        let mut all = vec![code.to_owned()];
         for name in cases {
             let file = self.case(name)?;
             let folder = file.parent().unwrap_or(file);
@@ -139,7 +185,7 @@ pub fn run(workspace: &Repository, options: &Options) -> Result<bool> {
     let list = List::read(root)?;
     let mut stamps = stamps(root)?;
     stamps.retain(|key, _| list.entries().iter().any(|(known, _)| known == key));
-    let is_wanted = |key: &str| options.all || !stamps.get(key).is_some_and(|stamp| stamp.fresh(root));
+    let is_wanted = |key: &str| options.all || !list.is_fresh(root, key, stamps.get(key));
     let wanted: Vec<_> = list.entries().into_iter().filter(|(key, _)| is_wanted(key)).collect();
     let mut results = BTreeMap::new();
     for name in wanted.iter().flat_map(|(_, cases)| cases) {
@@ -148,12 +194,13 @@ pub fn run(workspace: &Repository, options: &Options) -> Result<bool> {
         }
     }
     for (key, cases) in &wanted {
-        if let Some(picture) = list.picture.iter().find(|picture| picture.key() == *key) {
+        if let Some(picture) = list.picture(key) {
             draw(root, picture, &results)?;
-        } else if let Some(block) = list.table.iter().find(|block| block.key() == *key) {
+        } else if let Some(block) = list.block(key) {
             write(root, block, &results)?;
         }
-        stamps.insert(key.clone(), SourceStamp::new(root, &list.sources(cases)?)?);
+        let stamp = SourceStamp::new(root, &list.sources(key, cases)?)?;
+        stamps.insert(key.clone(), DrawnEntry { entry: list.hash(key)?, stamp });
         print(&format!("{key}\n"));
     }
     include::update(root, &crate::tidy::tracked(root)?)?;
@@ -169,7 +216,7 @@ pub fn findings(root: &Path, files: &[PathBuf]) -> Result<Vec<String>> {
     let stamps = stamps(root)?;
     let mut findings = include::findings(root, files)?;
     for (key, _) in list.entries() {
-        if !stamps.get(&key).is_some_and(|stamp| stamp.fresh(root)) {
+        if !list.is_fresh(root, &key, stamps.get(&key)) {
             findings.push(format!("{key}: stale; run `cargo xtask pictures`"));
         }
     }
@@ -183,7 +230,7 @@ pub fn findings(root: &Path, files: &[PathBuf]) -> Result<Vec<String>> {
     Ok(findings)
 }
 
-fn stamps(root: &Path) -> Result<BTreeMap<String, SourceStamp>> {
+fn stamps(root: &Path) -> Result<BTreeMap<String, DrawnEntry>> {
     match fs::read_to_string(root.join(STAMPS)) {
         Ok(text) => toml::from_str(&text).into_diagnostic().wrap_err(STAMPS),
         Err(_) => Ok(BTreeMap::new()),
@@ -221,13 +268,18 @@ fn solve(workspace: &Repository, options: &Options, name: &str, scene: &Path) ->
     if !ended.success() {
         return Err(miette!("{program} run {}: {ended}", scene.display()));
     }
+    page::write(&executable, &output)?;
     Ok(output)
 }
 
 fn draw(root: &Path, picture: &Picture, results: &BTreeMap<String, PathBuf>) -> Result<()> {
     let mut panels = Vec::new();
     for panel in &picture.panel {
-        let image = Image::read(&results[&panel.case].join(&panel.from))?;
+        let mut file = results[&panel.case].join(&panel.from);
+        if panel.is_page() {
+            file = page::photograph(&file)?;
+        }
+        let image = Image::read(&file)?;
         panels.push(match panel.crop {
             Some(crop) => image.crop(crop).wrap_err_with(|| panel.from.display().to_string())?,
             None => image,
@@ -265,10 +317,10 @@ mod tests {
         };
         write("crates/harness/src/output/picture.rs", "fn a() {}\n");
         write("cases/plate/case.toml", "program = 'peri'\n");
-        let list = "cases = { plate = 'cases/plate/case.toml' }\n[[picture]]\nfile = 'docs/a.png'\nwidth = \
+        let text = "cases = { plate = 'cases/plate/case.toml' }\n[[picture]]\nfile = 'docs/a.png'\nwidth = \
             10\n\
                     [[picture.panel]]\ncase = 'plate'\nfrom = 'a.png'\n";
-        write(LIST, list);
+        write(LIST, text);
         let files = ["docs/a.png", "docs/b.png"].map(PathBuf::from);
         write("docs/b.png", "");
         let found = || findings(root.path(), &files).expect("findings");
@@ -276,9 +328,10 @@ mod tests {
         assert_eq!(found(), [stale, "docs/b.png: not in docs/pictures.toml"]);
         fs::remove_file(root.path().join("docs/b.png")).expect("removed");
         let list = List::read(root.path()).expect("a list");
-        let sources = list.sources(&["plate"]).expect("sources");
+        let sources = list.sources("docs/a.png", &["plate"]).expect("sources");
         let stamp = SourceStamp::new(root.path(), &sources).expect("a stamp");
-        let stamps = BTreeMap::from([("docs/a.png".to_owned(), stamp)]);
+        let entry = list.hash("docs/a.png").expect("a hash");
+        let stamps = BTreeMap::from([("docs/a.png".to_owned(), DrawnEntry { entry, stamp })]);
         write(STAMPS, &toml::to_string(&stamps).expect("text"));
         assert_eq!(found(), [""; 0]);
         write("crates/harness/src/output/picture.rs", "// a comment\nfn a() {}\n");
@@ -287,6 +340,12 @@ mod tests {
         assert_eq!(found(), [stale]);
         write("cases/plate/case.toml", "program = 'peri'\n");
         write("crates/harness/src/output/picture.rs", "fn a() { }\n");
+        assert_eq!(found(), [stale]);
+        // another entry changes nothing, its own does
+        write("crates/harness/src/output/picture.rs", "fn a() {}\n");
+        write(LIST, &format!("{text}[[table]]\nfile = 'docs/a.md'\nname = 'a'\ntext = ''\n"));
+        assert_eq!(found(), [stale.replace("a.png", "a.md (a)")]);
+        write(LIST, &text.replace("width = 10", "width = 20"));
         assert_eq!(found(), [stale]);
     }
 
@@ -297,7 +356,7 @@ mod tests {
         let list = List::read(&root).expect("a list");
         for (key, cases) in list.entries() {
             assert!(!cases.is_empty(), "{key}");
-            list.sources(&cases).expect("sources");
+            list.sources(&key, &cases).expect("sources");
         }
     }
 }

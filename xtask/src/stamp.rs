@@ -63,27 +63,28 @@ pub fn sources(root: &Path, crates: &[&str], parts: &[&str]) -> Vec<String> {
     folders.chain(below).filter(|source| root.join(source).exists()).collect()
 }
 
-/// Hashes names and contents of all files, sorted by name, by FNV-1a: the same on every machine. Lines of
-/// Rust that are blank or comments do not count.
+/// Hashes names and contents of all files, sorted by name. Lines of Rust that are blank or comments do not
+/// count.
 fn hash(root: &Path, sources: &[String]) -> std::io::Result<String> {
     let mut files = Vec::new();
     for source in sources {
         collect(&root.join(source), &mut files)?;
     }
     files.sort();
-    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    let mut take = |bytes: &[u8]| {
-        for &byte in bytes {
-            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-        }
-    };
+    let mut all = Vec::new();
     for file in files {
-        take(file.strip_prefix(root).unwrap_or(&file).to_string_lossy().as_bytes());
-        take(&[0]);
-        take(&content(&file)?);
-        take(&[0]);
+        all.extend(file.strip_prefix(root).unwrap_or(&file).to_string_lossy().as_bytes());
+        all.push(0);
+        all.extend(content(&file)?);
+        all.push(0);
     }
-    Ok(format!("{hash:016x}"))
+    Ok(hash_bytes(&all))
+}
+
+/// Hashes bytes by FNV-1a: the same on every machine.
+pub fn hash_bytes(bytes: &[u8]) -> String {
+    let add = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
+    format!("{:016x}", bytes.iter().fold(0xcbf2_9ce4_8422_2325, add))
 }
 
 /// Content of a file as far as it matters.

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 /// Error of heat conduction and crystallization.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A mesh cannot be used.
     #[error("mesh: {0}")]

@@ -273,11 +273,13 @@ pub fn variants(
 
 /// Name of a key's value: `print.layer_time`, `10 s` → `layer_time-10s`.
 pub(crate) fn named(key: &str, value: &str) -> String {
-    let plain = |text: &str| -> String {
-        let kept = text.chars().filter(|c| !c.is_whitespace());
-        kept.map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect()
-    };
     format!("{}-{}", plain(key.rsplit('.').next().unwrap_or(key)), plain(value))
+}
+
+/// A text as part of a file name: without blanks, letters, digits and hyphens kept, `_` for the rest.
+pub(crate) fn plain(text: &str) -> String {
+    let kept = text.chars().filter(|c| !c.is_whitespace());
+    kept.map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect()
 }
 
 /// Combinations of values of lists of these lengths, by their places; the last runs fastest.

@@ -88,6 +88,14 @@ impl Rows {
             found.dedup();
             names.extend(found.into_iter().filter(|name| !names.contains(name)).cloned().collect::<Vec<_>>());
         }
+        // statistics have columns of their own
+        let fields = self.fields();
+        let is_statistic = |name: &String| {
+            STATISTICS
+                .iter()
+                .any(|s| name.strip_prefix(s).is_some_and(|rest| fields.iter().any(|f| f == rest)))
+        };
+        names.retain(|name| !is_statistic(name));
         names
     }
 
@@ -108,14 +116,33 @@ impl Rows {
         self.rows.iter().filter_map(|row| row.outcome.as_ref().ok())
     }
 
-    /// `name [unit]`, with the unit that the reports give.
-    fn heading(&self, name: &str) -> String {
+    /// Returns `name [unit]`, with the unit that the reports give.
+    pub fn heading(&self, name: &str) -> String {
         let unit =
             self.reports().filter_map(|report| report.values.get(name)).find_map(|value| match value {
                 Value::Scalar { unit, .. } if !unit.is_empty() => Some(unit),
                 _ => None,
             });
         unit.map_or_else(|| name.to_owned(), |unit| format!("{name} [{unit}]"))
+    }
+
+    /// Returns heading and cells of each setting: `key [unit]` and numbers where all values are numbers
+    /// with one unit written to them, such as `10s`.
+    fn setting_columns(&self) -> Vec<(String, Vec<&str>)> {
+        let column = |(index, key): (usize, &String)| {
+            let cells: Vec<&str> = self.rows.iter().map(|row| row.settings[index].as_str()).collect();
+            let split: Option<Vec<_>> = cells.iter().map(|cell| number_and_unit(cell)).collect();
+            match split.as_deref() {
+                Some([(_, unit), rest @ ..])
+                    if !unit.is_empty() && rest.iter().all(|(_, own)| own == unit) =>
+                {
+                    let numbers = cells.iter().map(|cell| &cell[..cell.len() - unit.len()]);
+                    (format!("{key} [{unit}]"), numbers.collect())
+                }
+                _ => (key.clone(), cells),
+            }
+        };
+        self.settings.iter().enumerate().map(column).collect()
     }
 
     /// Returns the table to be read: a column for each field, with its mean, extremes and deviation.
@@ -151,9 +178,9 @@ impl Rows {
     }
 
     fn table(&self) -> Vec<Vec<String>> {
-        let fields = self.fields();
+        let (fields, settings) = (self.fields(), self.setting_columns());
         let mut head = vec!["run".to_owned()];
-        head.extend(self.settings.iter().cloned());
+        head.extend(settings.iter().map(|(heading, _)| heading.clone()));
         head.extend(fields.iter().map(|name| format!("{name}: mean (least to largest) ± deviation")));
         let asked = self.requested();
         head.extend(asked.iter().map(|name| self.heading(name)));
@@ -162,21 +189,17 @@ impl Rows {
         }
         head.push("steps".into());
         let mut table = vec![head];
-        for row in &self.rows {
+        for (index, row) in self.rows.iter().enumerate() {
             let mut line = vec![row.name.clone()];
-            line.extend(row.settings.iter().cloned());
+            line.extend(settings.iter().map(|(_, cells)| cells[index].to_owned()));
             match &row.outcome {
                 Ok(report) => {
                     line.extend(fields.iter().map(|field| {
-                        let [mean, least, largest, deviation] = STATISTICS.map(|statistic| {
-                            let value = report.scalar(&format!("{statistic}{field}"));
-                            value.map_or_else(|| "–".to_owned(), |value| format!("{value:.4}"))
-                        });
+                        let [mean, least, largest, deviation] =
+                            STATISTICS.map(|statistic| shown(report, &format!("{statistic}{field}")));
                         format!("{mean} ({least} to {largest}) ± {deviation}")
                     }));
-                    line.extend(asked.iter().map(|name| {
-                        report.scalar(name).map_or_else(|| "–".to_owned(), |value| format!("{value:.4}"))
-                    }));
+                    line.extend(asked.iter().map(|name| shown(report, name)));
                     if self.judged() {
                         line.push(verdict(report));
                     }
@@ -194,9 +217,9 @@ impl Rows {
     /// # Errors
     /// A file that cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), polycore::Error> {
-        let values = self.names();
+        let (values, settings) = (self.names(), self.setting_columns());
         let mut head = vec!["run".to_owned()];
-        head.extend(self.settings.iter().cloned());
+        head.extend(settings.iter().map(|(heading, _)| heading.clone()));
         head.extend(values.iter().map(|name| self.heading(name)));
         if self.judged() {
             head.push(ENDS.to_owned());
@@ -205,10 +228,10 @@ impl Rows {
         atomic_write(path, |file| {
             let mut writer = csv::Writer::from_writer(file);
             writer.write_record(&head)?;
-            for row in &self.rows {
+            for (index, row) in self.rows.iter().enumerate() {
                 let report = row.outcome.as_ref().ok();
                 let mut line = vec![row.name.clone()];
-                line.extend(row.settings.iter().cloned());
+                line.extend(settings.iter().map(|(_, cells)| cells[index].to_owned()));
                 line.extend(values.iter().map(|name| {
                     let value = report.and_then(|report| report.scalar(name));
                     value.map(|value| format!("{value:?}")).unwrap_or_default()
@@ -224,6 +247,26 @@ impl Rows {
             writer.flush()
         })
     }
+}
+
+/// Splits `10s` into its number and unit, the text as it stands; `None` for a text that begins with no
+/// number or has a blank between both.
+pub(crate) fn number_and_unit(text: &str) -> Option<(f64, &str)> {
+    let end = text.find(|c: char| !(c.is_ascii_digit() || "+-.eE".contains(c))).unwrap_or(text.len());
+    let unit = &text[end..];
+    let number = text[..end].parse().ok()?;
+    (!unit.contains([' ', ';', ',', '"'])).then_some((number, unit))
+}
+
+/// Splits a heading `key [unit]` into key and unit.
+pub(crate) fn key_and_unit(heading: &str) -> (&str, &str) {
+    heading.strip_suffix(']').and_then(|rest| rest.rsplit_once(" [")).unwrap_or((heading, ""))
+}
+
+/// A value as it is read, `–` if the run has none.
+fn shown(report: &Report, name: &str) -> String {
+    let (number, _) = report.shown(name);
+    if number.is_empty() { "–".to_owned() } else { number }
 }
 
 /// `yes`, or the quantities that miss what the scene expects of them.

@@ -1,6 +1,6 @@
 //! Many runs of one scene over a grid of values: in parallel, one thread each; finished ones are kept.
 
-use super::rows::{Row, Rows};
+use super::rows::{Row, Rows, key_and_unit};
 use super::terminal::WIDTH;
 use super::{Case, Fault, Finished, Options, Program};
 use crate::report::{Phases, Report};
@@ -242,12 +242,14 @@ fn former(vary: &[Vary], output: &Path) -> Result<Vec<Vec<String>>, Error> {
         Some(Report::read(report).ok()?.provenance.scene)
     };
     let Some(scene) = rows.iter().find_map(scene) else { return Ok(Vec::new()) };
-    let set =
-        |name: &&str| divided(name, ';').iter().all(|key| scene.contains(&format!("{} = ", quoted(key))));
-    let keys: Vec<&str> = head.iter().skip(1).take_while(set).collect();
+    let set = |(name, _): &(&str, &str)| {
+        divided(name, ';').iter().all(|key| scene.contains(&format!("{} = ", quoted(key))))
+    };
+    let (keys, units): (Vec<&str>, Vec<&str>) = head.iter().skip(1).map(key_and_unit).take_while(set).unzip();
     if vary.iter().map(|vary| vary.key.as_str()).eq(keys.iter().copied()) {
-        let values =
-            |row: &csv::StringRecord| row.iter().skip(1).take(keys.len()).map(str::to_owned).collect();
+        let values = |row: &csv::StringRecord| {
+            row.iter().skip(1).zip(&units).map(|(value, unit)| format!("{value}{unit}")).collect()
+        };
         return Ok(rows.iter().map(values).collect());
     }
     let reason =
@@ -336,10 +338,13 @@ fn solve<C: Case>(
     Ok(outcomes.into_values().map(|outcome| outcome.map_err(|failure| failure.to_string())).collect())
 }
 
-/// `layer_time-10s_film-20W_m_2_K`, of values of keys.
+/// `layer_time-10s_film-20W_m_2_K`, of values of keys; `to-8mm_0mm` of a list of them.
 fn name(vary: &[Vary], values: &[String]) -> String {
     let each = vary.iter().flat_map(Vary::keys).zip(values.iter().flat_map(|value| divided(value, ';')));
-    each.map(|(key, value)| named(&key, &value)).collect::<Vec<_>>().join("_")
+    let name = each.map(|(key, value)| named(&key, &value)).collect::<Vec<_>>().join("_");
+    // brackets and quotes leave several underscores, and some behind a hyphen
+    let pieces = name.split('_').filter(|piece| !piece.is_empty());
+    pieces.collect::<Vec<_>>().join("_").replace("-_", "-")
 }
 
 #[cfg(test)]
@@ -358,6 +363,8 @@ mod tests {
         assert_eq!((linked.key.as_str(), linked.keys().len()), ("print.layer_time;time.end", 2));
         assert_eq!(linked.values, ["5s;60s", "10s;120s"]);
         assert_eq!(name(&[linked], &["5s;60s".into()]), "layer_time-5s_end-60s");
+        let list = of("boundary[1].to=[\"-8 mm\", \"0 mm\"]").unwrap();
+        assert_eq!(name(std::slice::from_ref(&list), &list.values), "to--8mm_0mm");
         for wrong in ["a", "a=", "=1", "a=1,,2", "a=1,1", "a=1,2;b=3", "a=1;"] {
             assert!(of(wrong).unwrap_err().contains("allowed"), "{wrong}");
         }

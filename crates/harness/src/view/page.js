@@ -228,8 +228,10 @@ function groups() {
     if (!found.has(key)) found.set(key, { name: kind, tables: [] });
     found.get(key).tables.push(table);
   }
+  // posterior draws are many and tell least
   const first = ({ name, tables }) => tables.some((table) => table.main !== null)
-    ? -1 : ["history", "load", "probe", "point", "profile"].indexOf(name) >>> 0;
+    ? -1 : tables.every((table) => table.name.endsWith("_posterior"))
+      ? Infinity : ["history", "load", "probe", "point", "profile"].indexOf(name) >>> 0;
   const list = [...found.values()].sort((a, b) => first(a) - first(b));
   // variants in the order of the scene
   const place = ({ name }) => run.variants.findIndex((variant) => name.endsWith(`[${variant}]`));

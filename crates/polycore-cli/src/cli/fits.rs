@@ -383,9 +383,32 @@ fn remarks(case: &FitCase, all: &[TableFits]) -> String {
         for (law, why) in &set.failed {
             let _ = writeln!(text, "failed  {law} on {}: {why}", set.name);
         }
+        text += &transfer(set);
         text += &material::best(set);
     }
     text
+}
+
+/// Names the laws of a table that hold in all other tables, R² at least [`SAFE_R2`], and those that do not;
+/// empty without `cross`.
+fn transfer(set: &TableFits) -> String {
+    if set.crossed.is_empty() {
+        return String::new();
+    }
+    let names = |safe: bool| {
+        let held = |key: &str| {
+            set.crossed.iter().filter(|crossed| crossed.0 == key).all(|crossed| holds(&crossed.2))
+        };
+        let those: Vec<&str> =
+            set.fits.iter().map(|fit| fit.model.key).filter(|key| held(key) == safe).collect();
+        if those.is_empty() { "none".to_owned() } else { those.join(", ") }
+    };
+    format!("{}: safe outside: {}; unsafe: {}\n", set.name, names(true), names(false))
+}
+
+/// Returns true for a law that agrees with another table.
+fn holds(found: &Option<Agreement>) -> bool {
+    found.is_some_and(|found| found.r2.is_none_or(|r2| r2 >= SAFE_R2))
 }
 
 /// R² in the own and in other tables below which a law is unsafe there.
@@ -416,11 +439,9 @@ fn verdicts(set: &TableFits) -> String {
             let r2 = found.map_or_else(|| "locked".to_owned(), |found| shown(found.r2));
             let _ = write!(text, ", {other} {r2}");
         }
-        let bad =
-            |found: &Option<Agreement>| !found.is_some_and(|found| found.r2.is_none_or(|r2| r2 >= SAFE_R2));
         if !crossed.is_empty() {
-            let unsafe_there = crossed.iter().any(|(_, _, found)| bad(found));
-            let verdict = if unsafe_there { "unsafe outside" } else { "safe outside" };
+            let safe = crossed.iter().all(|(_, _, found)| holds(found));
+            let verdict = if safe { "safe outside" } else { "unsafe outside" };
             let _ = write!(text, "; {verdict} {}", set.name);
         }
         if let Some(chi) = fit.chi {

@@ -35,7 +35,7 @@ fn particles(n: [usize; 3], edge: [f64; 3]) -> Vec<Cuboid> {
     (0..n.iter().product()).map(of).collect()
 }
 
-/// formulation-print.md, part D: cells of 1 mm to particles of 0.7 mm.
+/// Cells of 1 mm to particles of 0.7 mm.
 #[test]
 fn cells_to_particles() {
     let (points, cells) = brick([7, 1, 1], |p| p);

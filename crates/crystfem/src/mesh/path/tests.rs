@@ -336,7 +336,7 @@ fn beads_come_from_filament() {
     assert!((path.rest - 0.1).abs() < 1e-12);
 }
 
-/// Slicer files agree with an own reader in Python (formulation-print.md, part E): filament of printing
+/// Slicer files agree with an own reader in Python: filament of printing
 /// moves, time at F with dwells, and with 500 mm/s² and a jerk of 8 mm/s.
 #[test]
 fn files_of_slicers() {

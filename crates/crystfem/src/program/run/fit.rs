@@ -73,7 +73,7 @@ pub fn run(
         })?;
         done.extend(fits);
         heat_flow::record(&mut report, spec, &peaks);
-        heat_flow::write(output, &spec.name, &peaks, scene.output.pictures)?;
+        heat_flow::write(output, spec, &peaks, scene.output.pictures)?;
     }
     phases.start("write");
     for fit in &done {
@@ -214,7 +214,7 @@ fn solve(spec: &FitSpec, job: Job, run: &mut harness::case::Run) -> Result<Vec<F
 }
 
 /// Returns the name of a file without folder and extension.
-fn stem(file: &Path) -> String {
+pub(super) fn stem(file: &Path) -> String {
     file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
@@ -308,7 +308,10 @@ fn write_predictions(output: &Path, done: &FinishedFit) -> Result<(), polycore::
     csv::write(output.join(format!("{}_prediction.csv", done.name)), &columns)
 }
 
-/// Draws NAME.png: measurements as markers, the model as a dashed line.
+/// Markers of a run at most: more hide the model.
+const MARKERS: usize = 200;
+
+/// Draws NAME.png: measurements as markers, evenly picked, the model as a dashed line.
 fn draw(output: &Path, done: &FinishedFit) -> Result<(), polycore::Error> {
     let unit = done.abscissa.1.replace("degC", "°C");
     let axis = format!("{} ({unit})", done.abscissa.0.replace('_', " "));
@@ -325,7 +328,9 @@ fn draw(output: &Path, done: &FinishedFit) -> Result<(), polycore::Error> {
         }
         // NaN separates the lines of the runs
         curve.iter_mut().for_each(|values| values.push(f64::NAN));
-        plot = plot.series(Series::markers(name, x, data));
+        let stride = x.len().div_ceil(MARKERS).max(1);
+        let picked = |values: &[f64]| values.iter().step_by(stride).copied().collect::<Vec<f64>>();
+        plot = plot.series(Series::markers(name, &picked(x), &picked(data)));
     }
     plot = plot.series(Series::reference("model", &curve[0], &curve[1]));
     plot.write(output.join(format!("{}.png", done.name)))

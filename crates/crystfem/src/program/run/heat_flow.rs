@@ -1,5 +1,6 @@
 //! Peaks of heat flow: enthalpies, tables and pictures.
 
+use super::fit::stem;
 use crate::fit::MeasuredPeak;
 use crate::program::observe::celsius::to_celsius;
 use crate::program::quantities as q;
@@ -24,11 +25,12 @@ pub fn record(report: &mut Report, spec: &FitSpec, peaks: &[MeasuredPeak]) {
 /// Writes NAME-heat-flow.csv and .png: released heat, baseline and α. Does nothing without peaks.
 pub fn write(
     output: &Path,
-    name: &str,
+    spec: &FitSpec,
     peaks: &[MeasuredPeak],
     picture: bool,
 ) -> Result<(), polycore::Error> {
     let Some(first) = peaks.first() else { return Ok(()) };
+    let name = &spec.name;
     let mut columns: Vec<(&str, &str, Vec<f64>)> = vec![
         ("run", "", Vec::new()),
         ("time", "s", Vec::new()),
@@ -43,12 +45,12 @@ pub fn write(
     let axis = if cooling { "temperature (°C)" } else { "time (s)" };
     let mut plot = LinePlot::new(name).axes(axis, "released heat (W/g)").size(800.0, 460.0);
     let mut under = [Vec::new(), Vec::new()];
-    for (index, MeasuredPeak { peak, temperatures, .. }) in peaks.iter().enumerate() {
+    for (index, (MeasuredPeak { peak, temperatures, .. }, data)) in peaks.iter().zip(&spec.data).enumerate() {
         let per_gram = |flows: &[f64]| flows.iter().map(|q| q / 1e3).collect::<Vec<f64>>();
         let [flows, baseline] = [per_gram(&peak.flows), per_gram(&peak.baseline)];
         let celsius = to_celsius(temperatures);
         let x = if cooling { &celsius } else { &peak.times };
-        plot = plot.series(Series::line(&format!("run {}", index + 1), x, &flows));
+        plot = plot.series(Series::line(&stem(&data.file), x, &flows));
         under[0].extend(x);
         under[1].extend(&baseline);
         // NaN separates the lines of the runs

@@ -2,10 +2,11 @@
 
 use super::{FAILED_RUNS, Vary};
 use crate::case::Program;
-use crate::case::rows::{Rows, STATISTICS};
+use crate::case::rows::{Rows, STATISTICS, number_and_unit};
 use crate::output::picture::{LinePlot, Series};
 use crate::report::Report;
 use crate::scene::Source;
+use crate::study::plain;
 use std::path::Path;
 
 /// Every statistic of every run, and as curves against the number of the run.
@@ -42,17 +43,20 @@ pub(super) fn together(program: &Program, source: &Source, vary: &[Vary], rows: 
 pub(super) fn numeric(values: &[String]) -> Option<(Vec<f64>, String)> {
     let split = |text: &String| -> Option<(f64, String)> {
         // of keys that change together the first
-        let text = text.split(';').next().unwrap_or_default();
-        let end = text.find(|c: char| !(c.is_ascii_digit() || "+-.eE".contains(c))).unwrap_or(text.len());
-        Some((text[..end].parse().ok()?, text[end..].trim().to_owned()))
+        let text: String = text.split(';').next()?.split_whitespace().collect();
+        number_and_unit(&text).map(|(number, unit)| (number, unit.to_owned()))
     };
     let all: Vec<(f64, String)> = values.iter().map(split).collect::<Option<_>>()?;
     let unit = all.first()?.1.clone();
     all.iter().all(|(_, other)| *other == unit).then(|| (all.iter().map(|(x, _)| *x).collect(), unit))
 }
 
+/// Values with a picture of their own at most.
+const DRAWN: usize = 8;
+
 /// sweep_FIELD.png: mean, least and largest at the end (the mean only where several keys vary), and
-/// sweep_deviation_of_FIELD.png, against the first key, with a line for each combination of the others.
+/// sweep_deviation_of_FIELD.png, sweep_VALUE.png of at most [`DRAWN`] other values, against the first key, with
+/// a line for each combination of the others.
 pub(super) fn draw(vary: &[Vary], rows: &Rows, output: &Path) -> Result<(), polycore::Error> {
     let Some(first) = vary.first().filter(|vary| vary.values.len() > 1) else { return Ok(()) };
     let (places, label) = match numeric(&first.values) {
@@ -67,22 +71,35 @@ pub(super) fn draw(vary: &[Vary], rows: &Rows, output: &Path) -> Result<(), poly
     others.dedup();
     others.sort();
     others.dedup();
+    let points = |other: &String, name: &str| -> (Vec<f64>, Vec<f64>) {
+        let mut points: Vec<(f64, f64)> = rows
+            .rows
+            .iter()
+            .filter(|row| row.settings[1..].join(", ") == *other)
+            .filter_map(|row| {
+                let value = row.outcome.as_ref().ok()?.scalar(name)?;
+                Some((places[first.values.iter().position(|v| *v == row.settings[0])?], value))
+            })
+            .collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        points.into_iter().unzip()
+    };
+    let asked = rows.requested();
+    for name in asked.iter().filter(|name| asked.len() <= DRAWN && rows.has_value(name)) {
+        let mut plot = LinePlot::new("At the end").axes(&label, &rows.heading(name)).size(800.0, 480.0);
+        for other in &others {
+            let (x, y) = points(other, name);
+            let label = if other.is_empty() { name } else { other };
+            plot = plot.series(Series::marked_line(&label.replace("degC", " °C"), &x, &y));
+        }
+        plot.write(output.join(format!("sweep_{}.png", plain(name))))?;
+    }
     for field in rows.fields() {
         let line = |other: &String, statistic: &str| {
-            let mut points: Vec<(f64, f64)> = rows
-                .rows
-                .iter()
-                .filter(|row| row.settings[1..].join(", ") == *other)
-                .filter_map(|row| {
-                    let value = row.outcome.as_ref().ok()?.scalar(&format!("{statistic}{field}"))?;
-                    Some((places[first.values.iter().position(|v| *v == row.settings[0])?], value))
-                })
-                .collect();
-            points.sort_by(|a, b| a.0.total_cmp(&b.0));
             let name = [statistic.trim_end_matches("_of_").trim_end_matches('_'), other];
             let name: Vec<&str> = name.into_iter().filter(|part| !part.is_empty()).collect();
             let name = name.join(", ").replace("degC", " °C");
-            let (x, y): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
+            let (x, y) = points(other, &format!("{statistic}{field}"));
             Series::marked_line(&name, &x, &y)
         };
         let plot = |statistics: &[&str], what: &str| {

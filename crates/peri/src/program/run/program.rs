@@ -17,7 +17,7 @@ impl Case for Peri {
         examples: "  peri check cases/ch2/dent/case.toml               what it builds and leaves out
   peri run cases/ch2/dent/case.toml --quick         solve, draw, judge; results in out/dent
   peri resume out/dent                              continue an interrupted run
-  peri sweep SCENE --vary material.fracture_energy=50J/m^2,100J/m^2
+  peri sweep SCENE --vary material.critical.fracture_energy=50J/m^2,100J/m^2
   peri exact law --law chain-affine --links 720 --dissociation 1200
   peri schema > peri.schema.json                    for editors",
         magic: b"peri-c13",
