@@ -202,7 +202,11 @@ impl Rows {
                     line.extend(asked.iter().map(|name| shown(report, name)));
                     if self.judged() {
                         let missed = report.expect.iter().filter(|one| !one.pass).count();
-                        line.push(if missed == 0 { "yes".to_owned() } else { format!("no: {missed} missed") });
+                        line.push(if missed == 0 {
+                            "yes".to_owned()
+                        } else {
+                            format!("no: {missed} missed")
+                        });
                     }
                     line.push(report.work.get("steps").map(u64::to_string).unwrap_or_default());
                 }

@@ -232,17 +232,20 @@ impl Viscoelastic {
         }
         let mut all = self.respond_relaxed(start.peak, &increment.to, tangent, end, memory)?;
         let c = voigt::to_stress(&increment.to);
-        let isochoric = c / c.determinant().cbrt();
-        let before = voigt::to_stress(&increment.from);
-        let before = before / before.determinant().cbrt();
+        let volume = c.determinant().cbrt();
+        let isochoric = c / volume;
         let conditions = Conditions::new(increment);
         let mut distance = Voigt::zeros();
         end.branches.clear();
         for (branch, start) in self.branches.iter().zip(&start.branches) {
-            let euler = branch.euler([&c, &isochoric], start, &conditions, tangent)?;
+            let euler = branch.euler((volume, &isochoric), start, &conditions, tangent)?;
             let found = match increment.scheme {
                 Scheme::Euler => euler,
-                Scheme::Sdirk2 => branch.sdirk2([&c, &isochoric], &before, start, &conditions, &euler)?,
+                Scheme::Sdirk2 => {
+                    let before = voigt::to_stress(&increment.from);
+                    let before = before / before.determinant().cbrt();
+                    branch.sdirk2((volume, &isochoric), &before, start, &conditions, &euler)?
+                }
             };
             distance += found.stress - euler.stress;
             all.prediction.stress += found.stress;

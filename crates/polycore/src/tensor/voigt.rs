@@ -72,24 +72,24 @@ pub fn stress_transformation(a: &Tensor) -> Voigt6x6 {
 /// A tangent in axes turned by the orthogonal Q (or, generally, A_iI A_jJ A_kK A_lL ℂ_IJKL).
 pub fn transform_tangent(tangent: &Voigt6x6, a: &Tensor) -> Voigt6x6 {
     let t = stress_transformation(a);
-    // in loops, which the compiler unrolls: nalgebra's product calls a function for each column
-    let mut half = Voigt6x6::zeros();
-    for j in 0..6 {
-        for k in 0..6 {
-            for i in 0..6 {
-                half[(i, j)] += t[(i, k)] * tangent[(k, j)];
+    // in loops, which the compiler unrolls: nalgebra's product calls a function for each column. Tangents in
+    // principal axes and frames of the plane are sparse
+    let product = |left: &Voigt6x6, factor: &dyn Fn(usize, usize) -> f64| {
+        let mut product = Voigt6x6::zeros();
+        for j in 0..6 {
+            for k in 0..6 {
+                let factor = factor(k, j);
+                if factor != 0.0 {
+                    for i in 0..6 {
+                        product[(i, j)] += left[(i, k)] * factor;
+                    }
+                }
             }
         }
-    }
-    let mut turned = Voigt6x6::zeros();
-    for j in 0..6 {
-        for k in 0..6 {
-            for i in 0..6 {
-                turned[(i, j)] += half[(i, k)] * t[(j, k)];
-            }
-        }
-    }
-    turned
+        product
+    };
+    let half = product(&t, &|k, j| tangent[(k, j)]);
+    product(&half, &|k, j| t[(j, k)])
 }
 
 /// The spatial tangent c_ijkl = J⁻¹ F_iI F_jJ F_kK F_lL ℂ_IJKL: the Truesdell rate of σ over the rate of
