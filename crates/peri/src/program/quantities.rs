@@ -72,15 +72,19 @@ harness::quantities! {
     CONTACT_SHARE = "contact_share", "", "with `[contact]`: energy of contact over the stored energy at the \
         end; the load is too low by about this fraction";
     CONTACT_STIFFNESS = "contact_stiffness", "", "with `[contact]`: stiffness s of the first plane, else of \
-        pairs of particles; κ with `short_range`";
+        the first indenter, else of pairs of particles; κ with `short_range`";
     FRICTION_WORK = "friction_work", "J", "with `friction`: energy dissipated by friction";
-    PLANE_FORCE = "{plane}_force_{axis}", "N", "force of a rigid plane on the body along an axis at the end";
-    PLANE_AREA = "{plane}_area", "m²", "undeformed area of the faces of the body that touch a rigid plane at \
-        the end";
-    PLANE_WIDTH = "{plane}_width", "m", "largest extent along a rigid plane of the faces that touch it at \
-        the end; in a plane body the width of contact";
+    PLANE_FORCE = "{plane}_force_{axis}", "N", "force of a rigid plane or an indenter on the body along an \
+        axis at the end";
+    PLANE_AREA = "{plane}_area", "m²", "undeformed area of the faces of the body that touch a rigid plane or \
+        an indenter at the end";
+    PLANE_WIDTH = "{plane}_width", "m", "largest extent along a rigid plane, or across the force of an \
+        indenter, of the faces that touch it at the end; in a plane body the width of contact";
     PLANE_SPREAD = "{plane}_spread", "m", "root mean square distance from the centre of pressure on a rigid \
-        plane at the end, weighted by pressure; half the half-width of a Hertzian strip";
+        plane or an indenter at the end, weighted by pressure; half the half-width of a Hertzian strip, \
+        0.632 of the radius of a Hertzian circle";
+    INDENTER_DISPLACEMENT = "{indenter}_displacement_{axis}", "m", "displacement of an indenter at the end; \
+        with a force from where it first touches the body at rest";
     CRITICAL_TIME_STEP = "critical_time_step", "s", "critical time step 2/ω of the body at the start";
     TIME_STEP = "time_step", "s", "time step at the end";
     KINETIC_ENERGY = "kinetic_energy", "J", "kinetic energy at the end";

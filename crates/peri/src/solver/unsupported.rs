@@ -12,6 +12,7 @@ use super::load::Loads;
 use super::state::State;
 use super::system::System;
 use crate::bonds::{BodyGeometry, components};
+use crate::contact::RigidSurface;
 use crate::error::Error;
 use crate::field::Field;
 use polycore::numerics::DisjointSets;
@@ -57,7 +58,7 @@ impl fmt::Display for Unsupported {
 /// Contacts that may hold a part besides supports, by pushing.
 #[derive(Clone, Debug, Default)]
 pub struct ContactStops<const D: usize> {
-    /// Normals of rigid planes, towards the body.
+    /// Directions in which rigid surfaces push.
     pub normals: Vec<[f64; D]>,
     /// True if particles repel each other.
     pub pairs: bool,
@@ -180,7 +181,7 @@ fn join_pieces<const D: usize>(
 impl<const D: usize> System<'_, D> {
     fn stops(&self) -> ContactStops<D> {
         let Some(contact) = self.repulsion() else { return ContactStops::default() };
-        let normals = contact.planes().map(|plane| plane.normal).collect();
+        let normals = contact.surfaces().flat_map(RigidSurface::pushes).collect();
         ContactStops {
             normals,
             pairs: contact.has_pairs(),

@@ -17,6 +17,7 @@ mod followed;
 mod formula;
 mod grips;
 mod inclusion;
+mod indenter;
 mod interface;
 mod line;
 mod loads;
@@ -45,6 +46,7 @@ pub use boundary::{Boundary, Prescribed, PrescribedField, RotationSpec, Side};
 pub use build::{body_of, least_memory};
 pub use check::{check, check_variant};
 pub use contact::{ContactSpec, PlaneSpec, tied_grips};
+pub use indenter::IndenterSpec;
 pub use crack::{cuts_of, severed_of_each};
 pub use curve::common_amplitude;
 pub use curve_spec::{CurveList, CurveSpec, CurveTable};
@@ -118,7 +120,7 @@ pub struct Scene {
     /// True for the scene of a later step, see [`Scene::stage`].
     #[serde(skip)]
     pub later: bool,
-    /// Repulsion of particles without a bond, friction, rigid planes; default: none.
+    /// Repulsion of particles without a bond, friction, rigid planes and indenters; default: none.
     pub contact: Option<ContactSpec>,
     /// Quantities recorded in every row of the history.
     #[serde(default)]

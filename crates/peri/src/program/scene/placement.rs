@@ -22,8 +22,9 @@ pub fn check_placement<const D: usize>(
     }
     plate_frame(source, scene, body)?;
     super::planes::check(source, scene, body)?;
-    let planes = scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes(source, false))?;
-    let rigid: Vec<[f64; D]> = planes.iter().map(|plane| plane.displacement).collect();
+    super::indenter::check_placed(source, scene, body)?;
+    let surfaces = scene.contact.as_ref().map_or(Ok(Vec::new()), |own| own.surfaces(source, false))?;
+    let rigid: Vec<[f64; D]> = surfaces.iter().map(|surface| surface.displacement).collect();
     let reach = loads.reach(&*body.bonds, &rigid);
     // the displacement under forces is unknown before the run
     let beyond = |at: f64| reach > 0.0 && at > reach * (1.0 + 1e-9);
