@@ -96,7 +96,10 @@ impl<const D: usize> Contact<D> {
     fn slipped(&self, pair: ContactPair, displacement: &Field<D>) -> [f64; 3] {
         let Some(start) = &self.start else { return [0.0; 3] };
         let ContactPair::Particles(own, other) = pair else {
-            return self.surfaces.as_ref().map_or([0.0; 3], |surfaces| surfaces.slipped(pair, displacement, start));
+            return self
+                .surfaces
+                .as_ref()
+                .map_or([0.0; 3], |surfaces| surfaces.slipped(pair, displacement, start));
         };
         let since = |site: u32, d: usize| {
             displacement.components()[d][site as usize] - start.components()[d][site as usize]
@@ -150,8 +153,10 @@ impl<const D: usize> Contact<D> {
         old: &[FrictionPair],
     ) -> SlidingFriction {
         let mut grips = self.grips(bonds, displacement, displacement, old);
-        let mut sliding =
-            SlidingFriction { surfaces: vec![[0.0; 3]; self.surfaces().count()], ..SlidingFriction::default() };
+        let mut sliding = SlidingFriction {
+            surfaces: vec![[0.0; 3]; self.surfaces().count()],
+            ..SlidingFriction::default()
+        };
         let at = |site: u32| velocity.get(site as usize);
         for grip in &mut grips {
             grip.share = 1.0;

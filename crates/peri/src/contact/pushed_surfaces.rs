@@ -47,7 +47,8 @@ impl<const D: usize> RigidSurfaces<D> {
             let Some((size, along)) = surface.pushed() else { continue };
             let wanted = size * self.each[number].factor;
             let travel = self.first_touch(surface, &along, field).unwrap_or(0.0);
-            let travel = if wanted > 0.0 { self.balanced(surface, &along, field, wanted, travel) } else { travel };
+            let travel =
+                if wanted > 0.0 { self.balanced(surface, &along, field, wanted, travel) } else { travel };
             self.each[number].now = along.map(|e| travel * e);
         }
     }
@@ -97,7 +98,11 @@ impl<const D: usize> RigidSurfaces<D> {
             if at[0].abs() <= BALANCED * wanted {
                 break;
             }
-            if at[0] > 0.0 { high = travel } else { low = travel }
+            if at[0] > 0.0 {
+                high = travel
+            } else {
+                low = travel
+            }
             let newton = travel - at[0] / at[1];
             let next = if low < newton && newton < high { newton } else { 0.5 * (low + high) };
             if next == travel {

@@ -102,9 +102,7 @@ impl<const D: usize> RigidSurface<D> {
     /// Height of a place above the surface at rest, m.
     pub fn height(&self, place: [f64; D]) -> f64 {
         match (&self.shape, self.radius()) {
-            (SurfaceShape::Plane(normal), _) => {
-                (0..D).map(|d| (place[d] - self.point[d]) * normal[d]).sum()
-            }
+            (SurfaceShape::Plane(normal), _) => (0..D).map(|d| (place[d] - self.point[d]) * normal[d]).sum(),
             (_, radius) => length(self.from_centre(place)) - radius.unwrap_or(0.0),
         }
     }

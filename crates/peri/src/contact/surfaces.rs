@@ -114,7 +114,8 @@ impl<const D: usize> RigidSurfaces<D> {
         for (number, surface) in surfaces.into_iter().enumerate() {
             let surface = surface.checked()?;
             let near = |&face: &u32| surface.height(faces.places[face as usize]).abs() < TIED * spacing;
-            let tied: Vec<u32> = (0..faces.len() as u32).filter(|face| surface.bonded && near(face)).collect();
+            let tied: Vec<u32> =
+                (0..faces.len() as u32).filter(|face| surface.bonded && near(face)).collect();
             if surface.bonded && tied.is_empty() {
                 return Err(Error::geometry(format!(
                     "bonded plane {}: found no face of the body within half a spacing; allowed: a plane that \
@@ -253,12 +254,7 @@ impl<const D: usize> RigidSurfaces<D> {
     }
 
     /// Computes the overlap of an element, m, with a surface where it was before its last move.
-    pub(super) fn earlier_overlap(
-        &self,
-        placed: &MovingSurface<D>,
-        field: &Field<D>,
-        element: usize,
-    ) -> f64 {
+    pub(super) fn earlier_overlap(&self, placed: &MovingSurface<D>, field: &Field<D>, element: usize) -> f64 {
         match placed.surface.shape {
             SurfaceShape::Plane(normal) => {
                 let along = |moved: &[f64; D]| (0..D).map(|d| moved[d] * normal[d]).sum::<f64>();

@@ -22,6 +22,13 @@ harness::quantities! {
     DISPLACEMENT_AT_PEAK = "displacement_at_peak", "m", "displacement of the grips at the largest load";
     LOAD_AT = "load_at_{displacement}mm", "N", "with `output.load_at`: load at this displacement, if the run \
         reaches it";
+    SECANT_STIFFNESS_AT = "secant_stiffness_at_{displacement}mm", "N/m", "with `output.stiffness_at`: load \
+        over displacement at this one, if the run reaches it";
+    TANGENT_STIFFNESS_AT = "tangent_stiffness_at_{displacement}mm", "N/m", "with `output.stiffness_at`: slope \
+        of the load over the displacement at this one, of second order in the load steps, if the run reaches \
+        it";
+    LOOP_ENERGY = "loop_energy", "J", "with a `path` or factors of time steps that return: work of the last \
+        loop of the load over the displacement, by the trapezoidal rule; the energy lost in it";
     WORK_OF_LOADS = "work_of_loads", "J", "work of the loads";
     STORED_ENERGY = "stored_energy", "J", "energy in bonds and contact at the end";
     DAMPED_ENERGY = "damped_energy", "J", "work less stored, released, dissipated and friction energy; in \
@@ -200,6 +207,11 @@ pub const INTEGRALS: [Quantity; 8] = [
 /// Names the load at a displacement, m.
 pub fn load_at(displacement: f64) -> Named {
     LOAD_AT.named(&[&millimetres(displacement)])
+}
+
+/// Names the secant and the tangent stiffness at a displacement, m.
+pub fn stiffness_at(displacement: f64) -> [Named; 2] {
+    [SECANT_STIFFNESS_AT, TANGENT_STIFFNESS_AT].map(|one| one.named(&[&millimetres(displacement)]))
 }
 
 /// Names the load at an opening, m, of a probe.

@@ -6,7 +6,7 @@ use super::load::Loads;
 use super::record::StepRecord;
 use super::state::State;
 use crate::bonds::{Bonds, StretchScan, not_finite};
-use crate::contact::{Contact, ContactSummary, FrictionPair, SurfaceReaction, RigidSurface};
+use crate::contact::{Contact, ContactSummary, FrictionPair, RigidSurface, SurfaceReaction};
 use crate::error::Error;
 use crate::field::Field;
 use crate::material::{Material, SolverMaterial};

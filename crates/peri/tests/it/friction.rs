@@ -343,7 +343,10 @@ fn refuses() {
     assert_eq!(fault(good), None);
     for (plane, what) in [
         (RigidSurface { shape: SurfaceShape::Plane([0.0; 2]), ..good }, "normal of a plane: found 0"),
-        (RigidSurface { shape: SurfaceShape::Plane([f64::NAN, 1.0]), ..good }, "normal of a plane: found NaN"),
+        (
+            RigidSurface { shape: SurfaceShape::Plane([f64::NAN, 1.0]), ..good },
+            "normal of a plane: found NaN",
+        ),
         (RigidSurface { stiffness: -1.0, ..good }, "stiffness of a rigid surface: found -1"),
         (RigidSurface { friction: f64::INFINITY, ..good }, "friction of a rigid surface: found inf"),
         (RigidSurface { velocity: [f64::NAN; 2], ..good }, "velocity of a rigid surface: found NaN"),

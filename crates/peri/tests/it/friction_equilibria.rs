@@ -123,7 +123,8 @@ fn spring_over_a_plane() {
             let mut built = Body::<2>::solid([2, 1], 1.0, 1.015).build();
             let bonds = &mut built.lattice;
             let loads = hold(bonds, |x| Some(if x[0] < 1.0 { (3, [far, 0.0]) } else { (2, [0.0; 2]) }));
-            let plane = RigidSurface { friction: mu, stiffness, ..RigidSurface::plane([0.0, deep], [0.0, 1.0]) };
+            let plane =
+                RigidSurface { friction: mu, stiffness, ..RigidSurface::plane([0.0, deep], [0.0, 1.0]) };
             let contact = beside(bonds, 0.0, vec![plane]);
             let (state, _) = equilibria(method, bonds, &loads, contact, &factors[..last], None).unwrap();
             let (mut pulled, mut before) = (0.0_f64, 0.0);

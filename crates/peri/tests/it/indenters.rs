@@ -53,7 +53,8 @@ fn forces_are_the_gradient_of_an_energy() {
             (contact.summary(bonds, u).energy - 0.5 * contact.travelled(), force)
         };
         let force = potential(&u).1;
-        let direction = scatter(bonds.sites(), &built.on_lattice, &Random(8).vectors(built.points.len(), 1.0));
+        let direction: Field<3> =
+            scatter(bonds.sites(), &built.on_lattice, &Random(8).vectors(built.points.len(), 1.0));
         let along = |step: f64| {
             let mut moved = u.clone();
             for site in bonds.particles().iter().map(|&site| site as usize) {
@@ -111,7 +112,11 @@ fn contact_balances_a_force() {
 
 /// Solves equilibria of a block that is held at its lower half; returns the last state and a restartable one
 /// of the third step.
-fn equilibria(surface: RigidSurface<3>, method: usize, from: Option<State<3>>) -> (State<3>, Option<State<3>>) {
+fn equilibria(
+    surface: RigidSurface<3>,
+    method: usize,
+    from: Option<State<3>>,
+) -> (State<3>, Option<State<3>>) {
     let mut built = block();
     let contact = beside(&built.lattice, vec![surface]).unwrap();
     let bonds = &mut built.lattice;
@@ -216,8 +221,7 @@ fn disc_in_motion() {
     let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), &loads, &[]);
     system.contact = Some(contact);
     let mut state = State::new(system.bonds.sites());
-    let solver =
-        VelocityVerlet { records: 10, ..VelocityVerlet::new(DENSITY, 2.0) };
+    let solver = VelocityVerlet { records: 10, ..VelocityVerlet::new(DENSITY, 2.0) };
     solver.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
     let last = state.history.last().unwrap();
     let off = last.work - last.stored - last.kinetic;

@@ -108,7 +108,8 @@ impl ContactSpec {
     pub fn tie_stiffness(&self, explicit: bool) -> f64 {
         let own = self.plane.iter().map(|plane| plane.stiffness);
         let own = own.chain(self.indenter.iter().map(|indenter| indenter.stiffness));
-        own.map(|own| self.stiffness_of(own, explicit)).fold(if explicit { PAIR_STIFFNESS } else { PLANE_STIFFNESS }, f64::max)
+        own.map(|own| self.stiffness_of(own, explicit))
+            .fold(if explicit { PAIR_STIFFNESS } else { PLANE_STIFFNESS }, f64::max)
     }
 
     /// Returns the stiffness s of pairs of particles.
@@ -174,9 +175,8 @@ impl ContactSpec {
         explicit: bool,
     ) -> Result<Vec<RigidSurface<D>>, SceneError> {
         let planes = self.plane.iter().enumerate();
-        let planes = planes.map(|(index, plane)| {
-            self.plane_in(source, &format!("contact.plane[{index}]"), plane, explicit)
-        });
+        let planes = planes
+            .map(|(index, plane)| self.plane_in(source, &format!("contact.plane[{index}]"), plane, explicit));
         let indenters = self.indenter.iter().enumerate();
         let indenters = indenters.map(|(index, indenter)| {
             indenter.surface(source, &format!("contact.indenter[{index}]"), self, explicit)

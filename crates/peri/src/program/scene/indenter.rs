@@ -236,7 +236,8 @@ pub(super) fn check_placed<const D: usize>(
             if !stops && !scene.boundary.iter().any(|boundary| holds(boundary, d)) {
                 let axis = ["x", "y", "z"][d];
                 let found = format!("a force along {axis}, along which nothing holds the body");
-                let allowed = format!("a `displacement` along {axis} of some region, or a plane behind the body");
+                let allowed =
+                    format!("a `displacement` along {axis} of some region, or a plane behind the body");
                 return Err(source.error(&key("force"), found, allowed));
             }
         }

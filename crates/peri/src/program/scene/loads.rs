@@ -5,9 +5,9 @@ use super::region::region;
 use super::values::{DiscreteBody, ONE_OF_THEM};
 use super::{Boundary, ContactSpec, Prescribed, PrescribedField, Scene, Side, SolverMethod};
 use crate::bonds::components;
+use crate::contact::RigidSurface;
 use crate::field::Field;
 use crate::material::{BodyTensor, surface_load};
-use crate::contact::RigidSurface;
 use crate::solver::{
     ContactStops, INVERTS, Loads, RigidRegion, Support, Unsupported, find_unsupported, inverted,
 };

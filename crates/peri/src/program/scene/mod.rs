@@ -46,7 +46,6 @@ pub use boundary::{Boundary, Prescribed, PrescribedField, RotationSpec, Side};
 pub use build::{body_of, least_memory};
 pub use check::{check, check_variant};
 pub use contact::{ContactSpec, PlaneSpec, tied_grips};
-pub use indenter::IndenterSpec;
 pub use crack::{cuts_of, severed_of_each};
 pub use curve::common_amplitude;
 pub use curve_spec::{CurveList, CurveSpec, CurveTable};
@@ -56,6 +55,7 @@ pub use followed::{ParameterField, followed};
 pub use formula::Formula;
 pub use grips::free_lengths;
 pub use inclusion::{Inclusion, Inclusions};
+pub use indenter::IndenterSpec;
 pub use interface::{InterfaceSpec, limits_of_bonds};
 pub use line::{LineField, SectionSpec, line_fields};
 pub use loads::{loads_of, order_regions, region_names, velocities_of};
@@ -427,6 +427,8 @@ pub struct OutputFiles {
     pub flags: bool,
     /// Displacements at which the report has the load, as `load_at_20mm`.
     pub load_at: Vec<Length>,
+    /// Displacements at which the report has the stiffness, as `secant_stiffness_at_2mm`.
+    pub stiffness_at: Vec<Length>,
     /// Adds the integrals of Appendix A over the horizon, by quadrature, to the report.
     pub integrals: bool,
     /// Reference for the variants.
@@ -447,6 +449,7 @@ impl Default for OutputFiles {
             solid: None,
             flags: false,
             load_at: Vec::new(),
+            stiffness_at: Vec::new(),
             integrals: false,
             compare: None,
             line: Vec::new(),

@@ -28,13 +28,13 @@ pub fn check_placement<const D: usize>(
     let reach = loads.reach(&*body.bonds, &rigid);
     // the displacement under forces is unknown before the run
     let beyond = |at: f64| reach > 0.0 && at > reach * (1.0 + 1e-9);
-    match scene.output.load_at.iter().position(|at| beyond(at.si())) {
-        Some(index) => {
-            let found = format!("{} m, beyond the last displacement", scene.output.load_at[index].si());
-            Err(source.error(&format!("output.load_at[{index}]"), found, format!("up to {reach} m")))
+    for (key, list) in [("load_at", &scene.output.load_at), ("stiffness_at", &scene.output.stiffness_at)] {
+        if let Some(index) = list.iter().position(|at| beyond(at.si())) {
+            let found = format!("{} m, beyond the last displacement", list[index].si());
+            return Err(source.error(&format!("output.{key}[{index}]"), found, format!("up to {reach} m")));
         }
-        None => Ok(()),
     }
+    Ok(())
 }
 
 /// Returns half the edges of the plate of `[exact]` and the width of its loaded layers, m; `None` for other

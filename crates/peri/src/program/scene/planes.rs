@@ -105,8 +105,7 @@ pub(super) fn check<const D: usize>(
                 .count();
             let found = format!("{behind} of {} particles behind plane `{}`", particles.len(), own.name);
             let advice = if own.high < allowed {
-                let opposite =
-                    own.normal.map(|n| super::plain(if n == 0.0 { 0.0 } else { -n })).join(", ");
+                let opposite = own.normal.map(|n| super::plain(if n == 0.0 { 0.0 } else { -n })).join(", ");
                 format!("a normal towards the body: [{opposite}]")
             } else {
                 "a plane with the whole body in front of it; `normal` points towards the body".to_owned()
