@@ -23,8 +23,8 @@
 //! stays there. Force and energy are finite at full overlap (r = 0: kd along the reference ξ; energy ½kd² V_I
 //! V_J), so larger loads press particles through each other.
 //!
-//! Rigid surfaces act on faces, see `faces`. Friction is Coulomb's with an elastic slip, see `friction_pair`: equal
-//! and opposite within a pair, but not along it. Particles have no spin, so friction does not conserve
+//! Rigid surfaces act on faces, see `faces`. Friction is Coulomb's with an elastic slip, see `friction_pair`:
+//! equal and opposite within a pair, but not along it. Particles have no spin, so friction does not conserve
 //! angular momentum.
 
 mod faces;
@@ -59,7 +59,8 @@ pub use ties::{GripInterface, across, grips};
 
 /// κ of Macek & Silling (2007).
 pub const SHORT_RANGE: f64 = 15.0;
-/// Stiffness s of rigid surfaces in equilibria: at most 2 % of the compliance of a confined body of ten layers.
+/// Stiffness s of rigid surfaces in equilibria: at most 2 % of the compliance of a confined body of ten
+/// layers.
 pub const PLANE_STIFFNESS: f64 = 10.0;
 /// Stiffness s of pairs, and of rigid surfaces in explicit dynamics.
 pub const PAIR_STIFFNESS: f64 = 2.0;
@@ -282,6 +283,12 @@ impl<const D: usize> Contact<D> {
         }
     }
 
+    /// Finds a rigid surface whose force contact does not balance: its number, the balanced part and the
+    /// force, N.
+    pub fn unbalanced(&self, displacement: &Field<D>) -> Option<(usize, f64, f64)> {
+        self.surfaces.as_ref()?.unbalanced(displacement)
+    }
+
     /// Sums P·t of the forces on rigid surfaces at load factor 1 and their travels, N·m.
     pub fn travelled(&self) -> f64 {
         self.surfaces.as_ref().map_or(0.0, RigidSurfaces::travelled)
@@ -292,7 +299,8 @@ impl<const D: usize> Contact<D> {
         self.surfaces.iter().flat_map(RigidSurfaces::moved)
     }
 
-    /// Deepest overlap of a rigid surface that has moved, m, before its last move and after it; −∞ if none touches.
+    /// Deepest overlap of a rigid surface that has moved, m, before its last move and after it; −∞ if none
+    /// touches.
     pub fn approach(&self, displacement: &Field<D>) -> [f64; 2] {
         self.surfaces.as_ref().map_or([f64::NEG_INFINITY; 2], |surfaces| surfaces.approach(displacement))
     }

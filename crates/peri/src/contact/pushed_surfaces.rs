@@ -7,12 +7,14 @@
 //! within a bracket, from the geometry alone, so that no earlier state changes a bit.
 
 use super::surface::{RigidSurface, SurfaceShape};
-use super::surfaces::{MovingSurface, RigidSurfaces};
+use super::surfaces::{MovingSurface, RigidSurfaces, SurfaceContact};
 use crate::error::Error;
 use crate::field::Field;
 
 /// Relative error of the balance of a force.
 const BALANCED: f64 = 1e-13;
+/// Relative error of the balance beyond which a surface has lost the body.
+const MISSED: f64 = 1e-6;
 /// Largest number of evaluations; bisection alone needs 60.
 const EVALUATIONS: u32 = 200;
 /// Least component of a normal along the force of a plane that can balance it.
@@ -29,8 +31,8 @@ impl<const D: usize> RigidSurfaces<D> {
             let rest = Field::zeros(sites);
             let Some(travel) = self.first_touch(&self.each[number].surface, &along, &rest) else {
                 return Err(Error::geometry(format!(
-                    "rigid surface {}: found no face of the body ahead along its force; allowed: a surface in \
-                     front of the body with a force towards it",
+                    "rigid surface {}: found no face of the body ahead along its force; allowed: a surface \
+                     in front of the body with a force towards it",
                     number + 1
                 )));
             };
@@ -60,6 +62,21 @@ impl<const D: usize> RigidSurfaces<D> {
             (0..D).map(|d| force[d] * placed.now[d]).sum::<f64>()
         };
         self.each.iter().map(of).sum()
+    }
+
+    /// Finds a surface whose force contact does not balance: its number, the balanced part and the force, N.
+    pub(super) fn unbalanced(&self, field: &Field<D>) -> Option<(usize, f64, f64)> {
+        let of = |(number, placed): (usize, &MovingSurface<D>)| {
+            let (size, along) = placed.surface.pushed()?;
+            let wanted = size * placed.factor;
+            let push = |contact: &SurfaceContact<D>| {
+                let force = contact.force();
+                (0..D).map(|d| force[d] * along[d]).sum::<f64>()
+            };
+            let found: f64 = self.near(placed, field, 0.0).iter().map(push).sum();
+            (wanted > 0.0 && (found - wanted).abs() > MISSED * wanted).then_some((number, found, wanted))
+        };
+        self.each.iter().enumerate().find_map(of)
     }
 
     /// Finds the travel, m, at which the contact of a surface has the force `wanted`, N, along `along`, from

@@ -77,8 +77,8 @@ pub struct RigidSurfaces<const D: usize> {
     /// M/Δx, Pa/m.
     pub(super) penalty: Property,
     pub(super) spacing: f64,
-    /// Forces of all surfaces on faces and on bare particles, N, at the displacement of the last update; empty
-    /// without contact.
+    /// Forces of all surfaces on faces and on bare particles, N, at the displacement of the last update;
+    /// empty without contact.
     pub(super) pushes: Vec<[f64; D]>,
     /// Friction forces in explicit dynamics, likewise.
     pub(super) drags: Vec<[f64; D]>,

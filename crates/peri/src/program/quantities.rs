@@ -24,9 +24,9 @@ harness::quantities! {
         reaches it";
     SECANT_STIFFNESS_AT = "secant_stiffness_at_{displacement}mm", "N/m", "with `output.stiffness_at`: load \
         over displacement at this one, if the run reaches it";
-    TANGENT_STIFFNESS_AT = "tangent_stiffness_at_{displacement}mm", "N/m", "with `output.stiffness_at`: slope \
-        of the load over the displacement at this one, of second order in the load steps, if the run reaches \
-        it";
+    TANGENT_STIFFNESS_AT = "tangent_stiffness_at_{displacement}mm", "N/m", "with `output.stiffness_at`: \
+        slope of the load over the displacement at this one, of second order in the load steps, if the run \
+        reaches it";
     LOOP_ENERGY = "loop_energy", "J", "with a `path` or factors of time steps that return: work of the last \
         loop of the load over the displacement, by the trapezoidal rule; the energy lost in it";
     WORK_OF_LOADS = "work_of_loads", "J", "work of the loads";

@@ -150,8 +150,8 @@ impl<const D: usize> Loads<D> {
 
     /// Load, N, and its conjugate displacement, m, from [`Loads::conjugates`]: the force conjugate to the
     /// grips' distance `factor` · [`Loads::reach`]; with prescribed forces only, these, and the mean
-    /// displacement of their points along them (of both ends together if they pull at both). Of rigid surfaces
-    /// `rigid` are the displacements, as in [`Loads::reach`], and `pushes` the forces, N.
+    /// displacement of their points along them (of both ends together if they pull at both). Of rigid
+    /// surfaces `rigid` are the displacements, as in [`Loads::reach`], and `pushes` the forces, N.
     pub fn response(
         &self,
         bonds: &dyn BodyGeometry<D>,

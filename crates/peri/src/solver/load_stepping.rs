@@ -150,6 +150,7 @@ fn step_by_step<const D: usize>(
             particles.iter().for_each(|&site| state.velocity.set(site as usize, [0.0; D]));
         }
         system.check_overlaps(state)?;
+        system.refuse_lost(state)?;
         system.end_time_step(state)?;
         record(system, state);
         state.step += 1;

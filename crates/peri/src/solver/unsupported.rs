@@ -214,6 +214,23 @@ impl<const D: usize> System<'_, D> {
         }
     }
 
+    /// Refuses a state in which a rigid surface with a force has lost the body.
+    ///
+    /// # Errors
+    /// [`Error::NoEquilibrium`] for such a surface.
+    pub(super) fn refuse_lost(&self, state: &State<D>) -> Result<(), Error> {
+        match self.repulsion().and_then(|contact| contact.unbalanced(&state.displacement)) {
+            Some((number, found, wanted)) => Err(self.no_equilibrium(
+                state,
+                format!(
+                    "rigid surface {} has a force of {wanted:.3e} N, of which contact balances {found:.3e} N",
+                    number + 1
+                ),
+            )),
+            None => Ok(()),
+        }
+    }
+
     /// Refuses a balance of forces at a displacement that only rounding can balance.
     ///
     /// # Errors

@@ -165,7 +165,8 @@ impl ContactSpec {
         })
     }
 
-    /// Converts all planes, then all indenters; `explicit` selects the default stiffness of explicit dynamics.
+    /// Converts all planes, then all indenters; `explicit` selects the default stiffness of explicit
+    /// dynamics.
     ///
     /// # Errors
     /// As [`super::check`].

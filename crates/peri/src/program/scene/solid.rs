@@ -30,8 +30,8 @@ pub struct SolidLaw {
     /// Links of a chain, of `eight-chain`.
     pub links: Option<f64>,
     /// Averages J of the volumetric energy over nearest neighbours, for `eight-chain` on a lattice, solid or
-    /// plane strain. Default: true beside rigid planes and indenters if the bulk modulus is at least 50 times the shear
-    /// modulus.
+    /// plane strain. Default: true beside rigid planes and indenters if the bulk modulus is at least 50 times
+    /// the shear modulus.
     pub pressure_filter: Option<bool>,
     /// Constitutive law of `correspondence`.
     pub constitutive: Option<ConstitutiveSpec>,
