@@ -9,7 +9,7 @@ pub use body::Body;
 pub use rubber::Rubber;
 
 use crate::bonds::{BodyGeometry, LatticeBonds, Property, covered_stretches, fragments};
-use crate::contact::{Contact, RigidPlane};
+use crate::contact::{Contact, RigidSurface};
 use crate::error::Error;
 use crate::material::{BondMaterial, Material};
 use crate::potential::KernelFit;
@@ -61,7 +61,7 @@ pub struct Model<const D: usize, M> {
     times: Vec<f64>,
     critical_stretch: Option<Property>,
     contact: Option<f64>,
-    planes: Vec<RigidPlane<D>>,
+    surfaces: Vec<RigidSurface<D>>,
 }
 
 impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
@@ -76,7 +76,7 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
             times: Vec::new(),
             critical_stretch: None,
             contact: None,
-            planes: Vec::new(),
+            surfaces: Vec::new(),
         }
     }
 
@@ -143,10 +143,10 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
         self
     }
 
-    /// Adds a rigid plane that the body cannot pass, or to which it is tied. Explicit dynamics takes larger
-    /// steps with a [`RigidPlane::stiffness`] of 2.
-    pub fn plane(mut self, plane: RigidPlane<D>) -> Self {
-        self.planes.push(plane);
+    /// Adds a rigid surface that the body cannot pass, or a plane to which it is tied. Explicit dynamics takes
+    /// larger steps with a [`RigidSurface::stiffness`] of 2.
+    pub fn rigid_surface(mut self, surface: RigidSurface<D>) -> Self {
+        self.surfaces.push(surface);
         self
     }
 
@@ -191,12 +191,12 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
             );
         }
         let modulus = material.longitudinal_modulus(&bonds);
-        let contact = match (self.contact, self.planes.is_empty()) {
+        let contact = match (self.contact, self.surfaces.is_empty()) {
             (None, true) => None,
             (stiffness, _) => {
                 let surface = self.body.surface();
                 let contact = Contact::new(&bonds, modulus, stiffness.unwrap_or(0.0))?;
-                Some(contact.with_planes(&bonds, &surface, modulus, self.planes)?)
+                Some(contact.with_surfaces(&bonds, &surface, modulus, self.surfaces)?)
             }
         };
         let stretch = self.critical_stretch.or(critical.map(Property::from));

@@ -2,7 +2,7 @@
 
 pub use crate::Error;
 pub use crate::calibrate::Space;
-pub use crate::contact::RigidPlane;
+pub use crate::contact::RigidSurface;
 pub use crate::geometry::{Cut, Shape};
 pub use crate::material::{Correspondence, EightChainSolid, Material, NonlocalSolid};
 pub use crate::model::{Body, Model, Rubber, Simulation};

@@ -10,8 +10,8 @@ use std::ops::Range;
 /// Friction after a step of explicit dynamics.
 #[derive(Clone, Debug, Default)]
 pub struct SlidingFriction {
-    /// Force on the body by each plane, N.
-    pub planes: Vec<[f64; 3]>,
+    /// Force on the body by each rigid surface, N.
+    pub surfaces: Vec<[f64; 3]>,
     /// Energy of elastic slip, J.
     pub stored: f64,
 }
@@ -68,14 +68,14 @@ impl<const D: usize> Contact<D> {
         let parts: Vec<Vec<FrictionPair>> =
             (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
         let mut grips = parts.concat();
-        grips.extend(self.planes.iter().flat_map(|planes| planes.grips(displacement, start, old)));
+        grips.extend(self.surfaces.iter().flat_map(|surfaces| surfaces.grips(displacement, start, old)));
         grips
     }
 
     /// Returns the friction after a load step, sorted by pair, for the next one; the energy dissipated in the
-    /// step, J; and the friction force of each plane, N.
+    /// step, J; and the friction force of each rigid surface, N.
     pub fn slide(&self, displacement: &Field<D>) -> (Vec<FrictionPair>, f64, Vec<[f64; 3]>) {
-        let mut forces = vec![[0.0; 3]; self.planes().count()];
+        let mut forces = vec![[0.0; 3]; self.surfaces().count()];
         let (mut dissipated, mut grips) = (0.0, self.held.clone());
         for grip in &mut grips {
             let drag = grip.drag(self.slipped(grip.pair, displacement));
@@ -83,9 +83,9 @@ impl<const D: usize> Contact<D> {
             match grip.pair {
                 // the other half is counted from the other side
                 ContactPair::Particles(..) => dissipated += 0.5 * drag.dissipated,
-                ContactPair::Face(plane, _) | ContactPair::Particle(plane, _) => {
+                ContactPair::Face(surface, _) | ContactPair::Particle(surface, _) => {
                     dissipated += drag.dissipated;
-                    (0..3).for_each(|d| forces[plane as usize][d] += drag.force[d]);
+                    (0..3).for_each(|d| forces[surface as usize][d] += drag.force[d]);
                 }
             }
         }
@@ -96,7 +96,10 @@ impl<const D: usize> Contact<D> {
     fn slipped(&self, pair: ContactPair, displacement: &Field<D>) -> [f64; 3] {
         let Some(start) = &self.start else { return [0.0; 3] };
         let ContactPair::Particles(own, other) = pair else {
-            return self.planes.as_ref().map_or([0.0; 3], |planes| planes.slipped(pair, displacement, start));
+            return self
+                .surfaces
+                .as_ref()
+                .map_or([0.0; 3], |surfaces| surfaces.slipped(pair, displacement, start));
         };
         let since = |site: u32, d: usize| {
             displacement.components()[d][site as usize] - start.components()[d][site as usize]
@@ -150,30 +153,32 @@ impl<const D: usize> Contact<D> {
         old: &[FrictionPair],
     ) -> SlidingFriction {
         let mut grips = self.grips(bonds, displacement, displacement, old);
-        let mut sliding =
-            SlidingFriction { planes: vec![[0.0; 3]; self.planes().count()], ..SlidingFriction::default() };
+        let mut sliding = SlidingFriction {
+            surfaces: vec![[0.0; 3]; self.surfaces().count()],
+            ..SlidingFriction::default()
+        };
         let at = |site: u32| velocity.get(site as usize);
         for grip in &mut grips {
             grip.share = 1.0;
-            let moved = match (grip.pair, &self.planes) {
+            let moved = match (grip.pair, &self.surfaces) {
                 (ContactPair::Particles(own, other), _) => {
                     let (own, other) = (at(own), at(other));
                     std::array::from_fn(|d| if d < D { step * (own[d] - other[d]) } else { 0.0 })
                 }
-                (pair, Some(planes)) => planes.carried(pair, velocity, step),
+                (pair, Some(surfaces)) => surfaces.carried(pair, velocity, step),
                 (_, None) => [0.0; 3],
             };
             let drag = grip.drag(moved);
             grip.slip = drag.slip;
             let part = if matches!(grip.pair, ContactPair::Particles(..)) { 0.5 } else { 1.0 };
             sliding.stored += part * grip.energy();
-            if let ContactPair::Face(plane, _) | ContactPair::Particle(plane, _) = grip.pair {
-                (0..3).for_each(|d| sliding.planes[plane as usize][d] += drag.force[d]);
+            if let ContactPair::Face(surface, _) | ContactPair::Particle(surface, _) = grip.pair {
+                (0..3).for_each(|d| sliding.surfaces[surface as usize][d] += drag.force[d]);
             }
         }
         self.held = grips;
-        if let Some(planes) = &mut self.planes {
-            planes.drag(&self.held);
+        if let Some(surfaces) = &mut self.surfaces {
+            surfaces.drag(&self.held);
         }
         sliding
     }
@@ -198,8 +203,8 @@ impl<const D: usize> Contact<D> {
             let volume = self.list.volume(own as usize);
             (0..D).for_each(|d| force[d][own as usize - start] -= grip.stiffness * grip.slip[d] / volume);
         }
-        if let Some(planes) = &self.planes {
-            planes.friction(start, force);
+        if let Some(surfaces) = &self.surfaces {
+            surfaces.friction(start, force);
         }
     }
 }

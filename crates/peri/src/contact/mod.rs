@@ -1,4 +1,4 @@
-//! Contact: repulsion of unbonded particles, rigid planes, friction.
+//! Contact: repulsion of unbonded particles, rigid surfaces, friction.
 //!
 //! Two particles at the distance r = |ζ| < d repel each other along ζ = ξ + η with the force density pair k(d
 //! − r) and d = min(0.9|ξ|, 1.35(r_I + r_J)), radius r = ½(V/thickness)^(1/D), half the distance of
@@ -23,18 +23,20 @@
 //! stays there. Force and energy are finite at full overlap (r = 0: kd along the reference ξ; energy ½kd² V_I
 //! V_J), so larger loads press particles through each other.
 //!
-//! Planes act on faces, see `faces`. Friction is Coulomb's with an elastic slip, see `friction_pair`: equal
-//! and opposite within a pair, but not along it. Particles have no spin, so friction does not conserve
+//! Rigid surfaces act on faces, see `faces`. Friction is Coulomb's with an elastic slip, see `friction_pair`:
+//! equal and opposite within a pair, but not along it. Particles have no spin, so friction does not conserve
 //! angular momentum.
 
 mod faces;
 mod friction;
 mod friction_pair;
 mod list;
-mod plane;
-mod plane_friction;
-mod planes;
+mod pushed_surfaces;
 mod stiffness;
+mod surface;
+mod surface_friction;
+mod surface_reactions;
+mod surfaces;
 mod ties;
 mod vicinity;
 
@@ -46,20 +48,21 @@ pub(crate) use faces::Faces;
 pub use friction::SlidingFriction;
 pub use friction_pair::{ContactPair, Drag, FrictionPair};
 use list::{ContactList, ListedParticle, NearbyParticle};
-pub use plane::{PlaneReaction, RigidPlane};
-use planes::Planes;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 pub use stiffness::Spring;
+pub use surface::{RigidSurface, SurfaceReaction, SurfaceShape};
+use surfaces::RigidSurfaces;
 use ties::Ties;
 pub use ties::{GripInterface, across, grips};
 
 /// κ of Macek & Silling (2007).
 pub const SHORT_RANGE: f64 = 15.0;
-/// Stiffness s of planes in equilibria: at most 2 % of the compliance of a confined body of ten layers.
+/// Stiffness s of rigid surfaces in equilibria: at most 2 % of the compliance of a confined body of ten
+/// layers.
 pub const PLANE_STIFFNESS: f64 = 10.0;
-/// Stiffness s of pairs, and of planes in explicit dynamics.
+/// Stiffness s of pairs, and of rigid surfaces in explicit dynamics.
 pub const PAIR_STIFFNESS: f64 = 2.0;
 /// Largest gap, in spacings, at which two particles count as about to touch.
 const NEAR: f64 = 0.25;
@@ -77,7 +80,7 @@ pub struct Contact<const D: usize> {
     /// Largest gap of particles about to touch, m.
     near: f64,
     list: ContactList<D>,
-    planes: Option<Planes<D>>,
+    surfaces: Option<RigidSurfaces<D>>,
     ties: Option<Ties<D>>,
     /// μ of pairs of particles, and γ, m.
     friction: f64,
@@ -90,11 +93,11 @@ pub struct Contact<const D: usize> {
 /// Pairs, faces and energy in contact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ContactSummary {
-    /// Pairs with r < d, and faces in contact with a plane.
+    /// Pairs with r < d, and faces in contact with a surface.
     pub pairs: u64,
     /// Greatest overlap: 1 − r/d of a pair, overlap over half a spacing of a face; 0 without contact.
     pub overlap: f64,
-    /// Energy of pairs, planes and elastic slip, J.
+    /// Energy of pairs, surfaces and elastic slip, J.
     pub energy: f64,
 }
 
@@ -155,7 +158,7 @@ impl<const D: usize> Contact<D> {
             largest_volume: volumes.fold(0.0, f64::max),
             near,
             list: ContactList::new(bonds, near),
-            planes: None,
+            surfaces: None,
             ties: None,
             friction: 0.0,
             elastic_slip: None,
@@ -164,24 +167,25 @@ impl<const D: usize> Contact<D> {
         })
     }
 
-    /// Adds rigid planes in contact with the faces of `surface`, for a body of the longitudinal modulus M =
+    /// Adds rigid surfaces in contact with the faces of `outside`, for a body of the longitudinal modulus M =
     /// `modulus`, Pa.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a normal without direction and for values that are negative or not finite;
-    /// [`Error::Geometry`] for a bonded plane that touches no face.
-    pub fn with_planes(
+    /// [`Error::Geometry`] for a bonded plane that touches no face, and for a surface with a force that meets
+    /// none.
+    pub fn with_surfaces(
         mut self,
         bonds: &dyn Bonds<D>,
-        surface: &BodySurface<D>,
+        outside: &BodySurface<D>,
         modulus: impl Into<Property>,
-        planes: Vec<RigidPlane<D>>,
+        surfaces: Vec<RigidSurface<D>>,
     ) -> Result<Self, Error> {
-        if !planes.is_empty() {
+        if !surfaces.is_empty() {
             let modulus = modulus.into();
             positive("modulus of contact", modulus.least())?;
             let radius = |site: usize| self.list.radius(site);
-            self.planes = Some(Planes::new(bonds, surface, &modulus, planes, radius)?);
+            self.surfaces = Some(RigidSurfaces::new(bonds, outside, &modulus, surfaces, radius)?);
         }
         Ok(self)
     }
@@ -229,9 +233,9 @@ impl<const D: usize> Contact<D> {
         self
     }
 
-    /// Returns true if pairs, planes or ties exert forces.
+    /// Returns true if pairs, surfaces or ties exert forces.
     pub fn repels(&self) -> bool {
-        self.has_pairs() || self.has_planes() || self.ties.is_some()
+        self.has_pairs() || self.has_surfaces() || self.ties.is_some()
     }
 
     /// Returns true if particles repel each other.
@@ -239,60 +243,84 @@ impl<const D: usize> Contact<D> {
         self.stiffness > 0.0
     }
 
-    /// Returns true if there are planes.
-    pub fn has_planes(&self) -> bool {
-        self.planes.is_some()
+    /// Returns true if there are surfaces.
+    pub fn has_surfaces(&self) -> bool {
+        self.surfaces.is_some()
     }
 
     /// Returns true if a friction coefficient is above 0.
     pub fn has_friction(&self) -> bool {
         (self.has_pairs() && self.friction > 0.0)
-            || self.planes().any(|plane| plane.friction > 0.0 && !plane.bonded)
+            || self.surfaces().any(|surface| surface.friction > 0.0 && !surface.bonded)
     }
 
-    /// Returns true if planes or grips hold faces in all directions.
+    /// Returns true if bonded planes or grips hold faces in all directions.
     pub fn is_tied(&self) -> bool {
-        self.ties.is_some() || self.planes().any(|plane| plane.bonded)
+        self.ties.is_some() || self.surfaces().any(|surface| surface.bonded)
     }
 
-    /// Moves planes to their positions at a load factor and a time, s.
-    pub fn move_planes(&mut self, factor: f64, time: f64) {
-        if let Some(planes) = &mut self.planes {
-            planes.move_to(factor, time);
+    /// Moves rigid surfaces to their positions at a load factor and a time, s.
+    pub fn move_surfaces(&mut self, factor: f64, time: f64) {
+        if let Some(surfaces) = &mut self.surfaces {
+            surfaces.move_to(factor, time);
         }
     }
 
-    /// The planes, in their order.
-    pub fn planes(&self) -> impl Iterator<Item = &RigidPlane<D>> {
-        self.planes.iter().flat_map(Planes::planes)
+    /// The rigid surfaces, in their order.
+    pub fn surfaces(&self) -> impl Iterator<Item = &RigidSurface<D>> {
+        self.surfaces.iter().flat_map(RigidSurfaces::surfaces)
     }
 
-    /// Last move of every plane, m.
+    /// Returns true if a rigid surface has a force.
+    pub fn has_pushed(&self) -> bool {
+        self.surfaces().any(|surface| surface.force.is_some())
+    }
+
+    /// Moves rigid surfaces with a force to where contact balances it at a displacement.
+    pub fn balance(&mut self, displacement: &Field<D>) {
+        if let Some(surfaces) = &mut self.surfaces {
+            surfaces.balance(displacement);
+        }
+    }
+
+    /// Finds a rigid surface whose force contact does not balance: its number, the balanced part and the
+    /// force, N.
+    pub fn unbalanced(&self, displacement: &Field<D>) -> Option<(usize, f64, f64)> {
+        self.surfaces.as_ref()?.unbalanced(displacement)
+    }
+
+    /// Sums P·t of the forces on rigid surfaces at load factor 1 and their travels, N·m.
+    pub fn travelled(&self) -> f64 {
+        self.surfaces.as_ref().map_or(0.0, RigidSurfaces::travelled)
+    }
+
+    /// Last move of every rigid surface, m.
     pub fn moved(&self) -> impl Iterator<Item = [f64; D]> {
-        self.planes.iter().flat_map(Planes::moved)
+        self.surfaces.iter().flat_map(RigidSurfaces::moved)
     }
 
-    /// Deepest overlap of a plane that has moved, m, before its last move and after it; −∞ if none touches.
+    /// Deepest overlap of a rigid surface that has moved, m, before its last move and after it; −∞ if none
+    /// touches.
     pub fn approach(&self, displacement: &Field<D>) -> [f64; 2] {
-        self.planes.as_ref().map_or([f64::NEG_INFINITY; 2], |planes| planes.approach(displacement))
+        self.surfaces.as_ref().map_or([f64::NEG_INFINITY; 2], |surfaces| surfaces.approach(displacement))
     }
 
-    /// Force, area and width of the contact with each plane, without friction.
-    pub fn plane_reactions(&self, displacement: &Field<D>) -> Vec<PlaneReaction> {
-        self.planes.as_ref().map_or_else(Vec::new, |planes| planes.reactions(displacement))
+    /// Force, area and width of the contact with each rigid surface, without friction.
+    pub fn surface_reactions(&self, displacement: &Field<D>) -> Vec<SurfaceReaction> {
+        self.surfaces.as_ref().map_or_else(Vec::new, |surfaces| surfaces.reactions(displacement))
     }
 
-    /// Sum of the squares of the planes' force densities at the last update, (N/m³)².
-    pub fn plane_force_square(&self) -> f64 {
-        self.planes.as_ref().map_or(0.0, Planes::square)
+    /// Sum of the squares of the surfaces' force densities at the last update, (N/m³)².
+    pub fn surface_force_square(&self) -> f64 {
+        self.surfaces.as_ref().map_or(0.0, RigidSurfaces::square)
     }
 
-    /// Force densities of the planes at the last update, N/m³; `None` without planes.
-    pub fn plane_forces(&self, sites: usize) -> Option<Field<D>> {
-        let planes = self.planes.as_ref()?;
+    /// Force densities of the surfaces at the last update, N/m³; `None` without surfaces.
+    pub fn surface_forces(&self, sites: usize) -> Option<Field<D>> {
+        let surfaces = self.surfaces.as_ref()?;
         let mut field = Field::zeros(sites);
         let chunks = field.chunks_mut().into_par_iter().enumerate();
-        chunks.for_each(|(chunk, mut force)| planes.force(chunk * CHUNK, &mut force));
+        chunks.for_each(|(chunk, mut force)| surfaces.force(chunk * CHUNK, &mut force));
         Some(field)
     }
 
@@ -302,13 +330,13 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Prepares the forces of a displacement: rebuilds the list if nearby particles may have moved against
-    /// each other by the skin, and computes the forces of planes.
+    /// each other by the skin, and computes the forces of surfaces.
     pub fn update(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
         if self.has_pairs() {
             self.list.update(bonds, displacement);
         }
-        if let Some(planes) = &mut self.planes {
-            planes.update(displacement, &self.held, self.start.as_ref());
+        if let Some(surfaces) = &mut self.surfaces {
+            surfaces.update(displacement, &self.held, self.start.as_ref());
         }
         if let Some(ties) = &mut self.ties {
             ties.update(displacement);
@@ -320,8 +348,8 @@ impl<const D: usize> Contact<D> {
         if self.has_pairs() {
             self.list.add_broken_pairs(bonds, pairs);
         }
-        if let Some(planes) = &mut self.planes {
-            planes.expose(bonds, pairs.iter().map(|pair| pair[0] as usize));
+        if let Some(surfaces) = &mut self.surfaces {
+            surfaces.expose(bonds, pairs.iter().map(|pair| pair[0] as usize));
         }
     }
 
@@ -329,8 +357,8 @@ impl<const D: usize> Contact<D> {
     /// [`Self::add_broken_pairs`].
     pub fn rebuild(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
         self.list.rebuild(bonds, displacement);
-        if let Some(planes) = &mut self.planes {
-            planes.expose(bonds, bonds.particles().iter().map(|&site| site as usize));
+        if let Some(surfaces) = &mut self.surfaces {
+            surfaces.expose(bonds, bonds.particles().iter().map(|&site| site as usize));
         }
     }
 
@@ -353,7 +381,7 @@ impl<const D: usize> Contact<D> {
         self.has_pairs().then(|| self.list.pairs(bonds, displacement, sites, gap)).into_iter().flatten()
     }
 
-    /// Adds the force densities of pairs, −Σ_J k(d − r) V_J ζ/r, of planes, and of friction between
+    /// Adds the force densities of pairs, −Σ_J k(d − r) V_J ζ/r, of surfaces, and of friction between
     /// equilibria, N/m³, on the particles from the site `start` on, of one work item.
     pub fn force(
         &self,
@@ -362,8 +390,8 @@ impl<const D: usize> Contact<D> {
         start: usize,
         force: &mut [&mut [f64]; D],
     ) {
-        if let Some(planes) = &self.planes {
-            planes.force(start, force);
+        if let Some(surfaces) = &self.surfaces {
+            surfaces.force(start, force);
         }
         if let Some(ties) = &self.ties {
             ties.force(start, force);
@@ -428,8 +456,8 @@ impl<const D: usize> Contact<D> {
             overlap: a.overlap.max(b.overlap),
             energy: a.energy + b.energy,
         });
-        if let Some(planes) = &self.planes {
-            let (count, overlap, energy) = planes.summary(displacement);
+        if let Some(surfaces) = &self.surfaces {
+            let (count, overlap, energy) = surfaces.summary(displacement);
             all.pairs += count;
             all.energy += energy;
             all.overlap = all.overlap.max(overlap);

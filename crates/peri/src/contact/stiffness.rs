@@ -2,7 +2,7 @@
 
 use super::Contact;
 use super::list::{ListedParticle, NearbyParticle};
-use super::planes::Planes;
+use super::surfaces::RigidSurfaces;
 use super::ties::Ties;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field, chunk_range};
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 pub type Spring<'a, const D: usize> = dyn FnMut(&[(usize, f64)], Option<[f64; D]>, f64) + 'a;
 
 impl<const D: usize> Contact<D> {
-    /// Computes max_I Σ_J k V_J over all contacts plus half the stiffness of planes, N/m⁴: twice that over
+    /// Computes max_I Σ_J k V_J over all contacts plus half the stiffness of surfaces, N/m⁴: twice that over
     /// the density bounds the share of contact in the squared greatest frequency.
     pub fn greatest_stiffness(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> f64 {
         let sites = displacement.sites();
@@ -26,22 +26,22 @@ impl<const D: usize> Contact<D> {
             sums.fold(0.0, f64::max)
         };
         let pairs = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of).reduce(|| 0.0, f64::max);
-        pairs + self.half_plane_stiffness()
+        pairs + self.half_surface_stiffness()
     }
 
-    fn half_plane_stiffness(&self) -> f64 {
-        let planes = self.planes.as_ref().map_or(0.0, Planes::stiffness);
-        0.5 * (planes + self.ties.as_ref().map_or(0.0, Ties::greatest))
+    fn half_surface_stiffness(&self) -> f64 {
+        let surfaces = self.surfaces.as_ref().map_or(0.0, RigidSurfaces::stiffness);
+        0.5 * (surfaces + self.ties.as_ref().map_or(0.0, Ties::greatest))
     }
 
-    /// Sums k V of the largest particle and half the stiffness of planes: the least value of
+    /// Sums k V of the largest particle and half the stiffness of surfaces: the least value of
     /// [`Contact::greatest_stiffness`] with any contact, if all particles are alike.
     pub fn pair_stiffness(&self) -> f64 {
-        self.stiffness * self.largest_volume + self.half_plane_stiffness()
+        self.stiffness * self.largest_volume + self.half_surface_stiffness()
     }
 
     /// Adds contacts, present or imminent, to the Gershgorin sums of dynamic relaxation, in units of
-    /// `tangent`: Σ_J k V_J (1 + max_{d≠e} |n_d n_e|), and planes. A particle that became heavy only in
+    /// `tangent`: Σ_J k V_J (1 + max_{d≠e} |n_d n_e|), and surfaces. A particle that became heavy only in
     /// contact would enter another as a light one and leave as a heavy one, and so on indefinitely. A
     /// particle without bonds has twice the sum: it starts each step from rest, see
     /// [`Contact::stop_detached`], and must not go farther than a gradient step.
@@ -91,24 +91,24 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Visits faces in contact with planes or tied: particles below with weights, the normal of a plane
+    /// Visits faces in contact with surfaces or tied: particles below with weights, the normal of one
     /// without friction, the stiffness, N/m.
     pub fn springs(&self, displacement: &Field<D>, visit: &mut Spring<D>) {
         self.near_springs(displacement, 0.0, visit);
     }
 
     fn near_springs(&self, displacement: &Field<D>, gap: f64, visit: &mut Spring<D>) {
-        if let Some(planes) = &self.planes {
-            planes.springs(displacement, gap, visit);
+        if let Some(surfaces) = &self.surfaces {
+            surfaces.springs(displacement, gap, visit);
         }
         if let Some(ties) = &self.ties {
             ties.springs(visit);
         }
     }
 
-    /// Numbers of the faces in contact with planes, plane by plane.
+    /// Numbers of the faces in contact with surfaces, surface by surface.
     pub fn in_touch(&self, displacement: &Field<D>) -> Vec<[u32; 2]> {
-        self.planes.as_ref().map_or_else(Vec::new, |planes| planes.in_touch(displacement))
+        self.surfaces.as_ref().map_or_else(Vec::new, |surfaces| surfaces.in_touch(displacement))
     }
 
     /// Longest step along a direction in which no particle jumps past another: a relative motion of a quarter
@@ -120,7 +120,7 @@ impl<const D: usize> Contact<D> {
         direction: &Field<D>,
     ) -> f64 {
         if !self.has_pairs() {
-            // nothing jumps past a plane
+            // nothing jumps past a surface
             return f64::INFINITY;
         }
         let sites = displacement.sites();

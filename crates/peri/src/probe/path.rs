@@ -1,5 +1,5 @@
-//! Paths of two quantities: swings over time, crossings of positions, the envelope of equilibria that snap
-//! back.
+//! Paths of two quantities: swings over time, crossings of positions, stiffness and loops of loads over
+//! displacements, the envelope of equilibria that snap back.
 
 use std::f64::consts::PI;
 
@@ -41,6 +41,41 @@ pub fn load_at(path: impl IntoIterator<Item = [f64; 2]>, displacement: f64) -> O
         before = here;
     }
     None
+}
+
+/// Secant and tangent stiffness, N/m, at a displacement where a path of displacements and loads that begins
+/// at rest first comes to it: load over displacement, and the slope there of the parabola through the two
+/// points beside and the next one, of second order in their distances.
+pub fn stiffness_at(path: impl IntoIterator<Item = [f64; 2]>, displacement: f64) -> Option<[f64; 2]> {
+    let path: Vec<[f64; 2]> = std::iter::once([0.0; 2]).chain(path).collect();
+    let load = load_at(path.iter().copied(), displacement)?;
+    let end = path.iter().position(|point| point[0] >= displacement * (1.0 - 1e-12)).filter(|&k| k > 0)?;
+    let [a, b] = [path[end - 1], path[end]];
+    let after = path.get(end + 1).filter(|point| point[0] > b[0]);
+    let before = end.checked_sub(2).map(|k| &path[k]).filter(|point| point[0] < a[0]);
+    let slope = |a: [f64; 2], b: [f64; 2]| (b[1] - a[1]) / (b[0] - a[0]);
+    let chord = slope(a, b);
+    let curvature = after.or(before).map_or(0.0, |&c| (slope(b, c) - chord) / (c[0] - a[0]));
+    Some([load / displacement, chord + curvature * (2.0 * displacement - a[0] - b[0])])
+}
+
+/// Work, J, of the last loop of a path of displacements and loads that begins at rest, ∮ F du by the
+/// trapezoidal rule: from the last time that it passed its final displacement. `None` if it never did.
+pub fn loop_energy(path: impl IntoIterator<Item = [f64; 2]>) -> Option<f64> {
+    let path: Vec<[f64; 2]> = std::iter::once([0.0; 2]).chain(path).collect();
+    let end = path.last()?[0];
+    let size = path.iter().map(|point| point[0].abs()).fold(0.0, f64::max);
+    let is_off = |point: &[f64; 2]| (point[0] - end).abs() > 1e-9 * size;
+    // the last point away from the end, and the sign of that way
+    let away = path.iter().rposition(is_off)?;
+    let sign = (path[away][0] - end).signum();
+    let start = path[..away].iter().rposition(|point| (point[0] - end) * sign <= 1e-9 * size)?;
+    let area = |a: [f64; 2], b: [f64; 2]| 0.5 * (a[1] + b[1]) * (b[0] - a[0]);
+    let [a, b] = [path[start], path[start + 1]];
+    let part = ((end - a[0]) / (b[0] - a[0])).clamp(0.0, 1.0);
+    let crossing = [a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])];
+    let rest = path[start + 1..].windows(2).map(|ends| area(ends[0], ends[1]));
+    Some(area(crossing, b) + rest.sum::<f64>())
 }
 
 /// Envelope of equilibria that snap back, as a test machine records it: the greatest load at each
@@ -88,6 +123,36 @@ mod tests {
             envelope(&[[0.0, 0.0], [1.0, 2.0], [2.0, 1.0]]),
             [vec![0.0, 1.0, 2.0], vec![0.0, 2.0, 1.0]]
         );
+    }
+
+    #[test]
+    fn stiffness_of_a_parabola() {
+        // F = 3u + u²: the slope is exact at and between points, at the end and after a turn
+        let load = |u: f64| [u, 3.0 * u + u * u];
+        let path: Vec<[f64; 2]> = [0.5, 1.2, 2.0, 1.0, 0.0].map(load).to_vec();
+        for at in [0.2, 0.5, 0.9, 1.2, 2.0] {
+            let [secant, tangent] = stiffness_at(path.iter().copied(), at).unwrap();
+            let chord = load_at(path.iter().copied(), at).unwrap() / at;
+            assert!((secant - chord).abs() < 1e-12 && (tangent - 3.0 - 2.0 * at).abs() < 1e-12, "{at}");
+        }
+        assert_eq!(stiffness_at(path.iter().copied(), 2.1), None);
+        assert_eq!(stiffness_at([[1.0, 4.0]], 1.0), Some([4.0, 4.0]));
+    }
+
+    #[test]
+    fn loops() {
+        // Coulomb's block of 2 N on a spring of 4 N/m, between 0 and 3 m, from rest and again
+        let first = [[0.5, 2.0], [3.0, 2.0], [2.0, -2.0], [0.0, -2.0]];
+        let again = [[1.0, 2.0], [3.0, 2.0], [2.0, -2.0], [0.0, -2.0]];
+        assert_eq!(loop_energy(first), Some(0.5 + 5.0 + 4.0));
+        assert_eq!(loop_energy(first.into_iter().chain(again)), Some(2.0 * 4.0));
+        // a part of a loop, closed at 1 m
+        let part = [[2.0, 4.0], [1.0, 1.0]];
+        assert_eq!(loop_energy(part), Some(3.0 - 2.5));
+        assert_eq!(loop_energy([[1.0, 2.0], [2.0, 3.0]]), None);
+        assert_eq!(loop_energy([]), None);
+        // no way at all
+        assert_eq!(loop_energy([[0.0, 1.0]]), None);
     }
 
     #[test]

@@ -22,6 +22,13 @@ harness::quantities! {
     DISPLACEMENT_AT_PEAK = "displacement_at_peak", "m", "displacement of the grips at the largest load";
     LOAD_AT = "load_at_{displacement}mm", "N", "with `output.load_at`: load at this displacement, if the run \
         reaches it";
+    SECANT_STIFFNESS_AT = "secant_stiffness_at_{displacement}mm", "N/m", "with `output.stiffness_at`: load \
+        over displacement at this one, if the run reaches it";
+    TANGENT_STIFFNESS_AT = "tangent_stiffness_at_{displacement}mm", "N/m", "with `output.stiffness_at`: \
+        slope of the load over the displacement at this one, of second order in the load steps, if the run \
+        reaches it";
+    LOOP_ENERGY = "loop_energy", "J", "with a `path` or factors of time steps that return: work of the last \
+        loop of the load over the displacement, by the trapezoidal rule; the energy lost in it";
     WORK_OF_LOADS = "work_of_loads", "J", "work of the loads";
     STORED_ENERGY = "stored_energy", "J", "energy in bonds and contact at the end";
     DAMPED_ENERGY = "damped_energy", "J", "work less stored, released, dissipated and friction energy; in \
@@ -72,15 +79,19 @@ harness::quantities! {
     CONTACT_SHARE = "contact_share", "", "with `[contact]`: energy of contact over the stored energy at the \
         end; the load is too low by about this fraction";
     CONTACT_STIFFNESS = "contact_stiffness", "", "with `[contact]`: stiffness s of the first plane, else of \
-        pairs of particles; κ with `short_range`";
+        the first indenter, else of pairs of particles; κ with `short_range`";
     FRICTION_WORK = "friction_work", "J", "with `friction`: energy dissipated by friction";
-    PLANE_FORCE = "{plane}_force_{axis}", "N", "force of a rigid plane on the body along an axis at the end";
-    PLANE_AREA = "{plane}_area", "m²", "undeformed area of the faces of the body that touch a rigid plane at \
-        the end";
-    PLANE_WIDTH = "{plane}_width", "m", "largest extent along a rigid plane of the faces that touch it at \
-        the end; in a plane body the width of contact";
+    PLANE_FORCE = "{plane}_force_{axis}", "N", "force of a rigid plane or an indenter on the body along an \
+        axis at the end";
+    PLANE_AREA = "{plane}_area", "m²", "undeformed area of the faces of the body that touch a rigid plane or \
+        an indenter at the end";
+    PLANE_WIDTH = "{plane}_width", "m", "largest extent along a rigid plane, or across the force of an \
+        indenter, of the faces that touch it at the end; in a plane body the width of contact";
     PLANE_SPREAD = "{plane}_spread", "m", "root mean square distance from the centre of pressure on a rigid \
-        plane at the end, weighted by pressure; half the half-width of a Hertzian strip";
+        plane or an indenter at the end, weighted by pressure; half the half-width of a Hertzian strip, \
+        0.632 of the radius of a Hertzian circle";
+    INDENTER_DISPLACEMENT = "{indenter}_displacement_{axis}", "m", "displacement of an indenter at the end; \
+        with a force from where it first touches the body at rest";
     CRITICAL_TIME_STEP = "critical_time_step", "s", "critical time step 2/ω of the body at the start";
     TIME_STEP = "time_step", "s", "time step at the end";
     KINETIC_ENERGY = "kinetic_energy", "J", "kinetic energy at the end";
@@ -196,6 +207,11 @@ pub const INTEGRALS: [Quantity; 8] = [
 /// Names the load at a displacement, m.
 pub fn load_at(displacement: f64) -> Named {
     LOAD_AT.named(&[&millimetres(displacement)])
+}
+
+/// Names the secant and the tangent stiffness at a displacement, m.
+pub fn stiffness_at(displacement: f64) -> [Named; 2] {
+    [SECANT_STIFFNESS_AT, TANGENT_STIFFNESS_AT].map(|one| one.named(&[&millimetres(displacement)]))
 }
 
 /// Names the load at an opening, m, of a probe.

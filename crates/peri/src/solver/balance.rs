@@ -102,7 +102,7 @@ impl Balance {
             }
             _ => [0.0; D],
         };
-        let rigid = system.repulsion().and_then(|contact| contact.plane_forces(state.displacement.sites()));
+        let rigid = system.repulsion().and_then(|contact| contact.surface_forces(state.displacement.sites()));
         // force, external force, moment (yz, zx, xy), size
         let of = |sites: &[u32]| {
             let mut sums = [0.0; 10];

@@ -340,7 +340,7 @@ impl<const D: usize> LbfgsSolver<D> {
     /// Returns true if a tenth of the faces in contact with planes have changed since the preconditioner was
     /// built.
     fn others_touch(&self, system: &System<D>, state: &State<D>) -> bool {
-        if system.repulsion().is_none_or(|contact| !contact.has_planes()) {
+        if system.repulsion().is_none_or(|contact| !contact.has_surfaces()) {
             return false;
         }
         let now = in_touch(system, state);

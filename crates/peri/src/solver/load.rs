@@ -6,6 +6,7 @@ use super::rigid::RigidRegion;
 use super::rotation::RotatingRegion;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
+use crate::geometry::length;
 use rayon::prelude::*;
 
 /// Prescribed displacement and body force of a region at load factor 1.
@@ -111,7 +112,7 @@ impl<const D: usize> Loads<D> {
     }
 
     /// Relative prescribed displacement at factor 1, m: √Σ_d (max − min)²; for rotating regions the longest
-    /// arc; `rigid` are the displacements of rigid planes.
+    /// arc; `rigid` are the displacements of rigid surfaces.
     pub fn reach(&self, bonds: &dyn BodyGeometry<D>, rigid: &[[f64; D]]) -> f64 {
         let mut turned = vec![false; if self.turned.is_empty() { 0 } else { bonds.sites() }];
         self.turned.iter().flat_map(|region| &region.sites).for_each(|&site| turned[site as usize] = true);
@@ -149,20 +150,21 @@ impl<const D: usize> Loads<D> {
 
     /// Load, N, and its conjugate displacement, m, from [`Loads::conjugates`]: the force conjugate to the
     /// grips' distance `factor` · [`Loads::reach`]; with prescribed forces only, these, and the mean
-    /// displacement of their points along them (of both ends together if they pull at both). `rigid` as in
-    /// [`Loads::reach`].
+    /// displacement of their points along them (of both ends together if they pull at both). Of rigid
+    /// surfaces `rigid` are the displacements, as in [`Loads::reach`], and `pushes` the forces, N.
     pub fn response(
         &self,
         bonds: &dyn BodyGeometry<D>,
         factor: f64,
         (pull, push): (f64, f64),
-        rigid: &[[f64; D]],
+        [rigid, pushes]: [&[[f64; D]]; 2],
     ) -> (f64, f64) {
         let reach = self.reach(bonds, rigid);
         if reach > 0.0 {
             return (pull / reach, factor * reach);
         }
-        let applied = self.applied(bonds).iter().map(|x| x * x).sum::<f64>().sqrt();
+        let mut applied = self.applied(bonds).iter().map(|x| x * x).sum::<f64>().sqrt();
+        pushes.iter().for_each(|&push| applied += length(push));
         if applied > 0.0 { (factor * applied, push / applied) } else { (0.0, 0.0) }
     }
 

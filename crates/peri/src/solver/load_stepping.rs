@@ -150,6 +150,7 @@ fn step_by_step<const D: usize>(
             particles.iter().for_each(|&site| state.velocity.set(site as usize, [0.0; D]));
         }
         system.check_overlaps(state)?;
+        system.refuse_lost(state)?;
         system.end_time_step(state)?;
         record(system, state);
         state.step += 1;
@@ -247,6 +248,9 @@ fn work_of_loads<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
         state.work += system.work_of_curves(state, [before, factor]);
         return;
     }
+    if let Some(contact) = system.contact.as_mut().filter(|contact| contact.has_pushed()) {
+        contact.balance(&state.displacement);
+    }
     let (pull, push) = system.conjugates(state);
     let [old_factor, old_pull, old_push] = state.control.balanced;
     state.work += 0.5 * (pull + old_pull) * (factor - old_factor);
@@ -260,7 +264,7 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     if state.control.round > 1 || state.history.last().map_or(0, |r| r.broken) != state.fracture.broken {
         state.control.past.clear();
     }
-    // planes act at the final displacement
+    // rigid surfaces act at the final displacement
     if let Some(contact) = system.contact.as_mut().filter(|contact| contact.repels()) {
         contact.update(&*system.bonds, &state.displacement);
     }

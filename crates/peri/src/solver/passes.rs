@@ -100,7 +100,7 @@ pub fn force_pass<const D: usize>(
         });
     let (mut sums, observed) = all;
     // planes hold a body, too
-    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.plane_force_square());
+    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.surface_force_square());
     (sums, observed)
 }
 
@@ -156,7 +156,7 @@ pub fn gradient_pass<const D: usize>(
         slope += system.shared_gradient(state, places, direction, gradient, &mut sums);
     }
     // planes hold a body, too
-    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.plane_force_square());
+    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.surface_force_square());
     (sums, observed, slope)
 }
 

@@ -1,7 +1,7 @@
 //! Rows of a run's history, and the status of an iteration.
 
 use super::force_scale::Balance;
-use crate::contact::{ContactSummary, PlaneReaction};
+use crate::contact::{ContactSummary, SurfaceReaction};
 use serde::{Deserialize, Serialize};
 
 /// Row of the history: a load step in equilibrium, or a time of a dynamic solution.
@@ -51,7 +51,7 @@ pub struct StepRecord {
     /// Energy dissipated by friction so far, J.
     pub rubbed: f64,
     /// Contact with each rigid plane.
-    pub resting: Vec<PlaneReaction>,
+    pub resting: Vec<SurfaceReaction>,
     /// Values of [`System::observer`](super::System::observer).
     pub seen: Vec<f64>,
 }

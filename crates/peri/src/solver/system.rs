@@ -6,7 +6,7 @@ use super::load::Loads;
 use super::record::StepRecord;
 use super::state::State;
 use crate::bonds::{Bonds, StretchScan, not_finite};
-use crate::contact::{Contact, ContactSummary, FrictionPair, PlaneReaction, RigidPlane};
+use crate::contact::{Contact, ContactSummary, FrictionPair, RigidSurface, SurfaceReaction};
 use crate::error::Error;
 use crate::field::Field;
 use crate::material::{Material, SolverMaterial};
@@ -109,22 +109,22 @@ impl<'a, const D: usize> System<'a, D> {
         self.material.prepare(&*self.bonds, displacement);
     }
 
-    /// Moves rigid planes to their positions at a load factor and a time, s.
-    pub(super) fn move_planes(&mut self, factor: f64, time: f64) {
+    /// Moves rigid surfaces to their positions at a load factor and a time, s.
+    pub(super) fn move_surfaces(&mut self, factor: f64, time: f64) {
         if let Some(contact) = &mut self.contact {
-            contact.move_planes(factor, time);
+            contact.move_surfaces(factor, time);
         }
     }
 
-    /// Moves rigid planes to the end of a load step, sets the rates of rotating regions there, and starts
+    /// Moves rigid surfaces to the end of a load step, sets the rates of rotating regions there, and starts
     /// friction.
     pub(super) fn begin_step(&mut self, state: &mut State<D>) {
         let before = state.step.checked_sub(1).map_or(0.0, |before| self.factors[before]);
         let after = self.factors[state.step];
         self.set_rates(after, after);
         self.begin_curved_step(state, [before, after]);
-        self.move_planes(before, 0.0);
-        self.move_planes(after, 0.0);
+        self.move_surfaces(before, 0.0);
+        self.move_surfaces(after, 0.0);
         if let Some(start) = &state.contact.start
             && let Some(contact) = self.contact.as_mut().filter(|contact| contact.has_friction())
         {
@@ -171,15 +171,16 @@ impl<'a, const D: usize> System<'a, D> {
         self.contact.as_ref().filter(|contact| contact.has_friction())
     }
 
-    /// Conjugate sums of loads and rigid planes, see [`Loads::conjugates`].
+    /// Conjugate sums of loads and rigid surfaces, see [`Loads::conjugates`].
     pub(super) fn conjugates(&self, state: &State<D>) -> (f64, f64) {
         let (pull, push) = self.loads.conjugates(&*self.bonds, &state.displacement, &state.force);
-        let work = |(plane, resting): (&RigidPlane<D>, &PlaneReaction)| {
-            (0..D).map(|d| plane.displacement[d] * resting.force[d]).sum::<f64>()
+        let work = |(surface, resting): (&RigidSurface<D>, &SurfaceReaction)| {
+            (0..D).map(|d| surface.displacement[d] * resting.force[d]).sum::<f64>()
         };
         let Some(contact) = self.repulsion() else { return (pull, push) };
-        let resting = self.plane_reactions(state);
-        (pull + contact.planes().zip(&resting).map(work).sum::<f64>(), push)
+        let resting = self.surface_reactions(state);
+        let push = if contact.has_pushed() { push + contact.travelled() } else { push };
+        (pull + contact.surfaces().zip(&resting).map(work).sum::<f64>(), push)
     }
 
     /// Load and displacement, see [`Loads::response`] and [`Self::curved_response`].
@@ -187,33 +188,34 @@ impl<'a, const D: usize> System<'a, D> {
         if self.loads.curved.is_some() {
             return self.curved_response(state, factor);
         }
-        let planes = self.contact.iter().flat_map(Contact::planes);
-        let rigid: Vec<[f64; D]> = planes.map(|plane| plane.displacement).collect();
-        self.loads.response(&*self.bonds, factor, conjugates, &rigid)
+        let surfaces = || self.contact.iter().flat_map(Contact::surfaces);
+        let rigid: Vec<[f64; D]> = surfaces().map(|surface| surface.displacement).collect();
+        let pushes: Vec<[f64; D]> = surfaces().filter_map(|surface| surface.force).collect();
+        self.loads.response(&*self.bonds, factor, conjugates, [&rigid, &pushes])
     }
 
-    /// Contact of the body with each rigid plane, including friction.
-    pub(super) fn plane_reactions(&self, state: &State<D>) -> Vec<PlaneReaction> {
+    /// Contact of the body with each rigid surface, including friction.
+    pub(super) fn surface_reactions(&self, state: &State<D>) -> Vec<SurfaceReaction> {
         let Some(contact) = self.repulsion() else { return Vec::new() };
-        let mut resting = contact.plane_reactions(&state.displacement);
+        let mut resting = contact.surface_reactions(&state.displacement);
         for (resting, rub) in resting.iter_mut().zip(&state.contact.plane_friction) {
             (0..3).for_each(|d| resting.force[d] += rub[d]);
         }
         resting
     }
 
-    /// Refuses a state with particles behind a plane, or halfway through each other.
+    /// Refuses a state with particles behind a rigid surface, or halfway through each other.
     ///
     /// # Errors
     /// [`Error::Penetration`] with the overlap.
     pub(super) fn check_overlaps(&self, state: &State<D>) -> Result<(), Error> {
         let Some(contact) = self.repulsion() else { return Ok(()) };
         let allowed = 0.5 * self.bonds.spacing();
-        let resting = contact.plane_reactions(&state.displacement);
-        let planes = contact.planes().zip(resting).enumerate();
-        for (number, (plane, resting)) in planes.filter(|(_, (plane, _))| !plane.bonded) {
-            if resting.gap < -allowed && plane.stiffness > 0.0 {
-                let what = format!("the body and plane {}", number + 1);
+        let resting = contact.surface_reactions(&state.displacement);
+        let surfaces = contact.surfaces().zip(resting).enumerate();
+        for (number, (surface, resting)) in surfaces.filter(|(_, (surface, _))| !surface.bonded) {
+            if resting.gap < -allowed && surface.stiffness > 0.0 {
+                let what = format!("the body and {} {}", surface.kind(), number + 1);
                 let (step, time, overlap) = (state.step, state.motion.time, -resting.gap);
                 return Err(Error::Penetration { what, step, time, overlap, allowed });
             }
@@ -324,7 +326,7 @@ impl<'a, const D: usize> System<'a, D> {
             kinetic: state.motion.energies.kinetic,
             damped: state.motion.energies.damped,
             rubbed: state.motion.energies.rubbed,
-            resting: self.plane_reactions(state),
+            resting: self.surface_reactions(state),
             seen: self.seen(state),
         }
     }

@@ -12,6 +12,7 @@ use super::load::Loads;
 use super::state::State;
 use super::system::System;
 use crate::bonds::{BodyGeometry, components};
+use crate::contact::RigidSurface;
 use crate::error::Error;
 use crate::field::Field;
 use polycore::numerics::DisjointSets;
@@ -57,7 +58,7 @@ impl fmt::Display for Unsupported {
 /// Contacts that may hold a part besides supports, by pushing.
 #[derive(Clone, Debug, Default)]
 pub struct ContactStops<const D: usize> {
-    /// Normals of rigid planes, towards the body.
+    /// Directions in which rigid surfaces push.
     pub normals: Vec<[f64; D]>,
     /// True if particles repel each other.
     pub pairs: bool,
@@ -180,7 +181,7 @@ fn join_pieces<const D: usize>(
 impl<const D: usize> System<'_, D> {
     fn stops(&self) -> ContactStops<D> {
         let Some(contact) = self.repulsion() else { return ContactStops::default() };
-        let normals = contact.planes().map(|plane| plane.normal).collect();
+        let normals = contact.surfaces().flat_map(RigidSurface::pushes).collect();
         ContactStops {
             normals,
             pairs: contact.has_pairs(),
@@ -209,6 +210,23 @@ impl<const D: usize> System<'_, D> {
         let (bonds, moved, stops) = (&*self.bonds, Some(&state.displacement), self.stops());
         match find_unsupported(bonds, &roots, &self.loads, moved, &stops, tolerance) {
             Some(part) => Err(self.no_equilibrium(state, part.to_string())),
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses a state in which a rigid surface with a force has lost the body.
+    ///
+    /// # Errors
+    /// [`Error::NoEquilibrium`] for such a surface.
+    pub(super) fn refuse_lost(&self, state: &State<D>) -> Result<(), Error> {
+        match self.repulsion().and_then(|contact| contact.unbalanced(&state.displacement)) {
+            Some((number, found, wanted)) => Err(self.no_equilibrium(
+                state,
+                format!(
+                    "rigid surface {} has a force of {wanted:.3e} N, of which contact balances {found:.3e} N",
+                    number + 1
+                ),
+            )),
             None => Ok(()),
         }
     }

@@ -12,7 +12,7 @@ use super::record::Status;
 use super::state::State;
 use super::system::System;
 use super::time_step::{critical, largest_frequency_squared};
-use super::verlet_friction::{friction_pass, plane_pass};
+use super::verlet_friction::{friction_pass, surface_pass};
 use super::verlet_step::{
     VerletStep, VerletSums, force_pass, kick_pass, leap_pass, refresh, stored, volumes,
 };
@@ -143,7 +143,7 @@ impl VelocityVerlet {
         system.contact.iter_mut().for_each(Contact::end_friction);
         if state.motion.begun {
             let factor = self.factor(system, state.motion.time).0;
-            system.move_planes(factor, state.motion.time);
+            system.move_surfaces(factor, state.motion.time);
             system.restore(state)?;
             system.set_forces(factor, &state.displacement);
             system.contact.iter_mut().for_each(|contact| contact.resume_friction(&state.contact.grips));
@@ -192,7 +192,7 @@ impl VelocityVerlet {
         volumes: &[f64],
     ) -> Result<(), Error> {
         let (factor, rate) = self.factor(system, 0.0);
-        system.move_planes(factor, 0.0);
+        system.move_surfaces(factor, 0.0);
         system.set_rates(factor, factor);
         system.set_forces(factor, &state.displacement);
         (state.contact.friction, state.contact.start) = (None, None);
@@ -248,7 +248,7 @@ impl VelocityVerlet {
         self.cover(system, state);
         let rest = VerletStep { step: 0.0, density: self.density, damping: 0.0, factors: [factor; 2], rate };
         friction_pass(system, state, volumes, &rest, None);
-        plane_pass(system, state, &[]);
+        surface_pass(system, state, &[]);
         self.break_overstretched(system, state, observed, factor);
         Ok(())
     }
@@ -322,7 +322,7 @@ impl VelocityVerlet {
             // two ends, √D components
             let strain = 2.0 * (D as f64).sqrt() * first.increment / state.motion.limits.bonds.shortest;
             state.motion.look.slack = slack + strain;
-            system.move_planes(factor, after);
+            system.move_surfaces(factor, after);
             system.set_duration(state, step)?;
             system.prepare(&state.displacement);
             let Some((displacement, velocity)) = &start else { break (after, leap, first) };
@@ -333,7 +333,7 @@ impl VelocityVerlet {
             // a step whose end requires a shorter one is undone
             state.displacement.clone_from(displacement);
             state.velocity.clone_from(velocity);
-            system.move_planes(before, state.motion.time);
+            system.move_surfaces(before, state.motion.time);
             state.motion.plan(end);
         };
         let factor = leap.factors[1];
@@ -362,7 +362,7 @@ impl VelocityVerlet {
             system.level_forces(state);
             second = kick_pass(&system.loads, state, volumes, &leap);
         }
-        plane_pass(system, state, &rubbing);
+        surface_pass(system, state, &rubbing);
         let motion = &mut state.motion;
         motion.time = after;
         motion.steps.taken += 1;

@@ -1,4 +1,4 @@
-//! Friction and rigid planes in a step of velocity Verlet.
+//! Friction and rigid surfaces in a step of velocity Verlet.
 //!
 //! Friction reads the half-step velocities of both sides, so it has a pass of its own between the forces and
 //! the second half of the kick: no work item changes a velocity that another one reads. Its work is Σ ½(force
@@ -7,6 +7,7 @@
 use super::state::State;
 use super::system::System;
 use super::verlet_step::{FieldPair, VerletStep};
+use crate::contact::RigidSurface;
 use crate::field::{Field, chunk_range};
 use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
@@ -53,32 +54,32 @@ pub fn friction_pass<const D: usize>(
     };
     let items = friction.chunks_mut().into_par_iter().zip(state.force.chunks_mut()).enumerate();
     let mut taken = -ordered_sum(items.map(of));
-    // the drag of planes is work, not heat
-    taken += work_of_planes(contact.moved(), &state.contact.plane_friction, &sliding.planes);
+    // the drag of surfaces is work, not heat
+    taken += work_of_surfaces(contact.moved(), &state.contact.plane_friction, &sliding.surfaces);
     if leap.step > 0.0 {
         state.motion.energies.rubbed += taken - (sliding.stored - state.motion.energies.stuck);
     } else {
         state.work += sliding.stored;
     }
     state.motion.energies.stuck = sliding.stored;
-    (state.contact.friction, state.contact.plane_friction) = (Some(friction), sliding.planes);
+    (state.contact.friction, state.contact.plane_friction) = (Some(friction), sliding.surfaces);
 }
 
-/// Adds the work of planes that have moved; `rubbed` is their friction before this step.
-pub fn plane_pass<const D: usize>(system: &System<D>, state: &mut State<D>, rubbed: &[[f64; 3]]) {
+/// Adds the work of surfaces that have moved; `rubbed` is their friction before this step.
+pub fn surface_pass<const D: usize>(system: &System<D>, state: &mut State<D>, rubbed: &[[f64; 3]]) {
     let Some(contact) = system.repulsion() else { return };
-    if contact.planes().all(|plane| plane.displacement == [0.0; D] && plane.velocity == [0.0; D]) {
+    if !contact.surfaces().any(RigidSurface::moves) {
         return;
     }
-    let resting = contact.plane_reactions(&state.displacement);
-    let pushing: Vec<[f64; 3]> = resting.iter().map(|plane| plane.force).collect();
-    state.work += work_of_planes(contact.moved(), &state.contact.plane_push, &pushing)
-        + work_of_planes(contact.moved(), rubbed, &state.contact.plane_friction);
+    let resting = contact.surface_reactions(&state.displacement);
+    let pushing: Vec<[f64; 3]> = resting.iter().map(|resting| resting.force).collect();
+    state.work += work_of_surfaces(contact.moved(), &state.contact.plane_push, &pushing)
+        + work_of_surfaces(contact.moved(), rubbed, &state.contact.plane_friction);
     state.contact.plane_push = pushing;
 }
 
 /// Σ ½(force before + force after)·Δ; zero before the first step.
-fn work_of_planes<const D: usize>(
+fn work_of_surfaces<const D: usize>(
     moved: impl Iterator<Item = [f64; D]>,
     before: &[[f64; 3]],
     after: &[[f64; 3]],

@@ -4,7 +4,7 @@ use crate::bodies::{Body, MODULUS, Random, Slit, norm};
 use crate::dynamics::DENSITY;
 use peri::Error;
 use peri::bonds::{BodyGeometry, Bonds, CloudBonds, VolumeCorrection};
-use peri::contact::{Contact, RigidPlane, SHORT_RANGE};
+use peri::contact::{Contact, RigidSurface, SHORT_RANGE, SurfaceShape};
 use peri::field::{CHUNK, Field};
 use peri::material::BondMaterial;
 use peri::potential::Law;
@@ -14,9 +14,9 @@ use peri::surface::BodySurface;
 const G: f64 = 9.81;
 
 /// Builds the contact of a body with planes, with M = 1 Pa.
-pub fn beside(bonds: &dyn Bonds<2>, pairs: f64, planes: Vec<RigidPlane<2>>) -> Contact<2> {
+pub fn beside(bonds: &dyn Bonds<2>, pairs: f64, planes: Vec<RigidSurface<2>>) -> Contact<2> {
     let contact = Contact::short_range(bonds, MODULUS, pairs).unwrap();
-    contact.with_planes(bonds, &BodySurface::default(), 1.0, planes).unwrap()
+    contact.with_surfaces(bonds, &BodySurface::default(), 1.0, planes).unwrap()
 }
 
 /// Runs explicit dynamics with linear bonds.
@@ -59,11 +59,11 @@ impl Incline {
         let site = one.particles()[0] as usize;
         let place = one.position(site);
         let point = std::array::from_fn(|d| place[d] - 0.5 * normal[d]);
-        let plane = RigidPlane {
+        let plane = RigidSurface {
             stiffness: PENALTY,
             friction: self.mu,
             velocity: along.map(|x| x * self.belt),
-            ..RigidPlane::new(point, normal.map(|x| 7.0 * x))
+            ..RigidSurface::plane(point, normal.map(|x| 7.0 * x))
         };
         let contact = beside(&one, 0.0, vec![plane]);
         let (pull, push) = (G * self.theta.sin(), G * self.theta.cos());
@@ -157,8 +157,8 @@ fn plane_hits_a_particle() {
     for moves in [false, true] {
         // by its own velocity, or with the load factor, over 1 s
         let (velocity, displacement) = if moves { ([0.5, 0.0], [0.0; 2]) } else { ([0.0; 2], [0.5, 0.0]) };
-        let plane = RigidPlane { velocity, displacement, ..RigidPlane::new([-0.1, 0.0], [1.0, 0.0]) };
-        let contact = beside(&one, 0.0, vec![RigidPlane { stiffness: 2e3, ..plane }]);
+        let plane = RigidSurface { velocity, displacement, ..RigidSurface::plane([-0.1, 0.0], [1.0, 0.0]) };
+        let contact = beside(&one, 0.0, vec![RigidSurface { stiffness: 2e3, ..plane }]);
         let mut state = State::new(one.sites());
         let solver = VelocityVerlet {
             time_step: Some(1e-4),
@@ -279,11 +279,11 @@ fn neither_threads_nor_restarts_change_a_bit() {
             let mut built = body.build();
             let bonds = &mut built.lattice;
             let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
-            let plane = RigidPlane {
+            let plane = RigidSurface {
                 friction: friction.unwrap_or(0.0),
                 velocity: [0.5, 0.1],
                 stiffness: 30.0,
-                ..RigidPlane::new([0.0; 2], [0.0, 1.0])
+                ..RigidSurface::plane([0.0; 2], [0.0, 1.0])
             };
             let mut contact = beside(bonds, SHORT_RANGE, vec![plane]);
             if let Some(friction) = friction {
@@ -335,26 +335,29 @@ fn neither_threads_nor_restarts_change_a_bit() {
 fn refuses() {
     let one = Body::<2>::solid([1, 1], 1.0, 3.015).build().lattice;
     let contact = || Contact::short_range(&one, MODULUS, SHORT_RANGE).unwrap();
-    let good = RigidPlane::new([0.0; 2], [0.0, 1.0]);
-    let fault = |plane: RigidPlane<2>| {
-        let planes = contact().with_planes(&one, &BodySurface::default(), 1.0, vec![plane]);
+    let good = RigidSurface::plane([0.0; 2], [0.0, 1.0]);
+    let fault = |plane: RigidSurface<2>| {
+        let planes = contact().with_surfaces(&one, &BodySurface::default(), 1.0, vec![plane]);
         planes.err().map(|error| error.to_string())
     };
     assert_eq!(fault(good), None);
     for (plane, what) in [
-        (RigidPlane { normal: [0.0; 2], ..good }, "normal of a plane: found 0"),
-        (RigidPlane { normal: [f64::NAN, 1.0], ..good }, "normal of a plane: found NaN"),
-        (RigidPlane { stiffness: -1.0, ..good }, "stiffness of a plane: found -1"),
-        (RigidPlane { friction: f64::INFINITY, ..good }, "friction of a plane: found inf"),
-        (RigidPlane { velocity: [f64::NAN; 2], ..good }, "velocity of a plane: found NaN"),
-        (RigidPlane { elastic_slip: Some(0.0), ..good }, "elastic slip of a plane: found 0"),
+        (RigidSurface { shape: SurfaceShape::Plane([0.0; 2]), ..good }, "normal of a plane: found 0"),
+        (
+            RigidSurface { shape: SurfaceShape::Plane([f64::NAN, 1.0]), ..good },
+            "normal of a plane: found NaN",
+        ),
+        (RigidSurface { stiffness: -1.0, ..good }, "stiffness of a rigid surface: found -1"),
+        (RigidSurface { friction: f64::INFINITY, ..good }, "friction of a rigid surface: found inf"),
+        (RigidSurface { velocity: [f64::NAN; 2], ..good }, "velocity of a rigid surface: found NaN"),
+        (RigidSurface { elastic_slip: Some(0.0), ..good }, "elastic slip of a rigid surface: found 0"),
     ] {
         assert!(fault(plane).unwrap().starts_with(what), "{what}");
     }
     assert!(contact().with_friction(-0.1, None).is_err() && contact().with_friction(0.1, Some(0.0)).is_err());
-    let slack = contact().with_planes(&one, &BodySurface::default(), 0.0, vec![good]).err().unwrap();
+    let slack = contact().with_surfaces(&one, &BodySurface::default(), 0.0, vec![good]).err().unwrap();
     assert!(slack.to_string().starts_with("modulus of contact: found 0"), "{slack}");
-    let far = RigidPlane { bonded: true, ..RigidPlane::new([0.0, -3.0], [0.0, 1.0]) };
+    let far = RigidSurface { bonded: true, ..RigidSurface::plane([0.0, -3.0], [0.0, 1.0]) };
     assert!(fault(far).unwrap().contains("no face of the body within half a spacing"));
 }
 
@@ -363,7 +366,7 @@ fn refuses() {
 fn plane_through_a_body() {
     let mut built = Body::<2>::solid([12, 12], 1.0, 3.015).build();
     let bonds = &mut built.lattice;
-    let plane = RigidPlane { friction: 0.5, stiffness: 5.0, ..RigidPlane::new([0.0, 6.0], [0.0, 1.0]) };
+    let plane = RigidSurface { friction: 0.5, stiffness: 5.0, ..RigidSurface::plane([0.0, 6.0], [0.0, 1.0]) };
     let contact = beside(bonds, SHORT_RANGE, vec![plane]).with_friction(0.5, None).unwrap();
     let mut state = State::new(bonds.sites());
     let solver = VelocityVerlet { records: 5, ..VelocityVerlet::new(DENSITY, 20.0) };

@@ -5,7 +5,7 @@ use crate::bodies::{Body, MODULUS, Slit, hold};
 use crate::friction::beside;
 use peri::Error;
 use peri::bonds::{BodyGeometry, Bonds};
-use peri::contact::{Contact, RigidPlane, SHORT_RANGE};
+use peri::contact::{Contact, RigidSurface, SHORT_RANGE};
 use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{DynamicRelaxation, Lbfgs, Loads, Method, State, System};
@@ -51,11 +51,11 @@ fn belt_in_equilibrium() {
         let bonds = &mut built.lattice;
         let loads = hold(bonds, |_| Some((3, [0.0; 2])));
         let (mu, stiffness, deep) = (0.5, 40.0, 0.1);
-        let belt = RigidPlane {
+        let belt = RigidSurface {
             friction: mu,
             stiffness,
             displacement: [0.2, 0.0],
-            ..RigidPlane::new([0.0, deep], [0.0, 1.0])
+            ..RigidSurface::plane([0.0, deep], [0.0, 1.0])
         };
         let contact = beside(bonds, 0.0, vec![belt]);
         let factors: Vec<f64> = (1..=steps).map(|step| f64::from(step) / f64::from(steps)).collect();
@@ -92,7 +92,7 @@ fn strip_pulled_forth_and_back() {
         // a penalty ten times the bonds', and μN = 1/n of the unit for each particle
         let (mu, stiffness) = (0.5, 60.0 * MODULUS);
         let deep = unit / count as f64 / (mu * stiffness);
-        let floor = RigidPlane { friction: mu, stiffness, ..RigidPlane::new([0.0, deep], [0.0, 1.0]) };
+        let floor = RigidSurface { friction: mu, stiffness, ..RigidSurface::plane([0.0, deep], [0.0, 1.0]) };
         let contact = beside(bonds, 0.0, vec![floor]);
         let factors: Vec<f64> =
             leg(0.0, 1.0, steps).chain(leg(1.0, -1.0, 2 * steps)).chain(leg(-1.0, 1.0, 2 * steps)).collect();
@@ -123,7 +123,8 @@ fn spring_over_a_plane() {
             let mut built = Body::<2>::solid([2, 1], 1.0, 1.015).build();
             let bonds = &mut built.lattice;
             let loads = hold(bonds, |x| Some(if x[0] < 1.0 { (3, [far, 0.0]) } else { (2, [0.0; 2]) }));
-            let plane = RigidPlane { friction: mu, stiffness, ..RigidPlane::new([0.0, deep], [0.0, 1.0]) };
+            let plane =
+                RigidSurface { friction: mu, stiffness, ..RigidSurface::plane([0.0, deep], [0.0, 1.0]) };
             let contact = beside(bonds, 0.0, vec![plane]);
             let (state, _) = equilibria(method, bonds, &loads, contact, &factors[..last], None).unwrap();
             let (mut pulled, mut before) = (0.0_f64, 0.0);
@@ -158,7 +159,7 @@ fn row_on_a_plane() {
             let loads = hold(bonds, |x| (x[1] > 4.0).then_some((3, [0.0, top])));
             let law = Law::Linear.build(1.0, 1.0, false).unwrap();
             let displacement = if by_plane { [0.0, 0.2] } else { [0.0; 2] };
-            let plane = RigidPlane { stiffness, displacement, ..RigidPlane::new([0.0; 2], [0.0, 2.0]) };
+            let plane = RigidSurface { stiffness, displacement, ..RigidSurface::plane([0.0; 2], [0.0, 2.0]) };
             let contact = beside(bonds, 0.0, vec![plane]);
             let factors = [0.25, 0.5, 1.0];
             let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), &loads, &factors);
@@ -209,7 +210,7 @@ fn dragged_over_a_plane() {
             let bonds = &mut built.lattice;
             let loads = hold(bonds, |x| (x[1] > 6.0).then_some((3, [2.0, -0.6])));
             let plane =
-                RigidPlane { friction: 0.1, stiffness: 30.0, ..RigidPlane::new([0.0; 2], [0.0, 1.0]) };
+                RigidSurface { friction: 0.1, stiffness: 30.0, ..RigidSurface::plane([0.0; 2], [0.0, 1.0]) };
             let contact = beside(bonds, SHORT_RANGE, vec![plane]).with_friction(0.4, None).unwrap();
             let factors = [0.25, 0.5, 0.75, 1.0];
             equilibria(method, bonds, &loads, contact, &factors, from).unwrap()

@@ -20,6 +20,7 @@ mod friction_equilibria;
 mod hardy;
 mod homogeneous;
 mod impact;
+mod indenters;
 mod lammps;
 mod lbfgs;
 mod learnt;

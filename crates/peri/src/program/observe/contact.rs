@@ -1,10 +1,10 @@
-//! Scalars of contact, friction and rigid planes; warnings where contact is soft or never begins.
+//! Scalars of contact, friction and rigid surfaces; warnings where contact is soft or never begins.
 
 use super::moment::Moment;
 use super::values::axes;
-use crate::contact::PlaneReaction;
+use crate::contact::SurfaceReaction;
 use crate::program::quantities as q;
-use crate::program::scene::{ContactSpec, Scene};
+use crate::program::scene::{ContactSpec, PlaneSpec, Scene};
 use harness::observe::Scalars;
 
 /// Energy of contact over the stored energy above which a run warns.
@@ -14,10 +14,13 @@ const ADVISED_SHARE: f64 = 0.01;
 /// Stored energy over work below which a body is undeformed.
 const UNDEFORMED: f64 = 1e-12;
 
-/// Returns the stiffness of the first plane, else of pairs of particles.
+/// Returns the stiffness of the first plane, else of the first indenter, else of pairs of particles.
 fn contact_stiffness(contact: &ContactSpec, scene: &Scene) -> f64 {
-    let of_plane = contact.plane.first().map(|plane| contact.stiffness_of(plane, scene.dynamics.is_some()));
-    of_plane.or(contact.short_range).unwrap_or(contact.pair_stiffness())
+    let own = contact.plane.first().map(|plane| plane.stiffness);
+    let own = own.or(contact.indenter.first().map(|indenter| indenter.stiffness));
+    own.map(|own| contact.stiffness_of(own, scene.dynamics.is_some()))
+        .or(contact.short_range)
+        .unwrap_or(contact.pair_stiffness())
 }
 
 /// Returns the largest overlap of all steps.
@@ -33,7 +36,7 @@ fn contact_share<const D: usize>(m: &Moment<D>) -> Option<f64> {
     Some(if at_rest || last.stored <= 0.0 { 0.0 } else { touching.energy / last.stored })
 }
 
-/// Adds energies, contacts, overlaps and forces of planes.
+/// Adds energies, contacts, overlaps and forces of planes and indenters.
 pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
     let Some(contact) = &scene.contact else { return };
     let touching = |m: &Moment<D>| m.state.history.last()?.contact;
@@ -45,13 +48,15 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
     if contact.has_friction() {
         to.add_if(q::FRICTION_WORK, |m| m.state.history.last().map(|last| last.rubbed));
     }
-    for (index, plane) in contact.plane.iter().enumerate() {
-        let name = plane.name(index);
+    for (index, name) in contact.surface_names().into_iter().enumerate() {
         let resting = move |m: &Moment<D>| m.state.history.last()?.resting.get(index).copied();
         for (d, axis) in axes(scene).iter().enumerate() {
             to.add_if(q::PLANE_FORCE.named(&[&name, axis]), |m| Some(resting(m)?.force[d]));
         }
-        let sizes: [fn(PlaneReaction) -> f64; 3] = [|one| one.area, |one| one.spread, |one| one.width];
+        for (d, axis) in axes(scene).iter().enumerate().filter(|_| index >= contact.plane.len()) {
+            to.add_if(q::INDENTER_DISPLACEMENT.named(&[&name, axis]), |m| Some(resting(m)?.moved[d]));
+        }
+        let sizes: [fn(SurfaceReaction) -> f64; 3] = [|one| one.area, |one| one.spread, |one| one.width];
         for (quantity, get) in [q::PLANE_AREA, q::PLANE_SPREAD, q::PLANE_WIDTH].iter().zip(sizes) {
             to.add_if(quantity.named(&[&name]), |m| resting(m).map(get));
         }
@@ -82,13 +87,17 @@ pub(super) fn warnings<const D: usize>(m: &Moment<D>) -> Vec<String> {
             ));
         }
     }
-    for (index, plane) in contact.plane.iter().enumerate().filter(|(_, plane)| !plane.bonded) {
+    let rests = |plane: &PlaneSpec| {
+        let wanted = plane.displacement.is_some() || plane.friction.is_some_and(|mu| mu > 0.0);
+        ("plane", wanted && !plane.bonded)
+    };
+    let planes = contact.plane.iter().map(rests);
+    let each = planes.chain(contact.indenter.iter().map(|own| ("indenter", own.is_driven())));
+    for ((index, (kind, wanted)), name) in each.enumerate().zip(contact.surface_names()) {
         let gaps = m.state.history.iter().filter_map(|row| row.resting.get(index)).map(|resting| resting.gap);
         let least = gaps.fold(f64::INFINITY, f64::min);
-        let wanted = plane.displacement.is_some() || plane.friction.is_some_and(|mu| mu > 0.0);
         if least > 0.0 && wanted {
-            let name = plane.name(index);
-            warnings.push(format!("plane `{name}` touched nothing: the smallest gap was {least:.3e} m"));
+            warnings.push(format!("{kind} `{name}` touched nothing: the smallest gap was {least:.3e} m"));
         }
     }
     warnings

@@ -1,7 +1,7 @@
 //! Scalars of the history: peak load, first break, energies, balances.
 
 use super::moment::Moment;
-use crate::probe::load_at;
+use crate::probe::{load_at, loop_energy, stiffness_at};
 use crate::program::quantities as q;
 use crate::program::scene::{Scene, SolidLaw};
 use crate::solver::{Balance, StepRecord};
@@ -42,6 +42,19 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
         let path =
             |m: &Moment<D>| load_at(m.state.history.iter().map(|row| [row.displacement, row.load]), at);
         to.add_if(q::load_at(at), path);
+    }
+    for at in scene.output.stiffness_at.iter().map(|at| at.si()) {
+        let stiffness = move |m: &Moment<D>| {
+            stiffness_at(m.state.history.iter().map(|row| [row.displacement, row.load]), at)
+        };
+        let [secant, tangent] = q::stiffness_at(at);
+        to.add_if(secant, move |m| Some(stiffness(m)?[0]));
+        to.add_if(tangent, move |m| Some(stiffness(m)?[1]));
+    }
+    if scene.returns() {
+        to.add_if(q::LOOP_ENERGY, |m| {
+            loop_energy(m.state.history.iter().map(|row| [row.displacement, row.load]))
+        });
     }
     if breaks {
         breaking_scalars(dynamic, to);

@@ -106,7 +106,7 @@ impl<const D: usize> BodyWithMaterial<D> {
             other => source.error("material.critical", other, "a critical stretch"),
         };
         if let Some(solid) = &spec.solid {
-            let law = solid.build::<D>(source, space, scene.is_beside_planes(), scene.driving())?;
+            let law = solid.build::<D>(source, space, scene.is_beside_surfaces(), scene.driving())?;
             let limit = |critical: Critical| critical.solid_criterion(&*law, &*body.bonds);
             let across = |rest: Property| {
                 let least = |critical, _| limit(critical).map(|own| own.least());

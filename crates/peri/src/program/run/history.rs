@@ -58,17 +58,23 @@ impl VariantOutcome {
         if self.history.iter().any(|r| r.rubbed != 0.0) {
             columns.push(("friction_work".to_owned(), "J".to_owned(), each(&|r| r.rubbed)));
         }
-        for (index, plane) in self.planes.iter().enumerate() {
+        for (index, surface) in self.surfaces.iter().enumerate() {
             let resting = |r: &StepRecord| r.resting.get(index).copied().unwrap_or_default();
             for (d, axis) in ["x", "y", "z"].iter().enumerate() {
                 let values = each(&|r| resting(r).force[d]);
                 if values.iter().any(|&v| v != 0.0) {
-                    columns.push((format!("force_{axis} {plane}"), "N".to_owned(), values));
+                    columns.push((format!("force_{axis} {surface}"), "N".to_owned(), values));
                 }
             }
-            columns.push((format!("area {plane}"), "m²".to_owned(), each(&|r| resting(r).area)));
-            columns.push((format!("spread {plane}"), "m".to_owned(), each(&|r| resting(r).spread)));
-            columns.push((format!("width {plane}"), "m".to_owned(), each(&|r| resting(r).width)));
+            for (d, axis) in ["x", "y", "z"].iter().enumerate().filter(|_| index >= self.planes) {
+                let values = each(&|r| resting(r).moved[d]);
+                if values.iter().any(|&v| v != 0.0) {
+                    columns.push((format!("displacement_{axis} {surface}"), "m".to_owned(), values));
+                }
+            }
+            columns.push((format!("area {surface}"), "m²".to_owned(), each(&|r| resting(r).area)));
+            columns.push((format!("spread {surface}"), "m".to_owned(), each(&|r| resting(r).spread)));
+            columns.push((format!("width {surface}"), "m".to_owned(), each(&|r| resting(r).width)));
         }
         let touching: Vec<_> = self.history.iter().filter_map(|r| r.contact).collect();
         if !touching.is_empty() {

@@ -19,7 +19,7 @@ use crate::error::Error;
 use crate::field::Field;
 use crate::program::observe::{self, FieldFrames, Moment, Physics, SceneObservers, in_space};
 use crate::program::quantities as q;
-use crate::program::scene::{self, NAMING, Scene, SceneVariant};
+use crate::program::scene::{self, ContactSpec, NAMING, Scene, SceneVariant};
 use crate::solver::{Breaking, State, Status, StepRecord, System, load_stepping};
 use harness::case::{Fault, Run, Step, StepField};
 use harness::observe::{Outputs, Scalars};
@@ -233,8 +233,8 @@ fn run_variant<const D: usize>(
     outcome.history.clone_from(&state.history);
     outcome.events.clone_from(&state.fracture.events);
     outcome.fragments = moment.fragments().to_vec();
-    let planes = scene.contact.iter().flat_map(|contact| contact.plane.iter().enumerate());
-    outcome.planes = planes.map(|(index, plane)| plane.name(index)).collect();
+    outcome.planes = scene.contact.as_ref().map_or(0, |contact| contact.plane.len());
+    outcome.surfaces = scene.contact.as_ref().map_or_else(Vec::new, ContactSpec::surface_names);
     outcome.probes = observe::columns(scene);
     outcome.record_seconds(&phases.borrow());
     frames.finish(&observers, &moment)?;
@@ -281,13 +281,13 @@ fn solve<const D: usize>(
     let mut watch = |status: &Status, state: &State<D>| variant_run.watch(status, state);
     let contact = match &scene.contact {
         Some(contact) => {
-            let planes = contact.planes(source, scene.dynamics.is_some()).map_err(PeriFailure::from)?;
+            let surfaces = contact.surfaces(source, scene.dynamics.is_some()).map_err(PeriFailure::from)?;
             let whole = material.longitudinal_modulus(&*body.bonds);
             let modulus =
                 Property::new(&*body.bonds, |site, _| whole * physics.body.stiffness.value_at(site));
             let held = physics.held.as_deref();
             let tied = held.map(|held| (held, contact.tie_stiffness(scene.dynamics.is_some())));
-            Some(contact.contact(planes, body, material.micromodulus(&*body.bonds), &modulus, tied)?)
+            Some(contact.contact(surfaces, body, material.micromodulus(&*body.bonds), &modulus, tied)?)
         }
         None => None,
     };

@@ -35,8 +35,10 @@ pub struct VariantOutcome {
     pub snaps_back: bool,
     /// Names of the regions of prescribed displacement.
     pub regions: Vec<String>,
-    /// Names of rigid planes.
-    pub planes: Vec<String>,
+    /// Names of rigid surfaces: planes, then indenters.
+    pub surfaces: Vec<String>,
+    /// Number of planes.
+    pub planes: usize,
     /// Columns of probes, with units.
     pub probes: Vec<(String, String)>,
     /// Warnings.
@@ -86,7 +88,8 @@ impl VariantOutcome {
             dynamic: variant.scene.at_end().dynamics.is_some(),
             snaps_back: false,
             regions: Vec::new(),
-            planes: Vec::new(),
+            surfaces: Vec::new(),
+            planes: 0,
             probes: Vec::new(),
             warnings: Vec::new(),
             description: None,

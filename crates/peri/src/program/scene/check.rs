@@ -177,8 +177,10 @@ fn device(source: &Source, dynamics: &Dynamics) -> Result<(), SceneError> {
 }
 
 fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
-    for (index, at) in scene.output.load_at.iter().enumerate() {
-        positive(source, &format!("output.load_at[{index}]"), at.si(), "m")?;
+    for (key, list) in [("load_at", &scene.output.load_at), ("stiffness_at", &scene.output.stiffness_at)] {
+        for (index, at) in list.iter().enumerate() {
+            positive(source, &format!("output.{key}[{index}]"), at.si(), "m")?;
+        }
     }
     if scene.output.every == Some(0) {
         return Err(source.error("output.every", 0, "at least 1 step"));

@@ -1,11 +1,12 @@
-//! Contact settings of a scene: between particles, and with rigid planes.
+//! Contact settings of a scene: between particles, and with rigid surfaces.
 
+use super::IndenterSpec;
 use super::line::plane_of;
 use super::values::{DiscreteBody, plain, vector};
 use super::{Scene, SolverMethod};
 use crate::bonds::{Bonds, Property};
 use crate::calibrate::Space;
-use crate::contact::{Contact, GripInterface, PAIR_STIFFNESS, PLANE_STIFFNESS, RigidPlane, grips};
+use crate::contact::{Contact, GripInterface, PAIR_STIFFNESS, PLANE_STIFFNESS, RigidSurface, grips};
 use crate::error::Error;
 use crate::solver::Loads;
 use harness::scene::{SceneError, Source, check_name};
@@ -27,7 +28,7 @@ pub struct ContactSpec {
     /// Stiffness κ of a contact of particles over that of a bond as long as the horizon, instead of
     /// `stiffness`; 15 in the literature.
     pub short_range: Option<f64>,
-    /// Coefficient of Coulomb friction μ between particles, and of planes without `friction`.
+    /// Coefficient of Coulomb friction μ between particles, and of planes and indenters without `friction`.
     pub friction: f64,
     /// Elastic slip γ of sticking contacts at the force at which they begin to slide; default: the slip at
     /// which tangential and normal stiffness are equal.
@@ -36,10 +37,13 @@ pub struct ContactSpec {
     /// Ignored; kept for older scenes. Sticking friction holds by its elastic slip.
     pub slip_velocity: Option<Speed>,
     /// Holds regions of prescribed displacement at the surface of a solid instead of by bonds across it,
-    /// which are as compliant as a layer of the body. Default: true beside planes, unless bonds break.
+    /// which are as compliant as a layer of the body. Default: true beside planes and indenters, unless bonds
+    /// break.
     pub tied_grips: Option<bool>,
     /// Rigid planes.
     pub plane: Vec<PlaneSpec>,
+    /// Rigid spheres, cylinders and planes, by displacement or by force.
+    pub indenter: Vec<IndenterSpec>,
 }
 
 /// A rigid plane (a line in a plane body) that the body cannot pass.
@@ -73,17 +77,39 @@ impl PlaneSpec {
 }
 
 impl Scene {
-    /// Returns true for a lattice beside rigid planes.
-    pub fn is_beside_planes(&self) -> bool {
-        self.body.points.is_none() && self.contact.as_ref().is_some_and(|contact| !contact.plane.is_empty())
+    /// Returns true for a lattice beside rigid surfaces.
+    pub fn is_beside_surfaces(&self) -> bool {
+        self.body.points.is_none() && self.contact.as_ref().is_some_and(ContactSpec::has_surfaces)
     }
 }
 
 impl ContactSpec {
-    /// Returns the stiffness s of ties: that of the stiffest plane.
+    /// Returns true if it has rigid planes or indenters.
+    pub fn has_surfaces(&self) -> bool {
+        !self.plane.is_empty() || !self.indenter.is_empty()
+    }
+
+    /// Returns the names of all rigid surfaces: planes, then indenters.
+    pub fn surface_names(&self) -> Vec<String> {
+        let planes = self.plane.iter().enumerate().map(|(index, plane)| plane.name(index));
+        planes.chain(self.indenter.iter().enumerate().map(|(index, own)| own.name(index))).collect()
+    }
+
+    /// Returns the key of the first displacement of a rigid surface.
+    pub(super) fn displaced(&self) -> Option<String> {
+        let plane = self.plane.iter().position(|plane| plane.displacement.is_some());
+        let indenter = self.indenter.iter().position(|indenter| indenter.displacement.is_some());
+        plane
+            .map(|index| format!("contact.plane[{index}].displacement"))
+            .or(indenter.map(|index| format!("contact.indenter[{index}].displacement")))
+    }
+
+    /// Returns the stiffness s of ties: that of the stiffest rigid surface.
     pub fn tie_stiffness(&self, explicit: bool) -> f64 {
-        let planes = self.plane.iter().map(|plane| self.stiffness_of(plane, explicit));
-        planes.fold(if explicit { PAIR_STIFFNESS } else { PLANE_STIFFNESS }, f64::max)
+        let own = self.plane.iter().map(|plane| plane.stiffness);
+        let own = own.chain(self.indenter.iter().map(|indenter| indenter.stiffness));
+        own.map(|own| self.stiffness_of(own, explicit))
+            .fold(if explicit { PAIR_STIFFNESS } else { PLANE_STIFFNESS }, f64::max)
     }
 
     /// Returns the stiffness s of pairs of particles.
@@ -96,21 +122,22 @@ impl ContactSpec {
         self.short_range.unwrap_or(self.pair_stiffness()) > 0.0
     }
 
-    /// Returns the stiffness s of a plane.
-    pub fn stiffness_of(&self, plane: &PlaneSpec, explicit: bool) -> f64 {
-        let own = if explicit { PAIR_STIFFNESS } else { PLANE_STIFFNESS };
-        plane.stiffness.or(self.stiffness.filter(|&s| s > 0.0)).unwrap_or(own)
+    /// Returns the stiffness s of a rigid surface with or without its `own`.
+    pub fn stiffness_of(&self, own: Option<f64>, explicit: bool) -> f64 {
+        let default = if explicit { PAIR_STIFFNESS } else { PLANE_STIFFNESS };
+        own.or(self.stiffness.filter(|&s| s > 0.0)).unwrap_or(default)
     }
 
-    /// Returns the coefficient of friction of a plane.
-    fn friction_of(&self, plane: &PlaneSpec) -> f64 {
-        plane.friction.unwrap_or(self.friction)
+    /// Returns the coefficient of friction of a rigid surface with or without its `own`.
+    pub(super) fn friction_of(&self, own: Option<f64>) -> f64 {
+        own.unwrap_or(self.friction)
     }
 
     /// Returns true if any coefficient of friction is above 0.
     pub fn has_friction(&self) -> bool {
         (self.friction > 0.0 && self.has_pairs())
-            || self.plane.iter().any(|plane| self.friction_of(plane) > 0.0 && !plane.bonded)
+            || self.plane.iter().any(|plane| self.friction_of(plane.friction) > 0.0 && !plane.bonded)
+            || self.indenter.iter().any(|indenter| self.friction_of(indenter.friction) > 0.0)
     }
 
     /// Converts a plane.
@@ -123,55 +150,48 @@ impl ContactSpec {
         key: &str,
         spec: &PlaneSpec,
         explicit: bool,
-    ) -> Result<RigidPlane<D>, SceneError> {
+    ) -> Result<RigidSurface<D>, SceneError> {
         let (point, normal) = plane_of(source, key, &spec.point, &spec.normal)?;
-        let none = [0.0; D];
-        let displacement = spec.displacement.as_ref();
-        let displacement =
-            displacement.map_or(Ok(none), |v| vector(source, &format!("{key}.displacement"), v))?;
-        let velocity = match &spec.velocity {
-            None => none,
-            Some(given) => {
-                let values: Vec<f64> = given.iter().map(|v| v.si()).collect();
-                <[f64; D]>::try_from(values.as_slice()).map_err(|_| {
-                    let found = format!("{} components", values.len());
-                    source.error(&format!("{key}.velocity"), found, format!("{D} components"))
-                })?
-            }
-        };
-        Ok(RigidPlane {
-            point,
-            normal,
-            stiffness: self.stiffness_of(spec, explicit),
-            friction: self.friction_of(spec),
+        let (displacement, velocity) =
+            motion(source, key, spec.displacement.as_deref(), spec.velocity.as_deref())?;
+        Ok(RigidSurface {
+            stiffness: self.stiffness_of(spec.stiffness, explicit),
+            friction: self.friction_of(spec.friction),
             elastic_slip: self.elastic_slip.map(|slip| slip.si()),
             bonded: spec.bonded,
             displacement,
             velocity,
+            ..RigidSurface::plane(point, normal)
         })
     }
 
-    /// Converts all planes; `explicit` selects the default stiffness of explicit dynamics.
+    /// Converts all planes, then all indenters; `explicit` selects the default stiffness of explicit
+    /// dynamics.
     ///
     /// # Errors
     /// As [`super::check`].
-    pub fn planes<const D: usize>(
+    pub fn surfaces<const D: usize>(
         &self,
         source: &Source,
         explicit: bool,
-    ) -> Result<Vec<RigidPlane<D>>, SceneError> {
-        let each = self.plane.iter().enumerate();
-        each.map(|(index, plane)| self.plane_in(source, &format!("contact.plane[{index}]"), plane, explicit))
-            .collect()
+    ) -> Result<Vec<RigidSurface<D>>, SceneError> {
+        let planes = self.plane.iter().enumerate();
+        let planes = planes
+            .map(|(index, plane)| self.plane_in(source, &format!("contact.plane[{index}]"), plane, explicit));
+        let indenters = self.indenter.iter().enumerate();
+        let indenters = indenters.map(|(index, indenter)| {
+            indenter.surface(source, &format!("contact.indenter[{index}]"), self, explicit)
+        });
+        planes.chain(indenters).collect()
     }
 
     /// Builds the contact of a body with bond modulus kθ = `micromodulus` and longitudinal modulus `modulus`.
     ///
     /// # Errors
-    /// As [`Contact::with_planes`]; none after [`super::check`].
+    /// As [`Contact::with_surfaces`]; none after [`super::check`].
     pub fn contact<const D: usize>(
         &self,
-        planes: Vec<RigidPlane<D>>,
+        surfaces: Vec<RigidSurface<D>>,
         body: &DiscreteBody<D>,
         micromodulus: f64,
         modulus: &Property,
@@ -185,11 +205,11 @@ impl ContactSpec {
         let contact = contact.with_friction(self.friction, self.elastic_slip.map(|slip| slip.si()))?;
         let outside = body.surface();
         let (Some((held, stiffness)), Some(lattice)) = (tied, bonds.as_lattice()) else {
-            return contact.with_planes(bonds, &outside, modulus.clone(), planes);
+            return contact.with_surfaces(bonds, &outside, modulus.clone(), surfaces);
         };
         let interface = GripInterface::new(lattice, held);
         let surface = outside.clone().bounded_by(&interface.surface);
-        contact.with_planes(bonds, &surface, modulus.clone(), planes)?.with_tied(
+        contact.with_surfaces(bonds, &surface, modulus.clone(), surfaces)?.with_tied(
             lattice,
             interface,
             &outside,
@@ -197,6 +217,28 @@ impl ContactSpec {
             stiffness,
         )
     }
+}
+
+/// Converts the displacement at load factor 1, m, and the velocity, m/s, of a rigid surface; zero by default.
+///
+/// # Errors
+/// As [`super::check`].
+pub(super) fn motion<const D: usize>(
+    source: &Source,
+    key: &str,
+    displacement: Option<&[Length]>,
+    velocity: Option<&[Speed]>,
+) -> Result<([f64; D], [f64; D]), SceneError> {
+    let none = [0.0; D];
+    let displacement =
+        displacement.map_or(Ok(none), |v| vector(source, &format!("{key}.displacement"), v))?;
+    let Some(given) = velocity else { return Ok((displacement, none)) };
+    let values: Vec<f64> = given.iter().map(|v| v.si()).collect();
+    let velocity = <[f64; D]>::try_from(values.as_slice()).map_err(|_| {
+        let found = format!("{} components", values.len());
+        source.error(&format!("{key}.velocity"), found, format!("{D} components"))
+    })?;
+    Ok((displacement, velocity))
 }
 
 /// Returns the particles of grips that are tied at their surface, by site; `None` without any.
@@ -215,7 +257,7 @@ pub fn tied_grips<const D: usize>(
         let allowed = "false: only solids (`[material.solid]`) on a lattice have faces to tie";
         return Err(source.error("contact.tied_grips", "true", allowed));
     }
-    let default = can && !contact.plane.is_empty() && !scene.breaks();
+    let default = can && contact.has_surfaces() && !scene.breaks();
     let Some(lattice) = bonds.as_lattice().filter(|_| contact.tied_grips.unwrap_or(default)) else {
         return Ok(None);
     };
@@ -246,15 +288,29 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         return Err(source.conflict("contact.short_range", "stiffness", why));
     }
     rough("contact.friction", contact.friction)?;
+    let names = contact.surface_names();
+    for (number, name) in names.iter().enumerate() {
+        let indenter = number.checked_sub(contact.plane.len());
+        let (key, own, friction) = match indenter {
+            None => {
+                let plane = &contact.plane[number];
+                (format!("contact.plane[{number}]"), plane.stiffness, plane.friction)
+            }
+            Some(index) => {
+                let indenter = &contact.indenter[index];
+                (format!("contact.indenter[{index}]"), indenter.stiffness, indenter.friction)
+            }
+        };
+        stiff(&format!("{key}.stiffness"), contact.stiffness_of(own, explicit))?;
+        rough(&format!("{key}.friction"), contact.friction_of(friction))?;
+        check_name(source, &format!("{key}.name"), name)?;
+        if names[..number].contains(name) {
+            let found = format!("`{name}` twice");
+            return Err(source.error(&format!("{key}.name"), found, "different names"));
+        }
+    }
     for (index, plane) in contact.plane.iter().enumerate() {
         let key = |name: &str| format!("contact.plane[{index}].{name}");
-        stiff(&key("stiffness"), contact.stiffness_of(plane, explicit))?;
-        rough(&key("friction"), contact.friction_of(plane))?;
-        let name = plane.name(index);
-        check_name(source, &key("name"), &name)?;
-        if contact.plane[..index].iter().enumerate().any(|(other, plane)| plane.name(other) == name) {
-            return Err(source.error(&key("name"), format!("`{name}` twice"), "different names"));
-        }
         if plane.velocity.is_some() && !explicit {
             let why = format!(
                 "needs `solver.method = \"verlet\"`; with `{}` write `displacement`",
@@ -264,10 +320,11 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         }
     }
     if scene.body.space == Space::Solid {
-        contact.planes::<3>(source, explicit)?;
+        contact.surfaces::<3>(source, explicit)?;
     } else {
-        contact.planes::<2>(source, explicit)?;
+        contact.surfaces::<2>(source, explicit)?;
     }
+    super::indenter::check(source, scene, contact)?;
     match contact.elastic_slip {
         Some(slip) => super::values::positive(source, "contact.elastic_slip", slip.si(), "m"),
         None => Ok(()),

@@ -3,7 +3,7 @@
 use super::curve_spec::{CurveList, CurveSpec, CurveTable};
 use super::formula::Formula;
 use super::values::plain;
-use super::{BodyForceSpec, Boundary, Prescribed, Scene};
+use super::{BodyForceSpec, Boundary, ContactSpec, Prescribed, Scene};
 use crate::field::Field;
 use crate::solver::{Amplitude, CurvedLoads, CurvedRegion, LoadCurve, Loads, Support, ramped};
 use harness::scene::{SceneError, Source};
@@ -376,14 +376,12 @@ pub(super) fn follow<const D: usize>(
 pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let mut boundaries = scene.boundary.iter().enumerate();
     let of_boundary = boundaries.find_map(|(index, own)| Some(format!("boundary[{index}].{}", own.timed()?)));
-    let planes = scene.contact.iter().flat_map(|contact| &contact.plane);
     let runs = of_boundary.is_some() || scene.time.is_some() || scene.dynamics.is_some();
-    if let Some(index) = planes.clone().position(|plane| plane.displacement.is_some())
+    if let Some(key) = scene.contact.as_ref().and_then(ContactSpec::displaced)
         && scene.has_curves()
         && runs
     {
-        let why = "the plane moves with the load factor, which runs with curves do not have";
-        let key = format!("contact.plane[{index}].displacement");
+        let why = "it moves with the load factor, which runs with curves do not have";
         let pressed = scene.boundary.iter().any(|own| own.pressure.is_some());
         let other = match &of_boundary {
             Some(_) => "boundary.curve",

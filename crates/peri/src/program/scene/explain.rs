@@ -113,6 +113,9 @@ pub fn explain<const D: usize>(
         if !contact.plane.is_empty() {
             builds(format!("{} rigid planes, faces of the body", contact.plane.len()));
         }
+        if !contact.indenter.is_empty() {
+            builds(format!("{} indenters, faces of the body", contact.indenter.len()));
+        }
         if contact.has_friction() {
             builds("friction: a pass over contacts in each step".to_owned());
         }

@@ -5,6 +5,7 @@ use super::region::region;
 use super::values::{DiscreteBody, ONE_OF_THEM};
 use super::{Boundary, ContactSpec, Prescribed, PrescribedField, Scene, Side, SolverMethod};
 use crate::bonds::components;
+use crate::contact::RigidSurface;
 use crate::field::Field;
 use crate::material::{BodyTensor, surface_load};
 use crate::solver::{
@@ -247,14 +248,13 @@ fn refuse_unbalanced<const D: usize>(
     roots: &[u32],
     loads: &Loads<D>,
 ) -> Result<(), SceneError> {
-    let planes =
-        scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes::<D>(source, false))?;
-    let normals = planes.iter().map(|plane| plane.normal).collect();
+    let surfaces = scene.contact.as_ref().map_or(Ok(Vec::new()), |own| own.surfaces::<D>(source, false))?;
+    let normals = surfaces.iter().flat_map(RigidSurface::pushes).collect();
     let stops = ContactStops {
         normals,
         pairs: scene.contact.is_some(),
         rubs: scene.contact.as_ref().is_some_and(ContactSpec::has_friction)
-            || planes.iter().any(|plane| plane.bonded),
+            || surfaces.iter().any(|surface| surface.bonded),
     };
     let Some(part) = find_unsupported(&*body.bonds, roots, loads, None, &stops, scene.tolerance()) else {
         return Ok(());

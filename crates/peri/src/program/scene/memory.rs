@@ -63,7 +63,7 @@ fn bytes_of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> 
     }
     if let Some(contact) = &scene.contact {
         each += CONTACT;
-        if !contact.plane.is_empty() {
+        if contact.has_surfaces() {
             // radii, volumes, bonds; faces of the sides of a cube, each over a column of two horizons
             let side = 2.0 * D as f64 * sites.powf(-1.0 / D as f64);
             each += 20.0 + side.min(1.0) * FACE * if D == 2 { 1.0 } else { 4.0 };

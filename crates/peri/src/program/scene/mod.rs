@@ -17,6 +17,7 @@ mod followed;
 mod formula;
 mod grips;
 mod inclusion;
+mod indenter;
 mod interface;
 mod line;
 mod loads;
@@ -54,6 +55,7 @@ pub use followed::{ParameterField, followed};
 pub use formula::Formula;
 pub use grips::free_lengths;
 pub use inclusion::{Inclusion, Inclusions};
+pub use indenter::IndenterSpec;
 pub use interface::{InterfaceSpec, limits_of_bonds};
 pub use line::{LineField, SectionSpec, line_fields};
 pub use loads::{loads_of, order_regions, region_names, velocities_of};
@@ -118,7 +120,7 @@ pub struct Scene {
     /// True for the scene of a later step, see [`Scene::stage`].
     #[serde(skip)]
     pub later: bool,
-    /// Repulsion of particles without a bond, friction, rigid planes; default: none.
+    /// Repulsion of particles without a bond, friction, rigid planes and indenters; default: none.
     pub contact: Option<ContactSpec>,
     /// Quantities recorded in every row of the history.
     #[serde(default)]
@@ -425,6 +427,8 @@ pub struct OutputFiles {
     pub flags: bool,
     /// Displacements at which the report has the load, as `load_at_20mm`.
     pub load_at: Vec<Length>,
+    /// Displacements at which the report has the stiffness, as `secant_stiffness_at_2mm`.
+    pub stiffness_at: Vec<Length>,
     /// Adds the integrals of Appendix A over the horizon, by quadrature, to the report.
     pub integrals: bool,
     /// Reference for the variants.
@@ -445,6 +449,7 @@ impl Default for OutputFiles {
             solid: None,
             flags: false,
             load_at: Vec::new(),
+            stiffness_at: Vec::new(),
             integrals: false,
             compare: None,
             line: Vec::new(),

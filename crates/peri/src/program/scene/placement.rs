@@ -22,18 +22,19 @@ pub fn check_placement<const D: usize>(
     }
     plate_frame(source, scene, body)?;
     super::planes::check(source, scene, body)?;
-    let planes = scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes(source, false))?;
-    let rigid: Vec<[f64; D]> = planes.iter().map(|plane| plane.displacement).collect();
+    super::indenter::check_placed(source, scene, body)?;
+    let surfaces = scene.contact.as_ref().map_or(Ok(Vec::new()), |own| own.surfaces(source, false))?;
+    let rigid: Vec<[f64; D]> = surfaces.iter().map(|surface| surface.displacement).collect();
     let reach = loads.reach(&*body.bonds, &rigid);
     // the displacement under forces is unknown before the run
     let beyond = |at: f64| reach > 0.0 && at > reach * (1.0 + 1e-9);
-    match scene.output.load_at.iter().position(|at| beyond(at.si())) {
-        Some(index) => {
-            let found = format!("{} m, beyond the last displacement", scene.output.load_at[index].si());
-            Err(source.error(&format!("output.load_at[{index}]"), found, format!("up to {reach} m")))
+    for (key, list) in [("load_at", &scene.output.load_at), ("stiffness_at", &scene.output.stiffness_at)] {
+        if let Some(index) = list.iter().position(|at| beyond(at.si())) {
+            let found = format!("{} m, beyond the last displacement", list[index].si());
+            return Err(source.error(&format!("output.{key}[{index}]"), found, format!("up to {reach} m")));
         }
-        None => Ok(()),
     }
+    Ok(())
 }
 
 /// Returns half the edges of the plate of `[exact]` and the width of its loaded layers, m; `None` for other

@@ -2,7 +2,7 @@
 
 use super::values::DiscreteBody;
 use super::{Scene, SolverMethod};
-use crate::contact::RigidPlane;
+use crate::contact::{RigidSurface, SurfaceShape};
 use harness::scene::{SceneError, Source};
 use polycore::numerics::range;
 
@@ -20,7 +20,10 @@ const MOMENTS: u32 = 100;
 /// Plane of a scene with a unit normal, and the range of the particles' heights above it, m.
 struct PlanePosition<const D: usize> {
     name: String,
-    plane: RigidPlane<D>,
+    /// Key of the scene.
+    key: String,
+    plane: RigidSurface<D>,
+    normal: [f64; D],
     low: f64,
     high: f64,
     /// Height of the lowest point of the surface above the plane, m.
@@ -30,7 +33,8 @@ struct PlanePosition<const D: usize> {
 impl<const D: usize> PlanePosition<D> {
     /// Returns the displacement of the plane along its normal, m, at a load factor and a time, s.
     fn displacement(&self, factor: f64, time: f64) -> f64 {
-        let RigidPlane { normal, displacement, velocity, .. } = self.plane;
+        let RigidSurface { displacement, velocity, .. } = self.plane;
+        let normal = self.normal;
         (0..D).map(|d| normal[d] * (factor * displacement[d] + time * velocity[d])).sum()
     }
 }
@@ -42,19 +46,26 @@ fn plane_positions<const D: usize>(
     body: &DiscreteBody<D>,
 ) -> Result<Vec<PlanePosition<D>>, SceneError> {
     let Some(contact) = &scene.contact else { return Ok(Vec::new()) };
-    let planes = contact.planes::<D>(source, scene.method() == SolverMethod::Verlet)?;
-    let surface = body.surface();
-    let each = planes.into_iter().enumerate().map(|(index, mut plane)| {
-        let size = crate::geometry::length(plane.normal);
-        plane.normal = plane.normal.map(|n| n / size);
+    let surfaces = contact.surfaces::<D>(source, scene.method() == SolverMethod::Verlet)?;
+    let outside = body.surface();
+    let names = contact.surface_names();
+    let each = surfaces.into_iter().zip(names).enumerate().filter_map(|(number, (mut plane, name))| {
+        let SurfaceShape::Plane(normal) = plane.shape else { return None };
+        let size = crate::geometry::length(normal);
+        let normal = normal.map(|n| n / size);
+        plane.shape = SurfaceShape::Plane(normal);
+        let key = match number.checked_sub(contact.plane.len()) {
+            None => format!("contact.plane[{number}]"),
+            Some(index) => format!("contact.indenter[{index}]"),
+        };
         let heights =
             body.bonds.particles().iter().map(|&site| plane.height(body.bonds.position(site as usize)));
         let [low, high] = range(heights);
-        let faces = surface.faces().iter().map(|face| plane.height(face.place));
+        let faces = outside.faces().iter().map(|face| plane.height(face.place));
         let lowest = faces.fold(f64::INFINITY, f64::min);
         let of_particles = low - 0.5 * body.bonds.spacing();
         let lowest = if lowest.is_finite() { lowest } else { of_particles };
-        PlanePosition { name: contact.plane[index].name(index), plane, low, high, surface: lowest }
+        Some(PlanePosition { name, key, plane, normal, low, high, surface: lowest })
     });
     Ok(each.collect())
 }
@@ -84,7 +95,7 @@ pub(super) fn check<const D: usize>(
     let (planes, spacing) = (plane_positions(source, scene, body)?, body.bonds.spacing());
     let particles = body.bonds.particles();
     for (index, own) in planes.iter().enumerate() {
-        let key = format!("contact.plane[{index}]");
+        let key = &own.key;
         // the surface of a particle lies half a spacing from its centre
         let allowed = 1e-6 * spacing;
         if own.low < -allowed {
@@ -94,8 +105,7 @@ pub(super) fn check<const D: usize>(
                 .count();
             let found = format!("{behind} of {} particles behind plane `{}`", particles.len(), own.name);
             let advice = if own.high < allowed {
-                let opposite =
-                    own.plane.normal.map(|n| super::plain(if n == 0.0 { 0.0 } else { -n })).join(", ");
+                let opposite = own.normal.map(|n| super::plain(if n == 0.0 { 0.0 } else { -n })).join(", ");
                 format!("a normal towards the body: [{opposite}]")
             } else {
                 "a plane with the whole body in front of it; `normal` points towards the body".to_owned()
@@ -114,8 +124,8 @@ pub(super) fn check<const D: usize>(
             let allowed = "false: a cloud of points has no faces to tie";
             return Err(source.error(&format!("{key}.bonded"), "true", allowed));
         }
-        for (other_index, other) in planes.iter().enumerate().skip(index + 1) {
-            let turn: f64 = (0..D).map(|d| own.plane.normal[d] * other.plane.normal[d]).sum();
+        for other in planes.iter().skip(index + 1) {
+            let turn: f64 = (0..D).map(|d| own.normal[d] * other.normal[d]).sum();
             if turn > FACING {
                 continue;
             }
@@ -136,7 +146,7 @@ pub(super) fn check<const D: usize>(
                     );
                     let allowed =
                         format!("at least {:.3e} m, a fifth of the body", LEAST_ROOM * body_between);
-                    let key = format!("contact.plane[{other_index}].displacement");
+                    let key = format!("{}.displacement", other.key);
                     return Err(source.error(&key, found, allowed));
                 }
             }
@@ -168,8 +178,8 @@ fn has_room<const D: usize>(
     // n·x − t ≥ h of planes and of a box ten times the body
     let mut rows: Vec<([f64; D], f64)> = Vec::new();
     for position in planes {
-        let at: f64 = (0..D).map(|d| position.plane.normal[d] * position.plane.point[d]).sum();
-        rows.push((position.plane.normal, at + position.displacement(factor, time)));
+        let at: f64 = (0..D).map(|d| position.normal[d] * position.plane.point[d]).sum();
+        rows.push((position.normal, at + position.displacement(factor, time)));
     }
     if rows.len() < 2 {
         return true;
@@ -222,7 +232,7 @@ pub(super) fn warnings<const D: usize>(
                 position.name, -gap
             ));
         }
-        let moves = position.plane.displacement != [0.0; D] || position.plane.velocity != [0.0; D];
+        let moves = position.plane.moves();
         let reach = moments(scene).into_iter().map(|(f, t)| position.displacement(f, t)).fold(0.0, f64::max);
         let far = reach < gap - PRESTRESSED * spacing && !position.plane.bonded;
         (moves && far && scene.dynamics.is_none()).then(|| {

@@ -30,8 +30,8 @@ pub struct SolidLaw {
     /// Links of a chain, of `eight-chain`.
     pub links: Option<f64>,
     /// Averages J of the volumetric energy over nearest neighbours, for `eight-chain` on a lattice, solid or
-    /// plane strain. Default: true beside rigid planes if the bulk modulus is at least 50 times the shear
-    /// modulus.
+    /// plane strain. Default: true beside rigid planes and indenters if the bulk modulus is at least 50 times
+    /// the shear modulus.
     pub pressure_filter: Option<bool>,
     /// Constitutive law of `correspondence`.
     pub constitutive: Option<ConstitutiveSpec>,
@@ -257,7 +257,7 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         }
         check_limit(source, "material.critical", critical)?;
     }
-    let planes = scene.is_beside_planes();
+    let planes = scene.is_beside_surfaces();
     if solid.pressure_filter == Some(true) && scene.body.points.is_some() {
         let allowed = "false: points of a cloud have no nearest neighbours";
         return Err(source.error(&format!("{KEY}.pressure_filter"), "true", allowed));

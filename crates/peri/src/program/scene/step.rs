@@ -101,9 +101,9 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         return Ok(());
     }
     if let Some(contact) = &scene.contact
-        && (contact.has_friction() || !contact.plane.is_empty())
+        && (contact.has_friction() || contact.has_surfaces())
     {
-        let why = "friction and rigid planes are not carried over to the next step";
+        let why = "friction and rigid surfaces are not carried over to the next step";
         return Err(source.conflict("contact", "step", why));
     }
     for index in 0..=scene.step.len() {

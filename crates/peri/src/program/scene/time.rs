@@ -84,6 +84,14 @@ impl Scene {
         (factors, times)
     }
 
+    /// Returns true for load factors that turn back.
+    pub(crate) fn returns(&self) -> bool {
+        let factors = self.programme().0;
+        let steps = std::iter::once(0.0).chain(factors.iter().copied()).zip(&factors);
+        let signs: Vec<bool> = steps.filter(|(a, b)| a != *b).map(|(a, b)| *b > a).collect();
+        self.dynamics.is_none() && signs.windows(2).any(|pair| pair[0] != pair[1])
+    }
+
     /// Returns the number of load steps.
     pub fn step_count(&self) -> usize {
         match &self.time {

@@ -1,11 +1,11 @@
-//! Friction of faces and particles on rigid planes.
+//! Friction of faces and particles on rigid surfaces.
 
 use super::friction_pair::{ContactPair, FrictionPair};
-use super::planes::Planes;
+use super::surfaces::RigidSurfaces;
 use crate::field::Field;
 
-impl<const D: usize> Planes<D> {
-    /// Motion of a face or particle against a plane since `start`, m.
+impl<const D: usize> RigidSurfaces<D> {
+    /// Motion of a face or particle against a surface since `start`, m.
     pub fn slipped(&self, pair: ContactPair, field: &Field<D>, start: &Field<D>) -> [f64; 3] {
         let Some((number, element)) = self.element(pair) else { return [0.0; 3] };
         let (now, then) = (self.displacement(field, element), self.displacement(start, element));
@@ -14,7 +14,7 @@ impl<const D: usize> Planes<D> {
         std::array::from_fn(|d| if d < D { moved(d) } else { 0.0 })
     }
 
-    /// Motion of a face or particle against a plane in a step, s, with a velocity, m/s, m.
+    /// Motion of a face or particle against a surface in a step, s, with a velocity, m/s, m.
     pub fn carried(&self, pair: ContactPair, velocity: &Field<D>, step: f64) -> [f64; 3] {
         let Some((number, element)) = self.element(pair) else { return [0.0; 3] };
         let (placed, v) = (&self.each[number], self.displacement(velocity, element));
@@ -48,25 +48,20 @@ impl<const D: usize> Planes<D> {
     pub fn grips(&self, field: &Field<D>, start: &Field<D>, old: &[FrictionPair]) -> Vec<FrictionPair> {
         let mut grips = Vec::new();
         for (number, placed) in self.each.iter().enumerate() {
-            let plane = &placed.plane;
-            if plane.friction == 0.0 || plane.bonded {
+            let surface = &placed.surface;
+            if surface.friction == 0.0 || surface.bonded {
                 continue;
             }
-            let shift: f64 = (0..D).map(|d| placed.before[d] * plane.normal[d]).sum();
             for touch in self.near(placed, field, 0.0) {
-                let bound = plane.friction * touch.stiffness * touch.overlap;
+                let bound = surface.friction * touch.stiffness * touch.overlap;
                 let pair = match touch.element.checked_sub(self.faces.len()) {
                     None => ContactPair::Face(number as u32, touch.element as u32),
                     Some(bare) => ContactPair::Particle(number as u32, self.bare[bare]),
                 };
-                let stiffness = plane.elastic_slip.map_or(touch.stiffness, |slip| bound / slip);
-                let normal = std::array::from_fn(|d| plane.normal.get(d).copied().unwrap_or(0.0));
+                let stiffness = surface.elastic_slip.map_or(touch.stiffness, |slip| bound / slip);
+                let normal = std::array::from_fn(|d| touch.normal.get(d).copied().unwrap_or(0.0));
                 let known = old.binary_search_by_key(&pair, |grip| grip.pair).ok().map(|at| &old[at]);
-                let then = self.beside(placed, start, touch.element).overlap - {
-                    // `beside` uses the current position of the plane
-                    let now: f64 = (0..D).map(|d| placed.now[d] * plane.normal[d]).sum();
-                    now - shift
-                };
+                let then = self.earlier_overlap(placed, start, touch.element);
                 let share = if then >= 0.0 { 1.0 } else { touch.overlap / (touch.overlap - then) };
                 let slip = known.map_or([0.0; 3], |grip| grip.slip);
                 let mut grip = FrictionPair { pair, slip, bound, stiffness, normal, share };

@@ -1,0 +1,165 @@
+//! Rigid surfaces with a force: where contact balances it.
+//!
+//! A surface with the force P along e has one degree of freedom, its travel t. For a displacement u of the
+//! body it stands where E(u, t) − Pt is least, E the energy of contact, so that Σ k o n·e = P. Forces on the
+//! body there are the gradient of min_t (E − Pt), a function of u alone: methods that minimise the energy of
+//! a body need not know of t. The sum grows with t as long as faces lie ahead; it is found by Newton's method
+//! within a bracket, from the geometry alone, so that no earlier state changes a bit.
+
+use super::surface::{RigidSurface, SurfaceShape};
+use super::surfaces::{MovingSurface, RigidSurfaces, SurfaceContact};
+use crate::error::Error;
+use crate::field::Field;
+
+/// Relative error of the balance of a force.
+const BALANCED: f64 = 1e-13;
+/// Relative error of the balance beyond which a surface has lost the body.
+const MISSED: f64 = 1e-6;
+/// Largest number of evaluations; bisection alone needs 60.
+const EVALUATIONS: u32 = 200;
+/// Least component of a normal along the force of a plane that can balance it.
+const FACING: f64 = 1e-3;
+
+impl<const D: usize> RigidSurfaces<D> {
+    /// Starts surfaces with a force at first touch of the undeformed body.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] for one that meets no face.
+    pub(super) fn start_at_touch(&mut self, sites: usize) -> Result<(), Error> {
+        for number in 0..self.each.len() {
+            let Some((_, along)) = self.each[number].surface.pushed() else { continue };
+            let rest = Field::zeros(sites);
+            let Some(travel) = self.first_touch(&self.each[number].surface, &along, &rest) else {
+                return Err(Error::geometry(format!(
+                    "rigid surface {}: found no face of the body ahead along its force; allowed: a surface \
+                     in front of the body with a force towards it",
+                    number + 1
+                )));
+            };
+            let point = &mut self.each[number].surface.point;
+            (0..D).for_each(|d| point[d] += travel * along[d]);
+        }
+        Ok(())
+    }
+
+    /// Moves surfaces with a force to where contact balances it.
+    pub(super) fn balance(&mut self, field: &Field<D>) {
+        for number in 0..self.each.len() {
+            let surface = &self.each[number].surface;
+            let Some((size, along)) = surface.pushed() else { continue };
+            let wanted = size * self.each[number].factor;
+            let travel = self.first_touch(surface, &along, field).unwrap_or(0.0);
+            let travel =
+                if wanted > 0.0 { self.balanced(surface, &along, field, wanted, travel) } else { travel };
+            self.each[number].now = along.map(|e| travel * e);
+        }
+    }
+
+    /// Sums P·t of the forces at load factor 1 and their travels, N·m.
+    pub(super) fn travelled(&self) -> f64 {
+        let of = |placed: &MovingSurface<D>| {
+            let force = placed.surface.force.unwrap_or([0.0; D]);
+            (0..D).map(|d| force[d] * placed.now[d]).sum::<f64>()
+        };
+        self.each.iter().map(of).sum()
+    }
+
+    /// Finds a surface whose force contact does not balance: its number, the balanced part and the force, N.
+    pub(super) fn unbalanced(&self, field: &Field<D>) -> Option<(usize, f64, f64)> {
+        let of = |(number, placed): (usize, &MovingSurface<D>)| {
+            let (size, along) = placed.surface.pushed()?;
+            let wanted = size * placed.factor;
+            let push = |contact: &SurfaceContact<D>| {
+                let force = contact.force();
+                (0..D).map(|d| force[d] * along[d]).sum::<f64>()
+            };
+            let found: f64 = self.near(placed, field, 0.0).iter().map(push).sum();
+            (wanted > 0.0 && (found - wanted).abs() > MISSED * wanted).then_some((number, found, wanted))
+        };
+        self.each.iter().enumerate().find_map(of)
+    }
+
+    /// Finds the travel, m, at which the contact of a surface has the force `wanted`, N, along `along`, from
+    /// that of first touch on.
+    fn balanced(
+        &self,
+        surface: &RigidSurface<D>,
+        along: &[f64; D],
+        field: &Field<D>,
+        wanted: f64,
+        touch: f64,
+    ) -> f64 {
+        // force less the wanted one, N, and stiffness, N/m
+        let excess = |travel: f64| {
+            let (mut force, mut stiffness) = (0.0, 0.0);
+            for contact in self.near_at(surface, &along.map(|e| travel * e), field, 0.0) {
+                let facing: f64 = (0..D).map(|d| contact.normal[d] * along[d]).sum();
+                force += facing * contact.stiffness * contact.overlap;
+                stiffness += facing * facing * contact.stiffness;
+            }
+            [force - wanted, stiffness]
+        };
+        let (mut low, mut step) = (touch, 1e-3 * self.spacing);
+        let mut high = touch + step;
+        let mut at = excess(high);
+        for _ in 0..60 {
+            if at[0] >= 0.0 {
+                break;
+            }
+            (low, step) = (high, 2.0 * step);
+            high += step;
+            at = excess(high);
+        }
+        let mut travel = high;
+        for _ in 0..EVALUATIONS {
+            if at[0].abs() <= BALANCED * wanted {
+                break;
+            }
+            if at[0] > 0.0 {
+                high = travel
+            } else {
+                low = travel
+            }
+            let newton = travel - at[0] / at[1];
+            let next = if low < newton && newton < high { newton } else { 0.5 * (low + high) };
+            if next == travel {
+                break;
+            }
+            travel = next;
+            at = excess(travel);
+        }
+        travel
+    }
+
+    /// Finds the least travel along `along`, m, at which a surface touches an element ahead of it.
+    fn first_touch(&self, surface: &RigidSurface<D>, along: &[f64; D], field: &Field<D>) -> Option<f64> {
+        let touch = |element: usize| {
+            let (home, radius, _) = self.ball(element);
+            let moved = self.displacement(field, element);
+            surface.travel_to(std::array::from_fn(|d| home[d] + moved[d]), radius, along)
+        };
+        (0..self.elements()).filter(|&element| self.is_live(element)).filter_map(touch).min_by(f64::total_cmp)
+    }
+}
+
+impl<const D: usize> RigidSurface<D> {
+    /// Computes the travel along the unit vector `along`, m, at which the surface touches a ball of this
+    /// centre and radius, m, ahead of it; `None` if it passes beside.
+    pub fn travel_to(&self, centre: [f64; D], radius: f64, along: &[f64; D]) -> Option<f64> {
+        let dot = |a: &[f64; D], b: &[f64; D]| (0..D).map(|d| a[d] * b[d]).sum::<f64>();
+        if let SurfaceShape::Plane(normal) = &self.shape {
+            let facing = dot(normal, along);
+            return (facing > FACING).then(|| (self.height(centre) - radius) / facing);
+        }
+        // |c − t e| = R + r across the axis
+        let from = self.from_centre(centre);
+        let across = match &self.shape {
+            SurfaceShape::Cylinder(axis, _) => super::friction_pair::across(axis, *along),
+            _ => *along,
+        };
+        let (square, ahead) = (dot(&across, &across), dot(&from, &across));
+        let reach = self.radius().unwrap_or(0.0) + radius;
+        let inside = ahead * ahead - square * (dot(&from, &from) - reach * reach);
+        (square > FACING * FACING && ahead > 0.0 && inside >= 0.0).then(|| (ahead - inside.sqrt()) / square)
+    }
+}

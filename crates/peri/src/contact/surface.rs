@@ -1,0 +1,216 @@
+//! Rigid surfaces that a body cannot pass, or to which it is tied: planes, spheres, cylinders.
+
+use super::friction_pair::across;
+use super::non_negative;
+use crate::error::Error;
+use crate::geometry::length;
+use serde::{Deserialize, Serialize};
+
+/// Shape of a rigid surface, through its signed distance h and the normal ∇h: positive on the side of the
+/// body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SurfaceShape<const D: usize> {
+    /// Half-space behind a plane, by its normal towards the body.
+    Plane([f64; D]),
+    /// Sphere, in a plane body a disc, of this radius, m, about the point of the surface.
+    Sphere(f64),
+    /// Cylinder about an axis through the point of the surface: direction and radius, m.
+    Cylinder([f64; D], f64),
+}
+
+/// A rigid body bounded by a surface. A face of a deformable body at the depth o below the surface is pushed
+/// out with the pressure s(M/Δx)o, with the longitudinal modulus M and the spacing Δx: s layers of confined
+/// material are as stiff as the contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RigidSurface<const D: usize> {
+    /// A point of a plane, the centre of a sphere, a point of the axis of a cylinder, m.
+    pub point: [f64; D],
+    /// Shape; vectors have any length.
+    pub shape: SurfaceShape<D>,
+    /// Stiffness s.
+    pub stiffness: f64,
+    /// Coefficient of friction μ.
+    pub friction: f64,
+    /// Elastic slip γ at which friction reaches Coulomb's limit, m; `None`: tangential and normal stiffness
+    /// are equal.
+    pub elastic_slip: Option<f64>,
+    /// Ties the faces that touch it in the reference state: no gap, no slip. Planes only.
+    pub bonded: bool,
+    /// Displacement at load factor 1, m, in proportion to the factor.
+    pub displacement: [f64; D],
+    /// Velocity in explicit dynamics, m/s, in addition to the displacement.
+    pub velocity: [f64; D],
+    /// Force on the rigid body at load factor 1, N, in equilibria: it moves along the force, from where it
+    /// first touches the undeformed body, to where contact balances the force. `None`: moves by
+    /// `displacement` and `velocity`.
+    pub force: Option<[f64; D]>,
+}
+
+impl<const D: usize> RigidSurface<D> {
+    /// A plane at rest, without friction, of stiffness [`super::PLANE_STIFFNESS`].
+    pub fn plane(point: [f64; D], normal: [f64; D]) -> Self {
+        Self {
+            point,
+            shape: SurfaceShape::Plane(normal),
+            stiffness: super::PLANE_STIFFNESS,
+            friction: 0.0,
+            elastic_slip: None,
+            bonded: false,
+            displacement: [0.0; D],
+            velocity: [0.0; D],
+            force: None,
+        }
+    }
+
+    /// A sphere, in a plane body a disc, as [`Self::plane`].
+    pub fn sphere(centre: [f64; D], radius: f64) -> Self {
+        Self { shape: SurfaceShape::Sphere(radius), ..Self::plane(centre, [0.0; D]) }
+    }
+
+    /// A cylinder without ends, as [`Self::plane`].
+    pub fn cylinder(point: [f64; D], axis: [f64; D], radius: f64) -> Self {
+        Self { shape: SurfaceShape::Cylinder(axis, radius), ..Self::plane(point, [0.0; D]) }
+    }
+
+    /// Word for the shape.
+    pub fn kind(&self) -> &'static str {
+        match self.shape {
+            SurfaceShape::Plane(_) => "plane",
+            SurfaceShape::Sphere(_) if D == 2 => "circle",
+            SurfaceShape::Sphere(_) => "sphere",
+            SurfaceShape::Cylinder(..) => "cylinder",
+        }
+    }
+
+    /// Vector from the centre or axis of a round surface at rest to a place, m.
+    pub(super) fn from_centre(&self, place: [f64; D]) -> [f64; D] {
+        let from = std::array::from_fn(|d| place[d] - self.point[d]);
+        match &self.shape {
+            SurfaceShape::Cylinder(axis, _) => across(axis, from),
+            _ => from,
+        }
+    }
+
+    /// Radius of a round surface, m.
+    pub(super) fn radius(&self) -> Option<f64> {
+        match self.shape {
+            SurfaceShape::Plane(_) => None,
+            SurfaceShape::Sphere(radius) | SurfaceShape::Cylinder(_, radius) => Some(radius),
+        }
+    }
+
+    /// Height of a place above the surface at rest, m.
+    pub fn height(&self, place: [f64; D]) -> f64 {
+        match (&self.shape, self.radius()) {
+            (SurfaceShape::Plane(normal), _) => (0..D).map(|d| (place[d] - self.point[d]) * normal[d]).sum(),
+            (_, radius) => length(self.from_centre(place)) - radius.unwrap_or(0.0),
+        }
+    }
+
+    /// Unit normal at a place beside the surface at rest, towards the body; zero on an axis or centre.
+    pub fn normal(&self, place: [f64; D]) -> [f64; D] {
+        if let SurfaceShape::Plane(normal) = self.shape {
+            return normal;
+        }
+        let from = self.from_centre(place);
+        let size = length(from);
+        if size > 0.0 { from.map(|x| x / size) } else { [0.0; D] }
+    }
+
+    /// Directions in which the surface may hold a body.
+    pub fn pushes(&self) -> Vec<[f64; D]> {
+        let unit = |d: usize, sign: f64| std::array::from_fn(|e| if e == d { sign } else { 0.0 });
+        match &self.shape {
+            SurfaceShape::Plane(normal) => vec![*normal],
+            SurfaceShape::Sphere(_) => (0..D).flat_map(|d| [unit(d, 1.0), unit(d, -1.0)]).collect(),
+            SurfaceShape::Cylinder(axis, _) => {
+                (0..D).flat_map(|d| [across(axis, unit(d, 1.0)), across(axis, unit(d, -1.0))]).collect()
+            }
+        }
+    }
+
+    /// Size of the force at load factor 1, N, and its direction.
+    pub(super) fn pushed(&self) -> Option<(f64, [f64; D])> {
+        let force = self.force?;
+        let size = length(force);
+        Some((size, force.map(|f| f / size)))
+    }
+
+    /// Returns true if it moves by itself.
+    pub fn moves(&self) -> bool {
+        self.displacement != [0.0; D] || self.velocity != [0.0; D]
+    }
+
+    /// Checks the surface and normalises its vectors.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a vector without direction, for values that are negative or not finite, and
+    /// for a force together with friction on a round surface.
+    pub(super) fn checked(mut self) -> Result<Self, Error> {
+        non_negative("stiffness of a rigid surface", self.stiffness)?;
+        non_negative("friction of a rigid surface", self.friction)?;
+        if let Some(slip) = self.elastic_slip {
+            super::positive("elastic slip of a rigid surface", slip)?;
+        }
+        for (name, vector) in [
+            ("point of a rigid surface", self.point),
+            ("displacement of a rigid surface", self.displacement),
+            ("velocity of a rigid surface", self.velocity),
+        ] {
+            if let Some(&found) = vector.iter().find(|x| !x.is_finite()) {
+                return Err(Error::Parameter { name, found, allowed: "finite".into() });
+            }
+        }
+        if let Some(radius) = self.radius() {
+            super::positive("radius of a rigid surface", radius)?;
+        }
+        self.shape = match self.shape {
+            SurfaceShape::Plane(normal) => SurfaceShape::Plane(unit("normal of a plane", normal)?),
+            SurfaceShape::Cylinder(axis, radius) => {
+                SurfaceShape::Cylinder(unit("axis of a cylinder", axis)?, radius)
+            }
+            sphere => sphere,
+        };
+        if let Some(force) = self.force {
+            let direction = unit("force on a rigid surface", force)?;
+            let aside = match &self.shape {
+                SurfaceShape::Plane(normal) => length(across(normal, direction)) > 1e-9,
+                _ => true,
+            };
+            if self.friction > 0.0 && aside {
+                let allowed = "0 with a force that is not normal to a plane".to_owned();
+                let (name, found) = ("friction of a rigid surface", self.friction);
+                return Err(Error::Parameter { name, found, allowed });
+            }
+        }
+        Ok(self)
+    }
+}
+
+/// Scales a vector to the length 1.
+fn unit<const D: usize>(name: &'static str, vector: [f64; D]) -> Result<[f64; D], Error> {
+    let size = length(vector);
+    if !size.is_normal() {
+        return Err(Error::Parameter { name, found: size, allowed: "a length above 0, finite".to_owned() });
+    }
+    Ok(vector.map(|x| x / size))
+}
+
+/// Contact of a body with a rigid surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SurfaceReaction {
+    /// Force of the surface on the body, N.
+    pub force: [f64; 3],
+    /// Area of the faces in contact, m².
+    pub area: f64,
+    /// Root of the mean square distance from the centre of pressure, weighted with the pressure, m; b/2 for a
+    /// Hertzian strip of half-width b, a√(2/5) for a Hertzian circle of radius a.
+    pub spread: f64,
+    /// Least gap, m, negative for an overlap.
+    pub gap: f64,
+    /// Largest extent of the faces in contact across the normal, or across the force of a round surface, m:
+    /// in a plane body the width of the contact.
+    pub width: f64,
+    /// Displacement of the surface, m.
+    pub moved: [f64; 3],
+}

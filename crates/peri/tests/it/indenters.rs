@@ -1,0 +1,236 @@
+//! Rigid spheres, cylinders and planes on a body: gradients of their energy, balance of a force, work,
+//! friction, motion, bits.
+
+use crate::bodies::{Body, Built, MODULUS, Random, hold, scatter};
+use crate::dynamics::DENSITY;
+use peri::Error;
+use peri::bonds::{BodyGeometry, Bonds, LatticeBonds};
+use peri::contact::{Contact, RigidSurface};
+use peri::field::Field;
+use peri::material::BondMaterial;
+use peri::potential::Law;
+use peri::solver::{DynamicRelaxation, Lbfgs, Method, State, StepRecord, System, VelocityVerlet};
+use peri::surface::BodySurface;
+
+/// Builds the contact of a body of the longitudinal modulus 1 Pa with rigid surfaces on its faces.
+fn beside<const D: usize>(
+    bonds: &LatticeBonds<D>,
+    surfaces: Vec<RigidSurface<D>>,
+) -> Result<Contact<D>, Error> {
+    let contact = Contact::short_range(bonds, MODULUS, 0.0)?;
+    contact.with_surfaces(bonds, &BodySurface::of_lattice(bonds), 1.0, surfaces)
+}
+
+fn block() -> Built<3> {
+    Body::<3>::solid([6, 6, 4], 1.0, 3.015).build()
+}
+
+/// Forces are the gradient of the energy of contact, less the work of a force, by central differences, for
+/// spheres, cylinders and planes that stand still or balance a force.
+#[test]
+fn forces_are_the_gradient_of_an_energy() {
+    let built = block();
+    let bonds = &built.lattice;
+    let push = Some([0.0, 0.3, -4.0]);
+    let up = [0.0, 0.0, -1.0];
+    let still = [
+        RigidSurface::sphere([3.1, 2.7, 8.7], 5.0),
+        RigidSurface::cylinder([3.1, 2.7, 7.7], [0.3, 1.0, 0.1], 4.0),
+        RigidSurface::plane([3.1, 2.7, 3.8], up),
+    ];
+    let pushed = [
+        RigidSurface { force: push, ..RigidSurface::sphere([3.1, 2.7, 10.0], 5.0) },
+        RigidSurface { force: push, ..RigidSurface::cylinder([3.1, 2.7, 9.5], [0.3, 1.0, 0.1], 4.0) },
+        RigidSurface { force: push, ..RigidSurface::plane([3.1, 2.7, 5.0], up) },
+    ];
+    for surface in still.into_iter().chain(pushed) {
+        let mut contact = beside(bonds, vec![surface]).unwrap();
+        contact.move_surfaces(0.5, 0.0);
+        let u = scatter(bonds.sites(), &built.on_lattice, &Random(7).vectors(built.points.len(), 0.05));
+        let mut potential = |u: &Field<3>| {
+            contact.update(bonds, u);
+            let force = contact.surface_forces(bonds.sites()).unwrap();
+            (contact.summary(bonds, u).energy - 0.5 * contact.travelled(), force)
+        };
+        let force = potential(&u).1;
+        let direction: Field<3> =
+            scatter(bonds.sites(), &built.on_lattice, &Random(8).vectors(built.points.len(), 1.0));
+        let along = |step: f64| {
+            let mut moved = u.clone();
+            for site in bonds.particles().iter().map(|&site| site as usize) {
+                let (here, by) = (u.get(site), direction.get(site));
+                moved.set(site, std::array::from_fn(|d| here[d] + step * by[d]));
+            }
+            moved
+        };
+        let step = 1e-6;
+        let slope = (potential(&along(step)).0 - potential(&along(-step)).0) / (2.0 * step);
+        let work: f64 = bonds
+            .particles()
+            .iter()
+            .map(|&site| {
+                let (f, by) = (force.get(site as usize), direction.get(site as usize));
+                bonds.volume(site as usize) * (0..3).map(|d| f[d] * by[d]).sum::<f64>()
+            })
+            .sum();
+        assert!(work.abs() > 1e-3 && (slope + work).abs() < 1e-6 * work.abs(), "{slope} {work} {surface:?}");
+    }
+}
+
+/// Travel and force: a surface with a force starts where it touches the body at rest, and contact balances it
+/// to rounding along the force.
+#[test]
+fn contact_balances_a_force() {
+    let built = block();
+    let bonds = &built.lattice;
+    let force = [0.0, 0.0, -2.0];
+    let sphere = RigidSurface { force: Some(force), ..RigidSurface::sphere([3.0, 3.0, 50.0], 5.0) };
+    let mut contact = beside(bonds, vec![sphere]).unwrap();
+    // four faces at half a spacing from the axis on either side, but for balls below faces of a thin block
+    let height = 4.0 + (25.0_f64 - 0.5).sqrt();
+    assert!((contact.surfaces().next().unwrap().point[2] - height).abs() < 0.02);
+    let rest = Field::zeros(bonds.sites());
+    for factor in [0.0, 1e-6, 0.1, 1.0, 20.0] {
+        contact.move_surfaces(factor, 0.0);
+        contact.update(bonds, &rest);
+        let found = contact.surface_reactions(&rest)[0];
+        assert!(found.gap.abs() < 1e-12 || factor > 0.0, "{found:?}");
+        assert!((found.force[2] - factor * force[2]).abs() <= 1e-11 * factor, "{factor}: {found:?}");
+        assert!(found.force[0].abs() < 1e-9 && found.moved[2] <= 1e-12 && found.moved[0] == 0.0);
+    }
+    for (fault, wrong) in [
+        ("no face of the body ahead", RigidSurface { force: Some([0.0, 0.0, 2.0]), ..sphere }),
+        ("no face of the body ahead", RigidSurface { point: [30.0, 3.0, 50.0], ..sphere }),
+        ("radius of a rigid surface: found -1", RigidSurface::sphere([0.0; 3], -1.0)),
+        ("axis of a cylinder: found 0", RigidSurface::cylinder([0.0; 3], [0.0; 3], 1.0)),
+        ("friction of a rigid surface: found 0.5", RigidSurface { friction: 0.5, ..sphere }),
+        ("force on a rigid surface: found 0", RigidSurface { force: Some([0.0; 3]), ..sphere }),
+    ] {
+        let message = beside(bonds, vec![wrong]).map(|_| ()).unwrap_err().to_string();
+        assert!(message.contains(fault), "{message}");
+    }
+}
+
+/// Solves equilibria of a block that is held at its lower half; returns the last state and a restartable one
+/// of the third step.
+fn equilibria(
+    surface: RigidSurface<3>,
+    method: usize,
+    from: Option<State<3>>,
+) -> (State<3>, Option<State<3>>) {
+    let mut built = block();
+    let contact = beside(&built.lattice, vec![surface]).unwrap();
+    let bonds = &mut built.lattice;
+    let loads = hold(bonds, |x| (x[2] < 1.0).then_some((7, [0.0; 3])));
+    let law = Law::Linear.build(1.0, 1.0, false).unwrap();
+    let factors = [0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25, 0.0];
+    let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), &loads, &factors);
+    system.contact = Some(contact);
+    let (mut state, mut saved) = (from.unwrap_or_else(|| State::new(system.bonds.sites())), None);
+    let watch = &mut |status: &peri::solver::Status, state: &State<3>| {
+        if status.restartable && status.step == 2 && saved.is_none() {
+            saved = Some(state.clone());
+        }
+        Ok(())
+    };
+    let finished = &mut |_: &dyn Bonds<3>, _: &_| Ok(());
+    let tolerance = 1e-7;
+    match method {
+        0 => DynamicRelaxation { tolerance, ..DynamicRelaxation::default() }.solve(
+            &mut system,
+            &mut state,
+            watch,
+            finished,
+        ),
+        _ => Lbfgs { tolerance, ..Lbfgs::default() }.solve(&mut system, &mut state, watch, finished),
+    }
+    .unwrap();
+    (state, saved)
+}
+
+/// Returns the centre of a sphere above the block where it touches it.
+fn touching(sphere: RigidSurface<3>) -> [f64; 3] {
+    let pushed = RigidSurface { force: Some([0.0, 0.0, -1.0]), ..sphere };
+    beside(&block().lattice, vec![pushed]).unwrap().surfaces().next().unwrap().point
+}
+
+/// An elastic block under a sphere stores the work of the sphere, by its displacement and by its force, and
+/// gives it back; both find the same force and depth, in either method; a run resumed within a step gives the
+/// same bits on any number of threads.
+#[test]
+fn loaded_and_unloaded() {
+    let sphere = RigidSurface { stiffness: 50.0, ..RigidSurface::sphere([3.0, 3.0, 50.0], 8.0) };
+    let pressed = RigidSurface { point: touching(sphere), displacement: [0.0, 0.0, -0.2], ..sphere };
+    let (by_depth, _) = equilibria(pressed, 1, None);
+    let peak = &by_depth.history[3];
+    let force = peak.resting[0].force[2];
+    assert!(force < -0.01 && (peak.load / force.abs() - 1.0).abs() < 1e-9, "{peak:?}");
+    let pushed = RigidSurface { force: Some([0.0, 0.0, force]), ..sphere };
+    let of_force: Vec<State<3>> = (0..2).map(|method| equilibria(pushed, method, None).0).collect();
+    for (state, by_force) in std::iter::once((&by_depth, false)).chain(of_force.iter().map(|s| (s, true))) {
+        let row = |k: usize| -> &StepRecord { &state.history[k] };
+        assert!((row(3).resting[0].moved[2] + 0.2).abs() < 1e-5, "{:?}", row(3).resting);
+        assert!((row(3).stored / peak.stored - 1.0).abs() < 1e-4);
+        // the trapezoidal rule of four steps of F ∝ δ^1.5 is 1.8 % off by depth and 3 % by force, both ways
+        let error = row(3).work / row(3).stored - 1.0;
+        assert!(error.abs() < 0.05, "{by_force}: {error}");
+        assert!(row(7).work.abs() < 1e-4 * row(3).work, "{by_force}: {} {}", row(7).work, row(3).work);
+        assert!(row(7).stored < 1e-6 * row(3).stored, "{:?}", row(7));
+        let balance = row(3).balance;
+        assert!(balance.force < 1e-12 * balance.size && balance.external < 1e-6 * balance.size);
+        if by_force {
+            let (load, at) = (row(3).load, row(3).displacement);
+            assert!((load + force).abs() < 1e-9 && (at - 0.2).abs() < 1e-5, "{load} {at}");
+        }
+    }
+    for method in 0..2 {
+        let run = |threads: usize, from: Option<State<3>>| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| equilibria(pushed, method, from))
+        };
+        let (one, saved) = run(1, None);
+        assert!(run(2, None).0 == one && run(2, saved).0 == one, "method {method}");
+    }
+}
+
+/// A sphere dragged over a block sticks or slides by μN: with a coefficient of 0.05 it slides, and friction
+/// takes its work.
+#[test]
+fn dragged_sphere() {
+    let at = touching(RigidSurface::sphere([2.7, 3.0, 50.0], 8.0));
+    let sphere = RigidSurface {
+        friction: 0.05,
+        stiffness: 50.0,
+        displacement: [0.6, 0.0, -0.2],
+        ..RigidSurface::sphere(at, 8.0)
+    };
+    let row = equilibria(sphere, 1, None).0.history[3].clone();
+    let [x, _, z] = row.resting[0].force;
+    // normals lean by up to 0.3/8 from z
+    assert!(row.rubbed > 0.0 && (-x / z.abs()).abs() < 0.2, "{row:?}");
+    assert!((row.work - row.stored - row.rubbed).abs() < 0.1 * row.work, "{row:?}");
+}
+
+/// A disc that flies through a strip in motion does the work that it stores and moves.
+#[test]
+fn disc_in_motion() {
+    let mut built = Body::<2>::solid([20, 8], 1.0, 3.015).build();
+    let disc = RigidSurface {
+        stiffness: 2.0,
+        velocity: [0.0, -0.2],
+        ..RigidSurface::sphere([10.0, 8.0 + 6.1], 6.0)
+    };
+    let contact = beside(&built.lattice, vec![disc]).unwrap();
+    let bonds = &mut built.lattice;
+    let loads = hold(bonds, |x| (x[1] < 1.0).then_some((3, [0.0; 2])));
+    let law = Law::Linear.build(1.0, 1.0, false).unwrap();
+    let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), &loads, &[]);
+    system.contact = Some(contact);
+    let mut state = State::new(system.bonds.sites());
+    let solver = VelocityVerlet { records: 10, ..VelocityVerlet::new(DENSITY, 2.0) };
+    solver.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
+    let last = state.history.last().unwrap();
+    let off = last.work - last.stored - last.kinetic;
+    assert!(last.work > 0.0 && off.abs() < 0.01 * last.work, "{off} {last:?}");
+    assert!((last.resting[0].moved[1] + 0.4).abs() < 1e-12 && last.resting[0].force[1] < 0.0);
+}
