@@ -98,10 +98,19 @@ impl<const D: usize> Region<D> {
 
     /// Fractions of the segment from `a` to `b` between which it is inside or outside.
     fn passages(&self, a: [f64; D], b: [f64; D]) -> Vec<f64> {
+        let mut ends = Vec::new();
         match self {
-            Self::Shape(shape) => shape.span(a, b).into_iter().flatten().collect(),
-            Self::Part { parts, .. } => parts.passages(a, b).chain([0.0, 1.0]).collect(),
+            Self::Shape(shape @ Shape::Enclosed(_)) => {
+                shape.passages(a, b, &mut ends);
+                ends.extend([0.0, 1.0]);
+            }
+            Self::Shape(shape) => shape.passages(a, b, &mut ends),
+            Self::Part { parts, .. } => {
+                ends = parts.passages(a, b);
+                ends.extend([0.0, 1.0]);
+            }
         }
+        ends
     }
 }
 

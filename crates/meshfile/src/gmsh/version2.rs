@@ -4,8 +4,8 @@
 use std::collections::HashMap;
 
 use super::{ElementKind, MshReader, Numbers, kind_of, place, read_label};
+use crate::content::FileNode;
 use crate::error::Error;
-use crate::mesh::file_mesh::FileNode;
 
 /// Limit on the tags of an element: groups, an entity, partitions.
 const MAX_TAGS: i64 = 10_000;
@@ -56,11 +56,11 @@ impl MshReader {
                 let mut own = self.content.elements.len() as u32 - 1;
                 if kind.solid().is_some() {
                     let first = self.content.elements[own as usize].first;
-                    let nodes = self.content.element_nodes[first..].to_vec();
+                    let nodes = self.content.element_labels[first..].to_vec();
                     let place = *known.entry(nodes).or_insert(own);
                     if place != own {
                         self.content.elements.pop();
-                        self.content.element_nodes.truncate(first);
+                        self.content.element_labels.truncate(first);
                         (own, again) = (place, again + 1);
                     }
                 }
