@@ -56,6 +56,16 @@ impl ElementKind {
         if let Self::Solid(shape) = self { Some(shape) } else { None }
     }
 
+    /// Dimension: 3 of solids, 2 of plane elements, 1 of lines, 0 of points.
+    pub fn dimension(self) -> usize {
+        match self {
+            Self::Solid(_) => 3,
+            Self::Point => 0,
+            Self::Line | Self::Line3 => 1,
+            _ => 2,
+        }
+    }
+
     /// Number of corners of a triangle or quadrangle.
     pub fn facet(self) -> Option<usize> {
         match self {

@@ -9,7 +9,7 @@ mod parts;
 
 pub(crate) use cuts::length;
 pub use cuts::{Cut, cuts_within, severed};
-pub use enclosure::Enclosure;
+pub use enclosure::{Enclosure, moments};
 pub use facets::Facets;
 pub use gaps::Gaps;
 pub use parts::Parts;

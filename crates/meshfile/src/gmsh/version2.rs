@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use super::{ElementKind, MshReader, Numbers, kind_of, place, read_label};
+use super::{MshReader, Numbers, kind_of, place, read_label};
 use crate::content::FileNode;
 use crate::error::Error;
 
@@ -65,7 +65,7 @@ impl MshReader {
                     }
                 }
                 if group > 0 {
-                    self.add_to(numbers, dimension(kind), group, own..own + 1)?;
+                    self.add_to(numbers, kind.dimension() as i64, group, own..own + 1)?;
                 }
             }
             read += block;
@@ -83,13 +83,4 @@ impl MshReader {
 fn count(numbers: &mut Numbers, what: &str) -> Result<u64, Error> {
     let line = numbers.text_line();
     line.trim().parse().map_err(|_| numbers.error(what, line, "a count"))
-}
-
-fn dimension(kind: ElementKind) -> i64 {
-    match kind {
-        ElementKind::Solid(_) => 3,
-        ElementKind::Point => 0,
-        ElementKind::Line | ElementKind::Line3 => 1,
-        _ => 2,
-    }
 }

@@ -37,8 +37,7 @@ impl<const D: usize> Enclosure<D> {
         let facets = Facets::new(corners);
         let (low, high) = facets.bounds();
         let near = ON * (0..D).map(|d| high[d] - low[d]).fold(0.0, f64::max);
-        let origin = low;
-        let volume = facets.corners().iter().map(|corners| cone(corners, origin)).sum();
+        let (volume, _) = moments(facets.corners());
         if volume > 0.0 {
             return Ok(Self { facets, near, volume });
         }
@@ -102,6 +101,21 @@ pub(super) const FACING: f64 = -0.5;
 
 pub(super) fn dot<const D: usize>(a: [f64; D], b: [f64; D]) -> f64 {
     (0..D).map(|d| a[d] * b[d]).sum()
+}
+
+/// Volume inside closed facets, m³ (in 2D the area, m²), and its centroid, m.
+pub fn moments<const D: usize>(corners: &[[[f64; D]; D]]) -> (f64, [f64; D]) {
+    let origin = corners.first().map_or([0.0; D], |facet| facet[0]);
+    let (mut volume, mut moment) = (0.0, [0.0; D]);
+    for facet in corners {
+        let own = cone(facet, origin);
+        volume += own;
+        for (d, moment) in moment.iter_mut().enumerate() {
+            let sum: f64 = facet.iter().map(|corner| corner[d] - origin[d]).sum();
+            *moment += own * sum / (D + 1) as f64;
+        }
+    }
+    (volume, std::array::from_fn(|d| origin[d] + moment[d] / volume))
 }
 
 /// Signed volume between an origin and a facet.
@@ -209,6 +223,9 @@ mod tests {
         let [coarse, fine] = [32, 64].map(|n| PI - circle(n));
         assert!((coarse / fine - 4.0).abs() < 0.02, "{coarse} {fine}");
         assert!(Enclosure::new(cuboid([2.0; 3], [0.0; 3])).is_err(), "inside out");
+        let (volume, centroid) = moments(&cuboid([1.0, 2.0, 3.0], [3.0, 3.0, 4.0]));
+        assert!((volume - 2.0).abs() < 1e-14);
+        assert!(centroid.iter().zip([2.0, 2.5, 3.5]).all(|(x, y)| (x - y).abs() < 1e-14), "{centroid:?}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Inclusions and fields of other scenes: stiffness, critical stretch and prestrain of each particle.
 
-use super::build::shape;
+use super::shapes::shape;
 use super::interface::{part_number, parts_of};
 use super::values::DiscreteBody;
 use super::{Material, ParameterField, Scene, ShapeSpec, VaryingParameter, plain};
