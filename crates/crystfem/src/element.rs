@@ -7,8 +7,8 @@
 mod face;
 pub mod natural;
 
-use meshfile::ElementShape;
 pub use face::FaceGeometry;
+use meshfile::ElementShape;
 use nalgebra::Matrix3;
 use natural::QuadratureRule;
 use polycore::numerics::hexahedron;

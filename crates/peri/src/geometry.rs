@@ -10,7 +10,7 @@ mod parts;
 pub(crate) use cuts::length;
 pub use cuts::{Cut, cuts_within, severed};
 pub use enclosure::{Enclosure, moments};
-pub use facets::Facets;
+pub use facets::{Facet, Facets};
 pub use gaps::Gaps;
 pub use parts::Parts;
 

@@ -77,9 +77,9 @@ pub(super) fn convert(path: &Path, mut content: MeshFile, scale: f64) -> Result<
     let kept = quality::drop_unused_nodes(&mut mesh);
     if kept.len() < content.nodes.len() {
         let unused = content.nodes.len() - kept.len();
-        content.notes.push(format!(
-            "{unused} nodes that belong to no hexahedron, tetrahedron or wedge are left out"
-        ));
+        content
+            .notes
+            .push(format!("{unused} nodes that belong to no hexahedron, tetrahedron or wedge are left out"));
     }
     let notes = &mut content.notes;
     mesh.node_sets.retain(|name, set| {
@@ -98,7 +98,11 @@ pub(super) fn convert(path: &Path, mut content: MeshFile, scale: f64) -> Result<
 }
 
 /// Finds the face of a solid element for each triangle and quadrangle; the first of two.
-fn match_facets(content: &mut MeshFile, mesh: &Mesh, mut facets: Vec<([u32; 4], u32)>) -> BTreeMap<u32, Face> {
+fn match_facets(
+    content: &mut MeshFile,
+    mesh: &Mesh,
+    mut facets: Vec<([u32; 4], u32)>,
+) -> BTreeMap<u32, Face> {
     facets.sort_unstable();
     let mut face_of = BTreeMap::new();
     if facets.is_empty() {

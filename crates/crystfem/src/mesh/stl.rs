@@ -101,9 +101,7 @@ pub fn voxels(surface: &Stl, size: [f64; 3], least: f64) -> Result<(Voxels, Vec<
     }
     if is_reported(negative) {
         let mm3 = 1e9 * negative;
-        notes.push(format!(
-            "{mm3:.4} mm³ inside shells that face inwards, and in no other, are left empty"
-        ));
+        notes.push(format!("{mm3:.4} mm³ inside shells that face inwards, and in no other, are left empty"));
     }
     // exact except for the ray measurements
     let volume = surface.volume - twice + negative;

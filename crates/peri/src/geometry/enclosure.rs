@@ -1,6 +1,6 @@
 //! Bodies inside closed facets: polygons in 2D, meshes and STL surfaces in 3D.
 
-use super::facets::Facets;
+use super::facets::{Facet, Facets};
 use crate::error::Error;
 use std::collections::HashMap;
 
@@ -23,7 +23,7 @@ impl<const D: usize> Enclosure<D> {
     /// # Errors
     /// [`Error::Geometry`] for coordinates that are not finite, facets that are not closed, with the number
     /// of open edges, and a volume that is not positive.
-    pub fn new(corners: Vec<[[f64; D]; D]>) -> Result<Self, Error> {
+    pub fn new(corners: Vec<Facet<D>>) -> Result<Self, Error> {
         if let Some(corner) = corners.iter().flatten().find(|corner| corner.iter().any(|x| !x.is_finite())) {
             return Err(Error::geometry(format!("a corner at {corner:?} m; allowed: finite coordinates")));
         }
@@ -104,7 +104,7 @@ pub(super) fn dot<const D: usize>(a: [f64; D], b: [f64; D]) -> f64 {
 }
 
 /// Volume inside closed facets, m³ (in 2D the area, m²), and its centroid, m.
-pub fn moments<const D: usize>(corners: &[[[f64; D]; D]]) -> (f64, [f64; D]) {
+pub fn moments<const D: usize>(corners: &[Facet<D>]) -> (f64, [f64; D]) {
     let origin = corners.first().map_or([0.0; D], |facet| facet[0]);
     let (mut volume, mut moment) = (0.0, [0.0; D]);
     for facet in corners {
@@ -119,7 +119,7 @@ pub fn moments<const D: usize>(corners: &[[[f64; D]; D]]) -> (f64, [f64; D]) {
 }
 
 /// Signed volume between an origin and a facet.
-fn cone<const D: usize>(corners: &[[f64; D]; D], origin: [f64; D]) -> f64 {
+fn cone<const D: usize>(corners: &Facet<D>, origin: [f64; D]) -> f64 {
     let at = |k: usize, d: usize| corners[k.min(D - 1)][d % D] - origin[d % D];
     match D {
         2 => 0.5 * (at(0, 0) * at(1, 1) - at(0, 1) * at(1, 0)),
@@ -132,7 +132,7 @@ fn cone<const D: usize>(corners: &[[f64; D]; D], origin: [f64; D]) -> f64 {
 
 /// Counts the edges (in 2D: ends) that facets do not pass equally often in both directions; returns also the
 /// middle of the first.
-fn open_edges<const D: usize>(corners: &[[[f64; D]; D]]) -> (usize, [f64; D]) {
+fn open_edges<const D: usize>(corners: &[Facet<D>]) -> (usize, [f64; D]) {
     // −0 is 0
     let key = |corner: &[f64; D]| corner.map(|x| (x + 0.0).to_bits());
     let mut edges: HashMap<[[u64; D]; 2], (i64, [f64; D])> = HashMap::new();

@@ -5,10 +5,13 @@ use super::cuts::{Cut, length};
 /// Excess of a facet, over its edges, at which a segment still meets it.
 const SLACK: f64 = 1e-9;
 
+/// Corners of a facet, m: two in 2D, three in 3D.
+pub type Facet<const D: usize> = [[f64; D]; D];
+
 /// Facets with their corners, binned by their shadow on the first D − 1 axes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Facets<const D: usize> {
-    corners: Vec<[[f64; D]; D]>,
+    corners: Vec<Facet<D>>,
     low: [f64; D],
     high: [f64; D],
     /// Number of bins along the first D − 1 axes.
@@ -20,7 +23,7 @@ pub struct Facets<const D: usize> {
 
 impl<const D: usize> Facets<D> {
     /// Bins facets; a facet whose corners coincide is a point.
-    pub fn new(corners: Vec<[[f64; D]; D]>) -> Self {
+    pub fn new(corners: Vec<Facet<D>>) -> Self {
         let [low, high] = polycore::numerics::bounds(corners.iter().flatten().copied());
         // about one bin a facet
         let along = (corners.len() as f64).powf(1.0 / (D - 1) as f64).ceil().clamp(1.0, 4096.0) as usize;
@@ -45,7 +48,7 @@ impl<const D: usize> Facets<D> {
     }
 
     /// Corners of each facet, m.
-    pub fn corners(&self) -> &[[[f64; D]; D]] {
+    pub fn corners(&self) -> &[Facet<D>] {
         &self.corners
     }
 
@@ -161,15 +164,14 @@ impl<const D: usize> Facets<D> {
 }
 
 /// Area vector of a facet: in 2D its length, to the right of its direction.
-fn area_vector<const D: usize>(corners: &[[f64; D]; D]) -> [f64; D] {
-    let edge =
-        |k: usize| -> [f64; D] { std::array::from_fn(|d| corners[k.min(D - 1)][d] - corners[0][d]) };
+fn area_vector<const D: usize>(corners: &Facet<D>) -> [f64; D] {
+    let edge = |k: usize| -> [f64; D] { std::array::from_fn(|d| corners[k.min(D - 1)][d] - corners[0][d]) };
     let (a, b) = (edge(1), edge(2));
     match D {
         2 => std::array::from_fn(|d| if d == 0 { a[1] } else { -a[0] }),
-        _ => std::array::from_fn(|d| {
-            0.5 * (a[(d + 1) % D] * b[(d + 2) % D] - a[(d + 2) % D] * b[(d + 1) % D])
-        }),
+        _ => {
+            std::array::from_fn(|d| 0.5 * (a[(d + 1) % D] * b[(d + 2) % D] - a[(d + 2) % D] * b[(d + 1) % D]))
+        }
     }
 }
 
@@ -192,7 +194,7 @@ fn side<const D: usize>(p: &[f64; D], q: &[f64; D], at: [f64; D]) -> f64 {
 
 /// Crossing of a facet by the ray from a point along the last axis: 1 where the ray leaves, −1 where it
 /// enters, 0 without any.
-fn crossing<const D: usize>(corners: &[[f64; D]; D], point: [f64; D]) -> i32 {
+fn crossing<const D: usize>(corners: &Facet<D>, point: [f64; D]) -> i32 {
     if D == 2 {
         let [p, q] = [corners[0], corners[1]];
         // the body lies on the left of a facet towards −x, below it
@@ -217,7 +219,7 @@ fn crossing<const D: usize>(corners: &[[f64; D]; D], point: [f64; D]) -> i32 {
 }
 
 /// Distance of a point from a facet, m.
-fn distance<const D: usize>(point: [f64; D], corners: &[[f64; D]; D]) -> f64 {
+fn distance<const D: usize>(point: [f64; D], corners: &Facet<D>) -> f64 {
     if D == 3 {
         let across = area_vector(corners);
         let size = length(across);

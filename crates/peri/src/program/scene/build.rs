@@ -1,5 +1,6 @@
 //! Builds the body of a variant, and checks the rules that span several keys.
 
+use super::Scene;
 use super::cloud::cloud;
 use super::crack::{cracks, severed};
 use super::interface::cross_interfaces;
@@ -9,7 +10,6 @@ use super::mesh_shape::check_filling;
 use super::shapes::operations;
 use super::values::DiscreteBody;
 use super::variant::SceneVariant;
-use super::Scene;
 use crate::bonds::{BodyGeometry, BondDamage, LatticeBonds};
 use crate::calibrate::Space;
 use crate::geometry::{Cut, Gaps, MOST_CELLS, Operation, bounds, cell_counts, lattice};

@@ -1,7 +1,7 @@
 //! Inclusions and fields of other scenes: stiffness, critical stretch and prestrain of each particle.
 
-use super::shapes::shape;
 use super::interface::{part_number, parts_of};
+use super::shapes::shape;
 use super::values::DiscreteBody;
 use super::{Material, ParameterField, Scene, ShapeSpec, VaryingParameter, plain};
 use crate::bonds::{Bonds, Property};

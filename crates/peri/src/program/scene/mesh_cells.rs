@@ -1,7 +1,7 @@
 //! Cells of a mesh file in the dimension of the body.
 
 use super::values::positive;
-use crate::geometry::moments;
+use crate::geometry::{Facet, moments};
 use harness::scene::{SceneError, Source};
 use meshfile::{ElementKind, FileElement, MeshFile};
 use polycore::units::Length;
@@ -17,11 +17,11 @@ pub(super) struct CellMesh<const D: usize> {
     /// Elements of the dimension of the body, by their place in the file.
     cells: Vec<u32>,
     /// Facets of each of them.
-    facets: Vec<Vec<[[f64; D]; D]>>,
+    facets: Vec<Vec<Facet<D>>>,
 }
 
 /// Number of cells that share a side, and the facets of the first of them.
-type SharedSide<const D: usize> = (u32, Vec<[[f64; D]; D]>);
+type SharedSide<const D: usize> = (u32, Vec<Facet<D>>);
 
 /// Returns true for a file whose ending is that of a mesh.
 pub(super) fn is_mesh(file: &Path) -> bool {
@@ -46,7 +46,8 @@ impl<const D: usize> CellMesh<D> {
         positive(source, unit_key, scale, "m")?;
         let content = meshfile::read(&source.file(file), |_| None)
             .map_err(|error| source.refused(key, error.to_string()))?;
-        let points = content.nodes.iter().map(|node| std::array::from_fn(|d| scale * node.point[d])).collect();
+        let points =
+            content.nodes.iter().map(|node| std::array::from_fn(|d| scale * node.point[d])).collect();
         let (facets, file) = (Vec::new(), file.to_owned());
         let mut mesh = Self { file, content, points, cells: Vec::new(), facets };
         mesh.cells = mesh.cells_of(0..mesh.content.elements.len() as u32);
@@ -100,7 +101,7 @@ impl<const D: usize> CellMesh<D> {
     ///
     /// # Errors
     /// A side of more than two cells.
-    pub fn boundary(&self, places: &[u32]) -> Result<(Vec<[[f64; D]; D]>, f64), String> {
+    pub fn boundary(&self, places: &[u32]) -> Result<(Vec<Facet<D>>, f64), String> {
         let mut sides: HashMap<[u32; 4], SharedSide<D>> = HashMap::new();
         let mut keys = Vec::new();
         let mut volume = 0.0;
@@ -126,7 +127,7 @@ impl<const D: usize> CellMesh<D> {
     }
 
     /// Returns the facets of an element of one dimension less than the body.
-    pub fn facets_of_side(&self, place: u32) -> Vec<[[f64; D]; D]> {
+    pub fn facets_of_side(&self, place: u32) -> Vec<Facet<D>> {
         let element = &self.content.elements[place as usize];
         let count = element.kind.facet().unwrap_or(2);
         let nodes = self.content.nodes_of(element);
@@ -135,7 +136,7 @@ impl<const D: usize> CellMesh<D> {
     }
 
     /// Returns the facets of a side of a solid, numbered from 0 as in Abaqus.
-    pub fn facets_of_face(&self, place: u32, side: u8) -> Vec<[[f64; D]; D]> {
+    pub fn facets_of_face(&self, place: u32, side: u8) -> Vec<Facet<D>> {
         let element = &self.content.elements[place as usize];
         let sides = sides_of(element.kind);
         sides.get(usize::from(side)).map_or(Vec::new(), |side| self.side(element, side, false).1)
@@ -153,9 +154,12 @@ impl<const D: usize> CellMesh<D> {
         if self.cells.is_empty() {
             let allowed = match D {
                 2 => "at least one triangle or quadrangle for a plane body",
-                _ => "at least one hexahedron, tetrahedron or wedge for a `solid`; plane bodies take triangles",
+                _ => {
+                    "at least one hexahedron, tetrahedron or wedge for a `solid`; plane bodies take triangles"
+                }
             };
-            let without = if most == 2 { "a mesh of triangles or quadrangles" } else { "a mesh without cells" };
+            let without =
+                if most == 2 { "a mesh of triangles or quadrangles" } else { "a mesh without cells" };
             return Err(source.error(key, found(without), allowed));
         }
         let nodes = self.cells.iter().flat_map(|&cell| self.nodes(cell));
@@ -185,11 +189,11 @@ impl<const D: usize> CellMesh<D> {
     ///
     /// # Errors
     /// A volume that is not positive, a plane cell that is not convex.
-    fn facets_of_cell(&self, source: &Source, key: &str, cell: u32) -> Result<Vec<[[f64; D]; D]>, SceneError> {
+    fn facets_of_cell(&self, source: &Source, key: &str, cell: u32) -> Result<Vec<Facet<D>>, SceneError> {
         let element = &self.content.elements[cell as usize];
         let flipped = self.is_clockwise(element);
         let sides = sides_of(element.kind);
-        let facets: Vec<[[f64; D]; D]> =
+        let facets: Vec<Facet<D>> =
             sides.iter().flat_map(|side| self.side(element, side, flipped).1).collect();
         let (volume, _) = moments(&facets);
         let place = || format!("{}:{}: element {}", self.path(), element.line, element.label);
@@ -199,7 +203,8 @@ impl<const D: usize> CellMesh<D> {
             return Err(source.error(key, found, "cells with their nodes in the order of the format"));
         }
         if D == 2 {
-            let corners: Vec<[f64; D]> = sides.iter().map(|side| self.point(self.nodes(cell)[side.0[0]])).collect();
+            let corners: Vec<[f64; D]> =
+                sides.iter().map(|side| self.point(self.nodes(cell)[side.0[0]])).collect();
             let count = corners.len();
             let turns = |k: usize| {
                 let [p, q, r] = [corners[k], corners[(k + 1) % count], corners[(k + 2) % count]];
@@ -215,7 +220,7 @@ impl<const D: usize> CellMesh<D> {
     }
 
     /// Returns the sorted corners of a side, and its facets.
-    fn side(&self, element: &FileElement, side: &LocalSide, flipped: bool) -> ([u32; 4], Vec<[[f64; D]; D]>) {
+    fn side(&self, element: &FileElement, side: &LocalSide, flipped: bool) -> ([u32; 4], Vec<Facet<D>>) {
         let nodes = self.content.nodes_of(element);
         let [mut corners, mut middles] = [&side.0, &side.1].map(|local| {
             let global = local.iter().map(|&k| nodes[k]);
@@ -233,7 +238,7 @@ impl<const D: usize> CellMesh<D> {
 
     /// Splits a side into facets, the same from both of its sides: corners in order, and the nodes between
     /// each and the next.
-    fn split(&self, corners: &[u32], middles: &[u32]) -> Vec<[[f64; D]; D]> {
+    fn split(&self, corners: &[u32], middles: &[u32]) -> Vec<Facet<D>> {
         let facet = |three: [[f64; D]; 3]| std::array::from_fn(|k| three[k.min(2)]);
         let at = |node: u32| self.point(node);
         let ring: Vec<u32> = (0..corners.len())

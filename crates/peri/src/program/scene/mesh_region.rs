@@ -5,10 +5,10 @@ use super::region::layers;
 use super::values::required;
 use super::{Boundary, Scene};
 use crate::bonds::Bonds;
-use crate::geometry::{Enclosure, Facets};
+use crate::geometry::{Enclosure, Facet, Facets};
 use harness::scene::{SceneError, Source};
 use polycore::units::Length;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Mesh files of a body that regions name.
 pub struct MeshSets<const D: usize>(Vec<CellMesh<D>>);
@@ -45,23 +45,30 @@ impl Scene {
             || self.probe.iter().any(|probe| probe.set.is_some())
     }
 
-    /// Lists the mesh files of the body, each once, with their units and the keys of both.
-    fn mesh_files(&self) -> Vec<(&Path, Option<Length>, [String; 2])> {
-        let mut files: Vec<(&Path, Option<Length>, [String; 2])> = Vec::new();
+    /// Lists the mesh files of the body, each once.
+    fn mesh_files(&self) -> Vec<MeshEntry<'_>> {
+        let mut files: Vec<MeshEntry> = Vec::new();
         for (index, shape) in self.body.shapes().iter().enumerate() {
             let keys = ["file", "unit"].map(|name| format!("body.shapes[{index}].{name}"));
-            files.extend(shape.file.iter().map(|file| (&**file, shape.unit, keys.clone())));
+            files.extend(shape.file.as_ref().map(|file| MeshEntry { file, unit: shape.unit, keys }));
         }
-        let points = self.body.points.iter();
-        files.extend(points.map(|file| (&**file, self.body.unit, ["body.points", "body.unit"].map(str::to_owned))));
-        let mut known: Vec<PathBuf> = Vec::new();
-        files.retain(|(file, ..)| {
-            let is_new = is_mesh(file) && !known.iter().any(|other| other == file);
-            known.extend(is_new.then(|| file.to_path_buf()));
+        let keys = ["body.points", "body.unit"].map(str::to_owned);
+        files.extend(self.body.points.as_ref().map(|file| MeshEntry { file, unit: self.body.unit, keys }));
+        let mut known: Vec<&Path> = Vec::new();
+        files.retain(|entry| {
+            let is_new = is_mesh(entry.file) && !known.contains(&entry.file);
+            known.push(entry.file);
             is_new
         });
         files
     }
+}
+
+/// Mesh file that a scene names, with the keys of its name and its unit.
+struct MeshEntry<'a> {
+    file: &'a Path,
+    unit: Option<Length>,
+    keys: [String; 2],
 }
 
 impl<const D: usize> MeshSets<D> {
@@ -73,7 +80,7 @@ impl<const D: usize> MeshSets<D> {
         if !scene.names_sets() {
             return Ok(Self::default());
         }
-        let read = |(file, unit, [key, unit_key]): (&Path, Option<Length>, [String; 2])| {
+        let read = |MeshEntry { file, unit, keys: [key, unit_key] }: MeshEntry| {
             let unit = required(source, &unit_key, unit, "the file has none, e.g. \"1 mm\"")?;
             CellMesh::read(source, &key, &unit_key, file, unit)
         };
@@ -124,7 +131,8 @@ impl<const D: usize> MeshSets<D> {
             }
             let facets = mesh.boundary(&cells).map(|(facets, _)| facets);
             let body = facets.and_then(|facets| Enclosure::new(facets).map_err(|error| error.to_string()));
-            let body = body.map_err(|error| source.error(&set, format!("{}: {error}", mesh.path()), "cells"))?;
+            let body =
+                body.map_err(|error| source.error(&set, format!("{}: {error}", mesh.path()), "cells"))?;
             return Ok(SetRegion::Cells(body));
         }
         let depth = boundary.depth.map(|depth| depth.si());
@@ -153,12 +161,12 @@ impl<const D: usize> CellMesh<D> {
     }
 
     /// Facets of the faces of a set (in 2D edges); without any its nodes, as facets without an extent.
-    fn facets_of_set(&self, name: &str) -> Vec<[[f64; D]; D]> {
+    fn facets_of_set(&self, name: &str) -> Vec<Facet<D>> {
         let content = self.content();
         let lists = [content.element_sets.get(name), content.curve_sets.get(name)];
         let places = lists.into_iter().flatten().flatten();
         let sides = places.filter(|place| content.elements[**place as usize].kind.dimension() + 1 == D);
-        let mut facets: Vec<[[f64; D]; D]> = sides.flat_map(|&place| self.facets_of_side(place)).collect();
+        let mut facets: Vec<Facet<D>> = sides.flat_map(|&place| self.facets_of_side(place)).collect();
         let faces = content.surfaces.get(name).into_iter().flatten().filter(|_| D == 3);
         facets.extend(faces.flat_map(|face| self.facets_of_face(face.element, face.side)));
         if facets.is_empty() {

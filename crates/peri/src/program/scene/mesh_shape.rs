@@ -1,7 +1,7 @@
 //! Shapes inside closed facets: cells of mesh files, STL surfaces, polygons.
 
 use super::mesh_cells::{CellMesh, is_mesh};
-use super::values::{plain, positive, required, vector};
+use super::values::{DiscreteBody, plain, positive, required, vector};
 use super::{Scene, ShapeSpec};
 use crate::geometry::{Enclosure, Lattice, Operation, Parts, Shape, cell};
 use harness::scene::{SceneError, Source};
@@ -109,7 +109,8 @@ pub(super) fn polygon<const D: usize>(
         .sum();
     for (one, other) in (0..count).flat_map(|one| (one + 1..count).map(move |other| (one, other))) {
         let neighbours = other == next(one) || one == next(other);
-        if !neighbours && crosses([corners[one], corners[next(one)]], [corners[other], corners[next(other)]]) {
+        if !neighbours && crosses([corners[one], corners[next(one)]], [corners[other], corners[next(other)]])
+        {
             let found = format!("edges from corners {one} and {other} that meet");
             return Err(source.error(&key, found, "a polygon whose edges do not cross"));
         }
@@ -132,6 +133,33 @@ fn crosses<const D: usize>([a, b]: [[f64; D]; 2], [p, q]: [[f64; D]; 2]) -> bool
     side(a, b, p) * side(a, b, q) <= 0.0 && side(p, q, a) * side(p, q, b) <= 0.0 && within(0) && within(1)
 }
 
+/// Returns lines for `peri check`: the volume of each shape of a file or polygon, and that of its particles.
+pub(super) fn explain<const D: usize>(scene: &Scene, body: &DiscreteBody<D>) -> Vec<String> {
+    if body.operations.iter().all(|operation| operation.enclosure().is_none()) {
+        return Vec::new();
+    }
+    let parts = shape_numbers(&body.operations);
+    let mut filled = vec![0.0; body.operations.len()];
+    for &site in body.bonds.particles() {
+        if let Some(shape) = parts.part_at(body.bonds.position(site as usize)) {
+            filled[shape as usize] += body.bonds.volume(site as usize);
+        }
+    }
+    let line = |(index, operation): (usize, &Operation<D>)| {
+        let own = operation.enclosure()?;
+        let name = scene.body.shapes().get(index)?.block.as_ref();
+        let name = name.map_or(String::new(), |name| format!(", block {name}"));
+        let [volume, filled] = [own.volume() * body.thickness, filled[index]].map(|v| v * 1e9);
+        Some(format!("body.shapes[{index}]{name}: {volume:.6} mm³, its particles {filled:.6} mm³"))
+    };
+    body.operations.iter().enumerate().filter_map(line).collect()
+}
+
+/// Numbers shapes as parts.
+fn shape_numbers<const D: usize>(operations: &[Operation<D>]) -> Parts<D> {
+    Parts::new(operations, &(0..operations.len() as u32).collect::<Vec<u32>>())
+}
+
 /// Checks that blocks of one mesh file do not overlap at a particle, and that each has particles.
 ///
 /// # Errors
@@ -151,20 +179,19 @@ pub(super) fn check_filling<const D: usize>(
         return Ok(());
     }
     let shapes = scene.body.shapes();
-    let numbers: Vec<u32> = (0..operations.len() as u32).collect();
-    let parts = Parts::new(operations, &numbers);
+    let parts = shape_numbers(operations);
     let mut filled = vec![0_u64; operations.len()];
     for index in (0..lattice.occupied.len()).filter(|&index| lattice.occupied[index]) {
         let cell = cell(index, lattice.cells);
-        let place: [f64; D] =
-            std::array::from_fn(|d| lattice.origin[d] + lattice.spacing * cell[d] as f64);
+        let place: [f64; D] = std::array::from_fn(|d| lattice.origin[d] + lattice.spacing * cell[d] as f64);
         if let Some(part) = parts.part_at(place) {
             filled[part as usize] += 1;
         }
         let mut owner: Option<usize> = None;
         for &(index, body) in &bodies {
             let depth = body.depth(place);
-            let same = owner.filter(|&other| shapes[other].file.is_some() && shapes[other].file == shapes[index].file);
+            let same = owner
+                .filter(|&other| shapes[other].file.is_some() && shapes[other].file == shapes[index].file);
             if depth > 1 || depth > 0 && same.is_some() {
                 let at: Vec<String> = place.iter().map(|x| plain((x * 1e9).round() / 1e6)).collect();
                 let others = same.map_or("cells overlap".to_owned(), |other| {

@@ -182,7 +182,11 @@ pub(super) fn shape<const D: usize>(
         }
         ShapeKind::Cylinder => {
             if D != 3 {
-                return Err(source.error(key, "a cylinder", "`disk`, `box`, `polygon` or `mesh` in a plane body"));
+                return Err(source.error(
+                    key,
+                    "a cylinder",
+                    "`disk`, `box`, `polygon` or `mesh` in a plane body",
+                ));
             }
             let axis = match required(source, &format!("{key}.axis"), spec.axis, "needed for a cylinder")? {
                 AxisName::X => 0,
