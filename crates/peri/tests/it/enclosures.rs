@@ -89,8 +89,7 @@ fn closed_facets_are_the_shapes_around_them() {
     let apart = |shape: fn([f64; 3], [f64; 3]) -> Shape<3>| {
         Body::lattice(shape([0.0; 3], [5.0, 4.0, 4.0]), 1.0).join(shape([5.5, 0.0, 0.0], [8.5, 4.0, 4.0]))
     };
-    let [parts, shapes] =
-        [apart(|low, high| enclosed(cuboid(low, high))), apart(|low, high| Shape::cuboid(low, high))];
+    let [parts, shapes] = [apart(|low, high| enclosed(cuboid(low, high))), apart(Shape::cuboid)];
     assert_eq!(counts(&parts), counts(&shapes), "a gap of half a spacing");
     assert!(counts(&parts)[1] < counts(&whole)[1]);
 }
