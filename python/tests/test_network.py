@@ -49,3 +49,29 @@ def test_mixtures_and_chains_with_one_group():
 def test_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         polymech.network(4, 10.0, **arguments)
+
+
+def test_vulcanized():
+    made = polymech.vulcanized("most-probable", 100.0, units=2.0)
+    again = polymech.vulcanized("most-probable", 100.0, sol_fraction=made.sol)
+    assert math.isclose(made.sol + math.sqrt(made.sol), 1 / 2, rel_tol=1e-12)  # Charlesby and Pinner
+    assert math.isclose(again.modulus, made.modulus, rel_tol=1e-9) and again.conversion == pytest.approx(2.0)
+    equal = polymech.vulcanized("one-length", 100.0, units=2.0)
+    assert math.isclose(equal.sol, math.exp(-2 * (1 - equal.sol)), rel_tol=1e-12)
+    for arguments, message in [
+        ({"chains": "broad", "units": 2.0}, "most-probable, one-length"),
+        ({"chains": "one-length", "units": 0.9}, "no gel"),
+        ({"chains": "one-length"}, "exactly one"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            polymech.vulcanized(mass=100.0, **arguments)
+
+
+def test_swelling():
+    solvent = polymech.Solvent(106e-6, 0.45)
+    fraction = solvent.polymer_fraction(0.2e6)
+    stress = 106e-6 * 0.2e6 / (8.31446261815324 * 298.15) * fraction ** (1 / 3)
+    assert abs(math.log(1 - fraction) + fraction + 0.45 * fraction**2 + stress) < 1e-15
+    assert math.isclose(solvent.modulus(fraction), 0.2e6, rel_tol=1e-9)
+    with pytest.raises(ValueError, match="volume fraction"):
+        solvent.modulus(1.5)

@@ -1,4 +1,4 @@
-//! Prony series and fits with time from the command line: relaxation, isotherms, runs at two rates, bad scenes.
+//! Prony series and fits with time from the command line: relaxation, isotherms, two rates, bad scenes.
 
 use std::path::Path;
 use std::process::Command;

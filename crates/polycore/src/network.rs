@@ -32,6 +32,7 @@ mod linkers;
 #[cfg(feature = "tables")]
 pub mod prediction;
 mod structure;
+mod swelling;
 #[cfg(feature = "tables")]
 pub mod table;
 mod vulcanized;
@@ -41,6 +42,7 @@ pub use end_linked::{EndLinked, LOOP_FACTOR, Reacted};
 pub use error::Error;
 pub use linkers::LinkerMix;
 pub use structure::{Melt, PolymerNetwork, SolFractions};
+pub use swelling::Solvent;
 pub use vulcanized::{PrimaryChains, Vulcanized};
 
 /// Molar gas constant, J/(mol K); exact in SI.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use evidence::{at_most, near};
 use polycore::network::{
-    EndLinked, Error, KuhnChain, LinkerMix, Melt, PolymerNetwork, PrimaryChains, Reacted, Vulcanized,
+    EndLinked, Error, KuhnChain, LinkerMix, Melt, PolymerNetwork, PrimaryChains, Reacted, Solvent, Vulcanized,
 };
 use polycore::table::Table;
 
@@ -375,4 +375,33 @@ fn extremes_and_refusals() {
     let mean = LinkerMix::mean(5.1).unwrap();
     assert!((mean.per_group() - 1.0 / 5.1).abs() < 1e-15 && mean.shares()[0].0 == 5);
     assert!((mean.shares()[1].1 - 6.0 * 0.1 / 5.1).abs() < 1e-12);
+}
+
+/// Roots of the law of Flory and Rehner by SciPy's `brentq`, and φ^(5/3) = V₁G/(RT(½ − χ)) of soft gels.
+#[test]
+fn swelling_to_equilibrium() {
+    let volume = 106e-6;
+    for (interaction, modulus, root) in [
+        (0.0, 0.2e6, 0.08408379307820563),
+        (0.45, 0.2e6, 0.19766153567491457),
+        (1.2, 0.2e6, 0.7822618095095174),
+    ] {
+        let solvent = Solvent::new(volume, interaction).unwrap();
+        let found = solvent.polymer_fraction(modulus, 298.15).unwrap();
+        near("swelling_against_scipy", found, root, 1e-9);
+        near("swelling_back_to_the_modulus", solvent.modulus(found, 298.15).unwrap(), modulus, 1e-9);
+    }
+    let soft = Solvent::new(volume, 0.3).unwrap().polymer_fraction(1e-3, 298.15).unwrap();
+    let leading = (volume * 1e-3 / (8.314462618 * 298.15) / (0.5 - 0.3)).powf(0.6);
+    near("swelling_of_a_soft_gel", soft, leading, 1e-4);
+    // the series of small φ meets the logarithm
+    let solvent = Solvent::new(volume, 0.45).unwrap();
+    let [below, above] =
+        [0.999_999e-3, 1.000_001e-3].map(|fraction| solvent.modulus(fraction, 298.15).unwrap());
+    near("swelling_series", below, above, 1e-5);
+
+    // a poor solvent: φ cannot be as small, whatever the network
+    assert!(Solvent::new(volume, 1.2).unwrap().modulus(0.3, 298.15).is_err());
+    assert!(Solvent::new(0.0, 0.4).is_err() && Solvent::new(volume, f64::NAN).is_err());
+    assert!(solvent.polymer_fraction(-1.0, 298.15).is_err() && solvent.modulus(1.0, 298.15).is_err());
 }

@@ -23,7 +23,7 @@ class Network:
     sol: float
     """Sol fraction by mass."""
     conversion: float
-    """Conversion of the groups of the cross-linkers."""
+    """Conversion of the groups of the cross-linkers; of a vulcanized network its cross-linked units per chain."""
     least_conversion: float | None
     """Lower bound of a conversion from a sol fraction: that without loops."""
     strands: float
@@ -85,3 +85,60 @@ def network(
         loop_factor=loop_factor,
     )
     return Network(**found)
+
+
+def vulcanized(
+    chains: str,
+    mass: float,
+    *,
+    units: float | None = None,
+    sol_fraction: float | None = None,
+    extracted: bool = False,
+    polymer: str = "PDMS",
+    density: float | None = None,
+    temperature: float = 298.15,
+    entanglement_modulus: float | None = None,
+) -> Network:
+    """Computes a network of long chains cross-linked at random: by sulphur, peroxide, radiation.
+
+    >>> [round(vulcanized(chains, 100.0, units=2.0).sol, 3) for chains in ("most-probable", "one-length")]
+    [0.134, 0.203]
+
+    `chains`: their lengths, ``"most-probable"`` (Flory, M_w = 2 M_n) or ``"one-length"``; `mass`: their M_n, kg/mol. Exactly one of `units`
+    (cross-linked units per number-average chain) and `sol_fraction` (measured). The others as in `network`. Raises `ValueError`.
+    """
+    found = _polymech.vulcanized(
+        chains=chains,
+        mass=mass,
+        units=units,
+        sol_fraction=sol_fraction,
+        extracted=extracted,
+        polymer=polymer,
+        density=density,
+        temperature=temperature,
+        entanglement_modulus=entanglement_modulus,
+    )
+    return Network(**found)
+
+
+@dataclass(frozen=True)
+class Solvent:
+    """A solvent that swells a network to equilibrium, by the law of Flory and Rehner with phantom junctions.
+
+    >>> solvent = Solvent(molar_volume=106e-6, interaction=0.45)
+    >>> round(1 / solvent.polymer_fraction(0.2e6), 2)
+    5.06
+    """
+
+    molar_volume: float
+    """Molar volume, m³/mol."""
+    interaction: float
+    """Interaction parameter χ of polymer and solvent."""
+
+    def polymer_fraction(self, modulus: float, temperature: float = 298.15) -> float:
+        """Computes the volume fraction of polymer at equilibrium from the shear modulus of the dry gel, Pa."""
+        return _polymech.swollen_fraction(self.molar_volume, self.interaction, modulus, temperature)
+
+    def modulus(self, fraction: float, temperature: float = 298.15) -> float:
+        """Computes the shear modulus of the dry gel, Pa, from the volume fraction of polymer at equilibrium."""
+        return _polymech.modulus_of_swelling(self.molar_volume, self.interaction, fraction, temperature)

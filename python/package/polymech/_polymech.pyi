@@ -61,6 +61,20 @@ def network(
     entanglement_modulus: float | None,
     loop_factor: float | None,
 ) -> dict[str, Any]: ...
+def vulcanized(
+    *,
+    chains: str,
+    mass: float,
+    units: float | None,
+    sol_fraction: float | None,
+    extracted: bool,
+    polymer: str,
+    density: float | None,
+    temperature: float,
+    entanglement_modulus: float | None,
+) -> dict[str, Any]: ...
+def swollen_fraction(volume: float, interaction: float, modulus: float, temperature: float) -> float: ...
+def modulus_of_swelling(volume: float, interaction: float, fraction: float, temperature: float) -> float: ...
 def course(
     material: dict[str, Any], time: list[float], temperature: list[float], degree: float, kelvin: float
 ) -> dict[str, Array]: ...

@@ -203,7 +203,7 @@ pub(super) fn cross_interfaces<const D: usize>(
 }
 
 /// Gives bonds across interfaces their own limits in place of `rest`, bonds of unbreakable particles none.
-/// `own` computes a limit from the criterion and the stiffness of a bond, the mean of `stiffness` at its ends.
+/// `own` computes a limit from the criterion and the mean `stiffness` at the ends of a bond.
 ///
 /// # Errors
 /// A limit out of its domain, and unbreakable shapes without particles.

@@ -59,7 +59,7 @@ pub(super) fn add<const D: usize>(
             if wall < least {
                 let found = format!("a wall of {} mm", plain(wall * 1e3));
                 let allowed = format!(
-                    "at least {} mm, {LEAST_WALL} horizons: the force on a thinner one is over 5 % too large; \
+                    "at least {} mm, {LEAST_WALL} horizons: a thinner one gets over 5 % too much force; \
                      take a smaller `body.spacing`",
                     plain((least * 1e6).ceil() / 1e3)
                 );

@@ -108,8 +108,8 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         return Ok(());
     };
     if !remembers && !scene.has_curves() {
-        let why = "only a `solid` with `branch` or `mullins`, a `curve`, a formula of `t`, a `pressure` or a `spin` \
-             follows the time";
+        let why = "only a `solid` with `branch` or `mullins`, a `curve`, a formula of `t`, a `pressure` or \
+             a `spin` follows the time";
         return Err(source.unexpected("time", why));
     }
     if scene.dynamics.is_some() {
