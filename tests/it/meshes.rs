@@ -11,7 +11,10 @@ fn values(scene: &str, arguments: &str) -> serde_json::Value {
     peri(&format!("run scene.toml --output out {arguments}"), folder.path()).with_code(0);
     let report = fs::read_to_string(folder.path().join("out/report.json")).unwrap();
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
-    report["values"].clone()
+    let mut values = report["values"].clone();
+    // of a hole that is a shape
+    values.as_object_mut().unwrap().remove("kt_finite_width");
+    values
 }
 
 fn case(name: &str) -> String {
@@ -74,7 +77,8 @@ fn checked(body: &str) -> String {
 }
 
 /// Volumes inside the facets of all element types are those of finite elements (Gauss quadrature of shape
-/// functions), and particles fill them.
+/// functions), and particles fill them. Curved sides of second-order elements become flat pieces between their
+/// nodes: of arcs of 15°, chords of half of it lose 1 − cos 7.5° of the radius, 1 %.
 #[test]
 fn volumes_are_those_of_finite_elements() {
     let mut worst: f64 = 0.0;
@@ -89,11 +93,18 @@ fn volumes_are_those_of_finite_elements() {
         let line = text.lines().find(|line| line.contains("body.shapes[0]: ")).unwrap();
         let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
         let [volume, filled] = numbers[..] else { panic!("{line}") };
-        worst = worst.max((volume / expected - 1.0).abs());
-        assert!((volume / expected - 1.0).abs() < 1e-4, "{}: {volume} {expected}", file.display());
+        let curved = file.file_name().unwrap().to_string_lossy().starts_with("second_");
+        let error = (volume / expected - 1.0).abs();
+        assert!(error < if curved { 0.02 } else { 1e-6 }, "{}: {volume} {expected}", file.display());
+        worst = worst.max(if curved { 0.0 } else { error });
         assert!((filled / volume - 1.0).abs() < 0.15, "{}: {line}", file.display());
     }
-    evidence::near("volume inside facets over that of finite elements, less 1", worst, 0.0, 1e-4);
+    evidence::near(
+        "volume inside facets over that of finite elements of first order, less 1",
+        worst,
+        0.0,
+        1e-6,
+    );
 }
 
 /// One particle for each cell.

@@ -61,6 +61,11 @@ impl<const D: usize> Enclosure<D> {
         boxed && (self.facets.windings(point) > 0 || self.facets.is_within(point, self.near))
     }
 
+    /// Returns true for a point inside or within `reach`, m, of the facets.
+    pub fn is_near(&self, point: [f64; D], reach: f64) -> bool {
+        self.facets.is_within(point, reach) || self.facets.windings(point) > 0
+    }
+
     /// Counts how often a point lies inside: 2 where pieces overlap; 0 outside and on the facets.
     pub fn depth(&self, point: [f64; D]) -> i32 {
         let count = self.facets.windings(point);

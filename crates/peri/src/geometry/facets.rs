@@ -12,6 +12,8 @@ pub type Facet<const D: usize> = [[f64; D]; D];
 #[derive(Clone, Debug, PartialEq)]
 pub struct Facets<const D: usize> {
     corners: Vec<Facet<D>>,
+    /// Bounding box of each facet.
+    boxes: Vec<[[f64; D]; 2]>,
     low: [f64; D],
     high: [f64; D],
     /// Number of bins along the first D − 1 axes.
@@ -27,7 +29,9 @@ impl<const D: usize> Facets<D> {
         let [low, high] = polycore::numerics::bounds(corners.iter().flatten().copied());
         // about one bin a facet
         let along = (corners.len() as f64).powf(1.0 / (D - 1) as f64).ceil().clamp(1.0, 4096.0) as usize;
-        let mut facets = Self { corners, low, high, bins: [1; D], firsts: Vec::new(), members: Vec::new() };
+        let boxes = corners.iter().map(|facet| polycore::numerics::bounds(facet.iter().copied())).collect();
+        let (firsts, members) = (Vec::new(), Vec::new());
+        let mut facets = Self { corners, boxes, low, high, bins: [1; D], firsts, members };
         facets.bins[..D - 1].fill(along);
         let mut counts = vec![0_u32; facets.bins.iter().product::<usize>() + 1];
         let spans: Vec<[[usize; 2]; D]> = (0..facets.corners.len()).map(|k| facets.span_of(k)).collect();
@@ -66,9 +70,7 @@ impl<const D: usize> Facets<D> {
     pub fn is_within(&self, point: [f64; D], reach: f64) -> bool {
         let (low, high) = (point.map(|x| x - reach), point.map(|x| x + reach));
         let mut found = false;
-        self.near(low, high, |facet| {
-            found = found || distance(point, &self.corners[facet]) <= reach;
-        });
+        self.near(low, high, |facet| found = found || distance(point, &self.corners[facet]) <= reach);
         found
     }
 
@@ -122,15 +124,10 @@ impl<const D: usize> Facets<D> {
         let range = self.range(low, high);
         self.visit(&range, |bin, at| {
             for &facet in &self.members[self.firsts[bin] as usize..self.firsts[bin + 1] as usize] {
-                let corners = &self.corners[facet as usize];
-                let meets = (0..D).all(|d| {
-                    let ends = corners.iter().map(|corner| corner[d]);
-                    let (least, most) = ends.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
-                    least <= high[d] && low[d] <= most
-                });
+                let [least, most] = &self.boxes[facet as usize];
+                let meets = (0..D).all(|d| least[d] <= high[d] && low[d] <= most[d]);
                 // in the first of their common bins
-                let span = self.span_of(facet as usize);
-                if meets && (0..D - 1).all(|d| at[d] == span[d][0].max(range[d][0])) {
+                if meets && (0..D - 1).all(|d| at[d] == self.bin(d, least[d]).max(range[d][0])) {
                     visit(facet as usize);
                 }
             }
@@ -139,17 +136,18 @@ impl<const D: usize> Facets<D> {
 
     /// Bins of a facet along each axis: the first and the last.
     fn span_of(&self, facet: usize) -> [[usize; 2]; D] {
-        let [low, high] = polycore::numerics::bounds(self.corners[facet].iter().copied());
+        let [low, high] = self.boxes[facet];
         self.range(low, high)
     }
 
     fn range(&self, low: [f64; D], high: [f64; D]) -> [[usize; 2]; D] {
-        let bin = |d: usize, x: f64| {
-            let part = (x - self.low[d]) / (self.high[d] - self.low[d]);
-            // not a number in a box without width
-            (part.clamp(0.0, 1.0) * self.bins[d] as f64).min(self.bins[d] as f64 - 1.0).max(0.0) as usize
-        };
-        std::array::from_fn(|d| if d + 1 < D { [bin(d, low[d]), bin(d, high[d])] } else { [0, 0] })
+        std::array::from_fn(|d| if d + 1 < D { [self.bin(d, low[d]), self.bin(d, high[d])] } else { [0, 0] })
+    }
+
+    fn bin(&self, d: usize, x: f64) -> usize {
+        let part = (x - self.low[d]) / (self.high[d] - self.low[d]);
+        // not a number in a box without width
+        (part.clamp(0.0, 1.0) * self.bins[d] as f64).min(self.bins[d] as f64 - 1.0).max(0.0) as usize
     }
 
     /// Visits the bins of a range, with their numbers and places.

@@ -115,7 +115,8 @@ impl<const D: usize> Gaps<D> {
         };
         let near = |shape: &Shape<D>| {
             let (low, high) = shape.bounds();
-            (0..D).all(|d| low[d] - reach <= point[d] && point[d] <= high[d] + reach)
+            let boxed = (0..D).all(|d| low[d] - reach <= point[d] && point[d] <= high[d] + reach);
+            boxed && !matches!(shape, Shape::Enclosed(body) if !body.is_near(point, reach))
         };
         let count = operations.len();
         let shapes: Vec<usize> = (0..count).filter(|&index| near(operations[index].shape())).collect();
@@ -166,7 +167,9 @@ impl<const D: usize> Gaps<D> {
             }
             let here: [f64; D] =
                 std::array::from_fn(|d| lattice.origin[d] + lattice.spacing * cell[d] as f64);
-            near.belongs(a, here)
+            let apart = matches!(other, Shape::Enclosed(body) if !body.is_near(here, 2.0 * lattice.spacing));
+            !apart
+                && near.belongs(a, here)
                 && (near.belongs(b, here)
                     || (0..3_usize.pow(D as u32)).any(|step| {
                         let there: [f64; D] = std::array::from_fn(|d| {
