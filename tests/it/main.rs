@@ -13,6 +13,7 @@
 //! * [`limits`]: a full disk, memory of the process, one run a folder;
 //! * [`loads`]: loads, displacements and names of values in reports;
 //! * [`memory`]: no run takes more memory than stated, absurd sizes are refused before they are allocated;
+//! * [`meshes`]: bodies from mesh files;
 //! * [`packages`]: what each crate is built with;
 //! * [`python`]: the Python package;
 //! * [`release`]: one version everywhere, the archive;
@@ -37,6 +38,7 @@ mod killed;
 mod limits;
 mod loads;
 mod memory;
+mod meshes;
 mod packages;
 mod parts;
 mod printing;

@@ -7,8 +7,8 @@
 mod face;
 pub mod natural;
 
-use crate::shape::ElementShape;
 pub use face::FaceGeometry;
+use meshfile::ElementShape;
 use nalgebra::Matrix3;
 use natural::QuadratureRule;
 use polycore::numerics::hexahedron;
@@ -211,7 +211,7 @@ fn natural_gradients(nodes: usize, point: usize, gradients: &mut [[f64; 3]]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shape::HEXAHEDRON_SIDES;
+    use meshfile::HEXAHEDRON_SIDES;
 
     const BOX: [f64; 3] = [2.0, 3.0, 5.0];
 

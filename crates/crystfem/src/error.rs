@@ -102,3 +102,16 @@ pub enum Error {
     #[error(transparent)]
     Shared(#[from] polycore::Error),
 }
+
+impl From<meshfile::Error> for Error {
+    fn from(error: meshfile::Error) -> Self {
+        match error {
+            meshfile::Error::Mesh(text) => Self::Mesh(text),
+            meshfile::Error::Parameter { name, found, allowed } => Self::Parameter { name, found, allowed },
+            meshfile::Error::File { path, line, what, found, allowed } => {
+                Self::File { path, line, what, found, allowed }
+            }
+            meshfile::Error::Shared(error) => Self::Shared(error),
+        }
+    }
+}

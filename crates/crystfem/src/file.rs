@@ -18,10 +18,5 @@ pub fn line_error(
     found: impl ToString,
     allowed: impl Into<String>,
 ) -> Error {
-    let mut found = found.to_string();
-    if let Some((end, _)) = found.char_indices().nth(80) {
-        found.truncate(end);
-        found.push('…');
-    }
-    Error::File { path: path.to_owned(), line, what: what.into(), found, allowed: allowed.into() }
+    meshfile::line_error(path, line, what, found, allowed).into()
 }

@@ -52,7 +52,6 @@ pub mod point;
 pub mod print_plan;
 pub mod printed;
 pub mod problem;
-mod shape;
 mod simd_math;
 pub mod simulation;
 mod solver;

@@ -1,17 +1,22 @@
-//! Bodies from shapes: boxes, disks, balls, cylinders, added and cut in order; cracks of zero width; point
-//! clouds.
+//! Bodies from shapes: boxes, disks, balls, cylinders, closed surfaces, added and cut in order; cracks of
+//! zero width; point clouds.
 
 mod cuts;
+mod enclosure;
+mod facets;
 mod gaps;
 mod parts;
 
 pub(crate) use cuts::length;
 pub use cuts::{Cut, cuts_within, severed};
+pub use enclosure::{Enclosure, moments};
+pub use facets::{Facet, Facets};
 pub use gaps::Gaps;
 pub use parts::Parts;
 
 use crate::error::Error;
 use polycore::memory::{available, gib};
+use std::sync::Arc;
 
 /// A box of cells, some of them occupied by particles.
 #[derive(Clone, Debug)]
@@ -56,6 +61,8 @@ pub enum Shape<const D: usize> {
         /// The axis' index.
         axis: usize,
     },
+    /// Body inside closed facets, facets included.
+    Enclosed(Arc<Enclosure<D>>),
 }
 
 impl Shape<2> {
@@ -94,6 +101,7 @@ impl<const D: usize> Shape<D> {
                 let radial: f64 = (0..D).filter(|d| d != axis).map(|d| (point[d] - centre[d]).powi(2)).sum();
                 radial < radius * radius && 2.0 * (point[*axis] - centre[*axis]).abs() <= *length
             }
+            Self::Enclosed(body) => body.contains(point),
         }
     }
 
@@ -106,6 +114,7 @@ impl<const D: usize> Shape<D> {
                 let half = |d: usize| if d == *axis { 0.5 * length } else { *radius };
                 (std::array::from_fn(|d| centre[d] - half(d)), std::array::from_fn(|d| centre[d] + half(d)))
             }
+            Self::Enclosed(body) => body.facets().bounds(),
         }
     }
 }
@@ -117,6 +126,13 @@ pub enum Operation<const D: usize> {
     Add(Shape<D>),
     /// Difference with the shape.
     Cut(Shape<D>),
+}
+
+impl<const D: usize> Operation<D> {
+    /// Returns the closed facets that it adds.
+    pub fn enclosure(&self) -> Option<&Enclosure<D>> {
+        if let Self::Add(Shape::Enclosed(body)) = self { Some(body) } else { None }
+    }
 }
 
 /// Returns true if a point belongs to the body built by a list of operations.

@@ -1,7 +1,7 @@
 //! Surface of a body as face points, about one for each particle on it: rigid planes act there.
 
 use crate::bonds::{BodyGeometry, LatticeBonds};
-use crate::geometry::{Operation, Shape, bounds, cell_counts, inside, length};
+use crate::geometry::{Operation, Shape, bounds, cell, cell_counts, inside, length};
 use std::collections::HashSet;
 use std::f64::consts::{PI, TAU};
 
@@ -71,13 +71,16 @@ pub struct BodySurface<const D: usize> {
 
 impl<const D: usize> BodySurface<D> {
     /// Samples the boundary of shapes: flat sides above the columns of the lattice, round ones at equal arcs
-    /// of about `spacing`, m.
+    /// of about `spacing`, m; of bodies with closed facets the free sides of the cells inside.
     pub fn of_shapes(operations: &[Operation<D>], spacing: f64) -> Self {
         let mut surface = Self { faces: Vec::new(), patches: Vec::new(), bounds: 0 };
         let Some((low, high)) = bounds(operations) else { return surface };
         let counts = cell_counts(low, high, spacing);
         let origin = std::array::from_fn(|d| 0.5 * (low[d] + high[d]) - 0.5 * spacing * (counts[d] - 1.0));
         let columns = CellColumns { origin, counts: counts.map(|count| count as usize), spacing };
+        if operations.iter().any(|operation| operation.enclosure().is_some()) {
+            return Self::of_cells(operations, &columns);
+        }
         for operation in operations {
             let (shape, outward) = match operation {
                 Operation::Add(shape) => (shape, 1.0),
@@ -94,6 +97,30 @@ impl<const D: usize> BodySurface<D> {
         let mut is_new = |face: &SurfaceFace<D>| known.insert((face.patch, face.place.map(f64::to_bits)));
         surface.faces.retain(|face| side(face, -1.0) && !side(face, 1.0) && is_new(face));
         surface
+    }
+
+    /// Takes the free sides of the cells whose centres lie inside: closed facets have no smooth patches.
+    fn of_cells(operations: &[Operation<D>], columns: &CellColumns<D>) -> Self {
+        let patches = Self::axes();
+        let mut faces = Vec::new();
+        for index in 0..columns.counts.iter().product() {
+            let cell = cell(index, columns.counts);
+            let place: [f64; D] = std::array::from_fn(|d| columns.coordinate(d, cell[d]));
+            if !inside(operations, place) {
+                continue;
+            }
+            for (patch, kind) in patches.iter().enumerate() {
+                let Patch::Flat { axis, outward } = *kind else { continue };
+                let (mut beside, mut face) = (place, place);
+                beside[axis] += outward * columns.spacing;
+                face[axis] += 0.5 * outward * columns.spacing;
+                if !inside(operations, beside) {
+                    let normal = std::array::from_fn(|d| if d == axis { outward } else { 0.0 });
+                    faces.push(SurfaceFace { place: face, normal, patch: patch as u32 });
+                }
+            }
+        }
+        Self { faces, patches, bounds: 0 }
     }
 
     /// Takes the free sides of the cells of a lattice.
@@ -204,6 +231,7 @@ impl<const D: usize> BodySurface<D> {
                     });
                 }
             }
+            Shape::Enclosed(_) => {}
         }
     }
 

@@ -1,7 +1,7 @@
 //! Faces of elements at their integration points.
 
 use super::{GAUSS, natural};
-use crate::shape::ElementShape;
+use meshfile::ElementShape;
 
 /// A face at its integration points: 2 × 2 Gauss points or three on a triangle; 3 × 3 or six in second order.
 #[derive(Clone, Debug)]

@@ -5,7 +5,7 @@
 //! wedge and −1 … 1 along its third axis; r, s, t ≥ 0, r + s + t ≤ 1 in a tetrahedron.
 
 use super::{CORNERS, MAX_ELEMENT_NODES, MAX_ELEMENT_POINTS};
-use crate::shape::ElementShape;
+use meshfile::ElementShape;
 use std::sync::OnceLock;
 
 /// N and ∂N/∂ξ of each node at one point.

@@ -24,26 +24,16 @@ use nalgebra::Vector3;
 
 use crate::error::Error;
 
-pub use crate::shape::{Cell, ElementShape, HEXAHEDRON_SIDES, TETRAHEDRON_SIDES};
 pub use bar::{Bar, Substrate};
 pub use file_mesh::ReadMesh;
 pub(crate) use geometry::box_around;
 pub use locate::LocatedPoint;
+pub use meshfile::{Cell, ElementShape, Face, HEXAHEDRON_SIDES, TETRAHEDRON_SIDES};
 pub use read::read;
 pub use split::CellSplit;
 pub use structured::{Block, Grid, graded};
 pub use tube::Tube;
 pub use voxels::{RATIOS, Voxels};
-
-/// A face of an element: the element's index and the side, 0–5 of a hexahedron, 0–3 of a tetrahedron or 0–4
-/// of a wedge, numbered as in Abaqus (S1 is side 0).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Face {
-    /// Element: 8-node hexahedra first, then 4-node tetrahedra, then all others.
-    pub element: u32,
-    /// Side.
-    pub side: u8,
-}
 
 /// A mesh. Elements are numbered 8-node hexahedra first, then 4-node tetrahedra, then the others; nodes of an
 /// element are in the order of Abaqus ([`ElementShape`]).

@@ -3,11 +3,13 @@
 //! A bond crosses a gap if its straight line
 //! * passes from one added shape to another that does not touch it, or
 //! * passes through the empty part of a box cut out (a disc: a flat cylinder) with its ends on opposite
-//!   sides, or through a hole narrower than the horizon.
+//!   sides, or through a hole narrower than the horizon, or
+//! * leaves closed facets and enters them again through a facet turned by 120° or more.
 //!
 //! Bonds around a re-entrant corner, and chords of wide holes, stay. Shapes touch if they overlap or share a
 //! part of a face; points and edges do not connect them.
 
+use super::enclosure::{FACING, dot};
 use super::{Lattice, Operation, Shape, length};
 use crate::bonds::CellGrid;
 use std::collections::HashMap;
@@ -28,8 +30,9 @@ pub struct Gaps<const D: usize> {
 
 #[derive(Clone, Debug)]
 enum GapKind<const D: usize> {
-    /// Shapes, and the pairs of them that touch: row by row.
-    Shapes { operations: Vec<Operation<D>>, touching: Vec<bool> },
+    /// Shapes, the pairs of them that touch: row by row; true if closed facets face each other within the
+    /// horizon.
+    Shapes { operations: Vec<Operation<D>>, touching: Vec<bool>, facing: bool },
     /// A lattice and the part of each of its cells.
     Cells { spacing: f64, origin: [f64; D], cells: [usize; D], parts: Vec<u32> },
     /// Points, by the bits of their positions, and their parts.
@@ -46,11 +49,12 @@ impl<const D: usize> Gaps<D> {
             Operation::Cut(shape) => shape.width() < horizon,
             Operation::Add(_) => false,
         });
-        if adds < 2 && !narrow {
+        let facing = operations.iter().filter_map(Operation::enclosure).any(|body| body.has_slots(horizon));
+        if adds < 2 && !narrow && !facing {
             return None;
         }
         let touching = vec![true; operations.len().pow(2)];
-        let kind = GapKind::Shapes { operations: operations.to_vec(), touching };
+        let kind = GapKind::Shapes { operations: operations.to_vec(), touching, facing };
         let mut gaps = Self { horizon, closed, kind };
         let found: Vec<bool> = (0..operations.len().pow(2))
             .map(|pair| gaps.touch(lattice, operations, pair / operations.len(), pair % operations.len()))
@@ -59,7 +63,7 @@ impl<const D: usize> Gaps<D> {
         if let GapKind::Shapes { touching, .. } = &mut gaps.kind {
             *touching = found;
         }
-        (narrow || parted).then_some(gaps)
+        (narrow || parted || facing).then_some(gaps)
     }
 
     /// Finds the gaps between the parts of a lattice: cells that share a face, an edge or a corner belong
@@ -106,18 +110,22 @@ impl<const D: usize> Gaps<D> {
 
     /// Selects the gaps that bonds of length `reach` from a point may meet; `None`: no gap.
     pub fn within(&self, point: [f64; D], reach: f64) -> Option<NearbyGaps<'_, D>> {
-        let GapKind::Shapes { operations, touching } = &self.kind else {
+        let GapKind::Shapes { operations, touching, facing } = &self.kind else {
             return Some(NearbyGaps { gaps: self, shapes: Vec::new() });
         };
         let near = |shape: &Shape<D>| {
             let (low, high) = shape.bounds();
-            (0..D).all(|d| low[d] - reach <= point[d] && point[d] <= high[d] + reach)
+            let boxed = (0..D).all(|d| low[d] - reach <= point[d] && point[d] <= high[d] + reach);
+            boxed && !matches!(shape, Shape::Enclosed(body) if !body.is_near(point, reach))
         };
         let count = operations.len();
         let shapes: Vec<usize> = (0..count).filter(|&index| near(operations[index].shape())).collect();
         let apart = |&a: &usize| shapes.iter().any(|&b| !touching[a * count + b]);
         let gap = shapes.iter().any(|index| match &operations[*index] {
             Operation::Cut(shape) => shape.width() < self.horizon,
+            Operation::Add(Shape::Enclosed(body)) if *facing => {
+                body.facets().is_within(point, reach) || apart(index)
+            }
             Operation::Add(_) => apart(index),
         });
         gap.then_some(NearbyGaps { gaps: self, shapes })
@@ -131,8 +139,9 @@ impl<const D: usize> Gaps<D> {
         if a == b || !one.touches(other, self.closed) {
             return a == b;
         }
+        let enclosed = |shape: &Shape<D>| matches!(shape, Shape::Enclosed(_));
         let cut = |index: usize| matches!(operations[index], Operation::Cut(_));
-        if !(a.min(b)..operations.len()).any(cut) {
+        if !(enclosed(one) || enclosed(other) || (a.min(b)..operations.len()).any(cut)) {
             return true;
         }
         // a common particle, or two neighbours without a gap between them
@@ -158,7 +167,9 @@ impl<const D: usize> Gaps<D> {
             }
             let here: [f64; D] =
                 std::array::from_fn(|d| lattice.origin[d] + lattice.spacing * cell[d] as f64);
-            near.belongs(a, here)
+            let apart = matches!(other, Shape::Enclosed(body) if !body.is_near(here, 2.0 * lattice.spacing));
+            !apart
+                && near.belongs(a, here)
                 && (near.belongs(b, here)
                     || (0..3_usize.pow(D as u32)).any(|step| {
                         let there: [f64; D] = std::array::from_fn(|d| {
@@ -181,8 +192,8 @@ impl<const D: usize> NearbyGaps<'_, D> {
     /// Returns true if the bond of `a` and `b` crosses a gap, whichever end comes first.
     pub fn severs(&self, a: [f64; D], b: [f64; D]) -> bool {
         let (a, b) = if a <= b { (a, b) } else { (b, a) };
-        let (operations, touching) = match &self.gaps.kind {
-            GapKind::Shapes { operations, touching } => (operations, touching),
+        let (operations, touching, facing) = match &self.gaps.kind {
+            GapKind::Shapes { operations, touching, facing } => (operations, touching, *facing),
             GapKind::Cells { spacing, origin, cells, parts } => {
                 let part = |point: [f64; D]| {
                     let place = |d: usize| ((point[d] - origin[d]) / spacing).round() as usize;
@@ -202,12 +213,16 @@ impl<const D: usize> NearbyGaps<'_, D> {
             Operation::Add(_) => false,
         };
         let slots: Vec<usize> = self.shapes.iter().copied().filter(opposed).collect();
+        let mut normals = Vec::new();
+        let bodies = self.shapes.iter().filter_map(|&index| operations[index].enclosure());
+        bodies.filter(|_| facing).for_each(|body| body.normals(a, b, &mut normals));
         let mut last = self.covering(a);
         let mut crosses = false;
-        self.pieces(a, b, |middle| {
+        self.pieces(a, b, |middle, ends| {
             let covering = self.covering(middle);
             if covering.is_empty() {
                 crosses |= slots.iter().any(|&slot| operations[slot].shape().contains(middle));
+                crosses |= face_each_other(&normals, ends);
             } else {
                 crosses |= !last.is_empty() && !joined(&last, &covering);
                 last = covering;
@@ -220,22 +235,22 @@ impl<const D: usize> NearbyGaps<'_, D> {
     /// Returns true if the segment from `a` to `b` leaves the body.
     fn leaves(&self, a: [f64; D], b: [f64; D]) -> bool {
         let mut leaves = false;
-        self.pieces(a, b, |middle| leaves |= self.covering(middle).is_empty());
+        self.pieces(a, b, |middle, _| leaves |= self.covering(middle).is_empty());
         leaves
     }
 
-    /// Visits the middles of the pieces into which shapes divide the segment from `a` to `b`, except closed
-    /// ones.
-    fn pieces(&self, a: [f64; D], b: [f64; D], mut visit: impl FnMut([f64; D])) {
+    /// Visits the middles of the pieces into which shapes divide the segment from `a` to `b`, with the ends
+    /// of each as fractions of it, except closed ones.
+    fn pieces(&self, a: [f64; D], b: [f64; D], mut visit: impl FnMut([f64; D], [f64; 2])) {
         let GapKind::Shapes { operations, .. } = &self.gaps.kind else { return };
         let mut ends = vec![0.0, 1.0];
-        ends.extend(self.shapes.iter().filter_map(|&index| operations[index].shape().span(a, b)).flatten());
+        self.shapes.iter().for_each(|&index| operations[index].shape().passages(a, b, &mut ends));
         ends.sort_by(f64::total_cmp);
         let size = length(std::array::from_fn::<f64, D, _>(|d| b[d] - a[d]));
         for pair in ends.windows(2) {
             if (pair[1] - pair[0]) * size > self.gaps.closed {
                 let part = 0.5 * (pair[0] + pair[1]);
-                visit(std::array::from_fn(|d| a[d] + part * (b[d] - a[d])));
+                visit(std::array::from_fn(|d| a[d] + part * (b[d] - a[d])), [pair[0], pair[1]]);
             }
         }
     }
@@ -254,6 +269,12 @@ impl<const D: usize> NearbyGaps<'_, D> {
         let cut = |operation: &Operation<D>| matches!(operation, Operation::Cut(cut) if cut.contains(point));
         shape.contains(point) && !later.iter().any(cut)
     }
+}
+
+/// Returns true if facets met at both ends of a piece of a segment face each other across it.
+fn face_each_other<const D: usize>(normals: &[(f64, [f64; D])], [from, to]: [f64; 2]) -> bool {
+    let at = |end: f64| normals.iter().filter(move |(part, _)| (part - end).abs() <= f64::EPSILON);
+    at(from).any(|(_, one)| at(to).any(|(_, other)| dot(*one, *other) < FACING))
 }
 
 impl<const D: usize> Operation<D> {
@@ -280,11 +301,20 @@ impl<const D: usize> Shape<D> {
             Self::Box { .. } => (0..D).any(beyond),
             Self::Ball { radius, .. } => 2.0 * radius < horizon,
             Self::Cylinder { radius, axis, .. } => 2.0 * radius < horizon || beyond(*axis),
+            Self::Enclosed(_) => (0..D).any(beyond) || (0..D).all(|d| high[d] - low[d] < horizon),
         }
     }
 
-    /// Fraction of the segment from `a` to `b` inside the shape, from 0 to 1.
-    pub fn span(&self, a: [f64; D], b: [f64; D]) -> Option<[f64; 2]> {
+    /// Adds the fractions of the segment from `a` to `b` at which it enters or leaves the shape.
+    pub fn passages(&self, a: [f64; D], b: [f64; D], to: &mut Vec<f64>) {
+        match self {
+            Self::Enclosed(body) => body.facets().meet(a, b, |_, part| to.push(part.clamp(0.0, 1.0))),
+            _ => to.extend(self.span(a, b).into_iter().flatten()),
+        }
+    }
+
+    /// Fraction of the segment from `a` to `b` inside a convex shape, from 0 to 1.
+    fn span(&self, a: [f64; D], b: [f64; D]) -> Option<[f64; 2]> {
         let slab = |d: usize, low: f64, high: f64| {
             let way = b[d] - a[d];
             if way == 0.0 {
@@ -319,12 +349,14 @@ impl<const D: usize> Shape<D> {
                 let middle = centre[*axis];
                 vec![round(centre, *radius, *axis), slab(*axis, middle - 0.5 * length, middle + 0.5 * length)]
             }
+            Self::Enclosed(_) => return None,
         };
         let joint = spans.iter().fold([0.0_f64, 1.0], |[s, t], span| [s.max(span[0]), t.min(span[1])]);
         (joint[0] < joint[1]).then_some(joint)
     }
 
-    /// Returns true if it overlaps another, or shares a part of a face with it, within `near`, m.
+    /// Returns true if it overlaps another, or shares a part of a face with it, within `near`, m; of closed
+    /// facets if their boxes do.
     fn touches(&self, other: &Self, near: f64) -> bool {
         let ((low, high), (from, to)) = (self.bounds(), other.bounds());
         let common: [f64; D] = std::array::from_fn(|d| high[d].min(to[d]) - low[d].max(from[d]));
@@ -341,7 +373,7 @@ impl<const D: usize> Shape<D> {
             (0..D).filter(|&d| d != skip).map(|d| (a[d] - b[d]).powi(2)).sum::<f64>().sqrt()
         };
         match (self, other) {
-            (Self::Box { .. }, Self::Box { .. }) => true,
+            (Self::Box { .. }, Self::Box { .. }) | (Self::Enclosed(_), _) | (_, Self::Enclosed(_)) => true,
             (Self::Ball { centre, radius }, Self::Box { min, max })
             | (Self::Box { min, max }, Self::Ball { centre, radius }) => {
                 beside(centre, min, max, D) < radius - near

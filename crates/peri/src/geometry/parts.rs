@@ -32,8 +32,10 @@ impl<const D: usize> Parts<D> {
     }
 
     /// Fractions of the segment from `a` to `b` at which it enters or leaves a shape.
-    pub fn passages(&self, a: [f64; D], b: [f64; D]) -> impl Iterator<Item = f64> {
-        self.operations.iter().filter_map(move |(operation, _)| operation.shape().span(a, b)).flatten()
+    pub fn passages(&self, a: [f64; D], b: [f64; D]) -> Vec<f64> {
+        let mut ends = Vec::new();
+        self.operations.iter().for_each(|(operation, _)| operation.shape().passages(a, b, &mut ends));
+        ends
     }
 
     /// Finds the bonds whose straight line passes from one part of a pair to the other, for each pair: by
@@ -78,7 +80,8 @@ impl<const D: usize> Parts<D> {
     /// Lists the pairs of parts between which the segment from `a` to `b` passes, each once and ascending;
     /// the space between two parts belongs to their interface.
     fn passed(&self, a: [f64; D], b: [f64; D]) -> Vec<[u32; 2]> {
-        let mut ends: Vec<f64> = self.passages(a, b).chain([0.0, 1.0]).collect();
+        let mut ends = self.passages(a, b);
+        ends.extend([0.0, 1.0]);
         ends.sort_by(f64::total_cmp);
         let middles = ends.windows(2).filter(|pair| pair[1] - pair[0] > THIN).map(|pair| {
             let part = 0.5 * (pair[0] + pair[1]);

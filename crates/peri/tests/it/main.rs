@@ -11,6 +11,7 @@ mod contact;
 mod cracks;
 mod curves;
 mod dynamics;
+mod enclosures;
 mod equilibria;
 mod fields;
 mod filter;

@@ -70,11 +70,11 @@ fn text_and_bytes_are_one_surface() {
 #[test]
 fn a_box_fills_its_cells() {
     let stl = parsed(&binary(&brick([3.0, 2.0, 1.0]))).unwrap();
-    let voxels = stl.voxels([5e-4; 3], 0.5).unwrap().0;
+    let voxels = super::voxels(&stl, [5e-4; 3], 0.5).unwrap().0;
     assert_eq!(voxels.mesh.element_count(), 6 * 4 * 2);
     assert!((voxels.ratio - 1.0).abs() < 1e-6 && voxels.fill.iter().all(|fill| (fill - 1.0).abs() < 1e-6));
     // partly filled cells: 3 = 4 × 0.8 − 0.2
-    let voxels = stl.voxels([8e-4, 5e-4, 4e-4], 0.1).unwrap().0;
+    let voxels = super::voxels(&stl, [8e-4, 5e-4, 4e-4], 0.1).unwrap().0;
     assert_eq!(voxels.mesh.element_count(), 4 * 4 * 3);
     assert!((voxels.fill.iter().sum::<f64>() * 1.6e-10 / 6e-9 - 1.0).abs() < 1e-12);
     assert!((voxels.fill[3] - 0.75).abs() < 1e-6 && (voxels.fill[47] - 0.375).abs() < 1e-6);
@@ -87,9 +87,9 @@ fn a_sphere_has_its_volume() {
     let exact = 4.0 / 3.0 * std::f64::consts::PI * 125e-9;
     // chords of 90°/32
     assert!((stl.volume / exact - 1.0).abs() < 2e-3, "{}", stl.volume / exact);
-    let full = stl.voxels([5e-4; 3], 0.5).unwrap().0;
+    let full = super::voxels(&stl, [5e-4; 3], 0.5).unwrap().0;
     assert!((full.ratio - 1.0).abs() < 0.01 && full.can_be_full(), "{}", full.ratio);
-    let parts = stl.voxels([1e-3; 3], 0.0).unwrap().0;
+    let parts = super::voxels(&stl, [1e-3; 3], 0.0).unwrap().0;
     assert!((parts.fill.iter().sum::<f64>() * 1e-9 / stl.volume - 1.0).abs() < 1e-12);
     // rays alone miss little of it
     assert!(parts.left_out.abs() < 1e-12 && parts.fill.iter().all(|fill| *fill < 1.002));
@@ -159,7 +159,7 @@ fn shells_are_united_as_slicers_do() {
     ];
     for (name, shells, volume, note) in cases {
         let stl = parsed(&binary(&shells.concat())).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let (voxels, notes) = stl.voxels([1e-3; 3], 0.1).unwrap();
+        let (voxels, notes) = super::voxels(&stl, [1e-3; 3], 0.1).unwrap();
         let notes = [stl.notes, notes].concat().join("; ");
         // cells as large as the parts: rays are exact
         assert!(
@@ -174,7 +174,7 @@ fn shells_are_united_as_slicers_do() {
     let through = shell([4.0, 4.0, -1.0], [6.0, 6.0, 11.0], false);
     let stl = parsed(&binary(&[whole(true), through].concat())).unwrap();
     assert!(stl.notes[0].contains("1 of 2 shells are inside out"), "{:?}", stl.notes);
-    assert!((stl.voxels([1e-3; 3], 0.1).unwrap().0.volume * 1e9 - 1008.0).abs() < 1e-3);
+    assert!((super::voxels(&stl, [1e-3; 3], 0.1).unwrap().0.volume * 1e9 - 1008.0).abs() < 1e-3);
 }
 
 /// Two spheres, each centre on the other: their common volume counts once.
@@ -182,7 +182,7 @@ fn shells_are_united_as_slicers_do() {
 fn overlapping_spheres_have_the_volume_of_their_union() {
     let moved = |by: f32| sphere().into_iter().map(move |t| t.map(|[x, y, z]| [x + by, y, z]));
     let stl = parsed(&binary(&moved(0.0).chain(moved(5.0)).collect::<Vec<_>>())).unwrap();
-    let (voxels, notes) = stl.voxels([5e-4; 3], 0.1).unwrap();
+    let (voxels, notes) = super::voxels(&stl, [5e-4; 3], 0.1).unwrap();
     // two caps of height r/2: the lens has the volume 5 π r³/12
     let pi = std::f64::consts::PI;
     let exact = (8.0 / 3.0 - 5.0 / 12.0) * pi * 125.0;
@@ -296,7 +296,7 @@ fn damaged_files_are_errors_or_surfaces() {
                     let size = (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
                     assert!(size > 0.0 && stl.volume > 0.0);
                     // too many cells are refused
-                    _ = stl.voxels([size / 4.0; 3], 0.1);
+                    _ = super::voxels(&stl, [size / 4.0; 3], 0.1);
                 }
             }
         }

@@ -148,9 +148,9 @@ impl StlSpec {
             stl::read(&file, self.unit.si()).map_err(|error| located(source, "mesh.stl.file", &error))?;
         let size = self.cell.map(|x| x.si());
         self.check_size(source, surface.bounds(), size)?;
-        memory::refuse_mesh(source, "mesh.stl.cell", surface.cells(size).map_err(at)?, 1)?;
+        memory::refuse_mesh(source, "mesh.stl.cell", stl::cells(&surface, size).map_err(at)?, 1)?;
         let least = self.least.unwrap_or(LEAST_FILLED[usize::from(!self.fill)]);
-        let (voxels, overlaps) = surface.voxels(size, least).map_err(at)?;
+        let (voxels, overlaps) = stl::voxels(&surface, size, least).map_err(at)?;
         surface.notes.extend(overlaps);
         surface.notes.push(format!("the part is {}", box_of(surface.bounds())));
         finish(source, block, voxels, self.fill, surface.notes, None)

@@ -1,18 +1,20 @@
 //! Builds the body of a variant, and checks the rules that span several keys.
 
+use super::Scene;
 use super::cloud::cloud;
 use super::crack::{cracks, severed};
 use super::interface::cross_interfaces;
 use super::memory;
-use super::values::{DiscreteBody, ONE_OF_THEM, check_order, required, vector};
+use super::mesh_region::MeshSets;
+use super::mesh_shape::check_filling;
+use super::shapes::operations;
+use super::values::DiscreteBody;
 use super::variant::SceneVariant;
-use super::{AxisName, Scene, ShapeKind, ShapeSpec};
 use crate::bonds::{BodyGeometry, BondDamage, LatticeBonds};
 use crate::calibrate::Space;
-use crate::geometry::{Cut, Gaps, MOST_CELLS, Operation, Shape, bounds, cell_counts, lattice};
+use crate::geometry::{Cut, Gaps, MOST_CELLS, Operation, bounds, cell_counts, lattice};
 use harness::scene::{SceneError, Source};
 use polycore::memory::{available, gib};
-use polycore::units::Length;
 
 /// Largest number of sites of a body: they are counted in 32 bits.
 const MOST_SITES: f64 = u32::MAX as f64;
@@ -34,6 +36,7 @@ pub fn body_of<const D: usize>(
     };
     body.severed = severed(source, &*body.bonds, &cuts)?;
     body.cuts = cuts;
+    body.sets = MeshSets::of_scene(source, scene)?;
     cross_interfaces(source, scene, &mut body)?;
     Ok(body)
 }
@@ -52,6 +55,7 @@ fn build_lattice_body<const D: usize>(
     check_shapes(source, &operations, low, high)?;
     let lattice = lattice(&operations, variant.spacing, thickness)
         .map_err(|error| source.error("body.shapes", error, "a body with at least one particle"))?;
+    check_filling(source, scene, &operations, &lattice)?;
     let volume = variant.spacing.powi(D as i32) * thickness;
     if !(volume.is_normal()) {
         let found = format!("{} m, with which the volume of a particle is {volume} m³", variant.spacing);
@@ -81,8 +85,8 @@ fn build_lattice_body<const D: usize>(
     memory::refuse_too_large(source, scene, spacing_key(scene), &bonds)?;
     let (severed, cuts) = (Vec::new(), Vec::new());
     let bonds = Box::new(bonds);
-    let interfaces = Vec::new();
-    Ok(DiscreteBody { bonds, bounds: (low, high), thickness, severed, cuts, gaps, operations, interfaces })
+    let (interfaces, sets, bounds) = (Vec::new(), MeshSets::default(), (low, high));
+    Ok(DiscreteBody { bonds, bounds, thickness, severed, cuts, gaps, operations, interfaces, sets })
 }
 
 /// Returns a lower bound of the memory of a variant before it is built, bytes; 0 for a cloud.
@@ -148,102 +152,6 @@ fn refuse_too_large<const D: usize>(
 /// Returns the key that gives the spacing.
 fn spacing_key(scene: &Scene) -> &'static str {
     if scene.study.iter().any(|study| !study.spacing.is_empty()) { "study" } else { "body.spacing" }
-}
-
-/// Reads the list of shapes under the key `list`.
-pub(super) fn operations<const D: usize>(
-    source: &Source,
-    list: &str,
-    shapes: &[ShapeSpec],
-) -> Result<Vec<Operation<D>>, SceneError> {
-    let each = shapes.iter().enumerate().map(|(index, spec)| {
-        let key = format!("{list}[{index}]");
-        match (spec.add, spec.cut) {
-            (Some(kind), None) => Ok(Operation::Add(shape(source, &key, kind, spec)?)),
-            (None, Some(kind)) => Ok(Operation::Cut(shape(source, &key, kind, spec)?)),
-            (Some(_), Some(_)) => Err(source.conflict(&format!("{key}.add"), "cut", ONE_OF_THEM)),
-            (None, None) => {
-                Err(source.missing(&format!("{key}.add"), "needed for a shape: `add` or `cut` with its kind"))
-            }
-        }
-    });
-    each.collect()
-}
-
-pub(super) fn shape<const D: usize>(
-    source: &Source,
-    key: &str,
-    kind: ShapeKind,
-    spec: &ShapeSpec,
-) -> Result<Shape<D>, SceneError> {
-    let given = [
-        ("min", spec.min.is_some(), matches!(kind, ShapeKind::Box)),
-        ("max", spec.max.is_some(), matches!(kind, ShapeKind::Box)),
-        ("centre", spec.centre.is_some(), !matches!(kind, ShapeKind::Box)),
-        ("radius", spec.radius.is_some(), !matches!(kind, ShapeKind::Box)),
-        ("length", spec.length.is_some(), matches!(kind, ShapeKind::Cylinder)),
-        ("axis", spec.axis.is_some(), matches!(kind, ShapeKind::Cylinder)),
-    ];
-    for (name, is_given, belongs) in given {
-        let path = format!("{key}.{name}");
-        if is_given && !belongs {
-            return Err(source.unexpected(&path, format!("a {} has no {name}", kind.name())));
-        }
-        if belongs && !is_given {
-            return Err(source.missing(&path, format!("needed for a {}", kind.name())));
-        }
-    }
-    if spec.part.is_some() && (spec.cut.is_some() || !key.starts_with("body.shapes")) {
-        return Err(
-            source.unexpected(&format!("{key}.part"), "only shapes that `body.shapes` adds are parts")
-        );
-    }
-    let positive = |name: &str, value: Option<Length>| {
-        let path = format!("{key}.{name}");
-        let value = required(source, &path, value, "needed for its size")?.si();
-        if value > 0.0 { Ok(value) } else { Err(source.error(&path, format!("{value} m"), "above 0")) }
-    };
-    let point = |name: &str, value: &Option<Vec<Length>>| {
-        let path = format!("{key}.{name}");
-        vector::<D>(source, &path, value.as_deref().unwrap_or_default())
-    };
-    match kind {
-        ShapeKind::Box => {
-            let (min, max) = (point("min", &spec.min)?, point("max", &spec.max)?);
-            check_order(source, key, min, max)?;
-            Ok(Shape::Box { min, max })
-        }
-        ShapeKind::Disk | ShapeKind::Ball => {
-            if (kind == ShapeKind::Disk) != (D == 2) {
-                let allowed = if D == 2 {
-                    "`disk` or `box` in a plane body"
-                } else {
-                    "`ball`, `cylinder` or `box` in a solid"
-                };
-                return Err(source.error(key, format!("a {}", kind.name()), allowed));
-            }
-            Ok(Shape::Ball {
-                centre: point("centre", &spec.centre)?,
-                radius: positive("radius", spec.radius)?,
-            })
-        }
-        ShapeKind::Cylinder => {
-            if D != 3 {
-                return Err(source.error(key, "a cylinder", "`disk` or `box` in a plane body"));
-            }
-            let axis = match required(source, &format!("{key}.axis"), spec.axis, "needed for a cylinder")? {
-                AxisName::X => 0,
-                AxisName::Y => 1,
-                AxisName::Z => 2,
-            };
-            Ok(Shape::Cylinder {
-                centre: point("centre", &spec.centre)?,
-                radius: positive("radius", spec.radius)?,
-                length: positive("length", spec.length)?,
-                axis,
-            })
-        }
-    }
 }
 
 /// Refuses a cut that removes the whole body, by its key rather than as an empty lattice.

@@ -3,6 +3,8 @@
 use super::GridSpec;
 use super::Scene;
 use super::memory;
+use super::mesh_cells::{CellMesh, is_mesh};
+use super::mesh_region::MeshSets;
 use super::values::{DiscreteBody, LARGEST_RATIO, check_order, positive, required, vector};
 use super::variant::SceneVariant;
 use crate::bonds::{BodyGeometry, BondDamage, CloudBonds, LatticeBonds};
@@ -10,6 +12,7 @@ use crate::geometry::{Cut, Gaps, recognise};
 use harness::scene::{SceneError, Source};
 use polycore::memory::{available, gib};
 use polycore::table::Table;
+use polycore::units::Length;
 use polycore::units::dimension::{LengthDimension, VolumeDimension};
 use std::collections::HashMap;
 use std::path::Path;
@@ -33,7 +36,10 @@ pub fn cloud<const D: usize>(
     let (positions, volumes, key) = match (&scene.body.points, &scene.body.grid) {
         (Some(points), _) => {
             let path = source.file(points);
-            let (positions, volumes) = read::<D>(source, &path)?;
+            let (positions, volumes) = match is_mesh(points) {
+                true => cells_of_mesh(source, points, scene.body.unit, thickness)?,
+                false => read::<D>(source, &path)?,
+            };
             (positions, volumes, "body.points")
         }
         (None, Some(spec)) => {
@@ -74,6 +80,7 @@ pub fn cloud<const D: usize>(
         gaps,
         operations: Vec::new(),
         interfaces: Vec::new(),
+        sets: MeshSets::default(),
     })
 }
 
@@ -107,6 +114,7 @@ fn recognise_lattice<const D: usize>(
         gaps,
         operations: Vec::new(),
         interfaces: Vec::new(),
+        sets: MeshSets::default(),
     })
 }
 
@@ -145,6 +153,20 @@ fn grid<const D: usize>(
     };
     let count = cells.iter().product();
     Ok(((0..count).map(place).collect(), vec![volume; count]))
+}
+
+/// Reads the centroids and volumes of the cells of a mesh file.
+fn cells_of_mesh<const D: usize>(
+    source: &Source,
+    file: &Path,
+    unit: Option<Length>,
+    thickness: f64,
+) -> Result<CloudPoints<D>, SceneError> {
+    let why = "the mesh file has none: the length of one unit, e.g. \"1 mm\"";
+    let unit = required(source, "body.unit", unit, why)?;
+    let mesh = CellMesh::<D>::read(source, "body.points", "body.unit", file, unit)?;
+    let cells = mesh.moments().into_iter().map(|(volume, centre)| (centre, volume * thickness));
+    Ok(cells.unzip())
 }
 
 fn read<const D: usize>(source: &Source, path: &Path) -> Result<CloudPoints<D>, SceneError> {

@@ -58,6 +58,7 @@ pub fn explain<const D: usize>(
             .collect();
         builds(format!("a crack, ({}) mm: {severed} bonds broken", corners.join(") – (")));
     }
+    super::mesh_shape::explain(scene, body).into_iter().for_each(&mut builds);
     super::interface::explain(scene, body, criterion).into_iter().for_each(&mut builds);
     lines.extend(super::parts::explain(body));
     lines.extend(super::loads::explain(source, scene, body)?);

@@ -1,7 +1,7 @@
 //! Inclusions and fields of other scenes: stiffness, critical stretch and prestrain of each particle.
 
-use super::build::shape;
 use super::interface::{part_number, parts_of};
+use super::shapes::shape;
 use super::values::DiscreteBody;
 use super::{Material, ParameterField, Scene, ShapeSpec, VaryingParameter, plain};
 use crate::bonds::{Bonds, Property};
@@ -98,10 +98,19 @@ impl<const D: usize> Region<D> {
 
     /// Fractions of the segment from `a` to `b` between which it is inside or outside.
     fn passages(&self, a: [f64; D], b: [f64; D]) -> Vec<f64> {
+        let mut ends = Vec::new();
         match self {
-            Self::Shape(shape) => shape.span(a, b).into_iter().flatten().collect(),
-            Self::Part { parts, .. } => parts.passages(a, b).chain([0.0, 1.0]).collect(),
+            Self::Shape(shape @ Shape::Enclosed(_)) => {
+                shape.passages(a, b, &mut ends);
+                ends.extend([0.0, 1.0]);
+            }
+            Self::Shape(shape) => shape.passages(a, b, &mut ends),
+            Self::Part { parts, .. } => {
+                ends = parts.passages(a, b);
+                ends.extend([0.0, 1.0]);
+            }
         }
+        ends
     }
 }
 

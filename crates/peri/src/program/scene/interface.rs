@@ -1,6 +1,6 @@
 //! Interfaces between parts of a body, and particles whose bonds never break.
 
-use super::build::operations;
+use super::shapes::operations;
 use super::values::{DiscreteBody, ONE_OF_THEM, plain};
 use super::{Scene, tearing};
 use crate::bonds::{Property, sever_pairs};
@@ -128,7 +128,9 @@ fn check_limit(source: &Source, scene: &Scene, key: &str, critical: &Critical) -
 /// Returns the names of the parts of a body, each once.
 fn part_names(scene: &Scene) -> Vec<&str> {
     let mut names: Vec<&str> = Vec::new();
-    for name in scene.body.shapes().iter().filter_map(|shape| shape.part.as_deref()) {
+    for name in
+        scene.body.shapes().iter().filter_map(|shape| shape.part_name().filter(|_| shape.add.is_some()))
+    {
         if !names.contains(&name) {
             names.push(name);
         }
@@ -154,8 +156,7 @@ pub(super) fn part_number(source: &Source, scene: &Scene, key: &str, name: &str)
 pub(super) fn parts_of<const D: usize>(scene: &Scene, body: &DiscreteBody<D>) -> Parts<D> {
     let names = part_names(scene);
     let number = |name: &str| names.iter().position(|known| *known == name).unwrap_or(names.len()) as u32;
-    let each =
-        scene.body.shapes().iter().map(|shape| shape.part.as_deref().map_or(names.len() as u32, number));
+    let each = scene.body.shapes().iter().map(|shape| shape.part_name().map_or(names.len() as u32, number));
     Parts::new(&body.operations, &each.collect::<Vec<u32>>())
 }
 

@@ -378,8 +378,9 @@ fn name_of(index: usize, boundary: &Boundary) -> String {
     match (&boundary.name, boundary.side) {
         (Some(name), _) => name.clone(),
         (None, Some(side)) => side.to_string(),
-        (None, None) if boundary.shapes.is_empty() => format!("box{}", index + 1),
-        (None, None) => format!("shapes{}", index + 1),
+        (None, None) => boundary.set.clone().unwrap_or_else(|| {
+            format!("{}{}", if boundary.shapes.is_empty() { "box" } else { "shapes" }, index + 1)
+        }),
     }
 }
 
@@ -417,7 +418,7 @@ fn support<const D: usize>(
     if let Some(traction) = &boundary.traction {
         count("traction", traction.len())?;
         if boundary.side.is_none() {
-            let why = "needs a `side`; a box takes `force`";
+            let why = "needs a `side`; other regions take `force`";
             return Err(source.unexpected(&format!("{key}.traction"), why));
         }
         if let Some(depth) = depth {

@@ -22,6 +22,9 @@ mod interface;
 mod line;
 mod loads;
 mod memory;
+mod mesh_cells;
+mod mesh_region;
+mod mesh_shape;
 mod method;
 mod network;
 mod overlap;
@@ -32,6 +35,7 @@ mod pressure;
 mod probe;
 mod region;
 mod rotation;
+mod shapes;
 mod solid;
 mod step;
 mod tearing;
@@ -64,6 +68,7 @@ pub use method::{DeviceChoice, Dynamics, ForcePrecision, SolverMethod, SolverSpe
 pub use network::{ChemistrySpec, explain_network, resolve_network};
 pub use placement::{check_placement, exact_plate};
 pub use probe::{HistoryProbe, Track};
+pub use shapes::{AxisName, ShapeKind, ShapeSpec};
 pub use solid::{SolidKind, SolidLaw};
 pub use step::{StepSpec, step_cuts};
 pub use tearing::{explain_tearing, tearing_warnings};
@@ -170,8 +175,10 @@ pub struct BodySpec {
     pub horizon: Option<Length>,
     /// Shapes added and cut in order.
     pub shapes: Option<Vec<ShapeSpec>>,
-    /// CSV file with the columns x, y(, z) in m and volume in m³.
+    /// CSV file with the columns x, y(, z) in m and volume in m³, or a mesh file: a point for each cell.
     pub points: Option<PathBuf>,
+    /// Length of one unit of a mesh file in `points`.
+    pub unit: Option<Length>,
     /// A box of cells that may have unequal sides, with `horizon`.
     pub grid: Option<GridSpec>,
     /// Bonds across gaps: between parts that do not touch and across cuts narrower than the horizon. Default:
@@ -208,68 +215,6 @@ impl BodySpec {
 
 /// Default horizon over spacing, as in the thesis.
 pub const HORIZON_RATIO: f64 = 3.015;
-
-/// Shape; its kind determines the lengths that it needs.
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ShapeSpec {
-    /// Kind of an added shape.
-    pub add: Option<ShapeKind>,
-    /// Kind of a shape that is cut out.
-    pub cut: Option<ShapeKind>,
-    /// Lower corner of a box.
-    pub min: Option<Vec<Length>>,
-    /// Upper corner of a box.
-    pub max: Option<Vec<Length>>,
-    /// Centre of a disk, ball or cylinder.
-    pub centre: Option<Vec<Length>>,
-    /// Radius of a disk, ball or cylinder.
-    pub radius: Option<Length>,
-    /// Length of a cylinder.
-    pub length: Option<Length>,
-    /// Axis of a cylinder.
-    pub axis: Option<AxisName>,
-    /// Name of the part to which a shape of the body belongs; of shapes that overlap, the last one counts.
-    pub part: Option<String>,
-}
-
-/// Kinds of shapes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum ShapeKind {
-    /// Axis-parallel box (2D: rectangle).
-    Box,
-    /// Disk, in 2D.
-    Disk,
-    /// Ball, in 3D.
-    Ball,
-    /// Cylinder along an axis, in 3D.
-    Cylinder,
-}
-
-impl ShapeKind {
-    /// Returns the name in scenes.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Box => "box",
-            Self::Disk => "disk",
-            Self::Ball => "ball",
-            Self::Cylinder => "cylinder",
-        }
-    }
-}
-
-/// A coordinate axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum AxisName {
-    /// First.
-    X,
-    /// Second.
-    Y,
-    /// Third.
-    Z,
-}
 
 /// Crack of zero width: the segment `from`–`to` in 2D; in 3D a parallelogram with the corner `from` and its
 /// neighbours `to` and `and`.

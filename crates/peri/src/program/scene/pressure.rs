@@ -35,6 +35,10 @@ pub(super) fn add<const D: usize>(
             let allowed = "`plane-strain` or `solid`: in plane stress the area changes with the thickness";
             return Err(source.error(&key, "a pressure in `plane-stress`", allowed));
         }
+        if boundary.set.is_some() {
+            let why = "a pressure acts on a `side`, or on the faces in `shapes` or a box";
+            return Err(source.conflict(&key, "set", why));
+        }
         if matches!(boundary.curve, Some(CurveList::Each(_))) {
             let why = "a pressure has one curve, not one for each component";
             return Err(source.conflict(&format!("boundary[{index}].curve"), "pressure", why));

@@ -28,6 +28,8 @@ pub struct HistoryProbe {
     pub min: Option<Vec<Length>>,
     /// … and upper corner.
     pub max: Option<Vec<Length>>,
+    /// Or a set of a mesh file of the body, as that of a boundary.
+    pub set: Option<String>,
     /// Marks of a strain or an opening.
     pub from: Option<Vec<Length>>,
     /// The other mark.
@@ -108,7 +110,7 @@ impl HistoryProbe {
         key: &str,
         body: &DiscreteBody<D>,
     ) -> Result<Vec<u32>, SceneError> {
-        if self.side.is_none() && self.min.is_none() && self.max.is_none() {
+        if self.side.is_none() && self.min.is_none() && self.max.is_none() && self.set.is_none() {
             return Ok(body.bonds.particles().to_vec());
         }
         let place = Boundary {
@@ -116,6 +118,7 @@ impl HistoryProbe {
             layers: self.layers,
             min: self.min.clone(),
             max: self.max.clone(),
+            set: self.set.clone(),
             ..Boundary::default()
         };
         let (members, _) = region(source, key, &place, body)?;
@@ -199,6 +202,7 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             ("side", probe.side.is_some(), in_region, false),
             ("min", probe.min.is_some(), in_region, false),
             ("max", probe.max.is_some(), in_region, false),
+            ("set", probe.set.is_some(), in_region, false),
             ("tip", probe.tip.is_some(), of_j, of_j),
             ("radii", probe.radii.is_some(), of_j, of_j),
             ("damage", probe.damage.is_some(), of_crack, false),

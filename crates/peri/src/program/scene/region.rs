@@ -1,7 +1,8 @@
 //! Selects the particles of a boundary.
 
 use super::Boundary;
-use super::build::operations;
+use super::mesh_region::SetRegion;
+use super::shapes::operations;
 use super::values::{DiscreteBody, ONE_OF_THEM, check_order, vector};
 use crate::bonds::Bonds;
 use crate::geometry::{Operation, inside};
@@ -20,6 +21,11 @@ pub(super) fn extent<const D: usize>(
     body: &DiscreteBody<D>,
 ) -> Result<(BoundaryExtent<D>, Option<f64>), SceneError> {
     let spacing = body.bonds.spacing();
+    let kinds = [boundary.side.is_some(), boundary.min.is_some(), !boundary.shapes.is_empty()];
+    if boundary.set.is_some() && kinds.contains(&true) {
+        let allowed = "one of `side`, `set`, `shapes`, or `min` and `max`";
+        return Err(source.error(key, "several kinds of region", allowed));
+    }
     let (low, high, depth) = match (boundary.side, &boundary.min, &boundary.max) {
         (Some(side), None, None) if boundary.shapes.is_empty() => {
             let (axis, upper) = side.axis();
@@ -74,32 +80,38 @@ pub(super) fn extent<const D: usize>(
             check_order(source, key, min, max)?;
             (min, max, None)
         }
-        (None, None, None) if !boundary.shapes.is_empty() && boundary.depth_key().is_none() => {
+        (None, None, None)
+            if boundary.set.is_some() || !boundary.shapes.is_empty() && boundary.depth_key().is_none() =>
+        {
             ([f64::NEG_INFINITY; D], [f64::INFINITY; D], None)
         }
         (side, min, max) => {
-            let given = [side.is_some(), min.is_some() || max.is_some(), !boundary.shapes.is_empty()];
+            let shapes = !boundary.shapes.is_empty() || boundary.set.is_some();
+            let given = [side.is_some(), min.is_some() || max.is_some(), shapes];
             let several = given.iter().filter(|given| **given).count() > 1;
             let found = if several { "several kinds of region" } else { "no region" };
-            return Err(source.error(key, found, "one of `side`, `shapes`, or `min` and `max`"));
+            return Err(source.error(key, found, "one of `side`, `set`, `shapes`, or `min` and `max`"));
         }
     };
     let shapes = operations(source, &format!("{key}.shapes"), &boundary.shapes)?;
-    Ok((BoundaryExtent { low, high, shapes }, depth))
+    let set = boundary.set.as_ref().map(|name| body.sets.find(source, key, name, boundary, &*body.bonds));
+    Ok((BoundaryExtent { low, high, shapes, set: set.transpose()? }, depth))
 }
 
-/// Region of a boundary: a box that may be unbounded, and shapes.
+/// Region of a boundary: a box that may be unbounded, shapes, and a set of a mesh.
 pub(super) struct BoundaryExtent<const D: usize> {
     low: [f64; D],
     high: [f64; D],
     shapes: Vec<Operation<D>>,
+    set: Option<SetRegion<D>>,
 }
 
 impl<const D: usize> BoundaryExtent<D> {
     /// Returns true if the region contains a point, edges included.
     pub(super) fn contains(&self, place: [f64; D]) -> bool {
         let boxed = (0..D).all(|d| self.low[d] <= place[d] && place[d] <= self.high[d]);
-        boxed && (self.shapes.is_empty() || inside(&self.shapes, place))
+        let shaped = boxed && (self.shapes.is_empty() || inside(&self.shapes, place));
+        shaped && self.set.as_ref().is_none_or(|set| set.contains(place))
     }
 }
 

@@ -117,7 +117,11 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             let why = "all steps of a run have one precision";
             return Err(source.error("dynamics.precision", why, "`double` with [[step]]"));
         }
-        if let Some(at) = scene.boundary.iter().position(|own| own.name.is_none() && own.side.is_none()) {
+        if let Some(at) = scene
+            .boundary
+            .iter()
+            .position(|own| own.name.is_none() && own.side.is_none() && own.set.is_none())
+        {
             let why = "needed with [[step]]: the name identifies a region in all steps";
             return Err(source.missing(&format!("boundary[{at}].name"), why));
         }

@@ -1,5 +1,6 @@
 //! Shared by several blocks: checks of single values, and the discretised body.
 
+use super::mesh_region::MeshSets;
 use crate::bonds::Bonds;
 use crate::geometry::{Cut, Gaps, Operation};
 use crate::surface::BodySurface;
@@ -30,6 +31,8 @@ pub struct DiscreteBody<const D: usize> {
     pub operations: Vec<Operation<D>>,
     /// Bonds across each `[[interface]]`, by their sites.
     pub interfaces: Vec<Vec<[u32; 2]>>,
+    /// Named sets of its mesh files.
+    pub sets: MeshSets<D>,
 }
 
 impl<const D: usize> DiscreteBody<D> {

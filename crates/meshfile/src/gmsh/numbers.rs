@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use crate::error::Error;
-use crate::file::line_error;
+use crate::error::{Error, line_error};
 
 /// Encoding of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use crate::error::Error;
-use crate::file::line_error;
+use crate::error::{Error, line_error};
 
 /// Three corners of each triangle, and a note on ignored bytes.
 pub(super) type Corners = (Vec<[f32; 3]>, Option<String>);

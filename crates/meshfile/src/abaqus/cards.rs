@@ -2,8 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::error::Error;
-use crate::file::line_error;
+use crate::error::{Error, line_error};
 
 /// A keyword line with its parameters.
 #[derive(Debug)]

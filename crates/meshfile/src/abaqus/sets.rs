@@ -3,11 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::error::Error;
-use crate::file::line_error;
-use crate::mesh::file_mesh::{FileContent, Labels};
-use crate::mesh::surface::OuterSurface;
-use crate::mesh::{Cell, ElementShape, Face, Mesh};
+use crate::content::{Face, Labels, MeshFile};
+use crate::error::{Error, line_error};
+use crate::shape::ElementShape;
 
 /// Kind of a set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,7 +59,7 @@ impl Resolver<'_> {
     ///
     /// # Errors
     /// [`Error::File`] for members that do not exist or are too many.
-    pub fn resolve(&mut self, sets: Vec<FileSet>, content: &mut FileContent) -> Result<(), Error> {
+    pub fn resolve(&mut self, sets: Vec<FileSet>, content: &mut MeshFile) -> Result<(), Error> {
         // names in upper case, with the letter case of their first use
         let mut node_sets: BTreeMap<String, (String, Vec<u32>)> = BTreeMap::new();
         let mut element_sets: BTreeMap<String, (String, Vec<u32>)> = BTreeMap::new();
@@ -92,7 +90,7 @@ impl Resolver<'_> {
                     self.count_work(set.entries.first().map_or(0, |entry| entry.0), 8 * members.len())?;
                     let elements = members.iter().map(|place| &content.elements[*place as usize]);
                     let nodes = elements
-                        .flat_map(|element| content.nodes_of(element))
+                        .flat_map(|element| content.labels_of(element))
                         .filter_map(|label| self.nodes.get(*label))
                         .collect();
                     node_sets.entry(key).or_insert((set.name, Vec::new())).1.append(&mut { nodes });
@@ -174,7 +172,7 @@ impl Resolver<'_> {
         line: usize,
         members: &[u32],
         side: Option<u8>,
-        content: &FileContent,
+        content: &MeshFile,
         outer: &mut Option<BTreeMap<u32, Vec<u8>>>,
         found: &mut Vec<Face>,
     ) -> Result<(), Error> {
@@ -196,7 +194,7 @@ impl Resolver<'_> {
                 None => {
                     let outer = match outer {
                         Some(outer) => outer,
-                        None => outer.insert(outer_sides(content, self.nodes)?),
+                        None => outer.insert(outer_sides(content)),
                     };
                     let sides = outer.get(place).map_or(&[][..], Vec::as_slice);
                     found.extend(sides.iter().map(|side| Face { element: *place, side: *side }));
@@ -208,35 +206,25 @@ impl Resolver<'_> {
 }
 
 /// Returns the sides of solid elements that no other shares, by the element's index.
-fn outer_sides(content: &FileContent, nodes: &Labels) -> Result<BTreeMap<u32, Vec<u8>>, Error> {
-    let mut mesh = Mesh { points: vec![[0.0; 3]; content.nodes.len()], ..Mesh::default() };
-    let mut places = [const { Vec::new() }; 3];
+fn outer_sides(content: &MeshFile) -> BTreeMap<u32, Vec<u8>> {
+    let mut sides: Vec<([u64; 4], Face)> = Vec::new();
     for (place, element) in (0u32..).zip(&content.elements) {
         let Some(shape) = element.kind.solid() else { continue };
-        // missing nodes are reported when the mesh is made
-        let own: Vec<u32> = content.nodes_of(element).iter().filter_map(|label| nodes.get(*label)).collect();
-        if own.len() < shape.nodes() {
-            continue;
-        }
-        match shape {
-            ElementShape::Hexahedron => {
-                mesh.hexahedra.extend(own.first_chunk::<8>());
-                places[0].push(place);
-            }
-            ElementShape::Tetrahedron => {
-                mesh.tetrahedra.extend(own.first_chunk::<4>());
-                places[1].push(place);
-            }
-            _ => {
-                mesh.others.extend(Cell::new(&own));
-                places[2].push(place);
-            }
+        let labels = content.labels_of(element);
+        for side in 0..shape.side_count() {
+            let mut key = [u64::MAX; 4];
+            key.iter_mut().zip(shape.side(side)).for_each(|(key, &corner)| *key = labels[corner]);
+            key.sort_unstable();
+            sides.push((key, Face { element: place, side }));
         }
     }
-    let places = places.concat();
+    sides.sort_unstable();
     let mut outer: BTreeMap<u32, Vec<u8>> = BTreeMap::new();
-    for face in OuterSurface::of_all(&mesh)?.faces() {
-        outer.entry(places[face.element as usize]).or_default().push(face.side);
+    for group in sides.chunk_by(|a, b| a.0 == b.0) {
+        if let [(_, face)] = group {
+            outer.entry(face.element).or_default().push(face.side);
+        }
     }
-    Ok(outer)
+    outer.values_mut().for_each(|sides| sides.sort_unstable());
+    outer
 }

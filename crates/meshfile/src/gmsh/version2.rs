@@ -3,9 +3,9 @@
 
 use std::collections::HashMap;
 
-use super::{ElementKind, MshReader, Numbers, kind_of, place, read_label};
+use super::{MshReader, Numbers, kind_of, place, read_label};
+use crate::content::FileNode;
 use crate::error::Error;
-use crate::mesh::file_mesh::FileNode;
 
 /// Limit on the tags of an element: groups, an entity, partitions.
 const MAX_TAGS: i64 = 10_000;
@@ -56,16 +56,16 @@ impl MshReader {
                 let mut own = self.content.elements.len() as u32 - 1;
                 if kind.solid().is_some() {
                     let first = self.content.elements[own as usize].first;
-                    let nodes = self.content.element_nodes[first..].to_vec();
+                    let nodes = self.content.element_labels[first..].to_vec();
                     let place = *known.entry(nodes).or_insert(own);
                     if place != own {
                         self.content.elements.pop();
-                        self.content.element_nodes.truncate(first);
+                        self.content.element_labels.truncate(first);
                         (own, again) = (place, again + 1);
                     }
                 }
                 if group > 0 {
-                    self.add_to(numbers, dimension(kind), group, own..own + 1)?;
+                    self.add_to(numbers, kind.dimension() as i64, group, own..own + 1)?;
                 }
             }
             read += block;
@@ -83,13 +83,4 @@ impl MshReader {
 fn count(numbers: &mut Numbers, what: &str) -> Result<u64, Error> {
     let line = numbers.text_line();
     line.trim().parse().map_err(|_| numbers.error(what, line, "a count"))
-}
-
-fn dimension(kind: ElementKind) -> i64 {
-    match kind {
-        ElementKind::Solid(_) => 3,
-        ElementKind::Point => 0,
-        ElementKind::Line | ElementKind::Line3 => 1,
-        _ => 2,
-    }
 }

@@ -1,0 +1,178 @@
+//! Named sets of the mesh files of a body, which select particles.
+
+use super::mesh_cells::{CellMesh, is_mesh};
+use super::region::layers;
+use super::values::required;
+use super::{Boundary, Scene};
+use crate::bonds::Bonds;
+use crate::geometry::{Enclosure, Facet, Facets};
+use harness::scene::{SceneError, Source};
+use polycore::units::Length;
+use std::path::Path;
+
+/// Mesh files of a body that regions name.
+pub struct MeshSets<const D: usize>(Vec<CellMesh<D>>);
+
+impl<const D: usize> Default for MeshSets<D> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+/// Region of a set.
+pub(super) enum SetRegion<const D: usize> {
+    /// Inside of cells.
+    Cells(Enclosure<D>),
+    /// Particles within a distance, m, of faces or nodes.
+    Near(Facets<D>, f64),
+}
+
+impl<const D: usize> SetRegion<D> {
+    /// Returns true if the region contains a point.
+    pub fn contains(&self, place: [f64; D]) -> bool {
+        match self {
+            Self::Cells(body) => body.contains(place),
+            Self::Near(facets, reach) => facets.is_within(place, *reach),
+        }
+    }
+}
+
+impl Scene {
+    /// Returns true if a region is a set of a mesh file.
+    fn names_sets(&self) -> bool {
+        let boundaries = self.boundary.iter().chain(self.step.iter().flat_map(|step| &step.boundary));
+        boundaries.filter_map(|boundary| boundary.set.as_ref()).next().is_some()
+            || self.probe.iter().any(|probe| probe.set.is_some())
+    }
+
+    /// Lists the mesh files of the body, each once.
+    fn mesh_files(&self) -> Vec<MeshEntry<'_>> {
+        let mut files: Vec<MeshEntry> = Vec::new();
+        for (index, shape) in self.body.shapes().iter().enumerate() {
+            let keys = ["file", "unit"].map(|name| format!("body.shapes[{index}].{name}"));
+            files.extend(shape.file.as_ref().map(|file| MeshEntry { file, unit: shape.unit, keys }));
+        }
+        let keys = ["body.points", "body.unit"].map(str::to_owned);
+        files.extend(self.body.points.as_ref().map(|file| MeshEntry { file, unit: self.body.unit, keys }));
+        let mut known: Vec<&Path> = Vec::new();
+        files.retain(|entry| {
+            let is_new = is_mesh(entry.file) && !known.contains(&entry.file);
+            known.push(entry.file);
+            is_new
+        });
+        files
+    }
+}
+
+/// Mesh file that a scene names, with the keys of its name and its unit.
+struct MeshEntry<'a> {
+    file: &'a Path,
+    unit: Option<Length>,
+    keys: [String; 2],
+}
+
+impl<const D: usize> MeshSets<D> {
+    /// Reads the mesh files of a body, if a region of the scene names a set.
+    ///
+    /// # Errors
+    /// Errors of [`CellMesh::read`].
+    pub(super) fn of_scene(source: &Source, scene: &Scene) -> Result<Self, SceneError> {
+        if !scene.names_sets() {
+            return Ok(Self::default());
+        }
+        let read = |MeshEntry { file, unit, keys: [key, unit_key] }: MeshEntry| {
+            let unit = required(source, &unit_key, unit, "the file has none, e.g. \"1 mm\"")?;
+            CellMesh::read(source, &key, &unit_key, file, unit)
+        };
+        scene.mesh_files().into_iter().map(read).collect::<Result<_, _>>().map(Self)
+    }
+
+    /// Finds the region of a set of a boundary: in its cells; of faces or nodes the particles within the
+    /// depth of the boundary.
+    ///
+    /// # Errors
+    /// A body without mesh files, an unknown set, a depth of cells, and a depth that is not positive.
+    pub(super) fn find(
+        &self,
+        source: &Source,
+        key: &str,
+        name: &str,
+        boundary: &Boundary,
+        bonds: &dyn Bonds<D>,
+    ) -> Result<SetRegion<D>, SceneError> {
+        let set = format!("{key}.set");
+        if self.0.is_empty() {
+            let allowed = "a body with a mesh file, whose sets have names";
+            return Err(source.error(&set, format!("`{name}` of a body without one"), allowed));
+        }
+        let own: Vec<&CellMesh<D>> = self.0.iter().filter(|mesh| mesh.has_set(name)).collect();
+        let mesh = match own[..] {
+            [mesh] => mesh,
+            [] => {
+                let mut names: Vec<&str> = self.0.iter().flat_map(CellMesh::set_names).collect();
+                names.sort_unstable();
+                names.dedup();
+                if names.is_empty() {
+                    let found = format!("`{name}` of a mesh without sets");
+                    return Err(source.error(&set, found, "a mesh with named sets, or `side` and `shapes`"));
+                }
+                return Err(source.unknown(&set, name, &names));
+            }
+            [one, other, ..] => {
+                let found = format!("`{name}`, which {} and {} have", one.path(), other.path());
+                return Err(source.error(&set, found, "a name that one of the files has"));
+            }
+        };
+        let places = mesh.content().element_sets.get(name).cloned().unwrap_or_default();
+        let cells = mesh.cells_of(places);
+        if !cells.is_empty() {
+            if let Some(depth) = boundary.depth_key() {
+                return Err(source.unexpected(&format!("{key}.{depth}"), "cells have their own extent"));
+            }
+            let facets = mesh.boundary(&cells).map(|(facets, _)| facets);
+            let body = facets.and_then(|facets| Enclosure::new(facets).map_err(|error| error.to_string()));
+            let body =
+                body.map_err(|error| source.error(&set, format!("{}: {error}", mesh.path()), "cells"))?;
+            return Ok(SetRegion::Cells(body));
+        }
+        let depth = boundary.depth.map(|depth| depth.si());
+        let reach = depth.unwrap_or_else(|| layers(boundary, bonds) as f64 * bonds.spacing());
+        if reach.is_nan() || reach <= 0.0 || boundary.layers == Some(0) {
+            let depth = boundary.depth_key().unwrap_or("depth");
+            return Err(source.error(&format!("{key}.{depth}"), format!("{reach} m"), "above 0"));
+        }
+        // particles on the border belong to it
+        Ok(SetRegion::Near(Facets::new(mesh.facets_of_set(name)), reach * (1.0 + 1e-9)))
+    }
+}
+
+impl<const D: usize> CellMesh<D> {
+    /// Names of all sets with members in the dimension of the body or below.
+    fn set_names(&self) -> Vec<&str> {
+        let content = self.content();
+        let elements = content.element_sets.keys().chain(content.curve_sets.keys());
+        let names = elements.chain(content.surfaces.keys()).chain(content.node_sets.keys());
+        names.map(String::as_str).filter(|name| self.has_set(name)).collect()
+    }
+
+    fn has_set(&self, name: &str) -> bool {
+        let places = self.content().element_sets.get(name).cloned().unwrap_or_default();
+        !self.cells_of(places).is_empty() || !self.facets_of_set(name).is_empty()
+    }
+
+    /// Facets of the faces of a set (in 2D edges); without any its nodes, as facets without an extent.
+    fn facets_of_set(&self, name: &str) -> Vec<Facet<D>> {
+        let content = self.content();
+        let lists = [content.element_sets.get(name), content.curve_sets.get(name)];
+        let places = lists.into_iter().flatten().flatten();
+        let sides = places.filter(|place| content.elements[**place as usize].kind.dimension() + 1 == D);
+        let mut facets: Vec<Facet<D>> = sides.flat_map(|&place| self.facets_of_side(place)).collect();
+        let faces = content.surfaces.get(name).into_iter().flatten().filter(|_| D == 3);
+        facets.extend(faces.flat_map(|face| self.facets_of_face(face.element, face.side)));
+        if facets.is_empty() {
+            let nodes = content.node_sets.get(name).into_iter().flatten();
+            facets.extend(nodes.map(|&node| [self.point(node); D]));
+        }
+        facets
+    }
+}

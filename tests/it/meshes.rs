@@ -1,0 +1,122 @@
+//! Bodies of `peri` from mesh files: against shapes, and against the finite element meshes of `crystfem`.
+
+use crate::program::{peri, workspace};
+use std::fs;
+use std::path::PathBuf;
+
+/// Values of the report of a scene that runs in a folder of its own.
+fn values(scene: &str, arguments: &str) -> serde_json::Value {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    peri(&format!("run scene.toml --output out {arguments}"), folder.path()).with_code(0);
+    let report = fs::read_to_string(folder.path().join("out/report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let mut values = report["values"].clone();
+    // of a hole that is a shape
+    values.as_object_mut().unwrap().remove("kt_finite_width");
+    values
+}
+
+fn case(name: &str) -> String {
+    let folder = workspace().join("cases/meshes").join(name);
+    let text = fs::read_to_string(folder.join("case.toml")).unwrap();
+    text.replace("file = \"", &format!("file = \"{}/", folder.display()))
+}
+
+fn without(text: &str, block: &str) -> String {
+    text.split("\n\n").filter(|part| !part.contains(block)).collect::<Vec<_>>().join("\n\n")
+}
+
+/// A plate whose mesh has all particles of a box with a disk cut out: the same bits, on one and two threads.
+#[test]
+fn a_mesh_is_the_body_of_its_shapes() {
+    let mesh = without(&case("plate-with-hole"), "[[expect]]").replace("\"10 mm\", \"5 mm\"", "\"10 mm\"");
+    let file = mesh.lines().find(|line| line.starts_with("shapes = ")).unwrap().to_owned();
+    let shapes = "shapes = [{ add = \"box\", min = [\"-500 mm\", \"-500 mm\"], max = [\"500 mm\", \"500 mm\"] }, \
+                  { cut = \"disk\", centre = [\"0 mm\", \"0 mm\"], radius = \"60 mm\" }]";
+    let from_mesh = values(&mesh, "--threads 1");
+    assert!(from_mesh.to_string().contains("hardy_rmse_inner"), "{from_mesh}");
+    assert_eq!(from_mesh, values(&mesh.replace(&file, shapes), "--threads 1"));
+    assert_eq!(from_mesh, values(&mesh, "--threads 2"));
+}
+
+/// A polygon is the box with its corners, in either direction.
+#[test]
+fn a_polygon_is_a_box() {
+    let base = fs::read_to_string(workspace().join("tests/bad/peri/square.toml")).unwrap();
+    let shape = base.lines().find(|line| line.starts_with("shapes = ")).unwrap().to_owned();
+    let expected = values(&base, "");
+    for corners in
+        [["0", "10", "10", "10", "10", "0", "0", "0"], ["0", "0", "10", "0", "10", "10", "0", "10"]]
+    {
+        let points: Vec<String> =
+            corners.chunks(2).map(|at| format!("[\"{} mm\", \"{} mm\"]", at[0], at[1])).collect();
+        let polygon = format!("shapes = [{{ add = \"polygon\", points = [{}] }}]", points.join(", "));
+        assert_eq!(values(&base.replace(&shape, &polygon), ""), expected);
+    }
+}
+
+/// Mesh files of `crystfem`'s tests.
+fn fixtures() -> Vec<PathBuf> {
+    let folder = workspace().join("crates/crystfem/tests/fixtures");
+    let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let is_mesh = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "msh" || ending == "inp");
+    files.filter(is_mesh).collect()
+}
+
+/// Checks a scene of a body and returns what is printed.
+fn checked(body: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = format!(
+        "version = 1\nprogram = \"peri\"\n[body]\nspace = \"solid\"\n{body}\n[material]\nlaw = \
+         \"linear\"\nyoungs_modulus = \"1 MPa\"\n[[boundary]]\nside = \"x-\"\nlayers = 1\ndisplacement = [\"0 \
+         mm\", \"0 mm\", \"0 mm\"]\n"
+    );
+    fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    peri("check scene.toml", folder.path()).with_code(0).stdout
+}
+
+/// Volumes inside the facets of all element types are those of finite elements (Gauss quadrature of shape
+/// functions), and particles fill them. Curved sides of second-order elements become flat pieces between their
+/// nodes: of arcs of 15°, chords of half of it lose 1 − cos 7.5° of the radius, 1 %.
+#[test]
+fn volumes_are_those_of_finite_elements() {
+    let mut worst: f64 = 0.0;
+    for file in fixtures() {
+        let mesh = crystfem::mesh::read(&file, 1e-3).unwrap();
+        let expected = mesh.quality.volume * 1e9;
+        let spacing = (expected / 5000.0).cbrt();
+        let text = checked(&format!(
+            "spacing = \"{spacing} mm\"\nshapes = [{{ add = \"mesh\", file = \"{}\", unit = \"1 mm\" }}]",
+            file.display()
+        ));
+        let line = text.lines().find(|line| line.contains("body.shapes[0]: ")).unwrap();
+        let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+        let [volume, filled] = numbers[..] else { panic!("{line}") };
+        let curved = file.file_name().unwrap().to_string_lossy().starts_with("second_");
+        let error = (volume / expected - 1.0).abs();
+        assert!(error < if curved { 0.02 } else { 1e-6 }, "{}: {volume} {expected}", file.display());
+        worst = worst.max(if curved { 0.0 } else { error });
+        assert!((filled / volume - 1.0).abs() < 0.15, "{}: {line}", file.display());
+    }
+    evidence::near(
+        "volume inside facets over that of finite elements of first order, less 1",
+        worst,
+        0.0,
+        1e-6,
+    );
+}
+
+/// One particle for each cell.
+#[test]
+fn cells_become_points() {
+    let file = workspace().join("crates/crystfem/tests/fixtures/tets_ascii.msh");
+    let mesh = crystfem::mesh::read(&file, 1e-3).unwrap();
+    let size = (mesh.quality.volume / mesh.mesh.element_count() as f64).cbrt() * 1e3;
+    let text = checked(&format!(
+        "points = \"{}\"\nunit = \"1 mm\"\nhorizon = \"{} mm\"",
+        file.display(),
+        3.0 * size
+    ));
+    assert!(text.contains(&format!("{} particles", mesh.mesh.element_count())), "{text}");
+}
