@@ -32,7 +32,8 @@ fn without(text: &str, block: &str) -> String {
 fn a_mesh_is_the_body_of_its_shapes() {
     let mesh = without(&case("plate-with-hole"), "[[expect]]").replace("\"10 mm\", \"5 mm\"", "\"10 mm\"");
     let file = mesh.lines().find(|line| line.starts_with("shapes = ")).unwrap().to_owned();
-    let shapes = "shapes = [{ add = \"box\", min = [\"-500 mm\", \"-500 mm\"], max = [\"500 mm\", \"500 mm\"] }, \
+    let shapes = "shapes = [{ add = \"box\", min = [\"-500 mm\", \"-500 mm\"], \
+                  max = [\"500 mm\", \"500 mm\"] }, \
                   { cut = \"disk\", centre = [\"0 mm\", \"0 mm\"], radius = \"60 mm\" }]";
     let from_mesh = values(&mesh, "--threads 1");
     assert!(from_mesh.to_string().contains("hardy_rmse_inner"), "{from_mesh}");
@@ -69,16 +70,16 @@ fn checked(body: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     let scene = format!(
         "version = 1\nprogram = \"peri\"\n[body]\nspace = \"solid\"\n{body}\n[material]\nlaw = \
-         \"linear\"\nyoungs_modulus = \"1 MPa\"\n[[boundary]]\nside = \"x-\"\nlayers = 1\ndisplacement = [\"0 \
-         mm\", \"0 mm\", \"0 mm\"]\n"
+         \"linear\"\nyoungs_modulus = \"1 MPa\"\n[[boundary]]\nside = \"x-\"\nlayers = 1\n\
+         displacement = [\"0 mm\", \"0 mm\", \"0 mm\"]\n"
     );
     fs::write(folder.path().join("scene.toml"), scene).unwrap();
     peri("check scene.toml", folder.path()).with_code(0).stdout
 }
 
 /// Volumes inside the facets of all element types are those of finite elements (Gauss quadrature of shape
-/// functions), and particles fill them. Curved sides of second-order elements become flat pieces between their
-/// nodes: of arcs of 15°, chords of half of it lose 1 − cos 7.5° of the radius, 1 %.
+/// functions), and particles fill them. Curved sides of second-order elements become flat pieces between
+/// their nodes: of arcs of 15°, chords of half of it lose 1 − cos 7.5° of the radius, 1 %.
 #[test]
 fn volumes_are_those_of_finite_elements() {
     let mut worst: f64 = 0.0;

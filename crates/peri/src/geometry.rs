@@ -11,7 +11,7 @@ pub(crate) use cuts::length;
 pub use cuts::{Cut, cuts_within, severed};
 pub use enclosure::{Enclosure, moments};
 pub use facets::{Facet, Facets};
-pub use gaps::Gaps;
+pub use gaps::{Gaps, NearbyGaps};
 pub use parts::Parts;
 
 use crate::error::Error;

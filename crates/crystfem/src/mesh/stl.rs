@@ -39,8 +39,8 @@ pub fn cells(surface: &Stl, size: [f64; 3]) -> Result<[f64; 3], Error> {
     Ok(VoxelGrid::around(low, high, size)?.counts().map(|count| count as f64))
 }
 
-/// Builds the cells inside a surface, at multiples of `size`. 8 × 8 rays in z through each column of cells are
-/// inside where they have entered more shells than they have left. Cells filled to less than `least` are
+/// Builds the cells inside a surface, at multiples of `size`. 8 × 8 rays in z through each column of cells
+/// are inside where they have entered more shells than they have left. Cells filled to less than `least` are
 /// left out. Returns also notes on overlaps.
 ///
 /// # Errors

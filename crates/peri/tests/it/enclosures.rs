@@ -94,8 +94,9 @@ fn closed_facets_are_the_shapes_around_them() {
     assert!(counts(&parts)[1] < counts(&whole)[1]);
 }
 
-/// No bond passes from one flank of a notch narrower than the horizon to the other. Of bonds near its tip those
-/// stay that pass through its end: 6 more than with a box cut out. Bonds around a re-entrant corner stay.
+/// No bond passes from one flank of a notch narrower than the horizon to the other. Of bonds near its tip
+/// those stay that pass through its end: 6 more than with a box cut out. Bonds around a re-entrant corner
+/// stay.
 #[test]
 fn bonds_end_at_notches() {
     let notched = polygon(&[

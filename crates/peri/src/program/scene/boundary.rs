@@ -25,8 +25,8 @@ pub struct Boundary {
     /// Or shapes, as those of the body.
     #[serde(default)]
     pub shapes: Vec<ShapeSpec>,
-    /// Or a set of a mesh file of the body: particles in its cells, or within `layers` or `depth` of its faces
-    /// and nodes.
+    /// Or a set of a mesh file of the body: particles in its cells, or within `layers` or `depth` of its
+    /// faces and nodes.
     pub set: Option<String>,
     /// Traction on the side, applied as a uniform body force over its layers.
     pub traction: Option<Vec<Stress>>,

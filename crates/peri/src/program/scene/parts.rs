@@ -2,18 +2,35 @@
 
 use super::{DiscreteBody, Scene};
 use crate::bonds::components;
-use crate::geometry::Operation;
+use crate::geometry::{NearbyGaps, Operation};
 use std::collections::BTreeMap;
 
 /// Largest number of parts that `peri check` lists.
 const LISTED: usize = 12;
 
-/// Returns true if the bond of two sites crosses a gap.
-fn crosses<const D: usize>(body: &DiscreteBody<D>, site: usize, other: usize) -> bool {
-    let bonds = &*body.bonds;
-    let (here, there) = (bonds.position(site), bonds.position(other));
-    let near = body.gaps.as_ref().and_then(|gaps| gaps.within(here, bonds.horizon() * (1.0 + 1e-9)));
-    near.is_some_and(|near| near.severs(here, there))
+/// Particles whose bonds may meet a gap, by site.
+struct GapSites(Vec<bool>);
+
+impl GapSites {
+    fn new<const D: usize>(body: &DiscreteBody<D>) -> Self {
+        let mut near = vec![false; body.bonds.sites()];
+        for &site in body.bonds.particles() {
+            near[site as usize] = within(body, site as usize).is_some();
+        }
+        Self(near)
+    }
+
+    /// Returns true if the bond of two sites crosses a gap.
+    fn crosses<const D: usize>(&self, body: &DiscreteBody<D>, site: usize, other: usize) -> bool {
+        let place = |site: usize| body.bonds.position(site);
+        self.0[site] && within(body, site).is_some_and(|near| near.severs(place(site), place(other)))
+    }
+}
+
+/// Selects the gaps within a horizon of a site.
+fn within<const D: usize>(body: &DiscreteBody<D>, site: usize) -> Option<NearbyGaps<'_, D>> {
+    let reach = body.bonds.horizon() * (1.0 + 1e-9);
+    body.gaps.as_ref().and_then(|gaps| gaps.within(body.bonds.position(site), reach))
 }
 
 /// Warns of bonds between separate parts of a cloud without `bond_gaps`.
@@ -22,10 +39,11 @@ pub(super) fn bonded_parts<const D: usize>(scene: &Scene, body: &DiscreteBody<D>
         return None;
     }
     let bonds = &*body.bonds;
+    let near = GapSites::new(body);
     let mut across = 0_u64;
     for &site in bonds.particles() {
         bonds.neighbours(site as usize, &mut |bond| {
-            across += u64::from((site as usize) < bond.site && crosses(body, site as usize, bond.site));
+            across += u64::from((site as usize) < bond.site && near.crosses(body, site as usize, bond.site));
         });
     }
     (across > 0).then(|| {
@@ -43,7 +61,8 @@ pub(super) fn explain<const D: usize>(body: &DiscreteBody<D>) -> Vec<String> {
         return Vec::new();
     }
     let bonds = &*body.bonds;
-    let roots = components(bonds, |site, other| !crosses(body, site, other));
+    let near = GapSites::new(body);
+    let roots = components(bonds, |site, other| !near.crosses(body, site, other));
     let mut parts: BTreeMap<u32, (usize, Vec<bool>)> = BTreeMap::new();
     let mut bridges: BTreeMap<[u32; 2], u64> = BTreeMap::new();
     for &site in bonds.particles() {
@@ -54,7 +73,7 @@ pub(super) fn explain<const D: usize>(body: &DiscreteBody<D>) -> Vec<String> {
             *of |= matches!(operation, Operation::Add(shape) if shape.contains(here));
         }
         bonds.neighbours(site as usize, &mut |bond| {
-            if (site as usize) < bond.site && crosses(body, site as usize, bond.site) {
+            if (site as usize) < bond.site && near.crosses(body, site as usize, bond.site) {
                 let other = roots[bond.site];
                 *bridges.entry([root.min(other), root.max(other)]).or_default() += 1;
             }

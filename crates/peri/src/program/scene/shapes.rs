@@ -34,7 +34,8 @@ pub struct ShapeSpec {
     pub file: Option<PathBuf>,
     /// Length of one unit of the file.
     pub unit: Option<Length>,
-    /// Cells of the file that form the shape: a physical group of Gmsh, an element set of Abaqus; default: all.
+    /// Cells of the file that form the shape: a physical group of Gmsh, an element set of Abaqus; default:
+    /// all.
     pub block: Option<String>,
     /// Name of the part to which a shape of the body belongs, default: its `block`; of shapes that overlap,
     /// the last one counts.
