@@ -34,8 +34,8 @@ harness::quantities! {
         breaking";
     FIRST_BREAK_TIME = "first_break_time", "s", "with `[time]` or `[dynamics]`: time at the end of the step \
         of the first broken bond";
-    LAST_TIME = "last_time", "s", "with `[time]` where bonds break: time at the end of the last step; of a body \
-        that tears under a dead load, of its last equilibrium";
+    LAST_TIME = "last_time", "s", "with `[time]` where bonds break: time at the end of the last step; of a \
+        body that tears under a dead load, of its last equilibrium";
     CRITICAL_STRETCH = "critical_stretch", "", "where bonds break: smallest stretch at which a bond \
         of the body breaks";
     CRITICAL_ENERGY = "critical_energy", "J/m³", "with `fracture_energy` of a `solid`: energy over its share \
