@@ -20,7 +20,7 @@ pub struct BranchSpec {
     /// The spring: `nu`; `nu_1`, `beta_1` …; `chain_modulus`, `links`.
     pub spring: SpringKind,
     /// The dashpot: `eta`; `eta_0`, `eta_inf`, `K_1`, `K_2`, `gamma_1`, `gamma_2`; `rate`, `stress`, `m`,
-    /// `c`, `xi`; `rate`, `stress`; `rate`, `stress`, `S_a`, `r_0`, `r_1`, `r_2`.
+    /// `c`, `xi`; `rate`, `stress`, optionally `pressure`; the same with `S_a`, `r_0`, `r_1`, `r_2`.
     pub viscosity: ViscosityKind,
     /// Constants by name: those with a unit as text, other numbers without.
     pub parameters: BTreeMap<String, BranchConstant>,
@@ -143,6 +143,14 @@ impl ViscosityKind {
             }
         }
     }
+
+    /// Constants that are 0 if not given; they follow those of [`ViscosityKind::names`].
+    fn optional(self) -> ConstantUnits {
+        match self {
+            Self::Eyring | Self::EyringSoftening => &[("pressure", "1")],
+            _ => &[],
+        }
+    }
 }
 
 impl BranchSpec {
@@ -153,13 +161,17 @@ impl BranchSpec {
     /// for a spring that softens at large strains.
     pub fn branch(&self, source: &Source, key: &str) -> Result<Branch, SceneError> {
         let key = format!("{key}.parameters");
-        let all: Vec<_> = self.spring.names().iter().chain(self.viscosity.names()).collect();
+        let required = self.spring.names().iter().chain(self.viscosity.names());
+        let all: Vec<_> = required.chain(self.viscosity.optional()).collect();
         let names: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
         if let Some(other) = self.parameters.keys().find(|name| !names.contains(&name.as_str())) {
             return Err(source.unknown(&format!("{key}.{other}"), other, &names));
         }
         let value = |&(name, unit): &(&str, &str)| {
             let Some(given) = self.parameters.get(name) else {
+                if self.viscosity.optional().iter().any(|(other, _)| *other == name) {
+                    return Ok(0.0);
+                }
                 return Err(source.error(&key, format!("no `{name}`"), names.join(", ")));
             };
             let path = format!("{key}.{name}");
@@ -204,6 +216,11 @@ impl BranchSpec {
         Ok(branch)
     }
 
+    /// Returns true for a viscosity that grows with the pressure.
+    pub fn has_pressure(&self) -> bool {
+        self.parameters.get("pressure").is_some_and(|own| !matches!(own, BranchConstant::Number(0.0)))
+    }
+
     /// Builds a branch from constants by name, in SI units.
     ///
     /// # Errors
@@ -214,10 +231,11 @@ impl BranchSpec {
         viscosity: ViscosityKind,
         constants: &BTreeMap<String, f64>,
     ) -> Result<Branch, Error> {
-        let names: Vec<&str> =
-            spring.names().iter().chain(viscosity.names()).map(|(name, _)| *name).collect();
+        let required = spring.names().len() + viscosity.names().len();
+        let all = spring.names().iter().chain(viscosity.names()).chain(viscosity.optional());
+        let names: Vec<&str> = all.map(|(name, _)| *name).collect();
         let other = constants.keys().find(|name| !names.contains(&name.as_str()));
-        let missing = names.iter().find(|name| !constants.contains_key(**name));
+        let missing = names[..required].iter().find(|name| !constants.contains_key(**name));
         let refuse = |found: String| {
             let reason = format!("{found}; allowed: {}", names.join(", "));
             Err(Error::Data { what: "constants of a branch".to_owned(), reason })
@@ -226,12 +244,14 @@ impl BranchSpec {
             (Some(other), _) => refuse(format!("unknown `{other}`")),
             (None, Some(missing)) => refuse(format!("no `{missing}`")),
             (None, None) => {
-                Self::build(spring, viscosity, &names.iter().map(|&name| constants[name]).collect::<Vec<_>>())
+                let value = |name: &&str| constants.get(*name).copied().unwrap_or(0.0);
+                Self::build(spring, viscosity, &names.iter().map(value).collect::<Vec<_>>())
             }
         }
     }
 
-    /// Returns spring and viscosity of a branch as scenes name them, and its constants with their units.
+    /// Returns spring and viscosity of a branch as scenes name them, and its constants with their units,
+    /// without optional ones of 0.
     pub fn constants(branch: &Branch) -> ([&'static str; 2], Vec<NamedConstant>) {
         let (spring, kind, law): (_, _, &dyn Hyperelastic) = match &branch.spring {
             Spring::NeoHookean(law) => ("neo-hookean", SpringKind::NeoHookean, law),
@@ -251,21 +271,22 @@ impl BranchSpec {
             Viscosity::BergstromBoyce { rate, stress, power, creep, offset } => {
                 ("bergstrom-boyce", ViscosityKind::BergstromBoyce, vec![rate, stress, power, creep, offset])
             }
-            Viscosity::Eyring { rate, stress, softening: None, .. } => {
-                ("eyring", ViscosityKind::Eyring, vec![rate, stress])
+            Viscosity::Eyring { rate, stress, pressure, softening: None } => {
+                ("eyring", ViscosityKind::Eyring, vec![rate, stress, pressure])
             }
-            Viscosity::Eyring { rate, stress, softening: Some(soft), .. } => {
+            Viscosity::Eyring { rate, stress, pressure, softening: Some(soft) } => {
                 let [r0, r1, r2] = soft.shape;
                 (
                     "eyring-softening",
                     ViscosityKind::EyringSoftening,
-                    vec![rate, stress, soft.amount, r0, r1, r2],
+                    vec![rate, stress, soft.amount, r0, r1, r2, pressure],
                 )
             }
         };
         let values = law.parameters().into_iter().map(|(_, value)| value).chain(own);
-        let all = kind.names().iter().chain(names.names()).zip(values);
-        ([spring, viscosity], all.map(|(&(name, unit), value)| (name, value, unit)).collect())
+        let all = kind.names().iter().chain(names.names()).chain(names.optional()).zip(values);
+        let given = all.filter(|((name, _), value)| *name != "pressure" || *value != 0.0);
+        ([spring, viscosity], given.map(|(&(name, unit), value)| (name, value, unit)).collect())
     }
 
     fn build(spring: SpringKind, viscosity: ViscosityKind, constants: &[f64]) -> Result<Branch, Error> {
@@ -290,11 +311,11 @@ impl BranchSpec {
                 Viscosity::BergstromBoyce { rate: q[0], stress: q[1], power: q[2], creep: q[3], offset: q[4] }
             }
             ViscosityKind::Eyring => {
-                Viscosity::Eyring { rate: q[0], stress: q[1], pressure: 0.0, softening: None }
+                Viscosity::Eyring { rate: q[0], stress: q[1], pressure: q[2], softening: None }
             }
             ViscosityKind::EyringSoftening => {
                 let softening = StrainSoftening { amount: q[2], shape: [q[3], q[4], q[5]] };
-                Viscosity::Eyring { rate: q[0], stress: q[1], pressure: 0.0, softening: Some(softening) }
+                Viscosity::Eyring { rate: q[0], stress: q[1], pressure: q[6], softening: Some(softening) }
             }
         };
         Branch::new(spring, viscosity)
@@ -342,8 +363,9 @@ mod tests {
             ViscosityKind::Eyring,
             ViscosityKind::EyringSoftening,
         ];
-        for (spring, viscosity) in springs.into_iter().flat_map(|s| viscosities.map(|v| (s, v))) {
-            let names: Vec<_> = spring.names().iter().chain(viscosity.names()).collect();
+        let both = springs.into_iter().flat_map(|s| viscosities.map(|v| (s, v)));
+        for (spring, viscosity, given) in both.flat_map(|(s, v)| [(s, v, v.optional()), (s, v, &[])]) {
+            let names: Vec<_> = spring.names().iter().chain(viscosity.names()).chain(given).collect();
             let value = |k: usize, name: &str| match name {
                 "c" => -0.5,
                 "r_2" => -5.0,

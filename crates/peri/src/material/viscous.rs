@@ -9,7 +9,7 @@ use crate::calibrate::Space;
 use crate::error::Error;
 use nalgebra::Matrix3;
 use polycore::constitutive::viscoelastic::{
-    Branch, BranchState, Increment, Response, State, Viscoelastic, Viscosity,
+    Branch, BranchState, Increment, Reaction, Response, State, Viscoelastic, Viscosity,
 };
 use polycore::constitutive::{Moduli, Workspace};
 use polycore::tensor::voigt::{self, Voigt};
@@ -17,7 +17,8 @@ use std::cell::RefCell;
 
 /// W = W_eq(C) + Σ_k W_k(C, C_v) + ½ g · residual: [`super::Correspondence`] whose law has a state. Each step
 /// minimises the energy of backward Euler in exponential form ([`Viscoelastic`]); g = a(μ + Σ_k ν_k/(1 + Δt
-/// ν_k/η_k)) with ν and η at its start.
+/// ν_k/η_k)) with ν and η at its start. A viscosity that depends on the pressure has that of the particle at
+/// the start of the step, −tr σ/3 of the whole law.
 ///
 /// A deformation without [`Past`] is one in equilibrium: it has the stress of W_eq alone.
 pub struct ViscousCorrespondence {
@@ -28,6 +29,8 @@ pub struct ViscousCorrespondence {
     driving: Driving,
     /// Temperature, K.
     temperature: f64,
+    /// True if a viscosity depends on the pressure, which is then part of the state.
+    keeps_pressure: bool,
 }
 
 /// Scratch memory: states of a point at both ends of a step.
@@ -36,6 +39,8 @@ struct StepStates {
     memory: Workspace,
     start: State,
     end: State,
+    /// Pressure at the start, Pa; 0 if no viscosity depends on it.
+    pressure: f64,
 }
 
 thread_local! {
@@ -47,8 +52,7 @@ impl ViscousCorrespondence {
     /// [`super::Correspondence::stabilised`].
     ///
     /// # Errors
-    /// [`Error::Parameter`]; also for a viscosity that depends on the pressure, which a particle does not
-    /// keep.
+    /// [`Error::Parameter`].
     pub fn new<const D: usize>(
         law: Viscoelastic,
         space: Space,
@@ -56,15 +60,8 @@ impl ViscousCorrespondence {
         driving: Driving,
     ) -> Result<Self, Error> {
         let moduli = check::<D>(law.equilibrium(), space, stabilisation)?;
-        for branch in law.branches() {
-            if let Viscosity::Eyring { pressure, .. } = branch.viscosity
-                && pressure != 0.0
-            {
-                let allowed = "0: particles keep no pressure".to_owned();
-                return Err(Error::Parameter { name: "pressure of a viscosity", found: pressure, allowed });
-            }
-        }
-        Ok(Self { law, space, moduli, stabilisation, driving, temperature: 293.15 })
+        let keeps_pressure = law.branches().iter().any(grows_with_pressure);
+        Ok(Self { law, space, moduli, stabilisation, driving, temperature: 293.15, keeps_pressure })
     }
 
     /// Sets the temperature, K, of branches with a shift; default 293.15.
@@ -74,12 +71,13 @@ impl ViscousCorrespondence {
         self
     }
 
-    /// Step at a given C.
-    fn increment(&self, c: Voigt, duration: f64) -> Increment {
-        Increment { temperature: self.temperature, ..Increment::new(c, c, duration) }
+    /// Step at a given C from a pressure, Pa.
+    fn increment(&self, c: Voigt, duration: f64, pressure: f64) -> Increment {
+        Increment { temperature: self.temperature, pressure, ..Increment::new(c, c, duration) }
     }
 
-    fn unpack(&self, past: &Past, state: &mut State) {
+    /// Writes the state at the start of a step, and returns the pressure there, Pa.
+    fn unpack(&self, past: &Past, state: &mut State) -> f64 {
         let mut rest = &past.state[..];
         let mut take = |count: usize| {
             let (taken, left) = rest.split_at(count);
@@ -93,16 +91,18 @@ impl ViscousCorrespondence {
             state.branches.push(BranchState { viscous, shear });
         }
         state.peak = if self.law.softening().is_some() { take(1)[0] } else { 0.0 };
+        if self.keeps_pressure { take(1)[0] } else { 0.0 }
     }
 
-    fn pack(&self, state: &State) -> impl Iterator<Item = f64> {
+    fn pack(&self, state: &State, pressure: f64) -> impl Iterator<Item = f64> {
         let branches = self.law.branches().iter().zip(&state.branches).flat_map(|(branch, own)| {
             own.viscous.iter().copied().chain(keeps_shear(branch).then_some(own.shear))
         });
-        branches.chain(self.law.softening().map(|_| state.peak))
+        let peak = self.law.softening().map(|_| state.peak);
+        branches.chain(peak).chain(self.keeps_pressure.then_some(pressure))
     }
 
-    /// λ₃², the response of a part of the energy there, and the state at the end in the scratch memory;
+    /// C, the response of a part of the energy there, and the state at the end in the scratch memory;
     /// `None` outside the law's domain. In plane stress the equilibrium law alone has its own thickness: the
     /// pressure that the branches need is no part of its stress.
     fn predict<const D: usize>(
@@ -111,20 +111,20 @@ impl ViscousCorrespondence {
         part: EnergyPart,
         tangent: bool,
         scratch: &mut StepStates,
-    ) -> Option<(f64, Response)> {
+    ) -> Option<(Voigt, Response)> {
         if deformation.volume_change() <= -1.0 {
             return None;
         }
-        let StepStates { memory, start, end } = scratch;
+        let StepStates { memory, start, end, pressure } = scratch;
         let past = deformation.past.as_deref();
         start.peak = 0.0;
-        past.iter().for_each(|past| self.unpack(past, start));
+        *pressure = past.map_or(0.0, |past| self.unpack(past, start));
         let past = past.filter(|_| !self.drives_alone(part));
         let mut found = None;
         let (c, _) = at_thickness(self.space, &deformation.gradient(), tangent, |c, tangent| {
             let response = match past {
                 Some(past) => {
-                    let increment = self.increment(*c, past.duration);
+                    let increment = self.increment(*c, past.duration, *pressure);
                     self.law.respond(start, &increment, tangent, end, memory)
                 }
                 None => self.law.respond_relaxed(start.peak, c, tangent, end, memory),
@@ -132,7 +132,7 @@ impl ViscousCorrespondence {
             found = response.ok();
             found.map(|found| found.prediction)
         })?;
-        found.map(|found| (c[2], found))
+        found.map(|found| (c, found))
     }
 
     /// Returns true for a part without branches.
@@ -152,6 +152,11 @@ impl ViscousCorrespondence {
 /// Returns true for a viscosity that depends on ∫ q/η dt.
 fn keeps_shear(branch: &Branch) -> bool {
     matches!(branch.viscosity, Viscosity::Eyring { softening: Some(_), .. })
+}
+
+/// Returns true for a viscosity that depends on the pressure.
+fn grows_with_pressure(branch: &Branch) -> bool {
+    matches!(branch.viscosity, Viscosity::Eyring { pressure, .. } if pressure > 0.0)
 }
 
 /// Part of the energy that a deformation refers to.
@@ -201,11 +206,11 @@ impl<const D: usize> PointLaw<D> for ViscousCorrespondence {
         }
         let found =
             SCRATCH.with_borrow_mut(|scratch| self.predict(deformation, EnergyPart::Stored, false, scratch));
-        found.map_or(f64::NAN, |(square, _)| square.sqrt())
+        found.map_or(f64::NAN, |(c, _)| c[2].sqrt())
     }
 
     fn past(&self) -> Option<Past> {
-        let state = self.pack(&self.law.rest()).collect();
+        let state = self.pack(&self.law.rest(), 0.0).collect();
         let stabilisation = self.stabilisation * (self.moduli.shear + self.law.branch_modulus());
         Some(Past { state, duration: 0.0, stabilisation, part: EnergyPart::Stored })
     }
@@ -213,11 +218,9 @@ impl<const D: usize> PointLaw<D> for ViscousCorrespondence {
     fn stabilise(&self, deformation: &mut Deformation<D>, duration: f64) {
         let modulus = SCRATCH.with_borrow_mut(|scratch| {
             // the thickness in equilibrium with the state at the start
-            let (square, _) = self.predict(deformation, EnergyPart::Stored, false, scratch)?;
-            let f = deformation.gradient();
-            let c = voigt::from_stress(&super::tensor::embed(&(f.transpose() * f), square));
-            self.unpack(deformation.past.as_deref()?, &mut scratch.start);
-            self.law.step_modulus(&scratch.start, &self.increment(c, duration)).ok()
+            let (c, _) = self.predict(deformation, EnergyPart::Stored, false, scratch)?;
+            let pressure = self.unpack(deformation.past.as_deref()?, &mut scratch.start);
+            self.law.step_modulus(&scratch.start, &self.increment(c, duration, pressure)).ok()
         });
         if let (Some(past), Some(modulus)) = (&mut deformation.past, modulus) {
             past.stabilisation = self.stabilisation * (self.moduli.shear + modulus);
@@ -226,11 +229,13 @@ impl<const D: usize> PointLaw<D> for ViscousCorrespondence {
 
     fn advance(&self, deformation: &mut Deformation<D>) -> f64 {
         SCRATCH.with_borrow_mut(|scratch| {
-            let Some((_, found)) = self.predict(deformation, EnergyPart::Stored, false, scratch) else {
+            let Some((c, found)) = self.predict(deformation, EnergyPart::Stored, false, scratch) else {
                 return 0.0;
             };
             if let Some(past) = &mut deformation.past {
-                past.state.iter_mut().zip(self.pack(&scratch.end)).for_each(|(old, new)| *old = new);
+                let pressure = Reaction::Law.pressure(&c, &found.prediction.stress);
+                let end = self.pack(&scratch.end, pressure);
+                past.state.iter_mut().zip(end).for_each(|(old, new)| *old = new);
             }
             found.dissipated
         })

@@ -41,6 +41,8 @@ harness::quantities! {
         breaking";
     FIRST_BREAK_TIME = "first_break_time", "s", "with `[time]` or `[dynamics]`: time at the end of the step \
         of the first broken bond";
+    LAST_TIME = "last_time", "s", "with `[time]` where bonds break: time at the end of the last step; of a \
+        body that tears under a dead load, of its last equilibrium";
     CRITICAL_STRETCH = "critical_stretch", "", "where bonds break: smallest stretch at which a bond \
         of the body breaks";
     CRITICAL_ENERGY = "critical_energy", "J/m³", "with `fracture_energy` of a `solid`: energy over its share \
@@ -124,6 +126,8 @@ harness::quantities! {
         harmonic swing of this peak";
     PROBE_SPEED = "{probe}_speed", "m/s", "of a crack or a front: mean speed between its gauges if a row \
         lies before the first; without gauges between its first and last row";
+    PROBE_ARRIVAL = "{probe}_arrival", "s", "of a crack or a front with gauges: time of the first row of the \
+        history with it at or beyond the first";
     PROBE_BETWEEN_GAUGES = "{probe}_between_gauges", "", "number of rows of the history with the tip or \
         front between the gauges";
     PROBE_BACKSTEP = "{probe}_backstep", "m", "of a crack or a front: largest backward step between the \

@@ -10,7 +10,8 @@ use peri::solver::{Breaking, Criterion, Lbfgs, Method, Policy, State, Status, Sy
 use polycore::constitutive::Workspace;
 use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric};
 use polycore::constitutive::viscoelastic::{
-    Branch, BranchState, Increment, Mullins, Shift, Spring, StrainSoftening, Viscoelastic, Viscosity,
+    Branch, BranchState, Increment, Mullins, Reaction, Shift, Spring, StrainSoftening, Viscoelastic,
+    Viscosity,
 };
 use polycore::tensor::Voigt;
 use std::sync::Arc;
@@ -220,4 +221,88 @@ fn a_glassy_sheet_softens_as_its_material_point() {
     let volume = last.stored / stored;
     near("dissipation of a glassy sheet", last.dissipated / dissipated / volume, 1.0, 1e-6);
     near("area of a glassy sheet", volume, 1.96, 1e-6);
+}
+
+/// μ_p of the glassy body below.
+const SENSITIVITY: f64 = 0.08;
+
+/// Glassy polymer that yields and softens.
+fn glassy_law(pressure: f64) -> Viscoelastic {
+    let rubber = Compressible::new(NeoHookean::new(26.0).unwrap(), Volumetric::Ciarlet { lame: 2000.0 });
+    let softening = Some(StrainSoftening { amount: 5.0, shape: [0.965, 50.0, -5.0] });
+    let viscosity = Viscosity::Eyring { rate: 1e-5, stress: 1.0, pressure, softening };
+    let branch = Branch::new(Spring::NeoHookean(NeoHookean::new(320.0).unwrap()), viscosity).unwrap();
+    Viscoelastic::new(Box::new(rubber.unwrap()), vec![branch]).unwrap()
+}
+
+/// Energies stored and dissipated by a body in homogeneous deformation, J, for displacements of `most` times
+/// the position that grow in 20 steps of a second.
+fn deform<const D: usize>(space: Space, most: [f64; D], pressure: f64) -> [f64; 2] {
+    let solid = ViscousCorrespondence::new::<D>(glassy_law(pressure), space, 1.0, Driving::Equilibrium);
+    let solid: Solid = NonlocalSolid(Arc::new(solid.unwrap()));
+    let mut built = Body::<D>::solid([14; D], 0.1, 3.015).build();
+    let bonds = &mut built.lattice;
+    // a free particle two horizons from the surface, where a homogeneous deformation is an equilibrium
+    let is_free = |place: [f64; D]| place.iter().all(|x| (0.65..0.75).contains(x));
+    let all = (1 << D) - 1;
+    let loads =
+        hold(bonds, |place| (!is_free(place)).then_some((all, std::array::from_fn(|d| most[d] * place[d]))));
+    let factors: Vec<f64> = (1..=20).map(|k| f64::from(k) / 20.0).collect();
+    let mut state = State::new(bonds.sites());
+    let mut system = System::new(bonds, solid, &loads, &factors);
+    system.times = factors.iter().map(|part| 20.0 * part).collect::<Vec<_>>().into();
+    let method = Lbfgs { tolerance: 1e-9, ..Default::default() };
+    method.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
+    let last = state.history.last().unwrap();
+    [last.stored, last.dissipated]
+}
+
+/// Densities of the energies stored and dissipated by the material point in the same history, J/m³; a thin
+/// body has the third stretch that frees its faces.
+fn deform_point(thin: bool, most: [f64; 3], pressure: f64) -> [f64; 2] {
+    let (law, mut memory) = (glassy_law(pressure), Workspace::default());
+    let (mut from, mut at, mut held, mut energies) = (BranchState::REST.viscous, law.rest(), 0.0, [0.0; 2]);
+    for k in 1..=20 {
+        let squares = most.map(|most| (1.0 + most * f64::from(k) / 20.0).powi(2));
+        let mut step = |third: f64| {
+            let to = Voigt::new(squares[0], squares[1], third, 0.0, 0.0, 0.0);
+            let increment = Increment { pressure: held, ..Increment::new(from, to, 1.0) };
+            (to, law.advance(&at, &increment, &mut memory).unwrap())
+        };
+        // S₃₃ = 0 by bisection
+        let (mut low, mut high) = if thin { (0.5, 1.5) } else { (squares[2], squares[2]) };
+        for _ in 0..60 {
+            let third = 0.5 * (low + high);
+            if step(third).1.prediction.stress[2] < 0.0 { low = third } else { high = third }
+        }
+        let (to, found) = step(low);
+        held = Reaction::Law.pressure(&to, &found.prediction.stress);
+        energies = [found.prediction.energy.unwrap(), energies[1] + found.dissipated];
+        (from, at) = (to, found.state);
+    }
+    energies
+}
+
+/// A glassy body whose viscosity grows with the pressure stores and dissipates what the material point does,
+/// in plane stress, plane strain and space; in tension less is dissipated than without the pressure.
+#[test]
+fn glassy_bodies_flow_at_their_own_pressure() {
+    let judge = |name: &str, body: [f64; 2], point: [f64; 2], other: [f64; 2], volume: f64| {
+        eprintln!("{name}: body {body:?}, point {point:?}, without pressure {other:?}");
+        for (energy, (found, expected)) in ["stored", "dissipated"].iter().zip(body.into_iter().zip(point)) {
+            near(&format!("{energy} in a glassy body, {name}"), found / expected / volume, 1.0, 1e-6);
+        }
+        assert!((body[1] / other[1] - 1.0).abs() > 0.02, "{name}: the pressure matters");
+    };
+    let most = [0.2, -0.165, 0.0];
+    for (name, space) in [("plane stress", Space::PlaneStress), ("plane strain", Space::PlaneStrain)] {
+        let thin = space == Space::PlaneStress;
+        let own = if thin { [0.2, 0.0] } else { [most[0], most[1]] };
+        let body = |pressure| deform::<2>(space, own, pressure);
+        let point = deform_point(thin, [own[0], own[1], 0.0], SENSITIVITY);
+        judge(name, body(SENSITIVITY), point, body(0.0), 1.96);
+    }
+    let most = [0.2, -0.1, -0.07];
+    let body = |pressure| deform::<3>(Space::Solid, most, pressure);
+    judge("space", body(SENSITIVITY), deform_point(false, most, SENSITIVITY), body(0.0), 2.744);
 }

@@ -370,9 +370,9 @@ fn advice(name: &str) -> Option<&'static str> {
         "8chain" => "`eight-chain`, or `arruda-boyce`, its five terms in finite-element programs",
         "ogden" => "`ogden-1`, `ogden-2` or `ogden-3`, by the number of terms",
         "mooney" | "polynomial1" => "`mooney-rivlin`, the polynomial of first order",
-        "polynomial" | "polynomial3" => "`polynomial-2`, the polynomial of second order, or `biderman`",
+        "polynomial" => "`polynomial-2` or `polynomial-3`, by the order, or `biderman`",
         "reducedpolynomial" | "reducedpolynomial3" | "yeoh3" => {
-            "`yeoh`, the reduced polynomial of third order"
+            "`yeoh`, the reduced polynomial of third order, or `reduced-polynomial-2`, `-4`, `-5`, `-6`"
         }
         "neohooke" | "neohookean" | "neo" => "`neo-hookean`",
         "kilian" => "`van-der-waals`, the law of Kilian",

@@ -61,6 +61,9 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
         if dynamic || scene.time.is_some() {
             to.add_if(q::FIRST_BREAK_TIME, |m| Some(m.state.history.iter().find(|row| row.broken > 0)?.time));
         }
+        if scene.time.is_some() {
+            add_last(to, q::LAST_TIME, |row| row.time);
+        }
     }
     add_last(to, q::WORK_OF_LOADS, |row| row.work);
     add_last(to, q::STORED_ENERGY, |row| row.stored);

@@ -54,6 +54,10 @@ pub(super) fn probe_scalars<const D: usize>(
             Some([from, to]) => Some((to - from) / (crossing(rows, to)? - crossing(rows, from)?)),
             None => rows.first().zip(rows.last()).map(|(a, b)| (b.1 - a.1) / (b.0 - a.0)),
         });
+        add(q::PROBE_ARRIVAL, &|rows| {
+            let [from, _] = gauges?;
+            rows.iter().find(|row| row.1 >= from).map(|row| row.0)
+        });
         let between = |rows: &ProbeRows| -> Option<Vec<f64>> {
             let [from, to] = gauges?;
             Some(rows.iter().map(|row| row.1).filter(|x| (from..=to).contains(x)).collect())

@@ -92,7 +92,8 @@ impl SolidLaw {
     pub fn memory_of_a_particle(&self) -> usize {
         let numbers = |own: &BranchSpec| 6 + usize::from(own.viscosity == ViscosityKind::EyringSoftening);
         let branches: usize = self.branch.iter().map(numbers).sum();
-        if self.has_state() { branches + usize::from(self.mullins.is_some()) + 1 } else { 0 }
+        let pressure = usize::from(self.branch.iter().any(BranchSpec::has_pressure));
+        if self.has_state() { branches + usize::from(self.mullins.is_some()) + pressure + 1 } else { 0 }
     }
 
     /// Adds branches and softening to the law in equilibrium.

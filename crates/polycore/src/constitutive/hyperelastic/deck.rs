@@ -43,7 +43,7 @@ const fn form(
 }
 
 /// Forms (Abaqus Keywords Guide, `*HYPERELASTIC`); of a law with several the first is written.
-const FORMS: [DeckForm; 14] = [
+const FORMS: [DeckForm; 18] = [
     DeckForm { factor: 0.5, ..form("neo-hookean", "NEO HOOKE", 0, 1, &[0]) },
     DeckForm { factor: 0.5, ..form("neo-hookean", "REDUCED POLYNOMIAL", 1, 1, &[0]) },
     form("mooney-rivlin", "MOONEY-RIVLIN", 0, 2, &[0, 1]),
@@ -51,8 +51,12 @@ const FORMS: [DeckForm; 14] = [
     form("yeoh", "YEOH", 0, 3, &[0, 1, 2]),
     form("yeoh", "REDUCED POLYNOMIAL", 3, 3, &[0, 1, 2]),
     form("reduced-polynomial-2", "REDUCED POLYNOMIAL", 2, 2, &[0, 1]),
+    form("reduced-polynomial-4", "REDUCED POLYNOMIAL", 4, 4, &[0, 1, 2, 3]),
+    form("reduced-polynomial-5", "REDUCED POLYNOMIAL", 5, 5, &[0, 1, 2, 3, 4]),
+    form("reduced-polynomial-6", "REDUCED POLYNOMIAL", 6, 6, &[0, 1, 2, 3, 4, 5]),
     form("polynomial-2", "POLYNOMIAL", 2, 5, &[0, 1, 2, 3, 4]),
     form("biderman", "POLYNOMIAL", 3, 9, &[0, 1, 2, 5]),
+    form("polynomial-3", "POLYNOMIAL", 3, 9, &[0, 1, 2, 3, 4, 5, 6, 7, 8]),
     form("arruda-boyce", "ARRUDA-BOYCE", 0, 2, &[0, 1]),
     form("van-der-waals", "VAN DER WAALS", 0, 4, &[0, 1, 2, 3]),
     form("ogden-1", "OGDEN", 1, 2, &[0, 1]),
@@ -61,6 +65,12 @@ const FORMS: [DeckForm; 14] = [
 ];
 
 impl DeckForm {
+    /// Returns true if all coefficients that are no parameters are 0.
+    fn covers(&self, coefficients: &[f64]) -> bool {
+        let given = coefficients.iter().take(self.coefficients).enumerate();
+        given.filter(|(i, _)| !self.places.contains(i)).all(|(_, coefficient)| *coefficient == 0.0)
+    }
+
     /// Number of Dᵢ.
     fn compliances(&self) -> usize {
         if self.key == "yeoh" { 3 } else { self.order.max(1) }
@@ -204,8 +214,8 @@ fn rubber(options: &[String], order: usize, numbers: &[f64]) -> DeckLaw {
     // Abaqus' default
     let other = |option: &&String| !option.contains('=');
     let kind = options.iter().find(other).map_or("POLYNOMIAL", String::as_str);
-    let Some(form) = FORMS.iter().find(|form| form.kind == kind && (form.order == 0 || form.order == order))
-    else {
+    let fits = |form: &&DeckForm| form.kind == kind && (form.order == 0 || form.order == order);
+    let Some(form) = FORMS.iter().filter(fits).find(|form| form.covers(numbers)) else {
         let named = |form: &DeckForm| match form.order {
             0 => form.kind.to_owned(),
             order => format!("{}, N={order}", form.kind),
@@ -214,9 +224,6 @@ fn rubber(options: &[String], order: usize, numbers: &[f64]) -> DeckLaw {
     };
     let numbers = cells(numbers, form.coefficients + form.compliances())?;
     let (coefficients, compliances) = numbers.split_at(form.coefficients);
-    if (0..coefficients.len()).any(|i| !form.places.contains(&i) && coefficients[i] != 0.0) {
-        return Err(format!("the coefficients of `{}`, all others 0", form.key));
-    }
     if compliances[0] < 0.0 || compliances[1..].iter().any(|compliance| *compliance != 0.0) {
         return Err("D1 of 0 or above, all other D 0".to_owned());
     }
@@ -293,6 +300,10 @@ mod tests {
         assert_eq!(shown, expected);
         assert_eq!(found[0].parameters, [0.4, 1.3, 2e-3, 5.0]);
         assert_eq!(found[2].parameters, [0.2, 7.0, 0.5]);
+        // the same keyword without terms that Biderman's law lacks, and with one
+        let third = |row: &str| parse("deck", &format!("*HYPERELASTIC, N=3\n{row}\n")).unwrap()[0].model.key;
+        assert_eq!(third("1, 0.1, 0.01, 0, 0, 1e-4"), "biderman");
+        assert_eq!(third("1, 0.1, 0.01, 0, 0, 1e-4, 1e-5"), "polynomial-3");
         // C10, a blank C01, D1
         let blank = parse("deck", "*HYPERELASTIC, MOONEY-RIVLIN\n0.5, , 0.02,\n").unwrap();
         assert_eq!((&blank[0].parameters[..], blank[0].bulk), (&[0.5, 0.0][..], Some(100.0)));
@@ -311,7 +322,8 @@ mod tests {
             ("*HYPERELASTIC, NEO HOOKE\n", "0 given"),
             ("*HYPERELASTIC, NEO HOOKE\n-1, 0\n", "shear_modulus = -2 is outside"),
             ("*HYPERELASTIC, YEOH\n1,0,0,0.1,0.1,0\n", "all other D 0"),
-            ("*HYPERELASTIC, N=3\n1,0,0,1,0,0,0,0\n0,0,0,0\n", "coefficients of `biderman`"),
+            ("*HYPERELASTIC, N=3\n1,0,0,1,0,0,0,0\n0,0,0,0,0\n", "1 to 12 numbers"),
+            ("*HYPERELASTIC, REDUCED POLYNOMIAL, N=7\n1\n", "REDUCED POLYNOMIAL, N=6"),
             ("*HYPERFOAM, N=1\n1, 2, 0.5\n", "0.5 given"),
             ("*HYPERFOAM, N=9\n1, 2, 0.5\n", "N=1 to N=3"),
             ("*MATERIAL, NAME=GENT\n*USER MATERIAL, CONSTANTS=1\n1\n", "3 constants; 1 given"),

@@ -147,11 +147,13 @@ fn ordinary_data_fit_every_law() {
             }
             found.rms
         };
-        let all: Vec<(&str, f64)> = MODELS.iter().map(|model| (model.key, rms(model.key))).collect();
+        // the compression has fewer points than the polynomial of third order has terms
+        let fitted = MODELS.iter().filter(|model| model.parameters.len() <= table.measurements());
+        let all: Vec<(&str, f64)> = fitted.clone().map(|model| (model.key, rms(model.key))).collect();
         let of = |key: &str| all.iter().find(|one| one.0 == key).unwrap().1;
         // a locking limit 1e6 times the least leaves 1e-6 of the stresses
         let least = 2e-6 * neo_hookean_modulus(&table).unwrap();
-        for model in MODELS {
+        for model in fitted {
             for inner in model.contains {
                 let [outer, inner] = [of(model.key), of(inner.key)];
                 assert!(outer <= inner * (1.0 + 1e-5) + least, "{name}: {} {outer} {inner}", model.key);

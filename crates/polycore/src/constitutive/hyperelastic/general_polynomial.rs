@@ -18,6 +18,8 @@ type Exponents = &'static [(i32, i32)];
 const SECOND_ORDER: Exponents = &[(1, 0), (0, 1), (2, 0), (1, 1), (0, 2)];
 const REDUCED: Exponents = &[(1, 0), (2, 0)];
 const BIDERMAN: Exponents = &[(1, 0), (0, 1), (2, 0), (3, 0)];
+const REDUCED_OF_SIX: Exponents = &[(1, 0), (2, 0), (3, 0), (4, 0), (5, 0), (6, 0)];
+const THIRD_ORDER: Exponents = &[(1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3)];
 
 const fn coefficient(name: &'static str) -> Parameter {
     Parameter { name, unit: "Pa", domain: Domain::Real }
@@ -77,6 +79,83 @@ pub(super) const BIDERMAN_4: ModelDescriptor = ModelDescriptor {
     refine: None,
 };
 
+const REDUCED_COEFFICIENTS: &[Parameter] = &[
+    coefficient("C10"),
+    coefficient("C20"),
+    coefficient("C30"),
+    coefficient("C40"),
+    coefficient("C50"),
+    coefficient("C60"),
+];
+
+/// Plausible C_i0 for a rubber.
+const REDUCED_EXAMPLE: &[f64] = &[0.2e6, 2e3, 50.0, 2.0, 0.1, 5e-3];
+
+/// Reduced polynomial of so many terms, which contains the law `inner` of one less.
+const fn reduced<const N: usize>(key: &'static str, inner: &'static [Contained]) -> ModelDescriptor {
+    ModelDescriptor {
+        key,
+        kind: ModelKind::Phenomenological,
+        parameters: REDUCED_COEFFICIENTS.split_at(N).0,
+        build: |p| build(REDUCED_OF_SIX, p),
+        example: REDUCED_EXAMPLE.split_at(N).0,
+        starts: |start| vec![linear::<N>(start.modulus)],
+        contains: inner,
+        slopes: None,
+        refine: None,
+    }
+}
+
+/// Parameters of a reduced polynomial and a term of 0.
+fn with_absent_term(p: &[f64]) -> Vec<Vec<f64>> {
+    vec![p.iter().copied().chain([0.0]).collect()]
+}
+
+pub(super) const REDUCED_POLYNOMIAL_4: ModelDescriptor =
+    reduced::<4>("reduced-polynomial-4", &[Contained { key: "yeoh", embed: |p, _| with_absent_term(p) }]);
+
+pub(super) const REDUCED_POLYNOMIAL_5: ModelDescriptor = reduced::<5>(
+    "reduced-polynomial-5",
+    &[Contained { key: "reduced-polynomial-4", embed: |p, _| with_absent_term(p) }],
+);
+
+pub(super) const REDUCED_POLYNOMIAL_6: ModelDescriptor = reduced::<6>(
+    "reduced-polynomial-6",
+    &[Contained { key: "reduced-polynomial-5", embed: |p, _| with_absent_term(p) }],
+);
+
+pub(super) const POLYNOMIAL_3: ModelDescriptor = ModelDescriptor {
+    key: "polynomial-3",
+    kind: ModelKind::Phenomenological,
+    parameters: &[
+        coefficient("C10"),
+        coefficient("C01"),
+        coefficient("C20"),
+        coefficient("C11"),
+        coefficient("C02"),
+        coefficient("C30"),
+        coefficient("C21"),
+        coefficient("C12"),
+        coefficient("C03"),
+    ],
+    build: |p| build(THIRD_ORDER, p),
+    example: &[0.15e6, 0.02e6, 1e3, 100.0, 50.0, 50.0, 2.0, 1.0, 0.5],
+    starts: |start| vec![linear::<9>(start.modulus)],
+    contains: &[
+        Contained {
+            key: "polynomial-2",
+            embed: |p, _| vec![vec![p[0], p[1], p[2], p[3], p[4], 0.0, 0.0, 0.0, 0.0]],
+        },
+        Contained {
+            key: "biderman",
+            embed: |p, _| vec![vec![p[0], p[1], p[2], 0.0, 0.0, p[3], 0.0, 0.0, 0.0]],
+        },
+    ],
+    slopes: None,
+    refine: None,
+};
+
+/// Builds the law of the first terms, one for each parameter.
 fn build(exponents: Exponents, p: &[f64]) -> Result<Box<dyn Hyperelastic>, Error> {
     let terms = exponents.iter().zip(p).map(|(&(i, j), &value)| (i, j, value)).collect();
     Ok(Box::new(Polynomial::new(terms)?))

@@ -282,7 +282,8 @@ fn eight_chain_reference_numbers() {
 
 /// P₁ in MPa by FElupe 11.3 with tensortrax, which differentiates the published energies, at (λ₁, λ₂): bar at
 /// 0.6 and 2, (4, ½), strip at 2, sheet at 2. Ten decimals. FElupe shifts equal stretches by 1.5e-8 and van
-/// der Waals' invariant by 1e-4 (6e-6 MPa): the last two rows are mpmath's derivatives of the energies.
+/// der Waals' invariant by 1e-4 (6e-6 MPa): the last two rows, and polynomials of orders above two, are
+/// mpmath's derivatives of the energies.
 #[test]
 fn laws_as_felupe_has_them() {
     let half = 0.5_f64.sqrt();
@@ -294,6 +295,26 @@ fn laws_as_felupe_has_them() {
             "polynomial-2",
             &[0.15, 0.02, 1e-3, 1e-4, 0.0],
             [-0.8054874074, 0.5747875, 1.4398945312, 0.6560625, 0.9587812500],
+        ),
+        (
+            "reduced-polynomial-4",
+            &[0.2, 2e-3, 5e-5, 2e-6],
+            [-0.8835161965, 0.7303240000, 2.3705364375, 0.7869393750, 0.8864584574],
+        ),
+        (
+            "reduced-polynomial-5",
+            &[0.2, 2e-3, 5e-5, 2e-6, 1e-7],
+            [-0.8835166998, 0.7303520000, 2.5013207461, 0.7869874292, 0.8877516128],
+        ),
+        (
+            "reduced-polynomial-6",
+            &[0.2, 2e-3, 5e-5, 2e-6, 1e-7, 5e-9],
+            [-0.8835167207, 0.7303553600, 2.6072560360, 0.7869939165, 0.8881444087],
+        ),
+        (
+            "polynomial-3",
+            &[0.15, 0.02, 1e-3, 1e-4, 5e-5, 5e-5, 2e-6, 1e-6, 5e-7],
+            [-0.8065544733, 0.5771735703, 1.6595910775, 0.6599532422, 1.0042406411],
         ),
         (
             "biderman",
@@ -323,7 +344,7 @@ fn laws_as_felupe_has_them() {
             worst = worst.max((found - expected).abs());
         }
     }
-    evidence::at_most("six laws against FElupe and mpmath, nominal stress, MPa", worst, 1e-9);
+    evidence::at_most("ten laws against FElupe and mpmath, nominal stress, MPa", worst, 1e-9);
 }
 
 /// Away from rest, where its curvature grows as 1/√x, van der Waals' law has its derivatives for any a.
