@@ -143,8 +143,8 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
         self
     }
 
-    /// Adds a rigid surface that the body cannot pass, or a plane to which it is tied. Explicit dynamics takes
-    /// larger steps with a [`RigidSurface::stiffness`] of 2.
+    /// Adds a rigid surface that the body cannot pass, or a plane to which it is tied. Explicit dynamics
+    /// takes larger steps with a [`RigidSurface::stiffness`] of 2.
     pub fn rigid_surface(mut self, surface: RigidSurface<D>) -> Self {
         self.surfaces.push(surface);
         self

@@ -152,7 +152,7 @@ impl<const D: usize> RigidSurface<D> {
             return (facing > FACING).then(|| (self.height(centre) - radius) / facing);
         }
         // |c − t e| = R + r across the axis
-        let from = self.from_centre(centre);
+        let from = self.offset_of(centre);
         let across = match &self.shape {
             SurfaceShape::Cylinder(axis, _) => super::friction_pair::across(axis, *along),
             _ => *along,

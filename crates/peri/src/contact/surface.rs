@@ -83,7 +83,7 @@ impl<const D: usize> RigidSurface<D> {
     }
 
     /// Vector from the centre or axis of a round surface at rest to a place, m.
-    pub(super) fn from_centre(&self, place: [f64; D]) -> [f64; D] {
+    pub(super) fn offset_of(&self, place: [f64; D]) -> [f64; D] {
         let from = std::array::from_fn(|d| place[d] - self.point[d]);
         match &self.shape {
             SurfaceShape::Cylinder(axis, _) => across(axis, from),
@@ -103,7 +103,7 @@ impl<const D: usize> RigidSurface<D> {
     pub fn height(&self, place: [f64; D]) -> f64 {
         match (&self.shape, self.radius()) {
             (SurfaceShape::Plane(normal), _) => (0..D).map(|d| (place[d] - self.point[d]) * normal[d]).sum(),
-            (_, radius) => length(self.from_centre(place)) - radius.unwrap_or(0.0),
+            (_, radius) => length(self.offset_of(place)) - radius.unwrap_or(0.0),
         }
     }
 
@@ -112,7 +112,7 @@ impl<const D: usize> RigidSurface<D> {
         if let SurfaceShape::Plane(normal) = self.shape {
             return normal;
         }
-        let from = self.from_centre(place);
+        let from = self.offset_of(place);
         let size = length(from);
         if size > 0.0 { from.map(|x| x / size) } else { [0.0; D] }
     }
