@@ -38,6 +38,7 @@ pub fn sums(outcomes: &[CaseOutcome]) -> String {
     let failed = outcomes.iter().filter(|outcome| !outcome.passed()).count();
     let judged = || outcomes.iter().flat_map(CaseOutcome::expect);
     let missed = judged().filter(|judgement| !judgement.pass).count();
+    let known = judged().filter(|judgement| judgement.is_known_miss()).count();
     let plural = if outcomes.len() == 1 { "" } else { "s" };
     let [cases, expectations] = [outcomes.len(), judged().count()];
     let (evidence, regressions): (Vec<_>, Vec<_>) =
@@ -47,6 +48,9 @@ pub fn sums(outcomes: &[CaseOutcome]) -> String {
     };
     let mut text =
         format!("{cases} case{plural}, {failed} failed; {expectations} expectations, {missed} not satisfied");
+    if known > 0 {
+        text += &format!(", {known} missed as stated");
+    }
     if !evidence.is_empty() {
         text += &format!(": {}", of(&evidence));
     }

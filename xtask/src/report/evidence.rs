@@ -124,7 +124,8 @@ impl CaseNumber {
         };
         let [_, _, value, _, _] = last.row();
         let asked: Vec<String> = judged.iter().map(|judgement| judgement.row()[3].clone()).collect();
-        let met = judged.iter().all(|judgement| judgement.pass) && outcome.failure.is_none();
+        let met = judged.iter().all(|judgement| judgement.pass && !judgement.expect.missed)
+            && outcome.failure.is_none();
         let unit = outcome.unit(&self.quantity);
         let value = if unit.is_empty() { value } else { format!("{value} {unit}") };
         let evidence = judged.iter().any(|judgement| judgement.expect.kind.is_evidence());

@@ -43,13 +43,21 @@ pub fn text(page: &Page, outcomes: &[CaseOutcome]) -> String {
         text += &table.markdown();
     }
     text += "\n## Cases\n\n";
-    let mut table =
-        TextTable::new(["case", "program", "expectations", "of them regressions", "not satisfied"]);
+    let mut table = TextTable::new([
+        "case",
+        "program",
+        "expectations",
+        "of them regressions",
+        "not satisfied",
+        "missed as stated",
+    ]);
     for outcome in outcomes {
         let missed = outcome.expect().iter().filter(|judgement| !judgement.pass).count();
         let ours = outcome.expect().iter().filter(|judgement| !judgement.expect.kind.is_evidence()).count();
-        let [all, ours, missed] = [outcome.expect().len(), ours, missed].map(|count| count.to_string());
-        table.push([outcome.case.clone(), outcome.program.clone(), all, ours, missed]);
+        let known = outcome.expect().iter().filter(|judgement| judgement.is_known_miss()).count();
+        let counts = [outcome.expect().len(), ours, missed, known].map(|count| count.to_string());
+        let [all, ours, missed, known] = counts;
+        table.push([outcome.case.clone(), outcome.program.clone(), all, ours, missed, known]);
     }
     text += &table.markdown();
     text += "\n## Error against run time\n\nMethods that no other measured method beats in both error and \

@@ -43,7 +43,9 @@ pub fn figures(outcomes: &[CaseOutcome]) -> Vec<ExternalFigure> {
             let [_, quantity, value, figure, source] = judgement.row();
             let unit = outcome.unit(&judgement.expect.quantity);
             let (verdict, tone) = match (judgement.pass, &outcome.failure) {
-                (true, None) if judgement.expect.kind.is_evidence() => ("met", "good"),
+                (true, None) if judgement.expect.kind.is_evidence() && !judgement.expect.missed => {
+                    ("met", "good")
+                }
                 _ => ("missed", "bad"),
             };
             ExternalFigure {

@@ -226,15 +226,17 @@ fn by_variant(names: &Names, shown: &[&str], width: usize) -> String {
 
 /// Returns the number of expectations that are met, by kind of evidence, and all that are not.
 fn verdict(report: &Report, style: &TerminalStyle) -> String {
-    let met = report.expect.iter().filter(|one| one.pass).count();
+    let known = report.expect.iter().filter(|one| one.is_known_miss()).count();
+    let met = report.expect.iter().filter(|one| one.pass).count() - known;
     let all = report.expect.len();
     let mut text = String::new();
     if all > 0 {
         let count = |kind: Kind| report.expect.iter().filter(|one| one.expect.kind == kind).count();
         let kinds = Kind::ALL.map(|kind| (count(kind), kind.name())).into_iter().filter(|own| own.0 > 0);
         let kinds: Vec<String> = kinds.map(|(count, kind)| format!("{count} {kind}")).collect();
-        let line = format!("{met} of {all} expectations met");
-        let line = if met == all { style.green(&line) } else { style.red(&line) };
+        let missed = if known > 0 { format!(", {known} missed as stated") } else { String::new() };
+        let line = format!("{met} of {all} expectations met{missed}");
+        let line = if met + known == all { style.green(&line) } else { style.red(&line) };
         text += &format!("{line} ({})\n", kinds.join(", "));
     } else if report.passed() {
         text += "no expectations: the scene has no [[expect]]\n";

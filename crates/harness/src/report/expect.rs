@@ -35,6 +35,8 @@ pub struct Expect {
     pub source: String,
     /// Judged in `--quick` runs too.
     pub quick: bool,
+    /// The bar is known to be missed: the run passes as long as it is, and shows it.
+    pub missed: bool,
 }
 
 /// Kind of evidence of an expectation.
@@ -232,6 +234,9 @@ struct Written {
     #[serde(default = "default_true")]
     /// Judged in `--quick` runs too.
     quick: bool,
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    /// The bar is known to be missed: the run passes as long as it is, and shows it as missed.
+    missed: bool,
 }
 
 fn default_true() -> bool {
@@ -242,7 +247,8 @@ impl TryFrom<Written> for Expect {
     type Error = String;
 
     fn try_from(written: Written) -> Result<Self, String> {
-        let Written { quantity, reference, tolerance, at_least, at_most, kind, source, quick } = written;
+        let Written { quantity, reference, tolerance, at_least, at_most, kind, source, quick, missed } =
+            written;
         for (name, number) in [("reference", reference), ("at_least", at_least), ("at_most", at_most)] {
             if let Some(number) = number.filter(|number| !number.is_finite()) {
                 return Err(format!("expectation of `{quantity}`: {name} = {number} is not finite"));
@@ -270,18 +276,18 @@ impl TryFrom<Written> for Expect {
                 ));
             }
         };
-        Ok(Self { quantity, bound, kind, source, quick })
+        Ok(Self { quantity, bound, kind, source, quick, missed })
     }
 }
 
 impl From<Expect> for Written {
     fn from(expect: Expect) -> Self {
-        let Expect { quantity, bound, kind, source, quick } = expect;
+        let Expect { quantity, bound, kind, source, quick, missed } = expect;
         let (reference, tolerance, at_least, at_most) = match bound {
             Bound::Near { reference, tolerance } => (Some(reference), Some(tolerance), None, None),
             Bound::Range { at_least, at_most } => (None, None, at_least, at_most),
         };
-        Self { quantity, reference, tolerance, at_least, at_most, kind, source, quick }
+        Self { quantity, reference, tolerance, at_least, at_most, kind, source, quick, missed }
     }
 }
 
@@ -311,7 +317,10 @@ impl Expect {
                 at_least.is_none_or(|low| value >= low) && at_most.is_none_or(|high| value <= high)
             }
         };
-        let pass = message.is_none() && value.is_some_and(within);
+        let met = value.map(within);
+        let stale = (self.missed && met == Some(true)).then(|| "the bar is met: remove `missed`".to_owned());
+        let message = message.or(stale);
+        let pass = message.is_none() && met.is_some_and(|met| met != self.missed);
         Judgement { expect: self.clone(), value, pass, message }
     }
 }
@@ -336,7 +345,7 @@ pub struct Judgement {
     /// Value of the report.
     #[serde(with = "number::option")]
     pub value: Option<f64>,
-    /// True if the expectation is met.
+    /// True if the expectation is met, or missed as it states.
     pub pass: bool,
     /// Reason if there is no value to compare.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -344,9 +353,18 @@ pub struct Judgement {
 }
 
 impl Judgement {
+    /// Returns true for a bar that is missed as the scene states.
+    pub fn is_known_miss(&self) -> bool {
+        self.pass && self.expect.missed
+    }
+
     /// Returns a row of a table: verdict, quantity, value, requirement, source.
     pub fn row(&self) -> [String; 5] {
-        let verdict = if self.pass { "pass" } else { "FAIL" };
+        let verdict = match (self.pass, self.expect.missed) {
+            (true, false) => "pass",
+            (true, true) => "miss",
+            (false, _) => "FAIL",
+        };
         let value = match (&self.message, self.value) {
             (Some(message), _) => message.clone(),
             (None, value) => value.map(number::short).unwrap_or_default(),

@@ -38,6 +38,9 @@ fn judgements() {
         (1.9, "at_least = 2.0", false),
         (2.5, "at_least = 2\nat_most = 3", true),
         (3.5, "at_least = 2\nat_most = 3", false),
+        // a bar that is missed as stated; one that is met is no miss any more
+        (3.5, "at_most = 3\nmissed = true", true),
+        (2.5, "at_most = 3\nmissed = true", false),
         (f64::NAN, "at_least = 2", false),
         (f64::INFINITY, "at_least = 2", false),
         (f64::NAN, "reference = 2\ntolerance = '100 %'", false),

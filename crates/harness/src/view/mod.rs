@@ -238,9 +238,17 @@ fn verdict(report: Option<&Report>, unfinished: bool) -> Json {
             let failed = report.expect.iter().filter(|one| !one.pass).count();
             let trials = report.trials.iter().filter(|trial| !trial.passed).count();
             let all = report.expect.len();
+            let known = report.expect.iter().filter(|one| one.is_known_miss()).count();
             match (report.passed, all) {
                 (true, 0) => ("", "The run has ended; the scene states no expectations.".to_owned()),
-                (true, 1) => ("good", "The one expectation of the scene is met.".to_owned()),
+                (true, 1) if known == 0 => ("good", "The one expectation of the scene is met.".to_owned()),
+                (true, all) if known > 0 => (
+                    "",
+                    format!(
+                        "{} of {all} expectations of the scene are met; the others are known misses.",
+                        all - known
+                    ),
+                ),
                 (true, all) => ("good", format!("All {all} expectations of the scene are met.")),
                 (false, _) if failed > 0 => {
                     ("bad", format!("{failed} of {all} expectations of the scene are not met."))
@@ -285,7 +293,7 @@ fn page(name: &str, found: Found) -> Result<String, Error> {
             let [_, quantity, value, bound, source] = judgement.row();
             let (pass, kind) = (judgement.pass, judgement.expect.kind);
             json!({
-                "quantity": quantity, "pass": pass, "value": value, "bound": bound, "kind": kind,
+                "quantity": quantity, "pass": pass, "missed": judgement.expect.missed, "value": value, "bound": bound, "kind": kind,
                 "source": source,
             })
         }));

@@ -111,7 +111,7 @@ function tables() {
   at("judged-title").textContent = `Expectations (${run.expect.length})`;
   at("only-failed").closest("label").hidden = !failed;
   searched("expect", at("find-expect"), run.expect.map((e) =>
-    row([e.pass ? "met" : "not met", e.quantity, e.value, e.bound, e.kind.replace("-", " "), e.source], !e.pass)),
+    row([e.pass ? (e.missed ? "known miss" : "met") : "not met", e.quantity, e.value, e.bound, e.kind.replace("-", " "), e.source], !e.pass)),
   [["", ""], ["quantity"], ["value", "number"], ["expected", "number"], ["evidence"], ["source", "source"]], at("only-failed"));
   at("values").hidden = !run.scalars.length;
   at("values-title").textContent = `All values (${run.scalars.length})`;

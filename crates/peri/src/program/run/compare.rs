@@ -134,6 +134,7 @@ fn contact_expectation(scene: &Scene, outcome: &VariantOutcome, several: bool) -
         kind: Kind::Bound,
         source: "every scene with contact: the load is too low by about this fraction".to_owned(),
         quick: true,
+        missed: false,
     })
 }
 
