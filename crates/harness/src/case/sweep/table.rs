@@ -55,8 +55,8 @@ pub(super) fn numeric(values: &[String]) -> Option<(Vec<f64>, String)> {
 const DRAWN: usize = 8;
 
 /// sweep_FIELD.png: mean, least and largest at the end (the mean only where several keys vary), and
-/// sweep_deviation_of_FIELD.png, sweep_VALUE.png of at most [`DRAWN`] other values, against the first key, with
-/// a line for each combination of the others.
+/// sweep_deviation_of_FIELD.png, sweep_VALUE.png of at most [`DRAWN`] other values, against the first
+/// key, with a line for each combination of the others.
 pub(super) fn draw(vary: &[Vary], rows: &Rows, output: &Path) -> Result<(), polycore::Error> {
     let Some(first) = vary.first().filter(|vary| vary.values.len() > 1) else { return Ok(()) };
     let (places, label) = match numeric(&first.values) {
