@@ -242,13 +242,15 @@ fn verdict(report: Option<&Report>, unfinished: bool) -> Json {
             match (report.passed, all) {
                 (true, 0) => ("", "The run has ended; the scene states no expectations.".to_owned()),
                 (true, 1) if known == 0 => ("good", "The one expectation of the scene is met.".to_owned()),
-                (true, all) if known > 0 => (
-                    "",
-                    format!(
-                        "{} of {all} expectations of the scene are met; the others are known misses.",
-                        all - known
-                    ),
-                ),
+                (true, all) if known > 0 => {
+                    let met = all - known;
+                    (
+                        "",
+                        format!(
+                            "{met} of {all} expectations of the scene are met; {known} are known misses."
+                        ),
+                    )
+                }
                 (true, all) => ("good", format!("All {all} expectations of the scene are met.")),
                 (false, _) if failed > 0 => {
                     ("bad", format!("{failed} of {all} expectations of the scene are not met."))
