@@ -295,8 +295,8 @@ fn page(name: &str, found: Found) -> Result<String, Error> {
             let [_, quantity, value, bound, source] = judgement.row();
             let (pass, kind) = (judgement.pass, judgement.expect.kind);
             json!({
-                "quantity": quantity, "pass": pass, "missed": judgement.expect.missed, "value": value, "bound": bound, "kind": kind,
-                "source": source,
+                "quantity": quantity, "pass": pass, "missed": judgement.expect.missed, "value": value,
+                "bound": bound, "kind": kind, "source": source,
             })
         }));
         let provenance = &report.provenance;
