@@ -78,7 +78,11 @@ impl<const D: usize> BodySurface<D> {
         let counts = cell_counts(low, high, spacing);
         let origin = std::array::from_fn(|d| 0.5 * (low[d] + high[d]) - 0.5 * spacing * (counts[d] - 1.0));
         let columns = CellColumns { origin, counts: counts.map(|count| count as usize), spacing };
-        if operations.iter().any(|operation| operation.enclosure().is_some()) {
+        let is_enclosed = |operation: &Operation<D>| {
+            let (Operation::Add(shape) | Operation::Cut(shape)) = operation;
+            matches!(shape, Shape::Enclosed(_))
+        };
+        if operations.iter().any(is_enclosed) {
             return Self::of_cells(operations, &columns);
         }
         for operation in operations {

@@ -171,14 +171,15 @@ impl<const D: usize> RigidSurface<D> {
             }
             sphere => sphere,
         };
+        if self.bonded && (self.force.is_some() || self.radius().is_some()) {
+            let allowed = "a plane without a force".to_owned();
+            return Err(Error::Parameter { name: "bonded rigid surface", found: 1.0, allowed });
+        }
         if let Some(force) = self.force {
-            let direction = unit("force on a rigid surface", force)?;
-            let aside = match &self.shape {
-                SurfaceShape::Plane(normal) => length(across(normal, direction)) > 1e-9,
-                _ => true,
-            };
-            if self.friction > 0.0 && aside {
-                let allowed = "0 with a force that is not normal to a plane".to_owned();
+            unit("force on a rigid surface", force)?;
+            // where it was at the last equilibrium, which decides about slip, is no part of a checkpoint
+            if self.friction > 0.0 {
+                let allowed = "0 with a force".to_owned();
                 let (name, found) = ("friction of a rigid surface", self.friction);
                 return Err(Error::Parameter { name, found, allowed });
             }

@@ -4,7 +4,7 @@
 //! * passes from one added shape to another that does not touch it, or
 //! * passes through the empty part of a box cut out (a disc: a flat cylinder) with its ends on opposite
 //!   sides, or through a hole narrower than the horizon, or
-//! * leaves closed facets and enters them again through a facet turned by 120° or more.
+//! * leaves closed facets (of a cut-out: enters) and meets others that are turned by 120° or more.
 //!
 //! Bonds around a re-entrant corner, and chords of wide holes, stay. Shapes touch if they overlap or share a
 //! part of a face; points and edges do not connect them.
@@ -49,7 +49,12 @@ impl<const D: usize> Gaps<D> {
             Operation::Cut(shape) => shape.width() < horizon,
             Operation::Add(_) => false,
         });
-        let facing = operations.iter().filter_map(Operation::enclosure).any(|body| body.has_slots(horizon));
+        // two bodies may face each other, and a cut-out has two flanks
+        let enclosed = |operation: &&Operation<D>| matches!(operation.shape(), Shape::Enclosed(_));
+        let several = operations.iter().filter(enclosed).count() > 1;
+        let cut = operations.iter().any(|own| enclosed(&own) && matches!(own, Operation::Cut(_)));
+        let slots = || operations.iter().filter_map(Operation::enclosure).any(|body| body.has_slots(horizon));
+        let facing = several || cut || slots();
         if adds < 2 && !narrow && !facing {
             return None;
         }
@@ -122,10 +127,12 @@ impl<const D: usize> Gaps<D> {
         let shapes: Vec<usize> = (0..count).filter(|&index| near(operations[index].shape())).collect();
         let apart = |&a: &usize| shapes.iter().any(|&b| !touching[a * count + b]);
         let gap = shapes.iter().any(|index| match &operations[*index] {
-            Operation::Cut(shape) => shape.width() < self.horizon,
-            Operation::Add(Shape::Enclosed(body)) if *facing => {
-                body.facets().is_within(point, reach) || apart(index)
+            Operation::Add(Shape::Enclosed(body)) | Operation::Cut(Shape::Enclosed(body))
+                if *facing && body.facets().is_within(point, reach) =>
+            {
+                true
             }
+            Operation::Cut(shape) => shape.width() < self.horizon,
             Operation::Add(_) => apart(index),
         });
         gap.then_some(NearbyGaps { gaps: self, shapes })
@@ -214,8 +221,15 @@ impl<const D: usize> NearbyGaps<'_, D> {
         };
         let slots: Vec<usize> = self.shapes.iter().copied().filter(opposed).collect();
         let mut normals = Vec::new();
-        let bodies = self.shapes.iter().filter_map(|&index| operations[index].enclosure());
-        bodies.filter(|_| facing).for_each(|body| body.normals(a, b, &mut normals));
+        for operation in self.shapes.iter().map(|&index| &operations[index]).filter(|_| facing) {
+            let Shape::Enclosed(body) = operation.shape() else { continue };
+            let known = normals.len();
+            body.normals(a, b, &mut normals);
+            if matches!(operation, Operation::Cut(_)) {
+                // outward of the body that is left
+                normals[known..].iter_mut().for_each(|(_, normal)| *normal = normal.map(|x| -x));
+            }
+        }
         let mut last = self.covering(a);
         let mut crosses = false;
         self.pieces(a, b, |middle, ends| {

@@ -28,7 +28,8 @@ harness::quantities! {
         slope of the load over the displacement at this one, of second order in the load steps, if the run \
         reaches it";
     LOOP_ENERGY = "loop_energy", "J", "with a `path` or factors of time steps that return: work of the last \
-        loop of the load over the displacement, by the trapezoidal rule; the energy lost in it";
+        loop of the load over the displacement, by the trapezoidal rule; the energy lost in it once the \
+        loops repeat";
     WORK_OF_LOADS = "work_of_loads", "J", "work of the loads";
     STORED_ENERGY = "stored_energy", "J", "energy in bonds and contact at the end";
     DAMPED_ENERGY = "damped_energy", "J", "work less stored, released, dissipated and friction energy; in \

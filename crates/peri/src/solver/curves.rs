@@ -270,7 +270,7 @@ impl<const D: usize> System<'_, D> {
     pub(super) fn curved_response(&self, state: &State<D>, part: f64) -> (f64, f64) {
         let force = match self.loads.displacement {
             Some(_) => self.loads.reaction(&*self.bonds, &state.force),
-            None => self.loads.applied(&*self.bonds),
+            None => self.loads.applied(&*self.bonds, &[]),
         };
         (force.iter().map(|x| x * x).sum::<f64>().sqrt(), self.loads.curved_reach(part))
     }

@@ -6,7 +6,6 @@ use super::rigid::RigidRegion;
 use super::rotation::RotatingRegion;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
-use crate::geometry::length;
 use rayon::prelude::*;
 
 /// Prescribed displacement and body force of a region at load factor 1.
@@ -135,15 +134,17 @@ impl<const D: usize> Loads<D> {
         if self.turned.is_empty() { straight } else { straight.hypot(self.arc(bonds)) }
     }
 
-    /// Total body force at factor 1 along each axis, N: the larger sum of both directions.
-    pub fn applied(&self, bonds: &dyn BodyGeometry<D>) -> [f64; D] {
-        let Some(body) = &self.body_force else { return [0.0; D] };
+    /// Total force at factor 1 along each axis, N, of the body force and of `pushes` on rigid surfaces: the
+    /// larger sum of both directions.
+    pub fn applied(&self, bonds: &dyn BodyGeometry<D>, pushes: &[[f64; D]]) -> [f64; D] {
         let sum = |d: usize, sign: f64| {
+            let pushed: f64 = pushes.iter().map(|push| (sign * push[d]).max(0.0)).sum();
+            let Some(body) = &self.body_force else { return pushed };
             let each = bonds
                 .particles()
                 .iter()
                 .map(|&s| (sign * body.get(s as usize)[d]).max(0.0) * bonds.volume(s as usize));
-            each.sum::<f64>()
+            each.sum::<f64>() + pushed
         };
         std::array::from_fn(|d| sum(d, 1.0).max(sum(d, -1.0)))
     }
@@ -163,8 +164,7 @@ impl<const D: usize> Loads<D> {
         if reach > 0.0 {
             return (pull / reach, factor * reach);
         }
-        let mut applied = self.applied(bonds).iter().map(|x| x * x).sum::<f64>().sqrt();
-        pushes.iter().for_each(|&push| applied += length(push));
+        let applied = self.applied(bonds, pushes).iter().map(|x| x * x).sum::<f64>().sqrt();
         if applied > 0.0 { (factor * applied, push / applied) } else { (0.0, 0.0) }
     }
 

@@ -123,6 +123,42 @@ fn bonds_end_at_notches() {
     assert_eq!(counts(&corner), counts(&shapes));
 }
 
+/// A slot between two bodies that touch at its end parts them as one inside a body does; a slanted slit cut
+/// out parts its flanks as the same notch in the outline does; a polygon cut out has the surface of the box.
+#[test]
+fn slots_between_bodies_and_cut_out() {
+    let outline =
+        [[0.0, 0.0], [10.0, 0.0], [10.0, 8.0], [5.1, 8.0], [5.1, 4.0], [4.9, 4.0], [4.9, 8.0], [0.0, 8.0]];
+    let one = Body::lattice(enclosed(polygon(&outline)), 0.5).plane_stress(1.0);
+    let halves = [
+        [[0.0, 0.0], [4.9, 0.0], [4.9, 8.0], [0.0, 8.0]],
+        [[5.1, 4.0], [10.0, 4.0], [10.0, 8.0], [5.1, 8.0]],
+        [[4.9, 0.0], [10.0, 0.0], [10.0, 4.0], [4.9, 4.0]],
+    ];
+    let [left, upper, lower] = halves.map(|points| enclosed(polygon(&points)));
+    let several = Body::lattice(left, 0.5).join(lower).join(upper).plane_stress(1.0);
+    assert_eq!(counts(&several)[0], counts(&one)[0]);
+    let differ = counts(&one)[1].abs_diff(counts(&several)[1]);
+    assert!(differ <= 24, "bonds around the tip: {differ}");
+
+    let square = || Shape::rectangle([0.0, 0.0], [10.0, 8.0]);
+    let whole = counts(&Body::lattice(square(), 0.5).plane_stress(1.0))[1];
+    // slits as long, upright and slanted by 45°
+    let slit = |[x, y]: [f64; 2], [a, b]: [f64; 2]| {
+        let corner = |s: f64, t: f64| [x + s * a - t * b, y + s * b + t * a];
+        enclosed(polygon(&[corner(-2.0, -0.1), corner(2.0, -0.1), corner(2.0, 0.1), corner(-2.0, 0.1)]))
+    };
+    let cut = |shape| whole - counts(&Body::lattice(square(), 0.5).cut(shape).plane_stress(1.0))[1];
+    let half = 0.5_f64.sqrt();
+    let [upright, slanted] = [[0.0, 1.0], [half, half]].map(|along| cut(slit([5.0, 4.0], along)));
+    assert!(slanted as f64 > 0.7 * upright as f64 && upright > 100, "{slanted} {upright}");
+
+    let hole = [[4.0, 3.0], [7.0, 3.0], [7.0, 6.0], [4.0, 6.0]];
+    let [polygons, boxes] = [enclosed(polygon(&hole)), Shape::rectangle(hole[0], hole[2])]
+        .map(|shape| Body::lattice(square(), 0.5).cut(shape).plane_stress(1.0).surface().faces().len());
+    assert_eq!(polygons, boxes);
+}
+
 /// Sides of the cells of a sphere: as many to either side along each axis, with the area of its shadow.
 #[test]
 fn surfaces_are_sides_of_cells() {

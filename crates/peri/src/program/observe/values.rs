@@ -120,7 +120,7 @@ pub(super) fn responses<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D
         if scene.has_forces() {
             to.add_if(q::APPLIED.named(&[axis]), |m| {
                 let loads = &m.physics.loads;
-                loads.body_force.is_some().then(|| loads.applied(m.bonds)[d])
+                loads.body_force.is_some().then(|| loads.applied(m.bonds, &[])[d])
             });
         }
     }

@@ -159,6 +159,19 @@ pub(super) fn check(source: &Source, scene: &Scene, contact: &ContactSpec) -> Re
             );
             return Err(source.unexpected(&key("velocity"), why));
         }
+        if let (Some(radius), Some(most)) = (indenter.radius, longest_step(scene, indenter))
+            && most > radius.si()
+        {
+            let found = format!(
+                "a step of {} mm, longer than the radius: it could pass a part of the body",
+                plain(most * 1e3)
+            );
+            return Err(source.error(
+                &key("displacement"),
+                found,
+                "steps of a radius or less: more `solver.steps`",
+            ));
+        }
         if indenter.force.is_none() {
             continue;
         }
@@ -171,12 +184,32 @@ pub(super) fn check(source: &Source, scene: &Scene, contact: &ContactSpec) -> Re
             return Err(source.unexpected(&key("force"), why));
         }
         let friction = contact.friction_of(indenter.friction);
-        if friction > 0.0 && indenter.radius.is_some() {
+        if friction > 0.0 {
             let allowed = "`friction = 0` of an indenter with a `force`";
             return Err(source.error(&key("friction"), plain(friction), allowed));
         }
+        if contact.stiffness_of(indenter.stiffness, explicit) == 0.0 {
+            return Err(source.error(&key("stiffness"), 0, "above 0 of an indenter with a `force`"));
+        }
+        if let Some(factor) = scene.programme().0.into_iter().find(|factor| *factor < 0.0) {
+            let found = format!("a load factor of {}", plain(factor));
+            let allowed = "factors of 0 and above: an indenter pushes and never pulls";
+            return Err(source.error(&key("force"), found, allowed));
+        }
     }
     Ok(())
+}
+
+/// Longest way of an indenter in one step of an equilibrium, m; `None` where it does not follow load factors.
+fn longest_step(scene: &Scene, indenter: &IndenterSpec) -> Option<f64> {
+    let way = indenter.displacement.as_ref()?;
+    if scene.method() == SolverMethod::Verlet {
+        return None;
+    }
+    let (factors, _) = scene.programme();
+    let starts = std::iter::once(0.0).chain(factors.iter().copied());
+    let most = starts.zip(&factors).map(|(from, to)| (to - from).abs()).fold(0.0, f64::max);
+    Some(most * way.iter().map(|d| d.si().powi(2)).sum::<f64>().sqrt())
 }
 
 /// Returns true if a boundary prescribes the displacement along an axis.
@@ -231,7 +264,9 @@ pub(super) fn check_placed<const D: usize>(
             return Err(source.error(&key("force"), found, "a force that leads to the body"));
         }
         for d in (0..D).filter(|&d| force[d] != 0.0) {
-            let others = surfaces.iter().enumerate().filter(|(other, _)| *other != number);
+            // a surface with a force of its own stops nothing
+            let others =
+                surfaces.iter().enumerate().filter(|(other, own)| *other != number && own.force.is_none());
             let stops = others.flat_map(|(_, other)| other.pushes()).any(|push| push[d] * force[d] < 0.0);
             if !stops && !scene.boundary.iter().any(|boundary| holds(boundary, d)) {
                 let axis = ["x", "y", "z"][d];

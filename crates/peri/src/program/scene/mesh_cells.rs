@@ -82,7 +82,11 @@ impl<const D: usize> CellMesh<D> {
     /// Selects elements of the dimension of the body.
     pub fn cells_of(&self, places: impl IntoIterator<Item = u32>) -> Vec<u32> {
         let is_cell = |place: &u32| self.content.elements[*place as usize].kind.dimension() == D;
-        places.into_iter().filter(is_cell).collect()
+        let mut cells: Vec<u32> = places.into_iter().filter(is_cell).collect();
+        // a set may name a cell twice
+        cells.sort_unstable();
+        cells.dedup();
+        cells
     }
 
     /// Names of the sets with cells.

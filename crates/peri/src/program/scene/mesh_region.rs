@@ -2,7 +2,7 @@
 
 use super::mesh_cells::{CellMesh, is_mesh};
 use super::region::layers;
-use super::values::required;
+use super::values::{ONE_OF_THEM, required};
 use super::{Boundary, Scene};
 use crate::bonds::Bonds;
 use crate::geometry::{Enclosure, Facet, Facets};
@@ -80,6 +80,19 @@ impl<const D: usize> MeshSets<D> {
         if !scene.names_sets() {
             return Ok(Self::default());
         }
+        for (index, shape) in scene.body.shapes().iter().enumerate() {
+            let twin = scene.body.shapes()[..index]
+                .iter()
+                .find(|other| shape.file.is_some() && other.file == shape.file && other.unit != shape.unit);
+            if twin.is_some() {
+                let found = "a second unit of one file, whose sets a region names";
+                return Err(source.error(
+                    &format!("body.shapes[{index}].unit"),
+                    found,
+                    "one unit for a file",
+                ));
+            }
+        }
         let read = |MeshEntry { file, unit, keys: [key, unit_key] }: MeshEntry| {
             let unit = required(source, &unit_key, unit, "the file has none, e.g. \"1 mm\"")?;
             CellMesh::read(source, &key, &unit_key, file, unit)
@@ -126,6 +139,10 @@ impl<const D: usize> MeshSets<D> {
         let places = mesh.content().element_sets.get(name).cloned().unwrap_or_default();
         let cells = mesh.cells_of(places);
         if !cells.is_empty() {
+            if !mesh.facets_of_set(name).is_empty() {
+                let found = format!("`{name}`, a set of cells and one of faces or nodes of {}", mesh.path());
+                return Err(source.error(&set, found, "a name of one kind: rename one of them in the file"));
+            }
             if let Some(depth) = boundary.depth_key() {
                 return Err(source.unexpected(&format!("{key}.{depth}"), "cells have their own extent"));
             }
@@ -134,6 +151,9 @@ impl<const D: usize> MeshSets<D> {
             let body =
                 body.map_err(|error| source.error(&set, format!("{}: {error}", mesh.path()), "cells"))?;
             return Ok(SetRegion::Cells(body));
+        }
+        if boundary.depth.is_some() && boundary.layers.is_some() {
+            return Err(source.conflict(&format!("{key}.depth"), "layers", ONE_OF_THEM));
         }
         let depth = boundary.depth.map(|depth| depth.si());
         let reach = depth.unwrap_or_else(|| layers(boundary, bonds) as f64 * bonds.spacing());
