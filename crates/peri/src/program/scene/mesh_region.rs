@@ -8,6 +8,7 @@ use crate::bonds::Bonds;
 use crate::geometry::{Enclosure, Facet, Facets};
 use harness::scene::{SceneError, Source};
 use polycore::units::Length;
+use std::collections::HashSet;
 use std::path::Path;
 
 /// Mesh files of a body that regions name.
@@ -139,7 +140,7 @@ impl<const D: usize> MeshSets<D> {
         let places = mesh.content().element_sets.get(name).cloned().unwrap_or_default();
         let cells = mesh.cells_of(places);
         if !cells.is_empty() {
-            if !mesh.facets_of_set(name).is_empty() {
+            if mesh.has_other_kind(name, &cells) {
                 let found = format!("`{name}`, a set of cells and one of faces or nodes of {}", mesh.path());
                 return Err(source.error(&set, found, "a name of one kind: rename one of them in the file"));
             }
@@ -180,8 +181,29 @@ impl<const D: usize> CellMesh<D> {
         !self.cells_of(places).is_empty() || !self.facets_of_set(name).is_empty()
     }
 
+    /// Returns true if a set of cells is one of faces, too, or one of other nodes than theirs.
+    fn has_other_kind(&self, name: &str, cells: &[u32]) -> bool {
+        let content = self.content();
+        let own: HashSet<u32> = cells
+            .iter()
+            .flat_map(|&cell| content.nodes_of(&content.elements[cell as usize]).iter().copied())
+            .collect();
+        let nodes = content.node_sets.get(name).map(|nodes| nodes.iter().copied().collect::<HashSet<u32>>());
+        !self.faces_of_set(name).is_empty() || nodes.is_some_and(|nodes| nodes != own)
+    }
+
     /// Facets of the faces of a set (in 2D edges); without any its nodes, as facets without an extent.
     fn facets_of_set(&self, name: &str) -> Vec<Facet<D>> {
+        let mut facets = self.faces_of_set(name);
+        if facets.is_empty() {
+            let nodes = self.content().node_sets.get(name).into_iter().flatten();
+            facets.extend(nodes.map(|&node| [self.point(node); D]));
+        }
+        facets
+    }
+
+    /// Facets of the faces of a set (in 2D edges).
+    fn faces_of_set(&self, name: &str) -> Vec<Facet<D>> {
         let content = self.content();
         let lists = [content.element_sets.get(name), content.curve_sets.get(name)];
         let places = lists.into_iter().flatten().flatten();
@@ -189,10 +211,6 @@ impl<const D: usize> CellMesh<D> {
         let mut facets: Vec<Facet<D>> = sides.flat_map(|&place| self.facets_of_side(place)).collect();
         let faces = content.surfaces.get(name).into_iter().flatten().filter(|_| D == 3);
         facets.extend(faces.flat_map(|face| self.facets_of_face(face.element, face.side)));
-        if facets.is_empty() {
-            let nodes = content.node_sets.get(name).into_iter().flatten();
-            facets.extend(nodes.map(|&node| [self.point(node); D]));
-        }
         facets
     }
 }
