@@ -69,7 +69,7 @@ def test_laws_against_formulas():
 
 def test_names_of_parameters():
     models = Law.models()
-    assert len(models) == 20 and models["gent"]
+    assert len(models) == 24 and models["gent"]
     names = list(models["gent"])
     law = Law("gent", **{name: float(value) for name, value in models["gent"].items()})
     assert list(law.parameters) and names and law.shear_modulus > 0
