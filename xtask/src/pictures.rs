@@ -190,7 +190,7 @@ pub fn run(workspace: &Repository, options: &Options) -> Result<bool> {
     let mut results = BTreeMap::new();
     for name in wanted.iter().flat_map(|(_, cases)| cases) {
         if !results.contains_key(*name) {
-            results.insert((*name).to_owned(), solve(workspace, options, name, list.case(name)?)?);
+            results.insert((*name).to_owned(), solve(workspace, options, name, &list)?);
         }
     }
     for (key, cases) in &wanted {
@@ -246,8 +246,9 @@ fn program(root: &Path, scene: &Path) -> Result<String> {
     program.map(str::to_owned).ok_or_else(|| miette!("{}: missing `program`", place()))
 }
 
-/// Runs a scene and returns the folder of its results.
-fn solve(workspace: &Repository, options: &Options, name: &str, scene: &Path) -> Result<PathBuf> {
+/// Runs a case and returns the folder of its results; writes its page if a picture shows it.
+fn solve(workspace: &Repository, options: &Options, name: &str, list: &List) -> Result<PathBuf> {
+    let scene = list.case(name)?;
     let program = program(workspace.root(), scene)?;
     let executable = match &options.from {
         Some(folder) => folder.join(&program).with_extension(std::env::consts::EXE_EXTENSION),
@@ -268,7 +269,10 @@ fn solve(workspace: &Repository, options: &Options, name: &str, scene: &Path) ->
     if !ended.success() {
         return Err(miette!("{program} run {}: {ended}", scene.display()));
     }
-    page::write(&executable, &output)?;
+    let shows = |panel: &Panel| panel.case == name && panel.is_page();
+    if list.picture.iter().flat_map(|picture| &picture.panel).any(shows) {
+        page::write(&executable, &output)?;
+    }
     Ok(output)
 }
 

@@ -369,8 +369,8 @@ impl<const D: usize> Shape<D> {
         (joint[0] < joint[1]).then_some(joint)
     }
 
-    /// Returns true if it overlaps another, or shares a part of a face with it, within `near`, m; of closed
-    /// facets if their boxes do.
+    /// Returns true for shapes that overlap or share a part of a face, within `near`, m; for closed facets,
+    /// if their boxes do.
     fn touches(&self, other: &Self, near: f64) -> bool {
         let ((low, high), (from, to)) = (self.bounds(), other.bounds());
         let common: [f64; D] = std::array::from_fn(|d| high[d].min(to[d]) - low[d].max(from[d]));

@@ -1,4 +1,4 @@
-//! What a scene has in place of keywords without effect on the mesh.
+//! Keys of scenes in place of keywords without effect on the mesh.
 
 /// Advice and the keywords that it is about.
 const ADVICE: [(&str, &[&str]); 15] = [

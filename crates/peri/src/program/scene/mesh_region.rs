@@ -3,16 +3,24 @@
 use super::mesh_cells::{CellMesh, is_mesh};
 use super::region::layers;
 use super::values::{ONE_OF_THEM, required};
-use super::{Boundary, Scene};
+use super::{Boundary, Scene, ShapeSpec};
 use crate::bonds::Bonds;
 use crate::geometry::{Enclosure, Facet, Facets};
 use harness::scene::{SceneError, Source};
+use polycore::numerics::DisjointSets;
 use polycore::units::Length;
 use std::collections::HashSet;
 use std::path::Path;
 
 /// Mesh files of a body that regions name.
-pub struct MeshSets<const D: usize>(Vec<CellMesh<D>>);
+pub struct MeshSets<const D: usize>(Vec<SetFile<D>>);
+
+/// Mesh file with sets.
+struct SetFile<const D: usize> {
+    mesh: CellMesh<D>,
+    /// True if particles fill its cells, false if it is only cut out.
+    is_filled: bool,
+}
 
 impl<const D: usize> Default for MeshSets<D> {
     fn default() -> Self {
@@ -24,8 +32,8 @@ impl<const D: usize> Default for MeshSets<D> {
 pub(super) enum SetRegion<const D: usize> {
     /// Inside of cells.
     Cells(Enclosure<D>),
-    /// Particles within a distance, m, of faces or nodes.
-    Near(Facets<D>, f64),
+    /// Particles within a distance, m, of faces or nodes, in the pieces of the mesh that have them.
+    Near(Facets<D>, f64, Option<Enclosure<D>>),
 }
 
 impl<const D: usize> SetRegion<D> {
@@ -33,7 +41,9 @@ impl<const D: usize> SetRegion<D> {
     pub fn contains(&self, place: [f64; D]) -> bool {
         match self {
             Self::Cells(body) => body.contains(place),
-            Self::Near(facets, reach) => facets.is_within(place, *reach),
+            Self::Near(facets, reach, pieces) => {
+                facets.is_within(place, *reach) && pieces.as_ref().is_none_or(|own| own.contains(place))
+            }
         }
     }
 }
@@ -82,10 +92,8 @@ impl<const D: usize> MeshSets<D> {
             return Ok(Self::default());
         }
         for (index, shape) in scene.body.shapes().iter().enumerate() {
-            let twin = scene.body.shapes()[..index]
-                .iter()
-                .find(|other| shape.file.is_some() && other.file == shape.file && other.unit != shape.unit);
-            if twin.is_some() {
+            let differs = |other: &ShapeSpec| other.file == shape.file && other.unit != shape.unit;
+            if shape.file.is_some() && scene.body.shapes()[..index].iter().any(differs) {
                 let found = "a second unit of one file, whose sets a region names";
                 return Err(source.error(
                     &format!("body.shapes[{index}].unit"),
@@ -96,7 +104,10 @@ impl<const D: usize> MeshSets<D> {
         }
         let read = |MeshEntry { file, unit, keys: [key, unit_key] }: MeshEntry| {
             let unit = required(source, &unit_key, unit, "the file has none, e.g. \"1 mm\"")?;
-            CellMesh::read(source, &key, &unit_key, file, unit)
+            let fills = |shape: &ShapeSpec| shape.add.is_some() && shape.file.as_deref() == Some(file);
+            let is_filled =
+                scene.body.shapes().iter().any(fills) || scene.body.points.as_deref() == Some(file);
+            Ok(SetFile { mesh: CellMesh::read(source, &key, &unit_key, file, unit)?, is_filled })
         };
         scene.mesh_files().into_iter().map(read).collect::<Result<_, _>>().map(Self)
     }
@@ -119,11 +130,11 @@ impl<const D: usize> MeshSets<D> {
             let allowed = "a body with a mesh file, whose sets have names";
             return Err(source.error(&set, format!("`{name}` of a body without one"), allowed));
         }
-        let own: Vec<&CellMesh<D>> = self.0.iter().filter(|mesh| mesh.has_set(name)).collect();
-        let mesh = match own[..] {
-            [mesh] => mesh,
+        let own: Vec<&SetFile<D>> = self.0.iter().filter(|file| file.mesh.has_set(name)).collect();
+        let SetFile { mesh, is_filled } = match own[..] {
+            [file] => file,
             [] => {
-                let mut names: Vec<&str> = self.0.iter().flat_map(CellMesh::set_names).collect();
+                let mut names: Vec<&str> = self.0.iter().flat_map(|file| file.mesh.set_names()).collect();
                 names.sort_unstable();
                 names.dedup();
                 if names.is_empty() {
@@ -133,7 +144,7 @@ impl<const D: usize> MeshSets<D> {
                 return Err(source.unknown(&set, name, &names));
             }
             [one, other, ..] => {
-                let found = format!("`{name}`, which {} and {} have", one.path(), other.path());
+                let found = format!("`{name}`, which {} and {} have", one.mesh.path(), other.mesh.path());
                 return Err(source.error(&set, found, "a name that one of the files has"));
             }
         };
@@ -147,8 +158,7 @@ impl<const D: usize> MeshSets<D> {
             if let Some(depth) = boundary.depth_key() {
                 return Err(source.unexpected(&format!("{key}.{depth}"), "cells have their own extent"));
             }
-            let facets = mesh.boundary(&cells).map(|(facets, _)| facets);
-            let body = facets.and_then(|facets| Enclosure::new(facets).map_err(|error| error.to_string()));
+            let body = mesh.enclosure(&cells);
             let body =
                 body.map_err(|error| source.error(&set, format!("{}: {error}", mesh.path()), "cells"))?;
             return Ok(SetRegion::Cells(body));
@@ -162,8 +172,12 @@ impl<const D: usize> MeshSets<D> {
             let depth = boundary.depth_key().unwrap_or("depth");
             return Err(source.error(&format!("{key}.{depth}"), format!("{reach} m"), "above 0"));
         }
+        // a set of one body takes no particles of another across a gap
+        let pieces = is_filled.then(|| mesh.enclosure(&mesh.pieces_at(name))).transpose();
+        let pieces =
+            pieces.map_err(|error| source.error(&set, format!("{}: {error}", mesh.path()), "cells"))?;
         // particles on the border belong to it
-        Ok(SetRegion::Near(Facets::new(mesh.facets_of_set(name)), reach * (1.0 + 1e-9)))
+        Ok(SetRegion::Near(Facets::new(mesh.facets_of_set(name)), reach * (1.0 + 1e-9), pieces))
     }
 }
 
@@ -179,6 +193,31 @@ impl<const D: usize> CellMesh<D> {
     fn has_set(&self, name: &str) -> bool {
         let places = self.content().element_sets.get(name).cloned().unwrap_or_default();
         !self.cells_of(places).is_empty() || !self.facets_of_set(name).is_empty()
+    }
+
+    /// Encloses cells by their outer sides.
+    fn enclosure(&self, cells: &[u32]) -> Result<Enclosure<D>, String> {
+        let (facets, _) = self.boundary(cells)?;
+        Enclosure::new(facets).map_err(|error| error.to_string())
+    }
+
+    /// Selects the cells that nodes join, over any number of cells, with a corner of a face or node of a set.
+    fn pieces_at(&self, name: &str) -> Vec<u32> {
+        let content = self.content();
+        let nodes = |cell: u32| content.nodes_of(&content.elements[cell as usize]);
+        let mut sets = DisjointSets::new(content.nodes.len());
+        for &cell in self.cells() {
+            for pair in nodes(cell).windows(2) {
+                sets.join(pair[0], pair[1]);
+            }
+        }
+        let bits = |point: [f64; D]| point.map(f64::to_bits);
+        let facets = self.facets_of_set(name);
+        let corners: HashSet<[u64; D]> = facets.iter().flatten().map(|corner| bits(*corner)).collect();
+        let at = (0..content.nodes.len() as u32).filter(|&node| corners.contains(&bits(self.point(node))));
+        let roots: HashSet<u32> = at.map(|node| sets.root(node)).collect();
+        let joined = |cell: &u32| nodes(*cell).first().is_some_and(|&node| roots.contains(&sets.root(node)));
+        self.cells().iter().copied().filter(joined).collect()
     }
 
     /// Returns true if a set of cells is one of faces, too, or one of other nodes than theirs.
