@@ -115,7 +115,7 @@ fn melt(
     extracted: bool,
 ) -> PyResult<Melt> {
     let known = known_polymer(polymer).map_err(refused)?;
-    let missing = |what: &str| value(format!("{what}: not known of {}; give it", known.name));
+    let missing = |what: &str| value(format!("{what}: unknown for {}; give it", known.name));
     Ok(Melt {
         density: density.or(known.density).ok_or_else(|| missing("density"))?,
         temperature,

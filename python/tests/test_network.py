@@ -43,7 +43,7 @@ def test_mixtures_and_chains_with_one_group():
         ({"conversion": 0.9, "sol_fraction": 0.1}, "exactly one"),
         ({"sol_fraction": 0.01, "ratio": 0.8}, "stays soluble"),
         ({"conversion": 0.9, "polymer": "PDMZ"}, "unknown polymer"),
-        ({"conversion": 0.9, "polymer": "PEO"}, "density: not known of PEO"),
+        ({"conversion": 0.9, "polymer": "PEO"}, "density: unknown for PEO"),
     ],
 )
 def test_refused(arguments, message):

@@ -166,7 +166,7 @@ impl List {
     /// Code of the programs is not among them: it changes daily, and tests judge its values.
     fn sources(&self, key: &str, cases: &[&str]) -> Result<Vec<String>> {
         let page = self.picture(key).is_some_and(Picture::shows_page);
-        let code = if page { "crates/harness/src/view" } else { "crates/harness/src/output" };
+        let code = if page { "crates/harness/src/view" } else { "crates/resultfile/src" };
         let mut all = vec![code.to_owned()];
         for name in cases {
             let file = self.case(name)?;
@@ -319,7 +319,7 @@ mod tests {
             fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
             fs::write(path, text).expect("a file");
         };
-        write("crates/harness/src/output/picture.rs", "fn a() {}\n");
+        write("crates/resultfile/src/picture.rs", "fn a() {}\n");
         write("cases/plate/case.toml", "program = 'peri'\n");
         let text = "cases = { plate = 'cases/plate/case.toml' }\n[[picture]]\nfile = 'docs/a.png'\nwidth = \
             10\n\
@@ -338,15 +338,15 @@ mod tests {
         let stamps = BTreeMap::from([("docs/a.png".to_owned(), DrawnEntry { entry, stamp })]);
         write(STAMPS, &toml::to_string(&stamps).expect("text"));
         assert_eq!(found(), [""; 0]);
-        write("crates/harness/src/output/picture.rs", "// a comment\nfn a() {}\n");
+        write("crates/resultfile/src/picture.rs", "// a comment\nfn a() {}\n");
         assert_eq!(found(), [""; 0]);
         write("cases/plate/case.toml", "program = 'peri'\ntitle = 'b'\n");
         assert_eq!(found(), [stale]);
         write("cases/plate/case.toml", "program = 'peri'\n");
-        write("crates/harness/src/output/picture.rs", "fn a() { }\n");
+        write("crates/resultfile/src/picture.rs", "fn a() { }\n");
         assert_eq!(found(), [stale]);
         // another entry changes nothing, its own does
-        write("crates/harness/src/output/picture.rs", "fn a() {}\n");
+        write("crates/resultfile/src/picture.rs", "fn a() {}\n");
         write(LIST, &format!("{text}[[table]]\nfile = 'docs/a.md'\nname = 'a'\ntext = ''\n"));
         assert_eq!(found(), [stale.replace("a.png", "a.md (a)")]);
         write(LIST, &text.replace("width = 10", "width = 20"));

@@ -5,9 +5,10 @@
 pub mod case;
 pub mod checkpoint;
 pub mod observe;
-pub mod output;
 pub mod report;
 pub mod scene;
 mod stamp;
 pub mod study;
 pub mod view;
+
+pub use resultfile as output;

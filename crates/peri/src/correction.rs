@@ -4,7 +4,7 @@
 
 use crate::bonds::{BodyGeometry, Property};
 use crate::field::Field;
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Computes per-particle factors g_d = W_exact/W_d for a uniaxial strain ε in each direction d, with
 /// W_exact = ½ C₁₁₁₁ ε² and the bonds' W_d = ¼ Σ_J 6kθ V_J |ξ| n_d⁴ ε² (dual force f = 2t, linear bond t =
@@ -15,20 +15,16 @@ pub fn surface_factors<const D: usize>(
     stiffness_1111: f64,
 ) -> Field<D> {
     let mut factors = Field::zeros(bonds.sites());
-    let values: Vec<[f64; D]> = bonds
-        .particles()
-        .par_iter()
-        .map(|&site| {
-            let mut energy = [0.0; D];
-            bonds.neighbours(site as usize, &mut |bond| {
-                for d in 0..D {
-                    let cosine = bond.bond[d] / bond.length;
-                    energy[d] += 1.5 * modulus * bond.volume * bond.length * cosine.powi(4);
-                }
-            });
-            energy.map(|w| if w > 0.0 { 0.5 * stiffness_1111 / w } else { 1.0 })
-        })
-        .collect();
+    let values: Vec<[f64; D]> = parallel::map_each(bonds.particles(), |&site| {
+        let mut energy = [0.0; D];
+        bonds.neighbours(site as usize, &mut |bond| {
+            for d in 0..D {
+                let cosine = bond.bond[d] / bond.length;
+                energy[d] += 1.5 * modulus * bond.volume * bond.length * cosine.powi(4);
+            }
+        });
+        energy.map(|w| if w > 0.0 { 0.5 * stiffness_1111 / w } else { 1.0 })
+    });
     for (&site, value) in bonds.particles().iter().zip(values) {
         factors.set(site as usize, value);
     }

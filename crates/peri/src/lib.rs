@@ -56,6 +56,7 @@ pub mod gpu;
 pub mod integrals;
 pub mod material;
 pub mod model;
+mod parallel;
 pub mod potential;
 pub mod prelude;
 pub mod probe;

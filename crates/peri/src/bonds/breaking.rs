@@ -2,6 +2,7 @@
 
 use super::{BodyGeometry, BondForces, Bonds, Property};
 use crate::field::{CHUNK, Field, chunk_range};
+use crate::parallel;
 use crate::potential::StretchRange;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -90,7 +91,7 @@ pub fn overstretched<const D: usize, B: BondForces<D> + ?Sized>(
         let suspects = parts.flat_map(|sites| bonds.suspects(displacement, sites, least));
         suspects.filter_map(beyond).collect::<Vec<Overstretched>>()
     };
-    let found: Vec<Vec<Overstretched>> = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of).collect();
+    let found: Vec<Vec<Overstretched>> = parallel::map(sites.div_ceil(CHUNK), of);
     let mut found = found.concat();
     found.par_sort_unstable_by_key(|bond| (bond.site, bond.index));
     found

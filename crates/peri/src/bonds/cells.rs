@@ -1,5 +1,6 @@
 //! Points sorted into cells, for range searches.
 
+use crate::parallel;
 use polycore::numerics::bounds;
 use rayon::prelude::*;
 
@@ -33,8 +34,8 @@ impl<const D: usize> CellGrid<D> {
         let [low, _] = bounds(points.iter().copied());
         let (cells, starts, members, last) = (Vec::new(), Vec::new(), Vec::new(), [0; D]);
         let mut grid = Self { low, edge: edge.max(f64::MIN_POSITIVE), cells, last, starts, members };
-        let keyed = points.par_iter().enumerate().map(|(k, &point)| (grid.cell(point), k as u32));
-        let mut keyed: Vec<([i64; D], u32)> = keyed.collect();
+        let key = |k: usize| (grid.cell(points[k]), k as u32);
+        let mut keyed: Vec<([i64; D], u32)> = parallel::map(points.len(), key);
         keyed.par_sort_unstable();
         for (place, (cell, member)) in keyed.into_iter().enumerate() {
             if grid.cells.last() != Some(&cell) {

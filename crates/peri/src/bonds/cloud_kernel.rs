@@ -6,9 +6,9 @@
 use super::kernel::{ForceKernel, law};
 use super::real::KernelReal;
 use crate::field::{CHUNK, Field};
+use crate::parallel;
 use crate::potential::StretchRange;
 use pulp::Simd;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Neighbour lists are padded to a multiple of this with bonds of zero stiffness from the particle to itself.
@@ -67,7 +67,7 @@ impl ParticleRows {
     /// Writes a vector of each particle, beginning with column `at` of its rows.
     fn write<const D: usize>(&mut self, field: &Field<D>, at: usize) {
         let (first, components) = (self.first, field.components());
-        self.rows.par_chunks_mut(CHUNK * (D - 1)).enumerate().for_each(|(chunk, rows)| {
+        parallel::for_chunks(&mut self.rows, CHUNK * (D - 1), |chunk, rows| {
             let sites = first + chunk * CHUNK..;
             for (site, row) in sites.zip(rows.as_flattened_mut().chunks_exact_mut(ROW * (D - 1))) {
                 for d in 0..D {

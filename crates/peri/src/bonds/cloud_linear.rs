@@ -7,9 +7,9 @@ use super::cloud_lists::NeighbourRows;
 use super::kernel::{ForceKernel, dispatch};
 use super::{BodyGeometry, CloudBonds};
 use crate::field::{CHUNK, Field, chunk_range};
+use crate::parallel;
 use crate::potential::StretchRange;
 use pulp::{Arch, Simd, WithSimd};
-use rayon::prelude::*;
 
 type FourLanes = [f64; 4];
 
@@ -59,7 +59,7 @@ impl<const D: usize> CloudPlaces<D> {
 
     /// Loads a displacement.
     pub fn load(&mut self, displacement: &Field<D>) {
-        self.places.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, places)| {
+        parallel::for_chunks(&mut self.places, CHUNK, |chunk, places| {
             for (at, place) in places.iter_mut().enumerate() {
                 place.u = lanes(displacement.get(chunk * CHUNK + at));
             }

@@ -4,7 +4,7 @@ use super::cells::CellGrid;
 use super::cloud_kernel::GROUP;
 use crate::error::Error;
 use crate::geometry::{Cut, Gaps, cuts_within, severed};
-use rayon::prelude::*;
+use crate::parallel;
 use std::ops::Range;
 
 /// Neighbours of all sites, ascending; each row padded to whole groups with the site itself.
@@ -62,7 +62,7 @@ impl NeighbourLists {
             Ok((list, parted))
         };
         let families: Vec<Result<(Vec<u32>, bool), Error>> =
-            points.par_iter().enumerate().map(family).collect();
+            parallel::map(points.len(), |own| family((own, &points[own])));
         let (mut starts, mut neighbours) = (vec![0], Vec::new());
         let (mut directed_bonds, mut parted) = (0, Vec::new());
         for (own, family) in families.into_iter().enumerate() {

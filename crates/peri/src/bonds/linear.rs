@@ -6,9 +6,8 @@ use super::kernel::dispatch;
 use super::linear_kernel::{self, LinearPass, LinearRow, MomentPass, Moments};
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field, chunk_range};
+use crate::parallel;
 use crate::potential::StretchRange;
-use polycore::numerics::ordered_sum;
-use rayon::prelude::*;
 
 impl<const D: usize> LatticeBonds<D> {
     /// Computes Σ_I V_I Σ_J w V_J |ξ| φ(e), each bond once; `None` if bonds have their own weights.
@@ -19,7 +18,7 @@ impl<const D: usize> LatticeBonds<D> {
         let (sites, volume) = (self.sites(), self.lattice().volume);
         let spans = self.spans(displacement);
         let of = |chunk: usize| spans.energy(chunk_range(chunk, sites), &energy);
-        Some(2.0 * volume * volume * ordered_sum((0..sites.div_ceil(CHUNK)).into_par_iter().map(of)))
+        Some(2.0 * volume * volume * parallel::sum(sites.div_ceil(CHUNK), of))
     }
 
     /// Builds the stencil for [`Self::moments`] and [`Self::linear_force`].

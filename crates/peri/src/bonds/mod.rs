@@ -43,8 +43,8 @@ pub(crate) use rows::Rational;
 
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
+use crate::parallel;
 use crate::potential::KernelFit;
-use rayon::prelude::*;
 
 /// Refuses a body in which a bond acts on one of its ends only: its forces would not sum to zero.
 fn refuse_one_sided<const D: usize>(bonds: &dyn BodyGeometry<D>) -> Result<(), Error> {
@@ -72,7 +72,7 @@ pub fn force<const D: usize, B: BondForces<D> + ?Sized>(
     force: &mut Field<D>,
 ) {
     let sites = bonds.sites();
-    force.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut out)| {
+    parallel::for_items(force.chunks_mut(), |chunk, mut out| {
         debug_assert_eq!(chunk_range(chunk, sites).len(), out[0].len());
         bonds.force(displacement, chunk * CHUNK, &mut out, None);
     });
@@ -84,10 +84,8 @@ pub fn stretch_range<const D: usize, B: BondForces<D> + ?Sized>(
     displacement: &Field<D>,
 ) -> StretchRange {
     let sites = bonds.sites();
-    (0..sites.div_ceil(CHUNK))
-        .into_par_iter()
-        .map(|chunk| bonds.stretches(displacement, chunk))
-        .reduce(|| StretchRange::REST, StretchRange::join)
+    let ranges = parallel::map(sites.div_ceil(CHUNK), |chunk| bonds.stretches(displacement, chunk));
+    ranges.into_iter().fold(StretchRange::REST, StretchRange::join)
 }
 
 /// Returns the range of bond stretches [λ_low, λ_high] of a displacement, with a margin for rounding: the

@@ -2,7 +2,7 @@
 
 use super::crossing::{Crossing, SHORT};
 use crate::bonds::Bonds;
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Bonds of a body before loading, as far as its crack area needs them.
 pub struct CrackArea {
@@ -64,7 +64,7 @@ impl CrackArea {
                 }
                 sum
             };
-            bonds.particles().par_iter().map(of).collect::<Vec<f64>>().iter().sum()
+            parallel::map_each(bonds.particles(), of).iter().sum()
         } else {
             let of = |&[a, b]: &[u32; 2]| {
                 let (a, b) = (a as usize, b as usize);
@@ -74,7 +74,7 @@ impl CrackArea {
                 };
                 if bonds.is_bonded(a, b) { 0.0 } else { share(a, b, apart()) }
             };
-            self.pairs.par_iter().map(of).collect::<Vec<f64>>().iter().sum()
+            parallel::map_each(&self.pairs, of).iter().sum()
         };
         2.0 * parted / self.short
     }

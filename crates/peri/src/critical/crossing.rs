@@ -2,7 +2,7 @@
 
 use crate::bonds::{BodyGeometry, surface_weight};
 use crate::field::Field;
-use rayon::prelude::*;
+use crate::parallel;
 use serde::Deserialize;
 
 /// Energy that the fracture energy G of a bond law refers to.
@@ -103,7 +103,7 @@ impl Crossing {
         };
         let whole = !inner.is_empty();
         let of = |sites: &[u32]| -> Vec<FamilySums<D>> {
-            sites.par_iter().map(|&site| FamilySums::new(bonds, surface, site as usize)).collect()
+            parallel::map_each(sites, |&site| FamilySums::new(bonds, surface, site as usize))
         };
         let each = if whole {
             of(&inner)
@@ -142,7 +142,7 @@ fn inside<const D: usize>(bonds: &dyn BodyGeometry<D>) -> Vec<u32> {
         first.iter().map(|x| x * x).sum::<f64>().sqrt() > SURFACE_OFFSET * bonds.horizon() * sum || sum == 0.0
     };
     let mut at_surface = vec![false; bonds.sites()];
-    let flags: Vec<bool> = bonds.particles().par_iter().map(off).collect();
+    let flags: Vec<bool> = parallel::map_each(bonds.particles(), off);
     bonds.particles().iter().zip(flags).for_each(|(&site, flag)| at_surface[site as usize] = flag);
     let whole = |&&site: &&u32| {
         let mut clear = !at_surface[site as usize];

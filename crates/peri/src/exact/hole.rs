@@ -3,8 +3,8 @@
 
 use super::{Plate, kirsch};
 use crate::bonds::Bonds;
+use crate::parallel;
 use crate::stress::StressTensor;
-use rayon::prelude::*;
 
 /// Particles of a plate with a hole, with the exact σ₁₁/σ∞ at each.
 pub struct HoleComparison {
@@ -46,7 +46,7 @@ impl HoleComparison {
             bonds.particles().iter().map(|&site| bonds.position(site as usize)).collect();
         let kirsch: Vec<f64> = positions.iter().map(|p| kirsch(p[0], p[1], radius, 1.0)[0]).collect();
         let exact = match plate {
-            Some(plate) => positions.par_iter().map(|p| plate.stress(p[0], p[1])[0]).collect(),
+            Some(plate) => parallel::map_each(&positions, |p| plate.stress(p[0], p[1])[0]),
             None => kirsch.clone(),
         };
         Self {

@@ -2,7 +2,7 @@
 
 use super::{Operation, Shape};
 use crate::bonds::BodyGeometry;
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Fraction of a bond's length below which a piece of it is rounding, where faces meet.
 const THIN: f64 = 1e-6;
@@ -57,7 +57,7 @@ impl<const D: usize> Parts<D> {
             });
             found
         };
-        let found: Vec<Vec<(usize, [u32; 2])>> = bonds.particles().par_iter().map(of).collect();
+        let found: Vec<Vec<(usize, [u32; 2])>> = parallel::map_each(bonds.particles(), of);
         let mut across = vec![Vec::new(); pairs.len()];
         found.into_iter().flatten().for_each(|(index, bond)| across[index].push(bond));
         across

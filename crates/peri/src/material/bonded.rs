@@ -5,9 +5,8 @@ use super::{Bond, Family, LawCover, LawRange, Material, SolverMaterial};
 use crate::bonds::{BodyGeometry, Bonds, Overstretched, Property};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
+use crate::parallel;
 use crate::potential::{BondPotential, BondSoftening, EnergyTable, KernelFit, StretchRange, TangentTable};
-use polycore::numerics::ordered_sum;
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Ratio of the largest tangent to that at rest above which every particle has the stiffness of its own
@@ -212,7 +211,8 @@ impl<const D: usize> SolverMaterial<D> for Kernels<'_> {
             }
             sum
         };
-        modulus * ordered_sum(bonds.particles().par_chunks(CHUNK).map(of)) + lacking.unwrap_or(0.0)
+        modulus * parallel::map_chunks(bonds.particles(), CHUNK, of).iter().sum::<f64>()
+            + lacking.unwrap_or(0.0)
     }
 
     /// Half of a bond's energy 2kθ|ξ|φ w V_I V_J from either end. q is constant beyond the fit, so the energy
@@ -258,7 +258,8 @@ impl<const D: usize> SolverMaterial<D> for Kernels<'_> {
         let least = LEAST_TANGENT * law.tangent().abs();
         let sites = bonds.sites();
         let chunk = |chunk| bonds.stiffness_sums(displacement, chunk, table, least);
-        let sums: Option<Vec<Vec<f64>>> = (0..sites.div_ceil(CHUNK)).into_par_iter().map(chunk).collect();
+        let sums: Vec<Option<Vec<f64>>> = parallel::map(sites.div_ceil(CHUNK), chunk);
+        let sums: Option<Vec<Vec<f64>>> = sums.into_iter().collect();
         if let Some(sums) = sums {
             let sums = sums.concat();
             return bonds.particles().iter().map(|&site| sums[site as usize]).collect();
@@ -281,7 +282,7 @@ impl<const D: usize> SolverMaterial<D> for Kernels<'_> {
             });
             sum
         };
-        bonds.particles().par_iter().map(of).collect()
+        parallel::map_each(bonds.particles(), of)
     }
 
     fn range(&self, stretches: [f64; 2]) -> LawRange {

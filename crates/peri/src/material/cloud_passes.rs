@@ -11,7 +11,7 @@ use crate::bonds::{
     StretchRange, among,
 };
 use crate::field::{CHUNK, Field, chunk_range};
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Data of every particle that both passes read.
 pub struct CloudPasses<const D: usize> {
@@ -49,9 +49,9 @@ impl<L: PointLaw<D>, const D: usize> Passes<NonlocalSolid<L>, D> for CloudPasses
         let softening = cloud.softening();
         self.places.load(displacement);
         let (places, stride) = (&self.places, self.places.stride());
-        let items = self.terms.par_chunks_mut(stride * CHUNK).zip(self.families.bonded.par_chunks_mut(CHUNK));
-        let items = items.zip(points.par_chunks_mut(CHUNK)).enumerate();
-        let springs = items.map(|(chunk, ((terms, bonded), points))| {
+        let items = self.terms.chunks_mut(stride * CHUNK).zip(self.families.bonded.chunks_mut(CHUNK));
+        let items = items.zip(points.chunks_mut(CHUNK)).collect();
+        let springs = parallel::map_items(items, |chunk, ((terms, bonded), points)| {
             let (mut springs, first) = (false, chunk * CHUNK);
             let soft = softening.among(chunk_range(chunk, cloud.sites()));
             changes.reshape(&solid.0, (bonds, displacement), (first, soft), bonded, points);
@@ -79,8 +79,7 @@ impl<L: PointLaw<D>, const D: usize> Passes<NonlocalSolid<L>, D> for CloudPasses
             });
             springs
         });
-        let springs = springs.reduce(|| false, |one, other| one | other);
-        self.families.mark(bonds, points, springs);
+        self.families.mark(bonds, points, springs.contains(&true));
     }
 
     fn force(

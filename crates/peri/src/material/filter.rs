@@ -4,6 +4,7 @@
 use super::point::SolidPoint;
 use super::point_law::PointLaw;
 use crate::bonds::BodyGeometry;
+use crate::parallel;
 use rayon::prelude::*;
 
 /// The symmetric average b = 1 + (A − D)/(2·dimension + 1) of the particles of a lattice, with A = 1 between
@@ -41,14 +42,14 @@ impl Filter {
             }
             found
         };
-        (0..points.len()).into_par_iter().map(of).collect_into_vec(&mut self.neighbours);
+        self.neighbours = parallel::map(points.len(), of);
     }
 
     /// Changes the energy to Σ_I V_I I_I U((bJ)_I): with p_I = Σ_J b_IJ I_J U′((bJ)_J)/I_I in place of
     /// U′(J_I), forces are its exact variation.
     pub(super) fn apply<L: PointLaw<D>, const D: usize>(&mut self, law: &L, points: &mut [SolidPoint<D>]) {
         let change = |point: &SolidPoint<D>| point.deformation().map_or(0.0, |found| found.volume_change());
-        points.par_iter().map(change).collect_into_vec(&mut self.values);
+        self.values = parallel::map_each(points, change);
         self.average::<D>();
         let own = |change: f64| law.filtered(change).unwrap_or_default();
         let parts = points.par_iter_mut().zip(&self.means).zip(&self.values);
@@ -72,10 +73,11 @@ impl Filter {
 
     fn average<const D: usize>(&mut self) {
         let (values, share) = (&self.values, 1.0 / (2 * D + 1) as f64);
-        let of = |(neighbours, &own): (&[u32; 6], &f64)| {
-            let others = neighbours.iter().take_while(|&&site| site != u32::MAX);
+        let of = |site: usize| {
+            let others = self.neighbours[site].iter().take_while(|&&site| site != u32::MAX);
+            let own = values[site];
             own + share * others.map(|&site| values[site as usize] - own).sum::<f64>()
         };
-        self.neighbours.par_iter().zip(values).map(of).collect_into_vec(&mut self.means);
+        self.means = parallel::map(values.len(), of);
     }
 }

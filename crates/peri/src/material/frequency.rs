@@ -16,8 +16,8 @@ use super::point::{FrequencyTerms, SolidPoint};
 use super::point_law::PointLaw;
 use super::{DeformedBody, Family};
 use crate::field::{CHUNK, chunk_range};
+use crate::parallel;
 use nalgebra::SVector;
-use rayon::prelude::*;
 
 /// Fraction of the bound by Schur's test that frequencies reach: at stretches of 1 to 3 and with up to half
 /// of the bonds broken.
@@ -102,7 +102,7 @@ pub fn bound<const D: usize>(
     enough: f64,
 ) -> f64 {
     let particles = bonds.particles();
-    let of_chunk = |(chunk, points): (usize, &mut [SolidPoint<D>])| {
+    let of_chunk = |chunk: usize, points: &mut [SolidPoint<D>]| {
         let range = chunk_range(chunk, bonds.sites());
         let [from, to] =
             [range.start, range.end].map(|end| particles.partition_point(|&s| (s as usize) < end));
@@ -115,7 +115,7 @@ pub fn bound<const D: usize>(
         }
         beyond
     };
-    let beyond: Vec<Vec<u32>> = points.par_chunks_mut(CHUNK).enumerate().map(of_chunk).collect();
+    let beyond: Vec<Vec<u32>> = parallel::map_items(points.chunks_mut(CHUNK).collect(), of_chunk);
     // particles that have one of these in their family, and these themselves
     let mut near = beyond.concat();
     for site in beyond.concat() {
@@ -125,5 +125,5 @@ pub fn bound<const D: usize>(
     near.dedup();
     let points = &*points;
     let of = |&site: &u32| of_particle(&Family::new(bonds, displacement, site as usize), points);
-    near.par_iter().map(of).reduce(|| enough, f64::max)
+    parallel::map_each(&near, of).into_iter().fold(enough, f64::max)
 }

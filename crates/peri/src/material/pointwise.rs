@@ -4,9 +4,8 @@ use super::{Bond, EnergyPart, Family, LawCover, LawRange, Material, Past, Solver
 use crate::bonds::{Bonds, Overstretched, Property, StretchScan, overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
+use crate::parallel;
 use crate::potential::{BondPotential, LinearBond, StretchRange};
-use polycore::numerics::ordered_sum;
-use rayon::prelude::*;
 
 /// The two passes of a material over a whole body, for materials with something faster than plain loops over
 /// bonds. States and forces must equal those of [`Material::prepare`] and [`Material::force`] except for
@@ -52,7 +51,7 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
     pub fn new(material: M, bonds: &dyn Bonds<D>) -> Self {
         let rest = Field::zeros(bonds.sites());
         let begin = |&site: &u32| material.begin(&Family::new(bonds, &rest, site as usize));
-        let begun: Vec<M::Point> = bonds.particles().par_iter().map(begin).collect();
+        let begun: Vec<M::Point> = parallel::map_each(bonds.particles(), begin);
         let mut points = vec![M::Point::default(); bonds.sites()];
         for (&site, point) in bonds.particles().iter().zip(begun) {
             points[site as usize] = point;
@@ -73,7 +72,7 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
             return;
         }
         let material = &self.material;
-        self.points.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, points)| {
+        parallel::for_chunks(&mut self.points, CHUNK, |chunk, points| {
             for &site in particles_of(bonds, chunk) {
                 let site = site as usize;
                 visit(material, &Family::new(bonds, displacement, site), &mut points[site - chunk * CHUNK]);
@@ -113,13 +112,14 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
     /// Σ V `of` over the particles, of their points.
     fn sum(&mut self, bonds: &dyn Bonds<D>, of: impl Fn(&M, &mut M::Point) -> f64 + Sync) -> f64 {
         let material = &self.material;
-        let items = self.points.par_chunks_mut(CHUNK).enumerate().map(|(chunk, points)| {
+        let items = self.points.chunks_mut(CHUNK).collect();
+        let sums = parallel::map_items(items, |chunk, points: &mut [M::Point]| {
             let sites = particles_of(bonds, chunk).iter().map(|&site| site as usize);
             sites
                 .map(|site| bonds.volume(site) * of(material, &mut points[site - chunk * CHUNK]))
                 .sum::<f64>()
         });
-        ordered_sum(items)
+        sums.iter().sum()
     }
 
     fn prepared_energy(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>) -> f64 {
@@ -130,7 +130,7 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
             });
             each.sum::<f64>()
         };
-        ordered_sum(bonds.particles().par_chunks(CHUNK).map(of))
+        parallel::map_chunks(bonds.particles(), CHUNK, of).iter().sum::<f64>()
     }
 
     /// The states, site by site.
@@ -174,7 +174,7 @@ impl<M: Material<D>, const D: usize> SolverMaterial<D> for Pointwise<M, D> {
             let unit = family.sum(|bond| 2.0 * bond.weight / bond.length);
             if unit > 0.0 { self.material.stiffness(&family, &self.points) / unit } else { 0.0 }
         };
-        self.tangent = bonds.particles().par_iter().map(of).reduce(|| 0.0, f64::max);
+        self.tangent = parallel::map_each(bonds.particles(), of).into_iter().fold(0.0, f64::max);
         Ok(self.tangent)
     }
 
@@ -315,7 +315,7 @@ impl<M: Material<D>, const D: usize> SolverMaterial<D> for Pointwise<M, D> {
             }
             found
         };
-        let parts: Vec<Vec<Overstretched>> = bonds.particles().par_chunks(CHUNK).map(of).collect();
+        let parts: Vec<Vec<Overstretched>> = parallel::map_chunks(bonds.particles(), CHUNK, of);
         parts.concat()
     }
 
@@ -333,7 +333,7 @@ impl<M: Material<D>, const D: usize> SolverMaterial<D> for Pointwise<M, D> {
             self.material.energy(&family, &self.points[site as usize])
         };
         let mut energies = vec![0.0; bonds.sites()];
-        let each: Vec<f64> = bonds.particles().par_iter().map(energy).collect();
+        let each: Vec<f64> = parallel::map_each(bonds.particles(), energy);
         bonds.particles().iter().zip(each).for_each(|(&site, energy)| energies[site as usize] = energy);
         let released = |bond: &Bond<D>, site: usize| {
             self.material.released_energy(bond, &self.points[site], energies[site]).unwrap_or(0.0)
@@ -355,7 +355,7 @@ impl<M: Material<D>, const D: usize> SolverMaterial<D> for Pointwise<M, D> {
             }
             found
         };
-        let parts: Vec<Vec<(Overstretched, f64)>> = bonds.particles().par_chunks(CHUNK).map(of).collect();
+        let parts: Vec<Vec<(Overstretched, f64)>> = parallel::map_chunks(bonds.particles(), CHUNK, of);
         if remembers {
             self.refer_to(bonds, EnergyPart::Stored);
             self.prepare(bonds, displacement);
@@ -378,7 +378,7 @@ impl<M: Material<D>, const D: usize> SolverMaterial<D> for Pointwise<M, D> {
             self.material.stiffness(&Family::new(bonds, displacement, site as usize), &self.points)
                 / self.modulus
         };
-        bonds.particles().par_iter().map(of).collect()
+        parallel::map_each(bonds.particles(), of)
     }
 
     fn frequency_bound(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, enough: f64) -> f64 {
@@ -390,7 +390,7 @@ impl<M: Material<D>, const D: usize> SolverMaterial<D> for Pointwise<M, D> {
         let of = |&site: &u32| {
             self.material.stiffness(&Family::new(bonds, displacement, site as usize), &self.points)
         };
-        2.0 * bonds.particles().par_iter().map(of).reduce(|| 0.0, f64::max)
+        2.0 * parallel::map_each(bonds.particles(), of).into_iter().fold(0.0, f64::max)
     }
 
     fn crushed(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, sites: &[u32]) -> Vec<u32> {

@@ -12,9 +12,9 @@ use super::spline_levels::SplineLevels;
 use super::tensor::{Vector, invert};
 use crate::bonds::{BodyGeometry, BondKind, Bonds, CloudBonds, CloudPlaces, MomentColumns};
 use crate::field::{CHUNK, Field};
+use crate::parallel;
 use nalgebra::SMatrix;
-use polycore::numerics::{conjugate_gradients, ordered_sum};
-use rayon::prelude::*;
+use polycore::numerics::conjugate_gradients;
 
 /// Largest |h + Lθ| over the largest |h| inside.
 const TOLERANCE: f64 = 1e-13;
@@ -39,16 +39,15 @@ pub fn relief<const D: usize>(bonds: &dyn Bonds<D>) -> Option<Field<D>> {
 /// ends there), and no cut divides them.
 fn complete<const D: usize>(cloud: &CloudBonds<D>) -> Vec<bool> {
     let directions = directions::<D>();
-    let sites = 0..cloud.sites();
-    let exposed: Vec<bool> =
-        sites.clone().into_par_iter().map(|site| is_exposed(cloud, site, &directions)).collect();
+    let sites = cloud.sites();
+    let exposed: Vec<bool> = parallel::map(sites, |site| is_exposed(cloud, site, &directions));
     let reach = cloud.horizon() - 0.5 * cloud.spacing();
     let is_inside = |site: usize| {
         let mut inside = !exposed[site] && cloud.parted().binary_search(&(site as u32)).is_err();
         cloud.neighbours(site, &mut |bond| inside &= !(exposed[bond.site] && bond.length <= reach));
         inside
     };
-    sites.into_par_iter().map(is_inside).collect()
+    parallel::map(sites, is_inside)
 }
 
 /// Returns true if a particle lies at a surface: some cone of 120° holds none of its near neighbours.
@@ -102,7 +101,7 @@ impl<'a, const D: usize> ReliefProblem<'a, D> {
             let (inverse, least) = if whole > 0.0 { invert(&(shape / whole)) } else { (shape, 0.0) };
             if D as f64 * least > LEAST_SHAPE { (whole, inverse) } else { (0.0, SMatrix::zeros()) }
         };
-        let families: Vec<_> = (0..cloud.sites()).into_par_iter().map(family).collect();
+        let families: Vec<_> = parallel::map(cloud.sites(), family);
         inside.iter_mut().zip(&families).for_each(|(inside, (whole, _))| *inside &= *whole > 0.0);
         let (places, terms) = (cloud.bare_places(), vec![[[0.0; 4]; D]; cloud.sites()]);
         Self { cloud, places, terms, force: Field::zeros(cloud.sites()), inside, families }
@@ -114,21 +113,21 @@ impl<'a, const D: usize> ReliefProblem<'a, D> {
         let sites = self.cloud.sites();
         // −h
         let mut residual = self.apply(None);
-        let scale: Vec<f64> = (0..sites).into_par_iter().map(|site| self.diagonal(site)).collect();
+        let scale: Vec<f64> = parallel::map(sites, |site| self.diagonal(site));
         let allowed = TOLERANCE * largest(&residual);
         // Lθ is about ¼m ∫(Δθ)², m = Σωξ₁⁴, for smooth fields
         let fourth = if D == 2 { 3.0 / 16.0 } else { 3.0 / 25.0 } * self.cloud.horizon().powi(2);
         let cloud = self.cloud;
         let mut levels = SplineLevels::new(cloud, &self.inside, 0.25 * fourth);
         let precondition = |residual: &[Vector<D>], scaled: &mut [Vector<D>]| {
-            let each = scaled.par_iter_mut().zip(residual).zip(&scale);
+            let each = scaled.iter_mut().zip(residual).zip(&scale);
             each.for_each(|((scaled, r), scale)| *scaled = r / *scale);
             levels.add(cloud, residual, scaled);
         };
         let product = |search: &[Vector<D>], image: &mut [Vector<D>]| {
             // −L p
             let force = self.apply(Some(search));
-            image.par_iter_mut().zip(force).for_each(|(image, force)| *image = -force);
+            image.iter_mut().zip(force).for_each(|(image, force)| *image = -force);
         };
         let dot = |a: &[Vector<D>], b: &[Vector<D>]| sum(sites, |site| a[site].dot(&b[site]));
         let reached = |residual: &[Vector<D>]| largest(residual) <= allowed;
@@ -149,7 +148,7 @@ impl<'a, const D: usize> ReliefProblem<'a, D> {
         }
         let Self { cloud, places, terms, force, inside, families } = self;
         let (cloud, places) = (*cloud, &*places);
-        terms.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, terms)| {
+        parallel::for_chunks(terms, CHUNK, |chunk, terms| {
             cloud.moments(places, chunk, &mut |site, moments| {
                 let (whole, inverse) = &families[site];
                 let columns = &mut terms[site - chunk * CHUNK];
@@ -162,14 +161,14 @@ impl<'a, const D: usize> ReliefProblem<'a, D> {
             });
         });
         let terms = &*terms;
-        force.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut part)| {
+        parallel::for_items(force.chunks_mut(), |chunk, mut part| {
             cloud.linear_force(places, terms, chunk, &mut part, None);
         });
         let value = |site: usize| {
             let density = Vector::from(force.get(site));
             if inside[site] { density * cloud.volume(site) } else { Vector::zeros() }
         };
-        (0..cloud.sites()).into_par_iter().map(value).collect()
+        parallel::map(cloud.sites(), value)
     }
 
     /// Approximate diagonal of L, m (2D: times the thickness).
@@ -190,5 +189,5 @@ fn largest<const D: usize>(field: &[Vector<D>]) -> f64 {
 /// Sums a term in the order of the work items.
 fn sum(sites: usize, term: impl Fn(usize) -> f64 + Sync) -> f64 {
     let of = |chunk: usize| crate::field::chunk_range(chunk, sites).map(&term).sum::<f64>();
-    ordered_sum((0..sites.div_ceil(CHUNK)).into_par_iter().map(of))
+    parallel::sum(sites.div_ceil(CHUNK), of)
 }

@@ -4,9 +4,8 @@
 use super::{Bond, BondMaterial};
 use crate::bonds::{BondForces, Property};
 use crate::field::{CHUNK, Field, chunk_range};
+use crate::parallel;
 use crate::potential::{BondSoftening, EnergyTable, KernelFit};
-use polycore::numerics::ordered_sum;
-use rayon::prelude::*;
 
 /// Softened bonds of a displacement, by work items: site, and the force density lost by its bonds, N/m³ (to
 /// be added).
@@ -56,7 +55,7 @@ impl SofteningLoss {
             found
         };
         let count = bonds.sites().div_ceil(CHUNK);
-        let parts: Vec<Vec<(u32, [f64; 3])>> = (0..count).into_par_iter().map(of).collect();
+        let parts: Vec<Vec<(u32, [f64; 3])>> = parallel::map(count, of);
         // an item may have found the other end of its bonds in another one
         let mut items = vec![Vec::new(); count];
         for found in parts.into_iter().flatten() {
@@ -95,5 +94,5 @@ pub(super) fn lacking_energy<const D: usize>(
         });
         sum
     };
-    ordered_sum((0..bonds.sites().div_ceil(CHUNK)).into_par_iter().map(of))
+    parallel::sum(bonds.sites().div_ceil(CHUNK), of)
 }

@@ -9,7 +9,7 @@ use super::pointwise::Passes;
 use super::tensor::BodyTensor;
 use crate::bonds::{BodyGeometry, BondDamage, Bonds, LinearRow, Softened, StretchRange, among};
 use crate::field::{CHUNK, Field, chunk_range};
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Data of the second pass, N = 1 + D²: A and S of every site.
 pub struct SolidPasses<const D: usize, const N: usize> {
@@ -154,9 +154,9 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
         let changes = self.families.changes(bonds);
         let rows = &self.rows;
         let filters = solid.0.filtered(0.0).is_some();
-        let items = self.terms.chunks_mut().into_par_iter().zip(self.families.bonded.par_chunks_mut(CHUNK));
-        let items = items.zip(points.par_chunks_mut(CHUNK)).enumerate();
-        let springs = items.map(|(chunk, ((mut terms, bonded), points))| {
+        let items = self.terms.chunks_mut().into_iter().zip(self.families.bonded.chunks_mut(CHUNK));
+        let items = items.zip(points.chunks_mut(CHUNK)).collect();
+        let springs = parallel::map_items(items, |chunk, ((mut terms, bonded), points)| {
             let mut springs = false;
             let first = chunk * CHUNK;
             let soft = softening.among(chunk_range(chunk, lattice.sites()));
@@ -190,14 +190,14 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
             });
             springs
         });
-        let springs = springs.reduce(|| false, |one, other| one | other);
+        let springs = springs.contains(&true);
         if filters {
             if changes.any {
                 self.filter.link(bonds, points, lattice.spacing());
             }
             self.filter.apply(&solid.0, points);
-            let items = self.terms.chunks_mut().into_par_iter().zip(points.par_chunks_mut(CHUNK));
-            items.for_each(|(mut terms, points)| {
+            let items = self.terms.chunks_mut().into_iter().zip(points.chunks_mut(CHUNK)).collect();
+            parallel::for_items(items, |_, (mut terms, points): (_, &mut [SolidPoint<D>])| {
                 for (at, point) in points.iter_mut().enumerate().filter(|(_, point)| point.has_gradient()) {
                     point.answer(&solid.0);
                     point.terms().enumerate().for_each(|(n, value)| terms[n][at] = value);

@@ -3,8 +3,9 @@
 
 use super::tensor::Vector;
 use crate::bonds::{BodyGeometry, CloudBonds};
+use crate::field::CHUNK;
+use crate::parallel;
 use polycore::numerics::bounds;
-use rayon::prelude::*;
 
 /// Width of the finest grid in spacings: twice that takes 40 % more iterations.
 const FINEST: f64 = 1.0;
@@ -78,10 +79,11 @@ impl<const D: usize> SplineLevels<D> {
             fine.values = values;
         }
         let (this, finest) = (&*self, &self.grids[0]);
-        to.par_iter_mut().enumerate().for_each(|(site, to)| {
-            this.visit_splines(cells, cloud.position(site), |node, weight| {
-                *to += finest.values[node] * weight
-            });
+        parallel::for_chunks(to, CHUNK, |chunk, to| {
+            for (index, to) in to.iter_mut().enumerate() {
+                let place = cloud.position(chunk * CHUNK + index);
+                this.visit_splines(cells, place, |node, weight| *to += finest.values[node] * weight);
+            }
         });
     }
 

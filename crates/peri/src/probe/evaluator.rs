@@ -2,11 +2,11 @@
 
 use crate::bonds::Bonds;
 use crate::material::{BodyTensor, BondMaterial, Family, NonlocalSolid, PointLaw, Pointwise, SolverMaterial};
+use crate::parallel;
 use crate::potential::KernelFit;
 use crate::solver::State;
 use crate::stress::{StressTensor, force_over_length};
 use polycore::constitutive::Flags;
-use rayon::prelude::*;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A solid of any law.
@@ -205,7 +205,7 @@ impl<const D: usize> StressEvaluator<D> {
         let of = |&site: &u32| {
             states.points()[site as usize].deformation().map_or(Flags::default(), |found| law.flags(found))
         };
-        Some(bonds.particles().par_iter().map(of).collect())
+        Some(parallel::map_each(bonds.particles(), of))
     }
 
     /// Fractions of particles outside the box of the training data, and with any flag.

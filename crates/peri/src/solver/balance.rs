@@ -13,7 +13,7 @@ use super::state::State;
 use super::system::System;
 use crate::error::Error;
 use crate::field::CHUNK;
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Lower limit of a reference over the greatest reference of an equilibrium.
 const LEAST_REFERENCE: f64 = 0.05;
@@ -128,7 +128,7 @@ impl Balance {
             }
             sums
         };
-        let parts: Vec<[f64; 10]> = particles.par_chunks(CHUNK).map(of).collect();
+        let parts: Vec<[f64; 10]> = parallel::map_chunks(particles, CHUNK, of);
         let sum = |k: usize| parts.iter().map(|part| part[k]).sum::<f64>();
         let norm = |from: usize| (from..from + 3).map(|k| sum(k).powi(2)).sum::<f64>().sqrt();
         let least = system.scale.strain(factor) * system.scale.held_sum;

@@ -7,6 +7,7 @@ use super::state::State;
 use super::system::System;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
+use crate::parallel;
 use rayon::prelude::*;
 use std::fmt;
 
@@ -115,7 +116,7 @@ fn add_to_particles<const D: usize>(
     density: impl Fn(usize) -> [f64; D] + Sync,
 ) {
     let particles = bonds.particles();
-    force.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut force)| {
+    parallel::for_items(force.chunks_mut(), |chunk, mut force| {
         let (start, length) = (chunk * CHUNK, force[0].len());
         let at = |end: usize| particles.partition_point(|&site| (site as usize) < end);
         for &site in &particles[at(start)..at(start + length)] {

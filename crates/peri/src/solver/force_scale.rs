@@ -3,8 +3,8 @@
 use super::load::Loads;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
-use polycore::numerics::{bounds, ordered_sum};
-use rayon::prelude::*;
+use crate::parallel;
+use polycore::numerics::bounds;
 use serde::{Deserialize, Serialize};
 
 /// Fraction of the grips' bond forces under the strain U/L.
@@ -31,7 +31,7 @@ impl ForceScale {
             bonds.neighbours(site as usize, &mut |bond| sum += 2.0 * stiffness * bond.weight / bond.length);
             sum
         };
-        let sums: Vec<f64> = bonds.particles().par_iter().map(of).collect();
+        let sums: Vec<f64> = parallel::map_each(bonds.particles(), of);
         let mut scale = Self { springs: vec![0.0; bonds.sites()], ..Self::default() };
         let [low, high] = bounds(bonds.particles().iter().map(|&site| bonds.position(site as usize)));
         let mut square = 0.0;
@@ -58,14 +58,15 @@ impl ForceScale {
     /// ‖s u‖₂.
     pub(super) fn moved<const D: usize>(&self, displacement: &Field<D>) -> f64 {
         let u = displacement.components();
-        let of = |(chunk, springs): (usize, &[f64])| {
+        let of = |chunk: usize| {
+            let springs = &self.springs[crate::field::chunk_range(chunk, self.springs.len())];
             let each = springs.iter().enumerate().map(|(k, s)| {
                 let square: f64 = (0..D).map(|d| u[d][chunk * CHUNK + k].powi(2)).sum();
                 s * s * square
             });
             each.sum::<f64>()
         };
-        ordered_sum(self.springs.par_chunks(CHUNK).enumerate().map(of)).sqrt()
+        parallel::sum(self.springs.len().div_ceil(CHUNK), of).sqrt()
     }
 }
 

@@ -6,7 +6,7 @@ use super::rigid::RigidRegion;
 use super::rotation::RotatingRegion;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Prescribed displacement and body force of a region at load factor 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -317,7 +317,7 @@ impl<const D: usize> Loads<D> {
             }
             (matrix, right)
         };
-        let parts: Vec<([[f64; 6]; 6], [f64; 6])> = bonds.particles().par_chunks(CHUNK).map(part).collect();
+        let parts: Vec<([[f64; 6]; 6], [f64; 6])> = parallel::map_chunks(bonds.particles(), CHUNK, part);
         let count = pairs.len();
         let matrix =
             nalgebra::DMatrix::from_fn(count, count, |i, j| parts.iter().map(|p| p.0[i][j]).sum::<f64>());

@@ -3,7 +3,7 @@
 use super::state::State;
 use super::system::System;
 use crate::bonds::BodyGeometry;
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Returns true if bonds differ so much in their tangent that every particle has its own mass.
 pub fn has_own_mass<const D: usize>(system: &System<D>, state: &State<D>) -> bool {
@@ -26,7 +26,7 @@ pub fn update_unit_mass<const D: usize>(bonds: &dyn BodyGeometry<D>, sites: &[u3
     let is_whole = |site: u32| bonds.has_whole_family(site as usize);
     let alike = sites.iter().find(|&&site| is_whole(site)).map(|&site| sum(site));
     let of = |&site: &u32| alike.filter(|_| is_whole(site)).unwrap_or_else(|| sum(site));
-    let sums: Vec<f64> = sites.par_iter().map(of).collect();
+    let sums: Vec<f64> = parallel::map_each(sites, of);
     for (&site, sum) in sites.iter().zip(sums) {
         mass[site as usize] = sum;
     }

@@ -8,7 +8,7 @@ use super::load::Loads;
 use super::rigid::RigidRegion;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
-use rayon::prelude::*;
+use crate::parallel;
 use std::ops::Range;
 
 /// Particles in consecutive sites of one work item.
@@ -103,7 +103,7 @@ impl ParticleMap {
     /// sites += factor·particles.
     pub fn add_scaled<const D: usize>(&self, sites: &mut Field<D>, factor: f64, particles: &Field<D>) {
         let values = particles.components();
-        let add = |(item, sites): (usize, [&mut [f64]; D])| {
+        let add = |item: usize, sites: [&mut [f64]; D]| {
             let first = self.first[item];
             for run in &self.runs[self.items[item].clone()] {
                 let from = first + run.particle;
@@ -118,9 +118,9 @@ impl ParticleMap {
         };
         let items = sites.chunks_mut();
         if items.len() < FEW {
-            items.into_iter().enumerate().for_each(add);
+            items.into_iter().enumerate().for_each(|(item, sites)| add(item, sites));
         } else {
-            items.into_par_iter().enumerate().for_each(add);
+            parallel::for_items(items, add);
         }
     }
 }
@@ -133,6 +133,6 @@ pub fn in_order<T: Send, R: Send>(items: Vec<T>, work: impl Fn(usize, T) -> R + 
     if items.len() < FEW {
         items.into_iter().enumerate().map(|(index, item)| work(index, item)).collect()
     } else {
-        items.into_par_iter().enumerate().map(|(index, item)| work(index, item)).collect()
+        parallel::map_items(items, work)
     }
 }

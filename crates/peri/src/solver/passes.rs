@@ -7,6 +7,7 @@ use super::state::State;
 use super::system::System;
 use crate::bonds::StretchRange;
 use crate::field::{CHUNK, Field, chunk_range};
+use crate::parallel;
 use pulp::{Arch, NullaryFnOnce};
 use rayon::prelude::*;
 
@@ -263,7 +264,7 @@ pub fn move_pass<const D: usize>(
     };
     let force = state.force.components();
     let (displacement, velocity) = (state.displacement.chunks_mut(), state.velocity.chunks_mut());
-    displacement.into_par_iter().zip(velocity).enumerate().for_each(|(chunk, (u, v))| {
+    parallel::for_items(displacement.into_iter().zip(velocity).collect(), |chunk, (u, v)| {
         let range = chunk_range(chunk, sites);
         let constrained = loads.constrained.get(range.clone()).unwrap_or_default();
         for d in 0..D {

@@ -5,7 +5,7 @@ use super::rotation::RotatingRegion;
 use super::system::System;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Particles of a region from which the first guess measures distances.
 const SAMPLES: usize = 256;
@@ -143,7 +143,7 @@ impl<const D: usize> Loads<D> {
             u
         };
         let moved: Vec<Vec<[f64; D]>> =
-            bonds.particles().par_chunks(CHUNK).map(|sites| sites.iter().map(moved).collect()).collect();
+            parallel::map_chunks(bonds.particles(), CHUNK, |sites| sites.iter().map(moved).collect());
         for (&site, u) in bonds.particles().iter().zip(moved.into_iter().flatten()) {
             displacement.set(site as usize, u);
         }

@@ -5,8 +5,7 @@ use super::motion::BondSums;
 use super::state::State;
 use super::system::System;
 use crate::field::{CHUNK, Field, chunk_range};
-use polycore::numerics::ordered_sum;
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Displacement of the tangent's force differences, in shortest bonds: truncation and rounding are both about
 /// 1e-10 of the force.
@@ -34,7 +33,7 @@ impl BondSums {
             }
             part
         };
-        let parts: Vec<Self> = system.bonds.particles().par_chunks(CHUNK).map(of).collect();
+        let parts: Vec<Self> = parallel::map_chunks(system.bonds.particles(), CHUNK, of);
         parts.into_iter().fold(Self { stiffness: 0.0, shortest: f64::INFINITY, extent: 0.0 }, |a, b| Self {
             stiffness: a.stiffness.max(b.stiffness),
             shortest: a.shortest.min(b.shortest),
@@ -134,7 +133,7 @@ fn tangent<const D: usize>(
         let moved = &*moved;
         system.prepare(moved);
         let system = &*system;
-        out.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut out)| {
+        parallel::for_items(out.chunks_mut(), |chunk, mut out| {
             system.internal_force(moved, chunk * CHUNK, &mut out, None);
         });
         system.count_evaluation(state);
@@ -182,14 +181,13 @@ fn product_of<const D: usize>(a: &Field<D>, b: &Field<D>, volumes: &[f64]) -> f6
         };
         (0..D).map(of_axis).sum()
     };
-    ordered_sum((0..sites.div_ceil(CHUNK)).into_par_iter().map(of))
+    parallel::sum(sites.div_ceil(CHUNK), of)
 }
 
 fn scale<const D: usize>(field: &mut Field<D>, factor: f64) {
-    field
-        .chunks_mut()
-        .into_par_iter()
-        .for_each(|chunk| chunk.into_iter().flatten().for_each(|x| *x *= factor));
+    parallel::for_items(field.chunks_mut(), |_, chunk| {
+        chunk.into_iter().flatten().for_each(|x| *x *= factor);
+    });
 }
 
 /// field += Σ factor·other.
@@ -197,7 +195,7 @@ fn combine<const D: usize>(field: &mut Field<D>, others: [(f64, &Field<D>); 2]) 
     let sites = field.sites();
     let [(first, a), (second, b)] = others;
     let (a, b) = (a.components(), b.components());
-    field.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, out)| {
+    parallel::for_items(field.chunks_mut(), |chunk, out| {
         let range = chunk_range(chunk, sites);
         for (d, out) in out.into_iter().enumerate() {
             for ((x, a), b) in out.iter_mut().zip(&a[d][range.clone()]).zip(&b[d][range.clone()]) {

@@ -9,8 +9,7 @@ use super::system::System;
 use super::verlet_step::{FieldPair, VerletStep};
 use crate::contact::RigidSurface;
 use crate::field::{Field, chunk_range};
-use polycore::numerics::ordered_sum;
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Computes friction for the half-step velocities, and adds it to the force; `old` are the friction forces of
 /// the previous step. Adds the work of friction in this step that is not stored to the dissipated energy.
@@ -43,7 +42,7 @@ pub fn friction_pass<const D: usize>(
         sum
     };
     let mut friction = old.unwrap_or_else(|| Field::zeros(sites));
-    let of = |(chunk, (mut own, total)): (usize, FieldPair<D>)| {
+    let of = |chunk: usize, (mut own, total): FieldPair<D>| {
         let before = work(chunk, &own);
         own.iter_mut().for_each(|part| part.fill(0.0));
         contact.add_friction(chunk, &mut own);
@@ -52,8 +51,8 @@ pub fn friction_pass<const D: usize>(
         }
         0.5 * (before + work(chunk, &own))
     };
-    let items = friction.chunks_mut().into_par_iter().zip(state.force.chunks_mut()).enumerate();
-    let mut taken = -ordered_sum(items.map(of));
+    let items = friction.chunks_mut().into_iter().zip(state.force.chunks_mut()).collect();
+    let mut taken = -parallel::map_items(items, of).iter().sum::<f64>();
     // the drag of surfaces is work, not heat
     taken += work_of_surfaces(contact.moved(), &state.contact.plane_friction, &sliding.surfaces);
     if leap.step > 0.0 {

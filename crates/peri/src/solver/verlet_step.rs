@@ -6,7 +6,7 @@ use super::state::State;
 use super::system::System;
 use crate::bonds::{StretchRange, StretchScan};
 use crate::field::{CHUNK, chunk_range};
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Constants of one step from t to t + Δt.
 #[derive(Clone, Copy, Debug)]
@@ -66,7 +66,7 @@ pub fn leap_pass<const D: usize>(
     let push = 0.5 * leap.step / leap.density;
     let loading = loads.force_factor(leap.factors[0]);
     let (displacement, velocity) = (state.displacement.chunks_mut(), state.velocity.chunks_mut());
-    let of = |(chunk, (u, v)): (usize, FieldPair<D>)| {
+    let of = |chunk: usize, (u, v): FieldPair<D>| {
         let range = chunk_range(chunk, volumes.len());
         let mut sums = VerletSums::default();
         for d in 0..D {
@@ -96,7 +96,7 @@ pub fn leap_pass<const D: usize>(
         }
         sums
     };
-    let parts: Vec<VerletSums> = displacement.into_par_iter().zip(velocity).enumerate().map(of).collect();
+    let parts = parallel::map_items(displacement.into_iter().zip(velocity).collect(), of);
     parts.into_iter().fold(VerletSums::default(), VerletSums::add)
 }
 
@@ -113,7 +113,7 @@ pub fn force_pass<const D: usize>(
     let (loads, displacement, body) = (&*system.loads, &state.displacement, &*system);
     let (force, velocity) = (state.force.chunks_mut(), state.velocity.chunks_mut());
     let part = if look { body.piece().max(CHECKED_SITES) } else { CHUNK };
-    let of = |(chunk, (mut f, mut v)): (usize, FieldPair<D>)| {
+    let of = |chunk: usize, (mut f, mut v): FieldPair<D>| {
         let (start, length) = (chunk * CHUNK, f[0].len());
         let mut seen = Vec::new();
         for from in (0..length).step_by(part) {
@@ -127,7 +127,7 @@ pub fn force_pass<const D: usize>(
         (if kicks { kick(loads, volumes, leap, chunk, f, &mut v) } else { VerletSums::default() }, seen)
     };
     let (sums, seen): (Vec<VerletSums>, Vec<Vec<StretchRange>>) =
-        force.into_par_iter().zip(velocity).enumerate().map(of).unzip();
+        parallel::map_items(force.into_iter().zip(velocity).collect(), of).into_iter().unzip();
     let seen = StretchScan { part, ranges: seen.concat() };
     let observed = seen.ranges.iter().copied().fold(StretchRange::REST, StretchRange::join);
     system.seen_stretches = seen;
@@ -144,11 +144,11 @@ pub fn kick_pass<const D: usize>(
 ) -> VerletSums {
     let force = state.force.components();
     let velocity = state.velocity.chunks_mut();
-    let of = |(chunk, mut v): (usize, [&mut [f64]; D])| {
+    let of = |chunk: usize, mut v: [&mut [f64]; D]| {
         let range = chunk_range(chunk, volumes.len());
         kick(loads, volumes, leap, chunk, force.map(|f| &f[range.clone()]), &mut v)
     };
-    let parts: Vec<VerletSums> = velocity.into_par_iter().enumerate().map(of).collect();
+    let parts = parallel::map_items(velocity, of);
     parts.into_iter().fold(VerletSums::default(), VerletSums::add)
 }
 
@@ -183,7 +183,7 @@ pub fn refresh<const D: usize>(
             }
         }
     };
-    state.force.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut f)| {
+    parallel::for_items(state.force.chunks_mut(), |chunk, mut f| {
         let (first, length) = (chunk * CHUNK, f[0].len());
         let Some(pieces) = &pieces else { return of(first, f) };
         let [from, to] = [first, first + length].map(|site| pieces.partition_point(|&p| p * piece < site));

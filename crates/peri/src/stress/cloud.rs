@@ -5,8 +5,8 @@ use super::{
     BallVolume, StressInput, StressMethod, StressTensor, ball_volume, force_over_length, segment_fraction,
 };
 use crate::bonds::{BodyGeometry, CellGrid, CloudBonds, Neighbour, Stencil};
+use crate::parallel;
 use pulp::{Arch, NullaryFnOnce};
-use rayon::prelude::*;
 
 pub fn piola<const D: usize>(
     bonds: &CloudBonds<D>,
@@ -40,18 +40,15 @@ fn in_balls<const D: usize>(
         (StressMethod::BallShare, BallVolume::Particles | BallVolume::Cells) => {
             // as for bonds: a distance equal to the horizon counts, whatever the rounding
             let reach = radius * (1.0 + 1e-9);
-            let inside: Vec<f64> = points
-                .par_iter()
-                .map(|&here| {
-                    let mut sum = 0.0;
-                    grid.near(here, reach, |other| {
-                        if distance_square(points[other], here) <= reach * reach {
-                            sum += bonds.volume(other);
-                        }
-                    });
-                    sum
-                })
-                .collect();
+            let inside = parallel::map_each(points, |&here| {
+                let mut sum = 0.0;
+                grid.near(here, reach, |other| {
+                    if distance_square(points[other], here) <= reach * reach {
+                        sum += bonds.volume(other);
+                    }
+                });
+                sum
+            });
             // bonds of a lattice of the same mean spacing in a whole ball: bodies thinner than that have no
             // such ball
             let full = (Stencil::<D>::new(reach / bonds.spacing()).offsets.len() + 1) as f64;
@@ -104,7 +101,7 @@ fn in_balls<const D: usize>(
         };
         sum.map(|row| row.map(|x| x / volume))
     };
-    (0..points.len()).into_par_iter().map(one).collect()
+    parallel::map(points.len(), one)
 }
 
 /// f V_I V_J ⊗ ξ of a bond, N m.
@@ -161,7 +158,7 @@ impl<const D: usize> CloudShares<'_, D> {
                 let shares = arch.dispatch(ShareKernel { shares: self, own, bonds: &bonds, around: &around });
                 (around.members, shares)
             };
-            let all: Vec<_> = owners.par_iter().map(of).collect();
+            let all: Vec<_> = parallel::map_each(&owners, of);
             for (members, shares) in all {
                 for (member, share) in members.into_iter().zip(shares) {
                     for a in 0..D {

@@ -4,8 +4,8 @@
 use super::StressTensor;
 use crate::bonds::TILE;
 use crate::field::CHUNK;
+use crate::parallel;
 use pulp::{Arch, Simd, WithSimd};
-use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Numbers summed at a time in registers: a block.
@@ -139,9 +139,10 @@ impl<const D: usize> OffsetBonds<D> {
         let lanes = lanes::<D>();
         let (filled, margin, occupied) = (&self.filled, self.margin, &self.occupied);
         let stored = &mut self.forces.get_mut()[margin * lanes..][..self.sites * lanes];
-        let tiles = filled.par_chunks(CHUNK / TILE);
-        stored.par_chunks_mut(CHUNK * lanes).zip(tiles).enumerate().for_each(|(chunk, (stored, filled))| {
+        let tiles = CHUNK / TILE;
+        parallel::for_chunks(stored, CHUNK * lanes, |chunk, stored| {
             let start = chunk * CHUNK;
+            let filled = &filled[chunk * tiles..filled.len().min((chunk + 1) * tiles)];
             force(start, filled, stored);
             if D < lanes {
                 let here = &occupied[margin + start..];
@@ -162,7 +163,7 @@ impl<const D: usize> OffsetBonds<D> {
             [runs(taps, width, lanes::<D>()), if apart { runs(taps, width, 1) } else { TapRuns::default() }];
         let ShareSums { sums, completed, rim } = to;
         let sums = &mut sums.get_mut()[..self.sites.next_multiple_of(CHUNK) * lanes::<D>() * D];
-        sums.par_chunks_mut(CHUNK * lanes::<D>() * D).enumerate().for_each(|(chunk, sums)| {
+        parallel::for_chunks(sums, CHUNK * lanes::<D>() * D, |chunk, sums| {
             let start = chunk * CHUNK;
             arch.dispatch(ConvolutionChunk { shared: self, runs: &runs, completed, rim, start, edge, sums });
         });

@@ -8,7 +8,7 @@ use super::{
     BallVolume, MeasuredStress, StressInput, StressMethod, ball_volume, cell_fractions, segment_fraction,
 };
 use crate::bonds::{BodyGeometry, LatticeBonds};
-use rayon::prelude::*;
+use crate::parallel;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
@@ -39,10 +39,11 @@ impl<const D: usize> StressSums<D> {
     fn finish(self, bonds: &LatticeBonds<D>, state: &StressInput<D>, ball: BallVolume) -> MeasuredStress<D> {
         let started = Instant::now();
         let volumes = volumes(bonds, state, self.measure, ball, self.window.as_ref());
-        let one = |(&site, volume): (&u32, f64)| {
-            self.shares.get(site as usize).map(|row| row.map(|sum| sum / volume))
+        let one = |particle: usize| {
+            let share = self.shares.get(bonds.particles()[particle] as usize);
+            share.map(|row| row.map(|sum| sum / volumes[particle]))
         };
-        let piola = bonds.particles().par_iter().zip(volumes).map(one).collect();
+        let piola = parallel::map(volumes.len(), one);
         MeasuredStress { piola, seconds: self.seconds + started.elapsed().as_secs_f64() }
     }
 }
@@ -174,8 +175,7 @@ fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &StressInput<D>, measure:
             let at = |k: i32| site.wrapping_add_signed(k as isize * stride);
             (-reach..=reach).all(|k| whole.get(at(k)).copied().unwrap_or(false))
         };
-        let next: Vec<bool> =
-            (0..whole.len()).into_par_iter().map(|site| whole[site] && full(site)).collect();
+        let next: Vec<bool> = parallel::map(whole.len(), |site| whole[site] && full(site));
         whole = next;
     }
     let particles = bonds.particles().iter().copied();
@@ -221,21 +221,15 @@ fn shares<const D: usize>(
     wanted: impl Fn(usize) -> bool + Sync,
 ) -> Vec<f64> {
     let occupied = bonds.occupancy();
-    bonds
-        .particles()
-        .par_iter()
-        .map(|&site| {
-            if cells.is_empty() || !wanted(site as usize) {
-                return 1.0;
-            }
-            let cell = bonds.cell_of(site as usize);
-            cells
-                .iter()
-                .filter(|(offset, _)| {
-                    cell.and_then(|c| bonds.cell_at(c, *offset)).is_some_and(|s| occupied[s])
-                })
-                .map(|c| c.1)
-                .sum()
-        })
-        .collect()
+    parallel::map_each(bonds.particles(), |&site| {
+        if cells.is_empty() || !wanted(site as usize) {
+            return 1.0;
+        }
+        let cell = bonds.cell_of(site as usize);
+        cells
+            .iter()
+            .filter(|(offset, _)| cell.and_then(|c| bonds.cell_at(c, *offset)).is_some_and(|s| occupied[s]))
+            .map(|c| c.1)
+            .sum()
+    })
 }

@@ -17,8 +17,8 @@ pub use ball::{ball_volume, cell_fractions, segment_fraction};
 
 use crate::bonds::{BodyGeometry, BondForces, BondKind, Bonds, CloudBonds, GradientSums, LatticeBonds};
 use crate::field::{CHUNK, Field, chunk_range};
+use crate::parallel;
 use crate::potential::KernelFit;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -258,12 +258,12 @@ pub fn deformation_gradients<const D: usize>(
             [sites.start, sites.end].map(|end| particles.partition_point(|&s| (s as usize) < end));
         Some(particles[from..to].iter().map(|&site| gradient(&sums[site as usize - sites.start])).collect())
     };
-    let chunks: Option<Vec<Vec<StressTensor<D>>>> =
-        (0..bonds.sites().div_ceil(CHUNK)).into_par_iter().map(chunk).collect();
+    let chunks: Vec<Option<Vec<StressTensor<D>>>> = parallel::map(bonds.sites().div_ceil(CHUNK), chunk);
+    let chunks: Option<Vec<Vec<StressTensor<D>>>> = chunks.into_iter().collect();
     if let Some(chunks) = chunks {
         return chunks.concat();
     }
-    particles.par_iter().map(|&site| deformation_gradient(bonds, displacement, site as usize)).collect()
+    parallel::map_each(particles, |&site| deformation_gradient(bonds, displacement, site as usize))
 }
 
 /// Computes the nonlocal deformation gradient of one particle, as [`deformation_gradients`].
@@ -310,17 +310,18 @@ pub fn cauchy<const D: usize>(
     piola: &[StressTensor<D>],
     gradients: &[StressTensor<D>],
 ) -> Vec<StressTensor<D>> {
-    let one = |(p, f): (&StressTensor<D>, &StressTensor<D>)| -> StressTensor<D> {
+    let one = |particle: usize| -> StressTensor<D> {
+        let (p, f) = (piola[particle], gradients[particle]);
         let jacobian = determinant::<D>(|a, b| f[a][b]);
         // an inverted family has no Cauchy stress; its nominal stress replaces it
         if jacobian <= 0.0 {
-            return *p;
+            return p;
         }
         std::array::from_fn(|a| {
             std::array::from_fn(|b| (0..D).map(|c| p[a][c] * f[b][c]).sum::<f64>() / jacobian)
         })
     };
-    piola.par_iter().zip(gradients).map(one).collect()
+    parallel::map(piola.len(), one)
 }
 
 /// Determinant of a D × D matrix, embedded in three dimensions.

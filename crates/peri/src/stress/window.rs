@@ -1,7 +1,7 @@
 //! Localisation functions φ of Hardy's stress, Eqs (2.15)–(2.18), averaged over a particle's cell.
 
 use super::{StressMethod, segment_fraction};
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Standard deviation of the Gaussian window over its cut-off radius.
 const DEVIATION: f64 = 1.0 / 3.0;
@@ -70,10 +70,10 @@ impl<const D: usize> AveragedWindow<D> {
         let steps = if window == StressWindow::Cell { fine } else { 4 };
         let side = 2 * reach * fine;
         let place = |i: usize| (i as f64 + 0.5) / fine as f64 - reach as f64;
-        let values = (0..side.pow(D as u32))
-            .into_par_iter()
-            .map(|i| window.value::<D>(std::array::from_fn(|d| place(i / side.pow(d as u32) % side)), radius))
-            .collect();
+        let value = |i: usize| {
+            window.value::<D>(std::array::from_fn(|d| place(i / side.pow(d as u32) % side)), radius)
+        };
+        let values = parallel::map(side.pow(D as u32), value);
         Self { fine, reach, steps, values: averaged::<D>(values, side, fine) }
     }
 
@@ -231,7 +231,7 @@ fn averaged<const D: usize>(mut values: Vec<f64>, side: usize, fine: usize) -> V
             let line = index - along * stride;
             (low..high).map(|k| values[line + k * stride]).sum::<f64>() / fine as f64
         };
-        values = (0..values.len()).into_par_iter().map(one).collect();
+        values = parallel::map(values.len(), one);
     }
     values
 }

@@ -5,7 +5,7 @@ use crate::bonds::BodyGeometry;
 use crate::bonds::lattice_kernel::{TILE, TileClass};
 use crate::field::{CHUNK, chunk_range};
 use crate::geometry::{Cut, Gaps, cuts_within, severed};
-use rayon::prelude::*;
+use crate::parallel;
 
 impl<const D: usize> LatticeBonds<D> {
     /// Bonds all pairs of occupied sites within the stencil, except those that cross a cut or a gap.
@@ -37,7 +37,7 @@ impl<const D: usize> LatticeBonds<D> {
                 chunk.push(part);
             }
         }
-        chunks.into_par_iter().enumerate().for_each(|(chunk, mut parts)| {
+        parallel::for_items(chunks, |chunk, mut parts| {
             for (index, site) in chunk_range(chunk, self.sites).enumerate() {
                 if occupied[site] {
                     for (part, value) in parts.iter_mut().zip(bits(site)) {
@@ -46,7 +46,7 @@ impl<const D: usize> LatticeBonds<D> {
                 }
             }
         });
-        self.directed_bonds = intact.par_iter().flatten().map(|word| u64::from(word.count_ones())).sum();
+        self.directed_bonds = intact.iter().flatten().map(|word| u64::from(word.count_ones())).sum();
         self.intact = intact;
     }
 
@@ -75,7 +75,7 @@ impl<const D: usize> LatticeBonds<D> {
                 TileClass::Partial
             }
         };
-        let classes = (0..sites / TILE).into_par_iter().map(class).collect();
+        let classes = parallel::map(sites / TILE, class);
         self.classes = classes;
     }
 

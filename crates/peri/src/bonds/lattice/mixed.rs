@@ -8,8 +8,8 @@ use crate::bonds::BondForces;
 use crate::bonds::lattice_kernel::{Factors, Tiles};
 use crate::bonds::rows::{LatticeKernel, StencilBond, single_kernel};
 use crate::field::{CHUNK, Field, chunk_range};
+use crate::parallel;
 use crate::potential::{KernelFit, StretchRange};
-use rayon::prelude::*;
 
 /// Largest relative error of the law in single precision.
 const LAW_ERROR: f64 = 1e-5;
@@ -37,7 +37,8 @@ impl<const D: usize> Mixed<D> {
     pub(super) fn set_displacement(&mut self, displacement: &Field<D>, spacing: f64) {
         let inverse = 1.0 / spacing;
         for (rounded, exact) in self.displacement.iter_mut().zip(displacement.components()) {
-            rounded.par_chunks_mut(CHUNK).zip(exact.par_chunks(CHUNK)).for_each(|(rounded, exact)| {
+            parallel::for_chunks(rounded, CHUNK, |chunk, rounded| {
+                let exact = &exact[chunk * CHUNK..];
                 rounded.iter_mut().zip(exact).for_each(|(rounded, u)| *rounded = (u * inverse) as f32);
             });
         }
@@ -76,7 +77,7 @@ impl<const D: usize> LatticeBonds<D> {
             pairs
                 .fold([0.0; 2], |[d, f], (mixed, double)| [d + (mixed - double).powi(2), f + double * double])
         };
-        let parts: Vec<[f64; 2]> = (0..self.sites.div_ceil(CHUNK)).into_par_iter().map(squares).collect();
+        let parts: Vec<[f64; 2]> = parallel::map(self.sites.div_ceil(CHUNK), squares);
         let [difference, force] = parts.into_iter().fold([0.0; 2], |[d, f], [e, g]| [d + e, f + g]);
         Some(if force > 0.0 { (difference / force).sqrt() } else { 0.0 })
     }

@@ -173,7 +173,7 @@ impl ChemistrySpec {
     fn melt(&self, source: &Source, known: Option<&KnownPolymer>) -> Result<Melt, SceneError> {
         let missing = |field: &str| {
             let why = match known {
-                Some(polymer) => format!("needed: not known of {}", polymer.name),
+                Some(polymer) => format!("needed: unknown for {}", polymer.name),
                 None => "needed without a `polymer` of which it is known".to_owned(),
             };
             source.missing(&format!("{KEY}.{field}"), why)

@@ -10,13 +10,13 @@ pub use stiffness::BondCounts;
 
 use crate::bonds::BodyGeometry;
 use crate::field::Field;
+use crate::parallel;
 use crate::potential::BondPotential;
 use crate::solver::load::Loads;
 use crate::solver::particle_map::in_order;
 use factor::{Factor, Pattern};
 use polycore::numerics::bounds;
 use pulp::Arch;
-use rayon::prelude::*;
 use space::{CORNERS, CoarseSpace, NONE};
 use stiffness::{Assembly, ElementMatrix};
 use transfer::{Prolong, Restrict};
@@ -81,7 +81,7 @@ impl<const D: usize> CoarseLevel<D> {
         let CoarseBody { bonds, loads, displacement, law, springs, survey, anchors } = *body;
         let assembly = Assembly::new(bonds, loads, displacement, survey, law, springs, space.edge);
         let mut matrices: Vec<(ElementMatrix, [f64; CORNERS])> =
-            space.elements.par_iter().map(|element| assembly.element(&space, element)).collect();
+            parallel::map_each(&space.elements, |element| assembly.element(&space, element));
         add_anchors(&space, anchors, &mut matrices);
         let extent = extent(body.bonds);
         let shift = SHIFT * assembly.stiffness() * (std::f64::consts::PI / extent).powi(2);

@@ -5,9 +5,9 @@
 use super::space::{CORNERS, CoarseElement, CoarseSpace};
 use crate::bonds::{BodyGeometry, Bonds};
 use crate::field::Field;
+use crate::parallel;
 use crate::potential::BondPotential;
 use crate::solver::load::Loads;
-use rayon::prelude::*;
 
 /// Pairs i ≤ j in three dimensions, and pairs of corners a ≤ b.
 const SYMMETRIC: usize = 6;
@@ -63,7 +63,7 @@ impl BondCounts {
             }
             (bonds.bonded(site), most)
         };
-        let each: Vec<(u32, f64)> = bonds.particles().par_iter().map(of).collect();
+        let each: Vec<(u32, f64)> = parallel::map_each(bonds.particles(), of);
         let mut bonded = vec![0; bonds.sites()];
         let (mut most, mut moved) = (0, 0.0_f64);
         for (&site, (count, square)) in bonds.particles().iter().zip(each) {

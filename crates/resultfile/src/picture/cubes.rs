@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use super::skin::{Corner, Plane, Skin};
-use crate::output::lattice::{LatticeCells, NONE, joined, neighbours};
+use crate::lattice::{LatticeCells, NONE, joined, neighbours};
 
 /// Particles in space.
 #[derive(Clone, Copy, Debug)]

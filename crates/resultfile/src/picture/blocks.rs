@@ -3,7 +3,7 @@
 use polycore::numerics::{Groups, bounds};
 use rayon::prelude::*;
 
-use crate::output::lattice::{self, NONE, joined, neighbours};
+use crate::lattice::{self, NONE, joined, neighbours};
 
 /// Area that a particle covers.
 #[derive(Clone, Debug)]

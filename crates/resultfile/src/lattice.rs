@@ -5,9 +5,9 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 /// No neighbour.
-pub(crate) const NONE: u32 = u32::MAX;
+pub const NONE: u32 = u32::MAX;
 /// Neighbours at both ends of each axis: side 2d lies before a particle along axis d, side 2d + 1 behind it.
-pub(crate) type Sides = [u32; 6];
+pub type Sides = [u32; 6];
 
 /// Two neighbours that have moved apart this many times farther than both have from the next ones behind them
 /// have a crack between them.
@@ -16,7 +16,7 @@ const JUMP: f64 = 2.0;
 const OFF: f64 = 0.05;
 
 /// Returns the neighbours of each particle that lies on the lattice of the first one.
-pub(crate) fn neighbours<const D: usize>(reference: &[[f64; D]], spacing: f64) -> Vec<Sides> {
+pub fn neighbours<const D: usize>(reference: &[[f64; D]], spacing: f64) -> Vec<Sides> {
     let Some(origin) = reference.first() else { return Vec::new() };
     let place = |x: &[f64; D]| -> Option<[i64; D]> {
         let steps: [f64; D] = std::array::from_fn(|d| (x[d] - origin[d]) / spacing);
@@ -41,7 +41,7 @@ pub(crate) fn neighbours<const D: usize>(reference: &[[f64; D]], spacing: f64) -
 }
 
 /// Returns the neighbours without a crack in between; those farther apart than `bridge` spacings have one.
-pub(crate) fn joined<const D: usize>(
+pub fn joined<const D: usize>(
     positions: &[[f64; D]],
     next: &[Sides],
     spacing: f64,
@@ -69,7 +69,7 @@ pub(crate) fn joined<const D: usize>(
 }
 
 /// LatticeCells around the particles of a lattice along its first `axes` axes.
-pub(crate) struct LatticeCells<'a, const D: usize> {
+pub struct LatticeCells<'a, const D: usize> {
     /// Positions.
     pub positions: &'a [[f64; D]],
     /// Pairs of neighbours from [`joined`].
