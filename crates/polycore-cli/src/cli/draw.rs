@@ -7,53 +7,74 @@ use polycore::Error;
 use polycore::constitutive::hyperelastic::data::{Mode, TestData, TestState};
 use polycore::constitutive::hyperelastic::fit::{self, Fit};
 use polycore::constitutive::hyperelastic::ranking::ModeTable;
-use polycore::constitutive::hyperelastic::{Hyperelastic, ModelKind, homogeneous};
+use polycore::constitutive::hyperelastic::{Hyperelastic, ModelKind};
 
 use super::MPA;
 
-/// Homogeneous test that may occur among general biaxial states.
+/// Test that may occur among general biaxial states, and the stress drawn over its first stretch.
 struct TestPlot {
     key: &'static str,
     title: &'static str,
+    /// Labels of abscissa and ordinate.
+    axes: [&'static str; 2],
+    mode: Mode,
+    /// Index of the stress.
+    stress: usize,
     holds: fn(&TestState) -> bool,
-    nominal: fn(&dyn Hyperelastic, f64) -> Result<f64, polycore::constitutive::Error>,
 }
+
+const NOMINAL: [&str; 2] = ["stretch", "nominal stress, MPa"];
 
 const TESTS: [TestPlot; 4] = [
     TestPlot {
         key: "uniaxial",
         title: "uniaxial tension",
+        axes: NOMINAL,
+        mode: Mode::Uniaxial,
+        stress: 0,
         holds: |state| match state.mode {
             Mode::Biaxial => state.nominal[1] == 0.0,
             mode => mode == Mode::Uniaxial,
         },
-        nominal: |law, stretch| homogeneous::uniaxial(law, stretch),
     },
     TestPlot {
         key: "pure-shear",
         title: "pure shear",
+        axes: NOMINAL,
+        mode: Mode::PureShear,
+        stress: 0,
         holds: |state| match state.mode {
             Mode::Biaxial => state.stretches[1] == 1.0 && state.nominal[1] != 0.0,
             mode => mode == Mode::PureShear && first_or_rest(state),
         },
-        nominal: |law, stretch| Ok(homogeneous::pure_shear(law, stretch)?[0]),
     },
     TestPlot {
         key: "simple-shear",
         title: "simple shear, as the pure shear of its stretch",
+        axes: NOMINAL,
+        mode: Mode::PureShear,
+        stress: 0,
         holds: |state| state.mode == Mode::SimpleShear,
-        nominal: |law, stretch| Ok(homogeneous::pure_shear(law, stretch)?[0]),
     },
     TestPlot {
         key: "equibiaxial",
         title: "equibiaxial tension",
+        axes: NOMINAL,
+        mode: Mode::Equibiaxial,
+        stress: 0,
         holds: |state| match state.mode {
             Mode::Biaxial => state.stretches[0] == state.stretches[1] && state.nominal[1] != 0.0,
             mode => mode == Mode::Equibiaxial && first_or_rest(state),
         },
-        nominal: |law, stretch| homogeneous::equibiaxial(law, stretch),
     },
 ];
+
+impl TestPlot {
+    /// State of the test at a first stretch.
+    fn at(&self, stretch: f64) -> TestState {
+        TestState::new(self.mode, [stretch, self.mode.second_stretch(stretch)], [0.0; 2])
+    }
+}
 
 /// Returns true unless only the second stress of a state was measured.
 fn first_or_rest(state: &TestState) -> bool {
@@ -94,7 +115,7 @@ pub fn pictures(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) ->
     Ok(())
 }
 
-/// Draws nominal stress over stretch.
+/// Draws the stress of a test over its stretch.
 fn curves(
     name: &str,
     test: &TestPlot,
@@ -103,16 +124,16 @@ fn curves(
     deviation: Option<f64>,
 ) -> LinePlot {
     let x: Vec<f64> = states.iter().map(|state| state.stretches[0]).collect();
-    let y: Vec<f64> = states.iter().map(|state| state.nominal[0] / MPA).collect();
+    let y: Vec<f64> = states.iter().map(|state| state.nominal[test.stress] / MPA).collect();
     let [low, high] = span(&x, 1.0).map(|l| 1.0 + 1.03 * (l - 1.0)).map(|l| l.max(0.01));
     let [least, most] = span(&y, 0.0).map(|nominal| 1.1 * nominal);
     let mut plot = LinePlot::new(&format!("{name}: {}", test.title))
-        .axes("stretch", "nominal stress, MPa")
+        .axes(test.axes[0], test.axes[1])
         .x_range(low, high)
         .y_range(least, most)
         .series(Series::markers("measured", &x, &y));
     if let Some(deviation) = deviation {
-        plot = plot.series(bars(states, deviation).joined());
+        plot = plot.series(bars(test, states, &x, deviation).joined());
     }
     for fit in fits {
         let [stretches, nominal] = curve(test, &fit.law, [low, high]);
@@ -143,7 +164,7 @@ pub fn every_mode(
         empty = false;
         plot = plot.series(Series::markers(mode.mode, &x, &y));
         if let Some(deviation) = deviation {
-            plot = plot.series(bars(&states, deviation).joined());
+            plot = plot.series(bars(test, &states, &x, deviation).joined());
         }
         let [stretches, nominal] = curve(test, &fit.law, span(&x, 1.0));
         plot = plot.series(Series::line("", &stretches, &nominal).joined());
@@ -154,22 +175,21 @@ pub fn every_mode(
 /// Test that the mode of compression belongs to.
 const COMPRESSION: (&str, &str) = ("uniaxial", "compression");
 
-/// Stretches of a range and nominal stresses there, MPa; beyond locking the curve ends.
+/// Stretches of a range and stresses there, MPa; beyond locking the curve ends.
 fn curve(test: &TestPlot, law: &dyn Hyperelastic, [low, high]: [f64; 2]) -> [Vec<f64>; 2] {
     let stretches: Vec<f64> = (0..=POINTS).map(|i| low + (high - low) * i as f64 / POINTS as f64).collect();
-    let nominal =
-        stretches.iter().map(|l| (test.nominal)(law, *l).map_or(f64::NAN, |nominal| nominal / MPA)).collect();
-    [stretches, nominal]
+    let stress = |l: &f64| test.at(*l).predict(law).map_or(f64::NAN, |nominal| nominal[test.stress] / MPA);
+    let found = stretches.iter().map(stress).collect();
+    [stretches, found]
 }
 
 /// Bars of one standard deviation, given that of a stress of weight 1, Pa.
-fn bars(states: &[&TestState], deviation: f64) -> Series {
-    let x: Vec<f64> = states.iter().map(|state| state.stretches[0]).collect();
+fn bars(test: &TestPlot, states: &[&TestState], x: &[f64], deviation: f64) -> Series {
     let end = |sign: f64| -> Vec<f64> {
-        let size = |state: &TestState| deviation / state.roots[0] / state.ratio();
-        states.iter().map(|state| (state.nominal[0] + sign * size(state)) / MPA).collect()
+        let size = |state: &TestState| deviation / state.roots[test.stress] / state.ratio();
+        states.iter().map(|state| (state.nominal[test.stress] + sign * size(state)) / MPA).collect()
     };
-    Series::bars(&x, &end(-1.0), &end(1.0))
+    Series::bars(x, &end(-1.0), &end(1.0))
 }
 
 /// Draws every stress of the table, model over measurement.

@@ -12,7 +12,7 @@ use polycore::constitutive::hyperelastic::data::{Mode, TestData, TestState};
 use polycore::constitutive::hyperelastic::fit::{
     Agreement, Fit, FittedParameter, Identifiability, fit_until,
 };
-use polycore::constitutive::hyperelastic::{Coverage, Hyperelastic, homogeneous, stability};
+use polycore::constitutive::hyperelastic::{Coverage, Hyperelastic, stability};
 
 use super::MPA;
 use super::data::DataSet;
@@ -177,10 +177,7 @@ fn record_cross(
     law: &dyn Hyperelastic,
     table: &TestData,
 ) -> Result<Option<Agreement>, Error> {
-    let locks = |state: &&TestState| {
-        let [a, b] = state.stretches;
-        matches!(homogeneous::biaxial(law, a, b), Err(constitutive::Error::Locked { .. }))
-    };
+    let locks = |state: &&TestState| matches!(state.predict(law), Err(constitutive::Error::Locked { .. }));
     let locked = table.states.iter().filter(locks).count();
     report.value(q::LOCKED.named(&[key]), locked as f64);
     if locked > 0 {
@@ -298,7 +295,7 @@ fn write_states(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) ->
     for fit in fits {
         let mut found = Vec::new();
         for state in &table.states {
-            found.push(homogeneous::biaxial(&fit.law, state.stretches[0], state.stretches[1])?);
+            found.push(state.predict(&fit.law)?);
         }
         for i in [0, 1] {
             let nominal = found.iter().map(|nominal| nominal[i] / MPA).collect();

@@ -1,7 +1,8 @@
 //! Measured homogeneous states of an incompressible rubber.
 
-use super::Error;
-use super::homogeneous::incompressible;
+use super::descriptor::Slopes;
+use super::homogeneous::{biaxial, incompressible};
+use super::{Error, Hyperelastic};
 
 /// Table of homogeneous states.
 #[derive(Debug, Clone, PartialEq)]
@@ -159,6 +160,19 @@ impl TestState {
     /// [`Error::Deformation`] if one is not positive and finite.
     pub fn principal_stretches(&self) -> Result<[f64; 3], Error> {
         incompressible(self.stretches[0], self.stretches[1])
+    }
+
+    /// Computes P₁, P₂ of a law, Pa.
+    ///
+    /// # Errors
+    /// As [`biaxial`].
+    pub fn predict<L: Hyperelastic + ?Sized>(&self, law: &L) -> Result<[f64; 2], Error> {
+        biaxial(law, self.stretches[0], self.stretches[1])
+    }
+
+    /// Computes the same from a closed form, with derivatives.
+    pub(super) fn predict_slopes(&self, closed: Slopes, p: &[f64], slopes: &mut [[f64; 2]]) -> [f64; 2] {
+        closed(p, self.stretches, slopes)
     }
 
     /// State of simple shear by an amount γ at a shear stress τ = P₁₂ = σ₁₂, Pa: σ₁ − σ₃ = τ(λ + 1/λ).
