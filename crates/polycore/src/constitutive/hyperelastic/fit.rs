@@ -1,4 +1,4 @@
-//! Least-squares fit of a law to homogeneous states.
+//! Least-squares fit of a law to measured states.
 //!
 //! The objective is the weighted sum of squares of the nominal-stress residuals, over every measured stress
 //! of the table (those that are not exactly zero; [`super::data::TestState::nominal`]); weights are 1 unless
