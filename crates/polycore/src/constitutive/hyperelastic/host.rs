@@ -1,6 +1,7 @@
 //! Fitted laws as materials of Ansys, LS-DYNA and FEBio; those of Abaqus and CalculiX are in [`super::deck`].
 
 use super::any_model;
+use super::deck::left_out;
 
 /// Finite-element program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
@@ -43,17 +44,20 @@ impl CardProgram {
         }
     }
 
-    /// Formats a law as material number `id`, stresses in the host's unit; `None` if the program has no such
-    /// law. Energies are those of the Ansys Material Reference, 4.6 and Structural Analysis Guide, 8.4.1.2
+    /// Formats a law as material number `id`, stresses in the host's unit, with the Dᵢ of the volumetric energy
+    /// Σ (J − 1)²ⁱ/Dᵢ; `None` if the program has no such law. Terms that the card has no place for are named
+    /// in a comment. Energies are those of the Ansys Material Reference, 4.6 and Structural Analysis Guide, 8.4.1.2
     /// (d = 2/K; Ogden's Σ μᵢ/αᵢ (Σ λ^αᵢ − 3)), of the LS-DYNA manual, volume II (the same of Ogden; K from
     /// Poisson's ratio), and of FEBio's sources (Σ cᵢ/mᵢ² (Σ λ^mᵢ − 3), ½k ln²J). Its Arruda–Boyce differs
     /// between versions, and none is written.
-    pub fn card(self, id: usize, key: &str, parameters: &[f64], bulk: f64) -> Option<String> {
-        match self {
-            Self::Ansys => ansys(id, key, parameters, bulk),
-            Self::LsDyna => ls_dyna(id, key, parameters, bulk),
-            Self::Febio => febio(id, key, parameters, bulk),
-        }
+    pub fn card(self, id: usize, key: &str, parameters: &[f64], compliances: &[f64]) -> Option<String> {
+        let bulk = compliances.first().map_or(f64::INFINITY, |d| 2.0 / d);
+        let (card, held) = match self {
+            Self::Ansys => ansys(id, key, parameters, compliances)?,
+            Self::LsDyna => (ls_dyna(id, key, parameters, bulk)?, 1),
+            Self::Febio => (febio(id, key, parameters, bulk)?, 1),
+        };
+        Some(left_out(compliances, held).map_or_else(String::new, |note| self.comment(&note)) + &card)
     }
 }
 
@@ -80,8 +84,8 @@ fn is_series(key: &str) -> bool {
     key == "yeoh" || key.starts_with("reduced-polynomial-")
 }
 
-fn ansys(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
-    let d = 2.0 / bulk;
+/// Material, and the number of Dᵢ that it holds.
+fn ansys(id: usize, key: &str, p: &[f64], compliances: &[f64]) -> Option<(String, usize)> {
     let (terms, option, mut constants) = match (key, p) {
         ("neo-hookean", _) => (1, "NEO", p.to_vec()),
         ("arruda-boyce", _) => (1, "BOYCE", p.to_vec()),
@@ -97,12 +101,15 @@ fn ansys(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
             (own.len(), "OGDEN", own.iter().flat_map(|[mu, alpha]| [2.0 * mu / alpha, *alpha]).collect())
         }
     };
-    constants.push(d);
+    // d₁ to d_N stand after the constants
+    let held = if ["YEOH", "OGDEN"].contains(&option) { terms } else { 1 };
+    let zero_if_soft = |d: &f64| if d.is_finite() { *d } else { 0.0 };
+    constants.extend(compliances.iter().take(held).map(zero_if_soft));
     let rows = constants.chunks(6).enumerate().map(|(i, row)| {
         let numbers: String = row.iter().map(|number| format!(",{number:.6e}")).collect();
         format!("TBDATA,{}{numbers}\n", 6 * i + 1)
     });
-    Some(format!("TB,HYPER,{id},1,{terms},{option}\n{}", rows.collect::<String>()))
+    Some((format!("TB,HYPER,{id},1,{terms},{option}\n{}", rows.collect::<String>()), held))
 }
 
 fn ls_dyna(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
@@ -232,7 +239,7 @@ mod tests {
         {
             let mut count = 0;
             for model in MODELS {
-                let Some(card) = host.card(3, model.key, model.example, 4e7) else { continue };
+                let Some(card) = host.card(3, model.key, model.example, &[5e-8]) else { continue };
                 let law = model.law(model.example).unwrap().energy_at(STRETCHES).unwrap();
                 worst = worst.max((energy(host, &card) / law - 1.0).abs());
                 count += 1;
@@ -245,7 +252,7 @@ mod tests {
     /// K = 40 MPa: d = 2/K; ν from K and μ = 0.4 MPa.
     #[test]
     fn bulk_moduli_in_the_form_of_each_program() {
-        let card = |host: CardProgram| host.card(1, "neo-hookean", &[0.4], 40.0).unwrap();
+        let card = |host: CardProgram| host.card(1, "neo-hookean", &[0.4], &[0.05]).unwrap();
         assert_eq!(card(CardProgram::Ansys), "TB,HYPER,1,1,1,NEO\nTBDATA,1,4.000000e-1,5.000000e-2\n");
         let poisson = numbers(card(CardProgram::LsDyna).lines().nth(1).unwrap())[1];
         assert!((poisson - (120.0 - 0.8) / 240.8).abs() < 1e-12, "{poisson}");
@@ -256,7 +263,15 @@ mod tests {
             (CardProgram::Ansys, "van-der-waals"),
         ] {
             let model = any_model(key).unwrap();
-            assert_eq!(host.card(1, key, model.example, 1e9), None);
+            assert_eq!(host.card(1, key, model.example, &[2e-9]), None);
+        }
+        let all = [0.05, 2e-3];
+        let yeoh = CardProgram::Ansys.card(1, "yeoh", &[0.2, 2e-3, 5e-5], &all).unwrap();
+        assert!(yeoh.ends_with("5.000000e-5,5.000000e-2,2.000000e-3\n"), "{yeoh}");
+        for host in [CardProgram::LsDyna, CardProgram::Febio] {
+            let card = host.card(1, "yeoh", &[0.2, 2e-3, 5e-5], &all).unwrap();
+            let note = "left out: D2 = 2.000000e-3; this material has D1 alone";
+            assert!(card.starts_with(&host.comment(note)), "{card}");
         }
     }
 }
