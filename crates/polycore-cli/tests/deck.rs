@@ -63,7 +63,8 @@ fn a_volumetric_test_gives_the_bulk_modulus() {
 fn materials_of_other_programs() {
     let folder = tempfile::tempdir().unwrap();
     let [scene, output] = ["case.toml", "out"].map(|name| folder.path().join(name).display().to_string());
-    let laws = "cards = [\"ansys\", \"ls-dyna\", \"febio\"]\nlaws = [\"neo-hookean\", \"arruda-boyce\"]";
+    let laws =
+        "cards = [\"ansys\", \"ls-dyna\", \"febio\", \"moose\"]\nlaws = [\"neo-hookean\", \"arruda-boyce\"]";
     std::fs::write(&scene, SCENE.replace("laws = [\"neo-hookean\"]", laws)).unwrap();
     let law = |l: f64| 0.5 * (l - l.powi(-2)) * (1.0 + 0.02 * (l * l + 2.0 / l - 3.0));
     let rows: String = [1.5, 2.0, 3.0, 4.0].iter().map(|l| format!("{l},{}\n", law(*l))).collect();
@@ -75,6 +76,7 @@ fn materials_of_other_programs() {
         ("materials_mm.mac", &["! units mm, N, MPa", "TB,HYPER,1,1,1,NEO", "TB,HYPER,2,1,1,BOYCE"][..]),
         ("materials_si.mac", &["! units m, N, Pa", "100 times the shear modulus"]),
         ("materials_mm.k", &["*MAT_077_H+", "$ LS-DYNA has no law `arruda-boyce`"]),
+        ("materials_mm.i", &["type = ComputeNeoHookeanStress", "# MOOSE has no law `arruda-boyce`"]),
         ("materials_si.feb", &["type=\"Mooney-Rivlin\"", "<!-- FEBio has no law `arruda-boyce` -->"]),
     ] {
         let text = read(name);

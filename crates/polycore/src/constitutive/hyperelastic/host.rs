@@ -1,4 +1,4 @@
-//! Fitted laws as materials of Ansys, LS-DYNA and FEBio; those of Abaqus and CalculiX are in [`super::deck`].
+//! Fitted laws as materials of Ansys, LS-DYNA, FEBio and MOOSE; those of Abaqus and CalculiX are in [`super::deck`].
 
 use super::any_model;
 use super::deck::left_out;
@@ -14,6 +14,8 @@ pub enum CardProgram {
     LsDyna,
     /// Uncoupled materials of version 3 and later.
     Febio,
+    /// `ComputeNeoHookeanStress` of its Lagrangian kernels.
+    Moose,
 }
 
 impl CardProgram {
@@ -23,6 +25,7 @@ impl CardProgram {
             Self::Ansys => "Ansys",
             Self::LsDyna => "LS-DYNA",
             Self::Febio => "FEBio",
+            Self::Moose => "MOOSE",
         }
     }
 
@@ -32,6 +35,7 @@ impl CardProgram {
             Self::Ansys => "mac",
             Self::LsDyna => "k",
             Self::Febio => "feb",
+            Self::Moose => "i",
         }
     }
 
@@ -41,6 +45,7 @@ impl CardProgram {
             Self::Ansys => format!("! {text}\n"),
             Self::LsDyna => format!("$ {text}\n"),
             Self::Febio => format!("<!-- {} -->\n", text.replace("--", "- -")),
+            Self::Moose => format!("# {text}\n"),
         }
     }
 
@@ -56,6 +61,7 @@ impl CardProgram {
             Self::Ansys => ansys(id, key, parameters, compliances)?,
             Self::LsDyna => (ls_dyna(id, key, parameters, bulk)?, 1),
             Self::Febio => (febio(id, key, parameters, bulk)?, 1),
+            Self::Moose => (moose(id, key, parameters, bulk)?, 1),
         };
         Some(left_out(compliances, held).map_or_else(String::new, |note| self.comment(&note)) + &card)
     }
@@ -152,6 +158,17 @@ fn febio(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
     Some(format!("<material id=\"{id}\" name=\"{key}\" type=\"{kind}\">\n{lines}</material>\n"))
 }
 
+/// S = (λ ln J − μ) C⁻¹ + μ 1, i.e. W = ½μ(I₁ − 3) − μ ln J + ½λ ln²J, with λ = K − ⅔μ
+/// (`ComputeNeoHookeanStress.C` of MOOSE's solid_mechanics): its only law of a rubber.
+fn moose(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
+    let ("neo-hookean", &[modulus]) = (key, p) else { return None };
+    let lame = bulk - 2.0 / 3.0 * modulus;
+    Some(format!(
+        "[Materials]\n  [neo_hookean_{id}]\n    type = ComputeNeoHookeanStress\n    lambda = \
+         {lame:.6e}\n    mu = {modulus:.6e}\n    large_kinematics = true\n  []\n[]\n"
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -216,6 +233,8 @@ mod tests {
                     _ => rows[0].iter().zip(&rows[1]).map(|(mu, alpha)| mu / alpha * powers(*alpha)).sum(),
                 }
             }
+            // of F with J = 1
+            CardProgram::Moose => 0.5 * numbers(card)[1] * x,
             CardProgram::Febio => {
                 let c = numbers(&card[head.len()..]);
                 match head.split("type=\"").nth(1).unwrap().split('"').next().unwrap() {
@@ -235,8 +254,12 @@ mod tests {
     #[test]
     fn cards_have_the_energies_of_their_laws() {
         let mut worst: f64 = 0.0;
-        for (host, expected) in [(CardProgram::Ansys, 16), (CardProgram::LsDyna, 9), (CardProgram::Febio, 11)]
-        {
+        for (host, expected) in [
+            (CardProgram::Ansys, 16),
+            (CardProgram::LsDyna, 9),
+            (CardProgram::Febio, 11),
+            (CardProgram::Moose, 1),
+        ] {
             let mut count = 0;
             for model in MODELS {
                 let Some(card) = host.card(3, model.key, model.example, &[5e-8]) else { continue };
@@ -249,7 +272,7 @@ mod tests {
         evidence::at_most("energies of cards by their programs' formulas, relative", worst, 5e-6);
     }
 
-    /// K = 40 MPa: d = 2/K; ν from K and μ = 0.4 MPa.
+    /// K = 40 MPa: d = 2/K; ν, λ = K − ⅔μ from K and μ = 0.4 MPa.
     #[test]
     fn bulk_moduli_in_the_form_of_each_program() {
         let card = |host: CardProgram| host.card(1, "neo-hookean", &[0.4], &[0.05]).unwrap();
@@ -257,7 +280,10 @@ mod tests {
         let poisson = numbers(card(CardProgram::LsDyna).lines().nth(1).unwrap())[1];
         assert!((poisson - (120.0 - 0.8) / 240.8).abs() < 1e-12, "{poisson}");
         assert!(card(CardProgram::Febio).contains("<k>4.000000e1</k>"), "{}", card(CardProgram::Febio));
+        let [lame, modulus] = numbers(&card(CardProgram::Moose))[..] else { panic!() };
+        assert!((lame - (40.0 - 0.8 / 3.0)).abs() < 1e-5 && modulus == 0.4, "{lame} {modulus}");
         for (host, key) in [
+            (CardProgram::Moose, "mooney-rivlin"),
             (CardProgram::Febio, "arruda-boyce"),
             (CardProgram::LsDyna, "gent"),
             (CardProgram::Ansys, "van-der-waals"),
