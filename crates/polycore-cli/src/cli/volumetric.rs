@@ -94,8 +94,8 @@ impl Bulk<'_> {
         }
     }
 
-    /// Dᵢ of the volumetric energy Σ (J − 1)²ⁱ/Dᵢ of a law with a shear modulus (Pa), in the reciprocal of a unit
-    /// of stress.
+    /// Dᵢ of the volumetric energy Σ (J − 1)²ⁱ/Dᵢ of a law with a shear modulus (Pa), in the reciprocal of a
+    /// unit of stress.
     pub fn compliances(self, shear: f64, unit: f64) -> Vec<f64> {
         match self {
             Self::Measured(set) => set.fit.compliances.iter().map(|d| d * unit).collect(),

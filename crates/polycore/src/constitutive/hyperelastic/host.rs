@@ -1,4 +1,5 @@
-//! Fitted laws as materials of Ansys, LS-DYNA, FEBio and MOOSE; those of Abaqus and CalculiX are in [`super::deck`].
+//! Fitted laws as materials of Ansys, LS-DYNA, FEBio and MOOSE; those of Abaqus and CalculiX are in
+//! [`super::deck`].
 
 use super::any_model;
 use super::deck::left_out;
@@ -49,12 +50,9 @@ impl CardProgram {
         }
     }
 
-    /// Formats a law as material number `id`, stresses in the host's unit, with the Dᵢ of the volumetric energy
-    /// Σ (J − 1)²ⁱ/Dᵢ; `None` if the program has no such law. Terms that the card has no place for are named
-    /// in a comment. Energies are those of the Ansys Material Reference, 4.6 and Structural Analysis Guide, 8.4.1.2
-    /// (d = 2/K; Ogden's Σ μᵢ/αᵢ (Σ λ^αᵢ − 3)), of the LS-DYNA manual, volume II (the same of Ogden; K from
-    /// Poisson's ratio), and of FEBio's sources (Σ cᵢ/mᵢ² (Σ λ^mᵢ − 3), ½k ln²J). Its Arruda–Boyce differs
-    /// between versions, and none is written.
+    /// Formats a law as material number `id`, stresses in the host's unit, with the Dᵢ of the volumetric
+    /// energy Σ (J − 1)²ⁱ/Dᵢ; `None` if the program has no such law. Terms that the card has no place for are
+    /// named in a comment.
     pub fn card(self, id: usize, key: &str, parameters: &[f64], compliances: &[f64]) -> Option<String> {
         let bulk = compliances.first().map_or(f64::INFINITY, |d| 2.0 / d);
         let (card, held) = match self {
@@ -90,7 +88,12 @@ fn is_series(key: &str) -> bool {
     key == "yeoh" || key.starts_with("reduced-polynomial-")
 }
 
-/// Material, and the number of Dᵢ that it holds.
+/// Material, and the number of Dᵢ that it holds. Energies and order of constants are those of the Material
+/// Reference, 4.6, and the Structural Analysis Guide, 8.4.1.2 (d = 2/K; Ogden's Σ μᵢ/αᵢ (Σ λ^αᵢ − 3)). Seen
+/// elsewhere: NEO (μ = 2C₁₀, d), YEOH (all c, then all d) and the nine terms of the polynomial in Ansys' own
+/// converter of Abaqus decks (`src/ansys/meshing/prime/internals/utils.py` of ansys/pyprimemesh), the five of
+/// MOONEY in Ansys' example `techdemo-15` (ansys/pymapdl-examples), OGDEN (μ₁, α₁, μ₂, α₂, d₁) in the Guide's
+/// listing; BOYCE, GENT and ETUBE in the Reference alone.
 fn ansys(id: usize, key: &str, p: &[f64], compliances: &[f64]) -> Option<(String, usize)> {
     let (terms, option, mut constants) = match (key, p) {
         ("neo-hookean", _) => (1, "NEO", p.to_vec()),
@@ -118,6 +121,8 @@ fn ansys(id: usize, key: &str, p: &[f64], compliances: &[f64]) -> Option<(String
     Some((format!("TB,HYPER,{id},1,{terms},{option}\n{}", rows.collect::<String>()), held))
 }
 
+/// Order of constants by the manual, volume II, and by `mat_077_H.cfg` and `mat_077_O.cfg` of OpenRadioss:
+/// C10, C01, C11, C20, C02, C30; a row of μ, a row of α of Σ μᵢ/αᵢ (Σ λ^αᵢ − 3). K from Poisson's ratio.
 fn ls_dyna(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
     let shear = any_model(key).ok()?.law(p).ok()?.shear_modulus();
     let poisson = (3.0 * bulk - 2.0 * shear) / (6.0 * bulk + 2.0 * shear);
@@ -136,6 +141,10 @@ fn ls_dyna(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
     Some(format!("{keyword}\n{id:>20}{density:>20}{poisson:>20.12}{:>20}\n{}\n", 0, rows.join("\n")))
 }
 
+/// Names and energies of FEBio's sources, in J^(−1/3) F: c₁ (I₁ − 3) + c₂ (I₂ − 3) (`FEMooneyRivlin.cpp`),
+/// Σ cᵢ (I₁ − 3)ⁱ (`FEYeoh.cpp`), W₁ = ½ G Jm/(Jm − I₁ + 3) (`FEGentMaterial.cpp`), λ ∂W/∂λ = Σ cᵢ/mᵢ λ^mᵢ
+/// (`FEOgdenMaterial.cpp`), and ½k ln²J (`FEUncoupledMaterial.h`). Its Arruda–Boyce differs between versions,
+/// and none is written.
 fn febio(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
     let tags = |name: &str, values: &[f64]| -> Vec<(String, f64)> {
         (1..).zip(values).map(|(i, value)| (format!("{name}{i}"), *value)).collect()
