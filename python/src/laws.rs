@@ -7,8 +7,8 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, P
 use polycore::constitutive::Error;
 use polycore::constitutive::hyperelastic::data::{Mode, TestData, TestState};
 use polycore::constitutive::hyperelastic::{
-    self, COMPRESSIBLE_MODELS, Compressible, Coupling, Hyperelastic, MODELS, ModelKind, Volumetric, fit,
-    homogeneous,
+    self, COMPRESSIBLE_MODELS, Compressible, Coupling, Hyperelastic, MODELS, ModelKind, TwistedCylinder,
+    Volumetric, fit, homogeneous,
 };
 use polycore::langevin::{self as chain, Inverse};
 use polycore::tensor::{DeformationGradient, Tensor};
@@ -154,6 +154,22 @@ impl Law {
         found.into_iter().flatten().collect::<Vec<_>>().into_pyarray(py).reshape([count, 2])
     }
 
+    /// Computes 2M/(πR³) and N/(πR²), (N, 2), of an incompressible cylinder of radius R, held at a stretch
+    /// and twisted to an amount of shear at its surface.
+    fn torsion<'py>(
+        &self,
+        py: Python<'py>,
+        stretch: PyReadonlyArray1<'py, f64>,
+        shear: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (stretch, shear) = (stretch.as_slice()?, shear.as_slice()?);
+        let law = &*self.law;
+        let at = |k: usize| TwistedCylinder { stretch: stretch[k], shear: shear[k] }.stresses(law);
+        let found = points(py, stretch.len().min(shear.len()), at)?;
+        let count = found.len();
+        found.into_iter().flatten().collect::<Vec<_>>().into_pyarray(py).reshape([count, 2])
+    }
+
     /// Computes W, (N, 1), P, σ or S, (N, 9), at each F, (N, 9).
     fn at_gradient<'py>(
         &self,
@@ -211,7 +227,8 @@ fn points<T: Send>(
     found.map_err(value)
 }
 
-/// Fits a law to nominal stresses: P₁ at λ₁ of a `mode`, or (P₁, P₂) at (λ₁, λ₂) of `biaxial` rows.
+/// Fits a law to nominal stresses: P₁ at λ₁ of a `mode`, (P₁, P₂) at (λ₁, λ₂) of `biaxial` rows, or
+/// (2M/(πR³), N/(πR²)) at (λ, ψR) of `torsion` rows.
 #[pyfunction]
 pub fn fit_law<'py>(
     py: Python<'py>,
@@ -220,7 +237,14 @@ pub fn fit_law<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let mut states = Vec::new();
     for (name, rows) in &tests {
-        let known = [Mode::Uniaxial, Mode::Equibiaxial, Mode::PureShear, Mode::SimpleShear, Mode::Biaxial];
+        let known = [
+            Mode::Uniaxial,
+            Mode::Equibiaxial,
+            Mode::PureShear,
+            Mode::SimpleShear,
+            Mode::Biaxial,
+            Mode::Torsion,
+        ];
         let mode = known.into_iter().find(|mode| mode.name() == name).ok_or_else(|| {
             value(format!("test: found {name:?}; allowed: {}", known.map(Mode::name).join(", ")))
         })?;
@@ -229,13 +253,16 @@ pub fn fit_law<'py>(
                 (Mode::Biaxial, Some(&[first, second, p, q])) => {
                     TestState::new(mode, [first, second], [p, q])
                 }
+                (Mode::Torsion, Some(&[stretch, shear, torque, force])) => {
+                    TestState::new(mode, TwistedCylinder { stretch, shear }.surface(), [torque, force])
+                }
                 (Mode::SimpleShear, Some(&[amount, stress])) => TestState::simple_shear(amount, stress),
-                (_, Some(&[stretch, nominal])) if mode != Mode::Biaxial => {
+                (_, Some(&[stretch, nominal])) if ![Mode::Biaxial, Mode::Torsion].contains(&mode) => {
                     TestState::new(mode, [stretch, mode.second_stretch(stretch)], [nominal, 0.0])
                 }
                 _ => {
                     return Err(value(format!(
-                        "{name}: found {} columns; allowed: 2, of biaxial tests 4",
+                        "{name}: found {} columns; allowed: 2, of biaxial tests and torsion 4",
                         row.len()
                     )));
                 }

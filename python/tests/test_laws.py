@@ -154,6 +154,24 @@ def test_a_fit_to_treloar(root):
         polymech.fit("gent", {"unaxial": (stretch, nominal)})
 
 
+def test_torsion():
+    """Mooney–Rivlin torsion in closed form: M = πψR⁴(C₁ + C₂), N = −½πψ²R⁴(C₁ + 2C₂); its fit returns it."""
+    law = Law("mooney-rivlin", 2e5, 5e4)
+    twist, radius = np.linspace(-100, 300, 9), 5e-3
+    torque, force = law.torsion(twist, radius)
+    assert np.allclose(torque, np.pi * twist * radius**4 * 2.5e5, rtol=1e-9)
+    assert np.allclose(force, -np.pi / 2 * twist**2 * radius**4 * 3e5, rtol=1e-9)
+    fit = polymech.fit("mooney-rivlin", {"torsion": (twist, torque, radius, force)})
+    assert np.allclose([float(value) for value in fit.parameters.values()], [2e5, 5e4], rtol=1e-5)
+    held = law.torsion(twist, radius, 1.3)
+    again = polymech.fit("neo-hookean", {"torsion": (twist, held[0], radius, 0.0, 1.3)})
+    assert np.isclose(float(again.parameters["shear_modulus"]), 2 * (2e5 + 5e4 / 1.3), rtol=1e-6)
+    with pytest.raises(ValueError, match="allowed: twist, torque, radius"):
+        polymech.fit("gent", {"torsion": (twist, torque)})
+    with pytest.raises(ValueError, match="allowed: above 0"):
+        polymech.fit("gent", {"torsion": (twist, torque, -radius)})
+
+
 def test_laws_are_pickled():
     law = Law("gent", 3e5, 80.0, volumetric=("quadratic", 1e6))
     again = pickle.loads(pickle.dumps(law))

@@ -63,7 +63,8 @@ fn a_volumetric_test_gives_the_bulk_modulus() {
 fn materials_of_other_programs() {
     let folder = tempfile::tempdir().unwrap();
     let [scene, output] = ["case.toml", "out"].map(|name| folder.path().join(name).display().to_string());
-    let laws = "cards = [\"ansys\", \"ls-dyna\", \"febio\"]\nlaws = [\"neo-hookean\", \"arruda-boyce\"]";
+    let laws =
+        "cards = [\"ansys\", \"ls-dyna\", \"febio\", \"moose\"]\nlaws = [\"neo-hookean\", \"arruda-boyce\"]";
     std::fs::write(&scene, SCENE.replace("laws = [\"neo-hookean\"]", laws)).unwrap();
     let law = |l: f64| 0.5 * (l - l.powi(-2)) * (1.0 + 0.02 * (l * l + 2.0 / l - 3.0));
     let rows: String = [1.5, 2.0, 3.0, 4.0].iter().map(|l| format!("{l},{}\n", law(*l))).collect();
@@ -75,6 +76,7 @@ fn materials_of_other_programs() {
         ("materials_mm.mac", &["! units mm, N, MPa", "TB,HYPER,1,1,1,NEO", "TB,HYPER,2,1,1,BOYCE"][..]),
         ("materials_si.mac", &["! units m, N, Pa", "100 times the shear modulus"]),
         ("materials_mm.k", &["*MAT_077_H+", "$ LS-DYNA has no law `arruda-boyce`"]),
+        ("materials_mm.i", &["type = ComputeNeoHookeanStress", "# MOOSE has no law `arruda-boyce`"]),
         ("materials_si.feb", &["type=\"Mooney-Rivlin\"", "<!-- FEBio has no law `arruda-boyce` -->"]),
     ] {
         let text = read(name);
@@ -97,4 +99,33 @@ fn files_without_a_law_are_refused() {
     assert_eq!(result.status.code(), Some(2));
     let shown = String::from_utf8_lossy(&result.stderr);
     assert!(shown.contains("no `*HYPERELASTIC`"), "{shown}");
+}
+
+/// Two terms of a volumetric test: all in the card of a kind that has them, named in that of another.
+#[test]
+fn terms_of_a_volumetric_test_are_not_dropped() {
+    let folder = tempfile::tempdir().unwrap();
+    let [scene, output] = ["case.toml", "out"].map(|name| folder.path().join(name).display().to_string());
+    let laws = "cards = [\"febio\"]\nlaws = [\"neo-hookean\", \"reduced-polynomial-2\"]";
+    let volumetric = "[[volumetric]]\nname = \"bulk\"\nfile = \"bulk.csv\"\nterms = 2\n";
+    let text = SCENE.replace("laws = [\"neo-hookean\"]", laws) + volumetric;
+    std::fs::write(&scene, text).unwrap();
+    let law = |l: f64| 0.5 * (l - l.powi(-2)) * (1.0 + 0.02 * (l * l + 2.0 / l - 3.0));
+    let rows: String = [1.5, 2.0, 3.0, 4.0].iter().map(|l| format!("{l},{}\n", law(*l))).collect();
+    std::fs::write(folder.path().join("bar.csv"), format!("stretch,nominal_MPa\n{rows}")).unwrap();
+    // p = −2 (J − 1)/D₁ − 4 (J − 1)³/D₂
+    let pressure = |j: f64| -2.0 * (j - 1.0) / 1e-3 - 4.0 * (j - 1.0).powi(3) / 1e-5;
+    let rows: String = [0.99, 0.97, 0.95].iter().map(|j| format!("{},{j}\n", pressure(*j))).collect();
+    std::fs::write(folder.path().join("bulk.csv"), format!("pressure [MPa],J\n{rows}")).unwrap();
+    let result = polycore(&["run", &scene, "--output", &output]);
+    assert!(result.status.success(), "{}", String::from_utf8_lossy(&result.stderr));
+    let read = |name: &str| std::fs::read_to_string(folder.path().join("out").join(name)).unwrap();
+    let deck = read("materials_mm.inp");
+    assert!(deck.contains("*HYPERELASTIC, REDUCED POLYNOMIAL, N=2"), "{deck}");
+    assert!(deck.contains(", 1.000000e-3, 1.000000e-5\n"), "{deck}");
+    let note = "left out: D2 = 1.000000e-5; this material has D1 alone";
+    assert!(deck.contains(&format!("** {note}\n*MATERIAL, NAME=NEO_HOOKEAN")), "{deck}");
+    assert_eq!(read("materials_mm.feb").matches(note).count(), 2);
+    assert!(read("materials_si.inp").contains(", 1.000000e-9, 1.000000e-11\n"));
+    assert!(read("materials.toml").contains("# volumetric test `bulk`, 2/D1 of 2 terms"));
 }

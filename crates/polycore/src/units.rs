@@ -339,6 +339,8 @@ dimensions! {
     MolarMass, MolarMassDimension: exponents!(molar_mass), "a molar mass", "kg/mol", "10 kg/mol";
     /// An energy (a torque has the same dimension).
     Energy, EnergyDimension: exponents!(energy), "an energy", "J", "1 J";
+    /// A torque.
+    Torque, TorqueDimension: exponents!(energy), "a torque", "N m", "30 N mm";
     /// A power.
     Power, PowerDimension: exponents!(power), "a power", "W", "21 W";
     /// A power per mass, as calorimeters measure it.
@@ -368,6 +370,8 @@ dimensions! {
         "a diffusivity", "m^2/s", "0.11 mm^2/s";
     /// A plane angle; needs its unit.
     Angle, AngleDimension: [0, 0, 0, 0, 0, 0, 0, 1], "an angle", "rad", "90 deg";
+    /// An angle per length.
+    Twist, TwistDimension: [-1, 0, 0, 0, 0, 0, 0, 1], "an angle per length", "rad/m", "2 deg/mm";
 }
 
 /// `a stress`, or the coherent SI unit where the dimension has no name.

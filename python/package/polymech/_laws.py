@@ -191,6 +191,17 @@ class Law:
         """Nominal stresses (…, 2), Pa, of a wide incompressible strip stretched to λ: along the load and along the width."""
         return self.biaxial(stretch, 1.0)
 
+    def torsion(self, twist: ArrayLike, radius: ArrayLike, stretch: ArrayLike = 1.0) -> tuple[Array, Array]:
+        """Torque M, N m, and axial force N, N, of an incompressible solid cylinder, held at a stretch and twisted.
+
+        `twist` is the angle per undeformed length, rad/m, `radius` the undeformed one, m. N is below 0 if the cylinder pushes.
+        """
+        given = [np.asarray(x, dtype=float) for x in (twist, radius, stretch)]
+        turn, size, held = np.broadcast_arrays(*given)
+        found = self._law.torsion(flat(held)[0], flat(np.abs(turn) * size)[0])
+        torque, force = (found[:, i].reshape(turn.shape) for i in (0, 1))
+        return np.sign(turn) * torque * np.pi * size**3 / 2, force * np.pi * size**2
+
     def energy(self, deformation: ArrayLike) -> Array:
         """W(F), J/m³, (…) for F (…, 3, 3)."""
         return self._of("energy", deformation)[..., 0]
@@ -233,12 +244,27 @@ class Fit:
     """Draws of the parameters from their posterior, (draws, parameters)."""
 
 
+def _torsion(columns: tuple[ArrayLike, ...]) -> tuple[ArrayLike, ...]:
+    """Converts twist, torque, radius, axial force, stretch to λ, ψR, 2M/(πR³), N/(πR²)."""
+    if not 3 <= len(columns) <= 5:
+        raise ValueError(f"torsion: found {len(columns)} columns; allowed: twist, torque, radius and, if known, axial force and stretch")
+    given = [np.asarray(column, dtype=float) for column in (*columns, *(0.0, 1.0)[len(columns) - 3 :])]
+    twist, torque, radius, force, stretch = np.broadcast_arrays(*given)
+    if not ((radius > 0).all() and (stretch > 0).all()):
+        raise ValueError("torsion: found a radius or a stretch of 0 or below; allowed: above 0")
+    sign = np.where(twist < 0, -1.0, 1.0)
+    return stretch, np.abs(twist) * radius, sign * 2 * torque / (np.pi * radius**3), force / (np.pi * radius**2)
+
+
 def fit(model: str, tests: Mapping[str, tuple[ArrayLike, ...]]) -> Fit:
     """Fits a law to tests: ``fit("ogden-2", {"uniaxial": (stretch, stress), "equibiaxial": …, "pure-shear": …})``.
 
-    Nominal stresses in Pa, (N,), at stretches (N,), of ``"simple-shear"`` at amounts of shear; for ``"biaxial"`` tests four columns: λ₁, λ₂, P₁, P₂. A stress of exactly 0 is a
-    condition, not a measurement. Least squares of the stresses by Levenberg–Marquardt from several starts.
+    Nominal stresses in Pa, (N,), at stretches (N,), of ``"simple-shear"`` at amounts of shear; for ``"biaxial"`` tests four columns: λ₁, λ₂, P₁, P₂; for
+    ``"torsion"`` of solid cylinders twist (angle per undeformed length, rad/m), torque (N m), undeformed radius (m) and, if known, axial force (N) and
+    held stretch, each an array or a number. A stress of exactly 0 is a condition, not a measurement. Least squares of the
+    stresses by Levenberg–Marquardt from several starts.
     """
+    tests = {name: _torsion(columns) if name == "torsion" else columns for name, columns in tests.items()}
     rows = [(name, np.column_stack([np.asarray(c, dtype=np.float64) for c in columns])) for name, columns in tests.items()]
     found = _polymech.fit_law(model, [(name, np.ascontiguousarray(table)) for name, table in rows])
     parameters = {name: Value(value, unit) for name, unit, value, _ in found["parameters"]}

@@ -37,7 +37,7 @@ pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
                     let parameters = fit.parameters.iter();
                     let scale = |unit: &str| if unit == "Pa" { pascals } else { 1.0 };
                     let scaled: Vec<f64> = parameters.map(|of| of.value / scale(of.unit)).collect();
-                    let bulk = set.bulk.modulus(fit.law.shear_modulus()) / pascals;
+                    let compliances = set.bulk.compliances(fit.law.shear_modulus(), pascals);
                     let origin = match measured {
                         true => format!("; K: {}", set.bulk.origin(fit.law.shear_modulus())),
                         false => String::new(),
@@ -47,7 +47,7 @@ pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
                         "**\n** {} fitted to {}{origin}\n{}",
                         fit.model.key,
                         set.name,
-                        card(fit.model.key, &scaled, bulk)
+                        card(fit.model.key, &scaled, &compliances)
                     )?;
                 }
             }
@@ -70,7 +70,7 @@ pub fn write_hosts(directory: &Path, all: &[TableFits], hosts: &[CardProgram]) -
             let (key, shear) = (fit.model.key, fit.law.shear_modulus());
             let scale = |unit: &str| if unit == "Pa" { pascals } else { 1.0 };
             let scaled: Vec<f64> = fit.parameters.iter().map(|of| of.value / scale(of.unit)).collect();
-            text += &match host.card(id, key, &scaled, set.bulk.modulus(shear) / pascals) {
+            text += &match host.card(id, key, &scaled, &set.bulk.compliances(shear, pascals)) {
                 Some(card) => {
                     let origin = set.bulk.origin(shear);
                     host.comment(&format!("{key} fitted to {}; K: {origin}", set.name)) + &card
@@ -116,7 +116,7 @@ mod tests {
             ),
             ("gent", &[0.3, 75.0], "*USER MATERIAL, CONSTANTS=3\n4.000000e1, 3.000000e-1, 7.500000e1\n"),
         ] {
-            let found = card(key, parameters, 40.0);
+            let found = card(key, parameters, &[0.05]);
             assert!(found.ends_with(expected), "{found}");
         }
     }

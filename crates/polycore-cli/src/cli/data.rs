@@ -1,4 +1,4 @@
-//! Tables of homogeneous states to which laws are fitted: entries of a scene, checks.
+//! Tables of measured states to which laws are fitted: entries of a scene, checks.
 
 use std::path::PathBuf;
 
@@ -6,10 +6,13 @@ use harness::scene::{SceneError, Source};
 use polycore::constitutive::hyperelastic::data::{Mode, TestData};
 use polycore::constitutive::hyperelastic::fit::neo_hookean_modulus;
 use polycore::constitutive::hyperelastic::ranking::{ModeTable, modes};
-use polycore::constitutive::hyperelastic::{Deviation, StrainMeasure, TestFormat, TestStressMeasure};
+use polycore::constitutive::hyperelastic::{
+    Deviation, StrainMeasure, TestCylinder, TestFormat, TestStressMeasure,
+};
+use polycore::units::Length;
 use serde::Deserialize;
 
-/// Table of homogeneous states.
+/// Table of measured states.
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TestTableSpec {
@@ -51,6 +54,12 @@ pub struct TestTableSpec {
     weight_column: Option<String>,
     /// Weight of the squares of this table among `tables` that are fitted at once.
     weight: Option<f64>,
+    /// Undeformed radius of the cylinder of a test of `mode = "torsion"`.
+    radius: Option<Length>,
+    /// Its undeformed length, for a column of angles.
+    length: Option<Length>,
+    /// Its length held in the test over the undeformed one, 1 if not given; or a column `stretch`.
+    stretch: Option<f64>,
 }
 
 /// Table to be fitted.
@@ -85,6 +94,7 @@ impl TestTableSpec {
         if above.iter().any(|other| other.name == self.name) {
             return Err(source.error(&key("name"), format!("`{}` a second time", self.name), "another name"));
         }
+        self.check_cylinder(source, &key)?;
         let rank = self.rank;
         if let Some(weight) = self.weight.filter(|weight| !(*weight > 0.0 && weight.is_finite())) {
             return Err(source.error(&key("weight"), weight, "a number above 0"));
@@ -107,6 +117,44 @@ impl TestTableSpec {
         Ok(set)
     }
 
+    /// Checks that a table of torsion has its cylinder, and no other table one.
+    fn check_cylinder(&self, source: &Source, key: &dyn Fn(&str) -> String) -> Result<(), SceneError> {
+        let is_torsion = self.mode == Some(Mode::Torsion);
+        let lengths = [("radius", self.radius), ("length", self.length)];
+        let sizes = lengths.map(|(name, length)| (name, length.map(Length::si)));
+        for (name, size) in sizes.into_iter().chain([("stretch", self.stretch)]) {
+            let Some(size) = size else { continue };
+            if !is_torsion {
+                let why = "is of a test of `mode = \"torsion\"`; remove it, or set that mode";
+                return Err(source.unexpected(&key(name), why));
+            }
+            if !(size > 0.0 && size.is_finite()) {
+                return Err(source.error(&key(name), size, "a number above 0"));
+            }
+        }
+        if !is_torsion {
+            return Ok(());
+        }
+        if self.radius.is_none() {
+            let why = "needed with `mode = \"torsion\"`: the undeformed radius, as \"5 mm\"";
+            return Err(source.missing(&key("radius"), why));
+        }
+        for (name, is_given) in [
+            ("strain", self.strain.is_some()),
+            ("stress", self.stress.is_some()),
+            ("stress_unit", self.stress_unit.is_some()),
+            ("strain_column", self.strain_column.is_some()),
+            ("stress_column", self.stress_column.is_some()),
+            ("tests", !self.tests.is_empty()),
+        ] {
+            if is_given {
+                let why = "a table of torsion has `twist [rad/m]` or `angle [deg]`, and `torque [N mm]`";
+                return Err(source.unexpected(&key(name), why));
+            }
+        }
+        Ok(())
+    }
+
     fn read_file(self, source: &Source, key: &dyn Fn(&str) -> String) -> Result<DataSet, SceneError> {
         let deviation = |text: &String| {
             Deviation::parse(text)
@@ -126,6 +174,11 @@ impl TestTableSpec {
             weight_column: self.weight_column,
             deviation_column: self.deviation_column,
             deviation: self.deviation.as_ref().map(deviation).transpose()?,
+            cylinder: self.radius.map(|radius| TestCylinder {
+                radius: radius.si(),
+                length: self.length.map(Length::si),
+                stretch: self.stretch,
+            }),
         };
         let reading = TestData::read_as(source.file(self.file.unwrap_or_default()), &format)
             .map_err(|error| source.refused(&key("file"), error))?;
@@ -162,6 +215,7 @@ impl TestTableSpec {
             self.deviation_column.is_some(),
             self.deviation.is_some(),
             self.weight.is_some(),
+            self.radius.is_some() || self.length.is_some() || self.stretch.is_some(),
         ];
         if self.tables.is_empty() || read.contains(&true) {
             let allowed = "the `file` of a table, or `tables` alone, names of tables above to fit at once";

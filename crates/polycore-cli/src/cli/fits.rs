@@ -12,7 +12,7 @@ use polycore::constitutive::hyperelastic::data::{Mode, TestData, TestState};
 use polycore::constitutive::hyperelastic::fit::{
     Agreement, Fit, FittedParameter, Identifiability, fit_until,
 };
-use polycore::constitutive::hyperelastic::{Coverage, Hyperelastic, homogeneous, stability};
+use polycore::constitutive::hyperelastic::{Coverage, Hyperelastic, TwistedCylinder, stability};
 
 use super::MPA;
 use super::data::DataSet;
@@ -177,10 +177,7 @@ fn record_cross(
     law: &dyn Hyperelastic,
     table: &TestData,
 ) -> Result<Option<Agreement>, Error> {
-    let locks = |state: &&TestState| {
-        let [a, b] = state.stretches;
-        matches!(homogeneous::biaxial(law, a, b), Err(constitutive::Error::Locked { .. }))
-    };
+    let locks = |state: &&TestState| matches!(state.predict(law), Err(constitutive::Error::Locked { .. }));
     let locked = table.states.iter().filter(locks).count();
     report.value(q::LOCKED.named(&[key]), locked as f64);
     if locked > 0 {
@@ -284,12 +281,18 @@ fn write_draws(directory: &Path, name: &str, fit: &Fit) -> Result<(), Error> {
     output::csv::write(directory.join(format!("{name}_{}_posterior.csv", fit.model.key)), &columns)
 }
 
-/// Writes `<data>_states.csv`: the measured states, and beside them the predictions of every law.
+/// Writes `<data>_states.csv`: the measured states, and beside them the predictions of every law; of torsion
+/// the stretches at the surface, the shear there, 2M/(πR³) and N/(πR²).
 fn write_states(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) -> Result<(), Error> {
     let mut columns: Vec<(String, &str, Vec<f64>)> = Vec::new();
     for i in [0, 1] {
         let stretches = table.states.iter().map(|state| state.stretches[i]).collect();
         columns.push((format!("stretch_{}", i + 1), "", stretches));
+    }
+    let cylinders: Vec<Option<TwistedCylinder>> = table.states.iter().map(TestState::cylinder).collect();
+    if cylinders.iter().any(Option::is_some) {
+        let shears = cylinders.iter().map(|one| one.map_or(f64::NAN, |one| one.shear)).collect();
+        columns.push(("shear".to_owned(), "", shears));
     }
     for i in [0, 1] {
         let nominal = table.states.iter().map(|state| state.nominal[i] / MPA).collect();
@@ -298,7 +301,7 @@ fn write_states(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) ->
     for fit in fits {
         let mut found = Vec::new();
         for state in &table.states {
-            found.push(homogeneous::biaxial(&fit.law, state.stretches[0], state.stretches[1])?);
+            found.push(state.predict(&fit.law)?);
         }
         for i in [0, 1] {
             let nominal = found.iter().map(|nominal| nominal[i] / MPA).collect();
@@ -307,7 +310,7 @@ fn write_states(directory: &Path, name: &str, table: &TestData, fits: &[Fit]) ->
     }
     let columns: Vec<output::csv::Column<'_>> =
         columns.iter().map(|(name, unit, data)| (name.as_str(), *unit, data.as_slice())).collect();
-    output::csv::write(directory.join(format!("{name}_states.csv")), &columns)
+    output::csv::write_with_gaps(directory.join(format!("{name}_states.csv")), &columns)
 }
 
 /// Summary of a run: layout of the files, rms by law and table, verdicts, parameters, a material block for

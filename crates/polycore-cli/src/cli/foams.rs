@@ -244,7 +244,7 @@ fn end_of(test: &FoamTest) -> f64 {
 /// Formats the law as `*HYPERFOAM`, in MPa.
 fn card(key: &str, law: &Hyperfoam) -> String {
     let values = law.terms().iter().flat_map(|term| [term.modulus / MPA, term.exponent, term.beta]);
-    format!("**\n{}", deck::card(key, &values.collect::<Vec<_>>(), f64::INFINITY))
+    format!("**\n{}", deck::card(key, &values.collect::<Vec<_>>(), &[]))
 }
 
 #[cfg(test)]

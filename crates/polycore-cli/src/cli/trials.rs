@@ -130,9 +130,10 @@ pub fn check(source: &Source, trials: &[FitTrial]) -> Result<(), SceneError> {
             let all: Vec<&str> = hyperelastic::MODELS.iter().map(|model| model.key).collect();
             return Err(source.error(&key("law"), format!("`{}`", trial.law), all.join(", ")));
         };
-        if trial.mode == Mode::SimpleShear {
-            let allowed = "uniaxial, equibiaxial, pure-shear: simple shear is pure shear but for a rotation";
-            return Err(source.error(&key("mode"), "simple-shear", allowed));
+        if !Mode::TESTS.contains(&trial.mode) {
+            let allowed = "uniaxial, equibiaxial, pure-shear: simple shear is pure shear but for a rotation, \
+                           and torsion has states of many stretches";
+            return Err(source.error(&key("mode"), trial.mode.name(), allowed));
         }
         match (&trial.data, &trial.parameters) {
             (Some(_), Some(_)) => {

@@ -94,10 +94,23 @@ impl Bulk<'_> {
         }
     }
 
+    /// Dᵢ of the volumetric energy Σ (J − 1)²ⁱ/Dᵢ of a law with a shear modulus (Pa), in the reciprocal of a
+    /// unit of stress.
+    pub fn compliances(self, shear: f64, unit: f64) -> Vec<f64> {
+        match self {
+            Self::Measured(set) => set.fit.compliances.iter().map(|d| d * unit).collect(),
+            Self::Assumed => vec![2.0 / (self.modulus(shear) / unit)],
+        }
+    }
+
     /// Origin of K, for a comment.
     pub fn origin(self, shear: f64) -> String {
         match self {
-            Self::Measured(set) => format!("volumetric test `{}`", set.name),
+            Self::Measured(set) => {
+                let terms = set.fit.compliances.len();
+                let first = if terms > 1 { format!(", 2/D1 of {terms} terms") } else { String::new() };
+                format!("volumetric test `{}`{first}", set.name)
+            }
             Self::Assumed => format!(
                 "{BULK_RATIO} times the shear modulus of {}: these tests do not determine it",
                 stress(shear, DIGITS)

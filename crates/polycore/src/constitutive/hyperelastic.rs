@@ -60,6 +60,9 @@ pub mod ranking;
 pub mod stability;
 #[cfg(feature = "tables")]
 mod table;
+pub mod torsion;
+#[cfg(feature = "tables")]
+mod torsion_table;
 mod van_der_waals;
 #[cfg(feature = "tables")]
 mod weights;
@@ -84,6 +87,9 @@ pub use polynomial::{MooneyRivlin, NeoHookean};
 pub use principal::PrincipalResponse;
 #[cfg(feature = "tables")]
 pub use table::{ImportedTest, TestFormat};
+pub use torsion::TwistedCylinder;
+#[cfg(feature = "tables")]
+pub use torsion_table::TestCylinder;
 pub use van_der_waals::VanDerWaals;
 #[cfg(feature = "tables")]
 pub use weights::Deviation;

@@ -1,7 +1,7 @@
 //! Strain and stress columns of a table, recognised by their headings.
 
 use super::data::Mode;
-use crate::table::{Heading, plainly};
+use crate::table::{Error, Heading, Table, plainly};
 use crate::units::Unit;
 use crate::units::dimension::{RatioDimension, StressDimension};
 
@@ -172,5 +172,95 @@ pub(super) fn mode(cell: &str) -> Option<(Mode, bool)> {
         Some((Mode::Uniaxial, compression))
     } else {
         None
+    }
+}
+
+/// Column and its measure.
+#[derive(Clone)]
+pub(super) struct TestColumn<M> {
+    pub column: usize,
+    pub measure: M,
+    /// True if the heading does not name the measure.
+    pub assumed: bool,
+    pub compressive: bool,
+    pub unit: Option<String>,
+}
+
+const LAYOUTS: &str = "a strain (`stretch`, `strain [%]`) and a stress (`nominal [MPa]`), with a `mode` in \
+                       each row if there are several tests, or `stretch_1`, `stretch_2`, `nominal_1 [MPa]`, \
+                       `nominal_2 [MPa]`; torsion: `mode = \"torsion\"`, `radius`";
+
+/// Column to be found.
+pub(super) struct Wanted<'a, M> {
+    pub key: &'static str,
+    pub name: Option<&'a str>,
+    pub measure: Option<M>,
+    pub of: &'a dyn Fn(ColumnKind) -> Option<Option<M>>,
+    pub order: &'a [M],
+    pub assumed: M,
+}
+
+/// Finds a column of a table by the roles of its headings, on an axis if one is given.
+///
+/// # Errors
+/// None or several such columns, one that is named and missing.
+pub(super) fn choose<M: Copy + PartialEq>(
+    file: &Table,
+    roles: &[Option<Role>],
+    axis: Option<usize>,
+    wanted: &Wanted<M>,
+) -> Result<TestColumn<M>, Error> {
+    let key = wanted.key;
+    let chosen = |column: usize, measure: Option<M>, role: Option<&Role>| TestColumn {
+        column,
+        measure: wanted.measure.or(measure).unwrap_or(wanted.assumed),
+        assumed: wanted.measure.or(measure).is_none(),
+        compressive: role.is_some_and(|role| role.compressive),
+        unit: role.map_or_else(|| file.headings[column].unit.clone(), |role| role.unit.clone()),
+    };
+    if let Some(name) = wanted.name {
+        let same = |i: &usize| {
+            let heading = &file.headings[*i];
+            heading.text == name || heading.name == name || heading.plain == plainly(name)
+        };
+        let number = name.parse::<usize>().ok().filter(|number| (1..=roles.len()).contains(number));
+        let several = (0..roles.len()).filter(same).count() > 1;
+        if several {
+            let allowed =
+                format!("the number of one of the columns `{name}` as `{key}_column`: \"1\" is the first");
+            return Err(file.refuse_headings(allowed));
+        }
+        let Some(column) = (0..roles.len()).find(same).or(number.map(|number| number - 1)) else {
+            return Err(file.refuse_headings(format!("the heading `{name}` of `{key}_column`")));
+        };
+        let role = roles[column].as_ref();
+        return Ok(chosen(column, role.and_then(|role| (wanted.of)(role.what)).flatten(), role));
+    }
+    let all: Vec<(usize, Option<M>, &Role)> = roles
+        .iter()
+        .enumerate()
+        .filter_map(|(i, role)| role.as_ref().map(|role| (i, role)))
+        .filter(|(_, role)| axis.is_none() || role.axis == axis)
+        .filter_map(|(i, role)| Some((i, (wanted.of)(role.what)?, role)))
+        .collect();
+    let of = |measure: Option<M>| all.iter().filter(move |one| one.1 == measure).collect::<Vec<_>>();
+    // named measures in their order, then those that name none, then the last; the key before all
+    let mut order: Vec<Option<M>> = wanted.order.iter().copied().map(Some).collect();
+    order.insert(order.len() - 1, None);
+    if let Some(asked) = wanted.measure {
+        order.splice(0..0, [Some(asked), None]);
+    }
+    let found = order.into_iter().map(of).find(|found| !found.is_empty()).unwrap_or_default();
+    match found[..] {
+        [(column, measure, role)] => Ok(chosen(*column, *measure, Some(role))),
+        [] => {
+            let raw = roles.iter().flatten().any(|role| role.what == ColumnKind::Raw);
+            let advice = "; divide forces by the undeformed area and displacements by the free length";
+            Err(file.refuse_headings(format!("{LAYOUTS}{}", if raw { advice } else { "" })))
+        }
+        _ => Err(file.refuse_headings(format!(
+            "one {key}, or `{key}_column = \"…\"` in the data's entry with one of these headings, or its \
+             number"
+        ))),
     }
 }

@@ -24,7 +24,7 @@ impl Coverage {
     pub fn new(table: &TestData) -> Result<Self, Error> {
         let mut points = vec![[0.0; 2]];
         for state in &table.states {
-            points.push(place(state.principal_stretches()?));
+            points.extend(state.bounding_stretches()?.into_iter().map(place));
         }
         let margin = MARGIN * points.iter().map(|[u, v]| u.hypot(*v)).fold(0.0, f64::max);
         points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));

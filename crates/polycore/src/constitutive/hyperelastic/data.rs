@@ -1,9 +1,11 @@
-//! Measured homogeneous states of an incompressible rubber.
+//! Measured states of an incompressible rubber: homogeneous ones, and twisted cylinders.
 
-use super::Error;
-use super::homogeneous::incompressible;
+use super::descriptor::Slopes;
+use super::homogeneous::{biaxial, incompressible};
+use super::torsion::TwistedCylinder;
+use super::{Error, Hyperelastic};
 
-/// Table of homogeneous states.
+/// Table of measured states.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TestData {
     /// Source of the numbers: the `# source:` line of the file, or empty.
@@ -39,6 +41,8 @@ pub enum Mode {
     /// of the state whose second stretch is λ₃ and whose free face is that of λ₂. `nominal` is (σ₁ − σ₂)/λ₁.
     #[serde(skip)]
     Difference,
+    /// [`TwistedCylinder`]: `stretches` are those at its surface, `nominal` is 2M/(πR³), N/(πR²).
+    Torsion,
 }
 
 impl Mode {
@@ -55,20 +59,22 @@ impl Mode {
             Self::Biaxial => "biaxial",
             Self::Component => "biaxial, one stress",
             Self::Difference => "biaxial, difference of true stresses",
+            Self::Torsion => "torsion",
         }
     }
 
-    /// λ₂ of a test at λ₁; for biaxial states, which define none, λ₁.
+    /// λ₂ of a test at λ₁, of torsion at fixed length; for biaxial states, which define none, λ₁.
     pub fn second_stretch(self, first: f64) -> f64 {
         match self {
             Self::Uniaxial => first.recip().sqrt(),
+            Self::Torsion => first.recip(),
             Self::PureShear | Self::SimpleShear => 1.0,
             Self::Equibiaxial | Self::Biaxial | Self::Component | Self::Difference => first,
         }
     }
 }
 
-/// Two principal stretches (λ₃ = 1/(λ₁λ₂)) and their nominal stresses.
+/// Two principal stretches (λ₃ = 1/(λ₁λ₂)) and their nominal stresses; of torsion as [`Mode::Torsion`] says.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TestState {
     /// Type of test.
@@ -159,6 +165,49 @@ impl TestState {
     /// [`Error::Deformation`] if one is not positive and finite.
     pub fn principal_stretches(&self) -> Result<[f64; 3], Error> {
         incompressible(self.stretches[0], self.stretches[1])
+    }
+
+    /// Computes P₁, P₂ of a law, of torsion 2M/(πR³), N/(πR²), Pa.
+    ///
+    /// # Errors
+    /// As [`biaxial`].
+    pub fn predict<L: Hyperelastic + ?Sized>(&self, law: &L) -> Result<[f64; 2], Error> {
+        match self.cylinder() {
+            Some(cylinder) => cylinder.stresses(law),
+            None => biaxial(law, self.stretches[0], self.stretches[1]),
+        }
+    }
+
+    /// Computes the same from a closed form, with derivatives.
+    pub(super) fn predict_slopes(&self, closed: Slopes, p: &[f64], slopes: &mut [[f64; 2]]) -> [f64; 2] {
+        let Some(cylinder) = self.cylinder() else { return closed(p, self.stretches, slopes) };
+        let mut part = vec![[0.0; 2]; slopes.len()];
+        let mut stresses = [0.0; 2];
+        slopes.fill([0.0; 2]);
+        let add = |sum: &mut [f64; 2], one: [f64; 2]| *sum = [sum[0] + one[0], sum[1] + one[1]];
+        for ring in cylinder.rings() {
+            add(&mut stresses, ring.observed(closed(p, ring.stretches, &mut part)));
+            slopes.iter_mut().zip(&part).for_each(|(sum, slope)| add(sum, ring.observed(*slope)));
+        }
+        stresses
+    }
+
+    /// The twisted cylinder of a state of torsion; `None` for homogeneous states.
+    pub fn cylinder(&self) -> Option<TwistedCylinder> {
+        (self.mode == Mode::Torsion).then(|| TwistedCylinder::from_surface(self.stretches))
+    }
+
+    /// Principal stretches of the strains that bound those of the body: its own, and of torsion those of the
+    /// axis.
+    ///
+    /// # Errors
+    /// As [`TestState::principal_stretches`].
+    pub fn bounding_stretches(&self) -> Result<Vec<[f64; 3]>, Error> {
+        let axis = self.cylinder().map(|cylinder| {
+            let stretch = cylinder.stretch;
+            incompressible(stretch, Mode::Uniaxial.second_stretch(stretch))
+        });
+        std::iter::once(self.principal_stretches()).chain(axis).collect()
     }
 
     /// State of simple shear by an amount γ at a shear stress τ = P₁₂ = σ₁₂, Pa: σ₁ − σ₃ = τ(λ + 1/λ).

@@ -77,10 +77,11 @@ impl DeckForm {
     }
 }
 
-/// Formats a law as a material, stresses in the host's unit: `*HYPERELASTIC` with D₁ = 2/K if hosts have the
-/// law (of `eight-chain` the five terms of `ARRUDA-BOYCE`, too soft near locking), `*HYPERFOAM` without
-/// `bulk`, otherwise the user material of crate `umat`. CalculiX has no `VAN DER WAALS`.
-pub fn card(key: &str, parameters: &[f64], bulk: f64) -> String {
+/// Formats a law as a material, stresses in the host's unit, with the Dᵢ of the volumetric energy
+/// Σ (J − 1)²ⁱ/Dᵢ, D₁ = 2/K: `*HYPERELASTIC` if hosts have the law (of `eight-chain` the five terms of
+/// `ARRUDA-BOYCE`, too soft near locking), `*HYPERFOAM` without Dᵢ, otherwise the user material of crate
+/// `umat`. Terms that the card has no place for are named in a comment. CalculiX has no `VAN DER WAALS`.
+pub fn card(key: &str, parameters: &[f64], compliances: &[f64]) -> String {
     let name = key.to_uppercase().replace('-', "_");
     let unlocked: Vec<f64>;
     let (key, parameters) = match (key, parameters) {
@@ -93,9 +94,17 @@ pub fn card(key: &str, parameters: &[f64], bulk: f64) -> String {
     if let Some(form) = FORMS.iter().find(|form| form.key == key) {
         let mut numbers = vec![0.0; form.coefficients + form.compliances()];
         form.places.iter().zip(parameters).for_each(|(&place, value)| numbers[place] = form.factor * value);
-        numbers[form.coefficients] = 2.0 / bulk;
+        let held = &mut numbers[form.coefficients..];
+        let terms = held.iter_mut().zip(compliances);
+        // a term without stiffness has D of 0
+        terms.for_each(|(place, d)| *place = if d.is_finite() { *d } else { 0.0 });
+        let note = match left_out(compliances, held.len()) {
+            Some(note) => format!("** {note}\n"),
+            None => String::new(),
+        };
         let order = if form.order > 0 { format!(", N={}", form.order) } else { String::new() };
-        return format!("*MATERIAL, NAME={name}\n*HYPERELASTIC, {}{order}\n{}", form.kind, lines(&numbers));
+        let kind = form.kind;
+        return format!("{note}*MATERIAL, NAME={name}\n*HYPERELASTIC, {kind}{order}\n{}", lines(&numbers));
     }
     if key.starts_with("hyperfoam") {
         let terms = parameters.chunks_exact(3);
@@ -103,13 +112,23 @@ pub fn card(key: &str, parameters: &[f64], bulk: f64) -> String {
         let numbers: Vec<f64> = terms.clone().flat_map(|term| [term[0], term[1]]).chain(ratios).collect();
         return format!("*MATERIAL, NAME={name}\n*HYPERFOAM, N={}\n{}", terms.len(), lines(&numbers));
     }
+    let bulk = compliances.first().map_or(f64::INFINITY, |d| 2.0 / d);
+    let note = left_out(compliances, 1).map_or_else(String::new, |note| format!("** {note}\n"));
     let numbers: Vec<f64> = std::iter::once(bulk).chain(parameters.iter().copied()).collect();
     let constants = numbers.len();
     format!(
-        "** of crate umat; in CalculiX NAME=USER_{name}\n*MATERIAL, NAME={name}\n*USER MATERIAL, \
+        "{note}** of crate umat; in CalculiX NAME=USER_{name}\n*MATERIAL, NAME={name}\n*USER MATERIAL, \
          CONSTANTS={constants}\n{}",
         lines(&numbers)
     )
+}
+
+/// Names the terms of a volumetric energy beyond those that a card holds; `None` if it holds all.
+pub(super) fn left_out(compliances: &[f64], held: usize) -> Option<String> {
+    let beyond = compliances.iter().enumerate().skip(held).filter(|(_, d)| d.is_finite());
+    let terms: Vec<String> = beyond.map(|(i, d)| format!("D{} = {d:.6e}", i + 1)).collect();
+    let first = if held == 1 { "D1".to_owned() } else { format!("D1 to D{held}") };
+    (!terms.is_empty()).then(|| format!("left out: {}; this material has {first} alone", terms.join(", ")))
 }
 
 /// Formats eight numbers per line.
@@ -225,7 +244,7 @@ fn rubber(options: &[String], order: usize, numbers: &[f64]) -> DeckLaw {
     let numbers = cells(numbers, form.coefficients + form.compliances())?;
     let (coefficients, compliances) = numbers.split_at(form.coefficients);
     if compliances[0] < 0.0 || compliances[1..].iter().any(|compliance| *compliance != 0.0) {
-        return Err("D1 of 0 or above, all other D 0".to_owned());
+        return Err("D1 of 0 or above, all other D 0: laws have K = 2/D1 alone".to_owned());
     }
     let parameters = form.places.iter().map(|&place| coefficients[place] / form.factor).collect();
     let bulk = (compliances[0] > 0.0).then(|| 2.0 / compliances[0]);
@@ -271,7 +290,7 @@ mod tests {
     fn every_law_returns_from_its_card() {
         let mut worst: f64 = 0.0;
         for model in MODELS.iter().chain(COMPRESSIBLE_MODELS) {
-            let text = card(model.key, model.example, 4e7);
+            let text = card(model.key, model.example, &[5e-8]);
             assert!(text.lines().all(|line| line.len() < 256), "{text}");
             let found = &parse("deck", &text).unwrap()[0];
             let expected: Vec<f64> = match model.key {
@@ -287,6 +306,31 @@ mod tests {
             assert_eq!(found.bulk.map(f64::round), bulk, "{text}");
         }
         evidence::at_most("parameters that return from a deck, relative", worst, 1e-6);
+    }
+
+    /// Dᵢ of a volumetric test stand where a kind has them, and are named where it has not.
+    #[test]
+    fn terms_of_the_volumetric_energy() {
+        let all = [0.05, 2e-3, 1e-4];
+        let yeoh = card("yeoh", &[0.2, 0.002, 5e-5], &all);
+        assert!(yeoh.ends_with("5.000000e-5, 5.000000e-2, 2.000000e-3, 1.000000e-4\n"), "{yeoh}");
+        assert!(!yeoh.contains("left out"), "{yeoh}");
+        assert!(parse("deck", &yeoh).unwrap_err().to_string().contains("all other D 0"));
+        let two = card("ogden-2", &[0.4, 2.0, 0.1, -1.5], &all);
+        assert!(
+            two.starts_with("** left out: D3 = 1.000000e-4; this material has D1 to D2 alone\n"),
+            "{two}"
+        );
+        assert!(two.ends_with("5.000000e-2, 2.000000e-3\n"), "{two}");
+        for key in ["neo-hookean", "gent"] {
+            let model = any_model(key).unwrap();
+            let one = card(key, model.example, &all);
+            let note = "** left out: D2 = 2.000000e-3, D3 = 1.000000e-4; this material has D1 alone\n";
+            assert!(one.starts_with(note), "{one}");
+            assert_eq!(parse("deck", &one).unwrap()[0].bulk.map(f64::round), Some(40.0));
+        }
+        // a term that the test does not have
+        assert!(card("ogden-2", &[0.4, 2.0, 0.1, -1.5], &[0.05, f64::INFINITY]).ends_with("0.000000e0\n"));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Least-squares fit of a law to homogeneous states.
+//! Least-squares fit of a law to measured states.
 //!
 //! The objective is the weighted sum of squares of the nominal-stress residuals, over every measured stress
 //! of the table (those that are not exactly zero; [`super::data::TestState::nominal`]); weights are 1 unless
@@ -14,7 +14,7 @@ use super::data::TestData;
 use super::descriptor::FitStart;
 pub use super::fit_map::{Identifiability, residuals};
 use super::fit_map::{ParameterMap, REJECTED};
-use super::{Error, Hyperelastic, ModelDescriptor, ModelKind, homogeneous};
+use super::{Error, Hyperelastic, ModelDescriptor, ModelKind};
 use crate::numerics::least_squares::{Optimum, levenberg_marquardt};
 
 /// A fitted law.
@@ -262,7 +262,7 @@ pub fn neo_hookean_modulus(table: &TestData) -> Result<f64, Error> {
     let unit = super::NeoHookean::new(1.0)?;
     let (mut model_data, mut model_model) = (0.0, 0.0);
     for state in &table.states {
-        let model = homogeneous::biaxial(&unit, state.stretches[0], state.stretches[1])?;
+        let model = state.predict(&unit)?;
         for axis in (0..2).filter(|&axis| state.nominal[axis] != 0.0) {
             let square = state.factor(axis).powi(2);
             model_data += square * model[axis] * state.nominal[axis];

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::data::{TestData, TestState};
 use super::descriptor::UNLIMITED;
-use super::{Domain, Error, Hyperelastic, ModelDescriptor, homogeneous};
+use super::{Domain, Error, Hyperelastic, ModelDescriptor};
 
 /// Verdict of the data on a fitted parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,7 +25,7 @@ pub enum Identifiability {
 pub fn residuals<L: Hyperelastic + ?Sized>(law: &L, table: &TestData) -> Result<Vec<f64>, Error> {
     let mut residuals = Vec::with_capacity(2 * table.states.len());
     for state in &table.states {
-        let nominal = homogeneous::biaxial(law, state.stretches[0], state.stretches[1])?;
+        let nominal = state.predict(law)?;
         let measured = (0..2).filter(|&axis| state.nominal[axis] != 0.0);
         residuals.extend(measured.map(|axis| state.factor(axis) * (nominal[axis] - state.nominal[axis])));
     }
@@ -124,7 +124,7 @@ impl<'a> ParameterMap<'a> {
         let residuals = match self.model.slopes {
             Some(slopes) => {
                 let mut unused = vec![[0.0; 2]; p.len()];
-                measured(table, |state| slopes(&p, state.stretches, &mut unused))
+                measured(table, |state| state.predict_slopes(slopes, &p, &mut unused))
                     .map(|(i, state, nominal)| state.factor(i) * (nominal[i] - state.nominal[i]))
                     .collect()
             }
@@ -143,7 +143,7 @@ impl<'a> ParameterMap<'a> {
             let mut of = vec![[0.0; 2]; p.len()];
             let mut row = 0;
             for state in &table.states {
-                slopes(&p, state.stretches, &mut of);
+                state.predict_slopes(slopes, &p, &mut of);
                 for axis in (0..2).filter(|&axis| state.nominal[axis] != 0.0) {
                     for (i, value) in values.iter().enumerate() {
                         rows[(row, i)] = state.factor(axis) * of[i][axis] * value.1 / self.modulus;

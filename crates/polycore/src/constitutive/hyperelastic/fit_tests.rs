@@ -1,5 +1,6 @@
 use super::*;
 use crate::constitutive::hyperelastic::data::{Mode, TestState};
+use crate::constitutive::hyperelastic::homogeneous;
 use crate::constitutive::hyperelastic::{MODELS, model};
 
 fn treloar() -> TestData {

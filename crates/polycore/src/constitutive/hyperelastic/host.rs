@@ -1,6 +1,8 @@
-//! Fitted laws as materials of Ansys, LS-DYNA and FEBio; those of Abaqus and CalculiX are in [`super::deck`].
+//! Fitted laws as materials of Ansys, LS-DYNA, FEBio and MOOSE; those of Abaqus and CalculiX are in
+//! [`super::deck`].
 
 use super::any_model;
+use super::deck::left_out;
 
 /// Finite-element program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
@@ -13,6 +15,8 @@ pub enum CardProgram {
     LsDyna,
     /// Uncoupled materials of version 3 and later.
     Febio,
+    /// `ComputeNeoHookeanStress` of its Lagrangian kernels.
+    Moose,
 }
 
 impl CardProgram {
@@ -22,6 +26,7 @@ impl CardProgram {
             Self::Ansys => "Ansys",
             Self::LsDyna => "LS-DYNA",
             Self::Febio => "FEBio",
+            Self::Moose => "MOOSE",
         }
     }
 
@@ -31,6 +36,7 @@ impl CardProgram {
             Self::Ansys => "mac",
             Self::LsDyna => "k",
             Self::Febio => "feb",
+            Self::Moose => "i",
         }
     }
 
@@ -40,20 +46,22 @@ impl CardProgram {
             Self::Ansys => format!("! {text}\n"),
             Self::LsDyna => format!("$ {text}\n"),
             Self::Febio => format!("<!-- {} -->\n", text.replace("--", "- -")),
+            Self::Moose => format!("# {text}\n"),
         }
     }
 
-    /// Formats a law as material number `id`, stresses in the host's unit; `None` if the program has no such
-    /// law. Energies are those of the Ansys Material Reference, 4.6 and Structural Analysis Guide, 8.4.1.2
-    /// (d = 2/K; Ogden's Σ μᵢ/αᵢ (Σ λ^αᵢ − 3)), of the LS-DYNA manual, volume II (the same of Ogden; K from
-    /// Poisson's ratio), and of FEBio's sources (Σ cᵢ/mᵢ² (Σ λ^mᵢ − 3), ½k ln²J). Its Arruda–Boyce differs
-    /// between versions, and none is written.
-    pub fn card(self, id: usize, key: &str, parameters: &[f64], bulk: f64) -> Option<String> {
-        match self {
-            Self::Ansys => ansys(id, key, parameters, bulk),
-            Self::LsDyna => ls_dyna(id, key, parameters, bulk),
-            Self::Febio => febio(id, key, parameters, bulk),
-        }
+    /// Formats a law as material number `id`, stresses in the host's unit, with the Dᵢ of the volumetric
+    /// energy Σ (J − 1)²ⁱ/Dᵢ; `None` if the program has no such law. Terms that the card has no place for are
+    /// named in a comment.
+    pub fn card(self, id: usize, key: &str, parameters: &[f64], compliances: &[f64]) -> Option<String> {
+        let bulk = compliances.first().map_or(f64::INFINITY, |d| 2.0 / d);
+        let (card, held) = match self {
+            Self::Ansys => ansys(id, key, parameters, compliances)?,
+            Self::LsDyna => (ls_dyna(id, key, parameters, bulk)?, 1),
+            Self::Febio => (febio(id, key, parameters, bulk)?, 1),
+            Self::Moose => (moose(id, key, parameters, bulk)?, 1),
+        };
+        Some(left_out(compliances, held).map_or_else(String::new, |note| self.comment(&note)) + &card)
     }
 }
 
@@ -80,8 +88,13 @@ fn is_series(key: &str) -> bool {
     key == "yeoh" || key.starts_with("reduced-polynomial-")
 }
 
-fn ansys(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
-    let d = 2.0 / bulk;
+/// Material, and the number of Dᵢ that it holds. Energies and order of constants are those of the Material
+/// Reference, 4.6, and the Structural Analysis Guide, 8.4.1.2 (d = 2/K; Ogden's Σ μᵢ/αᵢ (Σ λ^αᵢ − 3)). Seen
+/// elsewhere: NEO (μ = 2C₁₀, d), YEOH (all c, then all d) and the nine terms of the polynomial in Ansys' own
+/// converter of Abaqus decks (`src/ansys/meshing/prime/internals/utils.py` of ansys/pyprimemesh), the five of
+/// MOONEY in Ansys' example `techdemo-15` (ansys/pymapdl-examples), OGDEN (μ₁, α₁, μ₂, α₂, d₁) in the Guide's
+/// listing; BOYCE, GENT and ETUBE in the Reference alone.
+fn ansys(id: usize, key: &str, p: &[f64], compliances: &[f64]) -> Option<(String, usize)> {
     let (terms, option, mut constants) = match (key, p) {
         ("neo-hookean", _) => (1, "NEO", p.to_vec()),
         ("arruda-boyce", _) => (1, "BOYCE", p.to_vec()),
@@ -97,14 +110,19 @@ fn ansys(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
             (own.len(), "OGDEN", own.iter().flat_map(|[mu, alpha]| [2.0 * mu / alpha, *alpha]).collect())
         }
     };
-    constants.push(d);
+    // d₁ to d_N stand after the constants
+    let held = if ["YEOH", "OGDEN"].contains(&option) { terms } else { 1 };
+    let zero_if_soft = |d: &f64| if d.is_finite() { *d } else { 0.0 };
+    constants.extend(compliances.iter().take(held).map(zero_if_soft));
     let rows = constants.chunks(6).enumerate().map(|(i, row)| {
         let numbers: String = row.iter().map(|number| format!(",{number:.6e}")).collect();
         format!("TBDATA,{}{numbers}\n", 6 * i + 1)
     });
-    Some(format!("TB,HYPER,{id},1,{terms},{option}\n{}", rows.collect::<String>()))
+    Some((format!("TB,HYPER,{id},1,{terms},{option}\n{}", rows.collect::<String>()), held))
 }
 
+/// Order of constants by the manual, volume II, and by `mat_077_H.cfg` and `mat_077_O.cfg` of OpenRadioss:
+/// C10, C01, C11, C20, C02, C30; a row of μ, a row of α of Σ μᵢ/αᵢ (Σ λ^αᵢ − 3). K from Poisson's ratio.
 fn ls_dyna(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
     let shear = any_model(key).ok()?.law(p).ok()?.shear_modulus();
     let poisson = (3.0 * bulk - 2.0 * shear) / (6.0 * bulk + 2.0 * shear);
@@ -123,6 +141,10 @@ fn ls_dyna(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
     Some(format!("{keyword}\n{id:>20}{density:>20}{poisson:>20.12}{:>20}\n{}\n", 0, rows.join("\n")))
 }
 
+/// Names and energies of FEBio's sources, in J^(−1/3) F: c₁ (I₁ − 3) + c₂ (I₂ − 3) (`FEMooneyRivlin.cpp`),
+/// Σ cᵢ (I₁ − 3)ⁱ (`FEYeoh.cpp`), W₁ = ½ G Jm/(Jm − I₁ + 3) (`FEGentMaterial.cpp`), λ ∂W/∂λ = Σ cᵢ/mᵢ λ^mᵢ
+/// (`FEOgdenMaterial.cpp`), and ½k ln²J (`FEUncoupledMaterial.h`). Its Arruda–Boyce differs between versions,
+/// and none is written.
 fn febio(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
     let tags = |name: &str, values: &[f64]| -> Vec<(String, f64)> {
         (1..).zip(values).map(|(i, value)| (format!("{name}{i}"), *value)).collect()
@@ -143,6 +165,17 @@ fn febio(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
     let lines = constants.iter().map(|(tag, value)| format!("  <{tag}>{value:.6e}</{tag}>\n"));
     let lines: String = lines.collect();
     Some(format!("<material id=\"{id}\" name=\"{key}\" type=\"{kind}\">\n{lines}</material>\n"))
+}
+
+/// S = (λ ln J − μ) C⁻¹ + μ 1, i.e. W = ½μ(I₁ − 3) − μ ln J + ½λ ln²J, with λ = K − ⅔μ
+/// (`ComputeNeoHookeanStress.C` of MOOSE's solid_mechanics): its only law of a rubber.
+fn moose(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
+    let ("neo-hookean", &[modulus]) = (key, p) else { return None };
+    let lame = bulk - 2.0 / 3.0 * modulus;
+    Some(format!(
+        "[Materials]\n  [neo_hookean_{id}]\n    type = ComputeNeoHookeanStress\n    lambda = \
+         {lame:.6e}\n    mu = {modulus:.6e}\n    large_kinematics = true\n  []\n[]\n"
+    ))
 }
 
 #[cfg(test)]
@@ -209,6 +242,8 @@ mod tests {
                     _ => rows[0].iter().zip(&rows[1]).map(|(mu, alpha)| mu / alpha * powers(*alpha)).sum(),
                 }
             }
+            // of F with J = 1
+            CardProgram::Moose => 0.5 * numbers(card)[1] * x,
             CardProgram::Febio => {
                 let c = numbers(&card[head.len()..]);
                 match head.split("type=\"").nth(1).unwrap().split('"').next().unwrap() {
@@ -228,11 +263,15 @@ mod tests {
     #[test]
     fn cards_have_the_energies_of_their_laws() {
         let mut worst: f64 = 0.0;
-        for (host, expected) in [(CardProgram::Ansys, 16), (CardProgram::LsDyna, 9), (CardProgram::Febio, 11)]
-        {
+        for (host, expected) in [
+            (CardProgram::Ansys, 16),
+            (CardProgram::LsDyna, 9),
+            (CardProgram::Febio, 11),
+            (CardProgram::Moose, 1),
+        ] {
             let mut count = 0;
             for model in MODELS {
-                let Some(card) = host.card(3, model.key, model.example, 4e7) else { continue };
+                let Some(card) = host.card(3, model.key, model.example, &[5e-8]) else { continue };
                 let law = model.law(model.example).unwrap().energy_at(STRETCHES).unwrap();
                 worst = worst.max((energy(host, &card) / law - 1.0).abs());
                 count += 1;
@@ -242,21 +281,32 @@ mod tests {
         evidence::at_most("energies of cards by their programs' formulas, relative", worst, 5e-6);
     }
 
-    /// K = 40 MPa: d = 2/K; ν from K and μ = 0.4 MPa.
+    /// K = 40 MPa: d = 2/K; ν, λ = K − ⅔μ from K and μ = 0.4 MPa.
     #[test]
     fn bulk_moduli_in_the_form_of_each_program() {
-        let card = |host: CardProgram| host.card(1, "neo-hookean", &[0.4], 40.0).unwrap();
+        let card = |host: CardProgram| host.card(1, "neo-hookean", &[0.4], &[0.05]).unwrap();
         assert_eq!(card(CardProgram::Ansys), "TB,HYPER,1,1,1,NEO\nTBDATA,1,4.000000e-1,5.000000e-2\n");
         let poisson = numbers(card(CardProgram::LsDyna).lines().nth(1).unwrap())[1];
         assert!((poisson - (120.0 - 0.8) / 240.8).abs() < 1e-12, "{poisson}");
         assert!(card(CardProgram::Febio).contains("<k>4.000000e1</k>"), "{}", card(CardProgram::Febio));
+        let [lame, modulus] = numbers(&card(CardProgram::Moose))[..] else { panic!() };
+        assert!((lame - (40.0 - 0.8 / 3.0)).abs() < 1e-5 && modulus == 0.4, "{lame} {modulus}");
         for (host, key) in [
+            (CardProgram::Moose, "mooney-rivlin"),
             (CardProgram::Febio, "arruda-boyce"),
             (CardProgram::LsDyna, "gent"),
             (CardProgram::Ansys, "van-der-waals"),
         ] {
             let model = any_model(key).unwrap();
-            assert_eq!(host.card(1, key, model.example, 1e9), None);
+            assert_eq!(host.card(1, key, model.example, &[2e-9]), None);
+        }
+        let all = [0.05, 2e-3];
+        let yeoh = CardProgram::Ansys.card(1, "yeoh", &[0.2, 2e-3, 5e-5], &all).unwrap();
+        assert!(yeoh.ends_with("5.000000e-5,5.000000e-2,2.000000e-3\n"), "{yeoh}");
+        for host in [CardProgram::LsDyna, CardProgram::Febio] {
+            let card = host.card(1, "yeoh", &[0.2, 2e-3, 5e-5], &all).unwrap();
+            let note = "left out: D2 = 2.000000e-3; this material has D1 alone";
+            assert!(card.starts_with(&host.comment(note)), "{card}");
         }
     }
 }

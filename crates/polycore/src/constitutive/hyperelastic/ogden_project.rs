@@ -57,7 +57,7 @@ impl Projected<'_> {
         let mut found = vec![[0.0; 2]; 2 * terms];
         let mut row = 0;
         for state in &self.start.table.states {
-            slopes(&unit, state.stretches, &mut found);
+            state.predict_slopes(slopes, &unit, &mut found);
             for axis in (0..2).filter(|&axis| state.nominal[axis] != 0.0) {
                 for term in 0..terms {
                     all[0][(row, term)] = state.factor(axis) * found[2 * term][axis];

@@ -102,7 +102,7 @@ pub(super) fn grown(smaller: &[f64], start: &FitStart<'_>) -> Vec<Vec<f64>> {
 fn column(start: &FitStart<'_>, exponent: f64) -> Option<DVector<f64>> {
     let mut values = Vec::with_capacity(start.table.measurements());
     for state in &start.table.states {
-        let found = slopes(&[1.0, exponent], state.stretches, &mut [[0.0; 2]; 2]);
+        let found = state.predict_slopes(slopes, &[1.0, exponent], &mut [[0.0; 2]; 2]);
         let measured = (0..2).filter(|&axis| state.nominal[axis] != 0.0);
         values.extend(measured.map(|axis| state.factor(axis) * found[axis]));
     }

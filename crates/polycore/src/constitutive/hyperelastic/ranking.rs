@@ -31,6 +31,8 @@ fn mode_of(state: &TestState) -> Mode {
         Mode::Biaxial | Mode::Component if same(first) => bar(first.powi(-2)),
         Mode::Equibiaxial => bar(first.powi(-2)),
         Mode::SimpleShear | Mode::PureShear => Mode::PureShear,
+        // an average over pure shear from nil to that of the surface
+        Mode::Torsion => Mode::Torsion,
         Mode::Biaxial | Mode::Component | Mode::Difference => Mode::Biaxial,
     }
 }
@@ -138,12 +140,14 @@ mod tests {
             (Mode::Component, [2.0, 2.0], [1.0, 0.0], "equibiaxial"),
             (Mode::Biaxial, [2.0, 1.5], [1.0, 0.5], "biaxial"),
             (Mode::Difference, [2.0, 1.0], [1.0, 0.0], "biaxial"),
+            (Mode::Torsion, [2.0, 0.5], [1.0, -0.5], "torsion"),
         ];
         let states = states.iter().map(|(mode, l, p, _)| state(*mode, *l, *p)).collect();
         let table = TestData::new(String::new(), states);
         let found = modes(&table);
         let shown: Vec<_> = found.iter().map(|one| (one.mode, one.table.states.len())).collect();
-        let expected = [("uniaxial", 3), ("equibiaxial", 3), ("pure-shear", 3), ("biaxial", 2)];
+        let expected =
+            [("uniaxial", 3), ("equibiaxial", 3), ("pure-shear", 3), ("biaxial", 2), ("torsion", 1)];
         assert_eq!(shown, expected);
     }
 

@@ -3,12 +3,15 @@
 use std::path::Path;
 
 use super::Error;
-use super::columns::{ColumnKind, MODES, Role, StrainMeasure, TestStressMeasure, mode};
+use super::columns::{
+    ColumnKind, MODES, Role, StrainMeasure, TestColumn, TestStressMeasure, Wanted, choose, mode,
+};
 use super::components::ComponentColumns;
 use super::data::{Mode, TestData, TestState};
 use super::plausible::{TestRow, plausible};
+use super::torsion_table::{TestCylinder, TorsionColumns};
 use super::weights::{Deviation, WeightSource};
-use crate::table::{self, plain_unit, plainly};
+use crate::table::{self, plain_unit};
 use crate::units::Unit;
 use crate::units::dimension::{RatioDimension, StressDimension};
 
@@ -37,6 +40,8 @@ pub struct TestFormat {
     pub deviation_column: Option<String>,
     /// Standard deviation of all stresses.
     pub deviation: Option<Deviation>,
+    /// Cylinder of a torsion test.
+    pub cylinder: Option<TestCylinder>,
 }
 
 /// Result of reading a table.
@@ -71,7 +76,9 @@ impl TestData {
     /// column of the [`Mode`] or for one test; or two of each (`stretch_1`, `stretch_2`, `nominal_1 [MPa]`,
     /// …). By default, strains are engineering strains and stresses nominal ones, unless the heading or
     /// `format` says otherwise. Blank stresses were not measured. A table with a column `component` has one
-    /// stress in each row: `mode`, `lambda1`, `lambda2`, `component` (P1, P2, s1-s2), `unit`, `value`.
+    /// stress in each row: `mode`, `lambda1`, `lambda2`, `component` (P1, P2, s1-s2), `unit`, `value`. With a
+    /// cylinder, a table of torsion: `twist [rad/m]` or `angle [deg]`, `torque [N mm]`, `axial force [N]`,
+    /// `stretch`.
     ///
     /// # Errors
     /// [`crate::Error::Io`]; errors of [`TestData::parse_as`].
@@ -89,6 +96,9 @@ impl TestData {
     /// stiffness below zero, no measurement at all.
     pub fn parse_as(name: &str, bytes: Vec<u8>, format: &TestFormat) -> Result<ImportedTest, Error> {
         let file = table::Table::parse(name, bytes).map_err(located)?;
+        if let Some(torsion) = TorsionColumns::find(&file, format).map_err(located)? {
+            return torsion.read(&file, format).map_err(located);
+        }
         if let Some(components) = ComponentColumns::find(&file).map_err(located)? {
             return components.read(&file, format).map_err(located);
         }
@@ -109,26 +119,12 @@ fn located(error: table::Error) -> Error {
     Error::Data { what: path.display().to_string(), reason }
 }
 
-/// Column and its measure.
-#[derive(Clone)]
-struct TestColumn<M> {
-    column: usize,
-    measure: M,
-    /// True if the heading does not name the measure.
-    assumed: bool,
-    compressive: bool,
-    unit: Option<String>,
-}
-
+/// Columns of a table with one stress or two in each row.
 struct TestColumns {
     mode: Option<usize>,
     strains: Vec<TestColumn<StrainMeasure>>,
     stresses: Vec<TestColumn<TestStressMeasure>>,
 }
-
-const LAYOUTS: &str = "a strain (`stretch`, `strain [%]`) and a stress (`nominal [MPa]`), with a `mode` in \
-                       each row if there are several tests, or `stretch_1`, `stretch_2`, `nominal_1 [MPa]`, \
-                       `nominal_2 [MPa]`";
 
 impl TestColumns {
     fn find(file: &table::Table, format: &TestFormat) -> Result<Self, table::Error> {
@@ -362,7 +358,8 @@ impl TestColumns {
         mode(file.text(row, column)).ok_or_else(|| {
             let names = Mode::TESTS.into_iter().chain([Mode::SimpleShear]);
             let names = names.map(|mode| format!("`{}`", mode.name())).collect::<Vec<_>>().join(", ");
-            file.refuse_cell(row, column, &format!("a test: {names}"))
+            let allowed = format!("a test: {names}; torsion has tables of its own, `mode = \"torsion\"`");
+            file.refuse_cell(row, column, &allowed)
         })
     }
 
@@ -417,77 +414,6 @@ impl TestColumns {
             "{}; {biaxial}{strain} and {stress}{assumed}; stretches {low:.4} to {high:.4}",
             file.describe(&used)
         )
-    }
-}
-
-/// Column to be found.
-struct Wanted<'a, M> {
-    key: &'static str,
-    name: Option<&'a str>,
-    measure: Option<M>,
-    of: &'a dyn Fn(ColumnKind) -> Option<Option<M>>,
-    order: &'a [M],
-    assumed: M,
-}
-
-fn choose<M: Copy + PartialEq>(
-    file: &table::Table,
-    roles: &[Option<Role>],
-    axis: Option<usize>,
-    wanted: &Wanted<M>,
-) -> Result<TestColumn<M>, table::Error> {
-    let key = wanted.key;
-    let chosen = |column: usize, measure: Option<M>, role: Option<&Role>| TestColumn {
-        column,
-        measure: wanted.measure.or(measure).unwrap_or(wanted.assumed),
-        assumed: wanted.measure.or(measure).is_none(),
-        compressive: role.is_some_and(|role| role.compressive),
-        unit: role.map_or_else(|| file.headings[column].unit.clone(), |role| role.unit.clone()),
-    };
-    if let Some(name) = wanted.name {
-        let same = |i: &usize| {
-            let heading = &file.headings[*i];
-            heading.text == name || heading.name == name || heading.plain == plainly(name)
-        };
-        let number = name.parse::<usize>().ok().filter(|number| (1..=roles.len()).contains(number));
-        let several = (0..roles.len()).filter(same).count() > 1;
-        if several {
-            let allowed =
-                format!("the number of one of the columns `{name}` as `{key}_column`: \"1\" is the first");
-            return Err(file.refuse_headings(allowed));
-        }
-        let Some(column) = (0..roles.len()).find(same).or(number.map(|number| number - 1)) else {
-            return Err(file.refuse_headings(format!("the heading `{name}` of `{key}_column`")));
-        };
-        let role = roles[column].as_ref();
-        return Ok(chosen(column, role.and_then(|role| (wanted.of)(role.what)).flatten(), role));
-    }
-    let all: Vec<(usize, Option<M>, &Role)> = roles
-        .iter()
-        .enumerate()
-        .filter_map(|(i, role)| role.as_ref().map(|role| (i, role)))
-        .filter(|(_, role)| axis.is_none() || role.axis == axis)
-        .filter_map(|(i, role)| Some((i, (wanted.of)(role.what)?, role)))
-        .collect();
-    let of = |measure: Option<M>| all.iter().filter(move |one| one.1 == measure).collect::<Vec<_>>();
-    // named measures in their order, then those that name none, then the last; the key before all
-    let mut order: Vec<Option<M>> = wanted.order.iter().copied().map(Some).collect();
-    order.insert(order.len() - 1, None);
-    if let Some(asked) = wanted.measure {
-        order.splice(0..0, [Some(asked), None]);
-    }
-    let found = order.into_iter().map(of).find(|found| !found.is_empty()).unwrap_or_default();
-    match found[..] {
-        [(column, measure, role)] => Ok(chosen(*column, *measure, Some(role))),
-        [] => {
-            let raw = roles.iter().flatten().any(|role| role.what == ColumnKind::Raw);
-            let advice = "; divide forces by the undeformed area and displacements by the free length";
-            Err(file.refuse_headings(format!("{LAYOUTS}{}", if raw { advice } else { "" })))
-        }
-        _ => Err(file.refuse_headings(format!(
-            "one {key}, or `{key}_column = \"…\"` in the data's entry with one of these headings, or its \
-             number"
-        ))),
     }
 }
 
