@@ -21,8 +21,10 @@ pub enum SurfaceShape<const D: usize> {
 /// A rigid body bounded by a surface. A face of a deformable body at the depth o below the surface is pushed
 /// out with the pressure s(M/Δx)o, with the longitudinal modulus M and the spacing Δx: s layers of confined
 /// material are as stiff as the contact.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RigidSurface<const D: usize> {
+    /// Name in messages; empty: by its number.
+    pub name: String,
     /// A point of a plane, the centre of a sphere, a point of the axis of a cylinder, m.
     pub point: [f64; D],
     /// Shape; vectors have any length.
@@ -50,6 +52,7 @@ impl<const D: usize> RigidSurface<D> {
     /// A plane at rest, without friction, of stiffness [`super::PLANE_STIFFNESS`].
     pub fn plane(point: [f64; D], normal: [f64; D]) -> Self {
         Self {
+            name: String::new(),
             point,
             shape: SurfaceShape::Plane(normal),
             stiffness: super::PLANE_STIFFNESS,
@@ -79,6 +82,14 @@ impl<const D: usize> RigidSurface<D> {
             SurfaceShape::Sphere(_) if D == 2 => "circle",
             SurfaceShape::Sphere(_) => "sphere",
             SurfaceShape::Cylinder(..) => "cylinder",
+        }
+    }
+
+    /// Shape and name of the surface, the `index`-th of its body from 0, for messages.
+    pub fn title(&self, index: usize) -> String {
+        match self.name.as_str() {
+            "" => format!("{} {}", self.kind(), index + 1),
+            name => format!("{} `{name}`", self.kind()),
         }
     }
 
@@ -115,18 +126,6 @@ impl<const D: usize> RigidSurface<D> {
         let from = self.offset_of(place);
         let size = length(from);
         if size > 0.0 { from.map(|x| x / size) } else { [0.0; D] }
-    }
-
-    /// Directions in which the surface may hold a body.
-    pub fn pushes(&self) -> Vec<[f64; D]> {
-        let unit = |d: usize, sign: f64| std::array::from_fn(|e| if e == d { sign } else { 0.0 });
-        match &self.shape {
-            SurfaceShape::Plane(normal) => vec![*normal],
-            SurfaceShape::Sphere(_) => (0..D).flat_map(|d| [unit(d, 1.0), unit(d, -1.0)]).collect(),
-            SurfaceShape::Cylinder(axis, _) => {
-                (0..D).flat_map(|d| [across(axis, unit(d, 1.0)), across(axis, unit(d, -1.0))]).collect()
-            }
-        }
     }
 
     /// Size of the force at load factor 1, N, and its direction.

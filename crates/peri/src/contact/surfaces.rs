@@ -118,9 +118,9 @@ impl<const D: usize> RigidSurfaces<D> {
                 (0..faces.len() as u32).filter(|face| surface.bonded && near(face)).collect();
             if surface.bonded && tied.is_empty() {
                 return Err(Error::geometry(format!(
-                    "bonded plane {}: found no face of the body within half a spacing; allowed: a plane that \
+                    "bonded {}: found no face of the body within half a spacing; allowed: a plane that \
                     touches the body",
-                    number + 1
+                    surface.title(number)
                 )));
             }
             each.push(MovingSurface { surface, now: [0.0; D], before: [0.0; D], factor: 0.0, tied });

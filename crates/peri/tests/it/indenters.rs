@@ -44,7 +44,7 @@ fn forces_are_the_gradient_of_an_energy() {
         RigidSurface { force: push, ..RigidSurface::plane([3.1, 2.7, 5.0], up) },
     ];
     for surface in still.into_iter().chain(pushed) {
-        let mut contact = beside(bonds, vec![surface]).unwrap();
+        let mut contact = beside(bonds, vec![surface.clone()]).unwrap();
         contact.move_surfaces(0.5, 0.0);
         let u = scatter(bonds.sites(), &built.on_lattice, &Random(7).vectors(built.points.len(), 0.05));
         let mut potential = |u: &Field<3>| {
@@ -85,7 +85,7 @@ fn contact_balances_a_force() {
     let bonds = &built.lattice;
     let force = [0.0, 0.0, -2.0];
     let sphere = RigidSurface { force: Some(force), ..RigidSurface::sphere([3.0, 3.0, 50.0], 5.0) };
-    let mut contact = beside(bonds, vec![sphere]).unwrap();
+    let mut contact = beside(bonds, vec![sphere.clone()]).unwrap();
     // four faces at half a spacing from the axis on either side, but for balls below faces of a thin block
     let height = 4.0 + (25.0_f64 - 0.5).sqrt();
     assert!((contact.surfaces().next().unwrap().point[2] - height).abs() < 0.02);
@@ -99,12 +99,12 @@ fn contact_balances_a_force() {
         assert!(found.force[0].abs() < 1e-9 && found.moved[2] <= 1e-12 && found.moved[0] == 0.0);
     }
     for (fault, wrong) in [
-        ("no face of the body ahead", RigidSurface { force: Some([0.0, 0.0, 2.0]), ..sphere }),
-        ("no face of the body ahead", RigidSurface { point: [30.0, 3.0, 50.0], ..sphere }),
+        ("no face of the body ahead", RigidSurface { force: Some([0.0, 0.0, 2.0]), ..sphere.clone() }),
+        ("no face of the body ahead", RigidSurface { point: [30.0, 3.0, 50.0], ..sphere.clone() }),
         ("radius of a rigid surface: found -1", RigidSurface::sphere([0.0; 3], -1.0)),
         ("axis of a cylinder: found 0", RigidSurface::cylinder([0.0; 3], [0.0; 3], 1.0)),
-        ("friction of a rigid surface: found 0.5", RigidSurface { friction: 0.5, ..sphere }),
-        ("force on a rigid surface: found 0", RigidSurface { force: Some([0.0; 3]), ..sphere }),
+        ("friction of a rigid surface: found 0.5", RigidSurface { friction: 0.5, ..sphere.clone() }),
+        ("force on a rigid surface: found 0", RigidSurface { force: Some([0.0; 3]), ..sphere.clone() }),
     ] {
         let message = beside(bonds, vec![wrong]).map(|_| ()).unwrap_err().to_string();
         assert!(message.contains(fault), "{message}");
@@ -160,13 +160,14 @@ fn touching(sphere: RigidSurface<3>) -> [f64; 3] {
 #[test]
 fn loaded_and_unloaded() {
     let sphere = RigidSurface { stiffness: 50.0, ..RigidSurface::sphere([3.0, 3.0, 50.0], 8.0) };
-    let pressed = RigidSurface { point: touching(sphere), displacement: [0.0, 0.0, -0.2], ..sphere };
+    let pressed =
+        RigidSurface { point: touching(sphere.clone()), displacement: [0.0, 0.0, -0.2], ..sphere.clone() };
     let (by_depth, _) = equilibria(pressed, 1, None);
     let peak = &by_depth.history[3];
     let force = peak.resting[0].force[2];
     assert!(force < -0.01 && (peak.load / force.abs() - 1.0).abs() < 1e-9, "{peak:?}");
     let pushed = RigidSurface { force: Some([0.0, 0.0, force]), ..sphere };
-    let of_force: Vec<State<3>> = (0..2).map(|method| equilibria(pushed, method, None).0).collect();
+    let of_force: Vec<State<3>> = (0..2).map(|method| equilibria(pushed.clone(), method, None).0).collect();
     for (state, by_force) in std::iter::once((&by_depth, false)).chain(of_force.iter().map(|s| (s, true))) {
         let row = |k: usize| -> &StepRecord { &state.history[k] };
         assert!((row(3).resting[0].moved[2] + 0.2).abs() < 1e-5, "{:?}", row(3).resting);
@@ -186,7 +187,7 @@ fn loaded_and_unloaded() {
     for method in 0..2 {
         let run = |threads: usize, from: Option<State<3>>| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| equilibria(pushed, method, from))
+            pool.install(|| equilibria(pushed.clone(), method, from))
         };
         let (one, saved) = run(1, None);
         assert!(run(2, None).0 == one && run(2, saved).0 == one, "method {method}");

@@ -12,6 +12,9 @@ use serde::Deserialize;
 
 /// Least radius of an indenter in spacings: a smaller one passes between the faces of the body.
 const LEAST_RADIUS: f64 = 2.0;
+/// Overlap of an indenter and the surface of the body at the start, in spacings, up to which it counts as
+/// touch: faces of a round body stand out by less.
+const TOUCHES: f64 = 0.1;
 
 /// A rigid sphere (in a plane body a circle), cylinder or plane that the body cannot pass.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
@@ -221,6 +224,17 @@ fn holds(boundary: &Boundary, axis: usize) -> bool {
         || boundary.rotation.is_some()
 }
 
+/// Returns the directions in which rigid surfaces may push a body, at the start and at load factor 1; one with
+/// a force of its own stops nothing.
+pub(super) fn stops<const D: usize>(surfaces: &[RigidSurface<D>], body: &DiscreteBody<D>) -> Vec<[f64; D]> {
+    let bonds = &body.bonds;
+    let centres: Vec<[f64; D]> =
+        bonds.particles().iter().map(|&site| bonds.position(site as usize)).collect();
+    let standing = surfaces.iter().filter(|surface| surface.force.is_none());
+    let shifts = standing.flat_map(|surface| [[0.0; D], surface.displacement].map(|shift| (surface, shift)));
+    shifts.flat_map(|(surface, shift)| surface.stops(&shift, &centres, 0.5 * bonds.spacing())).collect()
+}
+
 /// Checks indenters against the body: its surface must be resolved, and something must hold it.
 ///
 /// # Errors
@@ -232,7 +246,9 @@ pub(super) fn check_placed<const D: usize>(
 ) -> Result<(), SceneError> {
     let Some(contact) = &scene.contact else { return Ok(()) };
     let surfaces = contact.surfaces::<D>(source, scene.method() == SolverMethod::Verlet)?;
-    let spacing = body.bonds.spacing();
+    let (spacing, outside) = (body.bonds.spacing(), body.surface());
+    let held =
+        if surfaces.iter().any(|own| own.force.is_some()) { stops(&surfaces, body) } else { Vec::new() };
     for (number, surface) in surfaces.iter().enumerate().skip(contact.plane.len()) {
         let index = number - contact.plane.len();
         let key = |name: &str| format!("contact.indenter[{index}].{name}");
@@ -253,6 +269,20 @@ pub(super) fn check_placed<const D: usize>(
             let found = format!("{behind} of {} particles inside indenter `{name}`", particles.len());
             return Err(source.error(&key("point"), found, "an indenter outside the body at the start"));
         }
+        let faces = outside.faces().iter().map(|face| surface.height(face.place));
+        let depth = -faces.fold(f64::INFINITY, f64::min);
+        let is_plane = matches!(surface.shape, SurfaceShape::Plane(_));
+        if depth > TOUCHES * spacing && surface.force.is_none() && !is_plane {
+            let mm = |x: f64| format!("{:.4}", x * 1e3);
+            let found = format!("indenter `{name}` {} mm inside the surface of the body", mm(depth));
+            let allowed = format!(
+                "up to {} mm, {TOUCHES} spacings, at the start: move it away by {} mm, it presses by its \
+                 `displacement`",
+                mm(TOUCHES * spacing),
+                mm(depth)
+            );
+            return Err(source.error(&key("point"), found, allowed));
+        }
         let Some(force) = surface.force else { continue };
         let size = length(force);
         let ahead = |&site: &u32| {
@@ -264,11 +294,8 @@ pub(super) fn check_placed<const D: usize>(
             return Err(source.error(&key("force"), found, "a force that leads to the body"));
         }
         for d in (0..D).filter(|&d| force[d] != 0.0) {
-            // a surface with a force of its own stops nothing
-            let others =
-                surfaces.iter().enumerate().filter(|(other, own)| *other != number && own.force.is_none());
-            let stops = others.flat_map(|(_, other)| other.pushes()).any(|push| push[d] * force[d] < 0.0);
-            if !stops && !scene.boundary.iter().any(|boundary| holds(boundary, d)) {
+            let stopped = held.iter().any(|push| push[d] * force[d] < 0.0);
+            if !stopped && !scene.boundary.iter().any(|boundary| holds(boundary, d)) {
                 let axis = ["x", "y", "z"][d];
                 let found = format!("a force along {axis}, along which nothing holds the body");
                 let allowed =
