@@ -28,6 +28,7 @@
 //! angular momentum.
 
 mod faces;
+mod faceted;
 mod forces;
 mod friction;
 mod friction_pair;

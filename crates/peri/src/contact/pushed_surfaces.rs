@@ -152,6 +152,9 @@ impl<const D: usize> RigidSurface<D> {
             let facing = dot(normal, along);
             return (facing > FACING).then(|| (self.height(centre) - radius) / facing);
         }
+        if let SurfaceShape::Facets(facets) = &self.shape {
+            return self.way_to_facets(facets, centre, radius, &along.map(|e| -e));
+        }
         // |c − t e| = R + r across the axis
         let from = self.offset_of(centre);
         let across = match &self.shape {

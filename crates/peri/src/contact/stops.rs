@@ -43,15 +43,19 @@ impl<const D: usize> RigidSurface<D> {
         let present = most(&|centre| self.height(centre)).max(0.0);
         let signed = |d: usize, sign: f64| std::array::from_fn(|e| if e == d { sign } else { 0.0 });
         let ways = (0..D).flat_map(|d| [1.0, -1.0].map(|sign| signed(d, sign)));
-        ways.filter(|way| most(&|centre| self.least_height(centre, way)) > present + STOPPED * radius)
-            .map(|way| way.map(|x| -x))
-            .collect()
+        ways.filter(|way| {
+            most(&|centre| self.least_height(centre, 0.25 * radius, way)) > present + STOPPED * radius
+        })
+        .map(|way| way.map(|x| -x))
+        .collect()
     }
 
-    /// Least height above the surface at rest on the way from a place along the unit vector `way`, m.
-    fn least_height(&self, place: [f64; D], way: &[f64; D]) -> f64 {
+    /// Least height above the surface at rest on the way from a place along the unit vector `way`, m, to
+    /// about `fine`, m.
+    fn least_height(&self, place: [f64; D], fine: f64, way: &[f64; D]) -> f64 {
         let dot = |a: &[f64; D], b: &[f64; D]| (0..D).map(|d| a[d] * b[d]).sum::<f64>();
         let across = match &self.shape {
+            SurfaceShape::Facets(facets) => return self.least_height_on_way(facets, place, fine, way),
             SurfaceShape::Cylinder(axis, _) => super::friction_pair::across(axis, *way),
             _ => *way,
         };

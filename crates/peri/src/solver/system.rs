@@ -124,6 +124,10 @@ impl<'a, const D: usize> System<'a, D> {
         self.set_rates(after, after);
         self.begin_curved_step(state, [before, after]);
         self.move_surfaces(before, 0.0);
+        if let (Some(contact), Some(start)) = (&mut self.contact, &state.contact.start) {
+            // where a force has them at the start of the step, in a resumed run too
+            contact.balance(start);
+        }
         self.move_surfaces(after, 0.0);
         if let Some(start) = &state.contact.start
             && let Some(contact) = self.contact.as_mut().filter(|contact| contact.has_friction())

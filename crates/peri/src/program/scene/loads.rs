@@ -250,7 +250,7 @@ fn refuse_unbalanced<const D: usize>(
 ) -> Result<(), SceneError> {
     let surfaces = scene.contact.as_ref().map_or(Ok(Vec::new()), |own| own.surfaces::<D>(source, false))?;
     let stops = ContactStops {
-        normals: super::indenter::stops(&surfaces, body),
+        normals: super::indenter_place::stops(&surfaces, body),
         pairs: scene.contact.is_some(),
         rubs: scene.contact.as_ref().is_some_and(ContactSpec::has_friction)
             || surfaces.iter().any(|surface| surface.bonded),
