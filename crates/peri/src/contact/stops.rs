@@ -29,8 +29,9 @@ impl<const D: usize> Contact<D> {
 
 impl<const D: usize> RigidSurface<D> {
     /// Directions in which the surface, moved by `shift`, m, may push a body of particles of these centres
-    /// and this radius, m. A plane pushes along its normal. Another surface pushes against each axis along which some translation
-    /// of the body runs into it: without friction it holds along normals of its contact only.
+    /// and this radius, m. A plane pushes along its normal. Another surface pushes against each axis along
+    /// which some translation of the body runs into it: without friction it holds along normals of its
+    /// contact only.
     pub fn stops(&self, shift: &[f64; D], centres: &[[f64; D]], radius: f64) -> Vec<[f64; D]> {
         if let SurfaceShape::Plane(normal) = self.shape {
             return vec![normal];

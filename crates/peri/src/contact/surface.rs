@@ -28,7 +28,8 @@ pub enum SurfaceShape<const D: usize> {
 pub struct RigidSurface<const D: usize> {
     /// Name in messages; empty: by its number.
     pub name: String,
-    /// A point of a plane, the centre of a sphere, a point of the axis of a cylinder, the origin of facets, m.
+    /// A point of a plane, the centre of a sphere, a point of the axis of a cylinder, the origin of facets,
+    /// m.
     pub point: [f64; D],
     /// Shape; vectors have any length.
     pub shape: SurfaceShape<D>,

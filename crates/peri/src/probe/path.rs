@@ -43,14 +43,14 @@ pub fn load_at(path: impl IntoIterator<Item = [f64; 2]>, displacement: f64) -> O
     None
 }
 
-/// Secant and tangent stiffness, N/m, at a displacement where a path of displacements and loads first comes to
-/// it: load over displacement, and the slope there of the parabola through the two points beside and the next
-/// one, of second order in their distances.
+/// Secant and tangent stiffness, N/m, at a displacement where a path of displacements and loads first comes
+/// to it: load over displacement, and the slope there of the parabola through the two points beside and the
+/// next one, of second order in their distances.
 ///
-/// The path begins at rest; points at displacement 0 before all others, as of a body with stresses of its own,
-/// are its start in place of that, and secants count from the load there. `falls` has the events so far at
-/// each point, such as broken bonds: a load is no function of the displacement where they grow. `None` between
-/// such points; no parabola passes through two of them.
+/// The path begins at rest; points at displacement 0 before all others, as of a body with stresses of its
+/// own, are its start in place of that, and secants count from the load there. `falls` has the events so far
+/// at each point, such as broken bonds: a load is no function of the displacement where they grow. `None`
+/// between such points; no parabola passes through two of them.
 pub fn stiffness_at(path: impl IntoIterator<Item = ([f64; 2], u64)>, displacement: f64) -> Option<[f64; 2]> {
     let mut path: Vec<([f64; 2], u64)> = std::iter::once(([0.0; 2], 0)).chain(path).collect();
     let start = path.iter().position(|point| point.0[0] != 0.0)?.checked_sub(1)?;

@@ -1,5 +1,5 @@
-//! Rigid spheres, cylinders, planes and facets on a body: gradients of their energy, balance of a force, work,
-//! friction, motion, bits.
+//! Rigid spheres, cylinders, planes and facets on a body: gradients of their energy, balance of a force,
+//! work, friction, motion, bits.
 
 use crate::bodies::{Body, Built, MODULUS, Random, hold, scatter};
 use crate::dynamics::DENSITY;
@@ -340,8 +340,8 @@ fn ball_of_facets_is_a_sphere() {
     assert!(rough.area <= smooth.area);
 }
 
-/// Facets with a force start at touch, balance it, and keep their bits when a run is resumed and on any number
-/// of threads.
+/// Facets with a force start at touch, balance it, and keep their bits when a run is resumed and on any
+/// number of threads.
 #[test]
 fn facets_under_a_force() {
     let force = Some([0.0, 0.0, -0.1]);

@@ -22,8 +22,8 @@ fn holds(boundary: &Boundary, axis: usize) -> bool {
         || boundary.rotation.is_some()
 }
 
-/// Returns the directions in which rigid surfaces may push a body, at the start and at load factor 1; one with
-/// a force of its own stops nothing.
+/// Returns the directions in which rigid surfaces may push a body, at the start and at load factor 1; one
+/// with a force of its own stops nothing.
 pub(super) fn stops<const D: usize>(surfaces: &[RigidSurface<D>], body: &DiscreteBody<D>) -> Vec<[f64; D]> {
     let bonds = &body.bonds;
     let centres: Vec<[f64; D]> =
