@@ -2,6 +2,7 @@
 //! zero width; point clouds.
 
 mod cuts;
+mod distance;
 mod enclosure;
 mod facets;
 mod gaps;
@@ -9,6 +10,7 @@ mod parts;
 
 pub(crate) use cuts::length;
 pub use cuts::{Cut, cuts_within, severed};
+pub use distance::{NearestFacet, SignedDistance};
 pub use enclosure::{Enclosure, moments};
 pub use facets::{Facet, Facets};
 pub use gaps::{Gaps, NearbyGaps};

@@ -13,9 +13,9 @@ use serde::{Deserialize, Serialize};
 pub enum ContactPair {
     /// Two particles, by their sites.
     Particles(u32, u32),
-    /// A plane and a face, by their numbers.
+    /// A rigid surface and a face, by their numbers.
     Face(u32, u32),
-    /// A plane, by its number, and a particle without a face, by its site.
+    /// A rigid surface, by its number, and a particle without a face, by its site.
     Particle(u32, u32),
 }
 
@@ -30,7 +30,7 @@ pub struct FrictionPair {
     pub bound: f64,
     /// k_t, N/m.
     pub stiffness: f64,
-    /// Unit normal, towards the first side of two particles and the body of a plane.
+    /// Unit normal, towards the first side of two particles and the body of a surface.
     pub normal: [f64; 3],
     /// Fraction of the load step since the sides have touched.
     pub share: f64,

@@ -31,9 +31,9 @@ impl<const D: usize> RigidSurfaces<D> {
             let rest = Field::zeros(sites);
             let Some(travel) = self.first_touch(&self.each[number].surface, &along, &rest) else {
                 return Err(Error::geometry(format!(
-                    "rigid surface {}: found no face of the body ahead along its force; allowed: a surface \
-                     in front of the body with a force towards it",
-                    number + 1
+                    "{}: found no face of the body ahead along its force; allowed: a surface in front of \
+                     the body with a force towards it",
+                    self.each[number].surface.title(number)
                 )));
             };
             let point = &mut self.each[number].surface.point;
@@ -64,8 +64,8 @@ impl<const D: usize> RigidSurfaces<D> {
         self.each.iter().map(of).sum()
     }
 
-    /// Finds a surface whose force contact does not balance: its number, the balanced part and the force, N.
-    pub(super) fn unbalanced(&self, field: &Field<D>) -> Option<(usize, f64, f64)> {
+    /// Finds a surface whose force contact does not balance: its title, the balanced part and the force, N.
+    pub(super) fn unbalanced(&self, field: &Field<D>) -> Option<(String, f64, f64)> {
         let of = |(number, placed): (usize, &MovingSurface<D>)| {
             let (size, along) = placed.surface.pushed()?;
             let wanted = size * placed.factor;
@@ -74,7 +74,8 @@ impl<const D: usize> RigidSurfaces<D> {
                 (0..D).map(|d| force[d] * along[d]).sum::<f64>()
             };
             let found: f64 = self.near(placed, field, 0.0).iter().map(push).sum();
-            (wanted > 0.0 && (found - wanted).abs() > MISSED * wanted).then_some((number, found, wanted))
+            let lost = wanted > 0.0 && (found - wanted).abs() > MISSED * wanted;
+            lost.then(|| (placed.surface.title(number), found, wanted))
         };
         self.each.iter().enumerate().find_map(of)
     }
@@ -150,6 +151,9 @@ impl<const D: usize> RigidSurface<D> {
         if let SurfaceShape::Plane(normal) = &self.shape {
             let facing = dot(normal, along);
             return (facing > FACING).then(|| (self.height(centre) - radius) / facing);
+        }
+        if let SurfaceShape::Facets(facets) = &self.shape {
+            return self.way_to_facets(facets, centre, radius, &along.map(|e| -e));
         }
         // |c − t e| = R + r across the axis
         let from = self.offset_of(centre);

@@ -1,14 +1,15 @@
-//! Rigid surfaces that a body cannot pass, or to which it is tied: planes, spheres, cylinders.
+//! Rigid surfaces that a body cannot pass, or to which it is tied: planes, spheres, cylinders, facets.
 
 use super::friction_pair::across;
 use super::non_negative;
 use crate::error::Error;
-use crate::geometry::length;
+use crate::geometry::{SignedDistance, length};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Shape of a rigid surface, through its signed distance h and the normal ∇h: positive on the side of the
 /// body.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum SurfaceShape<const D: usize> {
     /// Half-space behind a plane, by its normal towards the body.
     Plane([f64; D]),
@@ -16,14 +17,19 @@ pub enum SurfaceShape<const D: usize> {
     Sphere(f64),
     /// Cylinder about an axis through the point of the surface: direction and radius, m.
     Cylinder([f64; D], f64),
+    /// Closed facets, whose origin is the point of the surface.
+    Facets(Arc<SignedDistance<D>>),
 }
 
 /// A rigid body bounded by a surface. A face of a deformable body at the depth o below the surface is pushed
 /// out with the pressure s(M/Δx)o, with the longitudinal modulus M and the spacing Δx: s layers of confined
 /// material are as stiff as the contact.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RigidSurface<const D: usize> {
-    /// A point of a plane, the centre of a sphere, a point of the axis of a cylinder, m.
+    /// Name in messages; empty: by its number.
+    pub name: String,
+    /// A point of a plane, the centre of a sphere, a point of the axis of a cylinder, the origin of facets,
+    /// m.
     pub point: [f64; D],
     /// Shape; vectors have any length.
     pub shape: SurfaceShape<D>,
@@ -50,6 +56,7 @@ impl<const D: usize> RigidSurface<D> {
     /// A plane at rest, without friction, of stiffness [`super::PLANE_STIFFNESS`].
     pub fn plane(point: [f64; D], normal: [f64; D]) -> Self {
         Self {
+            name: String::new(),
             point,
             shape: SurfaceShape::Plane(normal),
             stiffness: super::PLANE_STIFFNESS,
@@ -72,6 +79,11 @@ impl<const D: usize> RigidSurface<D> {
         Self { shape: SurfaceShape::Cylinder(axis, radius), ..Self::plane(point, [0.0; D]) }
     }
 
+    /// A body inside facets whose origin is `point`, as [`Self::plane`].
+    pub fn facets(point: [f64; D], facets: Arc<SignedDistance<D>>) -> Self {
+        Self { shape: SurfaceShape::Facets(facets), ..Self::plane(point, [0.0; D]) }
+    }
+
     /// Word for the shape.
     pub fn kind(&self) -> &'static str {
         match self.shape {
@@ -79,6 +91,15 @@ impl<const D: usize> RigidSurface<D> {
             SurfaceShape::Sphere(_) if D == 2 => "circle",
             SurfaceShape::Sphere(_) => "sphere",
             SurfaceShape::Cylinder(..) => "cylinder",
+            SurfaceShape::Facets(_) => "surface",
+        }
+    }
+
+    /// Shape and name of the surface, the `index`-th of its body from 0, for messages.
+    pub fn title(&self, index: usize) -> String {
+        match self.name.as_str() {
+            "" => format!("{} {}", self.kind(), index + 1),
+            name => format!("{} `{name}`", self.kind()),
         }
     }
 
@@ -94,7 +115,7 @@ impl<const D: usize> RigidSurface<D> {
     /// Radius of a round surface, m.
     pub(super) fn radius(&self) -> Option<f64> {
         match self.shape {
-            SurfaceShape::Plane(_) => None,
+            SurfaceShape::Plane(_) | SurfaceShape::Facets(_) => None,
             SurfaceShape::Sphere(radius) | SurfaceShape::Cylinder(_, radius) => Some(radius),
         }
     }
@@ -102,6 +123,7 @@ impl<const D: usize> RigidSurface<D> {
     /// Height of a place above the surface at rest, m.
     pub fn height(&self, place: [f64; D]) -> f64 {
         match (&self.shape, self.radius()) {
+            (SurfaceShape::Facets(facets), _) => facets.height_and_normal(self.offset_of(place)).0,
             (SurfaceShape::Plane(normal), _) => (0..D).map(|d| (place[d] - self.point[d]) * normal[d]).sum(),
             (_, radius) => length(self.offset_of(place)) - radius.unwrap_or(0.0),
         }
@@ -109,24 +131,14 @@ impl<const D: usize> RigidSurface<D> {
 
     /// Unit normal at a place beside the surface at rest, towards the body; zero on an axis or centre.
     pub fn normal(&self, place: [f64; D]) -> [f64; D] {
-        if let SurfaceShape::Plane(normal) = self.shape {
-            return normal;
-        }
         let from = self.offset_of(place);
+        match &self.shape {
+            SurfaceShape::Plane(normal) => return *normal,
+            SurfaceShape::Facets(facets) => return facets.height_and_normal(from).1,
+            _ => {}
+        }
         let size = length(from);
         if size > 0.0 { from.map(|x| x / size) } else { [0.0; D] }
-    }
-
-    /// Directions in which the surface may hold a body.
-    pub fn pushes(&self) -> Vec<[f64; D]> {
-        let unit = |d: usize, sign: f64| std::array::from_fn(|e| if e == d { sign } else { 0.0 });
-        match &self.shape {
-            SurfaceShape::Plane(normal) => vec![*normal],
-            SurfaceShape::Sphere(_) => (0..D).flat_map(|d| [unit(d, 1.0), unit(d, -1.0)]).collect(),
-            SurfaceShape::Cylinder(axis, _) => {
-                (0..D).flat_map(|d| [across(axis, unit(d, 1.0)), across(axis, unit(d, -1.0))]).collect()
-            }
-        }
     }
 
     /// Size of the force at load factor 1, N, and its direction.
@@ -134,6 +146,12 @@ impl<const D: usize> RigidSurface<D> {
         let force = self.force?;
         let size = length(force);
         Some((size, force.map(|f| f / size)))
+    }
+
+    /// Returns true for a plane whose force is along its normal, so that friction is across it.
+    pub fn is_pushed_along_normal(&self) -> bool {
+        let (SurfaceShape::Plane(normal), Some(force)) = (&self.shape, self.force) else { return false };
+        length(across(&normal.map(|n| n / length(*normal)), force)) <= 1e-9 * length(force)
     }
 
     /// Returns true if it moves by itself.
@@ -145,7 +163,7 @@ impl<const D: usize> RigidSurface<D> {
     ///
     /// # Errors
     /// [`Error::Parameter`] for a vector without direction, for values that are negative or not finite, and
-    /// for a force together with friction on a round surface.
+    /// for a force together with friction, except of a plane pressed along its normal.
     pub(super) fn checked(mut self) -> Result<Self, Error> {
         non_negative("stiffness of a rigid surface", self.stiffness)?;
         non_negative("friction of a rigid surface", self.friction)?;
@@ -169,17 +187,17 @@ impl<const D: usize> RigidSurface<D> {
             SurfaceShape::Cylinder(axis, radius) => {
                 SurfaceShape::Cylinder(unit("axis of a cylinder", axis)?, radius)
             }
-            sphere => sphere,
+            other => other,
         };
-        if self.bonded && (self.force.is_some() || self.radius().is_some()) {
+        if self.bonded && (self.force.is_some() || !matches!(self.shape, SurfaceShape::Plane(_))) {
             let allowed = "a plane without a force".to_owned();
             return Err(Error::Parameter { name: "bonded rigid surface", found: 1.0, allowed });
         }
         if let Some(force) = self.force {
             unit("force on a rigid surface", force)?;
-            // where it was at the last equilibrium, which decides about slip, is no part of a checkpoint
-            if self.friction > 0.0 {
-                let allowed = "0 with a force".to_owned();
+            // elsewhere friction has a part along the force, which the balance of contact does not know
+            if self.friction > 0.0 && !self.is_pushed_along_normal() {
+                let allowed = "0 with a force, except of a plane pressed along its normal".to_owned();
                 let (name, found) = ("friction of a rigid surface", self.friction);
                 return Err(Error::Parameter { name, found, allowed });
             }

@@ -118,9 +118,9 @@ impl<const D: usize> RigidSurfaces<D> {
                 (0..faces.len() as u32).filter(|face| surface.bonded && near(face)).collect();
             if surface.bonded && tied.is_empty() {
                 return Err(Error::geometry(format!(
-                    "bonded plane {}: found no face of the body within half a spacing; allowed: a plane that \
+                    "bonded {}: found no face of the body within half a spacing; allowed: a plane that \
                     touches the body",
-                    number + 1
+                    surface.title(number)
                 )));
             }
             each.push(MovingSurface { surface, now: [0.0; D], before: [0.0; D], factor: 0.0, tied });
@@ -223,6 +223,15 @@ impl<const D: usize> RigidSurfaces<D> {
         let (home, radius, area) = self.ball(element);
         let moved = self.displacement(field, element);
         let centre: [f64; D] = std::array::from_fn(|d| home[d] + moved[d]);
+        let stiffness = surface.stiffness * self.penalty.value_at(self.head(element)) * area;
+        if let SurfaceShape::Facets(facets) = &surface.shape {
+            // h − r of the ball is the height of its lowest point
+            let from = surface.offset_of(std::array::from_fn(|d| centre[d] - shift[d]));
+            let (height, normal) = facets.height_and_normal(from);
+            let place = std::array::from_fn(|d| centre[d] - radius * normal[d]);
+            let overlap = radius - height;
+            return SurfaceContact { element, place, overlap, normal, offset: None, area, stiffness };
+        }
         let normal = match surface.shape {
             SurfaceShape::Plane(normal) => normal,
             _ => surface.normal(std::array::from_fn(|d| centre[d] - shift[d])),
@@ -234,7 +243,6 @@ impl<const D: usize> RigidSurfaces<D> {
             }
             _ => -surface.height(std::array::from_fn(|d| place[d] - shift[d])),
         };
-        let stiffness = surface.stiffness * self.penalty.value_at(self.head(element)) * area;
         SurfaceContact { element, place, overlap, normal, offset: None, area, stiffness }
     }
 
@@ -306,7 +314,8 @@ impl<const D: usize> RigidSurfaces<D> {
         let batch = |start: usize| {
             let range = start * BATCH..((start + 1) * BATCH).min(count);
             let live = range.filter(|&element| self.is_live(element));
-            live.map(|element| self.beside(surface, shift, field, element))
+            live.filter(|&element| self.is_beside(surface, shift, field, element, gap))
+                .map(|element| self.beside(surface, shift, field, element))
                 .filter(|touch| touch.overlap > -gap)
                 .collect::<Vec<_>>()
         };

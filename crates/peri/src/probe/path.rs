@@ -43,36 +43,57 @@ pub fn load_at(path: impl IntoIterator<Item = [f64; 2]>, displacement: f64) -> O
     None
 }
 
-/// Secant and tangent stiffness, N/m, at a displacement where a path of displacements and loads that begins
-/// at rest first comes to it: load over displacement, and the slope there of the parabola through the two
-/// points beside and the next one, of second order in their distances.
-pub fn stiffness_at(path: impl IntoIterator<Item = [f64; 2]>, displacement: f64) -> Option<[f64; 2]> {
-    let path: Vec<[f64; 2]> = std::iter::once([0.0; 2]).chain(path).collect();
-    let load = load_at(path.iter().copied(), displacement)?;
-    let end = path.iter().position(|point| point[0] >= displacement * (1.0 - 1e-12)).filter(|&k| k > 0)?;
-    let [a, b] = [path[end - 1], path[end]];
-    let after = path.get(end + 1).filter(|point| point[0] > b[0]);
-    let before = end.checked_sub(2).map(|k| &path[k]).filter(|point| point[0] < a[0]);
+/// Secant and tangent stiffness, N/m, at a displacement where a path of displacements and loads first comes
+/// to it: load over displacement, and the slope there of the parabola through the two points beside and the
+/// next one, of second order in their distances.
+///
+/// The path begins at rest; points at displacement 0 before all others, as of a body with stresses of its
+/// own, are its start in place of that, and secants count from the load there. `falls` has the events so far
+/// at each point, such as broken bonds: a load is no function of the displacement where they grow. `None`
+/// between such points; no parabola passes through two of them.
+pub fn stiffness_at(path: impl IntoIterator<Item = ([f64; 2], u64)>, displacement: f64) -> Option<[f64; 2]> {
+    let mut path: Vec<([f64; 2], u64)> = std::iter::once(([0.0; 2], 0)).chain(path).collect();
+    let start = path.iter().position(|point| point.0[0] != 0.0)?.checked_sub(1)?;
+    path.drain(..start);
+    let end = path.iter().position(|point| point.0[0] >= displacement * (1.0 - 1e-12)).filter(|&k| k > 0)?;
+    let [(a, before), (b, after)] = [path[end - 1], path[end]];
+    if before != after {
+        return None;
+    }
+    let next = path.get(end + 1).filter(|point| point.0[0] > b[0] && point.1 == after);
+    let last = end.checked_sub(2).map(|k| &path[k]).filter(|point| point.0[0] < a[0] && point.1 == before);
     let slope = |a: [f64; 2], b: [f64; 2]| (b[1] - a[1]) / (b[0] - a[0]);
     let chord = slope(a, b);
-    let curvature = after.or(before).map_or(0.0, |&c| (slope(b, c) - chord) / (c[0] - a[0]));
-    Some([load / displacement, chord + curvature * (2.0 * displacement - a[0] - b[0])])
+    let curvature = next.or(last).map_or(0.0, |&(c, _)| (slope(b, c) - chord) / (c[0] - a[0]));
+    let load = a[1] + ((displacement - a[0]) / (b[0] - a[0])).min(1.0) * (b[1] - a[1]);
+    Some([(load - path[0].0[1]) / displacement, chord + curvature * (2.0 * displacement - a[0] - b[0])])
 }
 
 /// Work, J, of the last loop of a path of displacements and loads that begins at rest, ∮ F du by the
 /// trapezoidal rule: from the last time that it passed its final displacement. `None` if it never did.
 pub fn loop_energy(path: impl IntoIterator<Item = [f64; 2]>) -> Option<f64> {
+    last_loop(path, 0)
+}
+
+/// Work, J, of the last loop as [`loop_energy`], of a path that its loads drive: from the last time that it
+/// passed its final load. A body that has moved on meanwhile has F times this way in it.
+pub fn driven_loop_energy(path: impl IntoIterator<Item = [f64; 2]>) -> Option<f64> {
+    last_loop(path, 1)
+}
+
+/// ∮ F du from the last time that the path passed the final value of its component `by`.
+fn last_loop(path: impl IntoIterator<Item = [f64; 2]>, by: usize) -> Option<f64> {
     let path: Vec<[f64; 2]> = std::iter::once([0.0; 2]).chain(path).collect();
-    let end = path.last()?[0];
-    let size = path.iter().map(|point| point[0].abs()).fold(0.0, f64::max);
-    let is_off = |point: &[f64; 2]| (point[0] - end).abs() > 1e-9 * size;
+    let end = path.last()?[by];
+    let size = path.iter().map(|point| point[by].abs()).fold(0.0, f64::max);
+    let is_off = |point: &[f64; 2]| (point[by] - end).abs() > 1e-9 * size;
     // the last point away from the end, and the sign of that way
     let away = path.iter().rposition(is_off)?;
-    let sign = (path[away][0] - end).signum();
-    let start = path[..away].iter().rposition(|point| (point[0] - end) * sign <= 1e-9 * size)?;
+    let sign = (path[away][by] - end).signum();
+    let start = path[..away].iter().rposition(|point| (point[by] - end) * sign <= 1e-9 * size)?;
     let area = |a: [f64; 2], b: [f64; 2]| 0.5 * (a[1] + b[1]) * (b[0] - a[0]);
     let [a, b] = [path[start], path[start + 1]];
-    let part = ((end - a[0]) / (b[0] - a[0])).clamp(0.0, 1.0);
+    let part = ((end - a[by]) / (b[by] - a[by])).clamp(0.0, 1.0);
     let crossing = [a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])];
     let rest = path[start + 1..].windows(2).map(|ends| area(ends[0], ends[1]));
     Some(area(crossing, b) + rest.sum::<f64>())
@@ -129,14 +150,52 @@ mod tests {
     fn stiffness_of_a_parabola() {
         // F = 3u + u²: the slope is exact at and between points, at the end and after a turn
         let load = |u: f64| [u, 3.0 * u + u * u];
+        let smooth = |path: &[[f64; 2]], at: f64| stiffness_at(path.iter().map(|&point| (point, 0)), at);
         let path: Vec<[f64; 2]> = [0.5, 1.2, 2.0, 1.0, 0.0].map(load).to_vec();
         for at in [0.2, 0.5, 0.9, 1.2, 2.0] {
-            let [secant, tangent] = stiffness_at(path.iter().copied(), at).unwrap();
+            let [secant, tangent] = smooth(&path, at).unwrap();
             let chord = load_at(path.iter().copied(), at).unwrap() / at;
             assert!((secant - chord).abs() < 1e-12 && (tangent - 3.0 - 2.0 * at).abs() < 1e-12, "{at}");
         }
-        assert_eq!(stiffness_at(path.iter().copied(), 2.1), None);
-        assert_eq!(stiffness_at([[1.0, 4.0]], 1.0), Some([4.0, 4.0]));
+        assert_eq!(smooth(&path, 2.1), None);
+        assert_eq!(smooth(&[[1.0, 4.0]], 1.0), Some([4.0, 4.0]));
+        assert_eq!(smooth(&[], 1.0), None);
+    }
+
+    #[test]
+    fn stiffness_across_falls_and_from_a_load_at_rest() {
+        // 4 N/m, bonds that break between 2 and 3 m, then 1 N/m
+        let path = [([1.0, 4.0], 0), ([2.0, 8.0], 0), ([3.0, 3.0], 7), ([4.0, 4.0], 7)];
+        for (at, expected) in [
+            (1.5, Some([4.0, 4.0])),
+            (2.0, Some([4.0, 4.0])),
+            (2.5, None),
+            (3.0, None),
+            (3.5, Some([1.0, 1.0])),
+        ] {
+            assert_eq!(stiffness_at(path, at), expected, "{at}");
+        }
+        // 5 N of a stress of the body itself, in one row and in two, then 2 N/m
+        let rest = ([0.0, 5.0], 0);
+        assert_eq!(stiffness_at([rest, ([1.0, 7.0], 0)], 0.5), Some([2.0, 2.0]));
+        assert_eq!(stiffness_at([([0.0, 1.0], 0), rest, ([1.0, 7.0], 0)], 0.5), Some([2.0, 2.0]));
+        assert_eq!(stiffness_at([rest], 0.5), None);
+    }
+
+    #[test]
+    fn loops_of_a_load() {
+        // a spring of 2 N/m beside a Coulomb slider of 1 N between loads of 0 and 6 N: u = (F ∓ 1)/2 but for
+        // the parts where it sticks; a loop loses twice 1 N times 2 m
+        let cycle = [[2.5, 6.0], [2.5, 4.0], [0.5, 0.0]];
+        let again = [[0.5, 2.0], [2.5, 6.0], [2.5, 4.0], [0.5, 0.0]];
+        let path = || [[0.0, 1.0]].into_iter().chain(cycle).chain(again);
+        assert_eq!(driven_loop_energy(path()), Some(2.0 * 2.0));
+        // by displacement it is the same loop
+        assert_eq!(loop_energy(path()), Some(2.0 * 2.0));
+        // from rest the body has not come back
+        assert_eq!(driven_loop_energy([[0.0, 1.0]].into_iter().chain(cycle)), Some(8.75 - 4.0));
+        assert_eq!(loop_energy([[0.0, 1.0]].into_iter().chain(cycle).take(3)), None);
+        assert_eq!(driven_loop_energy([[1.0, 2.0], [2.0, 3.0]]), None);
     }
 
     #[test]

@@ -22,14 +22,15 @@ harness::quantities! {
     DISPLACEMENT_AT_PEAK = "displacement_at_peak", "m", "displacement of the grips at the largest load";
     LOAD_AT = "load_at_{displacement}mm", "N", "with `output.load_at`: load at this displacement, if the run \
         reaches it";
-    SECANT_STIFFNESS_AT = "secant_stiffness_at_{displacement}mm", "N/m", "with `output.stiffness_at`: load \
-        over displacement at this one, if the run reaches it";
+    SECANT_STIFFNESS_AT = "secant_stiffness_at_{displacement}mm", "N/m", "with `output.stiffness_at`: load, \
+        less that of rows at displacement 0, over displacement at this one, if the run reaches it and no \
+        bonds break in the step around it";
     TANGENT_STIFFNESS_AT = "tangent_stiffness_at_{displacement}mm", "N/m", "with `output.stiffness_at`: \
-        slope of the load over the displacement at this one, of second order in the load steps, if the run \
-        reaches it";
+        slope of the load over the displacement at this one, of second order in the load steps, where \
+        there is a secant stiffness";
     LOOP_ENERGY = "loop_energy", "J", "with a `path` or factors of time steps that return: work of the last \
-        loop of the load over the displacement, by the trapezoidal rule; the energy lost in it once the \
-        loops repeat";
+        loop of the load over the displacement, by the trapezoidal rule, between equal displacements, \
+        or between equal loads of a run that forces drive; the energy lost in it once the loops repeat";
     WORK_OF_LOADS = "work_of_loads", "J", "work of the loads";
     STORED_ENERGY = "stored_energy", "J", "energy in bonds and contact at the end";
     DAMPED_ENERGY = "damped_energy", "J", "work less stored, released, dissipated and friction energy; in \

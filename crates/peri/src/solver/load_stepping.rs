@@ -241,7 +241,7 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
 fn work_of_loads<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     let factor = system.factors[state.step];
     if let Some(contact) = system.friction() {
-        state.contact.plane_friction = contact.slide(&state.displacement).2;
+        state.contact.surface_friction = contact.slide(&state.displacement).2;
     }
     if system.loads.curved.is_some() {
         let before = state.step.checked_sub(1).map_or(0.0, |before| system.factors[before]);

@@ -136,16 +136,16 @@ pub struct ForceResiduals {
     pub(super) floor: f64,
 }
 
-/// Friction and moving planes of a state.
+/// Friction and rigid surfaces of a state.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub(super) struct ContactState<const D: usize> {
     /// Force densities of friction in explicit dynamics, a part of [`State::force`], N/m³.
     pub friction: Option<Field<D>>,
-    /// Friction of each plane, N.
-    pub plane_friction: Vec<[f64; 3]>,
-    /// Force of each plane, N, if any moves.
-    pub plane_push: Vec<[f64; 3]>,
+    /// Friction of each rigid surface, N.
+    pub surface_friction: Vec<[f64; 3]>,
+    /// Force of each rigid surface, N, if any moves.
+    pub surface_push: Vec<[f64; 3]>,
     /// Displacement at the start of the load step, with friction between equilibria.
     pub start: Option<Field<D>>,
     /// Friction after the last step.

@@ -124,6 +124,10 @@ impl<'a, const D: usize> System<'a, D> {
         self.set_rates(after, after);
         self.begin_curved_step(state, [before, after]);
         self.move_surfaces(before, 0.0);
+        if let (Some(contact), Some(start)) = (&mut self.contact, &state.contact.start) {
+            // where a force has them at the start of the step, in a resumed run too
+            contact.balance(start);
+        }
         self.move_surfaces(after, 0.0);
         if let Some(start) = &state.contact.start
             && let Some(contact) = self.contact.as_mut().filter(|contact| contact.has_friction())
@@ -198,7 +202,7 @@ impl<'a, const D: usize> System<'a, D> {
     pub(super) fn surface_reactions(&self, state: &State<D>) -> Vec<SurfaceReaction> {
         let Some(contact) = self.repulsion() else { return Vec::new() };
         let mut resting = contact.surface_reactions(&state.displacement);
-        for (resting, rub) in resting.iter_mut().zip(&state.contact.plane_friction) {
+        for (resting, rub) in resting.iter_mut().zip(&state.contact.surface_friction) {
             (0..3).for_each(|d| resting.force[d] += rub[d]);
         }
         resting
@@ -215,7 +219,7 @@ impl<'a, const D: usize> System<'a, D> {
         let surfaces = contact.surfaces().zip(resting).enumerate();
         for (number, (surface, resting)) in surfaces.filter(|(_, (surface, _))| !surface.bonded) {
             if resting.gap < -allowed && surface.stiffness > 0.0 {
-                let what = format!("the body and {} {}", surface.kind(), number + 1);
+                let what = format!("the body and {}", surface.title(number));
                 let (step, time, overlap) = (state.step, state.motion.time, -resting.gap);
                 return Err(Error::Penetration { what, step, time, overlap, allowed });
             }

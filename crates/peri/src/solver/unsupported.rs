@@ -5,14 +5,14 @@
 //! is nowhere prescribed has no reaction along d, so if its forces along d do not vanish it has no
 //! equilibrium at any displacement. If every such sum vanishes, dead loads give its rotation a bounded
 //! potential, so that no other mechanism lacks an equilibrium: only translations are checked. Contact pushes:
-//! a plane may hold a part that presses on it, a part held along d may hold one behind it.
+//! a plane may hold a part that presses on it, a round surface one that it stops, a part held along d one
+//! behind it.
 
 use super::force_scale::ForceScale;
 use super::load::Loads;
 use super::state::State;
 use super::system::System;
 use crate::bonds::{BodyGeometry, components};
-use crate::contact::RigidSurface;
 use crate::error::Error;
 use crate::field::Field;
 use polycore::numerics::DisjointSets;
@@ -179,11 +179,10 @@ fn join_pieces<const D: usize>(
 }
 
 impl<const D: usize> System<'_, D> {
-    fn stops(&self) -> ContactStops<D> {
+    fn stops(&self, state: &State<D>) -> ContactStops<D> {
         let Some(contact) = self.repulsion() else { return ContactStops::default() };
-        let normals = contact.surfaces().flat_map(RigidSurface::pushes).collect();
         ContactStops {
-            normals,
+            normals: contact.stops(&*self.bonds, &state.displacement),
             pairs: contact.has_pairs(),
             rubs: contact.has_friction() || contact.is_tied(),
         }
@@ -207,7 +206,7 @@ impl<const D: usize> System<'_, D> {
             ));
         }
         let roots = components(&*self.bonds, |_, _| true);
-        let (bonds, moved, stops) = (&*self.bonds, Some(&state.displacement), self.stops());
+        let (bonds, moved, stops) = (&*self.bonds, Some(&state.displacement), self.stops(state));
         match find_unsupported(bonds, &roots, &self.loads, moved, &stops, tolerance) {
             Some(part) => Err(self.no_equilibrium(state, part.to_string())),
             None => Ok(()),
@@ -220,12 +219,9 @@ impl<const D: usize> System<'_, D> {
     /// [`Error::NoEquilibrium`] for such a surface.
     pub(super) fn refuse_lost(&self, state: &State<D>) -> Result<(), Error> {
         match self.repulsion().and_then(|contact| contact.unbalanced(&state.displacement)) {
-            Some((number, found, wanted)) => Err(self.no_equilibrium(
+            Some((surface, found, wanted)) => Err(self.no_equilibrium(
                 state,
-                format!(
-                    "rigid surface {} has a force of {wanted:.3e} N, of which contact balances {found:.3e} N",
-                    number + 1
-                ),
+                format!("{surface} has a force of {wanted:.3e} N, of which contact balances {found:.3e} N"),
             )),
             None => Ok(()),
         }

@@ -196,7 +196,7 @@ impl VelocityVerlet {
         system.set_rates(factor, factor);
         system.set_forces(factor, &state.displacement);
         (state.contact.friction, state.contact.start) = (None, None);
-        (state.contact.plane_friction, state.contact.plane_push) = (Vec::new(), Vec::new());
+        (state.contact.surface_friction, state.contact.surface_push) = (Vec::new(), Vec::new());
         for &site in system.bonds.particles() {
             let site = site as usize;
             let constrained = system.loads.constrained(site);
@@ -340,7 +340,7 @@ impl VelocityVerlet {
         system.set_forces(factor, &state.displacement);
         let (friction, rubbing, rubs) = (
             state.contact.friction.take(),
-            state.contact.plane_friction.clone(),
+            state.contact.surface_friction.clone(),
             system.friction().is_some(),
         );
         let look = state.motion.look.is_due(state.stretches.fitted, system.breaking_stretch());

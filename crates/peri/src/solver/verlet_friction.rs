@@ -54,14 +54,14 @@ pub fn friction_pass<const D: usize>(
     let items = friction.chunks_mut().into_iter().zip(state.force.chunks_mut()).collect();
     let mut taken = -parallel::map_items(items, of).iter().sum::<f64>();
     // the drag of surfaces is work, not heat
-    taken += work_of_surfaces(contact.moved(), &state.contact.plane_friction, &sliding.surfaces);
+    taken += work_of_surfaces(contact.moved(), &state.contact.surface_friction, &sliding.surfaces);
     if leap.step > 0.0 {
         state.motion.energies.rubbed += taken - (sliding.stored - state.motion.energies.stuck);
     } else {
         state.work += sliding.stored;
     }
     state.motion.energies.stuck = sliding.stored;
-    (state.contact.friction, state.contact.plane_friction) = (Some(friction), sliding.surfaces);
+    (state.contact.friction, state.contact.surface_friction) = (Some(friction), sliding.surfaces);
 }
 
 /// Adds the work of surfaces that have moved; `rubbed` is their friction before this step.
@@ -72,9 +72,9 @@ pub fn surface_pass<const D: usize>(system: &System<D>, state: &mut State<D>, ru
     }
     let resting = contact.surface_reactions(&state.displacement);
     let pushing: Vec<[f64; 3]> = resting.iter().map(|resting| resting.force).collect();
-    state.work += work_of_surfaces(contact.moved(), &state.contact.plane_push, &pushing)
-        + work_of_surfaces(contact.moved(), rubbed, &state.contact.plane_friction);
-    state.contact.plane_push = pushing;
+    state.work += work_of_surfaces(contact.moved(), &state.contact.surface_push, &pushing)
+        + work_of_surfaces(contact.moved(), rubbed, &state.contact.surface_friction);
+    state.contact.surface_push = pushing;
 }
 
 /// Σ ½(force before + force after)·Δ; zero before the first step.

@@ -340,17 +340,20 @@ fn refuses() {
         let planes = contact().with_surfaces(&one, &BodySurface::default(), 1.0, vec![plane]);
         planes.err().map(|error| error.to_string())
     };
-    assert_eq!(fault(good), None);
+    assert_eq!(fault(good.clone()), None);
     for (plane, what) in [
-        (RigidSurface { shape: SurfaceShape::Plane([0.0; 2]), ..good }, "normal of a plane: found 0"),
+        (RigidSurface { shape: SurfaceShape::Plane([0.0; 2]), ..good.clone() }, "normal of a plane: found 0"),
         (
-            RigidSurface { shape: SurfaceShape::Plane([f64::NAN, 1.0]), ..good },
+            RigidSurface { shape: SurfaceShape::Plane([f64::NAN, 1.0]), ..good.clone() },
             "normal of a plane: found NaN",
         ),
-        (RigidSurface { stiffness: -1.0, ..good }, "stiffness of a rigid surface: found -1"),
-        (RigidSurface { friction: f64::INFINITY, ..good }, "friction of a rigid surface: found inf"),
-        (RigidSurface { velocity: [f64::NAN; 2], ..good }, "velocity of a rigid surface: found NaN"),
-        (RigidSurface { elastic_slip: Some(0.0), ..good }, "elastic slip of a rigid surface: found 0"),
+        (RigidSurface { stiffness: -1.0, ..good.clone() }, "stiffness of a rigid surface: found -1"),
+        (RigidSurface { friction: f64::INFINITY, ..good.clone() }, "friction of a rigid surface: found inf"),
+        (RigidSurface { velocity: [f64::NAN; 2], ..good.clone() }, "velocity of a rigid surface: found NaN"),
+        (
+            RigidSurface { elastic_slip: Some(0.0), ..good.clone() },
+            "elastic slip of a rigid surface: found 0",
+        ),
     ] {
         assert!(fault(plane).unwrap().starts_with(what), "{what}");
     }

@@ -1,5 +1,5 @@
-//! Rigid spheres, cylinders and planes on a body: gradients of their energy, balance of a force, work,
-//! friction, motion, bits.
+//! Rigid spheres, cylinders, planes and facets on a body: gradients of their energy, balance of a force,
+//! work, friction, motion, bits.
 
 use crate::bodies::{Body, Built, MODULUS, Random, hold, scatter};
 use crate::dynamics::DENSITY;
@@ -7,10 +7,13 @@ use peri::Error;
 use peri::bonds::{BodyGeometry, Bonds, LatticeBonds};
 use peri::contact::{Contact, RigidSurface};
 use peri::field::Field;
+use peri::geometry::{Enclosure, SignedDistance};
 use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{DynamicRelaxation, Lbfgs, Method, State, StepRecord, System, VelocityVerlet};
 use peri::surface::BodySurface;
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
 
 /// Builds the contact of a body of the longitudinal modulus 1 Pa with rigid surfaces on its faces.
 fn beside<const D: usize>(
@@ -25,8 +28,45 @@ fn block() -> Built<3> {
     Body::<3>::solid([6, 6, 4], 1.0, 3.015).build()
 }
 
+/// Facets of a sphere about the origin with poles on the x axis: `bands` rings of 2·`bands` quadrangles in
+/// halves.
+fn ball(radius: f64, bands: u32) -> Vec<[[f64; 3]; 3]> {
+    let around = 2 * bands;
+    let corner = |i: u32, k: u32| {
+        let theta = PI * f64::from(i) / f64::from(bands);
+        let phi = TAU * f64::from(k % around) / f64::from(around);
+        let across = if i == 0 || i == bands { 0.0 } else { theta.sin() };
+        [theta.cos(), across * phi.cos(), across * phi.sin()].map(|x| radius * x)
+    };
+    let both = |(i, k): (u32, u32)| {
+        let [p, q, r, s] = [corner(i, k), corner(i + 1, k), corner(i + 1, k + 1), corner(i, k + 1)];
+        let halves = [(i + 1 < bands).then_some([p, q, r]), (i > 0).then_some([p, r, s])];
+        halves.into_iter().flatten()
+    };
+    (0..bands).flat_map(|i| (0..around).map(move |k| (i, k))).flat_map(both).collect()
+}
+
+/// Facets of a box.
+fn cuboid(low: [f64; 3], high: [f64; 3]) -> Vec<[[f64; 3]; 3]> {
+    let corner = |at: [usize; 3]| std::array::from_fn(|d| if at[d] == 0 { low[d] } else { high[d] });
+    let side = |axis: usize, end: usize| {
+        let at = |a: usize, b: usize| {
+            let mut at = [0; 3];
+            (at[axis], at[(axis + 1) % 3], at[(axis + 2) % 3]) = (end, a, b);
+            corner(at)
+        };
+        let [p, q, r, s] = [at(0, 0), at(1, 0), at(1, 1), at(0, 1)];
+        if end == 1 { [[p, q, r], [p, r, s]] } else { [[p, r, q], [p, s, r]] }
+    };
+    (0..3).flat_map(|axis| [0, 1].map(|end| side(axis, end))).flatten().collect()
+}
+
+fn faceted(point: [f64; 3], facets: Vec<[[f64; 3]; 3]>) -> RigidSurface<3> {
+    RigidSurface::facets(point, Arc::new(SignedDistance::new(Enclosure::new(facets).unwrap())))
+}
+
 /// Forces are the gradient of the energy of contact, less the work of a force, by central differences, for
-/// spheres, cylinders and planes that stand still or balance a force.
+/// spheres, cylinders, planes and facets that stand still or balance a force.
 #[test]
 fn forces_are_the_gradient_of_an_energy() {
     let built = block();
@@ -37,14 +77,16 @@ fn forces_are_the_gradient_of_an_energy() {
         RigidSurface::sphere([3.1, 2.7, 8.7], 5.0),
         RigidSurface::cylinder([3.1, 2.7, 7.7], [0.3, 1.0, 0.1], 4.0),
         RigidSurface::plane([3.1, 2.7, 3.8], up),
+        faceted([3.1, 2.7, 8.7], ball(5.0, 8)),
     ];
     let pushed = [
         RigidSurface { force: push, ..RigidSurface::sphere([3.1, 2.7, 10.0], 5.0) },
         RigidSurface { force: push, ..RigidSurface::cylinder([3.1, 2.7, 9.5], [0.3, 1.0, 0.1], 4.0) },
         RigidSurface { force: push, ..RigidSurface::plane([3.1, 2.7, 5.0], up) },
+        RigidSurface { force: push, ..faceted([3.1, 2.7, 10.0], ball(5.0, 8)) },
     ];
     for surface in still.into_iter().chain(pushed) {
-        let mut contact = beside(bonds, vec![surface]).unwrap();
+        let mut contact = beside(bonds, vec![surface.clone()]).unwrap();
         contact.move_surfaces(0.5, 0.0);
         let u = scatter(bonds.sites(), &built.on_lattice, &Random(7).vectors(built.points.len(), 0.05));
         let mut potential = |u: &Field<3>| {
@@ -85,7 +127,7 @@ fn contact_balances_a_force() {
     let bonds = &built.lattice;
     let force = [0.0, 0.0, -2.0];
     let sphere = RigidSurface { force: Some(force), ..RigidSurface::sphere([3.0, 3.0, 50.0], 5.0) };
-    let mut contact = beside(bonds, vec![sphere]).unwrap();
+    let mut contact = beside(bonds, vec![sphere.clone()]).unwrap();
     // four faces at half a spacing from the axis on either side, but for balls below faces of a thin block
     let height = 4.0 + (25.0_f64 - 0.5).sqrt();
     assert!((contact.surfaces().next().unwrap().point[2] - height).abs() < 0.02);
@@ -99,12 +141,12 @@ fn contact_balances_a_force() {
         assert!(found.force[0].abs() < 1e-9 && found.moved[2] <= 1e-12 && found.moved[0] == 0.0);
     }
     for (fault, wrong) in [
-        ("no face of the body ahead", RigidSurface { force: Some([0.0, 0.0, 2.0]), ..sphere }),
-        ("no face of the body ahead", RigidSurface { point: [30.0, 3.0, 50.0], ..sphere }),
+        ("no face of the body ahead", RigidSurface { force: Some([0.0, 0.0, 2.0]), ..sphere.clone() }),
+        ("no face of the body ahead", RigidSurface { point: [30.0, 3.0, 50.0], ..sphere.clone() }),
         ("radius of a rigid surface: found -1", RigidSurface::sphere([0.0; 3], -1.0)),
         ("axis of a cylinder: found 0", RigidSurface::cylinder([0.0; 3], [0.0; 3], 1.0)),
-        ("friction of a rigid surface: found 0.5", RigidSurface { friction: 0.5, ..sphere }),
-        ("force on a rigid surface: found 0", RigidSurface { force: Some([0.0; 3]), ..sphere }),
+        ("friction of a rigid surface: found 0.5", RigidSurface { friction: 0.5, ..sphere.clone() }),
+        ("force on a rigid surface: found 0", RigidSurface { force: Some([0.0; 3]), ..sphere.clone() }),
     ] {
         let message = beside(bonds, vec![wrong]).map(|_| ()).unwrap_err().to_string();
         assert!(message.contains(fault), "{message}");
@@ -160,13 +202,14 @@ fn touching(sphere: RigidSurface<3>) -> [f64; 3] {
 #[test]
 fn loaded_and_unloaded() {
     let sphere = RigidSurface { stiffness: 50.0, ..RigidSurface::sphere([3.0, 3.0, 50.0], 8.0) };
-    let pressed = RigidSurface { point: touching(sphere), displacement: [0.0, 0.0, -0.2], ..sphere };
+    let pressed =
+        RigidSurface { point: touching(sphere.clone()), displacement: [0.0, 0.0, -0.2], ..sphere.clone() };
     let (by_depth, _) = equilibria(pressed, 1, None);
     let peak = &by_depth.history[3];
     let force = peak.resting[0].force[2];
     assert!(force < -0.01 && (peak.load / force.abs() - 1.0).abs() < 1e-9, "{peak:?}");
     let pushed = RigidSurface { force: Some([0.0, 0.0, force]), ..sphere };
-    let of_force: Vec<State<3>> = (0..2).map(|method| equilibria(pushed, method, None).0).collect();
+    let of_force: Vec<State<3>> = (0..2).map(|method| equilibria(pushed.clone(), method, None).0).collect();
     for (state, by_force) in std::iter::once((&by_depth, false)).chain(of_force.iter().map(|s| (s, true))) {
         let row = |k: usize| -> &StepRecord { &state.history[k] };
         assert!((row(3).resting[0].moved[2] + 0.2).abs() < 1e-5, "{:?}", row(3).resting);
@@ -186,7 +229,7 @@ fn loaded_and_unloaded() {
     for method in 0..2 {
         let run = |threads: usize, from: Option<State<3>>| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| equilibria(pushed, method, from))
+            pool.install(|| equilibria(pushed.clone(), method, from))
         };
         let (one, saved) = run(1, None);
         assert!(run(2, None).0 == one && run(2, saved).0 == one, "method {method}");
@@ -233,4 +276,108 @@ fn disc_in_motion() {
     let off = last.work - last.stored - last.kinetic;
     assert!(last.work > 0.0 && off.abs() < 0.01 * last.work, "{off} {last:?}");
     assert!((last.resting[0].moved[1] + 0.4).abs() < 1e-12 && last.resting[0].force[1] < 0.0);
+}
+
+/// The lower side of a box of facets acts as a plane, to rounding.
+#[test]
+fn box_of_facets_is_a_plane() {
+    let bonds = &block().lattice;
+    let rest = Field::zeros(bonds.sites());
+    let reactions = |surface: RigidSurface<3>| {
+        let mut contact =
+            beside(bonds, vec![RigidSurface { displacement: [0.0, 0.0, -0.3], ..surface }]).unwrap();
+        contact.move_surfaces(1.0, 0.0);
+        contact.update(bonds, &rest);
+        let forces = contact.surface_forces(bonds.sites()).unwrap();
+        (contact.surface_reactions(&rest)[0], contact.summary(bonds, &rest), forces)
+    };
+    let flat = reactions(RigidSurface::plane([0.0, 0.0, 4.1], [0.0, 0.0, -1.0]));
+    let boxed = reactions(faceted([0.0, 0.0, 4.1], cuboid([-20.0, -30.0, 0.0], [40.0, 20.0, 9.0])));
+    assert!(flat.1.pairs >= 36 && boxed.1.pairs == flat.1.pairs && boxed.0.area == flat.0.area);
+    for (a, b) in [
+        (flat.0.force[2], boxed.0.force[2]),
+        (flat.0.gap, boxed.0.gap),
+        (flat.0.spread, boxed.0.spread),
+        (flat.0.width, boxed.0.width),
+        (flat.1.energy, boxed.1.energy),
+    ] {
+        assert!((a - b).abs() < 1e-12 * a.abs(), "{a} {b}");
+    }
+    for &site in bonds.particles() {
+        let (a, b) = (flat.2.get(site as usize), boxed.2.get(site as usize));
+        assert!((0..3).all(|d| (a[d] - b[d]).abs() < 1e-12 * flat.0.force[2].abs()));
+    }
+}
+
+/// A sphere of 9800 facets acts as a sphere, within the error of its facets: a facet of corners on the sphere
+/// lies inside of it by up to R − √(R² − ρ²), with the radius ρ of the circle through them, which takes this
+/// off overlaps, and leans from its normal by up to ρ/R.
+#[test]
+fn ball_of_facets_is_a_sphere() {
+    let bonds = &Body::<3>::solid([16, 16, 4], 1.0, 3.015).build().lattice;
+    let rest = Field::zeros(bonds.sites());
+    let (radius, bands, depth) = (20.0_f64, 50, 0.5);
+    let reactions = |surface: RigidSurface<3>| {
+        let surface = RigidSurface { displacement: [0.0, 0.0, -depth], ..surface };
+        let mut contact = beside(bonds, vec![surface]).unwrap();
+        contact.move_surfaces(1.0, 0.0);
+        contact.surface_reactions(&rest)[0]
+    };
+    let centre = [7.3, 8.2, 4.0 + radius];
+    let smooth = reactions(RigidSurface::sphere(centre, radius));
+    let facets = ball(radius, bands);
+    assert_eq!(facets.len(), 9800);
+    let rough = reactions(faceted(centre, facets));
+    let circle = PI * radius / f64::from(bands) / 2.0_f64.sqrt();
+    let inside = radius - (radius * radius - circle * circle).sqrt();
+    let (lean, slope) = (circle / radius, (2.0 * depth / radius).sqrt());
+    // stiffness over area: 10 layers of a modulus of 1 Pa and a spacing of 1 m
+    let allowed = 10.0 * smooth.area * inside + smooth.force[2].abs() * lean * (slope + 0.5 * lean);
+    let off = rough.force[2] - smooth.force[2];
+    eprintln!("{smooth:?}\n{rough:?}: off by {off:.3}, allowed {allowed:.3}");
+    assert!(off.abs() <= allowed && allowed < 0.12 * smooth.force[2].abs(), "{off} {allowed}");
+    assert!((rough.gap - smooth.gap).abs() <= inside, "{} {}", rough.gap, smooth.gap);
+    assert!(rough.area <= smooth.area);
+}
+
+/// Facets with a force start at touch, balance it, and keep their bits when a run is resumed and on any
+/// number of threads.
+#[test]
+fn facets_under_a_force() {
+    let force = Some([0.0, 0.0, -0.1]);
+    let facets = RigidSurface { stiffness: 50.0, ..faceted([3.0, 3.0, 50.0], ball(8.0, 16)) };
+    let top = touching(facets.clone())[2];
+    assert!((11.8..12.0).contains(&top), "{top}");
+    let pushed = RigidSurface { force, ..facets };
+    let run = |threads: usize, from: Option<State<3>>| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| equilibria(pushed.clone(), 1, from))
+    };
+    let (one, saved) = run(1, None);
+    let row = &one.history[3];
+    assert!((row.resting[0].force[2] + 0.1).abs() < 1e-9 && row.resting[0].moved[2] < 0.0, "{row:?}");
+    assert!(run(2, None).0 == one && run(2, saved).0 == one);
+}
+
+/// A rough plane pressed along its normal by a force of its own: friction takes work when the body spreads
+/// below it, the force stays balanced, and a resumed run has the same bits.
+#[test]
+fn rough_plane_under_a_force() {
+    let plane = RigidSurface { stiffness: 50.0, ..RigidSurface::plane([3.0, 3.0, 5.0], [0.0, 0.0, -2.0]) };
+    let pushed = RigidSurface { force: Some([0.0, 0.0, -4.0]), ..plane };
+    let smooth = equilibria(pushed.clone(), 1, None).0;
+    let rough = RigidSurface { friction: 0.05, ..pushed.clone() };
+    let run = |threads: usize, from: Option<State<3>>| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| equilibria(rough.clone(), 1, from))
+    };
+    let (one, saved) = run(1, None);
+    let row = &one.history[3];
+    assert!((row.resting[0].force[2] + 4.0).abs() < 1e-9, "{row:?}");
+    assert!(row.rubbed > 0.0 && row.resting[0].moved[2] > smooth.history[3].resting[0].moved[2], "{row:?}");
+    assert!((row.work - row.stored - row.rubbed).abs() < 0.02 * row.work, "{row:?}");
+    assert!(run(2, None).0 == one && run(2, saved).0 == one);
+    let aside = RigidSurface { force: Some([0.0, 1.0, -4.0]), ..rough };
+    let message = beside(&block().lattice, vec![aside]).map(|_| ()).unwrap_err().to_string();
+    assert!(message.contains("except of a plane pressed along its normal"), "{message}");
 }

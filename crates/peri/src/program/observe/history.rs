@@ -1,9 +1,9 @@
 //! Scalars of the history: peak load, first break, energies, balances.
 
 use super::moment::Moment;
-use crate::probe::{load_at, loop_energy, stiffness_at};
+use crate::probe::{driven_loop_energy, load_at, loop_energy, stiffness_at};
 use crate::program::quantities as q;
-use crate::program::scene::{Scene, SolidLaw};
+use crate::program::scene::{Scene, SolidLaw, plain};
 use crate::solver::{Balance, StepRecord};
 use harness::observe::Scalars;
 use harness::report::Quantity;
@@ -21,6 +21,24 @@ pub fn damped_energy(row: &StepRecord, dynamic: bool) -> f64 {
     } else {
         row.work - row.stored - row.released - row.rubbed - row.dissipated
     }
+}
+
+/// Returns secant and tangent stiffness at a displacement, N/m.
+fn stiffness(history: &[StepRecord], displacement: f64) -> Option<[f64; 2]> {
+    let rows = history.iter().map(|row| ([row.displacement, row.load], row.broken));
+    stiffness_at(rows, displacement)
+}
+
+/// Returns true for loads in proportion to their factors, and displacements that are not.
+fn is_driven_by_force(history: &[StepRecord]) -> bool {
+    let follows = |get: fn(&StepRecord) -> f64| {
+        let most = history.iter().max_by(|a, b| a.factor.abs().total_cmp(&b.factor.abs()));
+        most.filter(|row| row.factor != 0.0).is_some_and(|row| {
+            let unit = get(row) / row.factor;
+            history.iter().all(|row| (get(row) - unit * row.factor).abs() <= 1e-9 * (unit * row.factor).abs())
+        })
+    };
+    follows(|row| row.load) && !follows(|row| row.displacement)
 }
 
 /// Adds peak, first break, energies and balances.
@@ -44,16 +62,15 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
         to.add_if(q::load_at(at), path);
     }
     for at in scene.output.stiffness_at.iter().map(|at| at.si()) {
-        let stiffness = move |m: &Moment<D>| {
-            stiffness_at(m.state.history.iter().map(|row| [row.displacement, row.load]), at)
-        };
+        let both = move |m: &Moment<D>| stiffness(&m.state.history, at);
         let [secant, tangent] = q::stiffness_at(at);
-        to.add_if(secant, move |m| Some(stiffness(m)?[0]));
-        to.add_if(tangent, move |m| Some(stiffness(m)?[1]));
+        to.add_if(secant, move |m| Some(both(m)?[0]));
+        to.add_if(tangent, move |m| Some(both(m)?[1]));
     }
     if scene.returns() {
         to.add_if(q::LOOP_ENERGY, |m| {
-            loop_energy(m.state.history.iter().map(|row| [row.displacement, row.load]))
+            let rows = m.state.history.iter().map(|row| [row.displacement, row.load]);
+            if is_driven_by_force(&m.state.history) { driven_loop_energy(rows) } else { loop_energy(rows) }
         });
     }
     if breaks {
@@ -110,8 +127,17 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
 /// Largest share of the dissipated energy by which stored and dissipated energy may miss the work.
 const LARGEST_MISS: f64 = 0.1;
 
-/// Warns of increments too long for the energies of branches.
+/// Warns of increments too long for the energies of branches, and of a stiffness asked for across a fall.
 pub(super) fn warnings<const D: usize>(m: &Moment<D>) -> Vec<String> {
+    let reached = |at: &f64| m.state.history.iter().any(|row| row.displacement >= *at * (1.0 - 1e-12));
+    let asked = m.scene.output.stiffness_at.iter().map(|at| at.si()).filter(reached);
+    let fallen = asked.filter(|&at| stiffness(&m.state.history, at).is_none()).map(|at| {
+        format!(
+            "no stiffness at {} mm: bonds break in the step around it; take more `steps`, or another \
+             `output.stiffness_at`",
+            plain(at * 1e3)
+        )
+    });
     let last = m.state.history.last().filter(|row| m.scene.dynamics.is_none() && row.broken == 0);
     let off = last.filter(|row| damped_energy(row, false).abs() > LARGEST_MISS * row.dissipated);
     let warning = |row: &StepRecord| {
@@ -122,7 +148,7 @@ pub(super) fn warnings<const D: usize>(m: &Moment<D>) -> Vec<String> {
             damped_energy(row, false).abs()
         )
     };
-    off.filter(|row| row.dissipated > 0.0).map(warning).into_iter().collect()
+    fallen.chain(off.filter(|row| row.dissipated > 0.0).map(warning)).collect()
 }
 
 /// Adds first break, breaking events and the last load.

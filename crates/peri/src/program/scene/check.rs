@@ -182,6 +182,13 @@ fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             positive(source, &format!("output.{key}[{index}]"), at.si(), "m")?;
         }
     }
+    let begins_at_rest = scene.programme().0.first() == Some(&0.0);
+    if !scene.output.stiffness_at.is_empty() && scene.material.is_prestrained() && !begins_at_rest {
+        let found = "a prestrained body, whose load at displacement 0 no step has";
+        let allowed =
+            "a first step at load factor 0: `path = [0, 1]` in [solver], half of the `steps` to each";
+        return Err(source.error("output.stiffness_at", found, allowed));
+    }
     if scene.output.every == Some(0) {
         return Err(source.error("output.every", 0, "at least 1 step"));
     }

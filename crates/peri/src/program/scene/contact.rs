@@ -182,7 +182,8 @@ impl ContactSpec {
         let indenters = indenters.map(|(index, indenter)| {
             indenter.surface(source, &format!("contact.indenter[{index}]"), self, explicit)
         });
-        planes.chain(indenters).collect()
+        let all = planes.chain(indenters).zip(self.surface_names());
+        all.map(|(surface, name)| Ok(RigidSurface { name, ..surface? })).collect()
     }
 
     /// Builds the contact of a body with bond modulus kθ = `micromodulus` and longitudinal modulus `modulus`.

@@ -1,26 +1,31 @@
-//! Indenters of a scene: rigid spheres, cylinders and planes with a displacement or a force of their own.
+//! Indenters of a scene: rigid spheres, cylinders, planes and surfaces of STL files with a displacement or a
+//! force of their own.
 
 use super::contact::motion;
 use super::line::plane_of;
-use super::values::{DiscreteBody, plain, vector};
-use super::{Boundary, ContactSpec, Prescribed, PrescribedField, Scene, SolverMethod};
-use crate::contact::{RigidSurface, SurfaceShape};
-use crate::geometry::length;
+use super::values::{plain, required, vector};
+use super::{ContactSpec, Scene, SolverMethod};
+use crate::contact::RigidSurface;
+use crate::geometry::{Enclosure, SignedDistance, length};
 use harness::scene::{SceneError, Source};
 use polycore::units::{Force, Length, Speed};
 use serde::Deserialize;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-/// Least radius of an indenter in spacings: a smaller one passes between the faces of the body.
-const LEAST_RADIUS: f64 = 2.0;
-
-/// A rigid sphere (in a plane body a circle), cylinder or plane that the body cannot pass.
+/// A rigid sphere (in a plane body a circle), cylinder, plane or closed surface that the body cannot pass.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IndenterSpec {
     /// Name in curves and values; default: `indenter` and its number.
     pub name: Option<String>,
-    /// Centre of a sphere or circle, a point of the axis of a cylinder, a point of a plane.
-    pub point: Vec<Length>,
+    /// Centre of a sphere or circle, a point of the axis of a cylinder, a point of a plane; of a `file` the
+    /// place of its origin, by default that of the scene.
+    pub point: Option<Vec<Length>>,
+    /// Closed surface of an STL file, in a solid.
+    pub file: Option<PathBuf>,
+    /// Length of a unit of the file.
+    pub unit: Option<Length>,
     /// Radius of a sphere, circle or cylinder.
     pub radius: Option<Length>,
     /// Direction of the axis of a cylinder, of any length, in a solid.
@@ -62,14 +67,88 @@ impl IndenterSpec {
         contact: &ContactSpec,
         explicit: bool,
     ) -> Result<RigidSurface<D>, SceneError> {
-        let point = vector(source, &format!("{key}.point"), &self.point)?;
-        let plain_surface = match (&self.radius, &self.normal) {
+        let surface = match &self.file {
+            Some(file) => self.faceted(source, key, file)?,
+            None => self.shaped(source, key)?,
+        };
+        let (displacement, velocity) =
+            motion(source, key, self.displacement.as_deref(), self.velocity.as_deref())?;
+        let force = match &self.force {
+            None => None,
+            Some(force) => Some(self.force(source, key, force)?),
+        };
+        Ok(RigidSurface {
+            stiffness: contact.stiffness_of(self.stiffness, explicit),
+            friction: contact.friction_of(self.friction),
+            elastic_slip: contact.elastic_slip.map(|slip| slip.si()),
+            displacement,
+            velocity,
+            force,
+            ..surface
+        })
+    }
+
+    /// Reads the closed surface of a file.
+    ///
+    /// # Errors
+    /// As [`super::check`]; a file that cannot be read, or whose surface is not closed.
+    fn faceted<const D: usize>(
+        &self,
+        source: &Source,
+        key: &str,
+        file: &Path,
+    ) -> Result<RigidSurface<D>, SceneError> {
+        let file_key = format!("{key}.file");
+        let others = [
+            ("radius", self.radius.is_some()),
+            ("normal", self.normal.is_some()),
+            ("axis", self.axis.is_some()),
+        ];
+        if let Some((name, _)) = others.into_iter().find(|(_, given)| *given) {
+            return Err(source.conflict(&file_key, name, "the shape is that of the file"));
+        }
+        if D == 2 {
+            return Err(source.error(&file_key, "a surface in a plane body", "a `radius` or a `normal`"));
+        }
+        let ending = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        if ending != "stl" {
+            return Err(source.error(&file_key, format!("`{}`", file.display()), "a closed surface, `.stl`"));
+        }
+        let unit = required(source, &format!("{key}.unit"), self.unit, "the file has none")?.si();
+        super::values::positive(source, &format!("{key}.unit"), unit, "m")?;
+        let point = match &self.point {
+            Some(point) => vector(source, &format!("{key}.point"), point)?,
+            None => [0.0; D],
+        };
+        let read = meshfile::stl::read(&source.file(file), unit)
+            .map_err(|error| source.refused(&file_key, error.to_string()))?;
+        let corner = |node: u32| -> [f64; D] { std::array::from_fn(|d| read.points[node as usize][d]) };
+        let facet = |nodes: &[u32; 3]| std::array::from_fn(|k| corner(nodes[k.min(2)]));
+        let body = Enclosure::new(read.triangles.iter().map(facet).collect())
+            .map_err(|error| source.refused(&file_key, format!("{}: {error}", file.display())))?;
+        Ok(RigidSurface::facets(point, Arc::new(SignedDistance::new(body))))
+    }
+
+    /// Converts a plane, sphere or cylinder.
+    ///
+    /// # Errors
+    /// As [`super::check`].
+    fn shaped<const D: usize>(&self, source: &Source, key: &str) -> Result<RigidSurface<D>, SceneError> {
+        if self.unit.is_some() {
+            return Err(source.unexpected(&format!("{key}.unit"), "the unit of a `file`"));
+        }
+        let point_key = format!("{key}.point");
+        let Some(place) = &self.point else {
+            return Err(source.missing(&point_key, "the place of the indenter at the start"));
+        };
+        let point = vector(source, &point_key, place)?;
+        Ok(match (&self.radius, &self.normal) {
             (Some(_), Some(_)) => {
                 let why = "a plane has a `normal`, a sphere or cylinder a `radius`";
                 return Err(source.conflict(&format!("{key}.normal"), "radius", why));
             }
             (None, None) => {
-                let why = "a `radius` of a sphere, circle or cylinder, or the `normal` of a plane";
+                let why = "a `radius` of a sphere, circle or cylinder, the `normal` of a plane, or a `file`";
                 return Err(source.missing(&format!("{key}.radius"), why));
             }
             (None, Some(normal)) => {
@@ -77,7 +156,7 @@ impl IndenterSpec {
                     let why = "the axis of a cylinder, which has a `radius`; a plane has a `normal` only";
                     return Err(source.unexpected(&format!("{key}.axis"), why));
                 }
-                let (point, normal) = plane_of(source, key, &self.point, normal)?;
+                let (point, normal) = plane_of(source, key, place, normal)?;
                 RigidSurface::plane(point, normal)
             }
             (Some(radius), None) => {
@@ -103,21 +182,6 @@ impl IndenterSpec {
                     }
                 }
             }
-        };
-        let (displacement, velocity) =
-            motion(source, key, self.displacement.as_deref(), self.velocity.as_deref())?;
-        let force = match &self.force {
-            None => None,
-            Some(force) => Some(self.force(source, key, force)?),
-        };
-        Ok(RigidSurface {
-            stiffness: contact.stiffness_of(self.stiffness, explicit),
-            friction: contact.friction_of(self.friction),
-            elastic_slip: contact.elastic_slip.map(|slip| slip.si()),
-            displacement,
-            velocity,
-            force,
-            ..plain_surface
         })
     }
 
@@ -159,18 +223,8 @@ pub(super) fn check(source: &Source, scene: &Scene, contact: &ContactSpec) -> Re
             );
             return Err(source.unexpected(&key("velocity"), why));
         }
-        if let (Some(radius), Some(most)) = (indenter.radius, longest_step(scene, indenter))
-            && most > radius.si()
-        {
-            let found = format!(
-                "a step of {} mm, longer than the radius: it could pass a part of the body",
-                plain(most * 1e3)
-            );
-            return Err(source.error(
-                &key("displacement"),
-                found,
-                "steps of a radius or less: more `solver.steps`",
-            ));
+        if let Some(radius) = indenter.radius {
+            refuse_leap(source, scene, (index, indenter), radius.si(), "the radius")?;
         }
         if indenter.force.is_none() {
             continue;
@@ -182,11 +236,6 @@ pub(super) fn check(source: &Source, scene: &Scene, contact: &ContactSpec) -> Re
         if scene.has_curves() {
             let why = "it follows the load factor, which runs with curves or pressures do not have";
             return Err(source.unexpected(&key("force"), why));
-        }
-        let friction = contact.friction_of(indenter.friction);
-        if friction > 0.0 {
-            let allowed = "`friction = 0` of an indenter with a `force`";
-            return Err(source.error(&key("friction"), plain(friction), allowed));
         }
         if contact.stiffness_of(indenter.stiffness, explicit) == 0.0 {
             return Err(source.error(&key("stiffness"), 0, "above 0 of an indenter with a `force`"));
@@ -212,70 +261,20 @@ fn longest_step(scene: &Scene, indenter: &IndenterSpec) -> Option<f64> {
     Some(most * way.iter().map(|d| d.si().powi(2)).sum::<f64>().sqrt())
 }
 
-/// Returns true if a boundary prescribes the displacement along an axis.
-fn holds(boundary: &Boundary, axis: usize) -> bool {
-    let prescribed = boundary.displacement.as_ref().and_then(|each| each.get(axis));
-    let by_field = boundary.displacement_field.as_ref().and_then(|each| each.get(axis));
-    prescribed.is_some_and(|own| *own != Prescribed::Free)
-        || by_field.is_some_and(|own| *own != PrescribedField::Free)
-        || boundary.rotation.is_some()
-}
-
-/// Checks indenters against the body: its surface must be resolved, and something must hold it.
+/// Refuses steps of an indenter longer than half its size, m.
 ///
 /// # Errors
-/// A [`SceneError`] that names the key, the value found and what is allowed.
-pub(super) fn check_placed<const D: usize>(
+/// A [`SceneError`] that names the longest step.
+pub(super) fn refuse_leap(
     source: &Source,
     scene: &Scene,
-    body: &DiscreteBody<D>,
+    (index, indenter): (usize, &IndenterSpec),
+    half: f64,
+    size: &str,
 ) -> Result<(), SceneError> {
-    let Some(contact) = &scene.contact else { return Ok(()) };
-    let surfaces = contact.surfaces::<D>(source, scene.method() == SolverMethod::Verlet)?;
-    let spacing = body.bonds.spacing();
-    for (number, surface) in surfaces.iter().enumerate().skip(contact.plane.len()) {
-        let index = number - contact.plane.len();
-        let key = |name: &str| format!("contact.indenter[{index}].{name}");
-        let name = contact.indenter[index].name(index);
-        if let SurfaceShape::Sphere(radius) | SurfaceShape::Cylinder(_, radius) = surface.shape
-            && radius < LEAST_RADIUS * spacing
-        {
-            let allowed = format!(
-                "at least {} mm, {LEAST_RADIUS} spacings: a smaller one passes between the faces of the body",
-                plain(LEAST_RADIUS * spacing * 1e3)
-            );
-            return Err(source.error(&key("radius"), format!("{} mm", plain(radius * 1e3)), allowed));
-        }
-        let particles = body.bonds.particles();
-        let heights = particles.iter().map(|&site| surface.height(body.bonds.position(site as usize)));
-        let behind = heights.filter(|height| *height < -1e-6 * spacing).count();
-        if behind > 0 && surface.force.is_none() {
-            let found = format!("{behind} of {} particles inside indenter `{name}`", particles.len());
-            return Err(source.error(&key("point"), found, "an indenter outside the body at the start"));
-        }
-        let Some(force) = surface.force else { continue };
-        let size = length(force);
-        let ahead = |&site: &u32| {
-            let place = body.bonds.position(site as usize);
-            surface.travel_to(place, 0.5 * spacing, &force.map(|f| f / size)).is_some()
-        };
-        if !particles.iter().any(ahead) {
-            let found = format!("a force along which indenter `{name}` does not meet the body");
-            return Err(source.error(&key("force"), found, "a force that leads to the body"));
-        }
-        for d in (0..D).filter(|&d| force[d] != 0.0) {
-            // a surface with a force of its own stops nothing
-            let others =
-                surfaces.iter().enumerate().filter(|(other, own)| *other != number && own.force.is_none());
-            let stops = others.flat_map(|(_, other)| other.pushes()).any(|push| push[d] * force[d] < 0.0);
-            if !stops && !scene.boundary.iter().any(|boundary| holds(boundary, d)) {
-                let axis = ["x", "y", "z"][d];
-                let found = format!("a force along {axis}, along which nothing holds the body");
-                let allowed =
-                    format!("a `displacement` along {axis} of some region, or a plane behind the body");
-                return Err(source.error(&key("force"), found, allowed));
-            }
-        }
-    }
-    Ok(())
+    let Some(most) = longest_step(scene, indenter).filter(|most| *most > half) else { return Ok(()) };
+    let found =
+        format!("a step of {} mm, longer than {size}: it could pass a part of the body", plain(most * 1e3));
+    let allowed = format!("steps of {size} or less: more `solver.steps`");
+    Err(source.error(&format!("contact.indenter[{index}].displacement"), found, allowed))
 }

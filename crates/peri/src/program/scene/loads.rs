@@ -5,7 +5,7 @@ use super::region::region;
 use super::values::{DiscreteBody, ONE_OF_THEM};
 use super::{Boundary, ContactSpec, Prescribed, PrescribedField, Scene, Side, SolverMethod};
 use crate::bonds::components;
-use crate::contact::RigidSurface;
+use crate::contact::SurfaceShape;
 use crate::field::Field;
 use crate::material::{BodyTensor, surface_load};
 use crate::solver::{
@@ -249,9 +249,8 @@ fn refuse_unbalanced<const D: usize>(
     loads: &Loads<D>,
 ) -> Result<(), SceneError> {
     let surfaces = scene.contact.as_ref().map_or(Ok(Vec::new()), |own| own.surfaces::<D>(source, false))?;
-    let normals = surfaces.iter().flat_map(RigidSurface::pushes).collect();
     let stops = ContactStops {
-        normals,
+        normals: super::indenter_place::stops(&surfaces, body),
         pairs: scene.contact.is_some(),
         rubs: scene.contact.as_ref().is_some_and(ContactSpec::has_friction)
             || surfaces.iter().any(|surface| surface.bonded),
@@ -265,7 +264,10 @@ fn refuse_unbalanced<const D: usize>(
     } else {
         part.to_string()
     };
-    let allowed = format!("balanced forces, or a `displacement` along {axis} of some region of it");
+    let mut allowed = format!("balanced forces, or a `displacement` along {axis} of some region of it");
+    if surfaces.iter().any(|surface| !matches!(surface.shape, SurfaceShape::Plane(_))) {
+        allowed += "; an indenter without friction holds along the normals of its contact only";
+    }
     Err(source.error("boundary", found, allowed))
 }
 

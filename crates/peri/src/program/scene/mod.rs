@@ -18,6 +18,7 @@ mod formula;
 mod grips;
 mod inclusion;
 mod indenter;
+mod indenter_place;
 mod interface;
 mod line;
 mod loads;

@@ -22,7 +22,7 @@ pub fn check_placement<const D: usize>(
     }
     plate_frame(source, scene, body)?;
     super::planes::check(source, scene, body)?;
-    super::indenter::check_placed(source, scene, body)?;
+    super::indenter_place::check(source, scene, body)?;
     let surfaces = scene.contact.as_ref().map_or(Ok(Vec::new()), |own| own.surfaces(source, false))?;
     let rigid: Vec<[f64; D]> = surfaces.iter().map(|surface| surface.displacement).collect();
     let reach = loads.reach(&*body.bonds, &rigid);
