@@ -13,9 +13,9 @@
 use crate::bonds::{BodyGeometry, Bonds, CellGrid};
 use crate::field::Field;
 use crate::material::{BodyTensor, surface_load};
+use crate::parallel;
 use crate::surface::{BodySurface, SurfaceFace};
 use nalgebra::{SMatrix, SVector};
-use rayon::prelude::*;
 
 /// Half-width of the hat functions, and depth of the particles below a face, in spacings and horizons.
 const HAT: f64 = 1.0;
@@ -209,7 +209,7 @@ impl<const D: usize> Faces<D> {
             });
             terms.sum::<f64>()
         };
-        (0..self.len()).into_par_iter().map(row).reduce(|| 0.0, f64::max)
+        parallel::map(self.len(), row).into_iter().fold(0.0, f64::max)
     }
 
     fn transpose(&mut self) {
@@ -281,7 +281,7 @@ fn below<const D: usize>(bonds: &dyn BodyGeometry<D>, surface: &BodySurface<D>) 
         sites.iter().for_each(|&site| of(site, &mut all));
         all
     };
-    let parts: Vec<Vec<FaceParticle>> = bonds.particles().par_chunks(BATCH).map(batch).collect();
+    let parts: Vec<Vec<FaceParticle>> = parallel::map_chunks(bonds.particles(), BATCH, batch);
     parts.concat()
 }
 

@@ -4,7 +4,7 @@ use super::list::{ListedParticle, NearbyParticle};
 use super::{Contact, ContactSummary};
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field, chunk_range};
-use rayon::prelude::*;
+use crate::parallel;
 use std::ops::Range;
 
 impl<const D: usize> Contact<D> {
@@ -72,8 +72,7 @@ impl<const D: usize> Contact<D> {
                 .flat_map(|(_, near)| near.map(|touch| [touch.overlap() / touch.distance, touch.distance]));
             each.max_by(|a, b| a[0].total_cmp(&b[0]))
         };
-        let parts: Vec<Option<[f64; 2]>> =
-            (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
+        let parts: Vec<Option<[f64; 2]>> = parallel::map(displacement.sites().div_ceil(CHUNK), of);
         parts.into_iter().flatten().max_by(|a, b| a[0].total_cmp(&b[0]))
     }
 
@@ -95,8 +94,7 @@ impl<const D: usize> Contact<D> {
             }
             part
         };
-        let parts: Vec<ContactSummary> =
-            (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
+        let parts: Vec<ContactSummary> = parallel::map(displacement.sites().div_ceil(CHUNK), of);
         let mut all = parts.into_iter().fold(none, |a, b| ContactSummary {
             pairs: a.pairs + b.pairs,
             overlap: a.overlap.max(b.overlap),

@@ -4,7 +4,7 @@ use super::Contact;
 use super::friction_pair::{ContactPair, FrictionPair};
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field, chunk_range};
-use rayon::prelude::*;
+use crate::parallel;
 use std::ops::Range;
 
 /// Friction after a step of explicit dynamics.
@@ -65,8 +65,7 @@ impl<const D: usize> Contact<D> {
             grips.sort_unstable_by_key(|grip| grip.pair);
             grips
         };
-        let parts: Vec<Vec<FrictionPair>> =
-            (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
+        let parts: Vec<Vec<FrictionPair>> = parallel::map(displacement.sites().div_ceil(CHUNK), of);
         let mut grips = parts.concat();
         grips.extend(self.surfaces.iter().flat_map(|surfaces| surfaces.grips(displacement, start, old)));
         grips

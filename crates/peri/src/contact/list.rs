@@ -4,7 +4,7 @@ use super::vicinity::Vicinity;
 use crate::bonds::{BodyGeometry, CellGrid};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::geometry::length;
-use rayon::prelude::*;
+use crate::parallel;
 use std::ops::Range;
 
 /// Largest contact distance over the reference distance, and over the sum of the radii.
@@ -151,7 +151,8 @@ impl<const D: usize> ContactList<D> {
             let near = self.near(own as usize, other as usize, bond, &vicinity.listed_at, reach)?;
             Some((own, self.candidate(&near)))
         };
-        let mut found: Vec<(u32, ContactCandidate<D>)> = pairs.par_iter().filter_map(near).collect();
+        let found: Vec<Option<(u32, ContactCandidate<D>)>> = parallel::map_each(pairs, near);
+        let mut found: Vec<(u32, ContactCandidate<D>)> = found.into_iter().flatten().collect();
         found.sort_unstable_by_key(|(own, candidate)| (*own, candidate.site));
         let (listed, candidates) = (std::mem::take(&mut self.listed), std::mem::take(&mut self.candidates));
         self.candidates.reserve(candidates.len() + found.len());
@@ -195,12 +196,12 @@ impl<const D: usize> ContactList<D> {
         let reach = self.gap + self.skin;
         let edge = 2.0 * RADII_FACTOR * self.largest + reach;
         let far = FARTHEST_CELLS * edge;
-        let home: Vec<[f64; D]> = particles.par_iter().map(|&site| bonds.position(site as usize)).collect();
-        let place = |(&site, home): (&u32, &[f64; D])| {
-            let moved = displacement.get(site as usize);
-            std::array::from_fn(|d| (home[d] + moved[d]).clamp(-far, far))
+        let home: Vec<[f64; D]> = parallel::map_each(particles, |&site| bonds.position(site as usize));
+        let place = |own: usize| {
+            let moved = displacement.get(particles[own] as usize);
+            std::array::from_fn(|d| (home[own][d] + moved[d]).clamp(-far, far))
         };
-        let places: Vec<[f64; D]> = particles.par_iter().zip(&home).map(place).collect();
+        let places: Vec<[f64; D]> = parallel::map(particles.len(), place);
         let grid = CellGrid::with_edge(&places, edge);
         let near = |own: usize, found: &mut Vec<u32>| {
             found.clear();
@@ -239,7 +240,7 @@ impl<const D: usize> ContactList<D> {
             (listed, candidates)
         };
         let parts: Vec<(Vec<ListedParticle>, Vec<ContactCandidate<D>>)> =
-            (0..particles.len().div_ceil(CHUNK)).into_par_iter().map(of).collect();
+            parallel::map(particles.len().div_ceil(CHUNK), of);
         self.listed.clear();
         self.candidates.clear();
         for (listed, candidates) in parts {

@@ -46,12 +46,12 @@ mod vicinity;
 use crate::bonds::{BodyGeometry, Bonds, LatticeBonds, Property};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
+use crate::parallel;
 use crate::surface::BodySurface;
 pub(crate) use faces::Faces;
 pub use friction::SlidingFriction;
 pub use friction_pair::{ContactPair, Drag, FrictionPair};
 use list::ContactList;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 pub use stiffness::Spring;
 pub use surface::{RigidSurface, SurfaceReaction, SurfaceShape};
@@ -321,8 +321,8 @@ impl<const D: usize> Contact<D> {
     pub fn surface_forces(&self, sites: usize) -> Option<Field<D>> {
         let surfaces = self.surfaces.as_ref()?;
         let mut field = Field::zeros(sites);
-        let chunks = field.chunks_mut().into_par_iter().enumerate();
-        chunks.for_each(|(chunk, mut force)| surfaces.force(chunk * CHUNK, &mut force));
+        let force = |chunk: usize, mut force: [&mut [f64]; D]| surfaces.force(chunk * CHUNK, &mut force);
+        parallel::for_items(field.chunks_mut(), force);
         Some(field)
     }
 

@@ -6,7 +6,7 @@ use super::surfaces::RigidSurfaces;
 use super::ties::Ties;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field, chunk_range};
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Visitor of a face: particles below with weights, the direction in which it is held (`None`: all), the
 /// stiffness, N/m.
@@ -25,7 +25,7 @@ impl<const D: usize> Contact<D> {
             let sums = pairs.map(|(own, touching)| touching.map(|t| stiffness(own.site, t)).sum::<f64>());
             sums.fold(0.0, f64::max)
         };
-        let pairs = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of).reduce(|| 0.0, f64::max);
+        let pairs = parallel::map(sites.div_ceil(CHUNK), of).into_iter().fold(0.0, f64::max);
         pairs + self.half_surface_stiffness()
     }
 
@@ -78,13 +78,12 @@ impl<const D: usize> Contact<D> {
             self.pair(own, site) * bonds.volume(site as usize) * (1.0 + mixed)
         };
         let sites = masses.len();
-        let sums = (0..sites.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
+        let sums: Vec<Vec<(ListedParticle, f64)>> = parallel::map(sites.div_ceil(CHUNK), |chunk| {
             let pairs = self.pairs(bonds, displacement, chunk_range(chunk, sites), self.near);
             let all =
                 pairs.map(|(own, near)| (own, near.map(|near| of(own.site, near)).sum::<f64>() / tangent));
             all.filter(|(_, sum)| *sum > 0.0).collect()
         });
-        let sums: Vec<Vec<(ListedParticle, f64)>> = sums.collect();
         for (own, sum) in sums.into_iter().flatten() {
             let mass = &mut masses[own.site as usize];
             *mass = if own.alone { 2.0 * sum } else { *mass + sum };
@@ -140,8 +139,9 @@ impl<const D: usize> Contact<D> {
             }
             [farthest, closing]
         };
-        let parts = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of);
-        let [farthest, closing] = parts.reduce(|| [0.0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
+        let parts = parallel::map(sites.div_ceil(CHUNK), of).into_iter();
+        let [farthest, closing] =
+            parts.fold([0.0; 2], |a: [f64; 2], b: [f64; 2]| [a[0].max(b[0]), a[1].max(b[1])]);
         self.near / (0.5 * farthest.sqrt()).max(closing.sqrt())
     }
 

@@ -4,7 +4,7 @@ use super::Contact;
 use super::surface::{RigidSurface, SurfaceShape};
 use crate::bonds::BodyGeometry;
 use crate::field::Field;
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Overlap, over the radius of a particle, by which a translation must run into a surface to be stopped: flat
 /// faces that pass below a sphere of two spacings come nearer by a quarter of it, as particles lie beside the
@@ -38,8 +38,8 @@ impl<const D: usize> RigidSurface<D> {
         }
         let most = |height: &(dyn Fn([f64; D]) -> f64 + Sync)| {
             let beside = |centre: &[f64; D]| std::array::from_fn(|d| centre[d] - shift[d]);
-            let overlaps = centres.par_iter().map(|centre| radius - height(beside(centre)));
-            overlaps.reduce(|| f64::NEG_INFINITY, f64::max)
+            let overlaps = parallel::map_each(centres, |centre| radius - height(beside(centre)));
+            overlaps.into_iter().fold(f64::NEG_INFINITY, f64::max)
         };
         let present = most(&|centre| self.height(centre)).max(0.0);
         let signed = |d: usize, sign: f64| std::array::from_fn(|e| if e == d { sign } else { 0.0 });

@@ -6,8 +6,8 @@ use super::surface::{RigidSurface, SurfaceShape};
 use crate::bonds::{BodyGeometry, Bonds, Property};
 use crate::error::Error;
 use crate::field::Field;
+use crate::parallel;
 use crate::surface::BodySurface;
-use rayon::prelude::*;
 
 /// Distance of a face from a plane up to which it is tied to it, in spacings.
 const TIED: f64 = 0.5;
@@ -319,7 +319,7 @@ impl<const D: usize> RigidSurfaces<D> {
                 .filter(|touch| touch.overlap > -gap)
                 .collect::<Vec<_>>()
         };
-        (0..count.div_ceil(BATCH)).into_par_iter().map(batch).collect::<Vec<_>>().concat()
+        parallel::map(count.div_ceil(BATCH), batch).concat()
     }
 
     /// Returns true for a bare particle, and for a face whose particles have all their bonds.

@@ -2,6 +2,7 @@
 
 use crate::bonds::CellGrid;
 use crate::field::{CHUNK, Field, chunk_range};
+use crate::parallel;
 use polycore::numerics::bounds;
 use rayon::prelude::*;
 
@@ -77,7 +78,7 @@ impl<const D: usize> Vicinity<D> {
             [low, high]
         };
         let members: Vec<&[u32]> = self.grid.members().collect();
-        let moves: Vec<[[f64; D]; 2]> = members.into_par_iter().map(of).collect();
+        let moves: Vec<[[f64; D]; 2]> = parallel::map_each(&members, |members| of(members));
         let against = |a: &[[f64; D]; 2], b: &[[f64; D]; 2]| {
             let along = |d: usize| (a[1][d] - b[0][d]).max(b[1][d] - a[0][d]);
             (0..D).map(|d| along(d) * along(d)).sum::<f64>().sqrt()
@@ -93,7 +94,7 @@ impl<const D: usize> Vicinity<D> {
             });
             left
         };
-        let near = (0..moves.len()).into_par_iter().map(left).reduce(|| f64::INFINITY, f64::min);
+        let near = parallel::map(moves.len(), left).into_iter().fold(f64::INFINITY, f64::min);
         let all = bounds(moves.iter().flatten().copied());
         let left = near.min(allowed(RINGS + 1) - against(&all, &all));
         let known = moves.iter().flatten().flatten().all(|moved| moved.is_finite());
