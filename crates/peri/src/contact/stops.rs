@@ -85,7 +85,10 @@ mod tests {
         }
         assert_eq!(stops(RigidSurface::sphere([5.1, 4.8, 6.0], 2.0)), down, "the smallest sphere");
         assert_eq!(stops(RigidSurface::sphere([-10.0, 5.0, 2.0], 10.0)), [[1.0, 0.0, 0.0]]);
-        let corner = stops(RigidSurface::sphere([14.0, 5.0, 11.0], 7.0));
+        // its lowest point is 1.2 m below the upper side, beside the edge at 7.05 m from its centre
+        let corner = stops(RigidSurface::sphere([14.0, 5.0, 9.8], 7.0));
+        let passes = stops(RigidSurface::sphere([14.0, 5.0, 11.0], 7.0));
+        assert_eq!(passes, down, "the body passes below it");
         assert_eq!(corner, [[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]);
         // in a hole of the body it holds across its axis
         let around: Vec<[f64; 3]> =
