@@ -13,8 +13,9 @@ use std::time::Duration;
 /// Stated is the allocation, used are the pages written: most sites of a thin body are not.
 const LARGE: f64 = 100e6;
 const FACTOR: f64 = 4.0;
-/// Memory that a program may take before it refuses a scene, bytes, beside [`TABLE`] times its tables' text.
-const REFUSED: f64 = 20e6;
+/// Memory that a program may take before it refuses a scene, bytes, beside [`TABLE`] times its tables' text;
+/// with the pages of the program itself, about 20 MB, where its help ends before a sample of its memory.
+const REFUSED: f64 = 30e6;
 const TABLE: f64 = 10.0;
 
 /// Runs a program; returns its output and its peak memory, bytes (VmHWM of proc_pid_status(5)).

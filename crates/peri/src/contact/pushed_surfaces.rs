@@ -17,6 +17,9 @@ const BALANCED: f64 = 1e-13;
 const MISSED: f64 = 1e-6;
 /// Largest number of evaluations; bisection alone needs 60.
 const EVALUATIONS: u32 = 200;
+/// Way back to the first touch, over the size of a closed surface, above which it surrounds the body or
+/// overlaps it.
+pub(crate) const BEHIND: f64 = 0.01;
 /// Least component of a normal along the force of a plane that can balance it.
 const FACING: f64 = 1e-3;
 
@@ -36,6 +39,16 @@ impl<const D: usize> RigidSurfaces<D> {
                     self.each[number].surface.title(number)
                 )));
             };
+            if let SurfaceShape::Facets(facets) = &self.each[number].surface.shape
+                && travel < -BEHIND * facets.ball().1
+            {
+                return Err(Error::geometry(format!(
+                    "{}: found its first touch from outside {:.4} mm behind its place; allowed: a surface in \
+                     front of the body, which it neither surrounds nor overlaps, or a `displacement`",
+                    self.each[number].surface.title(number),
+                    -travel * 1e3
+                )));
+            }
             let point = &mut self.each[number].surface.point;
             (0..D).for_each(|d| point[d] += travel * along[d]);
         }

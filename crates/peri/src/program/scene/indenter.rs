@@ -129,6 +129,12 @@ impl IndenterSpec {
         Ok(RigidSurface::facets(point, Arc::new(SignedDistance::new(body))))
     }
 
+    /// Notes of the reader of its file.
+    pub(super) fn notes(&self, source: &Source) -> Vec<String> {
+        let Some((file, unit)) = self.file.as_ref().zip(self.unit) else { return Vec::new() };
+        meshfile::stl::read(&source.file(file), unit.si()).map(|read| read.notes).unwrap_or_default()
+    }
+
     /// Converts a plane, sphere or cylinder.
     ///
     /// # Errors

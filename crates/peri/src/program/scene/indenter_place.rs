@@ -1,10 +1,11 @@
 //! Checks of indenters against the body: outside of it at the start, resolved, and something to press on.
 
 use super::indenter::refuse_leap;
+use super::pressure::{LEAST_WALL, wall};
 use super::values::{DiscreteBody, plain};
 use super::{Boundary, Prescribed, PrescribedField, Scene, SolverMethod};
-use crate::contact::{RigidSurface, SurfaceShape};
-use crate::geometry::length;
+use crate::contact::{BEHIND, RigidSurface, SurfaceShape};
+use crate::geometry::{Enclosure, inside, length};
 use harness::scene::{SceneError, Source};
 
 /// Least radius of an indenter in spacings: a smaller one passes between the faces of the body.
@@ -31,6 +32,77 @@ pub(super) fn stops<const D: usize>(surfaces: &[RigidSurface<D>], body: &Discret
     let standing = surfaces.iter().filter(|surface| surface.force.is_none());
     let shifts = standing.flat_map(|surface| [[0.0; D], surface.displacement].map(|shift| (surface, shift)));
     shifts.flat_map(|(surface, shift)| surface.stops(&shift, &centres, 0.5 * bonds.spacing())).collect()
+}
+
+/// Warns of bodies too thin below a rigid surface, and passes on the notes of files.
+pub(super) fn warnings<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &DiscreteBody<D>,
+) -> Vec<String> {
+    let Some(contact) = &scene.contact else { return Vec::new() };
+    let surfaces = contact.surfaces::<D>(source, scene.method() == SolverMethod::Verlet).unwrap_or_default();
+    let (spacing, outside) = (body.bonds.spacing(), body.surface());
+    let least = LEAST_WALL * body.bonds.horizon();
+    let thin = |(number, surface): (usize, &RigidSurface<D>)| {
+        let heights: Vec<f64> = outside.faces().iter().map(|face| surface.height(face.place)).collect();
+        let nearest = heights.iter().copied().fold(f64::INFINITY, f64::min).max(0.0);
+        let reach = nearest + length(surface.displacement) + spacing;
+        let met = outside.faces().iter().zip(&heights).filter(|(face, height)| {
+            let beyond: [f64; D] = std::array::from_fn(|d| face.place[d] + 0.1 * spacing * face.normal[d]);
+            **height < reach && surface.height(beyond) < **height - 0.05 * spacing
+        });
+        let wall = wall(body, met.map(|(face, _)| face)).filter(|wall| *wall < least)?;
+        Some(format!(
+            "{} meets a body {} mm thick, less than {LEAST_WALL} horizons: contact between two of its sides \
+             is up to 43 % too stiff; take a `body.spacing` below {} mm",
+            surface.title(number),
+            plain(wall * 1e3),
+            plain(spacing * wall / least * 1e3)
+        ))
+    };
+    let notes = contact.indenter.iter().flat_map(|indenter| indenter.notes(source));
+    surfaces.iter().enumerate().filter_map(thin).chain(notes).collect()
+}
+
+/// Refuses a closed surface with a wall or an edge that passes between the faces of the body, or with a
+/// corner inside the body.
+fn refuse_slender<const D: usize>(
+    source: &Source,
+    key: &str,
+    (surface, facets): (&RigidSurface<D>, &Enclosure<D>),
+    body: &DiscreteBody<D>,
+) -> Result<(), SceneError> {
+    let spacing = body.bonds.spacing();
+    let mm = |place: [f64; D]| place.map(|x| plain((x * 1e6).round() / 1e3)).join(", ");
+    for (index, corners) in facets.facets().corners().iter().enumerate() {
+        let normal = facets.facets().normal(index);
+        let middle: [f64; D] =
+            std::array::from_fn(|d| corners.iter().map(|corner| corner[d]).sum::<f64>() / D as f64);
+        let place: [f64; D] = std::array::from_fn(|d| middle[d] + surface.point[d]);
+        let behind = std::array::from_fn(|d| place[d] - LEAST_RADIUS * spacing * normal[d]);
+        if surface.height(behind) > 0.0 {
+            let found =
+                format!("a wall or an edge thinner than {LEAST_RADIUS} spacings at ({}) mm", mm(place));
+            let allowed = format!(
+                "at least {} mm of solid behind every facet: less passes between the faces of the body",
+                plain(LEAST_RADIUS * spacing * 1e3)
+            );
+            return Err(source.error(key, found, allowed));
+        }
+        let corner = corners.iter().map(|corner| std::array::from_fn(|d| corner[d] + surface.point[d]));
+        if surface.force.is_none()
+            && !body.operations.is_empty()
+            && let Some(corner) = corner.clone().find(|&corner: &[f64; D]| {
+                let deeper = std::array::from_fn(|d| corner[d] - TOUCHES * spacing * normal[d]);
+                inside(&body.operations, corner) && inside(&body.operations, deeper)
+            })
+        {
+            let found = format!("a corner inside the body, at ({}) mm", mm(corner));
+            return Err(source.error(key, found, "an indenter outside the body at the start"));
+        }
+    }
+    Ok(())
 }
 
 /// Checks indenters against the body: its surface must be resolved, and something must hold it.
@@ -72,6 +144,7 @@ pub(super) fn check<const D: usize>(
                 );
                 return Err(source.error(&key("file"), found, allowed));
             }
+            refuse_slender(source, &key("file"), (surface, facets.body()), body)?;
             refuse_leap(source, scene, (index, &contact.indenter[index]), 0.5 * least, "half its width")?;
         }
         let particles = body.bonds.particles();
@@ -113,6 +186,20 @@ pub(super) fn check<const D: usize>(
         if !particles.iter().any(ahead) {
             let found = format!("a force along which indenter `{name}` does not meet the body");
             return Err(source.error(&key("force"), found, "a force that leads to the body"));
+        }
+        if let SurfaceShape::Facets(facets) = &surface.shape {
+            let way = force.map(|f| f / size);
+            let ways = outside.faces().iter().filter_map(|face| surface.travel_to(face.place, 0.0, &way));
+            let first = ways.fold(f64::INFINITY, f64::min);
+            if first < -BEHIND * facets.ball().1 {
+                let found = format!(
+                    "a surface that first touches the body {} mm behind its place: indenter `{name}` \
+                     surrounds or overlaps it",
+                    plain((-first * 1e6).round() / 1e3)
+                );
+                let allowed = "a surface in front of the body, or a `displacement`";
+                return Err(source.error(&key("force"), found, allowed));
+            }
         }
         for d in (0..D).filter(|&d| force[d] != 0.0) {
             let stopped = held.iter().any(|push| push[d] * force[d] < 0.0);

@@ -14,7 +14,7 @@ use harness::scene::{SceneError, Source};
 /// Thickness of a wall over the horizon above which the force on its side is right within 5 %: the area
 /// vectors of both sides overlap in walls below four. On a flat wall the force is 0.2, 2.6, 4.9, 15 and 25 %
 /// too large at 10, 9, 8, 7 and 6 layers, horizon ratio 3.015.
-const LEAST_WALL: f64 = 2.5;
+pub(super) const LEAST_WALL: f64 = 2.5;
 
 /// Adds the pressures of boundaries to loads that follow curves.
 ///
@@ -79,7 +79,7 @@ pub(super) fn add<const D: usize>(
 
 /// Median thickness of the wall below some faces, m, up to [`LEAST_WALL`] horizons and in steps of a quarter
 /// of the spacing; `None` without shapes or faces.
-fn wall<'a, const D: usize>(
+pub(super) fn wall<'a, const D: usize>(
     body: &DiscreteBody<D>,
     faces: impl Iterator<Item = &'a SurfaceFace<D>>,
 ) -> Option<f64> {
