@@ -158,7 +158,7 @@ impl<const D: usize> CloudShares<'_, D> {
                 let shares = arch.dispatch(ShareKernel { shares: self, own, bonds: &bonds, around: &around });
                 (around.members, shares)
             };
-            let all: Vec<_> = parallel::map_each(&owners, of);
+            let all: Vec<_> = parallel::map_each(owners, of);
             for (members, shares) in all {
                 for (member, share) in members.into_iter().zip(shares) {
                     for a in 0..D {
