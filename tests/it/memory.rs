@@ -13,9 +13,8 @@ use std::time::Duration;
 /// Stated is the allocation, used are the pages written: most sites of a thin body are not.
 const LARGE: f64 = 100e6;
 const FACTOR: f64 = 4.0;
-/// Memory that a program may take before it refuses a scene, bytes, beside [`TABLE`] times its tables' text;
-/// with the pages of the program itself, about 20 MB, where its help ends before a sample of its memory.
-const REFUSED: f64 = 30e6;
+/// Memory that a program may take before it refuses a scene, bytes, beside [`TABLE`] times its tables' text.
+const REFUSED: f64 = 20e6;
 const TABLE: f64 = 10.0;
 
 /// Runs a program; returns its output and its peak memory, bytes (VmHWM of proc_pid_status(5)).
@@ -32,16 +31,17 @@ fn watched(program: &str, arguments: &str, here: &Path) -> (Ended, f64) {
         let mut most = 0.0;
         while let Some(now) = peak() {
             most = now;
-            std::thread::sleep(Duration::from_millis(1));
+            std::thread::sleep(Duration::from_micros(100));
         }
         most
     });
     (finish(child), watch.join().unwrap())
 }
 
-/// Bytes beyond those that the program takes for its help.
+/// Bytes beyond those that the program takes for its help: the most of several runs, each of which may end
+/// before a sample of its memory.
 fn beyond_help(program: &str, arguments: &str, here: &Path) -> (Ended, f64) {
-    let (_, empty) = watched(program, "--help", here);
+    let empty = (0..5).map(|_| watched(program, "--help", here).1).fold(0.0, f64::max);
     let (ended, most) = watched(program, arguments, here);
     (ended, most - empty)
 }

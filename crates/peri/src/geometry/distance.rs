@@ -12,9 +12,9 @@ const ON: f64 = 1e-9;
 /// A facet nearest to a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NearestFacet<const D: usize> {
-    /// Its number.
+    /// Number of the facet.
     pub facet: usize,
-    /// Its point nearest to the point, m.
+    /// Nearest point of the facet, m.
     pub place: [f64; D],
     /// Distance of the point, m.
     pub distance: f64,

@@ -11,7 +11,7 @@ use super::point::LEAST_SHAPE;
 use super::spline_levels::SplineLevels;
 use super::tensor::{Vector, invert};
 use crate::bonds::{BodyGeometry, BondKind, Bonds, CloudBonds, CloudPlaces, MomentColumns};
-use crate::field::{CHUNK, Field};
+use crate::field::{CHUNK, Field, chunk_range};
 use crate::parallel;
 use nalgebra::SMatrix;
 use polycore::numerics::conjugate_gradients;
@@ -120,8 +120,11 @@ impl<'a, const D: usize> ReliefProblem<'a, D> {
         let cloud = self.cloud;
         let mut levels = SplineLevels::new(cloud, &self.inside, 0.25 * fourth);
         let precondition = |residual: &[Vector<D>], scaled: &mut [Vector<D>]| {
-            let each = scaled.iter_mut().zip(residual).zip(&scale);
-            each.for_each(|((scaled, r), scale)| *scaled = r / *scale);
+            parallel::for_chunks(scaled, CHUNK, |chunk, scaled| {
+                let range = chunk_range(chunk, sites);
+                let each = scaled.iter_mut().zip(&residual[range.clone()]).zip(&scale[range]);
+                each.for_each(|((scaled, r), scale)| *scaled = r / *scale);
+            });
             levels.add(cloud, residual, scaled);
         };
         let product = |search: &[Vector<D>], image: &mut [Vector<D>]| {
@@ -188,6 +191,6 @@ fn largest<const D: usize>(field: &[Vector<D>]) -> f64 {
 
 /// Sums a term in the order of the work items.
 fn sum(sites: usize, term: impl Fn(usize) -> f64 + Sync) -> f64 {
-    let of = |chunk: usize| crate::field::chunk_range(chunk, sites).map(&term).sum::<f64>();
+    let of = |chunk: usize| chunk_range(chunk, sites).map(&term).sum::<f64>();
     parallel::sum(sites.div_ceil(CHUNK), of)
 }

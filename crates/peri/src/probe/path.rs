@@ -48,9 +48,9 @@ pub fn load_at(path: impl IntoIterator<Item = [f64; 2]>, displacement: f64) -> O
 /// next one, of second order in their distances.
 ///
 /// The path begins at rest; points at displacement 0 before all others, as of a body with stresses of its
-/// own, are its start in place of that, and secants count from the load there. `falls` has the events so far
-/// at each point, such as broken bonds: a load is no function of the displacement where they grow. `None`
-/// between such points; no parabola passes through two of them.
+/// own, are its start in place of that, and secants count from the load there. Each point has the number of
+/// events so far, such as broken bonds. Returns `None` between two points with different numbers, where the
+/// load drops; no parabola passes through both.
 pub fn stiffness_at(path: impl IntoIterator<Item = ([f64; 2], u64)>, displacement: f64) -> Option<[f64; 2]> {
     let mut path: Vec<([f64; 2], u64)> = std::iter::once(([0.0; 2], 0)).chain(path).collect();
     let start = path.iter().position(|point| point.0[0] != 0.0)?.checked_sub(1)?;

@@ -3,6 +3,7 @@
 
 use crate::bodies::{Body, Built, MODULUS, Random, hold, scatter};
 use crate::dynamics::DENSITY;
+use harness::scene::Source;
 use peri::Error;
 use peri::bonds::{BodyGeometry, Bonds, LatticeBonds};
 use peri::contact::{Contact, RigidSurface};
@@ -10,6 +11,7 @@ use peri::field::Field;
 use peri::geometry::{Enclosure, SignedDistance};
 use peri::material::BondMaterial;
 use peri::potential::Law;
+use peri::program::scene::Scene;
 use peri::solver::{DynamicRelaxation, Lbfgs, Method, State, StepRecord, System, VelocityVerlet};
 use peri::surface::BodySurface;
 use std::f64::consts::{PI, TAU};
@@ -380,4 +382,47 @@ fn rough_plane_under_a_force() {
     let aside = RigidSurface { force: Some([0.0, 1.0, -4.0]), ..rough };
     let message = beside(&block().lattice, vec![aside]).map(|_| ()).unwrap_err().to_string();
     assert!(message.contains("except of a plane pressed along its normal"), "{message}");
+}
+
+/// A block between two planes: below 2.5 horizons, 7.54 spacings, a scene warns of both.
+#[test]
+fn thin_bodies_are_warned_of() {
+    let told = |height: u32| {
+        let scene = format!(
+            r#"version = 1
+program = "peri"
+[body]
+space = "solid"
+spacing = "1 mm"
+shapes = [{{ add = "box", min = ["-4 mm", "-4 mm", "0 mm"], max = ["4 mm", "4 mm", "{height} mm"] }}]
+[material]
+law = "linear"
+youngs_modulus = "1 MPa"
+[[boundary]]
+min = ["-1.1 mm", "-1.1 mm", "0 mm"]
+max = ["1.1 mm", "1.1 mm", "1.1 mm"]
+displacement = ["0 mm", "0 mm", "free"]
+[contact]
+[[contact.plane]]
+name = "base"
+point = ["0 mm", "0 mm", "0 mm"]
+normal = [0, 0, 1]
+[[contact.indenter]]
+name = "punch"
+point = ["0 mm", "0 mm", "{height} mm"]
+normal = [0, 0, -1]
+displacement = ["0 mm", "0 mm", "-0.06 mm"]
+"#
+        );
+        let source = Source::new("scene.toml", scene);
+        let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
+        let lines = peri::program::run::explanation(&source, &scene, false);
+        lines.unwrap_or_else(|error| panic!("{error}")).join("\n")
+    };
+    let [thin, thick] = [6, 8].map(told);
+    for name in ["base", "punch"] {
+        let found = thin.contains(&format!("`{name}` meets a body 6 mm thick, less than 2.5 horizons"));
+        assert!(found, "{thin}");
+    }
+    assert!(!thick.contains("meets a body"), "{thick}");
 }

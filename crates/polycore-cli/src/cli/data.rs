@@ -56,9 +56,9 @@ pub struct TestTableSpec {
     weight: Option<f64>,
     /// Undeformed radius of the cylinder of a test of `mode = "torsion"`.
     radius: Option<Length>,
-    /// Its undeformed length, for a column of angles.
+    /// Undeformed length of a cylinder, for a column of angles.
     length: Option<Length>,
-    /// Its length held in the test over the undeformed one, 1 if not given; or a column `stretch`.
+    /// Length of a cylinder held in the test over the undeformed one, 1 if not given; or a column `stretch`.
     stretch: Option<f64>,
 }
 

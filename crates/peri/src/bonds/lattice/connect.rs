@@ -46,7 +46,8 @@ impl<const D: usize> LatticeBonds<D> {
                 }
             }
         });
-        self.directed_bonds = intact.iter().flatten().map(|word| u64::from(word.count_ones())).sum();
+        let count = |bits: &Vec<u64>| bits.iter().map(|bits| u64::from(bits.count_ones())).sum::<u64>();
+        self.directed_bonds = parallel::map_each(&intact, count).iter().sum();
         self.intact = intact;
     }
 

@@ -55,10 +55,10 @@ pub(super) fn warnings<const D: usize>(
         let wall = wall(body, met.map(|(face, _)| face)).filter(|wall| *wall < least)?;
         Some(format!(
             "{} meets a body {} mm thick, less than {LEAST_WALL} horizons: contact between two of its sides \
-             is up to 43 % too stiff; take a `body.spacing` below {} mm",
+             is too stiff, by 43 % at two horizons; take a `body.spacing` below {:.3} mm",
             surface.title(number),
             plain(wall * 1e3),
-            plain(spacing * wall / least * 1e3)
+            spacing * wall / least * 1e3
         ))
     };
     let notes = contact.indenter.iter().flat_map(|indenter| indenter.notes(source));
@@ -74,6 +74,12 @@ fn refuse_slender<const D: usize>(
     body: &DiscreteBody<D>,
 ) -> Result<(), SceneError> {
     let spacing = body.bonds.spacing();
+    let is_deep = |corner: [f64; D]| {
+        let beside = |d: usize, way: f64| {
+            std::array::from_fn(|e| corner[e] + if e == d { way * TOUCHES * spacing } else { 0.0 })
+        };
+        (0..D).all(|d| [1.0, -1.0].iter().all(|&way| inside(&body.operations, beside(d, way))))
+    };
     let mm = |place: [f64; D]| place.map(|x| plain((x * 1e6).round() / 1e3)).join(", ");
     for (index, corners) in facets.facets().corners().iter().enumerate() {
         let normal = facets.facets().normal(index);
@@ -93,10 +99,7 @@ fn refuse_slender<const D: usize>(
         let corner = corners.iter().map(|corner| std::array::from_fn(|d| corner[d] + surface.point[d]));
         if surface.force.is_none()
             && !body.operations.is_empty()
-            && let Some(corner) = corner.clone().find(|&corner: &[f64; D]| {
-                let deeper = std::array::from_fn(|d| corner[d] - TOUCHES * spacing * normal[d]);
-                inside(&body.operations, corner) && inside(&body.operations, deeper)
-            })
+            && let Some(corner) = corner.clone().find(|&corner| is_deep(corner))
         {
             let found = format!("a corner inside the body, at ({}) mm", mm(corner));
             return Err(source.error(key, found, "an indenter outside the body at the start"));

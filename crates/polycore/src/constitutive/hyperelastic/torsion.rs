@@ -34,19 +34,29 @@ pub(super) struct Ring {
     shares: [[f64; 2]; 2],
 }
 
-/// Number of rings, by Gauss's rule in s: exact for polynomials of W in invariants up to the 15th power.
-const RINGS: usize = 16;
+/// Number of rings, by Gauss's rule in t with s = 1 − (1 − t)³: exact for polynomials in s up to the 20th
+/// power. Rings crowd at the surface, where a law that locks is steep: the torque of Gent's law is right to 1e-9 at
+/// 99.9 % of its locking shear and to 1e-6 at 99.99 %.
+const RINGS: usize = 32;
 
 /// Abscissae above 0 on [−1, 1] and their weights.
 const GAUSS: [(f64, f64); RINGS / 2] = [
-    (0.9894009349916499, 0.027152459411754096),
-    (0.9445750230732326, 0.062253523938647894),
-    (0.8656312023878318, 0.09515851168249279),
-    (0.755404408355003, 0.12462897125553388),
-    (0.6178762444026438, 0.14959598881657674),
-    (0.45801677765722737, 0.16915651939500254),
-    (0.2816035507792589, 0.18260341504492358),
-    (0.09501250983763744, 0.1894506104550685),
+    (0.9972638618494816, 0.007018610009470506),
+    (0.9856115115452684, 0.016274394730905743),
+    (0.9647622555875064, 0.025392065309262024),
+    (0.9349060759377397, 0.034273862913021765),
+    (0.8963211557660521, 0.042835898022226836),
+    (0.84936761373257, 0.05099805926237609),
+    (0.7944837959679424, 0.058684093478535565),
+    (0.7321821187402897, 0.06582222277636168),
+    (0.6630442669302152, 0.07234579410884834),
+    (0.5877157572407623, 0.07819389578707023),
+    (0.5068999089322294, 0.08331192422694671),
+    (0.42135127613063533, 0.08765209300440378),
+    (0.33186860228212767, 0.09117387869576378),
+    (0.23928736225213706, 0.09384439908080451),
+    (0.1444719615827965, 0.09563872007927471),
+    (0.048307665687738324, 0.09654008851472766),
 ];
 
 impl TwistedCylinder {
@@ -66,8 +76,10 @@ impl TwistedCylinder {
     /// Computes [2M/(πR³), N/(πR²)] of a law, Pa: torque and axial force of the undeformed radius R.
     ///
     /// # Errors
-    /// As [`biaxial`], at a ring.
+    /// As [`biaxial`], at a ring or at the surface.
     pub fn stresses<L: Hyperelastic + ?Sized>(self, law: &L) -> Result<[f64; 2], Error> {
+        let [a, b] = self.surface();
+        biaxial(law, a, b)?;
         let mut sum = [0.0; 2];
         for ring in self.rings() {
             let own = ring.observed(biaxial(law, ring.stretches[0], ring.stretches[1])?);
@@ -91,9 +103,11 @@ impl TwistedCylinder {
     pub(super) fn rings(self) -> [Ring; RINGS] {
         std::array::from_fn(|i| {
             let (abscissa, weight) = GAUSS[i / 2];
-            let s = 0.5 * if i % 2 == 0 { 1.0 - abscissa } else { 1.0 + abscissa };
+            // 1 − t
+            let rest = 0.5 * if i % 2 == 0 { 1.0 + abscissa } else { 1.0 - abscissa };
+            let s = 1.0 - rest.powi(3);
             let ([a, b], [cosine, sine]) = self.plane(s);
-            let weight = 0.5 * weight;
+            let weight = 1.5 * weight * rest * rest;
             // σ_θz = ½(σ₁ − σ₂) sin, 2σ_zz − σ_θθ = ½(σ₁ + σ₂) + 3/2 (σ₁ − σ₂) cos, σᵢ = λᵢPᵢ
             let torque = 2.0 * weight * s * s * sine / (self.stretch * self.stretch.sqrt());
             let force = weight * s / self.stretch;
@@ -148,13 +162,14 @@ mod tests {
     }
 
     /// Gent's law at λ = 1, W₁ = μJ/(2(J − k²)): 2M/(πR³) = 4μγJ ∫ s³ ds/(J − γ²s²) = −2μJ(1/γ + J ln(1 −
-    /// γ²/J)/γ³), N/(πR²) = −¼γ 2M/(πR³) as W₂ = 0; to 90 % of the locking shear.
+    /// γ²/J)/γ³), N/(πR²) = −¼γ 2M/(πR³) as W₂ = 0; to 99.9 % of the locking shear. Beyond it the law has no
+    /// torque.
     #[test]
     fn gent_in_closed_form() {
         let (modulus, limit) = (0.3e6, 4.0_f64);
         let law = Gent::new(modulus, limit).unwrap();
         let mut worst: f64 = 0.0;
-        for part in [0.2, 0.5, 0.9] {
+        for part in [0.2, 0.5, 0.9, 0.99, 0.999] {
             let shear = part * limit.sqrt();
             let logarithm = (-shear * shear / limit).ln_1p();
             let torque = -2.0 * modulus * limit * (1.0 / shear + limit * logarithm / shear.powi(3));
@@ -162,6 +177,7 @@ mod tests {
             worst = worst.max((found[0] / torque - 1.0).abs());
             worst = worst.max((found[1] / (-0.25 * shear * torque) - 1.0).abs());
         }
+        assert!(TwistedCylinder { stretch: 1.0, shear: 1.001 * limit.sqrt() }.stresses(&law).is_err());
         evidence::at_most("torque and force of Gent's law near locking, relative", worst, 1e-8);
     }
 

@@ -33,7 +33,7 @@ pub(super) struct TorsionColumns {
     cylinder: TestCylinder,
 }
 
-/// Units of its columns.
+/// Units of the columns of torsion.
 struct TorsionUnits {
     torques: Unit<TorqueDimension>,
     forces: Option<Unit<ForceDimension>>,
@@ -52,6 +52,8 @@ const ANGLES: [&str; 6] = ["twist", "twist per length", "angle", "twist angle", 
 const TORQUES: [&str; 4] = ["torque", "moment", "torsional moment", "twisting moment"];
 const FORCES: [&str; 4] = ["axial force", "normal force", "force", "axial load"];
 const STRETCHES: [&str; 3] = ["stretch", "axial stretch", "lambda"];
+/// Headings of a held strain, which is refused.
+const STRAINS: [&str; 3] = ["strain", "axial strain", "elongation"];
 
 /// Excess of a held stretch over 1 that counts as none.
 const SAME_LENGTH: f64 = 1e-6;
@@ -64,7 +66,7 @@ impl TorsionColumns {
     ///
     /// # Errors
     /// No cylinder, a column that is missing or has a unit of another quantity, angles without the length of
-    /// the cylinder or twists with it, two sources of the held stretch.
+    /// the cylinder or twists with it, a held stretch that is given twice or as a strain.
     pub fn find(file: &Table, format: &TestFormat) -> Result<Option<Self>, Error> {
         let cylinder = match (format.cylinder, format.mode) {
             (Some(cylinder), _) => cylinder,
@@ -93,6 +95,10 @@ impl TorsionColumns {
         let stretch = optional(&STRETCHES);
         if stretch.is_some() && cylinder.stretch.is_some() {
             let allowed = "a column `stretch` or the key `stretch` in the data's entry, not both";
+            return Err(file.refuse_headings(allowed));
+        }
+        if stretch.is_none() && optional(&STRAINS).is_some() {
+            let allowed = "a column `stretch`, length over undeformed length, in place of a strain";
             return Err(file.refuse_headings(allowed));
         }
         let torque = file.require_column(&TORQUES)?;
@@ -128,7 +134,18 @@ impl TorsionColumns {
             let allowed = "a torque with the sign of its twist";
             return Err(file.refuse_cell(rows[at], self.torque, allowed));
         }
+        let is_at_rest = |state: &TestState| state.cylinder().is_some_and(|cylinder| cylinder.shear == 0.0);
+        let offset = |state: &TestState| is_at_rest(state) && state.nominal[0] > NOISE_LEVEL * largest;
+        if let Some(at) = states.iter().position(offset) {
+            return Err(file.refuse_cell(rows[at], self.torque, "no torque at a twist of 0"));
+        }
         let mut notes = Vec::new();
+        let unfitted = states.iter().filter(|state| state.nominal[0] == 0.0 && !is_at_rest(state)).count();
+        if unfitted > 0 {
+            notes.push(format!(
+                "{unfitted} twists with a torque of 0 or none are fitted by their force alone"
+            ));
+        }
         if blank > 0 {
             notes.push(format!("{blank} rows without a torque or a force are left out"));
         }
@@ -284,12 +301,17 @@ mod tests {
     #[test]
     fn rows_notes_and_weights() {
         let text = "# source: mine\nstretch,twist [rad/m],torque [N mm],force [N]\n1,0,0,0\n1,100,,\n\
-                    1.2,100,80,\n1,-100,-90,0.4\n";
+                    1.2,100,80,\n1,-100,-90,0.4\n1,50,0,-1\n";
         let reading = read(text, &format(None, None)).unwrap();
-        assert_eq!((reading.table.states.len(), reading.table.measurements()), (3, 3));
+        assert_eq!((reading.table.states.len(), reading.table.measurements()), (4, 4));
         assert!((reading.table.states[1].cylinder().unwrap().stretch - 1.2).abs() < 1e-12);
         let notes = reading.notes.join("; ");
-        for part in ["1 rows without", "1 twists below 0", "1 axial forces are above 0"] {
+        for part in [
+            "1 rows without",
+            "1 twists with a torque of 0",
+            "1 twists below 0",
+            "1 axial forces are above 0",
+        ] {
             assert!(notes.contains(part), "{notes}");
         }
         assert!(reading.description.contains("radius 5.0000 mm; shear at its surface up to 0.5000"));
@@ -326,6 +348,8 @@ mod tests {
             ("twist [rad/m],torque [N m]\n1,0\n", &plain, "a torque other than zero"),
             ("twist [rad/m],torque [N m],stretch\n1,1,0\n", &plain, "a stretch above 0"),
             ("twist [rad/m],torque [N m],stretch\n1,1,1\n", &format(None, Some(1.1)), "not both"),
+            ("twist [rad/m],torque [N m],strain [%]\n1,1,25\n", &plain, "in place of a strain"),
+            ("twist [rad/m],torque [N m]\n0,5\n90,25\n", &plain, "no torque at a twist of 0"),
         ] {
             let error = read(text, format).unwrap_err().to_string();
             assert!(error.contains(part), "{text}{error}");
