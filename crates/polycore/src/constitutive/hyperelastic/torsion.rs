@@ -35,8 +35,8 @@ pub(super) struct Ring {
 }
 
 /// Number of rings, by Gauss's rule in t with s = 1 − (1 − t)³: exact for polynomials in s up to the 20th
-/// power. Rings crowd at the surface, where a law that locks is steep: the torque of Gent's law is right to 1e-9 at
-/// 99.9 % of its locking shear and to 1e-6 at 99.99 %.
+/// power. Rings crowd at the surface, where a law that locks is steep: the torque of Gent's law is right to
+/// 1e-9 at 99.9 % of its locking shear and to 1e-6 at 99.99 %.
 const RINGS: usize = 32;
 
 /// Abscissae above 0 on [−1, 1] and their weights.
