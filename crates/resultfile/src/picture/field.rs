@@ -25,7 +25,7 @@ const LARGEST_PICTURE: usize = 200_000_000;
 /// Fields side by side in one PNG.
 ///
 /// ```
-/// # use harness::output::picture::{FieldMap, Panel};
+/// # use resultfile::picture::{FieldMap, Panel};
 /// let positions: Vec<[f64; 2]> = (0..100).map(|i| [f64::from(i % 10), f64::from(i / 10)]).collect();
 /// let stress: Vec<f64> = positions.iter().map(|[x, y]| x * y).collect();
 /// let map = FieldMap::new()

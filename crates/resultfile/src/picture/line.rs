@@ -3,7 +3,7 @@
 /// A plot of several curves.
 ///
 /// ```
-/// # use harness::output::picture::{LinePlot, Series};
+/// # use resultfile::picture::{LinePlot, Series};
 /// let x = [0.0, 1.0, 2.0];
 /// let plot = LinePlot::new("Stress along the ligament")
 ///     .axes("x / a", "stress / applied stress")

@@ -36,7 +36,7 @@ const LARGEST: f64 = 1e8;
 /// one after another as an animation.
 ///
 /// ```
-/// # use harness::output::picture::{ColorMap, Corner, Skin, Solids, Strip, View};
+/// # use resultfile::picture::{ColorMap, Corner, Skin, Solids, Strip, View};
 /// let mut skin = Skin::new(None);
 /// let corner = |x: f64, y: f64| Corner { at: [x, y, x * y], values: [x + y, f64::NAN] };
 /// skin.face(&[corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)]);

@@ -27,7 +27,7 @@ const LARGEST: usize = 100_000_000;
 /// Data shared by all stages. A sample is a pixel.
 ///
 /// ```
-/// # use harness::output::picture::{ColorMap, Strip, Strips};
+/// # use resultfile::picture::{ColorMap, Strip, Strips};
 /// let strips = Strips {
 ///     title: "Cooling".into(),
 ///     samples: [60, 20],
