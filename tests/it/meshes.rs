@@ -59,8 +59,8 @@ fn a_polygon_is_a_box() {
     }
 }
 
-/// An edge of a plane element and the two nodes of another, ten spacings apart, have the particles of the sides
-/// of a box; z differs by rounding.
+/// An edge of a plane element and the two nodes of another, ten spacings apart, have the particles of the
+/// sides of a box; z differs by rounding.
 #[test]
 fn edges_of_a_plane_deck_are_sides() {
     let base = fs::read_to_string(workspace().join("tests/bad/peri/square.toml")).unwrap();

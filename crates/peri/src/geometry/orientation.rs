@@ -4,8 +4,8 @@
 /// J. R. Shewchuk, Discrete Comput. Geom. 18 (1997) 305, doi:10.1007/PL00009321.
 const ROUNDING: f64 = 3.330_669_073_875_472e-16;
 
-/// Returns twice the area of the triangle `a`, `b`, `c`, above 0 if it is anticlockwise, with an exact sign; 0
-/// if and only if the points lie on a line.
+/// Returns twice the area of the triangle `a`, `b`, `c`, above 0 if it is anticlockwise, with an exact sign:
+/// 0 if and only if the points lie on a line.
 pub(super) fn orientation(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     let left = (a[0] - c[0]) * (b[1] - c[1]);
     let right = (a[1] - c[1]) * (b[0] - c[0]);

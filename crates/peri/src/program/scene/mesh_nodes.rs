@@ -13,8 +13,8 @@ struct SpannedSide<const D: usize> {
 }
 
 impl<const D: usize> CellMesh<D> {
-    /// Returns the facets that nodes span: outer sides of cells whose corners are all among them; for nodes on
-    /// none of these such sides between cells, then edges of cells; a point for a single node on no edge.
+    /// Returns the facets that nodes span: outer sides of cells whose corners are all among them; for nodes
+    /// on none of these such sides between cells, then edges of cells; a point for a single node on no edge.
     ///
     /// # Errors
     /// The number of nodes left.

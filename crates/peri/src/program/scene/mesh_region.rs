@@ -33,7 +33,7 @@ pub(super) enum SetRegion<const D: usize> {
     /// Inside of cells.
     Cells(Enclosure<D>),
     /// Particles below faces or around edges or a node.
-    Below(LayerBelow<D>),
+    Below(Box<LayerBelow<D>>),
 }
 
 /// Particles within a distance of faces, edges or a node.
@@ -52,7 +52,8 @@ impl<const D: usize> SetRegion<D> {
     pub fn contains(&self, place: [f64; D]) -> bool {
         match self {
             Self::Cells(body) => body.contains(place),
-            Self::Below(LayerBelow { faces, reach, pieces, is_filled }) => {
+            Self::Below(layer) => {
+                let LayerBelow { faces, reach, pieces, is_filled } = &**layer;
                 // a set of one body takes no particles of another across a gap
                 (!is_filled || pieces.contains(place)) && faces.covers(place, *reach, pieces.facets())
             }
@@ -193,7 +194,7 @@ impl<const D: usize> MeshSets<D> {
         })?);
         // particles on the border belong to it
         let reach = reach * (1.0 + 1e-9);
-        Ok(SetRegion::Below(LayerBelow { faces, reach, pieces, is_filled: *is_filled }))
+        Ok(SetRegion::Below(Box::new(LayerBelow { faces, reach, pieces, is_filled: *is_filled })))
     }
 }
 
