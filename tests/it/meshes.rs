@@ -41,20 +41,57 @@ fn a_mesh_is_the_body_of_its_shapes() {
     assert_eq!(from_mesh, values(&mesh, "--threads 2"));
 }
 
-/// A polygon is the box with its corners, in either direction.
+/// A polygon is the box with its corners, in either direction, closed by its first corner or not.
 #[test]
 fn a_polygon_is_a_box() {
     let base = fs::read_to_string(workspace().join("tests/bad/peri/square.toml")).unwrap();
     let shape = base.lines().find(|line| line.starts_with("shapes = ")).unwrap().to_owned();
     let expected = values(&base, "");
-    for corners in
-        [["0", "10", "10", "10", "10", "0", "0", "0"], ["0", "0", "10", "0", "10", "10", "0", "10"]]
-    {
+    for corners in [
+        &["0", "10", "10", "10", "10", "0", "0", "0"][..],
+        &["0", "0", "10", "0", "10", "10", "0", "10"],
+        &["0", "0", "10", "0", "10", "10", "0", "10", "0", "0"],
+    ] {
         let points: Vec<String> =
             corners.chunks(2).map(|at| format!("[\"{} mm\", \"{} mm\"]", at[0], at[1])).collect();
         let polygon = format!("shapes = [{{ add = \"polygon\", points = [{}] }}]", points.join(", "));
         assert_eq!(values(&base.replace(&shape, &polygon), ""), expected);
     }
+}
+
+/// An edge of a plane element and the two nodes of another, ten spacings apart, have the particles of the
+/// sides of a box; z differs by rounding.
+#[test]
+fn edges_of_a_plane_deck_are_sides() {
+    let base = fs::read_to_string(workspace().join("tests/bad/peri/square.toml")).unwrap();
+    let deck = fs::read_to_string(workspace().join("tests/bad/inputs/plane.inp")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("plane.inp");
+    fs::write(&file, deck.replace("3, 10, 10", "3, 10, 10, 1e-9")).unwrap();
+    let shape = base.lines().find(|line| line.starts_with("shapes = ")).unwrap().to_owned();
+    let mesh = format!("shapes = [{{ add = \"mesh\", file = \"{}\", unit = \"1 mm\" }}]", file.display());
+    let sets = base
+        .replace(&shape, &mesh)
+        .replace("side = \"x-\"", "set = \"LEFT\"")
+        .replace("side = \"x+\"", "set = \"RIGHT\"");
+    assert_eq!(values(&sets, ""), values(&base, ""));
+}
+
+/// A file that a deck includes belongs to the scene: its contents are in the record of the run.
+#[test]
+fn included_files_are_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let deck = fs::read_to_string(workspace().join("tests/bad/inputs/plane.inp")).unwrap();
+    let (nodes, rest) = deck.split_at(deck.find("*ELEMENT").unwrap());
+    fs::write(folder.path().join("nodes.inp"), nodes).unwrap();
+    fs::write(folder.path().join("part.inp"), format!("*INCLUDE, INPUT=nodes.inp\n{rest}")).unwrap();
+    let base = fs::read_to_string(workspace().join("tests/bad/peri/square.toml")).unwrap();
+    let shape = base.lines().find(|line| line.starts_with("shapes = ")).unwrap().to_owned();
+    let mesh = "shapes = [{ add = \"mesh\", file = \"part.inp\", unit = \"1 mm\" }]";
+    fs::write(folder.path().join("scene.toml"), base.replace(&shape, mesh)).unwrap();
+    peri("run scene.toml --output out", folder.path()).with_code(0);
+    let report = fs::read_to_string(folder.path().join("out/report.json")).unwrap();
+    assert!(report.contains("\"part.inp\"") && report.contains("\"nodes.inp\""), "{report}");
 }
 
 /// Mesh files of `crystfem`'s tests.

@@ -74,8 +74,10 @@ fn mesh(path: &Path, cards: &mut Cards, advice: Advice) -> Result<MeshFile, Erro
             _ => ignored.add(&card, cards),
         }
     }
-    if cards.included() > 0 {
-        reader.content.notes.push(format!("{} files are included", cards.included()));
+    reader.content.included = cards.included();
+    if !reader.content.included.is_empty() {
+        let count = reader.content.included.len();
+        reader.content.notes.push(format!("{count} files are included"));
     }
     ignored.write_notes(advice, &mut reader.content.notes);
     if let Some(place) = &reader.place {
@@ -85,7 +87,9 @@ fn mesh(path: &Path, cards: &mut Cards, advice: Advice) -> Result<MeshFile, Erro
     let [nodes, elements] = reader.content.labels(path)?;
     let budget = cards.bytes.saturating_mul(16).saturating_add(1 << 16);
     let sets = std::mem::take(&mut reader.sets);
-    Resolver { path, nodes: &nodes, elements: &elements, budget }.resolve(sets, &mut reader.content)?;
+    let is_plane = reader.content.elements.iter().all(|element| element.kind.solid().is_none());
+    let mut resolver = Resolver { path, nodes: &nodes, elements: &elements, is_plane, budget };
+    resolver.resolve(sets, &mut reader.content)?;
     reader.content.number_nodes(path, &nodes)?;
     Ok(reader.content)
 }
@@ -277,7 +281,8 @@ impl InputReader<'_> {
                     return Err(row.error(
                         "side",
                         side,
-                        "S1 … S6 of hexahedra, S1 … S4 of tetrahedra, S1 … S5 of wedges, or none",
+                        "S1 … S6 of hexahedra, S1 … S4 of tetrahedra and quadrangles, S1 … S5 of wedges, \
+                            S1 … S3 of triangles, or none",
                     ));
                 }
             };

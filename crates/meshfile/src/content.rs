@@ -1,13 +1,14 @@
 //! Content of a mesh file: nodes, elements and sets, as written there.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Error, line_error};
 use crate::shape::ElementShape;
 
 /// A face of an element: the element's index and the side, 0–5 of a hexahedron, 0–3 of a tetrahedron or 0–4
-/// of a wedge, numbered as in Abaqus (S1 is side 0).
+/// of a wedge, numbered as in Abaqus (S1 is side 0); in a file without solids an edge, 0–3 of a quadrangle or
+/// 0–2 of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Face {
     /// Index of the element.
@@ -117,8 +118,10 @@ pub struct MeshFile {
     pub element_sets: BTreeMap<String, Vec<u32>>,
     /// Physical groups of Gmsh that consist of curves and points; their nodes are also in `node_sets`.
     pub curve_sets: BTreeMap<String, Vec<u32>>,
-    /// Sides of solids by name.
+    /// Sides of solids by name; in a file without solids edges of plane elements.
     pub surfaces: BTreeMap<String, Vec<Face>>,
+    /// Files that this one includes, each once.
+    pub included: Vec<PathBuf>,
     /// Notes for the user: omissions and doubtful input.
     pub notes: Vec<String>,
 }

@@ -4,14 +4,17 @@
 mod cuts;
 mod distance;
 mod enclosure;
+mod facet_set;
 mod facets;
 mod gaps;
+mod orientation;
 mod parts;
 
 pub(crate) use cuts::length;
 pub use cuts::{Cut, cuts_within, severed};
 pub use distance::{NearestFacet, SignedDistance};
 pub use enclosure::{Enclosure, moments};
+pub use facet_set::FacetSet;
 pub use facets::{Facet, Facets};
 pub use gaps::{Gaps, NearbyGaps};
 pub use parts::Parts;

@@ -134,6 +134,8 @@ fn match_facets(
 fn name_sets(content: &mut MeshFile, mesh: &mut Mesh, number: &[u32], face_of: &BTreeMap<u32, Face>) {
     mesh.surfaces = std::mem::take(&mut content.surfaces);
     for faces in mesh.surfaces.values_mut() {
+        // edges of plane elements are no faces of solids
+        faces.retain(|face| number[face.element as usize] != u32::MAX);
         faces.iter_mut().for_each(|face| face.element = number[face.element as usize]);
     }
     for (name, places) in std::mem::take(&mut content.element_sets) {

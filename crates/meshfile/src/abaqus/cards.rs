@@ -100,12 +100,13 @@ impl<'a> Cards<'a> {
         self.files.push(OpenFile { path, bytes, at: 0, line: 0 });
     }
 
-    /// Number of included files.
-    pub fn included(&self) -> usize {
-        let mut files: Vec<&PathBuf> = self.parts.iter().map(|part| &part.1).collect();
+    /// Lists the included files, each once.
+    pub fn included(&self) -> Vec<PathBuf> {
+        let mut files: Vec<PathBuf> = self.parts.iter().map(|part| part.1.clone()).collect();
         files.sort_unstable();
         files.dedup();
-        files.len() - 1
+        files.retain(|file| file != self.path);
+        files
     }
 
     /// Converts the line of an error to its file and line there.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::content::{Face, Labels, MeshFile};
+use crate::content::{ElementKind, Face, Labels, MeshFile};
 use crate::error::{Error, line_error};
 use crate::shape::ElementShape;
 
@@ -49,6 +49,8 @@ pub(super) struct Resolver<'a> {
     pub path: &'a Path,
     pub nodes: &'a Labels,
     pub elements: &'a Labels,
+    /// True for a file without solids, whose plane elements have their edges as sides.
+    pub is_plane: bool,
     /// Limit on further members, in proportion to the file, so that nested sets and ranges cannot grow
     /// without bound.
     pub budget: usize,
@@ -179,13 +181,13 @@ impl Resolver<'_> {
         self.count_work(line, 6 * members.len())?;
         for place in members {
             let element = &content.elements[*place as usize];
-            // shells and lines have no sides
-            let sides = element.kind.solid().map_or(0, ElementShape::side_count);
+            let sides = side_count(element.kind, self.is_plane);
             match side {
                 Some(side) if side < sides => found.push(Face { element: *place, side }),
                 Some(side) => {
                     let allowed = match sides {
-                        0 => "sides of hexahedra, tetrahedra and wedges".to_owned(),
+                        0 => "sides of hexahedra, tetrahedra and wedges, of plane elements without these"
+                            .into(),
                         sides => format!("S1 … S{sides}"),
                     };
                     let what = format!("side of element {}", element.label);
@@ -194,7 +196,7 @@ impl Resolver<'_> {
                 None => {
                     let outer = match outer {
                         Some(outer) => outer,
-                        None => outer.insert(outer_sides(content)),
+                        None => outer.insert(outer_sides(content, self.is_plane)),
                     };
                     let sides = outer.get(place).map_or(&[][..], Vec::as_slice);
                     found.extend(sides.iter().map(|side| Face { element: *place, side: *side }));
@@ -205,15 +207,23 @@ impl Resolver<'_> {
     }
 }
 
-/// Returns the sides of solid elements that no other shares, by the element's index.
-fn outer_sides(content: &MeshFile) -> BTreeMap<u32, Vec<u8>> {
+/// Returns the number of sides of an element: faces of solids, in a plane mesh edges of plane elements.
+fn side_count(kind: ElementKind, is_plane: bool) -> u8 {
+    let edges = kind.facet().filter(|_| is_plane).map_or(0, |corners| corners as u8);
+    kind.solid().map_or(edges, ElementShape::side_count)
+}
+
+/// Returns the sides of elements that no other shares, by the element's index.
+fn outer_sides(content: &MeshFile, is_plane: bool) -> BTreeMap<u32, Vec<u8>> {
     let mut sides: Vec<([u64; 4], Face)> = Vec::new();
     for (place, element) in (0u32..).zip(&content.elements) {
-        let Some(shape) = element.kind.solid() else { continue };
         let labels = content.labels_of(element);
-        for side in 0..shape.side_count() {
+        let count = side_count(element.kind, is_plane);
+        for side in 0..count {
+            let edge = [usize::from(side), usize::from((side + 1) % count)];
+            let corners = element.kind.solid().map_or(&edge[..], |shape| shape.side(side));
             let mut key = [u64::MAX; 4];
-            key.iter_mut().zip(shape.side(side)).for_each(|(key, &corner)| *key = labels[corner]);
+            key.iter_mut().zip(corners).for_each(|(key, &corner)| *key = labels[corner]);
             key.sort_unstable();
             sides.push((key, Face { element: place, side }));
         }

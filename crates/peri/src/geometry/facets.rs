@@ -1,6 +1,7 @@
 //! Flat facets, found by their place: segments in 2D, triangles in 3D.
 
 use super::cuts::{Cut, length};
+use super::orientation::orientation;
 
 /// Excess of a facet, over its edges, at which a segment still meets it.
 const SLACK: f64 = 1e-9;
@@ -173,11 +174,13 @@ fn area_vector<const D: usize>(corners: &Facet<D>) -> [f64; D] {
     }
 }
 
-/// Side of a point from the line through two points, seen along the last axis: above 0 on the left. The line
-/// has one side of a point, whichever end comes first; a point on it is moved by (ε², ε).
+/// Side of a point from the line through two points, seen along the last axis: above 0 on the left, with an
+/// exact sign, so that one facet of a fan around a corner has the point. The line has one side of a point,
+/// whichever end comes first; a point on it is moved by (ε², ε).
 fn side<const D: usize>(p: &[f64; D], q: &[f64; D], at: [f64; D]) -> f64 {
     let (low, high) = if p <= q { (p, q) } else { (q, p) };
-    let mut cross = (high[0] - low[0]) * (at[1] - low[1]) - (high[1] - low[1]) * (at[0] - low[0]);
+    let shadow = |x: &[f64; D]| [x[0], x[1]];
+    let mut cross = orientation(shadow(low), shadow(high), shadow(&at));
     if cross == 0.0 {
         cross = if high[0] > low[0] {
             f64::MIN_POSITIVE
@@ -217,7 +220,17 @@ fn crossing<const D: usize>(corners: &Facet<D>, point: [f64; D]) -> i32 {
 }
 
 /// Distance of a point from a facet, m.
-fn distance<const D: usize>(point: [f64; D], corners: &Facet<D>) -> f64 {
+pub(super) fn distance<const D: usize>(point: [f64; D], corners: &Facet<D>) -> f64 {
+    foot(point, corners).0
+}
+
+/// Returns the point of a facet nearest to a point, m.
+pub(super) fn nearest<const D: usize>(point: [f64; D], corners: &Facet<D>) -> [f64; D] {
+    foot(point, corners).1
+}
+
+/// Distance of a point from a facet, m, and the nearest point of it.
+fn foot<const D: usize>(point: [f64; D], corners: &Facet<D>) -> (f64, [f64; D]) {
     if D == 3 {
         let across = area_vector(corners);
         let size = length(across);
@@ -229,7 +242,8 @@ fn distance<const D: usize>(point: [f64; D], corners: &Facet<D>) -> f64 {
         });
         if within && size > 0.0 {
             let height: f64 = (0..D).map(|d| (point[d] - corners[0][d]) * across[d]).sum();
-            return (height / size).abs();
+            let height = height / size;
+            return (height.abs(), std::array::from_fn(|d| point[d] - height * across[d] / size));
         }
     }
     let beside = |k: usize| {
@@ -238,9 +252,11 @@ fn distance<const D: usize>(point: [f64; D], corners: &Facet<D>) -> f64 {
         let square: f64 = along.iter().map(|x| x * x).sum();
         let dot: f64 = (0..D).map(|d| (point[d] - p[d]) * along[d]).sum();
         let part = if square > 0.0 { (dot / square).clamp(0.0, 1.0) } else { 0.0 };
-        length(std::array::from_fn::<f64, D, _>(|d| point[d] - p[d] - part * along[d]))
+        let offset = length(std::array::from_fn::<f64, D, _>(|d| point[d] - p[d] - part * along[d]));
+        (offset, std::array::from_fn(|d| p[d] + part * along[d]))
     };
-    (0..D).map(beside).fold(f64::INFINITY, f64::min)
+    let least = |one: (f64, [f64; D]), other: (f64, [f64; D])| if other.0 < one.0 { other } else { one };
+    (0..D).map(beside).fold((f64::INFINITY, corners[0]), least)
 }
 
 #[cfg(test)]

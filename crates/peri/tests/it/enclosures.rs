@@ -94,6 +94,44 @@ fn closed_facets_are_the_shapes_around_them() {
     assert!(counts(&parts)[1] < counts(&whole)[1]);
 }
 
+/// A fan of prisms around a node at a point of a lattice, up to three units in the last place beside it: each
+/// point inside is in one prism, at any angle of the facets.
+#[test]
+fn points_at_a_node_are_in_one_cell() {
+    let mut random = polycore::random::SplitMix64::new(7);
+    let mut worst = 0;
+    for fan in 0..400 {
+        let [x, y] = [1 + fan % 20, 1 + fan / 20].map(|k| 0.1 * f64::from(k));
+        let count = 4 + fan as usize % 5;
+        let ring: Vec<[f64; 2]> = (0..count)
+            .map(|k| {
+                let angle = 2.0 * PI * (k as f64 + 0.4 * random.uniform()) / count as f64;
+                let radius = 0.5 + random.uniform();
+                [x + radius * angle.cos(), y + radius * angle.sin()]
+            })
+            .collect();
+        let prisms: Vec<Enclosure<3>> = (0..count)
+            .map(|k| {
+                let base = [[x, y], ring[k], ring[(k + 1) % count]];
+                let at = |k: usize, z: f64| [base[k % 3][0], base[k % 3][1], z];
+                let mut facets = vec![[at(0, 0.0), at(2, 0.0), at(1, 0.0)], [0, 1, 2].map(|k| at(k, 1.0))];
+                for k in 0..3 {
+                    facets.push([at(k, 0.0), at(k + 1, 0.0), at(k + 1, 1.0)]);
+                    facets.push([at(k, 0.0), at(k + 1, 1.0), at(k, 1.0)]);
+                }
+                Enclosure::new(facets).unwrap()
+            })
+            .collect();
+        let beside = |x: f64, ulps: i64| f64::from_bits(x.to_bits().wrapping_add_signed(ulps));
+        for (i, j) in (-3..=3).flat_map(|i| (-3..=3).map(move |j| (i, j))) {
+            let point = [beside(x, i), beside(y, j), 0.5];
+            let windings: i32 = prisms.iter().map(|prism| prism.facets().windings(point)).sum();
+            worst += i32::from(windings != 1);
+        }
+    }
+    assert_eq!(worst, 0, "points in no cell or in several");
+}
+
 /// No bond passes from one flank of a notch narrower than the horizon to the other. Of bonds near its tip
 /// those stay that pass through its end: 6 more than with a box cut out. Bonds around a re-entrant corner
 /// stay.

@@ -20,6 +20,9 @@ pub(super) struct CellMesh<const D: usize> {
     facets: Vec<Vec<Facet<D>>>,
 }
 
+/// Differences of z of a plane mesh, over its size, that are none: of seven digits, as programs write them.
+const FLAT: f64 = 1e-6;
+
 /// Number of cells that share a side, and the facets of the first of them.
 type SharedSide<const D: usize> = (u32, Vec<Facet<D>>);
 
@@ -46,12 +49,16 @@ impl<const D: usize> CellMesh<D> {
         positive(source, unit_key, scale, "m")?;
         let content = meshfile::read(&source.file(file), |_| None)
             .map_err(|error| source.refused(key, error.to_string()))?;
+        for included in &content.included {
+            // with its hash in the stamp of the scene
+            source.file(included.strip_prefix(source.folder()).unwrap_or(included));
+        }
         let points =
             content.nodes.iter().map(|node| std::array::from_fn(|d| scale * node.point[d])).collect();
         let (facets, file) = (Vec::new(), file.to_owned());
         let mut mesh = Self { file, content, points, cells: Vec::new(), facets };
         mesh.cells = mesh.cells_of(0..mesh.content.elements.len() as u32);
-        mesh.check_dimension(source, key)?;
+        mesh.check_dimension(source, key, scale)?;
         for &cell in &mesh.cells {
             let facets = mesh.facets_of_cell(source, key, cell)?;
             mesh.facets.push(facets);
@@ -147,7 +154,7 @@ impl<const D: usize> CellMesh<D> {
     }
 
     /// Refuses files without cells of the body's dimension, and plane bodies with others or off their plane.
-    fn check_dimension(&self, source: &Source, key: &str) -> Result<(), SceneError> {
+    fn check_dimension(&self, source: &Source, key: &str, scale: f64) -> Result<(), SceneError> {
         let kinds = || self.content.elements.iter().map(|element| element.kind.dimension());
         let most = kinds().max().unwrap_or(0);
         let found = |what: &str| format!("{}, {what}", self.path());
@@ -169,7 +176,13 @@ impl<const D: usize> CellMesh<D> {
         let nodes = self.cells.iter().flat_map(|&cell| self.nodes(cell));
         let heights = nodes.map(|&node| self.content.nodes[node as usize].point[2]);
         let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
-        if D == 2 && low != high {
+        let size = |d: usize| {
+            let along = self.points.iter().map(|point| point[d]);
+            along.clone().fold(f64::MIN, f64::max) - along.fold(f64::MAX, f64::min)
+        };
+        // in the unit of the file
+        let size = (0..D).map(size).fold(0.0, f64::max) / scale;
+        if D == 2 && high - low > FLAT * size {
             let what = format!("nodes between z = {low} and {high}");
             return Err(source.error(key, found(&what), "nodes of a plane body at one z"));
         }
@@ -224,7 +237,7 @@ impl<const D: usize> CellMesh<D> {
     }
 
     /// Returns the sorted corners of a side, and its facets.
-    fn side(&self, element: &FileElement, side: &LocalSide, flipped: bool) -> ([u32; 4], Vec<Facet<D>>) {
+    pub fn side(&self, element: &FileElement, side: &LocalSide, flipped: bool) -> ([u32; 4], Vec<Facet<D>>) {
         let nodes = self.content.nodes_of(element);
         let [mut corners, mut middles] = [&side.0, &side.1].map(|local| {
             let global = local.iter().map(|&k| nodes[k]);
@@ -278,10 +291,10 @@ impl<const D: usize> CellMesh<D> {
 }
 
 /// Local nodes of a side: corners, then the nodes between each and the next.
-type LocalSide = (Vec<usize>, Vec<usize>);
+pub(super) type LocalSide = (Vec<usize>, Vec<usize>);
 
 /// Returns the sides of a cell: faces of a solid, anticlockwise seen from outside; edges of a plane cell.
-fn sides_of(kind: ElementKind) -> Vec<LocalSide> {
+pub(super) fn sides_of(kind: ElementKind) -> Vec<LocalSide> {
     if let Some(shape) = kind.solid() {
         let side = |side: u8| {
             let ring = shape.side(side);

@@ -5,7 +5,7 @@ use super::region::layers;
 use super::values::{ONE_OF_THEM, required};
 use super::{Boundary, Scene, ShapeSpec};
 use crate::bonds::Bonds;
-use crate::geometry::{Enclosure, Facet, Facets};
+use crate::geometry::{Enclosure, Facet, FacetSet};
 use harness::scene::{SceneError, Source};
 use polycore::numerics::DisjointSets;
 use polycore::units::Length;
@@ -32,8 +32,19 @@ impl<const D: usize> Default for MeshSets<D> {
 pub(super) enum SetRegion<const D: usize> {
     /// Inside of cells.
     Cells(Enclosure<D>),
-    /// Particles within a distance, m, of faces or nodes, in the pieces of the mesh that have them.
-    Near(Facets<D>, f64, Option<Enclosure<D>>),
+    /// Particles below faces or around edges or a node.
+    Below(Box<LayerBelow<D>>),
+}
+
+/// Particles within a distance of faces, edges or a node.
+pub(super) struct LayerBelow<const D: usize> {
+    faces: FacetSet<D>,
+    /// Greatest distance, m.
+    reach: f64,
+    /// The pieces of the mesh that have them.
+    pieces: Enclosure<D>,
+    /// True if particles fill the mesh, false if it is only cut out.
+    is_filled: bool,
 }
 
 impl<const D: usize> SetRegion<D> {
@@ -41,8 +52,10 @@ impl<const D: usize> SetRegion<D> {
     pub fn contains(&self, place: [f64; D]) -> bool {
         match self {
             Self::Cells(body) => body.contains(place),
-            Self::Near(facets, reach, pieces) => {
-                facets.is_within(place, *reach) && pieces.as_ref().is_none_or(|own| own.contains(place))
+            Self::Below(layer) => {
+                let LayerBelow { faces, reach, pieces, is_filled } = &**layer;
+                // a set of one body takes no particles of another across a gap
+                (!is_filled || pieces.contains(place)) && faces.covers(place, *reach, pieces.facets())
             }
         }
     }
@@ -172,12 +185,16 @@ impl<const D: usize> MeshSets<D> {
             let depth = boundary.depth_key().unwrap_or("depth");
             return Err(source.error(&format!("{key}.{depth}"), format!("{reach} m"), "above 0"));
         }
-        // a set of one body takes no particles of another across a gap
-        let pieces = is_filled.then(|| mesh.enclosure(&mesh.pieces_at(name))).transpose();
-        let pieces =
-            pieces.map_err(|error| source.error(&set, format!("{}: {error}", mesh.path()), "cells"))?;
+        let wrong = |error: String| source.error(&set, format!("{}: {error}", mesh.path()), "cells");
+        let pieces = mesh.enclosure(&mesh.pieces_at(name)).map_err(wrong)?;
+        let faces = FacetSet::new(mesh.facets_of_set(name).map_err(|nodes| {
+            let found = format!("`{name}` of {}, {nodes} nodes that no side of a cell joins", mesh.path());
+            let allowed = "the nodes of whole faces or edges of cells, a single node, or a set of faces";
+            source.error(&set, found, allowed)
+        })?);
         // particles on the border belong to it
-        Ok(SetRegion::Near(Facets::new(mesh.facets_of_set(name)), reach * (1.0 + 1e-9), pieces))
+        let reach = reach * (1.0 + 1e-9);
+        Ok(SetRegion::Below(Box::new(LayerBelow { faces, reach, pieces, is_filled: *is_filled })))
     }
 }
 
@@ -192,7 +209,10 @@ impl<const D: usize> CellMesh<D> {
 
     fn has_set(&self, name: &str) -> bool {
         let places = self.content().element_sets.get(name).cloned().unwrap_or_default();
-        !self.cells_of(places).is_empty() || !self.facets_of_set(name).is_empty()
+        let nodes = self.content().node_sets.get(name);
+        !self.cells_of(places).is_empty()
+            || nodes.is_some_and(|nodes| !nodes.is_empty())
+            || !self.faces_of_set(name).is_empty()
     }
 
     /// Encloses cells by their outer sides.
@@ -212,8 +232,10 @@ impl<const D: usize> CellMesh<D> {
             }
         }
         let bits = |point: [f64; D]| point.map(f64::to_bits);
-        let facets = self.facets_of_set(name);
-        let corners: HashSet<[u64; D]> = facets.iter().flatten().map(|corner| bits(*corner)).collect();
+        let own = content.node_sets.get(name).into_iter().flatten().map(|&node| bits(self.point(node)));
+        let faces = self.faces_of_set(name);
+        let corners = faces.iter().flatten().map(|corner| bits(*corner));
+        let corners: HashSet<[u64; D]> = if faces.is_empty() { own.collect() } else { corners.collect() };
         let at = (0..content.nodes.len() as u32).filter(|&node| corners.contains(&bits(self.point(node))));
         let roots: HashSet<u32> = at.map(|node| sets.root(node)).collect();
         let joined = |cell: &u32| nodes(*cell).first().is_some_and(|&node| roots.contains(&sets.root(node)));
@@ -231,24 +253,28 @@ impl<const D: usize> CellMesh<D> {
         !self.faces_of_set(name).is_empty() || nodes.is_some_and(|nodes| nodes != own)
     }
 
-    /// Facets of the faces of a set (in 2D edges); without any its nodes, as facets without an extent.
-    fn facets_of_set(&self, name: &str) -> Vec<Facet<D>> {
-        let mut facets = self.faces_of_set(name);
-        if facets.is_empty() {
-            let nodes = self.content().node_sets.get(name).into_iter().flatten();
-            facets.extend(nodes.map(|&node| [self.point(node); D]));
+    /// Returns the facets of the faces of a set (in 2D edges); without any those that its nodes span.
+    ///
+    /// # Errors
+    /// The number of nodes that are on no face or edge of it.
+    fn facets_of_set(&self, name: &str) -> Result<Vec<Facet<D>>, usize> {
+        let faces = self.faces_of_set(name);
+        if !faces.is_empty() {
+            return Ok(faces);
         }
-        facets
+        self.facets_of_nodes(self.content().node_sets.get(name).map_or(&[], Vec::as_slice))
     }
 
     /// Facets of the faces of a set (in 2D edges).
     fn faces_of_set(&self, name: &str) -> Vec<Facet<D>> {
         let content = self.content();
+        let dimension = |place: u32| content.elements[place as usize].kind.dimension();
         let lists = [content.element_sets.get(name), content.curve_sets.get(name)];
         let places = lists.into_iter().flatten().flatten();
-        let sides = places.filter(|place| content.elements[**place as usize].kind.dimension() + 1 == D);
+        let sides = places.filter(|place| dimension(**place) + 1 == D);
         let mut facets: Vec<Facet<D>> = sides.flat_map(|&place| self.facets_of_side(place)).collect();
-        let faces = content.surfaces.get(name).into_iter().flatten().filter(|_| D == 3);
+        let faces = content.surfaces.get(name).into_iter().flatten();
+        let faces = faces.filter(|face| dimension(face.element) == D);
         facets.extend(faces.flat_map(|face| self.facets_of_face(face.element, face.side)));
         facets
     }

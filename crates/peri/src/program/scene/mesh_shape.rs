@@ -80,7 +80,7 @@ fn enclosed<const D: usize>(body: Enclosure<D>) -> Shape<D> {
     Shape::Enclosed(Arc::new(body))
 }
 
-/// Builds a polygon from its corners, in either direction.
+/// Builds a polygon from its corners, in either direction; the last may repeat the first.
 ///
 /// # Errors
 /// In 3D, fewer than three corners, edges that cross, no area.
@@ -95,6 +95,10 @@ pub(super) fn polygon<const D: usize>(
     let key = format!("{key}.points");
     let corner = |(index, point): (usize, &Vec<Length>)| vector(source, &format!("{key}[{index}]"), point);
     let mut corners: Vec<[f64; D]> = points.iter().enumerate().map(corner).collect::<Result<_, _>>()?;
+    // closed by its first corner
+    if corners.len() > 1 && corners.first() == corners.last() {
+        corners.pop();
+    }
     let count = corners.len();
     if count < 3 {
         return Err(source.error(&key, format!("{count} corners"), "at least 3"));

@@ -24,6 +24,7 @@ mod line;
 mod loads;
 mod memory;
 mod mesh_cells;
+mod mesh_nodes;
 mod mesh_region;
 mod mesh_shape;
 mod method;
