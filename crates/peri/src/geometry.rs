@@ -7,7 +7,6 @@ mod enclosure;
 mod facet_set;
 mod facets;
 mod gaps;
-mod orientation;
 mod parts;
 
 pub(crate) use cuts::length;

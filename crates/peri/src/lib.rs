@@ -42,6 +42,7 @@
 //! ([`probe`]). All quantities are in SI units. The `peri` command line solves problems written as scenes
 //! (`program::scene`, feature `case`).
 
+pub mod amplitude;
 pub mod bonds;
 pub mod calibrate;
 pub mod contact;

@@ -269,6 +269,27 @@ impl<const D: usize> Contact<D> {
         }
     }
 
+    /// Sets the rates of displacements of rigid surfaces between two load factors.
+    pub fn set_rates(&mut self, before: f64, after: f64) {
+        if let Some(surfaces) = &mut self.surfaces {
+            surfaces.set_rates(before, after);
+        }
+    }
+
+    /// Sets the forces on rigid surfaces that follow amplitudes to their mean at two load factors, for
+    /// [`Self::travelled`].
+    pub fn set_weights(&mut self, factors: [f64; 2]) {
+        if let Some(surfaces) = &mut self.surfaces {
+            surfaces.set_weights(factors);
+        }
+    }
+
+    /// Displacements of rigid surfaces without a force over the load factor, m: mean rates of the present
+    /// step.
+    pub fn rates(&self) -> impl Iterator<Item = [f64; D]> {
+        self.surfaces.iter().flat_map(RigidSurfaces::rates)
+    }
+
     /// The rigid surfaces, in their order.
     pub fn surfaces(&self) -> impl Iterator<Item = &RigidSurface<D>> {
         self.surfaces.iter().flat_map(RigidSurfaces::surfaces)
@@ -292,7 +313,8 @@ impl<const D: usize> Contact<D> {
         self.surfaces.as_ref()?.unbalanced(displacement)
     }
 
-    /// Sums P·t of the forces on rigid surfaces at load factor 1 and their travels, N·m.
+    /// Sums P·t of the forces on rigid surfaces at load factor 1, of those with amplitudes at their mean
+    /// multiples, and their travels, N·m.
     pub fn travelled(&self) -> f64 {
         self.surfaces.as_ref().map_or(0.0, RigidSurfaces::travelled)
     }

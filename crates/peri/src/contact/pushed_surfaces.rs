@@ -68,11 +68,12 @@ impl<const D: usize> RigidSurfaces<D> {
         }
     }
 
-    /// Sums P·t of the forces at load factor 1 and their travels, N·m.
+    /// Sums P·t of the forces at load factor 1, of those with amplitudes at their mean multiples, and their
+    /// travels, N·m.
     pub(super) fn travelled(&self) -> f64 {
         let of = |placed: &MovingSurface<D>| {
             let force = placed.surface.force.unwrap_or([0.0; D]);
-            (0..D).map(|d| force[d] * placed.now[d]).sum::<f64>()
+            placed.weight * (0..D).map(|d| force[d] * placed.now[d]).sum::<f64>()
         };
         self.each.iter().map(of).sum()
     }

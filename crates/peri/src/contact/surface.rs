@@ -2,6 +2,7 @@
 
 use super::friction_pair::across;
 use super::non_negative;
+use crate::amplitude::Amplitude;
 use crate::error::Error;
 use crate::geometry::{SignedDistance, length};
 use serde::{Deserialize, Serialize};
@@ -50,6 +51,9 @@ pub struct RigidSurface<const D: usize> {
     /// first touches the undeformed body, to where contact balances the force. `None`: moves by
     /// `displacement` and `velocity`.
     pub force: Option<[f64; D]>,
+    /// Multiples of the components of `displacement` over the load factor, of which `force` follows the
+    /// first; `None`: the factor itself.
+    pub amplitudes: Option<[Amplitude; D]>,
 }
 
 impl<const D: usize> RigidSurface<D> {
@@ -66,6 +70,7 @@ impl<const D: usize> RigidSurface<D> {
             displacement: [0.0; D],
             velocity: [0.0; D],
             force: None,
+            amplitudes: None,
         }
     }
 
@@ -139,6 +144,33 @@ impl<const D: usize> RigidSurface<D> {
         }
         let size = length(from);
         if size > 0.0 { from.map(|x| x / size) } else { [0.0; D] }
+    }
+
+    /// Displacement at a load factor, m, without that of its velocity.
+    pub fn displacement_at(&self, factor: f64) -> [f64; D] {
+        let multiple = |d: usize| self.amplitudes.as_ref().map_or(factor, |each| each[d].multiple(factor));
+        std::array::from_fn(|d| multiple(d) * self.displacement[d])
+    }
+
+    /// Multiple of the force at a load factor.
+    pub(super) fn force_factor(&self, factor: f64) -> f64 {
+        self.amplitudes.as_ref().map_or(factor, |each| each[0].multiple(factor))
+    }
+
+    /// Mean rate of the displacement over the load factor between two factors, m.
+    pub(super) fn rate(&self, before: f64, after: f64) -> [f64; D] {
+        let rate = |d: usize| self.amplitudes.as_ref().map_or(1.0, |each| each[d].secant(before, after));
+        std::array::from_fn(|d| rate(d) * self.displacement[d])
+    }
+
+    /// Least and greatest displacement along each axis, m, without that of its velocity.
+    pub fn displacement_range(&self) -> [[f64; D]; 2] {
+        let range = |d: usize| {
+            let multiples = self.amplitudes.as_ref().map_or([0.0, 1.0], |each| each[d].extremes());
+            let [a, b] = multiples.map(|multiple| multiple * self.displacement[d]);
+            [a.min(b), a.max(b)]
+        };
+        [std::array::from_fn(|d| range(d)[0]), std::array::from_fn(|d| range(d)[1])]
     }
 
     /// Size of the force at load factor 1, N, and its direction.

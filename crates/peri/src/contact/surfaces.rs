@@ -22,6 +22,10 @@ pub(super) struct MovingSurface<const D: usize> {
     pub(super) before: [f64; D],
     /// Load factor of its force.
     pub(super) factor: f64,
+    /// Mean rate of its displacement over the load factor in the present step, m, and mean of the multiples
+    /// of its force at two factors.
+    pub(super) rate: [f64; D],
+    pub(super) weight: f64,
     /// Faces tied to the surface.
     tied: Vec<u32>,
 }
@@ -123,7 +127,8 @@ impl<const D: usize> RigidSurfaces<D> {
                     surface.title(number)
                 )));
             }
-            each.push(MovingSurface { surface, now: [0.0; D], before: [0.0; D], factor: 0.0, tied });
+            let (rate, now, before) = (surface.displacement, [0.0; D], [0.0; D]);
+            each.push(MovingSurface { surface, now, before, factor: 0.0, rate, weight: 1.0, tied });
         }
         let mut all = Self {
             each,
@@ -157,13 +162,31 @@ impl<const D: usize> RigidSurfaces<D> {
     /// [`Self::balance`].
     pub fn move_to(&mut self, factor: f64, time: f64) {
         for placed in &mut self.each {
-            let RigidSurface { displacement, velocity, force, .. } = placed.surface;
-            (placed.before, placed.factor) = (placed.now, factor);
-            if force.is_some() {
-                continue;
+            let (surface, velocity) = (&placed.surface, placed.surface.velocity);
+            (placed.before, placed.factor) = (placed.now, surface.force_factor(factor));
+            if surface.force.is_none() {
+                let displacement = surface.displacement_at(factor);
+                placed.now = std::array::from_fn(|d| displacement[d] + time * velocity[d]);
             }
-            placed.now = std::array::from_fn(|d| factor * displacement[d] + time * velocity[d]);
         }
+    }
+
+    /// Sets the rates of displacements between two load factors.
+    pub(super) fn set_rates(&mut self, before: f64, after: f64) {
+        self.each.iter_mut().for_each(|placed| placed.rate = placed.surface.rate(before, after));
+    }
+
+    /// Sets the multiples of forces that follow amplitudes to their mean at two load factors.
+    pub(super) fn set_weights(&mut self, factors: [f64; 2]) {
+        for placed in self.each.iter_mut().filter(|placed| placed.surface.amplitudes.is_some()) {
+            let [before, after] = factors.map(|factor| placed.surface.force_factor(factor));
+            placed.weight = 0.5 * (before + after);
+        }
+    }
+
+    /// Mean rate of the displacement of every surface over the load factor in the present step, m.
+    pub(super) fn rates(&self) -> impl Iterator<Item = [f64; D]> {
+        self.each.iter().map(|placed| placed.rate)
     }
 
     /// Last move of every surface, m.

@@ -1,7 +1,7 @@
 //! Flat facets, found by their place: segments in 2D, triangles in 3D.
 
 use super::cuts::{Cut, length};
-use super::orientation::orientation;
+use robust::{Coord, orient2d};
 
 /// Excess of a facet, over its edges, at which a segment still meets it.
 const SLACK: f64 = 1e-9;
@@ -179,8 +179,8 @@ fn area_vector<const D: usize>(corners: &Facet<D>) -> [f64; D] {
 /// whichever end comes first; a point on it is moved by (ε², ε).
 fn side<const D: usize>(p: &[f64; D], q: &[f64; D], at: [f64; D]) -> f64 {
     let (low, high) = if p <= q { (p, q) } else { (q, p) };
-    let shadow = |x: &[f64; D]| [x[0], x[1]];
-    let mut cross = orientation(shadow(low), shadow(high), shadow(&at));
+    let shadow = |x: &[f64; D]| Coord { x: x[0], y: x[1] };
+    let mut cross = orient2d(shadow(low), shadow(high), shadow(&at));
     if cross == 0.0 {
         cross = if high[0] > low[0] {
             f64::MIN_POSITIVE

@@ -8,40 +8,12 @@ use super::force_fields::ForceField;
 use super::load::Loads;
 use super::state::State;
 use super::system::System;
+use crate::amplitude::Amplitude;
 use crate::bonds::BodyGeometry;
+use crate::contact::Contact;
 use crate::field::Field;
-use std::fmt;
+use crate::geometry::length;
 use std::sync::Arc;
-
-/// Parts of the time at which the largest multiple is sought.
-const MOMENTS: u32 = 256;
-
-/// Multiple of a load over τ, and its rate.
-#[derive(Clone)]
-pub struct Amplitude(Arc<dyn Fn(f64) -> (f64, f64) + Send + Sync>);
-
-impl fmt::Debug for Amplitude {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Amplitude(0: {:?}, 1: {:?})", self.multiple(0.0), self.multiple(1.0))
-    }
-}
-
-impl Amplitude {
-    /// Creates an amplitude from a function of τ.
-    pub fn new(amplitude: impl Fn(f64) -> (f64, f64) + Send + Sync + 'static) -> Self {
-        Self(Arc::new(amplitude))
-    }
-
-    /// Multiple of the load at τ.
-    pub fn multiple(&self, part: f64) -> f64 {
-        (self.0)(part).0
-    }
-
-    /// Rate of the multiple at τ.
-    pub fn rate(&self, part: f64) -> f64 {
-        (self.0)(part).1
-    }
-}
 
 /// Displacement or body force of a region whose components follow amplitudes.
 #[derive(Clone, Debug)]
@@ -137,10 +109,7 @@ impl<const D: usize> Loads<D> {
     pub(super) fn set_curved_rates(&mut self, before: f64, after: f64) {
         let (Some(field), Some(curved)) = (self.displacement.as_mut(), &self.curved) else { return };
         for region in &curved.held {
-            let rate = |amplitude: &Amplitude| match before == after {
-                true => amplitude.rate(after),
-                false => (amplitude.multiple(after) - amplitude.multiple(before)) / (after - before),
-            };
+            let rate = |amplitude: &Amplitude| amplitude.secant(before, after);
             region.set(field, region.scaled(region.amplitudes.each_ref().map(rate)));
         }
     }
@@ -166,14 +135,7 @@ impl<const D: usize> Loads<D> {
     pub fn set_peaks(&mut self) {
         if let (Some(field), Some(curved)) = (self.displacement.as_mut(), &self.curved) {
             for region in &curved.held {
-                let size = |amplitude: &Amplitude| {
-                    let each = (0..=MOMENTS).map(|k| amplitude.multiple(f64::from(k) / f64::from(MOMENTS)));
-                    each.fold(
-                        0.0,
-                        |most: f64, multiple| if multiple.abs() > most.abs() { multiple } else { most },
-                    )
-                };
-                region.set(field, region.scaled(region.amplitudes.each_ref().map(size)));
+                region.set(field, region.scaled(region.amplitudes.each_ref().map(Amplitude::largest)));
             }
         }
         self.set_forces([1.0; 2]);
@@ -203,9 +165,14 @@ impl<const D: usize> Loads<D> {
         if self.curved.is_some() { 1.0 } else { factor }
     }
 
-    /// Relative prescribed displacement at τ, m: √Σ_d (max − min)², counted from the body at rest.
-    pub(super) fn curved_reach(&self, part: f64) -> f64 {
+    /// Relative prescribed displacement at τ, m, of regions and rigid surfaces: √Σ_d (max − min)², counted
+    /// from the body at rest.
+    pub(super) fn curved_reach(&self, part: f64, rigid: &[[f64; D]]) -> f64 {
         let mut span = [[0.0_f64; 2]; D];
+        for (d, span) in span.iter_mut().enumerate() {
+            let moved = rigid.iter().map(|displacement| displacement[d]);
+            *span = moved.fold(*span, |[low, high], u| [low.min(u), high.max(u)]);
+        }
         for region in self.curved.iter().flat_map(|curved| &curved.held) {
             for (_, value) in region.placed(part) {
                 for d in (0..D).filter(|d| region.components >> d & 1 == 1) {
@@ -266,12 +233,20 @@ impl<const D: usize> System<'_, D> {
     }
 
     /// Load, N, and displacement, m, of a row of history with curves: the reaction of the regions of
-    /// prescribed displacement, or without any the applied force, and [`Loads::curved_reach`].
+    /// prescribed displacement, without any the applied force, without that the largest of a rigid surface;
+    /// and [`Loads::curved_reach`].
     pub(super) fn curved_response(&self, state: &State<D>, part: f64) -> (f64, f64) {
         let force = match self.loads.displacement {
             Some(_) => self.loads.reaction(&*self.bonds, &state.force),
             None => self.loads.applied(&*self.bonds, &[]),
         };
-        (force.iter().map(|x| x * x).sum::<f64>().sqrt(), self.loads.curved_reach(part))
+        let surfaces = self.contact.iter().flat_map(Contact::surfaces);
+        let rigid: Vec<[f64; D]> = surfaces.map(|surface| surface.displacement_at(part)).collect();
+        let (force, reach) = (length(force), self.loads.curved_reach(part, &rigid));
+        if force > 0.0 || rigid.is_empty() {
+            return (force, reach);
+        }
+        let resting = self.surface_reactions(state);
+        (resting.iter().map(|own| length(own.force)).fold(0.0, f64::max), reach)
     }
 }

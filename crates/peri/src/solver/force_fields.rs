@@ -1,11 +1,12 @@
 //! Body forces that depend on the displacement, or on place and time at once: they are computed anew, with
 //! the loads that follow curves, and act in full.
 
-use super::curves::{Amplitude, FixedForces};
+use super::curves::FixedForces;
 use super::load::Loads;
 use super::state::State;
 use super::system::System;
-use crate::bonds::BodyGeometry;
+use crate::amplitude::Amplitude;
+use crate::bonds::{BodyGeometry, Property};
 use crate::field::{CHUNK, Field};
 use crate::parallel;
 use rayon::prelude::*;
@@ -36,7 +37,7 @@ pub trait ForceField<const D: usize>: fmt::Debug + Send + Sync {
 #[derive(Clone, Debug)]
 pub struct Centrifugal<const D: usize> {
     /// Density ρ of the undeformed body, kg/m³.
-    pub density: f64,
+    pub density: Property,
     /// Angular velocity ω at a multiple of 1, rad/s.
     pub angular_velocity: f64,
     /// Point c of the axis, m.
@@ -57,11 +58,12 @@ impl<const D: usize> ForceField<D> for Centrifugal<D> {
         force: &mut Field<D>,
     ) {
         let speed = self.angular_velocity * self.amplitude.multiple(part);
-        let factor = share * self.density * speed * speed;
+        let factor = share * speed * speed;
         add_to_particles(bonds, force, |site| {
             let (place, moved) = (bonds.position(site), displacement.get(site));
             let from: [f64; D] = std::array::from_fn(|d| place[d] + moved[d] - self.centre[d]);
             let along: f64 = (0..D).map(|d| self.axis[d] * from[d]).sum();
+            let factor = factor * self.density.value_at(site);
             std::array::from_fn(|d| factor * (from[d] - along * self.axis[d]))
         });
     }
@@ -176,6 +178,7 @@ impl<const D: usize> System<'_, D> {
     pub(super) fn set_mean_forces(&mut self, parts: [f64; 2], displacement: &Field<D>) {
         if self.loads.curved.is_some() {
             self.loads.to_mut().update_forces(parts, &*self.bonds, displacement);
+            self.contact.iter_mut().for_each(|contact| contact.set_weights(parts));
         }
     }
 

@@ -46,8 +46,9 @@ mod verlet_device;
 mod verlet_friction;
 mod verlet_step;
 
+pub use crate::amplitude::Amplitude;
 pub use criterion::{Bilinear, Breaking, Criterion, Policy};
-pub use curves::{Amplitude, CurvedLoads, CurvedRegion};
+pub use curves::{CurvedLoads, CurvedRegion};
 pub use dynamic_relaxation::{DynamicRelaxation, RelaxationSolver};
 pub use force_fields::{Centrifugal, ForceField, PlacedForce};
 pub use force_scale::Balance;

@@ -1,8 +1,8 @@
 //! Pressure that follows the surface: −p cof(F) N per reference area (Nanson's formula), in faces of the
 //! body.
 
-use super::curves::Amplitude;
 use super::force_fields::ForceField;
+use crate::amplitude::Amplitude;
 use crate::bonds::{BodyGeometry, Bonds};
 use crate::contact::Faces;
 use crate::field::Field;

@@ -155,6 +155,7 @@ impl<const D: usize> System<'_, D> {
     pub(super) fn set_rates(&mut self, before: f64, after: f64) {
         if !self.loads.is_proportional() {
             self.loads.to_mut().set_rates(&*self.bonds, before, after);
+            self.contact.iter_mut().for_each(|contact| contact.set_rates(before, after));
         }
     }
 

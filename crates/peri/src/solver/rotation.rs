@@ -1,6 +1,6 @@
 //! Rotations about an axis, and rotating regions.
 
-use super::curves::Amplitude;
+use crate::amplitude::Amplitude;
 use crate::field::Field;
 use crate::geometry::length;
 

@@ -15,6 +15,7 @@ use super::state::State;
 use super::system::System;
 use super::time_step::largest_frequency_squared;
 use super::verlet::VelocityVerlet;
+use super::verlet_step::SiteMasses;
 use crate::bonds::stretch_range;
 
 /// Factor by which ω² may grow before steps are shortened.
@@ -131,7 +132,7 @@ impl VelocityVerlet {
         &self,
         system: &mut System<D>,
         state: &mut State<D>,
-        volumes: &[f64],
+        masses: &SiteMasses,
         broken: bool,
     ) {
         let pace = &mut state.motion.pace;
@@ -158,7 +159,7 @@ impl VelocityVerlet {
         }
         if pace.outgrown || bound > ABOVE * pace.bound || falls && BELOW * bound <= pace.bound {
             let shortest = state.motion.limits.bonds.shortest;
-            let frequency = largest_frequency_squared(system, state, volumes, self.density, shortest);
+            let frequency = largest_frequency_squared(system, state, masses, self.density, shortest);
             state.motion.limits.searches += 1;
             self.measure(system, state, frequency);
         } else {

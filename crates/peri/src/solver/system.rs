@@ -6,7 +6,7 @@ use super::load::Loads;
 use super::record::StepRecord;
 use super::state::State;
 use crate::bonds::{Bonds, StretchScan, not_finite};
-use crate::contact::{Contact, ContactSummary, FrictionPair, RigidSurface, SurfaceReaction};
+use crate::contact::{Contact, ContactSummary, FrictionPair, SurfaceReaction};
 use crate::error::Error;
 use crate::field::Field;
 use crate::material::{Material, SolverMaterial};
@@ -48,6 +48,8 @@ pub struct System<'a, const D: usize> {
     pub(super) seen_stretches: StretchScan,
     /// Reference scale of out-of-balance forces.
     pub(super) scale: ForceScale,
+    /// Density of each site over that of [`VelocityVerlet`](super::VelocityVerlet), above 0; empty: 1.
+    pub density_ratios: Vec<f64>,
     /// Load factor and its rate over the time, s, in explicit dynamics, instead of the ramp.
     pub amplitude: Option<&'a LoadCurve<'a>>,
     /// Values recorded in every row of the history, see [`StepRecord::seen`](super::StepRecord::seen).
@@ -93,6 +95,7 @@ impl<'a, const D: usize> System<'a, D> {
             contact: None,
             seen_stretches: StretchScan::default(),
             scale: ForceScale::default(),
+            density_ratios: Vec::new(),
             amplitude: None,
             observer: None,
         }
@@ -178,13 +181,13 @@ impl<'a, const D: usize> System<'a, D> {
     /// Conjugate sums of loads and rigid surfaces, see [`Loads::conjugates`].
     pub(super) fn conjugates(&self, state: &State<D>) -> (f64, f64) {
         let (pull, push) = self.loads.conjugates(&*self.bonds, &state.displacement, &state.force);
-        let work = |(surface, resting): (&RigidSurface<D>, &SurfaceReaction)| {
-            (0..D).map(|d| surface.displacement[d] * resting.force[d]).sum::<f64>()
+        let work = |(rate, resting): ([f64; D], &SurfaceReaction)| {
+            (0..D).map(|d| rate[d] * resting.force[d]).sum::<f64>()
         };
         let Some(contact) = self.repulsion() else { return (pull, push) };
         let resting = self.surface_reactions(state);
         let push = if contact.has_pushed() { push + contact.travelled() } else { push };
-        (pull + contact.surfaces().zip(&resting).map(work).sum::<f64>(), push)
+        (pull + contact.rates().zip(&resting).map(work).sum::<f64>(), push)
     }
 
     /// Load and displacement, see [`Loads::response`] and [`Self::curved_response`].

@@ -4,6 +4,7 @@
 use super::motion::BondSums;
 use super::state::State;
 use super::system::System;
+use super::verlet_step::SiteMasses;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::parallel;
 
@@ -51,24 +52,25 @@ pub fn critical(frequency_squared: f64) -> f64 {
 /// doi:10.6028/jres.045.026) on differences of forces, constrained components at rest; 0 if the greatest is
 /// not positive.
 ///
-/// Volumes are the weights of the inner product in which the tangent is symmetric. The Ritz value is a lower
+/// Masses are the weights of the inner product in which the tangent is symmetric. The Ritz value is a lower
 /// bound; adding its residual, up to a hundredth of it, makes it safe: half a hundredth above the result of
 /// 200 steps.
 pub fn largest_frequency_squared<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,
-    volumes: &[f64],
+    masses: &SiteMasses,
     density: f64,
     shortest: f64,
 ) -> f64 {
     if !shortest.is_finite() {
         return 0.0;
     }
+    let weights = masses.weights();
     let mut now = start(system);
     let mut before = Field::zeros(system.bonds.sites());
     let mut product = before.clone();
     let mut scratch = [before.clone(), before.clone()];
-    let size = product_of(&now, &now, volumes).sqrt();
+    let size = product_of(&now, &now, &weights).sqrt();
     if size == 0.0 {
         return 0.0;
     }
@@ -77,10 +79,13 @@ pub fn largest_frequency_squared<const D: usize>(
     let mut value = 0.0;
     for step in 1..=MOST_STEPS {
         tangent(system, state, &now, shortest, density, &mut scratch, &mut product);
-        diagonal.push(product_of(&now, &product, volumes));
+        for component in product.components_mut() {
+            component.iter_mut().zip(&masses.ratios).for_each(|(x, ratio)| *x /= ratio);
+        }
+        diagonal.push(product_of(&now, &product, &weights));
         let (alpha, beta) = (diagonal[step - 1], beside.last().copied().unwrap_or(0.0));
         combine(&mut product, [(-alpha, &now), (-beta, &before)]);
-        let next = product_of(&product, &product, volumes).sqrt();
+        let next = product_of(&product, &product, &weights).sqrt();
         let exhausted = next.is_nan() || next <= 1e-12 * alpha.abs() || step == MOST_STEPS;
         // the small problem costs the cube of its size: not at every step
         if exhausted || step.is_multiple_of(5) {

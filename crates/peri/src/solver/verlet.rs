@@ -14,7 +14,7 @@ use super::system::System;
 use super::time_step::{critical, largest_frequency_squared};
 use super::verlet_friction::{friction_pass, surface_pass};
 use super::verlet_step::{
-    VerletStep, VerletSums, force_pass, kick_pass, leap_pass, refresh, stored, volumes,
+    SiteMasses, VerletStep, VerletSums, force_pass, kick_pass, leap_pass, refresh, stored,
 };
 use crate::bonds::{StretchRange, stretch_range};
 use crate::contact::Contact;
@@ -91,11 +91,11 @@ impl<const D: usize> Method<D> for VelocityVerlet {
         watch: &mut Watch<D>,
         finished: &mut StepCallback<D>,
     ) -> Result<(), Error> {
-        let volumes = self.open(system, state)?;
+        let masses = self.open(system, state)?;
         while state.step < self.records {
             let end = self.end_of_row(state);
             while state.motion.steps.taken < state.motion.steps.planned {
-                self.advance(system, state, &volumes, end)?;
+                self.advance(system, state, &masses, end)?;
                 watch(&self.status(state, true), state)?;
             }
             self.close_row(system, state)?;
@@ -129,17 +129,17 @@ impl VelocityVerlet {
         }
     }
 
-    /// Begins, or continues, a run; volumes of all sites.
+    /// Begins, or continues, a run; masses of all sites.
     pub(super) fn open<const D: usize>(
         &self,
         system: &mut System<D>,
         state: &mut State<D>,
-    ) -> Result<Vec<f64>, Error> {
+    ) -> Result<SiteMasses, Error> {
         self.check()?;
         if !state.motion.begun && system.amplitude.is_none() {
             system.refuse_inverted(&[1.0])?;
         }
-        let volumes = volumes(system);
+        let masses = SiteMasses::new(system);
         system.contact.iter_mut().for_each(Contact::end_friction);
         if state.motion.begun {
             let factor = self.factor(system, state.motion.time).0;
@@ -148,9 +148,9 @@ impl VelocityVerlet {
             system.set_forces(factor, &state.displacement);
             system.contact.iter_mut().for_each(|contact| contact.resume_friction(&state.contact.grips));
         } else {
-            self.begin(system, state, &volumes)?;
+            self.begin(system, state, &masses)?;
         }
-        Ok(volumes)
+        Ok(masses)
     }
 
     /// Time at the end of the next row of history, s, with steps planned to it.
@@ -189,7 +189,7 @@ impl VelocityVerlet {
         &self,
         system: &mut System<D>,
         state: &mut State<D>,
-        volumes: &[f64],
+        masses: &SiteMasses,
     ) -> Result<(), Error> {
         let (factor, rate) = self.factor(system, 0.0);
         system.move_surfaces(factor, 0.0);
@@ -222,8 +222,8 @@ impl VelocityVerlet {
         let observed = state.stretches.balanced;
         let stored = system.stored_energy(state, observed);
         let square = |site: u32| state.velocity.get(site as usize).iter().map(|v| v * v).sum::<f64>();
-        let particles = system.bonds.particles().iter();
-        let kinetic = particles.map(|&site| volumes[site as usize] * square(site)).sum::<f64>();
+        let (weights, particles) = (masses.weights(), system.bonds.particles().iter());
+        let kinetic = particles.map(|&site| weights[site as usize] * square(site)).sum::<f64>();
         let kinetic = 0.5 * self.density * kinetic;
         if state.force.non_finite().is_some() || !(kinetic + stored).is_finite() {
             return Err(system.not_finite(state));
@@ -231,7 +231,7 @@ impl VelocityVerlet {
         state.work = kinetic + stored + state.fracture.released + state.memory.dissipated;
         (state.step, state.counts.iteration, state.counts.step_iterations) = (0, 0, 0);
         let bonds = BondSums::new(system);
-        let frequency = largest_frequency_squared(system, state, volumes, self.density, bonds.shortest);
+        let frequency = largest_frequency_squared(system, state, masses, self.density, bonds.shortest);
         let contact = system.repulsion().map_or(0.0, |contact| {
             contact.greatest_stiffness(&*system.bonds, &state.displacement).max(contact.pair_stiffness())
         });
@@ -247,7 +247,7 @@ impl VelocityVerlet {
         self.record_frequency(system, state, frequency);
         self.cover(system, state);
         let rest = VerletStep { step: 0.0, density: self.density, damping: 0.0, factors: [factor; 2], rate };
-        friction_pass(system, state, volumes, &rest, None);
+        friction_pass(system, state, &masses.volumes, &rest, None);
         surface_pass(system, state, &[]);
         self.break_overstretched(system, state, observed, factor);
         Ok(())
@@ -268,14 +268,15 @@ impl VelocityVerlet {
         let motion = &mut state.motion;
         // blocks of the tangent's rows: ω² ≤ ‖A_II‖ + Σ‖A_IJ‖ with ‖t′nn + t/λ(1 − nn)‖ ≤ max(|t′|, |t|/λ);
         // Feingold & Varga (1962), doi:10.2140/pjm.1962.12.1241
-        let contact = 2.0 * motion.limits.contact / self.density;
+        let lightest = self.density * system.density_ratios.iter().copied().reduce(f64::min).unwrap_or(1.0);
+        let contact = 2.0 * motion.limits.contact / lightest;
         // the greatest frequency of a sum is no greater than the sum of both (Weyl)
         let [bound, estimate] = if system.material.has_points() {
             motion.pace.squares(self.density).map(|square| square + contact)
         } else {
             [
                 2.0 * (motion.limits.bonds.stiffness * state.stretches.tangent + motion.limits.contact)
-                    / self.density,
+                    / lightest,
                 motion.limits.frequency * law.mean_tangent + contact,
             ]
         };
@@ -303,7 +304,7 @@ impl VelocityVerlet {
         &self,
         system: &mut System<D>,
         state: &mut State<D>,
-        volumes: &[f64],
+        masses: &SiteMasses,
         end: f64,
     ) -> Result<(), Error> {
         let before = self.factor(system, state.motion.time).0;
@@ -317,7 +318,7 @@ impl VelocityVerlet {
             let leap = VerletStep { step, density, damping, factors: [before, factor], rate };
             // the drift goes to the factor times this, the kick takes its increment
             system.set_ends(factor);
-            let first = leap_pass(&system.loads, state, volumes, &leap);
+            let first = leap_pass(&system.loads, state, masses, &leap);
             system.set_rates(before, factor);
             // two ends, √D components
             let strain = 2.0 * (D as f64).sqrt() * first.increment / state.motion.limits.bonds.shortest;
@@ -346,7 +347,7 @@ impl VelocityVerlet {
         let look = state.motion.look.is_due(state.stretches.fitted, system.breaking_stretch());
         // forces that are not final yet
         let late = look || rubs || !system.loads.rigid.is_empty();
-        let (mut second, observed) = force_pass(system, state, volumes, &leap, look, !late);
+        let (mut second, observed) = force_pass(system, state, masses, &leap, look, !late);
         system.count_evaluation(state);
         if look {
             state.stretches.observe(observed);
@@ -358,9 +359,9 @@ impl VelocityVerlet {
             }
         }
         if late {
-            friction_pass(system, state, volumes, &leap, friction);
+            friction_pass(system, state, &masses.volumes, &leap, friction);
             system.level_forces(state);
-            second = kick_pass(&system.loads, state, volumes, &leap);
+            second = kick_pass(&system.loads, state, masses, &leap);
         }
         surface_pass(system, state, &rubbing);
         let motion = &mut state.motion;
@@ -373,7 +374,7 @@ impl VelocityVerlet {
         self.cover_contact(system, state);
         let follows = self.follows(system);
         if follows {
-            self.follow(system, state, volumes, broken);
+            self.follow(system, state, masses, broken);
         }
         let motion = &mut state.motion;
         let longer = follows && motion.limits.longest > LONGER * motion.steps.time_step;

@@ -51,6 +51,32 @@ impl VerletSums {
 /// such ranges hold overstretched bonds, but many work items do.
 const CHECKED_SITES: usize = 256;
 
+/// Volumes of all sites, m³, 0 without a particle, and their densities over that of the method; none: 1.
+#[derive(Clone, Debug, Default)]
+pub struct SiteMasses {
+    /// Volumes.
+    pub volumes: Vec<f64>,
+    /// Relative densities; empty: 1.
+    pub ratios: Vec<f64>,
+}
+
+impl SiteMasses {
+    /// Collects the volumes of a system and its densities.
+    pub fn new<const D: usize>(system: &System<D>) -> Self {
+        let mut volumes = vec![0.0; system.bonds.sites()];
+        for &site in system.bonds.particles() {
+            volumes[site as usize] = system.bonds.volume(site as usize);
+        }
+        Self { volumes, ratios: system.density_ratios.clone() }
+    }
+
+    /// Volumes times relative densities, m³.
+    pub fn weights(&self) -> Vec<f64> {
+        let ratios = self.ratios.iter().copied().chain(std::iter::repeat(1.0));
+        self.volumes.iter().zip(ratios).map(|(volume, ratio)| volume * ratio).collect()
+    }
+}
+
 /// A work item of two fields.
 pub type FieldPair<'a, const D: usize> = ([&'a mut [f64]; D], [&'a mut [f64]; D]);
 
@@ -58,7 +84,7 @@ pub type FieldPair<'a, const D: usize> = ([&'a mut [f64]; D], [&'a mut [f64]; D]
 pub fn leap_pass<const D: usize>(
     loads: &Loads<D>,
     state: &mut State<D>,
-    volumes: &[f64],
+    masses: &SiteMasses,
     leap: &VerletStep,
 ) -> VerletSums {
     let force = state.force.components();
@@ -67,10 +93,10 @@ pub fn leap_pass<const D: usize>(
     let loading = loads.force_factor(leap.factors[0]);
     let (displacement, velocity) = (state.displacement.chunks_mut(), state.velocity.chunks_mut());
     let of = |chunk: usize, (u, v): FieldPair<D>| {
-        let range = chunk_range(chunk, volumes.len());
+        let range = chunk_range(chunk, masses.volumes.len());
         let mut sums = VerletSums::default();
         for d in 0..D {
-            let at = AxisLoads::new(loads, volumes, range.clone(), d);
+            let at = AxisLoads::new(loads, masses, range.clone(), d);
             let (u, v, f) = (&mut *u[d], &mut *v[d], &force[d][range.clone()]);
             if at.is_plain(leap) {
                 sums.increment = sums.increment.max(leap.step * free_leap(u, v, f, keep, push, leap.step));
@@ -83,11 +109,12 @@ pub fn leap_pass<const D: usize>(
                     sums.work -= 0.5 * f[k] * increment * at.volumes[k];
                     increment
                 } else {
-                    let before = v[k];
-                    v[k] = keep * before + push * f[k];
+                    let (before, ratio) = (v[k], at.ratio(k));
+                    v[k] = keep * before + push / ratio * f[k];
                     let increment = leap.step * v[k];
                     u[k] += increment;
-                    sums.damped += 0.5 * leap.damping * leap.density * before * increment * at.volumes[k];
+                    let damping = leap.damping * leap.density;
+                    sums.damped += 0.5 * damping * before * increment * at.volumes[k] * ratio;
                     increment
                 };
                 sums.work += 0.5 * loading * at.body(k) * increment * at.volumes[k];
@@ -105,7 +132,7 @@ pub fn leap_pass<const D: usize>(
 pub fn force_pass<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,
-    volumes: &[f64],
+    masses: &SiteMasses,
     leap: &VerletStep,
     look: bool,
     kicks: bool,
@@ -124,7 +151,7 @@ pub fn force_pass<const D: usize>(
         }
         load(loads, start, leap.factors[1], &mut f);
         let f = f.map(|f| &*f);
-        (if kicks { kick(loads, volumes, leap, chunk, f, &mut v) } else { VerletSums::default() }, seen)
+        (if kicks { kick(loads, masses, leap, chunk, f, &mut v) } else { VerletSums::default() }, seen)
     };
     let (sums, seen): (Vec<VerletSums>, Vec<Vec<StretchRange>>) =
         parallel::map_items(force.into_iter().zip(velocity).collect(), of).into_iter().unzip();
@@ -139,14 +166,14 @@ pub fn force_pass<const D: usize>(
 pub fn kick_pass<const D: usize>(
     loads: &Loads<D>,
     state: &mut State<D>,
-    volumes: &[f64],
+    masses: &SiteMasses,
     leap: &VerletStep,
 ) -> VerletSums {
     let force = state.force.components();
     let velocity = state.velocity.chunks_mut();
     let of = |chunk: usize, mut v: [&mut [f64]; D]| {
-        let range = chunk_range(chunk, volumes.len());
-        kick(loads, volumes, leap, chunk, force.map(|f| &f[range.clone()]), &mut v)
+        let range = chunk_range(chunk, masses.volumes.len());
+        kick(loads, masses, leap, chunk, force.map(|f| &f[range.clone()]), &mut v)
     };
     let parts = parallel::map_items(velocity, of);
     parts.into_iter().fold(VerletSums::default(), VerletSums::add)
@@ -206,13 +233,13 @@ fn load<const D: usize>(loads: &Loads<D>, start: usize, factor: f64, force: &mut
 
 fn kick<const D: usize>(
     loads: &Loads<D>,
-    volumes: &[f64],
+    masses: &SiteMasses,
     leap: &VerletStep,
     chunk: usize,
     force: [&[f64]; D],
     velocity: &mut [&mut [f64]; D],
 ) -> VerletSums {
-    let range = chunk_range(chunk, volumes.len());
+    let range = chunk_range(chunk, masses.volumes.len());
     let push = 0.5 * leap.step / leap.density;
     let keep = 1.0 / (1.0 + 0.5 * leap.damping * leap.step);
     let [before, after] = leap.factors;
@@ -220,29 +247,29 @@ fn kick<const D: usize>(
     let mut sums = VerletSums::default();
     let mut square = 0.0;
     for d in 0..D {
-        let at = AxisLoads::new(loads, volumes, range.clone(), d);
+        let at = AxisLoads::new(loads, masses, range.clone(), d);
         let (v, f) = (&mut *velocity[d], force[d]);
         if at.is_plain(leap) {
             square += free_kick(v, f, at.volumes, push);
             continue;
         }
         for k in 0..f.len() {
-            let volume = at.volumes[k];
+            let (volume, ratio) = (at.volumes[k], at.ratio(k));
             let increment = if let Some(full) = at.constrained(k) {
                 let increment = (after - before) * full;
                 let old = std::mem::replace(&mut v[k], leap.rate * full);
                 // the support moves the particle's mass, too
-                let gained = 0.5 * leap.density * (v[k] * v[k] - old * old);
+                let gained = 0.5 * leap.density * (v[k] * v[k] - old * old) * ratio;
                 sums.work += (gained - 0.5 * f[k] * increment) * volume;
                 increment
             } else {
                 let increment = leap.step * v[k];
-                v[k] = keep * (v[k] + push * f[k]);
-                sums.damped += 0.5 * leap.damping * leap.density * v[k] * increment * volume;
+                v[k] = keep * (v[k] + push / ratio * f[k]);
+                sums.damped += 0.5 * leap.damping * leap.density * v[k] * increment * volume * ratio;
                 increment
             };
             sums.work += 0.5 * loading * at.body(k) * increment * volume;
-            square += v[k] * v[k] * volume;
+            square += v[k] * v[k] * volume * ratio;
         }
     }
     sums.kinetic = 0.5 * leap.density * square;
@@ -256,12 +283,13 @@ struct AxisLoads<'a> {
     prescribed: &'a [f64],
     body: &'a [f64],
     volumes: &'a [f64],
+    ratios: &'a [f64],
 }
 
 impl<'a> AxisLoads<'a> {
     fn new<const D: usize>(
         loads: &'a Loads<D>,
-        volumes: &'a [f64],
+        masses: &'a SiteMasses,
         range: std::ops::Range<usize>,
         axis: usize,
     ) -> Self {
@@ -271,12 +299,18 @@ impl<'a> AxisLoads<'a> {
             field.as_ref().map_or(&[][..], |field| &field.components()[axis][range.clone()])
         };
         let (prescribed, body) = (of(&loads.displacement), of(&loads.body_force));
-        Self { constrained, bit: axis, prescribed, body, volumes: &volumes[range.clone()] }
+        let ratios = masses.ratios.get(range.clone()).unwrap_or_default();
+        Self { constrained, bit: axis, prescribed, body, volumes: &masses.volumes[range], ratios }
     }
 
-    /// Returns true without constraints, loads and damping.
+    /// Returns true without constraints, loads, damping and densities of parts.
     fn is_plain(&self, leap: &VerletStep) -> bool {
-        self.constrained.is_empty() && self.body.is_empty() && leap.damping == 0.0
+        self.constrained.is_empty() && self.body.is_empty() && leap.damping == 0.0 && self.ratios.is_empty()
+    }
+
+    /// Relative density.
+    fn ratio(&self, k: usize) -> f64 {
+        self.ratios.get(k).copied().unwrap_or(1.0)
     }
 
     /// Prescribed displacement at factor 1, if constrained.
@@ -325,13 +359,4 @@ pub fn stored<const D: usize>(system: &mut System<D>, state: &State<D>, observed
     let [low, high] = state.stretches.fitted.map(|stretch| stretch * stretch - 1.0);
     let inside = observed.low >= low && observed.high <= high;
     system.stored_energy(state, if inside { StretchRange { low, high } } else { observed })
-}
-
-/// Volumes of all sites, 0 without a particle.
-pub fn volumes<const D: usize>(system: &System<D>) -> Vec<f64> {
-    let mut volumes = vec![0.0; system.bonds.sites()];
-    for &site in system.bonds.particles() {
-        volumes[site as usize] = system.bonds.volume(site as usize);
-    }
-    volumes
 }

@@ -148,6 +148,55 @@ fn two_particles() {
     }
 }
 
+/// Two particles of the densities ρ and 3ρ on a linear bond, the one at rest where the other starts with the
+/// momentum ρV v₀: ω² of the reduced mass is ⅔ of that of equal ones, the sharp critical step is that of it, the
+/// centre of mass flies on at v₀/4, and the energies add up.
+#[test]
+fn two_densities() {
+    let law = Law::Linear.build(1.0, 1.0, false).unwrap();
+    let mut two = Body::<2>::solid([2, 1], 0.1, 3.015).build();
+    let omega = (2.0 / 3.0 * 12.0 * MODULUS * 0.01 / (DENSITY * 0.1)).sqrt();
+    for bonds in [&mut two.lattice as &mut dyn Bonds<2>, &mut two.cloud] {
+        let order = |&site: &u32| (bonds.position(site as usize)[0] * 1e6) as i64;
+        let mut sites = bonds.particles().to_vec();
+        sites.sort_by_key(order);
+        let [light, heavy] = [sites[0] as usize, sites[1] as usize];
+        let mut density_ratios = vec![1.0; bonds.sites()];
+        density_ratios[heavy] = 3.0;
+        let mut state = State::new(bonds.sites());
+        state.velocity.set(light, [0.01, 0.0]);
+        let (steps, period) = (160.0, 2.0 * PI / omega);
+        let step = period / steps;
+        let loads = Loads::default();
+        let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), &loads, &[]);
+        system.density_ratios = density_ratios;
+        once(0.25 * period, step)
+            .solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
+            .unwrap();
+        assert!((state.motion.limits.critical_step * omega / 2.0 - 1.0).abs() < 1e-8);
+        assert!(state.motion.limits.gershgorin_step <= state.motion.limits.critical_step);
+        let [u, w] = [light, heavy].map(|site| state.displacement.get(site)[0]);
+        let centre = 0.25 * (u + 3.0 * w);
+        assert!((centre / (0.0025 * 0.25 * period) - 1.0).abs() < 1e-12, "{centre}");
+        // relative motion v₀ sin(ωt)/ω, by the method's own frequency
+        let theta = 2.0 * (0.5 * omega * step).asin();
+        let exact = 0.01 * step / theta.sin() * (0.25 * steps * theta).sin();
+        assert!((u - w - exact).abs() < 1e-8 * 0.01 / omega, "{} {exact}", u - w);
+        let last = &state.history[0];
+        let kinetic = 0.5
+            * DENSITY
+            * 0.01
+            * [light, heavy]
+                .map(|site| state.velocity.get(site)[0].powi(2))
+                .iter()
+                .zip([1.0, 3.0])
+                .map(|(square, ratio)| ratio * square)
+                .sum::<f64>();
+        assert!((last.kinetic / kinetic - 1.0).abs() < 1e-12, "{} {kinetic}", last.kinetic);
+        assert!(((last.kinetic + last.stored) / last.work - 1.0).abs() < 1e-3, "{last:?}");
+    }
+}
+
 /// Kinetic + stored + released + damped = work, with ramps, supports, body forces, damping and breaking
 /// bonds; the error falls as Δt² where no bond breaks.
 #[test]

@@ -12,7 +12,7 @@ use peri::geometry::{Enclosure, SignedDistance};
 use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::program::scene::Scene;
-use peri::solver::{DynamicRelaxation, Lbfgs, Method, State, StepRecord, System, VelocityVerlet};
+use peri::solver::{Amplitude, DynamicRelaxation, Lbfgs, Method, State, StepRecord, System, VelocityVerlet};
 use peri::surface::BodySurface;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -155,7 +155,8 @@ fn contact_balances_a_force() {
     }
 }
 
-/// Solves equilibria of a block that is held at its lower half; returns the last state and a restartable one
+/// Solves equilibria of a block that is held at its lower half, loaded and unloaded by the load factor or by
+/// the amplitude of the surface; returns the last state and a restartable one
 /// of the third step.
 fn equilibria(
     surface: RigidSurface<3>,
@@ -163,11 +164,16 @@ fn equilibria(
     from: Option<State<3>>,
 ) -> (State<3>, Option<State<3>>) {
     let mut built = block();
+    let follows = surface.amplitudes.is_some();
     let contact = beside(&built.lattice, vec![surface]).unwrap();
     let bonds = &mut built.lattice;
-    let loads = hold(bonds, |x| (x[2] < 1.0).then_some((7, [0.0; 3])));
+    let mut loads = hold(bonds, |x| (x[2] < 1.0).then_some((7, [0.0; 3])));
     let law = Law::Linear.build(1.0, 1.0, false).unwrap();
-    let factors = [0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25, 0.0];
+    let mut factors = [0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25, 0.0];
+    if follows {
+        loads.curved = Some(Box::default());
+        factors = std::array::from_fn(|k| (k + 1) as f64 / 8.0);
+    }
     let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), &loads, &factors);
     system.contact = Some(contact);
     let (mut state, mut saved) = (from.unwrap_or_else(|| State::new(system.bonds.sites())), None);
@@ -235,6 +241,33 @@ fn loaded_and_unloaded() {
         };
         let (one, saved) = run(1, None);
         assert!(run(2, None).0 == one && run(2, saved).0 == one, "method {method}");
+    }
+}
+
+/// A surface that follows a triangle of time, by displacement or by force, has the forces, the displacements
+/// and the work of one that follows the same load factors.
+#[test]
+fn along_a_curve() {
+    let triangle =
+        || Amplitude::new(|part| if part <= 0.5 { (2.0 * part, 2.0) } else { (2.0 - 2.0 * part, -2.0) });
+    let sphere = RigidSurface { stiffness: 50.0, ..RigidSurface::sphere([3.0, 3.0, 50.0], 8.0) };
+    let point = touching(sphere.clone());
+    let pressed = RigidSurface { point, displacement: [0.0, 0.0, -0.2], ..sphere.clone() };
+    let pushed = RigidSurface { force: Some([0.0, 0.0, -0.05]), ..sphere };
+    for surface in [pressed, pushed] {
+        let follower = RigidSurface { amplitudes: Some([(); 3].map(|()| triangle())), ..surface.clone() };
+        let by_factor = equilibria(surface.clone(), 1, None).0.history;
+        let (state, saved) = equilibria(follower.clone(), 1, None);
+        let size = by_factor[3].work;
+        for (own, other) in state.history.iter().zip(&by_factor) {
+            let [a, b] = [own, other].map(|row| row.resting[0]);
+            assert!((a.force[2] - b.force[2]).abs() < 1e-5 * by_factor[3].load, "{a:?} {b:?}");
+            assert!((a.moved[2] - b.moved[2]).abs() < 1e-5, "{a:?} {b:?}");
+            assert!((own.work - other.work).abs() < 1e-4 * size, "{} {}", own.work, other.work);
+        }
+        assert!(size > 1e-3 && state.history[7].work.abs() < 1e-4 * size);
+        let resumed = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+        assert!(resumed.install(|| equilibria(follower, 1, saved)).0 == state);
     }
 }
 

@@ -54,7 +54,7 @@ fn spin(solver: Solver, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> 
     let rest = vec![[0.0; 2]; low.len()];
     let push = vec![[0.1, 0.4]; high.len()];
     let spun = Centrifugal {
-        density: 1.0,
+        density: 1.0.into(),
         angular_velocity: 0.4,
         centre: [0.5, 0.0],
         axis: [0.0, 0.0, 1.0],

@@ -219,7 +219,8 @@ pub fn write(scene: &Scene, outcomes: &[VariantOutcome], output: &Path) -> Resul
     for outcome in outcomes.iter().filter(|outcome| outcome.fragments.len() > 1) {
         let particles: Vec<f64> = outcome.fragments.iter().map(|own| own.particles as f64).collect();
         let volume: Vec<f64> = outcome.fragments.iter().map(|own| own.volume).collect();
-        let density = scene.dynamics.as_ref().map(|dynamics| dynamics.density.si());
+        let is_uniform = scene.material.inclusions.iter().all(|inclusion| inclusion.density.is_none());
+        let density = scene.dynamics.as_ref().filter(|_| is_uniform).map(|dynamics| dynamics.density.si());
         let mass: Option<Vec<f64>> = density.map(|density| volume.iter().map(|v| density * v).collect());
         let mut columns = vec![("particles", "", &particles[..]), ("volume", "m^3", &volume)];
         columns.extend(mass.iter().map(|mass| ("mass", "kg", &mass[..])));

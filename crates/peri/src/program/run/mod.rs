@@ -281,7 +281,7 @@ fn solve<const D: usize>(
     let mut watch = |status: &Status, state: &State<D>| variant_run.watch(status, state);
     let contact = match &scene.contact {
         Some(contact) => {
-            let surfaces = contact.surfaces(source, scene.dynamics.is_some()).map_err(PeriFailure::from)?;
+            let surfaces = contact.surfaces(source, scene).map_err(PeriFailure::from)?;
             let whole = material.longitudinal_modulus(&*body.bonds);
             let modulus =
                 Property::new(&*body.bonds, |site, _| whole * physics.body.stiffness.value_at(site));
@@ -291,11 +291,13 @@ fn solve<const D: usize>(
         }
         None => None,
     };
+    let density_ratios = scene::density_ratios(source, scene, body)?;
     let amplitude = scene.amplitude();
     let row = |bonds: &dyn Bonds<D>, state: &State<D>| physics.row(bonds, state);
     let response = material.respond(&*body.bonds);
     let mut system = System::of_response(&mut *body.bonds, response, loads, &factors);
     system.times = times.into();
+    system.density_ratios = density_ratios;
     system.amplitude = amplitude.as_deref();
     system.observer = Some(&row);
     system.fit_bound = scene.fit_bound();

@@ -3,6 +3,7 @@
 use super::curve::{CurveTime, Multiplied};
 use super::curve_spec::CurveSpec;
 use super::formula::{Formula, VectorFormula};
+use super::inclusion::densities;
 use super::rotation::direction;
 use super::values::{DiscreteBody, ONE_OF_THEM, plain, positive, vector};
 use super::{Scene, SolverMethod};
@@ -134,12 +135,14 @@ pub(super) fn add<const D: usize>(
         };
         let places = particles.iter().map(|&site| body.bonds.position(site as usize));
         let values: Vec<[f64; D]> = if let Some(acceleration) = &force.acceleration {
-            let value: Vec<f64> = acceleration.iter().map(|value| density * value.si()).collect();
+            let value: Vec<f64> = acceleration.iter().map(|value| value.si()).collect();
             let value = <[f64; D]>::try_from(value.as_slice()).map_err(|_| {
                 let found = format!("{} components", value.len());
                 source.error(&key("acceleration"), found, format!("{D} components"))
             })?;
-            vec![value; particles.len()]
+            let density = densities(source, scene, body, density)?;
+            let of = |&site: &u32| value.map(|component| density.value_at(site as usize) * component);
+            particles.iter().map(of).collect()
         } else if let Some(formula) = &force.formula {
             let formula = VectorFormula::new(source, &key("formula"), formula)?;
             let places: Vec<[f64; D]> = places.collect();
@@ -156,6 +159,7 @@ pub(super) fn add<const D: usize>(
             let centre = vector::<D>(source, &key("spin.point"), &spin.point)?;
             let axis = direction::<D>(source, &key("spin.axis"), spin.axis.as_deref())?;
             let angular_velocity = spin.angular_velocity.si();
+            let density = densities(source, scene, body, density)?;
             let held = |d: usize| loads.constrained.iter().any(|bits| bits >> d & 1 == 1);
             let across = (0..D).find(|&d| axis[d].abs() < 1.0 - 1e-9 && !held(d));
             if let Some(d) = across.filter(|_| scene.method() != SolverMethod::Verlet) {

@@ -3,8 +3,8 @@
 use super::values::{ONE_OF_THEM, plain, positive, ratio, required};
 use super::variant::{SceneVariant, variants};
 use super::{
-    DeviceChoice, Dynamics, ForcePrecision, HORIZON_RATIO, HistoryProbe, Scene, SolverMethod, Track,
-    VaryingParameter,
+    BodyForceSpec, DeviceChoice, Dynamics, ForcePrecision, HORIZON_RATIO, HistoryProbe, Scene, SolverMethod,
+    Track, VaryingParameter,
 };
 use crate::calibrate::{Calibration, Space};
 use crate::solver::Policy;
@@ -339,6 +339,21 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     for (index, inclusion) in material.inclusions.iter().enumerate() {
         let key = format!("material.inclusions[{index}].stiffness");
         positive(source, &key, inclusion.stiffness, "")?;
+        if let Some(density) = inclusion.density {
+            let key = format!("material.inclusions[{index}].density");
+            positive(source, &key, density.si(), "kg/m³")?;
+            let weighs = |force: &BodyForceSpec| force.acceleration.is_some() || force.spin.is_some();
+            if scene.dynamics.is_none() && !scene.body_force.iter().any(weighs) {
+                let why = "only [dynamics] and an `acceleration` or a `spin` of [[body_force]] have masses";
+                return Err(source.unexpected(&key, why));
+            }
+            if let Some(index) = scene.boundary.iter().position(|boundary| boundary.rigid)
+                && scene.dynamics.is_some()
+            {
+                let why = "the particles of a region that moves as a whole have one density";
+                return Err(source.conflict(&key, &format!("boundary[{index}].rigid"), why));
+            }
+        }
         if inclusion.critical.is_some() && material.critical.is_none() {
             let key = format!("material.inclusions[{index}].critical");
             return Err(source.unexpected(&key, "needs `material.critical`, that of the rest of the body"));

@@ -1,7 +1,9 @@
 //! Contact settings of a scene: between particles, and with rigid surfaces.
 
 use super::IndenterSpec;
+use super::curve_spec::CurveList;
 use super::line::plane_of;
+use super::surface_curve::{CurvedSurface, surface_amplitudes};
 use super::values::{DiscreteBody, plain, vector};
 use super::{Scene, SolverMethod};
 use crate::bonds::{Bonds, Property};
@@ -67,6 +69,8 @@ pub struct PlaneSpec {
     pub displacement: Option<Vec<Length>>,
     /// Velocity, in explicit dynamics; added to the displacement.
     pub velocity: Option<Vec<Speed>>,
+    /// Curve of time that multiplies `displacement`, or one for each component, instead of the load factor.
+    pub curve: Option<CurveList>,
 }
 
 impl PlaneSpec {
@@ -95,13 +99,26 @@ impl ContactSpec {
         planes.chain(self.indenter.iter().enumerate().map(|(index, own)| own.name(index))).collect()
     }
 
-    /// Returns the key of the first displacement of a rigid surface.
-    pub(super) fn displaced(&self) -> Option<String> {
-        let plane = self.plane.iter().position(|plane| plane.displacement.is_some());
-        let indenter = self.indenter.iter().position(|indenter| indenter.displacement.is_some());
-        plane
-            .map(|index| format!("contact.plane[{index}].displacement"))
-            .or(indenter.map(|index| format!("contact.indenter[{index}].displacement")))
+    /// Returns true if a curve of time moves or presses a rigid surface.
+    pub(super) fn has_curve(&self) -> bool {
+        self.curved_surfaces().iter().any(|surface| surface.curve.is_some())
+    }
+
+    /// Lists what moves all rigid surfaces: planes, then indenters.
+    pub(super) fn curved_surfaces(&self) -> Vec<CurvedSurface<'_>> {
+        let planes = self.plane.iter().enumerate().map(|(index, plane)| CurvedSurface {
+            key: format!("contact.plane[{index}]"),
+            curve: plane.curve.as_ref(),
+            displacement: plane.displacement.as_deref(),
+            force: None,
+        });
+        let indenters = self.indenter.iter().enumerate().map(|(index, indenter)| CurvedSurface {
+            key: format!("contact.indenter[{index}]"),
+            curve: indenter.curve.as_ref(),
+            displacement: indenter.displacement.as_deref(),
+            force: indenter.force.as_deref(),
+        });
+        planes.chain(indenters).collect()
     }
 
     /// Returns the stiffness s of ties: that of the stiffest rigid surface.
@@ -165,16 +182,16 @@ impl ContactSpec {
         })
     }
 
-    /// Converts all planes, then all indenters; `explicit` selects the default stiffness of explicit
-    /// dynamics.
+    /// Converts all planes, then all indenters.
     ///
     /// # Errors
     /// As [`super::check`].
     pub fn surfaces<const D: usize>(
         &self,
         source: &Source,
-        explicit: bool,
+        scene: &Scene,
     ) -> Result<Vec<RigidSurface<D>>, SceneError> {
+        let explicit = scene.method() == SolverMethod::Verlet;
         let planes = self.plane.iter().enumerate();
         let planes = planes
             .map(|(index, plane)| self.plane_in(source, &format!("contact.plane[{index}]"), plane, explicit));
@@ -182,8 +199,10 @@ impl ContactSpec {
         let indenters = indenters.map(|(index, indenter)| {
             indenter.surface(source, &format!("contact.indenter[{index}]"), self, explicit)
         });
-        let all = planes.chain(indenters).zip(self.surface_names());
-        all.map(|(surface, name)| Ok(RigidSurface { name, ..surface? })).collect()
+        let names = self.surface_names().into_iter();
+        let amplitudes = surface_amplitudes(source, scene, self)?;
+        let all = planes.chain(indenters).zip(names.zip(amplitudes));
+        all.map(|(surface, (name, amplitudes))| Ok(RigidSurface { name, amplitudes, ..surface? })).collect()
     }
 
     /// Builds the contact of a body with bond modulus kθ = `micromodulus` and longitudinal modulus `modulus`.
@@ -321,9 +340,9 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         }
     }
     if scene.body.space == Space::Solid {
-        contact.surfaces::<3>(source, explicit)?;
+        contact.surfaces::<3>(source, scene)?;
     } else {
-        contact.surfaces::<2>(source, explicit)?;
+        contact.surfaces::<2>(source, scene)?;
     }
     super::indenter::check(source, scene, contact)?;
     match contact.elastic_slip {

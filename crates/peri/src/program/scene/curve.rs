@@ -44,6 +44,7 @@ impl Scene {
         self.later
             || self.boundary.iter().any(|own| own.timed().is_some() || own.pressure.is_some())
             || self.body_force.iter().any(BodyForceSpec::is_curved)
+            || self.contact.as_ref().is_some_and(ContactSpec::has_curve)
     }
 
     /// Returns true if forces depend on the displacement.
@@ -136,6 +137,30 @@ impl CurveTime {
             return Err(source.error(key, found, "0 at 0 s: a quasi-static run begins at rest"));
         }
         Ok(amplitude)
+    }
+
+    /// Converts and checks the curves of all components at a key; `values` are those that the curve of a
+    /// component, or of all, multiplies.
+    pub(super) fn amplitudes<const D: usize>(
+        &self,
+        source: &Source,
+        key: &str,
+        curve: &CurveList,
+        values: impl Fn(Option<usize>) -> Multiplied,
+    ) -> Result<[Amplitude; D], SceneError> {
+        let each: Vec<Amplitude> = match curve {
+            CurveList::All(curve) => vec![self.amplitude(source, key, curve, &values(None))?; D],
+            CurveList::Each(curves) => {
+                let each = curves.iter().enumerate().map(|(d, curve)| {
+                    self.amplitude(source, &format!("{key}[{d}]"), curve, &values(Some(d)))
+                });
+                each.collect::<Result<_, _>>()?
+            }
+        };
+        let found = each.len();
+        <[Amplitude; D]>::try_from(each).map_err(|_| {
+            source.error(key, format!("{found} curves"), format!("one, or {D}: one for each component"))
+        })
     }
 
     fn of_table(
@@ -242,12 +267,12 @@ impl Multiplied {
     }
 
     /// Returns true if any value is a displacement.
-    fn moves(&self) -> bool {
+    pub(super) fn moves(&self) -> bool {
         self.fields || self.lengths.iter().chain(&self.angles).any(|value| *value != 0.0)
     }
 
     /// Returns true if any value is not 0.
-    fn is_load(&self) -> bool {
+    pub(super) fn is_load(&self) -> bool {
         self.moves() || self.formulas || self.forces.iter().chain(&self.stresses).any(|value| *value != 0.0)
     }
 
@@ -296,22 +321,12 @@ pub(super) fn amplitudes<const D: usize>(
     let time = CurveTime::new(scene);
     let of = |(index, boundary): (usize, &Boundary)| {
         let key = format!("boundary[{index}].curve");
-        let each: Vec<Amplitude> = match &boundary.curve {
-            None => vec![time.common.clone(); D],
-            Some(CurveList::All(curve)) => {
-                vec![time.amplitude(source, &key, curve, &Multiplied::new(boundary, None))?; D]
-            }
-            Some(CurveList::Each(curves)) => {
-                let each = curves.iter().enumerate().map(|(d, curve)| {
-                    time.amplitude(source, &format!("{key}[{d}]"), curve, &Multiplied::new(boundary, Some(d)))
-                });
-                each.collect::<Result<_, _>>()?
+        let each: [Amplitude; D] = match &boundary.curve {
+            None => std::array::from_fn(|_| time.common.clone()),
+            Some(curve) => {
+                time.amplitudes(source, &key, curve, |component| Multiplied::new(boundary, component))?
             }
         };
-        let found = each.len();
-        let each = <[Amplitude; D]>::try_from(each).map_err(|_| {
-            source.error(&key, format!("{found} curves"), format!("one, or {D}: one for each component"))
-        })?;
         let angle = match boundary.rotation.as_ref().and_then(|rotation| rotation.curve.as_ref()) {
             Some(curve) => {
                 let angle = boundary.rotation.iter().map(|rotation| rotation.angle.si()).collect();
@@ -376,23 +391,11 @@ pub(super) fn follow<const D: usize>(
 pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let mut boundaries = scene.boundary.iter().enumerate();
     let of_boundary = boundaries.find_map(|(index, own)| Some(format!("boundary[{index}].{}", own.timed()?)));
-    let runs = of_boundary.is_some() || scene.time.is_some() || scene.dynamics.is_some();
-    if let Some(key) = scene.contact.as_ref().and_then(ContactSpec::displaced)
-        && scene.has_curves()
-        && runs
-    {
-        let why = "it moves with the load factor, which runs with curves do not have";
-        let pressed = scene.boundary.iter().any(|own| own.pressure.is_some());
-        let other = match &of_boundary {
-            Some(_) => "boundary.curve",
-            None if pressed => "boundary.pressure",
-            None => "body_force",
-        };
-        return Err(source.conflict(&key, other, why));
-    }
+    let surfaces = scene.contact.as_ref().map(ContactSpec::curved_surfaces).unwrap_or_default();
+    let of_surface = surfaces.iter().find(|own| own.curve.is_some()).map(|own| format!("{}.curve", own.key));
     let mut forces = scene.body_force.iter().enumerate();
     let of_force = forces.find_map(|(index, force)| Some(format!("body_force[{index}].{}", force.timed()?)));
-    let Some(first) = of_boundary.or(of_force) else { return Ok(()) };
+    let Some(first) = of_boundary.or(of_force).or(of_surface) else { return Ok(()) };
     for (index, boundary) in scene.boundary.iter().enumerate() {
         if boundary.has_curve() && !boundary.loads() {
             let why =
@@ -410,7 +413,9 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let idle = |boundary: &Boundary| boundary.timed().is_none() && Multiplied::new(boundary, None).is_load();
     let boundary = scene.boundary.iter().position(idle).map(|index| format!("boundary[{index}]"));
     let force = scene.body_force.iter().position(|force| force.timed().is_none());
-    match boundary.or(force.map(|index| format!("body_force[{index}]"))) {
+    let force = force.map(|index| format!("body_force[{index}]"));
+    let surface = surfaces.iter().find(|own| own.curve.is_none() && own.multiplied(None).is_load());
+    match boundary.or(force).or(surface.map(|own| own.key.clone())) {
         Some(key) if time.step.iter().all(|step| step.factor.is_none()) => {
             let found = "a load without `curve`, in a programme whose factor stays 0";
             let allowed = "a `curve` here, or a `factor` in [[time.step]]";

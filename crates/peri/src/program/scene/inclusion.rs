@@ -10,7 +10,7 @@ use crate::critical::Critical;
 use crate::error::Error;
 use crate::geometry::{Parts, Shape};
 use harness::scene::{SceneError, Source};
-use polycore::units::{EnergyPerArea, Ratio};
+use polycore::units::{Density, EnergyPerArea, Ratio};
 use serde::Deserialize;
 use std::array;
 use std::collections::HashMap;
@@ -29,6 +29,8 @@ pub struct Inclusion {
     /// Replaces `material.critical`. A bond that ends in inclusions or passes through them takes the lowest
     /// value on its way, so that a layer may be thinner than the spacing.
     pub critical: Option<Critical>,
+    /// Density, kg/m³, instead of that of `[dynamics]` or of a body force.
+    pub density: Option<Density>,
     /// Strain ε* of the free part, equal in all directions; prestrains of overlapping parts add up.
     pub prestrain: Option<Ratio>,
 }
@@ -112,6 +114,58 @@ impl<const D: usize> Region<D> {
         }
         ends
     }
+}
+
+/// Returns the density of each site over that of `[dynamics]`; none if all are 1.
+///
+/// # Errors
+/// As [`densities`].
+pub fn density_ratios<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &DiscreteBody<D>,
+) -> Result<Vec<f64>, SceneError> {
+    let Some(dynamics) = &scene.dynamics else { return Ok(Vec::new()) };
+    let rest = dynamics.density.si();
+    let densities = densities(source, scene, body, rest)?;
+    if densities == rest.into() {
+        return Ok(Vec::new());
+    }
+    let mut ratios = vec![1.0; body.bonds.sites()];
+    for &site in body.bonds.particles() {
+        ratios[site as usize] = densities.value_at(site as usize) / rest;
+    }
+    Ok(ratios)
+}
+
+/// Returns the density of each site, kg/m³: `rest`, replaced by that of the last inclusion with `density`.
+///
+/// # Errors
+/// An invalid shape, or one without particles.
+pub(super) fn densities<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &DiscreteBody<D>,
+    rest: f64,
+) -> Result<Property, SceneError> {
+    let bonds = &*body.bonds;
+    let mut parts = Vec::new();
+    for (index, inclusion) in scene.material.inclusions.iter().enumerate() {
+        let Some(density) = inclusion.density else { continue };
+        let region = Region::new(source, scene, index, inclusion, body)?;
+        if !bonds.particles().iter().any(|&site| region.contains(bonds.position(site as usize))) {
+            let found = "a shape without particles";
+            return Err(source.error(&inclusion.key(index), found, "a shape with at least one"));
+        }
+        parts.push((region, density.si()));
+    }
+    if parts.is_empty() {
+        return Ok(rest.into());
+    }
+    Ok(Property::new(bonds, |_, place| {
+        let own = parts.iter().rev().find(|(region, _)| region.contains(place));
+        own.map_or(rest, |(_, density)| *density)
+    }))
 }
 
 /// Returns the prestrain ε* = −S:σ with which a body of bonds has the stress σ while it is held in its shape.

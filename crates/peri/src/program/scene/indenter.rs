@@ -2,6 +2,7 @@
 //! force of their own.
 
 use super::contact::motion;
+use super::curve_spec::CurveList;
 use super::line::plane_of;
 use super::values::{plain, required, vector};
 use super::{ContactSpec, Scene, SolverMethod};
@@ -43,6 +44,9 @@ pub struct IndenterSpec {
     /// Force on the indenter at the end of the last step instead of a displacement, in equilibrium: it moves
     /// along the force only, from where it first touches the body at rest.
     pub force: Option<Vec<Force>>,
+    /// Curve of time that multiplies `displacement` or `force` instead of the load factor; of a displacement
+    /// also one for each component.
+    pub curve: Option<CurveList>,
 }
 
 impl IndenterSpec {
@@ -229,9 +233,6 @@ pub(super) fn check(source: &Source, scene: &Scene, contact: &ContactSpec) -> Re
             );
             return Err(source.unexpected(&key("velocity"), why));
         }
-        if let Some(radius) = indenter.radius {
-            refuse_leap(source, scene, (index, indenter), radius.si(), "the radius")?;
-        }
         if indenter.force.is_none() {
             continue;
         }
@@ -239,14 +240,11 @@ pub(super) fn check(source: &Source, scene: &Scene, contact: &ContactSpec) -> Re
             let why = "an indenter has no mass: explicit dynamics moves it by `displacement` or `velocity`";
             return Err(source.unexpected(&key("force"), why));
         }
-        if scene.has_curves() {
-            let why = "it follows the load factor, which runs with curves or pressures do not have";
-            return Err(source.unexpected(&key("force"), why));
-        }
         if contact.stiffness_of(indenter.stiffness, explicit) == 0.0 {
             return Err(source.error(&key("stiffness"), 0, "above 0 of an indenter with a `force`"));
         }
-        if let Some(factor) = scene.programme().0.into_iter().find(|factor| *factor < 0.0) {
+        let factors = if indenter.curve.is_some() { Vec::new() } else { scene.programme().0 };
+        if let Some(factor) = factors.into_iter().find(|factor| *factor < 0.0) {
             let found = format!("a load factor of {}", plain(factor));
             let allowed = "factors of 0 and above: an indenter pushes and never pulls";
             return Err(source.error(&key("force"), found, allowed));
@@ -255,32 +253,34 @@ pub(super) fn check(source: &Source, scene: &Scene, contact: &ContactSpec) -> Re
     Ok(())
 }
 
-/// Longest way of an indenter in one step of an equilibrium, m; `None` where it does not follow load factors.
-fn longest_step(scene: &Scene, indenter: &IndenterSpec) -> Option<f64> {
-    let way = indenter.displacement.as_ref()?;
-    if scene.method() == SolverMethod::Verlet {
-        return None;
-    }
-    let (factors, _) = scene.programme();
+/// Longest way of an indenter in one step of an equilibrium, m.
+fn longest_step<const D: usize>(scene: &Scene, surface: &RigidSurface<D>) -> f64 {
+    let factors = scene.load_steps().0;
     let starts = std::iter::once(0.0).chain(factors.iter().copied());
-    let most = starts.zip(&factors).map(|(from, to)| (to - from).abs()).fold(0.0, f64::max);
-    Some(most * way.iter().map(|d| d.si().powi(2)).sum::<f64>().sqrt())
+    let way = |(from, to): (f64, &f64)| {
+        let [before, after] = [from, *to].map(|factor| surface.displacement_at(factor));
+        length(std::array::from_fn::<f64, D, _>(|d| after[d] - before[d]))
+    };
+    starts.zip(&factors).map(way).fold(0.0, f64::max)
 }
 
 /// Refuses steps of an indenter longer than half its size, m.
 ///
 /// # Errors
 /// A [`SceneError`] that names the longest step.
-pub(super) fn refuse_leap(
+pub(super) fn refuse_leap<const D: usize>(
     source: &Source,
     scene: &Scene,
-    (index, indenter): (usize, &IndenterSpec),
+    (key, surface): (&str, &RigidSurface<D>),
     half: f64,
     size: &str,
 ) -> Result<(), SceneError> {
-    let Some(most) = longest_step(scene, indenter).filter(|most| *most > half) else { return Ok(()) };
+    let most = longest_step(scene, surface);
+    if most <= half || scene.method() == SolverMethod::Verlet {
+        return Ok(());
+    }
     let found =
         format!("a step of {} mm, longer than {size}: it could pass a part of the body", plain(most * 1e3));
-    let allowed = format!("steps of {size} or less: more `solver.steps`");
-    Err(source.error(&format!("contact.indenter[{index}].displacement"), found, allowed))
+    let allowed = format!("steps of {size} or less: more `solver.steps` or shorter steps of the programme");
+    Err(source.error(key, found, allowed))
 }

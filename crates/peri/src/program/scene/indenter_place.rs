@@ -3,7 +3,7 @@
 use super::indenter::refuse_leap;
 use super::pressure::{LEAST_WALL, wall};
 use super::values::{DiscreteBody, plain};
-use super::{Boundary, Prescribed, PrescribedField, Scene, SolverMethod};
+use super::{Boundary, Prescribed, PrescribedField, Scene};
 use crate::contact::{BEHIND, RigidSurface, SurfaceShape};
 use crate::geometry::{Enclosure, inside, length};
 use harness::scene::{SceneError, Source};
@@ -30,7 +30,10 @@ pub(super) fn stops<const D: usize>(surfaces: &[RigidSurface<D>], body: &Discret
     let centres: Vec<[f64; D]> =
         bonds.particles().iter().map(|&site| bonds.position(site as usize)).collect();
     let standing = surfaces.iter().filter(|surface| surface.force.is_none());
-    let shifts = standing.flat_map(|surface| [[0.0; D], surface.displacement].map(|shift| (surface, shift)));
+    let shifts = standing.flat_map(|surface| {
+        let [low, high] = surface.displacement_range();
+        [[0.0; D], low, high].map(|shift| (surface, shift))
+    });
     shifts.flat_map(|(surface, shift)| surface.stops(&shift, &centres, 0.5 * bonds.spacing())).collect()
 }
 
@@ -41,13 +44,14 @@ pub(super) fn warnings<const D: usize>(
     body: &DiscreteBody<D>,
 ) -> Vec<String> {
     let Some(contact) = &scene.contact else { return Vec::new() };
-    let surfaces = contact.surfaces::<D>(source, scene.method() == SolverMethod::Verlet).unwrap_or_default();
+    let surfaces = contact.surfaces::<D>(source, scene).unwrap_or_default();
     let (spacing, outside) = (body.bonds.spacing(), body.surface());
     let least = LEAST_WALL * body.bonds.horizon();
     let thin = |(number, surface): (usize, &RigidSurface<D>)| {
         let heights: Vec<f64> = outside.faces().iter().map(|face| surface.height(face.place)).collect();
         let nearest = heights.iter().copied().fold(f64::INFINITY, f64::min).max(0.0);
-        let reach = nearest + length(surface.displacement) + spacing;
+        let reach =
+            nearest + surface.displacement_range().map(length).into_iter().fold(0.0, f64::max) + spacing;
         let met = outside.faces().iter().zip(&heights).filter(|(face, height)| {
             let beyond: [f64; D] = std::array::from_fn(|d| face.place[d] + 0.1 * spacing * face.normal[d]);
             **height < reach && surface.height(beyond) < **height - 0.05 * spacing
@@ -118,7 +122,7 @@ pub(super) fn check<const D: usize>(
     body: &DiscreteBody<D>,
 ) -> Result<(), SceneError> {
     let Some(contact) = &scene.contact else { return Ok(()) };
-    let surfaces = contact.surfaces::<D>(source, scene.method() == SolverMethod::Verlet)?;
+    let surfaces = contact.surfaces::<D>(source, scene)?;
     let (spacing, outside) = (body.bonds.spacing(), body.surface());
     let held =
         if surfaces.iter().any(|own| own.force.is_some()) { stops(&surfaces, body) } else { Vec::new() };
@@ -135,6 +139,9 @@ pub(super) fn check<const D: usize>(
             );
             return Err(source.error(&key("radius"), format!("{} mm", plain(radius * 1e3)), allowed));
         }
+        if let SurfaceShape::Sphere(radius) | SurfaceShape::Cylinder(_, radius) = surface.shape {
+            refuse_leap(source, scene, (&key("displacement"), surface), radius, "the radius")?;
+        }
         if let SurfaceShape::Facets(facets) = &surface.shape {
             let (low, high) = facets.body().facets().bounds();
             let least = (0..D).map(|d| high[d] - low[d]).fold(f64::INFINITY, f64::min);
@@ -148,7 +155,7 @@ pub(super) fn check<const D: usize>(
                 return Err(source.error(&key("file"), found, allowed));
             }
             refuse_slender(source, &key("file"), (surface, facets.body()), body)?;
-            refuse_leap(source, scene, (index, &contact.indenter[index]), 0.5 * least, "half its width")?;
+            refuse_leap(source, scene, (&key("displacement"), surface), 0.5 * least, "half its width")?;
         }
         let particles = body.bonds.particles();
         let height = |&site: &u32| surface.height(body.bonds.position(site as usize));

@@ -59,7 +59,7 @@ pub fn loads_of<const D: usize>(
     }
     apply_formulas(source, scene, body, &regions, &mut loads)?;
     super::rotation::turn(source, scene, body, &regions, &amplitudes, &mut loads)?;
-    if !amplitudes.is_empty() {
+    if scene.has_curves() {
         let rotates = |index: usize| scene.boundary[index].rotation.is_some();
         let kept = |index: usize| {
             let components = scene.boundary[index].displacement.iter().flatten().enumerate();
@@ -248,7 +248,7 @@ fn refuse_unbalanced<const D: usize>(
     roots: &[u32],
     loads: &Loads<D>,
 ) -> Result<(), SceneError> {
-    let surfaces = scene.contact.as_ref().map_or(Ok(Vec::new()), |own| own.surfaces::<D>(source, false))?;
+    let surfaces = scene.contact.as_ref().map_or(Ok(Vec::new()), |own| own.surfaces::<D>(source, scene))?;
     let stops = ContactStops {
         normals: super::indenter_place::stops(&surfaces, body),
         pairs: scene.contact.is_some(),

@@ -3,6 +3,7 @@
 use super::region::layers;
 use super::values::DiscreteBody;
 use super::{ExactSpec, Scene, Side};
+use crate::contact::RigidSurface;
 use crate::exact::Plate;
 use crate::solver::Loads;
 use harness::scene::{SceneError, Source};
@@ -23,8 +24,8 @@ pub fn check_placement<const D: usize>(
     plate_frame(source, scene, body)?;
     super::planes::check(source, scene, body)?;
     super::indenter_place::check(source, scene, body)?;
-    let surfaces = scene.contact.as_ref().map_or(Ok(Vec::new()), |own| own.surfaces(source, false))?;
-    let rigid: Vec<[f64; D]> = surfaces.iter().map(|surface| surface.displacement).collect();
+    let surfaces = scene.contact.as_ref().map_or(Ok(Vec::new()), |own| own.surfaces(source, scene))?;
+    let rigid: Vec<[f64; D]> = surfaces.iter().flat_map(RigidSurface::displacement_range).collect();
     let reach = loads.reach(&*body.bonds, &rigid);
     // the displacement under forces is unknown before the run
     let beyond = |at: f64| reach > 0.0 && at > reach * (1.0 + 1e-9);

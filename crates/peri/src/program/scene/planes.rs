@@ -1,7 +1,7 @@
 //! Checks of rigid planes: planes behind the body, without room between them, or out of reach.
 
+use super::Scene;
 use super::values::DiscreteBody;
-use super::{Scene, SolverMethod};
 use crate::contact::{RigidSurface, SurfaceShape};
 use harness::scene::{SceneError, Source};
 use polycore::numerics::range;
@@ -33,9 +33,9 @@ struct PlanePosition<const D: usize> {
 impl<const D: usize> PlanePosition<D> {
     /// Returns the displacement of the plane along its normal, m, at a load factor and a time, s.
     fn displacement(&self, factor: f64, time: f64) -> f64 {
-        let RigidSurface { displacement, velocity, .. } = self.plane;
+        let (displacement, velocity) = (self.plane.displacement_at(factor), self.plane.velocity);
         let normal = self.normal;
-        (0..D).map(|d| normal[d] * (factor * displacement[d] + time * velocity[d])).sum()
+        (0..D).map(|d| normal[d] * (displacement[d] + time * velocity[d])).sum()
     }
 }
 
@@ -46,7 +46,7 @@ fn plane_positions<const D: usize>(
     body: &DiscreteBody<D>,
 ) -> Result<Vec<PlanePosition<D>>, SceneError> {
     let Some(contact) = &scene.contact else { return Ok(Vec::new()) };
-    let surfaces = contact.surfaces::<D>(source, scene.method() == SolverMethod::Verlet)?;
+    let surfaces = contact.surfaces::<D>(source, scene)?;
     let outside = body.surface();
     let names = contact.surface_names();
     let each = surfaces.into_iter().zip(names).enumerate().filter_map(|(number, (mut plane, name))| {
@@ -74,6 +74,9 @@ fn plane_positions<const D: usize>(
 fn moments(scene: &Scene) -> Vec<(f64, f64)> {
     let end = scene.dynamics.as_ref().map_or(0.0, |dynamics| dynamics.method().end_time);
     let even = (0..=MOMENTS).map(|k| f64::from(k) / f64::from(MOMENTS));
+    if scene.has_curves() && scene.dynamics.is_some() {
+        return even.map(|part| (part, part * end)).collect();
+    }
     if scene.dynamics.is_some() {
         let ramp = scene.dynamics.as_ref().map_or(0.0, |dynamics| dynamics.method().ramp);
         let factor = |time: f64| if time < ramp { time / ramp } else { 1.0 };
