@@ -5,16 +5,18 @@ use crate::pool;
 use crate::watch::stoppable;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use polycore::constitutive::Error;
+use polycore::constitutive::hyperelastic::bulk::{VolumetricFit, VolumetricState};
 use polycore::constitutive::hyperelastic::data::{Mode, TestData, TestState};
 use polycore::constitutive::hyperelastic::{
-    self, COMPRESSIBLE_MODELS, Compressible, Coupling, Hyperelastic, MODELS, ModelKind, TwistedCylinder,
-    Volumetric, fit, homogeneous,
+    self, COMPRESSIBLE_MODELS, Compressible, Coupling, HELD_STRETCHES, Hyperelastic, MODELS, ModelKind,
+    TwistedCylinder, Volumetric, check_torques, fit, homogeneous,
 };
 use polycore::langevin::{self as chain, Inverse};
 use polycore::tensor::{DeformationGradient, Tensor};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
+use std::f64::consts::PI;
 use std::sync::atomic::Ordering;
 
 /// Least number of values that are distributed to threads.
@@ -154,19 +156,33 @@ impl Law {
         found.into_iter().flatten().collect::<Vec<_>>().into_pyarray(py).reshape([count, 2])
     }
 
-    /// Computes 2M/(πR³) and N/(πR²), (N, 2), of an incompressible cylinder of radius R, held at a stretch
-    /// and twisted to an amount of shear at its surface.
+    /// Computes torque, N m, and axial force, N, (N, 2), of incompressible cylinders: twist, rad/m, radius, m,
+    /// held stretch.
     fn torsion<'py>(
         &self,
         py: Python<'py>,
+        twist: PyReadonlyArray1<'py, f64>,
+        radius: PyReadonlyArray1<'py, f64>,
         stretch: PyReadonlyArray1<'py, f64>,
-        shear: PyReadonlyArray1<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let (stretch, shear) = (stretch.as_slice()?, shear.as_slice()?);
+        let (twists, radii, stretches) = (twist.as_slice()?, radius.as_slice()?, stretch.as_slice()?);
+        let count = twists.len().min(radii.len()).min(stretches.len());
+        for k in 0..count {
+            let refused = |what| value(format!("point {k}: {what}"));
+            check_cylinder(twists[k], radii[k]).map_err(refused)?;
+            if !(stretches[k] > 0.0 && stretches[k].is_finite()) {
+                return Err(refused(format!("found a stretch of {}; allowed: above 0", stretches[k])));
+            }
+        }
         let law = &*self.law;
-        let at = |k: usize| TwistedCylinder { stretch: stretch[k], shear: shear[k] }.stresses(law);
-        let found = points(py, stretch.len().min(shear.len()), at)?;
-        let count = found.len();
+        let at = |k: usize| {
+            let (twist, radius) = (twists[k], radii[k]);
+            let cylinder = TwistedCylinder { stretch: stretches[k], shear: radius * twist.abs() };
+            let [torque, force] = cylinder.stresses(law)?;
+            let area = PI * radius * radius;
+            Ok([twist.signum() * 0.5 * radius * area * torque, area * force])
+        };
+        let found = points(py, count, at)?;
         found.into_iter().flatten().collect::<Vec<_>>().into_pyarray(py).reshape([count, 2])
     }
 
@@ -227,15 +243,41 @@ fn points<T: Send>(
     found.map_err(value)
 }
 
-/// Fits a law to nominal stresses: P₁ at λ₁ of a `mode`, (P₁, P₂) at (λ₁, λ₂) of `biaxial` rows, or
-/// (2M/(πR³), N/(πR²)) at (λ, ψR) of `torsion` rows.
+/// Checks twist, rad/m, and radius, m, of a cylinder.
+fn check_cylinder(twist: f64, radius: f64) -> Result<(), String> {
+    if !twist.is_finite() {
+        return Err(format!("found a twist of {twist} rad/m; allowed: a finite number"));
+    }
+    if !(radius > 0.0 && radius.is_finite()) {
+        return Err(format!("found a radius of {radius} m; allowed: above 0"));
+    }
+    Ok(())
+}
+
+/// State of torsion from twist, rad/m, torque, N m, radius, m, axial force, N, and held stretch.
+fn torsion_state([twist, torque, radius, force, stretch]: [f64; 5]) -> Result<TestState, String> {
+    check_cylinder(twist, radius)?;
+    if !HELD_STRETCHES.contains(&stretch) {
+        let (low, high) = (HELD_STRETCHES.start(), HELD_STRETCHES.end());
+        return Err(format!(
+            "found a stretch of {stretch}; allowed: {low} to {high}, length over undeformed length"
+        ));
+    }
+    let torque = if twist < 0.0 { -torque } else { torque };
+    let surface = TwistedCylinder { stretch, shear: radius * twist.abs() }.surface();
+    let area = PI * radius * radius;
+    Ok(TestState::new(Mode::Torsion, surface, [2.0 * torque / (radius * area), force / area]))
+}
+
+/// Fits a law to nominal stresses: P₁ at λ₁ of a `mode`, (P₁, P₂) at (λ₁, λ₂) of `biaxial` rows, or to rows of
+/// `torsion`: twist, torque, radius, axial force and held stretch.
 #[pyfunction]
 pub fn fit_law<'py>(
     py: Python<'py>,
     key: &str,
     tests: Vec<(String, PyReadonlyArray2<'py, f64>)>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let mut states = Vec::new();
+    let (mut states, mut notes) = (Vec::new(), Vec::new());
     for (name, rows) in &tests {
         let known = [
             Mode::Uniaxial,
@@ -248,13 +290,23 @@ pub fn fit_law<'py>(
         let mode = known.into_iter().find(|mode| mode.name() == name).ok_or_else(|| {
             value(format!("test: found {name:?}; allowed: {}", known.map(Mode::name).join(", ")))
         })?;
-        for row in rows.as_array().rows() {
+        let begin = states.len();
+        let rows = rows.as_array();
+        if rows.nrows() == 0 {
+            return Err(value(format!("{name}: found no rows; allowed: at least one measured state")));
+        }
+        for (k, row) in rows.rows().into_iter().enumerate() {
+            if let Some(cell) = row.iter().find(|cell| !cell.is_finite()) {
+                let allowed = "finite numbers; leave out a state that was not measured";
+                return Err(value(format!("{name}: row {k}: found {cell}; allowed: {allowed}")));
+            }
             let state = match (mode, row.as_slice()) {
                 (Mode::Biaxial, Some(&[first, second, p, q])) => {
                     TestState::new(mode, [first, second], [p, q])
                 }
-                (Mode::Torsion, Some(&[stretch, shear, torque, force])) => {
-                    TestState::new(mode, TwistedCylinder { stretch, shear }.surface(), [torque, force])
+                (Mode::Torsion, Some(&[twist, torque, radius, force, stretch])) => {
+                    torsion_state([twist, torque, radius, force, stretch])
+                        .map_err(|what| value(format!("{name}: row {k}: {what}")))?
                 }
                 (Mode::SimpleShear, Some(&[amount, stress])) => TestState::simple_shear(amount, stress),
                 (_, Some(&[stretch, nominal])) if ![Mode::Biaxial, Mode::Torsion].contains(&mode) => {
@@ -262,13 +314,23 @@ pub fn fit_law<'py>(
                 }
                 _ => {
                     return Err(value(format!(
-                        "{name}: found {} columns; allowed: 2, of biaxial tests and torsion 4",
+                        "{name}: found {} columns; allowed: 2, of biaxial tests 4, of torsion 5",
                         row.len()
                     )));
                 }
             };
-            state.principal_stretches().map_err(value)?;
+            let refused = |error| value(format!("{name}: row {k}: {error}"));
+            state.principal_stretches().map_err(refused)?;
             states.push(state);
+        }
+        if mode == Mode::Torsion {
+            let refused = |(k, allowed): (usize, String)| {
+                let (twist, torque) = (rows[[k, 0]], rows[[k, 1]]);
+                let found = format!("a torque of {torque} N m at a twist of {twist} rad/m");
+                value(format!("{name}: row {k}: found {found}; allowed: {allowed}"))
+            };
+            let note = check_torques(&states[begin..]).map_err(refused)?;
+            notes.extend(note.map(|note| format!("{name}: {note}")));
         }
     }
     let table = TestData::new(String::new(), states);
@@ -279,9 +341,31 @@ pub fn fit_law<'py>(
     let parameters: Vec<_> =
         found.parameters.iter().map(|p| (p.name, p.unit, p.value, p.standard_error)).collect();
     answer.set_item("parameters", parameters)?;
+    answer.set_item("notes", notes)?;
     answer.set_item("rms", found.rms)?;
     answer.set_item("measurements", found.measurements)?;
     answer.set_item("evaluations", found.iterations)?;
     answer.set_item("draws", PyArray2::from_vec2(py, &found.draws).map_err(value)?)?;
+    Ok(answer)
+}
+
+/// Fits Dᵢ of U = Σ (J − 1)²ⁱ/Dᵢ to pressures, Pa, at ratios of volumes J.
+#[pyfunction]
+pub fn fit_volumetric<'py>(
+    py: Python<'py>,
+    ratios: PyReadonlyArray1<'py, f64>,
+    pressures: PyReadonlyArray1<'py, f64>,
+    terms: usize,
+) -> PyResult<Bound<'py, PyDict>> {
+    let pairs = ratios.as_slice()?.iter().zip(pressures.as_slice()?);
+    let states: Vec<VolumetricState> =
+        pairs.map(|(&ratio, &pressure)| VolumetricState { ratio, pressure }).collect();
+    let found = VolumetricFit::new(&states, terms).map_err(value)?;
+    let answer = PyDict::new(py);
+    answer.set_item("bulk", (found.bulk, found.bulk_error))?;
+    answer.set_item("notes", found.warnings())?;
+    answer.set_item("rms", found.rms)?;
+    answer.set_item("compliances", found.compliances.into_pyarray(py))?;
+    answer.set_item("errors", found.compliance_errors.into_pyarray(py))?;
     Ok(answer)
 }

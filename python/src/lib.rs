@@ -32,7 +32,7 @@ mod _polymech {
         bond::BondLaw,
         error::{Interrupted, RunError, SceneError},
         fields::{field, layout},
-        laws::{Law, fit_law, langevin, langevin_methods, models},
+        laws::{Law, fit_law, fit_volumetric, langevin, langevin_methods, models},
         model::Simulation,
         network::modulus_of_swelling,
         network::network,

@@ -172,6 +172,74 @@ def test_torsion():
         polymech.fit("gent", {"torsion": (twist, torque, -radius)})
 
 
+def test_bad_torsion():
+    """Torques against their twist or in another unit, sizes of no cylinder, NaN, arrays that do not fit."""
+    law = Law("neo-hookean", 4e5)
+    twist, radius = np.linspace(20, 200, 10), 5e-3
+    torque, _ = law.torsion(twist, radius)
+    turned = np.where(np.arange(10) == 7, -torque, torque)
+    for columns, message in [
+        ((twist, turned, radius), r"torsion: row 7: found a torque of -0\.06.* rad/m; allowed: a torque with the sign"),
+        ((twist, 1e3 * torque, radius), r"allowed: torques of a shear modulus .* it is 4\.000e8 Pa"),
+        ((twist, np.where(twist > 100, np.nan, torque), radius), "row 5: found NaN; allowed: finite numbers"),
+        ((twist, torque, 0.0), "row 0: found a radius of 0 m; allowed: above 0"),
+        ((twist, torque, radius, 0.0, 125.0), "found a stretch of 125; allowed: 0.3 to 20"),
+        ((twist, torque[:5], radius), r"torsion: found arrays of the shapes \(10,\), \(5,\), \(\)"),
+        (([], [], radius), "torsion: found no rows"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            polymech.fit("neo-hookean", {"torsion": columns})
+    for arguments, message in [
+        ((twist, -radius), "point 0: found a radius of -0.005 m; allowed: above 0"),
+        ((twist, 0.0), "found a radius of 0 m; allowed: above 0"),
+        ((twist, [radius, np.nan]), r"found arrays of the shapes \(10,\), \(2,\), \(\)"),
+        (([1.0, np.nan], radius), "point 1: found a twist of NaN rad/m"),
+        ((twist, radius, 0.0), "found a stretch of 0; allowed: above 0"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            law.torsion(*arguments)
+    assert law.torsion([], radius)[0].shape == (0,)
+    with pytest.warns(UserWarning, match="torsion: the torques imply a shear modulus of 400 Pa"):
+        polymech.fit("neo-hookean", {"torsion": (twist, 1e-3 * torque, radius)})
+
+
+def test_bad_columns():
+    stretch, nominal = [1.5, 2.0, 3.0], [0.3e6, 0.5e6, 0.8e6]
+    for columns, message in [
+        ((stretch, nominal[:2]), r"uniaxial: found columns of the shapes \(3,\), \(2,\); allowed: columns of one length"),
+        ((stretch, [*nominal[:2], np.nan]), "uniaxial: row 2: found NaN; allowed: finite numbers"),
+        (([], []), "uniaxial: found no rows"),
+        (([1.5, -2.0], [1e5, 2e5]), "uniaxial: row 1: "),
+        ((stretch, nominal, nominal), "found 3 columns; allowed: 2"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            polymech.fit("neo-hookean", {"uniaxial": columns})
+
+
+def test_volumetric():
+    """p = −2 (J − 1)/D₁ − 4 (J − 1)³/D₂ returns; its U″ vanishes at |J − 1| = √(−D₂/(6D₁)) = 0.1."""
+    ratio = np.linspace(0.99, 0.85, 12)
+
+    def pressure(d1, d2):
+        return -2 * (ratio - 1) / d1 - 4 * (ratio - 1) ** 3 / d2
+
+    fit = polymech.fit_volumetric(ratio, pressure(1e-9, 3e-11), 2)
+    assert np.allclose(fit.compliances, [1e-9, 3e-11], rtol=1e-9) and np.isclose(fit.bulk_modulus, 2e9)
+    assert fit.warnings == () and (fit.standard_errors < 1e-9 * fit.compliances).all() and fit.bulk_error < 1
+    with pytest.warns(UserWarning, match="falls with compression at J below 0.9000 .* within the states"):
+        fit = polymech.fit_volumetric(ratio, pressure(1e-9, -6e-11), 2)
+    assert len(fit.warnings) == 1
+    for arguments, message in [
+        ((ratio, -pressure(1e-9, 3e-11)), "bulk modulus of -"),
+        ((ratio, np.full(12, np.nan)), "state 0: J = 0.99, NaN Pa; allowed: .* finite pressure"),
+        ((ratio, [1e6]), "found columns of the shapes"),
+        (([], []), "0 states away from rest for 1 terms"),
+        ((ratio, pressure(1e-9, 3e-11), 0), "terms: found 0"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            polymech.fit_volumetric(*arguments)
+
+
 def test_laws_are_pickled():
     law = Law("gent", 3e5, 80.0, volumetric=("quadratic", 1e6))
     again = pickle.loads(pickle.dumps(law))

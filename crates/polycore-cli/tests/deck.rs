@@ -129,3 +129,55 @@ fn terms_of_a_volumetric_test_are_not_dropped() {
     assert!(read("materials_si.inp").contains(", 1.000000e-9, 1.000000e-11\n"));
     assert!(read("materials.toml").contains("# volumetric test `bulk`, 2/D1 of 2 terms"));
 }
+
+/// A second term that falls with compression from J = 0.9 on, and one that the test does not determine: a
+/// warning in `check`, the run, its report and every card.
+#[test]
+fn doubtful_volumetric_terms_are_told_everywhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let [scene, output] = ["case.toml", "out"].map(|name| folder.path().join(name).display().to_string());
+    let laws = "cards = [\"ansys\", \"ls-dyna\", \"febio\", \"moose\"]\nlaws = [\"neo-hookean\"]";
+    let volumetric = "[[volumetric]]\nname = \"bulk\"\nfile = \"bulk.csv\"\nterms = 2\n";
+    std::fs::write(&scene, SCENE.replace("laws = [\"neo-hookean\"]", laws) + volumetric).unwrap();
+    std::fs::write(folder.path().join("bar.csv"), BAR).unwrap();
+    // p = −2 (J − 1)/D₁ − 4 (J − 1)³/D₂; U″ = 2/D₁ + 12 (J − 1)²/D₂ is 0 at J = 0.9
+    let soft = [0.98, 0.95, 0.92, 0.88].map(|j: f64| {
+        let pressure = -2.0 * (j - 1.0) / 1e-3 + 4.0 * (j - 1.0).powi(3) / 6e-5;
+        (j, pressure)
+    });
+    let noisy = [(0.998, 4.2), (0.995, 9.8), (0.992, 16.3), (0.99, 19.9)];
+    for (states, part) in
+        [(soft, "at J below 0.9000"), (noisy, "D2 is not determined: its standard error is 369 % of it")]
+    {
+        let rows: String = states.iter().map(|(j, pressure)| format!("{pressure},{j}\n")).collect();
+        std::fs::write(folder.path().join("bulk.csv"), format!("pressure [MPa],J\n{rows}")).unwrap();
+        let checked = polycore(&["check", &scene]);
+        let result = polycore(&["run", &scene, "--output", &output]);
+        assert!(result.status.success(), "{}", String::from_utf8_lossy(&result.stderr));
+        for shown in [checked, result] {
+            let shown = String::from_utf8_lossy(&shown.stdout);
+            let shown = shown.split_whitespace().collect::<Vec<_>>().join(" ");
+            assert!(shown.contains("warning: volumetric bulk: ") && shown.contains(part), "{shown}");
+        }
+        let read = |name: &str| std::fs::read_to_string(folder.path().join("out").join(name)).unwrap();
+        for (name, sign) in [
+            ("materials.toml", "# "),
+            ("materials_mm.inp", "** "),
+            ("materials_si.inp", "** "),
+            ("materials_mm.mac", "! "),
+            ("materials_mm.k", "$ "),
+            ("materials_si.feb", "<!-- "),
+            ("materials_mm.i", "# "),
+        ] {
+            let text = read(name);
+            let told = |line: &str| line.starts_with(&format!("{sign}warning: ")) && line.contains(part);
+            assert!(text.lines().any(told), "{name}: {text}");
+        }
+        let report = harness::report::Report::read(folder.path().join("out/report.json")).unwrap();
+        let scalar = |name: &str| report.scalar(name).unwrap();
+        // the term of noise is negative, too
+        assert_eq!(scalar("bulk.monotonic"), 0.0);
+        let share = scalar("bulk.D2.standard_error") / scalar("bulk.D2").abs();
+        assert_eq!(share > 1.0, part.starts_with("D2"), "{share}");
+    }
+}

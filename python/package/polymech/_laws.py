@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +20,16 @@ def flat(x: ArrayLike) -> tuple[Array, tuple[int, ...]]:
     """Flattens an array, without a copy if possible, and returns its shape."""
     array = np.asarray(x, dtype=np.float64)
     return np.ascontiguousarray(array).reshape(-1), array.shape
+
+
+def aligned(what: str, given: Sequence[ArrayLike]) -> list[Array]:
+    """Broadcasts arrays of one shape, and numbers, to that shape."""
+    arrays = [np.asarray(x, dtype=np.float64) for x in given]
+    try:
+        return [np.ascontiguousarray(x) for x in np.broadcast_arrays(*arrays)]
+    except ValueError:
+        shapes = ", ".join(str(x.shape) for x in arrays)
+        raise ValueError(f"{what}: found arrays of the shapes {shapes}; allowed: arrays of one shape, or numbers") from None
 
 
 class Langevin:
@@ -174,7 +185,7 @@ class Law:
 
     def biaxial(self, first: ArrayLike, second: ArrayLike) -> Array:
         """Nominal stresses (…, 2), Pa, of an incompressible sheet stretched to λ₁ and λ₂."""
-        a, b = np.broadcast_arrays(np.asarray(first, dtype=float), np.asarray(second, dtype=float))
+        a, b = aligned("stretches", (first, second))
         return self._law.biaxial(flat(a)[0], flat(b)[0]).reshape(*a.shape, 2)
 
     def uniaxial(self, stretch: ArrayLike) -> Array:
@@ -196,11 +207,10 @@ class Law:
 
         `twist` is the angle per undeformed length, rad/m, `radius` the undeformed one, m. N is below 0 if the cylinder pushes.
         """
-        given = [np.asarray(x, dtype=float) for x in (twist, radius, stretch)]
-        turn, size, held = np.broadcast_arrays(*given)
-        found = self._law.torsion(flat(held)[0], flat(np.abs(turn) * size)[0])
+        turn, size, held = aligned("twist, radius, stretch", (twist, radius, stretch))
+        found = self._law.torsion(flat(turn)[0], flat(size)[0], flat(held)[0])
         torque, force = (found[:, i].reshape(turn.shape) for i in (0, 1))
-        return np.sign(turn) * torque * np.pi * size**3 / 2, force * np.pi * size**2
+        return torque, force
 
     def energy(self, deformation: ArrayLike) -> Array:
         """W(F), J/m³, (…) for F (…, 3, 3)."""
@@ -244,16 +254,18 @@ class Fit:
     """Draws of the parameters from their posterior, (draws, parameters)."""
 
 
-def _torsion(columns: tuple[ArrayLike, ...]) -> tuple[ArrayLike, ...]:
-    """Converts twist, torque, radius, axial force, stretch to λ, ψR, 2M/(πR³), N/(πR²)."""
-    if not 3 <= len(columns) <= 5:
-        raise ValueError(f"torsion: found {len(columns)} columns; allowed: twist, torque, radius and, if known, axial force and stretch")
-    given = [np.asarray(column, dtype=float) for column in (*columns, *(0.0, 1.0)[len(columns) - 3 :])]
-    twist, torque, radius, force, stretch = np.broadcast_arrays(*given)
-    if not ((radius > 0).all() and (stretch > 0).all()):
-        raise ValueError("torsion: found a radius or a stretch of 0 or below; allowed: above 0")
-    sign = np.where(twist < 0, -1.0, 1.0)
-    return stretch, np.abs(twist) * radius, sign * 2 * torque / (np.pi * radius**3), force / (np.pi * radius**2)
+def _rows(name: str, columns: tuple[ArrayLike, ...]) -> Array:
+    """Stacks the columns of a test; of torsion numbers and missing columns are filled in."""
+    if name == "torsion":
+        if not 3 <= len(columns) <= 5:
+            allowed = "twist, torque, radius and, if known, axial force and stretch"
+            raise ValueError(f"torsion: found {len(columns)} columns; allowed: {allowed}")
+        columns = (*aligned(name, (*columns, *(0.0, 1.0)[len(columns) - 3 :])),)
+    given = [np.atleast_1d(np.asarray(column, dtype=np.float64)) for column in columns]
+    if any(column.shape != (len(given[0]),) for column in given):
+        shapes = ", ".join(str(column.shape) for column in given)
+        raise ValueError(f"{name}: found columns of the shapes {shapes}; allowed: columns of one length, (N,)")
+    return np.ascontiguousarray(np.column_stack(given))
 
 
 def fit(model: str, tests: Mapping[str, tuple[ArrayLike, ...]]) -> Fit:
@@ -264,10 +276,44 @@ def fit(model: str, tests: Mapping[str, tuple[ArrayLike, ...]]) -> Fit:
     held stretch, each an array or a number. A stress of exactly 0 is a condition, not a measurement. Least squares of the
     stresses by Levenberg–Marquardt from several starts.
     """
-    tests = {name: _torsion(columns) if name == "torsion" else columns for name, columns in tests.items()}
-    rows = [(name, np.column_stack([np.asarray(c, dtype=np.float64) for c in columns])) for name, columns in tests.items()]
-    found = _polymech.fit_law(model, [(name, np.ascontiguousarray(table)) for name, table in rows])
+    found = _polymech.fit_law(model, [(name, _rows(name, columns)) for name, columns in tests.items()])
+    for note in found["notes"]:
+        warnings.warn(note, stacklevel=2)
     parameters = {name: Value(value, unit) for name, unit, value, _ in found["parameters"]}
     errors = {name: error for name, _, _, error in found["parameters"]}
     law = Law(model, *(float(value) for value in parameters.values()))
     return Fit(law, parameters, errors, found["rms"], found["measurements"], found["draws"])
+
+
+@dataclass(frozen=True)
+class VolumetricFit:
+    """Volumetric energy U = Σ (J − 1)²ⁱ/Dᵢ fitted to a test."""
+
+    bulk_modulus: float
+    """K = 2/D₁, Pa."""
+    bulk_error: float | None
+    """Standard error of K, Pa; `None` if there are as many states as terms."""
+    compliances: Array
+    """Dᵢ, 1/Pa."""
+    standard_errors: Array
+    """Standard errors of Dᵢ, 1/Pa; empty if there are as many states as terms."""
+    rms: float
+    """Root mean square of the residuals of the pressure, Pa."""
+    warnings: tuple[str, ...]
+    """Defects: errors that are unknown or exceed their values, a pressure that falls with compression."""
+
+
+def fit_volumetric(ratio: ArrayLike, pressure: ArrayLike, terms: int = 1) -> VolumetricFit:
+    """Fits Dᵢ of U = Σ (J − 1)²ⁱ/Dᵢ to pressures, Pa, above 0 in compression, at ratios of volumes J.
+
+    Defects of the fit are warnings: errors of Dᵢ that are unknown or exceed their values, a pressure that falls with
+    compression within the test or from J = 0.8 to 1.2.
+    """
+    rows = _rows("ratio, pressure", (ratio, pressure))
+    if terms < 1:
+        raise ValueError(f"terms: found {terms}; allowed: 1 or more")
+    found = _polymech.fit_volumetric(rows[:, 0].copy(), rows[:, 1].copy(), terms)
+    for note in found["notes"]:
+        warnings.warn(note, stacklevel=2)
+    bulk, error = found["bulk"]
+    return VolumetricFit(bulk, error, found["compliances"], found["errors"], found["rms"], tuple(found["notes"]))

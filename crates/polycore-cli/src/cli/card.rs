@@ -42,13 +42,9 @@ pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
                         true => format!("; K: {}", set.bulk.origin(fit.law.shear_modulus())),
                         false => String::new(),
                     };
-                    write!(
-                        file,
-                        "**\n** {} fitted to {}{origin}\n{}",
-                        fit.model.key,
-                        set.name,
-                        card(fit.model.key, &scaled, &compliances)
-                    )?;
+                    writeln!(file, "**\n** {} fitted to {}{origin}", fit.model.key, set.name)?;
+                    set.bulk.warnings().iter().try_for_each(|line| writeln!(file, "** {line}"))?;
+                    write!(file, "{}", card(fit.model.key, &scaled, &compliances))?;
                 }
             }
             Ok(())
@@ -73,7 +69,10 @@ pub fn write_hosts(directory: &Path, all: &[TableFits], hosts: &[CardProgram]) -
             text += &match host.card(id, key, &scaled, &set.bulk.compliances(shear, pascals)) {
                 Some(card) => {
                     let origin = set.bulk.origin(shear);
-                    host.comment(&format!("{key} fitted to {}; K: {origin}", set.name)) + &card
+                    let head = host.comment(&format!("{key} fitted to {}; K: {origin}", set.name));
+                    let warnings =
+                        set.bulk.warnings().iter().map(|line| host.comment(line)).collect::<String>();
+                    head + &warnings + &card
                 }
                 None => host.comment(&format!("{} has no law `{key}`", host.name())),
             };

@@ -7,7 +7,7 @@ use polycore::constitutive::hyperelastic::data::{Mode, TestData};
 use polycore::constitutive::hyperelastic::fit::neo_hookean_modulus;
 use polycore::constitutive::hyperelastic::ranking::{ModeTable, modes};
 use polycore::constitutive::hyperelastic::{
-    Deviation, StrainMeasure, TestCylinder, TestFormat, TestStressMeasure,
+    Deviation, HELD_STRETCHES, StrainMeasure, TestCylinder, TestFormat, TestStressMeasure,
 };
 use polycore::units::Length;
 use serde::Deserialize;
@@ -131,6 +131,11 @@ impl TestTableSpec {
             if !(size > 0.0 && size.is_finite()) {
                 return Err(source.error(&key(name), size, "a number above 0"));
             }
+        }
+        if let Some(stretch) = self.stretch.filter(|stretch| !HELD_STRETCHES.contains(stretch)) {
+            let (low, high) = (HELD_STRETCHES.start(), HELD_STRETCHES.end());
+            let allowed = format!("{low} to {high}, length over undeformed length: 1.25 is 25 % longer");
+            return Err(source.error(&key("stretch"), stretch, allowed));
         }
         if !is_torsion {
             return Ok(());
@@ -269,6 +274,12 @@ pub fn check_weights(source: &Source, data: &[DataSet]) -> Result<(), SceneError
 }
 
 impl DataSet {
+    /// Doubts about its file, a line each.
+    pub fn warnings(&self) -> Vec<String> {
+        let doubts = self.read.iter().filter_map(|line| line.strip_prefix("warning: "));
+        doubts.map(|doubt| format!("warning: {}: {doubt}", self.name)).collect()
+    }
+
     /// Key of the scene that names its states.
     pub fn source_key(&self) -> &'static str {
         if self.parts.is_empty() { "file" } else { "tables" }

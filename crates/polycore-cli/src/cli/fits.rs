@@ -20,6 +20,7 @@ use super::material::{DIGITS, digits};
 use super::quantities as q;
 use super::scene::FitCase;
 use super::table_fits::{TableFits, unit_of};
+use super::volumetric::VolumetricSet;
 use super::{card, draw, material, ranking, time_fits, trials};
 
 /// Fits every law to every table; writes tables and pictures. A law that cannot be fitted is reported, the
@@ -161,7 +162,10 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     }
     let mut finished = Finished::new(report, text);
     finished.table = (!all.is_empty()).then(|| errors(case, &all));
-    Ok(finished.with_notes(&remarks(case, &all)))
+    let warnings = case.data.iter().flat_map(DataSet::warnings);
+    let warnings = warnings.chain(case.volumetric.iter().flat_map(VolumetricSet::warnings));
+    let warnings: String = warnings.map(|line| line + "\n").collect();
+    Ok(finished.with_notes(&(warnings + &remarks(case, &all))))
 }
 
 /// Converts a value to the unit of the tables: stresses to MPa, numbers unchanged.

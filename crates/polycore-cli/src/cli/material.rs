@@ -42,6 +42,7 @@ fn block(fit: &Fit, bulk: Bulk) -> String {
     }
     let shear = fit.law.shear_modulus();
     let mut text = format!("[material.solid] # {}, rms {rms}\n", fit.model.key);
+    bulk.warnings().iter().for_each(|line| text += &format!("# {line}\n"));
     let _ = writeln!(text, "law = \"correspondence\"");
     let _ = writeln!(text, "[material.solid.constitutive]\nmodel = \"{}\"", fit.model.key);
     let _ =

@@ -76,6 +76,9 @@ harness::quantities! {
     BULK_ERROR = "{volumetric}.bulk_modulus.standard_error", "MPa", "its standard error";
     BULK_RMS = "{volumetric}.rms", "MPa", "root mean square of the pressure of the fit − measurement";
     COMPLIANCE = "{volumetric}.D{i}", "1/MPa", "Dᵢ of the energy Σ (J − 1)²ⁱ/Dᵢ";
+    COMPLIANCE_ERROR = "{volumetric}.D{i}.standard_error", "1/MPa", "its standard error";
+    MONOTONIC = "{volumetric}.monotonic", "", "1 if the pressure rises with compression in the test and \
+                                               from J = 0.8 to 1.2, else 0";
 }
 
 harness::quantities! {

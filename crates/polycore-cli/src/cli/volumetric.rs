@@ -103,6 +103,14 @@ impl Bulk<'_> {
         }
     }
 
+    /// Defects of the volumetric test, a line each; none of an assumed modulus.
+    pub fn warnings(self) -> Vec<String> {
+        match self {
+            Self::Measured(set) => set.warnings(),
+            Self::Assumed => Vec::new(),
+        }
+    }
+
     /// Origin of K, for a comment.
     pub fn origin(self, shear: f64) -> String {
         match self {
@@ -120,21 +128,28 @@ impl Bulk<'_> {
 }
 
 impl VolumetricSet {
-    /// Describes what a run will do, in a line.
+    /// Describes what a run will do, in a line, with the warnings below it.
     pub fn plan(&self) -> String {
-        format!(
-            "volumetric {}: {} states, {} terms",
-            self.name,
-            self.states.len(),
-            self.fit.compliances.len()
-        )
+        let (states, terms) = (self.states.len(), self.fit.compliances.len());
+        let mut text = format!("volumetric {}: {states} states, {terms} terms", self.name);
+        self.warnings().iter().for_each(|line| text += &format!("\n{line}"));
+        text
+    }
+
+    /// Defects of the fit, a line each.
+    pub fn warnings(&self) -> Vec<String> {
+        let line = |defect: String| format!("warning: volumetric {}: {defect}", self.name);
+        self.fit.warnings().into_iter().map(line).collect()
     }
 
     /// Lists the names of its scalars.
     pub fn quantities(&self) -> Vec<String> {
-        let own = [q::BULK, q::BULK_ERROR, q::BULK_RMS].map(|quantity| quantity.named(&[&self.name]).name);
-        let terms =
-            (1..=self.fit.compliances.len()).map(|i| q::COMPLIANCE.named(&[&self.name, &i.to_string()]).name);
+        let own = [q::BULK, q::BULK_ERROR, q::BULK_RMS, q::MONOTONIC]
+            .map(|quantity| quantity.named(&[&self.name]).name);
+        let terms = (1..=self.fit.compliances.len()).flat_map(|i| {
+            let number = i.to_string();
+            [q::COMPLIANCE, q::COMPLIANCE_ERROR].map(|quantity| quantity.named(&[&self.name, &number]).name)
+        });
         own.into_iter().chain(terms).collect()
     }
 
@@ -151,11 +166,20 @@ impl VolumetricSet {
         report.value(q::BULK_RMS.named(&[&self.name]), fit.rms / MPA);
         let error = fit.bulk_error.map_or_else(String::new, |error| format!(" ± {}", stress(error, 2)));
         let mut text = format!("volumetric {}: K {}{error}", self.name, stress(fit.bulk, DIGITS));
-        for (i, compliance) in (1..).zip(&fit.compliances) {
-            report.value(q::COMPLIANCE.named(&[&self.name, &i.to_string()]), compliance * MPA);
-            let _ = write!(text, ", D{i} {} 1/MPa", digits(compliance * MPA, DIGITS));
+        let is_monotonic = fit.softening().is_none();
+        report.value(q::MONOTONIC.named(&[&self.name]), f64::from(u8::from(is_monotonic)));
+        for (i, compliance) in fit.compliances.iter().enumerate() {
+            let number = (i + 1).to_string();
+            report.value(q::COMPLIANCE.named(&[&self.name, &number]), compliance * MPA);
+            let _ = write!(text, ", D{number} {}", digits(compliance * MPA, DIGITS));
+            if let Some(error) = fit.compliance_errors.get(i) {
+                report.value(q::COMPLIANCE_ERROR.named(&[&self.name, &number]), error * MPA);
+                let _ = write!(text, " ± {}", digits(error * MPA, 2));
+            }
+            text += " 1/MPa";
         }
         let _ = writeln!(text, "; rms of the pressure {}", stress(fit.rms, 3));
+        self.warnings().iter().for_each(|line| text += &format!("{line}\n"));
         atomic_write(directory.join(format!("{}_volumetric.csv", self.name)), |file| {
             writeln!(file, "J,pressure_MPa,fitted_MPa")?;
             self.states.iter().try_for_each(|state| {

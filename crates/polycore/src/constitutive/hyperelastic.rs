@@ -61,6 +61,7 @@ pub mod stability;
 #[cfg(feature = "tables")]
 mod table;
 pub mod torsion;
+mod torsion_check;
 #[cfg(feature = "tables")]
 mod torsion_table;
 mod van_der_waals;
@@ -88,6 +89,7 @@ pub use principal::PrincipalResponse;
 #[cfg(feature = "tables")]
 pub use table::{ImportedTest, TestFormat};
 pub use torsion::TwistedCylinder;
+pub use torsion_check::{HELD_STRETCHES, check_torques};
 #[cfg(feature = "tables")]
 pub use torsion_table::TestCylinder;
 pub use van_der_waals::VanDerWaals;

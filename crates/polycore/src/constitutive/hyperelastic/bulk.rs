@@ -6,6 +6,7 @@ use std::path::Path;
 use nalgebra::{DMatrix, DVector};
 
 use super::Error;
+use crate::numerics::bisection::bisected;
 #[cfg(feature = "tables")]
 use crate::table::{self, Table};
 #[cfg(feature = "tables")]
@@ -29,19 +30,39 @@ pub struct VolumetricFit {
     pub bulk_error: Option<f64>,
     /// Dᵢ, 1/Pa.
     pub compliances: Vec<f64>,
+    /// Standard errors of Dᵢ, 1/Pa: Dᵢ² times that of 1/Dᵢ, to first order. Empty if the states are as many
+    /// as the terms.
+    pub compliance_errors: Vec<f64>,
     /// Root mean square of the residuals of the pressure, Pa.
     pub rms: f64,
+    /// Least and largest J of the states, 1 included.
+    pub range: [f64; 2],
 }
+
+/// Change of volume |J − 1| up to which a pressure should rise with compression, even beyond the states.
+const LEAST_CHANGE: f64 = 0.2;
+
+/// Number of steps of a scan of the stiffness from rest.
+const STEPS: usize = 1000;
 
 impl VolumetricFit {
     /// Fits p = −dU/dJ = −Σ 2i (J − 1)²ⁱ⁻¹/Dᵢ, linear in 1/Dᵢ, by least squares. States at J = 1 do not
     /// count.
     ///
     /// # Errors
-    /// [`Error::Data`] for fewer states than terms, and for a bulk modulus that is not above 0 or a term that
-    /// the states do not determine.
+    /// [`Error::Data`] for fewer states than terms, states that are not finite or without a volume, and for a
+    /// bulk modulus that is not above 0 or a term that the states do not determine.
     pub fn new(states: &[VolumetricState], terms: usize) -> Result<Self, Error> {
         let refused = |reason: String| Error::Data { what: "volumetric test".to_owned(), reason };
+        let is_valid = |state: &VolumetricState| {
+            state.ratio > 0.0 && state.ratio.is_finite() && state.pressure.is_finite()
+        };
+        if let Some((at, VolumetricState { ratio, pressure })) =
+            states.iter().enumerate().find(|(_, state)| !is_valid(state))
+        {
+            let allowed = "a ratio of volumes above 0 and a finite pressure";
+            return Err(refused(format!("state {at}: J = {ratio}, {pressure} Pa; allowed: {allowed}")));
+        }
         let states: Vec<&VolumetricState> = states.iter().filter(|state| state.ratio != 1.0).collect();
         if terms == 0 || states.len() < terms {
             return Err(refused(format!("{} states away from rest for {terms} terms", states.len())));
@@ -67,22 +88,80 @@ impl VolumetricFit {
         let bulk = 2.0 * found[0] / norms[0];
         if !(bulk > 0.0 && bulk.is_finite()) {
             let allowed = "a ratio of volumes below 1 under pressure, above 1 under tension";
-            return Err(refused(format!("bulk modulus of {bulk:.6e} Pa; allowed: {allowed}")));
+            let fewer = if terms > 1 { "; or fewer terms" } else { "" };
+            return Err(refused(format!("bulk modulus of {bulk:.6e} Pa; allowed: {allowed}{fewer}")));
         }
+        let compliances: Vec<f64> = found.iter().zip(&norms).map(|(value, norm)| norm / value).collect();
         let degrees = states.len() - terms;
-        let error = || 2.0 * (squares / degrees as f64 * inverse[(0, 0)]).sqrt() / norms[0];
-        Ok(Self {
-            bulk,
-            bulk_error: (degrees > 0).then(error),
-            compliances: found.iter().zip(&norms).map(|(value, norm)| norm / value).collect(),
-            rms: (squares / states.len() as f64).sqrt(),
-        })
+        // of 1/Dᵢ, relative
+        let shares = (0..terms)
+            .map(|i| (squares / degrees as f64 * inverse[(i, i)]).sqrt() / found[i].abs())
+            .filter(|_| degrees > 0);
+        let compliance_errors: Vec<f64> =
+            shares.zip(&compliances).map(|(share, compliance)| share * compliance.abs()).collect();
+        let bulk_error = compliance_errors.first().map(|error| bulk * error / compliances[0]);
+        let ends = states
+            .iter()
+            .fold([1.0_f64, 1.0_f64], |[low, high], state| [low.min(state.ratio), high.max(state.ratio)]);
+        let rms = (squares / states.len() as f64).sqrt();
+        Ok(Self { bulk, bulk_error, compliances, compliance_errors, rms, range: ends })
     }
 
     /// Pressure at a ratio of volumes, Pa.
     pub fn pressure(&self, ratio: f64) -> f64 {
         let term = |(i, d): (usize, &f64)| -2.0 * i as f64 * (ratio - 1.0).powi(2 * i as i32 - 1) / d;
         (1..).zip(&self.compliances).map(term).sum()
+    }
+
+    /// Stiffness −dp/dJ = Σ 2i (2i − 1) (J − 1)²ⁱ⁻²/Dᵢ at a change of volume |J − 1|, Pa.
+    fn stiffness(&self, change: f64) -> f64 {
+        let term = |(i, d): (i32, &f64)| f64::from(2 * i * (2 * i - 1)) * change.powi(2 * i - 2) / d;
+        (1..).zip(&self.compliances).map(term).sum()
+    }
+
+    /// Returns the least change of volume |J − 1| at which the pressure no longer rises with compression,
+    /// within the states or 0.2; `None` if it rises throughout.
+    pub fn softening(&self) -> Option<f64> {
+        let [low, high] = self.range;
+        let end = LEAST_CHANGE.max(1.0 - low).max(high - 1.0);
+        let at = |step: usize| end * step as f64 / STEPS as f64;
+        let lost = (1..=STEPS).find(|&step| self.stiffness(at(step)) <= 0.0)?;
+        Some(bisected(at(lost - 1), at(lost), 60, |change| self.stiffness(change) > 0.0))
+    }
+
+    /// Returns the numbers i of the Dᵢ whose standard errors exceed their values.
+    pub fn undetermined(&self) -> Vec<usize> {
+        let pairs = self.compliances.iter().zip(&self.compliance_errors);
+        let is_open = |(compliance, error): (&f64, &f64)| !(*error <= compliance.abs());
+        (1..).zip(pairs).filter(|(_, pair)| is_open(*pair)).map(|(i, _)| i).collect()
+    }
+
+    /// Describes the defects for which the terms should not be used as they are, a line each: errors that
+    /// are unknown or exceed their values, a pressure that falls with compression.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        if self.compliance_errors.is_empty() {
+            lines.push("the errors of D are unknown: there are as many states as terms".to_owned());
+        }
+        let advice = "use fewer terms, or states of larger changes of volume";
+        for i in self.undetermined() {
+            let share = self.compliance_errors[i - 1] / self.compliances[i - 1].abs();
+            lines.push(format!(
+                "D{i} is not determined: its standard error is {:.0} % of it; {advice}",
+                100.0 * share
+            ));
+        }
+        if let Some(change) = self.softening() {
+            let [low, high] = self.range;
+            let within = if 1.0 - change > low || 1.0 + change < high { "within" } else { "beyond" };
+            lines.push(format!(
+                "the pressure falls with compression at J below {:.4} and with expansion above {:.4}, {within} \
+                 the states of {low:.4} to {high:.4}: a body there is unstable; {advice}",
+                1.0 - change,
+                1.0 + change
+            ));
+        }
+        lines
     }
 }
 
@@ -170,6 +249,60 @@ mod tests {
         assert!((found.bulk / 2e9 - 1.0).abs() < 1e-6 && found.rms < 1e-6 * pressure(0.81), "{found:?}");
     }
 
+    /// Standard errors of two terms by their closed form: of the 2 × 2 normal equations of 1/D₁ and 1/D₂.
+    #[test]
+    fn errors_of_two_terms() {
+        let points = [(0.99, 20.5e6), (0.98, 41e6), (0.96, 88e6), (0.93, 190e6), (0.9, 330e6)];
+        let found = VolumetricFit::new(&states(&points), 2).unwrap();
+        let [x, y] = [1, 2].map(|i| points.map(|(j, _)| -2.0 * f64::from(i) * (j - 1.0_f64).powi(2 * i - 1)));
+        let dot = |a: [f64; 5], b: [f64; 5]| (0..5).map(|k| a[k] * b[k]).sum::<f64>();
+        let determinant = dot(x, x) * dot(y, y) - dot(x, y).powi(2);
+        let residuals = points.map(|(j, p)| p - found.pressure(j));
+        let variance = dot(residuals, residuals) / 3.0;
+        let errors = [dot(y, y), dot(x, x)].map(|part| (variance * part / determinant).sqrt());
+        let worst = (0..2)
+            .map(|i| found.compliance_errors[i] / (found.compliances[i].powi(2) * errors[i]) - 1.0)
+            .chain([found.bulk_error.unwrap() / (2.0 * errors[0]) - 1.0])
+            .map(f64::abs)
+            .fold(0.0, f64::max);
+        evidence::at_most("standard errors of two terms against their closed form, relative", worst, 1e-6);
+        assert_eq!((found.range, found.warnings()), ([0.9, 1.0], vec![]));
+    }
+
+    /// U″ = 2/D₁ + 12 x²/D₂ with D₂ below 0 is 0 at x = √(−D₂/(6D₁)), here 0.1.
+    #[test]
+    fn pressures_that_fall_with_compression() {
+        let [first, second] = [1e-9, -6e-11];
+        let pressure = |j: f64| -2.0 * (j - 1.0) / first - 4.0 * (j - 1.0).powi(3) / second;
+        for (last, place) in [(0.95, "beyond the states of 0.9500"), (0.85, "within the states of 0.8500")] {
+            let points: Vec<_> = (1..=10).map(|k| 1.0 - f64::from(k) * (1.0 - last) / 10.0).collect();
+            let points: Vec<_> = points.into_iter().map(|j| (j, pressure(j))).collect();
+            let found = VolumetricFit::new(&states(&points), 2).unwrap();
+            assert!((found.softening().unwrap() - 0.1).abs() < 1e-8, "{found:?}");
+            let warnings = found.warnings();
+            assert!(warnings.len() == 1 && warnings[0].contains(place), "{warnings:?}");
+            assert!(warnings[0].contains("J below 0.9000 and with expansion above 1.1000"), "{warnings:?}");
+        }
+        // stable up to 0.2 and within the states
+        assert_eq!(VolumetricFit::new(&states(&[(0.99, 2e7), (0.98, 4e7)]), 1).unwrap().softening(), None);
+    }
+
+    /// Noise decides on the third term of small changes of volume; two states leave no error of two terms.
+    #[test]
+    fn terms_that_the_states_do_not_determine() {
+        let noise = [0.3e6, -0.4e6, 0.2e6, -0.3e6, 0.4e6, -0.2e6];
+        let points: Vec<_> = (1..)
+            .zip(noise)
+            .map(|(k, noise)| (1.0 - 0.005 * f64::from(k), 1e7 * f64::from(k) + noise))
+            .collect();
+        let found = VolumetricFit::new(&states(&points), 3).unwrap();
+        assert_eq!(found.undetermined(), [2, 3], "{found:?}");
+        let warnings = found.warnings();
+        assert!(warnings[0].starts_with("D2 is not determined: its standard error is"), "{warnings:?}");
+        let found = VolumetricFit::new(&states(&[(0.99, 2e7), (0.98, 4.1e7)]), 2).unwrap();
+        assert!(found.bulk_error.is_none() && found.warnings()[0].contains("as many states"), "{found:?}");
+    }
+
     #[test]
     fn bad_tests_are_refused() {
         for (points, terms, part) in [
@@ -177,6 +310,9 @@ mod tests {
             (&[(1.01, 2e7), (1.02, 4e7)], 1, "a ratio of volumes below 1 under pressure"),
             (&[(0.99, 2e7), (0.99, 2e7), (0.99, 2e7)], 2, "do not determine 2 terms"),
             (&[(0.99, 2e7)], 0, "for 0 terms"),
+            (&[(0.99, 2e7), (f64::NAN, 2e7)], 1, "state 1: J = NaN, 20000000 Pa"),
+            (&[(0.99, f64::INFINITY)], 1, "a finite pressure"),
+            (&[(0.99, 1e6), (0.98, 1e6), (0.9, 9e8)], 2, "under tension; or fewer terms"),
         ] {
             let error = VolumetricFit::new(&states(points), terms).unwrap_err().to_string();
             assert!(error.contains(part), "{error}");

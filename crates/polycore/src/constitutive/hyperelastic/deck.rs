@@ -81,6 +81,7 @@ impl DeckForm {
 /// Σ (J − 1)²ⁱ/Dᵢ, D₁ = 2/K: `*HYPERELASTIC` if hosts have the law (of `eight-chain` the five terms of
 /// `ARRUDA-BOYCE`, too soft near locking), `*HYPERFOAM` without Dᵢ, otherwise the user material of crate
 /// `umat`. Terms that the card has no place for are named in a comment. CalculiX has no `VAN DER WAALS`.
+/// `ARRUDA-BOYCE` and `VAN DER WAALS` have (½(J² − 1) − ln J)/D₁, of the same K (Abaqus Theory Guide, 4.6.1).
 pub fn card(key: &str, parameters: &[f64], compliances: &[f64]) -> String {
     let name = key.to_uppercase().replace('-', "_");
     let unlocked: Vec<f64>;

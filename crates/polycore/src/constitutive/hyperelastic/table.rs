@@ -51,7 +51,7 @@ pub struct ImportedTest {
     pub table: TestData,
     /// Description of the file's layout, one line.
     pub description: String,
-    /// Rows left out and signs changed, one line each.
+    /// Rows left out and signs changed, one line each; doubts begin with `warning: `.
     pub notes: Vec<String>,
 }
 

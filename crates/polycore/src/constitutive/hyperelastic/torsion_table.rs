@@ -5,8 +5,9 @@ use std::f64::consts::PI;
 use super::data::{Mode, TestData, TestState};
 use super::table::{ImportedTest, TestFormat};
 use super::torsion::TwistedCylinder;
+use super::torsion_check::{HELD_STRETCHES, check_torques};
 use super::weights::WeightSource;
-use crate::table::{Error, Table, plain_unit};
+use crate::table::{Error, Heading, Table, plain_unit, plainly};
 use crate::units::dimension::{
     AngleDimension, ForceDimension, RatioDimension, TorqueDimension, TwistDimension,
 };
@@ -58,15 +59,28 @@ const STRAINS: [&str; 3] = ["strain", "axial strain", "elongation"];
 /// Excess of a held stretch over 1 that counts as none.
 const SAME_LENGTH: f64 = 1e-6;
 
-/// Share of the largest torque below which one against its twist is noise.
-const NOISE_LEVEL: f64 = 0.02;
+/// Words beside a name that make a column another quantity.
+const OTHERS: [&str; 12] = [
+    "rate",
+    "speed",
+    "velocity",
+    "error",
+    "std",
+    "sd",
+    "deviation",
+    "offset",
+    "modulus",
+    "energy",
+    "weight",
+    "inertia",
+];
 
 impl TorsionColumns {
     /// Finds the columns; `None` if the format does not ask for torsion.
     ///
     /// # Errors
-    /// No cylinder, a column that is missing or has a unit of another quantity, angles without the length of
-    /// the cylinder or twists with it, a held stretch that is given twice or as a strain.
+    /// No cylinder, a column that is missing, there twice or of a unit of another quantity, angles without
+    /// the length of the cylinder or twists with it, a held stretch that is given twice or as a strain.
     pub fn find(file: &Table, format: &TestFormat) -> Result<Option<Self>, Error> {
         let cylinder = match (format.cylinder, format.mode) {
             (Some(cylinder), _) => cylinder,
@@ -76,8 +90,10 @@ impl TorsionColumns {
             }
             _ => return Ok(None),
         };
-        let optional = |names: &[&str]| file.matching(names).first().copied();
-        let angle = file.require_column(&ANGLES)?;
+        let find = |names: &[&str], example: &str| find_column(file, format, names, example);
+        let Some(angle) = find(&ANGLES, "twist [rad/m]")? else {
+            return Err(file.refuse_headings("one column `twist [unit]`"));
+        };
         let written = file.headings[angle].unit.as_deref().unwrap_or_default();
         let twist = match (Unit::parse(&plain_unit(written)), cylinder.length) {
             (Ok(unit), Some(length)) => TwistUnit::Angle(unit, length),
@@ -92,24 +108,27 @@ impl TorsionColumns {
             }
             (Err(_), None) => TwistUnit::PerLength(file.unit(angle, None)?),
         };
-        let stretch = optional(&STRETCHES);
+        let stretch = find(&STRETCHES, "stretch")?;
         if stretch.is_some() && cylinder.stretch.is_some() {
             let allowed = "a column `stretch` or the key `stretch` in the data's entry, not both";
             return Err(file.refuse_headings(allowed));
         }
-        if stretch.is_none() && optional(&STRAINS).is_some() {
+        if stretch.is_none() && !file.matching(&STRAINS).is_empty() {
             let allowed = "a column `stretch`, length over undeformed length, in place of a strain";
             return Err(file.refuse_headings(allowed));
         }
-        let torque = file.require_column(&TORQUES)?;
-        Ok(Some(Self { angle, twist, torque, force: optional(&FORCES), stretch, cylinder }))
+        let Some(torque) = find(&TORQUES, "torque [N mm]")? else {
+            return Err(file.refuse_headings("one column `torque [unit]`"));
+        };
+        let force = find(&FORCES, "axial force [N]")?;
+        Ok(Some(Self { angle, twist, torque, force, stretch, cylinder }))
     }
 
     /// Reads the rows; a blank torque or force was not measured.
     ///
     /// # Errors
-    /// Units of other quantities, cells that are no number, a stretch that is not above 0, torques against
-    /// their twists, no measurement at all.
+    /// Units of other quantities, cells that are no number, stretches that are strains or in per cent, torques
+    /// that [`check_torques`] refuses, no measurement at all.
     pub fn read(&self, file: &Table, format: &TestFormat) -> Result<ImportedTest, Error> {
         let torques = file.unit(self.torque, None)?;
         let forces = self.force.map(|column| file.unit(column, None)).transpose()?;
@@ -129,17 +148,10 @@ impl TorsionColumns {
             turned += usize::from(is_turned);
         }
         let blank = file.rows() - rows.len();
-        let largest = states.iter().map(|state| state.nominal[0].abs()).fold(0.0, f64::max);
-        if let Some(at) = states.iter().position(|state| state.nominal[0] < -NOISE_LEVEL * largest) {
-            let allowed = "a torque with the sign of its twist";
-            return Err(file.refuse_cell(rows[at], self.torque, allowed));
-        }
+        let remark = check_torques(&states)
+            .map_err(|(at, allowed)| file.refuse_cell(rows[at], self.torque, &allowed))?;
         let is_at_rest = |state: &TestState| state.cylinder().is_some_and(|cylinder| cylinder.shear == 0.0);
-        let offset = |state: &TestState| is_at_rest(state) && state.nominal[0] > NOISE_LEVEL * largest;
-        if let Some(at) = states.iter().position(offset) {
-            return Err(file.refuse_cell(rows[at], self.torque, "no torque at a twist of 0"));
-        }
-        let mut notes = Vec::new();
+        let mut notes: Vec<String> = remark.into_iter().map(|remark| format!("warning: {remark}")).collect();
         let unfitted = states.iter().filter(|state| state.nominal[0] == 0.0 && !is_at_rest(state)).count();
         if unfitted > 0 {
             notes.push(format!(
@@ -184,8 +196,13 @@ impl TorsionColumns {
             (Some(column), Some(unit)) => Some(quantity(file, row, column, unit)?.unwrap_or(f64::NAN)),
             _ => None,
         };
-        if let (Some(column), false) = (self.stretch, own.is_none_or(|l| l > 0.0)) {
-            return Err(file.refuse_cell(row, column, "a stretch above 0, 1 at the free length"));
+        if let (Some(column), false) = (self.stretch, own.is_none_or(|l| HELD_STRETCHES.contains(&l))) {
+            let (low, high) = (HELD_STRETCHES.start(), HELD_STRETCHES.end());
+            let allowed = format!(
+                "a stretch of {low} to {high}, length over undeformed length, 1 at the free length; for per \
+                 cent use the heading `stretch [%]`"
+            );
+            return Err(file.refuse_cell(row, column, &allowed));
         }
         let stretch = own.or(self.cylinder.stretch).unwrap_or(1.0);
         let twist = self.twist.per_length(file, row, self.angle)?;
@@ -239,6 +256,46 @@ impl TwistUnit {
     }
 }
 
+/// Finds the column with one of some names; `None` if there is none.
+///
+/// # Errors
+/// Several columns with one of the names, or with an addition to it, as `torque 2` or `twist_deg`; one with an
+/// addition alone.
+fn find_column(
+    file: &Table,
+    format: &TestFormat,
+    names: &[&str],
+    example: &str,
+) -> Result<Option<usize>, Error> {
+    let weights = [&format.weight_column, &format.deviation_column];
+    let is_weight = |heading: &Heading| {
+        weights.into_iter().flatten().any(|name| heading.name == *name || heading.plain == plainly(name))
+    };
+    let begins = |heading: &Heading| {
+        let mut rests = names.iter().filter_map(|name| heading.plain.strip_prefix(name));
+        let is_other = |rest: &str| rest.split(' ').any(|word| OTHERS.contains(&word));
+        rests.any(|rest| rest.is_empty() || rest.starts_with(' ') && !is_other(rest))
+    };
+    let alike = |i: &usize| begins(&file.headings[*i]) && !is_weight(&file.headings[*i]);
+    let found: Vec<usize> = (0..file.headings.len()).filter(alike).collect();
+    let refuse = |what: String, allowed: String| {
+        let texts: Vec<&str> = found.iter().map(|i| file.headings[*i].text.as_str()).collect();
+        Err(file.refuse(file.layout().heading_line, &what, texts.join(", "), &allowed))
+    };
+    match found[..] {
+        [] => Ok(None),
+        [one] if names.contains(&file.headings[one].plain.as_str()) => Ok(Some(one)),
+        [one] => {
+            refuse(format!("column {}", one + 1), format!("a heading `{example}`, with its unit in brackets"))
+        }
+        _ => {
+            let numbers: Vec<String> = found.iter().map(|i| (i + 1).to_string()).collect();
+            let allowed = format!("one of them as `{example}`: remove the others or give them another name");
+            refuse(format!("columns {}", numbers.join(", ")), allowed)
+        }
+    }
+}
+
 /// Reads a number of a unit, SI; `None` from a blank cell.
 fn quantity<D: Dimension>(
     file: &Table,
@@ -252,107 +309,5 @@ fn quantity<D: Dimension>(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::constitutive::hyperelastic::{Deviation, MooneyRivlin};
-
-    fn format(length: Option<f64>, stretch: Option<f64>) -> TestFormat {
-        let cylinder = TestCylinder { radius: 5e-3, length, stretch };
-        TestFormat { mode: Some(Mode::Torsion), cylinder: Some(cylinder), ..TestFormat::default() }
-    }
-
-    fn read(text: &str, format: &TestFormat) -> Result<ImportedTest, crate::constitutive::Error> {
-        TestData::parse_as("t.csv", text.as_bytes().to_vec(), format)
-    }
-
-    /// M = πψR⁴(C₁ + C₂), N = −½πψ²R⁴(C₁ + 2C₂), in three sets of units.
-    #[test]
-    fn torque_and_force_of_a_cylinder() {
-        let [a, b] = [0.2e6, 0.05e6];
-        let law = MooneyRivlin::new(a, b).unwrap();
-        let (radius, length, angle) = (5e-3_f64, 40e-3, 6.0_f64);
-        let twist = angle / length;
-        let torque = PI * twist * radius.powi(4) * (a + b);
-        let force = -0.5 * PI * twist * twist * radius.powi(4) * (a + 2.0 * b);
-        for (text, length) in [
-            (format!("twist [rad/m],torque [N m],axial force [N]\n{twist},{torque},{force}\n"), None),
-            (
-                format!(
-                    "angle [deg];torque [N mm];force [kN]\n{};{};{}\n",
-                    angle.to_degrees(),
-                    1e3 * torque,
-                    1e-3 * force
-                ),
-                Some(length),
-            ),
-            (format!("twist [rad/mm],moment [N*mm],force [N]\n{},{},\n", -1e-3 * twist, -1e3 * torque), None),
-        ] {
-            let reading = read(&text, &format(length, None)).unwrap();
-            let state = reading.table.states[0];
-            let found = state.predict(&law).unwrap();
-            for axis in (0..2).filter(|&axis| state.nominal[axis] != 0.0) {
-                assert!((found[axis] / state.nominal[axis] - 1.0).abs() < 1e-9, "{text}{state:?} {found:?}");
-            }
-            let shear = state.cylinder().unwrap().shear;
-            assert!((shear / (twist * radius) - 1.0).abs() < 1e-12, "{shear}");
-        }
-    }
-
-    #[test]
-    fn rows_notes_and_weights() {
-        let text = "# source: mine\nstretch,twist [rad/m],torque [N mm],force [N]\n1,0,0,0\n1,100,,\n\
-                    1.2,100,80,\n1,-100,-90,0.4\n1,50,0,-1\n";
-        let reading = read(text, &format(None, None)).unwrap();
-        assert_eq!((reading.table.states.len(), reading.table.measurements()), (4, 4));
-        assert!((reading.table.states[1].cylinder().unwrap().stretch - 1.2).abs() < 1e-12);
-        let notes = reading.notes.join("; ");
-        for part in [
-            "1 rows without",
-            "1 twists with a torque of 0",
-            "1 twists below 0",
-            "1 axial forces are above 0",
-        ] {
-            assert!(notes.contains(part), "{notes}");
-        }
-        assert!(reading.description.contains("radius 5.0000 mm; shear at its surface up to 0.5000"));
-        let weighted = TestFormat { deviation: Deviation::parse("2 %").ok(), ..format(None, None) };
-        let weighted = read(text, &weighted).unwrap().table;
-        let shares = weighted.states[1..]
-            .iter()
-            .map(|state| weighted.deviation.unwrap() / state.roots[0] / state.nominal[0].abs());
-        assert!(shares.zip([0.02; 2]).all(|(found, share)| (found / share - 1.0).abs() < 1e-12));
-    }
-
-    #[test]
-    fn bad_tables_of_torsion() {
-        let plain = format(None, None);
-        let bare = TestFormat { cylinder: None, ..plain.clone() };
-        let error = read("stretch,stress [MPa]\n2,1\n", &bare).unwrap_err().to_string();
-        assert!(error.contains("the radius of the cylinder"), "{error}");
-        for (text, format, part) in [
-            ("angle [deg],torque [N m]\n1,1\n", &plain, "`length`, the undeformed length"),
-            ("twist [rad/m],torque [N m]\n1,1\n", &format(Some(0.1), None), "has a `length`"),
-            ("twist,torque [N m]\n1,1\n", &plain, "unit of column 1, `twist`"),
-            ("twist [rad/m],torque\n1,1\n", &plain, "unit of column 2, `torque`"),
-            ("twist [rad/m],torque [N]\n1,1\n", &plain, "a torque"),
-            ("twist [rad/m],torque [N m],force [MPa]\n1,1,1\n", &plain, "a force"),
-            ("twist [rad/m],stress [MPa]\n1,1\n", &plain, "one column `torque [unit]`"),
-            ("stretch,stress [MPa]\n1,1\n", &plain, "one column `twist [unit]`"),
-            ("twist [rad/m],torque [N m]\n1,x\n", &plain, "line 2: column 2, `torque [N m]`: found `x`"),
-            (
-                "twist [rad/m],torque [N m]\n1,1\n2,-1\n",
-                &plain,
-                "line 3: column 2, `torque [N m]`: found `-1`",
-            ),
-            ("twist [rad/m],torque [N m]\n1e200,1\n", &plain, "of a finite shear"),
-            ("twist [rad/m],torque [N m]\n1,0\n", &plain, "a torque other than zero"),
-            ("twist [rad/m],torque [N m],stretch\n1,1,0\n", &plain, "a stretch above 0"),
-            ("twist [rad/m],torque [N m],stretch\n1,1,1\n", &format(None, Some(1.1)), "not both"),
-            ("twist [rad/m],torque [N m],strain [%]\n1,1,25\n", &plain, "in place of a strain"),
-            ("twist [rad/m],torque [N m]\n0,5\n90,25\n", &plain, "no torque at a twist of 0"),
-        ] {
-            let error = read(text, format).unwrap_err().to_string();
-            assert!(error.contains(part), "{text}{error}");
-        }
-    }
-}
+#[path = "torsion_table_tests.rs"]
+mod tests;
