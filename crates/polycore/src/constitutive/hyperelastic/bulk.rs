@@ -132,8 +132,8 @@ impl VolumetricFit {
     /// Returns the numbers i of the Dᵢ whose standard errors exceed their values.
     pub fn undetermined(&self) -> Vec<usize> {
         let pairs = self.compliances.iter().zip(&self.compliance_errors);
-        let is_open = |(compliance, error): (&f64, &f64)| !(*error <= compliance.abs());
-        (1..).zip(pairs).filter(|(_, pair)| is_open(*pair)).map(|(i, _)| i).collect()
+        let shares = pairs.map(|(compliance, error)| error / compliance.abs());
+        (1..).zip(shares).filter(|(_, share)| *share > 1.0 || share.is_nan()).map(|(i, _)| i).collect()
     }
 
     /// Describes the defects for which the terms should not be used as they are, a line each: errors that
