@@ -156,8 +156,8 @@ impl Law {
         found.into_iter().flatten().collect::<Vec<_>>().into_pyarray(py).reshape([count, 2])
     }
 
-    /// Computes torque, N m, and axial force, N, (N, 2), of incompressible cylinders: twist, rad/m, radius, m,
-    /// held stretch.
+    /// Computes torque, N m, and axial force, N, (N, 2), of incompressible cylinders: twist, rad/m, radius,
+    /// m, held stretch.
     fn torsion<'py>(
         &self,
         py: Python<'py>,
@@ -269,8 +269,8 @@ fn torsion_state([twist, torque, radius, force, stretch]: [f64; 5]) -> Result<Te
     Ok(TestState::new(Mode::Torsion, surface, [2.0 * torque / (radius * area), force / area]))
 }
 
-/// Fits a law to nominal stresses: P₁ at λ₁ of a `mode`, (P₁, P₂) at (λ₁, λ₂) of `biaxial` rows, or to rows of
-/// `torsion`: twist, torque, radius, axial force and held stretch.
+/// Fits a law to nominal stresses: P₁ at λ₁ of a `mode`, (P₁, P₂) at (λ₁, λ₂) of `biaxial` rows, or to rows
+/// of `torsion`: twist, torque, radius, axial force and held stretch.
 #[pyfunction]
 pub fn fit_law<'py>(
     py: Python<'py>,

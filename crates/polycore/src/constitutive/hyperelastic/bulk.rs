@@ -155,8 +155,8 @@ impl VolumetricFit {
             let [low, high] = self.range;
             let within = if 1.0 - change > low || 1.0 + change < high { "within" } else { "beyond" };
             lines.push(format!(
-                "the pressure falls with compression at J below {:.4} and with expansion above {:.4}, {within} \
-                 the states of {low:.4} to {high:.4}: a body there is unstable; {advice}",
+                "the pressure falls with compression at J below {:.4} and with expansion above {:.4}, \
+                 {within} the states of {low:.4} to {high:.4}: a body there is unstable; {advice}",
                 1.0 - change,
                 1.0 + change
             ));

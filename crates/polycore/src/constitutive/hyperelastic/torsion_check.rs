@@ -50,7 +50,8 @@ pub fn check_torques(states: &[TestState]) -> Result<Option<String>, (usize, Str
         ));
     }
     let remark = format!(
-        "the torques imply a shear modulus of {modulus:.0} Pa, less than that of a rubber: for no gel, {advice}"
+        "the torques imply a shear modulus of {modulus:.0} Pa, less than that of a rubber: for no gel, \
+         {advice}"
     );
     Ok((modulus < LEAST_RUBBER).then_some(remark))
 }

@@ -127,8 +127,8 @@ impl TorsionColumns {
     /// Reads the rows; a blank torque or force was not measured.
     ///
     /// # Errors
-    /// Units of other quantities, cells that are no number, stretches that are strains or in per cent, torques
-    /// that [`check_torques`] refuses, no measurement at all.
+    /// Units of other quantities, cells that are no number, stretches that are strains or in per cent,
+    /// torques that [`check_torques`] refuses, no measurement at all.
     pub fn read(&self, file: &Table, format: &TestFormat) -> Result<ImportedTest, Error> {
         let torques = file.unit(self.torque, None)?;
         let forces = self.force.map(|column| file.unit(column, None)).transpose()?;
@@ -259,8 +259,8 @@ impl TwistUnit {
 /// Finds the column with one of some names; `None` if there is none.
 ///
 /// # Errors
-/// Several columns with one of the names, or with an addition to it, as `torque 2` or `twist_deg`; one with an
-/// addition alone.
+/// Several columns with one of the names, or with an addition to it, as `torque 2` or `twist_deg`; one with
+/// an addition alone.
 fn find_column(
     file: &Table,
     format: &TestFormat,
