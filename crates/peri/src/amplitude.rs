@@ -52,10 +52,4 @@ impl Amplitude {
         let each = (0..=MOMENTS).map(|k| self.multiple(f64::from(k) / f64::from(MOMENTS)));
         each.fold(0.0, |most: f64, multiple| if multiple.abs() > most.abs() { multiple } else { most })
     }
-
-    /// Least and largest multiple, and 0.
-    pub fn extremes(&self) -> [f64; 2] {
-        let each = (0..=MOMENTS).map(|k| self.multiple(f64::from(k) / f64::from(MOMENTS)));
-        each.fold([0.0; 2], |[low, high], multiple| [low.min(multiple), high.max(multiple)])
-    }
 }

@@ -8,6 +8,9 @@ use crate::geometry::{SignedDistance, length};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
+/// Parts of the time of a run at which the path of a surface is known.
+const MOMENTS: u32 = 64;
+
 /// Shape of a rigid surface, through its signed distance h and the normal ∇h: positive on the side of the
 /// body.
 #[derive(Clone, Debug, PartialEq)]
@@ -163,14 +166,14 @@ impl<const D: usize> RigidSurface<D> {
         std::array::from_fn(|d| rate(d) * self.displacement[d])
     }
 
-    /// Least and greatest displacement along each axis, m, without that of its velocity.
-    pub fn displacement_range(&self) -> [[f64; D]; 2] {
-        let range = |d: usize| {
-            let multiples = self.amplitudes.as_ref().map_or([0.0, 1.0], |each| each[d].extremes());
-            let [a, b] = multiples.map(|multiple| multiple * self.displacement[d]);
-            [a.min(b), a.max(b)]
-        };
-        [std::array::from_fn(|d| range(d)[0]), std::array::from_fn(|d| range(d)[1])]
+    /// Displacements from the start to the end of its motion, m, without those of its velocity.
+    pub fn path(&self) -> Vec<[f64; D]> {
+        match self.amplitudes {
+            None => vec![[0.0; D], self.displacement],
+            Some(_) => {
+                (0..=MOMENTS).map(|k| self.displacement_at(f64::from(k) / f64::from(MOMENTS))).collect()
+            }
+        }
     }
 
     /// Size of the force at load factor 1, N, and its direction.

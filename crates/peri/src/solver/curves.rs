@@ -210,7 +210,7 @@ impl<const D: usize> System<'_, D> {
                 self.keep_forces(state);
             }
             self.set_mean_forces([before, after], &state.displacement);
-            let (pull, push) = self.conjugates(state);
+            let (pull, push) = self.curved_conjugates(state);
             // after a cut, forces are those of the step given up
             let pull = if state.control.cuts == 0 { pull } else { state.control.balanced[1] };
             state.control.balanced = [before, pull, push];
@@ -218,35 +218,48 @@ impl<const D: usize> System<'_, D> {
         self.set_forces(after, &state.displacement);
     }
 
+    /// Conjugate sums as [`System::conjugates`]; body forces that depend on the displacement do not count.
+    fn curved_conjugates(&self, state: &State<D>) -> (f64, f64) {
+        let (pull, push) = self.conjugates(state);
+        (pull, if self.loads.follows() { self.work_of_pushed() } else { push })
+    }
+
     /// Work of curved loads since the last equilibrium, J, by the trapezoidal rule.
     pub(super) fn work_of_curves(&mut self, state: &mut State<D>, [before, after]: [f64; 2]) -> f64 {
         let [old_factor, old_pull, old_push] = state.control.balanced;
         let first = state.control.round == 0;
         self.set_mean_forces(if first { [before, after] } else { [after; 2] }, &state.displacement);
-        let (pull, push) = self.conjugates(state);
+        let (pull, push) = self.curved_conjugates(state);
         self.set_forces(after, &state.displacement);
-        let present = self.conjugates(state).1;
+        let present = self.curved_conjugates(state).1;
         state.control.balanced = [after, pull, present];
-        let pushed = if self.loads.follows() { self.work_of_followers(state) } else { push - old_push };
+        let followed = if self.loads.follows() { self.work_of_followers(state) } else { 0.0 };
+        let pushed = push - old_push + followed;
         self.keep_forces(state);
         0.5 * (pull + old_pull) * (after - old_factor) + pushed
     }
 
     /// Load, N, and displacement, m, of a row of history with curves: the reaction of the regions of
-    /// prescribed displacement, without any the applied force, without that the largest of a rigid surface;
-    /// and [`Loads::curved_reach`].
+    /// prescribed displacement, without any the applied force, and [`Loads::curved_reach`]. Where no region
+    /// moves, the force and the way of the rigid surface that moves or is pressed with the largest force.
     pub(super) fn curved_response(&self, state: &State<D>, part: f64) -> (f64, f64) {
         let force = match self.loads.displacement {
             Some(_) => self.loads.reaction(&*self.bonds, &state.force),
             None => self.loads.applied(&*self.bonds, &[]),
         };
+        let held = self.loads.curved.iter().flat_map(|curved| &curved.held);
+        let regions_move =
+            !self.loads.turned.is_empty() || held.flat_map(|region| &region.values).any(|u| *u != [0.0; D]);
+        if !regions_move {
+            let surfaces = self.contact.iter().flat_map(Contact::surfaces).zip(self.surface_reactions(state));
+            let driven = surfaces.filter(|(surface, _)| surface.moves() || surface.force.is_some());
+            let each = driven.map(|(_, resting)| (length(resting.force), length(resting.moved)));
+            if let Some(response) = each.max_by(|a, b| a.0.total_cmp(&b.0)) {
+                return response;
+            }
+        }
         let surfaces = self.contact.iter().flat_map(Contact::surfaces);
         let rigid: Vec<[f64; D]> = surfaces.map(|surface| surface.displacement_at(part)).collect();
-        let (force, reach) = (length(force), self.loads.curved_reach(part, &rigid));
-        if force > 0.0 || rigid.is_empty() {
-            return (force, reach);
-        }
-        let resting = self.surface_reactions(state);
-        (resting.iter().map(|own| length(own.force)).fold(0.0, f64::max), reach)
+        (length(force), self.loads.curved_reach(part, &rigid))
     }
 }

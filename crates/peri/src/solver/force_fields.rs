@@ -58,12 +58,11 @@ impl<const D: usize> ForceField<D> for Centrifugal<D> {
         force: &mut Field<D>,
     ) {
         let speed = self.angular_velocity * self.amplitude.multiple(part);
-        let factor = share * speed * speed;
         add_to_particles(bonds, force, |site| {
             let (place, moved) = (bonds.position(site), displacement.get(site));
             let from: [f64; D] = std::array::from_fn(|d| place[d] + moved[d] - self.centre[d]);
             let along: f64 = (0..D).map(|d| self.axis[d] * from[d]).sum();
-            let factor = factor * self.density.value_at(site);
+            let factor = share * self.density.value_at(site) * speed * speed;
             std::array::from_fn(|d| factor * (from[d] - along * self.axis[d]))
         });
     }

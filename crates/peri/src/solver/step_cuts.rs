@@ -8,6 +8,10 @@ use crate::field::Field;
 pub(super) const BY_STRETCH: u32 = 3;
 /// Motion of a plane beyond first contact in one step, in spacings.
 const TOUCH_MOTION: f64 = 0.5;
+/// Least part of a step that a surface on a curve is followed to touch, and least overlap there over the
+/// largest.
+const LEAST_TOUCH: f64 = 1e-6;
+const NEAR_TOUCH: f64 = 0.8;
 /// Fraction of the shortest step below which a remainder is no step of its own.
 const LEAST_REMAINDER: f64 = 0.25;
 
@@ -46,8 +50,8 @@ impl<const D: usize> System<'_, D> {
         true
     }
 
-    /// Cuts a step in which a plane would move by more than half a spacing beyond first contact; returns
-    /// whether it did.
+    /// Cuts a step in which a rigid surface would move by more than half a spacing beyond first contact; returns
+    /// whether it did. A surface that jumps along its curve is not followed.
     pub(super) fn cut_at_touch(&mut self, state: &mut State<D>) -> bool {
         let Some(contact) = self.repulsion().filter(|_| !self.snap_back) else { return false };
         let [before, after] = contact.approach(&state.displacement);
@@ -56,10 +60,42 @@ impl<const D: usize> System<'_, D> {
             return false;
         }
         let start = self.abscissa(state.step.checked_sub(1));
-        let part = (most - before) / (after - before);
+        let is_linear = contact.surfaces().all(|surface| surface.amplitudes.is_none());
+        let part =
+            if is_linear { (most - before) / (after - before) } else { self.touch_on_curve(state, most) };
+        if !is_linear && part < LEAST_TOUCH {
+            return false;
+        }
         let place = start + part * (self.abscissa(Some(state.step)) - start);
         self.insert(state, &[place]);
         true
+    }
+
+    /// Returns the part of the present step after which the deepest overlap of surfaces that follow curves is at
+    /// most `most`, m, and nearly that; the surfaces end at the end of the step.
+    fn touch_on_curve(&mut self, state: &State<D>, most: f64) -> f64 {
+        let before = state.step.checked_sub(1).map_or(0.0, |before| self.factors[before]);
+        let after = self.factors[state.step];
+        let (mut low, mut high) = (0.0, 1.0);
+        while high - low > LEAST_TOUCH {
+            let part = 0.5 * (low + high);
+            // from the start, as a surface that has not moved approaches nothing
+            self.move_surfaces(before, 0.0);
+            self.move_surfaces(before + part * (after - before), 0.0);
+            let overlap =
+                self.contact.as_ref().map_or(0.0, |contact| contact.approach(&state.displacement)[1]);
+            if overlap <= most {
+                low = part;
+                if overlap >= NEAR_TOUCH * most {
+                    break;
+                }
+            } else {
+                high = part;
+            }
+        }
+        self.place_surfaces_at_start(state, before);
+        self.move_surfaces(after, 0.0);
+        low
     }
 
     /// Load factors `shortest` apart between those of two equilibria, of which the second has overstretched

@@ -77,7 +77,7 @@ impl VelocityVerlet {
     ) {
         system.prepare(&state.displacement);
         let bound = system.material.frequency_bound(&*system.bonds, &state.displacement, 0.0);
-        let measured = self.density * frequency;
+        let measured = self.density * system.lightest_ratio() * frequency;
         // nothing oscillates, or the Lanczos iteration has failed: only the bound remains
         let good = measured > 0.0 && measured.is_finite() && bound > 0.0;
         let part = if good { (measured / bound).max(LEAST_PART) } else { 1.0 };

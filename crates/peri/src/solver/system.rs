@@ -119,18 +119,28 @@ impl<'a, const D: usize> System<'a, D> {
         }
     }
 
+    /// Moves rigid surfaces to the load factor at the start of a step, those with a force to their balance.
+    pub(super) fn place_surfaces_at_start(&mut self, state: &State<D>, before: f64) {
+        self.move_surfaces(before, 0.0);
+        if let (Some(contact), Some(start)) = (&mut self.contact, &state.contact.start) {
+            contact.balance(start);
+        }
+    }
+
+    /// Returns the least density of a particle over that of the method.
+    pub(super) fn lightest_ratio(&self) -> f64 {
+        self.density_ratios.iter().copied().reduce(f64::min).unwrap_or(1.0)
+    }
+
     /// Moves rigid surfaces to the end of a load step, sets the rates of rotating regions there, and starts
     /// friction.
     pub(super) fn begin_step(&mut self, state: &mut State<D>) {
         let before = state.step.checked_sub(1).map_or(0.0, |before| self.factors[before]);
         let after = self.factors[state.step];
         self.set_rates(after, after);
+        // first, as a step given up at touch has left them at its end
+        self.place_surfaces_at_start(state, before);
         self.begin_curved_step(state, [before, after]);
-        self.move_surfaces(before, 0.0);
-        if let (Some(contact), Some(start)) = (&mut self.contact, &state.contact.start) {
-            // where a force has them at the start of the step, in a resumed run too
-            contact.balance(start);
-        }
         self.move_surfaces(after, 0.0);
         if let Some(start) = &state.contact.start
             && let Some(contact) = self.contact.as_mut().filter(|contact| contact.has_friction())
@@ -186,8 +196,12 @@ impl<'a, const D: usize> System<'a, D> {
         };
         let Some(contact) = self.repulsion() else { return (pull, push) };
         let resting = self.surface_reactions(state);
-        let push = if contact.has_pushed() { push + contact.travelled() } else { push };
-        (pull + contact.rates().zip(&resting).map(work).sum::<f64>(), push)
+        (pull + contact.rates().zip(&resting).map(work).sum::<f64>(), push + self.work_of_pushed())
+    }
+
+    /// Work of the forces on rigid surfaces, see [`Contact::travelled`].
+    pub(super) fn work_of_pushed(&self) -> f64 {
+        self.repulsion().filter(|contact| contact.has_pushed()).map_or(0.0, Contact::travelled)
     }
 
     /// Load and displacement, see [`Loads::response`] and [`Self::curved_response`].

@@ -268,11 +268,11 @@ impl VelocityVerlet {
         let motion = &mut state.motion;
         // blocks of the tangent's rows: ω² ≤ ‖A_II‖ + Σ‖A_IJ‖ with ‖t′nn + t/λ(1 − nn)‖ ≤ max(|t′|, |t|/λ);
         // Feingold & Varga (1962), doi:10.2140/pjm.1962.12.1241
-        let lightest = self.density * system.density_ratios.iter().copied().reduce(f64::min).unwrap_or(1.0);
+        let lightest = self.density * system.lightest_ratio();
         let contact = 2.0 * motion.limits.contact / lightest;
         // the greatest frequency of a sum is no greater than the sum of both (Weyl)
         let [bound, estimate] = if system.material.has_points() {
-            motion.pace.squares(self.density).map(|square| square + contact)
+            motion.pace.squares(lightest).map(|square| square + contact)
         } else {
             [
                 2.0 * (motion.limits.bonds.stiffness * state.stretches.tangent + motion.limits.contact)

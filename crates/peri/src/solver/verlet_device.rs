@@ -305,6 +305,7 @@ fn refuse<const D: usize>(system: &System<D>) -> Result<(), Error> {
         (!system.loads.turned.is_empty(), "a rotation"),
         (!system.loads.rigid.is_empty(), "a region that moves as a whole"),
         (system.loads.curved.is_some(), "a curve of time"),
+        (!system.density_ratios.is_empty(), "parts of their own density"),
     ];
     match what.iter().find(|(has, _)| *has) {
         Some((_, what)) => Err(Error::Device(format!("unexpected {what}: only the processor does that"))),

@@ -272,6 +272,27 @@ fn along_a_curve() {
     }
 }
 
+/// A sphere on a curve that would leap into the block in one step is cut at touch: it does the work that the block
+/// stores and takes it back, whether the curve is smooth or jumps.
+#[test]
+fn cut_at_touch_on_a_curve() {
+    let sphere = RigidSurface { stiffness: 50.0, ..RigidSurface::sphere([3.0, 3.0, 50.0], 8.0) };
+    let point = touching(sphere.clone());
+    let wave = Amplitude::new(|part| ((PI * part).sin(), PI * (PI * part).cos()));
+    let jump = Amplitude::new(|part| (if (0.3..0.9).contains(&part) { 1.0 } else { 0.0 }, 0.0));
+    for (amplitude, steps, off) in [(wave, 9, 0.1), (jump, 9, 0.3)] {
+        let displacement = [0.0, 0.0, -1.6];
+        let amplitudes = Some([(); 3].map(|()| amplitude.clone()));
+        let surface = RigidSurface { point, displacement, amplitudes, ..sphere.clone() };
+        let history = equilibria(surface, 1, None).0.history;
+        let peak = history.iter().max_by(|a, b| a.stored.total_cmp(&b.stored)).unwrap();
+        let (work, last) = (peak.work / peak.stored, history.last().unwrap());
+        assert!(history.len() >= steps && history.len() < 2 * steps, "{}", history.len());
+        assert!((work - 1.0).abs() < off, "{work}");
+        assert!(last.work.abs() < 2.0 * off * peak.stored && last.stored < 1e-6 * peak.stored, "{last:?}");
+    }
+}
+
 /// A sphere dragged over a block sticks or slides by μN: with a coefficient of 0.05 it slides, and friction
 /// takes its work.
 #[test]

@@ -395,7 +395,10 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let of_surface = surfaces.iter().find(|own| own.curve.is_some()).map(|own| format!("{}.curve", own.key));
     let mut forces = scene.body_force.iter().enumerate();
     let of_force = forces.find_map(|(index, force)| Some(format!("body_force[{index}].{}", force.timed()?)));
-    let Some(first) = of_boundary.or(of_force).or(of_surface) else { return Ok(()) };
+    let first = of_boundary.or(of_force).or(of_surface);
+    if !scene.has_curves() {
+        return Ok(());
+    }
     for (index, boundary) in scene.boundary.iter().enumerate() {
         if boundary.has_curve() && !boundary.loads() {
             let why =
@@ -407,6 +410,7 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         return Ok(());
     }
     let Some(time) = &scene.time else {
+        let Some(first) = first else { return Ok(()) };
         let why = format!("needed for `{first}`: the steps of a programme, or [dynamics]");
         return Err(source.missing("time", why));
     };

@@ -23,17 +23,14 @@ fn holds(boundary: &Boundary, axis: usize) -> bool {
         || boundary.rotation.is_some()
 }
 
-/// Returns the directions in which rigid surfaces may push a body, at the start and at load factor 1; one
-/// with a force of its own stops nothing.
+/// Returns the directions in which rigid surfaces may push a body, at the start and on their way; one with a
+/// force of its own stops nothing.
 pub(super) fn stops<const D: usize>(surfaces: &[RigidSurface<D>], body: &DiscreteBody<D>) -> Vec<[f64; D]> {
     let bonds = &body.bonds;
     let centres: Vec<[f64; D]> =
         bonds.particles().iter().map(|&site| bonds.position(site as usize)).collect();
     let standing = surfaces.iter().filter(|surface| surface.force.is_none());
-    let shifts = standing.flat_map(|surface| {
-        let [low, high] = surface.displacement_range();
-        [[0.0; D], low, high].map(|shift| (surface, shift))
-    });
+    let shifts = standing.flat_map(|surface| surface.path().into_iter().map(move |shift| (surface, shift)));
     shifts.flat_map(|(surface, shift)| surface.stops(&shift, &centres, 0.5 * bonds.spacing())).collect()
 }
 
@@ -50,8 +47,7 @@ pub(super) fn warnings<const D: usize>(
     let thin = |(number, surface): (usize, &RigidSurface<D>)| {
         let heights: Vec<f64> = outside.faces().iter().map(|face| surface.height(face.place)).collect();
         let nearest = heights.iter().copied().fold(f64::INFINITY, f64::min).max(0.0);
-        let reach =
-            nearest + surface.displacement_range().map(length).into_iter().fold(0.0, f64::max) + spacing;
+        let reach = nearest + surface.path().into_iter().map(length).fold(0.0, f64::max) + spacing;
         let met = outside.faces().iter().zip(&heights).filter(|(face, height)| {
             let beyond: [f64; D] = std::array::from_fn(|d| face.place[d] + 0.1 * spacing * face.normal[d]);
             **height < reach && surface.height(beyond) < **height - 0.05 * spacing

@@ -25,7 +25,7 @@ pub fn check_placement<const D: usize>(
     super::planes::check(source, scene, body)?;
     super::indenter_place::check(source, scene, body)?;
     let surfaces = scene.contact.as_ref().map_or(Ok(Vec::new()), |own| own.surfaces(source, scene))?;
-    let rigid: Vec<[f64; D]> = surfaces.iter().flat_map(RigidSurface::displacement_range).collect();
+    let rigid: Vec<[f64; D]> = surfaces.iter().flat_map(RigidSurface::path).collect();
     let reach = loads.reach(&*body.bonds, &rigid);
     // the displacement under forces is unknown before the run
     let beyond = |at: f64| reach > 0.0 && at > reach * (1.0 + 1e-9);

@@ -8,6 +8,9 @@ use crate::amplitude::Amplitude;
 use harness::scene::{SceneError, Source};
 use polycore::units::{Force, Length};
 
+/// Parts of the time of a run at which a force is checked.
+const MOMENTS: u32 = 256;
+
 /// Displacement or force of a rigid surface and its curve.
 pub(super) struct CurvedSurface<'a> {
     /// Key of the scene.
@@ -46,9 +49,12 @@ impl CurvedSurface<'_> {
             return Err(source.error(&key, "a list of curves", "one curve: a force keeps its direction"));
         }
         let each = time.amplitudes::<D>(source, &key, curve, |component| self.multiplied(component))?;
-        let pulled = |&&moment: &&f64| each[0].multiple(moment / time.end) < 0.0;
-        match time.moments().iter().find(pulled).filter(|_| self.force.is_some()) {
-            Some(&moment) => {
+        // steps may be cut anywhere
+        let between = (0..=MOMENTS).map(|k| time.end * f64::from(k) / f64::from(MOMENTS));
+        let mut moments = time.moments().iter().copied().chain(between);
+        let pulls = |moment: &f64| self.force.is_some() && each[0].multiple(moment / time.end) < 0.0;
+        match moments.find(pulls) {
+            Some(moment) => {
                 let found = format!("{} at {} s", plain(each[0].multiple(moment / time.end)), plain(moment));
                 let allowed = "multiples of 0 and above: a rigid surface pushes and never pulls";
                 Err(source.error(&key, found, allowed))
