@@ -130,6 +130,40 @@ fn of_parts() {
     holds("crystfem", &brick([40; 3], "solver = \"direct\""), &[]);
     holds("crystfem", &brick([60; 3], ""), &[]);
     holds("crystfem", &brick([500, 200, 1], ""), &[]);
+    // elements that all differ, with and without levels of multigrid
+    let unequal = |solver| {
+        let equal = "[mesh.brick]\nsize = [\"100 mm\", \"100 mm\", \"100 mm\"]\nelements = [40, 40, 40]";
+        let scene = brick([40; 3], solver);
+        assert!(scene.contains(equal));
+        scene.replace(equal, "[mesh]\nfile = \"body.inp\"")
+    };
+    for solver in ["solver = \"conjugate-gradients\"", "solver = \"multigrid\""] {
+        holds("crystfem", &unequal(solver), &[("body.inp", distorted(40))]);
+    }
+}
+
+/// Abaqus mesh of a brick of 100 mm, `count` elements along an edge, none equal to another.
+fn distorted(count: usize) -> String {
+    let (nodes, edge) = (count + 1, 0.1 / count as f64);
+    let number = |x: usize, y: usize, z: usize| (z * nodes + y) * nodes + x + 1;
+    let grid = |count: usize| {
+        (0..count).flat_map(move |z| (0..count).flat_map(move |y| (0..count).map(move |x| [x, y, z])))
+    };
+    let mut text = "*NODE\n".to_owned();
+    for [x, y, z] in grid(nodes) {
+        let moved = |a: usize, b: usize, c: usize| {
+            edge * (a as f64 + 0.2 * (1.0 + 2.0 * b as f64 + 3.0 * c as f64 + a as f64).sin())
+        };
+        let [p, q, r] = [moved(x, y, z), moved(y, z, x), moved(z, x, y)];
+        text += &format!("{}, {p:e}, {q:e}, {r:e}\n", number(x, y, z));
+    }
+    text += "*ELEMENT, TYPE=C3D8, ELSET=body\n";
+    for (index, [x, y, z]) in grid(count).enumerate() {
+        let layer = |z| [number(x, y, z), number(x + 1, y, z), number(x + 1, y + 1, z), number(x, y + 1, z)];
+        let corners = [layer(z), layer(z + 1)].concat().iter().map(usize::to_string).collect::<Vec<_>>();
+        text += &format!("{}, {}\n", index + 1, corners.join(", "));
+    }
+    text
 }
 
 /// A block that cools, two steps, fields.

@@ -38,7 +38,7 @@ pub struct StoppingCriterion<'a> {
 
 /// Relative change of a solution by packed rows, in the norm of A: 2⁻²⁴ of the terms |a_ij| (x_i − x_j)²/2,
 /// whose sum is at most about four times xᵀAx, since entries have both signs.
-const PACKED_CHANGE: f64 = 4.0 / 16_777_216.0;
+pub const PACKED_CHANGE: f64 = 4.0 / 16_777_216.0;
 /// Fraction of the remaining error that packed rows may cause.
 const PACKED_ERROR: f64 = 0.03;
 /// Fraction of the tolerance that packed rows may cause.
@@ -117,6 +117,13 @@ impl ConjugateGradients {
     pub fn swap_vectors(&mut self, direction: &mut Vec<f64>, image: &mut Vec<f64>) {
         std::mem::swap(&mut self.direction, direction);
         std::mem::swap(&mut self.image, image);
+    }
+
+    /// Recomputes the residual of the last solution with A itself, if its products were rounded.
+    pub fn renew(&self, operator: &Operator, inverse: &[f64], residual: &mut [f64], solution: &[f64]) {
+        if !self.right.is_empty() {
+            renew(operator, &self.right, inverse, residual, solution);
+        }
     }
 
     /// Solves A x = r from x = 0, preconditioned by a multigrid cycle or the diagonal. `inverse` is the

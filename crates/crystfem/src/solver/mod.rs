@@ -9,9 +9,10 @@ mod direct;
 mod dissection;
 mod multigrid;
 mod packed;
+mod packed_bands;
 
 pub use cached::Cached;
-pub use cg::{SolveOutcome, StoppingCriterion};
+pub use cg::{PACKED_CHANGE, SolveOutcome, StoppingCriterion};
 pub use choice::{LEVELS, LinearMethod, LinearSolver, LinearTask, SolverChoice};
 pub use direct::Direct;
 pub use multigrid::Multigrid;
@@ -77,6 +78,11 @@ impl Iterative {
     /// free until the next call.
     pub fn swap_vectors(&mut self, direction: &mut Vec<f64>, image: &mut Vec<f64>) {
         self.conjugate.swap_vectors(direction, image);
+    }
+
+    /// Recomputes the residual of the last solve of a symmetric matrix with A itself, if packed rows served it.
+    pub fn renew(&self, operator: &Operator, inverse: &[f64], residual: &mut [f64], solution: &[f64]) {
+        self.conjugate.renew(operator, inverse, residual, solution);
     }
 
     /// Solves A x = r from x = 0 by the method that suits the matrix. `inverse` is the reciprocal of A's

@@ -6,6 +6,7 @@
 //! with that of A to about 2⁻²⁴ for long and short steps alike; conjugate gradients recompute the residual
 //! with A itself before the difference matters.
 
+use super::packed_bands::{PackedBandProduct, PackedBands};
 use crate::system::ConductionRows;
 use crate::system::vector::CHUNK;
 use polycore::numerics::ordered_sum;
@@ -21,6 +22,8 @@ const MAX_SPREAD: f64 = 1.3;
 #[derive(Default)]
 pub struct PackedRows {
     items: Vec<CachedItem>,
+    /// Packed diagonals, instead of items.
+    bands: Option<PackedBands>,
     /// Versions of rows, and factors, for which it was made.
     made_for: Option<([u64; 2], [u64; 2])>,
     any: bool,
@@ -70,6 +73,15 @@ impl PackedRows {
             return false;
         }
         let made_for = Some((rows.versions(), factors));
+        if let Some(bands) = rows.bands() {
+            if self.made_for != made_for {
+                self.items = Vec::new();
+                self.bands.get_or_insert_default().pack(bands, weights);
+                (self.made_for, self.any) = (made_for, true);
+            }
+            return true;
+        }
+        self.bands = None;
         if self.made_for != made_for {
             self.items.resize_with(rows.items(), CachedItem::default);
             self.items.par_iter_mut().enumerate().for_each(|(index, kept)| {
@@ -98,6 +110,12 @@ impl PackedRows {
         y: &mut [f64],
     ) -> f64 {
         let arch = Arch::new();
+        if let Some(packed) = &self.bands {
+            let part = |(index, y): (usize, &mut [f64])| {
+                arch.dispatch(PackedBandProduct { packed, diagonal, factor, x, y, first: index * CHUNK })
+            };
+            return ordered_sum(y.par_chunks_mut(CHUNK).enumerate().map(part));
+        }
         let part = |(index, y): (usize, &mut [f64])| match self.items.get(index).map(|kept| &kept.item) {
             Some(Some(item)) => {
                 let first = index * CHUNK;

@@ -9,6 +9,7 @@ use super::general::ElementPoints;
 use super::nodal::NodalPoints;
 use super::node_elements::NodeElements;
 use super::numbering::Numbering;
+use super::rows::bands::Bands;
 use super::rows::{ConductionRows, RowBuilder};
 use super::surfaces::{Surfaces, TouchedEquations};
 use super::{MaterialBehaviour, NONE, ThermalSystem};
@@ -244,7 +245,13 @@ impl ThermalSystem {
         }
         added.visited = ring.len() as u64;
         self.elements += new.len();
-        self.connect(mesh, born, size, &touched);
+        if old == 0
+            && let Some(bands) = self.bands(problem, size, new)
+        {
+            self.rows = ConductionRows::from_bands(bands);
+        } else {
+            self.connect(mesh, born, size, &touched);
+        }
         let Self { plan, nodal, .. } = self;
         if behaviours.iter().any(MaterialBehaviour::nodal) {
             let like = nodal.like.clone();
@@ -276,10 +283,27 @@ impl ThermalSystem {
             }
         }
         self.fixed.sort_unstable();
+        // only births and rows without own masses ask for neighbours later
+        if self.rows.bands().is_some() {
+            self.plan.around.release();
+        }
         self.build += 1;
         self.generation = self.build << 32;
         self.evaluated_at = f64::NEG_INFINITY;
         Ok(added)
+    }
+
+    /// Returns empty diagonals for all elements, if most have their own matrices, none varies, and none is
+    /// born later.
+    fn bands(&self, problem: &Problem, size: usize, new: &[u32]) -> Option<Bands> {
+        let kind = |element: &u32| self.plan.kinds[*element as usize];
+        let own = new.iter().filter(|element| kind(element) == OWN).count();
+        if !problem.births.is_empty() || 2 * own <= new.len() || new.iter().any(|e| kind(e) == VARYING) {
+            return None;
+        }
+        Bands::find(size, self.consistent, new.iter(), |&element, equations| {
+            equations.extend(problem.mesh.nodes(element).iter().map(|&node| self.equation[node as usize]));
+        })
     }
 
     /// Assembles the rows of touched equations.
@@ -348,6 +372,13 @@ impl ThermalSystem {
                         self.add_own(nodes, &matrices(geometry, behaviour), touched)
                     }
                     None => {}
+                }
+                // rows by diagonals take equal elements one by one, too
+                if self.rows.bands().is_some()
+                    && let Some(class) = self.plan.classes.get(usize::from(kind))
+                {
+                    let both = (class.conduction, class.capacity);
+                    self.add_own(nodes, &both, touched);
                 }
                 let corner_volumes = match geometry.as_ref() {
                     Some(ElementGeometry::Narrow(geometry)) => &geometry.corner_volumes[..],

@@ -14,6 +14,7 @@
 
 mod build;
 mod classes;
+mod face_matrices;
 mod general;
 mod nodal;
 mod node_elements;
@@ -23,12 +24,14 @@ mod surfaces;
 pub mod vector;
 
 pub use build::{Added, PointMoves};
+pub use face_matrices::FaceMatrices;
 pub use general::ElementPoints;
 pub use nodal::NodalPoints;
 #[cfg(test)]
 pub use rows::RowBuilder;
+pub(crate) use rows::bands;
 pub use rows::{ConductionRows, Diagonal};
-pub use surfaces::{Exchange, FaceMatrices, Surfaces};
+pub use surfaces::{Exchange, Surfaces};
 
 use crate::error::Error;
 use crate::material::{PointInput, ThermalMaterial};
@@ -209,7 +212,12 @@ impl ThermalSystem {
 
     /// Returns true if no Newton iteration is needed.
     pub fn is_linear(&self) -> bool {
-        !self.nodal.coupled && self.general.is_empty() && !self.surfaces.radiates()
+        self.is_linear_inside() && !self.surfaces.radiates()
+    }
+
+    /// Returns true if energy and flux of all elements are linear in temperature.
+    pub fn is_linear_inside(&self) -> bool {
+        !self.nodal.coupled && self.general.is_empty()
     }
 
     /// Returns true for a symmetric tangent.

@@ -28,6 +28,11 @@ impl NodeElements {
         Self { corners: Groups::new(mesh.points.len(), corners), stride }
     }
 
+    /// Frees the lists of a mesh that gains no elements; no other call may follow.
+    pub fn release(&mut self) {
+        self.corners = Groups::new(0, std::iter::empty());
+    }
+
     /// Born elements of a node, with the local number of the node.
     pub fn elements_of(&self, node: u32, born: &[u32]) -> impl Iterator<Item = (u32, usize)> {
         let stride = self.stride;

@@ -42,64 +42,6 @@ impl Exchange {
     }
 }
 
-/// Tangents ∂Q/∂T of faces, W/K, face by face.
-#[derive(Clone, Debug, Default)]
-pub struct FaceMatrices {
-    /// Number of nodes of each face.
-    nodes: Vec<u8>,
-    equations: Vec<u32>,
-    values: Vec<f64>,
-}
-
-/// Tangent ∂Q/∂T of one face, W/K.
-#[derive(Clone, Copy, Debug)]
-pub struct FaceMatrix<'a> {
-    /// Equations of the nodes.
-    pub equations: &'a [u32],
-    /// Values, row by row.
-    pub values: &'a [f64],
-}
-
-impl FaceMatrices {
-    /// Empty list.
-    pub const NONE: &'static Self = &Self { nodes: Vec::new(), equations: Vec::new(), values: Vec::new() };
-
-    /// Returns true if there are no faces.
-    pub fn is_empty(&self) -> bool {
-        self.nodes.is_empty()
-    }
-
-    /// Iterates over the faces.
-    pub fn iter(&self) -> impl Iterator<Item = FaceMatrix<'_>> {
-        let (mut equations, mut values) = (self.equations.as_slice(), self.values.as_slice());
-        self.nodes.iter().map(move |&nodes| {
-            let nodes = usize::from(nodes);
-            let (own, rest) = equations.split_at(nodes);
-            let (matrix, others) = values.split_at(nodes * nodes);
-            (equations, values) = (rest, others);
-            FaceMatrix { equations: own, values: matrix }
-        })
-    }
-
-    fn clear(&mut self) {
-        self.nodes.clear();
-        self.equations.clear();
-        self.values.clear();
-    }
-}
-
-impl FaceMatrix<'_> {
-    /// Adds factor · matrix · x to y.
-    pub fn add_product(&self, factor: f64, x: &[f64], y: &mut [f64]) {
-        let nodes = self.equations.len();
-        for (a, &row) in self.equations.iter().enumerate() {
-            let sum: f64 =
-                (0..nodes).map(|b| self.values[nodes * a + b] * x[self.equations[b] as usize]).sum();
-            y[row as usize] += factor * sum;
-        }
-    }
-}
-
 /// A face with its quadrature.
 #[derive(Clone, Debug)]
 struct QuadratureFace<const N: usize, const P: usize> {
@@ -136,6 +78,8 @@ struct ConditionFaces {
     faces: Vec<QuadratureFace<4, 4>>,
     /// Second-order faces, likewise.
     wide: Vec<QuadratureFace<8, 9>>,
+    /// Earlier part that has the same faces, which are stored there.
+    shared: Option<usize>,
 }
 
 /// Conditions on the current outer surface, and sources in existing elements.
@@ -242,7 +186,9 @@ impl Surfaces {
         touched: &TouchedEquations,
         acts: impl Fn(usize, Face) -> bool,
     ) {
-        for part in &mut self.parts {
+        for index in 0..self.parts.len() {
+            let (earlier, rest) = self.parts.split_at_mut(index);
+            let part = &mut rest[0];
             let by_nodes =
                 !consistent || matches!(problem.conditions[part.condition], Condition::Flux { .. });
             let (mut list, mut pairs) = (Vec::new(), Vec::new());
@@ -275,6 +221,10 @@ impl Surfaces {
             }
             touched.replace(&mut part.nodes, list);
             part.pairs = gather_pairs(pairs);
+            part.shared = earlier.iter().position(|earlier| part.has_faces_of(earlier));
+            if part.shared.is_some() {
+                (part.faces, part.wide) = (Vec::new(), Vec::new());
+            }
         }
     }
 
@@ -295,8 +245,9 @@ impl Surfaces {
 
     /// Returns true if a condition radiates.
     pub fn radiates(&self) -> bool {
-        let acts =
-            |part: &ConditionFaces| !(part.nodes.is_empty() && part.faces.is_empty() && part.wide.is_empty());
+        let acts = |part: &ConditionFaces| {
+            !(part.nodes.is_empty() && part.faces.is_empty() && part.wide.is_empty()) || part.shared.is_some()
+        };
         self.parts.iter().any(|part| part.radiates && acts(part))
     }
 
@@ -310,12 +261,50 @@ impl Surfaces {
         })
     }
 
+    /// Adds the heat that radiation takes beyond its tangent at T, R(δ) = ∮ N (q(T + δ) − q(T) − ∂q/∂T δ) dA,
+    /// W, as R(δ₀ + δ₁) − R(δ₀) of two `changes`; all other conditions are linear in T.
+    pub fn add_remainder(
+        &self,
+        problem: &Problem,
+        temperature: &[f64],
+        changes: [&[f64]; 2],
+        to: &mut [f64],
+    ) {
+        let fields = [temperature, changes[0], changes[1]];
+        for part in &self.parts {
+            let Condition::Radiation { emissivity, .. } = problem.conditions[part.condition] else {
+                continue;
+            };
+            let remainder = |[t, before, change]: [f64; 3]| {
+                let fourth = |t: f64| t.abs() * t * t * t;
+                let tangent = 4.0 * t.abs() * t * t * change;
+                emissivity * STEFAN_BOLTZMANN * (fourth(t + before + change) - fourth(t + before) - tangent)
+            };
+            for &(equation, area) in &part.nodes {
+                let equation = equation as usize;
+                to[equation] += area * remainder(fields.map(|field| field[equation]));
+            }
+            let faces = part.shared.map_or(part, |shared| &self.parts[shared]);
+            for face in &faces.faces {
+                face.add_remainder(fields, to, remainder);
+            }
+            for face in &faces.wide {
+                face.add_remainder(fields, to, remainder);
+            }
+        }
+    }
+
     /// Adds to `rate`, `conductance` and `faces`; sets `exchange`.
     pub fn evaluate(&self, problem: &Problem, nodes: &[u32], at: &StepInput, out: &mut Evaluation) {
         let mut exchange = Exchange::default();
         out.faces.clear();
         let place = |equation: u32| problem.mesh.points[nodes[equation as usize] as usize];
+        // first value of each part's matrices
+        let mut starts: Vec<usize> = Vec::with_capacity(self.parts.len());
         for part in &self.parts {
+            let start = part.shared.map_or(out.faces.values.len(), |shared| starts[shared]);
+            starts.push(start);
+            let faces = &self.parts[part.shared.unwrap_or(starts.len() - 1)];
             match &problem.conditions[part.condition] {
                 Condition::Temperature { .. } => {}
                 Condition::Flux { inward, .. } => {
@@ -332,13 +321,13 @@ impl Surfaces {
                 }
                 Condition::Film { coefficient, ambient, .. } => {
                     let (film, ambient) = (coefficient.value_at(at.time), ambient.value_at(at.time));
-                    exchange.film -= part.add_loss(at, out, |t| (film * (t - ambient), film));
+                    exchange.film -= part.add_loss(faces, start, at, out, |t| (film * (t - ambient), film));
                 }
                 Condition::Radiation { emissivity, ambient, .. } => {
                     let ambient = ambient.value_at(at.time);
                     let (factor, fourth) = (emissivity * STEFAN_BOLTZMANN, ambient.powi(4));
                     // odd continuation below 0 K, which iterates may reach
-                    exchange.radiation -= part.add_loss(at, out, |t| {
+                    exchange.radiation -= part.add_loss(faces, start, at, out, |t| {
                         let cube = t.abs() * t * t;
                         (factor * (cube * t - fourth), 4.0 * factor * cube)
                     });
@@ -366,8 +355,26 @@ impl Surfaces {
 }
 
 impl ConditionFaces {
-    /// Adds a heat loss (q, ∂q/∂T) that depends on temperature; returns its sum, W.
-    fn add_loss(&self, at: &StepInput, out: &mut Evaluation, loss: impl Fn(f64) -> (f64, f64)) -> f64 {
+    /// Returns true if both act on the same faces, in the same order.
+    fn has_faces_of(&self, other: &Self) -> bool {
+        let (faces, wide) = (&self.faces, &self.wide);
+        faces.len() + wide.len() > 0
+            && faces.len() == other.faces.len()
+            && wide.len() == other.wide.len()
+            && faces.iter().zip(&other.faces).all(|(a, b)| a.equations == b.equations)
+            && wide.iter().zip(&other.wide).all(|(a, b)| a.equations == b.equations)
+    }
+
+    /// Adds a heat loss (q, ∂q/∂T) that depends on temperature, on own or shared `faces` whose matrices begin
+    /// at `start`; returns its sum, W.
+    fn add_loss(
+        &self,
+        faces: &Self,
+        mut start: usize,
+        at: &StepInput,
+        out: &mut Evaluation,
+        loss: impl Fn(f64) -> (f64, f64),
+    ) -> f64 {
         let mut total = 0.0;
         for &(equation, area) in &self.nodes {
             let (q, slope) = loss(at.temperature[equation as usize]);
@@ -375,26 +382,36 @@ impl ConditionFaces {
             out.conductance.push((equation, area * slope));
             total += area * q;
         }
-        total = self.faces.iter().fold(total, |total, face| face.add_loss(at, out, &loss, total));
-        self.wide.iter().fold(total, |total, face| face.add_loss(at, out, &loss, total))
+        for face in &faces.faces {
+            total = face.add_loss(&mut start, at, out, &loss, total);
+        }
+        for face in &faces.wide {
+            total = face.add_loss(&mut start, at, out, &loss, total);
+        }
+        total
     }
 }
 
 impl<const N: usize, const P: usize> QuadratureFace<N, P> {
-    /// Adds to `rate` and `faces`, and the heat loss, W, to `total`.
+    /// Adds to `rate` and, from `start` on, `faces`, and the heat loss, W, to `total`.
     fn add_loss(
         &self,
+        start: &mut usize,
         at: &StepInput,
         out: &mut Evaluation,
         loss: &impl Fn(f64) -> (f64, f64),
         mut total: f64,
     ) -> f64 {
         let nodes = self.geometry.nodes;
-        let matrix = out.faces.values.len();
+        let matrix = *start;
         if at.tangent {
-            out.faces.nodes.push(nodes as u8);
-            out.faces.equations.extend_from_slice(&self.equations[..nodes]);
-            out.faces.values.resize(matrix + nodes * nodes, 0.0);
+            *start += nodes * nodes;
+            // another condition may have made it
+            if matrix == out.faces.values.len() {
+                out.faces.nodes.push(nodes as u8);
+                out.faces.equations.extend_from_slice(&self.equations[..nodes]);
+                out.faces.values.resize(matrix + nodes * nodes, 0.0);
+            }
         }
         for g in 0..self.geometry.points {
             let shapes = &self.geometry.shapes[g];
@@ -412,5 +429,20 @@ impl<const N: usize, const P: usize> QuadratureFace<N, P> {
             }
         }
         total
+    }
+
+    /// Adds ∮ N f dA, with f of the fields' values at Gauss points.
+    fn add_remainder(&self, fields: [&[f64]; 3], to: &mut [f64], of: impl Fn([f64; 3]) -> f64) {
+        let equations = &self.equations[..self.geometry.nodes];
+        for g in 0..self.geometry.points {
+            let shapes = &self.geometry.shapes[g];
+            let value = |field: &[f64]| {
+                equations.iter().zip(shapes).map(|(&equation, shape)| shape * field[equation as usize]).sum()
+            };
+            let flux = self.geometry.weights[g] * of(fields.map(value));
+            for (&equation, shape) in equations.iter().zip(shapes) {
+                to[equation as usize] += shape * flux;
+            }
+        }
     }
 }

@@ -72,8 +72,8 @@ impl Matrix {
             }
             whole.copy_from_slice(&self.diagonal);
         }
-        if system.is_linear() || !system.general.is_empty() {
-            // also for rows that change in every evaluation
+        if system.is_linear() || !system.general.is_empty() || system.rows.bands().is_some() {
+            // also for rows that change in every evaluation, and where diagonals lie side by side
             system.rows.add_diagonal(weights, whole);
         } else {
             let own = self.rows.update(&system.rows, weights);

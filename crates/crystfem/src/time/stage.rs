@@ -1,19 +1,24 @@
 //! Stages: solve E(T) − E(start) + a Q(T) + known = 0 at the free nodes.
 
+mod correction;
+
 use super::Work;
 use super::matrix::{Matrix, key};
 use crate::error::Error;
 use crate::ledger::REFERENCE_SHIFT;
 use crate::problem::Problem;
 use crate::solver::{
-    Cached, Direct, Iterative, LinearMethod, Multigrid, Operator, PackedRows, SolveOutcome,
-    StoppingCriterion, norm_squared,
+    Cached, Direct, Iterative, LinearMethod, Multigrid, Operator, PackedRows, StoppingCriterion, norm_squared,
 };
-use crate::system::vector::{combine, dot, largest, set, sum};
+use crate::system::vector::{dot, largest, set, sum};
 use crate::system::{Evaluation, PointMemory, StepInput, ThermalSystem};
 
 /// Limit on Newton iterations.
 const MAX_ITERATIONS: usize = 60;
+/// Fraction of the error that the linear solve of a Newton iteration leaves to the next one.
+const FORCING: f64 = 1e-3;
+/// Fraction of the tolerance that no linear solve of a Newton iteration needs to go below.
+const LINEAR: f64 = 0.3;
 /// Limit on halvings of a Newton step.
 const MAX_HALVINGS: usize = 7;
 /// Limit on consecutive full Newton steps at a jump of k while the residual does not fall.
@@ -57,7 +62,7 @@ pub struct Stages {
     factors: Cached<Option<Direct>>,
     iterative: Iterative,
     packed: PackedRows,
-    /// Right-hand side of a filter.
+    /// Right-hand side of a filter; image of a correction by factors.
     right: Vec<f64>,
     correction: Vec<f64>,
     trial: Vec<f64>,
@@ -103,7 +108,7 @@ impl Stages {
         self.evaluate(problem, system, stage, temperature, work)?;
         if system.is_linear() {
             self.prepare(system, stage.weight);
-            self.correct(problem, system, stage, tolerance, work)?;
+            self.correct(problem, system, stage, [tolerance; 2], temperature, work)?;
             for (t, correction) in temperature.iter_mut().zip(&self.correction) {
                 *t += correction;
             }
@@ -134,7 +139,8 @@ impl Stages {
                 return self.finite(problem, system, stage, temperature);
             }
             work.newton_iterations += 1;
-            self.correct(problem, system, stage, (1e-3 * error).max(0.3 * tolerance), work)?;
+            let goal = (FORCING * error).max(LINEAR * tolerance);
+            self.correct(problem, system, stage, [goal, tolerance], temperature, work)?;
             // line search along the correction, in the norm of this iterate's matrix
             let inverse = std::mem::take(&mut self.matrix.value.inverse);
             let mut part = 1.0;
@@ -146,11 +152,12 @@ impl Stages {
                 best = (square, iteration);
             }
             let whole = !system.is_symmetric() && iteration - best.1 < MAX_FULL_STEPS;
+            let mut reached = f64::INFINITY;
             for halving in 0..=MAX_HALVINGS {
                 let correction = &self.correction;
                 set(&mut trial, |k| temperature[k] + part * correction[k]);
                 let evaluated = self.evaluate(problem, system, stage, &trial, work);
-                let reached = norm_squared(&self.residual, &inverse);
+                reached = norm_squared(&self.residual, &inverse);
                 let better = reached <= (1.0 - 0.1 * part) * square || reached <= self.matrix.value.floor;
                 let better = better || (whole && reached.is_finite());
                 if evaluated.is_ok() && (better || (halving == MAX_HALVINGS && reached.is_finite())) {
@@ -165,6 +172,12 @@ impl Stages {
             std::mem::swap(temperature, &mut trial);
             (self.trial, self.matrix.value.inverse) = (trial, inverse);
             self.matrix.forget();
+            // where only surfaces change the matrix, and hardly, its norm at the last iterate serves this one
+            error = (reached / self.matrix.value.capacity).sqrt();
+            let converged = error <= tolerance || reached <= self.matrix.value.floor;
+            if system.is_linear_inside() && converged && self.balanced(system, stage.weight) {
+                return self.finite(problem, system, stage, temperature);
+            }
         }
         Err(Error::NotConverged {
             method: "Newton's iteration",
@@ -269,100 +282,6 @@ impl Stages {
             }
             levels.set_key(key);
         }
-    }
-
-    /// Computes the correction of temperature: A δ = −residual, with Σ(residual + A δ) = 0 over the free
-    /// nodes to rounding.
-    fn correct(
-        &mut self,
-        problem: &Problem,
-        system: &ThermalSystem,
-        stage: &StageEquation,
-        tolerance: f64,
-        work: &mut Work,
-    ) -> Result<(), Error> {
-        let size = system.size();
-        // both are work vectors here, and evaluated again after the correction
-        self.iterative.swap_vectors(&mut self.evaluation.change, &mut self.evaluation.rate);
-        self.build_levels(problem, system, stage.weight, work);
-        self.correction.resize(size, 0.0);
-        combine(&mut self.residual, |k, residual| -system.free[k] * residual);
-        let operator = self.matrix.value.operator(system, stage.weight, &self.evaluation);
-        let goal = StoppingCriterion {
-            capacity: self.matrix.value.capacity,
-            tolerance,
-            floor: self.matrix.value.floor,
-            limit: limit(size),
-            stop: stage.stop,
-        };
-        let factored = self.method == LinearMethod::Factors && system.is_symmetric() && {
-            let key = key(system, stage.weight);
-            if !self.factors.matches_build(system.build) {
-                let place = |e: u32| problem.mesh.points[system.nodes()[e as usize] as usize];
-                self.factors.value = Direct::analyse(&operator, &system.free, place);
-                self.factors.forget();
-            }
-            // without memory for factors, or with a matrix singular to rounding, the other method takes over
-            if !(self.factors.matches(key) && system.is_linear()) {
-                work.factorizations += 1;
-                if !self.factors.value.as_mut().is_some_and(|factors| factors.factor(&operator)) {
-                    self.factors.value = None;
-                }
-                self.factors.set_key(key);
-            }
-            self.factors.value.is_some()
-        };
-        if factored && let Some(factors) = &mut self.factors.value {
-            factors.solve(&self.residual, &mut self.correction);
-            work.direct_solves += 1;
-            self.trial.resize(size, 0.0);
-            operator.product(&self.correction, &mut self.trial);
-            let image = &self.trial;
-            for ((right, image), free) in self.residual.iter_mut().zip(image).zip(&system.free) {
-                *right -= free * image;
-            }
-        }
-        let symmetric = system.is_symmetric();
-        // 1·(r + A δ) from column sums, as the iterations know A to single precision only
-        let mut total = 0.0;
-        let ended = if factored {
-            SolveOutcome { iterations: 0, error: 0.0, converged: true }
-        } else {
-            work.cg_solves += 1;
-            let packed = pack(&mut self.packed, system, stage.weight);
-            let operator = Operator { packed, ..operator };
-            let right = &self.residual;
-            total = sum(size, |k| right[k]);
-            let (inverse, right, found) =
-                (&self.matrix.value.inverse, &mut self.residual, &mut self.correction);
-            self.iterative.solve(&operator, symmetric, inverse, right, found, &goal)
-        };
-        work.cg_iterations += ended.iterations as u64;
-        if (stage.stop)() {
-            return Err(Error::Stopped { time: stage.time - stage.dt });
-        }
-        if !ended.converged {
-            return Err(Error::NotConverged {
-                method: if system.is_symmetric() { "conjugate gradients" } else { "biconjugate gradients" },
-                time: stage.time,
-                iterations: ended.iterations,
-                error: ended.error,
-                wanted: tolerance,
-            });
-        }
-        // a uniform shift of the free nodes makes the balance of the whole body exact
-        let left = match symmetric && !factored {
-            true => total - self.matrix.value.column_sums(system, stage.weight, &self.correction),
-            false => dot(&system.free, &self.residual),
-        };
-        let shift = left / self.sensitivity();
-        if shift.is_finite() {
-            for (correction, free) in self.correction.iter_mut().zip(&system.free) {
-                *correction += shift * free;
-            }
-        }
-        self.iterative.swap_vectors(&mut self.evaluation.change, &mut self.evaluation.rate);
-        Ok(())
     }
 
     /// Returns true if the residuals of the free nodes sum to zero, within [`BALANCE_TOLERANCE`].

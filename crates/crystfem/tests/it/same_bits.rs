@@ -83,6 +83,41 @@ fn on_any_number_of_threads() {
     }
 }
 
+/// A distorted body that exists from the start stores its rows by diagonals: 14 numbers of each matrix and a
+/// word for a row, about a third of those of a body with births. A resumed run takes the same steps.
+#[test]
+fn of_a_distorted_body_without_births() {
+    for capacity in [Capacity::Lumped, Capacity::Consistent] {
+        // points of latent heat at nodes, or constant properties
+        let upper = if capacity == Capacity::Lumped { pa12(Some(209e3)) } else { conductor(PA12) };
+        let materials = || vec![conductor(PA12), upper.clone()];
+        let problem =
+            || Problem { materials: materials(), births: Vec::new(), capacity, ..distorted(problem(false)) };
+        let runs: Vec<State> = [1, 2]
+            .into_iter()
+            .map(|threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| {
+                    let settings = Settings::adaptive(0.05);
+                    let mut simulation = Simulation::new(problem(), settings).unwrap();
+                    let [_, _, bytes] = simulation.storage();
+                    let matrices = if capacity == Capacity::Consistent { 2 } else { 1 };
+                    let rows = simulation.state().temperature.len() + 512;
+                    assert!(bytes <= rows * (14 * 8 * matrices + 4), "{bytes} in {rows} rows");
+                    run(&mut simulation, 0.3);
+                    if threads == 2 {
+                        let saved = simulation.state().clone();
+                        simulation = Simulation::resume(problem(), settings, saved).unwrap();
+                    }
+                    run(&mut simulation, 0.6);
+                    simulation.state().clone()
+                })
+            })
+            .collect();
+        assert!(bits(&runs[0]) == bits(&runs[1]) && runs[0] == runs[1]);
+    }
+}
+
 /// Adding birth by birth equals building at once, as resumed simulations do. A birth visits its neighbourhood
 /// only.
 #[test]

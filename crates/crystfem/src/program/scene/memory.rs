@@ -5,7 +5,7 @@
 //! with measured peaks.
 
 use super::{Mechanics, PartScene};
-use crate::simulation::Simulation;
+use crate::simulation::{LinearSolver, Simulation};
 use crate::time::Steps;
 use harness::scene::{LineSpec, SceneError, Source};
 use polycore::memory::{available, gib};
@@ -33,6 +33,10 @@ const FLOWING: f64 = 2.0 * 8.0 * 48.0 + (24.0 * 24.0 + 24.0 * 9.0 + 81.0) * 8.0 
 const GROUP: f64 = 64.0;
 /// Entry of the conduction matrix during sorting.
 const ENTRY: f64 = 40.0;
+/// Rows by diagonals with their copy in single precision, over their bytes.
+const PACKED: f64 = 1.6;
+/// Levels of multigrid, per entry of the conduction matrix: transfers and matrices.
+const LEVELS: f64 = 28.0;
 /// Material point: birth and material (twice during a birth); stored mass; each state variable (value, copy
 /// during a birth, checkpoint), and its new value if stored separately.
 const POINT: f64 = 24.0;
@@ -127,7 +131,16 @@ impl PartScene {
         // simulation of the compensated shape beside the first
         let copies = if mechanics.is_some_and(|mechanics| mechanics.compensation) { 2.0 } else { 1.0 };
         bytes *= copies;
-        bytes += copies * system.rows.stored()[2] as f64 * ENTRY;
+        let entries = system.rows.stored()[2] as f64;
+        bytes += copies
+            * match system.rows.bands() {
+                Some(bands) => {
+                    let wanted = simulation.settings.solver;
+                    let levels = matches!(wanted, LinearSolver::Auto | LinearSolver::Multigrid);
+                    PACKED * bands.bytes() as f64 + if levels { entries * LEVELS } else { 0.0 }
+                }
+                None => entries * ENTRY,
+            };
         let states = simulation.behaviours.iter().map(|behaviour| behaviour.states).max().unwrap_or(0) as f64;
         let fixed = matches!(simulation.settings.steps, Steps::Fixed { .. });
         if !fixed {
