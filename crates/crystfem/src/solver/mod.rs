@@ -80,7 +80,8 @@ impl Iterative {
         self.conjugate.swap_vectors(direction, image);
     }
 
-    /// Recomputes the residual of the last solve of a symmetric matrix with A itself, if packed rows served it.
+    /// Recomputes the residual of the last solve of a symmetric matrix with A itself, if packed rows served
+    /// it.
     pub fn renew(&self, operator: &Operator, inverse: &[f64], residual: &mut [f64], solution: &[f64]) {
         self.conjugate.renew(operator, inverse, residual, solution);
     }

@@ -116,8 +116,8 @@ fn add_band<S: Simd>(simd: S, values: &[f32], x: &[f64], y: &mut [f64]) {
 mod tests {
     use super::*;
 
-    /// Products on a grid of 90 × 70 with unequal entries agree with f64 to the rounding of f32, and on uniform
-    /// vectors to that of f64; with lumped and consistent capacity.
+    /// Products on a grid of 90 × 70 with unequal entries agree with f64 to the rounding of f32, and on
+    /// uniform vectors to that of f64; with lumped and consistent capacity.
     #[test]
     fn products_of_grids() {
         let (width, height) = (90, 70);

@@ -285,7 +285,7 @@ impl ThermalSystem {
         self.fixed.sort_unstable();
         // only births and rows without own masses ask for neighbours later
         if self.rows.bands().is_some() {
-            self.plan.around.release();
+            self.plan.around.free_lists();
         }
         self.build += 1;
         self.generation = self.build << 32;

@@ -29,7 +29,7 @@ impl NodeElements {
     }
 
     /// Frees the lists of a mesh that gains no elements; no other call may follow.
-    pub fn release(&mut self) {
+    pub fn free_lists(&mut self) {
         self.corners = Groups::new(0, std::iter::empty());
     }
 

@@ -50,8 +50,8 @@ impl<const D: usize> System<'_, D> {
         true
     }
 
-    /// Cuts a step in which a rigid surface would move by more than half a spacing beyond first contact; returns
-    /// whether it did. A surface that jumps along its curve is not followed.
+    /// Cuts a step in which a rigid surface would move by more than half a spacing beyond first contact;
+    /// returns whether it did. A surface that jumps along its curve is not followed.
     pub(super) fn cut_at_touch(&mut self, state: &mut State<D>) -> bool {
         let Some(contact) = self.repulsion().filter(|_| !self.snap_back) else { return false };
         let [before, after] = contact.approach(&state.displacement);
@@ -71,8 +71,8 @@ impl<const D: usize> System<'_, D> {
         true
     }
 
-    /// Returns the part of the present step after which the deepest overlap of surfaces that follow curves is at
-    /// most `most`, m, and nearly that; the surfaces end at the end of the step.
+    /// Returns the part of the present step after which the deepest overlap of surfaces that follow curves
+    /// is at most `most`, m, and nearly that; the surfaces end at the end of the step.
     fn touch_on_curve(&mut self, state: &State<D>, most: f64) -> f64 {
         let before = state.step.checked_sub(1).map_or(0.0, |before| self.factors[before]);
         let after = self.factors[state.step];

@@ -148,9 +148,9 @@ fn two_particles() {
     }
 }
 
-/// Two particles of the densities ρ and 3ρ on a linear bond, the light one with the speed v₀: ω² of the reduced
-/// mass is ⅔ of that of equal ones, the sharp critical step follows from it, the centre of mass flies on at v₀/4,
-/// and the energies add up.
+/// Two particles of the densities ρ and 3ρ on a linear bond, the light one with the speed v₀: ω² of the
+/// reduced mass is ⅔ of that of equal ones, the sharp critical step follows from it, the centre of mass
+/// flies on at v₀/4, and the energies add up.
 #[test]
 fn two_densities() {
     let law = Law::Linear.build(1.0, 1.0, false).unwrap();

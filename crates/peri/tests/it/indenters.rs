@@ -272,8 +272,8 @@ fn along_a_curve() {
     }
 }
 
-/// A sphere on a curve that would leap into the block in one step is cut at touch: it does the work that the block
-/// stores and takes it back, whether the curve is smooth or jumps.
+/// A sphere on a curve that would leap into the block in one step is cut at touch: it does the work that
+/// the block stores and takes it back, whether the curve is smooth or jumps.
 #[test]
 fn cut_at_touch_on_a_curve() {
     let sphere = RigidSurface { stiffness: 50.0, ..RigidSurface::sphere([3.0, 3.0, 50.0], 8.0) };

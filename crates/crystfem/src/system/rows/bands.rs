@@ -51,7 +51,7 @@ impl BandLayout {
 
     /// Place of entry a_ij, j − i = `distances`\[`band`\].
     #[inline(always)]
-    pub fn place(&self, band: usize, row: usize) -> usize {
+    pub fn entry_index(&self, band: usize, row: usize) -> usize {
         (row / TILE * self.distances.len() + band) * TILE + row % TILE
     }
 
@@ -63,7 +63,7 @@ impl BandLayout {
         let right = rows.start..rows.end.min(self.size.saturating_sub(distance)).max(rows.start);
         let piece = |rows: &Range<usize>, begin: usize, column: usize| {
             (!rows.is_empty()).then(|| BandPiece {
-                at: self.place(band, rows.start),
+                at: self.entry_index(band, rows.start),
                 begin,
                 length: rows.len(),
                 column,
@@ -146,7 +146,7 @@ impl Bands {
     pub fn add(&mut self, row: usize, column: usize, conduction: f64, capacity: f64) {
         let Some(distance) = column.checked_sub(row) else { return };
         if let Ok(band) = self.layout.distances.binary_search(&distance) {
-            let at = self.layout.place(band, row);
+            let at = self.layout.entry_index(band, row);
             self.conduction[at] += conduction;
             if let Some(value) = self.capacity.get_mut(at) {
                 *value += capacity;
@@ -173,7 +173,7 @@ impl Bands {
     /// Returns entry a_ij of `weights[0]`·M + `weights[1]`·K, j − i = `distances`\[`band`\].
     #[inline(always)]
     pub fn value(&self, band: usize, row: usize, [capacity, conduction]: [f64; 2]) -> f64 {
-        let at = self.layout.place(band, row);
+        let at = self.layout.entry_index(band, row);
         let own = conduction * self.conduction[at];
         match self.capacity.get(at) {
             Some(value) => own + capacity * value,

@@ -12,16 +12,17 @@ use crate::time::Work;
 
 /// Limit on solves of a correction.
 const MAX_SOLVES: usize = 4;
-/// Fraction of the tolerance to which they reduce the residual, which is known to the rounding of packed rows.
+/// Fraction of the tolerance to which they reduce the residual, which is known to the rounding of packed
+/// rows.
 const REACHED: f64 = 0.7;
 
 impl Stages {
     /// Computes the correction of temperature: A δ = −residual, with Σ(residual + A δ) = 0 over the free
     /// nodes to rounding. It is solved to `goal`, K.
     ///
-    /// Surfaces at `temperature` + δ take more heat than their tangent tells. Where elements are linear, that is
-    /// all that an evaluation would find: it is added to the residual, and the same matrix solves the rest until
-    /// the residual is below the tolerance, K.
+    /// Surfaces at `temperature` + δ take more heat than their tangent tells. Where elements are linear,
+    /// that is all that an evaluation would find: it is added to the residual, and the same matrix solves
+    /// the rest until the residual is below the tolerance, K.
     pub(super) fn correct(
         &mut self,
         problem: &Problem,
