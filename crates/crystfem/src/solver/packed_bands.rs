@@ -41,7 +41,7 @@ impl PackedBands {
                 for (band, distance) in layout.distances.iter().enumerate() {
                     for row in [Some(row), row.checked_sub(*distance)].into_iter().flatten() {
                         let exact = bands.value(band + 1, row, weights);
-                        *core += exact - f64::from(values[layout.place(band, row)]);
+                        *core += exact - f64::from(values[layout.entry_index(band, row)]);
                     }
                 }
             }
