@@ -119,7 +119,7 @@ impl<const D: usize> Region<D> {
 /// Returns the density of each site over that of `[dynamics]`; none if all are 1.
 ///
 /// # Errors
-/// As [`densities`].
+/// An invalid shape, or one without particles.
 pub fn density_ratios<const D: usize>(
     source: &Source,
     scene: &Scene,
