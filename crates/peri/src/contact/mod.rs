@@ -52,6 +52,7 @@ pub(crate) use faces::Faces;
 pub use friction::SlidingFriction;
 pub use friction_pair::{ContactPair, Drag, FrictionPair};
 use list::ContactList;
+#[cfg(feature = "case")]
 pub(crate) use pushed_surfaces::BEHIND;
 use serde::{Deserialize, Serialize};
 pub use stiffness::Spring;
