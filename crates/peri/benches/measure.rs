@@ -23,7 +23,7 @@ const WIDE: [f64; 2] = [0.5, 3.0];
 /// Number of repetitions; the median counts.
 const REPEATS: usize = 7;
 
-type Failure = Box<dyn std::error::Error>;
+type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 /// Settings of the measurement.
 #[derive(Parser)]
