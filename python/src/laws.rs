@@ -297,7 +297,7 @@ pub fn fit_law<'py>(
         }
         for (k, row) in rows.rows().into_iter().enumerate() {
             if let Some(cell) = row.iter().find(|cell| !cell.is_finite()) {
-                let allowed = "finite numbers; leave out a state that was not measured";
+                let allowed = "finite numbers; omit states without a measurement";
                 return Err(value(format!("{name}: row {k}: found {cell}; allowed: {allowed}")));
             }
             let state = match (mode, row.as_slice()) {

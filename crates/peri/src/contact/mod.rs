@@ -285,8 +285,7 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Displacements of rigid surfaces without a force over the load factor, m: mean rates of the present
-    /// step.
+    /// Mean rates of the displacements of rigid surfaces over the load factor in the present step, m.
     pub fn rates(&self) -> impl Iterator<Item = [f64; D]> {
         self.surfaces.iter().flat_map(RigidSurfaces::rates)
     }

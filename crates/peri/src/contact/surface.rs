@@ -55,7 +55,8 @@ pub struct RigidSurface<const D: usize> {
     /// `displacement` and `velocity`.
     pub force: Option<[f64; D]>,
     /// Multiples of the components of `displacement` over the load factor, of which `force` follows the
-    /// first; `None`: the factor itself.
+    /// first; `None`: the factor itself. A system with amplitudes has
+    /// [`Loads::curved`](crate::solver::Loads::curved) loads, which count the work.
     pub amplitudes: Option<[Amplitude; D]>,
 }
 

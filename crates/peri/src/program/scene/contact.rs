@@ -101,7 +101,8 @@ impl ContactSpec {
 
     /// Returns true if a curve of time moves or presses a rigid surface.
     pub(super) fn has_curve(&self) -> bool {
-        self.curved_surfaces().iter().any(|surface| surface.curve.is_some())
+        self.plane.iter().any(|plane| plane.curve.is_some())
+            || self.indenter.iter().any(|indenter| indenter.curve.is_some())
     }
 
     /// Lists what moves all rigid surfaces: planes, then indenters.

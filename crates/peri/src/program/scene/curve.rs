@@ -16,7 +16,7 @@ use polycore::units::{Dimension, Unit};
 use std::fmt;
 
 /// Parts of the time of a run at which a formula is checked.
-const MOMENTS: u32 = 256;
+pub(super) const MOMENTS: u32 = 256;
 /// Largest multiple at the start of a quasi-static programme, which begins without load.
 const START: f64 = 1e-9;
 

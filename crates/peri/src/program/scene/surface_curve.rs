@@ -1,15 +1,12 @@
 //! Curves of time that move or press rigid surfaces.
 
-use super::curve::{CurveTime, Multiplied};
+use super::curve::{CurveTime, MOMENTS, Multiplied};
 use super::curve_spec::CurveList;
 use super::values::plain;
 use super::{ContactSpec, Scene};
 use crate::amplitude::Amplitude;
 use harness::scene::{SceneError, Source};
 use polycore::units::{Force, Length};
-
-/// Parts of the time of a run at which a force is checked.
-const MOMENTS: u32 = 256;
 
 /// Displacement or force of a rigid surface and its curve.
 pub(super) struct CurvedSurface<'a> {

@@ -80,7 +80,7 @@ impl TorsionColumns {
     ///
     /// # Errors
     /// No cylinder, a column that is missing, there twice or of a unit of another quantity, angles without
-    /// the length of the cylinder or twists with it, a held stretch that is given twice or as a strain.
+    /// the length of the cylinder or twists with it, two sources of the held stretch, a strain instead of it.
     pub fn find(file: &Table, format: &TestFormat) -> Result<Option<Self>, Error> {
         let cylinder = match (format.cylinder, format.mode) {
             (Some(cylinder), _) => cylinder,
