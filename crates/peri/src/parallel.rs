@@ -1,6 +1,6 @@
 //! Parallel loops over particles and work items. Each calls its body through a reference, so that rayon is
-//! compiled once for each type of result instead of once for each loop: 500 instances were a fifth of the code
-//! of this crate.
+//! compiled once for each type of result instead of once for each loop: 500 instances were a fifth of the
+//! code of this crate.
 
 use rayon::prelude::*;
 
