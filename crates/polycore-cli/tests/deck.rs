@@ -18,7 +18,7 @@ fn value(text: &str, key: &str) -> f64 {
     line.split('"').nth(1).unwrap().split(' ').next().unwrap().parse().unwrap()
 }
 
-/// Cards have seven digits.
+/// Cards have ten digits.
 #[test]
 fn cards_return_as_blocks() {
     let folder = tempfile::tempdir().unwrap();
@@ -33,7 +33,7 @@ fn cards_return_as_blocks() {
     let blocks = std::fs::read_to_string(folder.path().join("out/materials.toml")).unwrap();
     for key in ["shear_modulus", "bulk_modulus"] {
         let (found, expected) = (value(&shown, key), value(&blocks, key));
-        assert!((found / expected - 1.0).abs() < 2e-6, "{key}: {found} {expected}");
+        assert!((found / expected - 1.0).abs() < 2e-9, "{key}: {found} {expected}");
     }
 }
 

@@ -211,9 +211,10 @@ impl<const D: usize> System<'_, D> {
             }
             self.set_mean_forces([before, after], &state.displacement);
             let (pull, push) = self.curved_conjugates(state);
-            // after a cut, forces are those of the step given up
-            let pull = if state.control.cuts == 0 { pull } else { state.control.balanced[1] };
             state.control.balanced = [before, pull, push];
+            if self.refine > 1 && state.control.cuts == 0 {
+                state.control.start_force = Some(Box::new(state.force.clone()));
+            }
         }
         self.set_forces(after, &state.displacement);
     }

@@ -17,6 +17,8 @@ pub struct StepControl<const D: usize> {
     pub(super) past: Vec<Field<D>>,
     /// Factor, and the loads' conjugate sums, at the last equilibrium.
     pub(super) balanced: [f64; 3],
+    /// Force density at the start of the step, if loads follow curves and the step may be cut.
+    pub(super) start_force: Option<Box<Field<D>>>,
     /// Body force and displacement at the last equilibrium, if body forces depend on the displacement.
     pub(super) pushed: Option<Box<[Field<D>; 2]>>,
     /// Load factors and times of all steps, if steps have been cut …

@@ -46,6 +46,9 @@ impl<const D: usize> System<'_, D> {
         state.control.cuts += 1;
         let rest = || Field::zeros(state.displacement.sites());
         state.displacement = if at == 0 { rest() } else { state.control.past.pop().unwrap_or_else(rest) };
+        if let Some(force) = &state.control.start_force {
+            state.force.clone_from(force);
+        }
         (state.control.predicted, state.counts.iteration) = (false, 0);
         true
     }

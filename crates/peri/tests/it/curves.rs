@@ -2,18 +2,19 @@
 //! that appear in a stretched sheet.
 
 use crate::bodies::Body;
+use crate::load_steps::dent;
 use evidence::{at_most, near};
 use harness::case::{Case, Options, Run};
 use harness::scene::Source;
 use peri::bonds::{BodyGeometry, Bonds};
 use peri::calibrate::Space;
 use peri::field::Field;
-use peri::material::EightChainSolid;
-use peri::material::NonlocalSolid;
+use peri::material::{BondMaterial, EightChainSolid, NonlocalSolid};
 use peri::program::run::{FinishedScene, Peri, run};
 use peri::program::scene::Scene;
 use peri::solver::{
-    Amplitude, CurvedLoads, CurvedRegion, Lbfgs, Loads, Method, State, Status, System, VelocityVerlet,
+    Amplitude, Breaking, CurvedLoads, CurvedRegion, Lbfgs, Loads, Method, Policy, State, Status, System,
+    VelocityVerlet,
 };
 use std::f64::consts::PI;
 
@@ -114,6 +115,29 @@ fn work_of_curves_is_stored_and_runs_resume() {
             assert!(again == whole, "moving {moving}: from step {}", state.step);
         }
     }
+}
+
+/// The work of a displacement that grows with t² is the energy of the sheet at the load at which its first
+/// bond breaks, where the second of two increments is cut.
+#[test]
+fn work_of_curves_after_cuts_is_stored() {
+    let (mut bonds, proportional, law, modulus) = dent(4e-3, 0.02);
+    let rising = || Amplitude::new(|part| (part * part, 2.0 * part));
+    let grip = |side: f64| {
+        region(&bonds, move |[_, y]| side * y > 0.088, [0.0, 0.02 * side], 3, [rising(), rising()])
+    };
+    let loads = loads_of(&bonds, vec![grip(-1.0), grip(1.0)], Vec::new());
+    assert_eq!(loads.constrained, proportional.constrained);
+    let mut system = System::new(&mut bonds, BondMaterial::new(&*law, modulus), &loads, &[0.5, 1.0]);
+    system.breaking = Some(Breaking { criterion: 1.3.into(), policy: Policy::AtEquilibrium });
+    (system.refine, system.stop_below) = (64, 0.9);
+    let mut state = State::new(system.bonds.sites());
+    let settings = Lbfgs { tolerance: 1e-8, ..Default::default() };
+    settings.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
+    let first = state.history.iter().position(|row| row.broken > 0).unwrap();
+    let intact = &state.history[first - 1];
+    assert!(first > 1 && intact.factor > 0.5, "{first} {}", intact.factor);
+    at_most("cut_curve_energy_balance", (intact.work / intact.stored - 1.0).abs(), 1e-2);
 }
 
 fn solve(text: &str) -> FinishedScene {

@@ -125,7 +125,7 @@ pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
 }
 
 /// Number of significant digits of parameters.
-pub const DIGITS: usize = 7;
+pub const DIGITS: usize = 10;
 
 /// Formats a stress with its unit.
 pub fn stress(value: f64, significant: usize) -> String {

@@ -127,14 +127,14 @@ pub fn card(key: &str, parameters: &[f64], compliances: &[f64]) -> String {
 /// Names the terms of a volumetric energy beyond those that a card holds; `None` if it holds all.
 pub(super) fn left_out(compliances: &[f64], held: usize) -> Option<String> {
     let beyond = compliances.iter().enumerate().skip(held).filter(|(_, d)| d.is_finite());
-    let terms: Vec<String> = beyond.map(|(i, d)| format!("D{} = {d:.6e}", i + 1)).collect();
+    let terms: Vec<String> = beyond.map(|(i, d)| format!("D{} = {d:.9e}", i + 1)).collect();
     let first = if held == 1 { "D1".to_owned() } else { format!("D1 to D{held}") };
     (!terms.is_empty()).then(|| format!("left out: {}; this material has {first} alone", terms.join(", ")))
 }
 
 /// Formats eight numbers per line.
 fn lines(numbers: &[f64]) -> String {
-    let row = |row: &[f64]| row.iter().map(|x| format!("{x:.6e}")).collect::<Vec<_>>().join(", ") + "\n";
+    let row = |row: &[f64]| row.iter().map(|x| format!("{x:.9e}")).collect::<Vec<_>>().join(", ") + "\n";
     numbers.chunks(8).map(row).collect()
 }
 

@@ -115,7 +115,7 @@ fn ansys(id: usize, key: &str, p: &[f64], compliances: &[f64]) -> Option<(String
     let zero_if_soft = |d: &f64| if d.is_finite() { *d } else { 0.0 };
     constants.extend(compliances.iter().take(held).map(zero_if_soft));
     let rows = constants.chunks(6).enumerate().map(|(i, row)| {
-        let numbers: String = row.iter().map(|number| format!(",{number:.6e}")).collect();
+        let numbers: String = row.iter().map(|number| format!(",{number:.9e}")).collect();
         format!("TBDATA,{}{numbers}\n", 6 * i + 1)
     });
     Some((format!("TB,HYPER,{id},1,{terms},{option}\n{}", rows.collect::<String>()), held))
@@ -126,7 +126,7 @@ fn ansys(id: usize, key: &str, p: &[f64], compliances: &[f64]) -> Option<(String
 fn ls_dyna(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
     let shear = any_model(key).ok()?.law(p).ok()?.shear_modulus();
     let poisson = (3.0 * bulk - 2.0 * shear) / (6.0 * bulk + 2.0 * shear);
-    let row = |numbers: &[f64]| numbers.iter().map(|number| format!("{number:>20.6e}")).collect::<String>();
+    let row = |numbers: &[f64]| numbers.iter().map(|number| format!("{number:>20.9e}")).collect::<String>();
     let (keyword, rows) = match polynomial(key, p) {
         // C10 C01 C11 C20 C02 C30
         Some([a, b, c, d, e, f]) => ("*MAT_077_H+", vec![row(&[a, b, d, c, e, f])]),
@@ -162,7 +162,7 @@ fn febio(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
         }
     };
     constants.push(("k".to_owned(), bulk));
-    let lines = constants.iter().map(|(tag, value)| format!("  <{tag}>{value:.6e}</{tag}>\n"));
+    let lines = constants.iter().map(|(tag, value)| format!("  <{tag}>{value:.9e}</{tag}>\n"));
     let lines: String = lines.collect();
     Some(format!("<material id=\"{id}\" name=\"{key}\" type=\"{kind}\">\n{lines}</material>\n"))
 }
@@ -174,7 +174,7 @@ fn moose(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
     let lame = bulk - 2.0 / 3.0 * modulus;
     Some(format!(
         "[Materials]\n  [neo_hookean_{id}]\n    type = ComputeNeoHookeanStress\n    lambda = \
-         {lame:.6e}\n    mu = {modulus:.6e}\n    large_kinematics = true\n  []\n[]\n"
+         {lame:.9e}\n    mu = {modulus:.9e}\n    large_kinematics = true\n  []\n[]\n"
     ))
 }
 
