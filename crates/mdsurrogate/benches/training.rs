@@ -12,7 +12,7 @@ use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 
 /// Number of training rows in the thesis: 80 % of 72,720.
 const ROWS: usize = 58_176;
-const BATCHES: [usize; 2] = [32, 256];
+const BATCHES: [usize; 5] = [16, 32, 64, 256, 1024];
 /// Number of epochs; the median is reported.
 const EPOCHS: u32 = 5;
 

@@ -40,7 +40,7 @@ pub fn run(workspace: &Repository, folder: &Path) -> Result<Vec<Row>> {
             "PyTorch, training",
             "TORCH_PYTHON",
             TRAINING,
-            ["58176", "5", "32", "256"].map(str::to_owned).to_vec(),
+            ["58176", "5", "16", "32", "64", "256", "1024"].map(str::to_owned).to_vec(),
         ),
         ("PyTorch, answers", "TORCH_PYTHON", ANSWERS, vec!["torch".to_owned(), law, answers.clone()]),
         ("onnxruntime", "ONNX_PYTHON", ANSWERS, vec!["onnx".to_owned(), path("ann4.onnx"), answers]),

@@ -241,7 +241,11 @@ impl Model {
     fn forward(&self, layers: &[Tensors], x: Tensor<2>) -> Tensor<2> {
         let mut y = x;
         for (layer, kind) in layers.iter().zip(&self.activations) {
-            y = value(*kind, y.matmul(layer.weights.clone()) + layer.bias.clone());
+            let sums = y.matmul(layer.weights.clone()) + layer.bias.clone();
+            y = match kind {
+                Activation::Linear => sums,
+                _ => ActivatedLayer::new(*kind, sums, 0).derivative(0),
+            };
         }
         y
     }
@@ -253,10 +257,11 @@ impl Model {
         let mut slopes = Vec::with_capacity(last);
         let mut y = x;
         for (l, (layer, kind)) in layers[..last].iter().zip(&self.activations).enumerate() {
-            let sum = y.clone().matmul(layer.weights.clone()) + layer.bias.clone();
-            slopes.push(slope(*kind, sum.clone()));
+            let sums = y.clone().matmul(layer.weights.clone()) + layer.bias.clone();
+            let activated = ActivatedLayer::new(*kind, sums, 1);
+            slopes.push(activated.derivative(1));
             if l + 1 < last {
-                y = value(*kind, sum);
+                y = activated.derivative(0);
             }
         }
         let rows = y.dims()[0];
@@ -289,40 +294,31 @@ fn numbers(tensor: Tensor<2>) -> Vec<f32> {
     tensor.into_data().try_into_vec::<f32>().unwrap_or_default()
 }
 
-/// Computes σ(a).
-fn value(kind: Activation, a: Tensor<2>) -> Tensor<2> {
-    match kind {
-        Activation::Linear => a,
-        Activation::Relu => activation::relu(a),
-        // ln(1 + eᵃ) = −ln σ(−a), which burn computes without overflow
-        Activation::Softplus => -activation::log_sigmoid(-a),
-        Activation::Tanh => a.tanh(),
-        Activation::Sigmoid => activation::sigmoid(a),
-        Activation::Silu => activation::silu(a),
-        Activation::Elu => activation::elu(a, 1.0),
-    }
+/// Activation of a layer at its sums a. Its derivatives come from [`Activation::evaluate`], as burn computes
+/// exponentials and logarithms one at a time.
+struct ActivatedLayer {
+    sums: Tensor<2>,
+    /// Entries of σ, σ′ and σ″, as far as they were asked for.
+    derivatives: [Vec<f32>; 3],
 }
 
-/// Computes σ′(a).
-fn slope(kind: Activation, a: Tensor<2>) -> Tensor<2> {
-    match kind {
-        Activation::Linear => a.ones_like(),
-        // refused by `Model::new`
-        Activation::Relu => a.zeros_like(),
-        Activation::Softplus => activation::sigmoid(a),
-        Activation::Tanh => {
-            let t = a.tanh();
-            -(t.clone() * t) + 1.0
-        }
-        Activation::Sigmoid => {
-            let s = activation::sigmoid(a);
-            s.clone() * (-s + 1.0)
-        }
-        Activation::Silu => {
-            let s = activation::sigmoid(a.clone());
-            s.clone() * ((-s + 1.0) * a + 1.0)
-        }
-        // eᵃ for a < 0, 1 for a > 0
-        Activation::Elu => a.clamp_max(0.0).exp(),
+impl ActivatedLayer {
+    /// Evaluates the derivatives of order 0 to `highest` and, for their gradients, one more.
+    fn new(kind: Activation, sums: Tensor<2>, highest: usize) -> Self {
+        let a = numbers(sums.clone().detach());
+        let list = |order: usize| vec![0.0; if order <= highest + 1 { a.len() } else { 0 }];
+        let [mut values, mut first, mut second] = [0, 1, 2].map(list);
+        kind.evaluate(&a, &mut values, &mut first, &mut second);
+        Self { sums, derivatives: [values, first, second] }
+    }
+
+    /// Returns the derivative f = σ⁽ᵒʳᵈᵉʳ⁾(a), tracked as f(a₀) + f′(a₀)·(a − a₀) with constants at a₀ = a,
+    /// which has its value and its gradient.
+    fn derivative(&self, order: usize) -> Tensor<2> {
+        let (shape, device) = (self.sums.dims(), self.sums.device());
+        let constant =
+            |entries: &[f32]| Tensor::<2>::from_data(TensorData::new(entries.to_vec(), shape), &device);
+        let change = self.sums.clone() - self.sums.clone().detach();
+        change * constant(&self.derivatives[order + 1]) + constant(&self.derivatives[order])
     }
 }

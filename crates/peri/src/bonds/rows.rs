@@ -151,10 +151,10 @@ macro_rules! for_size {
             (4, 0) (6, 0) (8, 0) (10, 0) (12, 0) (4, 4) (5, 5) (7, 6) (9, 8) (11, 10))
     };
     (cloud $d:literal, $rational:expr, $make:ident $arguments:tt) => {
-        for_size!(@try $d, $rational, $make $arguments; (6, 0) (8, 0) (12, 0) (5, 5) (8, 7) (11, 10));
+        for_size!(@try $d, $rational, $make $arguments; (6, 0) (8, 0) (12, 0) (5, 5) (8, 7) (11, 10))
     };
     (single $d:literal, $rational:expr, $make:ident $arguments:tt) => {
-        for_size!(@try $d, $rational, $make $arguments; (4, 0) (6, 0) (8, 0) (12, 0) (5, 5) (11, 10));
+        for_size!(@try $d, $rational, $make $arguments; (4, 0) (6, 0) (8, 0) (12, 0) (5, 5) (11, 10))
     };
     (@try $d:literal, $rational:expr, $make:ident $arguments:tt; $(($p:literal, $q:literal))*) => {{
         $(if $rational.numerator.len() <= $p && $rational.denominator.len() <= $q {

@@ -1,6 +1,7 @@
 //! Activation functions and their derivatives.
 
 use super::real::Real;
+use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
 /// Activation function of a neuron; (3.11) and more.
@@ -42,6 +43,12 @@ impl Activation {
         }
     }
 
+    /// Computes values of a list, and first and second derivatives if their lists are not empty, with the
+    /// widest instructions of this machine.
+    pub fn evaluate<T: Real>(self, x: &[T], values: &mut [T], first: &mut [T], second: &mut [T]) {
+        Arch::new().dispatch(ActivationPass { activation: self, x, values, first, second });
+    }
+
     /// Computes values, first and second derivatives of a list; empty lists are skipped.
     #[inline(always)]
     pub(super) fn fill<T: Real, const FUSED: bool>(
@@ -59,6 +66,29 @@ impl Activation {
             Self::Sigmoid => fill::<Sigmoid, T, FUSED>(sums, values, first, second),
             Self::Silu => fill::<Silu, T, FUSED>(sums, values, first, second),
             Self::Elu => fill::<Elu, T, FUSED>(sums, values, first, second),
+        }
+    }
+}
+
+struct ActivationPass<'a, T> {
+    activation: Activation,
+    x: &'a [T],
+    values: &'a mut [T],
+    first: &'a mut [T],
+    second: &'a mut [T],
+}
+
+impl<T: Real> WithSimd for ActivationPass<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { activation, x, values, first, second } = self;
+        // one lane: no vector unit that pulp knows of, and maybe no fused product
+        if S::F64_LANES > 1 {
+            activation.fill::<T, true>(x, values, first, second);
+        } else {
+            activation.fill::<T, false>(x, values, first, second);
         }
     }
 }
