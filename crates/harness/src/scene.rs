@@ -112,8 +112,8 @@ impl Source {
             return Err(fail("scene::directory", "is a directory, not a scene file".into(), help));
         }
         if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv")) {
-            let help = "name it in a scene: `version = 1`, the `program`, a `title`, and the block that reads it, as \
-                        `[[fit.data]]` with `name` and `file` of polycore";
+            let help = "name it in a scene: `version = 1`, the `program`, a `title`, and the block that \
+                        reads it, as `[[fit.data]]` with `name` and `file` of polycore";
             return Err(fail("scene::table", "is a table, not a scene".into(), Some(help.into())));
         }
         let mut bytes = Vec::new();

@@ -93,8 +93,8 @@ fn table_of_the_formulation() {
     near("networks_formula_rms_of_measured", all.rms, 0.86, 0.005);
 }
 
-/// The aims of formulation-networks.md, with nothing fitted to a measured network: plateau modulus of PDMS from the
-/// literature, loops and bead model from simulations, stiffening of short chains from theory.
+/// The aims of formulation-networks.md, with nothing fitted to a measured network: plateau modulus of PDMS
+/// from the literature, loops and bead model from simulations, stiffening of short chains from theory.
 #[test]
 fn predictions() {
     let settings = PredictionSettings::default();

@@ -147,8 +147,8 @@ impl Columns {
         Ok(Self { found })
     }
 
-    /// Place of a column.
-    pub fn place(&self, name: &str) -> Option<usize> {
+    /// Place of a column in the table.
+    pub fn column(&self, name: &str) -> Option<usize> {
         self.scaled(name).map(|(place, _)| place)
     }
 

@@ -113,8 +113,8 @@ impl CompositionTable {
             ("r", "groups of the cross-linkers per group of the chains"),
             ("M_strand_kg_mol", "molar mass of the strands, kg/mol"),
         ] {
-            let at_random = name != "M_strand_kg_mol" && columns.place("chains").is_some();
-            if columns.place(name).is_none() && !at_random {
+            let at_random = name != "M_strand_kg_mol" && columns.column("chains").is_some();
+            if columns.column(name).is_none() && !at_random {
                 return Err(table.refuse_headings(format!("a column `{name}`: {what}")));
             }
         }
@@ -132,7 +132,7 @@ impl CompositionTable {
 
 impl Composition {
     fn from_row(table: &Table, columns: &Columns, row: usize) -> Result<Self, Error> {
-        let text = |name: &str| columns.place(name).map_or("", |column| table.text(row, column));
+        let text = |name: &str| columns.column(name).map_or("", |column| table.text(row, column));
         let number = |name: &str, allowed: &Allowed| -> Result<Option<f64>, Error> {
             let Some((column, scale)) = columns.scaled(name) else { return Ok(None) };
             match table.number_or_blank(row, column)?.map(|number| number * scale) {
@@ -143,7 +143,7 @@ impl Composition {
         let choice = |name: &str, allowed: &str, choices: &[(&str, bool)]| -> Result<bool, Error> {
             let found = text(name).to_lowercase();
             let known = choices.iter().find(|(known, _)| *known == found);
-            match (known, columns.place(name)) {
+            match (known, columns.column(name)) {
                 (Some((_, meaning)), _) => Ok(*meaning),
                 (None, Some(column)) => Err(table.refuse_cell(row, column, allowed)),
                 (None, None) => Ok(false),
@@ -151,7 +151,7 @@ impl Composition {
         };
         let sol = [("", false), ("present", false), ("removed", true), ("left", false), ("extracted", true)];
         let kind = [("", false), ("exp", false), ("md", true), ("measured", false), ("simulated", true)];
-        let primary_chains = match (text("chains"), columns.place("chains")) {
+        let primary_chains = match (text("chains"), columns.column("chains")) {
             ("most-probable", _) => Some(PrimaryChains::MostProbable),
             ("one-length", _) => Some(PrimaryChains::OneLength),
             (found, Some(column)) if !found.is_empty() => {
@@ -162,7 +162,7 @@ impl Composition {
         let polymer = match text("polymer") {
             "" => None,
             name => Some(known_polymer(name).map_err(|error| {
-                table.refuse_cell(row, columns.place("polymer").unwrap_or_default(), &error.to_string())
+                table.refuse_cell(row, columns.column("polymer").unwrap_or_default(), &error.to_string())
             })?),
         };
         Ok(Self {
