@@ -111,6 +111,11 @@ impl Source {
             let help = error::scene_inside(path);
             return Err(fail("scene::directory", "is a directory, not a scene file".into(), help));
         }
+        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv")) {
+            let help = "name it in a scene: `version = 1`, the `program`, a `title`, and the block that \
+                        reads it, as `[[fit.data]]` with `name` and `file` of polycore";
+            return Err(fail("scene::table", "is a table, not a scene".into(), Some(help.into())));
+        }
         let mut bytes = Vec::new();
         // the length of a pipe or device is not known beforehand: read one byte more than allowed
         File::open(path).and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes)).map_err(io)?;

@@ -26,6 +26,8 @@
 //! ```
 
 mod chain;
+#[cfg(feature = "tables")]
+mod columns;
 mod end_linked;
 mod error;
 mod linkers;

@@ -93,8 +93,8 @@ fn table_of_the_formulation() {
     near("networks_formula_rms_of_measured", all.rms, 0.86, 0.005);
 }
 
-/// The aims of issue 43, with nothing fitted to a measured network: plateau modulus of PDMS from the
-/// literature, loops and bead model from simulations, stiffening of short chains from theory.
+/// The aims of formulation-networks.md, with nothing fitted to a measured network: plateau modulus of PDMS
+/// from the literature, loops and bead model from simulations, stiffening of short chains from theory.
 #[test]
 fn predictions() {
     let settings = PredictionSettings::default();
@@ -172,8 +172,9 @@ fn reasons() {
     let perfect = predicted(10).unwrap();
     let expected = found[10].as_ref().unwrap().network.modulus() / 1e6;
     assert!((perfect / expected - 1.0).abs() < 1e-5 && back.text(10, column("reason")).is_empty());
-    // what was written can be read again as compositions, with the predictions as unused columns
-    assert_eq!(CompositionTable::from_table(&back).unwrap().rows.len(), 11);
+    // what was written can be predicted again: the new columns take the place of the old ones
+    let again = CompositionTable::from_table(&back).unwrap();
+    assert_eq!(to_csv(&again, &predict(&again, &PredictionSettings::default())), csv);
 }
 
 /// Files that are no table of compositions are refused with line, column, cell and what is allowed.
@@ -213,10 +214,70 @@ fn refused_files() {
     assert!(error.contains("allowed: a column `r`: groups of the cross-linkers per group"), "{error}");
     let error = from("f,r,M_strand_kg_mol,p,p\n4,1,10,0.9,0.9\n").unwrap_err().to_string();
     assert!(error.contains("allowed: one column `p`"), "{error}");
+    let error = from("f,r,M_strand_kg_mol,p\n").unwrap_err().to_string();
+    assert!(error.contains("rows: found \"none\"; allowed: a network in each row"), "{error}");
     // decimal commas, other columns, blank lines
     let table = from("Name;f;r;M_strand_kg_mol;p\nx;4;1,1;10,5;0,8\n\ny;3;1;5;0,9\n").unwrap();
     assert_eq!((table.rows[0].ratio, table.rows[1].line), (Some(1.1), 4));
     assert_eq!(table.unused, ["Name"]);
+}
+
+/// Headings in other capitals and in other units mean the same; units that contradict a heading are refused.
+#[test]
+fn headings_in_other_units() {
+    const ROW: &str = "4,1.0,10,0.33,0.97,0.02,removed,0.25\n";
+    let read = |heads: &str, row: &str| from(&format!("{heads}\n{row}"));
+    let named = "f,r,M_strand_kg_mol,M_linker_kg_mol,p,w_sol,sol,G_MPa";
+    let expected = read(named, ROW).unwrap().rows.remove(0);
+    for (heads, row) in [
+        ("F,R,m_strand_kg_mol,M_LINKER_KG_MOL,P,W_sol,Sol,G_mpa", ROW),
+        ("f,r,M_strand [kg/mol],M_linker (kg/mol),p [-],w_sol,sol,G [MPa]", ROW),
+        (
+            "f,r,M_strand_g_mol,M_linker [g/mol],p [%],w_sol (%),sol,G_kPa",
+            "4,1.0,10000,330,97,2,removed,250\n",
+        ),
+        (
+            "f,r [%],M_strand_kg_mol,M_linker/(g/mol),p,w_sol_percent,sol,G/Pa",
+            "4,100,10,330,0.97,2,removed,250000\n",
+        ),
+        ("f,r,M_strand_kg_mol [kg/mol],M_linker_kg_mol,p,w_sol,sol,G_MPa [N/mm2]", ROW),
+        // a row of separators above the first network
+        (named, ",,,,,,,\n4,1.0,10,0.33,0.97,0.02,removed,0.25\n"),
+    ] {
+        let found = read(heads, row).unwrap().rows.remove(0);
+        let numbers = |row: &Composition| {
+            [
+                row.functionality,
+                row.ratio,
+                row.strand_mass,
+                row.linker_mass,
+                row.conversion,
+                row.sol,
+                row.modulus,
+            ]
+            .map(|number| number.unwrap())
+        };
+        for (found, expected) in numbers(&found).into_iter().zip(numbers(&expected)) {
+            assert!((found / expected - 1.0).abs() < 1e-12, "{heads}: {found} {expected}");
+        }
+        assert!(found.extracted, "{heads}");
+    }
+    for (heads, message) in [
+        ("f,r,M_strand_kg_mol [g/mol],p", "unit of column 3, `M_strand_kg_mol [g/mol]`: found \"g/mol\""),
+        ("f,r,M_strand_kg_mol,G_MPa [kPa]", "allowed: `G_MPa`, or `G [MPa]` with its unit"),
+        ("f,r,M_strand_kg_mol,p [K]", "unit of column 4, `p [K]`: found \"K\"; allowed: `p`, or `p [%]`"),
+        ("f,r,M_strand_kg_mol,P,P", "one column `p`"),
+    ] {
+        let row = "4,1.0,10,0.9,0.9".split_inclusive(',').take(heads.split(',').count());
+        let row: String = row.collect::<String>().trim_end_matches(',').to_owned() + "\n";
+        let error = read(heads, &row).unwrap_err().to_string();
+        assert!(error.contains(message), "{error}");
+    }
+    // columns of others are none of these
+    let table =
+        read("f,r,M_strand_kg_mol,G_model_MPa,w_sol_1,source_doi,p", "4,1,10,0.2,0.1,x,0.9\n").unwrap();
+    assert_eq!(table.unused, ["G_model_MPa", "w_sol_1", "source_doi"]);
+    assert_eq!((table.rows[0].sol, table.rows[0].modulus), (None, None));
 }
 
 /// Long chains cross-linked at random: sol of x = 2 by the table of formulation-networks.md, both ways, for

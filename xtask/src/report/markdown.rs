@@ -4,6 +4,7 @@
 use harness::report::Kind;
 
 use super::Page;
+use super::others::ExternalFigure;
 use crate::outcome::CaseOutcome;
 use crate::summary;
 use crate::table::TextTable;
@@ -27,6 +28,8 @@ pub fn text(page: &Page, outcomes: &[CaseOutcome]) -> String {
         table.push([kind.to_string(), count.to_string(), meaning(kind).to_owned()]);
     }
     text += &table.markdown();
+    let what = "Quantities of nature beside ours, and who measured them.";
+    text += &figures("Measurements", what, "measured", &page.measurements);
     text += "\n## Thesis map\n\n";
     let mut table = TextTable::new(["thesis", "what", "numbers", "verdict"]);
     page.thesis.iter().for_each(|judged| table.push(judged.cells()));
@@ -35,13 +38,8 @@ pub fn text(page: &Page, outcomes: &[CaseOutcome]) -> String {
     let mut table = TextTable::new(["link", "what", "numbers", "verdict"]);
     page.links.iter().for_each(|judged| table.push(judged.cells()));
     text += &table.markdown();
-    if !page.others.is_empty() {
-        text += "\n## Others' figures\n\nFigures of other authors beside ours (cases below \
-                 `cases/external`).\n\n";
-        let mut table = TextTable::new(["case", "what", "source", "figure", "ours", "verdict"]);
-        page.others.iter().for_each(|other| table.push(other.cells()));
-        text += &table.markdown();
-    }
+    let what = "Figures of other authors beside ours (cases below `cases/external`).";
+    text += &figures("Others' figures", what, "figure", &page.others);
     text += "\n## Cases\n\n";
     let mut table = TextTable::new([
         "case",
@@ -80,6 +78,16 @@ pub fn text(page: &Page, outcomes: &[CaseOutcome]) -> String {
     let mut table = TextTable::new(["engine", "largest difference", "expected", "verdict", "measured"]);
     page.cross.iter().for_each(|crossed| table.push(crossed.cells()));
     text + &table.markdown()
+}
+
+/// Formats a section of figures beside ours; empty without any.
+fn figures(title: &str, what: &str, heading: &'static str, found: &[ExternalFigure]) -> String {
+    if found.is_empty() {
+        return String::new();
+    }
+    let mut table = TextTable::new(["case", "what", "source", heading, "ours", "verdict"]);
+    found.iter().for_each(|figure| table.push(figure.cells()));
+    format!("\n## {title}\n\n{what}\n\n{}", table.markdown())
 }
 
 fn meaning(kind: Kind) -> &'static str {

@@ -1,6 +1,7 @@
-//! Comparison with external figures: the cases below cases/external.
+//! Comparison with external figures: measurements of all cases, and other figures of those below
+//! cases/external.
 
-use harness::report::Kind;
+use harness::report::{Judgement, Kind};
 use serde::Serialize;
 
 use crate::outcome::CaseOutcome;
@@ -31,38 +32,45 @@ impl ExternalFigure {
     }
 }
 
+/// Comparisons of all cases with measurements.
+pub fn measurements(outcomes: &[CaseOutcome]) -> Vec<ExternalFigure> {
+    let judged = outcomes.iter().flat_map(|outcome| of_case(outcome, &outcome.case));
+    judged.filter(|figure| figure.kind == Kind::Measured).collect()
+}
+
 /// Comparisons of all cases in the folder with closed forms, publications and other programs. A regression
 /// among them keeps our own distance from a foreign figure, which is therefore missed.
 pub fn figures(outcomes: &[CaseOutcome]) -> Vec<ExternalFigure> {
-    let of_others = |kind| !matches!(kind, Kind::Convergence | Kind::Bound);
-    let mut figures = Vec::new();
-    for outcome in outcomes.iter().filter(|outcome| outcome.case.starts_with(FOLDER)) {
-        let name = outcome.case.strip_prefix(FOLDER).unwrap_or(&outcome.case);
-        let judged = outcome.expect().iter().filter(|judgement| of_others(judgement.expect.kind));
-        figures.extend(judged.map(|judgement| {
-            let [_, quantity, value, figure, source] = judgement.row();
-            let unit = outcome.unit(&judgement.expect.quantity);
-            let (verdict, tone) = match (judgement.pass, &outcome.failure) {
-                (true, None) if judgement.expect.kind.is_evidence() && !judgement.expect.missed => {
-                    ("met", "good")
-                }
-                _ => ("missed", "bad"),
-            };
-            ExternalFigure {
-                case: name.to_owned(),
-                anchor: super::anchor(&outcome.case),
-                title: outcome.title.clone(),
-                quantity,
-                source,
-                kind: judgement.expect.kind,
-                figure,
-                ours: if unit.is_empty() { value } else { format!("{value} {unit}") },
-                verdict,
-                tone,
-            }
-        }));
+    let of_others = |kind| !matches!(kind, Kind::Measured | Kind::Convergence | Kind::Bound);
+    let named = outcomes.iter().filter_map(|outcome| Some((outcome, outcome.case.strip_prefix(FOLDER)?)));
+    let judged = named.flat_map(|(outcome, name)| of_case(outcome, name));
+    judged.filter(|figure| of_others(figure.kind)).collect()
+}
+
+/// Comparisons of one case.
+fn of_case<'a>(outcome: &'a CaseOutcome, name: &'a str) -> impl Iterator<Item = ExternalFigure> + 'a {
+    outcome.expect().iter().map(move |judgement| comparison(outcome, name, judgement))
+}
+
+fn comparison(outcome: &CaseOutcome, name: &str, judgement: &Judgement) -> ExternalFigure {
+    let [_, quantity, value, figure, source] = judgement.row();
+    let unit = outcome.unit(&judgement.expect.quantity);
+    let (verdict, tone) = match (judgement.pass, &outcome.failure) {
+        (true, None) if judgement.expect.kind.is_evidence() && !judgement.expect.missed => ("met", "good"),
+        _ => ("missed", "bad"),
+    };
+    ExternalFigure {
+        case: name.to_owned(),
+        anchor: super::anchor(&outcome.case),
+        title: outcome.title.clone(),
+        quantity,
+        source,
+        kind: judgement.expect.kind,
+        figure,
+        ours: if unit.is_empty() { value } else { format!("{value} {unit}") },
+        verdict,
+        tone,
     }
-    figures
 }
 
 #[cfg(test)]
@@ -84,5 +92,15 @@ mod tests {
         let mut ours = outcome(&report(3.0).replace("closed-form", "regression"), None);
         ours.case = "external/d".to_owned();
         assert_eq!(figures(&[ours])[0].verdict, "missed");
+    }
+
+    #[test]
+    fn measurements_of_all_cases() {
+        let mut outcomes =
+            [outcome(&report(3.0).replace("closed-form", "measured"), None), outcome(&report(3.0), None)];
+        outcomes[0].case = "external/a".to_owned();
+        let cells: Vec<[String; 6]> = measurements(&outcomes).iter().map(ExternalFigure::cells).collect();
+        assert_eq!(cells, [["external/a", "kt", "a | b", "3 ± 1 %", "3", "met"]]);
+        assert!(figures(&outcomes).is_empty());
     }
 }

@@ -265,6 +265,8 @@ fn files_that_are_no_scenes() {
     assert!(message("cas.toml").contains("did you mean"), "{}", message("cas.toml"));
     assert!(message("no/such/case.toml").contains("either"));
     assert!(message(".").contains("is a directory"));
+    std::fs::write(path("rubber.CSV"), "stretch,nominal [MPa]\n1.5,0.4\n").unwrap();
+    assert!(message("rubber.CSV").contains("is a table, not a scene"), "{}", message("rubber.CSV"));
     std::fs::write(path("latin1.toml"), b"version = 1\nname = \"Stra\xdfe\"").unwrap();
     assert!(
         message("latin1.toml").contains("not UTF-8 text (byte 24, line 2)"),

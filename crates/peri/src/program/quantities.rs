@@ -51,6 +51,9 @@ harness::quantities! {
         of a family above which a bond breaks";
     TEARING_ENERGY = "tearing_energy", "J/m²", "with `material.critical`: energy per area at which a crack \
         runs in equilibrium; for a bond law κB of the critical stretch, for a `solid` its `fracture_energy`";
+    NETWORK_MODULUS = "network_modulus", "Pa", "with `material.network`: shear modulus of the network";
+    LOCKING_STRETCH = "locking_stretch", "", "with `material.network`: √n of n Kuhn segments between \
+        junctions, an estimate of the stretch at which the network locks";
     NEW_CRACK_AREA = "new_crack_area", "m²", "where bonds break: area of new cracks, from pairs of \
         neighbours whose bond broke and that share no neighbour any more";
     DISSIPATED_PER_AREA = "dissipated_per_area", "J/m²", "work less stored, kinetic, friction and \

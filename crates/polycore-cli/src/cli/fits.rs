@@ -125,7 +125,7 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     }
     let volumes = case.volumetric.iter().map(|set| set.run(directory, &mut report));
     let volumes = volumes.collect::<Result<Vec<_>, _>>()?;
-    let networks = case.networks.iter().map(|set| set.run(directory, &mut report));
+    let networks = case.networks.iter().map(|set| set.run(directory, !quick, &mut report));
     let networks = networks.collect::<Result<Vec<_>, _>>()?;
     if !case.foams.is_empty() {
         phases.start("foams");

@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use harness::output::picture::{LegendPlace, LinePlot, Series};
 use harness::report::Report;
 use harness::scene::{SceneError, Source};
 use polycore::Error;
@@ -11,6 +12,7 @@ use polycore::network::prediction::{Deviations, NetworkPrediction, PredictionSet
 use polycore::network::table::{Composition, CompositionTable};
 use serde::Deserialize;
 
+use super::MPA;
 use super::network::{ConversionChoice, NetworkOptions, summary};
 use super::quantities as q;
 
@@ -113,11 +115,11 @@ impl NetworkSet {
         q::NETWORKS.iter().map(|quantity| quantity.named(&[&self.name]).name).collect()
     }
 
-    /// Predicts, records the deviations, writes the predictions; returns the summary.
+    /// Predicts, records the deviations, writes the predictions, draws them; returns the summary.
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn run(&self, directory: &Path, report: &mut Report) -> Result<String, Error> {
+    pub fn run(&self, directory: &Path, pictures: bool, report: &mut Report) -> Result<String, Error> {
         let predictions: Vec<Result<NetworkPrediction, String>> =
             self.table.rows.iter().map(|row| self.settings.predict(row)).collect();
         let predicted = predictions.iter().filter(|found| found.is_ok()).count();
@@ -135,6 +137,43 @@ impl NetworkSet {
         }
         let path = directory.join(format!("{}_networks.csv", self.name));
         atomic_write(path, |file| file.write_all(to_csv(&self.table, &predictions).as_bytes()))?;
+        if pictures {
+            self.draw(directory, &predictions)?;
+        }
         Ok(format!("networks {}\n{}", self.name, summary(&self.table, &predictions)))
+    }
+
+    /// Draws predicted over given moduli, a series for each source; nothing without a pair of them.
+    fn draw(
+        &self,
+        directory: &Path,
+        predictions: &[Result<NetworkPrediction, String>],
+    ) -> Result<(), polycore::Error> {
+        let mut sources: Vec<(&str, Vec<f64>, Vec<f64>)> = Vec::new();
+        for (row, prediction) in self.table.rows.iter().zip(predictions) {
+            let (Some(given), Ok(found)) = (row.modulus, prediction) else { continue };
+            let place = sources.iter().position(|(name, ..)| *name == row.source).unwrap_or_else(|| {
+                sources.push((&row.source, Vec::new(), Vec::new()));
+                sources.len() - 1
+            });
+            sources[place].1.push(given / MPA);
+            sources[place].2.push(found.network.modulus() / MPA);
+        }
+        let all = || sources.iter().flat_map(|(_, given, found)| given.iter().chain(found)).copied();
+        let [least, most] = [all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max)];
+        if sources.is_empty() {
+            return Ok(());
+        }
+        let mut plot = LinePlot::new(&format!("Shear moduli of networks: {}", self.name))
+            .axes("given, MPa", "predicted from the chemistry, MPa")
+            .log_x()
+            .log_y()
+            .size(760.0, 520.0)
+            .legend(LegendPlace::Outside);
+        for (name, given, found) in &sources {
+            plot = plot.series(Series::markers(name, given, found));
+        }
+        let plot = plot.series(Series::reference("equal", &[least, most], &[least, most]));
+        plot.write(directory.join(format!("{}_networks.png", self.name)))
     }
 }

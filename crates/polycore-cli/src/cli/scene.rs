@@ -242,7 +242,7 @@ impl FitCase {
             files += "<data>_ranking.csv, <data>_modes.png (not with --quick), ";
         }
         if !self.networks.is_empty() {
-            files += "<network>_networks.csv, ";
+            files += "<network>_networks.csv, <network>_networks.png (not with --quick), ";
         }
         if !self.prony.is_empty() {
             files += "<prony>_prony.csv, <prony>_curve.csv, <prony>_branches.toml, <prony>_prony.inp, ";

@@ -224,7 +224,8 @@ pub struct NetworkPrediction {
 }
 
 /// Writes compositions with their predictions as CSV: the columns of the file, then those of the
-/// prediction; a row to which the model does not apply has its reason.
+/// prediction, which take the place of columns of the same name; a row to which the model does not apply has
+/// its reason.
 pub fn to_csv(table: &CompositionTable, predictions: &[Result<NetworkPrediction, String>]) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let record = |writer: &mut csv::Writer<Vec<u8>>, cells: Vec<String>| {
@@ -232,9 +233,16 @@ pub fn to_csv(table: &CompositionTable, predictions: &[Result<NetworkPrediction,
         let _ = writer.write_record(cells);
     };
     let added = ADDED.map(str::to_owned).to_vec();
-    record(&mut writer, [table.headings.clone(), added].concat());
+    let kept = |cells: &[String]| -> Vec<String> {
+        let cells = cells.iter().zip(&table.headings);
+        cells
+            .filter(|(_, heading)| !ADDED.contains(&heading.as_str()))
+            .map(|(cell, _)| cell.clone())
+            .collect()
+    };
+    record(&mut writer, [kept(&table.headings), added].concat());
     for (row, prediction) in table.rows.iter().zip(predictions) {
-        let mut cells = row.cells.clone();
+        let mut cells = kept(&row.cells);
         match prediction {
             Err(reason) => {
                 cells.extend(std::iter::repeat_n(String::new(), ADDED.len() - 1));

@@ -1,7 +1,8 @@
 //! Tables of compositions: one network a row, measured or to be predicted.
 //!
-//! Columns, by name, in any order; further columns are kept and not used. Only the first three must be
-//! there (the third alone beside `chains`), and cells may be empty.
+//! Columns, by name, in any order and in any capitals; further columns are kept and not used. Only the first
+//! three must be there (the third alone beside `chains`), and cells may be empty. Another unit stands in the
+//! heading: `G [kPa]`, `M_strand [g/mol]`, `w_sol [%]`.
 //!
 //! | column | content |
 //! |---|---|
@@ -22,27 +23,9 @@
 
 use std::path::Path;
 
+use super::columns::Columns;
 use super::{KnownPolymer, PrimaryChains, known_polymer};
 use crate::table::{Error, Table};
-
-/// Columns that are read.
-const COLUMNS: [&str; 15] = [
-    "source",
-    "kind",
-    "sol",
-    "polymer",
-    "f",
-    "r",
-    "M_strand_kg_mol",
-    "M_linker_kg_mol",
-    "M_mono_kg_mol",
-    "b1",
-    "p",
-    "w_sol",
-    "chains",
-    "x",
-    "G_MPa",
-];
 
 /// Composition of a row; molar masses in kg/mol.
 #[derive(Clone, Debug, PartialEq)]
@@ -124,39 +107,35 @@ impl CompositionTable {
     /// # Errors
     /// As [`CompositionTable::read`].
     pub fn from_table(table: &Table) -> Result<Self, Error> {
+        let columns = Columns::find(table)?;
         for (name, what) in [
             ("f", "functionality of the cross-linker"),
             ("r", "groups of the cross-linkers per group of the chains"),
             ("M_strand_kg_mol", "molar mass of the strands, kg/mol"),
         ] {
-            let at_random = name != "M_strand_kg_mol" && table.find("chains").is_some();
-            if table.find(name).is_none() && !at_random {
+            let at_random = name != "M_strand_kg_mol" && columns.column("chains").is_some();
+            if columns.column(name).is_none() && !at_random {
                 return Err(table.refuse_headings(format!("a column `{name}`: {what}")));
             }
         }
-        for name in COLUMNS {
-            if table.headings.iter().filter(|heading| heading.name == name).count() > 1 {
-                return Err(table.refuse_headings(format!("one column `{name}`")));
-            }
+        if table.rows() == 0 {
+            return Err(table.refuse(0, "rows", "none".to_owned(), "a network in each row"));
         }
-        let unknown = |name: &&str| !COLUMNS.contains(name);
-        let headings: Vec<String> = table.headings.iter().map(|heading| heading.text.clone()).collect();
-        let unused = table.headings.iter().map(|heading| heading.name.as_str()).filter(unknown);
+        let row = |row| Composition::from_row(table, &columns, row);
         Ok(Self {
-            rows: (0..table.rows()).map(|row| Composition::from_row(table, row)).collect::<Result<_, _>>()?,
-            unused: unused.filter(|name| !name.is_empty()).map(str::to_owned).collect(),
-            headings,
+            rows: (0..table.rows()).map(row).collect::<Result<_, _>>()?,
+            unused: columns.unused(table),
+            headings: table.headings.iter().map(|heading| heading.text.clone()).collect(),
         })
     }
 }
 
 impl Composition {
-    fn from_row(table: &Table, row: usize) -> Result<Self, Error> {
-        let text = |name: &str| table.find(name).map_or("", |column| table.text(row, column));
+    fn from_row(table: &Table, columns: &Columns, row: usize) -> Result<Self, Error> {
+        let text = |name: &str| columns.column(name).map_or("", |column| table.text(row, column));
         let number = |name: &str, allowed: &Allowed| -> Result<Option<f64>, Error> {
-            let Some(column) = table.find(name) else { return Ok(None) };
-            let found = table.number_or_blank(row, column)?;
-            match found {
+            let Some((column, scale)) = columns.scaled(name) else { return Ok(None) };
+            match table.number_or_blank(row, column)?.map(|number| number * scale) {
                 Some(value) if !(allowed.test)(value) => Err(table.refuse_cell(row, column, allowed.words)),
                 found => Ok(found),
             }
@@ -164,7 +143,7 @@ impl Composition {
         let choice = |name: &str, allowed: &str, choices: &[(&str, bool)]| -> Result<bool, Error> {
             let found = text(name).to_lowercase();
             let known = choices.iter().find(|(known, _)| *known == found);
-            match (known, table.find(name)) {
+            match (known, columns.column(name)) {
                 (Some((_, meaning)), _) => Ok(*meaning),
                 (None, Some(column)) => Err(table.refuse_cell(row, column, allowed)),
                 (None, None) => Ok(false),
@@ -172,7 +151,7 @@ impl Composition {
         };
         let sol = [("", false), ("present", false), ("removed", true), ("left", false), ("extracted", true)];
         let kind = [("", false), ("exp", false), ("md", true), ("measured", false), ("simulated", true)];
-        let primary_chains = match (text("chains"), table.find("chains")) {
+        let primary_chains = match (text("chains"), columns.column("chains")) {
             ("most-probable", _) => Some(PrimaryChains::MostProbable),
             ("one-length", _) => Some(PrimaryChains::OneLength),
             (found, Some(column)) if !found.is_empty() => {
@@ -183,7 +162,7 @@ impl Composition {
         let polymer = match text("polymer") {
             "" => None,
             name => Some(known_polymer(name).map_err(|error| {
-                table.refuse_cell(row, table.find("polymer").unwrap_or_default(), &error.to_string())
+                table.refuse_cell(row, columns.column("polymer").unwrap_or_default(), &error.to_string())
             })?),
         };
         Ok(Self {
@@ -202,7 +181,7 @@ impl Composition {
             sol: number("w_sol", &SHARE)?,
             primary_chains,
             units: number("x", &POSITIVE)?,
-            modulus: number("G_MPa", &POSITIVE)?.map(|modulus| modulus * 1e6),
+            modulus: number("G_MPa", &POSITIVE)?,
             cells: (0..table.headings.len()).map(|column| table.text(row, column).to_owned()).collect(),
         })
     }

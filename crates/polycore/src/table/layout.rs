@@ -187,7 +187,8 @@ fn uncommented(line: &str) -> &str {
 impl Layout {
     /// Detects the layout of a text; returns the row that stands in place of headings if there are none.
     pub(super) fn detect(lines: &[&str]) -> Result<(Self, Heads), (usize, String)> {
-        let written = |(_, line): &(usize, &str)| !line.trim().is_empty() && !is_comment(line);
+        let blank = |line: &str| line.chars().all(|c| c.is_whitespace() || matches!(c, ';' | ',' | '"'));
+        let written = |(_, line): &(usize, &str)| !blank(line) && !is_comment(line);
         let numbered = || lines.iter().copied().enumerate();
         let mut sample: Vec<(usize, &str)> = numbered().filter(written).take(SAMPLE).collect();
         let told = sample

@@ -17,6 +17,7 @@ pub fn observers<const D: usize>(scene: &Scene) -> SceneObservers<'_, D> {
     let none = StatelessObserver::empty(scene);
     vec![
         stateless(StatelessObserver { scalars: values::followed_fields, ..none }),
+        stateless(StatelessObserver { scalars: values::network, ..none }),
         stateless(StatelessObserver { scalars: values::stretches, ..none }),
         Box::new(values::FitError::new(scene)),
         stateless(StatelessObserver { scalars: cracks::breaking, ..none }),

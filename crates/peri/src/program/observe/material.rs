@@ -16,6 +16,7 @@ use crate::program::scene::{
 };
 use crate::solver::{Criterion, Loads, State};
 use harness::scene::{Failure, SceneError, Source};
+use polycore::network::PolymerNetwork;
 use std::sync::Arc;
 
 /// Material of a scene.
@@ -205,6 +206,8 @@ pub struct Physics<const D: usize> {
     /// Bonds of each particle without cracks, and the bonds that cracks break; only with cracks or breaking
     /// bonds.
     pub whole: Option<[Vec<u32>; 2]>,
+    /// Network of `material.network`.
+    pub network: Option<PolymerNetwork>,
     /// Area of new cracks, if bonds break.
     pub cracks: Option<CrackArea>,
     /// Tearing energy, J/m²; `None` for a solid with a critical stretch.
@@ -244,7 +247,9 @@ impl<const D: usize> Physics<D> {
         let rows = rows(source, scene, &body)?;
         check_lines(source, scene, &*body.bonds)?;
         let with = BodyWithMaterial::new(source, scene, variant, &mut body)?;
+        let network = scene.material.network.as_ref();
         let physics = Self {
+            network: network.map(|network| network.network(source)).transpose()?,
             name: String::new(),
             body: with,
             loads,

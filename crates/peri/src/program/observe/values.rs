@@ -9,6 +9,7 @@ use crate::potential::KernelFit;
 use crate::program::quantities as q;
 use crate::program::scene::Scene;
 use harness::observe::{Observer, Scalars};
+use polycore::network::PolymerNetwork;
 
 /// Error of forces in mixed precision above which a run warns.
 const LARGEST_MIXED_ERROR: f64 = 1e-2;
@@ -29,6 +30,14 @@ pub(super) fn followed_fields<const D: usize>(scene: &Scene, to: &mut Scalars<Mo
                 Some((one.unit, [mean, one.mesh_mean, least, largest][index]))
             });
         }
+    }
+}
+
+/// Adds what follows from the chemistry of a network.
+pub(super) fn network<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
+    if scene.material.network.is_some() {
+        to.add_if(q::NETWORK_MODULUS, |m| m.physics.network.as_ref().map(PolymerNetwork::modulus));
+        to.add_if(q::LOCKING_STRETCH, |m| m.physics.network.as_ref()?.locking_stretch());
     }
 }
 

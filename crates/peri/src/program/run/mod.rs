@@ -6,6 +6,7 @@ mod draw;
 mod history;
 mod outcome;
 mod program;
+mod studies;
 mod variants;
 
 pub use outcome::{Profile, VariantOutcome};
@@ -138,6 +139,7 @@ fn run_in<const D: usize>(
     compare::suite(&mut report, &finished, output)?;
     if scene.output.pictures {
         draw::draw_curves(scene, &finished, output)?;
+        studies::draw_studies(&scene.expect, &finished, output)?;
     }
     Ok(FinishedScene { report, outcomes: finished })
 }

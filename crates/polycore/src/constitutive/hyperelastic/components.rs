@@ -2,6 +2,7 @@
 
 use super::columns::mode;
 use super::data::{Mode, TestData, TestState};
+use super::plausible::NOISE_LEVEL;
 use super::table::{ImportedTest, TestFormat};
 use super::weights::WeightSource;
 use crate::table::{Error, Table, plain_unit, plainly};
@@ -87,6 +88,7 @@ impl ComponentColumns {
         let weights = WeightSource::find(file, format)?;
         let state = |&row: &usize| self.state(file, row, format, weights.as_ref());
         let states = rows.iter().map(state).collect::<Result<Vec<_>, _>>()?;
+        self.check_signs(file, &rows, &states)?;
         let count = states.len();
         let source = file.remark("# Source:").or(file.remark("# source:")).unwrap_or_default().to_owned();
         let table = TestData::weighted(source, states, weights.is_some_and(|weights| weights.is_absolute()));
@@ -99,6 +101,20 @@ impl ComponentColumns {
         let description =
             format!("{}; one stress in each row; {count} rows of {chosen}", file.describe(&used));
         Ok(ImportedTest { description, table, notes: Vec::new() })
+    }
+
+    /// Refuses stresses against their strain, but for those near rest that are digitised on its other side.
+    fn check_signs(&self, file: &Table, rows: &[usize], states: &[TestState]) -> Result<(), Error> {
+        let amount = |state: &TestState| state.nominal[0].abs().max(state.nominal[1].abs());
+        let largest = |mode| states.iter().filter(|state| state.mode == mode).map(amount).fold(0.0, f64::max);
+        for (&row, state) in rows.iter().zip(states) {
+            let against = (state.stretches[0] - 1.0) * (state.nominal[0] + state.nominal[1]) < 0.0;
+            let is_signed = ![Mode::Component, Mode::Difference].contains(&state.mode);
+            if is_signed && against && amount(state) > NOISE_LEVEL * largest(state.mode) {
+                return Err(file.refuse_cell(row, self.value, "a stress with the sign of the strain"));
+            }
+        }
+        Ok(())
     }
 
     fn state(
@@ -140,7 +156,8 @@ impl ComponentColumns {
             None => test.second_stretch(first),
         };
         let unit = self.unit.map(|column| file.text(row, column)).filter(|unit| !unit.is_empty());
-        let unit = unit.or(format.stress_unit.as_deref()).unwrap_or_default();
+        let heading = file.headings[self.value].unit.as_deref();
+        let unit = unit.or(heading).or(format.stress_unit.as_deref()).unwrap_or_default();
         let unit = Unit::<StressDimension>::parse(&plain_unit(unit)).map_err(|error| {
             file.refuse_cell(row, self.unit.unwrap_or(self.value), &format!("a stress with a unit; {error}"))
         })?;
@@ -159,9 +176,6 @@ impl ComponentColumns {
                 return Err(file.refuse_cell(row, self.component, allowed));
             }
         };
-        if !is_general && state.mode != Mode::Difference && (first - 1.0) * stress < 0.0 {
-            return Err(file.refuse_cell(row, self.value, "a stress with the sign of the strain"));
-        }
         if let Some(weights) = weights.filter(|_| stress != 0.0) {
             state.roots = [weights.root(file, row, stress)?; 2];
         }
@@ -210,6 +224,12 @@ mod tests {
         let silicone = read(two, &of("silicone", &[])).unwrap().table;
         assert_eq!((silicone.states.len(), silicone.states[0].nominal), (2, [0.0, 1e5]));
         assert_eq!(silicone.states[1].mode, Mode::Component);
+        // digitised on the other side of rest, by 1 % of the largest stress
+        let near_rest = "a,gel,UT,0.999,,P1,kPa,0.05\na,gel,UT,2,,P1,kPa,5\n";
+        assert_eq!(read(near_rest, &TestFormat::default()).unwrap().table.states.len(), 2);
+        let unit_of_heading = b"mode,lambda1,component,value [kPa]\nUT,2,P1,5\n".to_vec();
+        let table = TestData::parse_as("t.csv", unit_of_heading, &TestFormat::default()).unwrap().table;
+        assert_eq!(table.states[0].nominal, [5e3, 0.0]);
         assert_eq!(read(two, &of("b", &["BT"])).unwrap().table.states[0].stretches, [1.5, 1.2]);
         for (rows, format, part) in [
             (two, TestFormat::default(), "2 materials and none chosen"),
@@ -220,6 +240,7 @@ mod tests {
             ("a,g,UT,2,,P2,kPa,5\n", TestFormat::default(), "column 6, `component`: found `P2`"),
             ("a,g,UT,2,,P1,K,5\n", TestFormat::default(), "column 7, `unit`: found `K`"),
             ("a,g,UT,2,,P1,kPa,-5\n", TestFormat::default(), "the sign of the strain"),
+            ("a,g,UT,2,,P1,kPa,5\na,g,UT,0.9,,P1,kPa,0.2\n", TestFormat::default(), "line 3: column 8"),
             ("a,g,UT,-2,,P1,kPa,5\n", TestFormat::default(), "a stretch above 0"),
             ("a,g,XX,2,,P1,kPa,5\n", TestFormat::default(), "a test: UT"),
         ] {

@@ -19,7 +19,7 @@ pub(super) struct TestRow {
 }
 
 /// Share of the largest stress below which stresses are noise around zero.
-const NOISE_LEVEL: f64 = 0.02;
+pub(super) const NOISE_LEVEL: f64 = 0.02;
 /// Strain without a unit beyond which it must be in per cent: rubbers break earlier.
 const LARGEST_STRAIN: f64 = 20.0;
 /// Share of the largest stress to which the stress of a torn specimen falls.

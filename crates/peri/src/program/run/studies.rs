@@ -1,0 +1,106 @@
+//! Draws values over the number of a study: `r=0.7`, `r=0.8`, `r=0.9`.
+
+use super::outcome::VariantOutcome;
+use harness::output::picture::{LinePlot, Series};
+use harness::report::{Bound, Expect};
+use polycore::Error;
+use std::path::Path;
+
+/// Number of studies from which a picture is drawn.
+const FEWEST: usize = 3;
+
+/// Values of one name over the number of their studies.
+struct StudyCurve {
+    /// Name of the value.
+    value: String,
+    /// Key of the studies.
+    key: String,
+    /// Number and reference.
+    references: Vec<[f64; 2]>,
+    /// Number and computed value.
+    computed: Vec<[f64; 2]>,
+    unit: String,
+}
+
+/// Draws `study_KEY_VALUE.png` for each value with a reference in at least three studies `KEY=NUMBER`: the
+/// computed values as points, the references as a line.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn draw_studies(
+    expectations: &[Expect],
+    outcomes: &[VariantOutcome],
+    output: &Path,
+) -> Result<(), Error> {
+    for curve in curves(expectations, outcomes) {
+        let (scale, unit) = match &*curve.unit {
+            "Pa" => (1e-6, "MPa"),
+            "m" => (1e3, "mm"),
+            unit => (1.0, unit),
+        };
+        let split = |points: &[[f64; 2]]| -> (Vec<f64>, Vec<f64>) {
+            let mut points = points.to_vec();
+            points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            points.iter().map(|[x, y]| (*x, scale * y)).unzip()
+        };
+        let (name, heading) = (curve.value.replace('_', " "), if unit.is_empty() { "" } else { " in " });
+        let [references, computed] = [&curve.references, &curve.computed].map(|points| split(points));
+        LinePlot::new(&name)
+            .axes(&curve.key, &format!("{name}{heading}{unit}"))
+            .size(520.0, 440.0)
+            .series(Series::markers("computed", &computed.0, &computed.1))
+            .series(Series::reference("reference", &references.0, &references.1))
+            .write(output.join(format!("study_{}_{}.png", curve.key, curve.value)))?;
+    }
+    Ok(())
+}
+
+/// Collects the curves, in the order of the expectations.
+fn curves(expectations: &[Expect], outcomes: &[VariantOutcome]) -> Vec<StudyCurve> {
+    let mut curves: Vec<StudyCurve> = Vec::new();
+    for expect in expectations {
+        let Bound::Near { reference, .. } = expect.bound else { continue };
+        let Some((value, variant)) = expect.quantity.strip_suffix(']').and_then(|name| name.split_once('['))
+        else {
+            continue;
+        };
+        let Some((key, number)) = numbered(variant) else { continue };
+        let place = curves.iter().position(|curve| curve.value == value && curve.key == key);
+        let place = place.unwrap_or_else(|| {
+            let [value, key] = [value, key].map(str::to_owned);
+            let (references, computed, unit) = (Vec::new(), Vec::new(), String::new());
+            curves.push(StudyCurve { value, key, references, computed, unit });
+            curves.len() - 1
+        });
+        let curve = &mut curves[place];
+        curve.references.push([number, reference]);
+        let solved = outcomes.iter().filter(|outcome| outcome.name == variant);
+        for (_, found, unit) in solved.flat_map(|outcome| &outcome.values).filter(|found| found.0 == value) {
+            curve.computed.push([number, *found]);
+            curve.unit.clone_from(unit);
+        }
+    }
+    curves.retain(|curve| curve.references.len() >= FEWEST && !curve.computed.is_empty());
+    curves
+}
+
+/// Returns key and number of a study `KEY=NUMBER`, the last word of the name of a variant.
+fn numbered(variant: &str) -> Option<(&str, f64)> {
+    let (_, study) = variant.rsplit_once(' ')?;
+    let (key, number) = study.split_once('=')?;
+    let is_lattice = key == "m";
+    (!is_lattice).then_some((key, number.parse().ok()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_studies() {
+        assert_eq!(numbered("dx=1mm m=3.015 r=0.7"), Some(("r", 0.7)));
+        for other in ["dx=1mm m=3.015", "dx=1mm m=3.015 fine", "dx=1mm m=3.015 a=x", "r=0.7"] {
+            assert_eq!(numbered(other), None, "{other}");
+        }
+    }
+}
