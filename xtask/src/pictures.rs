@@ -14,11 +14,13 @@ use crate::stamp::{SourceStamp, hash_bytes};
 use crate::table::print;
 use crate::workspace::Repository;
 
+mod chart;
 mod compose;
 mod fill;
 mod include;
 mod page;
 
+use chart::Chart;
 use compose::Image;
 
 /// The list of pictures and tables, below the root.
@@ -50,14 +52,17 @@ struct List {
     table: Vec<Block>,
 }
 
-/// A PNG file made of panels side by side.
+/// A PNG file made of panels side by side, or a chart of values.
 #[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct Picture {
     file: PathBuf,
     /// Greatest width, pixels.
+    #[serde(default)]
     width: usize,
+    #[serde(default)]
     panel: Vec<Panel>,
+    chart: Option<Chart>,
 }
 
 /// A part of a picture that a case draws.
@@ -93,7 +98,8 @@ struct DrawnEntry {
 
 impl Picture {
     fn cases(&self) -> Vec<&str> {
-        self.panel.iter().map(|panel| panel.case.as_str()).collect()
+        let panels = self.panel.iter().map(|panel| panel.case.as_str());
+        panels.chain(self.chart.iter().flat_map(Chart::cases)).collect()
     }
 
     fn key(&self) -> String {
@@ -277,6 +283,11 @@ fn solve(workspace: &Repository, options: &Options, name: &str, list: &List) -> 
 }
 
 fn draw(root: &Path, picture: &Picture, results: &BTreeMap<String, PathBuf>) -> Result<()> {
+    if let Some(chart) = &picture.chart {
+        let reports = reports(&chart.cases(), results)?;
+        let path = root.join(&picture.file);
+        return chart.write(&path, |case, quantity| reports.get(case)?.scalar(quantity));
+    }
     let mut panels = Vec::new();
     for panel in &picture.panel {
         let mut file = results[&panel.case].join(&panel.from);
@@ -292,12 +303,14 @@ fn draw(root: &Path, picture: &Picture, results: &BTreeMap<String, PathBuf>) -> 
     compose::side_by_side(&panels, picture.width).write(&root.join(&picture.file))
 }
 
+/// Reports of cases by name.
+fn reports(cases: &[&str], results: &BTreeMap<String, PathBuf>) -> Result<BTreeMap<String, Report>> {
+    let read = |name: &&str| Ok(((*name).to_owned(), Report::read(results[*name].join(FILE_NAME))?));
+    cases.iter().map(read).collect::<std::result::Result<_, polycore::Error>>().into_diagnostic()
+}
+
 fn write(root: &Path, block: &Block, results: &BTreeMap<String, PathBuf>) -> Result<()> {
-    let mut reports = BTreeMap::new();
-    for name in block.cases() {
-        let report = Report::read(results[name].join(FILE_NAME)).into_diagnostic()?;
-        reports.insert(name.to_owned(), report);
-    }
+    let reports = reports(&block.cases(), results)?;
     let value = |case: &str, quantity: &str| reports.get(case).and_then(|report| report.scalar(quantity));
     let filled = fill::fill(&block.text, value).wrap_err_with(|| block.key())?;
     let path = root.join(&block.file);

@@ -63,7 +63,7 @@ impl<L: Law, const D: usize> Correspondence<L, D> {
     /// Computes λ₃² and the law's prediction at C, with ℂ if requested.
     fn predict(&self, gradient: &BodyTensor<D>, tangent: bool) -> Option<(f64, Prediction)> {
         MEMORY.with_borrow_mut(|memory| {
-            let (c, found) = at_thickness(self.space, gradient, tangent, |c, tangent| {
+            let (c, found) = at_thickness((self.space, 1e-15), gradient, tangent, |c, tangent| {
                 if tangent { self.law.tangent(c, memory) } else { self.law.stress(c, memory) }.ok()
             })?;
             Some((c[2], found))
@@ -157,10 +157,11 @@ pub(super) fn check<const D: usize>(
     Ok(moduli)
 }
 
-/// C of a deformation and the prediction there; in plane stress C₃₃ is found by S₃₃ = 0.
+/// C of a deformation and the prediction there; in plane stress C₃₃ is found by S₃₃ = 0, by Newton's method
+/// up to a relative change of `enough`.
 #[inline]
 pub(super) fn at_thickness<const D: usize>(
-    space: Space,
+    (space, enough): (Space, f64),
     gradient: &BodyTensor<D>,
     tangent: bool,
     mut law: impl FnMut(&Voigt, bool) -> Option<Prediction>,
@@ -178,7 +179,7 @@ pub(super) fn at_thickness<const D: usize>(
             change = (next - c[2]).abs() / next;
             c[2] = next;
             // otherwise only rounding is left
-            if change <= 1e-15 || (change >= before && change < 1e-13) {
+            if change <= enough || (change >= before && change < 1e-13) {
                 break;
             }
         }

@@ -43,6 +43,10 @@ struct StepStates {
     pressure: f64,
 }
 
+/// Relative change of C₃₃ after which Newton's method leaves an error of its square, that of rounding: the
+/// tangent of a step is exact.
+const ENOUGH: f64 = 1e-9;
+
 thread_local! {
     static SCRATCH: RefCell<StepStates> = RefCell::default();
 }
@@ -121,7 +125,7 @@ impl ViscousCorrespondence {
         *pressure = past.map_or(0.0, |past| self.unpack(past, start));
         let past = past.filter(|_| !self.drives_alone(part));
         let mut found = None;
-        let (c, _) = at_thickness(self.space, &deformation.gradient(), tangent, |c, tangent| {
+        let (c, _) = at_thickness((self.space, ENOUGH), &deformation.gradient(), tangent, |c, tangent| {
             let response = match past {
                 Some(past) => {
                     let increment = self.increment(*c, past.duration, *pressure);

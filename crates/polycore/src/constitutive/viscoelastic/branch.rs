@@ -160,7 +160,7 @@ impl Frame {
 
 /// Returns true for a tensor without components 13 and 23.
 fn keeps_plane(a: &Tensor) -> bool {
-    [a[(0, 2)], a[(1, 2)]] == [0.0; 2]
+    a[(0, 2)] == 0.0 && a[(1, 2)] == 0.0
 }
 
 /// A B in loops, which the compiler unrolls; nalgebra's product calls a function for each column.
@@ -275,12 +275,12 @@ impl Branch {
         strains: [f64; 3],
         before: f64,
     ) -> Result<BranchStep, Error> {
-        let energy = self.spring.energy(strains);
+        let (energy, tau) = self.spring.energy_and_stress(strains);
         if !before.is_finite() {
             let stretches = frame.trial.map(f64::exp);
             return Err(Error::Overflow { law: "spring of a branch at the start of a step", stretches });
         }
-        let (tau, squares) = (self.spring.stress(strains), frame.squares(volume));
+        let squares = frame.squares(volume);
         let diagonal = [0, 1, 2].map(|i| tau[i] / squares[i]);
         let stress = voigt::from_stress(&diagonal_in(&frame.inverse, diagonal));
         Ok(BranchStep { state, stress, tangent: None, energy, dissipated: before - energy })

@@ -87,7 +87,8 @@ impl Flow<'_> {
     /// ln(Δt W′/η).
     pub fn logarithm(&self, strains: [f64; 3], trial: [f64; 3]) -> f64 {
         let slope = self.spring.slopes(strains)[0];
-        let fluidity = self.viscosity.fluidity(self.j2(strains), self.trace(strains, trial)).logarithm;
+        let j2 = if let Viscosity::Constant(_) = self.viscosity { 0.0 } else { self.j2(strains) };
+        let fluidity = self.viscosity.fluidity(j2, self.trace(strains, trial)).logarithm;
         (0.5 * self.duration).ln() + slope.ln() + fluidity - self.factor
     }
 
@@ -214,14 +215,13 @@ fn relaxed(trial: [f64; 3], alpha: f64, guess: [f64; 3]) -> Result<[f64; 3], Err
         let mut part = 1.0;
         loop {
             let next: [f64; 3] = std::array::from_fn(|i| strains[i] + part * step[i]);
-            let there = gradient(next);
             // a change of 1e-9 leaves an error of its square
-            let last = part == 1.0 && moved <= 1e-9 * size;
-            if last || dot(there.0, step).abs() <= 0.9 * slope || part < 1e-12 {
+            if part == 1.0 && moved <= 1e-9 * size {
+                return Ok(next);
+            }
+            let there = gradient(next);
+            if dot(there.0, step).abs() <= 0.9 * slope || part < 1e-12 {
                 (strains, here) = (next, there);
-                if last {
-                    return Ok(strains);
-                }
                 break;
             }
             part *= 0.5;

@@ -48,10 +48,15 @@ impl Spring {
         }
     }
 
-    /// τ = 2W′ dev exp 2e, Pa.
-    pub(super) fn stress(&self, strains: [f64; 3]) -> [f64; 3] {
-        let slope = self.slopes(strains)[0];
-        deviator(strains).map(|b| slope * b)
+    /// W, J/m³, and τ = 2W′ dev exp 2e, Pa.
+    pub(super) fn energy_and_stress(&self, strains: [f64; 3]) -> (f64, [f64; 3]) {
+        let squares = squares_above_one(strains);
+        let (energy, slope) = match self {
+            Self::NeoHookean(law) => (0.5 * law.shear_modulus() * sum(squares), law.shear_modulus()),
+            _ => (self.energy(strains), self.slopes(strains)[0]),
+        };
+        let [a, b, c] = without_mean(squares);
+        (energy, [slope * a, slope * b, slope * c])
     }
 
     /// τ, and dτ/de on Σe = 0, Pa.
@@ -94,17 +99,28 @@ impl Spring {
 
 /// I₁ − 3 of principal log strains, without cancellation.
 fn excess(strains: [f64; 3]) -> f64 {
-    squares_above_one(strains).iter().sum::<f64>().max(0.0)
+    sum(squares_above_one(strains))
+}
+
+/// I₁ − 3 of exp 2eᵢ − 1.
+fn sum(squares: [f64; 3]) -> f64 {
+    squares.iter().sum::<f64>().max(0.0)
 }
 
 /// exp 2eᵢ − 1.
 pub(super) fn squares_above_one(strains: [f64; 3]) -> [f64; 3] {
-    strains.map(|e| (2.0 * e).exp_m1())
+    let [a, b, c] = strains;
+    [(2.0 * a).exp_m1(), (2.0 * b).exp_m1(), (2.0 * c).exp_m1()]
 }
 
 /// exp 2eᵢ minus the mean.
 pub(super) fn deviator(strains: [f64; 3]) -> [f64; 3] {
-    let squares = squares_above_one(strains);
-    let mean = squares.iter().sum::<f64>() / 3.0;
-    squares.map(|x| x - mean)
+    without_mean(squares_above_one(strains))
+}
+
+/// Values minus their mean.
+fn without_mean(values: [f64; 3]) -> [f64; 3] {
+    let [a, b, c] = values;
+    let mean = values.iter().sum::<f64>() / 3.0;
+    [a - mean, b - mean, c - mean]
 }
