@@ -63,7 +63,7 @@ impl<L: Law, const D: usize> Correspondence<L, D> {
     /// Computes λ₃² and the law's prediction at C, with ℂ if requested.
     fn predict(&self, gradient: &BodyTensor<D>, tangent: bool) -> Option<(f64, Prediction)> {
         MEMORY.with_borrow_mut(|memory| {
-            let (c, found) = at_thickness((self.space, 1e-15), gradient, tangent, |c, tangent| {
+            let (c, found) = at_thickness(self.space, 1e-15, gradient, tangent, |c, tangent| {
                 if tangent { self.law.tangent(c, memory) } else { self.law.stress(c, memory) }.ok()
             })?;
             Some((c[2], found))
@@ -161,7 +161,8 @@ pub(super) fn check<const D: usize>(
 /// up to a relative change of `enough`.
 #[inline]
 pub(super) fn at_thickness<const D: usize>(
-    (space, enough): (Space, f64),
+    space: Space,
+    enough: f64,
     gradient: &BodyTensor<D>,
     tangent: bool,
     mut law: impl FnMut(&Voigt, bool) -> Option<Prediction>,

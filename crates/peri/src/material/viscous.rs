@@ -125,7 +125,7 @@ impl ViscousCorrespondence {
         *pressure = past.map_or(0.0, |past| self.unpack(past, start));
         let past = past.filter(|_| !self.drives_alone(part));
         let mut found = None;
-        let (c, _) = at_thickness((self.space, ENOUGH), &deformation.gradient(), tangent, |c, tangent| {
+        let (c, _) = at_thickness(self.space, ENOUGH, &deformation.gradient(), tangent, |c, tangent| {
             let response = match past {
                 Some(past) => {
                     let increment = self.increment(*c, past.duration, *pressure);
