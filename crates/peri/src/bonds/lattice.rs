@@ -2,6 +2,7 @@
 
 mod connect;
 mod mixed;
+mod periodic;
 
 use super::lattice_kernel::{Factors, TILE, TileClass, Tiles};
 use super::lattice_sums::{GradientSums, Span, Spans, Weights};
@@ -17,6 +18,8 @@ use crate::field::{Field, chunk_range};
 use crate::geometry::{Cut, Gaps, Lattice, cell, refuse_too_large};
 use crate::potential::{EnergyTable, KernelFit, StretchRange, TangentTable};
 use mixed::Mixed;
+pub use periodic::PeriodicImage;
+use periodic::widen;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -47,6 +50,9 @@ pub struct LatticeBonds<const D: usize> {
     directed_bonds: u64,
     softening: SoftenedBonds,
     mixed: Option<Mixed<D>>,
+    /// Images beyond periodic sides, by their sites, and the edges of the cell along periodic axes, m.
+    images: Vec<PeriodicImage<D>>,
+    period: [f64; D],
 }
 
 impl<const D: usize> LatticeBonds<D> {
@@ -75,6 +81,21 @@ impl<const D: usize> LatticeBonds<D> {
         cuts: &[Cut<D>],
         gaps: Option<&Gaps<D>>,
     ) -> Result<Self, Error> {
+        Self::with_periodic_sides(lattice, ratio, volume_correction, (cuts, gaps), [false; D])
+    }
+
+    /// Builds bonds as [`Self::with_gaps`] does, and across the sides of the box along `periodic` axes: there
+    /// bonds of particles near one side reach those near the opposite one. Cuts end at such sides.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_periodic_sides(
+        lattice: Lattice<D>,
+        ratio: f64,
+        volume_correction: VolumeCorrection,
+        (cuts, gaps): (&[Cut<D>], Option<&Gaps<D>>),
+        periodic: [bool; D],
+    ) -> Result<Self, Error> {
         let (listed, cells) = (lattice.occupied.len(), lattice.cells);
         if listed == 0
             || cells.iter().try_fold(1, |product: usize, &n| product.checked_mul(n)) != Some(listed)
@@ -88,14 +109,18 @@ impl<const D: usize> LatticeBonds<D> {
                 return Err(Error::geometry(format!("{name}: found {value}; allowed: above 0, finite")));
             }
         }
-        let (sites, offsets) =
-            (storage(cells.map(|n| n as f64), ratio), (2.0 * ratio.floor() + 1.0).powi(D as i32));
+        let layers = periodic.map(|periodic| if periodic { ratio.floor() as usize } else { 0 });
+        let period =
+            std::array::from_fn(|d| if periodic[d] { lattice.spacing * cells[d] as f64 } else { 0.0 });
+        let cells: [f64; D] = std::array::from_fn(|d| cells[d] as f64 + 2.0 * layers[d] as f64);
+        let (sites, offsets) = (storage(cells, ratio), (2.0 * ratio.floor() + 1.0).powi(D as i32));
         let bytes = 8.0 * (offsets / 64.0).ceil() * sites + (4 * D) as f64 * offsets;
         refuse_too_large(lattice.spacing, [sites, f64::from(u32::MAX)], bytes)?;
         let mut stencil = Stencil::<D>::new(ratio);
         if stencil.offsets.is_empty() {
             return Err(Error::geometry(format!("a horizon of {ratio} spacings reaches no neighbour")));
         }
+        let lattice = widen(lattice, layers)?;
         let order = fullest(lattice.cells, &lattice.occupied, ratio);
         let (strides, guard, sites) = layout(lattice.cells, ratio, order);
         // bond k and bond (n − 1 − k) stay opposite, and a bond is found by its distance in sites
@@ -120,6 +145,8 @@ impl<const D: usize> LatticeBonds<D> {
             directed_bonds: 0,
             softening: SoftenedBonds::default(),
             mixed: None,
+            images: Vec::new(),
+            period,
             lattice,
         };
         bonds.spans = bonds.measure();
@@ -127,6 +154,7 @@ impl<const D: usize> LatticeBonds<D> {
         if bonds.particles.is_empty() {
             return Err(Error::geometry("the body contains no particle".to_owned()));
         }
+        bonds.images = bonds.find_images(layers);
         bonds.connect(cuts, gaps);
         bonds.classify();
         refuse_one_sided(&bonds)?;
@@ -334,11 +362,19 @@ impl<const D: usize> BodyGeometry<D> for LatticeBonds<D> {
         let shifts: Vec<isize> = self.stencil.offsets.iter().map(|&o| self.shift(o)).collect();
         self.particles.par_iter().find_map_first(|&site| {
             let site = site as usize;
-            let there = |k: usize| site.wrapping_add_signed(shifts[k]);
+            let there = |k: usize| self.origin(site.wrapping_add_signed(shifts[k]));
             let lone = |k: &usize| self.is_intact(site, *k) && !self.is_intact(there(*k), opposite - k);
             let lone = (0..=opposite).find(lone)?;
             Some([site, there(lone)])
         })
+    }
+
+    fn images(&self) -> &[PeriodicImage<D>] {
+        &self.images
+    }
+
+    fn period(&self) -> [f64; D] {
+        self.period
     }
 
     fn whole_family(&self) -> Option<u32> {
@@ -361,6 +397,9 @@ impl<const D: usize> BondForces<D> for LatticeBonds<D> {
     }
 
     fn set_factors(&mut self, mut factors: Field<D>) {
+        for image in &self.images {
+            factors.set(image.site as usize, factors.get(image.origin as usize));
+        }
         // the factor of a particle with the whole stencil, if there is one
         let interior = self
             .particles

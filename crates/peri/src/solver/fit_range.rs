@@ -39,6 +39,7 @@ impl<const D: usize> System<'_, D> {
         state: &mut State<D>,
         observed: Option<StretchRange>,
     ) -> Result<bool, Error> {
+        self.place_images(&mut state.displacement);
         let observed = observed.unwrap_or_else(|| stretch_range(&*self.bonds, &state.displacement));
         state.stretches.balanced = observed;
         state.stretches.observe(observed);

@@ -325,7 +325,7 @@ impl VelocityVerlet {
             state.motion.look.slack = slack + strain;
             system.move_surfaces(factor, after);
             system.set_duration(state, step)?;
-            system.prepare(&state.displacement);
+            system.prepare(&mut state.displacement);
             let Some((displacement, velocity)) = &start else { break (after, leap, first) };
             cuts += 1;
             if cuts > MOST_CUTS || !self.is_too_long(system, state, strain) {
