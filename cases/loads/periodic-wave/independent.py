@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Standing waves of a periodic lattice of linear bonds, with the standard library: the references of case.toml.
+"""Standing waves of a periodic lattice of linear bonds, in plain Python: the references of case.toml.
 
-rho w^2 = sum over the stencil 6 k V n_d^2 (1 - cos(q . xi))/|xi| with k = 3E/(2 pi t delta^3) of plane stress, the
-displacement along d and q along x. From rest with v = v0 cos(q x) velocity Verlet of step h gives exactly
-u = v0 cos(q x) h sin(N W h)/sin(W h), W h = 2 asin(w h/2).
+rho w^2 = sum over the stencil 6 k V n_d^2 (1 - cos(q . xi))/|xi| with k = 3E/(2 pi t delta^3) of plane
+stress, the displacement along d and q along x. From u = 0 with v = v0 cos(q x), N steps h of velocity Verlet
+give u = v0 cos(q x) h sin(N W h)/sin(W h), W h = 2 asin(w h/2).
 
     python3 cases/loads/periodic-wave/independent.py
 """

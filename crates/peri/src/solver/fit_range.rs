@@ -12,9 +12,11 @@ impl<const D: usize> System<'_, D> {
     /// Restores bonds, law and loads of a state: at rest, or of an interrupted run.
     ///
     /// # Errors
-    /// [`Error::Geometry`] if the state belongs to another body, and errors of
+    /// [`Error::Geometry`] if the state belongs to another body or loads do not go with periodic sides, and
+    /// errors of
     /// [`crate::potential::KernelFit::new`].
     pub fn restore(&mut self, state: &mut State<D>) -> Result<(), Error> {
+        self.refuse_beside_images()?;
         state.fracture.restore(&mut *self.bonds)?;
         self.material.recall(&*self.bonds, state.memory.duration, &state.memory.values)?;
         if state.fracture.intact.is_some() {
@@ -30,6 +32,22 @@ impl<const D: usize> System<'_, D> {
         // a bound that depends on the displacement stays that of the previous run
         let known = Some(state.stretches.tangent).filter(|&tangent| tangent > 0.0);
         self.fit_law(state, known)
+    }
+
+    /// Refuses what does not follow images beyond periodic sides.
+    fn refuse_beside_images(&self) -> Result<(), Error> {
+        let loads = &self.loads;
+        let refused = [
+            (self.breaking.is_some(), "bonds that break"),
+            (self.contact.is_some(), "contact"),
+            (loads.curved.is_some(), "curves of time"),
+            (!loads.turned.is_empty(), "rotations"),
+            (!loads.rigid.is_empty(), "regions that move as a whole"),
+        ];
+        match refused.into_iter().find(|(given, _)| *given && !self.bonds.images().is_empty()) {
+            Some((_, what)) => Err(Error::geometry(format!("periodic sides: found {what}; allowed: none"))),
+            None => Ok(()),
+        }
     }
 
     /// Returns true if every stretch of the state, `observed` if known, lies within the fit; widens the fit

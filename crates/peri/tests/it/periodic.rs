@@ -2,11 +2,13 @@
 
 use crate::bodies::MODULUS;
 use crate::dynamics::{DENSITY, once, run};
-use peri::bonds::{BodyGeometry, LatticeBonds, Stencil, VolumeCorrection};
+use peri::bonds::{BodyGeometry, BondForces, LatticeBonds, Stencil, VolumeCorrection, force};
+use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
-use peri::material::BondMaterial;
+use peri::material::{BondMaterial, virial};
 use peri::potential::{BondPotential, Law};
-use peri::solver::{Lbfgs, Loads, Method, QuasiStatic, State, System};
+use peri::solver::{Lbfgs, Loads, Method, State, System};
+use peri::stress::{BallVolume, StressInput, StressMethod, SurfaceCompensation, piola_on_lattice};
 use std::f64::consts::PI;
 
 const SPACING: f64 = 0.1;
@@ -93,6 +95,39 @@ fn a_cell_relaxes_to_the_homogeneous_state() {
     assert!((state.history[0].stored / volume / energy - 1.0).abs() < 1e-8);
     eprintln!("a cell from a random start: {} iterations", state.counts.total_iterations);
     assert!((1..200).contains(&state.counts.total_iterations), "{}", state.counts.total_iterations);
+}
+
+/// Stresses of particles have the mean of the virial, and forces of a cell sum to zero, in any state.
+#[test]
+fn stresses_of_particles_have_the_mean_of_the_cell() {
+    let law = Law::Linear.build(1.0, 1.0, false).unwrap();
+    let mut bonds = cell([9, 7], [true; 2]);
+    let loads = Loads { mean_gradient: Some([[0.1, 0.05], [0.0, -0.05]]), ..Loads::default() };
+    let (material, factors) = (BondMaterial::new(&*law, MODULUS), [1.0]);
+    let mut random = crate::bodies::Random(3);
+    let mut displacement = Field::zeros(bonds.sites());
+    for &site in bonds.particles() {
+        displacement.set(site as usize, std::array::from_fn(|_| 0.2 * SPACING * random.next()));
+    }
+    System::new(&mut bonds, material.clone(), &loads, &factors).prepare(&mut displacement);
+    let sum = virial(&material, &vec![(); bonds.sites()], &bonds, &displacement);
+    let fit = crate::bodies::fit(&*law, [0.3, 1.7]);
+    let (modulus, missing) = (MODULUS, SurfaceCompensation::Bonds);
+    let loaded = StressInput { displacement: &displacement, fit: &fit, modulus, missing };
+    let stress = piola_on_lattice(&bonds, &loaded, StressMethod::OnePoint, BallVolume::Whole);
+    for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+        let mean: f64 = stress.iter().map(|stress| stress[a][b] * SPACING * SPACING).sum();
+        assert!((mean - sum[a][b]).abs() < 1e-8 * sum[0][0].abs(), "{a}{b}: {mean} {}", sum[a][b]);
+    }
+    bonds.set_law(&fit, MODULUS);
+    let mut forces = Field::zeros(bonds.sites());
+    force(&bonds, &displacement, &mut forces);
+    let each = || bonds.particles().iter().map(|&site| forces.get(site as usize));
+    let size: f64 = each().map(|f| f[0].abs()).sum();
+    for d in 0..2 {
+        let total: f64 = each().map(|f| f[d]).sum();
+        assert!(total.abs() < 1e-13 * size, "{total} of {size}");
+    }
 }
 
 /// A standing wave in a row, periodic along it: at any time the exact solution of velocity Verlet with the
