@@ -53,7 +53,7 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     }
     if let Some(rows) = &periodic.gradient {
         let good = rows.len() == dimension && rows.iter().all(|row| row.len() == dimension);
-        if !good || rows.iter().flatten().any(|entry| !(entry.abs() < 1e3)) {
+        if !good || rows.iter().flatten().any(|entry| entry.is_nan() || entry.abs() >= 1e3) {
             let allowed = format!("{dimension} rows of {dimension} numbers between −1000 and 1000");
             return Err(source.error("periodic.gradient", format!("{rows:?}"), allowed));
         }
