@@ -7,9 +7,9 @@ use crate::parallel;
 use crate::stress::StressTensor;
 
 /// Computes ½ Σ_I V_I Σ_J f_IJ ⊗ ξ_IJ V_J, N·m, with f_IJ the force densities of bonds and `points` the
-/// states of all sites. Over the volume it is the mean first Piola–Kirchhoff stress of a cell with periodic sides:
-/// ∂E/∂H of a homogeneous change of all displacements, in equilibrium that of the mean displacement gradient
-/// (Hill 1972, doi:10.1098/rspa.1972.0001).
+/// states of all sites. Over the volume it is the mean first Piola–Kirchhoff stress of a cell with periodic
+/// sides: ∂E/∂H of a homogeneous change of all displacements, in equilibrium that of the mean displacement
+/// gradient (Hill 1972, doi:10.1098/rspa.1972.0001).
 pub fn virial<M: Material<D>, const D: usize>(
     material: &M,
     points: &[M::Point],

@@ -104,9 +104,9 @@ impl<'a, const D: usize> System<'a, D> {
         }
     }
 
-    /// Runs the first pass over a new displacement, or over changed bonds: images, states of
-    /// particles, the copy read by kernels of clouds and of mixed precision, and pairs in contact if particles
-    /// have moved far. Call it once before the forces; how often pairs are updated changes no bit.
+    /// Runs the first pass over a new displacement, or over changed bonds: images, states of particles, the
+    /// copy read by kernels of clouds and of mixed precision, and pairs in contact if particles have moved
+    /// far. Call it once before the forces; how often pairs are updated changes no bit.
     pub fn prepare(&mut self, displacement: &mut Field<D>) {
         self.place_images(displacement);
         let displacement = &*displacement;
