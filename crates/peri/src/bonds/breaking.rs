@@ -163,5 +163,9 @@ pub fn components<const D: usize, B: BodyGeometry<D> + ?Sized>(
             }
         });
     }
+    for image in bonds.images() {
+        let (a, b) = (find(&mut root, image.site), find(&mut root, image.origin));
+        root[a.max(b) as usize] = a.min(b);
+    }
     (0..bonds.sites() as u32).map(|site| find(&mut root, site)).collect()
 }

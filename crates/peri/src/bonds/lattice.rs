@@ -1,7 +1,9 @@
 //! A regular lattice: one stencil of offsets, a bit mask of intact bonds per particle, no neighbour list.
 
 mod connect;
+mod damage;
 mod mixed;
+mod periodic;
 
 use super::lattice_kernel::{Factors, TILE, TileClass, Tiles};
 use super::lattice_sums::{GradientSums, Span, Spans, Weights};
@@ -9,14 +11,16 @@ use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
 use super::softening::{Softened, SoftenedBonds, integrity};
 use super::stencil::{Stencil, fullest, layout, storage};
 use super::{
-    BodyGeometry, BondDamage, BondForces, BondKind, Bonds, Neighbour, Overstretched, VolumeCorrection,
-    plain_force, refuse_one_sided, surface_weight,
+    BodyGeometry, BondForces, BondKind, Bonds, Neighbour, VolumeCorrection, plain_force, refuse_one_sided,
+    surface_weight,
 };
 use crate::error::Error;
 use crate::field::{Field, chunk_range};
 use crate::geometry::{Cut, Gaps, Lattice, cell, refuse_too_large};
 use crate::potential::{EnergyTable, KernelFit, StretchRange, TangentTable};
 use mixed::Mixed;
+pub use periodic::PeriodicImage;
+use periodic::widen;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -47,6 +51,9 @@ pub struct LatticeBonds<const D: usize> {
     directed_bonds: u64,
     softening: SoftenedBonds,
     mixed: Option<Mixed<D>>,
+    /// Images beyond periodic sides, by their sites, and the edges of the cell along periodic axes, m.
+    images: Vec<PeriodicImage<D>>,
+    period: [f64; D],
 }
 
 impl<const D: usize> LatticeBonds<D> {
@@ -75,6 +82,21 @@ impl<const D: usize> LatticeBonds<D> {
         cuts: &[Cut<D>],
         gaps: Option<&Gaps<D>>,
     ) -> Result<Self, Error> {
+        Self::with_periodic_sides(lattice, ratio, volume_correction, (cuts, gaps), [false; D])
+    }
+
+    /// Builds bonds as [`Self::with_gaps`] does, and across the sides of the box along `periodic` axes: there
+    /// bonds of particles near one side reach those near the opposite one. Cuts end at such sides.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_periodic_sides(
+        lattice: Lattice<D>,
+        ratio: f64,
+        volume_correction: VolumeCorrection,
+        (cuts, gaps): (&[Cut<D>], Option<&Gaps<D>>),
+        periodic: [bool; D],
+    ) -> Result<Self, Error> {
         let (listed, cells) = (lattice.occupied.len(), lattice.cells);
         if listed == 0
             || cells.iter().try_fold(1, |product: usize, &n| product.checked_mul(n)) != Some(listed)
@@ -88,14 +110,18 @@ impl<const D: usize> LatticeBonds<D> {
                 return Err(Error::geometry(format!("{name}: found {value}; allowed: above 0, finite")));
             }
         }
-        let (sites, offsets) =
-            (storage(cells.map(|n| n as f64), ratio), (2.0 * ratio.floor() + 1.0).powi(D as i32));
+        let layers = periodic.map(|periodic| if periodic { ratio.floor() as usize } else { 0 });
+        let period =
+            std::array::from_fn(|d| if periodic[d] { lattice.spacing * cells[d] as f64 } else { 0.0 });
+        let cells: [f64; D] = std::array::from_fn(|d| cells[d] as f64 + 2.0 * layers[d] as f64);
+        let (sites, offsets) = (storage(cells, ratio), (2.0 * ratio.floor() + 1.0).powi(D as i32));
         let bytes = 8.0 * (offsets / 64.0).ceil() * sites + (4 * D) as f64 * offsets;
         refuse_too_large(lattice.spacing, [sites, f64::from(u32::MAX)], bytes)?;
         let mut stencil = Stencil::<D>::new(ratio);
         if stencil.offsets.is_empty() {
             return Err(Error::geometry(format!("a horizon of {ratio} spacings reaches no neighbour")));
         }
+        let lattice = widen(lattice, layers)?;
         let order = fullest(lattice.cells, &lattice.occupied, ratio);
         let (strides, guard, sites) = layout(lattice.cells, ratio, order);
         // bond k and bond (n − 1 − k) stay opposite, and a bond is found by its distance in sites
@@ -120,6 +146,8 @@ impl<const D: usize> LatticeBonds<D> {
             directed_bonds: 0,
             softening: SoftenedBonds::default(),
             mixed: None,
+            images: Vec::new(),
+            period,
             lattice,
         };
         bonds.spans = bonds.measure();
@@ -127,6 +155,7 @@ impl<const D: usize> LatticeBonds<D> {
         if bonds.particles.is_empty() {
             return Err(Error::geometry("the body contains no particle".to_owned()));
         }
+        bonds.images = bonds.find_images(layers);
         bonds.connect(cuts, gaps);
         bonds.classify();
         refuse_one_sided(&bonds)?;
@@ -334,11 +363,19 @@ impl<const D: usize> BodyGeometry<D> for LatticeBonds<D> {
         let shifts: Vec<isize> = self.stencil.offsets.iter().map(|&o| self.shift(o)).collect();
         self.particles.par_iter().find_map_first(|&site| {
             let site = site as usize;
-            let there = |k: usize| site.wrapping_add_signed(shifts[k]);
+            let there = |k: usize| self.origin(site.wrapping_add_signed(shifts[k]));
             let lone = |k: &usize| self.is_intact(site, *k) && !self.is_intact(there(*k), opposite - k);
             let lone = (0..=opposite).find(lone)?;
             Some([site, there(lone)])
         })
+    }
+
+    fn images(&self) -> &[PeriodicImage<D>] {
+        &self.images
+    }
+
+    fn period(&self) -> [f64; D] {
+        self.period
     }
 
     fn whole_family(&self) -> Option<u32> {
@@ -361,6 +398,9 @@ impl<const D: usize> BondForces<D> for LatticeBonds<D> {
     }
 
     fn set_factors(&mut self, mut factors: Field<D>) {
+        for image in &self.images {
+            factors.set(image.site as usize, factors.get(image.origin as usize));
+        }
         // the factor of a particle with the whole stencil, if there is one
         let interior = self
             .particles
@@ -433,54 +473,6 @@ impl<const D: usize> BondForces<D> for LatticeBonds<D> {
     fn gradient_sums(&self, displacement: &Field<D>, chunk: usize) -> Option<Vec<GradientSums<D>>> {
         let sites = chunk_range(chunk, self.sites);
         self.softening.bonds().is_empty().then(|| self.spans(displacement).gradient_sums(sites))
-    }
-}
-
-impl<const D: usize> BondDamage<D> for LatticeBonds<D> {
-    fn break_bonds(&mut self, bonds: &[Overstretched]) {
-        for bond in bonds {
-            let (site, k) = (bond.site as usize, bond.index as usize);
-            self.intact[k / 64][site] &= !(1 << (k % 64));
-        }
-        self.directed_bonds -= bonds.len() as u64;
-        let mut tiles: Vec<usize> = bonds.iter().map(|bond| bond.site as usize / TILE).collect();
-        tiles.dedup();
-        for tile in tiles {
-            let empty = (tile * TILE..(tile + 1) * TILE).all(|s| self.intact.iter().all(|w| w[s] == 0));
-            self.classes[tile] = if empty { TileClass::Empty } else { TileClass::Partial };
-        }
-    }
-
-    fn softening(&self) -> &SoftenedBonds {
-        &self.softening
-    }
-
-    fn soften(&mut self, bonds: Vec<Softened>) {
-        self.softening.replace(bonds);
-    }
-
-    fn intact(&self) -> Vec<u64> {
-        self.intact.concat()
-    }
-
-    fn bit(&self, site: usize, index: u32) -> (usize, u64) {
-        (index as usize / 64 * self.sites + site, 1 << (index % 64))
-    }
-
-    fn restore(&mut self, words: &[u64]) -> bool {
-        if words.len() != self.intact.len() * self.sites {
-            return false;
-        }
-        for (own, saved) in self.intact.iter_mut().zip(words.chunks(self.sites)) {
-            own.iter_mut().zip(saved).for_each(|(own, saved)| *own &= saved);
-        }
-        self.directed_bonds = self.intact.iter().flatten().map(|word| u64::from(word.count_ones())).sum();
-        self.classify();
-        true
-    }
-
-    fn directed_bonds(&self) -> u64 {
-        self.directed_bonds
     }
 }
 

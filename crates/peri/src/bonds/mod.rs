@@ -28,7 +28,7 @@ pub use cells::CellGrid;
 pub use cloud::CloudBonds;
 pub use cloud_kernel::GROUP;
 pub use cloud_linear::{CloudMoments, CloudPlaces, MomentColumns};
-pub use lattice::LatticeBonds;
+pub use lattice::{LatticeBonds, PeriodicImage};
 pub use lattice_kernel::TILE;
 pub use lattice_sums::GradientSums;
 pub(crate) use lattice_sums::Weights;

@@ -41,6 +41,9 @@ impl Property {
             field.least = field.least.min(value);
             field.greatest = field.greatest.max(value);
         }
+        for image in bonds.images() {
+            field.values[image.site as usize] = field.values[image.origin as usize];
+        }
         // a uniform field is stored as one value
         if field.least == field.greatest { field.least.into() } else { field }
     }

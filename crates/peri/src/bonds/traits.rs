@@ -1,7 +1,7 @@
 //! Traits of a bonded body: its geometry, the forces of its bonds, and their damage.
 
 use super::lattice_sums::GradientSums;
-use super::{CloudBonds, LatticeBonds, Overstretched, Softened, SoftenedBonds};
+use super::{CloudBonds, LatticeBonds, Overstretched, PeriodicImage, Softened, SoftenedBonds};
 use crate::field::{CHUNK, Field};
 use crate::potential::{EnergyTable, KernelFit, StretchRange, TangentTable};
 use rayon::prelude::*;
@@ -40,6 +40,19 @@ pub trait BodyGeometry<const D: usize>: Send + Sync {
     fn horizon(&self) -> f64;
     /// Distance of neighbouring particles (for clouds the cube or square root of the mean volume), m.
     fn spacing(&self) -> f64;
+    /// Images beyond periodic sides, by their sites: neighbours of particles without bonds of their own.
+    fn images(&self) -> &[PeriodicImage<D>] {
+        &[]
+    }
+    /// Edges of the cell between periodic sides, m; 0 along axes without.
+    fn period(&self) -> [f64; D] {
+        [0.0; D]
+    }
+    /// Returns the site of the particle whose image is in a site; other sites themselves.
+    fn origin(&self, site: usize) -> usize {
+        let found = self.images().binary_search_by_key(&(site as u32), |image| image.site);
+        found.map_or(site, |at| self.images()[at].origin as usize)
+    }
     /// Visits the intact bonds of a site.
     fn neighbours(&self, site: usize, visit: &mut dyn FnMut(Neighbour<D>));
     /// Returns the intact bond of a site with a [`Neighbour::index`].

@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::field::{CHUNK, Field};
 use crate::parallel;
 use crate::potential::{BondPotential, BondSoftening, EnergyTable, KernelFit, StretchRange, TangentTable};
+use crate::stress::StressTensor;
 use std::sync::Arc;
 
 /// Ratio of the largest tangent to that at rest above which every particle has the stiffness of its own
@@ -213,6 +214,10 @@ impl<const D: usize> SolverMaterial<D> for Kernels<'_> {
         };
         modulus * parallel::map_chunks(bonds.particles(), CHUNK, of).iter().sum::<f64>()
             + lacking.unwrap_or(0.0)
+    }
+
+    fn virial(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>) -> StressTensor<D> {
+        super::virial(&self.material, &vec![(); bonds.sites()], bonds, displacement)
     }
 
     /// Half of a bond's energy 2kθ|ξ|φ w V_I V_J from either end. q is constant beyond the fit, so the energy

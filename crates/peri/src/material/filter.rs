@@ -3,6 +3,7 @@
 
 use super::point::SolidPoint;
 use super::point_law::PointLaw;
+use super::pointwise::copy_to_images;
 use crate::bonds::BodyGeometry;
 use crate::parallel;
 use rayon::prelude::*;
@@ -47,10 +48,15 @@ impl Filter {
 
     /// Changes the energy to Σ_I V_I I_I U((bJ)_I): with p_I = Σ_J b_IJ I_J U′((bJ)_J)/I_I in place of
     /// U′(J_I), forces are its exact variation.
-    pub(super) fn apply<L: PointLaw<D>, const D: usize>(&mut self, law: &L, points: &mut [SolidPoint<D>]) {
+    pub(super) fn apply<L: PointLaw<D>, const D: usize>(
+        &mut self,
+        law: &L,
+        bonds: &dyn BodyGeometry<D>,
+        points: &mut [SolidPoint<D>],
+    ) {
         let change = |point: &SolidPoint<D>| point.deformation().map_or(0.0, |found| found.volume_change());
         self.values = parallel::map_each(points, change);
-        self.average::<D>();
+        self.average(bonds);
         let own = |change: f64| law.filtered(change).unwrap_or_default();
         let parts = points.par_iter_mut().zip(&self.means).zip(&self.values);
         let slopes = parts.map(|((point, &mean), &change)| {
@@ -63,7 +69,7 @@ impl Filter {
         });
         let slopes: Vec<f64> = slopes.collect();
         self.values = slopes;
-        self.average::<D>();
+        self.average(bonds);
         points.par_iter_mut().zip(&self.means).filter(|(point, _)| point.has_gradient()).for_each(
             |(point, mean)| {
                 point.filtered[1] += mean / point.integrity();
@@ -71,7 +77,7 @@ impl Filter {
         );
     }
 
-    fn average<const D: usize>(&mut self) {
+    fn average<const D: usize>(&mut self, bonds: &dyn BodyGeometry<D>) {
         let (values, share) = (&self.values, 1.0 / (2 * D + 1) as f64);
         let of = |site: usize| {
             let others = self.neighbours[site].iter().take_while(|&&site| site != u32::MAX);
@@ -79,5 +85,6 @@ impl Filter {
             own + share * others.map(|&site| values[site as usize] - own).sum::<f64>()
         };
         self.means = parallel::map(values.len(), of);
+        copy_to_images(bonds, &mut self.means);
     }
 }

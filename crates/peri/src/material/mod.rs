@@ -32,6 +32,7 @@ mod spline_levels;
 mod strength;
 mod tensor;
 mod traction;
+mod virial;
 mod viscous;
 
 pub use affine::{Affine, AffinePoint};
@@ -50,6 +51,7 @@ pub use strength::energy_at_strength;
 pub use tensor::BodyTensor;
 pub(crate) use tensor::cofactor;
 pub use traction::surface_load;
+pub use virial::virial;
 pub use viscous::ViscousCorrespondence;
 
 pub use crate::bonds::Property;

@@ -1,11 +1,12 @@
 //! Materials by plain loops over families: any [`Material`] with the states of all particles.
 
 use super::{Bond, EnergyPart, Family, LawCover, LawRange, Material, Past, SolverMaterial};
-use crate::bonds::{Bonds, Overstretched, Property, StretchScan, overstretched};
+use crate::bonds::{BodyGeometry, Bonds, Overstretched, Property, StretchScan, overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::parallel;
 use crate::potential::{BondPotential, LinearBond, StretchRange};
+use crate::stress::StressTensor;
 
 /// The two passes of a material over a whole body, for materials with something faster than plain loops over
 /// bonds. States and forces must equal those of [`Material::prepare`] and [`Material::force`] except for
@@ -56,6 +57,7 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
         for (&site, point) in bonds.particles().iter().zip(begun) {
             points[site as usize] = point;
         }
+        copy_to_images(bonds, &mut points);
         let modulus = material.micromodulus(bonds);
         let passes = material.passes(bonds);
         Self { material, points, passes, modulus, tangent: 0.0 }
@@ -78,6 +80,7 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
                 visit(material, &Family::new(bonds, displacement, site), &mut points[site - chunk * CHUNK]);
             }
         });
+        copy_to_images(bonds, &mut self.points);
     }
 
     /// Visits the force densities τ_IJ − τ_JI, N/m⁶, of the intact bonds of a particle, after
@@ -136,6 +139,13 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
     /// The states, site by site.
     pub fn points(&self) -> &[M::Point] {
         &self.points
+    }
+}
+
+/// Copies the states of particles to their images beyond periodic sides.
+pub(super) fn copy_to_images<T: Clone, const D: usize>(bonds: &dyn BodyGeometry<D>, states: &mut [T]) {
+    for image in bonds.images() {
+        states[image.site as usize] = states[image.origin as usize].clone();
     }
 }
 
@@ -218,6 +228,10 @@ impl<M: Material<D>, const D: usize> SolverMaterial<D> for Pointwise<M, D> {
                 force[d][site - start] = sum[d];
             }
         }
+    }
+
+    fn virial(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>) -> StressTensor<D> {
+        super::virial(&self.material, &self.points, bonds, displacement)
     }
 
     fn energy(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, _met: StretchRange) -> f64 {

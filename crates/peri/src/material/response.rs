@@ -5,6 +5,7 @@ use crate::bonds::{Bonds, Overstretched, Property, StretchScan, overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
 use crate::potential::{BondPotential, StretchRange};
+use crate::stress::StressTensor;
 
 /// Stretches over which a law is to be evaluated, and how.
 #[derive(Clone, Copy, Debug)]
@@ -82,6 +83,10 @@ pub trait SolverMaterial<const D: usize>: Send + Sync {
 
     /// Energy of the body, J; `observed` are the stretches within which the law itself is evaluated.
     fn energy(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, observed: StretchRange) -> f64;
+
+    /// Volume times the mean first Piola–Kirchhoff stress in the displacement last prepared, N·m, see
+    /// [`super::virial`].
+    fn virial(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>) -> StressTensor<D>;
 
     /// Energy of bonds about to be severed, J, if it does not depend on others; `most` is the largest stretch
     /// of the law itself. `None`: the energy that the body loses when they break.

@@ -5,7 +5,7 @@ use super::family::Family;
 use super::filter::Filter;
 use super::point::SolidPoint;
 use super::point_law::{NonlocalSolid, PointLaw};
-use super::pointwise::Passes;
+use super::pointwise::{Passes, copy_to_images};
 use super::tensor::BodyTensor;
 use crate::bonds::{BodyGeometry, BondDamage, Bonds, LinearRow, Softened, StretchRange, among};
 use crate::field::{CHUNK, Field, chunk_range};
@@ -192,10 +192,11 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
         });
         let springs = springs.contains(&true);
         if filters {
+            copy_to_images(bonds, points);
             if changes.any {
                 self.filter.link(bonds, points, lattice.spacing());
             }
-            self.filter.apply(&solid.0, points);
+            self.filter.apply(&solid.0, bonds, points);
             let items = self.terms.chunks_mut().into_iter().zip(points.chunks_mut(CHUNK)).collect();
             parallel::for_items(items, |_, (mut terms, points): (_, &mut [SolidPoint<D>])| {
                 for (at, point) in points.iter_mut().enumerate().filter(|(_, point)| point.has_gradient()) {
@@ -203,6 +204,10 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
                     point.terms().enumerate().for_each(|(n, value)| terms[n][at] = value);
                 }
             });
+        }
+        copy_to_images(bonds, points);
+        for terms in self.terms.components_mut() {
+            copy_to_images(bonds, terms);
         }
         self.families.mark(bonds, points, springs);
     }

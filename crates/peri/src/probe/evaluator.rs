@@ -1,7 +1,9 @@
 //! Forces, stresses, energy-momentum and flags of a state, for bond laws and solids.
 
 use crate::bonds::Bonds;
-use crate::material::{BodyTensor, BondMaterial, Family, NonlocalSolid, PointLaw, Pointwise, SolverMaterial};
+use crate::material::{
+    BodyTensor, BondMaterial, Family, NonlocalSolid, PointLaw, Pointwise, SolverMaterial, virial,
+};
 use crate::parallel;
 use crate::potential::KernelFit;
 use crate::solver::State;
@@ -155,6 +157,19 @@ impl<const D: usize> StressEvaluator<D> {
             });
         }
         sum
+    }
+
+    /// Volume times the mean first Piola–Kirchhoff stress, N·m, see [`virial`].
+    pub fn virial(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<StressTensor<D>> {
+        match &self.0 {
+            EvaluatorKind::Nothing => None,
+            EvaluatorKind::Bonds { material, .. } => {
+                Some(virial(&**material, &vec![(); bonds.sites()], bonds, &state.displacement))
+            }
+            EvaluatorKind::Solid { states, .. } => {
+                Some(prepared(states, bonds, state).virial(bonds, &state.displacement))
+            }
+        }
     }
 
     /// First Piola–Kirchhoff and Cauchy stress of a solid's law in every particle, Pa; `None` for bond laws.

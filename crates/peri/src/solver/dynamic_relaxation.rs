@@ -107,7 +107,7 @@ impl RelaxationSolver {
             || state.counts.iteration < CHECK_INTERVAL
             || state.counts.iteration.is_multiple_of(CHECK_INTERVAL);
         let factor = system.loads.force_factor(system.factors[state.step]);
-        system.prepare(&state.displacement);
+        system.prepare(&mut state.displacement);
         system.follow(&state.displacement);
         let own = has_own_mass(system, state);
         if own && (state.counts.iteration.is_multiple_of(REFRESH) || self.own_mass.is_empty()) {

@@ -12,9 +12,11 @@ impl<const D: usize> System<'_, D> {
     /// Restores bonds, law and loads of a state: at rest, or of an interrupted run.
     ///
     /// # Errors
-    /// [`Error::Geometry`] if the state belongs to another body, and errors of
+    /// [`Error::Geometry`] if the state belongs to another body or loads do not go with periodic sides, and
+    /// errors of
     /// [`crate::potential::KernelFit::new`].
     pub fn restore(&mut self, state: &mut State<D>) -> Result<(), Error> {
+        self.refuse_beside_images()?;
         state.fracture.restore(&mut *self.bonds)?;
         self.material.recall(&*self.bonds, state.memory.duration, &state.memory.values)?;
         if state.fracture.intact.is_some() {
@@ -32,6 +34,22 @@ impl<const D: usize> System<'_, D> {
         self.fit_law(state, known)
     }
 
+    /// Refuses what does not follow images beyond periodic sides.
+    fn refuse_beside_images(&self) -> Result<(), Error> {
+        let loads = &self.loads;
+        let refused = [
+            (self.breaking.is_some(), "bonds that break"),
+            (self.contact.is_some(), "contact"),
+            (loads.curved.is_some(), "curves of time"),
+            (!loads.turned.is_empty(), "rotations"),
+            (!loads.rigid.is_empty(), "regions that move as a whole"),
+        ];
+        match refused.into_iter().find(|(given, _)| *given && !self.bonds.images().is_empty()) {
+            Some((_, what)) => Err(Error::geometry(format!("periodic sides: found {what}; allowed: none"))),
+            None => Ok(()),
+        }
+    }
+
     /// Returns true if every stretch of the state, `observed` if known, lies within the fit; widens the fit
     /// otherwise.
     pub(super) fn covers_stretches(
@@ -39,6 +57,7 @@ impl<const D: usize> System<'_, D> {
         state: &mut State<D>,
         observed: Option<StretchRange>,
     ) -> Result<bool, Error> {
+        self.place_images(&mut state.displacement);
         let observed = observed.unwrap_or_else(|| stretch_range(&*self.bonds, &state.displacement));
         state.stretches.balanced = observed;
         state.stretches.observe(observed);

@@ -33,6 +33,7 @@ impl ForceScale {
         };
         let sums: Vec<f64> = parallel::map_each(bonds.particles(), of);
         let mut scale = Self { springs: vec![0.0; bonds.sites()], ..Self::default() };
+        let sides = loads.mean_gradient.map(|rows| rows.iter().flatten().map(|x| x * x).sum::<f64>().sqrt());
         let [low, high] = bounds(bonds.particles().iter().map(|&site| bonds.position(site as usize)));
         let mut square = 0.0;
         for (&site, sum) in bonds.particles().iter().zip(sums) {
@@ -46,6 +47,16 @@ impl ForceScale {
             }
         }
         scale.diagonal = (0..D).map(|d| (high[d] - low[d]).powi(2)).sum::<f64>().sqrt();
+        if let Some(strain) = sides {
+            // bonds across periodic sides pull as those at grips
+            scale.largest = scale.largest.max(strain * scale.diagonal);
+            let origins = bonds.images().iter().map(|image| image.origin as usize);
+            let sums = origins.map(|site| (scale.springs[site], bonds.volume(site)));
+            let (squares, forces) =
+                sums.fold((0.0, 0.0), |(s, f), (sum, volume)| (s + sum * sum, f + volume * sum));
+            square += squares;
+            scale.held_sum += bonds.horizon() * forces;
+        }
         scale.constrained = bonds.horizon() * square.sqrt();
         scale
     }

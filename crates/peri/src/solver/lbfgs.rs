@@ -160,9 +160,14 @@ impl<const D: usize> LbfgsSolver<D> {
 
     /// Builds the preconditioner for the present state and forgets everything else: a run that begins with
     /// this state takes the same steps.
-    fn begin(&mut self, system: &mut System<D>, state: &State<D>, watch: &mut Watch<D>) -> Result<(), Error> {
+    fn begin(
+        &mut self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        watch: &mut Watch<D>,
+    ) -> Result<(), Error> {
         watch(&self.status(system, state, true), state)?;
-        system.prepare(&state.displacement);
+        system.prepare(&mut state.displacement);
         let particles = system.bonds.particles().len();
         let fields = [
             &mut self.gradient,
@@ -190,7 +195,7 @@ impl<const D: usize> LbfgsSolver<D> {
     /// Computes forces at the present displacement; their gradient goes to `self.trial`.
     fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> LinePoint {
         let factor = system.loads.force_factor(system.factors[state.step]);
-        system.prepare(&state.displacement);
+        system.prepare(&mut state.displacement);
         system.follow(&state.displacement);
         let body = (&self.places, self.preconditioner.volumes());
         let (sums, observed, slope) =

@@ -35,6 +35,9 @@ pub struct Loads<const D: usize> {
     pub rigid: Vec<RigidRegion>,
     /// With such regions: bit d of a site: component d is constrained or shared.
     pub joined: Vec<u8>,
+    /// Mean displacement gradient H of a body with periodic sides at load factor 1; zero columns along other
+    /// axes.
+    pub mean_gradient: Option<[[f64; D]; D]>,
     /// Loads that follow curves; absent: all follow the load factor.
     pub curved: Option<Box<CurvedLoads<D>>>,
 }
@@ -210,17 +213,58 @@ impl<const D: usize> Loads<D> {
         std::array::from_fn(|d| up[d].max(down[d]))
     }
 
+    /// Moves the images beyond periodic sides with their origins, and by F·H times the distance between both.
+    pub(super) fn place_images(&self, bonds: &dyn BodyGeometry<D>, factor: f64, displacement: &mut Field<D>) {
+        for image in bonds.images() {
+            let mut value = displacement.get(image.origin as usize);
+            if let Some(gradient) = &self.mean_gradient {
+                for (value, row) in value.iter_mut().zip(gradient) {
+                    *value += factor * (0..D).map(|d| row[d] * image.shift[d]).sum::<f64>();
+                }
+            }
+            displacement.set(image.site as usize, value);
+        }
+    }
+
+    /// Relative displacement of opposite periodic sides at factor 1, m: √Σ_d |H e_d|² L_d² with the edges L.
+    pub(super) fn reach_of_sides(&self, period: [f64; D]) -> f64 {
+        let Some(gradient) = &self.mean_gradient else { return 0.0 };
+        let each = gradient.iter().flat_map(|row| (0..D).map(|d| (row[d] * period[d]).powi(2)));
+        each.sum::<f64>().sqrt()
+    }
+
     /// Affine field u_d = a_d + Σ_e B_de X_e to start from: closest to the prescribed displacements if there
     /// are any, otherwise in balance with the body forces. One row (a_d, B_d1, …) per component, at load
     /// factor 1.
     pub fn affine_predictor(&self, bonds: &dyn BodyGeometry<D>, stiffness: f64) -> [[f64; 4]; D] {
-        if self.displacement.is_some() {
+        if let Some(gradient) = &self.mean_gradient {
+            self.affine_mean(bonds, gradient)
+        } else if self.displacement.is_some() {
             self.affine_closest(bonds)
         } else if self.body_force.is_some() {
             self.affine_balance(bonds, stiffness)
         } else {
             [[0.0; 4]; D]
         }
+    }
+
+    /// Field H X with the mean of the prescribed displacements where some are prescribed.
+    fn affine_mean(&self, bonds: &dyn BodyGeometry<D>, gradient: &[[f64; D]; D]) -> [[f64; 4]; D] {
+        let mut result = [[0.0; 4]; D];
+        for d in 0..D {
+            result[d][1..=D].copy_from_slice(&gradient[d]);
+            let held = bonds.particles().iter().map(|&site| site as usize);
+            let held = held.filter(|&site| self.constrained(site) >> d & 1 == 1);
+            let (mut sum, mut count) = (0.0, 0.0);
+            for site in held {
+                let position = bonds.position(site);
+                let prescribed = self.displacement.as_ref().map_or(0.0, |field| field.get(site)[d]);
+                sum += prescribed - (0..D).map(|e| gradient[d][e] * position[e]).sum::<f64>();
+                count += 1.0;
+            }
+            result[d][0] = if count > 0.0 { sum / count } else { 0.0 };
+        }
+        result
     }
 
     /// Least-squares fit, of least norm, to the prescribed displacements: moves the whole body with its

@@ -75,7 +75,7 @@ impl VelocityVerlet {
         state: &mut State<D>,
         frequency: f64,
     ) {
-        system.prepare(&state.displacement);
+        system.prepare(&mut state.displacement);
         let bound = system.material.frequency_bound(&*system.bonds, &state.displacement, 0.0);
         let measured = self.density * system.lightest_ratio() * frequency;
         // nothing oscillates, or the Lanczos iteration has failed: only the bound remains
@@ -146,7 +146,7 @@ impl VelocityVerlet {
         let mut bound = known;
         if broken || waited {
             state.motion.limits.bounds += 1;
-            system.prepare(&state.displacement);
+            system.prepare(&mut state.displacement);
             bound = system.material.frequency_bound(&*system.bonds, &state.displacement, enough);
             state.motion.pace.record_bound(bound);
         }

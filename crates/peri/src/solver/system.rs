@@ -46,6 +46,8 @@ pub struct System<'a, const D: usize> {
     pub contact: Option<Contact<D>>,
     /// Stretches of the last check.
     pub(super) seen_stretches: StretchScan,
+    /// Load factor to which periodic sides have moved.
+    pub(super) sides_at: f64,
     /// Reference scale of out-of-balance forces.
     pub(super) scale: ForceScale,
     /// Density of each site over that of [`VelocityVerlet`](super::VelocityVerlet), above 0; empty: 1.
@@ -94,6 +96,7 @@ impl<'a, const D: usize> System<'a, D> {
             fit_bound: 1e-9,
             contact: None,
             seen_stretches: StretchScan::default(),
+            sides_at: 0.0,
             scale: ForceScale::default(),
             density_ratios: Vec::new(),
             amplitude: None,
@@ -101,10 +104,12 @@ impl<'a, const D: usize> System<'a, D> {
         }
     }
 
-    /// Runs the first pass over a new displacement, or over changed bonds: states of particles, the copy read
-    /// by kernels of clouds and of mixed precision, and pairs in contact if particles have moved far. Call it
-    /// once before the forces; how often pairs are updated changes no bit.
-    pub fn prepare(&mut self, displacement: &Field<D>) {
+    /// Runs the first pass over a new displacement, or over changed bonds: images, states of particles, the
+    /// copy read by kernels of clouds and of mixed precision, and pairs in contact if particles have moved
+    /// far. Call it once before the forces; how often pairs are updated changes no bit.
+    pub fn prepare(&mut self, displacement: &mut Field<D>) {
+        self.place_images(displacement);
+        let displacement = &*displacement;
         if let Some(contact) = self.contact.as_mut().filter(|contact| contact.repels()) {
             contact.update(&*self.bonds, displacement);
         }
@@ -112,8 +117,14 @@ impl<'a, const D: usize> System<'a, D> {
         self.material.prepare(&*self.bonds, displacement);
     }
 
-    /// Moves rigid surfaces to their positions at a load factor and a time, s.
+    /// Moves the images beyond periodic sides with their origins.
+    pub(super) fn place_images(&self, displacement: &mut Field<D>) {
+        self.loads.place_images(&*self.bonds, self.sides_at, displacement);
+    }
+
+    /// Moves rigid surfaces and periodic sides to their positions at a load factor and a time, s.
     pub(super) fn move_surfaces(&mut self, factor: f64, time: f64) {
+        self.sides_at = factor;
         if let Some(contact) = &mut self.contact {
             contact.move_surfaces(factor, time);
         }
@@ -191,12 +202,21 @@ impl<'a, const D: usize> System<'a, D> {
     /// Conjugate sums of loads and rigid surfaces, see [`Loads::conjugates`].
     pub(super) fn conjugates(&self, state: &State<D>) -> (f64, f64) {
         let (pull, push) = self.loads.conjugates(&*self.bonds, &state.displacement, &state.force);
+        let pull = pull + self.work_rate_of_sides(state);
         let work = |(rate, resting): ([f64; D], &SurfaceReaction)| {
             (0..D).map(|d| rate[d] * resting.force[d]).sum::<f64>()
         };
         let Some(contact) = self.repulsion() else { return (pull, push) };
         let resting = self.surface_reactions(state);
         (pull + contact.rates().zip(&resting).map(work).sum::<f64>(), push + self.work_of_pushed())
+    }
+
+    /// Work that the mean stress does over the load factor, J: Σ_I V_I P_I : H, in equilibrium.
+    fn work_rate_of_sides(&self, state: &State<D>) -> f64 {
+        let Some(gradient) = &self.loads.mean_gradient else { return 0.0 };
+        let sum = self.material.virial(&*self.bonds, &state.displacement);
+        let pairs = sum.iter().flatten().zip(gradient.iter().flatten());
+        pairs.map(|(stress, rate)| stress * rate).sum()
     }
 
     /// Work of the forces on rigid surfaces, see [`Contact::travelled`].
@@ -208,6 +228,11 @@ impl<'a, const D: usize> System<'a, D> {
     pub(super) fn response(&self, state: &State<D>, factor: f64, conjugates: (f64, f64)) -> (f64, f64) {
         if self.loads.curved.is_some() {
             return self.curved_response(state, factor);
+        }
+        let sides = self.loads.reach_of_sides(self.bonds.period());
+        if sides > 0.0 {
+            let reach = sides.hypot(self.loads.reach(&*self.bonds, &[]));
+            return (conjugates.0 / reach, factor * reach);
         }
         let surfaces = || self.contact.iter().flat_map(Contact::surfaces);
         let rigid: Vec<[f64; D]> = surfaces().map(|surface| surface.displacement).collect();

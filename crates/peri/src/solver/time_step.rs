@@ -135,8 +135,8 @@ fn tangent<const D: usize>(
     for (sign, out) in [(1.0, &mut *product), (-1.0, force)] {
         moved.clone_from(&state.displacement);
         combine(moved, [(sign * probe, direction), (0.0, direction)]);
-        let moved = &*moved;
         system.prepare(moved);
+        let moved = &*moved;
         let system = &*system;
         parallel::for_items(out.chunks_mut(), |chunk, mut out| {
             system.internal_force(moved, chunk * CHUNK, &mut out, None);

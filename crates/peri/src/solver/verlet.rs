@@ -82,8 +82,8 @@ impl<const D: usize> Method<D> for VelocityVerlet {
     /// # Errors
     /// [`Error::Parameter`] for settings out of their domain; [`Error::TimeStep`] for a time step beyond the
     /// critical one; [`Error::Unstable`] if energy grows without work; [`Error::NotFinite`] for a state that
-    /// is not finite at the start; [`Error::Geometry`] of [`System::restore`]; errors of `watch` and
-    /// `finished`.
+    /// is not finite at the start; [`Error::Geometry`] for a mean gradient and of [`System::restore`];
+    /// errors of `watch` and `finished`.
     fn solve(
         &self,
         system: &mut System<D>,
@@ -136,6 +136,10 @@ impl VelocityVerlet {
         state: &mut State<D>,
     ) -> Result<SiteMasses, Error> {
         self.check()?;
+        if system.loads.mean_gradient.is_some() {
+            let why = "mean gradient: found one in explicit dynamics; allowed: in equilibria".to_owned();
+            return Err(Error::geometry(why));
+        }
         if !state.motion.begun && system.amplitude.is_none() {
             system.refuse_inverted(&[1.0])?;
         }
@@ -325,7 +329,7 @@ impl VelocityVerlet {
             state.motion.look.slack = slack + strain;
             system.move_surfaces(factor, after);
             system.set_duration(state, step)?;
-            system.prepare(&state.displacement);
+            system.prepare(&mut state.displacement);
             let Some((displacement, velocity)) = &start else { break (after, leap, first) };
             cuts += 1;
             if cuts > MOST_CUTS || !self.is_too_long(system, state, strain) {

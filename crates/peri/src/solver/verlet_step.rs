@@ -187,7 +187,7 @@ pub fn refresh<const D: usize>(
     factor: f64,
     sites: Option<&[u32]>,
 ) {
-    system.prepare(&state.displacement);
+    system.prepare(&mut state.displacement);
     system.follow(&state.displacement);
     // states of particles change beyond their own bonds, and forces of a region with all of them
     let whole = system.material.has_points() || !system.loads.rigid.is_empty();

@@ -162,7 +162,8 @@ pub struct MeasuredStress<const D: usize> {
     pub seconds: f64,
 }
 
-/// Computes [`piola`] of several measures. On a lattice they share the forces of bonds.
+/// Computes [`piola`] of several measures. On a lattice they share the forces of bonds; with periodic sides
+/// measures other than [`StressMethod::OnePoint`] give NaN.
 pub fn piolas<const D: usize>(
     bonds: &dyn Bonds<D>,
     state: &StressInput<D>,

@@ -35,6 +35,7 @@ mod materials;
 mod model;
 mod pace;
 mod parts;
+mod periodic;
 mod pressed;
 mod prestrain;
 mod relaxation;

@@ -12,6 +12,8 @@ impl<const D: usize> LatticeBonds<D> {
     pub(super) fn connect(&mut self, cuts: &[Cut<D>], gaps: Option<&Gaps<D>>) {
         let words = self.stencil.offsets.len().div_ceil(64);
         let occupied = self.occupancy();
+        let mut reached = occupied.clone();
+        self.images.iter().for_each(|image| reached[image.site as usize] = true);
         let bits = |site: usize| -> Vec<u64> {
             let mut bits = vec![0_u64; words];
             let Some(cell) = self.cell_of(site).filter(|_| occupied[site]) else { return bits };
@@ -23,7 +25,7 @@ impl<const D: usize> LatticeBonds<D> {
                     || gaps.as_ref().is_some_and(|gaps| gaps.severs(here, there))
             };
             for (k, offset) in self.stencil.offsets.iter().enumerate() {
-                let there = self.cell_at(cell, *offset).filter(|&there| occupied[there]);
+                let there = self.cell_at(cell, *offset).filter(|&there| reached[there]);
                 if there.is_some_and(|there| !parted(self.position(there))) {
                     bits[k / 64] |= 1 << (k % 64);
                 }

@@ -67,6 +67,7 @@ pub(super) fn refuse(source: &Source, scene: &Scene, variant: &SceneVariant) -> 
             "a body force",
             "prescribed displacements: the driver moves clamps",
         ),
+        (scene.periodic.is_some(), "periodic", "periodic sides", "none: the driver's box ends with the body"),
         (scene.contact.is_some(), "contact", "contact", "none: the tables act between bonded particles only"),
         (
             scene.dynamics.is_some() || scene.method() == SolverMethod::Verlet,

@@ -28,6 +28,7 @@ pub fn observers<const D: usize>(scene: &Scene) -> SceneObservers<'_, D> {
         Box::new(cracks::NewCracks::new(scene)),
         stateless(StatelessObserver { scalars: contact::scalars, warnings: contact::warnings, ..none }),
         stateless(StatelessObserver { scalars: probes::scalars, ..none }),
+        stateless(StatelessObserver { scalars: probes::mean_stresses, ..none }),
         stateless(StatelessObserver { scalars: flags::scalars, warnings: flags::warnings, ..none }),
         Box::new(exact::HoleErrors::new(scene)),
         Box::new(sections::Sections(scene)),

@@ -1,7 +1,7 @@
 //! Scalars of probes, computed from their columns in the history.
 
 use super::moment::Moment;
-use super::rows::width;
+use super::rows::{columns, mean_stress, width};
 use crate::probe::{crossing, first_swing, load_at, unwrapped};
 use crate::program::quantities as q;
 use crate::program::scene::{HistoryProbe, Scene, Track};
@@ -15,6 +15,15 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
     for probe in &scene.probe {
         probe_scalars(probe, column, to);
         column += width(probe);
+    }
+}
+
+/// Adds the mean stress of a cell with periodic sides.
+pub(super) fn mean_stresses<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
+    let names = mean_stress(scene);
+    let first = columns(scene).len() - names.len();
+    for (k, named) in names.into_iter().enumerate() {
+        to.add_if(named, |m| m.state.history.last()?.seen.get(first + k).copied());
     }
 }
 

@@ -1,6 +1,7 @@
 //! Rows of the history: numbers of probes, flags and sections, and their columns.
 
 use crate::bonds::Bonds;
+use crate::calibrate::Space;
 use crate::probe::{
     CrackTip, JIntegral, Section, StressEvaluator, WaveFront, mark_distances, mean_displacement, rotation,
 };
@@ -19,7 +20,7 @@ const FRONT_VELOCITY: f64 = 0.02;
 pub type RowPart<const D: usize> =
     Box<dyn Fn(&dyn Bonds<D>, &State<D>, &StressEvaluator<D>) -> Vec<f64> + Send + Sync>;
 
-/// Returns the parts of a row: probes, flags of a learnt law, sections.
+/// Returns the parts of a row: probes, flags of a learnt law, mean stress of a periodic cell, sections.
 ///
 /// # Errors
 /// Regions without particles, marks outside the body, sections without bonds across them.
@@ -32,6 +33,14 @@ pub(super) fn rows<const D: usize>(
     let probes = probes.map(|(index, spec)| probe(source, &format!("probe[{index}]"), spec, body));
     let flags: RowPart<D> =
         Box::new(|bonds, state, evaluator| evaluator.flagged(bonds, state).into_iter().flatten().collect());
+    let (low, high) = body.bounds;
+    let volume = body.thickness * (0..D).map(|d| high[d] - low[d]).product::<f64>();
+    let stress: Option<RowPart<D>> = scene.periodic.is_some().then(|| -> RowPart<D> {
+        Box::new(move |bonds, state, evaluator| {
+            let sum = evaluator.virial(bonds, state).unwrap_or([[f64::NAN; D]; D]);
+            sum.iter().flatten().map(|entry| entry / volume).collect()
+        })
+    });
     let sections = scene.output.section.iter().enumerate().map(|(index, spec)| -> Result<RowPart<D>, _> {
         let key = format!("output.section[{index}]");
         let (point, normal) = spec.plane(source, &key)?;
@@ -43,7 +52,7 @@ pub(super) fn rows<const D: usize>(
             [&force, &moment[if D == 3 { 0 } else { 2 }..]].concat()
         }))
     });
-    probes.chain([Ok(flags)]).chain(sections).collect()
+    probes.chain([Ok(flags)]).chain(stress.map(Ok)).chain(sections).collect()
 }
 
 /// Builds a probe: one number, for a crack two.
@@ -106,7 +115,18 @@ pub(super) fn width(probe: &HistoryProbe) -> usize {
     1 + usize::from(probe.track == Track::Crack)
 }
 
-/// Returns the columns of probes and flags in the history, with units.
+/// Returns the components of the mean stress of a cell with periodic sides, row by row.
+pub(super) fn mean_stress(scene: &Scene) -> Vec<Named> {
+    let digits: &[&str] = match (&scene.periodic, scene.body.space) {
+        (None, _) => &[],
+        (Some(_), Space::Solid) => &["1", "2", "3"],
+        (Some(_), _) => &["1", "2"],
+    };
+    let pairs = digits.iter().flat_map(|a| digits.iter().map(move |b| [*a, *b].concat()));
+    pairs.map(|pair| q::MEAN_STRESS.named(&[&pair])).collect()
+}
+
+/// Returns the columns of probes, flags and mean stresses in the history, with units.
 pub fn columns(scene: &Scene) -> Vec<(String, String)> {
     let each = |probe: &HistoryProbe| {
         let own = (probe.name.clone(), probe.track.unit().to_owned());
@@ -115,5 +135,6 @@ pub fn columns(scene: &Scene) -> Vec<(String, String)> {
     };
     let flags = [q::OUTSIDE_SHARE, q::FLAGGED_SHARE].map(|share| (share.name.to_owned(), String::new()));
     let probes = scene.probe.iter().flat_map(each).flatten();
-    probes.chain(flags.into_iter().filter(|_| scene.is_learnt())).collect()
+    let stress = mean_stress(scene).into_iter().map(|Named { name, unit }| (name, unit));
+    probes.chain(flags.into_iter().filter(|_| scene.is_learnt())).chain(stress).collect()
 }

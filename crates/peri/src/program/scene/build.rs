@@ -7,6 +7,7 @@ use super::interface::cross_interfaces;
 use super::memory;
 use super::mesh_region::MeshSets;
 use super::mesh_shape::check_filling;
+use super::periodic::check_body;
 use super::shapes::operations;
 use super::values::DiscreteBody;
 use super::variant::SceneVariant;
@@ -63,10 +64,11 @@ fn build_lattice_body<const D: usize>(
     }
     let gaps = Gaps::of_shapes(&operations, &lattice, variant.horizon_ratio * variant.spacing);
     let severing = gaps.as_ref().filter(|_| scene.body.bond_gaps != Some(true));
-    let mut bonds = LatticeBonds::with_gaps(lattice, variant.horizon_ratio, variant.volume, cuts, severing)
-        .map_err(|error| {
-        source.error("body.horizon_ratio", error, "a horizon that reaches a neighbour")
-    })?;
+    check_body(source, scene, (low, high), variant.spacing, severing.is_some())?;
+    let (ratio, across) = (variant.horizon_ratio, scene.periodic_axes());
+    let built = LatticeBonds::with_periodic_sides(lattice, ratio, variant.volume, (cuts, severing), across);
+    let mut bonds = built
+        .map_err(|error| source.error("body.horizon_ratio", error, "a horizon that reaches a neighbour"))?;
     if bonds.directed_bonds() == 0 {
         let found = format!(
             "{} m, which leaves {} particles without any bond",

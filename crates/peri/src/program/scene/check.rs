@@ -43,7 +43,8 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     material(source, scene)?;
     super::interface::check(source, scene)?;
     solver(source, scene)?;
-    if scene.boundary.is_empty() && scene.body_force.is_empty() {
+    let strained = scene.periodic.as_ref().is_some_and(|periodic| periodic.gradient.is_some());
+    if scene.boundary.is_empty() && scene.body_force.is_empty() && !strained {
         return Err(source.missing("boundary", "needed for loads and supports: at least one [[boundary]]"));
     }
     if let Some(stress) = &scene.stress
@@ -87,6 +88,7 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     super::contact::check(source, scene)?;
     super::probe::check(source, scene)?;
     super::line::check(source, scene)?;
+    super::periodic::check(source, scene)?;
     output(source, scene)
 }
 

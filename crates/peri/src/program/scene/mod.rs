@@ -31,6 +31,7 @@ mod method;
 mod network;
 mod overlap;
 mod parts;
+mod periodic;
 mod placement;
 mod planes;
 mod pressure;
@@ -69,6 +70,7 @@ pub use loads::{loads_of, order_regions, region_names, velocities_of};
 pub use memory::needed as memory_needed;
 pub use method::{DeviceChoice, Dynamics, ForcePrecision, SolverMethod, SolverSpec};
 pub use network::{ChemistrySpec, explain_network, resolve_network};
+pub use periodic::PeriodicSpec;
 pub use placement::{check_placement, exact_plate};
 pub use probe::{HistoryProbe, Track};
 pub use shapes::{AxisName, ShapeKind, ShapeSpec};
@@ -104,6 +106,8 @@ pub struct Scene {
     pub title: String,
     /// Geometry and discretisation.
     pub body: BodySpec,
+    /// Sides beyond which the body repeats itself.
+    pub periodic: Option<PeriodicSpec>,
     /// Bond law.
     pub material: Material,
     /// Interfaces between parts of the body.
@@ -427,7 +431,8 @@ impl Scene {
     /// Returns true if outputs need forces, stresses or flags.
     pub fn observes_forces(&self) -> bool {
         let j_integral = self.probe.iter().any(|probe| probe.track == Track::JIntegral);
-        self.stress.is_some() || !self.output.section.is_empty() || j_integral || self.is_learnt()
+        let traced = self.stress.is_some() || !self.output.section.is_empty() || self.periodic.is_some();
+        traced || j_integral || self.is_learnt()
     }
 
     /// Returns true for a law learnt from data.

@@ -49,19 +49,29 @@ struct BackgroundGrid<const D: usize> {
     low: [f64; D],
     edge: [f64; D],
     cells: [usize; D],
+    /// True along axes with periodic sides: the last node is the first.
+    periodic: [bool; D],
 }
 
 impl<const D: usize> BackgroundGrid<D> {
     /// Divides the bounding box into a whole number of cells of about `edge`.
     fn new(bonds: &dyn BodyGeometry<D>, edge: f64) -> Self {
-        let [low, high] = bounds(bonds.particles().iter().map(|&site| bonds.position(site as usize)));
-        let cells: [usize; D] = std::array::from_fn(|d| ((high[d] - low[d]) / edge).ceil().max(1.0) as usize);
+        let [mut low, mut high] = bounds(bonds.particles().iter().map(|&site| bonds.position(site as usize)));
+        let (period, half) = (bonds.period(), 0.5 * bonds.spacing());
+        let periodic = period.map(|period| period > 0.0);
+        for d in (0..D).filter(|&d| periodic[d]) {
+            (low[d], high[d]) = (low[d] - half, low[d] - half + period[d]);
+        }
+        // two cells of a period, as both nodes of one would be the same
+        let least = periodic.map(|periodic| if periodic { 2.0 } else { 1.0 });
+        let cells: [usize; D] =
+            std::array::from_fn(|d| ((high[d] - low[d]) / edge).ceil().max(least[d]) as usize);
         // a box without extent along an axis still has a cell there
         let edge = std::array::from_fn(|d| {
             let fitted = (high[d] - low[d]) / cells[d] as f64;
             if fitted > 0.0 { fitted } else { edge }
         });
-        Self { low, edge, cells }
+        Self { low, edge, cells, periodic }
     }
 
     /// Returns the cell of a position and the coordinates in it.
@@ -78,16 +88,17 @@ impl<const D: usize> BackgroundGrid<D> {
     }
 
     fn node_counts(&self) -> [usize; D] {
-        self.cells.map(|c| c + 1)
+        std::array::from_fn(|d| self.cells[d] + usize::from(!self.periodic[d]))
     }
 
     /// Node at corner `corner` of a cell.
     fn node(&self, cell: usize, corner: usize) -> usize {
         let (mut rest, mut index, mut stride) = (cell, 0, 1);
+        let counts = self.node_counts();
         for d in 0..D {
-            index += stride * (rest % self.cells[d] + (corner >> d & 1));
+            index += stride * ((rest % self.cells[d] + (corner >> d & 1)) % counts[d]);
             rest /= self.cells[d];
-            stride *= self.cells[d] + 1;
+            stride *= counts[d];
         }
         index
     }
@@ -104,7 +115,12 @@ impl<const D: usize> BackgroundGrid<D> {
         (0..1_usize << D).filter_map(move |corner| {
             let mut index = 0;
             for d in (0..D).rev() {
-                let cell = place[d].checked_sub(corner >> d & 1).filter(|&c| c < self.cells[d])?;
+                let place = if self.periodic[d] && place[d] == 0 { self.cells[d] } else { place[d] };
+                let cell = place.checked_sub(corner >> d & 1).map(|cell| match self.periodic[d] {
+                    true => cell % self.cells[d],
+                    false => cell,
+                });
+                let cell = cell.filter(|&cell| cell < self.cells[d])?;
                 index = index * self.cells[d] + cell;
             }
             Some(index)
@@ -182,7 +198,7 @@ impl<const D: usize> CoarseSpace<D> {
                         return Some(space);
                     }
                 }
-                if functions == 0 || grid.cells == [1; D] {
+                if functions == 0 || (0..D).all(|d| grid.cells[d] <= 1 + usize::from(grid.periodic[d])) {
                     return None;
                 }
                 excess = functions as f64 / most as f64;
@@ -314,7 +330,7 @@ fn split<const D: usize>(
             break;
         }
         bonds.neighbours(window[index] as usize, &mut |bond| {
-            let other = place[bond.site];
+            let other = place[bonds.origin(bond.site)];
             if other != NONE && joined.join(index as u32, other) {
                 parts -= 1;
             }

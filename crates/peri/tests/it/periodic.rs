@@ -1,0 +1,165 @@
+//! Cells with periodic sides: homogeneous states without surface, of any size; waves of the lattice.
+
+use crate::bodies::MODULUS;
+use crate::dynamics::{DENSITY, once, run};
+use peri::bonds::{BodyGeometry, BondForces, LatticeBonds, Stencil, VolumeCorrection, force};
+use peri::field::Field;
+use peri::geometry::{Operation, Shape, lattice};
+use peri::material::{BondMaterial, virial};
+use peri::potential::{BondPotential, Law};
+use peri::solver::{Lbfgs, Loads, Method, State, System};
+use peri::stress::{BallVolume, StressInput, StressMethod, SurfaceCompensation, piola_on_lattice};
+use std::f64::consts::PI;
+
+const SPACING: f64 = 0.1;
+
+fn cell<const D: usize>(cells: [usize; D], periodic: [bool; D]) -> LatticeBonds<D> {
+    let max = cells.map(|count| count as f64 * SPACING);
+    let body = [Operation::Add(Shape::Box { min: [0.0; D], max })];
+    let lattice = lattice(&body, SPACING, 1.0).unwrap();
+    LatticeBonds::with_periodic_sides(lattice, 3.015, VolumeCorrection::None, (&[], None), periodic).unwrap()
+}
+
+/// Energy density Σ kθ|ξ|φ V and stress Σ kθ V t m ⊗ ξ of a homogeneous lattice.
+fn homogeneous<const D: usize>(law: &dyn BondPotential, rows: [[f64; D]; D]) -> (f64, [[f64; D]; D]) {
+    let (mut energy, mut stress) = (0.0, [[0.0; D]; D]);
+    let volume = SPACING.powi(D as i32);
+    for offset in Stencil::<D>::new(3.015).offsets {
+        let bond = offset.map(|o| f64::from(o) * SPACING);
+        let moved: [f64; D] =
+            std::array::from_fn(|a| bond[a] + (0..D).map(|b| rows[a][b] * bond[b]).sum::<f64>());
+        let [length, now] = [bond, moved].map(|x| x.iter().map(|x| x * x).sum::<f64>().sqrt());
+        energy += MODULUS * volume * length * law.energy(now / length);
+        let pull = MODULUS * volume * law.tension(now / length) / now;
+        for (row, moved) in stress.iter_mut().zip(moved) {
+            row.iter_mut().zip(bond).for_each(|(entry, bond)| *entry += pull * moved * bond);
+        }
+    }
+    (energy, stress)
+}
+
+/// A strained cell stores the energy of the infinite lattice, whatever its size, also one of a single
+/// particle or thinner than the horizon: nothing is left to iterate.
+fn check_homogeneous<const D: usize>(cells: &[[usize; D]]) {
+    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
+    let entry = |a: usize, b: usize| 0.15 - 0.11 * a as f64 + 0.04 * b as f64;
+    let rows: [[f64; D]; D] = std::array::from_fn(|a| std::array::from_fn(|b| entry(a, b)));
+    let (energy, stress) = homogeneous(&*law, rows);
+    for &cells in cells {
+        let mut bonds = cell(cells, [true; D]);
+        let loads = Loads { mean_gradient: Some(rows), ..Loads::default() };
+        let (material, factors) = (BondMaterial::new(&*law, MODULUS), [1.0]);
+        let mut system = System::new(&mut bonds, material, &loads, &factors);
+        let mut state = State::new(system.bonds.sites());
+        let solver = Lbfgs { tolerance: 1e-8, ..Lbfgs::default() };
+        solver.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
+        let volume = cells.iter().map(|&count| count as f64 * SPACING).product::<f64>();
+        let row = &state.history[0];
+        // the law is fitted to 1e-9
+        assert!(
+            (row.stored / volume / energy - 1.0).abs() < 1e-8,
+            "{cells:?}: {} {energy}",
+            row.stored / volume
+        );
+        let rate: f64 = (0..D).flat_map(|a| (0..D).map(move |b| stress[a][b] * rows[a][b])).sum();
+        let pull = row.load * row.displacement / volume;
+        assert!((pull / rate - 1.0).abs() < 1e-8, "{cells:?}: {pull} {rate}");
+        assert_eq!(state.counts.total_iterations, 0, "{cells:?}");
+    }
+}
+
+#[test]
+fn a_uniform_cell_has_no_surface() {
+    check_homogeneous([[1, 1], [2, 5], [8, 8], [23, 9]].as_slice());
+    check_homogeneous([[1, 4, 2], [6, 5, 7]].as_slice());
+}
+
+/// From a random start a cell returns to the homogeneous state, and its coarse level helps.
+#[test]
+fn a_cell_relaxes_to_the_homogeneous_state() {
+    let law = Law::Linear.build(1.0, 1.0, false).unwrap();
+    let rows = [[0.1, 0.05], [0.0, -0.05]];
+    let (energy, _) = homogeneous(&*law, rows);
+    let mut bonds = cell([40, 24], [true; 2]);
+    let loads = Loads { mean_gradient: Some(rows), ..Loads::default() };
+    let (material, factors) = (BondMaterial::new(&*law, MODULUS), [1.0]);
+    let mut system = System::new(&mut bonds, material, &loads, &factors);
+    let mut state = State::new(system.bonds.sites());
+    let mut random = crate::bodies::Random(7);
+    for &site in system.bonds.particles() {
+        state.displacement.set(site as usize, std::array::from_fn(|_| 0.2 * SPACING * random.next()));
+    }
+    let solver = Lbfgs { tolerance: 1e-8, ..Lbfgs::default() };
+    solver.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
+    let volume = 40.0 * 24.0 * SPACING * SPACING;
+    assert!((state.history[0].stored / volume / energy - 1.0).abs() < 1e-8);
+    eprintln!("a cell from a random start: {} iterations", state.counts.total_iterations);
+    assert!((1..200).contains(&state.counts.total_iterations), "{}", state.counts.total_iterations);
+}
+
+/// Stresses of particles have the mean of the virial, and forces of a cell sum to zero, in any state.
+#[test]
+fn stresses_of_particles_have_the_mean_of_the_cell() {
+    let law = Law::Linear.build(1.0, 1.0, false).unwrap();
+    let mut bonds = cell([9, 7], [true; 2]);
+    let loads = Loads { mean_gradient: Some([[0.1, 0.05], [0.0, -0.05]]), ..Loads::default() };
+    let (material, factors) = (BondMaterial::new(&*law, MODULUS), [1.0]);
+    let mut random = crate::bodies::Random(3);
+    let mut displacement = Field::zeros(bonds.sites());
+    for &site in bonds.particles() {
+        displacement.set(site as usize, std::array::from_fn(|_| 0.2 * SPACING * random.next()));
+    }
+    System::new(&mut bonds, material.clone(), &loads, &factors).prepare(&mut displacement);
+    let sum = virial(&material, &vec![(); bonds.sites()], &bonds, &displacement);
+    let fit = crate::bodies::fit(&*law, [0.3, 1.7]);
+    let (modulus, missing) = (MODULUS, SurfaceCompensation::Bonds);
+    let loaded = StressInput { displacement: &displacement, fit: &fit, modulus, missing };
+    let stress = piola_on_lattice(&bonds, &loaded, StressMethod::OnePoint, BallVolume::Whole);
+    for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+        let mean: f64 = stress.iter().map(|stress| stress[a][b] * SPACING * SPACING).sum();
+        assert!((mean - sum[a][b]).abs() < 1e-8 * sum[0][0].abs(), "{a}{b}: {mean} {}", sum[a][b]);
+    }
+    bonds.set_law(&fit, MODULUS);
+    let mut forces = Field::zeros(bonds.sites());
+    force(&bonds, &displacement, &mut forces);
+    let each = || bonds.particles().iter().map(|&site| forces.get(site as usize));
+    let size: f64 = each().map(|f| f[0].abs()).sum();
+    for d in 0..2 {
+        let total: f64 = each().map(|f| f[d]).sum();
+        assert!(total.abs() < 1e-13 * size, "{total} of {size}");
+    }
+}
+
+/// A standing wave in a row, periodic along it: at any time the exact solution of velocity Verlet with the
+/// frequency of the lattice, and its energy.
+#[test]
+fn a_standing_wave_has_the_frequency_of_the_lattice() {
+    let law = Law::Linear.build(1.0, 1.0, false).unwrap();
+    let count = 12_u32;
+    let mut bonds = cell([count as usize, 1], [true, false]);
+    let volume = SPACING * SPACING;
+    for waves in 1..=5 {
+        let q = 2.0 * PI * f64::from(waves) / (f64::from(count) * SPACING);
+        let each = |k: i32| (1.0 - (q * f64::from(k) * SPACING).cos()) / (f64::from(k) * SPACING);
+        let frequency = (12.0 * MODULUS * volume / DENSITY * (1..=3).map(each).sum::<f64>()).sqrt();
+        let mut state = State::new(bonds.sites());
+        let shape = |x: f64| 1e-3 * (q * x).cos();
+        for &site in bonds.particles() {
+            let x = bonds.position(site as usize)[0];
+            state.displacement.set(site as usize, [shape(x), 0.0]);
+        }
+        let (time, steps) = (20.3 * 2.0 * PI / frequency, 4000.0);
+        let step = time / steps;
+        run(&once(time, step), &mut bonds, &*law, &Loads::default(), &mut state).unwrap();
+        let phase = 2.0 * (0.5 * frequency * step).asin() * steps;
+        for &site in bonds.particles() {
+            let exact = shape(bonds.position(site as usize)[0]) * phase.cos();
+            let found = state.displacement.get(site as usize)[0];
+            // 128 rad to the fit's 1e-9, and rounding of 4000 steps
+            assert!((found - exact).abs() < 1e-6 * 1e-3, "{waves} waves: {found} {exact}");
+        }
+        let row = state.history.last().unwrap();
+        let error = ((row.kinetic + row.stored) / row.work - 1.0).abs();
+        assert!(error < (frequency * step).powi(2), "{waves} waves: energy off by {error}");
+    }
+}
