@@ -74,17 +74,8 @@ impl Phase {
             positive("modulus of a branch, Pa", branch.modulus)?;
             rule("relaxation time, s", branch.time, branch.time > 0.0, "above 0")?;
         }
-        match self.shift {
-            Shift::None => {}
-            Shift::Wlf { reference, constants: [first, second] } => {
-                positive("reference of the shift, K", reference)?;
-                positive("C1 of WLF", first)?;
-                positive("C2 of WLF, K", second)?;
-            }
-            Shift::Arrhenius { reference, energy } => {
-                positive("reference of the shift, K", reference)?;
-                positive("activation energy of the shift, J/mol", energy)?;
-            }
+        if let Some((name, value)) = self.shift.invalid_constant() {
+            positive(name, value)?;
         }
         let slope = self.retardation;
         rule("retardation by crystals", slope, (-100.0..=100.0).contains(&slope), "-100 to 100")?;

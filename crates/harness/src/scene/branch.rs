@@ -39,15 +39,22 @@ pub enum ShiftSpec {
 }
 
 impl ShiftSpec {
-    /// Returns the shift.
-    pub fn shift(&self) -> Shift {
-        match *self {
+    /// Returns the shift; `key` is where it stands.
+    ///
+    /// # Errors
+    /// A [`SceneError`] for a constant that is not positive.
+    pub fn shift(&self, source: &Source, key: &str) -> Result<Shift, SceneError> {
+        let shift = match *self {
             Self::Wlf(reference, first, second) => {
                 Shift::Wlf { reference: reference.si(), constants: [first, second.si()] }
             }
             Self::Arrhenius(reference, energy) => {
                 Shift::Arrhenius { reference: reference.si(), energy: energy.si() }
             }
+        };
+        match shift.invalid_constant() {
+            Some((name, value)) => Err(source.error(key, format!("{name} = {value}"), "above 0, finite")),
+            None => Ok(shift),
         }
     }
 }
@@ -160,7 +167,8 @@ impl BranchSpec {
     /// A [`SceneError`] for a constant that is missing, unknown, without its unit, or out of its range, and
     /// for a spring that softens at large strains.
     pub fn branch(&self, source: &Source, key: &str) -> Result<Branch, SceneError> {
-        let key = format!("{key}.parameters");
+        let own = key;
+        let key = format!("{own}.parameters");
         let required = self.spring.names().iter().chain(self.viscosity.names());
         let all: Vec<_> = required.chain(self.viscosity.optional()).collect();
         let names: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
@@ -212,7 +220,9 @@ impl BranchSpec {
                 format!("a spring whose stress falls at a slope of {least:.3e} Pa below log strains of 1");
             return Err(source.error(&key, found, "a stress that grows with the strain"));
         }
-        branch.shift = self.shift.as_ref().map_or(Shift::None, ShiftSpec::shift);
+        if let Some(shift) = &self.shift {
+            branch.shift = shift.shift(source, &format!("{own}.shift"))?;
+        }
         Ok(branch)
     }
 

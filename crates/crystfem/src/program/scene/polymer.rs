@@ -89,7 +89,10 @@ impl PhaseSpec {
         let relaxing = self.moduli.iter().zip(&self.times);
         let relaxing = relaxing.map(|(modulus, time)| Branch { modulus: modulus.si(), time: time.si() });
         let elastic = self.elastic.map(|modulus| Branch { modulus: modulus.si(), time: f64::INFINITY });
-        let shift = self.shift.as_ref().map_or(Shift::None, ShiftSpec::shift);
+        let shift = match &self.shift {
+            Some(shift) => shift.shift(source, &format!("{key}.shift"))?,
+            None => Shift::None,
+        };
         let flow = self.flow.as_ref();
         let phase = Phase {
             branches: relaxing.chain(elastic).collect(),

@@ -43,10 +43,11 @@ pub fn draw_studies(
             points.sort_by(|a, b| a[0].total_cmp(&b[0]));
             points.iter().map(|[x, y]| (*x, scale * y)).unzip()
         };
-        let (name, heading) = (curve.value.replace('_', " "), if unit.is_empty() { "" } else { " in " });
+        let name = curve.value.replace('_', " ");
+        let label = if unit.is_empty() { name.clone() } else { format!("{name} [{unit}]") };
         let [references, computed] = [&curve.references, &curve.computed].map(|points| split(points));
         LinePlot::new(&name)
-            .axes(&curve.key, &format!("{name}{heading}{unit}"))
+            .axes(&curve.key, &label)
             .size(520.0, 440.0)
             .series(Series::markers("computed", &computed.0, &computed.1))
             .series(Series::reference("reference", &references.0, &references.1))

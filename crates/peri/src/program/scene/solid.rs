@@ -114,6 +114,11 @@ impl SolidLaw {
             None if shifted => return Err(source.missing(&key, "needed for the `shift` of a branch")),
             temperature => temperature.map_or(ROOM, |temperature| temperature.si()),
         };
+        let least = branches.iter().map(|branch| branch.shift.least_temperature()).fold(0.0, f64::max);
+        if temperature < least {
+            let found = format!("{temperature:.2} K, where WLF exceeds 12 decades");
+            return Err(source.error(&key, found, format!("{least:.2} K and above")));
+        }
         let wrong = |error: polycore::constitutive::Error| source.error(KEY, error, "a law with time");
         let mut law = Viscoelastic::new(Box::new(law), branches).map_err(wrong)?;
         if let Some(mullins) = &self.mullins {
