@@ -9,8 +9,8 @@ mod facets;
 mod gaps;
 mod parts;
 
-pub(crate) use cuts::length;
 pub use cuts::{Cut, cuts_within, severed};
+pub(crate) use cuts::{determinant, length};
 pub use distance::{NearestFacet, SignedDistance};
 pub use enclosure::{Enclosure, moments};
 pub use facet_set::FacetSet;
@@ -35,6 +35,21 @@ pub struct Lattice<const D: usize> {
     pub occupied: Vec<bool>,
     /// Volume of each particle, m³ (in 2D with the thickness).
     pub volume: f64,
+}
+
+impl<const D: usize> Lattice<D> {
+    /// Returns the cells with copies of themselves in so many layers beyond both sides along each axis.
+    pub(crate) fn repeated(&self, layers: [usize; D]) -> Self {
+        let cells: [usize; D] = std::array::from_fn(|d| self.cells[d] + 2 * layers[d]);
+        let occupied = (0..cells.iter().product()).map(|index| {
+            let place = cell(index, cells);
+            let inside =
+                |d: usize| (place[d] as isize - layers[d] as isize).rem_euclid(self.cells[d] as isize);
+            self.occupied[(0..D).rev().fold(0, |at, d| at * self.cells[d] + inside(d) as usize)]
+        });
+        let origin = std::array::from_fn(|d| self.origin[d] - self.spacing * layers[d] as f64);
+        Self { origin, cells, occupied: occupied.collect(), ..*self }
+    }
 }
 
 /// A solid region of dimension `D`; lengths in m.

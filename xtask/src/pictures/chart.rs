@@ -40,6 +40,7 @@ impl Chart {
         let texts = self.series.iter().flat_map(|series| &series.y);
         let mut cases: Vec<&str> =
             texts.flat_map(|text| fill::placeholders(text)).map(|[case, ..]| case).collect();
+        cases.sort_unstable();
         cases.dedup();
         cases
     }

@@ -129,7 +129,7 @@ pub(crate) fn length<const D: usize>(x: [f64; D]) -> f64 {
 }
 
 /// Determinant of two or three columns.
-fn determinant<const D: usize>(c: &[[f64; D]; D]) -> f64 {
+pub(crate) fn determinant<const D: usize>(c: &[[f64; D]; D]) -> f64 {
     let minor = |i: usize, j: usize| c[D - 2][i] * c[D - 1][j] - c[D - 2][j] * c[D - 1][i];
     if D == 2 { minor(0, 1) } else { (0..D).map(|d| c[0][d] * minor((d + 1) % 3, (d + 2) % 3)).sum() }
 }

@@ -142,8 +142,8 @@ harness::quantities! {
     PROBE_LOAD_AT = "{probe}_load_at_{opening}mm", "N", "of an opening: load at this value, if the run \
         reaches it";
     MEAN_STRESS = "mean_stress_{component}", "Pa", "with `[periodic]`: mean first Piola–Kirchhoff stress of \
-        the cell at the end, voids included: force along the first axis over the area at rest across the \
-        second";
+        the cell at the end, voids included; where no particle is held or loaded, the force along the first \
+        axis over the area at rest across the second";
     SECTION_FORCE = "{section}_force_{axis}", "N", "force along an axis that bonds across a section exert on \
         the part of the body behind it at the end";
     SECTION_MOMENT = "{section}_moment_{axis}", "N m", "moment of the forces across a section about its \

@@ -5,11 +5,14 @@ use super::load::Loads;
 use super::system::System;
 use crate::bonds::BodyGeometry;
 use crate::error::Error;
+use crate::geometry::determinant;
 use std::collections::{BTreeMap, HashMap};
 
 /// Distance across their relative motion, in spacings, within which a particle of one grip passes through one
 /// of another.
 const PASSING_DISTANCE: f64 = 0.75;
+/// Load factors between rest and each prescribed one at which the volume of a cell is computed.
+const BETWEEN: u32 = 100;
 /// Most grips that move rigidly: displacements of more follow a field.
 const MOST_GRIPS: usize = 16;
 /// Allowed alternatives, for messages.
@@ -25,12 +28,32 @@ pub fn inverted<const D: usize>(
     loads: &Loads<D>,
     factors: &[f64],
 ) -> Option<String> {
+    if let Some(gradient) = &loads.mean_gradient
+        && let Some(found) = flattened(gradient, factors)
+    {
+        return Some(found);
+    }
     loads.displacement.as_ref()?;
     // a rotation is not proportional to its end
     if !loads.is_proportional() {
         return None;
     }
     passing(bonds, loads, factors).or_else(|| turned(bonds, loads, factors))
+}
+
+/// Finds the load factor from which a mean displacement gradient flattens the body or turns it inside out.
+fn flattened<const D: usize>(gradient: &[[f64; D]; D], factors: &[f64]) -> Option<String> {
+    let volume = |factor: f64| {
+        let entry = |a: usize, b: usize| f64::from(u8::from(a == b)) + factor * gradient[a][b];
+        determinant::<D>(&std::array::from_fn(|a| std::array::from_fn(|b| entry(a, b))))
+    };
+    let between = |&end: &f64| (1..=BETWEEN).map(move |k| end * f64::from(k) / f64::from(BETWEEN));
+    let factor = factors.iter().flat_map(between).find(|&factor| volume(factor) <= 0.0)?;
+    Some(format!(
+        "a mean displacement gradient of {gradient:?}: at load factor {factor:.2} the cell has {:.3} of its \
+         volume",
+        volume(factor)
+    ))
 }
 
 /// Finds grips of one displacement each that pass through each other.

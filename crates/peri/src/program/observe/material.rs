@@ -237,7 +237,6 @@ impl<const D: usize> Physics<D> {
             body.bonds.set_relief(theta);
         }
         let (mut loads, loaded) = scene::loads_of(source, scene, &body)?;
-        loads.mean_gradient = scene.mean_gradient();
         let stages = SceneStage::all(source, scene, &body, &mut loads)?;
         scene::check_placement(source, scene, &body, &loads)?;
         let held = scene::tied_grips(source, scene, &*body.bonds, &loads)?;

@@ -15,6 +15,8 @@ struct StudyCurve {
     value: String,
     /// Key of the studies.
     key: String,
+    /// Spacing and horizon of the studies.
+    lattice: String,
     /// Number and reference.
     references: Vec<[f64; 2]>,
     /// Number and computed value.
@@ -65,32 +67,41 @@ fn curves(expectations: &[Expect], outcomes: &[VariantOutcome]) -> Vec<StudyCurv
         else {
             continue;
         };
-        let Some((key, number)) = numbered(variant) else { continue };
-        let place = curves.iter().position(|curve| curve.value == value && curve.key == key);
+        let Some((lattice, key, number)) = numbered(variant) else { continue };
+        let known = |curve: &StudyCurve| curve.value == value && curve.key == key;
+        // a spacing or horizon of its own has no part in the line of the others
+        if curves.iter().any(|curve| known(curve) && curve.lattice != lattice) {
+            continue;
+        }
+        let place = curves.iter().position(known);
         let place = place.unwrap_or_else(|| {
-            let [value, key] = [value, key].map(str::to_owned);
+            let [value, key, lattice] = [value, key, lattice].map(str::to_owned);
             let (references, computed, unit) = (Vec::new(), Vec::new(), String::new());
-            curves.push(StudyCurve { value, key, references, computed, unit });
+            curves.push(StudyCurve { value, key, lattice, references, computed, unit });
             curves.len() - 1
         });
         let curve = &mut curves[place];
         curve.references.push([number, reference]);
         let solved = outcomes.iter().filter(|outcome| outcome.name == variant);
         for (_, found, unit) in solved.flat_map(|outcome| &outcome.values).filter(|found| found.0 == value) {
-            curve.computed.push([number, *found]);
-            curve.unit.clone_from(unit);
+            if found.is_finite() {
+                curve.computed.push([number, *found]);
+                curve.unit.clone_from(unit);
+            }
         }
     }
     curves.retain(|curve| curve.references.len() >= FEWEST && !curve.computed.is_empty());
     curves
 }
 
-/// Returns key and number of a study `KEY=NUMBER`, the last word of the name of a variant.
-fn numbered(variant: &str) -> Option<(&str, f64)> {
-    let (_, study) = variant.rsplit_once(' ')?;
+/// Returns the lattice, key and number of a study `KEY=NUMBER`, the last word of the name of a variant; a
+/// ratio of two values has no variant of its own.
+fn numbered(variant: &str) -> Option<(&str, &str, f64)> {
+    let (lattice, study) = variant.rsplit_once(' ').filter(|_| !variant.contains(['[', ']']))?;
     let (key, number) = study.split_once('=')?;
+    let number: f64 = number.parse().ok()?;
     let is_lattice = key == "m";
-    (!is_lattice).then_some((key, number.parse().ok()?))
+    (!is_lattice && number.is_finite()).then_some((lattice, key, number))
 }
 
 #[cfg(test)]
@@ -99,8 +110,11 @@ mod tests {
 
     #[test]
     fn numbers_of_studies() {
-        assert_eq!(numbered("dx=1mm m=3.015 r=0.7"), Some(("r", 0.7)));
-        for other in ["dx=1mm m=3.015", "dx=1mm m=3.015 fine", "dx=1mm m=3.015 a=x", "r=0.7"] {
+        assert_eq!(numbered("dx=1mm m=3.015 r=0.7"), Some(("dx=1mm m=3.015", "r", 0.7)));
+        let ratio = "dx=1mm m=3.015 r=1] / load[dx=1mm m=3.015 r=2";
+        let infinite = "dx=1mm m=3.015 n=inf";
+        for other in ["dx=1mm m=3.015", "dx=1mm m=3.015 fine", "dx=1mm m=3.015 a=x", "r=0.7", ratio, infinite]
+        {
             assert_eq!(numbered(other), None, "{other}");
         }
     }

@@ -68,6 +68,23 @@ impl Boundary {
         surface || self.force.is_some()
     }
 
+    /// Returns the key by which it holds or loads particles along an axis.
+    pub fn acts_along(&self, d: usize) -> Option<&'static str> {
+        let held = |list: &Vec<Prescribed>| list.get(d).is_some_and(|held| *held != Prescribed::Free);
+        let formula = |list: &Vec<PrescribedField>| matches!(list.get(d), Some(PrescribedField::By(_)));
+        let keys = [
+            ("displacement", self.displacement.as_ref().is_some_and(held)),
+            ("displacement_field", self.displacement_field.as_ref().is_some_and(formula)),
+            (
+                "traction",
+                self.traction.as_ref().is_some_and(|list| list.get(d).is_some_and(|x| x.si() != 0.0)),
+            ),
+            ("traction_field", self.traction_field.as_ref().is_some_and(|list| d < list.len())),
+            ("force", self.force.as_ref().is_some_and(|list| list.get(d).is_some_and(|x| x.si() != 0.0))),
+        ];
+        keys.into_iter().find_map(|(key, acts)| acts.then_some(key))
+    }
+
     /// Returns the number of layers of particles that it takes at a side.
     pub fn layers_of(&self, spacing: f64, horizon_ratio: f64) -> usize {
         match (self.depth, self.layers) {

@@ -64,8 +64,8 @@ fn build_lattice_body<const D: usize>(
     }
     let gaps = Gaps::of_shapes(&operations, &lattice, variant.horizon_ratio * variant.spacing);
     let severing = gaps.as_ref().filter(|_| scene.body.bond_gaps != Some(true));
-    check_body(source, scene, (low, high), variant.spacing, severing.is_some())?;
     let (ratio, across) = (variant.horizon_ratio, scene.periodic_axes());
+    check_body(source, scene, (low, high), (&lattice, ratio), severing.is_some())?;
     let built = LatticeBonds::with_periodic_sides(lattice, ratio, variant.volume, (cuts, severing), across);
     let mut bonds = built
         .map_err(|error| source.error("body.horizon_ratio", error, "a horizon that reaches a neighbour"))?;

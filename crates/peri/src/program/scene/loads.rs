@@ -76,6 +76,7 @@ pub fn loads_of<const D: usize>(
         loads.update_forces([1.0; 2], &*body.bonds, &rest);
     }
     join(source, scene, &regions, &mut loads, body.bonds.sites())?;
+    loads.mean_gradient = scene.mean_gradient();
     refuse_inverted(source, scene, body, &loads)?;
     if scene.method() == SolverMethod::Verlet {
         // explicit dynamics needs neither balance nor supports
@@ -285,6 +286,9 @@ fn refuse_inverted<const D: usize>(
         None => scene.load_steps().0,
     };
     match inverted(&*body.bonds, loads, &factors) {
+        Some(found) if scene.boundary.iter().all(|own| !own.prescribes_displacement()) => {
+            Err(source.error("periodic.gradient", found, "one that leaves the cell right side out"))
+        }
         Some(found) => Err(source.error("boundary", found, INVERTS)),
         None => Ok(()),
     }

@@ -2,6 +2,7 @@
 
 use super::{AxisName, Scene, Track};
 use crate::calibrate::Space;
+use crate::geometry::{Gaps, Lattice};
 use crate::stress::StressMethod;
 use harness::scene::{SceneError, Source};
 use serde::Deserialize;
@@ -136,6 +137,14 @@ fn refuse_boundaries(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             };
             return Err(source.conflict(&format!("boundary[{index}].{name}"), "periodic", why));
         }
+        let strained = |d: usize| {
+            let rows = scene.periodic.iter().flat_map(|periodic| periodic.gradient.iter().flatten());
+            rows.skip(d).take(1).flatten().any(|&entry| entry != 0.0)
+        };
+        if let Some(name) = (0..3).filter(|&d| strained(d)).find_map(|d| boundary.acts_along(d)) {
+            let why = "components that the mean deformation moves are free";
+            return Err(source.conflict(&format!("boundary[{index}].{name}"), "periodic.gradient", why));
+        }
     }
     Ok(())
 }
@@ -149,13 +158,14 @@ pub(super) fn check_body<const D: usize>(
     source: &Source,
     scene: &Scene,
     (low, high): ([f64; D], [f64; D]),
-    spacing: f64,
+    (lattice, ratio): (&Lattice<D>, f64),
     severs: bool,
 ) -> Result<(), SceneError> {
     let axes = scene.periodic_axes::<D>();
     if axes == [false; D] {
         return Ok(());
     }
+    let spacing = lattice.spacing;
     let whole = |d: usize| {
         let count = (high[d] - low[d]) / spacing;
         (count - count.round()).abs() <= ROUNDING
@@ -168,8 +178,10 @@ pub(super) fn check_body<const D: usize>(
         );
         return Err(source.error("body.spacing", found, "a whole fraction of the period"));
     }
-    if severs {
-        let found = "gaps: parts that do not touch, or cut-outs narrower than the horizon";
+    let layers = axes.map(|periodic| if periodic { ratio.floor() as usize } else { 0 });
+    let parted = || scene.body.bond_gaps != Some(true) && Gaps::of_cells(&lattice.repeated(layers)).is_some();
+    if severs || parted() {
+        let found = "gaps: parts that do not touch, also across sides, or cut-outs narrower than the horizon";
         let allowed = "with periodic sides none, or `body.bond_gaps = true`";
         return Err(source.error("body.shapes", found, allowed));
     }
