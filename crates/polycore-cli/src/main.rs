@@ -4,6 +4,7 @@
 // harness::say! prints without a panic if the output is closed
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use harness::case::{self, Finished, Program, Run, terminal};
@@ -50,6 +51,7 @@ impl case::Case for Fits {
         about: "Hyperelastic laws: fits to data, tables, checks; networks from their chemistry",
         examples: "  polycore check cases/ch1/rubber-fits/case.toml    which laws it fits to which data
   polycore run cases/ch1/rubber-fits/case.toml      fit, draw, judge; results in out/rubber-fits
+  polycore run rubber.csv                           every law on one table of tests in several modes
   polycore exact eight-chain \"0.27 MPa\" 25 --to 4  nominal stress against stretch, as CSV
   polycore network networks.csv -o predicted.csv    moduli of polymer networks from their chemistry",
         magic: b"poly-ck3",
@@ -63,6 +65,15 @@ impl case::Case for Fits {
 
     fn solve(source: &Source, run: &mut Run) -> Result<Finished, Failure<Error>> {
         Ok(fits::run(&scene::FitCase::parse(source)?, run)?)
+    }
+
+    fn scene_of_table(table: &Path) -> Option<String> {
+        let [file, stem] = [table.file_name(), table.file_stem()].map(|name| name?.to_str());
+        let name = stem?.replace(|letter: char| !letter.is_alphanumeric(), "-");
+        let file = serde_json::Value::from(file?);
+        Some(format!(
+            "version = 1\nprogram = \"polycore\"\ntitle = {file}\n\n[[fit.data]]\nname = \"{name}\"\nfile = {file}\n"
+        ))
     }
 
     fn schema() -> serde_json::Value {

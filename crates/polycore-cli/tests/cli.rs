@@ -136,7 +136,7 @@ fn what_a_newcomer_sees() {
     assert_eq!(std::fs::read_dir(folder.path().join("out")).unwrap().count(), 2);
     assert!(texts[0].contains("neo-hookean           shear_modulus 0.500000 ± "), "{}", texts[0]);
     assert!(
-        texts[0].contains("shear_modulus = \"0.5000000 MPa\"")
+        texts[0].contains("shear_modulus = \"0.5000000000 MPa\"")
             && texts[0].contains("model = \"neo-hookean\""),
         "{}",
         texts[0]
@@ -295,9 +295,9 @@ fn ordinary_tables_give_every_law() {
     let gel = neo_hookean("Pa", 5.123_45, (1..12).map(|i| 1.0 + 0.1 * f64::from(i)));
     let stiff = neo_hookean("GPa", 1.25, (1..12).map(|i| 1.0 + 0.01 * f64::from(i)));
     for (table, modulus, written) in [
-        (&squeezed, 0.4, "\"0.4000000 MPa\""),
-        (&gel, 5.123_45e-6, "\"5.123450 Pa\""),
-        (&stiff, 1250.0, "\"1.250000 GPa\""),
+        (&squeezed, 0.4, "\"0.4000000000 MPa\""),
+        (&gel, 5.123_45e-6, "\"5.123450000 Pa\""),
+        (&stiff, 1250.0, "\"1.250000000 GPa\""),
     ] {
         let (folder, result) = fitted(table, "");
         let shown = text(&result.stdout);

@@ -51,7 +51,7 @@ fn a_volumetric_test_gives_the_bulk_modulus() {
     assert!(result.status.success(), "{}", String::from_utf8_lossy(&result.stderr));
     assert!(shown.contains("volumetric bulk: K 2.000000 GPa ± "), "{shown}");
     let read = |name: &str| std::fs::read_to_string(folder.path().join("out").join(name)).unwrap();
-    assert!(read("materials.toml").contains("bulk_modulus = \"2.000000 GPa\" # volumetric test `bulk`"));
+    assert!(read("materials.toml").contains("bulk_modulus = \"2.000000000 GPa\" # volumetric test `bulk`"));
     assert!(read("materials_mm.inp").contains("; K: volumetric test `bulk`"), "{}", read("materials_mm.inp"));
     assert_eq!(read("bulk_volumetric.csv").lines().count(), 4);
     let shown = polycore(&["deck", &cards]);
@@ -122,11 +122,11 @@ fn terms_of_a_volumetric_test_are_not_dropped() {
     let read = |name: &str| std::fs::read_to_string(folder.path().join("out").join(name)).unwrap();
     let deck = read("materials_mm.inp");
     assert!(deck.contains("*HYPERELASTIC, REDUCED POLYNOMIAL, N=2"), "{deck}");
-    assert!(deck.contains(", 1.000000e-3, 1.000000e-5\n"), "{deck}");
-    let note = "left out: D2 = 1.000000e-5; this material has D1 alone";
+    assert!(deck.contains(", 1.000000000e-3, 1.000000000e-5\n"), "{deck}");
+    let note = "left out: D2 = 1.000000000e-5; this material has D1 alone";
     assert!(deck.contains(&format!("** {note}\n*MATERIAL, NAME=NEO_HOOKEAN")), "{deck}");
     assert_eq!(read("materials_mm.feb").matches(note).count(), 2);
-    assert!(read("materials_si.inp").contains(", 1.000000e-9, 1.000000e-11\n"));
+    assert!(read("materials_si.inp").contains(", 1.000000000e-9, 1.000000000e-11\n"));
     assert!(read("materials.toml").contains("# volumetric test `bulk`, 2/D1 of 2 terms"));
 }
 

@@ -8,7 +8,7 @@ use super::terminal::{
 };
 use super::{Case, Options, Part, Sample, Search, Shard, SweepOptions, Vary};
 use crate::checkpoint::Header;
-use crate::scene::{Failure, Source};
+use crate::scene::{Failure, SceneError, Source};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use polycore::Error;
 use polycore::file::prepare_directory;
@@ -173,7 +173,7 @@ pub fn main<C: Case, V: Subcommand>(own: impl FnOnce(V) -> Result<bool, Failure<
         return ExitCode::FAILURE;
     }
     exit(match cli.command {
-        Command::Run(arguments) => Source::read(&arguments.scene)
+        Command::Run(arguments) => read_scene::<C>(&arguments.scene)
             .map_err(Failure::from)
             .and_then(|source| run_shown::<C>(&source, &arguments, cli.verbose)),
         Command::Resume { output, checkpoints } => resume::<C>(&output, checkpoints.every(), cli.verbose),
@@ -262,8 +262,18 @@ fn finish<C: Case>(
     Ok(finished.report.passed())
 }
 
+/// Reads a scene, or makes that of a table.
+fn read_scene<C: Case>(path: &Path) -> Result<Source, SceneError> {
+    let is_table =
+        path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv")) && path.is_file();
+    match C::scene_of_table(path).filter(|_| is_table) {
+        Some(text) => Ok(Source::new(path, text)),
+        None => Source::read(path),
+    }
+}
+
 fn check<C: Case>(path: &Path, quick: bool, inputs: &InputArguments) -> Result<bool, Failure<C::Error>> {
-    let (source, output) = (Source::read(path)?, default_output(path));
+    let (source, output) = (read_scene::<C>(path)?, default_output(path));
     let source = attach::<C>(source, &output, quick, inputs, false)?;
     explain_all::<C>(&source, &output, quick, inputs)?;
     crate::say!("{}: the scene is valid", path.display());

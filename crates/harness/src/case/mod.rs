@@ -81,6 +81,11 @@ pub trait Case {
         &[]
     }
 
+    /// Returns the scene of one table, which lies in the scene's folder; `None` if the program has none.
+    fn scene_of_table(_table: &Path) -> Option<String> {
+        None
+    }
+
     /// Returns the JSON Schema of its scenes.
     fn schema() -> serde_json::Value;
 }

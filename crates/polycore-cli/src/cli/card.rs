@@ -90,30 +90,34 @@ mod tests {
     #[test]
     fn hosts_have_their_own_forms() {
         for (key, parameters, expected) in [
-            ("neo-hookean", &[0.4][..], "*HYPERELASTIC, NEO HOOKE\n2.000000e-1, 5.000000e-2\n"),
+            ("neo-hookean", &[0.4][..], "*HYPERELASTIC, NEO HOOKE\n2.000000000e-1, 5.000000000e-2\n"),
             (
                 "mooney-rivlin",
                 &[0.15, 0.02],
-                "*HYPERELASTIC, MOONEY-RIVLIN\n1.500000e-1, 2.000000e-2, 5.000000e-2\n",
+                "*HYPERELASTIC, MOONEY-RIVLIN\n1.500000000e-1, 2.000000000e-2, 5.000000000e-2\n",
             ),
             (
                 "eight-chain",
                 &[0.27, 25.0],
-                "*HYPERELASTIC, ARRUDA-BOYCE\n2.700000e-1, 5.000000e0, 5.000000e-2\n",
+                "*HYPERELASTIC, ARRUDA-BOYCE\n2.700000000e-1, 5.000000000e0, 5.000000000e-2\n",
             ),
             (
                 "ogden-2",
                 &[0.4, 2.0, 0.1, -1.5],
-                "*HYPERELASTIC, OGDEN, N=2\n4.000000e-1, 2.000000e0, 1.000000e-1, -1.500000e0, 5.000000e-2, \
-                 0.000000e0\n",
+                "*HYPERELASTIC, OGDEN, N=2\n4.000000000e-1, 2.000000000e0, 1.000000000e-1, -1.500000000e0, 5.000000000e-2, \
+                 0.000000000e0\n",
             ),
             (
                 "yeoh",
                 &[0.2, 0.002, 5e-5],
-                "*HYPERELASTIC, YEOH\n2.000000e-1, 2.000000e-3, 5.000000e-5, 5.000000e-2, 0.000000e0, \
-                 0.000000e0\n",
+                "*HYPERELASTIC, YEOH\n2.000000000e-1, 2.000000000e-3, 5.000000000e-5, 5.000000000e-2, 0.000000000e0, \
+                 0.000000000e0\n",
             ),
-            ("gent", &[0.3, 75.0], "*USER MATERIAL, CONSTANTS=3\n4.000000e1, 3.000000e-1, 7.500000e1\n"),
+            (
+                "gent",
+                &[0.3, 75.0],
+                "*USER MATERIAL, CONSTANTS=3\n4.000000000e1, 3.000000000e-1, 7.500000000e1\n",
+            ),
         ] {
             let found = card(key, parameters, &[0.05]);
             assert!(found.ends_with(expected), "{found}");

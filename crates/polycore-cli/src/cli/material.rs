@@ -124,8 +124,10 @@ pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
     })
 }
 
-/// Number of significant digits of parameters.
+/// Number of significant digits of parameters in files.
 pub const DIGITS: usize = 10;
+/// Number of significant digits on the terminal.
+pub const SHOWN: usize = 7;
 
 /// Formats a stress with its unit.
 pub fn stress(value: f64, significant: usize) -> String {

@@ -12,7 +12,7 @@ use polycore::file::atomic_write;
 use serde::Deserialize;
 
 use super::MPA;
-use super::material::{BULK_RATIO, DIGITS, digits, stress};
+use super::material::{BULK_RATIO, DIGITS, SHOWN, digits, stress};
 use super::quantities as q;
 
 /// Volumetric test, which gives the bulk modulus of fits of the same `material`.
@@ -165,13 +165,13 @@ impl VolumetricSet {
         }
         report.value(q::BULK_RMS.named(&[&self.name]), fit.rms / MPA);
         let error = fit.bulk_error.map_or_else(String::new, |error| format!(" ± {}", stress(error, 2)));
-        let mut text = format!("volumetric {}: K {}{error}", self.name, stress(fit.bulk, DIGITS));
+        let mut text = format!("volumetric {}: K {}{error}", self.name, stress(fit.bulk, SHOWN));
         let is_monotonic = fit.softening().is_none();
         report.value(q::MONOTONIC.named(&[&self.name]), f64::from(u8::from(is_monotonic)));
         for (i, compliance) in fit.compliances.iter().enumerate() {
             let number = (i + 1).to_string();
             report.value(q::COMPLIANCE.named(&[&self.name, &number]), compliance * MPA);
-            let _ = write!(text, ", D{number} {}", digits(compliance * MPA, DIGITS));
+            let _ = write!(text, ", D{number} {}", digits(compliance * MPA, SHOWN));
             if let Some(error) = fit.compliance_errors.get(i) {
                 report.value(q::COMPLIANCE_ERROR.named(&[&self.name, &number]), error * MPA);
                 let _ = write!(text, " ± {}", digits(error * MPA, 2));

@@ -314,24 +314,24 @@ mod tests {
     fn terms_of_the_volumetric_energy() {
         let all = [0.05, 2e-3, 1e-4];
         let yeoh = card("yeoh", &[0.2, 0.002, 5e-5], &all);
-        assert!(yeoh.ends_with("5.000000e-5, 5.000000e-2, 2.000000e-3, 1.000000e-4\n"), "{yeoh}");
+        assert!(yeoh.ends_with("5.000000000e-5, 5.000000000e-2, 2.000000000e-3, 1.000000000e-4\n"), "{yeoh}");
         assert!(!yeoh.contains("left out"), "{yeoh}");
         assert!(parse("deck", &yeoh).unwrap_err().to_string().contains("all other D 0"));
         let two = card("ogden-2", &[0.4, 2.0, 0.1, -1.5], &all);
         assert!(
-            two.starts_with("** left out: D3 = 1.000000e-4; this material has D1 to D2 alone\n"),
+            two.starts_with("** left out: D3 = 1.000000000e-4; this material has D1 to D2 alone\n"),
             "{two}"
         );
-        assert!(two.ends_with("5.000000e-2, 2.000000e-3\n"), "{two}");
+        assert!(two.ends_with("5.000000000e-2, 2.000000000e-3\n"), "{two}");
         for key in ["neo-hookean", "gent"] {
             let model = any_model(key).unwrap();
             let one = card(key, model.example, &all);
-            let note = "** left out: D2 = 2.000000e-3, D3 = 1.000000e-4; this material has D1 alone\n";
+            let note = "** left out: D2 = 2.000000000e-3, D3 = 1.000000000e-4; this material has D1 alone\n";
             assert!(one.starts_with(note), "{one}");
             assert_eq!(parse("deck", &one).unwrap()[0].bulk.map(f64::round), Some(40.0));
         }
         // a term that the test does not have
-        assert!(card("ogden-2", &[0.4, 2.0, 0.1, -1.5], &[0.05, f64::INFINITY]).ends_with("0.000000e0\n"));
+        assert!(card("ogden-2", &[0.4, 2.0, 0.1, -1.5], &[0.05, f64::INFINITY]).ends_with("0.000000000e0\n"));
     }
 
     #[test]

@@ -285,10 +285,10 @@ mod tests {
     #[test]
     fn bulk_moduli_in_the_form_of_each_program() {
         let card = |host: CardProgram| host.card(1, "neo-hookean", &[0.4], &[0.05]).unwrap();
-        assert_eq!(card(CardProgram::Ansys), "TB,HYPER,1,1,1,NEO\nTBDATA,1,4.000000e-1,5.000000e-2\n");
+        assert_eq!(card(CardProgram::Ansys), "TB,HYPER,1,1,1,NEO\nTBDATA,1,4.000000000e-1,5.000000000e-2\n");
         let poisson = numbers(card(CardProgram::LsDyna).lines().nth(1).unwrap())[1];
         assert!((poisson - (120.0 - 0.8) / 240.8).abs() < 1e-12, "{poisson}");
-        assert!(card(CardProgram::Febio).contains("<k>4.000000e1</k>"), "{}", card(CardProgram::Febio));
+        assert!(card(CardProgram::Febio).contains("<k>4.000000000e1</k>"), "{}", card(CardProgram::Febio));
         let [lame, modulus] = numbers(&card(CardProgram::Moose))[..] else { panic!() };
         assert!((lame - (40.0 - 0.8 / 3.0)).abs() < 1e-5 && modulus == 0.4, "{lame} {modulus}");
         for (host, key) in [
@@ -302,10 +302,10 @@ mod tests {
         }
         let all = [0.05, 2e-3];
         let yeoh = CardProgram::Ansys.card(1, "yeoh", &[0.2, 2e-3, 5e-5], &all).unwrap();
-        assert!(yeoh.ends_with("5.000000e-5,5.000000e-2,2.000000e-3\n"), "{yeoh}");
+        assert!(yeoh.ends_with("5.000000000e-5,5.000000000e-2,2.000000000e-3\n"), "{yeoh}");
         for host in [CardProgram::LsDyna, CardProgram::Febio] {
             let card = host.card(1, "yeoh", &[0.2, 2e-3, 5e-5], &all).unwrap();
-            let note = "left out: D2 = 2.000000e-3; this material has D1 alone";
+            let note = "left out: D2 = 2.000000000e-3; this material has D1 alone";
             assert!(card.starts_with(&host.comment(note)), "{card}");
         }
     }
