@@ -72,7 +72,8 @@ impl case::Case for Fits {
         let name = stem?.replace(|letter: char| !letter.is_alphanumeric(), "-");
         let file = serde_json::Value::from(file?);
         Some(format!(
-            "version = 1\nprogram = \"polycore\"\ntitle = {file}\n\n[[fit.data]]\nname = \"{name}\"\nfile = {file}\n"
+            "version = 1\nprogram = \"polycore\"\ntitle = {file}\n\n\
+             [[fit.data]]\nname = \"{name}\"\nfile = {file}\n"
         ))
     }
 
