@@ -143,7 +143,7 @@ fn padded<T: KernelReal, const N: usize>(values: &[f64]) -> [T; N] {
 }
 
 /// Compiled sizes (numerator, denominator); a fit is padded with zeros to the first that holds it, which
-/// changes no bit. Each size costs half a second of compiling: clouds, which wait for memory, and laws fitted
+/// changes no bit. Each size takes time to compile: clouds, which wait for memory, and laws fitted
 /// to 1e-6 for single precision have fewer.
 macro_rules! for_size {
     ($d:literal, $rational:expr, $make:ident $arguments:tt) => {
