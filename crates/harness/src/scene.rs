@@ -93,6 +93,11 @@ impl Source {
         }
     }
 
+    /// Returns true for the name of a table.
+    pub fn is_table(path: &Path) -> bool {
+        path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"))
+    }
+
     /// Reads a scene file.
     ///
     /// # Errors
@@ -111,7 +116,7 @@ impl Source {
             let help = error::scene_inside(path);
             return Err(fail("scene::directory", "is a directory, not a scene file".into(), help));
         }
-        if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv")) {
+        if Self::is_table(path) {
             let help = "name it in a scene: `version = 1`, the `program`, a `title`, and the block that \
                         reads it, as `[[fit.data]]` with `name` and `file` of polycore";
             return Err(fail("scene::table", "is a table, not a scene".into(), Some(help.into())));

@@ -18,9 +18,9 @@ fn step(series: &mut ParticleSeries, step: usize) {
     series.step(step as f64, &points, &[("speed", 1, &speed)]).unwrap();
 }
 
-/// Not a test by itself: what the killed process does, over and over.
+/// Process that `survives_kill_9` starts and kills; no test of its own.
 #[test]
-#[ignore = "run by survives_kill_9"]
+#[ignore = "the process that survives_kill_9 kills"]
 fn writer() {
     let path = PathBuf::from(std::env::var_os(TARGET).expect("run by survives_kill_9"));
     loop {

@@ -38,17 +38,34 @@ pub struct Lattice<const D: usize> {
 }
 
 impl<const D: usize> Lattice<D> {
-    /// Returns the cells with copies of themselves in so many layers beyond both sides along each axis.
-    pub(crate) fn repeated(&self, layers: [usize; D]) -> Self {
+    /// Adds empty layers beyond both sides along each axis; returns with them the cells there that repeat an
+    /// occupied one: the index of each and that of the cell it repeats.
+    pub(crate) fn widened(self, layers: [usize; D]) -> (Self, Vec<[usize; 2]>) {
+        if layers == [0; D] {
+            return (self, Vec::new());
+        }
         let cells: [usize; D] = std::array::from_fn(|d| self.cells[d] + 2 * layers[d]);
-        let occupied = (0..cells.iter().product()).map(|index| {
-            let place = cell(index, cells);
-            let inside =
-                |d: usize| (place[d] as isize - layers[d] as isize).rem_euclid(self.cells[d] as isize);
-            self.occupied[(0..D).rev().fold(0, |at, d| at * self.cells[d] + inside(d) as usize)]
-        });
+        let index = |cells: [usize; D], place: [usize; D]| {
+            (0..D).rev().fold(0, |index, d| index * cells[d] + place[d])
+        };
+        let (mut occupied, mut copies) = (vec![false; cells.iter().product()], Vec::new());
+        for (own, occupied) in occupied.iter_mut().enumerate() {
+            let place = cell(own, cells);
+            let inner = |d: usize| {
+                let from_first = place[d] as isize - layers[d] as isize;
+                from_first.rem_euclid(self.cells[d] as isize) as usize
+            };
+            let repeated: [usize; D] = std::array::from_fn(inner);
+            if self.occupied[index(self.cells, repeated)] {
+                let origin = index(cells, std::array::from_fn(|d| repeated[d] + layers[d]));
+                *occupied = origin == own;
+                if origin != own {
+                    copies.push([own, origin]);
+                }
+            }
+        }
         let origin = std::array::from_fn(|d| self.origin[d] - self.spacing * layers[d] as f64);
-        Self { origin, cells, occupied: occupied.collect(), ..*self }
+        (Self { origin, cells, occupied, ..self }, copies)
     }
 }
 

@@ -48,7 +48,8 @@ impl Chart {
     /// Writes the chart as PNG.
     ///
     /// # Errors
-    /// An unknown value, text that is not a number, as many x as y not, a file that cannot be written.
+    /// An unknown value, text that is not a number, x and y of different lengths, a file that cannot be
+    /// written.
     pub fn write(&self, path: &Path, value: impl Fn(&str, &str) -> Option<f64>) -> Result<()> {
         let mut plot = LinePlot::new(&self.title).axes(&self.axes[0], &self.axes[1]).size(SIZE.0, SIZE.1);
         for series in &self.series {

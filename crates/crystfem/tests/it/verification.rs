@@ -245,7 +245,7 @@ fn jumping_conductivity_in_a_steady_state() {
 /// The surface of a half-space is 70 K below the jump, the rest 70 K above it: Neumann's solution without
 /// latent heat. The flux is exact at nodes; the error is of order h if the jump lies within an element.
 #[test]
-#[ignore = "long"]
+#[ignore = "takes 6 to 35 s; .ci/run runs it"]
 fn jumping_conductivity_in_a_half_space() {
     for (values, latest) in [([0.2, 2.0], 20.0), ([2.0, 0.2], 20.0)] {
         let exact = Freezing {

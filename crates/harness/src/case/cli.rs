@@ -264,9 +264,7 @@ fn finish<C: Case>(
 
 /// Reads a scene, or makes that of a table.
 fn read_scene<C: Case>(path: &Path) -> Result<Source, SceneError> {
-    let is_table =
-        path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv")) && path.is_file();
-    match C::scene_of_table(path).filter(|_| is_table) {
+    match C::scene_of_table(path).filter(|_| Source::is_table(path) && path.is_file()) {
         Some(text) => Ok(Source::new(path, text)),
         None => Source::read(path),
     }

@@ -20,7 +20,6 @@ use crate::geometry::{Cut, Gaps, Lattice, cell, refuse_too_large};
 use crate::potential::{EnergyTable, KernelFit, StretchRange, TangentTable};
 use mixed::Mixed;
 pub use periodic::PeriodicImage;
-use periodic::widen;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -121,7 +120,7 @@ impl<const D: usize> LatticeBonds<D> {
         if stencil.offsets.is_empty() {
             return Err(Error::geometry(format!("a horizon of {ratio} spacings reaches no neighbour")));
         }
-        let lattice = widen(lattice, layers)?;
+        let (lattice, copies) = lattice.widened(layers);
         let order = fullest(lattice.cells, &lattice.occupied, ratio);
         let (strides, guard, sites) = layout(lattice.cells, ratio, order);
         // bond k and bond (n − 1 − k) stay opposite, and a bond is found by its distance in sites
@@ -155,7 +154,7 @@ impl<const D: usize> LatticeBonds<D> {
         if bonds.particles.is_empty() {
             return Err(Error::geometry("the body contains no particle".to_owned()));
         }
-        bonds.images = bonds.find_images(layers);
+        bonds.images = bonds.images_in(&copies);
         bonds.connect(cuts, gaps);
         bonds.classify();
         refuse_one_sided(&bonds)?;

@@ -13,8 +13,7 @@ impl<const D: usize> System<'_, D> {
     ///
     /// # Errors
     /// [`Error::Geometry`] if the state belongs to another body or loads do not go with periodic sides, and
-    /// errors of
-    /// [`crate::potential::KernelFit::new`].
+    /// errors of [`crate::potential::KernelFit::new`].
     pub fn restore(&mut self, state: &mut State<D>) -> Result<(), Error> {
         self.refuse_beside_images()?;
         state.fracture.restore(&mut *self.bonds)?;
@@ -43,11 +42,25 @@ impl<const D: usize> System<'_, D> {
             (loads.curved.is_some(), "curves of time"),
             (!loads.turned.is_empty(), "rotations"),
             (!loads.rigid.is_empty(), "regions that move as a whole"),
+            // their forces would do work beside the mean stress
+            (self.acts_on_strained(), "particles held or loaded in a component that the mean gradient moves"),
         ];
         match refused.into_iter().find(|(given, _)| *given && !self.bonds.images().is_empty()) {
             Some((_, what)) => Err(Error::geometry(format!("periodic sides: found {what}; allowed: none"))),
             None => Ok(()),
         }
+    }
+
+    /// Returns true if a particle is held or loaded in a component whose row of the mean gradient is not 0.
+    fn acts_on_strained(&self) -> bool {
+        let (loads, particles) = (&self.loads, self.bonds.particles());
+        let Some(rows) = &loads.mean_gradient else { return false };
+        (0..D).filter(|&d| rows[d] != [0.0; D]).any(|d| {
+            particles.iter().map(|&site| site as usize).any(|site| {
+                let held = loads.constrained(site) >> d & 1 == 1;
+                held || loads.body_force.as_ref().is_some_and(|force| force.get(site)[d] != 0.0)
+            })
+        })
     }
 
     /// Returns true if every stretch of the state, `observed` if known, lies within the fit; widens the fit

@@ -28,11 +28,6 @@ pub fn inverted<const D: usize>(
     loads: &Loads<D>,
     factors: &[f64],
 ) -> Option<String> {
-    if let Some(gradient) = &loads.mean_gradient
-        && let Some(found) = flattened(gradient, factors)
-    {
-        return Some(found);
-    }
     loads.displacement.as_ref()?;
     // a rotation is not proportional to its end
     if !loads.is_proportional() {
@@ -41,8 +36,10 @@ pub fn inverted<const D: usize>(
     passing(bonds, loads, factors).or_else(|| turned(bonds, loads, factors))
 }
 
-/// Finds the load factor from which a mean displacement gradient flattens the body or turns it inside out.
-fn flattened<const D: usize>(gradient: &[[f64; D]; D], factors: &[f64]) -> Option<String> {
+/// Describes a mean displacement gradient that flattens the cell or turns it inside out at any of the load
+/// factors `factors`, or before them; `None` if there is none.
+pub fn flattened<const D: usize>(loads: &Loads<D>, factors: &[f64]) -> Option<String> {
+    let gradient = loads.mean_gradient.as_ref()?;
     let volume = |factor: f64| {
         let entry = |a: usize, b: usize| f64::from(u8::from(a == b)) + factor * gradient[a][b];
         determinant::<D>(&std::array::from_fn(|a| std::array::from_fn(|b| entry(a, b))))
@@ -213,7 +210,7 @@ impl<const D: usize> System<'_, D> {
     /// # Errors
     /// [`Error::Geometry`] with the regions and the load factor.
     pub(super) fn refuse_inverted(&self, factors: &[f64]) -> Result<(), Error> {
-        match inverted(&*self.bonds, &self.loads, factors) {
+        match flattened(&self.loads, factors).or_else(|| inverted(&*self.bonds, &self.loads, factors)) {
             Some(found) => Err(Error::geometry(format!("found {found}; allowed: {INVERTS}"))),
             None => Ok(()),
         }

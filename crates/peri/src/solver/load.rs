@@ -248,20 +248,15 @@ impl<const D: usize> Loads<D> {
         }
     }
 
-    /// Field H X with the mean of the prescribed displacements where some are prescribed.
+    /// Field H X, and the mean of the prescribed displacements in each component, which H does not move.
     fn affine_mean(&self, bonds: &dyn BodyGeometry<D>, gradient: &[[f64; D]; D]) -> [[f64; 4]; D] {
         let mut result = [[0.0; 4]; D];
         for d in 0..D {
             result[d][1..=D].copy_from_slice(&gradient[d]);
+            let Some(prescribed) = &self.displacement else { continue };
             let held = bonds.particles().iter().map(|&site| site as usize);
             let held = held.filter(|&site| self.constrained(site) >> d & 1 == 1);
-            let (mut sum, mut count) = (0.0, 0.0);
-            for site in held {
-                let position = bonds.position(site);
-                let prescribed = self.displacement.as_ref().map_or(0.0, |field| field.get(site)[d]);
-                sum += prescribed - (0..D).map(|e| gradient[d][e] * position[e]).sum::<f64>();
-                count += 1.0;
-            }
+            let (sum, count) = held.fold((0.0, 0.0), |(s, n), site| (s + prescribed.get(site)[d], n + 1.0));
             result[d][0] = if count > 0.0 { sum / count } else { 0.0 };
         }
         result

@@ -53,7 +53,7 @@ pub use dynamic_relaxation::{DynamicRelaxation, RelaxationSolver};
 pub use force_fields::{Centrifugal, ForceField, PlacedForce};
 pub use force_scale::Balance;
 pub use fracture::{BreakingEvent, Fracture};
-pub use inverted::{INVERTS, inverted};
+pub use inverted::{INVERTS, flattened, inverted};
 pub use lbfgs::{Lbfgs, LbfgsSolver};
 pub use load::{Loads, Support};
 pub use load_stepping::{Equilibrium, QuasiStatic, load_stepping};

@@ -116,7 +116,7 @@ fn roughness(rows: usize, filter: bool) -> f64 {
 
 /// The independent results have two digits, from another solver to 1e-4.
 #[test]
-#[ignore = "long"]
+#[ignore = "takes 6 to 35 s; .ci/run runs it"]
 fn pressures_at_grips_become_smoother() {
     for (rows, without, with) in [(16, 2.1, 0.77), (32, 1.4, 0.48), (64, 0.84, 0.29)] {
         near(&format!("solid_pressure_roughness_{rows}"), roughness(rows, false), without, 0.04 * without);

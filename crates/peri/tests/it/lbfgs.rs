@@ -207,7 +207,7 @@ fn dent_through_breaking() {
 /// Bits do not depend on threads, with several work items and elements, on a lattice and a cloud, with
 /// breaking bonds.
 #[test]
-#[ignore = "long"]
+#[ignore = "takes 6 to 35 s; .ci/run runs it"]
 fn bits_do_not_depend_on_threads() {
     let run = |threads: usize, cloud: bool| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -231,7 +231,7 @@ fn bits_do_not_depend_on_threads() {
 
 /// A run from any restartable state has equal bits.
 #[test]
-#[ignore = "long"]
+#[ignore = "takes 6 to 35 s; .ci/run runs it"]
 fn restarts_take_the_same_bits() {
     for (refine, snap_back) in [(1, false), (16, false), (16, true)] {
         restarts(refine, snap_back);

@@ -403,7 +403,7 @@ fn bits_do_not_depend_on_threads() {
 }
 
 #[test]
-#[ignore = "long"]
+#[ignore = "takes 6 to 35 s; .ci/run runs it"]
 fn methods_agree_on_a_state_based_material() {
     let [a, b] = [Scheme::Relaxation, Scheme::Lbfgs].map(|method| pulled(method, 1e-6, 2));
     println!("iterations: relaxation {}, L-BFGS {}", a.counts.total_iterations, b.counts.total_iterations);

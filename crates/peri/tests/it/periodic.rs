@@ -97,6 +97,29 @@ fn a_cell_relaxes_to_the_homogeneous_state() {
     assert!((1..200).contains(&state.counts.total_iterations), "{}", state.counts.total_iterations);
 }
 
+/// A mean gradient is refused where it moves a component that is held, and a cell turned inside out.
+#[test]
+fn gradients_that_no_cell_can_have() {
+    let law = Law::Linear.build(1.0, 1.0, false).unwrap();
+    let solve = |rows: [[f64; 2]; 2], held: u8| {
+        let mut bonds = cell([6, 6], [true; 2]);
+        let mut constrained = vec![0; bonds.sites()];
+        constrained[bonds.particles()[0] as usize] = held;
+        let displacement = Some(Field::zeros(bonds.sites()));
+        let loads = Loads { mean_gradient: Some(rows), constrained, displacement, ..Loads::default() };
+        let mut system = System::new(&mut bonds, BondMaterial::new(&*law, MODULUS), &loads, &[1.0]);
+        let mut state = State::new(system.bonds.sites());
+        let solver = Lbfgs { tolerance: 1e-8, ..Lbfgs::default() };
+        let solved = solver.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()));
+        solved.map_err(|error| error.to_string())
+    };
+    let along_x = [[0.01, 0.0], [0.0, 0.0]];
+    assert!(solve(along_x, 1).unwrap_err().contains("held or loaded in a component"));
+    solve(along_x, 2).unwrap();
+    let error = solve([[-2.0, 0.0], [0.0, 0.0]], 2).unwrap_err();
+    assert!(error.contains("at load factor 0.50 the cell has 0.000 of its volume"), "{error}");
+}
+
 /// Stresses of particles have the mean of the virial, and forces of a cell sum to zero, in any state.
 #[test]
 fn stresses_of_particles_have_the_mean_of_the_cell() {

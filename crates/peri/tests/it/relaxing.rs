@@ -98,7 +98,7 @@ fn tear(
 /// Work = stored + dissipated + released (+ kinetic) while a strip tears; a run resumed halfway has equal
 /// bits.
 #[test]
-#[ignore = "long"]
+#[ignore = "takes 6 to 35 s; .ci/run runs it"]
 fn a_relaxing_strip_tears_and_its_ledger_closes() {
     for (rule, moving) in
         [(Driving::Equilibrium, false), (Driving::Total, false), (Driving::Equilibrium, true)]
@@ -129,7 +129,7 @@ fn a_relaxing_strip_tears_and_its_ledger_closes() {
 /// the stress at frozen C_v, ½ΔP:ΔF a step above the mean of both ends, hence of first order. Extrapolated
 /// to steps of no length nothing is left.
 #[test]
-#[ignore = "long"]
+#[ignore = "takes 6 to 35 s; .ci/run runs it"]
 fn the_ledger_closes_with_the_steps() {
     let gap = |count: u32| {
         let mut body = Body::<2>::solid([16, 12], 0.1, 3.015);
@@ -288,7 +288,7 @@ fn deform_point(thin: bool, most: [f64; 3], pressure: f64) -> [f64; 2] {
 /// A glassy body whose viscosity grows with the pressure stores and dissipates what the material point does,
 /// in plane stress, plane strain and space; in tension less is dissipated than without the pressure.
 #[test]
-#[ignore = "long"]
+#[ignore = "takes 6 to 35 s; .ci/run runs it"]
 fn glassy_bodies_flow_at_their_own_pressure() {
     let judge = |name: &str, body: [f64; 2], point: [f64; 2], other: [f64; 2], volume: f64| {
         eprintln!("{name}: body {body:?}, point {point:?}, without pressure {other:?}");

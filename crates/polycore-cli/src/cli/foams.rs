@@ -258,8 +258,7 @@ mod tests {
         let term = FoamTerm { modulus: 0.2e6, exponent: 7.0, beta: 0.5 };
         let law = Hyperfoam::new(&[term, FoamTerm { beta: 0.0, ..term }]).unwrap();
         let expected = "*HYPERFOAM, N=2\n2.000000000e-1, 7.000000000e0, 2.000000000e-1, \
-                        7.000000000e0, 2.500000000e-1, \
-                        0.000000000e0\n";
+                        7.000000000e0, 2.500000000e-1, 0.000000000e0\n";
         assert!(card("hyperfoam-2", &law).ends_with(expected), "{}", card("hyperfoam-2", &law));
     }
 }

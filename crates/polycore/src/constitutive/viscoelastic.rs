@@ -125,10 +125,14 @@ impl Viscoelastic {
     /// Creates a law of an elastic law and branches.
     ///
     /// # Errors
-    /// [`Error::Parameter`] of a branch.
+    /// [`Error::Parameter`] of a branch or its shift.
     pub fn new(equilibrium: Box<dyn Law>, branches: Vec<Branch>) -> Result<Self, Error> {
         for branch in &branches {
             branch.viscosity.check()?;
+            if let Some((name, value)) = branch.shift.invalid_constant() {
+                let (law, parameter, allowed) = ("shift", name.to_owned(), "(0, ∞)");
+                return Err(Error::Parameter { law, parameter, value, allowed });
+            }
         }
         Ok(Self { equilibrium, branches, softening: None })
     }

@@ -24,7 +24,7 @@ use crate::program::scene::{self, ContactSpec, NAMING, Scene, SceneVariant};
 use crate::solver::{Breaking, State, Status, StepRecord, System, load_stepping};
 use harness::case::{Fault, Run, Step, StepField};
 use harness::observe::{Outputs, Scalars};
-use harness::report::{Phases, Report};
+use harness::report::{Phases, Report, SceneUnits};
 use harness::scene::Source;
 use harness::study;
 use polycore::memory::available;
@@ -139,7 +139,8 @@ fn run_in<const D: usize>(
     compare::suite(&mut report, &finished, output)?;
     if scene.output.pictures {
         draw::draw_curves(scene, &finished, output)?;
-        studies::draw_studies(&scene.expect, &finished, output)?;
+        let units = SceneUnits::from_scene(&source.text);
+        studies::draw_studies(&scene.expect, &finished, &units, output)?;
     }
     Ok(FinishedScene { report, outcomes: finished })
 }

@@ -2,7 +2,7 @@
 
 use super::outcome::VariantOutcome;
 use harness::output::picture::{LinePlot, Series};
-use harness::report::{Bound, Expect};
+use harness::report::{Bound, Expect, SceneUnits};
 use polycore::Error;
 use std::path::Path;
 
@@ -25,21 +25,22 @@ struct StudyCurve {
 }
 
 /// Draws `study_KEY_VALUE.png` for each value with a reference in at least three studies `KEY=NUMBER`: the
-/// computed values as points, the references as a line.
+/// computed values as points, the references as a line, in the units of the scene. Of several spacings or
+/// horizons the first that the expectations name is drawn.
 ///
 /// # Errors
 /// A file that cannot be written.
 pub fn draw_studies(
     expectations: &[Expect],
     outcomes: &[VariantOutcome],
+    units: &SceneUnits,
     output: &Path,
 ) -> Result<(), Error> {
     for curve in curves(expectations, outcomes) {
-        let (scale, unit) = match &*curve.unit {
-            "Pa" => (1e-6, "MPa"),
-            "m" => (1e3, "mm"),
-            unit => (1.0, unit),
-        };
+        let numbers = curve.computed.iter().chain(&curve.references);
+        let largest = numbers.map(|point| point[1].abs()).fold(0.0, f64::max);
+        let shown = units.shown(&curve.unit, largest);
+        let (scale, unit) = shown.map_or((1.0, &*curve.unit), |shown| (shown.factor, shown.name));
         let split = |points: &[[f64; 2]]| -> (Vec<f64>, Vec<f64>) {
             let mut points = points.to_vec();
             points.sort_by(|a, b| a[0].total_cmp(&b[0]));

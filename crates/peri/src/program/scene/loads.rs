@@ -9,7 +9,7 @@ use crate::contact::SurfaceShape;
 use crate::field::Field;
 use crate::material::{BodyTensor, surface_load};
 use crate::solver::{
-    ContactStops, INVERTS, Loads, RigidRegion, Support, Unsupported, find_unsupported, inverted,
+    ContactStops, INVERTS, Loads, RigidRegion, Support, Unsupported, find_unsupported, flattened, inverted,
 };
 use harness::scene::{SceneError, Source};
 
@@ -285,10 +285,10 @@ fn refuse_inverted<const D: usize>(
         Some(_) => vec![1.0],
         None => scene.load_steps().0,
     };
+    if let Some(found) = flattened(loads, &factors) {
+        return Err(source.error("periodic.gradient", found, "one that leaves the cell right side out"));
+    }
     match inverted(&*body.bonds, loads, &factors) {
-        Some(found) if scene.boundary.iter().all(|own| !own.prescribes_displacement()) => {
-            Err(source.error("periodic.gradient", found, "one that leaves the cell right side out"))
-        }
         Some(found) => Err(source.error("boundary", found, INVERTS)),
         None => Ok(()),
     }

@@ -179,8 +179,12 @@ pub(super) fn check_body<const D: usize>(
         return Err(source.error("body.spacing", found, "a whole fraction of the period"));
     }
     let layers = axes.map(|periodic| if periodic { ratio.floor() as usize } else { 0 });
-    let parted = || scene.body.bond_gaps != Some(true) && Gaps::of_cells(&lattice.repeated(layers)).is_some();
-    if severs || parted() {
+    let parted = || {
+        let (mut repeated, copies) = lattice.clone().widened(layers);
+        copies.iter().for_each(|[copy, _]| repeated.occupied[*copy] = true);
+        Gaps::of_cells(&repeated).is_some()
+    };
+    if severs || (scene.body.bond_gaps != Some(true) && parted()) {
         let found = "gaps: parts that do not touch, also across sides, or cut-outs narrower than the horizon";
         let allowed = "with periodic sides none, or `body.bond_gaps = true`";
         return Err(source.error("body.shapes", found, allowed));

@@ -79,8 +79,8 @@ impl TorsionColumns {
     /// Finds the columns; `None` if the format does not ask for torsion.
     ///
     /// # Errors
-    /// No cylinder, a column that is missing, there twice or of a unit of another quantity, angles without
-    /// the length of the cylinder or twists with it, two sources of the held stretch, a strain instead of it.
+    /// No cylinder; a column that is missing, repeated or in a unit of another quantity; angles without the
+    /// length of the cylinder, or twists with it; a held stretch that is given twice or as a strain.
     pub fn find(file: &Table, format: &TestFormat) -> Result<Option<Self>, Error> {
         let cylinder = match (format.cylinder, format.mode) {
             (Some(cylinder), _) => cylinder,
