@@ -59,12 +59,14 @@ fn interrupt(here: &Path, signal: &str) -> crate::program::Ended {
 }
 
 #[test]
+#[ignore = "takes 6 to 35 s; .ci/run runs it"]
 fn killed_at_random_times() {
     survives_kills(&relaxed(&scenes::plate(LONG.0, LONG.1)));
 }
 
 /// Broken bonds, histories and the fields of stages are restored.
 #[test]
+#[ignore = "takes 6 to 35 s; .ci/run runs it"]
 fn killed_while_it_breaks() {
     survives_kills(&scenes::fracture("2 mm", "[contact]"));
     survives_kills(&scenes::fracture("2 mm", "method = \"lbfgs\""));
@@ -72,6 +74,7 @@ fn killed_while_it_breaks() {
 
 /// Variants solved at the same time: some finished, some running, some not begun.
 #[test]
+#[ignore = "takes 6 to 35 s; .ci/run runs it"]
 fn killed_with_several_variants() {
     survives_kills(&several());
 }
@@ -128,15 +131,21 @@ fn killed_between_and_within_steps() {
     survives_kills(&format!("{scene}{again}"));
 }
 
-/// Layers, crystallization with its latent heat, probes and fields.
+/// Layers, stresses and fields.
 #[test]
+fn killed_while_it_warps() {
+    survives_kills_of("crystfem", &crate::parts::warped());
+}
+
+/// Layers, crystallization with its latent heat, probes.
+#[test]
+#[ignore = "takes 6 to 35 s; .ci/run runs it"]
 fn killed_while_it_prints() {
     survives_kills_of("crystfem", &crate::parts::studies());
     survives_kills_of(
         "crystfem",
         &crate::parts::BAR.replace("tolerance = \"1 K\"", "tolerance = \"0.02 K\""),
     );
-    survives_kills_of("crystfem", &crate::parts::warped());
 }
 
 fn survives_kills(scene: &str) {

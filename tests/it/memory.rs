@@ -123,6 +123,7 @@ fn of_a_thin_body() {
 }
 
 #[test]
+#[ignore = "takes 6 to 35 s; .ci/run runs it"]
 fn of_parts() {
     let fine =
         parts::BAR.replace("element_size = \"1 mm\"", "element_size = \"0.25 mm\"\nelements_per_layer = 2");
@@ -222,6 +223,7 @@ fn surrogate(more: &str) -> String {
 }
 
 #[test]
+#[ignore = "takes 6 to 35 s; .ci/run runs it"]
 fn of_surrogates() {
     holds("mdsurrogate", &surrogate(""), &[("data.csv", data(10_000))]);
     let wide = "[training]\nepochs = 1\nbatch = 512\n[[model]]\nkind = \"ann\"\nhidden = [[1200, \

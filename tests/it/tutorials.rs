@@ -59,11 +59,13 @@ fn rubber_that_relaxes() {
 }
 
 #[test]
+#[ignore = "takes 6 to 35 s; .ci/run runs it"]
 fn fracture_researcher() {
     follow("fracture", &["out/calibrate-sweep/sweep.csv", "out/predict/load_displacement.png"]);
 }
 
 #[test]
+#[ignore = "takes 6 to 35 s; .ci/run runs it"]
 fn printing_engineer() {
     follow("printing", &["out/print/warped.png", "out/print-sweep/sweep.csv"]);
 }
