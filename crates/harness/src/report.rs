@@ -23,7 +23,8 @@ mod units;
 pub use expect::{Bound, Expect, Judgement, Kind, Tolerance};
 pub use provenance::{Git, Host, Provenance};
 pub use quantity::{Named, Quantity};
-pub use units::SceneUnits;
+pub(crate) use units::RequestedUnit;
+pub use units::{SceneUnits, ShownUnit};
 
 /// The name of the file that [`Report::write`] leaves in the output directory.
 pub const FILE_NAME: &str = "report.json";
@@ -168,6 +169,14 @@ impl Report {
         match self.values.get(name) {
             Some(Value::Scalar { value, unit }) => (number::short(*value), unit.clone()),
             _ => Default::default(),
+        }
+    }
+
+    /// Returns a scalar with six digits in `unit`, and its unit; empty if there is none of that name.
+    pub fn shown_in(&self, name: &str, unit: Option<ShownUnit>) -> (String, String) {
+        match (self.scalar(name), unit) {
+            (Some(value), Some(unit)) => (number::short(value * unit.factor), unit.name.to_owned()),
+            _ => self.shown(name),
         }
     }
 

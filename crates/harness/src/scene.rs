@@ -23,6 +23,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use crate::report::RequestedUnit;
 use serde::Deserialize as _;
 use serde::de::DeserializeOwned;
 use toml::Spanned;
@@ -60,7 +61,7 @@ pub const SWEEP: &str = "sweep";
 /// The table of a scene that names the scenes whose results it reads; the harness reads it, programs do not.
 pub const INPUTS: &str = "inputs";
 
-/// The table of a scene that names the values to show first; the harness reads it, programs do not.
+/// The table of a scene that names the values to show first and their units; the harness reads it, programs do not.
 pub const REPORT: &str = "report";
 
 /// A larger file is not a scene; numbers in bulk belong into CSV files beside it.
@@ -234,8 +235,10 @@ impl Source {
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ReportSpec {
-    #[serde(rename = "values")]
+    #[serde(default, rename = "values")]
     _values: Vec<String>,
+    #[serde(default, rename = "units")]
+    _units: Vec<RequestedUnit>,
 }
 
 fn check_report(table: Spanned<DeValue<'_>>) -> Result<(), toml::de::Error> {

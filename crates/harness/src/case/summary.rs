@@ -3,7 +3,7 @@
 use super::rows::natural;
 use super::terminal::TerminalStyle;
 use super::{Finished, Program, matches_pattern};
-use crate::report::{FILE_NAME, Kind, Report, aligned};
+use crate::report::{FILE_NAME, Kind, Report, SceneUnits, ShownUnit, Value, aligned};
 use crate::scene::Source;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -85,6 +85,7 @@ pub(crate) struct Names<'a> {
     report: &'a Report,
     /// Quantities that several folders have, `FOLDER.QUANTITY`.
     shared: BTreeSet<&'a str>,
+    units: SceneUnits,
 }
 
 impl<'a> Names<'a> {
@@ -93,7 +94,21 @@ impl<'a> Names<'a> {
         for (_, quantity) in report.values.keys().filter_map(|name| name.split_once('.')) {
             *owners.entry(quantity).or_default() += 1;
         }
-        Self { report, shared: owners.into_iter().filter(|own| own.1 > 1).map(|own| own.0).collect() }
+        let shared = owners.into_iter().filter(|own| own.1 > 1).map(|own| own.0).collect();
+        Self { report, shared, units: SceneUnits::from_scene(&report.provenance.scene) }
+    }
+
+    /// Returns the unit for all values of a list.
+    fn unit(&self, names: &[&str]) -> Option<ShownUnit> {
+        let scalars = || {
+            names.iter().filter_map(|name| match self.report.values.get(*name)? {
+                Value::Scalar { value, unit } => Some((value.abs(), unit)),
+                Value::Curve { .. } => None,
+            })
+        };
+        let unit = scalars().map(|own| own.1).find(|unit| !unit.is_empty())?;
+        let largest = scalars().map(|own| own.0).filter(|value| value.is_finite()).fold(0.0, f64::max);
+        self.units.shown(unit, largest)
     }
 
     /// Quantity and variant of a name; the variant is empty where there is none.
@@ -173,7 +188,7 @@ fn main_values(report: &Report, listed: &[String], columns: &[&str], width: usiz
     }
     let most = SINGLE[usize::from(!several.is_empty())];
     let row = |name: &&str| {
-        let (value, unit) = report.shown(name);
+        let (value, unit) = report.shown_in(name, names.unit(&[name]));
         [(*name).to_owned(), value, unit]
     };
     text += &aligned(&single.iter().take(most).map(row).collect::<Vec<_>>());
@@ -203,8 +218,10 @@ fn by_variant(names: &Names, shown: &[&str], width: usize) -> String {
     let mut columns =
         vec![("variant".to_owned(), variants.iter().map(|v| (*v).to_owned()).collect::<Vec<_>>())];
     for quantity in quantities.iter().take(COLUMNS) {
-        let cells = variants.iter().map(|variant| of(quantity, variant).map(|name| names.report.shown(name)));
-        let cells: Vec<Option<(String, String)>> = cells.collect();
+        let own: Vec<Option<&str>> = variants.iter().map(|variant| of(quantity, variant).copied()).collect();
+        let unit = names.unit(&own.iter().flatten().copied().collect::<Vec<_>>());
+        let cell = |name: Option<&str>| name.map(|name| names.report.shown_in(name, unit));
+        let cells: Vec<Option<(String, String)>> = own.into_iter().map(cell).collect();
         let unit = cells.iter().flatten().map(|cell| cell.1.as_str()).find(|unit| !unit.is_empty());
         let head = unit.map_or_else(|| (*quantity).to_owned(), |unit| format!("{quantity} [{unit}]"));
         columns.push((head, cells.into_iter().map(|cell| cell.map_or("–".into(), |cell| cell.0)).collect()));

@@ -1,5 +1,7 @@
 //! Units in which results are shown: those that the scene uses.
 
+use crate::scene::REPORT;
+use serde::Deserialize;
 use std::collections::BTreeMap;
 
 /// Unit in which a number of a report is shown.
@@ -33,14 +35,42 @@ const READABLE: std::ops::Range<f64> = 1e-3..1e5;
 pub struct SceneUnits {
     /// Number of uses, by name.
     counts: BTreeMap<&'static str, usize>,
+    /// Units that the scene asks for, `[report] units`.
+    requested: Vec<String>,
+}
+
+/// Unit of `[report] units`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(try_from = "String")]
+pub(crate) struct RequestedUnit(String);
+
+impl TryFrom<String> for RequestedUnit {
+    type Error = String;
+
+    fn try_from(name: String) -> Result<Self, String> {
+        let all = || DIMENSIONS.iter().flat_map(|dimension| dimension.1).map(|own| own.0);
+        let unit = spelled(&name);
+        all()
+            .any(|own| own == unit)
+            .then_some(Self(unit))
+            .ok_or_else(|| format!("found `{name}`; allowed: {}", all().collect::<Vec<_>>().join(", ")))
+    }
+}
+
+/// Spells a unit as results do: `m²` for `m^2`, `µm` for `um`.
+fn spelled(unit: &str) -> String {
+    unit.trim().replace("^2", "²").replace("^3", "³").replace('u', "µ")
 }
 
 impl SceneUnits {
     /// Counts the units of all quantities in a scene.
     pub fn from_scene(text: &str) -> Self {
         let mut units = Self::default();
-        let mut left: Vec<toml::Value> =
-            text.parse::<toml::Table>().map(toml::Value::Table).into_iter().collect();
+        let root: toml::Table = text.parse().unwrap_or_default();
+        let requested = || root.get(REPORT)?.get("units")?.as_array();
+        let unit = |name: &toml::Value| RequestedUnit::try_from(name.as_str()?.to_owned()).ok();
+        units.requested = requested().into_iter().flatten().filter_map(|name| Some(unit(name)?.0)).collect();
+        let mut left = vec![toml::Value::Table(root)];
         while let Some(value) = left.pop() {
             match value {
                 toml::Value::Table(table) => left.extend(table.into_iter().map(|(_, value)| value)),
@@ -62,17 +92,22 @@ impl SceneUnits {
         let quantity = quantity.trim();
         let end = quantity.find(|c: char| !(c.is_ascii_digit() || "+-.eE".contains(c))).unwrap_or(0);
         let (number, unit) = quantity.split_at(end);
-        let unit = unit.trim().replace("^2", "²").replace("^3", "³").replace('u', "µ");
+        let unit = spelled(unit);
         let known = DIMENSIONS.iter().flat_map(|dimension| dimension.1).find(|own| own.0 == unit);
         if let (Ok(_), Some((name, _))) = (number.parse::<f64>(), known) {
             *self.counts.entry(name).or_default() += 1;
         }
     }
 
-    /// Returns the unit for numbers up to `largest`, in `unit` of the report: that of the scene if it gives
-    /// readable numbers, otherwise the largest unit that does. Other units stay.
+    /// Returns the unit for numbers up to `largest`, in `unit` of the report: that requested, that of the scene
+    /// if it gives readable numbers, otherwise the largest unit that does. Other units stay.
     pub fn shown(&self, unit: &str, largest: f64) -> Option<ShownUnit> {
         let (_, choices) = DIMENSIONS.iter().find(|dimension| dimension.0.contains(&unit))?;
+        if let Some((name, factor)) =
+            choices.iter().find(|own| self.requested.iter().any(|name| name == own.0))
+        {
+            return Some(ShownUnit { name, factor: *factor });
+        }
         let count = |name: &str| self.counts.get(name).copied().unwrap_or_default();
         let used = choices.iter().filter(|own| count(own.0) > 0).max_by_key(|own| count(own.0));
         let readable =
@@ -117,5 +152,9 @@ mod tests {
         close(units.convert(21.0, "degC"), 21.0, "°C");
         close(units.convert(3.0, "1/s"), 3.0, "1/s");
         assert_eq!(units.shown("m", 0.0).map(|unit| unit.name), Some("mm"));
+        // those requested, whatever the number
+        let units = SceneUnits::from_scene("[report]\nunits = [\"N\", \"um\"]\n[body]\nsize = \"2 mm\"");
+        close(units.convert(2.5e7, "N"), 2.5e7, "N");
+        close(units.convert(2e-3, "m"), 2000.0, "µm");
     }
 }

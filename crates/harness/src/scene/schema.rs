@@ -91,10 +91,13 @@ fn add_version(scene: &mut Value) {
     scene["properties"][REPORT] = json!({
         "type": "object",
         "additionalProperties": false,
-        "required": ["values"],
-        "properties": { "values": { "type": "array", "items": { "type": "string" } } },
+        "properties": {
+            "values": { "type": "array", "items": { "type": "string" } },
+            "units": { "type": "array", "items": { "type": "string" } },
+        },
         "description": "Values to show first in the terminal and on the page: names, or patterns with `*`; \
-                        a name without its variant stands for those of all variants.",
+                        a name without its variant stands for those of all variants. Units to show them in, \
+                        such as N, mm, MPa; by default those that the scene uses most.",
     });
     match scene["required"].as_array_mut() {
         Some(required) => required.insert(0, json!("version")),

@@ -1,6 +1,6 @@
 //! Report of a sweep, and pictures of its values over the first key.
 
-use super::{FAILED_RUNS, Vary};
+use super::{FAILED_RUNS, Vary, divided};
 use crate::case::Program;
 use crate::case::rows::{Rows, STATISTICS, number_and_unit};
 use crate::output::picture::{LinePlot, Series};
@@ -51,22 +51,67 @@ pub(super) fn numeric(values: &[String]) -> Option<(Vec<f64>, String)> {
     all.iter().all(|(_, other)| *other == unit).then(|| (all.iter().map(|(x, _)| *x).collect(), unit))
 }
 
+/// Returns the places of the values of a key and the label of their axis: of lists and tables the entry that
+/// varies alone, `boundary[1].to[0] [mm]`; the position in the sweep where there is no such number.
+fn axis(vary: &Vary) -> (Vec<f64>, String) {
+    let first = |text: &String| divided(text, ';').swap_remove(0);
+    let key = first(&vary.key);
+    let entries: Vec<Vec<(String, String)>> = vary.values.iter().map(|text| entries(&first(text))).collect();
+    let column = |place: usize| -> Option<Vec<&(String, String)>> {
+        entries.iter().map(|entries| entries.get(place)).collect()
+    };
+    let most = entries.iter().map(Vec::len).max().unwrap_or_default();
+    let columns: Option<Vec<_>> = (0..most).map(column).collect();
+    let mut varying = columns.iter().flatten().filter(|column| column.iter().any(|own| *own != column[0]));
+    if let (Some(column), None) = (varying.next(), varying.next())
+        && column.iter().all(|(path, _)| *path == column[0].0)
+        && let Some((places, unit)) =
+            numeric(&column.iter().map(|(_, text)| text.clone()).collect::<Vec<_>>())
+    {
+        let unit = if unit.is_empty() { unit } else { format!(" [{}]", unit.replace("degC", "°C")) };
+        return (places, format!("{key}{}{unit}", column[0].0));
+    }
+    let count = vary.values.len();
+    let names = vary.values.join(", ");
+    let names =
+        if names.chars().count() > LABEL { format!("value 1 to {count} of the sweep") } else { names };
+    ((1..=count).map(|k| k as f64).collect(), format!("{key}: {names}"))
+}
+
+/// Returns the entries of a value: path within it (empty, `[1]`, `.stretch`) and text.
+fn entries(text: &str) -> Vec<(String, String)> {
+    fn collect(path: String, value: &toml::Value, all: &mut Vec<(String, String)>) {
+        match value {
+            toml::Value::Array(items) => {
+                items.iter().zip(0..).for_each(|(item, k)| collect(format!("{path}[{k}]"), item, all));
+            }
+            toml::Value::Table(table) => {
+                table.iter().for_each(|(key, item)| collect(format!("{path}.{key}"), item, all));
+            }
+            toml::Value::String(text) => all.push((path, text.clone())),
+            other => all.push((path, other.to_string())),
+        }
+    }
+    let mut all = Vec::new();
+    match format!("value = {text}").parse::<toml::Table>() {
+        Ok(table) => collect(String::new(), &table["value"], &mut all),
+        // a quantity without quotes
+        Err(_) => all.push((String::new(), text.to_owned())),
+    }
+    all
+}
+
 /// Values with a picture of their own at most.
 const DRAWN: usize = 8;
+/// Characters of the values in the label of an axis at most.
+const LABEL: usize = 60;
 
 /// sweep_FIELD.png: mean, least and largest at the end (the mean only where several keys vary), and
 /// sweep_deviation_of_FIELD.png, sweep_VALUE.png of at most [`DRAWN`] other values, against the first
 /// key, with a line for each combination of the others.
 pub(super) fn draw(vary: &[Vary], rows: &Rows, output: &Path) -> Result<(), polycore::Error> {
     let Some(first) = vary.first().filter(|vary| vary.values.len() > 1) else { return Ok(()) };
-    let (places, label) = match numeric(&first.values) {
-        Some((places, unit)) if unit.is_empty() => (places, first.key.clone()),
-        Some((places, unit)) => (places, format!("{} [{}]", first.key, unit.replace("degC", "°C"))),
-        None => {
-            let names = first.values.join(", ");
-            ((1..=first.values.len()).map(|k| k as f64).collect(), format!("{}: {names}", first.key))
-        }
-    };
+    let (places, label) = axis(first);
     let mut others: Vec<String> = rows.rows.iter().map(|row| row.settings[1..].join(", ")).collect();
     others.dedup();
     others.sort();
@@ -127,4 +172,28 @@ pub(super) fn draw(vary: &[Vary], rows: &Rows, output: &Path) -> Result<(), poly
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn entries_that_vary_alone_are_axes() {
+        let labelled = |text: &str| axis(&text.parse().unwrap());
+        let told = |text: &str, places: &[f64], label: &str| {
+            assert_eq!(labelled(text), (places.to_vec(), label.to_owned()));
+        };
+        told("time.end=10 s,20s", &[10.0, 20.0], "time.end [s]");
+        told("body.ratio=3,4.5", &[3.0, 4.5], "body.ratio");
+        let lists = "boundary[1].to=[\"-8 mm\",\"0 mm\"],[\"-4mm\",\"0 mm\"]";
+        told(lists, &[-8.0, -4.0], "boundary[1].to[0] [mm]");
+        let tables = "critical={stretch=2,links=9},{stretch=3,links=9};end=1s,2s";
+        told(tables, &[2.0, 3.0], "critical.stretch");
+        told("a=[1,2],[3,4]", &[1.0, 2.0], "a: [1,2], [3,4]");
+        told("a=[1,2],[3,2,5]", &[1.0, 2.0], "a: [1,2], [3,2,5]");
+        told("end=1 s,1 min", &[1.0, 2.0], "end: 1 s, 1 min");
+        let long = labelled(&format!("a=[{}],[0,1]", "1,".repeat(40)));
+        assert_eq!(long.1, "a: value 1 to 2 of the sweep");
+    }
 }
