@@ -18,6 +18,8 @@ pub enum ColorMap {
 
 /// Colour of points without a number.
 pub(super) const MISSING: [u8; 3] = [190, 190, 190];
+/// Colour of rigid bodies.
+pub(super) const RIGID: [u8; 3] = [222, 222, 222];
 
 type ColorTable = [[u8; 3]; 256];
 

@@ -1,6 +1,7 @@
 //! Fields on particles in the plane, as coloured blocks with a colour bar.
 
 use polycore::numerics::range;
+use std::fmt;
 use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
@@ -11,7 +12,7 @@ use super::axis::{labels, ticks};
 use super::bar::{ColorBar, LABEL, LINE, TICK, TICK_LENGTH};
 use super::blocks::ParticleBlocks;
 use super::canvas::{BLACK, Canvas, LabelAnchor, Text};
-use super::color::{ColorMap, MISSING};
+use super::color::{ColorMap, MISSING, RIGID};
 use super::particles::{PixelWindow, Raster};
 use super::picture_error;
 use polycore::Error;
@@ -19,6 +20,8 @@ use polycore::file::atomic_write;
 
 const TITLE: u32 = 28;
 const MARGIN: usize = 26;
+/// Width of the rim around particles beside rigid bodies, over the longer side of the field.
+const RIM: f64 = 0.06;
 /// More pixels than this are a mistake.
 const LARGEST_PICTURE: usize = 200_000_000;
 
@@ -56,6 +59,17 @@ pub struct Panel<'a> {
     bridge: f64,
     colors: ColorMap,
     range: Option<(f64, f64)>,
+    rigid: Option<RigidOutline<'a>>,
+}
+
+/// Height above rigid bodies at a place, negative within them.
+#[derive(Clone, Copy)]
+struct RigidOutline<'a>(&'a (dyn Fn([f64; 2]) -> f64 + Sync));
+
+impl fmt::Debug for RigidOutline<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("RigidOutline")
+    }
 }
 
 impl<'a> Panel<'a> {
@@ -72,6 +86,7 @@ impl<'a> Panel<'a> {
             bridge: 1.5,
             colors: ColorMap::Viridis,
             range: None,
+            rigid: None,
         }
     }
 
@@ -99,6 +114,13 @@ impl<'a> Panel<'a> {
     /// default 1.5; larger stretches need more.
     pub fn bridge(mut self, spacings: f64) -> Self {
         self.bridge = spacings;
+        self
+    }
+
+    /// Draws rigid bodies beside the particles in grey: where `height`, in the unit of the positions, is
+    /// negative.
+    pub fn rigid(mut self, height: &'a (dyn Fn([f64; 2]) -> f64 + Sync)) -> Self {
+        self.rigid = Some(RigidOutline(height));
         self
     }
 
@@ -246,6 +268,7 @@ impl<'a> FieldMap<'a> {
                     .ok_or_else(|| {
                         format!("panel `{}`: positions are not finite or too far apart", panel.title)
                     })?;
+                let window = if panel.rigid.is_some() { window.widened(RIM) } else { window };
                 let kept = last.take().filter(|(other, _)| panel.has_outline_of(other));
                 let blocks = kept.map_or_else(|| Arc::new(panel.outline()), |(_, blocks)| blocks);
                 outlined.push((panel, window, Arc::clone(&blocks)));
@@ -304,6 +327,22 @@ impl<'a> FieldMap<'a> {
                     panel.colors.color_at((value - low) / (high - low))
                 };
                 canvas.set(x + column as isize, y + row as isize, color);
+            }
+        }
+        if let Some(RigidOutline(height)) = panel.rigid {
+            let within = |column: usize, row: usize| height(window.place(column, row)) < 0.0;
+            for at in (0..raster.values.len()).filter(|&at| raster.values[at].is_none()) {
+                let (column, row) = (at % raster.width, at / raster.width);
+                if within(column, row) {
+                    let next = [column.wrapping_sub(1), column, column + 1];
+                    let open = next.iter().any(|&c| {
+                        [row.wrapping_sub(1), row, row + 1]
+                            .iter()
+                            .any(|&r| c < raster.width && r < raster.height && !within(c, r))
+                    });
+                    let color = if open { BLACK } else { RIGID };
+                    canvas.set(x + column as isize, y + row as isize, color);
+                }
             }
         }
         if let Some(axes) = &axes {

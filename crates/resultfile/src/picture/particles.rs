@@ -45,6 +45,19 @@ impl PixelWindow {
         (extent.is_finite() && pixels > 0.0).then_some(Self { low, high, scale: pixels / spacing })
     }
 
+    /// Adds a rim of a part `share` of the longer side, a whole number of pixels.
+    pub(super) fn widened(self, share: f64) -> Self {
+        let longer = (self.high[0] - self.low[0]).max(self.high[1] - self.low[1]);
+        let rim = (share * longer * self.scale).round() / self.scale;
+        Self { low: self.low.map(|x| x - rim), high: self.high.map(|x| x + rim), ..self }
+    }
+
+    /// Returns the centre of a pixel.
+    pub(super) fn place(&self, column: usize, row: usize) -> [f64; 2] {
+        let [across, down] = [column, row].map(|pixel| (pixel as f64 + 0.5) / self.scale);
+        [self.low[0] + across, self.high[1] - down]
+    }
+
     fn pixels(&self) -> [usize; 2] {
         [0, 1].map(|axis| (((self.high[axis] - self.low[axis]) * self.scale).round() as usize).max(1))
     }

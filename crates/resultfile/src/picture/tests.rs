@@ -182,6 +182,21 @@ fn field_pixels() {
     assert_eq!((canvas.get(25, row), canvas.get(26 + 300, row)), ([255; 3], [255; 3]));
 }
 
+/// A floor at y = 0 below three particles: a rim of 18 pixels, grey under a black line.
+#[test]
+fn rigid_bodies_beside_particles() {
+    let (positions, values) = ([[0.5, 0.5], [1.5, 0.5], [2.5, 0.5]], [0.0, 0.5, 1.0]);
+    let floor = |place: [f64; 2]| place[1];
+    let panel = Panel::new("", "", &positions, &values, 1.0).rigid(&floor);
+    let canvas = FieldMap::new().size(300).panel(panel).canvas().unwrap();
+    let below = 26 + 18 + 100;
+    let grey = [222; 3];
+    let found = [0, 1, 17, 18].map(|down| canvas.get(26 + 18 + 150, below + down));
+    assert_eq!(found, [[0; 3], grey, grey, [255; 3]]);
+    // no particle beside the first, above the floor
+    assert_eq!(canvas.get(26 + 9, below - 50), [255; 3]);
+}
+
 #[test]
 fn fields_that_cannot_be_drawn() {
     let directory = tempfile::tempdir().unwrap();

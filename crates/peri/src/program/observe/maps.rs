@@ -3,6 +3,7 @@
 use super::moment::Moment;
 use super::scale::{bridge_length, short, stress_unit};
 use super::{solid, stages};
+use crate::contact::{RigidSurface, SurfaceReaction};
 use crate::error::Error;
 use crate::program::scene::Scene;
 use harness::observe::{Observer, Outputs};
@@ -61,6 +62,14 @@ fn maps<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error> {
     if wide > 1.8 * high {
         map = map.columns(1).size(1200);
     }
+    let (surfaces, record) = (&m.physics.surfaces, m.state.history.last());
+    let moved = record.map_or(&[][..], |record| &record.resting);
+    let height = |place: [f64; 2]| {
+        let above = |(surface, at): (&RigidSurface<D>, &SurfaceReaction)| {
+            surface.height(std::array::from_fn(|d| place[d] - at.moved[d]))
+        };
+        surfaces.iter().zip(moved).map(above).fold(f64::INFINITY, f64::min)
+    };
     for (name, values) in &components {
         let label = format!("{name}{unit}");
         // in a torn body these are residual stresses of its pieces
@@ -70,7 +79,8 @@ fn maps<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error> {
         });
         let title = format!("{label}, {}{moment}", measure.name());
         let panel = Panel::new(&title, &label, &places, values, m.bonds.spacing()).reference(&rest);
-        map = map.panel(panel.bridge(bridge_length(m)));
+        let panel = panel.bridge(bridge_length(m));
+        map = map.panel(if surfaces.is_empty() { panel } else { panel.rigid(&height) });
     }
     Ok(map.write(output.join(format!("stress_{}.png", m.physics.name)))?)
 }

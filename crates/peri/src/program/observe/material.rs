@@ -4,6 +4,7 @@ use super::rows::{RowPart, rows};
 use super::stage::SceneStage;
 use crate::bonds::{Bonds, Property};
 use crate::calibrate;
+use crate::contact::RigidSurface;
 use crate::correction::{bond_factors, surface_factors};
 use crate::critical::{Context, CrackArea, Critical, Crossing, Toughness};
 use crate::error::Error;
@@ -200,6 +201,8 @@ pub struct Physics<const D: usize> {
     pub loaded: Vec<bool>,
     /// Grips that are tied at their surface, by site.
     pub held: Option<Vec<bool>>,
+    /// Planes and indenters of `[contact]`.
+    pub surfaces: Vec<RigidSurface<D>>,
     rows: Vec<RowPart<D>>,
     /// Evaluator of forces and stresses; this and the following fields are set by [`Self::begin`].
     pub evaluator: StressEvaluator<D>,
@@ -244,6 +247,7 @@ impl<const D: usize> Physics<D> {
             let list = crate::contact::across(&*body.bonds, held);
             body.bonds.break_bonds(&list);
         }
+        let surfaces = scene.contact.as_ref().map(|contact| contact.surfaces(source, scene)).transpose()?;
         let rows = rows(source, scene, &body)?;
         check_lines(source, scene, &*body.bonds)?;
         let with = BodyWithMaterial::new(source, scene, variant, &mut body)?;
@@ -256,6 +260,7 @@ impl<const D: usize> Physics<D> {
             stages,
             loaded,
             held,
+            surfaces: surfaces.unwrap_or_default(),
             rows,
             evaluator: StressEvaluator::none(),
             whole: None,

@@ -284,7 +284,7 @@ fn solve<const D: usize>(
     let mut watch = |status: &Status, state: &State<D>| variant_run.watch(status, state);
     let contact = match &scene.contact {
         Some(contact) => {
-            let surfaces = contact.surfaces(source, scene).map_err(PeriFailure::from)?;
+            let surfaces = physics.surfaces.clone();
             let whole = material.longitudinal_modulus(&*body.bonds);
             let modulus =
                 Property::new(&*body.bonds, |site, _| whole * physics.body.stiffness.value_at(site));
