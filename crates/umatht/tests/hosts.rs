@@ -1,6 +1,6 @@
 //! The library called as hosts call it: from C, from Fortran in the order of Abaqus, and in CalculiX.
 //!
-//! Temperatures at which α reaches 0.01, 0.5, 0.99 on cooling are those of `shared/formulation.md`, which an
+//! Temperatures at which α reaches 0.01, 0.5, 0.99 on cooling are those of the formulation, which an
 //! independent program computed.
 
 use evidence::hosts::{self, has_program, run};

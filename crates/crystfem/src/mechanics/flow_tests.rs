@@ -25,7 +25,7 @@ fn cube() -> (Mesh, Vec<FixedComponent>) {
     (Mesh { points, hexahedra: vec![[0, 1, 2, 3, 4, 5, 6, 7]], ..Mesh::default() }, supports)
 }
 
-/// Steady flow at four rates, `/work/shared/reference/time/eyring.csv`: √3 τ₀ asinh(√3 ε̇/γ̇₀), γ̇₀ =
+/// Steady flow at four rates, `eyring.csv` of the formulation: √3 τ₀ asinh(√3 ε̇/γ̇₀), γ̇₀ =
 /// 1e-8 /s. The volume relaxes in 2.7e5 s, which lowers the stress by 5e-6.
 #[test]
 fn a_bar_yields_at_four_rates() {

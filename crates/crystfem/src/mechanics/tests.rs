@@ -216,7 +216,7 @@ fn a_release_does_the_work_of_its_reactions() {
     near("stress_release_rotation", turned / (curvature(&mesh, &body).abs() * 0.031), 1.0, 2e-3);
 }
 
-/// Iterations of the solver agree with `/work/shared/reference/print/pcg.csv` and `pcg_slender.csv`, to 1e-6
+/// Iterations of the solver agree with `pcg.csv` and `pcg_slender.csv` of the formulation, to 1e-6
 /// of the load, with a molten top layer.
 #[test]
 fn iterations_do_not_follow_the_shape() {

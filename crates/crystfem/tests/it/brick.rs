@@ -1,4 +1,4 @@
-//! Brick of `shared/peers/heat`: film and radiation on five sides, fixed bottom, 20 steps of 0.5 s by
+//! Brick with film and radiation on five sides, fixed bottom, 20 steps of 0.5 s by
 //! backward Euler. References: scikit-fem 476.76311907 K (nodal mean at 26³ elements, consistent capacity),
 //! CalculiX 476.763087 K (printed to 1e-3 K).
 
