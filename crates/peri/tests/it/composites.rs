@@ -4,7 +4,7 @@ use crate::bodies::{Body, MODULUS, Random, rms, scatter};
 use crate::materials::battery;
 use evidence::near;
 use peri::Error;
-use peri::bonds::{BodyGeometry, Bonds, LawShares, covered_stretches, stretch_range};
+use peri::bonds::{Bonds, LawShares, covered_stretches, stretch_range};
 use peri::field::{CHUNK, Field};
 use peri::geometry::Shape;
 use peri::material::{BondMaterial, LawCover, Material, Pointwise, SolverMaterial, virial};
