@@ -4,8 +4,8 @@ use super::BodyGeometry;
 use crate::error::Error;
 
 /// Laws of the particles, by number, and their shares in bonds: half of a bond belongs to each of its ends.
-/// A bond with the law of stiffness c_I at I and that of c_J at J has the mean (c_I x_I + c_J x_J)/(c_I + c_J)
-/// of both laws' tensions, energies and tangents x, times the mean stiffness, as all its other weights.
+/// A bond with the law of stiffness c_I at I and that of c_J at J has the mean (c_I x_I + c_J x_J)/(c_I +
+/// c_J) of both laws' tensions, energies and tangents x, times the mean stiffness, as all its other weights.
 #[derive(Debug)]
 pub struct LawShares {
     /// Number of the law, by site.

@@ -35,8 +35,8 @@ impl<'a> BondMaterial<'a> {
     /// Gives parts of a body laws of their own: `shares` number the law of [`Self::new`] 0, and those of
     /// `laws` from 1 on. Bonds then do not soften.
     ///
-    /// The forces of particles with such a law, and of their neighbours, are summed by plain loops, several
-    /// times slower than the kernels.
+    /// The forces of particles with such a law, and of their neighbours, are summed by plain loops, about
+    /// eleven times slower than the kernels.
     ///
     /// # Errors
     /// [`Error::Parameter`] unless `shares` have one law more than `laws`.

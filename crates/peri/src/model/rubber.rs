@@ -131,8 +131,8 @@ impl<const D: usize> IntoMaterial<D> for Rubber {
     }
 }
 
-/// Rubber with parts of other rubbers, such as fibres and layers: half of a bond across a border has the law of
-/// either end.
+/// Rubber with parts of other rubbers, such as fibres and layers: half of a bond across a border has the law
+/// of either end.
 pub struct CompositeRubber<const D: usize> {
     rest: Rubber,
     parts: Vec<(PartTest<D>, Rubber)>,
@@ -149,7 +149,7 @@ impl<const D: usize> CompositeRubber<D> {
     }
 
     /// Makes a part of the body of another rubber. If parts overlap, the last one counts.
-    pub fn part(mut self, region: impl Fn([f64; D]) -> bool + 'static, rubber: Rubber) -> Self {
+    pub fn add_part(mut self, region: impl Fn([f64; D]) -> bool + 'static, rubber: Rubber) -> Self {
         self.parts.push((Box::new(region), rubber));
         self
     }

@@ -133,7 +133,7 @@ fn models_of_two_rubbers() {
     let body = || model::Body::lattice(Shape::rectangle([0.0; 2], [20e-3, 10e-3]), 1e-3).plane_stress(1e-3);
     let pulled = |part: Rubber, everywhere: bool| {
         let rest = Rubber::new(Law::ChainOffset, 1e6).chains(50.0, 1000.0);
-        let rubber = CompositeRubber::new(rest).part(move |[x, _]| everywhere || x > 10e-3, part);
+        let rubber = CompositeRubber::new(rest).add_part(move |[x, _]| everywhere || x > 10e-3, part);
         let model = Model::new(body(), rubber).clamp(|[x, _]| x < 3e-3);
         let mut model = model.displace(|[x, _]| x > 17e-3, [10e-3, 0.0]).build().unwrap();
         model.solve(Lbfgs { tolerance: 1e-8, ..Lbfgs::default() }).unwrap();
@@ -165,8 +165,8 @@ fn composites_that_cannot_be() {
     let body = model::Body::lattice(Shape::rectangle([0.0; 2], [8e-3, 8e-3]), 1e-3);
     let rubber = || Rubber::new(Law::Linear, 1e6);
     let build = |composite: CompositeRubber<2>| Model::new(body.clone(), composite).build().map(drop);
-    let outside = build(CompositeRubber::new(rubber()).part(|[x, _]| x > 1.0, rubber()));
+    let outside = build(CompositeRubber::new(rubber()).add_part(|[x, _]| x > 1.0, rubber()));
     assert!(outside.unwrap_err().to_string().contains("part 1 of the rubber has no particle"));
-    let limited = CompositeRubber::new(rubber()).part(|[x, _]| x > 4e-3, rubber().critical_stretch(2.0));
+    let limited = CompositeRubber::new(rubber()).add_part(|[x, _]| x > 4e-3, rubber().critical_stretch(2.0));
     assert!(build(limited).unwrap_err().to_string().contains("critical stretch of part 1"));
 }
