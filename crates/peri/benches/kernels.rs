@@ -66,7 +66,7 @@ fn stress(criterion: &mut Criterion) {
     for measure in [StressMethod::Hardy, StressMethod::Gaussian] {
         let state = StressInput {
             displacement: &displacement,
-            fit: &fit,
+            fit: (&fit).into(),
             modulus: 1.0,
             missing: SurfaceCompensation::Bonds,
         };

@@ -6,18 +6,19 @@ mod rubber;
 mod solid;
 
 pub use body::Body;
-pub use rubber::Rubber;
+pub use rubber::{CompositeRubber, Rubber};
 
 use crate::bonds::{BodyGeometry, LatticeBonds, Property, covered_stretches, fragments};
 use crate::contact::{Contact, RigidSurface};
 use crate::error::Error;
 use crate::material::{BondMaterial, Material};
-use crate::potential::KernelFit;
 use crate::probe::StressEvaluator;
 use crate::solver::{
     Breaking, Loads, Method, Policy, RotatingRegion, Rotation, State, Status, StepRecord, Support, System,
 };
-use crate::stress::{self, BallVolume, StressInput, StressMethod, StressTensor, SurfaceCompensation};
+use crate::stress::{
+    self, BallVolume, BondFits, StressInput, StressMethod, StressTensor, SurfaceCompensation,
+};
 
 /// A material of a body: a [`Material`], or a description that becomes one in a body, such as [`Rubber`] or a
 /// [`Correspondence`](crate::material::Correspondence).
@@ -298,12 +299,13 @@ impl<const D: usize> Simulation<D, BondMaterial<'_>> {
     /// First Piola–Kirchhoff stress P of every particle, Pa, in the order of [`Self::displacements`].
     ///
     /// # Errors
-    /// As [`KernelFit::new`].
+    /// As [`BondMaterial::fits`].
     pub fn piola(&self, measure: StressMethod) -> Result<Vec<StressTensor<D>>, Error> {
         let displacement = &self.state.displacement;
-        let fit = KernelFit::new(self.material.law(), covered_stretches(&self.bonds, displacement), 1e-9)?;
+        let fits = self.material.fits(covered_stretches(&self.bonds, displacement), 1e-9)?;
         let (modulus, missing) = (self.material.modulus(), SurfaceCompensation::WindowAt(&self.loaded));
-        let loaded = StressInput { displacement, fit: &fit, modulus, missing };
+        let fit = BondFits::new(&fits, self.material.shares());
+        let loaded = StressInput { displacement, fit, modulus, missing };
         Ok(stress::piola(&self.bonds, &loaded, measure, BallVolume::default()))
     }
 

@@ -10,6 +10,7 @@
 //! items, the energy, bounds of the stiffness. A plain material need not implement it.
 
 mod affine;
+mod bond_kernels;
 mod bonded;
 mod cloud_passes;
 mod compression;
@@ -17,6 +18,7 @@ mod constitutive;
 mod eight_chain;
 mod family;
 mod filter;
+mod fitted_law;
 mod frequency;
 mod nonlocal_solid;
 mod past;

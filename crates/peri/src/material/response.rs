@@ -181,6 +181,11 @@ pub trait SolverMaterial<const D: usize>: Send + Sync {
         None
     }
 
+    /// Returns true if the tension of a bond falls as it is stretched beyond `stretch`.
+    fn softens_at(&self, stretch: f64) -> bool {
+        self.bond_law().0.tension_derivative(stretch) < 0.0
+    }
+
     /// Tangents and energies over a range of stretches.
     fn range(&self, stretches: [f64; 2]) -> LawRange;
 }

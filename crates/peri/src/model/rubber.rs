@@ -1,7 +1,7 @@
-//! Rubber of a bond law, described by its Young's modulus.
+//! Rubber of a bond law, described by its Young's modulus, and composites of several.
 
 use super::{Body, IntoMaterial};
-use crate::bonds::{BodyGeometry, LatticeBonds};
+use crate::bonds::{BodyGeometry, LatticeBonds, LawShares};
 use crate::calibrate::{Calibration, lattice_factor, modulus};
 use crate::critical::{Context, Convention, Critical, Crossing};
 use crate::error::Error;
@@ -128,5 +128,64 @@ impl<const D: usize> IntoMaterial<D> for Rubber {
             Some(end) => Ok((material.softening(softening, end.into()), critical)),
             None => Ok((material, critical)),
         }
+    }
+}
+
+/// Rubber with parts of other rubbers, such as fibres and layers: half of a bond across a border has the law
+/// of either end.
+pub struct CompositeRubber<const D: usize> {
+    rest: Rubber,
+    parts: Vec<(PartTest<D>, Rubber)>,
+}
+
+/// Selects the points X, m, of a part.
+type PartTest<const D: usize> = Box<dyn Fn([f64; D]) -> bool>;
+
+impl<const D: usize> CompositeRubber<D> {
+    /// Creates a rubber without parts. Bonds of the whole body break at its limit, if it has one, unless
+    /// [`Model::critical_stretch`](super::Model::critical_stretch) gives a field of others.
+    pub fn new(rest: Rubber) -> Self {
+        Self { rest, parts: Vec::new() }
+    }
+
+    /// Makes a part of the body of another rubber. If parts overlap, the last one counts.
+    pub fn add_part(mut self, region: impl Fn([f64; D]) -> bool + 'static, rubber: Rubber) -> Self {
+        self.parts.push((Box::new(region), rubber));
+        self
+    }
+}
+
+impl<const D: usize> IntoMaterial<D> for CompositeRubber<D> {
+    type Material = BondMaterial<'static>;
+
+    fn into_material(
+        self,
+        body: &Body<D>,
+        bonds: &LatticeBonds<D>,
+    ) -> Result<(Self::Material, Option<f64>), Error> {
+        let (rest, critical) = self.rest.into_material(body, bonds)?;
+        let (mut laws, mut regions): (Vec<Arc<dyn BondPotential>>, _) = (Vec::new(), Vec::new());
+        for (index, (region, rubber)) in self.parts.into_iter().enumerate() {
+            let part = index + 1;
+            if rubber.critical.is_some() {
+                return Err(Error::geometry(format!(
+                    "critical stretch of part {part}: found one of its own; allowed: that of the rest, or a \
+                    field by `Model::critical_stretch`"
+                )));
+            }
+            if !bonds.particles().iter().any(|&site| region(bonds.position(site as usize))) {
+                return Err(Error::geometry(format!("part {part} of the rubber has no particle")));
+            }
+            let (own, _) = IntoMaterial::<D>::into_material(rubber, body, bonds)?;
+            let factor = own.modulus() / rest.modulus();
+            laws.extend(
+                own.laws()
+                    .map(|law| -> Arc<dyn BondPotential> { Arc::new(Scaled { law: law.clone(), factor }) }),
+            );
+            regions.push(region);
+        }
+        let number = |_, place| (regions.iter().rposition(|region| region(place)).map_or(0, |k| k + 1), 1.0);
+        let shares = LawShares::new(bonds, laws.len() + 1, number)?;
+        Ok((rest.with_parts(laws, Arc::new(shares))?, critical))
     }
 }

@@ -7,7 +7,7 @@ use crate::material::{
 use crate::parallel;
 use crate::potential::KernelFit;
 use crate::solver::State;
-use crate::stress::{StressTensor, force_over_length};
+use crate::stress::{BondFits, StressTensor, force_over_length};
 use polycore::constitutive::Flags;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -18,15 +18,15 @@ pub type AnySolid<const D: usize> = NonlocalSolid<Arc<dyn PointLaw<D>>>;
 pub struct StressEvaluator<const D: usize>(EvaluatorKind<D>);
 
 enum EvaluatorKind<const D: usize> {
-    /// A bond law, with the solver's fit: bonds then carry the solver's forces.
+    /// Bond laws, with the solver's fits: bonds then carry the solver's forces.
     Bonds {
         material: Box<BondMaterial<'static>>,
-        /// Largest relative error of the fit.
+        /// Largest relative error of the fits.
         bound: f64,
         /// True if the law is constant beyond the fitted stretches.
         clamped: bool,
-        /// Last fit, with its stretches.
-        last: Mutex<Option<([f64; 2], KernelFit)>>,
+        /// Last fits of all laws, with their stretches.
+        last: Mutex<Option<([f64; 2], Vec<KernelFit>)>>,
     },
     Nothing,
     /// A solid, with states of its particles.
@@ -80,12 +80,15 @@ impl<const D: usize> StressEvaluator<D> {
             EvaluatorKind::Bonds { material, bound, clamped, last } => {
                 let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
                 if last.as_ref().is_none_or(|(stretches, _)| *stretches != state.stretches.fitted) {
-                    let fit = KernelFit::new(material.law(), state.stretches.fitted, *bound).ok();
-                    *last =
-                        fit.map(|fit| (state.stretches.fitted, if *clamped { fit.clamped() } else { fit }));
+                    let fits = material.fits(state.stretches.fitted, *bound).ok().map(|fits| match clamped {
+                        true => fits.into_iter().map(KernelFit::clamped).collect(),
+                        false => fits,
+                    });
+                    *last = fits.map(|fits| (state.stretches.fitted, fits));
                 }
-                // the solver has made the same fit
-                let Some((_, fit)) = &*last else { return };
+                // the solver has made the same fits
+                let Some((_, fits)) = &*last else { return };
+                let fits = BondFits::new(fits, material.shares());
                 for site in sites.iter().map(|&site| site as usize) {
                     let (own, volume) = (state.displacement.get(site), bonds.volume(site));
                     let mut sum = [0.0; D];
@@ -93,14 +96,7 @@ impl<const D: usize> StressEvaluator<D> {
                         if wanted(bond.site) {
                             let other = state.displacement.get(bond.site);
                             let eta: [f64; D] = std::array::from_fn(|d| other[d] - own[d]);
-                            let pull = force_over_length(
-                                fit,
-                                material.modulus(),
-                                bond.weight,
-                                volume,
-                                bond.bond,
-                                eta,
-                            );
+                            let pull = force_over_length(fits, material.modulus(), volume, site, &bond, eta);
                             for d in 0..D {
                                 sum[d] += pull * (bond.bond[d] + eta[d]);
                             }

@@ -283,7 +283,7 @@ impl<const D: usize> LbfgsSolver<D> {
     /// Longest step along the direction if bonds soften at stretches up to e = `most`, or particles are in
     /// contact: the energy is not convex there.
     fn longest_step(&mut self, system: &System<D>, state: &State<D>, most: f64) -> f64 {
-        let softens = system.material.bond_law().0.tension_derivative((1.0 + most).sqrt()) < 0.0;
+        let softens = system.material.softens_at((1.0 + most).sqrt());
         if !softens && system.repulsion().is_none() {
             return f64::INFINITY;
         }

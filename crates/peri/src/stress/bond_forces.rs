@@ -1,9 +1,8 @@
 //! Forces of the bonds of one offset.
 
-use super::StressInput;
 use super::convolution::lanes;
+use super::{BondFits, StressInput};
 use crate::bonds::{BodyGeometry, LatticeBonds, TILE, Weights};
-use crate::potential::KernelFit;
 use pulp::{Arch, Simd, WithSimd};
 
 /// Vectors processed at a time: those of a tile at the widest.
@@ -39,7 +38,7 @@ pub fn forces<const D: usize>(
 
 /// scale·weight·q(e) ζ, from the displacements of both ends.
 struct Pull<'a, const D: usize> {
-    fit: &'a KernelFit,
+    fit: BondFits<'a>,
     displacement: [&'a [f64]; D],
     weights: Weights<'a, D>,
     sites: usize,
@@ -126,7 +125,7 @@ impl<const D: usize> Pull<'_, D> {
         for v in 0..VECTORS {
             e[v] = simd.mul_f64s(e[v], inverse);
         }
-        let mut q = self.fit.vectors(simd, e);
+        let mut q = self.fit.vectors(simd, [start + part, there + part], e);
         let scale = simd.splat_f64s(self.scale * self.weights.share);
         for v in 0..VECTORS {
             q[v] = simd.mul_f64s(q[v], scale);

@@ -114,7 +114,7 @@ fn moment<const D: usize>(
     let (u, v) = (state.displacement.get(own), state.displacement.get(bond.site));
     let eta: [f64; D] = std::array::from_fn(|d| v[d] - u[d]);
     let volume = bonds.volume(own);
-    let scale = force_over_length(state.fit, state.modulus, bond.weight, volume, bond.bond, eta);
+    let scale = force_over_length(state.fit, state.modulus, volume, own, bond, eta);
     std::array::from_fn(|a| std::array::from_fn(|b| scale * (bond.bond[a] + eta[a]) * bond.bond[b]))
 }
 

@@ -108,7 +108,7 @@ fn of_families<const D: usize>(
         bonds.neighbours(site as usize, &mut |bond| {
             let other = state.displacement.get(bond.site);
             let eta: [f64; D] = std::array::from_fn(|d| other[d] - own[d]);
-            let pull = force_over_length(state.fit, state.modulus, bond.weight, 1.0, bond.bond, eta);
+            let pull = force_over_length(state.fit, state.modulus, 1.0, site as usize, &bond, eta);
             for a in 0..D {
                 for b in 0..D {
                     sum[a][b] += 0.5 * pull * (bond.bond[a] + eta[a]) * bond.bond[b];

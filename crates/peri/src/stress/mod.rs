@@ -7,6 +7,7 @@
 //! particle's cell do.
 
 mod ball;
+mod bond_fits;
 mod bond_forces;
 mod cloud;
 mod convolution;
@@ -14,11 +15,13 @@ mod lattice;
 mod window;
 
 pub use ball::{ball_volume, cell_fractions, segment_fraction};
+pub use bond_fits::BondFits;
 
-use crate::bonds::{BodyGeometry, BondForces, BondKind, Bonds, CloudBonds, GradientSums, LatticeBonds};
+use crate::bonds::{
+    BodyGeometry, BondForces, BondKind, Bonds, CloudBonds, GradientSums, LatticeBonds, Neighbour,
+};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::parallel;
-use crate::potential::KernelFit;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -144,8 +147,8 @@ pub enum BallVolume {
 pub struct StressInput<'a, const D: usize> {
     /// Displacement, m.
     pub displacement: &'a Field<D>,
-    /// Fitted bond law, covering the stretches of `displacement`.
-    pub fit: &'a KernelFit,
+    /// Fitted bond laws, covering the stretches of `displacement`.
+    pub fit: BondFits<'a>,
     /// kθ.
     pub modulus: f64,
     /// Compensation for bonds missing at surfaces.
@@ -230,18 +233,18 @@ pub fn piola_in_cloud<const D: usize>(
     cloud::piola(bonds, state, measure, ball)
 }
 
-/// Force f V_I V_J, N, along ζ per unit |ζ|: 2kθ w V_I V_J q(e)/|ξ|.
+/// Force f V_I V_J, N, along ζ per unit |ζ|: 2kθ w V_I V_J q(e)/|ξ|, of a bond `from` a site.
 pub(crate) fn force_over_length<const D: usize>(
-    fit: &KernelFit,
+    fits: BondFits,
     modulus: f64,
-    weight: f64,
     own_volume: f64,
-    bond: [f64; D],
+    from: usize,
+    bond: &Neighbour<D>,
     eta: [f64; D],
 ) -> f64 {
-    let square: f64 = bond.iter().map(|x| x * x).sum();
-    let e = (0..D).map(|d| eta[d] * (2.0 * bond[d] + eta[d])).sum::<f64>() / square;
-    2.0 * modulus * weight * own_volume * fit.value(e) / square.sqrt()
+    let square: f64 = bond.bond.iter().map(|x| x * x).sum();
+    let e = (0..D).map(|d| eta[d] * (2.0 * bond.bond[d] + eta[d])).sum::<f64>() / square;
+    2.0 * modulus * bond.weight * own_volume * fits.value(from, bond.site, e) / square.sqrt()
 }
 
 /// Computes the nonlocal deformation gradient F = (Σ w ζ ⊗ ξ)(Σ w ξ ⊗ ξ)⁻¹ over the intact bonds (Silling et

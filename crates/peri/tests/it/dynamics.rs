@@ -389,7 +389,7 @@ fn rigid_rotation() {
         largest = largest.max(each.fold(0.0, f64::max) / stiffness);
         let loaded = StressInput {
             displacement: &u,
-            fit: &fit,
+            fit: (&fit).into(),
             modulus: MODULUS,
             missing: SurfaceCompensation::Bonds,
         };

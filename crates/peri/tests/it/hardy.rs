@@ -39,7 +39,7 @@ fn on_lattice<const D: usize>(
     missing: SurfaceCompensation,
 ) -> Vec<StressTensor<D>> {
     let field = scatter(built.lattice.sites(), &built.on_lattice, u);
-    let state = StressInput { displacement: &field, fit, modulus: MODULUS, missing };
+    let state = StressInput { displacement: &field, fit: fit.into(), modulus: MODULUS, missing };
     piola_on_lattice(&built.lattice, &state, measure, BallVolume::Particles)
 }
 
@@ -190,7 +190,7 @@ fn clouds_share_bonds_out() {
             let field = scatter(built.cloud.sites(), &built.in_cloud, u);
             let state = StressInput {
                 displacement: &field,
-                fit: &fit,
+                fit: (&fit).into(),
                 modulus: MODULUS,
                 missing: SurfaceCompensation::Bonds,
             };

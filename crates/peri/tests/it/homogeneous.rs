@@ -78,7 +78,7 @@ fn a_sheet_between_rollers_is_in_uniaxial_stress() {
         let fit = fit(&*law, state.stretches.fitted);
         let loaded = StressInput {
             displacement: &state.displacement,
-            fit: &fit,
+            fit: (&fit).into(),
             modulus,
             missing: SurfaceCompensation::Bonds,
         };
@@ -147,7 +147,7 @@ fn a_block_between_rollers_is_in_uniaxial_stress() {
     let fit = fit(&*law, state.stretches.fitted);
     let loaded = StressInput {
         displacement: &state.displacement,
-        fit: &fit,
+        fit: (&fit).into(),
         modulus,
         missing: SurfaceCompensation::Bonds,
     };

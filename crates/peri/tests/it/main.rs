@@ -7,6 +7,7 @@ mod assembly;
 mod balance;
 mod bodies;
 mod clouds;
+mod composites;
 mod contact;
 mod cracks;
 mod curves;

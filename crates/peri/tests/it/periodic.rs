@@ -136,7 +136,7 @@ fn stresses_of_particles_have_the_mean_of_the_cell() {
     let sum = virial(&material, &vec![(); bonds.sites()], &bonds, &displacement);
     let fit = crate::bodies::fit(&*law, [0.3, 1.7]);
     let (modulus, missing) = (MODULUS, SurfaceCompensation::Bonds);
-    let loaded = StressInput { displacement: &displacement, fit: &fit, modulus, missing };
+    let loaded = StressInput { displacement: &displacement, fit: (&fit).into(), modulus, missing };
     let stress = piola_on_lattice(&bonds, &loaded, StressMethod::OnePoint, BallVolume::Whole);
     for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         let mean: f64 = stress.iter().map(|stress| stress[a][b] * SPACING * SPACING).sum();

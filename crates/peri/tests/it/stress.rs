@@ -42,13 +42,22 @@ fn measured<const D: usize>(
     let modulus = modulus(space(D), 1.0, ratio, 1.0);
     let diagonal = |p: StressTensor<D>| [p[0][0] / STRAIN, p[1][1] / STRAIN];
     let field = scatter(built.lattice.sites(), &built.on_lattice, &u);
-    let state = StressInput { displacement: &field, fit: &fit, modulus, missing: SurfaceCompensation::Bonds };
+    let state = StressInput {
+        displacement: &field,
+        fit: (&fit).into(),
+        modulus,
+        missing: SurfaceCompensation::Bonds,
+    };
     let stress = piola_on_lattice(&built.lattice, &state, measure, ball);
     let mut results = vec![("lattice", diagonal(stress[particle]))];
     if cloud {
         let field = scatter(built.cloud.sites(), &built.in_cloud, &u);
-        let state =
-            StressInput { displacement: &field, fit: &fit, modulus, missing: SurfaceCompensation::Bonds };
+        let state = StressInput {
+            displacement: &field,
+            fit: (&fit).into(),
+            modulus,
+            missing: SurfaceCompensation::Bonds,
+        };
         let stress = piola_in_cloud(&built.cloud, &state, measure, ball);
         results.push(("cloud", diagonal(stress[built.in_cloud[particle]])));
     }
@@ -305,7 +314,7 @@ fn check_definition<const D: usize>(cells: [usize; D], ratio: f64) {
     let field = scatter(built.lattice.sites(), &built.on_lattice, &u);
     let state = StressInput {
         displacement: &field,
-        fit: &fit,
+        fit: (&fit).into(),
         modulus: MODULUS,
         missing: SurfaceCompensation::Bonds,
     };
@@ -313,7 +322,7 @@ fn check_definition<const D: usize>(cells: [usize; D], ratio: f64) {
     let field = scatter(built.cloud.sites(), &built.in_cloud, &u);
     let state = StressInput {
         displacement: &field,
-        fit: &fit,
+        fit: (&fit).into(),
         modulus: MODULUS,
         missing: SurfaceCompensation::Bonds,
     };
@@ -434,7 +443,7 @@ fn cauchy_stress_of_a_homogeneous_strain() {
         let fit = fit(&*law, [0.5, 2.0]);
         let state = StressInput {
             displacement: &field,
-            fit: &fit,
+            fit: (&fit).into(),
             modulus: MODULUS,
             missing: SurfaceCompensation::Bonds,
         };

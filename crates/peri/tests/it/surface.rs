@@ -51,7 +51,7 @@ fn plate(spacing: f64, volume: VolumeCorrection, surface: bool) -> [f64; 3] {
     let fit = fit(&*law, state.stretches.fitted);
     let loaded = StressInput {
         displacement: &state.displacement,
-        fit: &fit,
+        fit: (&fit).into(),
         modulus,
         missing: SurfaceCompensation::Bonds,
     };

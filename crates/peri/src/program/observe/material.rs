@@ -57,14 +57,6 @@ impl<const D: usize> SceneMaterial<D> {
             Self::Solid(solid) => solid.micromodulus(bonds),
         }
     }
-
-    /// Returns the bond law of bonds that are at rest in the undeformed body.
-    pub fn bond_law(&self) -> Option<&dyn BondPotential> {
-        match self {
-            Self::Bonds(bonded) => Some(bonded.law()),
-            _ => None,
-        }
-    }
 }
 
 /// Calibrated material in a body with surface and stiffness factors.
@@ -171,6 +163,9 @@ impl<const D: usize> BodyWithMaterial<D> {
             && let Some(Criterion::Stretch(end)) = &criterion
         {
             bonded = bonded.softening(softening, end.clone());
+        }
+        if let Some((laws, shares)) = scene::laws_of_parts(scene, &*body.bonds, &inclusions)? {
+            bonded = bonded.with_parts(laws, shares)?;
         }
         let material = match inclusions.prestrain {
             Some(strain) => {

@@ -3,11 +3,10 @@
 use super::material::Physics;
 use crate::bonds::{Bonds, Fragment, covered_stretches, fragments};
 use crate::error::Error;
-use crate::potential::KernelFit;
 use crate::program::scene::Scene;
 use crate::solver::{State, StepRecord};
 use crate::stress::{
-    self, MeasuredStress, StressInput, StressMethod, StressTensor, SurfaceCompensation, cauchy,
+    self, BondFits, MeasuredStress, StressInput, StressMethod, StressTensor, SurfaceCompensation, cauchy,
     deformation_gradients,
 };
 use harness::observe::{Fields, Observer, Scalars};
@@ -93,7 +92,7 @@ impl<'a, const D: usize> Moment<'a, D> {
     /// Returns the stresses; the recorded time of a measure is its time alone ([`MeasuredStress::seconds`]).
     ///
     /// # Errors
-    /// As [`KernelFit::new`].
+    /// As [`crate::material::BondMaterial::fits`].
     pub fn stresses(&self) -> Result<&Stresses<D>, Error> {
         match self.stresses.get() {
             Some(known) => Ok(known),
@@ -119,11 +118,12 @@ impl<'a, const D: usize> Moment<'a, D> {
             return Ok(stresses);
         };
         let stretches = covered_stretches(bonds, &state.displacement);
-        let fit = KernelFit::new(material.law(), stretches, self.scene.fit_bound())?;
+        let fits = material.fits(stretches, self.scene.fit_bound())?;
         let gradients =
             phases.time("deformation gradient", || deformation_gradients(bonds, &state.displacement));
         let (modulus, missing) = (material.modulus(), SurfaceCompensation::WindowAt(&self.physics.by_window));
-        let loaded = StressInput { displacement: &state.displacement, fit: &fit, modulus, missing };
+        let fit = BondFits::new(&fits, material.shares());
+        let loaded = StressInput { displacement: &state.displacement, fit, modulus, missing };
         let measured = stress::piolas(bonds, &loaded, &spec.measures, spec.ball);
         for (&measure, MeasuredStress { piola, seconds }) in spec.measures.iter().zip(measured) {
             let started = Instant::now();

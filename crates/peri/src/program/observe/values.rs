@@ -5,7 +5,6 @@ use super::moment::Moment;
 use crate::bonds::covered_stretches;
 use crate::calibrate::Space;
 use crate::error::Error;
-use crate::potential::KernelFit;
 use crate::program::quantities as q;
 use crate::program::scene::Scene;
 use harness::observe::{Observer, Scalars};
@@ -73,9 +72,10 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for FitError<'_> {
     }
 
     fn end(&mut self, m: &Moment<'m, D>) -> Result<(), Error> {
-        if let Some(law) = m.physics.body.material.bond_law() {
+        if let Some(material) = m.physics.evaluator.bond_material() {
             let stretches = covered_stretches(m.bonds, &m.state.displacement);
-            self.error = KernelFit::new(law, stretches, self.scene.fit_bound())?.max_error;
+            let fits = material.fits(stretches, self.scene.fit_bound())?;
+            self.error = fits.iter().map(|fit| fit.max_error).fold(0.0, f64::max);
         }
         Ok(())
     }

@@ -280,27 +280,7 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             "a measure of bond forces, such as `hardy`",
         ));
     }
-    let law = material.law.unwrap_or_default();
-    let chain = law.is_chain();
-    // far beyond any polymer, and far from where the chain's force overflows
-    let most = 1e9;
-    for (key, value, least) in [("links", material.links, 2.0), ("dissociation", material.dissociation, 1.0)]
-    {
-        let key = format!("material.{key}");
-        match value {
-            None if chain => {
-                let why = format!("needed for `{}`: a number of at least {least}", law.name());
-                return Err(source.missing(&key, why));
-            }
-            Some(value) if !(least..=most).contains(&value) => {
-                return Err(source.error(&key, plain(value), format!("{least} to {most:e}")));
-            }
-            Some(_) if !chain => {
-                return Err(source.unexpected(&key, format!("`{}` has no chains", law.name())));
-            }
-            _ => {}
-        }
-    }
+    super::part_law::check(source, scene)?;
     if let Some(critical) = &material.critical {
         let given = critical.alternatives();
         if given.len() != 1 {

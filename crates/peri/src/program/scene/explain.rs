@@ -49,6 +49,7 @@ pub fn explain<const D: usize>(
             builds(format!("{branches} branches: {remembered} numbers a particle, {megabytes:.1} MB"));
         }
     }
+    super::part_law::explain(scene, bonds).into_iter().for_each(&mut builds);
     super::explain_network(source, &scene.material)?.into_iter().for_each(&mut builds);
     for (crack, severed) in scene.body.cracks.iter().zip(&body.severed) {
         let corners: Vec<String> = [Some(&crack.from), Some(&crack.to), crack.and.as_ref()]

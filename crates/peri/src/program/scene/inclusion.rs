@@ -1,21 +1,21 @@
 //! Inclusions and fields of other scenes: stiffness, critical stretch and prestrain of each particle.
 
-use super::interface::{part_number, parts_of};
-use super::shapes::shape;
+use super::inclusion_region::Region;
 use super::values::DiscreteBody;
 use super::{Material, ParameterField, Scene, ShapeSpec, VaryingParameter, plain};
 use crate::bonds::{Bonds, Property};
 use crate::calibrate::{Space, poisson_ratio};
 use crate::critical::Critical;
 use crate::error::Error;
-use crate::geometry::{Parts, Shape};
+use crate::potential::Law;
 use harness::scene::{SceneError, Source};
 use polycore::units::{Density, EnergyPerArea, Ratio};
 use serde::Deserialize;
 use std::array;
 use std::collections::HashMap;
 
-/// A part of the body whose bonds are stiffer or softer; a bond across its border has the mean of both.
+/// A part of the body whose bonds are stiffer or softer, or have a law of their own; a bond across its border
+/// has the mean of both.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Inclusion {
@@ -26,6 +26,16 @@ pub struct Inclusion {
     /// Stiffness over that of the rest; default: 1.
     #[serde(default = "default_stiffness")]
     pub stiffness: f64,
+    /// Bond law of the part; default: `material.law`. Of overlapping parts with a law, links, dissociation or
+    /// rescaling of their own the last counts.
+    pub law: Option<Law>,
+    /// Links per bond of the part, for the chain laws; default: `material.links`.
+    pub links: Option<f64>,
+    /// Dissociation energy of the part over kθ; default: `material.dissociation`.
+    pub dissociation: Option<f64>,
+    /// Scales kθ of the part so that the small-strain modulus is exact; default: by `law`, or
+    /// `material.rescale`.
+    pub rescale: Option<bool>,
     /// Replaces `material.critical`. A bond that ends in inclusions or passes through them takes the lowest
     /// value on its way, so that a layer may be thinner than the spacing.
     pub critical: Option<Critical>,
@@ -43,76 +53,6 @@ impl Inclusion {
     /// Returns the key of its region.
     fn key(&self, index: usize) -> String {
         format!("material.inclusions[{index}].{}", if self.part.is_some() { "part" } else { "shape" })
-    }
-}
-
-/// Region of an inclusion.
-enum Region<const D: usize> {
-    Shape(Shape<D>),
-    Part { parts: Parts<D>, part: u32, bounds: ([f64; D], [f64; D]) },
-}
-
-impl<const D: usize> Region<D> {
-    fn new(
-        source: &Source,
-        scene: &Scene,
-        index: usize,
-        inclusion: &Inclusion,
-        body: &DiscreteBody<D>,
-    ) -> Result<Self, SceneError> {
-        let key = format!("material.inclusions[{index}]");
-        match (&inclusion.shape, &inclusion.part) {
-            (Some(spec), None) => {
-                let key = format!("{key}.shape");
-                let Some(kind) = spec.add.filter(|_| spec.cut.is_none()) else {
-                    return Err(source.error(&key, "no `add`", "`add` with the kind of shape"));
-                };
-                Ok(Self::Shape(shape::<D>(source, &key, kind, spec)?))
-            }
-            (None, Some(name)) => {
-                let part = part_number(source, scene, &format!("{key}.part"), name)?;
-                let parts = parts_of(scene, body);
-                let bounds = parts.bounds(part).unwrap_or(body.bounds);
-                Ok(Self::Part { parts, part, bounds })
-            }
-            (shape, _) => {
-                let found = if shape.is_some() { "both `shape` and `part`" } else { "no region" };
-                Err(source.error(&key, found, "one of `shape` and `part`"))
-            }
-        }
-    }
-
-    fn contains(&self, point: [f64; D]) -> bool {
-        match self {
-            Self::Shape(shape) => shape.contains(point),
-            Self::Part { parts, part, .. } => parts.part_at(point) == Some(*part),
-        }
-    }
-
-    /// Returns true if a box about the region reaches to `reach` from a point.
-    fn is_near(&self, point: [f64; D], reach: f64) -> bool {
-        let (low, high) = match self {
-            Self::Shape(shape) => shape.bounds(),
-            Self::Part { bounds, .. } => *bounds,
-        };
-        (0..D).all(|d| low[d] - reach <= point[d] && point[d] <= high[d] + reach)
-    }
-
-    /// Fractions of the segment from `a` to `b` between which it is inside or outside.
-    fn passages(&self, a: [f64; D], b: [f64; D]) -> Vec<f64> {
-        let mut ends = Vec::new();
-        match self {
-            Self::Shape(shape @ Shape::Enclosed(_)) => {
-                shape.passages(a, b, &mut ends);
-                ends.extend([0.0, 1.0]);
-            }
-            Self::Shape(shape) => shape.passages(a, b, &mut ends),
-            Self::Part { parts, .. } => {
-                ends = parts.passages(a, b);
-                ends.extend([0.0, 1.0]);
-            }
-        }
-        ends
     }
 }
 
@@ -233,6 +173,7 @@ impl<'a, const D: usize> Inclusions<'a, D> {
             // a layer between particles may still be a weak one
             let acts =
                 inclusion.stiffness != 1.0 || inclusion.prestrain.is_some() || inclusion.critical.is_none();
+            let acts = acts || inclusion.has_law();
             if members.is_empty() && acts {
                 let key = inclusion.key(index);
                 return Err(source.error(&key, "a shape without particles", "a shape with at least one"));
@@ -259,6 +200,11 @@ impl<'a, const D: usize> Inclusions<'a, D> {
             return Err(source.error("material", format!("a prestrain of {}", plain(found)), "above -1"));
         }
         Ok(Self { micromodulus: Property::new(bonds, factor), fracture_energy, prestrain, each })
+    }
+
+    /// Lists the inclusions with the sites of their particles.
+    pub(super) fn members(&self) -> impl Iterator<Item = (&Inclusion, &[u32])> {
+        self.each.iter().map(|(inclusion, _, members)| (*inclusion, &members[..]))
     }
 
     /// Returns the critical stretch of each particle: `rest`, replaced by the stretch of a fracture energy
@@ -394,16 +340,6 @@ impl Material {
     pub fn is_prestrained(&self) -> bool {
         let follows = self.fields.iter().any(|field| field.of == VaryingParameter::Prestrain);
         follows || self.inclusions.iter().any(|inclusion| inclusion.prestrain.is_some())
-    }
-
-    /// Builds the bond law.
-    ///
-    /// # Errors
-    /// [`crate::Error::Parameter`] for a chain parameter out of its domain.
-    pub fn bond_law(&self) -> Result<Box<dyn crate::potential::BondPotential>, crate::Error> {
-        let law = self.law.unwrap_or_default();
-        let rescale = self.rescale.unwrap_or(law.rescales());
-        law.build(self.links.unwrap_or(1.0), self.dissociation.unwrap_or(1.0), rescale)
     }
 }
 

@@ -70,6 +70,7 @@ fn bytes_of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> 
         }
         each += if contact.has_friction() { 3.0 * vector } else { 0.0 };
     }
+    each += super::part_law::memory_of_a_site(scene);
     if let Some(solid) = &scene.material.solid {
         // histories in points, in the state, in a checkpoint; a heap block each
         let remembered = solid.memory_of_a_particle() as f64;

@@ -142,8 +142,7 @@ impl Scene {
                 Box::new(LbfgsSolver::new(Lbfgs { tolerance, max_iterations, accept, ..plain }))
             }
             SolverMethod::Adr | SolverMethod::Verlet => {
-                let mass_safety =
-                    self.solver.mass_safety.unwrap_or(self.material.law.unwrap_or_default().mass_safety());
+                let mass_safety = self.solver.mass_safety.unwrap_or(self.material.mass_safety());
                 let settings = DynamicRelaxation { tolerance, max_iterations, accept, mass_safety };
                 Box::new(RelaxationSolver::new(settings))
             }

@@ -1,0 +1,93 @@
+//! Bodies of several bond laws: the law of each particle, and the share of both ends in a bond.
+
+use super::BodyGeometry;
+use crate::error::Error;
+
+/// Laws of the particles, by number, and their shares in bonds: half of a bond belongs to each of its ends.
+/// A bond with the law of stiffness c_I at I and that of c_J at J has the mean (c_I x_I + c_J x_J)/(c_I +
+/// c_J) of both laws' tensions, energies and tangents x, times the mean stiffness, as all its other weights.
+#[derive(Debug)]
+pub struct LawShares {
+    /// Number of the law, by site.
+    numbers: Vec<u16>,
+    /// For each law the stiffness c of its particles, 0 at others, by site.
+    stiffness: Vec<Vec<f64>>,
+}
+
+impl LawShares {
+    /// Evaluates the number of the law, below `laws`, and the relative stiffness at the site and position, m,
+    /// of each particle.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a law that does not exist, or a stiffness that is not positive.
+    pub fn new<const D: usize>(
+        bonds: &dyn BodyGeometry<D>,
+        laws: usize,
+        of: impl Fn(usize, [f64; D]) -> (usize, f64),
+    ) -> Result<Self, Error> {
+        let mut numbers = vec![0; bonds.sites()];
+        let mut stiffness = vec![vec![0.0; bonds.sites()]; laws];
+        let most = laws.min(usize::from(u16::MAX));
+        let fault = |name, found, allowed: String| Err(Error::Parameter { name, found, allowed });
+        for site in bonds.particles().iter().map(|&site| site as usize) {
+            let (number, own) = of(site, bonds.position(site));
+            if number >= most {
+                return fault("number of a bond law", number as f64, format!("less than {most}"));
+            }
+            if !(own > 0.0 && own.is_finite()) {
+                return fault("stiffness of a particle", own, "above 0, finite".to_owned());
+            }
+            numbers[site] = number as u16;
+            stiffness[number][site] = own;
+        }
+        for image in bonds.images() {
+            let [site, origin] = [image.site, image.origin].map(|site| site as usize);
+            numbers[site] = numbers[origin];
+            stiffness.iter_mut().for_each(|own| own[site] = own[origin]);
+        }
+        Ok(Self { numbers, stiffness })
+    }
+
+    /// Number of laws.
+    pub fn laws(&self) -> usize {
+        self.stiffness.len()
+    }
+
+    /// Number of the law of the particle in a site; 0 in sites of another body.
+    #[inline]
+    pub fn number_at(&self, site: usize) -> usize {
+        self.numbers.get(site).map_or(0, |&number| usize::from(number))
+    }
+
+    /// Stiffness of the particles of a law, by site, 0 elsewhere.
+    pub fn stiffness_of(&self, law: usize) -> &[f64] {
+        &self.stiffness[law]
+    }
+
+    /// Computes the mean of a quantity of both ends' laws in a bond; the same bits from either end.
+    #[inline]
+    pub fn mean(&self, from: usize, to: usize, of: impl Fn(usize) -> f64) -> f64 {
+        let (own, other) = (self.number_at(from), self.number_at(to));
+        if own == other {
+            return of(own);
+        }
+        let stiffness = |law: usize, site: usize| self.stiffness[law].get(site).copied().unwrap_or(1.0);
+        let (a, b) = (stiffness(own, from), stiffness(other, to));
+        (a * of(own) + b * of(other)) / (a + b)
+    }
+
+    /// Finds the particles that have, or whose neighbours have, another law than the first.
+    pub fn beside_others<const D: usize>(&self, bonds: &dyn BodyGeometry<D>) -> Vec<u32> {
+        let is_beside = |&site: &u32| {
+            let mut other = self.number_at(site as usize) != 0;
+            bonds.neighbours(site as usize, &mut |bond| other |= self.number_at(bond.site) != 0);
+            other
+        };
+        bonds.particles().iter().copied().filter(is_beside).collect()
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.numbers.len() * (size_of::<u16>() + self.stiffness.len() * size_of::<f64>())
+    }
+}

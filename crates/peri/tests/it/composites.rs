@@ -1,0 +1,172 @@
+//! Bodies whose parts have bond laws of their own.
+
+use crate::bodies::{Body, MODULUS, Random, rms, scatter};
+use crate::materials::battery;
+use evidence::near;
+use peri::Error;
+use peri::bonds::{Bonds, LawShares, covered_stretches, stretch_range};
+use peri::field::{CHUNK, Field};
+use peri::geometry::Shape;
+use peri::material::{BondMaterial, LawCover, Material, Pointwise, SolverMaterial, virial};
+use peri::model::{self, CompositeRubber, Model, Rubber};
+use peri::potential::{BondPotential, Law, LinearBond};
+use peri::solver::Lbfgs;
+use peri::stress::{BallVolume, BondFits, StressInput, StressMethod, SurfaceCompensation, piola};
+use std::sync::Arc;
+
+/// Gives the particles of a body the laws in turn, with several stiffnesses.
+fn composite<const D: usize>(bonds: &dyn Bonds<D>, laws: &[Arc<dyn BondPotential>]) -> BondMaterial<'static> {
+    let of = |site: usize, _| (site % laws.len(), 1.0 + 0.5 * (site % 5) as f64);
+    let shares = LawShares::new(bonds, laws.len(), of).unwrap();
+    BondMaterial::new(laws[0].clone(), MODULUS).with_parts(laws[1..].to_vec(), Arc::new(shares)).unwrap()
+}
+
+fn chain(links: f64) -> Arc<dyn BondPotential> {
+    Arc::from(Law::ChainOffset.build(links, 1200.0, false).unwrap())
+}
+
+/// Returns the forces of a material in a displacement, N/m³, and its energy, J.
+fn response<const D: usize>(
+    material: &mut dyn SolverMaterial<D>,
+    bonds: &mut dyn Bonds<D>,
+    displacement: &Field<D>,
+) -> (Vec<[f64; D]>, f64) {
+    let stretches = covered_stretches(bonds, displacement);
+    let cover = LawCover { stretches, bound: 1e-9, clamped: false, known: None };
+    material.cover(bonds, displacement, &cover).unwrap();
+    bonds.prepare(displacement);
+    material.prepare(bonds, displacement);
+    let mut forces = Field::zeros(bonds.sites());
+    for (chunk, mut out) in forces.chunks_mut().into_iter().enumerate() {
+        material.force(bonds, displacement, chunk * CHUNK, &mut out, None);
+    }
+    let observed = stretch_range(bonds, displacement);
+    let energy = material.energy(bonds, displacement, observed);
+    (bonds.particles().iter().map(|&site| forces.get(site as usize)).collect(), energy)
+}
+
+/// Three laws, of particles in turn, pass the checks of all materials, also past the greatest force of the
+/// short chains.
+#[test]
+fn several_laws_pass() {
+    let all: [Arc<dyn BondPotential>; 3] = [chain(720.0), Arc::new(LinearBond), chain(9.0)];
+    battery::<2>("three laws", [8, 7], &|bonds| composite(bonds, &all).respond(bonds));
+    battery::<3>("three laws", [4, 4, 3], &|bonds| composite(bonds, &all).respond(bonds));
+    battery::<2>("three laws by loops", [8, 7], &|bonds| {
+        Box::new(Pointwise::new(composite(bonds, &all), bonds))
+    });
+}
+
+/// Compares forces and energies of two materials.
+fn compare(
+    name: &str,
+    bonds: &mut dyn Bonds<2>,
+    displacement: &Field<2>,
+    [one, other]: [&mut dyn SolverMaterial<2>; 2],
+    bound: f64,
+) {
+    let (found, energy) = response(one, bonds, displacement);
+    let (expected, stored) = response(other, bonds, displacement);
+    let difference = |(a, b): (&[f64; 2], &[f64; 2])| [a[0] - b[0], a[1] - b[1]];
+    let differences: Vec<[f64; 2]> = found.iter().zip(&expected).map(difference).collect();
+    let error = rms(&differences) / rms(&expected);
+    assert!(error < bound, "{name}: forces {error:e}");
+    assert!((energy / stored - 1.0).abs() < bound, "{name}: {energy} {stored}");
+}
+
+/// Forces and energy of the kernels are those of plain loops with the laws themselves, to the bound of the
+/// fit. Parts of one law have those of a body of one law, to rounding.
+#[test]
+fn kernels_and_loops_agree() {
+    let mut built = Body::<2>::damaged([12, 9], 0.1, 3.015).build();
+    let moved = Random(11).vectors::<2>(built.points.len(), 0.02);
+    let cases = [
+        ("lattice", &mut built.lattice as &mut dyn Bonds<2>, &built.on_lattice),
+        ("cloud", &mut built.cloud, &built.in_cloud),
+    ];
+    for (name, bonds, sites) in cases {
+        let displacement = scatter(bonds.sites(), sites, &moved);
+        let several = composite(bonds, &[chain(720.0), Arc::new(LinearBond), chain(9.0)]);
+        let mut kernels = Material::<2>::respond(several.clone(), bonds);
+        let mut loops = Pointwise::new(several, bonds);
+        compare(name, bonds, &displacement, [&mut *kernels, &mut loops], 1e-8);
+        let alike = composite(bonds, &[chain(25.0), chain(25.0)]);
+        let mut kernels = Material::<2>::respond(alike, bonds);
+        let mut one = Material::<2>::respond(BondMaterial::new(chain(25.0), MODULUS), bonds);
+        compare(name, bonds, &displacement, [&mut *kernels, &mut *one], 1e-12);
+    }
+}
+
+/// Σ V P over the particles is the virial of the laws, by all measures that share bonds out.
+#[test]
+fn stresses_sum_to_the_virial() {
+    let built = Body::<2>::solid([11, 9], 0.1, 3.015).build();
+    let moved = Random(5).vectors::<2>(built.points.len(), 0.01);
+    let cases = [
+        (&built.lattice as &dyn Bonds<2>, &built.on_lattice, vec![StressMethod::OnePoint]),
+        (&built.cloud, &built.in_cloud, vec![StressMethod::OnePoint, StressMethod::Hardy]),
+    ];
+    for (bonds, sites, measures) in cases {
+        let displacement = scatter(bonds.sites(), sites, &moved);
+        let material = composite(bonds, &[chain(720.0), Arc::new(LinearBond), chain(9.0)]);
+        let fits = material.fits(covered_stretches(bonds, &displacement), 1e-9).unwrap();
+        let (fit, missing) = (BondFits::new(&fits, material.shares()), SurfaceCompensation::Bonds);
+        let state = StressInput { displacement: &displacement, fit, modulus: MODULUS, missing };
+        let expected = virial(&material, &vec![(); bonds.sites()], bonds, &displacement);
+        for measure in measures {
+            let found = piola(bonds, &state, measure, BallVolume::Particles);
+            for (a, b) in [(0, 0), (0, 1), (1, 1)] {
+                let each = bonds.particles().iter().zip(&found);
+                let sum: f64 = each.map(|(&site, p)| bonds.volume(site as usize) * p[a][b]).sum();
+                let scale = expected[0][0].abs().max(expected[1][1].abs());
+                let error = (sum - expected[a][b]).abs() / scale;
+                assert!(error < 1e-7, "{measure:?} {a}{b}: {sum} {}", expected[a][b]);
+            }
+        }
+    }
+}
+
+/// Two rubbers, side by side between grips: with the same law those of one; with shorter chains stiffer, by
+/// less than a body of short chains alone.
+#[test]
+fn models_of_two_rubbers() {
+    let body = || model::Body::lattice(Shape::rectangle([0.0; 2], [20e-3, 10e-3]), 1e-3).plane_stress(1e-3);
+    let pulled = |part: Rubber, everywhere: bool| {
+        let rest = Rubber::new(Law::ChainOffset, 1e6).chains(50.0, 1000.0);
+        let rubber = CompositeRubber::new(rest).add_part(move |[x, _]| everywhere || x > 10e-3, part);
+        let model = Model::new(body(), rubber).clamp(|[x, _]| x < 3e-3);
+        let mut model = model.displace(|[x, _]| x > 17e-3, [10e-3, 0.0]).build().unwrap();
+        model.solve(Lbfgs { tolerance: 1e-8, ..Lbfgs::default() }).unwrap();
+        model.history()[0].load
+    };
+    let long = || Rubber::new(Law::ChainOffset, 1e6).chains(50.0, 1000.0);
+    let short = || Rubber::new(Law::ChainOffset, 1e6).chains(6.0, 1000.0);
+    let one = {
+        let model = Model::new(body(), long()).clamp(|[x, _]| x < 3e-3);
+        let mut model = model.displace(|[x, _]| x > 17e-3, [10e-3, 0.0]).build().unwrap();
+        model.solve(Lbfgs { tolerance: 1e-8, ..Lbfgs::default() }).unwrap();
+        model.history()[0].load
+    };
+    near("composite_of_one_rubber", pulled(long(), false) / one, 1.0, 1e-6);
+    let [half, whole] = [false, true].map(|everywhere| pulled(short(), everywhere));
+    assert!(1.01 * one < half && half < 0.99 * whole, "{one} {half} {whole}");
+}
+
+/// Laws that no particle has, particles with laws that do not exist, and limits of single parts are refused.
+#[test]
+fn composites_that_cannot_be() {
+    let built = Body::<2>::solid([6, 6], 0.1, 3.015).build();
+    let shares = LawShares::new(&built.lattice, 2, |_, _| (0, 1.0)).unwrap();
+    let one = BondMaterial::new(LinearBond, MODULUS);
+    assert!(matches!(one.with_parts(Vec::new(), Arc::new(shares)), Err(Error::Parameter { .. })));
+    for wrong in [(2, 1.0), (0, 0.0), (1, f64::NAN)] {
+        assert!(LawShares::new(&built.lattice, 2, |_, _| wrong).is_err(), "{wrong:?}");
+    }
+    let body = model::Body::lattice(Shape::rectangle([0.0; 2], [8e-3, 8e-3]), 1e-3);
+    let rubber = || Rubber::new(Law::Linear, 1e6);
+    let build = |composite: CompositeRubber<2>| Model::new(body.clone(), composite).build().map(drop);
+    let outside = build(CompositeRubber::new(rubber()).add_part(|[x, _]| x > 1.0, rubber()));
+    assert!(outside.unwrap_err().to_string().contains("part 1 of the rubber has no particle"));
+    let limited = CompositeRubber::new(rubber()).add_part(|[x, _]| x > 4e-3, rubber().critical_stretch(2.0));
+    assert!(build(limited).unwrap_err().to_string().contains("critical stretch of part 1"));
+}
