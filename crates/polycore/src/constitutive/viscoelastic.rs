@@ -30,6 +30,7 @@ pub mod linear;
 mod mullins;
 mod shift;
 mod spring;
+pub mod user_material;
 mod viscosity;
 
 pub use branch::{Branch, BranchState};
