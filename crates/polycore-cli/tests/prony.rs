@@ -176,6 +176,27 @@ source = "the data are elastic"
     let solid = &block["material"]["solid"];
     assert_eq!(solid["constitutive"]["model"].as_str(), Some("neo-hookean"));
     assert!(solid["branch"][0]["parameters"]["eta"].is_str());
+    let cards = read("time_materials_mm.inp");
+    assert!(shown.contains("10 state variables (*DEPVAR)") && cards.ends_with("*DEPVAR\n10\n"), "{cards}");
+    let card = cards.split("*USER MATERIAL, CONSTANTS=11\n").nth(1).unwrap();
+    let rows = card.lines().take(2).flat_map(|line| line.split(", "));
+    let numbers: Vec<f64> = rows.map(|number| number.parse().unwrap()).collect();
+    // K, μ, absolute zero, r, m, β, neo-Hooke, ν, constant, η, no shift
+    let modulus =
+        |text: &toml::Value| text.as_str().unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
+    let parameters = &solid["branch"][0]["parameters"];
+    let constitutive = &solid["constitutive"];
+    let given = [
+        modulus(&constitutive["bulk_modulus"]),
+        modulus(&constitutive["parameters"]["shear_modulus"]),
+        modulus(&parameters["nu"]),
+        modulus(&parameters["eta"]),
+    ];
+    for (found, given) in [numbers[0], numbers[1], numbers[7], numbers[9]].iter().zip(given) {
+        assert!((found / given - 1.0).abs() < 1e-4, "{cards} {given}");
+    }
+    assert_eq!([2, 3, 4, 5, 6, 8, 10].map(|k| numbers[k]), [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0]);
+    assert_eq!(numbers.len(), 11);
     assert_eq!(read("hold_prediction.csv").lines().count(), 83);
     for (from, to, message) in [
         ("\"0.1 1/s\"\nstarts", "\"0.2 1/s\"\nstarts", "0.01 /s, 0.1 /s"),

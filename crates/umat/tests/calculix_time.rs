@@ -109,7 +109,7 @@ fn creep_of_the_host() {
             let stress = (factor * 1.5_f64.powf(0.5 * (power + 1.0))).powf(-1.0 / power);
             format!("3., 1., {stress}, {power}, 0., 0.01")
         };
-        let count = if power == 1.0 { 11 } else { 14 };
+        let count = if power == 1.0 { 11 } else { 15 };
         let branch = format!("{bulk}, 1e-6, 0., 0., 0., 0., 1., {shear}\n{flow}, 0.");
         let user = format!(
             "*MATERIAL, NAME=USER_VISCOELASTIC_NEO_HOOKEAN\n*USER MATERIAL, CONSTANTS={count}\n{branch}\n\
