@@ -5,15 +5,17 @@ use std::io::Write as _;
 use std::path::Path;
 
 use polycore::Error;
+use polycore::constitutive::hyperelastic::Hyperelastic;
 use polycore::constitutive::viscoelastic::fit::TimeFit;
-use polycore::constitutive::viscoelastic::user_material;
+use polycore::constitutive::viscoelastic::{Hysteresis, Viscoelastic, user_material};
 use polycore::file::atomic_write;
 
 use super::card::FILES;
 use super::material::{BULK_RATIO, stress};
 use super::time_block::bulk_modulus;
 
-/// Writes `time_materials_mm.inp` and `time_materials_si.inp`: the law as a user material. Returns the number
+/// Writes `time_materials_mm.inp` and `time_materials_si.inp`: the law as a user material, and as
+/// `*HYSTERESIS` if Abaqus has it. Returns the number
 /// of state variables.
 ///
 /// # Errors
@@ -44,5 +46,29 @@ fn cards(found: &TimeFit, units: &str, pascals: f64) -> Result<String, Error> {
     let scaled = parameters.map(|(own, value)| if own.unit == "Pa" { value / pascals } else { *value });
     let elastic: Vec<f64> = [bulk_modulus(found, &law)? / pascals].into_iter().chain(scaled).collect();
     text += &user_material::card(model.key, &elastic, &law, pascals);
+    text += &hysteresis(found, &law, &elastic[1..], pascals)?;
     Ok(text)
+}
+
+/// Card of Abaqus' own law, or a comment that says why there is none; `parameters` are those of the equilibrium
+/// law in the host's unit. K is 100 times the modulus of the equilibrium law: Abaqus refuses more without
+/// hybrid elements.
+fn hysteresis(
+    found: &TimeFit,
+    law: &Viscoelastic,
+    parameters: &[f64],
+    pascals: f64,
+) -> Result<String, Error> {
+    let model = found.form.equilibrium;
+    let values = found.values();
+    let own = &values[..model.parameters.len()];
+    Ok(match Hysteresis::new(model, own, law, pascals) {
+        Ok(card) => {
+            let compliance = 2.0 * pascals / (BULK_RATIO * model.law(own)?.shear_modulus());
+            let note =
+                format!("** *HYSTERESIS of Abaqus: the same law, K {BULK_RATIO} times the modulus at rest");
+            format!("**\n{note}\n{}", card.card(model.key, parameters, compliance))
+        }
+        Err(reason) => format!("**\n** no *HYSTERESIS of Abaqus: {reason}\n"),
+    })
 }
