@@ -202,6 +202,8 @@ source = "the data are elastic"
     for (from, to, message) in [
         ("\"0.1 1/s\"\nstarts", "\"0.2 1/s\"\nstarts", "0.01 /s, 0.1 /s"),
         ("starts = 1", "starts = 0", "at least 1"),
+        ("starts = 1", "softening = \"yes\"", "time.softening"),
+        ("starts = 1", "fix = { \"mullins.r\" = 2.0 }", "`mullins.r`"),
         ("starts = 1", "fix = { \"1.tau\" = 3.0 }", "allowed: `shear_modulus`, `1.nu`, `1.eta`"),
         ("{ hold = \"100 s\" }", "{ hold = \"100 s\", to = 2.0 }", "`to` another strain"),
         ("time.all.rms", "time.al.rms", "time.all.rms"),

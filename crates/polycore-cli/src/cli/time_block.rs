@@ -33,6 +33,15 @@ pub fn block(found: &TimeFit) -> Result<String, Error> {
         let (name, value) = constant(parameter.name, *value, parameter.unit);
         let _ = writeln!(text, "{name} = {value}{}", remark(found, &name));
     }
+    if let Some(softening) = law.softening() {
+        text += "[material.solid.mullins]\n";
+        for (name, value, unit) in
+            [("r", softening.ratio, ""), ("m", softening.offset, "Pa"), ("beta", softening.slope, "")]
+        {
+            let (name, value) = constant(name, value, unit);
+            let _ = writeln!(text, "{name} = {value}{}", remark(found, &format!("mullins.{name}")));
+        }
+    }
     for (k, branch) in (1..).zip(law.branches()) {
         let ([spring, viscosity], constants) = BranchSpec::constants(branch);
         let _ = writeln!(

@@ -35,6 +35,9 @@ impl Hysteresis {
         law: &Viscoelastic,
         pascals: f64,
     ) -> Result<Self, &'static str> {
+        if law.softening().is_some() {
+            return Err("it has no softening; this law softens by its largest strain");
+        }
         let [branch] = law.branches() else {
             return Err("it has one branch; this law has another number");
         };
