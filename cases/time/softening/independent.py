@@ -1,9 +1,9 @@
-"""Cycles of a rubber with a branch and Mullins softening, with noise: data of this case, by a method of its own.
+"""Cycles of a rubber with a branch and Mullins softening, with noise: data of this case.
 
-Neo-Hookean rubber (mu) with the softening of Ogden and Roxburgh (r, m, beta), and one neo-Hookean branch (nu) of
-constant viscosity (eta), incompressible, in tension: d(ln le)/dt = d(ln l)/dt - nu (le^2 - 1/le)/(3 eta) by the
-classical Runge-Kutta method, 40 steps between two points. Writes cycles.csv, and prints three standard errors of
-each constant from the Jacobian by the logarithms and the noise: the tolerances of case.toml.
+Neo-Hookean rubber (mu) with the softening of Ogden and Roxburgh (r, m, beta), and one neo-Hookean branch (nu)
+of constant viscosity (eta), incompressible, in tension: d(ln le)/dt = d(ln l)/dt - nu (le^2 - 1/le)/(3 eta) by
+the classical Runge-Kutta method, 40 steps between two points. Writes cycles.csv, and prints three standard
+errors of each constant from the Jacobian by the logarithms and the noise: the tolerances of case.toml.
 
     python3 independent.py
 """
@@ -69,7 +69,8 @@ def main():
         ends = [[p[2] for rate in RATES for p in stresses(c, rate)] for c in moved]
         columns.append([(a - b) / 2e-4 for a, b in zip(*ends)])
     size = len(constants)
-    normal = [[sum(a * b for a, b in zip(columns[i], columns[j])) / NOISE**2 for j in range(size)] for i in range(size)]
+    product = [[sum(a * b for a, b in zip(one, other)) for other in columns] for one in columns]
+    normal = [[entry / NOISE**2 for entry in row] for row in product]
     rows = [row + [float(i == k) for k in range(size)] for i, row in enumerate(normal)]
     for i in range(size):
         rows[i] = [x / rows[i][i] for x in rows[i]]

@@ -73,8 +73,8 @@ impl Components {
 
 /// UMAT as Abaqus declares it (*Abaqus User Subroutines Guide*, 1.1.44): three normal stresses, three shear
 /// stresses or one. Rubbers use F from `DFGRD1`, with branches also `DTIME` and the temperature at the end;
-/// prints the strains `STRAN` + `DSTRAN`. If a law has no stress, `PNEWDT` requests a quarter of the increment,
-/// and the state stays as it was.
+/// prints the strains `STRAN` + `DSTRAN`. If a law has no stress, `PNEWDT` requests a quarter of the
+/// increment, and the state stays as it was.
 ///
 /// Energies are per deformed volume, in the host's unit of stress: `SSE` is W/J of a rubber or the elastic
 /// energy of a print, `SPD` the energy dissipated by softening or by growing and melting crystals, `SCD` that

@@ -1,9 +1,9 @@
 //! Materials of this workspace as UMAT: `umat_` for Abaqus and `umat_user_` for CalculiX, in `libumat`.
 //!
 //! The name of the material in the input of the host selects a hyperelastic law of [`polycore`]
-//! (`EIGHT_CHAIN`, `NEO_HOOKEAN`, …, [`RubberMaterial`]), such a law with branches (`VISCOELASTIC_EIGHT_CHAIN`,
-//! …, [`RelaxingRubber`]) or the solidifying body of prints (`PRINTED_PA12`, [`Print`]); CalculiX needs `USER_`
-//! before it. The library also contains `umatht_`.
+//! (`EIGHT_CHAIN`, `NEO_HOOKEAN`, …, [`RubberMaterial`]), such a law with branches
+//! (`VISCOELASTIC_EIGHT_CHAIN`, …, [`RelaxingRubber`]) or the solidifying body of prints (`PRINTED_PA12`,
+//! [`Print`]); CalculiX needs `USER_` before it. The library also contains `umatht_`.
 //!
 //! ```
 //! use umat::RubberMaterial;

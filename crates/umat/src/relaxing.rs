@@ -37,8 +37,8 @@ impl RelaxingRubber {
     /// Beginning of the name in the input of a host; that of the elastic law follows.
     pub const PREFIX: &'static str = "viscoelastic-";
 
-    /// Creates a law from the key of its elastic law; constants are those of the elastic law alone, then those
-    /// of [`user_material`], stresses in the host's unit.
+    /// Creates a law from the key of its elastic law; constants are those of the elastic law alone, then
+    /// those of [`user_material`], stresses in the host's unit.
     ///
     /// # Errors
     /// As [`crate::RubberMaterial::new`] and [`user_material::law`]; no branch.
@@ -75,9 +75,9 @@ impl RelaxingRubber {
         Err(Error::new("temperature, K", kelvin, allowed))
     }
 
-    /// Advances a point to C in a time: S, ℂ = 2 ∂S/∂C of the whole step, in the order 11, 22, 33, 12, 13, 23,
-    /// and energies per undeformed volume. `state` holds [`Self::states`] numbers, 0 at first; an error leaves
-    /// them as they are.
+    /// Advances a point to C in a time: S, ℂ = 2 ∂S/∂C of the whole step, in the order 11, 22, 33, 12, 13,
+    /// 23, and energies per undeformed volume. `state` holds [`Self::states`] numbers, 0 at first; an error
+    /// leaves them as they are.
     ///
     /// # Errors
     /// A C that is not positive definite, chains beyond their limit, a time below 0, a result that is not

@@ -227,8 +227,8 @@ fn relaxation_in_closed_form() {
     evidence::near("relaxation of a branch in the UMAT", (2.0 * fine - coarse) / expected, 1.0, 2e-6);
 }
 
-/// Elongation at a constant rate, without change of volume: σ₁ − σ₂ of the branch becomes 3ηε̇ at any rate and
-/// any increment.
+/// Elongation at a constant rate, without change of volume: σ₁ − σ₂ of the branch becomes 3ηε̇ at any rate
+/// and any increment.
 #[test]
 fn elongation_in_closed_form() {
     let (nu, eta, rate) = (0.8, 0.8, 0.1);

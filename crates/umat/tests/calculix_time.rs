@@ -59,10 +59,9 @@ fn bar(constants: &[f64], duration: f64, count: usize, stretch: impl Fn(f64) -> 
     (1..=count).map(step).collect()
 }
 
-/// Tests `examples/relaxation.inp`, which the guide shows: the force of every increment is that of a bar of the
-/// material point, to the seven digits that CalculiX prints; also through `umat_`, which CalculiX calls in the
-/// form of Abaqus for materials that begin with `ABAQUSNL` (their tangent is another one there, so that it
-/// takes smaller residuals or more iterations).
+/// Tests `examples/relaxation.inp`, which the guide names: the force of every increment is that of a bar of
+/// the material point; also through `umat_`, which CalculiX calls in the form of Abaqus for materials that
+/// begin with `ABAQUSNL` (DDSDDE has another meaning there: more iterations).
 #[test]
 fn a_cube_relaxes() {
     let Some(program) = program() else { return };
@@ -82,8 +81,8 @@ fn a_cube_relaxes() {
     evidence::at_most("the same through umat_ of Abaqus' form", off(&abaqus), 1e-4);
 }
 
-/// Creep that CalculiX has itself, ε̇ = A σⁿ of Mises stresses (`*CREEP, LAW=NORTON`), n = 1 and 3, at strains
-/// of 0.1 %: a branch with constant η = 1/(3A), and one of Bergström and Boyce with c = 0 and
+/// Creep that CalculiX has itself, ε̇ = A σⁿ of Mises stresses (`*CREEP, LAW=NORTON`), n = 1 and 3, at
+/// strains of 0.1 %: a branch with constant η = 1/(3A), and one of Bergström and Boyce with c = 0 and
 /// γ̇₀/τ̂^m = A (3/2)^((m+1)/2), beside an equilibrium law of a millionth.
 #[test]
 fn creep_of_the_host() {

@@ -280,7 +280,8 @@ impl TimeCase {
         let mut text: String = self.read.iter().map(|line| format!("{line}\n")).collect();
         let _ = writeln!(
             text,
-            "law with time: {}{}, {} branches; {} runs, {points} measured stresses, {} starts, {} predictions",
+            "law with time: {}{}, {} branches; {} runs, {points} measured stresses, {} starts, {} \
+             predictions",
             self.form.equilibrium.key,
             if self.form.softening { " with softening" } else { "" },
             self.form.branches.len(),

@@ -57,8 +57,8 @@ pub fn block(found: &TimeFit) -> Result<String, Error> {
     Ok(text)
 }
 
-/// Bulk modulus of a fitted law, Pa, which tests at constant volume do not determine: [`BULK_RATIO`] times the
-/// shear modulus of a fast strain.
+/// Bulk modulus of a fitted law, Pa, which tests at constant volume do not determine: [`BULK_RATIO`] times
+/// the shear modulus of a fast strain.
 ///
 /// # Errors
 /// As [`TimeFit::law`].

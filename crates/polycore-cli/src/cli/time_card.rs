@@ -50,8 +50,8 @@ fn cards(found: &TimeFit, units: &str, pascals: f64) -> Result<String, Error> {
     Ok(text)
 }
 
-/// Card of Abaqus' own law, or a comment that says why there is none; `parameters` are those of the equilibrium
-/// law in the host's unit. K is 100 times the modulus of the equilibrium law: Abaqus refuses more without
+/// Card of Abaqus' own law, or a comment that says why there is none; `parameters` are those of the
+/// equilibrium law in the host's unit. K is 100 times the modulus of the equilibrium law: Abaqus refuses more without
 /// hybrid elements.
 fn hysteresis(
     found: &TimeFit,
@@ -65,8 +65,12 @@ fn hysteresis(
     Ok(match Hysteresis::new(model, own, law, pascals) {
         Ok(card) => {
             let compliance = 2.0 * pascals / (BULK_RATIO * model.law(own)?.shear_modulus());
+            let form = match model.key {
+                "eight-chain" => "in five terms, too soft near locking",
+                _ => "the same law",
+            };
             let note =
-                format!("** *HYSTERESIS of Abaqus: the same law, K {BULK_RATIO} times the modulus at rest");
+                format!("** *HYSTERESIS of Abaqus: {form}; K is {BULK_RATIO} times the modulus at rest");
             format!("**\n{note}\n{}", card.card(model.key, parameters, compliance))
         }
         Err(reason) => format!("**\n** no *HYSTERESIS of Abaqus: {reason}\n"),
