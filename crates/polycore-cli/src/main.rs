@@ -34,6 +34,7 @@ mod cli {
     pub mod table_fits;
     pub mod time;
     pub mod time_block;
+    pub mod time_card;
     pub mod time_fits;
     pub mod trials;
     pub mod volumetric;

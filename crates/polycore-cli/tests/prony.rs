@@ -176,10 +176,34 @@ source = "the data are elastic"
     let solid = &block["material"]["solid"];
     assert_eq!(solid["constitutive"]["model"].as_str(), Some("neo-hookean"));
     assert!(solid["branch"][0]["parameters"]["eta"].is_str());
+    let cards = read("time_materials_mm.inp");
+    assert!(shown.contains("10 state variables (*DEPVAR)") && cards.contains("*DEPVAR\n10\n**\n"), "{cards}");
+    assert!(cards.ends_with("no *HYSTERESIS of Abaqus: its viscosity is that of Bergström and Boyce\n"));
+    let card = cards.split("*USER MATERIAL, CONSTANTS=11\n").nth(1).unwrap();
+    let rows = card.lines().take(2).flat_map(|line| line.split(", "));
+    let numbers: Vec<f64> = rows.map(|number| number.parse().unwrap()).collect();
+    // K, μ, absolute zero, r, m, β, neo-Hooke, ν, constant, η, no shift
+    let modulus =
+        |text: &toml::Value| text.as_str().unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
+    let parameters = &solid["branch"][0]["parameters"];
+    let constitutive = &solid["constitutive"];
+    let given = [
+        modulus(&constitutive["bulk_modulus"]),
+        modulus(&constitutive["parameters"]["shear_modulus"]),
+        modulus(&parameters["nu"]),
+        modulus(&parameters["eta"]),
+    ];
+    for (found, given) in [numbers[0], numbers[1], numbers[7], numbers[9]].iter().zip(given) {
+        assert!((found / given - 1.0).abs() < 1e-4, "{cards} {given}");
+    }
+    assert_eq!([2, 3, 4, 5, 6, 8, 10].map(|k| numbers[k]), [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0]);
+    assert_eq!(numbers.len(), 11);
     assert_eq!(read("hold_prediction.csv").lines().count(), 83);
     for (from, to, message) in [
         ("\"0.1 1/s\"\nstarts", "\"0.2 1/s\"\nstarts", "0.01 /s, 0.1 /s"),
         ("starts = 1", "starts = 0", "at least 1"),
+        ("starts = 1", "softening = \"yes\"", "time.softening"),
+        ("starts = 1", "fix = { \"mullins.r\" = 2.0 }", "`mullins.r`"),
         ("starts = 1", "fix = { \"1.tau\" = 3.0 }", "allowed: `shear_modulus`, `1.nu`, `1.eta`"),
         ("{ hold = \"100 s\" }", "{ hold = \"100 s\", to = 2.0 }", "`to` another strain"),
         ("time.all.rms", "time.al.rms", "time.all.rms"),

@@ -38,18 +38,47 @@ fn abort(message: &Error) -> ! {
     std::process::exit(2)
 }
 
-fn states(found: usize) {
-    if found < Print::STATES {
-        abort(&Error::new("state variables (*DEPVAR)", found, Print::STATES));
+fn states(found: usize, needed: usize) {
+    if found < needed {
+        abort(&Error::new("state variables (*DEPVAR)", found, needed));
     }
 }
 
-/// UMAT as Abaqus declares it (*Abaqus User Subroutines Guide*, 1.1.44): three normal and three shear
-/// stresses. Rubbers use F from `DFGRD1`, prints the strains `STRAN` + `DSTRAN`. If a law has no stress,
-/// `PNEWDT` requests a quarter of the increment.
+/// Components of stress and strain that a host passes.
+#[derive(Clone, Copy)]
+struct Components(usize);
+
+impl Components {
+    /// Checks the numbers of normal and of all components.
+    fn new(normal: c_int, all: c_int) -> Self {
+        match (normal, all) {
+            (3, 6) => Self(6),
+            (3, 4) => Self(4),
+            _ => {
+                let allowed = "3 and 3: solids; 3 and 1: plane strain and axisymmetry; no plane stress";
+                abort(&Error::new(
+                    "normal and shear stresses",
+                    format!("{normal} and {}", all - normal),
+                    allowed,
+                ))
+            }
+        }
+    }
+
+    /// Strain with 0 for the components that are not passed.
+    fn strain(self, own: &[f64]) -> Voigt {
+        Voigt::from_fn(|k, _| own.get(k).copied().unwrap_or(0.0))
+    }
+}
+
+/// UMAT as Abaqus declares it (*Abaqus User Subroutines Guide*, 1.1.44): three normal stresses, three shear
+/// stresses or one. Rubbers use F from `DFGRD1`, with branches also `DTIME` and the temperature at the end;
+/// prints the strains `STRAN` + `DSTRAN`. If a law has no stress, `PNEWDT` requests a quarter of the
+/// increment, and the state stays as it was.
 ///
 /// Energies are per deformed volume, in the host's unit of stress: `SSE` is W/J of a rubber or the elastic
-/// energy of a print, `SPD` the energy dissipated by growing and melting crystals, `SCD` that of relaxation.
+/// energy of a print, `SPD` the energy dissipated by softening or by growing and melting crystals, `SCD` that
+/// of relaxation.
 ///
 /// # Safety
 /// As in Fortran: every pointer is valid for the length that `NTENS`, `NSTATV` and `NPROPS` tell, and nothing
@@ -90,18 +119,15 @@ pub unsafe extern "C" fn umat_(
 ) {
     let length = |count: c_int| usize::try_from(count).unwrap_or(0);
     // SAFETY: the caller's promise
-    let (normal, all) = unsafe { (*ndi, *ntens) };
-    if (normal, all) != (3, 6) {
-        let allowed = "3 and 3: solids; no plane stress, no plane strain";
-        abort(&Error::new("normal and shear stresses", format!("{normal} and {}", all - normal), allowed));
-    }
-    // SAFETY: the caller's promise; `NTENS` is 6, lengths below 0 are 0
+    let components = unsafe { Components::new(*ndi, *ntens) };
+    let count = components.0;
+    // SAFETY: the caller's promise; `NTENS` is `count`, lengths below 0 are 0
     let (name, constants, state, change) = unsafe {
         (
             std::slice::from_raw_parts(cmname.cast::<u8>(), NAME),
             std::slice::from_raw_parts(props, length(*nprops)),
             std::slice::from_raw_parts_mut(statev, length(*nstatv)),
-            [stran, dstran].map(|six| Voigt::from_column_slice(std::slice::from_raw_parts(six, 6))),
+            [stran, dstran].map(|own| components.strain(std::slice::from_raw_parts(own, count))),
         )
     };
     let answer: Result<_, Error> = with_material(name, constants, |material| match material {
@@ -112,8 +138,22 @@ pub unsafe extern "C" fn umat_(
             unsafe { *sse = energy };
             Ok((stress, tangent))
         }
+        Material::Relaxing(rubber) => {
+            states(state.len(), rubber.states());
+            // SAFETY: the caller's promise
+            let (f, time, temperature) = unsafe { (&*dfgrd1, *dtime, *temp + *dtemp) };
+            let kelvin = rubber.kelvin(temperature).unwrap_or_else(|error| abort(&error));
+            let (stress, tangent, energies) = rubber.cauchy(state, f, time, kelvin)?;
+            // SAFETY: the caller's promise; the state has the energies since the start
+            unsafe {
+                *sse = energies.stored;
+                *spd = energies.softening;
+                *scd = energies.viscous;
+            }
+            Ok((stress, tangent))
+        }
         Material::Print(print) => {
-            states(state.len());
+            states(state.len(), Print::STATES);
             // SAFETY: the caller's promise
             let (turn, time, temperature) = unsafe { (&*drot, *dtime, *temp + *dtemp) };
             let mut old = state.to_vec();
@@ -132,12 +172,15 @@ pub unsafe extern "C" fn umat_(
         }
     });
     // SAFETY: the caller's promise
-    let (stress, tangent) =
-        unsafe { (std::slice::from_raw_parts_mut(stress, 6), std::slice::from_raw_parts_mut(ddsdde, 36)) };
+    let (stress, tangent) = unsafe {
+        (std::slice::from_raw_parts_mut(stress, count), std::slice::from_raw_parts_mut(ddsdde, count * count))
+    };
     match answer {
         Ok((found, slope)) => {
-            stress.copy_from_slice(found.as_slice());
-            tangent.copy_from_slice(slope.as_slice());
+            stress.copy_from_slice(&found.as_slice()[..count]);
+            for (own, column) in tangent.chunks_exact_mut(count).zip(slope.column_iter()) {
+                own.iter_mut().zip(column.iter()).for_each(|(own, entry)| *own = *entry);
+            }
         }
         Err(_) => {
             tangent.fill(0.0);
@@ -179,7 +222,7 @@ pub unsafe extern "C" fn umat_user_(
     _voj: *const f64,
     _xkl: *const f64,
     _vj: *const f64,
-    _ithermal: *const c_int,
+    ithermal: *const c_int,
     t1l: *const f64,
     dtime: *const f64,
     _time: *const f64,
@@ -223,8 +266,19 @@ pub unsafe extern "C" fn umat_user_(
             let c = Voigt::from_fn(|k, _| 2.0 * strain[k] + if k < 3 { 1.0 } else { 0.0 });
             rubber.material(&c)
         }
+        Material::Relaxing(rubber) => {
+            states(old.len(), rubber.states());
+            new.copy_from_slice(old);
+            let c = Voigt::from_fn(|k, _| 2.0 * strain[k] + if k < 3 { 1.0 } else { 0.0 });
+            // SAFETY: the caller's promise
+            let (heated, given, time) = unsafe { (*ithermal != 0, *t1l, *dtime) };
+            let temperature = if heated { given } else { f64::NAN };
+            let kelvin = rubber.kelvin(temperature).unwrap_or_else(|error| abort(&error));
+            let (stress, tangent, _) = rubber.material(new, &c, time, kelvin)?;
+            Ok((stress, tangent))
+        }
         Material::Print(print) => {
-            states(old.len());
+            states(old.len(), Print::STATES);
             // SAFETY: the caller's promise
             let (temperature, time) = unsafe { (*t1l, *dtime) };
             print

@@ -18,6 +18,35 @@ pub(crate) fn names() -> Vec<&'static str> {
     MODELS.iter().chain(COMPRESSIBLE_MODELS).map(|model| model.key).collect()
 }
 
+/// Number of constants of a law: its parameters and K, of a foam its parameters alone.
+pub(crate) fn count(key: &str) -> Result<usize, Error> {
+    let descriptor = any_model(key).map_err(|error| Error::new(key, "no such law", error))?;
+    Ok(descriptor.parameters.len() + usize::from(descriptor.kind != ModelKind::Compressible))
+}
+
+/// Builds a law as [`RubberMaterial::new`] does.
+pub(crate) fn law(key: &str, constants: &[f64]) -> Result<Compressible<Box<dyn Hyperelastic>>, Error> {
+    let wrong = |error: polycore::constitutive::Error| Error::new(key, format!("{constants:?}"), error);
+    let descriptor = any_model(key).map_err(wrong)?;
+    let names: Vec<&str> = descriptor.parameters.iter().map(|parameter| parameter.name).collect();
+    let law = |parameters: &[f64]| descriptor.law(parameters).map_err(wrong);
+    if descriptor.kind == ModelKind::Compressible {
+        return Compressible::new(law(constants)?, Volumetric::None).map_err(wrong);
+    }
+    let allowed = format!("K, {}", names.join(", "));
+    let Some((&bulk, parameters)) = constants.split_first().filter(|(_, rest)| rest.len() == names.len())
+    else {
+        return Err(Error::new(format!("constants of {key}"), format!("{constants:?}"), allowed));
+    };
+    let bare = Compressible::new(law(parameters)?, Volumetric::None).and_then(|law| law.bulk_modulus());
+    let bare = bare.map_err(wrong)?;
+    let lame = bulk - bare;
+    if !(lame.is_finite() && lame > 0.0) {
+        return Err(Error::new("K", bulk, format!("above {bare}, that of the law alone")));
+    }
+    Compressible::new(law(parameters)?, Volumetric::Ciarlet { lame }).map_err(wrong)
+}
+
 impl RubberMaterial {
     /// Creates a law by its key; constants are the bulk modulus K at small strains, then the parameters of
     /// the law, stresses in the host's unit; of a foam its parameters alone.
@@ -26,27 +55,7 @@ impl RubberMaterial {
     /// An unknown key; constants out of range, too few or too many; K below that of the law without a
     /// volumetric term.
     pub fn new(key: &str, constants: &[f64]) -> Result<Self, Error> {
-        let wrong = |error: polycore::constitutive::Error| Error::new(key, format!("{constants:?}"), error);
-        let descriptor = any_model(key).map_err(wrong)?;
-        let names: Vec<&str> = descriptor.parameters.iter().map(|parameter| parameter.name).collect();
-        let law = |parameters: &[f64]| descriptor.law(parameters).map_err(wrong);
-        if descriptor.kind == ModelKind::Compressible {
-            let law = Compressible::new(law(constants)?, Volumetric::None).map_err(wrong)?;
-            return Ok(Self { law });
-        }
-        let allowed = format!("K, {}", names.join(", "));
-        let Some((&bulk, parameters)) = constants.split_first().filter(|(_, rest)| rest.len() == names.len())
-        else {
-            return Err(Error::new(format!("constants of {key}"), format!("{constants:?}"), allowed));
-        };
-        let bare = Compressible::new(law(parameters)?, Volumetric::None).and_then(|law| law.bulk_modulus());
-        let bare = bare.map_err(wrong)?;
-        let lame = bulk - bare;
-        if !(lame.is_finite() && lame > 0.0) {
-            return Err(Error::new("K", bulk, format!("above {bare}, that of the law alone")));
-        }
-        let law = Compressible::new(law(parameters)?, Volumetric::Ciarlet { lame }).map_err(wrong)?;
-        Ok(Self { law })
+        Ok(Self { law: law(key, constants)? })
     }
 
     /// Computes S and ℂ = 2 ∂S/∂C at C, in the order 11, 22, 33, 12, 13, 23.
@@ -82,6 +91,6 @@ impl RubberMaterial {
     }
 }
 
-fn stretched(error: impl std::fmt::Display) -> Error {
+pub(crate) fn stretched(error: impl std::fmt::Display) -> Error {
     Error::new("deformation", error, "where the law has a stress")
 }

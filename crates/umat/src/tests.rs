@@ -8,24 +8,26 @@ use polycore::tensor::Tensor;
 use polycore::tensor::voigt::{self, PAIRS, Voigt, Voigt6x6};
 
 /// Arguments that change from one call to the next.
-struct UmatCall<'a> {
-    name: &'a str,
-    constants: &'a [f64],
-    deformation: Tensor,
-    strain: [Voigt; 2],
-    temperature: [f64; 2],
-    time: f64,
-    turn: Tensor,
+pub(crate) struct UmatCall<'a> {
+    pub name: &'a str,
+    pub constants: &'a [f64],
+    pub deformation: Tensor,
+    pub strain: [Voigt; 2],
+    pub temperature: [f64; 2],
+    pub time: f64,
+    pub turn: Tensor,
+    /// Shear stresses, 3 or 1; the others come back as 0.
+    pub shears: usize,
 }
 
 impl UmatCall<'_> {
     /// Returns σ, DDSDDE and PNEWDT.
-    fn umat(&self, state: &mut [f64]) -> (Voigt, Voigt6x6, f64) {
+    pub fn umat(&self, state: &mut [f64]) -> (Voigt, Voigt6x6, f64) {
         self.with_energies(state, &mut [0.0; 3])
     }
 
     /// Calls it as above, and updates SSE, SPD and SCD.
-    fn with_energies(&self, state: &mut [f64], energies: &mut [f64; 3]) -> (Voigt, Voigt6x6, f64) {
+    pub fn with_energies(&self, state: &mut [f64], energies: &mut [f64; 3]) -> (Voigt, Voigt6x6, f64) {
         let [sse, spd, scd] = energies;
         let (mut stress, mut tangent, mut cut) = ([0.0; 6], [0.0; 36], 1.0);
         let mut one = [0.0; 9];
@@ -34,6 +36,7 @@ impl UmatCall<'_> {
         name[..self.name.len()].copy_from_slice(self.name.as_bytes());
         let square = |tensor: &Tensor| -> [f64; 9] { std::array::from_fn(|k| tensor.as_slice()[k]) };
         let (f, turn) = (square(&self.deformation), square(&self.turn));
+        let count = 3 + self.shears;
         let [start, change] = [self.temperature[0], self.temperature[1] - self.temperature[0]];
         // SAFETY: every array has the length that the call states; what is not read has nine numbers
         unsafe {
@@ -58,8 +61,8 @@ impl UmatCall<'_> {
                 none,
                 name.as_ptr().cast(),
                 &3,
-                &3,
-                &6,
+                &(self.shears as i32),
+                &(count as i32),
                 &(state.len() as i32),
                 self.constants.as_ptr(),
                 &(self.constants.len() as i32),
@@ -71,11 +74,12 @@ impl UmatCall<'_> {
                 &f,
             );
         }
-        (Voigt::from(stress), Voigt6x6::from_column_slice(&tangent), cut)
+        let entry = |a: usize, b: usize| if a < count && b < count { tangent[a + count * b] } else { 0.0 };
+        (Voigt::from(stress), Voigt6x6::from_fn(entry), cut)
     }
 }
 
-fn call<'a>(name: &'a str, constants: &'a [f64], deformation: Tensor) -> UmatCall<'a> {
+pub(crate) fn call<'a>(name: &'a str, constants: &'a [f64], deformation: Tensor) -> UmatCall<'a> {
     let turn = Tensor::identity();
     UmatCall {
         name,
@@ -85,6 +89,7 @@ fn call<'a>(name: &'a str, constants: &'a [f64], deformation: Tensor) -> UmatCal
         temperature: [0.0; 2],
         time: 1.0,
         turn,
+        shears: 3,
     }
 }
 

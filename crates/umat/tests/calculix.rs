@@ -20,7 +20,7 @@ fn program() -> Option<&'static Path> {
             .args(["-O1", "-ffree-line-length-none", "-c", "-o"])
             .args([file("wrap.o"), file("wrap.f90")]));
         let library = hosts::static_library("umat");
-        let symbols = ["-u,umat_user_", "--wrap=umat_user_"];
+        let symbols = ["-u,umat_user_", "-u,umat_", "--wrap=umat_user_"];
         hosts::link_calculix(&source, &[&file("wrap.o"), &library], &symbols, &file("ccx"));
         Some((folder, PathBuf::from("ccx")))
     });

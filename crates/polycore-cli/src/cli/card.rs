@@ -13,7 +13,7 @@ use super::table_fits::TableFits;
 use super::volumetric::Bulk;
 
 /// Files by system of units: name, description, and the host's unit of stress, Pa.
-const FILES: [(&str, &str, f64); 2] =
+pub(super) const FILES: [(&str, &str, f64); 2] =
     [("materials_mm.inp", "mm, N, MPa", 1e6), ("materials_si.inp", "m, N, Pa", 1.0)];
 
 /// Writes `materials_mm.inp` and `materials_si.inp` with a card of every fit.

@@ -25,6 +25,9 @@ pub struct TimeSettings {
     equilibrium: String,
     /// Branches.
     branch: Vec<BranchFormSpec>,
+    /// Softening of the equilibrium law by the largest strain so far (Mullins effect).
+    #[serde(default)]
+    softening: bool,
     /// Constants that keep a value, SI: `"1.c" = -0.5`.
     #[serde(default)]
     fix: BTreeMap<String, f64>,
@@ -187,8 +190,8 @@ impl TimeCase {
             })?;
             branches.extend(vec![form; branch.count]);
         }
-        let form =
-            Form { equilibrium, branches, fixed: settings.fix.into_iter().collect(), free: settings.free };
+        let fixed = settings.fix.into_iter().collect();
+        let form = Form { equilibrium, branches, softening: settings.softening, fixed, free: settings.free };
         let known = form.names();
         for (key, name) in form
             .fixed
@@ -277,8 +280,10 @@ impl TimeCase {
         let mut text: String = self.read.iter().map(|line| format!("{line}\n")).collect();
         let _ = writeln!(
             text,
-            "law with time: {}, {} branches; {} runs, {points} measured stresses, {} starts, {} predictions",
+            "law with time: {}{}, {} branches; {} runs, {points} measured stresses, {} starts, {} \
+             predictions",
             self.form.equilibrium.key,
+            if self.form.softening { " with softening" } else { "" },
             self.form.branches.len(),
             self.runs.len(),
             self.starts,

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use harness::scene::BranchSpec;
 use polycore::constitutive::Error;
 use polycore::constitutive::hyperelastic::Hyperelastic;
+use polycore::constitutive::viscoelastic::Viscoelastic;
 use polycore::constitutive::viscoelastic::fit::TimeFit;
 
 use super::material::{BULK_RATIO, DIGITS, digits, in_megapascals, stress};
@@ -22,17 +23,24 @@ pub fn block(found: &TimeFit) -> Result<String, Error> {
     let mut text = format!("[material.solid] # {key} with branches, rms {}\n", stress(found.pooled.rms, 5));
     text += "law = \"correspondence\"\n[material.solid.constitutive]\n";
     let values = found.values();
-    let shear =
-        found.form.equilibrium.law(&values[..found.form.equilibrium.parameters.len()])?.shear_modulus();
     let _ = writeln!(
         text,
         "model = \"{key}\"\nbulk_modulus = \"{}\" # {BULK_RATIO} times the modulus of a fast strain: \
          these tests do not determine it\n[material.solid.constitutive.parameters]",
-        stress(BULK_RATIO * (shear + law.branch_modulus()), DIGITS)
+        stress(bulk_modulus(found, &law)?, DIGITS)
     );
     for (parameter, value) in found.form.equilibrium.parameters.iter().zip(&values) {
         let (name, value) = constant(parameter.name, *value, parameter.unit);
         let _ = writeln!(text, "{name} = {value}{}", remark(found, &name));
+    }
+    if let Some(softening) = law.softening() {
+        text += "[material.solid.mullins]\n";
+        for (name, value, unit) in
+            [("r", softening.ratio, ""), ("m", softening.offset, "Pa"), ("beta", softening.slope, "")]
+        {
+            let (name, value) = constant(name, value, unit);
+            let _ = writeln!(text, "{name} = {value}{}", remark(found, &format!("mullins.{name}")));
+        }
     }
     for (k, branch) in (1..).zip(law.branches()) {
         let ([spring, viscosity], constants) = BranchSpec::constants(branch);
@@ -47,6 +55,17 @@ pub fn block(found: &TimeFit) -> Result<String, Error> {
         }
     }
     Ok(text)
+}
+
+/// Bulk modulus of a fitted law, Pa, which tests at constant volume do not determine: [`BULK_RATIO`] times
+/// the shear modulus of a fast strain.
+///
+/// # Errors
+/// As [`TimeFit::law`].
+pub fn bulk_modulus(found: &TimeFit, law: &Viscoelastic) -> Result<f64, Error> {
+    let model = found.form.equilibrium;
+    let shear = model.law(&found.values()[..model.parameters.len()])?.shear_modulus();
+    Ok(BULK_RATIO * (shear + law.branch_modulus()))
 }
 
 /// Comment on a constant that was fixed or not determined.

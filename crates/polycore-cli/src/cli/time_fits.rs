@@ -20,7 +20,7 @@ use super::material::{DIGITS, digits, in_megapascals, stress};
 use super::quantities as q;
 use super::table_fits::unit_of;
 use super::time::TimeCase;
-use super::time_block;
+use super::{time_block, time_card};
 
 /// Name of the values of all runs together.
 pub const ALL: &str = "all";
@@ -67,6 +67,8 @@ pub fn run(case: &TimeCase, run: &mut Run, report: &mut Report) -> Result<String
     write_runs(directory, case, &found)?;
     let block = time_block::block(&found)?;
     atomic_write(directory.join("time_material.toml"), |file| file.write_all(block.as_bytes()))?;
+    let states = time_card::write(directory, &found)?;
+    let _ = writeln!(text, "user material for Abaqus and CalculiX: {states} state variables (*DEPVAR)");
     write_predictions(directory, case, &found)?;
     Ok(text)
 }

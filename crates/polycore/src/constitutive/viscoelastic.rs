@@ -26,14 +26,17 @@ mod branch;
 mod control;
 pub mod fit;
 mod flow;
+mod hysteresis;
 pub mod linear;
 mod mullins;
 mod shift;
 mod spring;
+pub mod user_material;
 mod viscosity;
 
 pub use branch::{Branch, BranchState};
 pub use control::{History, Pace, Reaction, Trace, TracePoint, nominal_of_test, strain_of_test};
+pub use hysteresis::Hysteresis;
 pub use mullins::Mullins;
 pub use shift::Shift;
 pub use spring::Spring;

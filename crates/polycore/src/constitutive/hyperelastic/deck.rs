@@ -133,7 +133,7 @@ pub(super) fn left_out(compliances: &[f64], held: usize) -> Option<String> {
 }
 
 /// Formats eight numbers per line.
-fn lines(numbers: &[f64]) -> String {
+pub(crate) fn lines(numbers: &[f64]) -> String {
     let row = |row: &[f64]| row.iter().map(|x| format!("{x:.9e}")).collect::<Vec<_>>().join(", ") + "\n";
     numbers.chunks(8).map(row).collect()
 }

@@ -1,6 +1,6 @@
 //! Forms of laws with time: which constants they have, and the law of given constants.
 
-use super::super::{Branch, Spring, Viscoelastic, Viscosity};
+use super::super::{Branch, Mullins, Spring, Viscoelastic, Viscosity};
 use crate::constitutive::Error;
 use crate::constitutive::hyperelastic::{Domain, EightChain, LopezPamies, ModelDescriptor, NeoHookean};
 
@@ -11,6 +11,9 @@ pub struct Form {
     pub equilibrium: &'static ModelDescriptor,
     /// The branches; their constants have the names `1.nu`, `1.eta_0`, `2.nu`, ….
     pub branches: Vec<BranchForm>,
+    /// Softening of the equilibrium law by the largest strain so far, with the constants `mullins.r`,
+    /// `mullins.m`, `mullins.beta`.
+    pub softening: bool,
     /// Constants that keep a value, by their names, SI. These replace the choices of the fit.
     pub fixed: Vec<(String, f64)>,
     /// Constants that are fitted although the fit would fix them.
@@ -113,6 +116,10 @@ pub(super) struct Scales {
     pub unit: f64,
     /// Shortest and longest duration of a run, s.
     pub durations: [f64; 2],
+    /// Energy of that law at the largest strain, J/m³.
+    pub energy: f64,
+    /// Number of different largest strains before an unloading.
+    pub peaks: usize,
     /// Lower limit of each constant of the equilibrium law, from the stretches of the data.
     pub limits: Vec<f64>,
 }
@@ -120,13 +127,13 @@ pub(super) struct Scales {
 impl Form {
     /// Creates a form of branches of one kind, with nothing fixed.
     pub fn new(equilibrium: &'static ModelDescriptor, branches: Vec<BranchForm>) -> Self {
-        Self { equilibrium, branches, fixed: Vec::new(), free: Vec::new() }
+        Self { equilibrium, branches, softening: false, fixed: Vec::new(), free: Vec::new() }
     }
 
     /// Names of the constants, in the order of [`Form::law`].
     pub fn names(&self) -> Vec<String> {
         let limits = vec![0.0; self.equilibrium.parameters.len()];
-        let scales = Scales { modulus: 1.0, unit: 1.0, durations: [1.0; 2], limits };
+        let scales = Scales { modulus: 1.0, unit: 1.0, durations: [1.0; 2], energy: 1.0, peaks: 2, limits };
         let unnamed = Self { fixed: Vec::new(), free: Vec::new(), ..self.clone() };
         let constants = unnamed.constants(&scales).unwrap_or_default();
         constants.into_iter().map(|constant| constant.name).collect()
@@ -134,7 +141,8 @@ impl Form {
 
     /// Lists the constants in the order of [`Form::law`]. Those that no data determine are fixed, with the
     /// reason: γ̇₀ of `BergstromBoyce` (degenerate with τ̂), η_∞ and K₂ of `KumarLopezPamies` (nearly
-    /// degenerate: only η₀/K₂^γ₂ and K₁/K₂^γ₂ are seen), ξ (acts on the first per cent of flow).
+    /// degenerate: only η₀/K₂^γ₂ and K₁/K₂^γ₂ are seen), ξ (acts on the first per cent of flow), β of the
+    /// softening where all cycles turn at one strain (only m + βW_max is seen).
     pub(super) fn constants(&self, scales: &Scales) -> Result<Vec<Constant>, Error> {
         let mut all = Vec::new();
         let mut add = |name: String, unit, map, fixed: Option<(f64, &'static str)>| {
@@ -188,6 +196,12 @@ impl Form {
                 }
             }
         }
+        if self.softening {
+            add("mullins.r".to_owned(), "1", Map::Above(1.0), None);
+            add("mullins.m".to_owned(), "Pa", POSITIVE, None);
+            let single = (0.0, "degenerate with mullins.m: all cycles turn at one strain");
+            add("mullins.beta".to_owned(), "1", POSITIVE, (scales.peaks < 2).then_some(single));
+        }
         let known = all.iter().map(|constant| constant.name.as_str()).collect::<Vec<_>>().join(", ");
         let unknown = |name: &str| Error::invalid("name of a constant", name, &known);
         for (name, value) in &self.fixed {
@@ -201,7 +215,8 @@ impl Form {
         Ok(all)
     }
 
-    /// Builds the law from its constants, SI, in the order equilibrium, spring and viscosity of each branch.
+    /// Builds the law from its constants, SI, in the order equilibrium, spring and viscosity of each branch,
+    /// softening.
     ///
     /// # Errors
     /// [`Error::Parameter`]; [`Error::Data`] for a wrong number of constants; [`Error::Invalid`] for a
@@ -250,10 +265,18 @@ impl Form {
             };
             branches.push(Branch::new(spring, viscosity)?);
         }
+        let softening = match self.softening {
+            true => Some(rest.take(3)?).map(|p| Mullins { ratio: p[0], offset: p[1], slope: p[2] }),
+            false => None,
+        };
         if rest.next < constants.len() {
             return Err(rest.wrong());
         }
-        Viscoelastic::new(Box::new(law), branches)
+        let law = Viscoelastic::new(Box::new(law), branches)?;
+        match softening {
+            Some(softening) => law.with_softening(softening),
+            None => Ok(law),
+        }
     }
 
     /// Spring of `share` times the equilibrium law.

@@ -55,7 +55,9 @@ impl<'a> Problem<'a> {
             limits.push(most);
         }
         let unit = 1000_f64.powf(size.log(1000.0).floor());
-        let scales = Scales { modulus, unit, durations: [shortest, longest], limits };
+        let (peaks, most) = runs::turns(runs);
+        let energy = 0.5 * modulus * most;
+        let scales = Scales { modulus, unit, durations: [shortest, longest], energy, peaks, limits };
         let constants = form.constants(&scales)?;
         let free = constants.iter().filter(|constant| constant.fixed.is_none()).count();
         if measured.len() < free {
@@ -215,6 +217,10 @@ impl<'a> Problem<'a> {
                     values.extend([1.0 / (time * ratio.sinh()), stress / ratio]);
                 }
             }
+        }
+        if self.form.softening {
+            let width = draw.between(0.1, 0.5) * scales.energy;
+            values.extend([draw.between(1.3, 2.5), width, draw.between(0.05, 0.3)]);
         }
         self.inverse(&values)
     }

@@ -150,6 +150,14 @@ impl Test {
         }
     }
 
+    /// I₁ − 3 at a strain.
+    fn excess(self, strain: f64) -> f64 {
+        match self {
+            Self::Uniaxial => strain * strain + 2.0 / strain - 3.0,
+            Self::SimpleShear => strain * strain,
+        }
+    }
+
     /// C at a strain.
     pub fn deformation(self, strain: f64) -> Voigt {
         match self {
@@ -210,6 +218,33 @@ impl Test {
             }
         }
     }
+}
+
+/// Ratio of I₁ − 3 at two turns that are different.
+const DIFFERENT: f64 = 1.1;
+
+/// Number of different strains at which runs turn after more than before, and the largest I₁ − 3.
+pub(super) fn turns(runs: &[MeasuredRun]) -> (usize, f64) {
+    let (mut turns, mut most) = (Vec::new(), 0.0_f64);
+    for run in runs {
+        let excess: Vec<f64> = run.points.iter().map(|point| run.test.excess(point.strain)).collect();
+        let mut record = 0.0;
+        for (before, after) in excess.iter().zip(excess.iter().skip(1)) {
+            if *before > record && after < before {
+                record = *before;
+                turns.push(record);
+            }
+        }
+        most = excess.into_iter().fold(most, f64::max);
+    }
+    turns.sort_by(f64::total_cmp);
+    let (mut count, mut last) = (0, 0.0);
+    for turn in turns {
+        if turn > DIFFERENT * last {
+            (count, last) = (count + 1, turn);
+        }
+    }
+    (count, most)
 }
 
 /// All points as elastic states, of which a law without time takes the mean.

@@ -1,7 +1,10 @@
 use evidence::near;
 
 use super::problem::Problem;
-use super::{BranchForm, Form, MeasuredRun, Measurement, SpringForm, Test, ViscosityForm, uncertainty};
+use super::{
+    BranchForm, FitSettings, Form, MeasuredRun, Measurement, SpringForm, Test, ViscosityForm, fit,
+    uncertainty,
+};
 use crate::constitutive::hyperelastic::model;
 use crate::constitutive::viscoelastic::{Pace, Scheme};
 
@@ -38,4 +41,36 @@ fn uncertainty_of_a_published_law() {
     let (values, errors) = uncertainty(scaled);
     // the direction of K₁ and γ₁ is below the noise: no interval
     assert!(values[11] < 1.0 && errors[9].is_none() && errors[8].is_some());
+}
+
+/// Fits softening to a cycle of a body without branches in closed form, to two strains: all constants return;
+/// to one strain β is fixed at 0 and m is m + βW_max.
+#[test]
+fn softening_in_closed_form() {
+    let (mu, r, m, beta) = (0.5e6, 1.6, 0.15e6, 0.2);
+    let run = |peaks: &[f64]| {
+        let (mut points, mut most, mut at) = (Vec::new(), 0.0_f64, 1.0);
+        for goal in peaks.iter().flat_map(|peak| [*peak, 1.05]) {
+            for k in 1..=20 {
+                let strain = at + (goal - at) * f64::from(k) / 20.0;
+                let energy = 0.5 * mu * (strain * strain + 2.0 / strain - 3.0);
+                most = most.max(energy);
+                let zeta = 1.0 - libm::erf((most - energy) / (m + beta * most)) / r;
+                let nominal = zeta * mu * (strain - strain.powi(-2));
+                points.push(Measurement { time: points.len() as f64 + 1.0, strain, nominal });
+            }
+            at = goal;
+        }
+        MeasuredRun::new("cycle", 0.1, Test::Uniaxial, points).unwrap()
+    };
+    let form = Form { softening: true, ..Form::new(model("neo-hookean").unwrap(), Vec::new()) };
+    let found = fit(&form, &[run(&[1.8, 2.6])], &FitSettings::default()).unwrap();
+    for (name, value) in [("shear_modulus", mu), ("mullins.r", r), ("mullins.m", m), ("mullins.beta", beta)] {
+        near(&format!("{name} of a softening fit"), found.value(name).unwrap() / value, 1.0, 1e-4);
+    }
+    let single = fit(&form, &[run(&[2.0])], &FitSettings::default()).unwrap();
+    let most = 0.5 * mu * (4.0 + 1.0 - 3.0);
+    near("m of one cycle", single.value("mullins.m").unwrap() / (m + beta * most), 1.0, 1e-4);
+    let fixed = single.constants.iter().find(|own| own.constant.name == "mullins.beta").unwrap();
+    assert_eq!(fixed.constant.fixed.map(|(value, _)| value), Some(0.0));
 }
