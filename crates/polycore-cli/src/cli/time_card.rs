@@ -51,8 +51,8 @@ fn cards(found: &TimeFit, units: &str, pascals: f64) -> Result<String, Error> {
 }
 
 /// Card of Abaqus' own law, or a comment that says why there is none; `parameters` are those of the
-/// equilibrium law in the host's unit. K is 100 times the modulus of the equilibrium law: Abaqus refuses more without
-/// hybrid elements.
+/// equilibrium law in the host's unit. K is 100 times the modulus of the equilibrium law: Abaqus refuses more
+/// without hybrid elements.
 fn hysteresis(
     found: &TimeFit,
     law: &Viscoelastic,
