@@ -72,7 +72,9 @@ impl Hysteresis {
         let elastic: String = elastic.lines().map(long_term).collect();
         let Self { scale, rate, power, creep, offset } = *self;
         let numbers = deck::lines(&[scale, rate, power, creep, offset]);
-        format!("** S, A, m, C, E; hybrid elements need D1 = 0\n{elastic}*HYSTERESIS\n{numbers}")
+        let note =
+            "S, A, m, C, E, the order of a published deck, not run in Abaqus; hybrid elements need D1 = 0";
+        format!("** {note}\n{elastic}*HYSTERESIS\n{numbers}")
     }
 }
 
