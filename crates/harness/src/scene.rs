@@ -61,7 +61,8 @@ pub const SWEEP: &str = "sweep";
 /// The table of a scene that names the scenes whose results it reads; the harness reads it, programs do not.
 pub const INPUTS: &str = "inputs";
 
-/// The table of a scene that names the values to show first and their units; the harness reads it, programs do not.
+/// The table of a scene that names the values to show first and their units; the harness reads it, programs
+/// do not.
 pub const REPORT: &str = "report";
 
 /// A larger file is not a scene; numbers in bulk belong into CSV files beside it.

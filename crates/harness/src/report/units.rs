@@ -99,8 +99,8 @@ impl SceneUnits {
         }
     }
 
-    /// Returns the unit for numbers up to `largest`, in `unit` of the report: that requested, that of the scene
-    /// if it gives readable numbers, otherwise the largest unit that does. Other units stay.
+    /// Returns the unit for numbers up to `largest`, in `unit` of the report: that requested, that of the
+    /// scene if it gives readable numbers, otherwise the largest unit that does. Other units stay.
     pub fn shown(&self, unit: &str, largest: f64) -> Option<ShownUnit> {
         let (_, choices) = DIMENSIONS.iter().find(|dimension| dimension.0.contains(&unit))?;
         if let Some((name, factor)) =

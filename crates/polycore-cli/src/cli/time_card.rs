@@ -14,8 +14,8 @@ use super::card::FILES;
 use super::material::{BULK_RATIO, stress};
 use super::time_block::bulk_modulus;
 
-/// Writes `time_materials_mm.inp` and `time_materials_si.inp`: the law as a user material, and as `*HYSTERESIS`
-/// if Abaqus has it. Returns the number of state variables.
+/// Writes `time_materials_mm.inp` and `time_materials_si.inp`: the law as a user material, and as
+/// `*HYSTERESIS` if Abaqus has it. Returns the number of state variables.
 ///
 /// # Errors
 /// As [`TimeFit::law`]; a file that cannot be written.

@@ -330,7 +330,7 @@ impl<'a> FieldMap<'a> {
             }
         }
         if let Some(RigidOutline(height)) = panel.rigid {
-            let within = |column: usize, row: usize| height(window.place(column, row)) < 0.0;
+            let within = |column: usize, row: usize| height(window.pixel_centre(column, row)) < 0.0;
             for at in (0..raster.values.len()).filter(|&at| raster.values[at].is_none()) {
                 let (column, row) = (at % raster.width, at / raster.width);
                 if within(column, row) {

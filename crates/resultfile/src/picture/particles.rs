@@ -53,7 +53,7 @@ impl PixelWindow {
     }
 
     /// Returns the centre of a pixel.
-    pub(super) fn place(&self, column: usize, row: usize) -> [f64; 2] {
+    pub(super) fn pixel_centre(&self, column: usize, row: usize) -> [f64; 2] {
         let [across, down] = [column, row].map(|pixel| (pixel as f64 + 0.5) / self.scale);
         [self.low[0] + across, self.high[1] - down]
     }
