@@ -202,6 +202,9 @@ fn turned(state: &mut [f64], turn: &[f64; 9]) {
     }
 }
 
+/// Number of constants for which CalculiX 2.20 has room in `elconloc`; more overwrite its stack.
+const CALCULIX_CONSTANTS: usize = 21;
+
 /// UMAT_USER of CalculiX 2.20, materials whose name begins with `USER`: Green's strain (tensor shears) in, S
 /// and dS/dE out; no `*ORIENTATION`.
 ///
@@ -246,6 +249,11 @@ pub unsafe extern "C" fn umat_user_(
     if orientation != 0 {
         abort(&Error::new("*ORIENTATION", orientation, "none: these materials are isotropic"));
     }
+    let count = length(-kode - 100);
+    if count > CALCULIX_CONSTANTS {
+        let allowed = format!("at most {CALCULIX_CONSTANTS}, for which CalculiX has room");
+        abort(&Error::new("constants (*USER MATERIAL)", count, allowed));
+    }
     // SAFETY: the caller's promise: xstate(nstate, mi(1), elements), numbers from 1
     let (name, constants, strain, old, new) = unsafe {
         let states = length(*nstate);
@@ -253,7 +261,7 @@ pub unsafe extern "C" fn umat_user_(
         (
             std::slice::from_raw_parts(amat.cast::<u8>(), NAME),
             // CalculiX encodes the number of constants like this
-            std::slice::from_raw_parts(elconloc, length(-kode - 100)),
+            std::slice::from_raw_parts(elconloc, count),
             Voigt::from_column_slice(&*emec),
             std::slice::from_raw_parts(xstateini.wrapping_add(place), states),
             std::slice::from_raw_parts_mut(xstate.wrapping_add(place), states),

@@ -99,14 +99,21 @@ impl SceneUnits {
         }
     }
 
-    /// Returns the unit for numbers up to `largest`, in `unit` of the report: that requested, that of the
-    /// scene if it gives readable numbers, otherwise the largest unit that does. Other units stay.
+    /// Returns the unit for numbers up to `largest`, in `unit` of the report: the first requested, that of
+    /// the scene if it gives readable numbers, otherwise the largest unit that does. Other units stay.
     pub fn shown(&self, unit: &str, largest: f64) -> Option<ShownUnit> {
-        let (_, choices) = DIMENSIONS.iter().find(|dimension| dimension.0.contains(&unit))?;
-        if let Some((name, factor)) =
-            choices.iter().find(|own| self.requested.iter().any(|name| name == own.0))
-        {
-            return Some(ShownUnit { name, factor: *factor });
+        let given = |dimension: &&UnitChoices| {
+            dimension.0.contains(&unit) || dimension.1.iter().any(|own| own.0 == unit)
+        };
+        let (base, choices) = DIMENSIONS.iter().find(given)?;
+        let is_base = base.contains(&unit);
+        let own = choices.iter().find(|own| own.0 == unit && !is_base).map_or(1.0, |own| own.1);
+        let of_name = |name: &String| choices.iter().find(|choice| choice.0 == name);
+        if let Some((name, factor)) = self.requested.iter().find_map(of_name) {
+            return Some(ShownUnit { name, factor: factor / own });
+        }
+        if !is_base {
+            return None;
         }
         let count = |name: &str| self.counts.get(name).copied().unwrap_or_default();
         let used = choices.iter().filter(|own| count(own.0) > 0).max_by_key(|own| count(own.0));
@@ -156,5 +163,9 @@ mod tests {
         let units = SceneUnits::from_scene("[report]\nunits = [\"N\", \"um\"]\n[body]\nsize = \"2 mm\"");
         close(units.convert(2.5e7, "N"), 2.5e7, "N");
         close(units.convert(2e-3, "m"), 2000.0, "µm");
+        // of reports in other units, too; the first of two
+        let units = SceneUnits::from_scene("[report]\nunits = [\"kPa\", \"MPa\"]");
+        close(units.convert(2.0, "MPa"), 2000.0, "kPa");
+        close(units.convert(2.0, "Pa"), 2e-3, "kPa");
     }
 }

@@ -27,19 +27,20 @@ impl<'a> BondMaterial<'a> {
         Self { law: Arc::new(law), modulus, soft: None, parts: None }
     }
 
-    /// Makes bonds of one law soften to zero load at a stretch λ_f, that of the weaker of their ends.
+    /// Makes bonds soften to zero load at a stretch λ_f, that of the weaker of their ends; of one law only.
     pub fn softening(self, softening: BondSoftening, end: Property) -> Self {
-        Self { soft: Some((softening, end)), parts: None, ..self }
+        Self { soft: Some((softening, end)), ..self }
     }
 
     /// Gives parts of a body laws of their own: `shares` number the law of [`Self::new`] 0, and those of
-    /// `laws` from 1 on. Bonds then do not soften.
+    /// `laws` from 1 on.
     ///
     /// The forces of particles with such a law, and of their neighbours, are summed by plain loops, about
     /// eleven times slower than the kernels.
     ///
     /// # Errors
-    /// [`Error::Parameter`] unless `shares` have one law more than `laws`.
+    /// [`Error::Parameter`] unless `shares` have one law more than `laws`; [`Error::Geometry`] if bonds
+    /// soften.
     pub fn with_parts(
         self,
         laws: Vec<Arc<dyn BondPotential + 'a>>,
@@ -50,7 +51,10 @@ impl<'a> BondMaterial<'a> {
             let allowed = format!("{}, one less than the shares have", shares.laws().saturating_sub(1));
             return Err(Error::Parameter { name, found, allowed });
         }
-        Ok(Self { soft: None, parts: Some((laws, shares)), ..self })
+        if self.soft.is_some() {
+            return Err(Error::geometry("laws of parts: found bonds that soften; allowed: none".to_owned()));
+        }
+        Ok(Self { parts: Some((laws, shares)), ..self })
     }
 
     /// All laws, that of the rest first.
@@ -137,6 +141,11 @@ impl<const D: usize> Material<D> for BondMaterial<'_> {
 
     fn micromodulus(&self, _bonds: &dyn BodyGeometry<D>) -> f64 {
         self.modulus * self.law.tangent() / 3.0
+    }
+
+    /// t′(1) of the law of a particle over that of the rest.
+    fn relative_stiffness(&self, site: usize) -> f64 {
+        self.mean(site, site, |law| law.tangent()) / self.law.tangent()
     }
 
     fn respond<'a>(self, bonds: &dyn Bonds<D>) -> Box<dyn SolverMaterial<D> + 'a>

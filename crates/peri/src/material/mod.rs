@@ -173,6 +173,12 @@ pub trait Material<const D: usize>: Send + Sync {
         stiffness_1111(space, youngs_modulus) + self.volumetric()
     }
 
+    /// Stiffness at rest of the particle in a site over that of the whole body; 1 by default.
+    fn relative_stiffness(&self, site: usize) -> f64 {
+        let _ = site;
+        1.0
+    }
+
     /// Stretch λ* at which a bond is at rest; it breaks at a multiple of λ*.
     fn rest(&self, bond: &Bond<D>) -> f64 {
         let _ = bond;

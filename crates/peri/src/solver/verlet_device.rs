@@ -300,7 +300,10 @@ fn refuse<const D: usize>(system: &System<D>) -> Result<(), Error> {
     let what = [
         (system.bonds.as_lattice().is_none(), "a body of points"),
         (!system.bonds.images().is_empty(), "periodic sides"),
-        (!system.material.is_fitted_law(), "a solid, or bonds with prestrains, or that soften"),
+        (
+            !system.material.is_fitted_law(),
+            "a solid, or bonds with prestrains, of several laws, or that soften",
+        ),
         (softens, "bonds that break by their energy"),
         (system.contact.is_some(), "contact"),
         (!system.loads.turned.is_empty(), "a rotation"),

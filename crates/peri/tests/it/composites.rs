@@ -5,6 +5,8 @@ use crate::materials::battery;
 use evidence::near;
 use peri::Error;
 use peri::bonds::{Bonds, LawShares, covered_stretches, stretch_range};
+use peri::contact::RigidSurface;
+use peri::critical::Convention;
 use peri::field::{CHUNK, Field};
 use peri::geometry::Shape;
 use peri::material::{BondMaterial, LawCover, Material, Pointwise, SolverMaterial, virial};
@@ -169,4 +171,25 @@ fn composites_that_cannot_be() {
     assert!(outside.unwrap_err().to_string().contains("part 1 of the rubber has no particle"));
     let limited = CompositeRubber::new(rubber()).add_part(|[x, _]| x > 4e-3, rubber().critical_stretch(2.0));
     assert!(build(limited).unwrap_err().to_string().contains("critical stretch of part 1"));
+    let softening = rubber().fracture_energy_by(Convention::Softening, 100.0);
+    let softening = CompositeRubber::new(softening).add_part(|[x, _]| x > 4e-3, rubber());
+    assert!(build(softening).unwrap_err().to_string().contains("bonds that soften"));
+}
+
+/// A plane pushes a body of one law as hard as the same body that has this law as a part.
+#[test]
+fn contact_has_the_stiffness_of_each_law() {
+    let pushed = |rubber: CompositeRubber<2>| {
+        let body = model::Body::lattice(Shape::rectangle([0.0; 2], [8e-3, 8e-3]), 1e-3);
+        let mut plane = RigidSurface::plane([0.0; 2], [0.0, 1.0]);
+        plane.displacement = [0.0, 0.4e-3];
+        let mut model =
+            Model::new(body, rubber).clamp(|[_, y]| y > 7e-3).rigid_surface(plane).build().unwrap();
+        model.solve(Lbfgs { tolerance: 1e-9, ..Lbfgs::default() }).unwrap();
+        model.history()[0].resting[0].force[1]
+    };
+    let [soft, hard] = [1e6, 1e8].map(|modulus| Rubber::new(Law::Linear, modulus));
+    let whole = pushed(CompositeRubber::new(hard.clone()));
+    let part = pushed(CompositeRubber::new(soft).add_part(|_| true, hard));
+    near("contact_of_a_part_of_the_whole_body", part / whole, 1.0, 1e-6);
 }

@@ -49,6 +49,14 @@ impl<const D: usize> SceneMaterial<D> {
         }
     }
 
+    /// Returns the stiffness at rest by the law of the particle in a site over that of the rest.
+    pub fn relative_stiffness(&self, site: usize) -> f64 {
+        match self {
+            Self::Bonds(bonded) => Material::<D>::relative_stiffness(bonded, site),
+            Self::Prestrained(_) | Self::Solid(_) => 1.0,
+        }
+    }
+
     /// Returns kθ of linear bonds of similar stiffness, N/m⁶.
     pub fn micromodulus(&self, bonds: &dyn Bonds<D>) -> f64 {
         match self {
@@ -166,6 +174,8 @@ impl<const D: usize> BodyWithMaterial<D> {
         }
         if let Some((laws, shares)) = scene::laws_of_parts(scene, &*body.bonds, &inclusions)? {
             bonded = bonded.with_parts(laws, shares)?;
+            // of the law of the rest alone
+            toughness = None;
         }
         let material = match inclusions.prestrain {
             Some(strain) => {

@@ -286,8 +286,8 @@ fn solve<const D: usize>(
         Some(contact) => {
             let surfaces = physics.surfaces.clone();
             let whole = material.longitudinal_modulus(&*body.bonds);
-            let modulus =
-                Property::new(&*body.bonds, |site, _| whole * physics.body.stiffness.value_at(site));
+            let stiffness = |site| physics.body.stiffness.value_at(site) * material.relative_stiffness(site);
+            let modulus = Property::new(&*body.bonds, |site, _| whole * stiffness(site));
             let held = physics.held.as_deref();
             let tied = held.map(|held| (held, contact.tie_stiffness(scene.dynamics.is_some())));
             Some(contact.contact(surfaces, body, material.micromodulus(&*body.bonds), &modulus, tied)?)

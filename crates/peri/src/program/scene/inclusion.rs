@@ -33,8 +33,8 @@ pub struct Inclusion {
     pub links: Option<f64>,
     /// Dissociation energy of the part over kθ; default: `material.dissociation`.
     pub dissociation: Option<f64>,
-    /// Scales kθ of the part so that the small-strain modulus is exact; default: by `law`, or
-    /// `material.rescale`.
+    /// Scales kθ of the part so that the small-strain modulus is exact; default: that of the
+    /// material if `law` is the same, otherwise by `law`.
     pub rescale: Option<bool>,
     /// Replaces `material.critical`. A bond that ends in inclusions or passes through them takes the lowest
     /// value on its way, so that a layer may be thinner than the spacing.

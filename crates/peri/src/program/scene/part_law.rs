@@ -106,7 +106,7 @@ impl Material {
     fn law_of(&self, part: &Inclusion) -> Option<LawChoice> {
         let rest = self.law_of_rest();
         let law = part.law.unwrap_or(rest.law);
-        let given = if part.law.is_none() { self.rescale } else { None };
+        let given = self.rescale.filter(|_| law == rest.law);
         part.has_law().then(|| LawChoice {
             law,
             links: part.links.or(rest.links),
@@ -169,6 +169,9 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         let key = format!("material.inclusions[{index}]");
         refuse_chains(source, &key, own.law, [part.links, part.dissociation])?;
         own.check(source, &key)?;
+        if own == rest {
+            continue;
+        }
         let named = [
             ("law", part.law.is_some()),
             ("links", part.links.is_some()),

@@ -5,7 +5,7 @@
 //! Guide*, 4.8.1). With the Frobenius norms |τ| = √(⅔) σ and |D| = √(3/2) ε̇ of
 //! [`Viscosity::BergstromBoyce`], A = (⅔)^((m+1)/2) γ̇₀/τ̂^m, C = c, E = ξ.
 
-use super::{Spring, Viscoelastic, Viscosity};
+use super::{Shift, Spring, Viscoelastic, Viscosity};
 use crate::constitutive::hyperelastic::{Hyperelastic, ModelDescriptor, deck};
 
 /// Constants of `*HYSTERESIS`, in the order of its data line.
@@ -41,6 +41,9 @@ impl Hysteresis {
         let [branch] = law.branches() else {
             return Err("it has one branch; this law has another number");
         };
+        if branch.shift != Shift::None {
+            return Err("it has no shift with temperature");
+        }
         let Viscosity::BergstromBoyce { rate, stress, power, creep, offset } = branch.viscosity else {
             return Err("its viscosity is that of Bergström and Boyce");
         };

@@ -90,8 +90,15 @@ pub fn constants(law: &Viscoelastic, zero: f64, pascals: f64) -> Vec<f64> {
 pub fn card(key: &str, elastic: &[f64], law: &Viscoelastic, pascals: f64) -> String {
     let name = format!("VISCOELASTIC_{}", key.to_uppercase().replace('-', "_"));
     let numbers = [elastic, &constants(law, 0.0, pascals)].concat();
+    let calculix = match numbers.len() {
+        count if count > 21 => "more constants than the 21 for which CalculiX has room".to_owned(),
+        count if count % 8 == 0 => {
+            format!("in CalculiX NAME=USER_{name}, and a line `0.` more behind the constants")
+        }
+        _ => format!("in CalculiX NAME=USER_{name}"),
+    };
     format!(
-        "** of crate umat; in CalculiX NAME=USER_{name}\n*MATERIAL, NAME={name}\n*USER MATERIAL, \
+        "** of crate umat; {calculix}\n*MATERIAL, NAME={name}\n*USER MATERIAL, \
          CONSTANTS={}\n{}*DEPVAR\n{}\n",
         numbers.len(),
         deck::lines(&numbers),

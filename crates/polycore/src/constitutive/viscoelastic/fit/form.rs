@@ -77,6 +77,8 @@ pub(super) enum Map {
     Above(f64),
     /// p = −1/(1 + e^−q), from −1 to 0.
     Creep,
+    /// p = limit/(1 + e^−q).
+    Below(f64),
 }
 
 /// Bounds of |q|: of logarithms, and of exponents, where the law is another one.
@@ -90,6 +92,7 @@ impl Map {
             Self::Real => q.clamp(-LARGEST_EXPONENT, LARGEST_EXPONENT),
             Self::Above(limit) => limit + log.exp(),
             Self::Creep => -1.0 / (1.0 + (-log).exp()),
+            Self::Below(limit) => limit / (1.0 + (-log).exp()),
         }
     }
 
@@ -97,13 +100,17 @@ impl Map {
         match self {
             Self::Real => p,
             Self::Above(limit) => (p - limit).max(f64::MIN_POSITIVE).ln(),
-            Self::Creep => {
-                let share = (-p).clamp(1e-9, 1.0 - 1e-9);
+            Self::Creep => Self::Below(1.0).inverse(-p),
+            Self::Below(limit) => {
+                let share = (p / limit).clamp(1e-9, 1.0 - 1e-9);
                 (share / (1.0 - share)).ln()
             }
         }
     }
 }
+
+/// Largest m of the softening over the energy at the largest strain.
+const WIDEST: f64 = 100.0;
 
 const POSITIVE: Map = Map::Above(0.0);
 
@@ -198,7 +205,12 @@ impl Form {
         }
         if self.softening {
             add("mullins.r".to_owned(), "1", Map::Above(1.0), None);
-            add("mullins.m".to_owned(), "Pa", POSITIVE, None);
+            if scales.peaks == 0 {
+                let found = "no run that turns back";
+                return Err(Error::invalid("softening", found, "at least one: loading does not show it"));
+            }
+            // far above, the law does not soften
+            add("mullins.m".to_owned(), "Pa", Map::Below(WIDEST * scales.energy), None);
             let single = (0.0, "degenerate with mullins.m: all cycles turn at one strain");
             add("mullins.beta".to_owned(), "1", POSITIVE, (scales.peaks < 2).then_some(single));
         }

@@ -223,19 +223,26 @@ impl Test {
 /// Ratio of I₁ − 3 at two turns that are different.
 const DIFFERENT: f64 = 1.1;
 
+/// Change of I₁ − 3 over its largest value below which a turn is noise of the strain.
+const NOISE: f64 = 0.05;
+
 /// Number of different strains at which runs turn after more than before, and the largest I₁ − 3.
 pub(super) fn turns(runs: &[MeasuredRun]) -> (usize, f64) {
-    let (mut turns, mut most) = (Vec::new(), 0.0_f64);
+    let excess = |run: &MeasuredRun| -> Vec<f64> {
+        run.points.iter().map(|point| run.test.excess(point.strain)).collect()
+    };
+    let most = runs.iter().flat_map(excess).fold(0.0, f64::max);
+    let mut turns = Vec::new();
     for run in runs {
-        let excess: Vec<f64> = run.points.iter().map(|point| run.test.excess(point.strain)).collect();
-        let mut record = 0.0;
-        for (before, after) in excess.iter().zip(excess.iter().skip(1)) {
-            if *before > record && after < before {
-                record = *before;
+        let (mut record, mut counted) = (0.0, true);
+        for now in excess(run) {
+            if now > record {
+                (record, counted) = (now, now <= NOISE * most);
+            } else if !counted && record - now > NOISE * most {
                 turns.push(record);
+                counted = true;
             }
         }
-        most = excess.into_iter().fold(most, f64::max);
     }
     turns.sort_by(f64::total_cmp);
     let (mut count, mut last) = (0, 0.0);

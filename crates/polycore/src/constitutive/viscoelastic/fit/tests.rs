@@ -68,9 +68,18 @@ fn softening_in_closed_form() {
     for (name, value) in [("shear_modulus", mu), ("mullins.r", r), ("mullins.m", m), ("mullins.beta", beta)] {
         near(&format!("{name} of a softening fit"), found.value(name).unwrap() / value, 1.0, 1e-4);
     }
-    let single = fit(&form, &[run(&[2.0])], &FitSettings::default()).unwrap();
+    // noise of the strain at the start is no turn
+    let jitter = [1.0003, 1.0001, 1.0004, 1.0002].into_iter().enumerate();
+    let jitter = jitter.map(|(k, strain)| Measurement { time: 0.1 * k as f64, strain, nominal: 0.0 });
+    let cycle = run(&[2.0]);
+    let measured = |points| MeasuredRun::new("cycle", 0.1, Test::Uniaxial, points).unwrap();
+    let noisy = measured(jitter.chain(cycle.points().iter().copied()).collect());
+    let single = fit(&form, &[noisy], &FitSettings::default()).unwrap();
     let most = 0.5 * mu * (4.0 + 1.0 - 3.0);
     near("m of one cycle", single.value("mullins.m").unwrap() / (m + beta * most), 1.0, 1e-4);
     let fixed = single.constants.iter().find(|own| own.constant.name == "mullins.beta").unwrap();
     assert_eq!(fixed.constant.fixed.map(|(value, _)| value), Some(0.0));
+    let ramp = measured(cycle.points()[..20].to_vec());
+    let error = fit(&form, &[ramp], &FitSettings::default()).unwrap_err().to_string();
+    assert!(error.contains("no run that turns back"), "{error}");
 }
