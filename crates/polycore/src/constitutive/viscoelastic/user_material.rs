@@ -333,6 +333,22 @@ mod tests {
         }
     }
 
+    /// CalculiX has room for 21 constants, and reads one line more after whole lines of eight.
+    #[test]
+    fn cards_say_what_calculix_takes() {
+        let spring = Spring::NeoHookean(NeoHookean::new(2e5).unwrap());
+        let branch = || Branch::new(spring.clone(), Viscosity::Constant(5e6)).unwrap();
+        for (count, constants, says) in [
+            (1, 11, "in CalculiX NAME=USER_VISCOELASTIC_NEO_HOOKEAN\n"),
+            (2, 16, "a line `0.` more behind the constants\n"),
+            (4, 26, "more constants than the 21"),
+        ] {
+            let law = Viscoelastic::new(rubber(), (0..count).map(|_| branch()).collect()).unwrap();
+            let card = card("neo-hookean", &[40.0, 0.4], &law, 1e6);
+            assert!(card.contains(&format!("CONSTANTS={constants}\n")) && card.contains(says), "{card}");
+        }
+    }
+
     #[test]
     fn wrong_constants_are_named() {
         let one = [0.0, 0.0, 0.0, 0.0];
