@@ -191,11 +191,11 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
                 RotatingRegion { rotation, shift, amplitudes: None, components, region, sites },
             );
         }
-        let modulus = material.longitudinal_modulus(&bonds);
-        let modulus = Property::new(&bonds, |site, _| modulus * material.relative_stiffness(site));
         let contact = match (self.contact, self.surfaces.is_empty()) {
             (None, true) => None,
             (stiffness, _) => {
+                let whole = material.longitudinal_modulus(&bonds);
+                let modulus = Property::new(&bonds, |site, _| whole * material.relative_stiffness(site));
                 let surface = self.body.surface();
                 let contact = Contact::new(&bonds, modulus.clone(), stiffness.unwrap_or(0.0))?;
                 Some(contact.with_surfaces(&bonds, &surface, modulus, self.surfaces)?)

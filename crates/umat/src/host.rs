@@ -1,6 +1,7 @@
 //! Symbols that hosts call. `umatht_` of [`umatht`] is included.
 
 use crate::{Error, Material, Print};
+use polycore::constitutive::viscoelastic::user_material::CALCULIX_CONSTANTS;
 use polycore::tensor::voigt::{self, Voigt, Voigt6x6};
 use std::cell::RefCell;
 use std::ffi::{c_char, c_int};
@@ -201,9 +202,6 @@ fn turned(state: &mut [f64], turn: &[f64; 9]) {
         branch.copy_from_slice(found.as_slice());
     }
 }
-
-/// Number of constants for which CalculiX 2.20 has room in `elconloc`; more overwrite its stack.
-const CALCULIX_CONSTANTS: usize = 21;
 
 /// UMAT_USER of CalculiX 2.20, materials whose name begins with `USER`: Green's strain (tensor shears) in, S
 /// and dS/dE out; no `*ORIENTATION`.

@@ -186,7 +186,7 @@ fn a_superposed_rotation_turns_the_stress() {
     evidence::at_most("UMAT with branches under a superposed rotation", worst, 1e-12);
 }
 
-/// One neo-Hookean branch of constant viscosity.
+/// Creates a neo-Hookean branch of constant viscosity.
 fn linear(nu: f64, eta: f64) -> Viscoelastic {
     let spring = Spring::NeoHookean(NeoHookean::new(nu).unwrap());
     point(vec![Branch::new(spring, Viscosity::Constant(eta)).unwrap()], None)

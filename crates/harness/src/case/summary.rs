@@ -85,7 +85,6 @@ pub(crate) struct Names<'a> {
     report: &'a Report,
     /// Quantities that several folders have, `FOLDER.QUANTITY`.
     shared: BTreeSet<&'a str>,
-    units: SceneUnits,
 }
 
 impl<'a> Names<'a> {
@@ -95,11 +94,11 @@ impl<'a> Names<'a> {
             *owners.entry(quantity).or_default() += 1;
         }
         let shared = owners.into_iter().filter(|own| own.1 > 1).map(|own| own.0).collect();
-        Self { report, shared, units: SceneUnits::from_scene(&report.provenance.scene) }
+        Self { report, shared }
     }
 
     /// Returns the unit for all values of a list.
-    fn unit(&self, names: &[&str]) -> Option<ShownUnit> {
+    fn unit(&self, units: &SceneUnits, names: &[&str]) -> Option<ShownUnit> {
         let scalars = || {
             names.iter().filter_map(|name| match self.report.values.get(*name)? {
                 Value::Scalar { value, unit } => Some((value.abs(), unit)),
@@ -108,7 +107,7 @@ impl<'a> Names<'a> {
         };
         let unit = scalars().map(|own| own.1).find(|unit| !unit.is_empty())?;
         let largest = scalars().map(|own| own.0).filter(|value| value.is_finite()).fold(0.0, f64::max);
-        self.units.shown(unit, largest)
+        units.shown(unit, largest)
     }
 
     /// Quantity and variant of a name; the variant is empty where there is none.
@@ -182,13 +181,14 @@ fn main_values(report: &Report, listed: &[String], columns: &[&str], width: usiz
     let shown = main_names(report, listed, columns);
     let (single, several): (Vec<&str>, Vec<&str>) =
         shown.iter().map(String::as_str).partition(|name| names.split(name).1.is_empty());
+    let units = SceneUnits::from_scene(&report.provenance.scene);
     let mut text = String::new();
     if !several.is_empty() {
-        text += &by_variant(&names, &several, width);
+        text += &by_variant(&names, &units, &several, width);
     }
     let most = SINGLE[usize::from(!several.is_empty())];
     let row = |name: &&str| {
-        let (value, unit) = report.shown_in(name, names.unit(&[name]));
+        let (value, unit) = report.shown_in(name, names.unit(&units, &[name]));
         [(*name).to_owned(), value, unit]
     };
     text += &aligned(&single.iter().take(most).map(row).collect::<Vec<_>>());
@@ -198,7 +198,7 @@ fn main_values(report: &Report, listed: &[String], columns: &[&str], width: usiz
     text
 }
 
-fn by_variant(names: &Names, shown: &[&str], width: usize) -> String {
+fn by_variant(names: &Names, units: &SceneUnits, shown: &[&str], width: usize) -> String {
     let (mut quantities, mut variants): (Vec<&str>, Vec<&str>) = (Vec::new(), Vec::new());
     // expectations stand in the order of the studies
     let expected = names.report.expect.iter().flat_map(|one| one.expect.names());
@@ -219,7 +219,7 @@ fn by_variant(names: &Names, shown: &[&str], width: usize) -> String {
         vec![("variant".to_owned(), variants.iter().map(|v| (*v).to_owned()).collect::<Vec<_>>())];
     for quantity in quantities.iter().take(COLUMNS) {
         let own: Vec<Option<&str>> = variants.iter().map(|variant| of(quantity, variant).copied()).collect();
-        let unit = names.unit(&own.iter().flatten().copied().collect::<Vec<_>>());
+        let unit = names.unit(units, &own.iter().flatten().copied().collect::<Vec<_>>());
         let cell = |name: Option<&str>| name.map(|name| names.report.shown_in(name, unit));
         let cells: Vec<Option<(String, String)>> = own.into_iter().map(cell).collect();
         let unit = cells.iter().flatten().map(|cell| cell.1.as_str()).find(|unit| !unit.is_empty());

@@ -27,9 +27,20 @@ impl<'a> BondMaterial<'a> {
         Self { law: Arc::new(law), modulus, soft: None, parts: None }
     }
 
-    /// Makes bonds soften to zero load at a stretch λ_f, that of the weaker of their ends; of one law only.
-    pub fn softening(self, softening: BondSoftening, end: Property) -> Self {
-        Self { soft: Some((softening, end)), ..self }
+    /// Makes bonds soften to zero load at a stretch λ_f, that of the weaker of their ends.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] for several laws.
+    pub fn softening(self, softening: BondSoftening, end: Property) -> Result<Self, Error> {
+        Self { soft: Some((softening, end)), ..self }.checked()
+    }
+
+    /// Refuses bonds that soften beside laws of parts.
+    fn checked(self) -> Result<Self, Error> {
+        if self.soft.is_some() && self.parts.is_some() {
+            return Err(Error::geometry("laws of parts: found bonds that soften; allowed: none".to_owned()));
+        }
+        Ok(self)
     }
 
     /// Gives parts of a body laws of their own: `shares` number the law of [`Self::new`] 0, and those of
@@ -51,10 +62,7 @@ impl<'a> BondMaterial<'a> {
             let allowed = format!("{}, one less than the shares have", shares.laws().saturating_sub(1));
             return Err(Error::Parameter { name, found, allowed });
         }
-        if self.soft.is_some() {
-            return Err(Error::geometry("laws of parts: found bonds that soften; allowed: none".to_owned()));
-        }
-        Ok(Self { parts: Some((laws, shares)), ..self })
+        Self { parts: Some((laws, shares)), ..self }.checked()
     }
 
     /// All laws, that of the rest first.

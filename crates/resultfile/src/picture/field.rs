@@ -330,19 +330,20 @@ impl<'a> FieldMap<'a> {
             }
         }
         if let Some(RigidOutline(height)) = panel.rigid {
-            let within = |column: usize, row: usize| height(window.pixel_centre(column, row)) < 0.0;
-            for at in (0..raster.values.len()).filter(|&at| raster.values[at].is_none()) {
-                let (column, row) = (at % raster.width, at / raster.width);
-                if within(column, row) {
-                    let next = [column.wrapping_sub(1), column, column + 1];
-                    let open = next.iter().any(|&c| {
-                        [row.wrapping_sub(1), row, row + 1]
-                            .iter()
-                            .any(|&r| c < raster.width && r < raster.height && !within(c, r))
-                    });
-                    let color = if open { BLACK } else { RIGID };
-                    canvas.set(x + column as isize, y + row as isize, color);
-                }
+            let place = |at: usize| (at % raster.width, at / raster.width);
+            let within = |at: usize| {
+                let (column, row) = place(at);
+                height(window.pixel_centre(column, row)) < 0.0
+            };
+            let inside: Vec<bool> = (0..raster.values.len()).map(within).collect();
+            for at in (0..inside.len()).filter(|&at| inside[at] && raster.values[at].is_none()) {
+                let (column, row) = place(at);
+                let mut around = (row.saturating_sub(1)..(row + 2).min(raster.height)).flat_map(|row| {
+                    let columns = column.saturating_sub(1)..(column + 2).min(raster.width);
+                    columns.map(move |column| row * raster.width + column)
+                });
+                let color = if around.all(|next| inside[next]) { RIGID } else { BLACK };
+                canvas.set(x + column as isize, y + row as isize, color);
             }
         }
         if let Some(axes) = &axes {

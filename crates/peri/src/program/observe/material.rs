@@ -170,7 +170,7 @@ impl<const D: usize> BodyWithMaterial<D> {
         if scene.softens()
             && let Some(Criterion::Stretch(end)) = &criterion
         {
-            bonded = bonded.softening(softening, end.clone());
+            bonded = bonded.softening(softening, end.clone())?;
         }
         if let Some((laws, shares)) = scene::laws_of_parts(scene, &*body.bonds, &inclusions)? {
             bonded = bonded.with_parts(laws, shares)?;

@@ -1,6 +1,6 @@
 //! Law of Bergström and Boyce as `*HYSTERESIS` of Abaqus.
 //!
-//! Its network B has S times the stress of the hyperelastic law, and flows with
+//! Network B has S times the stress of the hyperelastic law, and flows with
 //! ε̇ = A (λ_cr − 1 + E)^C σ^m, σ the Mises stress, ε̇ = √(⅔ D:D) and λ_cr = √(tr C_v/3) (*Abaqus Theory
 //! Guide*, 4.8.1). With the Frobenius norms |τ| = √(⅔) σ and |D| = √(3/2) ε̇ of
 //! [`Viscosity::BergstromBoyce`], A = (⅔)^((m+1)/2) γ̇₀/τ̂^m, C = c, E = ξ.

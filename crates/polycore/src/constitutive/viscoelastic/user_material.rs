@@ -67,6 +67,9 @@ impl PointRecord {
     }
 }
 
+/// Number of constants for which CalculiX 2.20 has room in `elconloc`; more overwrite its stack.
+pub const CALCULIX_CONSTANTS: usize = 21;
+
 /// Lists the constants of branches and softening behind those of the equilibrium law, for a host whose
 /// temperatures have this absolute zero and whose unit of stress has so many pascals.
 pub fn constants(law: &Viscoelastic, zero: f64, pascals: f64) -> Vec<f64> {
@@ -91,7 +94,9 @@ pub fn card(key: &str, elastic: &[f64], law: &Viscoelastic, pascals: f64) -> Str
     let name = format!("VISCOELASTIC_{}", key.to_uppercase().replace('-', "_"));
     let numbers = [elastic, &constants(law, 0.0, pascals)].concat();
     let calculix = match numbers.len() {
-        count if count > 21 => "more constants than the 21 for which CalculiX has room".to_owned(),
+        count if count > CALCULIX_CONSTANTS => {
+            format!("more constants than the {CALCULIX_CONSTANTS} for which CalculiX has room")
+        }
         count if count % 8 == 0 => {
             format!("in CalculiX NAME=USER_{name}, and a line `0.` more behind the constants")
         }
