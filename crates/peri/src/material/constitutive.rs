@@ -167,29 +167,46 @@ pub(super) fn at_thickness<const D: usize>(
     tangent: bool,
     mut law: impl FnMut(&Voigt, bool) -> Option<Prediction>,
 ) -> Option<(Voigt, Prediction)> {
-    let mut c = voigt::from_stress(&embed(&(gradient.transpose() * gradient), 1.0));
+    let mut c = isochoric_start(space, gradient);
     if space == Space::PlaneStress {
-        // starts from the stretch of an isochoric body
-        c[2] = 1.0 / (c[0] * c[1] - c[3] * c[3]);
-        let mut change = f64::INFINITY;
-        for _ in 0..60 {
-            let found = law(&c, true)?;
-            let step = found.stress[2] / (0.5 * found.tangent?[(2, 2)]);
-            let next = (c[2] - step).clamp(0.5 * c[2], 2.0 * c[2]);
-            let before = change;
-            change = (next - c[2]).abs() / next;
-            c[2] = next;
-            // otherwise only rounding is left
-            if change <= enough || (change >= before && change < 1e-13) {
-                break;
-            }
-        }
-        // no stress-free thickness: not a solution
-        if change.is_nan() || change > 1e-9 {
-            return None;
-        }
+        find_thickness(enough, &mut c, |c| law(c, true))?;
     }
     Some((c, law(&c, tangent)?))
+}
+
+/// C of a deformation in its plane, with the thickness of an isochoric body in plane stress.
+pub(super) fn isochoric_start<const D: usize>(space: Space, gradient: &BodyTensor<D>) -> Voigt {
+    let mut c = voigt::from_stress(&embed(&(gradient.transpose() * gradient), 1.0));
+    if space == Space::PlaneStress {
+        c[2] = 1.0 / (c[0] * c[1] - c[3] * c[3]);
+    }
+    c
+}
+
+/// Finds C₃₃ of S₃₃ = 0 by Newton's method up to a relative change of `enough`. Returns the last prediction,
+/// which has ℂ, and the change of C₃₃ after it; `None` without a stress-free thickness.
+#[inline]
+pub(super) fn find_thickness(
+    enough: f64,
+    c: &mut Voigt,
+    mut law: impl FnMut(&Voigt) -> Option<Prediction>,
+) -> Option<(Prediction, f64)> {
+    let mut relative = f64::INFINITY;
+    let mut last = None;
+    for _ in 0..60 {
+        let found = law(c)?;
+        let step = found.stress[2] / (0.5 * found.tangent?[(2, 2)]);
+        let next = (c[2] - step).clamp(0.5 * c[2], 2.0 * c[2]);
+        let before = relative;
+        relative = (next - c[2]).abs() / next;
+        last = Some((found, next - c[2]));
+        c[2] = next;
+        // otherwise only rounding is left
+        if relative <= enough || (relative >= before && relative < 1e-13) {
+            break;
+        }
+    }
+    last.filter(|_| relative <= enough.max(1e-9))
 }
 
 /// √(‖A‖₁‖A‖∞) of A_iJkL = F_iM ℂ_MJNL F_kN + δ_ik S_JL: 3K at rest where K > 2μ/3.

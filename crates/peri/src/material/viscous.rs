@@ -1,7 +1,7 @@
 //! Correspondence with a law that has a state: branches of springs and dashpots, softening by the largest
 //! strain.
 
-use super::constitutive::{at_thickness, check, tangent_norm};
+use super::constitutive::{at_thickness, check, find_thickness, isochoric_start, tangent_norm};
 use super::past::{Driving, EnergyPart, Past};
 use super::point_law::{Deformation, PointLaw, PointStress};
 use super::tensor::BodyTensor;
@@ -46,6 +46,8 @@ struct StepStates {
 /// Relative change of C₃₃ after which Newton's method leaves an error of its square, that of rounding: the
 /// tangent of a step is exact.
 const ENOUGH: f64 = 1e-9;
+/// Relative change of C₃₃ whose square is below 1e-11 of the stress.
+const NEARLY: f64 = 1e-6;
 
 thread_local! {
     static SCRATCH: RefCell<StepStates> = RefCell::default();
@@ -116,6 +118,40 @@ impl ViscousCorrespondence {
         tangent: bool,
         scratch: &mut StepStates,
     ) -> Option<(Voigt, Response)> {
+        let mut law = self.law_of_step(deformation, part, scratch)?;
+        let mut found = None;
+        let (c, _) = at_thickness(self.space, ENOUGH, &deformation.gradient(), tangent, |c, tangent| {
+            found = law(c, tangent);
+            found.map(|found| found.prediction)
+        })?;
+        found.map(|found| (c, found))
+    }
+
+    /// Second Piola-Kirchhoff stress of a part of the energy, Pa. In plane stress it follows the last step of
+    /// Newton's method along its tangent, an error of the square of [`NEARLY`], in place of another
+    /// evaluation.
+    fn stress<const D: usize>(
+        &self,
+        deformation: &Deformation<D>,
+        part: EnergyPart,
+        scratch: &mut StepStates,
+    ) -> Option<Voigt> {
+        let mut law = self.law_of_step(deformation, part, scratch)?;
+        let mut c = isochoric_start(self.space, &deformation.gradient());
+        if self.space != Space::PlaneStress {
+            return law(&c, false).map(|found| found.prediction.stress);
+        }
+        let (found, change) = find_thickness(NEARLY, &mut c, |c| law(c, true).map(|found| found.prediction))?;
+        Some(found.stress + found.tangent?.column(2) * (0.5 * change))
+    }
+
+    /// Response of a part of the energy to C, and to its tangent where asked; `None` for an inverted body.
+    fn law_of_step<'a, const D: usize>(
+        &'a self,
+        deformation: &'a Deformation<D>,
+        part: EnergyPart,
+        scratch: &'a mut StepStates,
+    ) -> Option<impl FnMut(&Voigt, bool) -> Option<Response> + 'a> {
         if deformation.volume_change() <= -1.0 {
             return None;
         }
@@ -124,8 +160,7 @@ impl ViscousCorrespondence {
         start.peak = 0.0;
         *pressure = past.map_or(0.0, |past| self.unpack(past, start));
         let past = past.filter(|_| !self.drives_alone(part));
-        let mut found = None;
-        let (c, _) = at_thickness(self.space, ENOUGH, &deformation.gradient(), tangent, |c, tangent| {
+        Some(move |c: &Voigt, tangent: bool| {
             let response = match past {
                 Some(past) => {
                     let increment = self.increment(*c, past.duration, *pressure);
@@ -133,10 +168,8 @@ impl ViscousCorrespondence {
                 }
                 None => self.law.respond_relaxed(start.peak, c, tangent, end, memory),
             };
-            found = response.ok();
-            found.map(|found| found.prediction)
-        })?;
-        found.map(|found| (c, found))
+            response.ok()
+        })
     }
 
     /// Returns true for a part without branches.
@@ -181,9 +214,8 @@ impl<const D: usize> PointLaw<D> for ViscousCorrespondence {
 
     fn respond(&self, deformation: &Deformation<D>) -> PointStress<D> {
         let part = part_of(deformation);
-        let found = SCRATCH.with_borrow_mut(|scratch| self.predict(deformation, part, false, scratch));
-        let stress = found
-            .map_or(Matrix3::from_element(f64::NAN), |(_, found)| voigt::to_stress(&found.prediction.stress));
+        let found = SCRATCH.with_borrow_mut(|scratch| self.stress(deformation, part, scratch));
+        let stress = found.map_or(Matrix3::from_element(f64::NAN), |stress| voigt::to_stress(&stress));
         let plane = BodyTensor::<D>::from_fn(|a, b| stress[(a, b)]);
         PointStress { piola: deformation.gradient() * plane, stabilisation: self.shear_of(deformation) }
     }
