@@ -77,6 +77,32 @@ fn edges_of_a_plane_deck_are_sides() {
     assert_eq!(values(&sets, ""), values(&base, ""));
 }
 
+/// The bush of Gmsh's file and the same mesh as meshio writes it for VTK, with physical groups as an array of
+/// cells: the same bits.
+#[test]
+fn a_mesh_of_vtk_is_that_of_gmsh() {
+    let gmsh = without(&case("bush"), "[[expect]]");
+    let studies = gmsh.find("[[study]]").unwrap();
+    let gmsh = gmsh[..studies].replace("thickness =", "spacing = \"0.5 mm\"\nthickness =");
+    let groups = fs::read_to_string(workspace().join("cases/meshes/bush/bush.msh")).unwrap();
+    let mut vtk = gmsh.clone();
+    for line in groups.lines().skip_while(|line| *line != "$PhysicalNames").skip(2) {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let [_, tag, name] = words[..] else { break };
+        let [key, array] = ["block", "set"].map(|key| (format!("{key} = {name}"), key));
+        for (named, key) in [key, array] {
+            vtk = vtk.replace(&named, &format!("{key} = \"gmsh:physical-{tag}\""));
+        }
+        let part = name.trim_matches('"');
+        vtk = vtk.replace(&format!("part = \"{part}\""), &format!("part = \"gmsh:physical-{tag}\""));
+    }
+    let file = workspace().join("crates/meshfile/tests/fixtures/bush.vtu");
+    let own = workspace().join("cases/meshes/bush/bush.msh");
+    let vtk = vtk.replace(&own.display().to_string(), &file.display().to_string());
+    assert!(!vtk.contains("bush.msh") && vtk.contains("physical-"), "{vtk}");
+    assert_eq!(values(&vtk, ""), values(&gmsh, ""));
+}
+
 /// A file that a deck includes belongs to the scene: its contents are in the record of the run.
 #[test]
 fn included_files_are_recorded() {
@@ -98,7 +124,9 @@ fn included_files_are_recorded() {
 fn fixtures() -> Vec<PathBuf> {
     let folder = workspace().join("crates/crystfem/tests/fixtures");
     let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    let is_mesh = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "msh" || ending == "inp");
+    let is_mesh = |path: &PathBuf| {
+        path.extension().is_some_and(|ending| ["msh", "inp", "vtu", "e"].iter().any(|own| ending == *own))
+    };
     files.filter(is_mesh).collect()
 }
 

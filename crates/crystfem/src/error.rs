@@ -111,6 +111,7 @@ impl From<meshfile::Error> for Error {
             meshfile::Error::File { path, line, what, found, allowed } => {
                 Self::File { path, line, what, found, allowed }
             }
+            meshfile::Error::Data { path, reason } => Self::Data { what: path.display().to_string(), reason },
             meshfile::Error::Shared(error) => Self::Shared(error),
         }
     }

@@ -32,6 +32,14 @@ pub enum Error {
         /// Allowed text.
         allowed: String,
     },
+    /// A result file that cannot be used.
+    #[error("{}: {reason}", path.display())]
+    Data {
+        /// Path of the file.
+        path: PathBuf,
+        /// Defect, with the allowed values.
+        reason: String,
+    },
     /// A file that cannot be read.
     #[error(transparent)]
     Shared(#[from] polycore::Error),
@@ -51,6 +59,12 @@ pub fn line_error(
         found.push('…');
     }
     Error::File { path: path.to_owned(), line, what: what.into(), found, allowed: allowed.into() }
+}
+
+/// Builds an error of a result file.
+#[cfg(feature = "results")]
+pub(crate) fn data_error(path: &Path, reason: &str) -> Error {
+    Error::Data { path: path.to_owned(), reason: reason.to_owned() }
 }
 
 /// Refuses a scale, m per unit of the file, that is not positive and finite.

@@ -5,8 +5,8 @@ use crate::mesh::abaqus::advice;
 use crate::mesh::file_mesh::{ReadMesh, convert};
 use std::path::Path;
 
-/// Reads a mesh file, `.msh` of Gmsh ([`super::gmsh::read`]) or `.inp` of Abaqus and CalculiX
-/// ([`super::abaqus::read`]), with coordinates multiplied by `scale` (1e-3 for a file in mm), and checks it.
+/// Reads a mesh file of a format of [`meshfile::read`], with coordinates multiplied by `scale` (1e-3 for a
+/// file in mm), and checks it.
 ///
 /// # Errors
 /// [`Error::Mesh`] for another extension, and errors of these functions.

@@ -61,7 +61,7 @@ pub struct MeshSpec {
     pub path: Option<PathSpec>,
     /// Cells inside an STL surface.
     pub stl: Option<StlSpec>,
-    /// Mesh file: Gmsh `.msh` (2 or 4), or Abaqus or CalculiX `.inp`.
+    /// Mesh file: Gmsh `.msh` (2 or 4), Abaqus or CalculiX `.inp`, VTK `.vtu`, Exodus II `.e`.
     pub file: Option<PathBuf>,
     /// Length of one unit of the file; default 1 m.
     pub unit: Option<Length>,

@@ -2,7 +2,6 @@
 
 mod exodus;
 pub mod frd;
-mod netcdf;
 mod vtu;
 mod xdmf;
 mod xml;

@@ -3,11 +3,11 @@
 //!
 //! Format: <https://www.xdmf.org/index.php/XDMF_Model_and_Format>.
 
-use super::netcdf::Netcdf;
-use super::vtu::numbers;
 use super::xml::{XmlElement, read};
 use super::{Analysis, CellsByDimension, ThermalFrame, choose_array, data_error};
 use crate::error::Error;
+use meshfile::netcdf::Netcdf;
+use meshfile::vtu::numbers;
 use std::path::{Path, PathBuf};
 
 /// Topology name in lower case, its number in mixed topologies, nodes per element, and cell type of VTK.
@@ -265,7 +265,8 @@ impl Xdmf {
                 let Some((file, name)) = text.rsplit_once(':') else {
                     return Err(self.wrong(format!("found {text:?}; allowed: FILE.h5:/PATH")));
                 };
-                Netcdf::open(&self.path.with_file_name(file))?.numbers(name.trim_start_matches('/'), None)
+                let mut file = Netcdf::open(&self.path.with_file_name(file))?;
+                Ok(file.numbers(name.trim_start_matches('/'), None)?)
             }
             "BINARY" => self.binary(item, text),
             other => Err(self.wrong(format!("found DataItem format {other:?}; allowed: XML, HDF, Binary"))),

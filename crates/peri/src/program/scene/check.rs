@@ -215,7 +215,7 @@ fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     if body.points.is_some() && body.grid.is_some() {
         return Err(source.conflict("body.grid", "points", ONE_OF_THEM));
     }
-    let has_mesh = body.points.as_deref().is_some_and(super::mesh_cells::is_mesh);
+    let has_mesh = body.points.as_deref().is_some_and(meshfile::is_mesh);
     if body.unit.is_some() && !has_mesh {
         return Err(source.unexpected("body.unit", "only a mesh file in `points` has a unit here"));
     }

@@ -3,7 +3,7 @@
 use super::GridSpec;
 use super::Scene;
 use super::memory;
-use super::mesh_cells::{CellMesh, is_mesh};
+use super::mesh_cells::CellMesh;
 use super::mesh_region::MeshSets;
 use super::values::{DiscreteBody, LARGEST_RATIO, check_order, positive, required, vector};
 use super::variant::SceneVariant;
@@ -36,7 +36,7 @@ pub fn cloud<const D: usize>(
     let (positions, volumes, key) = match (&scene.body.points, &scene.body.grid) {
         (Some(points), _) => {
             let path = source.file(points);
-            let (positions, volumes) = match is_mesh(points) {
+            let (positions, volumes) = match meshfile::is_mesh(points) {
                 true => cells_of_mesh(source, points, scene.body.unit, thickness)?,
                 false => read::<D>(source, &path)?,
             };

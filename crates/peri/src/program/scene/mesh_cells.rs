@@ -26,12 +26,6 @@ const FLAT: f64 = 1e-6;
 /// Number of cells that share a side, and the facets of the first of them.
 type SharedSide<const D: usize> = (u32, Vec<Facet<D>>);
 
-/// Returns true for a file whose ending is that of a mesh.
-pub(super) fn is_mesh(file: &Path) -> bool {
-    let ending = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    matches!(ending.as_str(), "msh" | "inp")
-}
-
 impl<const D: usize> CellMesh<D> {
     /// Reads and checks a file; `key` and `unit_key` are those of its name and its unit.
     ///
@@ -213,7 +207,11 @@ impl<const D: usize> CellMesh<D> {
         let facets: Vec<Facet<D>> =
             sides.iter().flat_map(|side| self.side(element, side, flipped).1).collect();
         let (volume, _) = moments(&facets);
-        let place = || format!("{}:{}: element {}", self.path(), element.line, element.label);
+        let place = || match element.line {
+            // without lines
+            0 => format!("{}: element {}", self.path(), element.label),
+            line => format!("{}:{line}: element {}", self.path(), element.label),
+        };
         if !(volume > 0.0 && volume.is_finite()) {
             let what = if D == 2 { "area" } else { "volume" };
             let found = format!("{}, inverted or without {what}: {volume:.3e} m^{D}", place());

@@ -1,6 +1,6 @@
 //! Named sets of the mesh files of a body, which select particles.
 
-use super::mesh_cells::{CellMesh, is_mesh};
+use super::mesh_cells::CellMesh;
 use super::region::layers;
 use super::values::{ONE_OF_THEM, required};
 use super::{Boundary, Scene, ShapeSpec};
@@ -80,7 +80,7 @@ impl Scene {
         files.extend(self.body.points.as_ref().map(|file| MeshEntry { file, unit: self.body.unit, keys }));
         let mut known: Vec<&Path> = Vec::new();
         files.retain(|entry| {
-            let is_new = is_mesh(entry.file) && !known.contains(&entry.file);
+            let is_new = meshfile::is_mesh(entry.file) && !known.contains(&entry.file);
             known.push(entry.file);
             is_new
         });

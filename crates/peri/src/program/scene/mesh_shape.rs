@@ -1,6 +1,6 @@
 //! Shapes inside closed facets: cells of mesh files, STL surfaces, polygons.
 
-use super::mesh_cells::{CellMesh, is_mesh};
+use super::mesh_cells::CellMesh;
 use super::values::{DiscreteBody, plain, positive, required, vector};
 use super::{Scene, ShapeSpec};
 use crate::geometry::{Enclosure, Lattice, Operation, Parts, Shape, cell};
@@ -27,7 +27,7 @@ pub(super) fn mesh_shape<const D: usize>(
     let at = |error: String| source.refused(&file_key, format!("{}: {error}", file.display()));
     if ending == "stl" {
         if D == 2 {
-            let allowed = "a `.msh` or `.inp` of triangles and quadrangles";
+            let allowed = "a mesh of triangles and quadrangles";
             return Err(source.error(&file_key, "an STL surface in a plane body", allowed));
         }
         if spec.block.is_some() {
@@ -41,8 +41,8 @@ pub(super) fn mesh_shape<const D: usize>(
         let facets = surface.triangles.iter().map(facet).collect();
         return Ok(enclosed(Enclosure::new(facets).map_err(|error| at(error.to_string()))?));
     }
-    if !is_mesh(file) {
-        let allowed = "`.msh` (Gmsh 2 and 4), `.inp` (Abaqus, CalculiX) or `.stl`";
+    if !meshfile::is_mesh(file) {
+        let allowed = format!("{} or `.stl`", meshfile::FORMATS);
         return Err(source.error(&file_key, format!("`{}`", file.display()), allowed));
     }
     let mesh = CellMesh::<D>::read(source, &file_key, &unit_key, file, unit)?;

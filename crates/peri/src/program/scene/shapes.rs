@@ -30,12 +30,13 @@ pub struct ShapeSpec {
     pub axis: Option<AxisName>,
     /// Corners of a polygon, in order.
     pub points: Option<Vec<Vec<Length>>>,
-    /// File of a mesh: Gmsh `.msh`, Abaqus or CalculiX `.inp`, or a closed surface, `.stl`.
+    /// File of a mesh: Gmsh `.msh`, Abaqus or CalculiX `.inp`, VTK `.vtu`, Exodus II `.e`, or a closed surface,
+    /// `.stl`.
     pub file: Option<PathBuf>,
     /// Length of one unit of the file.
     pub unit: Option<Length>,
-    /// Cells of the file that form the shape: a physical group of Gmsh, an element set of Abaqus; default:
-    /// all.
+    /// Cells of the file that form the shape: a physical group of Gmsh, an element set of Abaqus, a block of
+    /// Exodus II, the value of an array of VTK (`MaterialIds-2`); default: all.
     pub block: Option<String>,
     /// Name of the part to which a shape of the body belongs, default: its `block`; of shapes that overlap,
     /// the last one counts.

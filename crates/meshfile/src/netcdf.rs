@@ -1,7 +1,6 @@
 //! Variables of a netCDF file, in the classic format or in HDF5.
 
-use super::data_error;
-use crate::error::Error;
+use crate::error::{Error, data_error};
 use netcdf3::{DataVector, FileReader};
 use polycore::hdf5::dataset;
 use rust_hdf5::format::messages::datatype::DatatypeMessage;
@@ -71,6 +70,9 @@ impl Netcdf {
     }
 
     /// Reads the numbers or characters of a variable, or of one of its rows.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for a variable that is missing, damaged or larger than the file.
     pub fn numbers(&mut self, name: &str, row: Option<usize>) -> Result<Vec<f64>, Error> {
         let Some(shape) = self.shape(name) else {
             return Err(self.wrong(name, "missing (Exodus II has this variable)"));
