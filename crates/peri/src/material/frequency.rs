@@ -71,7 +71,7 @@ impl<const D: usize> SolidPoint<D> {
         let mixed = law.residual_stiffness(&self.deformation) * root;
         let shear = self.slope * self.whole / dimension;
         let gradient = law.stiffness(&self.deformation) + mixed * norm - shear * self.shape.min(1.0);
-        self.reach.slope = self.slope + dimension * mixed * (norm + root) / self.whole;
+        self.reach.slope = self.steepest() + dimension * mixed * (norm + root) / self.whole;
         self.reach.front = WAVES * self.integrity() * gradient.max(0.0) * size;
         self.reach.front * among + greatest_wave::<D>() * self.reach.slope * squares
     }

@@ -59,7 +59,7 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
             4.0 * point.spring * squares
         } else {
             // Σ_J ω 2(1 − cos kξ) is at most 2.6 (2D) or 2.4 (3D) Σ_J ω in all lattices
-            let springs = if D == 2 { 2.6 } else { 2.4 } * point.slope * squares;
+            let springs = if D == 2 { 2.6 } else { 2.4 } * point.steepest() * squares;
             let shear = point.slope * point.whole / D as f64;
             let gradient = self.0.stiffness(&point.deformation) - shear;
             // λ_max(M⁻¹)/D = 1/(D λ_min(M))

@@ -10,7 +10,7 @@ pub struct Past {
     pub state: Box<[f64]>,
     /// Duration of the step, s; 0 between steps.
     pub duration: f64,
-    /// Shear modulus of the stabilisation, Pa, constant in the step.
+    /// Greatest shear modulus of the stabilisation in the step, Pa.
     pub stabilisation: f64,
     /// Energy that law and forces refer to.
     pub part: EnergyPart,

@@ -174,6 +174,12 @@ impl<const D: usize> SolidPoint<D> {
         self.spring = 0.0;
     }
 
+    /// Greatest slope of the stabilisation: that of `slope`, or of all of a history.
+    pub(super) fn steepest(&self) -> f64 {
+        let history = self.deformation.past.as_ref().map_or(0.0, |past| past.stabilisation);
+        self.slope.max(D as f64 * history / self.whole)
+    }
+
     /// Replaces the law by springs.
     pub(super) fn spring(&mut self, law: &(impl PointLaw<D> + ?Sized)) {
         let dimension = D as f64;

@@ -15,10 +15,12 @@ use polycore::constitutive::{Moduli, Workspace};
 use polycore::tensor::voigt::{self, Voigt};
 use std::cell::RefCell;
 
-/// W = W_eq(C) + Σ_k W_k(C, C_v) + ½ g · residual: [`super::Correspondence`] whose law has a state. Each step
-/// minimises the energy of backward Euler in exponential form ([`Viscoelastic`]); g = a(μ + Σ_k ν_k/(1 + Δt
-/// ν_k/η_k)) with ν and η at its start. A viscosity that depends on the pressure has that of the particle at
-/// the start of the step, −tr σ/3 of the whole law.
+/// W = W_eq(C) + Σ_k W_k(C, C_v) + ½ aμ r + ½ g·max(0, √r − s)²: [`super::Correspondence`] whose law has a
+/// state, with the residual r. Each step minimises the energy of backward Euler in exponential form
+/// ([`Viscoelastic`]); g = a Σ_k ν_k/(1 + Δt ν_k/η_k) with ν and η at its start. s is the part of √r that has
+/// relaxed, as the branches do: s ← √r + (s − √r) g/(aΣν) at the end of a step. A tenth of g acts on all of r,
+/// so that no mode within s goes soft. A viscosity that depends on the pressure has that of the particle at the
+/// start of the step, −tr σ/3 of the whole law.
 ///
 /// A deformation without [`Past`] is one in equilibrium: it has the stress of W_eq alone.
 pub struct ViscousCorrespondence {
@@ -31,6 +33,8 @@ pub struct ViscousCorrespondence {
     temperature: f64,
     /// True if a viscosity depends on the pressure, which is then part of the state.
     keeps_pressure: bool,
+    /// True if the stabilisation relaxes, whose s is then part of the state.
+    keeps_residual: bool,
 }
 
 /// Scratch memory: states of a point at both ends of a step.
@@ -48,6 +52,9 @@ struct StepStates {
 const ENOUGH: f64 = 1e-9;
 /// Relative change of C₃₃ whose square is below 1e-11 of the stress.
 const NEARLY: f64 = 1e-6;
+
+/// Share of the branches' stabilisation that acts on all of the residual.
+const LASTING: f64 = 0.1;
 
 thread_local! {
     static SCRATCH: RefCell<StepStates> = RefCell::default();
@@ -67,7 +74,9 @@ impl ViscousCorrespondence {
     ) -> Result<Self, Error> {
         let moduli = check::<D>(law.equilibrium(), space, stabilisation)?;
         let keeps_pressure = law.branches().iter().any(grows_with_pressure);
-        Ok(Self { law, space, moduli, stabilisation, driving, temperature: 293.15, keeps_pressure })
+        let keeps_residual = stabilisation > 0.0 && !law.branches().is_empty();
+        let temperature = 293.15;
+        Ok(Self { law, space, moduli, stabilisation, driving, temperature, keeps_pressure, keeps_residual })
     }
 
     /// Sets the temperature, K, of branches with a shift; default 293.15.
@@ -100,12 +109,18 @@ impl ViscousCorrespondence {
         if self.keeps_pressure { take(1)[0] } else { 0.0 }
     }
 
-    fn pack(&self, state: &State, pressure: f64) -> impl Iterator<Item = f64> {
+    fn pack(&self, state: &State, pressure: f64, relaxed: f64) -> impl Iterator<Item = f64> {
         let branches = self.law.branches().iter().zip(&state.branches).flat_map(|(branch, own)| {
             own.viscous.iter().copied().chain(keeps_shear(branch).then_some(own.shear))
         });
         let peak = self.law.softening().map(|_| state.peak);
-        branches.chain(peak).chain(self.keeps_pressure.then_some(pressure))
+        let pressure = self.keeps_pressure.then_some(pressure);
+        branches.chain(peak).chain(pressure).chain(self.keeps_residual.then_some(relaxed))
+    }
+
+    /// Part of √r that has relaxed.
+    fn relaxed_residual(&self, past: &Past) -> f64 {
+        past.state.last().copied().filter(|_| self.keeps_residual).unwrap_or(0.0)
     }
 
     /// C, the response of a part of the energy there, and the state at the end in the scratch memory;
@@ -177,12 +192,29 @@ impl ViscousCorrespondence {
         part == EnergyPart::Driving && self.driving == Driving::Equilibrium
     }
 
-    /// Modulus of the stabilisation.
-    fn shear_of<const D: usize>(&self, deformation: &Deformation<D>) -> f64 {
-        match deformation.past.as_deref() {
-            Some(past) if !self.drives_alone(past.part) => past.stabilisation,
-            _ => self.stabilisation * self.moduli.shear,
+    /// g/(aΣν): part of √r − s at the start of a step that is left at its end.
+    fn left(&self, past: &Past) -> f64 {
+        if past.duration == 0.0 || !self.keeps_residual {
+            return 1.0;
         }
+        // springs that stiffen exceed their modulus at rest
+        let modulus = past.stabilisation / self.stabilisation - self.moduli.shear;
+        (modulus / self.law.branch_modulus()).clamp(0.0, 1.0)
+    }
+
+    /// Energy of the stabilisation, J/m³, that of a part of the energy, and its modulus 2 ∂W/∂r, Pa.
+    fn stabilisation_of<const D: usize>(&self, deformation: &Deformation<D>, part: EnergyPart) -> [f64; 2] {
+        let (own, residual) = (self.stabilisation * self.moduli.shear, deformation.residual);
+        let past = deformation.past.as_deref().filter(|_| !self.drives_alone(part));
+        let Some(past) = past else { return [0.5 * own * residual, own] };
+        let branches = past.stabilisation - own;
+        let (root, relaxed) = (residual.sqrt(), self.relaxed_residual(past));
+        let beyond = (root - relaxed).max(0.0);
+        let free = if relaxed == 0.0 { 1.0 } else { beyond / root.max(relaxed) };
+        let kept = if part == EnergyPart::Trial { beyond } else { self.left(past) * beyond };
+        let lasting = own + LASTING * branches;
+        let fleeting = (1.0 - LASTING) * branches;
+        [0.5 * (lasting * residual + fleeting * kept * kept), lasting + fleeting * free]
     }
 }
 
@@ -209,7 +241,7 @@ impl<const D: usize> PointLaw<D> for ViscousCorrespondence {
             let trial = if part == EnergyPart::Trial { found.dissipated } else { 0.0 };
             Some(found.prediction.energy? + trial)
         });
-        energy.unwrap_or(f64::NAN) + 0.5 * self.shear_of(deformation) * deformation.residual
+        energy.unwrap_or(f64::NAN) + self.stabilisation_of(deformation, part)[0]
     }
 
     fn respond(&self, deformation: &Deformation<D>) -> PointStress<D> {
@@ -217,7 +249,8 @@ impl<const D: usize> PointLaw<D> for ViscousCorrespondence {
         let found = SCRATCH.with_borrow_mut(|scratch| self.stress(deformation, part, scratch));
         let stress = found.map_or(Matrix3::from_element(f64::NAN), |stress| voigt::to_stress(&stress));
         let plane = BodyTensor::<D>::from_fn(|a, b| stress[(a, b)]);
-        PointStress { piola: deformation.gradient() * plane, stabilisation: self.shear_of(deformation) }
+        let [_, stabilisation] = self.stabilisation_of(deformation, part);
+        PointStress { piola: deformation.gradient() * plane, stabilisation }
     }
 
     fn stiffness(&self, deformation: &Deformation<D>) -> f64 {
@@ -246,7 +279,7 @@ impl<const D: usize> PointLaw<D> for ViscousCorrespondence {
     }
 
     fn past(&self) -> Option<Past> {
-        let state = self.pack(&self.law.rest(), 0.0).collect();
+        let state = self.pack(&self.law.rest(), 0.0, 0.0).collect();
         let stabilisation = self.stabilisation * (self.moduli.shear + self.law.branch_modulus());
         Some(Past { state, duration: 0.0, stabilisation, part: EnergyPart::Stored })
     }
@@ -264,16 +297,19 @@ impl<const D: usize> PointLaw<D> for ViscousCorrespondence {
     }
 
     fn advance(&self, deformation: &mut Deformation<D>) -> f64 {
-        SCRATCH.with_borrow_mut(|scratch| {
-            let Some((c, found)) = self.predict(deformation, EnergyPart::Stored, false, scratch) else {
-                return 0.0;
-            };
+        let of = |part| self.stabilisation_of(deformation, part)[0];
+        let flowed = of(EnergyPart::Trial) - of(EnergyPart::Stored);
+        let dissipated = SCRATCH.with_borrow_mut(|scratch| {
+            let (c, found) = self.predict(deformation, EnergyPart::Stored, false, scratch)?;
+            let root = deformation.residual.sqrt();
             if let Some(past) = &mut deformation.past {
                 let pressure = Reaction::Law.pressure(&c, &found.prediction.stress);
-                let end = self.pack(&scratch.end, pressure);
+                let relaxed = root + (self.relaxed_residual(past) - root) * self.left(past);
+                let end = self.pack(&scratch.end, pressure, relaxed);
                 past.state.iter_mut().zip(end).for_each(|(old, new)| *old = new);
             }
-            found.dissipated
-        })
+            Some(found.dissipated + flowed)
+        });
+        dissipated.unwrap_or(0.0)
     }
 }
