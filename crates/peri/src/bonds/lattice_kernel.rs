@@ -61,6 +61,9 @@ pub enum Factors<'a, const D: usize, T = f64> {
     Even(&'a [T]),
     /// Along each axis.
     Along([&'a [T]; D]),
+    /// Weights of one law among several: its share (c_I + c_J)/(C_I + C_J), c = `own` and C = `whole`, times
+    /// those of factors along each axis, if there are any.
+    Shared { along: Option<[&'a [T]; D]>, own: &'a [T], whole: &'a [T] },
 }
 
 impl<'a, const D: usize, T> Factors<'a, D, T> {
@@ -70,9 +73,13 @@ impl<'a, const D: usize, T> Factors<'a, D, T> {
     }
 
     fn cover(&self, sites: usize) -> bool {
+        let cover = |along: &[&[T]; D]| along.iter().all(|component| component.len() == sites);
         match self {
             Self::Even(factors) => factors.len() == sites,
-            Self::Along(factors) => factors.iter().all(|component| component.len() == sites),
+            Self::Along(along) => cover(along),
+            Self::Shared { along, own, whole } => {
+                along.as_ref().is_none_or(cover) && own.len() == sites && whole.len() == sites
+            }
         }
     }
 }
@@ -431,8 +438,7 @@ impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> StencilRow<T
         law::<T, S, P, Q>(simd, e, self.clamp, self.constant, &self.numerator, &self.denominator)
     }
 
-    /// Computes the weight of a bond from the correction factors g of its two ends, (Σ_d (n_d/ḡ_d)²)^(−1/2),
-    /// ḡ = ½(g_I + g_J); ḡ if they are even.
+    /// Computes the weight of a bond from the factors of its two ends.
     ///
     /// # Safety
     /// `here` and `there` are followed by a vector's width in every slice.
@@ -444,14 +450,40 @@ impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> StencilRow<T
         here: usize,
         there: usize,
     ) -> T::Vector<S> {
-        let factors = match factors {
-            Factors::Even(factors) => {
+        let ends = [here, there];
+        match factors {
+            // SAFETY: as above
+            Factors::Even(factors) => unsafe { mean::<T, S>(simd, factors, ends) },
+            // SAFETY: as above
+            Factors::Along(along) => unsafe { self.weight_along(simd, along, here, there) },
+            Factors::Shared { along, own, whole } => {
                 // SAFETY: as above
-                let pair = unsafe { T::add(simd, T::load::<S>(factors, here), T::load::<S>(factors, there)) };
-                return T::mul(simd, pair, T::splat(simd, T::from_f64(0.5)));
+                let [own, whole] =
+                    unsafe { [mean::<T, S>(simd, own, ends), mean::<T, S>(simd, whole, ends)] };
+                let share = T::div(simd, own, whole);
+                match along {
+                    // SAFETY: as above
+                    Some(along) => {
+                        T::mul(simd, share, unsafe { self.weight_along(simd, along, here, there) })
+                    }
+                    None => share,
+                }
             }
-            Factors::Along(factors) => factors,
-        };
+        }
+    }
+
+    /// Computes (Σ_d (n_d/ḡ_d)²)^(−1/2), ḡ = ½(g_I + g_J), from factors g along each axis.
+    ///
+    /// # Safety
+    /// As [`Self::weight`].
+    #[inline(always)]
+    unsafe fn weight_along<S: Simd>(
+        &self,
+        simd: S,
+        factors: [&[T]; D],
+        here: usize,
+        there: usize,
+    ) -> T::Vector<S> {
         let four = T::splat(simd, T::from_f64(4.0));
         let inverse = T::mul(simd, four, T::splat(simd, self.inverse_square));
         let mut sum = T::splat(simd, T::from_f64(0.0));
@@ -466,4 +498,15 @@ impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> StencilRow<T
         }
         T::div(simd, T::splat(simd, T::from_f64(1.0)), T::sqrt(simd, sum))
     }
+}
+
+/// Computes the mean of a field at both ends of a vector of bonds.
+///
+/// # Safety
+/// Both places are followed by a vector's width.
+#[inline(always)]
+unsafe fn mean<T: KernelReal, S: Simd>(simd: S, field: &[T], [here, there]: [usize; 2]) -> T::Vector<S> {
+    // SAFETY: as above
+    let pair = unsafe { T::add(simd, T::load::<S>(field, here), T::load::<S>(field, there)) };
+    T::mul(simd, pair, T::splat(simd, T::from_f64(0.5)))
 }

@@ -4,6 +4,7 @@ mod breaking;
 mod cells;
 mod cloud;
 mod cloud_kernel;
+mod cloud_laws;
 mod cloud_linear;
 mod cloud_lists;
 mod kernel;
