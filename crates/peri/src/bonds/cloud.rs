@@ -296,13 +296,12 @@ impl<const D: usize> BondForces<D> for CloudBonds<D> {
     }
 
     fn prepare(&mut self, displacement: &Field<D>) {
-        if self.law.kernel.is_none() && self.law.passes.is_empty() {
-            return;
-        }
-        if self.law.rows.is_empty() {
-            self.law.rows = ParticleRows::new(&self.position, displacement, 0..self.volumes.len());
-        } else {
-            self.law.rows.load(displacement);
+        match self.law.kernel {
+            Some(_) if self.law.rows.is_empty() => {
+                self.law.rows = ParticleRows::new(&self.position, displacement, 0..self.volumes.len());
+            }
+            Some(_) => self.law.rows.load(displacement),
+            None => {}
         }
     }
 
@@ -313,7 +312,7 @@ impl<const D: usize> BondForces<D> for CloudBonds<D> {
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     ) {
-        if self.law.kernel.is_some() || !self.law.passes.is_empty() {
+        if let Some(kernel) = &self.law.kernel {
             let own;
             let rows = if self.law.rows.is_empty() {
                 own = ParticleRows::new(
@@ -338,10 +337,10 @@ impl<const D: usize> BondForces<D> for CloudBonds<D> {
                 weights: &self.law.weights,
                 stiffness: self.law.stiffness,
             };
-            if !self.law.passes.is_empty() {
-                self.force_of_laws(&data, start, force, track);
-            } else if let Some(kernel) = &self.law.kernel {
+            if self.law.passes.is_empty() {
                 kernel.run(&data, start, force, track);
+            } else {
+                self.force_of_laws(&data, start, force, track);
             }
         } else if let Some((fit, modulus)) = &self.law.table {
             plain_force(self, fit, *modulus, displacement, start, force, track);

@@ -6,7 +6,8 @@ mod laws;
 mod mixed;
 mod periodic;
 
-use super::lattice_kernel::{Factors, TILE, TileClass, Tiles};
+use super::lattice_factors::Factors;
+use super::lattice_kernel::{TILE, TileClass, Tiles};
 use super::lattice_sums::{GradientSums, Span, Spans, Weights};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
 use super::softening::{Softened, SoftenedBonds, integrity};
@@ -17,7 +18,7 @@ use super::{
 };
 use crate::error::Error;
 use crate::field::{Field, chunk_range};
-use crate::geometry::{Cut, Gaps, Lattice, cell, refuse_too_large};
+use crate::geometry::{Cut, Gaps, Lattice, refuse_too_large};
 use crate::potential::{EnergyTable, KernelFit, StretchRange, TangentTable};
 use laws::LawPass;
 use mixed::Mixed;
@@ -289,16 +290,6 @@ impl<const D: usize> LatticeBonds<D> {
         } else if let Some((fit, modulus)) = &self.law {
             plain_force(self, fit, *modulus, displacement, start, force, track);
         }
-    }
-
-    fn occupied_sites(&self) -> Vec<u32> {
-        let cells = self.lattice.cells;
-        let mut particles: Vec<u32> = (0..self.lattice.occupied.len())
-            .filter(|&index| self.lattice.occupied[index])
-            .map(|index| self.site(cell(index, cells)) as u32)
-            .collect();
-        particles.sort_unstable();
-        particles
     }
 }
 

@@ -9,6 +9,7 @@ mod cloud_linear;
 mod cloud_lists;
 mod kernel;
 mod lattice;
+mod lattice_factors;
 mod lattice_kernel;
 mod lattice_sums;
 mod law_shares;

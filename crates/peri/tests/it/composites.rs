@@ -107,8 +107,8 @@ fn kernels_and_loops_agree() {
     }
 }
 
-/// Forces and energy of the kernels are those of plain loops with factors of bonds: stiffness alone, for which
-/// passes take the mean of both ends, surface corrections, and both; also for bonds that have broken.
+/// Forces and energy of the kernels are those of plain loops with factors of bonds: stiffness alone, for
+/// which passes take the mean of both ends, surface corrections, and both.
 #[test]
 fn kernels_and_loops_agree_with_factors() {
     let moved = Random(12).vectors::<2>(108, 0.02);
@@ -257,8 +257,8 @@ fn contact_has_the_stiffness_of_each_law() {
     near("contact_of_a_part_of_the_whole_body", part / whole, 1.0, 1e-6);
 }
 
-/// Strips of two parts with equal laws tear at the same bonds as a strip of this law, and their ledgers close:
-/// stored, kinetic and released energy are the work done, also if the parts have different laws.
+/// Strips of two parts with equal laws tear at the same bonds as a strip of this law, and their ledgers
+/// close: stored, kinetic and released energy are the work done, also if the parts have different laws.
 #[test]
 fn parts_break_and_their_ledger_closes() {
     let torn = |other: Option<f64>, end: f64| {

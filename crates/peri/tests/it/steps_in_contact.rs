@@ -88,8 +88,8 @@ fn friction_goes_on_in_the_next_step() {
     near("energy_of_steps", last.stored / end.stored, 1.0, 1e-5);
 }
 
-/// A floor hits a block that lies on it, and drags it along: in one step of dynamics, and in two, of which the
-/// first ends while they touch. The block moves on with the same energy, and the ledger closes.
+/// A floor hits a block that lies on it, and drags it along: in one step of dynamics, and in two, of which
+/// the first ends while they touch. The block moves on with the same energy, and the ledger closes.
 #[test]
 fn impacts_go_on_in_the_next_step() {
     let floor = "displacement = [\"0.3 mm\", \"0.5 mm\"]\ncurve = \"1000 * t\"";

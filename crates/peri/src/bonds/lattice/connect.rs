@@ -4,7 +4,7 @@ use super::LatticeBonds;
 use crate::bonds::BodyGeometry;
 use crate::bonds::lattice_kernel::{TILE, TileClass};
 use crate::field::{CHUNK, chunk_range};
-use crate::geometry::{Cut, Gaps, cuts_within, severed};
+use crate::geometry::{Cut, Gaps, cell, cuts_within, severed};
 use crate::parallel;
 
 impl<const D: usize> LatticeBonds<D> {
@@ -124,5 +124,16 @@ impl<const D: usize> LatticeBonds<D> {
 
     pub(super) fn site(&self, cell: [usize; D]) -> usize {
         self.guard + (0..D).map(|d| self.strides[d] * cell[d]).sum::<usize>()
+    }
+
+    /// Returns the sites of all particles, ascending.
+    pub(super) fn occupied_sites(&self) -> Vec<u32> {
+        let cells = self.lattice.cells;
+        let mut particles: Vec<u32> = (0..self.lattice.occupied.len())
+            .filter(|&index| self.lattice.occupied[index])
+            .map(|index| self.site(cell(index, cells)) as u32)
+            .collect();
+        particles.sort_unstable();
+        particles
     }
 }

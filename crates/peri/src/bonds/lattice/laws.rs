@@ -5,7 +5,8 @@
 
 use super::LatticeBonds;
 use crate::bonds::LawShares;
-use crate::bonds::lattice_kernel::{Factors, TILE, TileClass, Tiles};
+use crate::bonds::lattice_factors::Factors;
+use crate::bonds::lattice_kernel::{TILE, TileClass, Tiles};
 use crate::bonds::law_shares::add_force;
 use crate::bonds::rows::{LatticeKernel, StencilBond, lattice_kernel};
 use crate::field::{CHUNK, Field, chunk_range};
