@@ -39,6 +39,15 @@ fn cracked_bar_in_three_dimensions() {
     assert_eq!((&work["particles"], &work["steps"]), (&320.into(), &3.into()));
 }
 
+/// Rough planes, friction and its slip over steps of both methods.
+#[test]
+fn steps_in_contact() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    fs::write(here.join("scene.toml"), scenes::STEPS_IN_CONTACT).unwrap();
+    on_any_number_of_threads(here);
+}
+
 /// Variants, several at once if there are several threads.
 #[test]
 fn variants() {

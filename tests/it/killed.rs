@@ -131,6 +131,12 @@ fn killed_between_and_within_steps() {
     survives_kills(&format!("{scene}{again}"));
 }
 
+/// A press that closes (statics), a rough floor that moves below it (dynamics), and both go on (statics).
+#[test]
+fn killed_between_steps_in_contact() {
+    survives_kills(scenes::STEPS_IN_CONTACT);
+}
+
 /// Layers, stresses and fields.
 #[test]
 fn killed_while_it_warps() {

@@ -220,3 +220,49 @@ impl Random {
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 }
+
+/// A block on a rough floor below a press, which move by curves over the time of three steps: equilibria,
+/// explicit dynamics, equilibria.
+pub const STEPS_IN_CONTACT: &str = r#"version = 1
+program = "peri"
+[body]
+space = "plane-strain"
+thickness = "1 mm"
+spacing = "0.5 mm"
+shapes = [{ add = "box", min = ["0 mm", "0 mm"], max = ["16 mm", "8 mm"] }]
+[material.solid]
+law = "correspondence"
+constitutive = { model = "neo-hookean", parameters = { shear_modulus = "1 MPa" }, bulk_modulus = "2 MPa" }
+[[boundary]]
+side = "x-"
+displacement = ["0 mm", "free"]
+[contact]
+stiffness = 0
+[[contact.plane]]
+name = "floor"
+point = ["0 mm", "0 mm"]
+normal = [0, 1]
+stiffness = 5
+friction = 0.3
+displacement = ["1 mm", "0 mm"]
+curve = "0.2 * max(t - 1, 0)"
+[[contact.indenter]]
+name = "press"
+point = ["8 mm", "12 mm"]
+radius = "4 mm"
+stiffness = 5
+displacement = ["0 mm", "-0.4 mm"]
+curve = "min(t, 1) - max(t - 1.001, 0)"
+[[time.step]]
+duration = "1 s"
+increments = 3
+[solver]
+tolerance = 1e-7
+[[step]]
+boundary = [{ side = "x-", displacement = ["hold", "free"] }]
+dynamics = { density = "1000 kg/m^3", end_time = "1 ms" }
+[[step]]
+boundary = [{ side = "x-", displacement = ["hold", "free"] }]
+time = { step = [{ duration = "0.6 s", increments = 3, factor = 1 }] }
+solver = { tolerance = 1e-7 }
+"#;

@@ -1,16 +1,19 @@
 //! Bodies and materials on which force kernels are measured.
 
 use peri::Error;
-use peri::bonds::{Bonds, Lattice, LatticeBonds, VolumeCorrection};
+use peri::bonds::{Bonds, Lattice, LatticeBonds, LawShares, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::field::{CHUNK, Field};
 use peri::geometry::{Operation, Shape, lattice};
-use peri::material::{Correspondence, EightChainSolid, Material, NonlocalSolid, SolverMaterial};
+use peri::material::{
+    BondMaterial, Correspondence, EightChainSolid, Material, NonlocalSolid, PartLaw, SolverMaterial,
+};
 use peri::potential::{KernelFit, Law};
 use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric};
 use polycore::constitutive::network::Activation::Softplus;
 use polycore::constitutive::surrogate::{Header, Kind, Surrogate, Symmetry};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Horizon over spacing of every measurement.
 pub const RATIO: f64 = 3.015;
@@ -45,6 +48,20 @@ pub fn loaded<const D: usize>(
     Ok((fit, displacement))
 }
 
+/// Returns chains of 720 links with parts of 25 links where `is_part` is true of a place, m: all bonds have
+/// one law, or two.
+pub fn two_laws<const D: usize>(
+    bonds: &dyn Bonds<D>,
+    is_part: impl Fn([f64; D]) -> bool,
+) -> Result<Box<dyn SolverMaterial<D>>, Error> {
+    let [rest, law] = [720.0, 25.0].map(|links| Law::ChainOffset.build(links, 1200.0, false));
+    let space = if D == 2 { Space::PlaneStress } else { Space::Solid };
+    let material = BondMaterial::new(rest?, modulus(space, 1.0, bonds.horizon(), 1.0));
+    let shares = LawShares::new(bonds, 2, |_, place| (usize::from(is_part(place)), 1.0))?;
+    let part = PartLaw { part: "part".to_owned(), law: law?.into() };
+    Ok(material.with_parts(vec![part], Arc::new(shares))?.respond(bonds))
+}
+
 /// Response of a material, and its name.
 pub type Named<const D: usize> = (&'static str, Box<dyn SolverMaterial<D>>);
 
@@ -76,7 +93,16 @@ pub fn both_passes<const D: usize>(
     out: &mut Field<D>,
 ) {
     solid.prepare(bonds, displacement);
-    let solid = &*solid;
+    forces(&*solid, bonds, displacement, out);
+}
+
+/// Computes the forces of all particles.
+pub fn forces<const D: usize>(
+    solid: &dyn SolverMaterial<D>,
+    bonds: &dyn Bonds<D>,
+    displacement: &Field<D>,
+    out: &mut Field<D>,
+) {
     out.chunks_mut()
         .into_par_iter()
         .enumerate()

@@ -3,6 +3,7 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use peri::bonds::{BodyGeometry, BondDamage, CloudBonds, VolumeCorrection, force};
 use peri::field::Field;
+use peri::material::LawCover;
 use peri::potential::{KernelFit, Law};
 use peri::stress::{BallVolume, StressInput, StressMethod, SurfaceCompensation, piola_in_cloud};
 
@@ -27,6 +28,15 @@ fn dimension<const D: usize>(criterion: &mut Criterion) -> Result<(), peri::Erro
     let mut bonds = kernel::bonds::<D>(kernel::block(SIZE)?)?;
     let (_, displacement) = kernel::loaded(&mut bonds, Law::Linear, [0.95, 1.05])?;
     let mut out = Field::zeros(bonds.sites());
+    let mut layers = kernel::two_laws(&bonds, |place: [f64; D]| place[D - 1].rem_euclid(2.0) < 1.0)?;
+    let cover = LawCover { stretches: [0.95, 1.05], bound: 1e-9, clamped: false, known: None };
+    layers.cover(&mut bonds, &displacement, &cover)?;
+    let mut group = criterion.benchmark_group("directed bonds");
+    group.throughput(Throughput::Elements(bonds.directed_bonds()));
+    group.bench_function(format!("{D}D lattice, layers of two laws"), |bencher| {
+        bencher.iter(|| kernel::forces(&*layers, &bonds, &displacement, &mut out));
+    });
+    group.finish();
     for (name, mut solid) in kernel::solids(&bonds)? {
         let mut group = criterion.benchmark_group("directed bonds");
         group.throughput(Throughput::Elements(bonds.directed_bonds()));

@@ -7,7 +7,7 @@ use harness::case::terminal::Threads;
 use kernel::RATIO;
 use peri::bonds::{BodyGeometry, BondForces, Bonds, CloudBonds, VolumeCorrection, force};
 use peri::field::Field;
-use peri::material::relief;
+use peri::material::{LawCover, relief};
 use peri::potential::Law;
 use std::hint::black_box;
 use std::time::Instant;
@@ -130,6 +130,7 @@ fn measure_dimension<const D: usize>(
     measure_bonds(&mut bonds, "lattice", Law::ChainOffset, [0.95, 1.05], threads, rows)?;
     let seconds = measure_bonds(&mut bonds, "lattice", Law::ChainOffset, WIDE, threads, rows)?;
     measure_bonds(&mut bonds, "lattice", Law::Linear, [0.95, 1.05], threads, rows)?;
+    measure_two_laws(&mut bonds, "lattice", seconds, threads, rows)?;
     measure_solids(&mut bonds, "lattice", seconds, threads, rows)?;
     // a neighbour list of 3D bonds takes 2.5 kB a particle
     if size <= 1e6 {
@@ -137,6 +138,7 @@ fn measure_dimension<const D: usize>(
         let mut cloud = CloudBonds::new(&points, &vec![1.0; total], 1.0, RATIO, VolumeCorrection::None, &[])?;
         measure_bonds(&mut cloud, "list", Law::ChainOffset, [0.95, 1.05], threads, rows)?;
         let seconds = measure_bonds(&mut cloud, "list", Law::ChainOffset, WIDE, threads, rows)?;
+        measure_two_laws(&mut cloud, "list", seconds, threads, rows)?;
         measure_solids(&mut cloud, "list", seconds, threads, rows)?;
         // stretches of scenes; softening takes as long if it is zero
         let start = Instant::now();
@@ -146,6 +148,35 @@ fn measure_dimension<const D: usize>(
         let value = start.elapsed().as_secs_f64();
         rows.push(Measurement::new(what, total, threads, value, "s"));
         measure_solids(&mut cloud, "relieved list", seconds, threads, rows)?;
+    }
+    Ok(())
+}
+
+/// Measures forces of two laws in alternate layers of one particle, and in halves, over that of one law.
+fn measure_two_laws<const D: usize>(
+    bonds: &mut dyn Bonds<D>,
+    path: &str,
+    one_law: f64,
+    threads: usize,
+    rows: &mut Vec<Measurement>,
+) -> Result<(), Failure> {
+    let (_, displacement) = kernel::loaded(bonds, Law::ChainOffset, WIDE)?;
+    let (size, mut out) = (bonds.particles().len(), Field::<D>::zeros(bonds.sites()));
+    let half = 0.5 * (size as f64).powf(1.0 / D as f64);
+    let alternate = |x: f64| x.rem_euclid(2.0) < 1.0;
+    for (name, layer) in [("layers", &alternate as &dyn Fn(f64) -> bool), ("halves", &|x| x < half)] {
+        for axis in [0, D - 1] {
+            let mut material = kernel::two_laws(bonds, |place: [f64; D]| layer(place[axis]))?;
+            let cover = LawCover { stretches: WIDE, bound: 1e-9, clamped: false, known: None };
+            material.cover(bonds, &displacement, &cover)?;
+            let seconds = median(|| {
+                bonds.prepare(&displacement);
+                kernel::forces(&*material, bonds, &displacement, &mut out);
+                black_box(&out);
+            });
+            let what = format!("{D}D {path} two laws in {name} along axis {axis}, over one");
+            rows.push(Measurement::new(what, size, threads, seconds / one_law, ""));
+        }
     }
     Ok(())
 }

@@ -17,6 +17,14 @@ pub enum Error {
         /// Allowed values.
         allowed: String,
     },
+    /// A law of one of several parts of a body cannot be fitted.
+    #[error("bond law of {part}: {error}")]
+    PartLaw {
+        /// Name of the part.
+        part: String,
+        /// The error of the law.
+        error: Box<Error>,
+    },
     /// A result is not finite.
     #[error(
         "{quantity} is not finite at particle {particle} (X = {position:?} m), step {step}, \

@@ -305,7 +305,7 @@ impl<const D: usize> Simulation<D, BondMaterial<'_>> {
         let displacement = &self.state.displacement;
         let fits = self.material.fits(covered_stretches(&self.bonds, displacement), 1e-9)?;
         let (modulus, missing) = (self.material.modulus(), SurfaceCompensation::WindowAt(&self.loaded));
-        let fit = BondFits::new(&fits, self.material.shares());
+        let fit = BondFits::new(&fits, self.material.shares(), self.bonds.sites())?;
         let loaded = StressInput { displacement, fit, modulus, missing };
         Ok(stress::piola(&self.bonds, &loaded, measure, BallVolume::default()))
     }

@@ -2,12 +2,13 @@
 
 use super::cells::CellGrid;
 use super::cloud_kernel::{CloudData, ParticleRows};
+use super::cloud_laws::CloudLaw;
 use super::cloud_lists::{NeighbourLists, NeighbourRows};
 use super::rows::{CloudKernel, cloud_kernel};
 use super::softening::{Softened, SoftenedBonds, integrity};
 use super::{
-    BodyGeometry, BondDamage, BondForces, BondKind, Bonds, Neighbour, Overstretched, VolumeCorrection,
-    plain_force, refuse_one_sided, surface_weight,
+    BodyGeometry, BondDamage, BondForces, BondKind, Bonds, LawShares, Neighbour, Overstretched,
+    VolumeCorrection, plain_force, refuse_one_sided, surface_weight,
 };
 use crate::error::Error;
 use crate::field::{Field, chunk_range};
@@ -27,7 +28,7 @@ pub struct CloudBonds<const D: usize> {
     thickness: f64,
     volume_correction: VolumeCorrection,
     lists: NeighbourLists,
-    law: CloudBondLaw<D>,
+    pub(super) law: CloudBondLaw<D>,
     factors: Option<Field<D>>,
     softening: SoftenedBonds,
     /// θ of [`BodyGeometry::relief`].
@@ -36,7 +37,7 @@ pub struct CloudBonds<const D: usize> {
 
 /// The law of the bonds of a cloud.
 #[derive(Default)]
-struct CloudBondLaw<const D: usize> {
+pub(super) struct CloudBondLaw<const D: usize> {
     /// w V_J of each bond, where bonds differ in it.
     weights: Vec<f64>,
     /// 2kθ, times the common w V_J.
@@ -46,6 +47,8 @@ struct CloudBondLaw<const D: usize> {
     kernel: Option<Box<dyn CloudKernel<D>>>,
     /// A law that only a table represents, and kθ.
     table: Option<(KernelFit, f64)>,
+    /// Passes of several laws, instead of the one law.
+    pub passes: Vec<CloudLaw<D>>,
 }
 
 /// Validates points, volumes and horizon.
@@ -278,6 +281,14 @@ impl<const D: usize> BondForces<D> for CloudBonds<D> {
         }
         self.law.kernel = cloud_kernel(fit);
         self.law.table = self.law.kernel.is_none().then(|| (fit.clone(), modulus));
+        self.law.passes = Vec::new();
+    }
+
+    fn set_laws(&mut self, fits: &[&KernelFit], modulus: f64, shares: &LawShares) -> bool {
+        let pass = |(law, fit): (usize, &&KernelFit)| CloudLaw::new(self, fit, modulus, (shares, law));
+        let passes: Option<Vec<_>> = fits.iter().enumerate().map(pass).collect();
+        self.law.passes = passes.unwrap_or_default();
+        !self.law.passes.is_empty()
     }
 
     fn set_factors(&mut self, factors: Field<D>) {
@@ -326,7 +337,11 @@ impl<const D: usize> BondForces<D> for CloudBonds<D> {
                 weights: &self.law.weights,
                 stiffness: self.law.stiffness,
             };
-            kernel.run(&data, start, force, track);
+            if self.law.passes.is_empty() {
+                kernel.run(&data, start, force, track);
+            } else {
+                self.force_of_laws(&data, start, force, track);
+            }
         } else if let Some((fit, modulus)) = &self.law.table {
             plain_force(self, fit, *modulus, displacement, start, force, track);
         }
@@ -409,6 +424,7 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
             + self.volumes.len() * (8 * D + 8 + 4 + 4 + 8)
             + self.lists.parted.len() * 4
             + self.law.rows.bytes()
+            + self.law.passes.iter().map(CloudLaw::bytes).sum::<usize>()
             + [&self.factors, &self.relief].into_iter().flatten().map(|f| 8 * D * f.sites()).sum::<usize>()
     }
 

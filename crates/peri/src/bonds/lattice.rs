@@ -2,22 +2,25 @@
 
 mod connect;
 mod damage;
+mod laws;
 mod mixed;
 mod periodic;
 
-use super::lattice_kernel::{Factors, TILE, TileClass, Tiles};
+use super::lattice_factors::Factors;
+use super::lattice_kernel::{TILE, TileClass, Tiles};
 use super::lattice_sums::{GradientSums, Span, Spans, Weights};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
 use super::softening::{Softened, SoftenedBonds, integrity};
 use super::stencil::{Stencil, fullest, layout, storage};
 use super::{
-    BodyGeometry, BondForces, BondKind, Bonds, Neighbour, VolumeCorrection, plain_force, refuse_one_sided,
-    surface_weight,
+    BodyGeometry, BondForces, BondKind, Bonds, LawShares, Neighbour, VolumeCorrection, plain_force,
+    refuse_one_sided, surface_weight,
 };
 use crate::error::Error;
 use crate::field::{Field, chunk_range};
-use crate::geometry::{Cut, Gaps, Lattice, cell, refuse_too_large};
+use crate::geometry::{Cut, Gaps, Lattice, refuse_too_large};
 use crate::potential::{EnergyTable, KernelFit, StretchRange, TangentTable};
+use laws::LawPass;
 use mixed::Mixed;
 pub use periodic::PeriodicImage;
 use rayon::prelude::*;
@@ -47,6 +50,8 @@ pub struct LatticeBonds<const D: usize> {
     kernel: Option<Box<dyn LatticeKernel<D>>>,
     /// The fitted law, and kθ.
     law: Option<(KernelFit, f64)>,
+    /// Passes of several laws, instead of the one law.
+    passes: Vec<LawPass<D>>,
     directed_bonds: u64,
     softening: SoftenedBonds,
     mixed: Option<Mixed<D>>,
@@ -142,6 +147,7 @@ impl<const D: usize> LatticeBonds<D> {
             interior_factor: 1.0,
             kernel: None,
             law: None,
+            passes: Vec::new(),
             directed_bonds: 0,
             softening: SoftenedBonds::default(),
             mixed: None,
@@ -285,16 +291,6 @@ impl<const D: usize> LatticeBonds<D> {
             plain_force(self, fit, *modulus, displacement, start, force, track);
         }
     }
-
-    fn occupied_sites(&self) -> Vec<u32> {
-        let cells = self.lattice.cells;
-        let mut particles: Vec<u32> = (0..self.lattice.occupied.len())
-            .filter(|&index| self.lattice.occupied[index])
-            .map(|index| self.site(cell(index, cells)) as u32)
-            .collect();
-        particles.sort_unstable();
-        particles
-    }
 }
 
 fn shift<const D: usize>(strides: [usize; D], offset: [i32; D]) -> isize {
@@ -394,6 +390,12 @@ impl<const D: usize> BondForces<D> for LatticeBonds<D> {
         }
         self.kernel = lattice_kernel(fit, &stencil);
         self.law = Some((fit.clone(), modulus));
+        self.passes = Vec::new();
+    }
+
+    fn set_laws(&mut self, fits: &[&KernelFit], modulus: f64, shares: &LawShares) -> bool {
+        self.passes = self.passes_of(fits, modulus, shares).unwrap_or_default();
+        !self.passes.is_empty()
     }
 
     fn set_factors(&mut self, mut factors: Field<D>) {
@@ -420,6 +422,7 @@ impl<const D: usize> BondForces<D> for LatticeBonds<D> {
             mixed.set_factors(&factors);
         }
         self.factors = Some(factors);
+        self.passes = Vec::new();
         self.classify();
     }
 
@@ -440,7 +443,9 @@ impl<const D: usize> BondForces<D> for LatticeBonds<D> {
         force: &mut [&mut [f64]; D],
         mut track: Option<&mut StretchRange>,
     ) {
-        if !self.mixed_force(start, force, track.as_deref_mut()) {
+        if !self.passes.is_empty() {
+            self.force_of_laws(displacement, start, force, track);
+        } else if !self.mixed_force(start, force, track.as_deref_mut()) {
             self.double_force(displacement, start, force, track);
         }
     }
@@ -479,7 +484,9 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
     fn bytes(&self) -> usize {
         let factors = self.factors.as_ref().map_or(0, |_| D * self.sites * 8);
         let mixed = self.mixed.as_ref().map_or(0, Mixed::bytes);
-        self.sites * 8 * self.intact.len() + self.classes.len() + self.particles.len() * 4 + factors + mixed
+        let passes = self.passes.iter().map(LawPass::bytes).sum::<usize>();
+        let bits = self.sites * 8 * self.intact.len();
+        bits + self.classes.len() + self.particles.len() * 4 + factors + mixed + passes
     }
 
     fn kind(&self) -> BondKind<'_, D> {

@@ -1,6 +1,7 @@
 //! The lattice kernel: vectors of neighbouring particles, one bond of the stencil at a time, without gather.
 
 use super::kernel::{ForceKernel, law};
+use super::lattice_factors::{Factors, mean};
 use super::real::KernelReal;
 use crate::potential::StretchRange;
 use pulp::Simd;
@@ -52,29 +53,6 @@ pub struct Tiles<'a, const D: usize, T = f64> {
     pub factors: Option<Factors<'a, D, T>>,
     /// Largest |shift|: sites closer than this to either end hold no particle.
     pub guard: usize,
-}
-
-/// Surface-correction factors of particles.
-#[derive(Clone, Copy)]
-pub enum Factors<'a, const D: usize, T = f64> {
-    /// Equal along all axes: the weight of a bond is the mean of its ends.
-    Even(&'a [T]),
-    /// Along each axis.
-    Along([&'a [T]; D]),
-}
-
-impl<'a, const D: usize, T> Factors<'a, D, T> {
-    /// Wraps the components of a field; `even` if all are equal.
-    pub fn new(components: [&'a [T]; D], even: bool) -> Self {
-        if even { Self::Even(components[0]) } else { Self::Along(components) }
-    }
-
-    fn cover(&self, sites: usize) -> bool {
-        match self {
-            Self::Even(factors) => factors.len() == sites,
-            Self::Along(factors) => factors.iter().all(|component| component.len() == sites),
-        }
-    }
 }
 
 /// The lattice kernel: tiles and rows.
@@ -431,8 +409,7 @@ impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> StencilRow<T
         law::<T, S, P, Q>(simd, e, self.clamp, self.constant, &self.numerator, &self.denominator)
     }
 
-    /// Computes the weight of a bond from the correction factors g of its two ends, (Σ_d (n_d/ḡ_d)²)^(−1/2),
-    /// ḡ = ½(g_I + g_J); ḡ if they are even.
+    /// Computes the weight of a bond from the factors of its two ends.
     ///
     /// # Safety
     /// `here` and `there` are followed by a vector's width in every slice.
@@ -444,14 +421,40 @@ impl<T: KernelReal, const D: usize, const P: usize, const Q: usize> StencilRow<T
         here: usize,
         there: usize,
     ) -> T::Vector<S> {
-        let factors = match factors {
-            Factors::Even(factors) => {
+        let ends = [here, there];
+        match factors {
+            // SAFETY: as above
+            Factors::Even(factors) => unsafe { mean::<T, S>(simd, factors, ends) },
+            // SAFETY: as above
+            Factors::Along(along) => unsafe { self.weight_along(simd, along, here, there) },
+            Factors::Shared { along, own, whole } => {
                 // SAFETY: as above
-                let pair = unsafe { T::add(simd, T::load::<S>(factors, here), T::load::<S>(factors, there)) };
-                return T::mul(simd, pair, T::splat(simd, T::from_f64(0.5)));
+                let [own, whole] =
+                    unsafe { [mean::<T, S>(simd, own, ends), mean::<T, S>(simd, whole, ends)] };
+                let share = T::div(simd, own, whole);
+                match along {
+                    // SAFETY: as above
+                    Some(along) => {
+                        T::mul(simd, share, unsafe { self.weight_along(simd, along, here, there) })
+                    }
+                    None => share,
+                }
             }
-            Factors::Along(factors) => factors,
-        };
+        }
+    }
+
+    /// Computes (Σ_d (n_d/ḡ_d)²)^(−1/2), ḡ = ½(g_I + g_J), from factors g along each axis.
+    ///
+    /// # Safety
+    /// As [`Self::weight`].
+    #[inline(always)]
+    unsafe fn weight_along<S: Simd>(
+        &self,
+        simd: S,
+        factors: [&[T]; D],
+        here: usize,
+        there: usize,
+    ) -> T::Vector<S> {
         let four = T::splat(simd, T::from_f64(4.0));
         let inverse = T::mul(simd, four, T::splat(simd, self.inverse_square));
         let mut sum = T::splat(simd, T::from_f64(0.0));

@@ -1,7 +1,8 @@
 //! Bodies of several bond laws: the law of each particle, and the share of both ends in a bond.
 
-use super::BodyGeometry;
+use super::{BodyGeometry, TILE};
 use crate::error::Error;
+use std::ops::Range;
 
 /// Laws of the particles, by number, and their shares in bonds: half of a bond belongs to each of its ends.
 /// A bond with the law of stiffness c_I at I and that of c_J at J has the mean (c_I x_I + c_J x_J)/(c_I +
@@ -59,6 +60,26 @@ impl LawShares {
         self.numbers.get(site).map_or(0, |&number| usize::from(number))
     }
 
+    /// Refuses shares of a body that has not this number of `sites`.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`].
+    pub fn check(&self, sites: usize) -> Result<(), Error> {
+        let found = self.numbers.len();
+        if found == sites {
+            return Ok(());
+        }
+        Err(Error::geometry(format!(
+            "laws of parts: found those of another body, of {found} sites; allowed: \
+            of this body, of {sites}"
+        )))
+    }
+
+    /// Stiffness of the particle in a site.
+    pub fn stiffness_at(&self, site: usize) -> f64 {
+        self.stiffness[self.number_at(site)][site]
+    }
+
     /// Stiffness of the particles of a law, by site, 0 elsewhere.
     pub fn stiffness_of(&self, law: usize) -> &[f64] {
         &self.stiffness[law]
@@ -89,5 +110,26 @@ impl LawShares {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.numbers.len() * (size_of::<u16>() + self.stiffness.len() * size_of::<f64>())
+    }
+}
+
+/// Sites whose forces of one law are added at once.
+const BLOCK: usize = 16 * TILE;
+
+/// Adds the forces of the sites `range`, which `run` computes for blocks of whole tiles from its start, to
+/// `force` of the sites from `start` on.
+pub(super) fn add_force<const D: usize>(
+    force: &mut [&mut [f64]; D],
+    start: usize,
+    range: Range<usize>,
+    mut run: impl FnMut(usize, &mut [&mut [f64]; D]),
+) {
+    for first in range.clone().step_by(BLOCK) {
+        let count = BLOCK.min(range.end - first);
+        let mut part = [[0.0; BLOCK]; D];
+        run(first, &mut part.each_mut().map(|part| &mut part[..count]));
+        for (force, part) in force.iter_mut().zip(&part) {
+            force[first - start..].iter_mut().zip(&part[..count]).for_each(|(sum, own)| *sum += own);
+        }
     }
 }

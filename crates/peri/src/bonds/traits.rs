@@ -1,7 +1,7 @@
 //! Traits of a bonded body: its geometry, the forces of its bonds, and their damage.
 
 use super::lattice_sums::GradientSums;
-use super::{CloudBonds, LatticeBonds, Overstretched, PeriodicImage, Softened, SoftenedBonds};
+use super::{CloudBonds, LatticeBonds, LawShares, Overstretched, PeriodicImage, Softened, SoftenedBonds};
 use crate::field::{CHUNK, Field};
 use crate::potential::{EnergyTable, KernelFit, StretchRange, TangentTable};
 use rayon::prelude::*;
@@ -105,6 +105,10 @@ pub trait BodyGeometry<const D: usize>: Send + Sync {
 pub trait BondForces<const D: usize>: BodyGeometry<D> {
     /// Sets the bond law q(e) and its modulus kθ, N/m⁶.
     fn set_law(&mut self, fit: &KernelFit, modulus: f64);
+    /// Sets several laws, each of the particles that `shares` give it, for which they are of this body: a
+    /// pass of the kernel for each law, over the bonds with an end of it. Returns false if one of them has no
+    /// kernel; then the law of [`Self::set_law`] remains.
+    fn set_laws(&mut self, fits: &[&KernelFit], modulus: f64, shares: &LawShares) -> bool;
     /// Sets per-particle surface-correction factors (one field of `D` components over the sites).
     fn set_factors(&mut self, factors: Field<D>);
     /// Sets θ of solids of the mean family deformation, see [`crate::material::relief`]; call it before any

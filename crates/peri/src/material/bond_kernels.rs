@@ -8,7 +8,7 @@ use crate::bonds::{Bonds, Overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
 use crate::parallel;
-use crate::potential::{BondPotential, StretchRange};
+use crate::potential::{BondPotential, KernelFit, StretchRange};
 use crate::stress::StressTensor;
 
 /// Ratio of the largest tangent to that at rest above which every particle has the stiffness of its own
@@ -17,22 +17,22 @@ const STIFFENED: f64 = 1.2;
 /// Least tangent of a bond in its particles' stiffness, over that at rest.
 const LEAST_TANGENT: f64 = 0.25;
 
-/// Bond laws in the kernels: that of the rest in all bonds, then plain loops over the bonds of other laws.
+/// Bond laws in the kernels. If one of several is a table, the kernels evaluate that of the rest, and plain
+/// loops the bonds of other laws.
 pub(super) struct BondKernels<'a> {
     material: BondMaterial<'a>,
     /// All laws, that of the rest first.
     laws: Vec<FittedLaw<'a>>,
-    /// Particles with bonds of other laws, by site.
+    /// Particles with bonds of other laws, by site, unless kernels evaluate all laws.
     beside: Vec<u32>,
     /// Forces that softened bonds of the present displacement have lost.
     lacking: SofteningLoss,
 }
 
 impl<'a> BondKernels<'a> {
-    pub fn new<const D: usize>(material: BondMaterial<'a>, bonds: &dyn Bonds<D>) -> Self {
-        let laws = material.laws().map(|law| FittedLaw::new(law.clone())).collect();
-        let beside = material.shares().map_or_else(Vec::new, |shares| shares.beside_others(bonds));
-        Self { material, laws, beside, lacking: SofteningLoss::default() }
+    pub fn new(material: BondMaterial<'a>) -> Self {
+        let laws = material.laws().cloned().map(FittedLaw::new).collect();
+        Self { material, laws, beside: Vec::new(), lacking: SofteningLoss::default() }
     }
 
     /// Computes the mean of a quantity of the laws of a bond, by their numbers.
@@ -86,11 +86,17 @@ impl<const D: usize> SolverMaterial<D> for BondKernels<'_> {
         cover: &LawCover,
     ) -> Result<f64, Error> {
         let mut steepest = 0.0_f64;
-        for law in &mut self.laws {
-            steepest = steepest.max(law.cover(cover)?);
+        for (number, law) in self.laws.iter_mut().enumerate() {
+            let found = law.cover(cover).map_err(|error| self.material.of_law(number, error))?;
+            steepest = steepest.max(found);
         }
-        if let Some(fit) = &self.laws[0].fit {
-            bonds.set_law(fit, self.material.modulus());
+        let (fits, modulus): (Vec<&KernelFit>, _) =
+            (self.laws.iter().filter_map(|law| law.fit.as_ref()).collect(), self.material.modulus());
+        bonds.set_law(fits[0], modulus);
+        if let Some(shares) = self.material.shares() {
+            shares.check(bonds.sites())?;
+            let kernels = bonds.set_laws(&fits, modulus, shares);
+            self.beside = if kernels { Vec::new() } else { shares.beside_others(bonds) };
         }
         Ok(steepest * self.material.modulus())
     }

@@ -15,11 +15,17 @@ pub struct BondMaterial<'a> {
     /// Bonds that soften before they break, and their λ_f.
     pub(super) soft: Option<(BondSoftening, Property)>,
     /// Laws of parts of the body, and the particles of all laws.
-    parts: Option<(PartLaws<'a>, Arc<LawShares>)>,
+    parts: Option<(Vec<PartLaw<'a>>, Arc<LawShares>)>,
 }
 
-/// Laws of parts of a body beside that of the rest.
-type PartLaws<'a> = Vec<Arc<dyn BondPotential + 'a>>;
+/// Law of a part of a body.
+#[derive(Clone)]
+pub struct PartLaw<'a> {
+    /// Name of the part in messages.
+    pub part: String,
+    /// The law.
+    pub law: Arc<dyn BondPotential + 'a>,
+}
 
 impl<'a> BondMaterial<'a> {
     /// Creates the material of a law, or of a reference to one, in units of kθ = `modulus`, N/m⁶.
@@ -46,17 +52,13 @@ impl<'a> BondMaterial<'a> {
     /// Gives parts of a body laws of their own: `shares` number the law of [`Self::new`] 0, and those of
     /// `laws` from 1 on.
     ///
-    /// The forces of particles with such a law, and of their neighbours, are summed by plain loops, about
-    /// eleven times slower than the kernels.
+    /// Kernels evaluate the bonds of each law, those between two laws twice. If a law needs a table, plain
+    /// loops sum the bonds of parts and of their neighbours, about eleven times slower.
     ///
     /// # Errors
     /// [`Error::Parameter`] unless `shares` have one law more than `laws`; [`Error::Geometry`] if bonds
     /// soften.
-    pub fn with_parts(
-        self,
-        laws: Vec<Arc<dyn BondPotential + 'a>>,
-        shares: Arc<LawShares>,
-    ) -> Result<Self, Error> {
+    pub fn with_parts(self, laws: Vec<PartLaw<'a>>, shares: Arc<LawShares>) -> Result<Self, Error> {
         if shares.laws() != laws.len() + 1 {
             let (name, found) = ("laws of parts", laws.len() as f64);
             let allowed = format!("{}, one less than the shares have", shares.laws().saturating_sub(1));
@@ -67,7 +69,8 @@ impl<'a> BondMaterial<'a> {
 
     /// All laws, that of the rest first.
     pub fn laws(&self) -> impl Iterator<Item = &Arc<dyn BondPotential + 'a>> {
-        std::iter::once(&self.law).chain(self.parts.iter().flat_map(|(laws, _)| laws))
+        std::iter::once(&self.law)
+            .chain(self.parts.iter().flat_map(|(laws, _)| laws.iter().map(|part| &part.law)))
     }
 
     /// Shares of several laws in bonds.
@@ -80,7 +83,17 @@ impl<'a> BondMaterial<'a> {
     /// # Errors
     /// As [`KernelFit::new`].
     pub fn fits(&self, stretches: [f64; 2], bound: f64) -> Result<Vec<KernelFit>, Error> {
-        self.laws().map(|law| KernelFit::new(law, stretches, bound)).collect()
+        let fit = |(number, law): (usize, &Arc<dyn BondPotential + 'a>)| {
+            KernelFit::new(law, stretches, bound).map_err(|error| self.of_law(number, error))
+        };
+        self.laws().enumerate().map(fit).collect()
+    }
+
+    /// Names the part of the body whose law, by its number, has met an error.
+    pub(super) fn of_law(&self, number: usize, error: Error) -> Error {
+        let Some((laws, _)) = &self.parts else { return error };
+        let part = number.checked_sub(1).map_or("the rest of the body", |number| &laws[number].part);
+        Error::PartLaw { part: part.to_owned(), error: Box::new(error) }
     }
 
     /// Computes the mean of a quantity of the laws of a bond.
@@ -89,7 +102,7 @@ impl<'a> BondMaterial<'a> {
             None => of(&*self.law),
             Some((laws, shares)) => shares.mean(from, to, |number| match number {
                 0 => of(&*self.law),
-                number => of(&*laws[number - 1]),
+                number => of(&*laws[number - 1].law),
             }),
         }
     }
@@ -156,11 +169,11 @@ impl<const D: usize> Material<D> for BondMaterial<'_> {
         self.mean(site, site, |law| law.tangent()) / self.law.tangent()
     }
 
-    fn respond<'a>(self, bonds: &dyn Bonds<D>) -> Box<dyn SolverMaterial<D> + 'a>
+    fn respond<'a>(self, _bonds: &dyn Bonds<D>) -> Box<dyn SolverMaterial<D> + 'a>
     where
         Self: 'a,
     {
-        Box::new(BondKernels::new(self, bonds))
+        Box::new(BondKernels::new(self))
     }
 }
 

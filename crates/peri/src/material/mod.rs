@@ -38,7 +38,7 @@ mod virial;
 mod viscous;
 
 pub use affine::{Affine, AffinePoint};
-pub use bonded::BondMaterial;
+pub use bonded::{BondMaterial, PartLaw};
 pub use constitutive::Correspondence;
 pub use eight_chain::EightChainSolid;
 pub use family::{Bond, Family};

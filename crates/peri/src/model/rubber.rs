@@ -5,7 +5,7 @@ use crate::bonds::{BodyGeometry, LatticeBonds, LawShares};
 use crate::calibrate::{Calibration, lattice_factor, modulus};
 use crate::critical::{Context, Convention, Critical, Crossing};
 use crate::error::Error;
-use crate::material::BondMaterial;
+use crate::material::{BondMaterial, PartLaw};
 use crate::potential::{BondPotential, BondSoftening, Law, Scaled};
 use polycore::units::EnergyPerArea;
 use std::sync::Arc;
@@ -164,7 +164,7 @@ impl<const D: usize> IntoMaterial<D> for CompositeRubber<D> {
         bonds: &LatticeBonds<D>,
     ) -> Result<(Self::Material, Option<f64>), Error> {
         let (rest, critical) = self.rest.into_material(body, bonds)?;
-        let (mut laws, mut regions): (Vec<Arc<dyn BondPotential>>, _) = (Vec::new(), Vec::new());
+        let (mut laws, mut regions): (Vec<PartLaw<'static>>, _) = (Vec::new(), Vec::new());
         for (index, (region, rubber)) in self.parts.into_iter().enumerate() {
             let part = index + 1;
             if rubber.critical.is_some() {
@@ -178,10 +178,11 @@ impl<const D: usize> IntoMaterial<D> for CompositeRubber<D> {
             }
             let (own, _) = IntoMaterial::<D>::into_material(rubber, body, bonds)?;
             let factor = own.modulus() / rest.modulus();
-            laws.extend(
-                own.laws()
-                    .map(|law| -> Arc<dyn BondPotential> { Arc::new(Scaled { law: law.clone(), factor }) }),
-            );
+            let part = format!("part {part}");
+            laws.extend(own.laws().cloned().map(|law| {
+                let law: Arc<dyn BondPotential> = Arc::new(Scaled { law, factor });
+                PartLaw { part: part.clone(), law }
+            }));
             regions.push(region);
         }
         let number = |_, place| (regions.iter().rposition(|region| region(place)).map_or(0, |k| k + 1), 1.0);

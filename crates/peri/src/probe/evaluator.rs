@@ -88,7 +88,7 @@ impl<const D: usize> StressEvaluator<D> {
                 }
                 // the solver has made the same fits
                 let Some((_, fits)) = &*last else { return };
-                let fits = BondFits::new(fits, material.shares());
+                let Ok(fits) = BondFits::new(fits, material.shares(), bonds.sites()) else { return };
                 for site in sites.iter().map(|&site| site as usize) {
                     let (own, volume) = (state.displacement.get(site), bonds.volume(site));
                     let mut sum = [0.0; D];

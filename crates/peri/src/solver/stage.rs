@@ -3,7 +3,7 @@
 
 use super::fracture::Fracture;
 use super::load::Loads;
-use super::motion::Motion;
+use super::motion::{DynamicEnergies, Motion};
 use super::state::State;
 use super::step_control::StepControl;
 use super::system::System;
@@ -46,7 +46,10 @@ impl<const D: usize> State<D> {
             body_force,
         };
         (self.step, self.counts.iteration, self.counts.step_iterations) = (0, 0, 0);
-        (self.control, self.motion) = (StepControl::default(), Motion::default());
+        // the heat of friction goes on until explicit dynamics begins its ledger
+        let energies = DynamicEnergies { rubbed: self.motion.energies.rubbed, ..DynamicEnergies::default() };
+        (self.control, self.motion) = (StepControl::default(), Motion { energies, ..Motion::default() });
+        self.contact.begin_stage();
         if !moving {
             self.velocity = Field::zeros(self.velocity.sites());
         }

@@ -155,6 +155,14 @@ pub(super) struct ContactState<const D: usize> {
     pub renewals: u32,
 }
 
+impl<const D: usize> ContactState<D> {
+    /// Begins the next step of a programme: elastic slips stay.
+    pub fn begin_stage(&mut self) {
+        (self.friction, self.start, self.renewals) = (None, None, 0);
+        (self.active, self.surface_push) = (Vec::new(), Vec::new());
+    }
+}
+
 impl<const D: usize> State<D> {
     /// Creates the state of an undeformed body.
     pub fn new(sites: usize) -> Self {

@@ -197,6 +197,10 @@ impl VelocityVerlet {
     ) -> Result<(), Error> {
         let (factor, rate) = self.factor(system, 0.0);
         system.move_surfaces(factor, 0.0);
+        if state.stage.finished > 0 {
+            // where the step before has left them: not moved now
+            system.move_surfaces(factor, 0.0);
+        }
         system.set_rates(factor, factor);
         system.set_forces(factor, &state.displacement);
         (state.contact.friction, state.contact.start) = (None, None);

@@ -22,8 +22,9 @@ pub fn friction_pass<const D: usize>(
 ) {
     let Some(contact) = system.contact.as_mut().filter(|contact| contact.has_friction()) else { return };
     let sites = volumes.len();
-    // a body moving at the start slides to its limit in the first step
-    let span = if leap.step > 0.0 { leap.step } else { state.motion.limits.longest };
+    // a body moving at the start slides to its limit in the first step; after another one it has its slip
+    let first = if state.stage.finished == 0 { state.motion.limits.longest } else { 0.0 };
+    let span = if leap.step > 0.0 { leap.step } else { first };
     let sliding =
         contact.slide_on(&*system.bonds, &state.displacement, &state.velocity, span, &state.contact.grips);
     state.contact.grips = contact.active_grips().to_vec();

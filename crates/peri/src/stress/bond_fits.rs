@@ -1,6 +1,7 @@
 //! Fitted laws of bonds, one or one for each part of a body.
 
 use crate::bonds::LawShares;
+use crate::error::Error;
 use crate::potential::KernelFit;
 use pulp::Simd;
 use std::slice;
@@ -19,10 +20,14 @@ impl<'a> From<&'a KernelFit> for BondFits<'a> {
 }
 
 impl<'a> BondFits<'a> {
-    /// Creates the fits of several laws, in the order of their numbers in `shares`; without shares all bonds
-    /// have the first. Laws without a fit pull nothing.
-    pub fn new(fits: &'a [KernelFit], shares: Option<&'a LawShares>) -> Self {
-        Self { fits, shares }
+    /// Creates the fits of several laws of a body of `sites`, in the order of their numbers in `shares`;
+    /// without shares all bonds have the first. Laws without a fit pull nothing.
+    ///
+    /// # Errors
+    /// As [`LawShares::check`].
+    pub fn new(fits: &'a [KernelFit], shares: Option<&'a LawShares>, sites: usize) -> Result<Self, Error> {
+        shares.map_or(Ok(()), |shares| shares.check(sites))?;
+        Ok(Self { fits, shares })
     }
 
     /// q(e) of a bond.

@@ -1,18 +1,20 @@
 //! Bodies whose parts have bond laws of their own.
 
-use crate::bodies::{Body, MODULUS, Random, rms, scatter};
+use crate::bodies::{Body, MODULUS, Random, hold, rms, scatter};
+use crate::dynamics::DENSITY;
 use crate::materials::battery;
-use evidence::near;
+use evidence::{at_most, near};
 use peri::Error;
-use peri::bonds::{Bonds, LawShares, covered_stretches, stretch_range};
+use peri::bonds::{BodyGeometry, BondDamage, Bonds, LawShares, Property, covered_stretches, stretch_range};
 use peri::contact::RigidSurface;
+use peri::correction::{bond_factors, surface_factors};
 use peri::critical::Convention;
 use peri::field::{CHUNK, Field};
 use peri::geometry::Shape;
-use peri::material::{BondMaterial, LawCover, Material, Pointwise, SolverMaterial, virial};
+use peri::material::{BondMaterial, LawCover, Material, PartLaw, Pointwise, SolverMaterial, virial};
 use peri::model::{self, CompositeRubber, Model, Rubber};
 use peri::potential::{BondPotential, Law, LinearBond};
-use peri::solver::Lbfgs;
+use peri::solver::{Breaking, Lbfgs, Method, Policy, State, StepRecord, System, VelocityVerlet};
 use peri::stress::{BallVolume, BondFits, StressInput, StressMethod, SurfaceCompensation, piola};
 use std::sync::Arc;
 
@@ -20,7 +22,13 @@ use std::sync::Arc;
 fn composite<const D: usize>(bonds: &dyn Bonds<D>, laws: &[Arc<dyn BondPotential>]) -> BondMaterial<'static> {
     let of = |site: usize, _| (site % laws.len(), 1.0 + 0.5 * (site % 5) as f64);
     let shares = LawShares::new(bonds, laws.len(), of).unwrap();
-    BondMaterial::new(laws[0].clone(), MODULUS).with_parts(laws[1..].to_vec(), Arc::new(shares)).unwrap()
+    BondMaterial::new(laws[0].clone(), MODULUS)
+        .with_parts(laws[1..].iter().map(part).collect(), Arc::new(shares))
+        .unwrap()
+}
+
+fn part(law: &Arc<dyn BondPotential>) -> PartLaw<'static> {
+    PartLaw { part: "part".to_owned(), law: law.clone() }
 }
 
 fn chain(links: f64) -> Arc<dyn BondPotential> {
@@ -99,6 +107,40 @@ fn kernels_and_loops_agree() {
     }
 }
 
+/// Forces and energy of the kernels are those of plain loops with factors of bonds: stiffness alone, for
+/// which passes take the mean of both ends, surface corrections, and both.
+#[test]
+fn kernels_and_loops_agree_with_factors() {
+    let moved = Random(12).vectors::<2>(108, 0.02);
+    for (name, corrected, stiffer) in
+        [("stiffness", false, true), ("surface", true, false), ("surface and stiffness", true, true)]
+    {
+        let mut built = Body::<2>::damaged([12, 9], 0.1, 3.015).build();
+        let cases = [
+            ("lattice", &mut built.lattice as &mut dyn Bonds<2>, &built.on_lattice),
+            ("cloud", &mut built.cloud, &built.in_cloud),
+        ];
+        for (kind, bonds, sites) in cases {
+            let of = |x: [f64; 2]| if stiffer && x[0] > 0.5 { 3.0 } else { 1.0 };
+            let micromodulus = Property::new(bonds, |_, x| of(x));
+            let surface = corrected.then(|| surface_factors(bonds, MODULUS, 1.0));
+            if let Some(factors) = bond_factors(bonds, surface, &micromodulus) {
+                bonds.set_factors(factors);
+            }
+            let laws = [chain(720.0), Arc::new(LinearBond), chain(9.0)];
+            let number = |x: [f64; 2]| (5.0 * x[0]) as usize % 3;
+            let shares = LawShares::new(bonds, 3, |_, x| (number(x), of(x))).unwrap();
+            let parts = laws[1..].iter().map(part).collect();
+            let several = BondMaterial::new(laws[0].clone(), MODULUS).with_parts(parts, Arc::new(shares));
+            let several = several.unwrap();
+            let displacement = scatter(bonds.sites(), sites, &moved);
+            let mut loops = Pointwise::new(several.clone(), bonds);
+            let mut kernels = Material::<2>::respond(several, bonds);
+            compare(&format!("{kind}, {name}"), bonds, &displacement, [&mut *kernels, &mut loops], 1e-8);
+        }
+    }
+}
+
 /// Σ V P over the particles is the virial of the laws, by all measures that share bonds out.
 #[test]
 fn stresses_sum_to_the_virial() {
@@ -112,7 +154,8 @@ fn stresses_sum_to_the_virial() {
         let displacement = scatter(bonds.sites(), sites, &moved);
         let material = composite(bonds, &[chain(720.0), Arc::new(LinearBond), chain(9.0)]);
         let fits = material.fits(covered_stretches(bonds, &displacement), 1e-9).unwrap();
-        let (fit, missing) = (BondFits::new(&fits, material.shares()), SurfaceCompensation::Bonds);
+        let (fit, missing) =
+            (BondFits::new(&fits, material.shares(), bonds.sites()).unwrap(), SurfaceCompensation::Bonds);
         let state = StressInput { displacement: &displacement, fit, modulus: MODULUS, missing };
         let expected = virial(&material, &vec![(); bonds.sites()], bonds, &displacement);
         for measure in measures {
@@ -176,6 +219,26 @@ fn composites_that_cannot_be() {
     assert!(build(softening).unwrap_err().to_string().contains("bonds that soften"));
 }
 
+/// Shares of another body are refused, and a law that no fit holds is named by its part.
+#[test]
+fn errors_of_laws_name_them() {
+    let mut built = Body::<2>::solid([12, 9], 0.1, 3.015).build();
+    let small = Body::<2>::solid([6, 6], 0.1, 3.015).build();
+    let displacement = Field::zeros(built.lattice.sites());
+    let material = composite(&small.lattice, &[chain(25.0), chain(9.0)]);
+    let cover = LawCover { stretches: [0.9, 1.1], bound: 1e-9, clamped: false, known: None };
+    let found = Material::<2>::respond(material.clone(), &built.lattice)
+        .cover(&mut built.lattice, &displacement, &cover)
+        .unwrap_err();
+    assert!(found.to_string().contains("those of another body"), "{found}");
+    let fits = material.fits([0.9, 1.1], 1e-9).unwrap();
+    assert!(BondFits::new(&fits, material.shares(), built.lattice.sites()).is_err());
+    // the force of a chain falls to nothing far beyond its length
+    let found = composite(&built.lattice, &[chain(720.0), chain(2.0)]).fits([0.5, f64::NAN], 1e-9);
+    let found = found.map(drop).unwrap_err().to_string();
+    assert!(found.contains("bond law of the rest of the body: "), "{found}");
+}
+
 /// A plane pushes a body of one law as hard as the same body that has this law as a part.
 #[test]
 fn contact_has_the_stiffness_of_each_law() {
@@ -192,4 +255,42 @@ fn contact_has_the_stiffness_of_each_law() {
     let whole = pushed(CompositeRubber::new(hard.clone()));
     let part = pushed(CompositeRubber::new(soft).add_part(|_| true, hard));
     near("contact_of_a_part_of_the_whole_body", part / whole, 1.0, 1e-6);
+}
+
+/// Strips of two parts with equal laws tear at the same bonds as a strip of this law, and their ledgers
+/// close: stored, kinetic and released energy are the work done, also if the parts have different laws.
+#[test]
+fn parts_break_and_their_ledger_closes() {
+    let torn = |other: Option<f64>, end: f64| {
+        let mut built = Body::<2>::damaged([24, 20], 0.1, 3.015).build();
+        let bonds = &mut built.lattice;
+        let loads = hold(bonds, |x| {
+            (x[0] < 0.3 || x[0] > 2.1).then(|| (3, if x[0] < 0.3 { [0.0; 2] } else { [0.25, 0.05] }))
+        });
+        let mut material = BondMaterial::new(chain(100.0), MODULUS);
+        if let Some(links) = other {
+            let shares = LawShares::new(bonds, 2, |_, x| (usize::from(x[0] > 1.2), 1.0)).unwrap();
+            material = material.with_parts(vec![part(&chain(links))], Arc::new(shares)).unwrap();
+        }
+        let mut state = State::new(bonds.sites());
+        let solver = VelocityVerlet { ramp: 0.5 * end, records: 50, ..VelocityVerlet::new(DENSITY, end) };
+        let mut system = System::new(bonds, material, &loads, &[]);
+        system.breaking = Some(Breaking { criterion: 1.2.into(), policy: Policy::EachIteration });
+        solver.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
+        let scale = state.history.iter().map(|row| row.work.abs()).fold(0.0, f64::max);
+        let off = |row: &StepRecord| (row.kinetic + row.stored + row.released - row.work).abs() / scale;
+        let worst = state.history.iter().map(off).fold(0.0, f64::max);
+        drop(system);
+        (bonds.intact(), state, worst)
+    };
+    let end = 200.0 * torn(None, 1e-9).1.motion.limits.critical_step;
+    let (one, state, _) = torn(None, end);
+    let (alike, _, worst) = torn(Some(100.0), end);
+    let broken = state.fracture.broken;
+    assert!(one == alike && broken > 50, "{broken} broken");
+    // as of one law at 0.9 of the critical step, see `energies_balance`
+    at_most("ledger_of_equal_parts", worst, 0.03);
+    let (_, state, worst) = torn(Some(9.0), end);
+    assert!(state.fracture.broken > 0);
+    at_most("ledger_of_parts", worst, 0.03);
 }

@@ -140,7 +140,8 @@ fn work_of_curves_after_cuts_is_stored() {
     at_most("cut_curve_energy_balance", (intact.work / intact.stored - 1.0).abs(), 1e-2);
 }
 
-fn solve(text: &str) -> FinishedScene {
+/// Runs a scene.
+pub fn solve(text: &str) -> FinishedScene {
     let directory = tempfile::tempdir().unwrap();
     let source = Source::new("scene.toml", text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));

@@ -49,6 +49,7 @@ mod softening;
 mod solid_kernels;
 mod solids;
 mod spectra;
+mod steps_in_contact;
 mod stress;
 mod surface;
 mod tearing;

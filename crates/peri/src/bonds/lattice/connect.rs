@@ -4,7 +4,7 @@ use super::LatticeBonds;
 use crate::bonds::BodyGeometry;
 use crate::bonds::lattice_kernel::{TILE, TileClass};
 use crate::field::{CHUNK, chunk_range};
-use crate::geometry::{Cut, Gaps, cuts_within, severed};
+use crate::geometry::{Cut, Gaps, cell, cuts_within, severed};
 use crate::parallel;
 
 impl<const D: usize> LatticeBonds<D> {
@@ -55,15 +55,26 @@ impl<const D: usize> LatticeBonds<D> {
 
     /// Classifies the tiles by the checks that the kernel must make.
     pub(super) fn classify(&mut self) {
+        let one = |site: usize| {
+            self.factors.as_ref().is_none_or(|factors| factors.components().iter().all(|g| g[site] == 1.0))
+        };
+        let classes = self.classes_of(&self.intact, self.factors.is_some().then_some(&one));
+        self.classes = classes;
+    }
+
+    /// Classifies tiles by their bonds; particles `plain` have factors of 1, all without it.
+    pub(super) fn classes_of(
+        &self,
+        intact: &[Vec<u64>],
+        plain: Option<&(dyn Fn(usize) -> bool + Sync)>,
+    ) -> Vec<TileClass> {
         let bonds = self.stencil.offsets.len();
-        let full: Vec<u64> =
-            (0..self.intact.len()).map(|w| u64::MAX >> (64 - (bonds - 64 * w).min(64))).collect();
+        let full: Vec<u64> = (0..intact.len()).map(|w| u64::MAX >> (64 - (bonds - 64 * w).min(64))).collect();
         let shifts: Vec<isize> = self.stencil.offsets.iter().map(|&o| self.shift(o)).collect();
-        let (intact, factors, guard, sites) = (&self.intact, &self.factors, self.guard, self.sites);
+        let (guard, sites) = (self.guard, self.sites);
         let uniform = |site: usize| {
-            let Some(factors) = factors else { return true };
-            let one = |s: usize| factors.components().iter().all(|g| g[s] == 1.0);
-            one(site) && shifts.iter().all(|&s| one(site.wrapping_add_signed(s)))
+            let Some(plain) = plain else { return true };
+            plain(site) && shifts.iter().all(|&s| plain(site.wrapping_add_signed(s)))
         };
         let class = |tile: usize| {
             let mut range = tile * TILE..(tile + 1) * TILE;
@@ -78,8 +89,7 @@ impl<const D: usize> LatticeBonds<D> {
                 TileClass::Partial
             }
         };
-        let classes = parallel::map(sites / TILE, class);
-        self.classes = classes;
+        parallel::map(sites / TILE, class)
     }
 
     /// Returns, for each cell, whether a particle occupies it.
@@ -114,5 +124,16 @@ impl<const D: usize> LatticeBonds<D> {
 
     pub(super) fn site(&self, cell: [usize; D]) -> usize {
         self.guard + (0..D).map(|d| self.strides[d] * cell[d]).sum::<usize>()
+    }
+
+    /// Returns the sites of all particles, ascending.
+    pub(super) fn occupied_sites(&self) -> Vec<u32> {
+        let cells = self.lattice.cells;
+        let mut particles: Vec<u32> = (0..self.lattice.occupied.len())
+            .filter(|&index| self.lattice.occupied[index])
+            .map(|index| self.site(cell(index, cells)) as u32)
+            .collect();
+        particles.sort_unstable();
+        particles
     }
 }

@@ -6,17 +6,11 @@ use crate::bonds::{BondDamage, Overstretched, Softened, SoftenedBonds};
 
 impl<const D: usize> BondDamage<D> for LatticeBonds<D> {
     fn break_bonds(&mut self, bonds: &[Overstretched]) {
-        for bond in bonds {
-            let (site, k) = (bond.site as usize, bond.index as usize);
-            self.intact[k / 64][site] &= !(1 << (k % 64));
+        sever(&mut self.intact, &mut self.classes, bonds);
+        for pass in &mut self.passes {
+            sever(&mut pass.intact, &mut pass.classes, bonds);
         }
         self.directed_bonds -= bonds.len() as u64;
-        let mut tiles: Vec<usize> = bonds.iter().map(|bond| bond.site as usize / TILE).collect();
-        tiles.dedup();
-        for tile in tiles {
-            let empty = (tile * TILE..(tile + 1) * TILE).all(|s| self.intact.iter().all(|w| w[s] == 0));
-            self.classes[tile] = if empty { TileClass::Empty } else { TileClass::Partial };
-        }
     }
 
     fn softening(&self) -> &SoftenedBonds {
@@ -44,10 +38,27 @@ impl<const D: usize> BondDamage<D> for LatticeBonds<D> {
         }
         self.directed_bonds = self.intact.iter().flatten().map(|word| u64::from(word.count_ones())).sum();
         self.classify();
+        for pass in &mut self.passes {
+            pass.restore(&self.intact);
+        }
         true
     }
 
     fn directed_bonds(&self) -> u64 {
         self.directed_bonds
+    }
+}
+
+/// Clears the bits of bonds, and classifies their tiles again.
+fn sever(intact: &mut [Vec<u64>], classes: &mut [TileClass], bonds: &[Overstretched]) {
+    for bond in bonds {
+        let (site, k) = (bond.site as usize, bond.index as usize);
+        intact[k / 64][site] &= !(1 << (k % 64));
+    }
+    let mut tiles: Vec<usize> = bonds.iter().map(|bond| bond.site as usize / TILE).collect();
+    tiles.dedup();
+    for tile in tiles {
+        let empty = (tile * TILE..(tile + 1) * TILE).all(|s| intact.iter().all(|w| w[s] == 0));
+        classes[tile] = if empty { TileClass::Empty } else { TileClass::Partial };
     }
 }

@@ -5,7 +5,8 @@
 
 use super::LatticeBonds;
 use crate::bonds::BondForces;
-use crate::bonds::lattice_kernel::{Factors, Tiles};
+use crate::bonds::lattice_factors::Factors;
+use crate::bonds::lattice_kernel::Tiles;
 use crate::bonds::rows::{LatticeKernel, StencilBond, single_kernel};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::parallel;

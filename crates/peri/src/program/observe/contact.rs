@@ -18,7 +18,7 @@ const UNDEFORMED: f64 = 1e-12;
 fn contact_stiffness(contact: &ContactSpec, scene: &Scene) -> f64 {
     let own = contact.plane.first().map(|plane| plane.stiffness);
     let own = own.or(contact.indenter.first().map(|indenter| indenter.stiffness));
-    own.map(|own| contact.stiffness_of(own, scene.dynamics.is_some()))
+    own.map(|own| contact.stiffness_of(own, scene.has_dynamics()))
         .or(contact.short_range)
         .unwrap_or(contact.pair_stiffness())
 }

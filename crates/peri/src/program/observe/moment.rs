@@ -122,7 +122,7 @@ impl<'a, const D: usize> Moment<'a, D> {
         let gradients =
             phases.time("deformation gradient", || deformation_gradients(bonds, &state.displacement));
         let (modulus, missing) = (material.modulus(), SurfaceCompensation::WindowAt(&self.physics.by_window));
-        let fit = BondFits::new(&fits, material.shares());
+        let fit = BondFits::new(&fits, material.shares(), bonds.sites())?;
         let loaded = StressInput { displacement: &state.displacement, fit, modulus, missing };
         let measured = stress::piolas(bonds, &loaded, &spec.measures, spec.ball);
         for (&measure, MeasuredStress { piola, seconds }) in spec.measures.iter().zip(measured) {

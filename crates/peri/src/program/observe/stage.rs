@@ -1,5 +1,6 @@
 //! Later steps of a scene: their loads, cracks and velocities.
 
+use crate::contact::RigidSurface;
 use crate::error::Error;
 use crate::field::Field;
 use crate::geometry::Cut;
@@ -13,6 +14,8 @@ pub struct SceneStage<const D: usize> {
     cuts: Vec<Cut<D>>,
     /// Velocities that the step prescribes at its start, m/s; 0 where it prescribes none.
     velocity: Option<Field<D>>,
+    /// Rigid surfaces with their motion in the step.
+    pub surfaces: Vec<RigidSurface<D>>,
 }
 
 impl<const D: usize> SceneStage<D> {
@@ -38,7 +41,10 @@ impl<const D: usize> SceneStage<D> {
             let cuts = scene::step_cuts(&source, &scene, &*body.bonds)?;
             let moves = scene.boundary.iter().any(scene::Boundary::prescribes_velocity);
             let velocity = moves.then(|| scene::velocities_of(&source, &scene, body)).transpose()?;
-            Ok(Self { loads, cuts, velocity })
+            scene::check_surfaces(&source, &scene, body)?;
+            let contact = scene.contact.as_ref();
+            let surfaces = contact.map(|own| own.surfaces(&source, &scene)).transpose()?.unwrap_or_default();
+            Ok(Self { loads, cuts, velocity, surfaces })
         };
         (1..=scene.step.len()).map(of).collect()
     }

@@ -196,6 +196,7 @@ fn run_variant<const D: usize>(
                 stage.begin([&scene.stage(before), &own_scene], &body, force, &mut state);
             }
             physics.loads = stage.loads(&own_scene, &state);
+            physics.surfaces.clone_from(&stage.surfaces);
         }
         let watched = (&mut observers, &mut frames);
         let own = (&*own_source, &*own_scene, device.card.as_ref().filter(|_| index == 0));

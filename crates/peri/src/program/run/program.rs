@@ -61,7 +61,7 @@ impl Fault for Error {
             | Self::NotConverged { .. }
             | Self::Unstable { .. }
             | Self::Penetration { .. } => 1,
-            Self::Within { error, .. } => error.exit_code(),
+            Self::Within { error, .. } | Self::PartLaw { error, .. } => error.exit_code(),
             Self::Shared(error) => error.exit_code(),
         }
     }

@@ -65,7 +65,8 @@ pub struct PlaneSpec {
     /// Ties the faces of the body that lie on the plane at the start, in all directions; default: false.
     #[serde(default)]
     pub bonded: bool,
-    /// Displacement at the end of the last step; the plane follows the load factor.
+    /// Displacement at the end of the last step; the plane follows the load factor, and stays there in a
+    /// later [[step]].
     pub displacement: Option<Vec<Length>>,
     /// Velocity, in explicit dynamics; added to the displacement.
     pub velocity: Option<Vec<Speed>>,
@@ -192,7 +193,7 @@ impl ContactSpec {
         source: &Source,
         scene: &Scene,
     ) -> Result<Vec<RigidSurface<D>>, SceneError> {
-        let explicit = scene.method() == SolverMethod::Verlet;
+        let explicit = scene.has_dynamics();
         let planes = self.plane.iter().enumerate();
         let planes = planes
             .map(|(index, plane)| self.plane_in(source, &format!("contact.plane[{index}]"), plane, explicit));
@@ -278,7 +279,9 @@ pub fn tied_grips<const D: usize>(
         let allowed = "false: only solids (`[material.solid]`) on a lattice have faces to tie";
         return Err(source.error("contact.tied_grips", "true", allowed));
     }
-    let default = can && contact.has_surfaces() && !scene.breaks();
+    // each step holds regions of its own
+    let alone = scene.step.is_empty() && !scene.later;
+    let default = can && alone && contact.has_surfaces() && !scene.breaks();
     let Some(lattice) = bonds.as_lattice().filter(|_| contact.tied_grips.unwrap_or(default)) else {
         return Ok(None);
     };

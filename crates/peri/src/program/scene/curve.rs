@@ -66,8 +66,10 @@ impl Scene {
     }
 }
 
-/// Time of a run with curves: its end, s, and the load factor of boundaries without a curve.
+/// Time of a run with curves, or of one of its steps: its end, s, and the load factor of what has no curve.
 pub(super) struct CurveTime {
+    /// Time of a curve at the start, s.
+    begin: f64,
     pub(super) end: f64,
     explicit: bool,
     moments: Vec<f64>,
@@ -79,24 +81,36 @@ impl CurveTime {
         if let Some(dynamics) = &scene.dynamics {
             let (end, ramp) = (dynamics.method().end_time, dynamics.method().ramp);
             let common = match dynamics.factor.clone() {
-                Some(factor) => of_formula(factor, end),
+                Some(factor) => of_formula(factor, [0.0, end]),
                 None => Amplitude::new(move |part| {
                     let (value, rate) = ramped(part * end, ramp);
                     (value, rate * end)
                 }),
             };
             let moments = (0..=MOMENTS).map(|k| end * f64::from(k) / f64::from(MOMENTS)).collect();
-            return Self { end, explicit: true, moments, common };
+            return Self { begin: 0.0, end, explicit: true, moments, common };
         }
         let (factors, times) = scene.programme();
         let Some(&end) = times.last() else {
             // a later step without times: the load factor itself
             let common = Amplitude::new(|part| (part, 1.0));
-            return Self { end: 1.0, explicit: false, moments: Vec::new(), common };
+            return Self { begin: 0.0, end: 1.0, explicit: false, moments: Vec::new(), common };
         };
         let moments: Vec<f64> = std::iter::once(0.0).chain(times).collect();
         let factors = std::iter::once(0.0).chain(factors).collect();
-        Self { end, explicit: false, common: of_rows(moments.clone(), factors, end), moments }
+        let common = of_rows(moments.clone(), factors, [0.0, end]);
+        Self { begin: 0.0, end, explicit: false, common, moments }
+    }
+
+    /// Time of rigid surfaces: their curves are over the time of all steps, and those without one stay where
+    /// the first step has left them.
+    pub(super) fn of_surfaces(scene: &Scene) -> Self {
+        let mut time = Self::new(scene);
+        if scene.later {
+            let factor = scene.earlier.factor;
+            (time.begin, time.common) = (scene.earlier.time, Amplitude::new(move |_| (factor, 0.0)));
+        }
+        time
     }
 
     /// Times at which curves and formulas are checked, s.
@@ -118,7 +132,7 @@ impl CurveTime {
                     let found = format!("`{found}` in `{}`", formula.text());
                     return Err(source.error(key, found, "a formula of `t`, the time in s"));
                 }
-                of_formula(formula.clone(), self.end)
+                of_formula(formula.clone(), [self.begin, self.end])
             }
             CurveSpec::Table(table) => self.of_table(source, key, table, values)?,
         };
@@ -126,13 +140,14 @@ impl CurveTime {
             let (value, rate) =
                 (amplitude.multiple(time / self.end), amplitude.rate(time / self.end) / self.end);
             if !value.is_finite() || self.explicit && !rate.is_finite() {
-                let found = format!("{value}, rising at {rate} 1/s, at {} s", plain(time));
-                let allowed = format!("finite values and rates from 0 s to {} s", plain(self.end));
+                let found = format!("{value}, rising at {rate} 1/s, at {} s", plain(self.begin + time));
+                let allowed =
+                    format!("finite values and rates from 0 s to {} s", plain(self.begin + self.end));
                 return Err(source.error(key, found, allowed));
             }
         }
         let start = amplitude.multiple(0.0);
-        if !self.explicit && values.moves() && start.abs() > START {
+        if !self.explicit && self.begin == 0.0 && values.moves() && start.abs() > START {
             let found = format!("{start} at 0 s");
             return Err(source.error(key, found, "0 at 0 s: a quasi-static run begins at rest"));
         }
@@ -190,10 +205,11 @@ impl CurveTime {
             let allowed = format!("{allowed}, as column `{}` multiplies it", table.headings[of].text);
             return Err(source.error(&format!("{key}.value"), found, allowed));
         }
-        let whole = format!("times from 0 s to {} s, the whole run", plain(self.end));
+        let end = self.begin + self.end;
+        let whole = format!("times from 0 s to {} s, the whole run", plain(end));
         match (times.first(), times.last()) {
-            (Some(&first), Some(&last)) if first <= 0.0 && last >= self.end * (1.0 - 1e-9) => {
-                Ok(of_rows(times, rows, self.end))
+            (Some(&first), Some(&last)) if first <= 0.0 && last >= end * (1.0 - 1e-9) => {
+                Ok(of_rows(times, rows, [self.begin, self.end]))
             }
             (Some(first), Some(last)) => {
                 let found = format!("times from {} s to {} s", plain(*first), plain(*last));
@@ -204,23 +220,25 @@ impl CurveTime {
     }
 }
 
-/// Amplitude of a formula of the time in a run that ends at `end`, s.
-fn of_formula(formula: Formula, end: f64) -> Amplitude {
+/// Amplitude of a formula of the time over `end`, s, from `begin` on.
+fn of_formula(formula: Formula, [begin, end]: [f64; 2]) -> Amplitude {
     Amplitude::new(move |part| {
-        let (value, rate) = formula.value_and_rate(part * end);
+        let (value, rate) = formula.value_and_rate(begin + part * end);
         (value, rate * end)
     })
 }
 
-/// Amplitude that is linear between points of time, s; at a point it has the rate after it.
-fn of_rows(times: Vec<f64>, values: Vec<f64>, end: f64) -> Amplitude {
+/// Amplitude that is linear between points of time, s, over `end` from `begin` on; at a point it has the rate
+/// after it.
+fn of_rows(times: Vec<f64>, values: Vec<f64>, [begin, end]: [f64; 2]) -> Amplitude {
     Amplitude::new(move |part| {
-        let after = times.partition_point(|&time| time <= part * end);
+        let now = begin + part * end;
+        let after = times.partition_point(|&time| time <= now);
         let after = after.min(times.len() - 1).max(usize::from(times.len() > 1));
         let before = after.saturating_sub(1);
         let length = times[after] - times[before];
         let rise = if length > 0.0 { (values[after] - values[before]) / length } else { 0.0 };
-        let within = (part * end).clamp(times[before], times[after]) - times[before];
+        let within = now.clamp(times[before], times[after]) - times[before];
         // the end of a line to the bit
         let value = if within == length { values[after] } else { values[before] + rise * within };
         (value, rise * end)
@@ -411,7 +429,7 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     }
     let Some(time) = &scene.time else {
         let Some(first) = first else { return Ok(()) };
-        let why = format!("needed for `{first}`: the steps of a programme, or [dynamics]");
+        let why = format!("needed for `{first}`: the steps of a programme, or dynamics");
         return Err(source.missing("time", why));
     };
     let idle = |boundary: &Boundary| boundary.timed().is_none() && Multiplied::new(boundary, None).is_load();
@@ -435,12 +453,14 @@ mod tests {
 
     #[test]
     fn rows_are_joined_by_lines() {
-        let amplitude = of_rows(vec![0.0, 2.0, 3.0], vec![0.0, 4.0, 4.0], 3.0);
+        let amplitude = of_rows(vec![0.0, 2.0, 3.0], vec![0.0, 4.0, 4.0], [0.0, 3.0]);
         let found = [0.0, 1.0, 2.0, 2.5, 3.0]
             .map(|time| (amplitude.multiple(time / 3.0), amplitude.rate(time / 3.0)));
         let near = |(a, b): ((f64, f64), (f64, f64))| (a.0 - b.0).abs() < 1e-14 && (a.1 - b.1).abs() < 1e-14;
         let expected = [(0.0, 6.0), (2.0, 6.0), (4.0, 0.0), (4.0, 0.0), (4.0, 0.0)];
         assert!(found.into_iter().zip(expected).all(near), "{found:?}");
+        let later = of_rows(vec![0.0, 2.0, 3.0], vec![0.0, 4.0, 4.0], [1.0, 2.0]);
+        assert_eq!([0.0, 0.5, 1.0].map(|part| later.multiple(part)), [2.0, 4.0, 4.0]);
     }
 
     #[test]

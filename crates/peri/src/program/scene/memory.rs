@@ -70,7 +70,7 @@ fn bytes_of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> 
         }
         each += if contact.has_friction() { 3.0 * vector } else { 0.0 };
     }
-    each += super::part_law::memory_of_a_site(scene);
+    each += super::part_law::memory_of_a_site(scene, masks);
     if let Some(solid) = &scene.material.solid {
         // histories in points, in the state, in a checkpoint; a heap block each
         let remembered = solid.memory_of_a_particle() as f64;
@@ -140,6 +140,7 @@ pub fn needed<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> f64 {
                 + bytes_of_relief::<D>(scene, particles)
                 + bytes_of_pairs::<D>(scene, particles)
                 + shared
+                + super::part_law::memory_of_a_bond(scene) * directed
         }
     };
     ALWAYS + body + bytes_of_results::<D>(scene, particles)

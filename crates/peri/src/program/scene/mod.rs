@@ -74,11 +74,11 @@ pub use method::{DeviceChoice, Dynamics, ForcePrecision, SolverMethod, SolverSpe
 pub use network::{ChemistrySpec, explain_network, resolve_network};
 pub use part_law::laws_of_parts;
 pub use periodic::PeriodicSpec;
-pub use placement::{check_placement, exact_plate};
+pub use placement::{check_placement, check_surfaces, exact_plate};
 pub use probe::{HistoryProbe, Track};
 pub use shapes::{AxisName, ShapeKind, ShapeSpec};
 pub use solid::{SolidKind, SolidLaw};
-pub use step::{StepSpec, step_cuts};
+pub use step::{EarlierSteps, StepSpec, step_cuts};
 pub use tearing::{explain_tearing, tearing_warnings};
 pub use time::{TimeProgramSpec, TimeStep};
 pub use values::{DiscreteBody, plain};
@@ -135,6 +135,9 @@ pub struct Scene {
     /// True for the scene of a later step, see [`Scene::stage`].
     #[serde(skip)]
     pub later: bool,
+    /// Steps before this one.
+    #[serde(skip)]
+    pub earlier: EarlierSteps,
     /// Repulsion of particles without a bond, friction, rigid planes and indenters; default: none.
     pub contact: Option<ContactSpec>,
     /// Quantities recorded in every row of the history.

@@ -6,6 +6,7 @@ use super::{Inclusions, Material, Scene};
 use crate::bonds::{Bonds, LawShares};
 use crate::critical::Critical;
 use crate::error::Error;
+use crate::material::PartLaw;
 use crate::potential::{BondPotential, Law};
 use harness::scene::{SceneError, Source};
 use std::sync::Arc;
@@ -128,7 +129,7 @@ impl Material {
 }
 
 /// Bond laws of parts of a body, and the particles of all laws.
-pub type LawsOfParts = (Vec<Arc<dyn BondPotential>>, Arc<LawShares>);
+pub type LawsOfParts = (Vec<PartLaw<'static>>, Arc<LawShares>);
 
 /// Builds the bond laws of parts of the body; `None` if all particles have that of the rest.
 ///
@@ -151,7 +152,16 @@ pub fn laws_of_parts<const D: usize>(
     }
     let of = |site: usize, _| (numbers[site], inclusions.micromodulus.value_at(site));
     let shares = LawShares::new(bonds, laws.len(), of)?;
-    let built = laws[1..].iter().map(|choice| Ok(Arc::from(choice.build()?)));
+    let built = laws[1..].iter().map(|choice| {
+        let parts = scene.material.inclusions.iter().enumerate();
+        let own = parts.filter(|(_, part)| scene.material.law_of(part).as_ref() == Some(choice));
+        let name = |(index, part): (usize, &Inclusion)| match &part.part {
+            Some(name) => format!("part `{name}`"),
+            None => format!("`material.inclusions[{index}]`"),
+        };
+        let part = own.map(name).collect::<Vec<_>>().join(", ");
+        Ok(PartLaw { part, law: Arc::from(choice.build()?) })
+    });
     Ok(Some((built.collect::<Result<_, Error>>()?, Arc::new(shares))))
 }
 
@@ -201,15 +211,23 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
 pub(super) fn explain<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<String> {
     let laws = scene.material.laws();
     let names: Vec<&str> = laws.iter().map(|choice| choice.law.name()).collect();
-    let megabytes = memory_of_a_site(scene) * bonds.sites() as f64 / 1e6;
-    (laws.len() > 1).then(|| {
-        format!("bond laws {}: shares {megabytes:.1} MB, plain loops over bonds of parts", names.join(", "))
-    })
+    let words = bonds.as_lattice().map_or(0, |lattice| lattice.stencil().offsets.len().div_ceil(64));
+    let megabytes = memory_of_a_site(scene, 8.0 * words as f64) * bonds.sites() as f64 / 1e6;
+    (laws.len() > 1)
+        .then(|| format!("bond laws {}: {megabytes:.1} MB, a pass of the kernel for each", names.join(", ")))
 }
 
-/// Returns the bytes of a site for the shares of several laws.
-pub(super) fn memory_of_a_site(scene: &Scene) -> f64 {
+/// Returns the bytes of a site for the shares of several laws, and for their passes over bonds of `masks`
+/// bytes a site.
+pub(super) fn memory_of_a_site(scene: &Scene, masks: f64) -> f64 {
+    let laws = scene.material.laws().len() as f64;
+    // number and shares of laws, numbers and sites of particles while they are made; factors and bonds of
+    // passes, stiffness of all particles
+    if laws > 1.0 { 2.0 + 8.0 * laws + 8.0 + 4.0 + laws * (8.0 + 8.0 + masks) } else { 0.0 }
+}
+
+/// Returns the bytes of a bond of a cloud for its weights in the passes of several laws.
+pub(super) fn memory_of_a_bond(scene: &Scene) -> f64 {
     let laws = scene.material.laws().len();
-    // number and shares of laws, numbers and sites of particles while they are made
-    if laws > 1 { (2 + 8 * laws + 8 + 4) as f64 } else { 0.0 }
+    if laws > 1 { 8.0 * laws as f64 } else { 0.0 }
 }

@@ -22,8 +22,7 @@ pub fn check_placement<const D: usize>(
         check_hole(source, body, exact.hole().0)?;
     }
     plate_frame(source, scene, body)?;
-    super::planes::check(source, scene, body)?;
-    super::indenter_place::check(source, scene, body)?;
+    check_surfaces(source, scene, body)?;
     let surfaces = scene.contact.as_ref().map_or(Ok(Vec::new()), |own| own.surfaces(source, scene))?;
     let rigid: Vec<[f64; D]> = surfaces.iter().flat_map(RigidSurface::path).collect();
     let reach = loads.reach(&*body.bonds, &rigid);
@@ -36,6 +35,19 @@ pub fn check_placement<const D: usize>(
         }
     }
     Ok(())
+}
+
+/// Checks the places of rigid surfaces during a step.
+///
+/// # Errors
+/// A surface inside the body, planes without room between them, steps too long for an indenter.
+pub fn check_surfaces<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &DiscreteBody<D>,
+) -> Result<(), SceneError> {
+    super::planes::check(source, scene, body)?;
+    super::indenter_place::check(source, scene, body)
 }
 
 /// Returns half the edges of the plate of `[exact]` and the width of its loaded layers, m; `None` for other

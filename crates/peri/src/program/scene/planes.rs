@@ -138,7 +138,7 @@ pub(super) fn check<const D: usize>(
                 let gap = apart - own.displacement(factor, time) - other.displacement(factor, time);
                 if gap < LEAST_ROOM * body_between {
                     let when = if time > 0.0 {
-                        format!("time {time:.3e} s")
+                        format!("time {:.3e} s", scene.earlier.time + time)
                     } else {
                         format!("load factor {factor:.3}")
                     };
@@ -156,7 +156,10 @@ pub(super) fn check<const D: usize>(
         }
     }
     if let Some((factor, time)) = moments(scene).into_iter().find(|&(f, t)| !has_room(&planes, body, f, t)) {
-        let when = if time > 0.0 { format!("time {time:.3e} s") } else { format!("load factor {factor:.3}") };
+        let when = match time > 0.0 {
+            true => format!("time {:.3e} s", scene.earlier.time + time),
+            false => format!("load factor {factor:.3}"),
+        };
         let names: Vec<String> = planes.iter().map(|position| format!("`{}`", position.name)).collect();
         let found = format!("planes {} that leave no room between them at {when}", names.join(", "));
         return Err(source.error(
@@ -235,7 +238,8 @@ pub(super) fn warnings<const D: usize>(
                 position.name, -gap
             ));
         }
-        let moves = position.plane.moves();
+        // a later step may bring it nearer
+        let moves = position.plane.moves() && scene.step.is_empty();
         let reach = moments(scene).into_iter().map(|(f, t)| position.displacement(f, t)).fold(0.0, f64::max);
         let far = reach < gap - PRESTRESSED * spacing && !position.plane.bonded;
         (moves && far && scene.dynamics.is_none()).then(|| {

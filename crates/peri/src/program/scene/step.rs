@@ -2,9 +2,10 @@
 
 use super::check::check_variant;
 use super::{
-    BodyForceSpec, Boundary, CrackSpec, DeviceChoice, Dynamics, Prescribed, Scene, SolverMethod, SolverSpec,
+    BodyForceSpec, Boundary, ContactSpec, CrackSpec, DeviceChoice, Dynamics, Prescribed, Scene, SolverMethod,
+    SolverSpec,
 };
-use super::{TimeProgramSpec, crack, loads::own_region_names};
+use super::{TimeProgramSpec, common_amplitude, crack, loads::own_region_names};
 use crate::bonds::Bonds;
 use crate::geometry::Cut;
 use harness::scene::{SceneError, Source};
@@ -30,6 +31,17 @@ pub struct StepSpec {
     /// Cracks that appear at the start.
     #[serde(default)]
     pub cracks: Vec<CrackSpec>,
+}
+
+/// Steps before a later one.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct EarlierSteps {
+    /// Their time, s.
+    pub(super) time: f64,
+    /// Load factor at the end of the first step, at which rigid surfaces without a curve stay.
+    pub(super) factor: f64,
+    /// True if any step of the scene is explicit dynamics.
+    explicit: bool,
 }
 
 /// Keys of a step and the keys of the scene in whose place they are.
@@ -64,13 +76,34 @@ impl Scene {
         scene.solver = solver.unwrap_or_default();
         scene.solver.method = scene.solver.method.or(explicit);
         (scene.body.cracks, scene.step, scene.later) = (cracks, Vec::new(), true);
+        let later = self.step[..index - 1].iter().map(|own| (&own.time, &own.dynamics));
+        let all = std::iter::once((&self.time, &self.dynamics)).chain(later);
+        let time = all.map(|(time, dynamics)| duration(time.as_ref(), dynamics.as_ref())).sum();
+        scene.earlier = EarlierSteps { time, factor: self.last_factor(), explicit: self.has_dynamics() };
         Cow::Owned(scene)
+    }
+
+    /// Returns the load factor at the end of the step.
+    fn last_factor(&self) -> f64 {
+        let last = self.programme().0.last().copied().unwrap_or(1.0);
+        if self.dynamics.is_some() { common_amplitude(self).multiple(1.0) } else { last }
+    }
+
+    /// Returns true if any step of the scene is explicit dynamics.
+    pub fn has_dynamics(&self) -> bool {
+        self.earlier.explicit || self.dynamics.is_some() || self.step.iter().any(|own| own.dynamics.is_some())
     }
 
     /// Returns the scene of the last step.
     pub fn at_end(&self) -> Cow<'_, Self> {
         self.stage(self.step.len())
     }
+}
+
+/// Returns the time of a step, s; 0 without times.
+fn duration(time: Option<&TimeProgramSpec>, dynamics: Option<&Dynamics>) -> f64 {
+    let ramps = time.iter().flat_map(|time| &time.step).map(|own| own.duration.si()).sum();
+    dynamics.map_or(ramps, |dynamics| dynamics.end_time.si())
 }
 
 /// Returns the cuts of a later step.
@@ -100,11 +133,8 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     if scene.step.is_empty() {
         return Ok(());
     }
-    if let Some(contact) = &scene.contact
-        && (contact.has_friction() || contact.has_surfaces())
-    {
-        let why = "friction and rigid surfaces are not carried over to the next step";
-        return Err(source.conflict("contact", "step", why));
+    if let Some(contact) = &scene.contact {
+        refuse_in_contact(source, contact)?;
     }
     for index in 0..=scene.step.len() {
         let (source, scene) = (scene.source_of(source, index), scene.stage(index));
@@ -112,6 +142,12 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             let name = if scene.solver.snap_back { "snap_back" } else { "refine" };
             let why = "not available with [[step]]";
             return Err(source.unexpected(&format!("solver.{name}"), why));
+        }
+        let surfaces = scene.contact.as_ref().is_some_and(ContactSpec::has_surfaces);
+        if surfaces && scene.solver.stop_below.is_some() {
+            let why =
+                "not available with [[step]] and rigid surfaces: each has its place at the end of a step";
+            return Err(source.unexpected("solver.stop_below", why));
         }
         if scene.is_mixed() {
             let why = "all steps of a run have one precision";
@@ -152,6 +188,30 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             return Err(source.error("dynamics.device", "a graphics card in a later step", "`cpu`"));
         }
         check_variant(&source, &scene)?;
+    }
+    Ok(())
+}
+
+/// Refuses what rigid surfaces do not carry over to the next step.
+fn refuse_in_contact(source: &Source, contact: &ContactSpec) -> Result<(), SceneError> {
+    let planes = contact.plane.iter().enumerate();
+    let planes =
+        planes.map(|(index, own)| (format!("contact.plane[{index}]"), own.velocity.is_some(), false));
+    let indenters = contact.indenter.iter().enumerate().map(|(index, own)| {
+        (format!("contact.indenter[{index}]"), own.velocity.is_some(), own.force.is_some())
+    });
+    for (key, velocity, force) in planes.chain(indenters) {
+        if velocity {
+            let why = "with [[step]] a `displacement` and its `curve` over the time of all steps move it";
+            return Err(source.conflict(&format!("{key}.velocity"), "step", why));
+        }
+        if force {
+            let why = "with [[step]] a rigid surface moves by a `displacement`";
+            return Err(source.conflict(&format!("{key}.force"), "step", why));
+        }
+    }
+    if contact.tied_grips == Some(true) {
+        return Err(source.conflict("contact.tied_grips", "step", "each step holds regions of its own"));
     }
     Ok(())
 }

@@ -74,6 +74,6 @@ pub(super) fn surface_amplitudes<const D: usize>(
     if !scene.has_curves() {
         return Ok(vec![None; surfaces.len()]);
     }
-    let time = CurveTime::new(scene);
+    let time = CurveTime::of_surfaces(scene);
     surfaces.iter().map(|surface| surface.amplitudes(source, &time).map(Some)).collect()
 }
