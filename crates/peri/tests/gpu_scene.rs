@@ -101,3 +101,76 @@ fn gpu_scene_has_the_report_of_the_processor() {
         assert_eq!(crack(&found), crack(&host));
     }
 }
+
+/// A notched plate that is torn between equilibria.
+const TORN: &str = r#"
+version = 1
+program = "peri"
+[body]
+space = "plane-stress"
+thickness = "1 mm"
+spacing = "1 mm"
+shapes = [{ add = "box", min = ["0 mm", "0 mm"], max = ["24 mm", "30 mm"] }]
+cracks = [{ from = ["-1 mm", "15 mm"], to = ["9.6 mm", "15 mm"] }]
+[material]
+youngs_modulus = "191 GPa"
+law = "linear"
+critical = { stretch = 1.02 }
+[[boundary]]
+name = "pulled"
+min = ["0 mm", "27 mm"]
+max = ["24 mm", "30 mm"]
+displacement = ["0 mm", "0.2 mm"]
+[[boundary]]
+name = "fixed"
+min = ["0 mm", "0 mm"]
+max = ["24 mm", "3 mm"]
+displacement = ["0 mm", "0 mm"]
+[solver]
+method = "adr"
+steps = 8
+device = "cpu"
+[output]
+pictures = false
+fields = false
+"#;
+
+/// Compares the report of a scene with `device = "cpu"` with that on the device of this machine, in both
+/// precisions.
+fn compare_equilibria(text: &str, allowed: f64) {
+    let host = run("host.toml", text).unwrap();
+    let Ok(device) = Device::portable() else {
+        return evidence::skipped("a device behind Vulkan, Metal or DirectX 12");
+    };
+    for (precision, word) in [(Precision::Double, "double"), (Precision::Single, "single")] {
+        if Device::portable().and_then(|device| device.with_precision(precision)).is_err() {
+            continue;
+        }
+        let scene = text.replace("device = \"cpu\"", &format!("device = \"gpu\"\nprecision = \"{word}\""));
+        let found = run("gpu.toml", &scene).unwrap();
+        for (found, host) in found.outcomes.iter().zip(&host.outcomes) {
+            let note = found.warnings.join("\n");
+            assert!(note.contains("equilibria on") && note.contains(word), "{note}");
+            let greatest = |name: &str| host.get(name).unwrap().abs();
+            for name in ["largest_displacement", "work_of_loads", "broken_bonds", "iterations"] {
+                let [value, expected] = [found, host].map(|outcome| outcome.get(name).unwrap_or(0.0));
+                let bound = match precision {
+                    Precision::Double => allowed,
+                    Precision::Single => 0.02,
+                };
+                eprintln!("{word}, {name}: {value:e} {expected:e}");
+                let apart = (value - expected).abs();
+                assert!(apart <= bound * expected.abs(), "{word}, {name}: {value:e} {expected:e}");
+            }
+            assert!(greatest("work_of_loads") > 0.0);
+        }
+    }
+}
+
+#[test]
+fn gpu_scene_of_equilibria_has_the_report_of_the_processor() {
+    let auto = run("auto.toml", &TORN.replace("\"cpu\"", "\"auto\"")).unwrap();
+    let why = auto.outcomes[0].warnings.join("\n");
+    assert!(why.contains("directed bonds are too few"), "{why}");
+    compare_equilibria(TORN, 1e-9);
+}

@@ -9,6 +9,8 @@ mod breaking;
 mod coarse;
 mod criterion;
 mod curves;
+#[cfg(feature = "gpu")]
+mod device_body;
 mod dynamic_relaxation;
 mod fit_range;
 mod force_fields;
@@ -27,6 +29,8 @@ mod passes;
 mod preconditioner;
 mod pressure;
 mod record;
+#[cfg(feature = "gpu")]
+mod relaxation_device;
 mod rigid;
 mod rotating_loads;
 mod rotation;
@@ -61,6 +65,8 @@ pub use method::{Method, StepCallback, Watch};
 pub use motion::{DynamicEnergies, EqualSteps, Motion, StepLimits};
 pub use pressure::FollowingPressure;
 pub use record::{Status, StepRecord};
+#[cfg(feature = "gpu")]
+pub use relaxation_device::CardRelaxation;
 pub use rigid::RigidRegion;
 pub use rotation::{RotatingRegion, Rotation};
 pub use stage::StepOrigin;

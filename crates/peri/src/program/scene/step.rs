@@ -113,6 +113,10 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             let why = "not available with [[step]]";
             return Err(source.unexpected(&format!("solver.{name}"), why));
         }
+        if scene.solver.device.is_some_and(|device| device != DeviceChoice::Cpu) {
+            let why = "a graphics card with [[step]]";
+            return Err(source.error("solver.device", why, "`cpu`: the processor takes all steps"));
+        }
         if scene.is_mixed() {
             let why = "all steps of a run have one precision";
             return Err(source.error("dynamics.precision", why, "`double` with [[step]]"));
