@@ -210,12 +210,17 @@ impl<const D: usize> DeviceBody<D> {
     ) -> Result<(), Error> {
         self.fits(&[displacement.sites(), velocity.sites(), force.sites(), bonds.sites()])?;
         self.time_step = time_step;
-        let intact = halves(&bonds.intact(), self.sites, self.form.bonds);
-        self.intact = self.client.create_from_slice(u32::as_bytes(&intact));
+        self.set_intact(bonds);
         let scales = [1.0 / self.spacing, time_step / self.spacing, 1.0 / self.unit];
         let fields = [displacement, velocity, force];
         self.fields = std::array::from_fn(|k| upload(&self.client, self.precision, fields[k], scales[k]));
         Ok(())
+    }
+
+    /// Takes the bonds left to all particles.
+    pub fn set_intact(&mut self, bonds: &LatticeBonds<D>) {
+        let intact = halves(&bonds.intact(), self.sites, self.form.bonds);
+        self.intact = self.client.create_from_slice(u32::as_bytes(&intact));
     }
 
     /// Displacement, m, velocity, m/s, and force density with body forces, N/m³.
@@ -264,7 +269,7 @@ impl<const D: usize> DeviceBody<D> {
 }
 
 impl<const D: usize> DeviceBody<D> {
-    fn download(&self, from: &Handle, scale: f64) -> Result<Field<D>, Error> {
+    pub(super) fn download(&self, from: &Handle, scale: f64) -> Result<Field<D>, Error> {
         let values = self.values(from)?;
         let mut field = Field::zeros(self.sites);
         for (to, from) in field.components_mut().into_iter().zip(values.chunks(self.sites)) {
@@ -318,7 +323,7 @@ pub(super) fn failed(error: &ServerError) -> Error {
 }
 
 /// Refuses buffers, bytes each by name, that a device does not hold.
-fn hold(device: &Device, buffers: &[(&str, u64)]) -> Result<(), Error> {
+pub(super) fn hold(device: &Device, buffers: &[(&str, u64)]) -> Result<(), Error> {
     let (name, one) = (device.name(), device.largest_buffer());
     if let Some((what, bytes)) = buffers.iter().find(|(_, bytes)| *bytes > one) {
         let found = format!("{what}: found {bytes} bytes; allowed: {one} in a buffer of {name}");

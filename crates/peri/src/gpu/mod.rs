@@ -13,11 +13,14 @@
 
 mod body;
 mod kernels;
+mod lbfgs;
+mod lbfgs_kernels;
 mod relaxation;
 mod relaxation_kernels;
 mod steps;
 
 pub use body::{DeviceBody, DeviceLoads, MOST_STEPS};
+pub use lbfgs::{DeviceLineSums, DeviceSearch};
 pub use relaxation::{DeviceRelaxation, RelaxationSums};
 pub use steps::{DeviceStep, ListedBond, StepSums};
 

@@ -73,7 +73,7 @@ pub fn held_as_before<const D: usize>(
 pub fn refuse<const D: usize>(system: &System<D>) -> Result<(), Error> {
     let softens = matches!(
         system.breaking.as_ref().map(|breaking| &breaking.criterion),
-        Some(Criterion::Softening(_))
+        Some(Criterion::Energy(_) | Criterion::Softening(_))
     );
     let what = [
         (system.bonds.as_lattice().is_none(), "a body of points"),
@@ -82,17 +82,15 @@ pub fn refuse<const D: usize>(system: &System<D>) -> Result<(), Error> {
             !system.material.is_fitted_law(),
             "a solid, or bonds with prestrains, of several laws, or that soften",
         ),
-        (softens, "bonds that soften"),
+        (softens, "bonds that break by their energy"),
         (system.contact.is_some(), "contact"),
         (!system.loads.turned.is_empty(), "a rotation"),
         (!system.loads.rigid.is_empty(), "a region that moves as a whole"),
         (system.loads.curved.is_some(), "a curve of time"),
         (!system.density_ratios.is_empty(), "parts of their own density"),
     ];
-    what.iter().find(|(has, _)| *has).map_or(Ok(()), |(_, what)| Err(refused(what)))
-}
-
-/// Refusal of what only the host can do.
-pub fn refused(what: &str) -> Error {
-    Error::Device(format!("unexpected {what}: only the processor does that"))
+    match what.iter().find(|(has, _)| *has) {
+        Some((_, what)) => Err(Error::Device(format!("unexpected {what}: only the processor does that"))),
+        None => Ok(()),
+    }
 }

@@ -18,12 +18,16 @@ mod force_scale;
 mod fracture;
 mod inverted;
 mod lbfgs;
+#[cfg(feature = "gpu")]
+mod lbfgs_device;
+mod lbfgs_host;
 mod lbfgs_memory;
 mod load;
 mod load_stepping;
 mod mass;
 mod method;
 mod motion;
+mod pair_products;
 mod particle_map;
 mod passes;
 mod preconditioner;
@@ -58,7 +62,10 @@ pub use force_fields::{Centrifugal, ForceField, PlacedForce};
 pub use force_scale::Balance;
 pub use fracture::{BreakingEvent, Fracture};
 pub use inverted::{INVERTS, flattened, inverted};
-pub use lbfgs::{Lbfgs, LbfgsSolver};
+pub use lbfgs::{Lbfgs, LbfgsSearch, LbfgsSolver, LinePoint, SearchVectors};
+#[cfg(feature = "gpu")]
+pub use lbfgs_device::CardVectors;
+pub use lbfgs_host::HostVectors;
 pub use load::{Loads, Support};
 pub use load_stepping::{Equilibrium, QuasiStatic, load_stepping};
 pub use method::{Method, StepCallback, Watch};

@@ -22,7 +22,14 @@ const KEPT: u64 = 500;
 impl DynamicRelaxation {
     /// Creates a solver whose iterations a device takes, of lattices of a bond law, without contact.
     pub fn device_solver<'a, const D: usize>(&self, device: &'a Device) -> CardRelaxation<'a, D> {
-        CardRelaxation { settings: *self, device, card: None, unit_mass: Vec::new(), stiffened: false, pushed: 0.0 }
+        CardRelaxation {
+            settings: *self,
+            device,
+            card: None,
+            unit_mass: Vec::new(),
+            stiffened: false,
+            pushed: 0.0,
+        }
     }
 }
 

@@ -5,8 +5,7 @@
 //! back to that step. Otherwise a step is taken at a time, and the stretches that its forces meet are looked
 //! at.
 
-use super::criterion::Criterion;
-use super::device_body::{critical, lattice, lattice_with_law, limit, loads, refuse, refused};
+use super::device_body::{critical, lattice, lattice_with_law, limit, loads, refuse};
 use super::method::{StepCallback, Watch};
 use super::motion::StretchLook;
 use super::state::State;
@@ -42,10 +41,6 @@ impl VelocityVerlet {
         finished: &mut StepCallback<D>,
     ) -> Result<(), Error> {
         refuse(system)?;
-        let energies = matches!(system.breaking.as_ref().map(|own| &own.criterion), Some(Criterion::Energy(_)));
-        if energies {
-            return Err(refused("bonds that break by their energy"));
-        }
         self.open(system, state)?;
         let mut run = Run { body: body_of(device, system, state)?, strain: f64::INFINITY };
         while state.step < self.records {

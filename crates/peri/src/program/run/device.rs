@@ -2,7 +2,7 @@
 
 use crate::bonds::Bonds;
 use crate::error::Error;
-use crate::program::scene::{BodyForceSpec, Boundary, DeviceChoice, ForcePrecision, Scene, SolverMethod};
+use crate::program::scene::{BodyForceSpec, Boundary, DeviceChoice, ForcePrecision, Scene};
 use crate::solver::{Equilibrium, Method, State, StepCallback, System, VelocityVerlet, Watch};
 use harness::scene::{SceneError, Source};
 
@@ -100,8 +100,8 @@ pub fn equilibria<'a, const D: usize>(card: Option<&'a Card>, scene: &Scene) -> 
     match card {
         #[cfg(feature = "gpu")]
         Some(card) => match scene.method() {
-            SolverMethod::Lbfgs => scene.equilibria(),
-            SolverMethod::Adr | SolverMethod::Verlet => Box::new(scene.relaxation().device_solver(card)),
+            crate::program::scene::SolverMethod::Lbfgs => Box::new(scene.lbfgs().device_solver(card)),
+            _ => Box::new(scene.relaxation().device_solver(card)),
         },
         #[cfg(not(feature = "gpu"))]
         Some(card) => match *card {},
@@ -145,7 +145,6 @@ fn beyond_cards<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<(
         (formula_key.as_str(), formula.is_some(), "a formula of `t`"),
         (force_key.as_str(), force.is_some(), "a centrifugal force, or one that follows a curve"),
         ("dynamics.precision", scene.is_mixed(), "mixed precision"),
-        ("solver.method", scene.method() == SolverMethod::Lbfgs, "L-BFGS"),
     ];
     faults.iter().find(|(_, given, _)| *given).map(|(key, _, found)| ((*key).to_owned(), *found))
 }

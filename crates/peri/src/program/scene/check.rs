@@ -2,10 +2,7 @@
 
 use super::values::{ONE_OF_THEM, plain, positive, ratio, required};
 use super::variant::{SceneVariant, variants};
-use super::{
-    BodyForceSpec, HORIZON_RATIO, HistoryProbe, Scene, SolverMethod,
-    Track, VaryingParameter,
-};
+use super::{BodyForceSpec, HORIZON_RATIO, HistoryProbe, Scene, SolverMethod, Track, VaryingParameter};
 use crate::calibrate::{Calibration, Space};
 use crate::solver::Policy;
 use crate::stress::StressMethod;
