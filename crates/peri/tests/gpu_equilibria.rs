@@ -329,14 +329,14 @@ fn gpu_equilibria_continue_with_the_same_bits() {
         let first = whole.state.history[0].iterations;
         assert!(first > interval, "{first} iterations");
         let again = case.run(&mut damaged(cells), &mut *solver());
-        assert_eq!(whole.state, again.state);
+        assert!(whole.state == again.state, "another run");
         for stop in 1..=3 {
             let state = State::new(sheet.sites());
             let (stopped, kept) = case.run_from(&mut damaged(cells), &mut *solver(), state, Some(stop));
             assert!(stopped.is_err());
             let (result, rest) = case.run_from(&mut damaged(cells), &mut *solver(), kept.state, None);
             result.unwrap();
-            assert_eq!(whole.state, rest.state, "stopped at state {stop}");
+            assert!(whole.state == rest.state, "stopped at state {stop}");
         }
     }
 }

@@ -179,7 +179,9 @@ impl<const D: usize> SearchVectors<D> for CardVectors<'_, D> {
     }
 
     fn forget(&mut self, scale_too: bool) {
-        self.spare.extend(self.places.drain(..));
+        // sums run over places in their order: a run that continues here takes the same
+        self.places.clear();
+        self.spare = (0..=self.most).collect();
         self.products.clear(scale_too);
     }
 
