@@ -105,8 +105,8 @@ fn measure<const D: usize>(cells: u32, steps: u64) -> Result<(), Box<dyn std::er
     Ok(())
 }
 
-/// Stretches a cube of `cells`³ particles by 1 % in one step, by a solver; prints its work and the time of the
-/// whole step; returns the displacement.
+/// Stretches a cube of `cells`³ particles by 1 % in one step, by a solver; prints its work and the time
+/// of the whole step; returns the displacement.
 fn stretch(
     cells: u32,
     name: &str,

@@ -101,7 +101,7 @@ impl<const D: usize> DeviceBody<D> {
         let field = (D * sites) as u64 * precision.bytes();
         let words = 4 * (sites * form.bonds.div_ceil(32)) as u64;
         let fields = [("displacement", field), ("velocity", field), ("force", field)];
-        hold(device, &[&fields[..], &[("intact bonds", words)]].concat())?;
+        refuse_beyond_memory(device, &[&fields[..], &[("intact bonds", words)]].concat())?;
         let spacing = bonds.spacing();
         let unit = spacing * stencil.iter().map(|bond| bond.stiffness.abs()).fold(0.0, f64::max);
         let mut rows = Vec::with_capacity(form.bonds * (D + ROW));
@@ -323,7 +323,7 @@ pub(super) fn failed(error: &ServerError) -> Error {
 }
 
 /// Refuses buffers, bytes each by name, that a device does not hold.
-pub(super) fn hold(device: &Device, buffers: &[(&str, u64)]) -> Result<(), Error> {
+pub(super) fn refuse_beyond_memory(device: &Device, buffers: &[(&str, u64)]) -> Result<(), Error> {
     let (name, one) = (device.name(), device.largest_buffer());
     if let Some((what, bytes)) = buffers.iter().find(|(_, bytes)| *bytes > one) {
         let found = format!("{what}: found {bytes} bytes; allowed: {one} in a buffer of {name}");

@@ -1,5 +1,5 @@
-//! Kernels of L-BFGS; see [`super::kernels`] for fields, lengths and indices. The gradient g is −F where free,
-//! 0 where held; B is diagonal. Pairs lie one after the other, in single precision.
+//! Kernels of L-BFGS; see [`super::kernels`] for fields, lengths and indices. The gradient g is −F where
+//! free, 0 where held; B is diagonal. Pairs lie one after the other, in single precision.
 
 use super::kernels::KernelForm;
 use cubecl::ir::ElemType;
@@ -194,8 +194,8 @@ pub fn pair_products<F: Float>(
     partial[first + 3 * threads] = image_slope;
 }
 
-/// The direction d = −γ B g + Σ_i (γ a_i w_i − b_i s_i), with γ a and b of each pair in `weights`, and a list of
-/// g·d.
+/// The direction d = −γ B g + Σ_i (γ a_i w_i − b_i s_i), with γ a and b of each pair in `weights`, and a list
+/// of g·d.
 #[cube(launch_unchecked)]
 #[allow(clippy::too_many_arguments)]
 pub fn combine<F: Float>(

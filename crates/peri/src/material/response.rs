@@ -64,8 +64,8 @@ pub trait SolverMaterial<const D: usize>: Send + Sync {
         false
     }
 
-    /// Tangents of bonds within stretches, and the least that bounds of stiffness take, for such a law; `None`
-    /// for others.
+    /// Tangents of bonds within stretches, and the least that bounds of stiffness take, for such a law;
+    /// `None` for others.
     fn tangents(&mut self, stretches: [f64; 2]) -> Option<(&TangentTable, f64)> {
         let _ = stretches;
         None

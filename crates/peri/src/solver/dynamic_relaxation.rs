@@ -60,7 +60,7 @@ const LONG: u64 = 3000;
 const LATE_DAMPING: f64 = 0.05;
 
 /// Returns true if an iteration looks at the stretches.
-pub(super) fn looks<const D: usize>(system: &System<D>, state: &State<D>) -> bool {
+pub(super) fn is_look_due<const D: usize>(system: &System<D>, state: &State<D>) -> bool {
     // a step's first iterations move farthest: the fit must not be extrapolated for long
     system.breaks_on_the_way()
         || state.counts.iteration < CHECK_INTERVAL
@@ -123,7 +123,7 @@ impl RelaxationSolver {
         watch: &mut Watch<D>,
     ) -> Result<bool, Error> {
         let settings = self.settings;
-        let look = looks(system, state);
+        let look = is_look_due(system, state);
         let factor = system.loads.force_factor(system.factors[state.step]);
         system.prepare(&mut state.displacement);
         system.follow(&state.displacement);

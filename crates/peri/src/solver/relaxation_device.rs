@@ -1,11 +1,11 @@
-//! Dynamic relaxation on a graphics card: the host decides as [`super::dynamic_relaxation`] does, from sums of
-//! each iteration.
+//! Dynamic relaxation on a graphics card: the host decides as [`super::dynamic_relaxation`] does, from sums
+//! of each iteration.
 //!
 //! Fields go to the card when a search for equilibrium begins and come back when it has ended, when bonds
 //! break on the way, and where the run may be saved.
 
 use super::device_body::{held_as_before, lattice_with_law, loads, refuse, squares};
-use super::dynamic_relaxation::{DynamicRelaxation, REFRESH, damping, looks};
+use super::dynamic_relaxation::{DynamicRelaxation, REFRESH, damping, is_look_due};
 use super::load_stepping::Equilibrium;
 use super::mass::{has_own_mass, update_unit_mass};
 use super::method::Watch;
@@ -86,7 +86,7 @@ impl<const D: usize> CardRelaxation<'_, D> {
         watch: &mut Watch<D>,
     ) -> Result<bool, Error> {
         let (goal, iteration) = (self.settings.goal(), state.counts.iteration);
-        let look = looks(system, state);
+        let look = is_look_due(system, state);
         let factor = system.factors[state.step];
         let own = has_own_mass(system, state);
         if own && (iteration.is_multiple_of(REFRESH) || !self.stiffened) {
