@@ -101,3 +101,127 @@ fn gpu_scene_has_the_report_of_the_processor() {
         assert_eq!(crack(&found), crack(&host));
     }
 }
+
+/// A notched plate that is torn between equilibria.
+const TORN: &str = r#"
+version = 1
+program = "peri"
+[body]
+space = "plane-stress"
+thickness = "1 mm"
+spacing = "1 mm"
+shapes = [{ add = "box", min = ["0 mm", "0 mm"], max = ["24 mm", "30 mm"] }]
+cracks = [{ from = ["-1 mm", "15 mm"], to = ["9.6 mm", "15 mm"] }]
+[material]
+youngs_modulus = "191 GPa"
+law = "linear"
+critical = { stretch = 1.02 }
+[[boundary]]
+name = "pulled"
+min = ["0 mm", "27 mm"]
+max = ["24 mm", "30 mm"]
+displacement = ["0 mm", "0.25 mm"]
+[[boundary]]
+name = "fixed"
+min = ["0 mm", "0 mm"]
+max = ["24 mm", "3 mm"]
+displacement = ["0 mm", "0 mm"]
+[solver]
+method = "adr"
+steps = 8
+device = "cpu"
+[output]
+pictures = false
+fields = false
+"#;
+
+/// Compares the report of a scene with `device = "cpu"` with that on the device of this machine, in both
+/// precisions.
+fn compare_equilibria(text: &str, allowed: f64) {
+    let host = run("host.toml", text).unwrap();
+    if Device::portable().is_err() {
+        return evidence::skipped("a device behind Vulkan, Metal or DirectX 12");
+    }
+    for (precision, word) in [(Precision::Double, "double"), (Precision::Single, "single")] {
+        if Device::portable().and_then(|device| device.with_precision(precision)).is_err() {
+            continue;
+        }
+        let scene = text.replace("device = \"cpu\"", &format!("device = \"gpu\"\nprecision = \"{word}\""));
+        let found = run("gpu.toml", &scene).unwrap();
+        for (found, host) in found.outcomes.iter().zip(&host.outcomes) {
+            let note = found.warnings.join("\n");
+            assert!(note.contains("equilibria on") && note.contains(word), "{note}");
+            for name in ["largest_displacement", "work_of_loads", "broken_bonds"] {
+                let [value, expected] = [found, host].map(|outcome| outcome.get(name).unwrap_or(0.0));
+                let bound = match precision {
+                    Precision::Double => allowed,
+                    Precision::Single => 0.02,
+                };
+                eprintln!("{word}, {name}: {value:e} {expected:e}");
+                let apart = (value - expected).abs();
+                assert!(apart <= bound * expected.abs(), "{word}, {name}: {value:e} {expected:e}");
+            }
+            assert!(host.get("work_of_loads").unwrap() > 0.0);
+        }
+    }
+}
+
+/// A scene of the thesis with lines replaced.
+fn thesis(name: &str, lines: &[(&str, &str)]) -> String {
+    let path = format!("{}/../../cases/ch2/{name}/case.toml", env!("CARGO_MANIFEST_DIR"));
+    let mut text = std::fs::read_to_string(path).unwrap();
+    for (old, new) in lines {
+        assert!(text.contains(old), "{old}");
+        text = text.replace(old, new);
+    }
+    // expectations are those of other spacings
+    let end = text.find("\n[[expect]]").unwrap_or(text.len());
+    text.truncate(end);
+    text
+}
+
+/// Bars in tension, coarse and without a surface correction, by L-BFGS.
+#[test]
+fn gpu_scene_of_bars_in_tension() {
+    let bar = thesis(
+        "bar-in-tension",
+        &[
+            ("tolerance = 1e-6", "tolerance = 1e-6\ndevice = \"cpu\""),
+            (
+                "spacing = [\"20 mm\", \"10 mm\"]\nsurface_correction = [\"none\", \"energy\"]",
+                "spacing = [\"20 mm\"]\nsurface_correction = [\"none\"]",
+            ),
+        ],
+    );
+    let others = bar.find("[[study]]\nspacing = [\"10 mm\"]").unwrap();
+    // the balance is 1e-6 of the load, by different iterations
+    compare_equilibria(&bar[..others], 1e-5);
+}
+
+/// The sheet of mode I, coarse and to its first steps, by L-BFGS and by relaxation.
+#[test]
+fn gpu_scene_of_mode_one() {
+    for (method, allowed) in [("adr", 1e-9), ("lbfgs", 1e-4)] {
+        let solver = format!("method = \"{method}\"\ndevice = \"cpu\"\nsteps = 2");
+        let sheet = thesis(
+            "mode-1",
+            &[
+                ("steps = 100 ", &solver),
+                ("\"-100 mm\"", "\"-20 mm\""),
+                ("\"100 mm\"", "\"20 mm\""),
+                ("spacing = [\"4 mm\"]", "spacing = [\"8 mm\"]"),
+                ("thickness = \"2 mm\"\nspacing = \"2 mm\"", "thickness = \"2 mm\"\nspacing = \"8 mm\""),
+            ],
+        );
+        let others = sheet.find("# voids of 3Δx").unwrap();
+        compare_equilibria(&sheet[..others], allowed);
+    }
+}
+
+#[test]
+fn gpu_scene_of_equilibria_has_the_report_of_the_processor() {
+    let auto = run("auto.toml", &TORN.replace("\"cpu\"", "\"auto\"")).unwrap();
+    let why = auto.outcomes[0].warnings.join("\n");
+    assert!(why.contains("directed bonds are too few"), "{why}");
+    compare_equilibria(TORN, 1e-9);
+}

@@ -101,7 +101,7 @@ impl<const D: usize> DeviceBody<D> {
         let field = (D * sites) as u64 * precision.bytes();
         let words = 4 * (sites * form.bonds.div_ceil(32)) as u64;
         let fields = [("displacement", field), ("velocity", field), ("force", field)];
-        hold(device, &[&fields[..], &[("intact bonds", words)]].concat())?;
+        refuse_beyond_memory(device, &[&fields[..], &[("intact bonds", words)]].concat())?;
         let spacing = bonds.spacing();
         let unit = spacing * stencil.iter().map(|bond| bond.stiffness.abs()).fold(0.0, f64::max);
         let mut rows = Vec::with_capacity(form.bonds * (D + ROW));
@@ -210,12 +210,17 @@ impl<const D: usize> DeviceBody<D> {
     ) -> Result<(), Error> {
         self.fits(&[displacement.sites(), velocity.sites(), force.sites(), bonds.sites()])?;
         self.time_step = time_step;
-        let intact = halves(&bonds.intact(), self.sites, self.form.bonds);
-        self.intact = self.client.create_from_slice(u32::as_bytes(&intact));
+        self.set_intact(bonds);
         let scales = [1.0 / self.spacing, time_step / self.spacing, 1.0 / self.unit];
         let fields = [displacement, velocity, force];
         self.fields = std::array::from_fn(|k| upload(&self.client, self.precision, fields[k], scales[k]));
         Ok(())
+    }
+
+    /// Takes the bonds left to all particles.
+    pub fn set_intact(&mut self, bonds: &LatticeBonds<D>) {
+        let intact = halves(&bonds.intact(), self.sites, self.form.bonds);
+        self.intact = self.client.create_from_slice(u32::as_bytes(&intact));
     }
 
     /// Displacement, m, velocity, m/s, and force density with body forces, N/m³.
@@ -264,7 +269,7 @@ impl<const D: usize> DeviceBody<D> {
 }
 
 impl<const D: usize> DeviceBody<D> {
-    fn download(&self, from: &Handle, scale: f64) -> Result<Field<D>, Error> {
+    pub(super) fn download(&self, from: &Handle, scale: f64) -> Result<Field<D>, Error> {
         let values = self.values(from)?;
         let mut field = Field::zeros(self.sites);
         for (to, from) in field.components_mut().into_iter().zip(values.chunks(self.sites)) {
@@ -318,7 +323,7 @@ pub(super) fn failed(error: &ServerError) -> Error {
 }
 
 /// Refuses buffers, bytes each by name, that a device does not hold.
-fn hold(device: &Device, buffers: &[(&str, u64)]) -> Result<(), Error> {
+pub(super) fn refuse_beyond_memory(device: &Device, buffers: &[(&str, u64)]) -> Result<(), Error> {
     let (name, one) = (device.name(), device.largest_buffer());
     if let Some((what, bytes)) = buffers.iter().find(|(_, bytes)| *bytes > one) {
         let found = format!("{what}: found {bytes} bytes; allowed: {one} in a buffer of {name}");

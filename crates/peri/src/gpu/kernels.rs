@@ -436,7 +436,7 @@ pub fn kick<F: Float>(
 }
 
 /// Sums, or extremes, of `rows` lists: thread i of `lanes` takes every `lanes`th number from i on, in order.
-/// Bit r of `greatest` and `least`: list r has its extreme taken.
+/// Bit r of `greatest` and `least`: list r, of the first 32, has its extreme taken.
 #[cube(launch_unchecked)]
 pub fn fold<F: Float>(
     from: &[F],
@@ -460,9 +460,9 @@ pub fn fold<F: Float>(
         let mut index = ABSOLUTE_POS;
         while index < length {
             let value = from[row * length + index];
-            if comptime!((greatest >> row) & 1 == 1) {
+            if comptime!(row < 32 && (greatest >> row) & 1 == 1) {
                 sum = F::max(sum, value);
-            } else if comptime!((least >> row) & 1 == 1) {
+            } else if comptime!(row < 32 && (least >> row) & 1 == 1) {
                 sum = F::min(sum, value);
             } else {
                 sum += value;

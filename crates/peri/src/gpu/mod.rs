@@ -1,4 +1,4 @@
-//! Lattices on a graphics card (feature `gpu`): velocity Verlet with bonds that break.
+//! Lattices on a graphics card (feature `gpu`): velocity Verlet and equilibria, with bonds that break.
 //!
 //! A [`Device`] is a card, or a program that stands for one; [`DeviceBody`] is a lattice on it, with the
 //! stencil, the fitted law and the bits of intact bonds of the host's kernel (see
@@ -13,9 +13,15 @@
 
 mod body;
 mod kernels;
+mod lbfgs;
+mod lbfgs_kernels;
+mod relaxation;
+mod relaxation_kernels;
 mod steps;
 
 pub use body::{DeviceBody, DeviceLoads, MOST_STEPS};
+pub use lbfgs::{DeviceLineSums, DeviceSearch};
+pub use relaxation::{DeviceRelaxation, RelaxationSums};
 pub use steps::{DeviceStep, ListedBond, StepSums};
 
 use crate::error::Error;

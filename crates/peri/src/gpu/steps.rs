@@ -258,11 +258,11 @@ impl<const D: usize> DeviceBody<D> {
         }
     }
 
-    fn threads(&self) -> usize {
+    pub(super) fn threads(&self) -> usize {
         self.particles.min(super::body::THREADS)
     }
 
-    fn cubes_of(&self, threads: usize) -> CubeCount {
+    pub(super) fn cubes_of(&self, threads: usize) -> CubeCount {
         cubecl::calculate_cube_count_elemwise(&self.client, threads, CubeDim::new_1d(CUBE as u32))
     }
 
@@ -304,7 +304,7 @@ impl<const D: usize> DeviceBody<D> {
     }
 
     /// Folds lists of `length` to `lanes` numbers each, into part `slot` of `slots`.
-    fn fold(
+    pub(super) fn fold(
         &self,
         [from, into]: [&Handle; 2],
         length: usize,
@@ -333,7 +333,7 @@ impl<const D: usize> DeviceBody<D> {
 }
 
 /// A buffer as a kernel takes it.
-fn buffer(handle: &Handle, length: usize) -> BufferArg {
+pub(super) fn buffer(handle: &Handle, length: usize) -> BufferArg {
     // SAFETY: every buffer is made for at least `length` numbers of the kernel's type
     unsafe { BufferArg::from_raw_parts(handle.clone(), length) }
 }

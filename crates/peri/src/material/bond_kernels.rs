@@ -8,7 +8,7 @@ use crate::bonds::{Bonds, Overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
 use crate::parallel;
-use crate::potential::{BondPotential, KernelFit, StretchRange};
+use crate::potential::{BondPotential, KernelFit, StretchRange, TangentTable};
 use crate::stress::StressTensor;
 
 /// Ratio of the largest tangent to that at rest above which every particle has the stiffness of its own
@@ -42,6 +42,15 @@ impl<'a> BondKernels<'a> {
             None => of(&self.laws[0]),
             Some(shares) => shares.mean(from, to, |number| of(&self.laws[number])),
         }
+    }
+
+    /// Tabulates the tangents within stretches; returns the least that bounds of stiffness take.
+    fn sample_tangents(&mut self, stretches: [f64; 2]) -> f64 {
+        // bonds crushed to zero have no bound: the law's value at a thousandth
+        let [low, high] = stretches.map(|stretch| stretch.powi(2) - 1.0);
+        self.laws.iter_mut().for_each(|law| law.sample_tangents(StretchRange { low, high }));
+        // a bond past its greatest force is soft, but a light particle would jump when it meets a stiff one
+        LEAST_TANGENT * self.material.law().tangent().abs()
     }
 
     /// Replaces the forces of particles beside other laws in the sites from `start` on.
@@ -113,6 +122,12 @@ impl<const D: usize> SolverMaterial<D> for BondKernels<'_> {
 
     fn is_fitted_law(&self) -> bool {
         self.material.soft.is_none() && self.laws.len() == 1
+    }
+
+    fn tangents(&mut self, stretches: [f64; 2]) -> Option<(&TangentTable, f64)> {
+        let least = self.sample_tangents(stretches);
+        let table = self.laws[0].tangents().filter(|_| self.laws.len() == 1)?;
+        Some((table, least))
     }
 
     fn force(
@@ -218,11 +233,7 @@ impl<const D: usize> SolverMaterial<D> for BondKernels<'_> {
         displacement: &Field<D>,
         stretches: [f64; 2],
     ) -> Vec<f64> {
-        // bonds crushed to zero have no bound: the law's value at a thousandth
-        let [low, high] = stretches.map(|stretch| stretch.powi(2) - 1.0);
-        self.laws.iter_mut().for_each(|law| law.sample_tangents(StretchRange { low, high }));
-        // a bond past its greatest force is soft, but a light particle would jump when it meets a stiff one
-        let least = LEAST_TANGENT * self.material.law().tangent().abs();
+        let least = self.sample_tangents(stretches);
         if self.laws.len() == 1
             && let Some(table) = self.laws[0].tangents()
         {

@@ -4,7 +4,7 @@ use super::EnergyPart;
 use crate::bonds::{Bonds, Overstretched, Property, StretchScan, overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
-use crate::potential::{BondPotential, StretchRange};
+use crate::potential::{BondPotential, StretchRange, TangentTable};
 use crate::stress::StressTensor;
 
 /// Stretches over which a law is to be evaluated, and how.
@@ -62,6 +62,13 @@ pub trait SolverMaterial<const D: usize>: Send + Sync {
     /// Whether forces are those of the bonds' fitted law, and nothing else, as graphics cards evaluate them.
     fn is_fitted_law(&self) -> bool {
         false
+    }
+
+    /// Tangents of bonds within stretches, and the least that bounds of stiffness take, for such a law;
+    /// `None` for others.
+    fn tangents(&mut self, stretches: [f64; 2]) -> Option<(&TangentTable, f64)> {
+        let _ = stretches;
+        None
     }
 
     /// Computes the force densities, N/m³, of whole pieces from the site `start` on; tracks the stretches

@@ -101,6 +101,11 @@ impl TangentTable {
         Self { low, step, pieces: nodes.windows(2).map(|ends| ends[0].max(ends[1])).collect() }
     }
 
+    /// Least e, length of a piece in e, and the bound of each piece.
+    pub fn pieces(&self) -> (f64, f64, &[f64]) {
+        (self.low, self.step, &self.pieces)
+    }
+
     /// Bound at e; beyond the table, the value at its end.
     #[inline]
     pub fn value(&self, e: f64) -> f64 {

@@ -53,11 +53,29 @@ impl ForceSums {
 }
 
 impl<const D: usize> State<D> {
+    /// Returns true if the rounding of displacements is measured in this iteration.
+    pub(super) fn measures_rounding(&self) -> bool {
+        self.counts.iteration.is_multiple_of(CHECK_INTERVAL) || self.convergence.floor == 0.0
+    }
+
     /// Records the sums of an iterate: its residual, relative to the floor of its reference.
     pub(super) fn record_sums(&mut self, system: &System<D>, sums: &ForceSums, goal: &SearchLimits) {
-        if self.counts.iteration.is_multiple_of(CHECK_INTERVAL) || self.convergence.floor == 0.0 {
+        let moved = self.measures_rounding().then(|| system.scale.moved(&self.displacement));
+        self.record_measured(system, sums, goal, (f64::EPSILON, moved));
+    }
+
+    /// Records the sums of an iterate whose displacements have the precision `epsilon`, with ‖s u‖₂, N/m³,
+    /// where [`Self::measures_rounding`].
+    pub(super) fn record_measured(
+        &mut self,
+        system: &System<D>,
+        sums: &ForceSums,
+        goal: &SearchLimits,
+        (epsilon, moved): (f64, Option<f64>),
+    ) {
+        if let Some(moved) = moved {
             let (scale, factor) = (&system.scale, system.factors[self.step]);
-            let rounding = ROUNDING * f64::EPSILON * scale.moved(&self.displacement) / goal.tolerance;
+            let rounding = ROUNDING * epsilon * moved / goal.tolerance;
             let strained = scale.strain(factor) * scale.constrained;
             self.convergence.floor =
                 (LEAST_REFERENCE * self.convergence.reference).max(strained).max(rounding);

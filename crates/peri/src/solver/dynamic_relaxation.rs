@@ -9,7 +9,7 @@ use super::load::Loads;
 use super::load_stepping::{Equilibrium, QuasiStatic};
 use super::mass::{has_own_mass, own_mass, update_unit_mass};
 use super::method::Watch;
-use super::passes::{force_pass, move_pass};
+use super::passes::{ForceSums, force_pass, move_pass};
 use super::state::State;
 use super::system::System;
 
@@ -42,7 +42,7 @@ impl Default for DynamicRelaxation {
 }
 
 impl DynamicRelaxation {
-    fn goal(&self) -> SearchLimits {
+    pub(super) fn goal(&self) -> SearchLimits {
         SearchLimits { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
     }
 }
@@ -54,10 +54,31 @@ impl<const D: usize> QuasiStatic<D> for DynamicRelaxation {
 }
 
 /// Iterations between updates of the masses, if bonds differ much in their tangent.
-const REFRESH: u64 = 10;
+pub(super) const REFRESH: u64 = 10;
 /// Iterations after which a search is a long one, and the least damping towards twice as many.
 const LONG: u64 = 3000;
 const LATE_DAMPING: f64 = 0.05;
+
+/// Returns true if an iteration looks at the stretches.
+pub(super) fn is_look_due<const D: usize>(system: &System<D>, state: &State<D>) -> bool {
+    // a step's first iterations move farthest: the fit must not be extrapolated for long
+    system.breaks_on_the_way()
+        || state.counts.iteration < CHECK_INTERVAL
+        || state.counts.iteration.is_multiple_of(CHECK_INTERVAL)
+}
+
+/// Damping c of an iteration, from the Rayleigh quotient of the last increment.
+pub(super) fn damping(iteration: u64, sums: &ForceSums) -> f64 {
+    let quotient = if iteration > 0 && sums.quotient_bottom > 0.0 {
+        -sums.quotient_top / sums.quotient_bottom
+    } else {
+        0.0
+    };
+    // with softening bonds the quotient is negative and would let them oscillate indefinitely, so a long
+    // search is damped
+    let late = iteration.saturating_sub(LONG) as f64 / LONG as f64;
+    (2.0 * quotient.max(0.0).sqrt()).clamp(LATE_DAMPING * late.min(1.0), 1.9)
+}
 
 /// Solver of [`DynamicRelaxation`].
 pub struct RelaxationSolver {
@@ -102,10 +123,7 @@ impl RelaxationSolver {
         watch: &mut Watch<D>,
     ) -> Result<bool, Error> {
         let settings = self.settings;
-        // a step's first iterations move farthest: the fit must not be extrapolated for long
-        let look = system.breaks_on_the_way()
-            || state.counts.iteration < CHECK_INTERVAL
-            || state.counts.iteration.is_multiple_of(CHECK_INTERVAL);
+        let look = is_look_due(system, state);
         let factor = system.loads.force_factor(system.factors[state.step]);
         system.prepare(&mut state.displacement);
         system.follow(&state.displacement);
@@ -139,15 +157,7 @@ impl RelaxationSolver {
                 system.refuse_unsupported(state, settings.tolerance)?;
             }
         }
-        let quotient = if state.counts.iteration > 0 && sums.quotient_bottom > 0.0 {
-            -sums.quotient_top / sums.quotient_bottom
-        } else {
-            0.0
-        };
-        // with softening bonds the quotient is negative and would let them oscillate indefinitely, so a long
-        // search is damped
-        let late = state.counts.iteration.saturating_sub(LONG) as f64 / LONG as f64;
-        let damping = (2.0 * quotient.max(0.0).sqrt()).clamp(LATE_DAMPING * late.min(1.0), 1.9);
+        let damping = damping(state.counts.iteration, &sums);
         let goal = settings.goal();
         state.record_sums(system, &sums, &goal);
         if state.is_balanced(&goal, broken)? {

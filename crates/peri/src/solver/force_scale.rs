@@ -14,7 +14,7 @@ const LEAST_STRAIN: f64 = 0.01;
 #[derive(Clone, Debug, Default)]
 pub struct ForceScale {
     /// s of each site, N/m⁴.
-    springs: Vec<f64>,
+    pub(super) springs: Vec<f64>,
     /// U at load factor 1, m, and L, m.
     pub(super) largest: f64,
     pub(super) diagonal: f64,

@@ -3,19 +3,15 @@
 //! enough (the curvature condition), found by secants.
 
 use super::balance::SearchLimits;
-use super::lbfgs_memory::LbfgsMemory;
+use super::lbfgs_host::HostVectors;
 use super::load_stepping::{Equilibrium, QuasiStatic};
 use super::method::Watch;
-use super::particle_map::ParticleMap;
-use super::passes::{ForceSums, gradient_pass};
-use super::preconditioner::Preconditioner;
+use super::passes::ForceSums;
 use super::record::Status;
 use super::state::State;
 use super::system::System;
-use crate::bonds::{StretchRange, stretch_range};
-use crate::contact::Contact;
+use crate::bonds::StretchRange;
 use crate::error::Error;
-use crate::field::Field;
 
 /// Searches, load steps, and iterations of one search, after which the preconditioner is rebuilt …
 const SEARCHES: u64 = 25;
@@ -39,12 +35,6 @@ const CURVATURE: f64 = 1e-3;
 const STRETCH: f64 = 0.3;
 const CRUSH: f64 = 0.6;
 
-/// Largest change of a bond over its length in a step with softening bonds, so that none jumps over its
-/// energy's maximum.
-const LARGEST_CHANGE: f64 = 0.3;
-/// Scale at which a direction exceeds the bonds by far; a power of 2, so that nothing is rounded.
-const HUGE_SCALE: f64 = (1_u64 << 40) as f64;
-
 /// Quasi-static solution by limited-memory BFGS with a two-level preconditioner: the fastest method and the
 /// first choice for equilibria, with and without breaking bonds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,7 +46,7 @@ pub struct Lbfgs {
     /// Number of pairs of steps and gradient changes kept.
     pub memory: usize,
     /// Edge of a cell of the coarse level over the particle spacing, at least 2; larger if the coarse level
-    /// would become too large.
+    /// would become too large. ∞: no coarse level.
     pub coarsening: f64,
     /// Weight ω of the local part of the preconditioner.
     pub weight: f64,
@@ -90,22 +80,50 @@ impl<const D: usize> QuasiStatic<D> for Lbfgs {
     }
 }
 
+/// Vectors of a search for equilibrium, on the host or on a device.
+pub trait SearchVectors<const D: usize> {
+    /// Builds the preconditioner for the present state.
+    ///
+    /// # Errors
+    /// [`Error::Device`] for what a device cannot do, or where it fails; so below.
+    fn build(&mut self, system: &mut System<D>, state: &State<D>, settings: &Lbfgs) -> Result<(), Error>;
+    /// Returns true if there is a preconditioner.
+    fn is_built(&self) -> bool;
+    /// Begins from the fields of a state.
+    fn take(&mut self, system: &mut System<D>, state: &State<D>) -> Result<(), Error>;
+    /// Gives displacement and forces of the iterate to a state.
+    fn give(&self, system: &mut System<D>, state: &mut State<D>) -> Result<(), Error>;
+    /// Computes forces at the present displacement, those of the trial.
+    fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<LinePoint, Error>;
+    /// ‖s u‖₂ with the springs s of the reference force, N/m³, and the precision of u.
+    fn rounding(&mut self, system: &System<D>, state: &State<D>) -> Result<(f64, f64), Error>;
+    /// u += step·d.
+    fn step(&mut self, state: &mut State<D>, step: f64);
+    /// Longest step along the direction, at stretches up to e = `most`.
+    fn longest_step(&mut self, system: &System<D>, state: &State<D>, most: f64) -> Result<f64, Error>;
+    /// The direction from the pairs; returns the slope along it.
+    fn direct(&mut self) -> Result<f64, Error>;
+    /// The direction without pairs, anew.
+    fn direct_anew(&mut self) -> Result<f64, Error>;
+    /// Makes the trial after a step the iterate; keeps its pair if s·y is above `least`.
+    fn accept(&mut self, step: f64, least: f64) -> Result<(), Error>;
+    /// Makes a trial that no search produced the iterate.
+    fn arrive(&mut self);
+    /// Forgets all pairs, and their scale if it is `scale_too`.
+    fn forget(&mut self, scale_too: bool);
+    /// Simplifies after a failed search: forgets pairs, then leaves out the coarse level; then starts again.
+    fn simplify(&mut self);
+    /// Updates for the sites whose bonds have broken.
+    fn bonds_broke(&mut self, system: &System<D>, sites: &[u32]);
+}
+
+/// Solver of [`Lbfgs`] with vectors on the host.
+pub type LbfgsSolver<const D: usize> = LbfgsSearch<HostVectors<D>>;
+
 /// Solver of [`Lbfgs`].
-pub struct LbfgsSolver<const D: usize> {
+pub struct LbfgsSearch<V> {
     settings: Lbfgs,
-    preconditioner: Preconditioner<D>,
-    memory: LbfgsMemory<D>,
-    /// Positions of particles in storage: all fields below are over particles.
-    places: ParticleMap,
-    /// Gradients −V F of the energy at the iterate and at the trial, 0 where constrained.
-    gradient: Field<D>,
-    trial: Field<D>,
-    /// z = B g at both.
-    image: Field<D>,
-    trial_image: Field<D>,
-    direction: Field<D>,
-    /// True if the coarse level is left out because it gave no descent direction.
-    local_only: bool,
+    vectors: V,
     /// Searches with this preconditioner, iterations of the first of them, and whether the last took too
     /// many.
     searches: u64,
@@ -117,11 +135,13 @@ pub struct LbfgsSolver<const D: usize> {
 
 /// A point along a search direction.
 #[derive(Clone, Copy)]
-struct LinePoint {
-    sums: ForceSums,
-    observed: StretchRange,
+pub struct LinePoint {
+    /// Sums of forces.
+    pub sums: ForceSums,
+    /// Stretches.
+    pub observed: StretchRange,
     /// Derivative of the energy along the direction.
-    slope: f64,
+    pub slope: f64,
 }
 
 /// Result of a line search.
@@ -135,119 +155,94 @@ enum LineSearch {
 impl<const D: usize> LbfgsSolver<D> {
     /// Creates a solver without any computed data.
     pub fn new(settings: Lbfgs) -> Self {
-        Self {
-            settings,
-            preconditioner: Preconditioner::new(),
-            memory: LbfgsMemory::new(settings.memory),
-            places: ParticleMap::default(),
-            gradient: Field::zeros(0),
-            trial: Field::zeros(0),
-            image: Field::zeros(0),
-            trial_image: Field::zeros(0),
-            direction: Field::zeros(0),
-            local_only: false,
-            searches: 0,
-            first: 0,
-            worn: false,
-            in_touch: Vec::new(),
-        }
+        Self::with_vectors(settings, HostVectors::new(settings.memory))
     }
 
     /// Degrees of freedom of the coarse level and entries of its factors.
     pub fn coarse_size(&self) -> [usize; 2] {
-        self.preconditioner.coarse_size()
+        self.vectors.coarse_size()
+    }
+}
+
+impl<V> LbfgsSearch<V> {
+    /// Creates a solver with vectors of its own.
+    pub(super) fn with_vectors(settings: Lbfgs, vectors: V) -> Self {
+        Self { settings, vectors, searches: 0, first: 0, worn: false, in_touch: Vec::new() }
     }
 
     /// Builds the preconditioner for the present state and forgets everything else: a run that begins with
     /// this state takes the same steps.
-    fn begin(
+    fn begin<const D: usize>(
         &mut self,
         system: &mut System<D>,
         state: &mut State<D>,
         watch: &mut Watch<D>,
-    ) -> Result<(), Error> {
+    ) -> Result<(), Error>
+    where
+        V: SearchVectors<D>,
+    {
         watch(&self.status(system, state, true), state)?;
         system.prepare(&mut state.displacement);
-        let particles = system.bonds.particles().len();
-        let fields = [
-            &mut self.gradient,
-            &mut self.trial,
-            &mut self.image,
-            &mut self.trial_image,
-            &mut self.direction,
-        ];
-        if fields[0].sites() != particles {
-            fields.into_iter().for_each(|field| *field = Field::zeros(particles));
-            self.places = ParticleMap::new(&*system.bonds, &system.loads);
-        }
-        self.memory.clear(true);
-        self.local_only = false;
         (self.searches, self.first, self.worn) = (0, 0, false);
         self.in_touch = in_touch(system, state);
-        self.preconditioner.build(system, state, self.settings.weight, self.settings.coarsening.max(2.0));
-        Ok(())
+        self.vectors.build(system, state, &self.settings)
     }
 
-    fn status(&self, system: &System<D>, state: &State<D>, restartable: bool) -> Status {
+    fn status<const D: usize>(&self, system: &System<D>, state: &State<D>, restartable: bool) -> Status {
         state.status(system.factors.len(), self.settings.tolerance, 0.0, restartable)
     }
 
-    /// Computes forces at the present displacement; their gradient goes to `self.trial`.
-    fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> LinePoint {
-        let factor = system.loads.force_factor(system.factors[state.step]);
-        system.prepare(&mut state.displacement);
-        system.follow(&state.displacement);
-        let body = (&self.places, self.preconditioner.volumes());
-        let (sums, observed, slope) =
-            gradient_pass(system, state, body, &self.direction, factor, &mut self.trial);
-        system.count_evaluation(state);
-        LinePoint { sums, observed, slope }
-    }
-
     /// Evaluates, and again if the fitted law had to be widened.
-    fn evaluate_covered(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<LinePoint, Error> {
-        let point = self.evaluate(system, state);
+    fn evaluate_covered<const D: usize>(
+        &mut self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+    ) -> Result<LinePoint, Error>
+    where
+        V: SearchVectors<D>,
+    {
+        let point = self.vectors.evaluate(system, state)?;
         if !point.sums.is_finite() {
             return Ok(point);
         }
         state.stretches.observe(point.observed);
-        Ok(if system.widen(state)? { self.evaluate(system, state) } else { point })
+        if system.widen(state)? { self.vectors.evaluate(system, state) } else { Ok(point) }
     }
 
-    /// u += step·d.
-    fn step(&self, state: &mut State<D>, step: f64) {
-        self.places.add_scaled(&mut state.displacement, step, &self.direction);
-    }
-
-    /// Computes z = B g of the trial and the direction from it; returns the slope along it. Uses the
-    /// remaining steepest descent if the memory gives no descent.
-    fn direct(&mut self) -> f64 {
-        let slope = self.memory.direction(&self.gradient, &self.image, &mut self.direction);
+    /// Computes the direction; returns the slope along it. Uses the remaining steepest descent if the memory
+    /// gives no descent.
+    fn direct<const D: usize>(&mut self) -> Result<f64, Error>
+    where
+        V: SearchVectors<D>,
+    {
+        let slope = self.vectors.direct()?;
         if slope < 0.0 && slope.is_finite() {
-            return slope;
+            return Ok(slope);
         }
-        self.memory.clear(true);
-        self.preconditioner.apply(&self.places, &self.gradient, &mut self.image, self.local_only);
-        self.memory.direction(&self.gradient, &self.image, &mut self.direction)
+        self.vectors.forget(true);
+        self.vectors.direct_anew()
     }
 
     /// Searches along the direction from `start`, whose slope is `slope`, until the slope has fallen enough.
-    fn search(
+    fn search<const D: usize>(
         &mut self,
         system: &mut System<D>,
         state: &mut State<D>,
         start: &LinePoint,
         slope: f64,
-    ) -> Result<LineSearch, Error> {
+    ) -> Result<LineSearch, Error>
+    where
+        V: SearchVectors<D>,
+    {
         let [least, most] = allowed(start.observed);
-        let longest = self.longest_step(system, state, most);
+        let longest = self.vectors.longest_step(system, state, most)?;
         // the slope is too steep below `low`; above `high` it has turned, or the body is torn
         let (mut low, mut low_slope, mut high) = (0.0, slope, f64::INFINITY);
         let (mut at, mut step) = (0.0, longest.min(1.0));
         for trial in 0..TRIALS {
-            self.step(state, step - at);
+            self.vectors.step(state, step - at);
             at = step;
-            let rough = self.evaluate(system, state);
+            let rough = self.vectors.evaluate(system, state)?;
             let torn = !rough.sums.is_finite() || rough.observed.low < least || rough.observed.high > most;
             if torn {
                 high = step;
@@ -256,7 +251,7 @@ impl<const D: usize> LbfgsSolver<D> {
                 continue;
             }
             state.stretches.observe(rough.observed);
-            let point = if system.widen(state)? { self.evaluate(system, state) } else { rough };
+            let point = if system.widen(state)? { self.vectors.evaluate(system, state)? } else { rough };
             if point.sums.residual(state.convergence.floor) <= self.settings.tolerance
                 || point.slope.abs() <= SLOPE * slope.abs()
             {
@@ -276,75 +271,36 @@ impl<const D: usize> LbfgsSolver<D> {
                 step = secant.clamp(1.5 * step, GROWTH * step).min(longest);
             }
         }
-        self.step(state, -at);
+        self.vectors.step(state, -at);
         Ok(LineSearch::Failed)
     }
 
-    /// Longest step along the direction if bonds soften at stretches up to e = `most`, or particles are in
-    /// contact: the energy is not convex there.
-    fn longest_step(&mut self, system: &System<D>, state: &State<D>, most: f64) -> f64 {
-        let softens = system.material.softens_at((1.0 + most).sqrt());
-        if !softens && system.repulsion().is_none() {
-            return f64::INFINITY;
-        }
-        let spread = |factor: f64| {
-            let mut field = Field::zeros(state.displacement.sites());
-            self.places.add_scaled(&mut field, factor, &self.direction);
-            field
-        };
-        let touching =
-            |contact: &Contact<D>| contact.longest_step(&*system.bonds, &state.displacement, &spread(1.0));
-        let longest = system.repulsion().map_or(f64::INFINITY, touching);
-        if !softens {
-            return longest;
-        }
-        let range = stretch_range(&*system.bonds, &spread(HUGE_SCALE));
-        (LARGEST_CHANGE * HUGE_SCALE / (1.0 + range.high).sqrt()).min(longest)
-    }
-
     /// Runs one iteration from `point`; returns the next iterate, `None` if no direction gave a descent.
-    fn iterate(
+    fn iterate<const D: usize>(
         &mut self,
         system: &mut System<D>,
         state: &mut State<D>,
         point: &LinePoint,
-    ) -> Result<Option<LinePoint>, Error> {
-        let slope = self.direct();
+    ) -> Result<Option<LinePoint>, Error>
+    where
+        V: SearchVectors<D>,
+    {
+        let slope = self.direct()?;
         if slope == 0.0 || !slope.is_finite() {
             return Ok(None);
         }
         match self.search(system, state, point, slope)? {
             LineSearch::Found(step, point) => {
-                std::mem::swap(&mut self.gradient, &mut self.trial);
-                self.preconditioner.apply(
-                    &self.places,
-                    &self.gradient,
-                    &mut self.trial_image,
-                    self.local_only,
-                );
-                self.memory.add(
-                    step,
-                    &self.direction,
-                    (&self.trial, &self.image),
-                    (&self.gradient, &self.trial_image),
-                    CURVATURE * step * slope.abs(),
-                );
-                std::mem::swap(&mut self.image, &mut self.trial_image);
+                self.vectors.accept(step, CURVATURE * step * slope.abs())?;
                 Ok(Some(point))
             }
             LineSearch::Failed => Ok(None),
         }
     }
 
-    /// Simplifies after a failed search: clears the memory, then drops the coarse level; then starts again.
-    fn simplify(&mut self) {
-        self.local_only = self.memory.is_empty() && !self.local_only;
-        self.memory.clear(true);
-    }
-
     /// Returns true if a tenth of the faces in contact with planes have changed since the preconditioner was
     /// built.
-    fn others_touch(&self, system: &System<D>, state: &State<D>) -> bool {
+    fn others_touch<const D: usize>(&self, system: &System<D>, state: &State<D>) -> bool {
         if system.repulsion().is_none_or(|contact| !contact.has_surfaces()) {
             return false;
         }
@@ -354,48 +310,47 @@ impl<const D: usize> LbfgsSolver<D> {
     }
 
     /// Computes forces and gradient of an iterate that no search produced.
-    fn arrive(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<LinePoint, Error> {
+    fn arrive<const D: usize>(
+        &mut self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+    ) -> Result<LinePoint, Error>
+    where
+        V: SearchVectors<D>,
+    {
         let point = self.evaluate_covered(system, state)?;
+        self.vectors.arrive();
         if !point.sums.is_finite() {
+            self.vectors.give(system, state)?;
             return Err(system.not_finite(state));
         }
-        std::mem::swap(&mut self.gradient, &mut self.trial);
-        self.preconditioner.apply(&self.places, &self.gradient, &mut self.image, self.local_only);
         Ok(point)
     }
-}
 
-impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
-    fn equilibrate(
+    /// Iterates until the forces balance.
+    fn find_balance<const D: usize>(
         &mut self,
         system: &mut System<D>,
         state: &mut State<D>,
         watch: &mut Watch<D>,
-    ) -> Result<Option<StretchRange>, Error> {
+    ) -> Result<LinePoint, Error>
+    where
+        V: SearchVectors<D>,
+    {
         let goal = self.settings.goal();
-        self.memory.clear(false);
-        // a run can be interrupted where it is built
-        // small steps between which bonds break leave the body nearly unchanged; contact and large steps do
-        // not
-        let kept = system.breaking.is_some() && system.repulsion().is_none();
-        let fresh = state.control.round == 0
-            && state.contact.renewals == 0
-            && (!kept || state.step.is_multiple_of(STEPS));
-        let due = fresh || self.worn || self.searches >= SEARCHES;
-        if !self.preconditioner.is_built() || (state.counts.iteration == 0 && due) {
-            self.begin(system, state, watch)?;
-        }
         let before = state.counts.total_iterations;
         let mut point = self.arrive(system, state)?;
         let mut broken = false;
         loop {
-            state.record_sums(system, &point.sums, &goal);
+            let measured = state.measures_rounding().then(|| self.vectors.rounding(system, state));
+            let (moved, epsilon) = measured.transpose()?.unzip();
+            state.record_measured(system, &point.sums, &goal, (epsilon.unwrap_or(0.0), moved));
             if state.is_balanced(&goal, broken)? {
                 let took = state.counts.total_iterations - before;
                 self.first = if self.searches == 0 { took } else { self.first };
                 self.searches += 1;
                 self.worn = took > WORN_GROWTH * self.first.max(FEW);
-                return Ok(Some(point.observed));
+                return Ok(point);
             }
             broken = false;
             let next = self.iterate(system, state, &point)?;
@@ -403,10 +358,11 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
             if let Some(next) = next {
                 point = next;
             } else {
-                self.simplify();
+                self.vectors.simplify();
                 point = self.arrive(system, state)?;
             }
             if system.breaks_on_the_way() && system.is_overstretched(point.observed) {
+                self.vectors.give(system, state)?;
                 let sites = system.break_bonds(state);
                 broken = !sites.is_empty();
                 if broken {
@@ -419,15 +375,45 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
             let others_touch =
                 state.counts.iteration.is_multiple_of(TOUCHES) && self.others_touch(system, state);
             if state.counts.iteration.is_multiple_of(ITERATIONS) || others_touch {
+                self.vectors.give(system, state)?;
                 self.begin(system, state, watch)?;
+                self.vectors.take(system, state)?;
                 point = self.arrive(system, state)?;
             }
         }
     }
+}
+
+impl<const D: usize, V: SearchVectors<D>> Equilibrium<D> for LbfgsSearch<V> {
+    fn equilibrate(
+        &mut self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        watch: &mut Watch<D>,
+    ) -> Result<Option<StretchRange>, Error> {
+        self.vectors.forget(false);
+        // a run can be interrupted where it is built
+        // small steps between which bonds break leave the body nearly unchanged; contact and large steps do
+        // not
+        let kept = system.breaking.is_some() && system.repulsion().is_none();
+        let fresh = state.control.round == 0
+            && state.contact.renewals == 0
+            && (!kept || state.step.is_multiple_of(STEPS));
+        let due = fresh || self.worn || self.searches >= SEARCHES;
+        if !self.vectors.is_built() || (state.counts.iteration == 0 && due) {
+            self.begin(system, state, watch)?;
+        }
+        self.vectors.take(system, state)?;
+        let found = self.find_balance(system, state, watch);
+        if matches!(found, Ok(_) | Err(Error::NotConverged { .. })) {
+            self.vectors.give(system, state)?;
+        }
+        found.map(|point| Some(point.observed))
+    }
 
     fn bonds_broke(&mut self, system: &System<D>, sites: &[u32]) {
-        self.preconditioner.bonds_broke(&*system.bonds, sites);
-        self.memory.clear(false);
+        self.vectors.bonds_broke(system, sites);
+        self.vectors.forget(false);
     }
 
     fn tolerance(&self) -> f64 {

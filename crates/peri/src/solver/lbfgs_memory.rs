@@ -6,6 +6,7 @@
 //! pairs are most of the memory traffic of an iteration, and a direction needs no more. All sums are in
 //! double precision.
 
+use super::pair_products::{Kept, PairProducts};
 use super::particle_map::in_order;
 use super::passes::{LANES, sum};
 use crate::field::{CHUNK, Field, chunk_range};
@@ -24,29 +25,21 @@ struct StepPair<const D: usize> {
     step: Single<D>,
     /// w = B y.
     image: Single<D>,
-    /// s·y and y·w of this pair.
-    curvature: f64,
-    size: f64,
-    /// s·y and w·y with the y of each later pair, in their order.
-    later: VecDeque<[f64; 2]>,
-    /// s·g and w·g with the present gradient.
-    gradient: [f64; 2],
 }
 
 /// The pairs, oldest first.
 pub struct LbfgsMemory<const D: usize> {
-    most: usize,
     pairs: VecDeque<StepPair<D>>,
+    /// Inner products of the pairs.
+    products: PairProducts,
     /// Fields to be reused.
     spare: Vec<Single<D>>,
-    /// Scale of the initial inverse; 1 until a pair is known.
-    scale: f64,
 }
 
 impl<const D: usize> LbfgsMemory<D> {
     /// Creates a memory for `most` pairs.
     pub fn new(most: usize) -> Self {
-        Self { most, pairs: VecDeque::new(), spare: Vec::new(), scale: 1.0 }
+        Self { pairs: VecDeque::new(), products: PairProducts::new(most), spare: Vec::new() }
     }
 
     /// Returns true if no pair is stored.
@@ -59,40 +52,13 @@ impl<const D: usize> LbfgsMemory<D> {
         for pair in self.pairs.drain(..) {
             self.spare.extend([pair.step, pair.image]);
         }
-        if scale_too {
-            self.scale = 1.0;
-        }
+        self.products.clear(scale_too);
     }
 
     /// Computes d = −H g from z = B g; returns g·d.
     pub fn direction(&self, gradient: &Field<D>, image: &Field<D>, result: &mut Field<D>) -> f64 {
-        let count = self.pairs.len();
-        // backwards: a_i = s_i·(g − Σ_{j>i} a_j y_j)/(s_i·y_i)
-        let mut back = vec![0.0; count];
-        for i in (0..count).rev() {
-            let pair = &self.pairs[i];
-            let later: f64 = (i + 1..count).map(|j| back[j] * pair.later[j - i - 1][0]).sum();
-            back[i] = (pair.gradient[0] - later) / pair.curvature;
-        }
-        // forwards: b_i = y_i·(γ(z − Σ_j a_j w_j) + Σ_{k<i} (a_k − b_k) s_k)/(s_i·y_i)
-        let mut weights = vec![0.0; count];
-        for i in 0..count {
-            let pair = &self.pairs[i];
-            let mut value = pair.gradient[1] - back[i] * pair.size;
-            for j in 0..count {
-                if j < i {
-                    value -= back[j] * self.pairs[j].later[i - j - 1][1];
-                } else if j > i {
-                    value -= back[j] * pair.later[j - i - 1][1];
-                }
-            }
-            value *= self.scale;
-            for (k, weight) in weights[..i].iter().enumerate() {
-                value += weight * self.pairs[k].later[i - k - 1][0];
-            }
-            weights[i] = back[i] - value / pair.curvature;
-        }
-        let (sites, scale) = (gradient.sites(), self.scale);
+        let (back, weights) = self.products.weights();
+        let (sites, scale) = (gradient.sites(), self.products.scale());
         let (gradient, image) = (gradient.components(), image.components());
         let arch = Arch::new();
         let parts = in_order(result.chunks_mut(), |chunk, d| {
@@ -159,7 +125,7 @@ impl<const D: usize> LbfgsMemory<D> {
                         let [wide_s, wide_w] = wide.each_mut().map(|wide| &mut wide[..y.len()]);
                         arch.dispatch(ToDouble { from: s, to: &mut *wide_s });
                         arch.dispatch(ToDouble { from: w, to: &mut *wide_w });
-                        let products = arch.dispatch(PairProducts { s: wide_s, w: wide_w, y, g });
+                        let products = arch.dispatch(NewProducts { s: wide_s, w: wide_w, y, g });
                         for k in 0..4 {
                             sums[k] += products[k];
                         }
@@ -176,26 +142,19 @@ impl<const D: usize> LbfgsMemory<D> {
         for part in &parts {
             sums.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
         }
-        let [curvature, size] = [sums[0], sums[1]];
-        let keep = curvature > least && size > 0.0 && curvature.is_finite() && size.is_finite();
-        for (pair, sums) in self.pairs.iter_mut().zip(sums[4..].chunks(4)) {
-            pair.gradient = [sums[2], sums[3]];
-            if keep {
-                pair.later.push_back([sums[0], sums[1]]);
+        let of = |four: &[f64]| [four[0], four[1], four[2], four[3]];
+        let others: Vec<[f64; 4]> = sums[4..].chunks(4).map(of).collect();
+        match self.products.add(of(&sums[..4]), &others, least) {
+            Kept::None => self.spare.extend([new_step, new_image]),
+            kept => {
+                if kept == Kept::InsteadOfOldest
+                    && let Some(oldest) = self.pairs.pop_front()
+                {
+                    self.spare.extend([oldest.step, oldest.image]);
+                }
+                self.pairs.push_back(StepPair { step: new_step, image: new_image });
             }
         }
-        if !keep || self.most == 0 {
-            self.spare.extend([new_step, new_image]);
-            return;
-        }
-        self.scale = curvature / size;
-        if self.pairs.len() == self.most
-            && let Some(oldest) = self.pairs.pop_front()
-        {
-            self.spare.extend([oldest.step, oldest.image]);
-        }
-        let (later, gradient) = (VecDeque::new(), [sums[2], sums[3]]);
-        self.pairs.push_back(StepPair { step: new_step, image: new_image, curvature, size, later, gradient });
     }
 }
 
@@ -224,14 +183,14 @@ impl NullaryFnOnce for ToDouble<'_> {
 }
 
 /// s·y, w·y, s·g, w·g.
-struct PairProducts<'a> {
+struct NewProducts<'a> {
     s: &'a [f64],
     w: &'a [f64],
     y: &'a [f64],
     g: &'a [f64],
 }
 
-impl WithSimd for PairProducts<'_> {
+impl WithSimd for NewProducts<'_> {
     type Output = [f64; 4];
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> [f64; 4] {

@@ -9,6 +9,8 @@ mod breaking;
 mod coarse;
 mod criterion;
 mod curves;
+#[cfg(feature = "gpu")]
+mod device_body;
 mod dynamic_relaxation;
 mod fit_range;
 mod force_fields;
@@ -16,17 +18,23 @@ mod force_scale;
 mod fracture;
 mod inverted;
 mod lbfgs;
+#[cfg(feature = "gpu")]
+mod lbfgs_device;
+mod lbfgs_host;
 mod lbfgs_memory;
 mod load;
 mod load_stepping;
 mod mass;
 mod method;
 mod motion;
+mod pair_products;
 mod particle_map;
 mod passes;
 mod preconditioner;
 mod pressure;
 mod record;
+#[cfg(feature = "gpu")]
+mod relaxation_device;
 mod rigid;
 mod rotating_loads;
 mod rotation;
@@ -54,13 +62,18 @@ pub use force_fields::{Centrifugal, ForceField, PlacedForce};
 pub use force_scale::Balance;
 pub use fracture::{BreakingEvent, Fracture};
 pub use inverted::{INVERTS, flattened, inverted};
-pub use lbfgs::{Lbfgs, LbfgsSolver};
+pub use lbfgs::{Lbfgs, LbfgsSearch, LbfgsSolver, LinePoint, SearchVectors};
+#[cfg(feature = "gpu")]
+pub use lbfgs_device::CardVectors;
+pub use lbfgs_host::HostVectors;
 pub use load::{Loads, Support};
 pub use load_stepping::{Equilibrium, QuasiStatic, load_stepping};
 pub use method::{Method, StepCallback, Watch};
 pub use motion::{DynamicEnergies, EqualSteps, Motion, StepLimits};
 pub use pressure::FollowingPressure;
 pub use record::{Status, StepRecord};
+#[cfg(feature = "gpu")]
+pub use relaxation_device::CardRelaxation;
 pub use rigid::RigidRegion;
 pub use rotation::{RotatingRegion, Rotation};
 pub use stage::StepOrigin;

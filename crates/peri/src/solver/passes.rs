@@ -248,7 +248,16 @@ impl NullaryFnOnce for FreeSums<'_> {
     }
 }
 
-/// Updates v ← ((2 − c)v + 2F/M)/(2 + c), at rest v ← F/2M; u ← u + v; constrained components stay.
+/// Factors (a, b) of v ← a v + b F with the damping c: v ← ((2 − c)v + 2F/M)/(2 + c), at rest v ← F/2M.
+pub fn move_factors(iteration: u64, mass: f64, damping: f64) -> (f64, f64) {
+    if iteration == 0 {
+        (0.0, 0.5 / mass)
+    } else {
+        ((2.0 - damping) / (2.0 + damping), 2.0 / (2.0 + damping) / mass)
+    }
+}
+
+/// Updates v by [`move_factors`] and u ← u + v; constrained components stay.
 pub fn move_pass<const D: usize>(
     loads: &Loads<D>,
     state: &mut State<D>,
@@ -257,11 +266,7 @@ pub fn move_pass<const D: usize>(
     damping: f64,
 ) {
     let sites = unit_mass.len();
-    let (keep, push) = if state.counts.iteration == 0 {
-        (0.0, 0.5 / mass)
-    } else {
-        ((2.0 - damping) / (2.0 + damping), 2.0 / (2.0 + damping) / mass)
-    };
+    let (keep, push) = move_factors(state.counts.iteration, mass, damping);
     let force = state.force.components();
     let (displacement, velocity) = (state.displacement.chunks_mut(), state.velocity.chunks_mut());
     parallel::for_items(displacement.into_iter().zip(velocity).collect(), |chunk, (u, v)| {

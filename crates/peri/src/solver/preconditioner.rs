@@ -40,8 +40,8 @@ impl<const D: usize> Preconditioner<D> {
     }
 
     /// Builds it from the present state only: `weight` is ω, `coarsening` the edge of a coarse cell over the
-    /// particle spacing.
-    pub fn build(&mut self, system: &mut System<D>, state: &State<D>, weight: f64, coarsening: f64) {
+    /// particle spacing; `None`: without a coarse level.
+    pub fn build(&mut self, system: &mut System<D>, state: &State<D>, weight: f64, coarsening: Option<f64>) {
         // half the Gershgorin sum is about a particle's own stiffness
         let mut springs = Vec::new();
         let own = has_own_mass(system, state);
@@ -96,6 +96,7 @@ impl<const D: usize> Preconditioner<D> {
             anchors: &anchors,
         };
         let old = self.coarse.take();
+        let Some(coarsening) = coarsening else { return };
         let most = (self.volumes.len() / SHARE[D - 2]).clamp(LEAST[D - 2], MOST[D - 2]);
         self.coarse = CoarseLevel::new(&body, coarsening * bonds.spacing(), most, old);
     }
@@ -164,6 +165,12 @@ impl<const D: usize> Preconditioner<D> {
                 result.set(particle, z);
             }
         }
+    }
+
+    /// Local part of each particle, m/N.
+    #[cfg(feature = "gpu")]
+    pub fn local(&self) -> &[f64] {
+        &self.local
     }
 
     /// Volume of each particle, m³.

@@ -5,16 +5,16 @@
 //! back to that step. Otherwise a step is taken at a time, and the stretches that its forces meet are looked
 //! at.
 
-use super::criterion::Criterion;
+use super::device_body::{critical, lattice, lattice_with_law, limit, loads, refuse};
 use super::method::{StepCallback, Watch};
 use super::motion::StretchLook;
 use super::state::State;
 use super::system::System;
 use super::verlet::VelocityVerlet;
 use super::verlet_step::VerletSums;
-use crate::bonds::{LatticeBonds, Overstretched, Property};
+use crate::bonds::{LatticeBonds, Overstretched};
 use crate::error::Error;
-use crate::gpu::{Device, DeviceBody, DeviceLoads, DeviceStep, MOST_STEPS, StepSums};
+use crate::gpu::{Device, DeviceBody, DeviceStep, MOST_STEPS, StepSums};
 
 /// Strain of a step, over that of the last, that steps taken together allow for.
 const GROWTH: f64 = 1.5;
@@ -253,9 +253,7 @@ fn body_of<const D: usize>(
     system: &System<D>,
     state: &State<D>,
 ) -> Result<DeviceBody<D>, Error> {
-    let Some((bonds, (law, modulus))) = lattice(system).and_then(|bonds| Some((bonds, bonds.law()?))) else {
-        return Err(Error::Device("expected a lattice with a law".to_owned()));
-    };
+    let (bonds, (law, modulus)) = lattice_with_law(system)?;
     let mut body = DeviceBody::new(device, bonds, law, modulus)?;
     body.set_law(law, limit(system))?;
     body.set_loads(&loads(system));
@@ -263,56 +261,4 @@ fn body_of<const D: usize>(
     let fields = [&state.displacement, &state.velocity, &state.force];
     body.set_state(bonds, fields, time_step.unwrap_or(state.motion.limits.longest))?;
     Ok(body)
-}
-
-fn loads<'a, const D: usize>(system: &'a System<D>) -> DeviceLoads<'a, D> {
-    let loads = &system.loads;
-    DeviceLoads {
-        held: &loads.constrained,
-        displacement: loads.displacement.as_ref(),
-        body_force: loads.body_force.as_ref(),
-    }
-}
-
-fn lattice<'a, const D: usize>(system: &'a System<D>) -> Option<&'a LatticeBonds<D>> {
-    system.bonds.as_lattice()
-}
-
-fn critical<'a, const D: usize>(system: &'a System<D>) -> Option<&'a Property> {
-    match system.breaking.as_ref().map(|breaking| &breaking.criterion) {
-        Some(Criterion::Stretch(stretch)) => Some(stretch),
-        _ => None,
-    }
-}
-
-/// e from which bonds are listed: those that break, and some within rounding of them.
-fn limit<const D: usize>(system: &System<D>) -> f64 {
-    critical(system)
-        .map_or(f64::INFINITY, |critical| (critical.least() * critical.least() - 1.0) * (1.0 - 1e-6) - 1e-12)
-}
-
-/// Refuses what only the host can do.
-fn refuse<const D: usize>(system: &System<D>) -> Result<(), Error> {
-    let softens = matches!(
-        system.breaking.as_ref().map(|breaking| &breaking.criterion),
-        Some(Criterion::Energy(_) | Criterion::Softening(_))
-    );
-    let what = [
-        (system.bonds.as_lattice().is_none(), "a body of points"),
-        (!system.bonds.images().is_empty(), "periodic sides"),
-        (
-            !system.material.is_fitted_law(),
-            "a solid, or bonds with prestrains, of several laws, or that soften",
-        ),
-        (softens, "bonds that break by their energy"),
-        (system.contact.is_some(), "contact"),
-        (!system.loads.turned.is_empty(), "a rotation"),
-        (!system.loads.rigid.is_empty(), "a region that moves as a whole"),
-        (system.loads.curved.is_some(), "a curve of time"),
-        (!system.density_ratios.is_empty(), "parts of their own density"),
-    ];
-    match what.iter().find(|(has, _)| *has) {
-        Some((_, what)) => Err(Error::Device(format!("unexpected {what}: only the processor does that"))),
-        None => Ok(()),
-    }
 }

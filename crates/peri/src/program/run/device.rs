@@ -1,9 +1,9 @@
-//! Choice of the device that takes the steps of a variant.
+//! Choice of the device that takes the steps or iterations of a variant.
 
 use crate::bonds::Bonds;
 use crate::error::Error;
-use crate::program::scene::{BodyForceSpec, Boundary, DeviceChoice, Dynamics, Scene};
-use crate::solver::{Method, State, StepCallback, System, VelocityVerlet, Watch};
+use crate::program::scene::{BodyForceSpec, Boundary, DeviceChoice, ForcePrecision, Scene};
+use crate::solver::{Equilibrium, Method, State, StepCallback, System, VelocityVerlet, Watch};
 use harness::scene::{SceneError, Source};
 
 /// Directed bonds below which launching kernels takes longer than the processor's forces.
@@ -35,16 +35,18 @@ pub fn choose<const D: usize>(
     scene: &Scene,
     bonds: &dyn Bonds<D>,
 ) -> Result<Chosen, SceneError> {
-    let Some(dynamics) = scene.dynamics.as_ref().filter(|own| own.device != DeviceChoice::Cpu) else {
+    let (device, precision, block) = scene.device();
+    if device == DeviceChoice::Cpu {
         return Ok(Chosen::default());
-    };
-    let only = dynamics.device == DeviceChoice::Gpu;
+    }
+    let only = device == DeviceChoice::Gpu;
     let on_processor = |why: String| {
         let note = format!("`device = \"auto\"` takes the processor: {why}");
         Ok(Chosen { card: None, note: Some(note) })
     };
     if let Some((key, found)) = beyond_cards(scene, bonds) {
-        let allowed = "nothing of it on a graphics card; `dynamics.device = \"cpu\"` for the processor";
+        let allowed =
+            format!("nothing of it on a graphics card; `{block}.device = \"cpu\"` for the processor");
         return if only {
             Err(source.error(&key, found, allowed))
         } else {
@@ -55,7 +57,7 @@ pub fn choose<const D: usize>(
     if !only && directed < FEWEST_BONDS {
         return on_processor(format!("{directed} directed bonds are too few to gain by a card"));
     }
-    match open(dynamics) {
+    match open(precision == ForcePrecision::Single, block) {
         Ok((card, _)) if !only && !is_card(&card) => {
             on_processor("this machine has no graphics card".to_owned())
         }
@@ -63,7 +65,7 @@ pub fn choose<const D: usize>(
         Err(why) if only => {
             let found = format!("\"gpu\", but {why}");
             Err(source.error(
-                "dynamics.device",
+                &format!("{block}.device"),
                 found,
                 "`\"cpu\"`, or `\"auto\"` to take a card where there is one",
             ))
@@ -90,6 +92,20 @@ pub fn solve<const D: usize>(
         #[cfg(not(feature = "gpu"))]
         Some(card) => match *card {},
         None => method.solve(system, state, watch, finished),
+    }
+}
+
+/// Method of equilibria on a card, or on the processor where there is none.
+pub fn equilibria<'a, const D: usize>(card: Option<&'a Card>, scene: &Scene) -> Box<dyn Equilibrium<D> + 'a> {
+    match card {
+        #[cfg(feature = "gpu")]
+        Some(card) => match scene.method() {
+            crate::program::scene::SolverMethod::Lbfgs => Box::new(scene.lbfgs().device_solver(card)),
+            _ => Box::new(scene.relaxation().device_solver(card)),
+        },
+        #[cfg(not(feature = "gpu"))]
+        Some(card) => match *card {},
+        None => scene.equilibria(),
     }
 }
 
@@ -134,22 +150,21 @@ fn beyond_cards<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<(
 }
 
 #[cfg(feature = "gpu")]
-fn open(dynamics: &Dynamics) -> Result<(Card, String), String> {
-    use crate::program::scene::ForcePrecision;
-    let single = dynamics.precision == ForcePrecision::Single;
+fn open(single: bool, block: &str) -> Result<(Card, String), String> {
     let precision = if single { crate::gpu::Precision::Single } else { crate::gpu::Precision::Double };
     let none = |error: crate::Error| format!("this machine has no graphics card that can be used ({error})");
     let card = Card::portable().map_err(none)?;
     let name = card.name().to_owned();
     let card = card.with_precision(precision).map_err(|_| {
-        format!("{name} does not compute in double precision; take `dynamics.precision = \"single\"`")
+        format!("{name} does not compute in double precision; take `{block}.precision = \"single\"`")
     })?;
     let digits = if single { "single" } else { "double" };
-    Ok((card, format!("steps on {name} in {digits} precision")))
+    let what = if block == "solver" { "equilibria" } else { "steps" };
+    Ok((card, format!("{what} on {name} in {digits} precision")))
 }
 
 #[cfg(not(feature = "gpu"))]
-fn open(_: &Dynamics) -> Result<(Card, String), String> {
+fn open(_: bool, _: &str) -> Result<(Card, String), String> {
     Err("this program was built without graphics cards: `cargo build --release -p peri --features gpu`"
         .to_owned())
 }

@@ -326,7 +326,10 @@ fn solve<const D: usize>(
         Some(dynamics) => {
             device::solve(card, &dynamics.method(), &mut system, state, &mut watch, &mut finished)
         }
-        None => load_stepping(&mut *scene.equilibria(), &mut system, state, &mut watch, &mut finished),
+        None => {
+            let mut method = device::equilibria(card, scene);
+            load_stepping(&mut *method, &mut system, state, &mut watch, &mut finished)
+        }
     };
     phases.borrow_mut().stop();
     solved?;

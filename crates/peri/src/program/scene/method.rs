@@ -1,7 +1,7 @@
 //! Solver settings of a scene: quasi-static methods and explicit dynamics.
 
-use super::Scene;
 use super::formula::Formula;
+use super::{DeviceChoice, ForcePrecision, Scene};
 use crate::solver::{
     DynamicRelaxation, Equilibrium, Lbfgs, LbfgsSolver, Policy, RelaxationSolver, VelocityVerlet,
 };
@@ -37,6 +37,10 @@ pub struct SolverSpec {
     pub breaking: Policy,
     /// Ends the run once the load has fallen below this fraction of its peak.
     pub stop_below: Option<Ratio>,
+    /// Device that takes the iterations of equilibria; default: the processor.
+    pub device: Option<DeviceChoice>,
+    /// Precision of numbers on a graphics card, `double` or `single`; default: double.
+    pub precision: Option<ForcePrecision>,
 }
 
 impl Default for SolverSpec {
@@ -54,6 +58,8 @@ impl Default for SolverSpec {
             snap_back: false,
             breaking: Policy::default(),
             stop_below: None,
+            device: None,
+            precision: None,
         }
     }
 }
@@ -100,8 +106,7 @@ impl SolverMethod {
 impl Scene {
     /// Returns the largest relative error of the fitted bond law.
     pub fn fit_bound(&self) -> f64 {
-        let single =
-            self.dynamics.as_ref().is_some_and(|dynamics| dynamics.precision == ForcePrecision::Single);
+        let single = self.device().1 == ForcePrecision::Single;
         let rough = self.breaks() || self.is_mixed() || single;
         self.solver.fit_bound.unwrap_or(if rough { 1e-6 } else { 1e-9 })
     }
@@ -134,19 +139,25 @@ impl Scene {
 
     /// Builds the quasi-static method.
     pub fn equilibria<const D: usize>(&self) -> Box<dyn Equilibrium<D>> {
+        match self.method() {
+            SolverMethod::Lbfgs => Box::new(LbfgsSolver::new(self.lbfgs())),
+            SolverMethod::Adr | SolverMethod::Verlet => Box::new(RelaxationSolver::new(self.relaxation())),
+        }
+    }
+
+    /// Settings of L-BFGS.
+    pub fn lbfgs(&self) -> Lbfgs {
         let (tolerance, max_iterations) = (self.tolerance(), self.solver.max_iterations);
         let accept = self.solver.accept.unwrap_or(0.0);
-        match self.method() {
-            SolverMethod::Lbfgs => {
-                let plain = Lbfgs::default();
-                Box::new(LbfgsSolver::new(Lbfgs { tolerance, max_iterations, accept, ..plain }))
-            }
-            SolverMethod::Adr | SolverMethod::Verlet => {
-                let mass_safety = self.solver.mass_safety.unwrap_or(self.material.mass_safety());
-                let settings = DynamicRelaxation { tolerance, max_iterations, accept, mass_safety };
-                Box::new(RelaxationSolver::new(settings))
-            }
-        }
+        Lbfgs { tolerance, max_iterations, accept, ..Lbfgs::default() }
+    }
+
+    /// Settings of dynamic relaxation.
+    pub fn relaxation(&self) -> DynamicRelaxation {
+        let (tolerance, max_iterations) = (self.tolerance(), self.solver.max_iterations);
+        let accept = self.solver.accept.unwrap_or(0.0);
+        let mass_safety = self.solver.mass_safety.unwrap_or(self.material.mass_safety());
+        DynamicRelaxation { tolerance, max_iterations, accept, mass_safety }
     }
 }
 
@@ -176,48 +187,6 @@ pub struct Dynamics {
     /// Device that takes the steps; default: the processor.
     #[serde(default)]
     pub device: DeviceChoice,
-}
-
-/// Device that takes the steps of explicit dynamics.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum DeviceChoice {
-    /// The processor.
-    #[default]
-    Cpu,
-    /// A graphics card: a lattice of a bond law, without contact, inclusions, surface correction and
-    /// rotations.
-    Gpu,
-    /// A graphics card where there is one that can do it and the body is large enough to gain by it, the
-    /// processor otherwise.
-    Auto,
-}
-
-impl DeviceChoice {
-    /// Its name in scenes.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Cpu => "cpu",
-            Self::Gpu => "gpu",
-            Self::Auto => "auto",
-        }
-    }
-}
-
-/// Precision of bond forces on a lattice; everything else is in double precision, but on a graphics card in
-/// single precision.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum ForcePrecision {
-    /// Double precision.
-    #[default]
-    Double,
-    /// Single precision for bonds, double precision for the sums of their forces; the report has the error,
-    /// `mixed_error`. Double precision while stretches are so extreme that single precision would miss the
-    /// law by more than 1e-5.
-    Mixed,
-    /// Single precision throughout, on a graphics card.
-    Single,
 }
 
 impl Dynamics {

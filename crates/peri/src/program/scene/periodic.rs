@@ -76,7 +76,8 @@ fn refuse_blocks(source: &Source, scene: &Scene, periodic: &PeriodicSpec) -> Res
     let tracked = |probe: &super::HistoryProbe| {
         !matches!(probe.track, Track::Displacement | Track::Strain | Track::Opening)
     };
-    let card = |own: &super::Dynamics| own.device != super::DeviceChoice::Cpu;
+    let (device, _, block) = scene.device();
+    let device_key = format!("{block}.device");
     let refused = [
         ("body.points", scene.body.points.is_some()),
         ("body.grid", scene.body.grid.is_some()),
@@ -91,7 +92,7 @@ fn refuse_blocks(source: &Source, scene: &Scene, periodic: &PeriodicSpec) -> Res
         ("output.line", !scene.output.line.is_empty()),
         ("material.critical", scene.breaks()),
         ("material.inclusions", scene.material.is_prestrained()),
-        ("dynamics.device", scene.dynamics.as_ref().is_some_and(card)),
+        (device_key.as_str(), device != super::DeviceChoice::Cpu),
         ("dynamics", scene.dynamics.is_some() && solid),
     ];
     if let Some((key, _)) = refused.into_iter().find(|(_, given)| *given) {
