@@ -64,20 +64,20 @@ pub fn read(path: &Path) -> Result<MeshFile, Error> {
             "elements of complete second order: nodes in the middles of sides and elements are left out";
         mesh.notes.push(format!("{reduced} {note}"));
     }
-    for (set, name) in names(&mut file, "ns", "nodeset")?.into_iter().enumerate() {
-        let list = format!("node_ns{}", set + 1);
-        let members = if file.shape(&list).is_some() { file.numbers(&list, None)? } else { Vec::new() };
+    for (list, name) in lists(&mut file, ["ns", "nodeset", "node_ns"])? {
+        let members = file.numbers(&list, None)?;
         let nodes = indices(path, &list, &members, mesh.nodes.len())?;
         mesh.node_sets.entry(name).or_default().extend(nodes);
     }
-    for (set, name) in names(&mut file, "ss", "sideset")?.into_iter().enumerate() {
-        let [elements, sides] = ["elem", "side"].map(|kind| format!("{kind}_ss{}", set + 1));
-        if file.shape(&elements).is_none() {
-            continue;
-        }
+    for (elements, name) in lists(&mut file, ["ss", "sideset", "elem_ss"])? {
+        let sides = elements.replace("elem", "side");
         let members = file.numbers(&elements, None)?;
         let members = indices(path, &elements, &members, mesh.elements.len())?;
         let numbers = file.numbers(&sides, None)?;
+        if numbers.len() != members.len() {
+            let (found, allowed) = (numbers.len(), members.len());
+            return Err(data_error(path, &format!("found {found} numbers in `{sides}`; allowed: {allowed}")));
+        }
         let mut unused = 0;
         for (&element, &side) in members.iter().zip(&numbers) {
             let kind = mesh.elements[element as usize].kind;
@@ -131,17 +131,8 @@ pub fn points(file: &mut Netcdf, path: &Path) -> Result<Vec<[f64; 3]>, Error> {
 /// [`Error::Data`] for nodes that do not exist.
 pub fn blocks(file: &mut Netcdf, path: &Path, nodes: usize) -> Result<Vec<Block>, Error> {
     let mut found = Vec::new();
-    let names = names(file, "eb", "block")?;
-    for number in 1.. {
-        let list = format!("connect{number}");
-        let Some(shape) = file.shape(&list) else {
-            // a block without elements has none
-            if number > names.len() {
-                break;
-            }
-            continue;
-        };
-        let name = names.get(number - 1).cloned().unwrap_or_else(|| format!("block-{number}"));
+    for (list, name) in lists(file, ["eb", "block", "connect"])? {
+        let shape = file.shape(&list).unwrap_or_default();
         let nodes_each = shape.get(1).copied().unwrap_or_default().max(1);
         let element_type = file.attribute(&list, "elem_type").unwrap_or_default();
         let element_type = element_type.trim_matches(['\0', ' ']).to_uppercase();
@@ -155,6 +146,22 @@ pub fn blocks(file: &mut Netcdf, path: &Path, nodes: usize) -> Result<Vec<Block>
             ));
         }
         found.push(Block { name, element_type, nodes_each, nodes });
+    }
+    Ok(found)
+}
+
+/// Lists of the blocks or sets that have members, with their names.
+fn lists(file: &mut Netcdf, [kind, prefix, list]: [&str; 3]) -> Result<Vec<(String, String)>, Error> {
+    let names = names(file, kind, prefix)?;
+    let mut found = Vec::new();
+    for number in 1.. {
+        let own = format!("{list}{number}");
+        if file.shape(&own).is_some() {
+            let name = names.get(number - 1).cloned();
+            found.push((own, name.unwrap_or_else(|| format!("{prefix}-{number}"))));
+        } else if number > names.len() {
+            break;
+        }
     }
     Ok(found)
 }

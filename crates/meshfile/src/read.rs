@@ -31,6 +31,10 @@ pub fn read(path: &Path, advice: abaqus::Advice) -> Result<MeshFile, Error> {
         "vtu" | "pvtu" => crate::vtu::read(path),
         #[cfg(feature = "results")]
         "e" | "ex2" | "exo" | "g" | "gen" => crate::exodus::read(path),
+        #[cfg(not(feature = "results"))]
+        "vtu" | "pvtu" | "e" | "ex2" | "exo" | "g" | "gen" => {
+            Err(Error::Mesh(format!("{}: built without the feature `results`", path.display())))
+        }
         "vtk" => {
             let advice = "save it as .vtu, e.g. with ParaView or meshio";
             Err(Error::Mesh(format!("{}: a legacy file of VTK; {advice}", path.display())))

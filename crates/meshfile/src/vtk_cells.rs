@@ -6,7 +6,7 @@ use crate::shape::ElementShape;
 /// Cell type of VTK, number of its nodes, element kind: the first nodes of the cell, in its order. Nodes in
 /// the middles of sides and cells are left out. Types 68 to 73 are Lagrange cells of any order, whose order
 /// of edges changed between versions: those with corners only.
-const KINDS: [(u8, usize, ElementKind); 22] = [
+const KINDS: [(u8, usize, ElementKind); 23] = [
     (1, 1, ElementKind::Point),
     (3, 2, ElementKind::Line),
     (68, 2, ElementKind::Line),
@@ -27,6 +27,7 @@ const KINDS: [(u8, usize, ElementKind); 22] = [
     (25, 20, ElementKind::Solid(ElementShape::Hexahedron20)),
     (29, 27, ElementKind::Solid(ElementShape::Hexahedron20)),
     (13, 6, ElementKind::Solid(ElementShape::Wedge)),
+    (73, 6, ElementKind::Solid(ElementShape::Wedge)),
     (26, 15, ElementKind::Solid(ElementShape::Wedge15)),
     (32, 18, ElementKind::Solid(ElementShape::Wedge15)),
 ];

@@ -50,12 +50,43 @@ pub struct VtuArray {
 
 #[derive(Default)]
 struct VtuPiece {
+    /// Numbers of points and cells, where the piece states them.
+    counts: [Option<usize>; 2],
     points: Vec<f64>,
     nodes: Vec<f64>,
     ends: Vec<f64>,
     kinds: Vec<f64>,
     point_arrays: Vec<VtuArray>,
     cell_arrays: Vec<VtuArray>,
+}
+
+/// Array of cells that other pieces have, too, where it is not 0.
+const GHOST: &str = "vtkGhostType";
+
+impl VtuPiece {
+    /// Refuses lists that do not fit each other.
+    fn check(&self, path: &Path) -> Result<(), Error> {
+        let [points, cells] = self.counts;
+        let cells = cells.unwrap_or(self.ends.len());
+        let last = self.ends.last().map_or(0, |&end| end as usize);
+        let wrong = |name: &str, found: usize, allowed: usize| {
+            let what = format!("a piece has {found} values of `{name}`; allowed: {allowed}");
+            Err(data_error(path, &what))
+        };
+        match points {
+            Some(points) if self.points.len() != 3 * points => wrong("Points", self.points.len(), 3 * points),
+            _ if self.points.len() % 3 != 0 => {
+                wrong("Points", self.points.len(), 3 * self.points.len().div_ceil(3))
+            }
+            _ if self.ends.len() != cells => wrong("offsets", self.ends.len(), cells),
+            _ if self.kinds.len() != cells => wrong("types", self.kinds.len(), cells),
+            _ if self.nodes.len() != last => wrong("connectivity", self.nodes.len(), last),
+            _ => match self.cell_arrays.iter().find(|array| array.values.len() != cells) {
+                Some(array) => wrong(&array.name, array.values.len(), cells),
+                None => Ok(()),
+            },
+        }
+    }
 }
 
 /// Returns true for a path with an ending, in any case of letters.
@@ -194,6 +225,10 @@ impl VtuGrid {
                         }
                     };
                 }
+                "Piece" => {
+                    let count = |key: &str| attribute(key).parse::<usize>().ok();
+                    piece.counts = [count("NumberOfPoints"), count("NumberOfCells")];
+                }
                 "PointData" | "Points" | "Cells" | "CellData" => section = name.to_owned(),
                 "/PointData" | "/Points" | "/Cells" | "/CellData" => section.clear(),
                 "DataArray" => {
@@ -225,6 +260,7 @@ impl VtuGrid {
     fn add(&mut self, piece: VtuPiece, path: &Path) -> Result<(), Error> {
         let first = self.points.len();
         self.pieces.push(first);
+        piece.check(path)?;
         self.points.extend(piece.points.chunks_exact(3).map(|x| [x[0], x[1], x[2]]));
         let nodes = self.points.len() - first;
         let mut begin = 0;
@@ -242,10 +278,17 @@ impl VtuGrid {
             self.cells.push((kind as u8, self.nodes.len()));
             begin = end as usize;
         }
+        let cells = self.cells.len() - piece.kinds.len();
         for (own, all) in
             [(piece.point_arrays, &mut self.point_arrays), (piece.cell_arrays, &mut self.cell_arrays)]
         {
-            for array in own {
+            for mut array in own {
+                if array.name == GHOST {
+                    // pieces without it have no ghosts
+                    let known =
+                        all.iter().find(|known| known.name == GHOST).map_or(0, |own| own.values.len());
+                    array.values.splice(0..0, std::iter::repeat_n(0.0, cells - known));
+                }
                 match all.iter_mut().find(|known| known.name == array.name) {
                     Some(known) => known.values.extend(array.values),
                     None => all.push(array),

@@ -1,6 +1,6 @@
 //! Meshes from VTK's unstructured grids.
 
-use super::{VtuArray, VtuGrid};
+use super::{GHOST, VtuArray, VtuGrid};
 use crate::content::{FileElement, FileNode, MeshFile};
 use crate::error::{Error, data_error};
 use crate::vtk_cells::{ALLOWED, element};
@@ -25,7 +25,7 @@ pub fn read(path: &Path) -> Result<MeshFile, Error> {
         let (label, point) = (node.label, node.point);
         return Err(data_error(path, &format!("node {label} at {point:?}; allowed: finite positions")));
     }
-    let ghost = grid.cell_arrays.iter().find(|array| array.name == "vtkGhostType");
+    let ghost = grid.cell_arrays.iter().find(|array| array.name == GHOST);
     let mut place_of = vec![u32::MAX; grid.cells.len()];
     let mut unused = 0;
     for (cell, &(kind, _)) in grid.cells.iter().enumerate() {

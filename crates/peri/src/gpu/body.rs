@@ -67,6 +67,17 @@ pub struct DeviceBody<const D: usize> {
 }
 
 impl<const D: usize> DeviceBody<D> {
+    /// Refuses a list of numbers, one for each site, of another body.
+    pub(super) fn refuse_other_sites(&self, values: &[f64]) -> Result<(), Error> {
+        if values.len() == self.sites {
+            return Ok(());
+        }
+        let (found, sites) = (values.len(), self.sites);
+        Err(Error::Device(format!(
+            "found {found} springs against rounding; allowed: {sites}, one for each site"
+        )))
+    }
+
     /// Puts particles, intact bonds and a law q(e) with its modulus kθ, N/m⁶, on a device, without loads, at
     /// rest, undeformed.
     ///

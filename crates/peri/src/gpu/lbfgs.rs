@@ -62,7 +62,8 @@ impl<const D: usize> DeviceSearch<D> {
     /// of its sites, N/m⁴, that rounding of displacements pulls at.
     ///
     /// # Errors
-    /// Those of [`DeviceBody::new`]; [`Error::Device`] for pairs that the device's memory does not hold.
+    /// Those of [`DeviceBody::new`]; [`Error::Device`] for pairs that the device's memory does not hold, and for
+    /// springs of another body.
     pub fn new(
         device: &Device,
         bonds: &LatticeBonds<D>,
@@ -71,6 +72,7 @@ impl<const D: usize> DeviceSearch<D> {
         pairs: usize,
     ) -> Result<Self, Error> {
         let body = DeviceBody::new(device, bonds, law, modulus)?;
+        body.refuse_other_sites(springs)?;
         let (bytes, list) = (body.precision.bytes() as usize, D * body.sites);
         refuse_beyond_memory(device, &[("steps of L-BFGS", (4 * pairs * list) as u64); 2])?;
         let zeros = || numbers(&body.client, body.precision, (0..list).map(|_| 0.0));

@@ -235,9 +235,13 @@ pub fn combine<F: Float>(
             if is_free {
                 sum = scale * local[site] * force[at];
                 for pair in 0..pairs {
-                    let place = pair * force.len() + at;
-                    let back = weights[2 * pair] * F::cast_from(images[place]);
-                    sum += back - weights[2 * pair + 1] * F::cast_from(steps[place]);
+                    let back = weights[2 * pair];
+                    let along = weights[2 * pair + 1];
+                    // slots without a pair may have numbers that are not finite
+                    if back != F::new(0.0) || along != F::new(0.0) {
+                        let place = pair * force.len() + at;
+                        sum += back * F::cast_from(images[place]) - along * F::cast_from(steps[place]);
+                    }
                 }
                 slope -= force[at] * sum;
             }

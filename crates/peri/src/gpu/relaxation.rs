@@ -47,7 +47,7 @@ impl<const D: usize> DeviceRelaxation<D> {
     /// rounding of displacements pulls at.
     ///
     /// # Errors
-    /// Those of [`DeviceBody::new`].
+    /// Those of [`DeviceBody::new`]; [`Error::Device`] for springs of another body.
     pub fn new(
         device: &Device,
         bonds: &LatticeBonds<D>,
@@ -55,6 +55,7 @@ impl<const D: usize> DeviceRelaxation<D> {
         springs: &[f64],
     ) -> Result<Self, Error> {
         let body = DeviceBody::new(device, bonds, law, modulus)?;
+        body.refuse_other_sites(springs)?;
         let bytes = body.precision.bytes() as usize;
         let empty = |length: usize| body.client.empty(length * bytes);
         let unit = springs.iter().copied().fold(f64::MIN_POSITIVE, f64::max);

@@ -211,10 +211,14 @@ impl ViscousCorrespondence {
         let (root, relaxed) = (residual.sqrt(), self.relaxed_residual(past));
         let beyond = (root - relaxed).max(0.0);
         let free = if relaxed == 0.0 { 1.0 } else { beyond / root.max(relaxed) };
-        let kept = if part == EnergyPart::Trial { beyond } else { self.left(past) * beyond };
         let lasting = own + LASTING * branches;
         let fleeting = (1.0 - LASTING) * branches;
-        [0.5 * (lasting * residual + fleeting * kept * kept), lasting + fleeting * free]
+        let energy = match part {
+            EnergyPart::Trial => fleeting,
+            // of all of the springs, at the end of the step
+            _ => (1.0 - LASTING) * self.stabilisation * self.law.branch_modulus() * self.left(past).powi(2),
+        };
+        [0.5 * (lasting * residual + energy * beyond * beyond), lasting + fleeting * free]
     }
 }
 

@@ -126,6 +126,8 @@ fn beyond_cards<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<(
     let rotation_key = format!("boundary[{}].rotation", rotation.unwrap_or(0));
     let uniform = bonds.as_lattice().is_none_or(crate::bonds::LatticeBonds::is_uniform);
     let faults = [
+        ("step", !scene.step.is_empty(), "steps"),
+        ("periodic", scene.periodic.is_some(), "periodic sides"),
         ("body.points", scene.body.points.is_some(), "a body of points"),
         ("body.grid", scene.body.grid.is_some(), "a grid of cells"),
         ("material.solid", material.solid.is_some(), "a solid"),

@@ -72,7 +72,7 @@ pub fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     }
     let (device, precision, block) = scene.device();
     let found = match (device, precision, block) {
-        (_, ForcePrecision::Mixed, "solver") => "\"mixed\" of equilibria",
+        (_, ForcePrecision::Mixed, "solver") => "\"mixed\" for equilibria",
         (DeviceChoice::Cpu, ForcePrecision::Single, _) => "\"single\" on the processor",
         (DeviceChoice::Gpu, ForcePrecision::Mixed, _) => "\"mixed\" on a graphics card",
         _ => return Ok(()),

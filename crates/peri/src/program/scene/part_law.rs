@@ -214,7 +214,7 @@ pub(super) fn explain<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Op
     let words = bonds.as_lattice().map_or(0, |lattice| lattice.stencil().offsets.len().div_ceil(64));
     let megabytes = memory_of_a_site(scene, 8.0 * words as f64) * bonds.sites() as f64 / 1e6;
     (laws.len() > 1)
-        .then(|| format!("bond laws {}: {megabytes:.1} MB, a pass of the kernel for each", names.join(", ")))
+        .then(|| format!("bond laws {}: {megabytes:.1} MB, a pass of the kernel for each, plain loops if one needs a table", names.join(", ")))
 }
 
 /// Returns the bytes of a site for the shares of several laws, and for their passes over bonds of `masks`

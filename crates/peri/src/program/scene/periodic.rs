@@ -92,7 +92,7 @@ fn refuse_blocks(source: &Source, scene: &Scene, periodic: &PeriodicSpec) -> Res
         ("output.line", !scene.output.line.is_empty()),
         ("material.critical", scene.breaks()),
         ("material.inclusions", scene.material.is_prestrained()),
-        (device_key.as_str(), device != super::DeviceChoice::Cpu),
+        (device_key.as_str(), device == super::DeviceChoice::Gpu),
         ("dynamics", scene.dynamics.is_some() && solid),
     ];
     if let Some((key, _)) = refused.into_iter().find(|(_, given)| *given) {

@@ -70,6 +70,14 @@ fn plane_positions<const D: usize>(
     Ok(each.collect())
 }
 
+/// Name of a moment, for messages.
+fn moment(scene: &Scene, factor: f64, time: f64) -> String {
+    if time > 0.0 {
+        return format!("time {:.3e} s", scene.earlier.time + time);
+    }
+    format!("load factor {factor:.3}")
+}
+
 /// Returns the load factors and times, s, at which planes are checked.
 fn moments(scene: &Scene) -> Vec<(f64, f64)> {
     let end = scene.dynamics.as_ref().map_or(0.0, |dynamics| dynamics.method().end_time);
@@ -137,11 +145,7 @@ pub(super) fn check<const D: usize>(
             for (factor, time) in moments(scene) {
                 let gap = apart - own.displacement(factor, time) - other.displacement(factor, time);
                 if gap < LEAST_ROOM * body_between {
-                    let when = if time > 0.0 {
-                        format!("time {:.3e} s", scene.earlier.time + time)
-                    } else {
-                        format!("load factor {factor:.3}")
-                    };
+                    let when = moment(scene, factor, time);
                     let found = format!(
                         "planes `{}` and `{}` {:.3e} m apart at {when}, with {body_between:.3e} m of the \
                          body between them",
@@ -156,10 +160,7 @@ pub(super) fn check<const D: usize>(
         }
     }
     if let Some((factor, time)) = moments(scene).into_iter().find(|&(f, t)| !has_room(&planes, body, f, t)) {
-        let when = match time > 0.0 {
-            true => format!("time {:.3e} s", scene.earlier.time + time),
-            false => format!("load factor {factor:.3}"),
-        };
+        let when = moment(scene, factor, time);
         let names: Vec<String> = planes.iter().map(|position| format!("`{}`", position.name)).collect();
         let found = format!("planes {} that leave no room between them at {when}", names.join(", "));
         return Err(source.error(

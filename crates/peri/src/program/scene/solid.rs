@@ -93,7 +93,10 @@ impl SolidLaw {
         let numbers = |own: &BranchSpec| 6 + usize::from(own.viscosity == ViscosityKind::EyringSoftening);
         let branches: usize = self.branch.iter().map(numbers).sum();
         let pressure = usize::from(self.branch.iter().any(BranchSpec::has_pressure));
-        if self.has_state() { branches + usize::from(self.mullins.is_some()) + pressure + 1 } else { 0 }
+        // the relaxed part of the stabilisation, and the stabilisation of the step
+        let stabilisation = usize::from(!self.branch.is_empty() && self.stabilisation != Some(0.0)) + 1;
+        let softening = usize::from(self.mullins.is_some());
+        if self.has_state() { branches + softening + pressure + stabilisation } else { 0 }
     }
 
     /// Adds branches and softening to the law in equilibrium.

@@ -149,9 +149,9 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                 "not available with [[step]] and rigid surfaces: each has its place at the end of a step";
             return Err(source.unexpected("solver.stop_below", why));
         }
-        if scene.solver.device.is_some_and(|device| device != DeviceChoice::Cpu) {
-            let why = "a graphics card with [[step]]";
-            return Err(source.error("solver.device", why, "`cpu`: the processor takes all steps"));
+        if scene.solver.device == Some(DeviceChoice::Gpu) {
+            let allowed = "`\"cpu\"` or `\"auto\"` with [[step]]: the processor takes all steps";
+            return Err(source.error("solver.device", "\"gpu\"", allowed));
         }
         if scene.is_mixed() {
             let why = "all steps of a run have one precision";
