@@ -222,5 +222,5 @@ fn readers_are_chosen_by_extension() {
     assert_eq!(mesh::read(&folder.join("hexes.inp"), 1.0).unwrap().mesh.hexahedra.len(), 16);
     assert_eq!(mesh::read(&folder.join("hexes_binary.msh"), 1.0).unwrap().mesh.hexahedra.len(), 16);
     let error = mesh::read(Path::new("part.stl"), 1.0).unwrap_err().to_string();
-    assert!(error.contains("part.stl: allowed: .msh"), "{error}");
+    assert!(error.contains("part.stl: allowed: `.msh`"), "{error}");
 }
