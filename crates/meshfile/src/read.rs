@@ -4,8 +4,8 @@ use crate::{Error, MeshFile, abaqus, gmsh};
 use std::path::Path;
 
 /// Formats of [`read`], for messages.
-pub const FORMATS: &str = "`.msh` (Gmsh 2 and 4), `.inp` (Abaqus, CalculiX), `.vtu`, `.pvtu` (VTK), `.e`, `.ex2`, \
-    `.exo`, `.g`, `.gen` (Exodus II)";
+pub const FORMATS: &str = "`.msh` (Gmsh 2 and 4), `.inp` (Abaqus, CalculiX), `.vtu`, `.pvtu` (VTK), `.e`, \
+    `.ex2`, `.exo`, `.g`, `.gen` (Exodus II)";
 
 fn ending(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
@@ -16,9 +16,10 @@ pub fn is_mesh(path: &Path) -> bool {
     matches!(ending(path).as_str(), "msh" | "inp" | "vtu" | "pvtu" | "e" | "ex2" | "exo" | "g" | "gen")
 }
 
-/// Reads a mesh file, `.msh` of Gmsh ([`gmsh::read`]), `.inp` of Abaqus and CalculiX ([`abaqus::read`]), `.vtu`
-/// and `.pvtu` of VTK (`vtu::read`) or `.e`, `.ex2`, `.exo`, `.g`, `.gen` of Exodus II (`exodus::read`). `advice`
-/// replaces keywords of Abaqus that have no effect on the mesh, see [`abaqus::Advice`].
+/// Reads a mesh file: `.msh` of Gmsh ([`gmsh::read`]), `.inp` of Abaqus and CalculiX ([`abaqus::read`]),
+/// `.vtu` and `.pvtu` of VTK (`vtu::read`), `.e`, `.ex2`, `.exo`, `.g` and `.gen` of Exodus II
+/// (`exodus::read`). `advice` replaces keywords of Abaqus that have no effect on the mesh, see
+/// [`abaqus::Advice`].
 ///
 /// # Errors
 /// [`Error::Mesh`] for another extension, or for one of VTK or Exodus without the feature `results`, and

@@ -80,11 +80,13 @@ fn pieces_are_one_mesh() {
     let write = |name: &str, text: String| std::fs::write(folder.path().join(name), text).unwrap();
     let left = "0 0 0 1 0 0 0 1 0 1 1 0 2 0 0 2 1 0";
     let ghost = "<CellData><DataArray type=\"UInt8\" Name=\"vtkGhostType\" format=\"ascii\">0 1\
-                 </DataArray><DataArray type=\"Int32\" Name=\"part\" format=\"ascii\">-1 7</DataArray></CellData>";
+                 </DataArray><DataArray type=\"Int32\" Name=\"part\" format=\"ascii\">-1 7</DataArray>\
+                 </CellData>";
     write("a.vtu", piece(left, "0 1 3 2 1 4 5 3", "4 8", "9 9", ghost));
     let right = "1 -0 0 2 0 0 1 1 0 2 1 0";
     let whole = "<CellData><DataArray type=\"UInt8\" Name=\"vtkGhostType\" format=\"ascii\">0\
-                 </DataArray><DataArray type=\"Int32\" Name=\"part\" format=\"ascii\">7</DataArray></CellData>";
+                 </DataArray><DataArray type=\"Int32\" Name=\"part\" format=\"ascii\">7</DataArray>\
+                 </CellData>";
     write("b.vtu", piece(right, "0 1 3 2", "4", "9", whole));
     let parts = "<VTKFile type=\"PUnstructuredGrid\"><PUnstructuredGrid><Piece Source=\"a.vtu\"/>\
                  <Piece Source=\"b.vtu\"/></PUnstructuredGrid></VTKFile>";
@@ -95,6 +97,13 @@ fn pieces_are_one_mesh() {
     let sets: Vec<(&str, &[u32])> =
         mesh.element_sets.iter().map(|(name, places)| (name.as_str(), places.as_slice())).collect();
     assert_eq!(sets, [("part--1", &[0][..]), ("part-7", &[1][..])]);
+
+    // flags of the second piece are not those of the first
+    write("b.vtu", piece(right, "0 1 3 2", "4", "9", ""));
+    write("all.pvtu", parts.replace("a.vtu", "c.vtu").replace("b.vtu", "a.vtu").replace("c.vtu", "b.vtu"));
+    let mesh = vtu::read(&folder.path().join("all.pvtu")).unwrap();
+    assert_eq!((mesh.nodes.len(), mesh.elements.len()), (6, 2));
+    assert!(mesh.notes[0].contains("array `part` has 2 values for 3 cells"), "{:?}", mesh.notes);
 }
 
 #[test]
@@ -104,6 +113,8 @@ fn other_content_is_refused() {
     for (name, text, says) in [
         ("pyramid.vtu", piece(points, "0 1 2 3 4", "5", "14", ""), "cell 0 of VTK's type 14 with 5 nodes"),
         ("beyond.vtu", piece(points, "0 1 2 5", "4", "10", ""), "allowed: nodes 0 to 4"),
+        ("short.vtu", piece(points, "0 1 2 0 1 2", "3 6", "5", ""), "1 values of `types`; allowed: 2"),
+        ("long.vtu", piece(points, "0 1 2 3", "3", "5", ""), "4 values of `connectivity`; allowed: 3"),
         ("nan.vtu", piece(&points.replace("0 0 1", "0 0 nan"), "0 1 3 4", "4", "10", ""), "finite positions"),
         ("old.vtk", "# vtk DataFile Version 3.0".into(), "save it as .vtu"),
         ("text.e", "CDF?".into(), "allowed: netCDF"),

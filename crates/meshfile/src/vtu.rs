@@ -75,7 +75,7 @@ impl VtuPiece {
         };
         match points {
             Some(points) if self.points.len() != 3 * points => wrong("Points", self.points.len(), 3 * points),
-            _ if self.points.len() % 3 != 0 => {
+            _ if !self.points.len().is_multiple_of(3) => {
                 wrong("Points", self.points.len(), 3 * self.points.len().div_ceil(3))
             }
             _ if self.ends.len() != cells => wrong("offsets", self.ends.len(), cells),

@@ -62,8 +62,8 @@ impl<const D: usize> DeviceSearch<D> {
     /// of its sites, N/m⁴, that rounding of displacements pulls at.
     ///
     /// # Errors
-    /// Those of [`DeviceBody::new`]; [`Error::Device`] for pairs that the device's memory does not hold, and for
-    /// springs of another body.
+    /// Those of [`DeviceBody::new`]; [`Error::Device`] for pairs that the device's memory does not hold, and
+    /// for springs of another body.
     pub fn new(
         device: &Device,
         bonds: &LatticeBonds<D>,

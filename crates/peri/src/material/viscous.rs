@@ -17,10 +17,10 @@ use std::cell::RefCell;
 
 /// W = W_eq(C) + Σ_k W_k(C, C_v) + ½ aμ r + ½ g·max(0, √r − s)²: [`super::Correspondence`] whose law has a
 /// state, with the residual r. Each step minimises the energy of backward Euler in exponential form
-/// ([`Viscoelastic`]); g = a Σ_k ν_k/(1 + Δt ν_k/η_k) with ν and η at its start. s is the part of √r that has
-/// relaxed, as the branches do: s ← √r + (s − √r) g/(aΣν) at the end of a step. A tenth of g acts on all of r,
-/// so that no mode within s goes soft. A viscosity that depends on the pressure has that of the particle at the
-/// start of the step, −tr σ/3 of the whole law.
+/// ([`Viscoelastic`]); g = a Σ_k ν_k/(1 + Δt ν_k/η_k) with ν and η at its start. s is the part of √r that
+/// has relaxed, as the branches do: s ← √r + (s − √r) g/(aΣν) at the end of a step. A tenth of g acts on all
+/// of r, so that no mode within s goes soft. A viscosity that depends on the pressure has that of the
+/// particle at the start of the step, −tr σ/3 of the whole law.
 ///
 /// A deformation without [`Past`] is one in equilibrium: it has the stress of W_eq alone.
 pub struct ViscousCorrespondence {

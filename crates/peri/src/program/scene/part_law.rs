@@ -213,8 +213,10 @@ pub(super) fn explain<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Op
     let names: Vec<&str> = laws.iter().map(|choice| choice.law.name()).collect();
     let words = bonds.as_lattice().map_or(0, |lattice| lattice.stencil().offsets.len().div_ceil(64));
     let megabytes = memory_of_a_site(scene, 8.0 * words as f64) * bonds.sites() as f64 / 1e6;
-    (laws.len() > 1)
-        .then(|| format!("bond laws {}: {megabytes:.1} MB, a pass of the kernel for each, plain loops if one needs a table", names.join(", ")))
+    (laws.len() > 1).then(|| {
+        let passes = "a pass of the kernel for each, plain loops if one needs a table";
+        format!("bond laws {}: {megabytes:.1} MB, {passes}", names.join(", "))
+    })
 }
 
 /// Returns the bytes of a site for the shares of several laws, and for their passes over bonds of `masks`

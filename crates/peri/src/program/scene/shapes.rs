@@ -30,8 +30,8 @@ pub struct ShapeSpec {
     pub axis: Option<AxisName>,
     /// Corners of a polygon, in order.
     pub points: Option<Vec<Vec<Length>>>,
-    /// File of a mesh: Gmsh `.msh`, Abaqus or CalculiX `.inp`, VTK `.vtu`, Exodus II `.e`, or a closed surface,
-    /// `.stl`.
+    /// File of a mesh: Gmsh `.msh`, Abaqus or CalculiX `.inp`, VTK `.vtu`, Exodus II `.e`, or a closed
+    /// surface, `.stl`.
     pub file: Option<PathBuf>,
     /// Length of one unit of the file.
     pub unit: Option<Length>,
