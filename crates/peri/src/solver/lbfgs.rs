@@ -85,7 +85,7 @@ pub trait SearchVectors<const D: usize> {
     /// Builds the preconditioner for the present state.
     ///
     /// # Errors
-    /// [`Error::Device`] for what a device cannot do, or where it fails; so below.
+    /// `Error::Device` for what a device cannot do, or where it fails; so below.
     fn build(&mut self, system: &mut System<D>, state: &State<D>, settings: &Lbfgs) -> Result<(), Error>;
     /// Returns true if there is a preconditioner.
     fn is_built(&self) -> bool;

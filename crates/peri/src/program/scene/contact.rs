@@ -66,7 +66,7 @@ pub struct PlaneSpec {
     #[serde(default)]
     pub bonded: bool,
     /// Displacement at the end of the last step; the plane follows the load factor, and stays there in a
-    /// later [[step]].
+    /// later `[[step]]`.
     pub displacement: Option<Vec<Length>>,
     /// Velocity, in explicit dynamics; added to the displacement.
     pub velocity: Option<Vec<Speed>>,
