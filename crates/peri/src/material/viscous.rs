@@ -213,11 +213,10 @@ impl ViscousCorrespondence {
         let free = if relaxed == 0.0 { 1.0 } else { beyond / root.max(relaxed) };
         let lasting = own + LASTING * branches;
         let fleeting = (1.0 - LASTING) * branches;
-        let energy = match part {
-            EnergyPart::Trial => fleeting,
-            // of all of the springs, at the end of the step
-            _ => (1.0 - LASTING) * self.stabilisation * self.law.branch_modulus() * self.left(past).powi(2),
-        };
+        // of all of the springs: as if nothing had flowed in the step, or at its end
+        let left = if part == EnergyPart::Trial { 1.0 } else { self.left(past) };
+        let springs = self.stabilisation * self.law.branch_modulus();
+        let energy = (1.0 - LASTING) * springs * left * left;
         [0.5 * (lasting * residual + energy * beyond * beyond), lasting + fleeting * free]
     }
 }
