@@ -21,7 +21,7 @@ pub enum DeviceChoice {
 }
 
 impl DeviceChoice {
-    /// Its name in scenes.
+    /// Name in scenes.
     pub fn name(self) -> &'static str {
         match self {
             Self::Cpu => "cpu",
