@@ -67,15 +67,18 @@ pub struct DeviceBody<const D: usize> {
 }
 
 impl<const D: usize> DeviceBody<D> {
-    /// Refuses a list of numbers, one for each site, of another body.
-    pub(super) fn refuse_other_sites(&self, values: &[f64]) -> Result<(), Error> {
+    /// Refuses a list with other than one number a site.
+    pub(super) fn refuse_other_sites(&self, what: &str, values: &[f64]) -> Result<(), Error> {
         if values.len() == self.sites {
             return Ok(());
         }
         let (found, sites) = (values.len(), self.sites);
-        Err(Error::Device(format!(
-            "found {found} springs against rounding; allowed: {sites}, one for each site"
-        )))
+        Err(Error::Device(format!("found {found} {what}; allowed: {sites}, one for each site")))
+    }
+
+    /// Number of words of held components.
+    pub(super) fn held_words(&self) -> usize {
+        if self.form.held { self.sites } else { 1 }
     }
 
     /// Puts particles, intact bonds and a law q(e) with its modulus kθ, N/m⁶, on a device, without loads, at

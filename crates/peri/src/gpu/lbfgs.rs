@@ -72,7 +72,7 @@ impl<const D: usize> DeviceSearch<D> {
         pairs: usize,
     ) -> Result<Self, Error> {
         let body = DeviceBody::new(device, bonds, law, modulus)?;
-        body.refuse_other_sites(springs)?;
+        body.refuse_other_sites("springs", springs)?;
         let (bytes, list) = (body.precision.bytes() as usize, D * body.sites);
         refuse_beyond_memory(device, &[("steps of L-BFGS", (4 * pairs * list) as u64); 2])?;
         let zeros = || numbers(&body.client, body.precision, (0..list).map(|_| 0.0));
@@ -140,7 +140,7 @@ impl<const D: usize> DeviceSearch<D> {
                 buffer(direction, D * body.sites),
                 buffer(displacement, D * body.sites),
                 buffer(&body.sites_of_particles, body.particles),
-                buffer(&body.held, self.held()),
+                buffer(&body.held, body.held_words()),
                 buffer(&self.springs, body.sites),
                 buffer(&self.partial, LINE_SUMS * threads),
                 body.form,
@@ -180,8 +180,14 @@ impl<const D: usize> DeviceSearch<D> {
     /// each place s·y, w·y, s·g, w·g with the newest y and g.
     ///
     /// # Errors
-    /// [`Error::Device`] where the device fails.
+    /// [`Error::Device`] for a place beyond the last, and where the device fails.
     pub fn record(&self, slot: usize, step: f64) -> Result<Vec<[f64; PAIR_SUMS]>, Error> {
+        if slot >= self.pairs {
+            return Err(Error::Device(format!(
+                "found place {slot} for a pair; allowed: 0 to {}",
+                self.pairs - 1
+            )));
+        }
         let (body, threads) = (&self.body, self.body.threads());
         let (list, lanes) = (D * body.sites, body.particles.min(PAIR_THREADS));
         let [_, direction, force] = &body.fields;
@@ -195,7 +201,7 @@ impl<const D: usize> DeviceSearch<D> {
                 buffer(&self.before, list),
                 buffer(direction, list),
                 buffer(&body.sites_of_particles, body.particles),
-                buffer(&body.held, self.held()),
+                buffer(&body.held, body.held_words()),
                 buffer(&self.local, body.sites),
                 buffer(&self.steps, self.pairs * list),
                 buffer(&self.images, self.pairs * list),
@@ -212,7 +218,7 @@ impl<const D: usize> DeviceSearch<D> {
                 buffer(force, list),
                 buffer(&self.before, list),
                 buffer(&body.sites_of_particles, body.particles),
-                buffer(&body.held, self.held()),
+                buffer(&body.held, body.held_words()),
                 buffer(&self.steps, self.pairs * list),
                 buffer(&self.images, self.pairs * list),
                 buffer(&self.pair_partial, PAIR_SUMS * self.pairs * lanes),
@@ -231,8 +237,12 @@ impl<const D: usize> DeviceSearch<D> {
     /// `weights`; returns the slope along it, in the device's units.
     ///
     /// # Errors
-    /// [`Error::Device`] where the device fails.
+    /// [`Error::Device`] for weights of another number of places, and where the device fails.
     pub fn combine(&self, scale: f64, weights: &[[f64; 2]]) -> Result<f64, Error> {
+        if weights.len() != self.pairs {
+            let (found, pairs) = (weights.len(), self.pairs);
+            return Err(Error::Device(format!("found weights of {found} places; allowed: {pairs}")));
+        }
         let (body, threads, list) = (&self.body, self.body.threads(), D * self.body.sites);
         let weights = numbers(&body.client, body.precision, weights.as_flattened().iter().copied());
         // SAFETY: as in `record`, with two weights a place
@@ -243,7 +253,7 @@ impl<const D: usize> DeviceSearch<D> {
                 CubeDim::new_1d(CUBE as u32),
                 buffer(&self.before, list),
                 buffer(&body.sites_of_particles, body.particles),
-                buffer(&body.held, self.held()),
+                buffer(&body.held, body.held_words()),
                 buffer(&self.local, body.sites),
                 buffer(&self.steps, self.pairs * list),
                 buffer(&self.images, self.pairs * list),
@@ -285,11 +295,6 @@ impl<const D: usize> DeviceSearch<D> {
         body.launch_pull([&scratch[0], &scratch[1]], all, 0.0, form, true);
         self.scratch = Some(scratch);
         Ok(self.body.stretch_range()?.0)
-    }
-
-    /// Number of words of held components.
-    fn held(&self) -> usize {
-        if self.body.form.held { self.body.sites } else { 1 }
     }
 }
 

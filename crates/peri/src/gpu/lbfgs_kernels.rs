@@ -2,6 +2,7 @@
 //! free, 0 where held; B is diagonal. Pairs lie one after the other, in single precision.
 
 use super::kernels::KernelForm;
+use super::relaxation_kernels::is_free;
 use cubecl::ir::ElemType;
 use cubecl::prelude::*;
 
@@ -43,11 +44,7 @@ pub fn line_sums<F: Float>(
         for d in 0..dimension {
             let at = d * sites + site;
             let pull = force[at];
-            let mut is_free = true;
-            if comptime!(form.held) {
-                is_free = (held[site] >> (d as u32)) & 1u32 == 0;
-            }
-            if is_free {
+            if is_free(held, site, d, form) {
                 free = fma(pull, pull, free);
                 slope -= pull * direction[at];
             } else {
@@ -121,11 +118,7 @@ pub fn record<F: Float>(
         for d in 0..dimension {
             let at = d * sites + site;
             let mut image = F::new(0.0);
-            let mut is_free = true;
-            if comptime!(form.held) {
-                is_free = (held[site] >> (d as u32)) & 1u32 == 0;
-            }
-            if is_free {
+            if is_free(held, site, d, form) {
                 image = local[site] * (before[at] - force[at]);
             }
             steps[start + at] = f32::cast_from(step * direction[at]);
@@ -170,11 +163,7 @@ pub fn pair_products<F: Float>(
         #[unroll]
         for d in 0..dimension {
             let at = d * sites + site;
-            let mut is_free = true;
-            if comptime!(form.held) {
-                is_free = (held[site] >> (d as u32)) & 1u32 == 0;
-            }
-            if is_free {
+            if is_free(held, site, d, form) {
                 let change = before[at] - force[at];
                 let gradient = F::new(0.0) - force[at];
                 let step = F::cast_from(steps[start + at]);
@@ -227,12 +216,8 @@ pub fn combine<F: Float>(
         #[unroll]
         for d in 0..dimension {
             let at = d * sites + site;
-            let mut is_free = true;
-            if comptime!(form.held) {
-                is_free = (held[site] >> (d as u32)) & 1u32 == 0;
-            }
             let mut sum = F::new(0.0);
-            if is_free {
+            if is_free(held, site, d, form) {
                 sum = scale * local[site] * force[at];
                 for pair in 0..pairs {
                     let back = weights[2 * pair];

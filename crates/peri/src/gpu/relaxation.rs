@@ -55,7 +55,7 @@ impl<const D: usize> DeviceRelaxation<D> {
         springs: &[f64],
     ) -> Result<Self, Error> {
         let body = DeviceBody::new(device, bonds, law, modulus)?;
-        body.refuse_other_sites(springs)?;
+        body.refuse_other_sites("springs", springs)?;
         let bytes = body.precision.bytes() as usize;
         let empty = |length: usize| body.client.empty(length * bytes);
         let unit = springs.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
@@ -73,9 +73,14 @@ impl<const D: usize> DeviceRelaxation<D> {
     }
 
     /// Takes the sum of stiffness of each site for a unit tangent of bonds, m².
-    pub fn set_masses(&mut self, masses: &[f64]) {
+    ///
+    /// # Errors
+    /// [`Error::Device`] for masses of another body.
+    pub fn set_masses(&mut self, masses: &[f64]) -> Result<(), Error> {
         let body = &self.body;
+        body.refuse_other_sites("masses", masses)?;
         self.mass = numbers(&body.client, body.precision, masses.iter().map(|mass| mass / self.mass_unit));
+        Ok(())
     }
 
     /// Takes the sums of stiffness of the present displacement, with each bond's own tangent from a table,
@@ -134,7 +139,7 @@ impl<const D: usize> DeviceRelaxation<D> {
                 buffer(velocity, D * body.sites),
                 buffer(displacement, D * body.sites),
                 buffer(&body.sites_of_particles, body.particles),
-                buffer(&body.held, if body.form.held { body.sites } else { 1 }),
+                buffer(&body.held, body.held_words()),
                 buffer(&self.mass, body.sites),
                 buffer(&self.springs, body.sites),
                 buffer(&self.partial, RELAXATION_SUMS * threads),
@@ -170,7 +175,7 @@ impl<const D: usize> DeviceRelaxation<D> {
                 CubeDim::new_1d(CUBE as u32),
                 buffer(force, D * body.sites),
                 buffer(&body.sites_of_particles, body.particles),
-                buffer(&body.held, if body.form.held { body.sites } else { 1 }),
+                buffer(&body.held, body.held_words()),
                 buffer(&self.mass, body.sites),
                 buffer(velocity, D * body.sites),
                 buffer(displacement, D * body.sites),

@@ -5,6 +5,16 @@ use super::kernels::{KernelForm, ROW};
 use cubecl::ir::ElemType;
 use cubecl::prelude::*;
 
+/// Returns true if component `d` of a site is free.
+#[cube]
+pub fn is_free(held: &[u32], site: usize, d: usize, #[comptime] form: KernelForm) -> bool {
+    let mut free = true;
+    if comptime!(form.held) {
+        free = (held[site] >> (d as u32)) & 1u32 == 0;
+    }
+    free
+}
+
 /// Sums of an iteration: velocity times change of force, mass times v², F² where free, F² where held, |s u|².
 pub const RELAXATION_SUMS: usize = 5;
 
@@ -46,11 +56,7 @@ pub fn relaxation_sums<F: Float>(
             let at = d * sites + site;
             let pull = force[at];
             let speed = velocity[at];
-            let mut is_free = true;
-            if comptime!(form.held) {
-                is_free = (held[site] >> (d as u32)) & 1u32 == 0;
-            }
-            if is_free {
+            if is_free(held, site, d, form) {
                 top = fma(speed, pull - before[at], top);
                 bottom = fma(speed * speed, own, bottom);
                 free = fma(pull, pull, free);
@@ -102,12 +108,8 @@ pub fn relax<F: Float>(
         #[unroll]
         for d in 0..dimension {
             let at = d * sites + site;
-            let mut is_free = true;
-            if comptime!(form.held) {
-                is_free = (held[site] >> (d as u32)) & 1u32 == 0;
-            }
             let mut speed = F::new(0.0);
-            if is_free {
+            if is_free(held, site, d, form) {
                 speed = keep * velocity[at] + push * force[at] / own;
             }
             velocity[at] = speed;

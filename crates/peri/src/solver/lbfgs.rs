@@ -111,7 +111,7 @@ pub trait SearchVectors<const D: usize> {
     fn arrive(&mut self);
     /// Forgets all pairs, and their scale if it is `scale_too`.
     fn forget(&mut self, scale_too: bool);
-    /// Simplifies after a failed search: forgets pairs, then leaves out the coarse level; then starts again.
+    /// Simplifies after a failed search: clears the pairs first, the next time drops the coarse level.
     fn simplify(&mut self);
     /// Updates for the sites whose bonds have broken.
     fn bonds_broke(&mut self, system: &System<D>, sites: &[u32]);

@@ -61,7 +61,7 @@ impl<const D: usize> CardRelaxation<'_, D> {
             self.unit_mass = vec![1.0; system.bonds.sites()];
             update_unit_mass(bonds, system.bonds.particles(), &mut self.unit_mass);
         }
-        card.set_masses(&self.unit_mass);
+        card.set_masses(&self.unit_mass)?;
         self.stiffened = false;
         self.pushed = squares(system);
         self.card = Some(card);
@@ -164,7 +164,7 @@ impl<const D: usize> CardRelaxation<'_, D> {
             card.body.set_loads(&loads(system));
             self.pushed = squares(system);
             if !self.stiffened {
-                card.set_masses(&self.unit_mass);
+                card.set_masses(&self.unit_mass)?;
             }
         }
         system.refuse_unsupported(state, self.settings.tolerance)?;

@@ -46,7 +46,7 @@ impl<const D: usize> State<D> {
             body_force,
         };
         (self.step, self.counts.iteration, self.counts.step_iterations) = (0, 0, 0);
-        // the heat of friction goes on until explicit dynamics begins its ledger
+        // the heat of friction adds up until explicit dynamics begins a ledger of its own
         let energies = DynamicEnergies { rubbed: self.motion.energies.rubbed, ..DynamicEnergies::default() };
         (self.control, self.motion) = (StepControl::default(), Motion { energies, ..Motion::default() });
         self.contact.begin_stage();

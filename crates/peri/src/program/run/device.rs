@@ -45,8 +45,7 @@ pub fn choose<const D: usize>(
         Ok(Chosen { card: None, note: Some(note) })
     };
     if let Some((key, found)) = beyond_cards(scene, bonds) {
-        let allowed =
-            format!("nothing of it on a graphics card; `{block}.device = \"cpu\"` for the processor");
+        let allowed = format!("none on a graphics card; `{block}.device = \"cpu\"` takes the processor");
         return if only {
             Err(source.error(&key, found, allowed))
         } else {
