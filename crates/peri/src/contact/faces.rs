@@ -10,25 +10,16 @@
 //! weights gain a term, linear across N_f, that shifts it below X_f. No position depends on a rotation, so
 //! forces have an energy and conserve momentum and angular momentum.
 
-use crate::bonds::{BodyGeometry, Bonds, CellGrid};
+use super::face_areas::{FaceAreas, FaceParticle, SMALL};
+use crate::bonds::{BodyGeometry, Bonds};
 use crate::field::Field;
-use crate::material::{BodyTensor, surface_load};
 use crate::parallel;
 use crate::surface::{BodySurface, SurfaceFace};
 use nalgebra::{SMatrix, SVector};
 
-/// Half-width of the hat functions, and depth of the particles below a face, in spacings and horizons.
-const HAT: f64 = 1.0;
-const DEPTH: f64 = 2.16;
-/// Faces with less than this fraction of a particle's area join a neighbour within this distance in spacings.
-const SMALL: f64 = 0.5;
-const JOINED: f64 = 2.1;
 /// Least variance of the particles along a direction, in squared spacings, for which weights gain a linear
 /// term.
 const FLAT: f64 = 1e-3;
-/// Particles of a work item.
-const BATCH: usize = 1024;
-
 /// Faces with their weights, face by face and particle by particle.
 pub struct Faces<const D: usize> {
     /// X_f, m.
@@ -51,16 +42,6 @@ pub struct Faces<const D: usize> {
     shares: Vec<(u32, f64)>,
 }
 
-/// A particle below a face.
-#[derive(Clone, Copy)]
-struct FaceParticle {
-    face: u32,
-    site: u32,
-    /// ψ_f(I), and the depth, m.
-    hat: f64,
-    depth: f64,
-}
-
 impl<const D: usize> Faces<D> {
     /// Builds the faces of a body; none if the surface has none. Skips faces whose area belongs to bonds of a
     /// crack or of another side.
@@ -68,23 +49,7 @@ impl<const D: usize> Faces<D> {
     /// `tied` faces have r_f = 0: the weights gain a term along the normal as well, so that faces rotate with
     /// the body.
     pub fn new(bonds: &dyn Bonds<D>, surface: &BodySurface<D>, tied: bool) -> Self {
-        let area = typical_area(bonds);
-        let load = surface_load(bonds, BodyTensor::<D>::identity());
-        let mut below = below(bonds, surface);
-        let share = |below: &FaceParticle| {
-            let (site, normal) = (below.site as usize, surface.faces()[below.face as usize].normal);
-            let load = load.get(site);
-            below.hat * bonds.volume(site) * (0..D).map(|d| load[d] * normal[d]).sum::<f64>()
-        };
-        let sum = |below: &[FaceParticle]| {
-            let mut areas = vec![0.0; surface.faces().len()];
-            below.iter().for_each(|below| areas[below.face as usize] += share(below));
-            areas
-        };
-        let areas = sum(&below);
-        join_small(surface, &areas, &mut below, area, bonds.spacing());
-        below.sort_by_key(|below| (below.face, below.site));
-        let areas = sum(&below);
+        let FaceAreas { below, shares, typical } = FaceAreas::new(bonds, surface);
         let mut faces = Self {
             places: Vec::new(),
             sources: Vec::new(),
@@ -98,19 +63,22 @@ impl<const D: usize> Faces<D> {
             ends: Vec::new(),
             shares: Vec::new(),
         };
+        let mut start = 0;
         for group in below.chunk_by(|a, b| a.face == b.face) {
-            let face = group[0].face as usize;
+            let shares = &shares[start..start + group.len()];
+            start += group.len();
+            let area: f64 = shares.iter().sum();
             // area lost to bonds of a crack or of the other side
-            if areas[face] < SMALL * area {
+            if area < SMALL * typical {
                 continue;
             }
-            let place = surface.faces()[face].place;
-            let mut weights: Vec<f64> = group.iter().map(|below| share(below) / areas[face]).collect();
+            let face = group[0].face as usize;
+            let mut weights: Vec<f64> = shares.iter().map(|share| share / area).collect();
             faces.radii.push(centre(bonds, &surface.faces()[face], group, &mut weights, tied));
             faces.sources.push(face as u32);
-            faces.places.push(place);
+            faces.places.push(surface.faces()[face].place);
             faces.normals.push(surface.faces()[face].normal);
-            faces.areas.push(areas[face]);
+            faces.areas.push(area);
             for (below, weight) in group.iter().zip(weights) {
                 faces.sites.push(below.site);
                 faces.weights.push(weight);
@@ -231,94 +199,6 @@ impl<const D: usize> Faces<D> {
     }
 }
 
-/// Computes the side area of a particle, m²: its volume over the spacing.
-pub fn typical_area<const D: usize>(bonds: &dyn BodyGeometry<D>) -> f64 {
-    let volumes: f64 = bonds.particles().iter().map(|&site| bonds.volume(site as usize)).sum();
-    volumes / bonds.particles().len().max(1) as f64 / bonds.spacing()
-}
-
-/// Lists all particles below faces, each nearer to its face than to an opposite one; hats sum to 1 over the
-/// faces of a patch.
-fn below<const D: usize>(bonds: &dyn BodyGeometry<D>, surface: &BodySurface<D>) -> Vec<FaceParticle> {
-    let (faces, spacing) = (surface.faces(), bonds.spacing());
-    if faces.is_empty() {
-        return Vec::new();
-    }
-    let (depth, width) = (DEPTH * bonds.horizon(), HAT * spacing);
-    let places: Vec<[f64; D]> = faces.iter().map(|face| face.place).collect();
-    let grid = CellGrid::new(&places, depth);
-    let of = |site: u32, all: &mut Vec<FaceParticle>| {
-        let here = bonds.position(site as usize);
-        let mut near: Vec<FaceParticle> = Vec::new();
-        grid.near(here, depth.hypot(width), |number| {
-            let (aside, down) = surface.reach(&faces[number], here);
-            if aside < width && down > 0.0 && down < depth {
-                near.push(FaceParticle { face: number as u32, site, hat: 1.0 - aside / width, depth: down });
-            }
-        });
-        near.sort_unstable_by_key(|below| (faces[below.face as usize].patch, below.face));
-        let opposed = |own: &FaceParticle| {
-            let normal = faces[own.face as usize].normal;
-            near.iter().any(|other| {
-                let there = faces[other.face as usize].normal;
-                let turn: f64 = (0..D).map(|d| normal[d] * there[d]).sum();
-                turn < -0.5 && other.depth < own.depth + 1e-6 * spacing
-            })
-        };
-        for patch in near.chunk_by(|a, b| faces[a.face as usize].patch == faces[b.face as usize].patch) {
-            // the nearest step of a staircase
-            let nearest = patch.iter().map(|below| below.depth).fold(f64::INFINITY, f64::min);
-            let kept = |below: &&FaceParticle| below.depth < nearest + 0.75 * spacing;
-            let sum: f64 = patch.iter().filter(kept).map(|below| below.hat).sum();
-            let own = |below: &&FaceParticle| !surface.is_bound(below.face as usize) && !opposed(below);
-            for below in patch.iter().filter(kept).filter(own) {
-                all.push(FaceParticle { hat: below.hat / sum, ..*below });
-            }
-        }
-    };
-    let batch = |sites: &[u32]| {
-        let mut all = Vec::new();
-        sites.iter().for_each(|&site| of(site, &mut all));
-        all
-    };
-    let parts: Vec<Vec<FaceParticle>> = parallel::map_chunks(bonds.particles(), BATCH, batch);
-    parts.concat()
-}
-
-/// Moves the particles of small faces to the nearest larger face of the same patch.
-fn join_small<const D: usize>(
-    surface: &BodySurface<D>,
-    areas: &[f64],
-    below: &mut [FaceParticle],
-    area: f64,
-    spacing: f64,
-) {
-    let faces = surface.faces();
-    let is_small = |&face: &usize| !surface.is_bound(face) && areas[face] < SMALL * area;
-    let small: Vec<usize> = (0..faces.len()).filter(is_small).collect();
-    if small.is_empty() {
-        return;
-    }
-    let places: Vec<[f64; D]> = faces.iter().map(|face| face.place).collect();
-    let grid = CellGrid::new(&places, JOINED * spacing);
-    let mut target: Vec<u32> = (0..faces.len() as u32).collect();
-    for face in small {
-        let mut best: Option<(f64, usize)> = None;
-        grid.near(places[face], JOINED * spacing, |other| {
-            let distance: f64 = (0..D).map(|d| (places[other][d] - places[face][d]).powi(2)).sum();
-            let fits = faces[other].patch == faces[face].patch && areas[other] >= SMALL * area;
-            let nearer = best.is_none_or(|(least, at)| (distance, other) < (least, at));
-            if fits && distance < (JOINED * spacing).powi(2) && nearer {
-                best = Some((distance, other));
-            }
-        });
-        if let Some((_, other)) = best {
-            target[face] = other as u32;
-        }
-    }
-    below.iter_mut().for_each(|below| below.face = target[below.face as usize]);
-}
-
 /// Adds the term, linear across the normal of the face, that brings Σ w X below the face; returns its depth,
 /// m.
 fn centre<const D: usize>(
@@ -360,4 +240,49 @@ fn centre<const D: usize>(
     let below: f64 =
         group.iter().zip(&*weights).map(|(below, weight)| weight * normal.dot(&from(below))).sum();
     -spacing * below
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Shape;
+    use crate::material::{BodyTensor, surface_load};
+    use crate::model::Body;
+
+    /// Two horizons from the rim of a plate of `layers` particles: areas and depths of the faces of its broad
+    /// sides, and the balance of a uniform pressure on all faces in every particle.
+    fn check<const D: usize>(layers: usize, across: f64) {
+        let size: [f64; D] = std::array::from_fn(|d| if d == 1 { layers as f64 } else { across });
+        let plate = Body::lattice(Shape::Box { min: [0.0; D], max: size }, 1.0);
+        let bonds = plate.build().unwrap();
+        let faces = Faces::new(&bonds, &plate.surface(), false);
+        let inside = |at: [f64; D]| (0..D).all(|d| d == 1 || at[d] > 7.0 && at[d] < across - 7.0);
+        let (mut pushed, mut seen) = (vec![[0.0; D]; bonds.sites()], 0);
+        for face in 0..faces.len() {
+            let (place, normal, area) = (faces.places[face], faces.normals[face], faces.areas[face]);
+            for (site, weight) in faces.below(face) {
+                (0..D).for_each(|d| pushed[site][d] += area * weight * normal[d]);
+            }
+            if normal[1].abs() == 1.0 && inside(place) {
+                seen += 1;
+                assert!((area - 1.0).abs() < 2e-4, "{layers} layers: area {area}");
+                assert!(faces.radii[face].abs() < 2e-3, "{layers} layers: depth {}", faces.radii[face]);
+            }
+        }
+        assert_eq!(seen, 2 * (across as usize - 14).pow(D as u32 - 1));
+        let load = surface_load(&bonds, BodyTensor::<D>::identity());
+        for site in bonds.particles().iter().map(|&site| site as usize) {
+            if !inside(bonds.position(site)) {
+                continue;
+            }
+            let (found, expected) = (pushed[site], load.get(site).map(|h| h * bonds.volume(site)));
+            assert!((0..D).all(|d| (found[d] - expected[d]).abs() < 1e-10), "{found:?} {expected:?}");
+        }
+    }
+
+    #[test]
+    fn thin_walls_have_faces_of_full_area() {
+        (2..16).for_each(|layers| check::<2>(layers, 24.0));
+        [2, 3, 5, 8].into_iter().for_each(|layers| check::<3>(layers, 17.0));
+    }
 }

@@ -27,6 +27,7 @@
 //! equal and opposite within a pair, but not along it. Particles have no spin, so friction does not conserve
 //! angular momentum.
 
+mod face_areas;
 mod faces;
 mod faceted;
 mod forces;
@@ -48,6 +49,7 @@ use crate::error::Error;
 use crate::field::{CHUNK, Field};
 use crate::parallel;
 use crate::surface::BodySurface;
+pub(crate) use face_areas::{DEPTH, thin_wall_areas};
 pub(crate) use faces::Faces;
 pub use friction::SlidingFriction;
 pub use friction_pair::{ContactPair, Drag, FrictionPair};

@@ -5,7 +5,7 @@
 //! forces Σ c_d(τ) b_d(X) are computed anew at each τ and act in full.
 
 use super::force_fields::ForceField;
-use super::load::Loads;
+use super::load::{Loads, one_sided};
 use super::state::State;
 use super::system::System;
 use crate::amplitude::Amplitude;
@@ -14,6 +14,9 @@ use crate::contact::Contact;
 use crate::field::Field;
 use crate::geometry::length;
 use std::sync::Arc;
+
+/// Number of times at which the curves of regions are compared.
+const PROBED: u32 = 16;
 
 /// Displacement or body force of a region whose components follow amplitudes.
 #[derive(Clone, Debug)]
@@ -168,19 +171,70 @@ impl<const D: usize> Loads<D> {
     /// Relative prescribed displacement at τ, m, of regions and rigid surfaces: √Σ_d (max − min)², counted
     /// from the body at rest.
     pub(super) fn curved_reach(&self, part: f64, rigid: &[[f64; D]]) -> f64 {
-        let mut span = [[0.0_f64; 2]; D];
-        for (d, span) in span.iter_mut().enumerate() {
-            let moved = rigid.iter().map(|displacement| displacement[d]);
-            *span = moved.fold(*span, |[low, high], u| [low.min(u), high.max(u)]);
-        }
+        let regions = self.curved.iter().flat_map(|curved| &curved.held);
+        reach(regions.map(|region| (region.components, region.placed(part))), rigid)
+    }
+
+    /// Relative prescribed displacement of regions at a multiple of 1, m, if all regions move by one multiple.
+    fn common_reach(&self) -> Option<f64> {
+        let curved = self.curved.as_ref()?;
+        let moves = |region: &CurvedRegion<D>, d: usize| {
+            region.components >> d & 1 == 1 && region.values.iter().any(|value| value[d] != 0.0)
+        };
+        let is_common = |part: f64| {
+            let mut all = curved.held.iter().flat_map(|region| {
+                let multiples = region.multiples(part);
+                (0..D).filter(|&d| moves(region, d)).map(move |d| multiples[d])
+            });
+            let first = all.next();
+            all.all(|multiple| Some(multiple) == first)
+        };
+        let begins_at_rest =
+            self.turned.is_empty() && curved.held.iter().all(|region| region.offsets.is_empty());
+        let single = begins_at_rest && (1..=PROBED).all(|k| is_common(f64::from(k) / f64::from(PROBED)));
+        let full = curved.held.iter().map(|region| (region.components, region.scaled([1.0; D])));
+        single.then(|| reach(full, &[])).filter(|reach| *reach > 0.0)
+    }
+
+    /// Σ −F V·a and Σ u·a over the regions of prescribed displacement, with a the displacement at a multiple of
+    /// 1 and u that at τ.
+    fn along_curves(&self, bonds: &dyn BodyGeometry<D>, part: f64, force: &Field<D>) -> [f64; 2] {
+        let (mut pull, mut way) = (0.0, 0.0);
         for region in self.curved.iter().flat_map(|curved| &curved.held) {
-            for (_, value) in region.placed(part) {
+            for ((site, placed), value) in region.placed(part).zip(&region.values) {
+                let (force, volume) = (force.get(site), bonds.volume(site));
                 for d in (0..D).filter(|d| region.components >> d & 1 == 1) {
-                    span[d] = [span[d][0].min(value[d]), span[d][1].max(value[d])];
+                    pull -= force[d] * volume * value[d];
+                    way += placed[d] * value[d];
                 }
             }
         }
-        span.iter().map(|[low, high]| (high - low).powi(2)).sum::<f64>().sqrt()
+        [pull, way]
+    }
+
+    /// Load, N, and displacement, m, of body forces: their sum, and the mean displacement of their points
+    /// along them, both positive along the forces at a multiple of 1, or along the present ones if these do
+    /// not follow multiples. `None` without forces.
+    fn pushed_response(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> Option<(f64, f64)> {
+        let (present, curved) = (self.body_force.as_ref()?, self.curved.as_ref()?);
+        let mut full = Field::zeros(bonds.sites());
+        for (site, value) in curved.pushed.iter().flat_map(|region| region.scaled([1.0; D])) {
+            let old: [f64; D] = full.get(site);
+            full.set(site, std::array::from_fn(|d| old[d] + value[d]));
+        }
+        let full = if curved.pushed.is_empty() { present } else { &full };
+        let (mut push, mut way) = (0.0, 0.0);
+        for site in bonds.particles().iter().map(|&site| site as usize) {
+            let (full, volume) = (full.get(site), bonds.volume(site));
+            let product = |field: &Field<D>| {
+                let value = field.get(site);
+                (0..D).map(|d| full[d] * value[d]).sum::<f64>() * volume
+            };
+            push += product(present);
+            way += product(displacement);
+        }
+        let sum = length(one_sided(bonds, full));
+        (sum > 0.0).then(|| (along(length(one_sided(bonds, present)), push), way / sum))
     }
 
     /// Removes the body force of curves from a site.
@@ -241,13 +295,11 @@ impl<const D: usize> System<'_, D> {
     }
 
     /// Load, N, and displacement, m, of a row of history with curves: the reaction of the regions of
-    /// prescribed displacement, without any the applied force, and [`Loads::curved_reach`]. Where no region
-    /// moves, the force and the way of the rigid surface that moves or is pressed with the largest force.
+    /// prescribed displacement and [`Loads::curved_reach`], both positive along the displacements at a
+    /// multiple of 1; where one curve moves all, its conjugate force. Where no region moves, the force and the way of the rigid surface that moves or is
+    /// pressed with the largest force; without one the applied force and the mean displacement of its points
+    /// along it.
     pub(super) fn curved_response(&self, state: &State<D>, part: f64) -> (f64, f64) {
-        let force = match self.loads.displacement {
-            Some(_) => self.loads.reaction(&*self.bonds, &state.force),
-            None => self.loads.applied(&*self.bonds, &[]),
-        };
         let held = self.loads.curved.iter().flat_map(|curved| &curved.held);
         let regions_move =
             !self.loads.turned.is_empty() || held.flat_map(|region| &region.values).any(|u| *u != [0.0; D]);
@@ -255,12 +307,48 @@ impl<const D: usize> System<'_, D> {
             let surfaces = self.contact.iter().flat_map(Contact::surfaces).zip(self.surface_reactions(state));
             let driven = surfaces.filter(|(surface, _)| surface.moves() || surface.force.is_some());
             let each = driven.map(|(_, resting)| (length(resting.force), length(resting.moved)));
-            if let Some(response) = each.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            let pushed = || self.loads.pushed_response(&*self.bonds, &state.displacement);
+            if let Some(response) = each.max_by(|a, b| a.0.total_cmp(&b.0)).or_else(pushed) {
                 return response;
             }
         }
+        let force = match self.loads.displacement {
+            Some(_) => self.loads.reaction(&*self.bonds, &state.force),
+            None => self.loads.applied(&*self.bonds, &[]),
+        };
         let surfaces = self.contact.iter().flat_map(Contact::surfaces);
         let rigid: Vec<[f64; D]> = surfaces.map(|surface| surface.displacement_at(part)).collect();
-        (length(force), self.loads.curved_reach(part, &rigid))
+        let [pull, way] = self.loads.along_curves(&*self.bonds, part, &state.force);
+        let load = match self.loads.common_reach().filter(|_| rigid.iter().all(|u| *u == [0.0; D])) {
+            Some(reach) => pull / reach,
+            None => along(length(force), pull),
+        };
+        (load, along(self.loads.curved_reach(part, &rigid), way))
     }
+}
+
+/// Relative displacement, m, of regions with the bits of their prescribed components and of rigid surfaces:
+/// √Σ_d (max − min)², counted from the body at rest.
+fn reach<const D: usize>(
+    regions: impl Iterator<Item = (u8, impl Iterator<Item = (usize, [f64; D])>)>,
+    rigid: &[[f64; D]],
+) -> f64 {
+    let mut span = [[0.0_f64; 2]; D];
+    for (d, span) in span.iter_mut().enumerate() {
+        let moved = rigid.iter().map(|displacement| displacement[d]);
+        *span = moved.fold(*span, |[low, high], u| [low.min(u), high.max(u)]);
+    }
+    for (components, values) in regions {
+        for (_, value) in values {
+            for d in (0..D).filter(|d| components >> d & 1 == 1) {
+                span[d] = [span[d][0].min(value[d]), span[d][1].max(value[d])];
+            }
+        }
+    }
+    span.iter().map(|[low, high]| (high - low).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Magnitude with a sign; positive at 0.
+fn along(magnitude: f64, sign: f64) -> f64 {
+    if sign < 0.0 { -magnitude } else { magnitude }
 }

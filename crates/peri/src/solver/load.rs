@@ -42,6 +42,22 @@ pub struct Loads<const D: usize> {
     pub curved: Option<Box<CurvedLoads<D>>>,
 }
 
+/// Larger one of both directions' sums along each axis.
+fn larger_sums<const D: usize>(sum: impl Fn(usize, f64) -> f64) -> [f64; D] {
+    std::array::from_fn(|d| sum(d, 1.0).max(sum(d, -1.0)))
+}
+
+/// Sum of a body force in one direction of an axis, N.
+fn directed<const D: usize>(bonds: &dyn BodyGeometry<D>, body: &Field<D>, d: usize, sign: f64) -> f64 {
+    let each = bonds.particles().iter().map(|&site| site as usize);
+    each.map(|site| (sign * body.get(site)[d]).max(0.0) * bonds.volume(site)).sum()
+}
+
+/// Force of a body force along each axis, N: the larger sum of both directions.
+pub(super) fn one_sided<const D: usize>(bonds: &dyn BodyGeometry<D>, body: &Field<D>) -> [f64; D] {
+    larger_sums(|d, sign| directed(bonds, body, d, sign))
+}
+
 impl<const D: usize> Loads<D> {
     /// Collects regions, each given by its sites and its support; body forces add up, the last displacement
     /// applies.
@@ -140,16 +156,10 @@ impl<const D: usize> Loads<D> {
     /// Total force at factor 1 along each axis, N, of the body force and of `pushes` on rigid surfaces: the
     /// larger sum of both directions.
     pub fn applied(&self, bonds: &dyn BodyGeometry<D>, pushes: &[[f64; D]]) -> [f64; D] {
-        let sum = |d: usize, sign: f64| {
+        larger_sums(|d, sign| {
             let pushed: f64 = pushes.iter().map(|push| (sign * push[d]).max(0.0)).sum();
-            let Some(body) = &self.body_force else { return pushed };
-            let each = bonds
-                .particles()
-                .iter()
-                .map(|&s| (sign * body.get(s as usize)[d]).max(0.0) * bonds.volume(s as usize));
-            each.sum::<f64>() + pushed
-        };
-        std::array::from_fn(|d| sum(d, 1.0).max(sum(d, -1.0)))
+            pushed + self.body_force.as_ref().map_or(0.0, |body| directed(bonds, body, d, sign))
+        })
     }
 
     /// Load, N, and its conjugate displacement, m, from [`Loads::conjugates`]: the force conjugate to the

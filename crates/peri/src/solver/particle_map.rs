@@ -20,6 +20,15 @@ struct SiteRun {
     length: usize,
 }
 
+/// A particle with constrained or shared components.
+pub struct HeldParticle {
+    pub particle: usize,
+    /// Its site, in its work item.
+    pub site: usize,
+    /// Bits of these components.
+    pub components: u8,
+}
+
 /// Positions of particles in storage.
 #[derive(Default)]
 pub struct ParticleMap {
@@ -27,8 +36,7 @@ pub struct ParticleMap {
     /// The runs of each work item, its first particle, and the number of particles at the end.
     items: Vec<Range<usize>>,
     first: Vec<usize>,
-    /// Particles with constrained or shared components, and the bits of these.
-    held: Vec<(usize, u8)>,
+    held: Vec<HeldParticle>,
     /// Regions that move as a whole: bits of the shared components, particles.
     shared: Vec<(u8, Vec<usize>)>,
 }
@@ -52,9 +60,11 @@ impl ParticleMap {
             places.items.push(begin..places.runs.len());
             places.first.push(next);
         }
-        let bound = |&site: &u32| loads.bound().get(site as usize).copied().unwrap_or(0);
-        let each = particles.iter().map(bound).enumerate();
-        places.held = each.filter(|&(_, components)| components != 0).collect();
+        let bound = |(particle, &site): (usize, &u32)| {
+            let components = loads.bound().get(site as usize).copied().unwrap_or(0);
+            (components != 0).then_some(HeldParticle { particle, site: site as usize % CHUNK, components })
+        };
+        places.held = particles.iter().enumerate().filter_map(bound).collect();
         let place = |site: &u32| particles.binary_search(site).ok();
         let of_region =
             |region: &RigidRegion| (region.components, region.sites.iter().filter_map(place).collect());
@@ -67,9 +77,9 @@ impl ParticleMap {
         &self.shared
     }
 
-    /// Particles of a range with constrained or shared components, with the bits of these.
-    pub fn constrained(&self, particles: Range<usize>) -> &[(usize, u8)] {
-        let place = |particle: usize| self.held.partition_point(|held| held.0 < particle);
+    /// Particles of a range with constrained or shared components.
+    pub fn constrained(&self, particles: Range<usize>) -> &[HeldParticle] {
+        let place = |particle: usize| self.held.partition_point(|held| held.particle < particle);
         &self.held[place(particles.start)..place(particles.end)]
     }
 

@@ -20,9 +20,9 @@ pub struct ForceSums {
     pub quotient_bottom: f64,
     /// Σ F² over free components.
     pub free: f64,
-    /// Σ F² over constrained components.
+    /// Σ (F − b)² over constrained components: loads on held particles are no measure of a balance.
     pub constrained: f64,
-    /// Σ b² of the body forces.
+    /// Σ b² of the body forces on components that are not prescribed.
     pub external: f64,
 }
 
@@ -65,12 +65,11 @@ pub fn force_pass<const D: usize>(
                 system.internal_force(displacement, chunk * CHUNK, &mut new, look.then_some(&mut observed));
                 let mut sums = ForceSums::default();
                 let constrained = loads.bound().get(range.clone()).unwrap_or_default();
+                let prescribed = loads.constrained.get(range.clone()).unwrap_or_default();
                 for d in 0..D {
-                    if let Some(body) = &loads.body_force {
-                        for (f, b) in new[d].iter_mut().zip(&body.components()[d][range.clone()]) {
-                            *f += factor * b;
-                            sums.external += (factor * b) * (factor * b);
-                        }
+                    let body = loads.body_force.as_ref().map(|body| &body.components()[d][range.clone()]);
+                    if let Some(body) = body {
+                        sums.external += add_body_force(new[d], body, factor, (prescribed, 1 << d));
                     }
                     let (v, m) = (&velocity[d][range.clone()], &unit_mass[range.clone()]);
                     if constrained.iter().all(|h| h >> d & 1 == 0) {
@@ -82,7 +81,8 @@ pub fn force_pass<const D: usize>(
                     for k in 0..v.len() {
                         let f = new[d][k];
                         if constrained[k] >> d & 1 == 1 {
-                            sums.constrained += f * f;
+                            let load = own_load(body, prescribed, (k, d), factor);
+                            sums.constrained += (f - load) * (f - load);
                         } else {
                             sums.quotient_top += v[k] * (f - old[d][k]);
                             sums.quotient_bottom += v[k] * v[k] * m[k] * mass;
@@ -127,18 +127,19 @@ pub fn gradient_pass<const D: usize>(
             let (mut sums, mut slope) = (ForceSums::default(), 0.0);
             let particles = places.of_item(item);
             let held = places.constrained(particles.clone());
+            let prescribed = loads.constrained.get(chunk_range(item, sites)).unwrap_or_default();
             for d in 0..D {
-                if let Some(body) = &loads.body_force {
-                    for (f, b) in force[d].iter_mut().zip(&body.components()[d][chunk_range(item, sites)]) {
-                        *f += factor * b;
-                        sums.external += (factor * b) * (factor * b);
-                    }
+                let body =
+                    loads.body_force.as_ref().map(|body| &body.components()[d][chunk_range(item, sites)]);
+                if let Some(body) = body {
+                    sums.external += add_body_force(force[d], body, factor, (prescribed, 1 << d));
                 }
                 let g = &mut *gradient[d];
                 places.gather(item, force[d], g);
-                for &(particle, _) in held.iter().filter(|held| held.1 >> d & 1 == 1) {
-                    let force = &mut g[particle - particles.start];
-                    sums.constrained += *force * *force;
+                for own in held.iter().filter(|held| held.components >> d & 1 == 1) {
+                    let force = &mut g[own.particle - particles.start];
+                    let load = own_load(body, prescribed, (own.site, d), factor);
+                    sums.constrained += (*force - load) * (*force - load);
                     *force = 0.0;
                 }
                 let (volumes, direction) = (&volumes[particles.clone()], &directions[d][particles.clone()]);
@@ -159,6 +160,32 @@ pub fn gradient_pass<const D: usize>(
     // planes hold a body, too
     sums.constrained += system.repulsion().map_or(0.0, |contact| contact.surface_force_square());
     (sums, observed, slope)
+}
+
+/// Adds body forces to forces; returns the sum of their squares over components that are not prescribed, whose
+/// bits are empty where there are none.
+fn add_body_force(force: &mut [f64], body: &[f64], factor: f64, (prescribed, bit): (&[u8], u8)) -> f64 {
+    let mut square = 0.0;
+    if prescribed.iter().all(|bits| bits & bit == 0) {
+        for (f, b) in force.iter_mut().zip(body) {
+            *f += factor * b;
+            square += (factor * b) * (factor * b);
+        }
+        return square;
+    }
+    for ((f, b), bits) in force.iter_mut().zip(body).zip(prescribed) {
+        *f += factor * b;
+        square += if bits & bit == 0 { (factor * b) * (factor * b) } else { 0.0 };
+    }
+    square
+}
+
+/// Body force on a prescribed component; 0 on others.
+fn own_load(body: Option<&[f64]>, prescribed: &[u8], (site, d): (usize, usize), factor: f64) -> f64 {
+    match (body, prescribed.get(site)) {
+        (Some(body), Some(bits)) if bits >> d & 1 == 1 => factor * body[site],
+        _ => 0.0,
+    }
 }
 
 /// Number of partial sums, so that a sum vectorises.

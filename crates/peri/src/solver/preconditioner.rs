@@ -144,9 +144,9 @@ impl<const D: usize> Preconditioner<D> {
                     z[d][particle - start] += value[d];
                 }
             }
-            for &(particle, components) in places.constrained(range) {
-                for d in (0..D).filter(|d| components >> d & 1 == 1) {
-                    z[d][particle - start] = 0.0;
+            for held in places.constrained(range) {
+                for d in (0..D).filter(|d| held.components >> d & 1 == 1) {
+                    z[d][held.particle - start] = 0.0;
                 }
             }
         });

@@ -67,7 +67,7 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
         to.add_if(secant, move |m| Some(both(m)?[0]));
         to.add_if(tangent, move |m| Some(both(m)?[1]));
     }
-    if scene.returns() {
+    if scene.returns() || scene.has_curves() && !dynamic && scene.step.is_empty() {
         to.add_if(q::LOOP_ENERGY, |m| {
             let rows = m.state.history.iter().map(|row| [row.displacement, row.load]);
             if is_driven_by_force(&m.state.history) { driven_loop_energy(rows) } else { loop_energy(rows) }
@@ -138,6 +138,11 @@ pub(super) fn warnings<const D: usize>(m: &Moment<D>) -> Vec<String> {
             plain(at * 1e3)
         )
     });
+    let several = (!m.scene.output.stiffness_at.is_empty() && m.scene.has_several_motions()).then(|| {
+        "`output.stiffness_at`: loads follow several curves or steps, so that load and displacement of the \
+         history add up several motions; take the stiffness of one from its columns `reaction_…`"
+            .to_owned()
+    });
     let last = m.state.history.last().filter(|row| m.scene.dynamics.is_none() && row.broken == 0);
     let off = last.filter(|row| damped_energy(row, false).abs() > LARGEST_MISS * row.dissipated);
     let warning = |row: &StepRecord| {
@@ -148,7 +153,7 @@ pub(super) fn warnings<const D: usize>(m: &Moment<D>) -> Vec<String> {
             damped_energy(row, false).abs()
         )
     };
-    fallen.chain(off.filter(|row| row.dissipated > 0.0).map(warning)).collect()
+    fallen.chain(several).chain(off.filter(|row| row.dissipated > 0.0).map(warning)).collect()
 }
 
 /// Adds first break, breaking events and the last load.

@@ -47,6 +47,16 @@ impl Scene {
             || self.contact.as_ref().is_some_and(ContactSpec::has_curve)
     }
 
+    /// Returns true if loads follow curves that differ, or steps.
+    pub fn has_several_motions(&self) -> bool {
+        let curves = self.boundary.iter().filter_map(|own| own.curve.as_ref());
+        let texts = curves.flat_map(|curve| match curve {
+            CurveList::All(own) => vec![format!("{own:?}")],
+            CurveList::Each(each) => each.iter().map(|own| format!("{own:?}")).collect(),
+        });
+        !self.step.is_empty() || texts.collect::<std::collections::BTreeSet<_>>().len() > 1
+    }
+
     /// Returns true if forces depend on the displacement.
     pub fn has_followers(&self) -> bool {
         self.boundary.iter().any(|own| own.pressure.is_some())

@@ -43,7 +43,6 @@ pub(super) fn warnings<const D: usize>(
     let Some(contact) = &scene.contact else { return Vec::new() };
     let surfaces = contact.surfaces::<D>(source, scene).unwrap_or_default();
     let (spacing, outside) = (body.bonds.spacing(), body.surface());
-    let least = LEAST_WALL * body.bonds.horizon();
     let thin = |(number, surface): (usize, &RigidSurface<D>)| {
         let heights: Vec<f64> = outside.faces().iter().map(|face| surface.height(face.place)).collect();
         let nearest = heights.iter().copied().fold(f64::INFINITY, f64::min).max(0.0);
@@ -52,13 +51,12 @@ pub(super) fn warnings<const D: usize>(
             let beyond: [f64; D] = std::array::from_fn(|d| face.place[d] + 0.1 * spacing * face.normal[d]);
             **height < reach && surface.height(beyond) < **height - 0.05 * spacing
         });
-        let wall = wall(body, met.map(|(face, _)| face)).filter(|wall| *wall < least)?;
+        let wall = wall(body, met.map(|(face, _)| face)).filter(|wall| *wall < LEAST_WALL * spacing)?;
         Some(format!(
-            "{} meets a body {} mm thick, less than {LEAST_WALL} horizons: contact between two of its sides \
-             is too stiff, by 43 % at two horizons; take a `body.spacing` below {:.3} mm",
+            "{} meets a body {} mm thick, one layer of particles: that has no stiffness across it; take a \
+             smaller `body.spacing`",
             surface.title(number),
-            plain(wall * 1e3),
-            spacing * wall / least * 1e3
+            plain(wall * 1e3)
         ))
     };
     let notes = contact.indenter.iter().flat_map(|indenter| indenter.notes(source));

@@ -160,6 +160,16 @@ pub(super) fn parts_of<const D: usize>(scene: &Scene, body: &DiscreteBody<D>) ->
     Parts::new(&body.operations, &each.collect::<Vec<u32>>())
 }
 
+/// Warns of unbonded parts that would pass through each other.
+pub(super) fn free_to_pass(scene: &Scene) -> Option<String> {
+    let open = scene.interface.iter().find(|one| one.unbonded).filter(|_| scene.contact.is_none())?;
+    let [one, other] = &open.between;
+    Some(format!(
+        "parts `{one}` and `{other}` are unbonded and may pass through each other: a `[contact]` block lets them \
+         touch"
+    ))
+}
+
 /// Finds the bonds across each interface, and severs those of unbonded ones.
 ///
 /// # Errors

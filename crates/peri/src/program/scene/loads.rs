@@ -2,12 +2,12 @@
 
 use super::formula::Formula;
 use super::region::region;
+use super::side_areas::side_areas;
 use super::values::{DiscreteBody, ONE_OF_THEM};
-use super::{Boundary, ContactSpec, Prescribed, PrescribedField, Scene, Side, SolverMethod};
+use super::{Boundary, ContactSpec, Prescribed, PrescribedField, Scene, SolverMethod};
 use crate::bonds::components;
 use crate::contact::SurfaceShape;
 use crate::field::Field;
-use crate::material::{BodyTensor, surface_load};
 use crate::solver::{
     ContactStops, INVERTS, Loads, RigidRegion, Support, Unsupported, find_unsupported, flattened, inverted,
 };
@@ -50,12 +50,13 @@ pub fn loads_of<const D: usize>(
     super::overlap::refuse(source, scene, body, &regions, &amplitudes)?;
     let mut surfaces = Vec::new();
     for (index, side, traction) in tractions {
-        let mut alone = Loads::default();
+        let areas = side_areas(source, &format!("boundary[{index}].traction"), body, side)?;
+        let (mut alone, sites) = (Loads::default(), body.bonds.sites());
         if !amplitudes.is_empty() {
-            add_traction(body, side, traction, &mut alone, &mut loaded);
+            add_traction(&areas, traction, sites, &mut alone, &mut loaded);
         }
         surfaces.extend(alone.body_force.map(|field| (index, field)));
-        add_traction(body, side, traction, &mut loads, &mut loaded);
+        add_traction(&areas, traction, sites, &mut loads, &mut loaded);
     }
     apply_formulas(source, scene, body, &regions, &mut loads)?;
     super::rotation::turn(source, scene, body, &regions, &amplitudes, &mut loads)?;
@@ -136,35 +137,23 @@ fn join<const D: usize>(
     Ok(())
 }
 
-/// Adds a traction on a side of a solid: t (n·h_I)/V_I with area vectors h, which balances a uniform stress
-/// in every particle ([`surface_load`]). It acts within two horizons of the side, in a thin body in the half
-/// next to it.
+/// Adds a traction on the areas of a side, 1/m: it balances a uniform stress in every particle.
 fn add_traction<const D: usize>(
-    body: &DiscreteBody<D>,
-    side: Side,
+    areas: &[(u32, f64)],
     traction: [f64; D],
+    sites: usize,
     loads: &mut Loads<D>,
     loaded: &mut [bool],
 ) {
-    let (axis, upper) = side.axis();
-    let bounds = [body.bounds.0[axis], body.bounds.1[axis]];
-    let reach = (2.0 * body.bonds.horizon()).min(0.5 * (bounds[1] - bounds[0]));
-    let sign = if upper { 1.0 } else { -1.0 };
-    let stress = BodyTensor::from_fn(|a, b| if b == axis { sign * traction[a] } else { 0.0 });
-    let surface = surface_load(&*body.bonds, stress);
-    let field = loads.body_force.get_or_insert_with(|| Field::zeros(body.bonds.sites()));
-    for &site in body.bonds.particles() {
-        let site = site as usize;
-        let below = sign * (bounds[usize::from(upper)] - body.bonds.position(site)[axis]);
-        let (old, new) = (field.get(site), surface.get(site));
-        if below <= reach && new != [0.0; D] {
-            field.set(site, std::array::from_fn(|d| old[d] + new[d]));
-            loaded[site] = true;
-        }
+    let field = loads.body_force.get_or_insert_with(|| Field::zeros(sites));
+    for &(site, area) in areas {
+        let old = field.get(site as usize);
+        field.set(site as usize, std::array::from_fn(|d| old[d] + area * traction[d]));
+        loaded[site as usize] = true;
     }
 }
 
-/// Returns the velocities at the start, m/s; where regions overlap, the last one wins.
+/// Returns the velocities at the start, m/s.
 ///
 /// # Errors
 /// As [`super::body_of`].
@@ -183,17 +172,24 @@ pub fn velocities_of<const D: usize>(
             let place = body.bonds.position(site as usize);
             let mut value = [0.0; D];
             for (d, value) in value.iter_mut().enumerate() {
-                if let Some(velocity) = boundary.velocity.as_ref().and_then(|v| v.get(d)) {
-                    *value = velocity.si();
-                } else if let Some(formula) = boundary.velocity_field.as_ref().and_then(|v| v.get(d)) {
-                    *value =
-                        evaluate(source, &format!("boundary[{index}].velocity_field[{d}]"), formula, place)?;
+                if let Some(formula) = boundary.velocity_field.as_ref().and_then(|v| v.get(d)) {
+                    evaluate(source, &format!("boundary[{index}].velocity_field[{d}]"), formula, place)?;
                 }
+                *value = boundary.velocity_at(place, d);
             }
             field.set(site as usize, value);
         }
     }
     Ok(field)
+}
+
+impl Boundary {
+    /// Component `d` of its velocity at a place at the start, m/s.
+    pub(super) fn velocity_at<const D: usize>(&self, place: [f64; D], d: usize) -> f64 {
+        let formula = self.velocity_field.as_ref().and_then(|formulas| formulas.get(d));
+        let given = self.velocity.as_ref().and_then(|given| given.get(d)).map(|speed| speed.si());
+        given.or_else(|| formula.map(|formula| formula.value_at(place))).unwrap_or(0.0)
+    }
 }
 
 /// Evaluates a formula at a particle.

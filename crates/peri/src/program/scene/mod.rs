@@ -42,6 +42,7 @@ mod probe;
 mod region;
 mod rotation;
 mod shapes;
+mod side_areas;
 mod solid;
 mod step;
 mod surface_curve;

@@ -1,13 +1,16 @@
 //! Refuses regions that prescribe different displacements of one particle.
 
+use super::curve::CurveTime;
 use super::rotation::rotation_of;
 use super::values::{DiscreteBody, plain};
 use super::{Boundary, Prescribed, PrescribedField, Scene};
 use crate::solver::{Amplitude, Rotation, Support};
 use harness::scene::{SceneError, Source};
 
-/// Parts of the time at which displacements with curves are compared.
-const MOMENTS: [f64; 3] = [0.25, 0.5, 1.0];
+/// Number of parts of the time at which displacements with curves are compared, beside the ends of increments.
+const MOMENTS: u32 = 64;
+/// Largest number of increments whose ends are compared.
+const MOST_INCREMENTS: usize = 1024;
 /// No region.
 const NONE: u32 = u32::MAX;
 /// Difference of two displacements, over the larger, that rounding explains.
@@ -24,9 +27,11 @@ pub(super) fn refuse<const D: usize>(
     regions: &[(Vec<u32>, Support<D>)],
     amplitudes: &[(Amplitude, [Amplitude; D])],
 ) -> Result<(), SceneError> {
+    refuse_velocities(source, scene, body, regions)?;
     if scene.boundary.iter().filter(|boundary| boundary.prescribes_displacement()).count() < 2 {
         return Ok(());
     }
+    let moments = moments(scene, !amplitudes.is_empty());
     let motion = |(index, boundary)| -> Result<BoundaryMotion<D>, SceneError> {
         let rotation = rotation_of::<D>(source, &format!("boundary[{index}]"), boundary)?;
         Ok(BoundaryMotion { boundary, rotation, amplitudes: amplitudes.get(index) })
@@ -40,13 +45,67 @@ pub(super) fn refuse<const D: usize>(
             for d in (0..D).filter(|&d| support.displacement[d].is_some()) {
                 let other = std::mem::replace(&mut owners[site as usize][d], index as u32);
                 let Some(before) = motions.get(other as usize) else { continue };
-                if let Some((found, allowed)) = motions[index].disagreement(before, other, place, d) {
+                if let Some((found, allowed)) =
+                    motions[index].disagreement(before, other, (place, d), &moments)
+                {
                     return Err(source.error(&format!("boundary[{index}]"), found, allowed));
                 }
             }
         }
     }
     Ok(())
+}
+
+/// Parts of the time at which displacements are compared: of curves, ends of increments and even parts.
+fn moments(scene: &Scene, curved: bool) -> Vec<f64> {
+    if !curved {
+        return vec![1.0];
+    }
+    let time = CurveTime::new(scene);
+    let rows = time.moments();
+    let apart = rows.len().div_ceil(MOST_INCREMENTS).max(1);
+    let ends = rows.iter().step_by(apart).map(|at| at / time.end).filter(|&part| part > 0.0);
+    ends.chain((1..=MOMENTS).map(|k| f64::from(k) / f64::from(MOMENTS))).collect()
+}
+
+/// Refuses overlapping regions with different velocities at the start.
+fn refuse_velocities<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &DiscreteBody<D>,
+    regions: &[(Vec<u32>, Support<D>)],
+) -> Result<(), SceneError> {
+    let mut owners = vec![NONE; body.bonds.sites()];
+    for (index, (boundary, (members, _))) in scene.boundary.iter().zip(regions).enumerate() {
+        if !boundary.prescribes_velocity() {
+            continue;
+        }
+        for &site in members {
+            let other = std::mem::replace(&mut owners[site as usize], index as u32);
+            let Some(before) = scene.boundary.get(other as usize) else { continue };
+            let place = body.bonds.position(site as usize);
+            for d in 0..D {
+                let [own, before] = [boundary, before].map(|one| one.velocity_at(place, d));
+                if (own - before).abs() > EQUAL * own.abs().max(before.abs()) {
+                    let found = format!(
+                        "{} m/s along {} of the particle at ({}) mm, for which boundary[{other}] prescribes {} m/s",
+                        plain(own),
+                        ["x", "y", "z"][d],
+                        millimetres(place),
+                        plain(before)
+                    );
+                    let allowed = "equal velocities where regions overlap";
+                    return Err(source.error(&format!("boundary[{index}]"), found, allowed));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Formats a place in mm.
+fn millimetres<const D: usize>(place: [f64; D]) -> String {
+    place.map(|x| plain((x * 1e9).round() / 1e6)).join(", ")
 }
 
 /// Prescribed motion of a boundary.
@@ -62,10 +121,9 @@ impl<const D: usize> BoundaryMotion<'_, D> {
         &self,
         before: &Self,
         other: u32,
-        place: [f64; D],
-        d: usize,
+        (place, d): ([f64; D], usize),
+        moments: &[f64],
     ) -> Option<(String, &'static str)> {
-        let moments: &[f64] = if self.amplitudes.is_some() { &MOMENTS } else { &MOMENTS[2..] };
         for &part in moments {
             let [own, before] = [self, before].map(|motion| motion.displacement(place, part)[d]);
             if own.is_nan() != before.is_nan() {
@@ -75,13 +133,12 @@ impl<const D: usize> BoundaryMotion<'_, D> {
             // what is held in place is unknown before the run
             if (own - before).abs() > EQUAL * own.abs().max(before.abs()) {
                 let when = self.amplitudes.map_or(String::new(), |_| format!(" at {part} of the time"));
-                let at: Vec<String> = place.iter().map(|x| plain((x * 1e9).round() / 1e6)).collect();
                 let found = format!(
                     "{} m along {} of the particle at ({}) mm{when}, for which boundary[{other}] prescribes \
                      {} m",
                     plain(own),
                     ["x", "y", "z"][d],
-                    at.join(", "),
+                    millimetres(place),
                     plain(before)
                 );
                 return Some((found, "equal displacements where regions overlap, or `free` in one of them"));

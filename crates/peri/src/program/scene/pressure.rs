@@ -11,10 +11,8 @@ use crate::solver::{Amplitude, FollowingPressure, Loads};
 use crate::surface::SurfaceFace;
 use harness::scene::{SceneError, Source};
 
-/// Thickness of a wall over the horizon above which the force on its side is right within 5 %: the area
-/// vectors of both sides overlap in walls below four. On a flat wall the force is 0.2, 2.6, 4.9, 15 and 25 %
-/// too large at 10, 9, 8, 7 and 6 layers, horizon ratio 3.015.
-pub(super) const LEAST_WALL: f64 = 2.5;
+/// Least thickness of a wall, in spacings: one layer of particles has no stiffness across it.
+pub(super) const LEAST_WALL: f64 = 1.75;
 
 /// Adds the pressures of boundaries to loads that follow curves.
 ///
@@ -55,13 +53,13 @@ pub(super) fn add<const D: usize>(
         let Some(amplitude) = amplitudes.get(index).map(|(_, each)| &each[0]) else { continue };
         let surface = body.surface();
         if let Some(wall) = wall(body, surface.faces().iter().filter(|face| inside(face))) {
-            let least = LEAST_WALL * body.bonds.horizon();
-            if wall < least {
+            let spacing = body.bonds.spacing();
+            if wall < LEAST_WALL * spacing {
                 let found = format!("a wall of {} mm", plain(wall * 1e3));
                 let allowed = format!(
-                    "at least {} mm, {LEAST_WALL} horizons: a thinner one gets over 5 % too much force; \
-                     take a smaller `body.spacing`",
-                    plain((least * 1e6).ceil() / 1e3)
+                    "at least two layers of particles, {} mm: one has no stiffness across it; take a smaller \
+                     `body.spacing`",
+                    plain((2e6 * spacing).ceil() / 1e3)
                 );
                 return Err(source.error(&key, found, allowed));
             }
@@ -77,14 +75,14 @@ pub(super) fn add<const D: usize>(
     Ok(())
 }
 
-/// Median thickness of the wall below some faces, m, up to [`LEAST_WALL`] horizons and in steps of a quarter
-/// of the spacing; `None` without shapes or faces.
+/// Median thickness of the wall below some faces, m, up to [`LEAST_WALL`] spacings and in steps of a quarter;
+/// `None` without shapes or faces.
 pub(super) fn wall<'a, const D: usize>(
     body: &DiscreteBody<D>,
     faces: impl Iterator<Item = &'a SurfaceFace<D>>,
 ) -> Option<f64> {
     let step = 0.25 * body.bonds.spacing();
-    let most = (LEAST_WALL * body.bonds.horizon() / step).ceil() as u32 + 1;
+    let most = (4.0 * LEAST_WALL).ceil() as u32 + 1;
     let depth = |face: &SurfaceFace<D>| {
         let below =
             |k: u32| std::array::from_fn(|d| face.place[d] - (f64::from(k) + 0.5) * step * face.normal[d]);

@@ -55,6 +55,8 @@ pub(super) fn extent<const D: usize>(
                 return Err(source.error(&format!("{key}.depth"), found, allowed));
             }
             let extent = body.bounds.1[axis] - body.bounds.0[axis];
+            let given = boundary.depth_key().is_some() || boundary.prescribes_displacement();
+            let depth = if given { depth } else { depth.min(extent) };
             if depth > extent * (1.0 + 1e-9) {
                 let found = format!("{layers} layers, {depth} m deep");
                 return Err(source.error(

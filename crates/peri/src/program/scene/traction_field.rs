@@ -4,10 +4,10 @@ use super::body_force::add_field;
 use super::curve::CurveTime;
 use super::formula::VectorFormula;
 use super::region::region;
+use super::side_areas::side_areas;
 use super::values::{DiscreteBody, ONE_OF_THEM};
 use super::{Boundary, Scene, Side};
 use crate::field::Field;
-use crate::material::{BodyTensor, surface_load};
 use crate::solver::{Amplitude, CurvedRegion, Loads, PlacedForce};
 use harness::scene::{SceneError, Source};
 
@@ -78,8 +78,7 @@ fn points<const D: usize>(
 ) -> Result<Vec<(u32, [f64; D], f64)>, SceneError> {
     let (axis, upper) = side.axis();
     let (members, depth) = region(source, &format!("boundary[{index}]"), boundary, body)?;
-    let bounds = [body.bounds.0[axis], body.bounds.1[axis]];
-    let at = bounds[usize::from(upper)];
+    let at = [body.bounds.0[axis], body.bounds.1[axis]][usize::from(upper)];
     let place = |site: u32| {
         let place = body.bonds.position(site as usize);
         std::array::from_fn(|d| if d == axis { at } else { place[d] })
@@ -88,12 +87,6 @@ fn points<const D: usize>(
     if let Some(depth) = depth.filter(|_| in_layers) {
         return Ok(members.into_iter().map(|site| (site, place(site), 1.0 / depth)).collect());
     }
-    let reach = (2.0 * body.bonds.horizon()).min(0.5 * (bounds[1] - bounds[0]));
-    let areas = surface_load(&*body.bonds, BodyTensor::<D>::identity());
-    let sign = if upper { 1.0 } else { -1.0 };
-    let near = body.bonds.particles().iter().filter(|&&site| {
-        let below = sign * (at - body.bonds.position(site as usize)[axis]);
-        below <= reach && areas.get(site as usize)[axis] != 0.0
-    });
-    Ok(near.map(|&site| (site, place(site), sign * areas.get(site as usize)[axis])).collect())
+    let areas = side_areas(source, &format!("boundary[{index}].traction_field"), body, side)?;
+    Ok(areas.into_iter().map(|(site, area)| (site, place(site), area)).collect())
 }

@@ -32,6 +32,7 @@ pub fn warnings<const D: usize>(source: &Source, scene: &Scene, body: &DiscreteB
         contact,
         slip,
         super::parts::bonded_parts(scene, body),
+        super::interface::free_to_pass(scene),
     ];
     once.into_iter()
         .flatten()

@@ -1,0 +1,217 @@
+//! Areas of the faces of a body, shared out among the particles below them.
+//!
+//! h_I of a particle below two opposite faces is that of both sides together: the nearer face takes it. Where
+//! these regions overlap, in thin walls, both sides gain the same area G_I at each particle, which leaves
+//! uniform stresses balanced, such that the first moment of a side lies on its face,
+//! Σ_I (ψ_f h_I·N_f + ψ_f G_I) d_I = 0 with the depths d_I, G_I being the mean of both sides' values.
+
+use crate::bonds::{BodyGeometry, Bonds, CellGrid};
+use crate::material::{BodyTensor, surface_load};
+use crate::parallel;
+use crate::surface::BodySurface;
+
+/// Half-width of the hat functions, and depth of the particles below a face, in spacings and horizons.
+const HAT: f64 = 1.0;
+pub(crate) const DEPTH: f64 = 2.16;
+/// Faces with less than this fraction of a particle's area join a neighbour within this distance in spacings.
+pub(super) const SMALL: f64 = 0.5;
+const JOINED: f64 = 2.1;
+/// Particles of a work item.
+const BATCH: usize = 1024;
+
+/// A particle below a face.
+#[derive(Clone, Copy)]
+pub(super) struct FaceParticle {
+    pub face: u32,
+    pub site: u32,
+    /// ψ_f(I), and the depth, m.
+    pub hat: f64,
+    pub depth: f64,
+    /// Nearer to this face than to an opposite one.
+    own: bool,
+    /// Below an opposite face as well.
+    thin: bool,
+}
+
+/// Particles below all faces, by face, with their areas.
+pub(super) struct FaceAreas {
+    pub below: Vec<FaceParticle>,
+    /// ψ_f h_I·N_f + ψ_f G_I, m².
+    pub shares: Vec<f64>,
+    /// Side area of a particle, m².
+    pub typical: f64,
+}
+
+impl FaceAreas {
+    /// Shares out the areas; small faces join larger ones.
+    pub fn new<const D: usize>(bonds: &dyn Bonds<D>, surface: &BodySurface<D>) -> Self {
+        let typical = typical_area(bonds);
+        let load = surface_load(bonds, BodyTensor::<D>::identity());
+        let mut below = below(bonds, surface);
+        let own = |below: &FaceParticle| {
+            if !below.own {
+                return 0.0;
+            }
+            let (site, normal) = (below.site as usize, surface.faces()[below.face as usize].normal);
+            let load = load.get(site);
+            below.hat * bonds.volume(site) * (0..D).map(|d| load[d] * normal[d]).sum::<f64>()
+        };
+        let count = surface.faces().len();
+        let areas = sum(count, &below, own);
+        join_small(surface, &areas, &mut below, typical, bonds.spacing());
+        below.sort_by_key(|below| (below.face, below.site));
+        let common = common_areas(bonds.sites(), count, &below, own);
+        let share = |below: &FaceParticle| {
+            let common = if below.thin { below.hat * common[below.site as usize] } else { 0.0 };
+            own(below) + common
+        };
+        let shares = below.iter().map(share).collect();
+        Self { below, shares, typical }
+    }
+}
+
+/// Lists the particles in walls that are thin along an axis, ascending, with the area of the faces above them
+/// that point along it (`sign` 1) or against it (−1), projected on it, m².
+pub fn thin_wall_areas<const D: usize>(
+    bonds: &dyn Bonds<D>,
+    surface: &BodySurface<D>,
+    axis: usize,
+    sign: f64,
+) -> Vec<(u32, f64)> {
+    let FaceAreas { below, shares, .. } = FaceAreas::new(bonds, surface);
+    let along = |below: &FaceParticle| sign * surface.faces()[below.face as usize].normal[axis];
+    let mut areas: Vec<(u32, f64, bool)> = Vec::with_capacity(below.len());
+    for (below, share) in below.iter().zip(shares) {
+        let along = along(below);
+        areas.push((below.site, share * along.max(0.0), below.thin && along.abs() > 0.5));
+    }
+    areas.sort_by_key(|area| area.0);
+    let sites = areas.chunk_by(|a, b| a.0 == b.0).filter(|same| same.iter().any(|area| area.2));
+    sites.map(|same| (same[0].0, same.iter().map(|area| area.1).sum())).collect()
+}
+
+/// Computes the side area of a particle, m²: its volume over the spacing.
+fn typical_area<const D: usize>(bonds: &dyn BodyGeometry<D>) -> f64 {
+    let volumes: f64 = bonds.particles().iter().map(|&site| bonds.volume(site as usize)).sum();
+    volumes / bonds.particles().len().max(1) as f64 / bonds.spacing()
+}
+
+/// Sums a value of particles by face.
+fn sum(faces: usize, below: &[FaceParticle], value: impl Fn(&FaceParticle) -> f64) -> Vec<f64> {
+    let mut sums = vec![0.0; faces];
+    below.iter().for_each(|below| sums[below.face as usize] += value(below));
+    sums
+}
+
+/// Computes G_I, m², by site; empty without thin walls.
+fn common_areas(
+    sites: usize,
+    faces: usize,
+    below: &[FaceParticle],
+    own: impl Fn(&FaceParticle) -> f64,
+) -> Vec<f64> {
+    if below.iter().all(|below| !below.thin) {
+        return Vec::new();
+    }
+    let moments = sum(faces, below, |below| own(below) * below.depth);
+    let depths = sum(faces, below, |below| if below.thin { below.hat * below.depth } else { 0.0 });
+    let (mut common, mut hats) = (vec![0.0; sites], vec![0.0; sites]);
+    for below in below.iter().filter(|below| below.thin) {
+        let (face, site) = (below.face as usize, below.site as usize);
+        common[site] -= below.hat * moments[face] / depths[face];
+        hats[site] += below.hat;
+    }
+    common.iter_mut().zip(hats).filter(|(_, hat)| *hat > 0.0).for_each(|(common, hat)| *common /= hat);
+    common
+}
+
+/// Lists all particles below faces, by particle; hats sum to 1 over the faces of a patch.
+fn below<const D: usize>(bonds: &dyn BodyGeometry<D>, surface: &BodySurface<D>) -> Vec<FaceParticle> {
+    let (faces, spacing) = (surface.faces(), bonds.spacing());
+    if faces.is_empty() {
+        return Vec::new();
+    }
+    let (depth, width) = (DEPTH * bonds.horizon(), HAT * spacing);
+    let places: Vec<[f64; D]> = faces.iter().map(|face| face.place).collect();
+    let grid = CellGrid::new(&places, depth);
+    let of = |site: u32, all: &mut Vec<FaceParticle>| {
+        let here = bonds.position(site as usize);
+        let mut near: Vec<FaceParticle> = Vec::new();
+        grid.near(here, depth.hypot(width), |number| {
+            let (aside, down) = surface.reach(&faces[number], here);
+            if aside < width && down > 0.0 && down < depth {
+                let hat = 1.0 - aside / width;
+                near.push(FaceParticle {
+                    face: number as u32,
+                    site,
+                    hat,
+                    depth: down,
+                    own: true,
+                    thin: false,
+                });
+            }
+        });
+        near.sort_unstable_by_key(|below| (faces[below.face as usize].patch, below.face));
+        for patch in near.chunk_by(|a, b| faces[a.face as usize].patch == faces[b.face as usize].patch) {
+            // the nearest step of a staircase
+            let nearest = patch.iter().map(|below| below.depth).fold(f64::INFINITY, f64::min);
+            let kept = |below: &&FaceParticle| below.depth < nearest + 0.75 * spacing;
+            let sum: f64 = patch.iter().filter(kept).map(|below| below.hat).sum();
+            for below in patch.iter().filter(kept).filter(|below| !surface.is_bound(below.face as usize)) {
+                let normal = faces[below.face as usize].normal;
+                let opposite = |other: &&FaceParticle| {
+                    let there = faces[other.face as usize].normal;
+                    (0..D).map(|d| normal[d] * there[d]).sum::<f64>() < -0.5
+                };
+                let own =
+                    near.iter().filter(opposite).all(|other| other.depth >= below.depth + 1e-6 * spacing);
+                let across = near.iter().find(opposite);
+                let thin = across.is_some_and(|other| !surface.is_bound(other.face as usize));
+                if own || thin {
+                    all.push(FaceParticle { hat: below.hat / sum, own, thin, ..*below });
+                }
+            }
+        }
+    };
+    let batch = |sites: &[u32]| {
+        let mut all = Vec::new();
+        sites.iter().for_each(|&site| of(site, &mut all));
+        all
+    };
+    let parts: Vec<Vec<FaceParticle>> = parallel::map_chunks(bonds.particles(), BATCH, batch);
+    parts.concat()
+}
+
+/// Moves the particles of small faces to the nearest larger face of the same patch.
+fn join_small<const D: usize>(
+    surface: &BodySurface<D>,
+    areas: &[f64],
+    below: &mut [FaceParticle],
+    area: f64,
+    spacing: f64,
+) {
+    let faces = surface.faces();
+    let is_small = |&face: &usize| !surface.is_bound(face) && areas[face] < SMALL * area;
+    let small: Vec<usize> = (0..faces.len()).filter(is_small).collect();
+    if small.is_empty() {
+        return;
+    }
+    let places: Vec<[f64; D]> = faces.iter().map(|face| face.place).collect();
+    let grid = CellGrid::new(&places, JOINED * spacing);
+    let mut target: Vec<u32> = (0..faces.len() as u32).collect();
+    for face in small {
+        let mut best: Option<(f64, usize)> = None;
+        grid.near(places[face], JOINED * spacing, |other| {
+            let distance: f64 = (0..D).map(|d| (places[other][d] - places[face][d]).powi(2)).sum();
+            let fits = faces[other].patch == faces[face].patch && areas[other] >= SMALL * area;
+            let nearer = best.is_none_or(|(least, at)| (distance, other) < (least, at));
+            if fits && distance < (JOINED * spacing).powi(2) && nearer {
+                best = Some((distance, other));
+            }
+        });
+        if let Some((_, other)) = best {
+            target[face] = other as u32;
+        }
+    }
+    below.iter_mut().for_each(|below| below.face = target[below.face as usize]);
+}

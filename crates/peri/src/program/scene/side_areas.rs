@@ -1,0 +1,56 @@
+//! Areas of a side of a solid, for tractions.
+
+use super::Side;
+use super::values::{DiscreteBody, plain};
+use crate::contact::{DEPTH, thin_wall_areas};
+use crate::material::{BodyTensor, surface_load};
+use harness::scene::{SceneError, Source};
+
+/// Least thickness of a body without faces over its horizon: area vectors of both sides overlap in thinner
+/// ones, by over 5 %.
+const LEAST_EXTENT: f64 = 2.5;
+
+/// Returns the particles within two horizons of a side with the area of the side over their volume, 1/m: the
+/// component n·h_I/V_I of the area vectors ([`surface_load`]), in thin walls the share of the faces of this
+/// side.
+///
+/// # Errors
+/// A thin cloud, which has no faces.
+pub(super) fn side_areas<const D: usize>(
+    source: &Source,
+    key: &str,
+    body: &DiscreteBody<D>,
+    side: Side,
+) -> Result<Vec<(u32, f64)>, SceneError> {
+    let (bonds, surface, (axis, upper)) = (&*body.bonds, body.surface(), side.axis());
+    let bounds = [body.bounds.0[axis], body.bounds.1[axis]];
+    let (extent, least) = (bounds[1] - bounds[0], LEAST_EXTENT * bonds.horizon());
+    if surface.faces().is_empty() && extent < least {
+        let found = format!("a body {} mm thick", plain(extent * 1e3));
+        let allowed = format!(
+            "at least {} mm, {LEAST_EXTENT} horizons, in a body without faces; or `layers`, in which the traction is \
+             a body force",
+            plain((least * 1e6).ceil() / 1e3)
+        );
+        return Err(source.error(key, found, allowed));
+    }
+    let sign = if upper { 1.0 } else { -1.0 };
+    let mut reach = DEPTH * bonds.horizon();
+    let mut thin = Vec::new();
+    if surface.faces().is_empty() {
+        reach = reach.min(0.5 * extent);
+    } else {
+        thin = thin_wall_areas(bonds, &surface, axis, sign);
+    }
+    let areas = surface_load(bonds, BodyTensor::<D>::identity());
+    let area = |&site: &u32| {
+        let at = site as usize;
+        let below = sign * (bounds[usize::from(upper)] - bonds.position(at)[axis]);
+        let area = match thin.binary_search_by_key(&site, |own| own.0) {
+            Ok(own) => thin[own].1 / bonds.volume(at),
+            Err(_) => sign * areas.get(at)[axis],
+        };
+        (below <= reach && area != 0.0).then_some((site, area))
+    };
+    Ok(bonds.particles().iter().filter_map(area).collect())
+}
