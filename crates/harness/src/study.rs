@@ -192,6 +192,8 @@ pub struct Variant {
     pub description: Option<String>,
     /// Part of the error with which it must end.
     pub expect_error: Option<String>,
+    /// Keys that its study varies, with their values as texts.
+    pub varied: Vec<(String, String)>,
 }
 
 /// Lists the variants of a scene: the scene itself where it has no studies; `quick` leaves out those of
@@ -210,7 +212,8 @@ pub fn variants(
 ) -> Result<Vec<Variant>, SceneError> {
     if studies.is_empty() {
         let (name, source) = (name(source, None)?, source.clone());
-        return Ok(vec![Variant { name, study: None, source, description: None, expect_error: None }]);
+        let (description, expect_error, varied) = (None, None, Vec::new());
+        return Ok(vec![Variant { name, study: None, source, description, expect_error, varied }]);
     }
     let mut variants: Vec<Variant> = Vec::new();
     for (index, study) in studies.iter().enumerate() {
@@ -229,12 +232,13 @@ pub fn variants(
         for places in grid(&lists.iter().map(|list| list.2).collect::<Vec<_>>()) {
             // of what concerns a key the first holds: listed values before single keys, and these before
             // blocks
-            let (mut own, mut label) = (source.clone(), study.name.clone());
+            let (mut own, mut label, mut varied) = (source.clone(), study.name.clone(), Vec::new());
             for ((key, list, _, values), place) in lists.iter().zip(places) {
                 own = own.with_replaced(key, &format!("study[{index}].{list}[{place}]"));
                 if let Some(value) = values.and_then(|values| values.get(place)) {
                     let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
                     label = Some(label.map_or_else(String::new, |label| label + "_") + &named(key, &text));
+                    varied.push(((*key).to_owned(), text));
                 }
             }
             if study.sets {
@@ -251,7 +255,8 @@ pub fn variants(
             };
             if !variants.iter().any(same) {
                 let Study { description, expect_error, .. } = study.clone();
-                variants.push(Variant { name, study: Some(index), source: own, description, expect_error });
+                let (study, source) = (Some(index), own);
+                variants.push(Variant { name, study, source, description, expect_error, varied });
             } else if naming == Naming::Folders {
                 let found = format!("`{name}` twice");
                 return Err(source.error(&format!("study[{index}].name"), found, "different names"));

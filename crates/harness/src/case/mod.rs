@@ -18,7 +18,7 @@ pub use folder::{RunLock, lock_run, prepare_run, remove_unfinished, resume_run, 
 pub use inputs::{Input, InputState, attached, input_state, inputs};
 pub(crate) use rows::matches_pattern;
 pub(crate) use rows::natural;
-pub use rows::{Row, Rows, STATISTICS};
+pub use rows::{Row, Rows, STATISTICS, numeric};
 pub(crate) use summary::{Names, main_names};
 pub use sweep::{
     OF_SAMPLES, OF_SWEEPS, Part, Sample, Search, Shard, SweepOptions, Vary, drawn, job, search, sweep,

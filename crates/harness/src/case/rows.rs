@@ -263,6 +263,18 @@ pub(crate) fn number_and_unit(text: &str) -> Option<(f64, &str)> {
     (!unit.contains([' ', ';', ',', '"'])).then_some((number, unit))
 }
 
+/// Returns the numbers of values that have one unit, and the unit.
+pub fn numeric(values: &[String]) -> Option<(Vec<f64>, String)> {
+    let split = |text: &String| -> Option<(f64, String)> {
+        // of keys that change together the first
+        let text: String = text.split(';').next()?.split_whitespace().collect();
+        number_and_unit(&text).map(|(number, unit)| (number, unit.to_owned()))
+    };
+    let all: Vec<(f64, String)> = values.iter().map(split).collect::<Option<_>>()?;
+    let unit = all.first()?.1.clone();
+    all.iter().all(|(_, other)| *other == unit).then(|| (all.iter().map(|(x, _)| *x).collect(), unit))
+}
+
 /// Splits a heading `key [unit]` into key and unit.
 pub(crate) fn key_and_unit(heading: &str) -> (&str, &str) {
     heading.strip_suffix(']').and_then(|rest| rest.rsplit_once(" [")).unwrap_or((heading, ""))

@@ -1,8 +1,8 @@
-//! Forces, stresses, energy-momentum and flags of a state, for bond laws and solids.
+//! Forces, stresses, energies, energy-momentum and flags of a state, for bond laws and solids.
 
 use crate::bonds::Bonds;
 use crate::material::{
-    BodyTensor, BondMaterial, Family, NonlocalSolid, PointLaw, Pointwise, SolverMaterial, virial,
+    BodyTensor, BondMaterial, Family, Material, NonlocalSolid, PointLaw, Pointwise, SolverMaterial, virial,
 };
 use crate::parallel;
 use crate::potential::KernelFit;
@@ -205,6 +205,23 @@ impl<const D: usize> StressEvaluator<D> {
                 - BodyTensor::<D>::identity() * point.energy(&**law).unwrap_or(0.0))
                 * point.integrity();
             visit(at, std::array::from_fn(|a| std::array::from_fn(|b| tensor[(a, b)])));
+        }
+    }
+
+    /// Energy densities of particles, J/m³, by the law itself; `None` without a law.
+    pub fn energies(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<Vec<f64>> {
+        let family = |site: u32| Family::new(bonds, &state.displacement, site as usize);
+        match &self.0 {
+            EvaluatorKind::Nothing => None,
+            EvaluatorKind::Bonds { material, .. } => {
+                let of = |&site: &u32| Material::<D>::energy(&**material, &family(site), &());
+                Some(parallel::map_each(bonds.particles(), of))
+            }
+            EvaluatorKind::Solid { law, states, .. } => {
+                let (states, solid) = (prepared(states, bonds, state), NonlocalSolid(law.clone()));
+                let of = |&site: &u32| solid.energy(&family(site), &states.points()[site as usize]);
+                Some(parallel::map_each(bonds.particles(), of))
+            }
         }
     }
 

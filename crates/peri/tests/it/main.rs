@@ -2,6 +2,7 @@
 //! `formulation.md` (chapter 2), whose scripts wrote `stress_patch.csv` and `stress_surface.csv`.
 
 mod affine;
+mod answers;
 #[cfg(target_arch = "x86_64")]
 mod assembly;
 mod balance;

@@ -132,8 +132,8 @@ fn literal(value: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::table::numeric;
     use super::*;
+    use crate::case::rows::numeric;
 
     #[test]
     fn values_in_toml() {

@@ -1,7 +1,7 @@
 //! The least value of a key with which a scene meets all that it expects.
 
-use super::table::numeric;
 use super::{LEAST_VALUE, SweepOptions, Vary, rows};
+use crate::case::rows::numeric;
 use crate::case::{Case, Finished, Row};
 use crate::report::Named;
 use crate::scene::{Failure, Source};

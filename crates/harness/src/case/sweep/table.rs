@@ -2,7 +2,7 @@
 
 use super::{FAILED_RUNS, Vary, divided};
 use crate::case::Program;
-use crate::case::rows::{Rows, STATISTICS, number_and_unit};
+use crate::case::rows::{Rows, STATISTICS, numeric};
 use crate::output::picture::{LinePlot, Series};
 use crate::report::Report;
 use crate::scene::Source;
@@ -37,18 +37,6 @@ pub(super) fn together(program: &Program, source: &Source, vary: &[Vary], rows: 
     report.work("runs", rows.rows.len() as u64);
     report.work("steps", finished().filter_map(|(_, own)| own.work.get("steps")).sum());
     report
-}
-
-/// Returns the numbers of values that have one unit, and the unit.
-pub(super) fn numeric(values: &[String]) -> Option<(Vec<f64>, String)> {
-    let split = |text: &String| -> Option<(f64, String)> {
-        // of keys that change together the first
-        let text: String = text.split(';').next()?.split_whitespace().collect();
-        number_and_unit(&text).map(|(number, unit)| (number, unit.to_owned()))
-    };
-    let all: Vec<(f64, String)> = values.iter().map(split).collect::<Option<_>>()?;
-    let unit = all.first()?.1.clone();
-    all.iter().all(|(_, other)| *other == unit).then(|| (all.iter().map(|(x, _)| *x).collect(), unit))
 }
 
 /// Returns the places of the values of a key and the label of their axis: of lists and tables the entry that

@@ -71,6 +71,15 @@ pub(super) fn displacement_fields<const D: usize>(scene: &Scene, to: &mut Fields
     }
 }
 
+/// Adds the energy density, J/m³, if the scene requests it.
+pub(super) fn energy_field<const D: usize>(scene: &Scene, to: &mut Fields<Moment<D>>) {
+    if scene.output.energy {
+        to.add("energy_density", 1, Place::Points, |m| {
+            m.physics.evaluator.energies(m.bonds, m.state).unwrap_or_default()
+        });
+    }
+}
+
 /// Adds stresses by every measure.
 pub(super) fn stress_fields<const D: usize>(scene: &Scene, to: &mut Fields<Moment<D>>) {
     for piola in [false, true] {

@@ -36,6 +36,7 @@ pub fn observers<const D: usize>(scene: &Scene) -> SceneObservers<'_, D> {
         stateless(StatelessObserver { fields: frames::displacement_fields, ..none }),
         stateless(StatelessObserver { fields: cracks::damage_field, ..none }),
         stateless(StatelessObserver { fields: flags::flag_field, ..none }),
+        stateless(StatelessObserver { fields: frames::energy_field, ..none }),
         stateless(StatelessObserver { fields: frames::stress_fields, ..none }),
         Box::new(maps::Pictures(scene)),
     ]

@@ -22,16 +22,19 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Pictures<'_> {
         let flags = if spec.flags { m.physics.evaluator.flags(m.bonds, m.state) } else { None };
         let flags: Option<Vec<f64>> =
             flags.map(|flags| flags.iter().map(|flags| f64::from(u8::from(flags.any()))).collect());
+        let energies = if spec.energy { m.physics.evaluator.energies(m.bonds, m.state) } else { None };
         if D == 2 {
             maps(m, to.folder)?;
             flags.iter().try_for_each(|values| flagged(m, values, to.folder))?;
+            energies.iter().try_for_each(|values| energy_map(m, values, to.folder))?;
         }
         let breaks = m.physics.body.criterion.is_some();
         if spec.fields && spec.every.is_some() && self.0.stress.is_some() && breaks {
             stages::draw_stages(m, to.folder)?;
         } else if D == 3 {
             let flags = flags.map(|flags| (solid::flagged_field(), flags));
-            let second = flags.or_else(|| Some((solid::damage_field(), m.damage()?)));
+            let energies = energies.map(|values| (solid::energy_field(&values), values));
+            let second = flags.or(energies).or_else(|| Some((solid::damage_field(), m.damage()?)));
             solid::draw_end(m, second, to.folder)?;
         }
         Ok(())
@@ -97,6 +100,20 @@ fn flagged<const D: usize>(m: &Moment<D>, values: &[f64], output: &Path) -> Resu
         .lengths("mm", 1e-3)
         .panel(panel.range(0.0, 1.0).reference(&rest).bridge(bridge_length(m)));
     Ok(map.write(output.join(format!("flags_{}.png", m.physics.name)))?)
+}
+
+/// Draws the energy density of a plane body.
+///
+/// # Errors
+/// A file that cannot be written.
+fn energy_map<const D: usize>(m: &Moment<D>, values: &[f64], output: &Path) -> Result<(), Error> {
+    let [rest, places] = plane_positions(m);
+    let field = solid::energy_field(values);
+    let values: Vec<f64> = values.iter().map(|w| w * field.scale).collect();
+    let label = &field.strip.label;
+    let panel = Panel::new(label, label, &places, &values, m.bonds.spacing()).reference(&rest);
+    let map = FieldMap::new().lengths("mm", 1e-3).panel(panel.bridge(bridge_length(m)));
+    Ok(map.write(output.join(format!("energy_{}.png", m.physics.name)))?)
 }
 
 /// Returns the reference and current positions of the particles of a plane body.

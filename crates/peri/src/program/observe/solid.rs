@@ -95,6 +95,13 @@ pub fn flagged_field() -> ColouredField {
     field("flagged".to_owned(), 1.0, (0.0, 1.0))
 }
 
+/// Returns the field of energy densities with these values, J/m³.
+pub fn energy_field(values: &[f64]) -> ColouredField {
+    let most = values.iter().copied().fold(0.0, f64::max);
+    let (scale, unit) = stress_unit(most);
+    field(format!("energy density ({})", unit.replace("Pa", "J/m³")), scale, (0.0, most))
+}
+
 fn field(label: String, scale: f64, (low, high): (f64, f64)) -> ColouredField {
     let range = (low * scale, high * scale);
     let range = if range.0 < range.1 && (range.1 - range.0).is_finite() { range } else { (0.0, 1.0) };

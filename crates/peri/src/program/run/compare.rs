@@ -4,6 +4,7 @@ use super::outcome::{VariantOutcome, families};
 use crate::exact;
 use crate::program::quantities as q;
 use crate::program::scene::{NAMING, Scene};
+use harness::case::numeric;
 use harness::report::{Bound, Expect, Kind, Named, Report};
 use harness::scene::Source;
 use harness::study::{self, Compare, SuiteRow};
@@ -278,21 +279,49 @@ pub fn suite(report: &mut Report, outcomes: &[VariantOutcome], output: &Path) ->
     Ok(())
 }
 
-/// Writes all values of all variants to `study.csv`.
+/// Returns the keys that studies vary, with the text of each variant; a unit that all have is in the heading.
+fn varied(outcomes: &[VariantOutcome]) -> Vec<(String, Vec<String>)> {
+    let mut keys: Vec<&String> = Vec::new();
+    for (key, _) in outcomes.iter().flat_map(|outcome| &outcome.varied) {
+        if !keys.contains(&key) {
+            keys.push(key);
+        }
+    }
+    let of_key = |key: &String| {
+        let texts: Vec<Option<String>> = outcomes.iter().map(|own| own.text_of(key).cloned()).collect();
+        let Some((numbers, unit)) = numeric(&texts.iter().flatten().cloned().collect::<Vec<_>>()) else {
+            return (key.clone(), texts.into_iter().map(Option::unwrap_or_default).collect());
+        };
+        let mut numbers = numbers.into_iter();
+        let value = |text: &Option<String>| {
+            text.as_ref().and_then(|_| numbers.next()).map_or(String::new(), |number| format!("{number:?}"))
+        };
+        let heading = if unit.is_empty() { key.clone() } else { format!("{key} [{unit}]") };
+        (heading, texts.iter().map(value).collect())
+    };
+    keys.into_iter().map(of_key).collect()
+}
+
+/// Writes the varied keys and all values of all variants to `study.csv`.
 pub fn write(outcomes: &[VariantOutcome], output: &Path) -> Result<(), polycore::Error> {
     if outcomes.len() < 2 {
         return Ok(());
     }
-    let columns = columns(outcomes);
+    let (columns, varied) = (columns(outcomes), varied(outcomes));
     let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
     let mut text = String::from("variant,spacing [m],horizon_ratio");
+    varied.iter().for_each(|(key, _)| text += &format!(",{}", quoted(key)));
     for (name, unit) in &columns {
         let heading = if unit.is_empty() { (*name).to_owned() } else { format!("{name} [{unit}]") };
         text += &format!(",{}", quoted(&heading));
     }
     text.push('\n');
-    for outcome in outcomes {
+    for (row, outcome) in outcomes.iter().enumerate() {
         text += &format!("{},{:?},{:?}", quoted(&outcome.name), outcome.spacing, outcome.horizon_ratio);
+        for (_, values) in &varied {
+            let number = values[row].parse::<f64>().is_ok();
+            text += &format!(",{}", if number { values[row].clone() } else { quoted(&values[row]) });
+        }
         for (name, _) in &columns {
             // empty: this variant has no such value
             text += &outcome.get(name).map_or(",".to_owned(), |value| format!(",{value:?}"));

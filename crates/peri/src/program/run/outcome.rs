@@ -45,6 +45,8 @@ pub struct VariantOutcome {
     pub warnings: Vec<String>,
     /// Expected behaviour from the scene.
     pub description: Option<String>,
+    /// Keys that its study varies, with their values as texts.
+    pub varied: Vec<(String, String)>,
     /// Error with which the variant ended.
     pub error: Option<String>,
     /// Work done.
@@ -93,6 +95,7 @@ impl VariantOutcome {
             probes: Vec::new(),
             warnings: Vec::new(),
             description: None,
+            varied: variant.of.varied.clone(),
             error: None,
             work: Vec::new(),
             seconds: Vec::new(),
@@ -102,6 +105,11 @@ impl VariantOutcome {
     /// Returns the name for files, without spaces and shell characters.
     pub fn file_name(&self) -> String {
         self.name.replace(' ', "_").replace('=', "-")
+    }
+
+    /// Value of a key that its study varies.
+    pub fn text_of(&self, key: &str) -> Option<&String> {
+        self.varied.iter().find(|own| own.0 == key).map(|own| &own.1)
     }
 
     /// Adds a scalar.

@@ -44,6 +44,13 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     if scene.boundary.is_empty() && scene.body_force.is_empty() && !strained {
         return Err(source.missing("boundary", "needed for loads and supports: at least one [[boundary]]"));
     }
+    let named = |at: usize| scene.boundary[at].name.as_ref();
+    let twice = |&at: &usize| named(at).is_some() && (0..at).any(|before| named(before) == named(at));
+    if let Some(at) = (0..scene.boundary.len()).find(twice) {
+        let found = format!("`{}` twice", scene.boundary[at].name.as_deref().unwrap_or_default());
+        let allowed = "different names: columns of the history have them";
+        return Err(source.error(&format!("boundary[{at}].name"), found, allowed));
+    }
     if let Some(stress) = &scene.stress
         && stress.measures.is_empty()
     {
@@ -187,6 +194,9 @@ fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     if scene.output.flags && !scene.is_learnt() && scene.study.is_empty() {
         let why = "only laws of `material.solid.constitutive.learnt` have flags";
         return Err(source.unexpected("output.flags", why));
+    }
+    if scene.output.energy && scene.material.is_prestrained() {
+        return Err(source.unexpected("output.energy", "prestrained bodies have no energy densities"));
     }
     if !(1..=12).contains(&scene.output.stages) {
         return Err(source.error("output.stages", scene.output.stages, "1 to 12"));

@@ -107,6 +107,9 @@ fn bytes_of_results<const D: usize>(scene: &Scene, particles: f64) -> f64 {
         // flags, and as numbers
         each += size_of::<Flags>() as f64 + 16.0;
     }
+    if scene.output.energy {
+        each += 16.0;
+    }
     if scene.output.pictures {
         each += if D == 2 { DRAWN } else { DRAWN_IN_SPACE };
     }

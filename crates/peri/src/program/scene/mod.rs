@@ -386,6 +386,8 @@ pub struct OutputFiles {
     pub solid: Option<SolidSpec>,
     /// Writes where a learnt law is uncertain, as a field and in pictures.
     pub flags: bool,
+    /// Writes the energy density of particles, as a field and in pictures.
+    pub energy: bool,
     /// Displacements at which the report has the load, as `load_at_20mm`.
     pub load_at: Vec<Length>,
     /// Displacements at which the report has the stiffness, as `secant_stiffness_at_2mm`.
@@ -409,6 +411,7 @@ impl Default for OutputFiles {
             stages: 5,
             solid: None,
             flags: false,
+            energy: false,
             load_at: Vec::new(),
             stiffness_at: Vec::new(),
             integrals: false,
@@ -437,11 +440,11 @@ impl Scene {
         !self.body_force.is_empty() || self.boundary.iter().any(Boundary::prescribes_force)
     }
 
-    /// Returns true if outputs need forces, stresses or flags.
+    /// Returns true if outputs need forces, stresses, energies or flags.
     pub fn observes_forces(&self) -> bool {
         let j_integral = self.probe.iter().any(|probe| probe.track == Track::JIntegral);
         let traced = self.stress.is_some() || !self.output.section.is_empty() || self.periodic.is_some();
-        traced || j_integral || self.is_learnt()
+        traced || j_integral || self.output.energy || self.is_learnt()
     }
 
     /// Returns true for a law learnt from data.

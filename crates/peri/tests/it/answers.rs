@@ -1,0 +1,108 @@
+//! Answers of scenes in closed form: energies of particles, loads on held particles, signs of histories.
+
+use harness::case::{Case, Options, Run};
+use harness::output::vtkhdf;
+use harness::scene::Source;
+use peri::program::run::{FinishedScene, Peri, run};
+use peri::program::scene::Scene;
+use std::path::Path;
+
+const BONDS: &str = "[material]\nyoungs_modulus = \"1 MPa\"\nlaw = \"linear\"\n";
+const RUBBER: &str = "[material.solid]\nlaw = \"correspondence\"\nconstitutive = { model = \"neo-hookean\", \
+                      parameters = { shear_modulus = \"0.4 MPa\" }, bulk_modulus = \"4 MPa\" }\n";
+
+/// A strip of 20 × 6 particles, held at its left end.
+fn strip(material: &str, rest: &str) -> String {
+    format!(
+        r#"version = 1
+program = "peri"
+[body]
+space = "plane-strain"
+thickness = "1 mm"
+spacing = "1 mm"
+shapes = [{{ add = "box", min = ["0 mm", "0 mm"], max = ["20 mm", "6 mm"] }}]
+{material}
+[[boundary]]
+name = "foot"
+side = "x-"
+displacement = ["0 mm", "0 mm"]
+{rest}
+"#
+    )
+}
+
+fn solve(text: &str, output: &Path) -> FinishedScene {
+    let source = Source::new("scene.toml", text);
+    let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
+    let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(output));
+    run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Displacements and loads of a run.
+fn history(text: &str) -> Vec<[f64; 2]> {
+    let directory = tempfile::tempdir().unwrap();
+    let finished = solve(text, directory.path());
+    finished.outcomes[0].history.iter().map(|row| [row.displacement, row.load]).collect()
+}
+
+#[test]
+fn energy_densities_add_up_to_the_stored_energy() {
+    let pulled = "[[boundary]]\nside = \"x+\"\ndisplacement = [\"2 mm\", \"1 mm\"]\n[output]\npictures = \
+                  false\nenergy = true\n";
+    for material in [BONDS, RUBBER] {
+        let directory = tempfile::tempdir().unwrap();
+        let finished = solve(&strip(material, pulled), directory.path());
+        let frames = vtkhdf::read(directory.path().join("dx-1mm_m-3.015.vtkhdf")).unwrap();
+        let densities = frames.data(frames.len() - 1, "energy_density").unwrap();
+        assert_eq!(densities.len(), 120);
+        let (sum, stored) = (1e-9 * densities.iter().sum::<f64>(), finished.report.scalar("stored_energy"));
+        // fields are written in single precision
+        assert!((sum / stored.unwrap() - 1.0).abs() < 1e-6, "{sum} of {stored:?} J");
+    }
+}
+
+/// A load on held particles goes into the support and leaves the search for equilibrium as it is.
+#[test]
+fn loads_on_held_particles_do_not_end_the_search() {
+    let tip = "[[boundary]]\nside = \"x+\"\nforce = [\"0 N\", \"0.001 N\"]\n[output]\npictures = false\n";
+    let bolt = "[[boundary]]\nside = \"x-\"\nforce = [\"0 N\", \"-1000 N\"]\n";
+    for method in ["lbfgs", "adr"] {
+        let solver = format!("[solver]\nmethod = \"{method}\"\n");
+        let directory = tempfile::tempdir().unwrap();
+        let deflection = |extra: &str| {
+            let finished = solve(&strip(BONDS, &format!("{tip}{extra}{solver}")), directory.path());
+            finished.report.scalar("largest_displacement").unwrap()
+        };
+        let (with, without) = (deflection(bolt), deflection(""));
+        assert!(without > 1e-6 && (with / without - 1.0).abs() < 1e-6, "{method}: {with} and {without} m");
+    }
+}
+
+/// One curve of all loads gives the history of the same load factors; forces alone move their points.
+#[test]
+fn histories_of_curves_are_those_of_factors() {
+    let ends = [
+        "displacement = [\"0.5 mm\", \"0.2 mm\"]",
+        "traction = [\"20 kPa\", \"0 Pa\"]",
+        "force = [\"0.05 N\", \"0.01 N\"]",
+    ];
+    let times = |factors: [&str; 3]| {
+        let each =
+            factors.map(|factor| format!("[[time.step]]\nduration = \"1 s\"\nincrements = 2\n{factor}"));
+        format!("{}[solver]\ntolerance = 1e-9\n[output]\npictures = false\n", each.concat())
+    };
+    for end in ends {
+        let grip = format!("[[boundary]]\nname = \"grip\"\nside = \"x+\"\n{end}\n");
+        let curve = "curve = \"min(t, 2 - t)\"\n";
+        let factors = times(["factor = 1\n", "factor = 0\n", "factor = -1\n"]);
+        let by_factor = history(&strip(RUBBER, &format!("{grip}{factors}")));
+        let by_curve = history(&strip(RUBBER, &format!("{grip}{curve}{}", times([""; 3]))));
+        assert_eq!(by_curve.len(), 6);
+        let [way, load] = [0, 1].map(|k| by_factor.iter().map(|row| row[k].abs()).fold(0.0, f64::max));
+        for (found, expected) in by_curve.iter().zip(&by_factor) {
+            assert!((found[0] - expected[0]).abs() < 1e-6 * way, "{end}: {by_curve:?} {by_factor:?}");
+            assert!((found[1] - expected[1]).abs() < 1e-5 * load, "{end}: {by_curve:?} {by_factor:?}");
+        }
+        assert!(by_curve[5][0] < 0.0 && by_curve[5][1] < 0.0);
+    }
+}
