@@ -86,11 +86,13 @@ def by_energy(energy):
 
 
 def abaqus(text):
-    for block in re.split(r"\*MATERIAL, NAME=", text)[1:]:
-        name, keyword, *rows = [line for line in block.split("\n") if line and not line.startswith("**")]
+    for block in re.split(r"\*\* (?=\S+ fitted to )", text)[1:]:
+        head, *lines = block.split("\n")
+        name = head.split()[0]
+        _, keyword, *rows = [line for line in lines if line and not line.startswith("**")]
         kind = [part.strip() for part in keyword.split(",")][1]
         # crate umat; the card of eight chains is the law of five terms
-        if keyword.startswith("*USER") or name == "EIGHT_CHAIN":
+        if keyword.startswith("*USER") or name == "eight-chain":
             continue
         c = [float(cell) for row in rows for cell in row.split(",")]
         order = int(keyword.split("N=")[1]) if "N=" in keyword else 1
@@ -104,7 +106,7 @@ def abaqus(text):
             "VAN DER WAALS": (van_der_waals, 4),
             "OGDEN": (lambda c, l: sum(2 * m / a**2 * (sum(l**a) - 3) for m, a in pairs(c)), 2 * order),
         }[kind]
-        yield name.lower().replace("_", "-"), by_energy(lambda l, e=energy, c=c[:count]: e(c, l))
+        yield name, by_energy(lambda l, e=energy, c=c[:count]: e(c, l))
 
 
 def ansys(text):
@@ -133,7 +135,7 @@ def ls_dyna(text):
 
 
 def febio(text):
-    for name, kind, rows in re.findall(r'<material id="\d+" name="(\S+)" type="(\S+)">\n((?:  <.*\n)+)', text):
+    for name, kind, rows in re.findall(r'<!-- (\S+) fitted.*\n(?:<!-- .*\n)*<material id="\d+" name="\S+" type="(\S+)">\n((?:  <.*\n)+)', text):
         c = {tag: float(value) for tag, value in re.findall(r"<(\w+)>([^<]*)<", rows)}
 
         def stress(l, c=c, kind=kind):
