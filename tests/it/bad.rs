@@ -23,7 +23,7 @@ fn every_bad_scene_of_a_part_gets_its_message() {
 
 #[test]
 fn every_bad_scene_of_a_fit_gets_its_message() {
-    judge_all("polycore", 37);
+    judge_all("polycore", 38);
 }
 
 /// Scene with one fault.

@@ -37,8 +37,8 @@ pub struct StressSettings {
     /// Release at the end of the first step that reaches this time, s; the free part then anneals. Default:
     /// at the end.
     pub release_at: Option<f64>,
-    /// Rollers on planes of symmetry that contain the z axis, no two of them the same: a free part moves along
-    /// z alone, and its bed side has a constant z. Default: none.
+    /// Rollers on planes of symmetry that contain the z axis, at an angle: a free part moves along z alone,
+    /// and its bed side has a constant z. Default: none.
     pub rollers: Vec<Roller>,
 }
 

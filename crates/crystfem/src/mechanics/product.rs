@@ -225,7 +225,7 @@ mod tests {
         let number: Vec<u32> = (0..12).collect();
         let plain = list.iter().map(|(nodes, matrix, modulus)| (*nodes, matrix.as_slice(), *modulus));
         let across = Vector3::new(0.6, 0.0, 0.8);
-        expected[7] -= across * across.dot(&expected[7]);
+        slide(&mut expected, &[(7, across)]);
         Elements::new(plain, &number, free, vec![(7, across)]).product(&u, &mut image);
         // 30 products of order 10
         assert!(image.iter().zip(&expected).all(|(a, b)| (a - b).norm() < 1e-12), "{image:?}");

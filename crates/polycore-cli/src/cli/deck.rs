@@ -13,8 +13,8 @@ use super::material::{DIGITS, digits, stress};
 /// Arguments of `polycore deck FILE.inp --stress "1 MPa"`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Abaqus or CalculiX deck with `*HYPERELASTIC`, `*HYPERFOAM` or user materials of crate `umat`; or `.mac`,
-    /// `.k`, `.feb`, `.i` with the materials that a fit writes for Ansys, LS-DYNA, FEBio, MOOSE.
+    /// Abaqus or CalculiX deck with `*HYPERELASTIC`, `*HYPERFOAM` or user materials of crate `umat`; or
+    /// `.mac`, `.k`, `.feb`, `.i` with the materials that a fit writes for Ansys, LS-DYNA, FEBio, MOOSE.
     file: PathBuf,
     /// The deck's unit of stress: "1 MPa" with N and mm, "1 Pa" with N and m.
     #[arg(long, value_name = "QUANTITY", default_value = "1 MPa")]

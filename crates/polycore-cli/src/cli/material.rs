@@ -107,14 +107,16 @@ pub fn best(set: &TableFits) -> String {
 
 /// Names the laws of a table that are no materials, or not elliptic there, in a line; empty without any.
 pub fn doubts(set: &TableFits) -> String {
-    let is_open = |own: &(&Fit, &FitVerdict)| own.1.unusable.is_some();
-    let open: Vec<&str> = set.judged().filter(is_open).map(|(fit, _)| fit.model.key).collect();
-    let lost = set.judged().filter(|own| !is_open(own)).filter_map(|(fit, verdict)| {
+    let open = set
+        .judged()
+        .filter_map(|(fit, verdict)| Some(format!("{} ({})", fit.model.key, verdict.open.as_deref()?)));
+    let open: Vec<String> = open.collect();
+    let usable = set.judged().filter(|(_, verdict)| verdict.unusable.is_none());
+    let lost = usable.filter_map(|(fit, verdict)| {
         let states = verdict.without_ellipticity()?;
         Some(format!("{} is {states}", fit.model.key))
     });
-    let open = (!open.is_empty())
-        .then(|| format!("the data do not determine {}: no block, no card", open.join(", ")));
+    let open = (!open.is_empty()).then(|| format!("no block, no card of {}", open.join(", ")));
     let parts: Vec<String> = open.into_iter().chain(lost).collect();
     match parts.is_empty() {
         true => String::new(),

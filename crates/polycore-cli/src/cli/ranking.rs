@@ -46,7 +46,7 @@ pub fn rank<'a>(
             parameters: fit.parameters.len(),
             fitted: set.modes.iter().map(|mode| mode.error(&fit.law)).collect(),
             found: CrossValidation::new(fit.model, &set.modes, run.options.interrupted)?,
-            obstacle: verdict.obstacle(fit),
+            obstacle: verdict.obstacle(),
         });
     }
     let error = |law: &RankedLaw| law.found.worst().unwrap_or(f64::INFINITY);

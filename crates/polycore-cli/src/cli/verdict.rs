@@ -10,6 +10,8 @@ use super::fits::format_parameter;
 pub struct FitVerdict {
     /// Reason for which the law is no usable material, with advice.
     pub unusable: Option<String>,
+    /// The same in few words: `C2 absent`.
+    pub open: Option<String>,
     /// Number of states of the table, and of those at which the law is not elliptic.
     states: usize,
     lost: usize,
@@ -20,8 +22,12 @@ pub struct FitVerdict {
 impl FitVerdict {
     /// Judges a law fitted to a table.
     pub fn new(fit: &Fit, table: &TestData) -> Self {
+        let is_open = |own: &&FittedParameter| own.identifiability != Identifiability::Determined;
+        let unusable = unusable(fit);
+        let open = fit.parameters.iter().find(is_open).map(format_parameter);
         Self {
-            unusable: unusable(fit),
+            open: open.or_else(|| unusable.as_ref().map(|_| "parameters not determined".to_owned())),
+            unusable,
             states: table.states.len(),
             lost: stability::count_states_without_ellipticity(&fit.law, table),
             instability: find_instability(fit, table),
@@ -52,15 +58,12 @@ impl FitVerdict {
     }
 
     /// Finds a term that is absent, a parameter that the data do not determine, or an instability.
-    pub fn obstacle(&self, fit: &Fit) -> Option<String> {
-        let open = |parameter: &&FittedParameter| parameter.identifiability != Identifiability::Determined;
-        let parameter = fit.parameters.iter().find(open).map(format_parameter);
+    pub fn obstacle(&self) -> Option<String> {
         let unstable = || {
             let (mode, stretch) = self.instability?;
             Some(format!("unstable in {} tests from {stretch:.3} on", mode.name()))
         };
-        let open = || self.unusable.as_ref().map(|_| "parameters not determined".to_owned());
-        parameter.or_else(open).or_else(|| self.without_ellipticity()).or_else(unstable)
+        self.open.clone().or_else(|| self.without_ellipticity()).or_else(unstable)
     }
 }
 
@@ -87,8 +90,8 @@ fn unusable(fit: &Fit) -> Option<String> {
     }
     (!free.is_empty()).then(|| {
         format!(
-            "the data do not determine {}, other values fit as well: use a law with fewer parameters, or more \
-             kinds of tests",
+            "the data do not determine {}, other values fit as well: use a law with fewer parameters, or \
+             more kinds of tests",
             free.join(", ")
         )
     })

@@ -1,4 +1,4 @@
-//! Materials of Abaqus and CalculiX decks as laws: `*HYPERELASTIC` with parameters, `*HYPERFOAM`, and the user
+//! Materials of Abaqus and CalculiX decks as laws: `*HYPERELASTIC` with parameters, `*HYPERFOAM`, and user
 //! materials of crate `umat`.
 
 use std::path::Path;
@@ -195,8 +195,8 @@ fn relaxed(
             }
             let [shear, volume] = shares;
             notes.push(format!(
-                "MODULI=INSTANTANEOUS: moduli of long times, {shear:.6} times those of the deck, K {volume:.6} \
-                 times; the relaxation is left out"
+                "MODULI=INSTANTANEOUS: moduli of long times, {shear:.6} times those of the deck, K \
+                 {volume:.6} times; the relaxation is left out"
             ));
             return Ok(Some(shares));
         }

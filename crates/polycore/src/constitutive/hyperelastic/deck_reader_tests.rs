@@ -69,8 +69,8 @@ fn bad_decks_name_the_line() {
     }
 }
 
-/// Moduli at t → ∞ by G(t) = G₀ (1 − Σ gᵢ (1 − e^(−t/τᵢ))) and the same of K with kᵢ: μ and C by 1 − 0.5 − 0.1,
-/// K by 1 − 0.2; exponents stay.
+/// Moduli at t → ∞ by G(t) = G₀ (1 − Σ gᵢ (1 − e^(−t/τᵢ))) and the same of K with kᵢ: μ and C by 1 − 0.6, K
+/// by 1 − 0.2; exponents stay.
 #[test]
 fn instantaneous_moduli_become_those_of_long_times() {
     let prony = "*VISCOELASTIC, TIME=PRONY\n0.5, 0.2, 1.0\n0.1, , 30.\n*MULLINS EFFECT\n2.0, 0.1, 0.1\n\

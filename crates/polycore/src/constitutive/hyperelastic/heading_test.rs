@@ -32,8 +32,8 @@ pub(super) fn named_test(file: &Table, strain: usize, stress: usize) -> Result<O
         }
         (None, Some(Mode::SimpleShear)) => refused(
             "a shear stress with a strain that is not called one",
-            "`mode = \"simple-shear\"` (the strain is the amount of shear) or `mode = \"pure-shear\"` (a wide \
-             strip) in the data's entry",
+            "`mode = \"simple-shear\"` (the strain is the amount of shear) or `mode = \"pure-shear\"` (a \
+             wide strip) in the data's entry",
         ),
         (a, b) => Ok(a.or(b)),
     }

@@ -19,7 +19,7 @@ enum Volume {
 }
 
 /// Material as a text, before its law is known.
-struct HostMaterial<'a> {
+struct CardMaterial<'a> {
     line: usize,
     name: String,
     written: &'a str,
@@ -51,7 +51,7 @@ impl CardProgram {
             Self::Moose => moose(text),
         };
         let mut deck = MaterialDeck::default();
-        for HostMaterial { line, name, written, law } in found {
+        for CardMaterial { line, name, written, law } in found {
             match law.and_then(|law| material(&name, law)) {
                 Ok(material) => deck.materials.push(material),
                 Err(allowed) => {
@@ -154,7 +154,7 @@ fn ogden(terms: &[[f64; 2]]) -> Result<(&'static str, Vec<f64>), String> {
 
 /// `TB,HYPER` with its `TBDATA`; another `TB` of the same material than a density or thermal one leaves it
 /// out, as moduli may then be instantaneous.
-fn ansys(text: &str) -> Vec<HostMaterial<'_>> {
+fn ansys(text: &str) -> Vec<CardMaterial<'_>> {
     const APART: [&str; 6] = ["CTE", "DENS", "EFLX", "SDAMP", "SPHT", "THERM"];
     let cells = |line: &str| -> Vec<String> {
         let line = line.split('!').next().unwrap_or_default();
@@ -203,7 +203,7 @@ fn ansys(text: &str) -> Vec<HostMaterial<'_>> {
             Some(other) => Err(format!("a material without TB,{}", other[1])),
             None => data().and_then(|constants| ansys_law(cell(5), cell(4), &constants)),
         };
-        found.push(HostMaterial { line, name: named(id, comment), written, law });
+        found.push(CardMaterial { line, name: named(id, comment), written, law });
         comment = "";
     }
     found
@@ -248,7 +248,7 @@ fn ansys_law(option: &str, points: &str, constants: &[f64]) -> HostLaw {
 }
 
 /// `*MAT_077_H+` and `*MAT_077_O+` with constants (N = 0) and without relaxation.
-fn ls_dyna(text: &str) -> Vec<HostMaterial<'_>> {
+fn ls_dyna(text: &str) -> Vec<CardMaterial<'_>> {
     let lines: Vec<(usize, &str)> = (1..).zip(text.lines()).collect();
     let mut found = Vec::new();
     let mut comment = "";
@@ -263,7 +263,7 @@ fn ls_dyna(text: &str) -> Vec<HostMaterial<'_>> {
             own.filter(|(_, row)| !row.starts_with('$')).map(|(_, row)| fields(row)).collect();
         let id = rows.first().and_then(|row| row.first()).map_or("", |cell| cell.trim());
         let law = ls_dyna_law(&keyword, &rows);
-        found.push(HostMaterial { line, name: named(id, comment), written: written.trim(), law });
+        found.push(CardMaterial { line, name: named(id, comment), written: written.trim(), law });
         comment = "";
     }
     found
@@ -308,7 +308,7 @@ fn ls_dyna_law(keyword: &str, rows: &[Vec<&str>]) -> HostLaw {
 }
 
 /// `<material>` of the types `Mooney-Rivlin`, `Yeoh`, `Gent`, `Ogden` with constants alone.
-fn febio(text: &str) -> Vec<HostMaterial<'_>> {
+fn febio(text: &str) -> Vec<CardMaterial<'_>> {
     let mut found = Vec::new();
     for (at, _) in text.match_indices("<material ") {
         let Some(end) = text[at..].find('>') else { continue };
@@ -320,7 +320,7 @@ fn febio(text: &str) -> Vec<HostMaterial<'_>> {
         };
         let line = 1 + text[..at].matches('\n').count();
         let name = attribute("name").or(attribute("id")).unwrap_or_default();
-        found.push(HostMaterial { line, name: format!("material {name}"), written: head, law });
+        found.push(CardMaterial { line, name: format!("material {name}"), written: head, law });
     }
     found
 }
@@ -369,8 +369,8 @@ fn febio_law(kind: &str, body: &str) -> HostLaw {
 }
 
 /// Blocks with `type = ComputeNeoHookeanStress`, K = λ + ⅔μ.
-fn moose(text: &str) -> Vec<HostMaterial<'_>> {
-    let mut found: Vec<HostMaterial> = Vec::new();
+fn moose(text: &str) -> Vec<CardMaterial<'_>> {
+    let mut found: Vec<CardMaterial> = Vec::new();
     let (mut comment, mut block) = ("", Vec::new());
     for (line, written) in (1..).zip(text.lines().map(str::trim)) {
         comment = written.strip_prefix('#').map(str::trim).filter(is_title).unwrap_or(comment);
@@ -394,7 +394,7 @@ fn moose(text: &str) -> Vec<HostMaterial<'_>> {
                     ("neo-hookean", vec![modulus], Volume::Bulk(lame + 2.0 / 3.0 * modulus))
                 });
             let id = (found.len() + 1).to_string();
-            found.push(HostMaterial { line, name: named(&id, comment), written, law });
+            found.push(CardMaterial { line, name: named(&id, comment), written, law });
             comment = "";
         }
         block.clear();
