@@ -73,6 +73,10 @@ pub fn parse(name: &str, text: &str) -> Result<MaterialDeck, Error> {
         if class.is_none() || keyword.name == "*MATERIAL" {
             deck.add(&std::mem::take(&mut group));
         }
+        if keyword.name == "*INCLUDE" {
+            let (line, written) = (keyword.line, keyword.written);
+            deck.left_out.push(format!("line {line}: `{written}`: give that file by itself"));
+        }
         if class.is_some() {
             group.push(keyword);
         }

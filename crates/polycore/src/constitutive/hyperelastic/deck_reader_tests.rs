@@ -103,10 +103,11 @@ fn instantaneous_moduli_become_those_of_long_times() {
 fn one_material_does_not_refuse_a_deck() {
     let deck = "*MATERIAL, NAME=STEEL\n*ELASTIC\n2e5, 0.3\n*MATERIAL, NAME=MARLOW\n*HYPERELASTIC, MARLOW\n1\n\
                 *MATERIAL, NAME=SEAL\n*HYPERELASTIC, YEOH\n0.3\n*STEP\n*STATIC\n*DAMAGE\n*BOUNDARY\nA, 1\n\
-                *FIELD\n1\n";
+                *FIELD\n1\n*INCLUDE, INPUT=more.inp\n";
     let found = parse("deck", deck).unwrap();
     assert_eq!((found.materials.len(), found.materials[0].name.as_str()), (1, "SEAL"));
     assert!(found.materials[0].notes.is_empty());
     assert_eq!(found.left_out[0], "material `STEEL`: line 1: no law of a rubber or foam; it has *ELASTIC");
+    assert_eq!(found.left_out[2], "line 16: `*INCLUDE, INPUT=more.inp`: give that file by itself");
     assert!(found.left_out[1].starts_with("material `MARLOW`: line 5: found `*HYPERELASTIC, MARLOW`"));
 }
