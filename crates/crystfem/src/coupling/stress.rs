@@ -233,7 +233,8 @@ impl<'a> StressCoupling<'a> {
                         degree: self.settings.initial_alpha,
                         time: birth.time,
                     }),
-                    None => present[element],
+                    // of the initial state: a surface at another temperature strains it from the start
+                    None => present[element].map(|state| self.initial(simulation, element, state)),
                 };
                 born.push(element);
             }
@@ -259,6 +260,20 @@ impl<'a> StressCoupling<'a> {
             self.state.last = present;
         }
         Ok(())
+    }
+
+    /// Replaces the temperatures of an element's nodes by the initial ones.
+    fn initial(
+        &self,
+        simulation: &Simulation,
+        element: usize,
+        mut state: ElementThermalState,
+    ) -> ElementThermalState {
+        let initial = &simulation.problem().initial;
+        for (kelvin, &node) in state.nodes.iter_mut().zip(self.mesh.nodes(element as u32)) {
+            *kelvin = initial.value_at(self.mesh.points[node as usize], 0.0);
+        }
+        state
     }
 
     /// Solves for the step from the last states of elements to the present ones.

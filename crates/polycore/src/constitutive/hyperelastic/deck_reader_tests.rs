@@ -108,6 +108,6 @@ fn one_material_does_not_refuse_a_deck() {
     assert_eq!((found.materials.len(), found.materials[0].name.as_str()), (1, "SEAL"));
     assert!(found.materials[0].notes.is_empty());
     assert_eq!(found.left_out[0], "material `STEEL`: line 1: no law of a rubber or foam; it has *ELASTIC");
-    assert_eq!(found.left_out[2], "line 16: `*INCLUDE, INPUT=more.inp`: give that file by itself");
+    assert_eq!(found.left_out[2], "line 17: `*INCLUDE, INPUT=more.inp`: give that file by itself");
     assert!(found.left_out[1].starts_with("material `MARLOW`: line 5: found `*HYPERELASTIC, MARLOW`"));
 }
