@@ -210,9 +210,10 @@ fn a_ball_cools() {
 }
 
 /// Sector of 40° of a tube, a = 1, b = 2, with T = −ln r/ln 2 between fixed ends (plane strain), Eα = 1, and
-/// rollers on its cuts, of which one is oblique. Timoshenko and Goodier, §151: with I(r) = ∫Tρ dρ from a to r,
-/// σ_θ = 1/((1 − ν) r²) [(r² + a²)/(b² − a²) I(b) + I(r) − Tr²], σ_r = 1/((1 − ν) r²) [(r² − a²)/(b² − a²) I(b) −
-/// I(r)]. Elements of first order: 2 in space; (h/a)² = 0.8 % of the largest stress for h = 1/12, and 0.2 %.
+/// rollers on its cuts, of which one is oblique. Timoshenko and Goodier, §151: with I(r) = ∫Tρ dρ from a to
+/// r, σ_θ = 1/((1 − ν) r²) [(r² + a²)/(b² − a²) I(b) + I(r) − Tr²], σ_r = 1/((1 − ν) r²) [(r² − a²)/(b² − a²)
+/// I(b) − I(r)]. Elements of first order: 2 in space; (h/a)² = 0.8 % of the largest stress for h = 1/12, and
+/// 0.2 %.
 #[test]
 fn a_sector_of_a_tube_between_its_planes_of_symmetry() {
     const POISSON: f64 = 0.4;

@@ -51,8 +51,8 @@ impl CardProgram {
     }
 
     /// Formats a law as material number `id` with a name, stresses in the host's unit, with the Dᵢ of the
-    /// volumetric energy Σ (J − 1)²ⁱ/Dᵢ; `None` if the program has no such law. Terms that the card has no place
-    /// for are named in a comment.
+    /// volumetric energy Σ (J − 1)²ⁱ/Dᵢ; `None` if the program has no such law. Terms that the card has no
+    /// place for are named in a comment.
     pub fn card(
         self,
         id: usize,
