@@ -18,12 +18,12 @@ fn every_bad_scene_gets_its_message() {
 
 #[test]
 fn every_bad_scene_of_a_part_gets_its_message() {
-    judge_all("crystfem", 123);
+    judge_all("crystfem", 125);
 }
 
 #[test]
 fn every_bad_scene_of_a_fit_gets_its_message() {
-    judge_all("polycore", 37);
+    judge_all("polycore", 38);
 }
 
 /// Scene with one fault.

@@ -37,6 +37,7 @@ mod cli {
     pub mod time_card;
     pub mod time_fits;
     pub mod trials;
+    pub mod verdict;
     pub mod volumetric;
 }
 
@@ -87,7 +88,7 @@ impl case::Case for Fits {
 enum Command {
     /// Tabulate the nominal stress of an incompressible law, as CSV that a case can read back as data.
     Exact(exact::Arguments),
-    /// Print the hyperelastic laws of an Abaqus or CalculiX deck as blocks of scenes.
+    /// Print the hyperelastic laws of a finite-element program as blocks of scenes.
     Deck(deck::Arguments),
     /// Predict modulus, sol, chain length and fracture energy of polymer networks from their compositions.
     Network(network::Arguments),

@@ -58,6 +58,43 @@ fn a_volumetric_test_gives_the_bulk_modulus() {
     assert_eq!(value(&String::from_utf8_lossy(&shown.stdout), "bulk_modulus"), 2.0);
 }
 
+/// 20 MPa at J = 0.99: K without `--verbose`, of a scene without fits, too.
+#[test]
+fn a_run_prints_the_bulk_modulus() {
+    let folder = tempfile::tempdir().unwrap();
+    let [scene, output] = ["case.toml", "out"].map(|name| folder.path().join(name).display().to_string());
+    let text = "version = 1\nprogram = \"polycore\"\n[[volumetric]]\nname = \"bulk\"\nfile = \"bulk.csv\"\n";
+    std::fs::write(&scene, text).unwrap();
+    std::fs::write(folder.path().join("bulk.csv"), "pressure [MPa],J\n20,0.99\n40,0.98\n").unwrap();
+    let shown = polycore(&["run", &scene, "--output", &output]);
+    let shown = String::from_utf8_lossy(&shown.stdout);
+    assert!(shown.contains("volumetric bulk: K 2.000000 GPa ± "), "{shown}");
+}
+
+/// Moduli of long times, a material left out, and one without a law, each in a comment.
+#[test]
+fn a_deck_says_what_it_leaves_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let deck = folder.path().join("d.inp");
+    let text = "*MATERIAL, NAME=SEAL\n*HYPERELASTIC, MOONEY-RIVLIN, MODULI=INSTANTANEOUS\n0.3, 0.1, 0.01\n\
+                *VISCOELASTIC, TIME=PRONY\n0.5, 0.0, 1.0\n*EXPANSION\n1e-4\n*MATERIAL, NAME=PAD\n\
+                *HYPERFOAM, N=1, POISSON=0.2\n0.1, 5\n*MATERIAL, NAME=STEEL\n*ELASTIC\n2e5, 0.3\n";
+    std::fs::write(&deck, text).unwrap();
+    let result = polycore(&["deck", &deck.display().to_string()]);
+    let shown = String::from_utf8_lossy(&result.stdout);
+    assert!(result.status.success() && shown.matches("[material.solid]\n").count() == 0, "{shown}");
+    for part in [
+        "# MODULI=INSTANTANEOUS: moduli of long times, 0.500000 times",
+        "# *EXPANSION left out",
+        "C1 = \"0.1500000000 MPa\"\nC2 = \"0.05000000000 MPa\"",
+        "# left out: material `PAD`: line 9: found `*HYPERFOAM, N=1, POISSON=0.2`",
+        "# left out: material `STEEL`: line 11: no law of a rubber or foam; it has *ELASTIC",
+    ] {
+        assert!(shown.contains(part), "{part}: {shown}");
+    }
+    assert_eq!(shown.matches("[material.solid] #").count(), 1);
+}
+
 /// Materials of other programs, in both units, and a law that LS-DYNA does not have.
 #[test]
 fn materials_of_other_programs() {
@@ -128,6 +165,11 @@ fn terms_of_a_volumetric_test_are_not_dropped() {
     assert_eq!(read("materials_mm.feb").matches(note).count(), 2);
     assert!(read("materials_si.inp").contains(", 1.000000000e-9, 1.000000000e-11\n"));
     assert!(read("materials.toml").contains("# volumetric test `bulk`, 2/D1 of 2 terms"));
+    let cards = folder.path().join("out/materials_mm.inp").display().to_string();
+    let result = polycore(&["deck", &cards]);
+    let shown = String::from_utf8_lossy(&result.stdout);
+    assert!(shown.contains("# D2 = 0.00001 left out: K = 2/D1 is that at rest"), "{shown}");
+    assert_eq!(shown.matches("bulk_modulus = \"2.000000000 GPa\"").count(), 2, "{shown}");
 }
 
 /// A second term that falls with compression from J = 0.9 on, and one that the test does not determine: a

@@ -2,7 +2,7 @@
 //! computes from the written text are the derivatives of the law's energy.
 
 use evidence::hosts;
-use polycore::constitutive::hyperelastic::deck::card;
+use polycore::constitutive::hyperelastic::deck::{card, material_name};
 use polycore::constitutive::hyperelastic::{MODELS, ModelDescriptor};
 
 /// Lengths of a block of 1 × 1 × 1, J = 1.08.
@@ -78,7 +78,7 @@ fn cards_give_the_forces_of_their_laws() {
         let scale = |(value, unit): (&f64, &str)| if unit == "Pa" { 1e-6 * value } else { *value };
         let units = model.parameters.iter().map(|parameter| parameter.unit);
         let parameters: Vec<f64> = model.example.iter().zip(units).map(scale).collect();
-        let text = card(model.key, &parameters, &COMPLIANCES);
+        let text = card(&material_name(model.key, ""), model.key, &parameters, &COMPLIANCES);
         // CalculiX has neither this kind nor more than three terms; the card of eight chains is another law
         let lacks = ["VAN DER WAALS", "N=4", "N=5", "N=6", "USER MATERIAL"];
         if model.key == "eight-chain" || lacks.iter().any(|kind| text.contains(kind)) {

@@ -3,7 +3,8 @@
 use super::bed::{bed_nodes, loose_elements, out_of_flatness, remove_rigid_motion, statically_determinate};
 use crate::error::Error;
 use crate::mechanics::{
-    Body, BodyState, EnergyBalance, FixedComponent, MAX_NODES_PER_ELEMENT, SolidifyingMaxwell, points, shares,
+    Body, BodyState, EnergyBalance, FixedComponent, MAX_NODES_PER_ELEMENT, Roller, SolidifyingMaxwell,
+    points, shares,
 };
 use crate::mesh::Mesh;
 use crate::simulation::Simulation;
@@ -36,6 +37,9 @@ pub struct StressSettings {
     /// Release at the end of the first step that reaches this time, s; the free part then anneals. Default:
     /// at the end.
     pub release_at: Option<f64>,
+    /// Rollers on planes of symmetry that contain the z axis, at an angle: a free part moves along z alone,
+    /// and its bed side has a constant z. Default: none.
+    pub rollers: Vec<Roller>,
 }
 
 impl StressSettings {
@@ -59,6 +63,7 @@ impl StressSettings {
             longest_step: f64::INFINITY,
             release: true,
             release_at: None,
+            rollers: Vec::new(),
         })
     }
 }
@@ -108,6 +113,7 @@ impl<'a> StressCoupling<'a> {
         settings.law.check()?;
         let mut body = Body::new(mesh, settings.law.poisson)?;
         body.tolerance = TOLERANCE;
+        body.rollers.clone_from(&settings.rollers);
         if settings.bed.len() < 3 {
             let found = settings.bed.len();
             return Err(Error::Mesh(format!("{found} nodes of the part on the bed; allowed: at least 3")));
@@ -173,12 +179,21 @@ impl<'a> StressCoupling<'a> {
     }
 
     fn free_supports(&self) -> Vec<FixedComponent> {
-        statically_determinate(self.mesh, &self.present_bed(&self.displacement()))
+        let bed = self.present_bed(&self.displacement());
+        if self.settings.rollers.is_empty() {
+            return statically_determinate(self.mesh, &bed);
+        }
+        bed.first().map(|&node| (node, 2)).into_iter().collect()
     }
 
     fn forget_rigid_motion(&mut self) {
         let bed = self.present_bed(&self.displacement());
-        remove_rigid_motion(self.mesh, &bed, &mut self.body.state.displacement);
+        let displacement = &mut self.body.state.displacement;
+        if self.settings.rollers.is_empty() {
+            return remove_rigid_motion(self.mesh, &bed, displacement);
+        }
+        let shift = bed.iter().map(|&node| displacement[node as usize][2]).sum::<f64>() / bed.len() as f64;
+        displacement.iter_mut().for_each(|u| u[2] -= shift);
     }
 
     fn update(&mut self, simulation: &Simulation, must: bool) -> Result<(), Error> {
@@ -218,7 +233,8 @@ impl<'a> StressCoupling<'a> {
                         degree: self.settings.initial_alpha,
                         time: birth.time,
                     }),
-                    None => present[element],
+                    // of the initial state: a surface at another temperature strains it from the start
+                    None => present[element].map(|state| self.initial(simulation, element, state)),
                 };
                 born.push(element);
             }
@@ -244,6 +260,20 @@ impl<'a> StressCoupling<'a> {
             self.state.last = present;
         }
         Ok(())
+    }
+
+    /// Replaces the temperatures of an element's nodes by the initial ones.
+    fn initial(
+        &self,
+        simulation: &Simulation,
+        element: usize,
+        mut state: ElementThermalState,
+    ) -> ElementThermalState {
+        let initial = &simulation.problem().initial;
+        for (kelvin, &node) in state.nodes.iter_mut().zip(self.mesh.nodes(element as u32)) {
+            *kelvin = initial.value_at(self.mesh.points[node as usize], 0.0);
+        }
+        state
     }
 
     /// Solves for the step from the last states of elements to the present ones.
@@ -343,14 +373,22 @@ impl<'a> StressCoupling<'a> {
         self.state.released
     }
 
-    /// Warpage, m: range of distances of the bed side from its least-squares plane.
+    /// Warpage, m: range of distances of the bed side from its least-squares plane; of a part with rollers
+    /// from a plane across z, to which its whole is symmetric.
     pub fn warpage(&self) -> f64 {
         let moved = self.displacement();
         let place = |&node: &u32| -> [f64; 3] {
             std::array::from_fn(|d| self.mesh.points[node as usize][d] + moved[3 * node as usize + d])
         };
         let places = self.settings.bed.iter().map(place).filter(|place| place.iter().all(|x| x.is_finite()));
-        out_of_flatness(&places.collect::<Vec<_>>())
+        let places: Vec<[f64; 3]> = places.collect();
+        if self.settings.rollers.is_empty() {
+            return out_of_flatness(&places);
+        }
+        let heights = places.iter().map(|place| place[2]);
+        let (low, high) =
+            (heights.clone().fold(f64::INFINITY, f64::min), heights.fold(f64::NEG_INFINITY, f64::max));
+        (high - low).max(0.0)
     }
 
     /// Largest rotation of an element since it solidified, rad.

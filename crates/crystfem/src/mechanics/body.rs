@@ -5,9 +5,13 @@ use super::element::{GAUSS_POINTS, VoigtVector};
 use super::element_kind::{self, MechanicalElement};
 use crate::error::Error;
 use crate::mesh::Mesh;
+use nalgebra::Vector3;
 
 /// Default relative residual at which a solution ends.
 const TOLERANCE: f64 = 1e-12;
+
+/// Length of the free part of a normal below which it is rounding.
+const SMALLEST_NORMAL: f64 = 1e-9;
 
 /// Body of elements with their state and displacements.
 ///
@@ -21,6 +25,8 @@ pub struct Body<'a> {
     pub(super) poisson: f64,
     /// Relative residual at which a solution ends.
     pub tolerance: f64,
+    /// Rollers, at most one a node; none by default.
+    pub rollers: Vec<Roller>,
     /// State of the body.
     pub state: BodyState,
 }
@@ -56,6 +62,15 @@ pub struct EnergyBalance {
 
 /// A fixed node and component: zero displacement increment.
 pub type FixedComponent = (u32, usize);
+
+/// Node without a displacement increment along a unit normal, as on a plane of symmetry.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Roller {
+    /// Node of the mesh.
+    pub node: u32,
+    /// Unit normal of its plane.
+    pub normal: [f64; 3],
+}
 
 impl<'a> Body<'a> {
     /// Returns a body without active elements.
@@ -97,6 +112,7 @@ impl<'a> Body<'a> {
             shape,
             poisson,
             tolerance: TOLERANCE,
+            rollers: Vec::new(),
             state: BodyState {
                 strains: vec![Vec::new(); count],
                 stresses: vec![[[0.0; 6]; GAUSS_POINTS]; count],
@@ -145,9 +161,28 @@ impl<'a> Body<'a> {
         points.fold([0.0; 6], |sum, (stress, share)| std::array::from_fn(|k| sum[k] + share * stress[k]))
     }
 
+    /// Nodes with rollers and their normals among free components.
+    pub(super) fn normals(&self, free: &[[bool; 3]]) -> Vec<(usize, Vector3<f64>)> {
+        let own = |roller: &Roller| {
+            let node = roller.node as usize;
+            let normal = Vector3::from_fn(|d, _| if free[node][d] { roller.normal[d] } else { 0.0 });
+            // of a held node nothing is left
+            (normal.norm() > SMALLEST_NORMAL).then(|| (node, normal.normalize()))
+        };
+        self.rollers.iter().filter_map(own).collect()
+    }
+
     /// Nodes of an element.
     pub(super) fn nodes(&self, element: usize) -> &'a [u32] {
         self.mesh.nodes(element as u32)
+    }
+}
+
+/// Removes the components along normals.
+pub(super) fn slide(vectors: &mut [Vector3<f64>], normals: &[(usize, Vector3<f64>)]) {
+    for (node, normal) in normals {
+        let along = normal.dot(&vectors[*node]);
+        vectors[*node] -= normal * along;
     }
 }
 

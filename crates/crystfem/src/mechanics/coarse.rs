@@ -71,6 +71,12 @@ impl CoarseMotions {
                 motions[node].fixed_view_mut::<1, 3>(d, 3).copy_from(&turns.row(d));
             }
         }
+        let mut on_roller = vec![false; points.len()];
+        for (node, normal) in elements.normals() {
+            let own = motions[*node];
+            motions[*node] = own - normal * (normal.transpose() * own);
+            on_roller[*node] = true;
+        }
         let mut first: Vec<u32> = (0..numbers.len() as u32).collect();
         for (nodes, ..) in elements.each() {
             let least = nodes.iter().map(|&node| group[node as usize]).min().unwrap_or(0);
@@ -82,7 +88,8 @@ impl CoarseMotions {
         let mut matrix = Skyline::new(&first);
         for (nodes, stiffness, modulus) in elements.each() {
             let groups: Vec<u32> = nodes.iter().map(|&node| group[node as usize]).collect();
-            let held = nodes.iter().any(|&node| free[node as usize] != [true; 3]);
+            let is_held = |&node: &u32| free[node as usize] != [true; 3] || on_roller[node as usize];
+            let held = nodes.iter().any(is_held);
             // rigid motions of one group do not strain an element inside it
             if !held && groups.iter().all(|other| *other == groups[0]) {
                 continue;

@@ -16,7 +16,7 @@ mod solve;
 mod step;
 mod tetrahedron;
 
-pub use body::{Body, BodyState, EnergyBalance, FixedComponent};
+pub use body::{Body, BodyState, EnergyBalance, FixedComponent, Roller};
 pub use branch::{BranchEnergies, BranchInput, BranchStep};
 pub use eigenstrain::SpecificVolume;
 pub use element::{GAUSS_POINTS, Hexahedron, stiffness};

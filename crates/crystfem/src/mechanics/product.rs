@@ -1,6 +1,7 @@
 //! Products of element matrices with displacements: vectorized element by element, then summed at each node
 //! in the order of its elements, so that the bits do not depend on threads.
 
+use super::body::slide;
 use super::element::ElementVector;
 use crate::system::vector::sum;
 use nalgebra::{Matrix3, Vector3};
@@ -31,17 +32,20 @@ pub struct Elements<'a> {
     /// Positions in `forces` of each node.
     corners: Groups<u32>,
     free: Vec<[bool; 3]>,
+    /// Nodes with rollers and their normals.
+    normals: Vec<(usize, Vector3<f64>)>,
     /// Nodal forces of all elements.
     forces: Vec<f64>,
 }
 
 impl<'a> Elements<'a> {
-    /// Collects elements on nodes with `free` components; `number` is the index of each node of the mesh
-    /// among these.
+    /// Collects elements on nodes with `free` components and, of nodes with rollers, normals; `number` is the
+    /// index of each node of the mesh among these.
     pub fn new(
         list: impl Iterator<Item = (&'a [u32], &'a [f64], f64)>,
         number: &[u32],
         free: Vec<[bool; 3]>,
+        normals: Vec<(usize, Vector3<f64>)>,
     ) -> Self {
         let (mut hexahedra, mut first, mut second) = (Vec::new(), Vec::new(), Vec::new());
         for (nodes, stiffness, modulus) in list {
@@ -54,7 +58,7 @@ impl<'a> Elements<'a> {
             }
         }
         let corners = Groups::new(0, std::iter::empty());
-        let mut own = Self { hexahedra, first, second, corners, free, forces: Vec::new() };
+        let mut own = Self { hexahedra, first, second, corners, free, normals, forces: Vec::new() };
         let nodes: Vec<u32> = own.each().flat_map(|element| element.0).copied().collect();
         own.corners = Groups::new(own.free.len(), nodes.iter().map(|&node| node as usize).zip(0..));
         own.forces = vec![0.0; 3 * nodes.len()];
@@ -75,9 +79,14 @@ impl<'a> Elements<'a> {
         &self.free
     }
 
+    /// Nodes with rollers and their normals.
+    pub fn normals(&self) -> &[(usize, Vector3<f64>)] {
+        &self.normals
+    }
+
     /// Computes image = Σ E K̂ u on free components.
     pub fn product(&mut self, u: &[Vector3<f64>], image: &mut [Vector3<f64>]) {
-        let Self { hexahedra, first, second, corners, free, forces } = self;
+        let Self { hexahedra, first, second, corners, free, normals, forces } = self;
         let arch = Arch::new();
         let (of_hexahedra, rest) = forces.split_at_mut(COMPONENTS * hexahedra.len());
         let (of_first, of_second) = rest.split_at_mut(12 * first.len());
@@ -98,6 +107,7 @@ impl<'a> Elements<'a> {
                 *image = Vector3::from_fn(|d, _| if free[k][d] { sum[d] } else { 0.0 });
             }
         });
+        slide(image, normals);
     }
 }
 
@@ -214,7 +224,9 @@ mod tests {
         let mut image = vec![Vector3::zeros(); 12];
         let number: Vec<u32> = (0..12).collect();
         let plain = list.iter().map(|(nodes, matrix, modulus)| (*nodes, matrix.as_slice(), *modulus));
-        Elements::new(plain, &number, free).product(&u, &mut image);
+        let across = Vector3::new(0.6, 0.0, 0.8);
+        slide(&mut expected, &[(7, across)]);
+        Elements::new(plain, &number, free, vec![(7, across)]).product(&u, &mut image);
         // 30 products of order 10
         assert!(image.iter().zip(&expected).all(|(a, b)| (a - b).norm() < 1e-12), "{image:?}");
         assert_eq!(dot(&image, &u), image.iter().zip(&u).map(|(a, b)| a.dot(b)).sum::<f64>());

@@ -1,6 +1,6 @@
 //! Linear solution of a body by matrix-free conjugate gradients.
 
-use super::body::Body;
+use super::body::{Body, slide};
 use super::coarse::CoarseMotions;
 use super::product::{Elements, NodalLoad, block, dot};
 use crate::error::Error;
@@ -45,7 +45,9 @@ impl Body<'_> {
             let stiffness = tangent.unwrap_or_else(|| self.shape_of(element).condensed());
             (self.nodes(element), stiffness, modulus)
         });
-        let mut elements = Elements::new(stiff, &number, nodes.iter().map(|&node| free[node]).collect());
+        let normals = self.normals(free).into_iter().map(|(node, normal)| (number[node] as usize, normal));
+        let own_free = nodes.iter().map(|&node| free[node]).collect();
+        let mut elements = Elements::new(stiff, &number, own_free, normals.collect());
         let free = elements.free();
         let mut residual: Vec<Vector3<f64>> = nodes.iter().map(|&node| load.sum[node]).collect();
         let mut blocks = vec![Matrix3::zeros(); residual.len()];
@@ -60,19 +62,28 @@ impl Body<'_> {
                 block.column_mut(d).fill(0.0);
                 block[(d, d)] = 1.0;
             }
+        }
+        for (node, normal) in elements.normals() {
+            let within = Matrix3::identity() - normal * normal.transpose();
+            blocks[*node] = within * blocks[*node] * within + normal * normal.transpose();
+        }
+        for block in &mut blocks {
             *block = block.try_inverse().unwrap_or_else(Matrix3::identity);
         }
         for (value, free) in residual.iter_mut().zip(free) {
             (0..3).filter(|&d| !free[d]).for_each(|d| value[d] = 0.0);
         }
+        slide(&mut residual, elements.normals());
         let goal = (tolerance * dot(&residual, &residual).sqrt()).max(ROUNDING_RATIO * load.parts.sqrt());
         if dot(&residual, &residual).sqrt() <= goal {
             return Ok(vec![Vector3::zeros(); number.len()]);
         }
         let coarse = CoarseMotions::new(&elements, &points);
+        let normals = elements.normals().to_vec();
         let precondition = |residual: &[Vector3<f64>], result: &mut [Vector3<f64>]| {
             combine(result, |k, _| blocks[k] * residual[k]);
             coarse.add(residual, result);
+            slide(result, &normals);
         };
         let most = (MAX_ITERATIONS_PER_EQUATION * 3 * residual.len()).max(100);
         let reached = |residual: &[Vector3<f64>]| dot(residual, residual).sqrt() <= goal;

@@ -1,6 +1,6 @@
 //! A step of a body: one linear solution, or Newton's method where branches flow.
 
-use super::body::{Body, FixedComponent, gauss_position, mechanical, places};
+use super::body::{Body, FixedComponent, gauss_position, mechanical, places, slide};
 use super::branch::BranchEnergies;
 use super::element::{GAUSS_POINTS, ModalVector, VoigtVector};
 use super::element_kind::ElementTangent;
@@ -69,24 +69,25 @@ impl Body<'_> {
             self.nodes(step.element).iter().for_each(|&node| free[node as usize] = [true; 3]);
         }
         supports.iter().for_each(|&(node, component)| free[node as usize][component] = false);
-        let load = self.load(&mut steps)?;
+        let load = self.load(&mut steps, &free)?;
         let moved = self.solve(&moduli(&steps), &free, &load, self.tolerance)?;
         let moved = if flows { self.iterate(&mut steps, &free, &load, moved)? } else { moved };
         self.accept(steps, &moved);
         Ok(())
     }
 
-    /// Load that is out of balance at the present strains, with tangents and modal forces.
-    fn load(&self, steps: &mut [ElementStep]) -> Result<NodalLoad, Error> {
+    /// Load that is out of balance at the present strains, without that on rollers, with tangents and modal
+    /// forces.
+    fn load(&self, steps: &mut [ElementStep], free: &[[bool; 3]]) -> Result<NodalLoad, Error> {
         let mut load = NodalLoad { sum: vec![Vector3::zeros(); self.state.displacement.len()], parts: 0.0 };
-        for ElementStep { element, increment, free, modal, flowing } in steps {
+        for ElementStep { element, increment, free: strains_free, modal, flowing } in steps {
             let shape = self.shape_of(*element);
             let mut moduli = [nalgebra::SMatrix::zeros(); GAUSS_POINTS];
             let stresses: [VoigtVector; GAUSS_POINTS] = std::array::from_fn(|point| {
                 let mut strains: Vec<[f64; 6]> =
                     self.state.strains[*element].iter().map(|branch| branch[point]).collect();
                 let strain = flowing.as_ref().map_or_else(VoigtVector::zeros, |flow| flow.strains[point]);
-                let mechanical = mechanical(&strain, free[point]);
+                let mechanical = mechanical(&strain, strains_free[point]);
                 if flowing.is_some() {
                     let step = increment.point(self.poisson, &strains, &mechanical);
                     moduli[point] = step.tangent();
@@ -114,6 +115,7 @@ impl Body<'_> {
             }
             load.parts += forces.norm_squared();
         }
+        slide(&mut load.sum, &self.normals(free));
         Ok(load)
     }
 
@@ -140,7 +142,7 @@ impl Body<'_> {
         let (mut change, mut halvings) = (first_moved, 0);
         self.move_by(steps, &change);
         for _ in 0..NEWTON_STEPS {
-            let load = self.load(steps)?;
+            let load = self.load(steps, free)?;
             let found = norm(&load, steps);
             if found.is_finite() && (found < least || halvings == HALVINGS || found <= goal) {
                 moved

@@ -1,7 +1,7 @@
 //! Stress of curved bodies on distorted hexahedra: a hot spot in a plate, and a cooling ball.
 
-use crystfem::mechanics::{Body, FixedComponent, SolidifyingMaxwell};
-use crystfem::mesh::Mesh;
+use crystfem::mechanics::{Body, FixedComponent, Roller, SolidifyingMaxwell};
+use crystfem::mesh::{Mesh, Tube};
 use evidence::{at_most, near};
 use std::collections::HashMap;
 use std::f64::consts::PI;
@@ -207,4 +207,58 @@ fn a_ball_cools() {
     }
     at_most("ball_surface", errors[1][0], 0.015);
     at_most("ball_stress", errors[1][1], 0.02);
+}
+
+/// Sector of 40° of a tube, a = 1, b = 2, with T = −ln r/ln 2 between fixed ends (plane strain), Eα = 1, and
+/// rollers on its cuts, of which one is oblique. Timoshenko and Goodier, §151: with I(r) = ∫Tρ dρ from a to
+/// r, σ_θ = 1/((1 − ν) r²) [(r² + a²)/(b² − a²) I(b) + I(r) − Tr²], σ_r = 1/((1 − ν) r²) [(r² − a²)/(b² − a²)
+/// I(b) − I(r)]. Elements of first order: 2 in space; (h/a)² = 0.8 % of the largest stress for h = 1/12, and
+/// 0.2 %.
+#[test]
+fn a_sector_of_a_tube_between_its_planes_of_symmetry() {
+    const POISSON: f64 = 0.4;
+    let angle = 40.0_f64.to_radians();
+    let temperature = |r: f64| -r.ln() / 2.0_f64.ln();
+    let heat = |r: f64| -(0.5 * r * r * r.ln() - 0.25 * (r * r - 1.0)) / 2.0_f64.ln();
+    let mut errors = Vec::new();
+    for n in [1, 2] {
+        let tube = Tube { radii: [1.0, 2.0], angle, length: 0.1, elements: [12 * n, 6 * n, 1] };
+        let mesh = tube.mesh().unwrap();
+        let mut body = Body::new(&mesh, POISSON).unwrap();
+        body.tolerance = 1e-10;
+        body.activate(0..mesh.element_count(), 1);
+        let cuts = [("start", [0.0, 1.0, 0.0]), ("end", [-angle.sin(), angle.cos(), 0.0])];
+        let rollers = |(name, normal): (&str, [f64; 3])| {
+            mesh.node_sets[name].iter().map(move |&node| Roller { node, normal }).collect::<Vec<_>>()
+        };
+        body.rollers = cuts.into_iter().flat_map(rollers).collect();
+        let supports: Vec<FixedComponent> = (0..mesh.points.len() as u32).map(|node| (node, 2)).collect();
+        let law = SolidifyingMaxwell::elastic(1.0, POISSON, 0.0, f64::INFINITY);
+        let hold = |_| law.increment([300.0, 0.0], [300.0, 0.0], 0.0);
+        body.step(hold, |_, _, [x, y, _]| temperature(x.hypot(y)), &supports).unwrap();
+        let mut worst = 0.0_f64;
+        for element in 0..mesh.hexahedra.len() {
+            let [x, y, _] = middle(&mesh, element);
+            let r = x.hypot(y);
+            let [xx, yy, _, xy, ..] = body.mean_stress(element);
+            let (c, s) = (x / r, y / r);
+            let hoop = xx * s * s + yy * c * c - 2.0 * xy * s * c;
+            let radial = xx * c * c + yy * s * s + 2.0 * xy * s * c;
+            let factor = 1.0 / ((1.0 - POISSON) * r * r);
+            let exact_hoop = factor * ((r * r + 1.0) / 3.0 * heat(2.0) + heat(r) - temperature(r) * r * r);
+            let exact_radial = factor * ((r * r - 1.0) / 3.0 * heat(2.0) - heat(r));
+            worst = worst.max((hoop - exact_hoop).abs()).max((radial - exact_radial).abs());
+        }
+        // nothing moves through the cuts
+        for (name, normal) in cuts {
+            let nodes = mesh.node_sets[name].iter().map(|&node| body.state.displacement[node as usize]);
+            let through = nodes.map(|u| (0..3).map(|d| u[d] * normal[d]).sum::<f64>().abs());
+            at_most(&format!("tube_cut_{name}_{n}"), through.fold(0.0, f64::max), 1e-14);
+        }
+        // over the hoop stress of the bore, T̄/(1 − ν)
+        errors.push(worst / (2.0 / 3.0 * heat(2.0) / (1.0 - POISSON)).abs());
+    }
+    at_most("tube_stress", errors[0], 0.008);
+    at_most("tube_stress_fine", errors[1], 0.002);
+    near("tube_order", (errors[0] / errors[1]).log2(), 2.0, 0.3);
 }

@@ -4,83 +4,129 @@ use std::io::Write as _;
 use std::path::Path;
 
 use polycore::Error;
-use polycore::constitutive::hyperelastic::deck::card;
+use polycore::constitutive::hyperelastic::deck::{card, material_name};
+use polycore::constitutive::hyperelastic::fit::Fit;
 use polycore::constitutive::hyperelastic::host::CardProgram;
 use polycore::file::atomic_write;
 
-use super::material::{BULK_RATIO, unusable};
+use super::material::BULK_RATIO;
 use super::table_fits::TableFits;
+use super::verdict::FitVerdict;
 use super::volumetric::Bulk;
 
 /// Files by system of units: name, description, and the host's unit of stress, Pa.
 pub(super) const FILES: [(&str, &str, f64); 2] =
     [("materials_mm.inp", "mm, N, MPa", 1e6), ("materials_si.inp", "m, N, Pa", 1.0)];
 
-/// Writes `materials_mm.inp` and `materials_si.inp` with a card of every fit.
+/// Writes `materials_mm.inp` and `materials_si.inp` with a card of every fit; a law that the data do not
+/// determine is named in a comment.
 ///
 /// # Errors
 /// A file that cannot be written.
 pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
     let measured = all.iter().any(|set| matches!(set.bulk, Bulk::Measured(_)));
     for (name, units, pascals) in FILES {
-        atomic_write(directory.join(name), |file| {
-            match measured {
-                true => writeln!(file, "** units {units}")?,
-                false => writeln!(
-                    file,
-                    "** units {units}; K is {BULK_RATIO} times the shear modulus: tests at constant volume \
-                     do not determine it"
-                )?,
+        let assumed = format!(
+            "; K is {BULK_RATIO} times the shear modulus: tests at constant volume do not determine it"
+        );
+        let mut text = format!("** units {units}{}\n", if measured { "" } else { &assumed });
+        for FittedCard { name, set, fit, verdict } in cards(all) {
+            let origin = match measured {
+                true => format!("; K: {}", set.bulk.origin(fit.law.shear_modulus())),
+                false => String::new(),
+            };
+            let comment = |line: &str| format!("** {line}\n");
+            text += &format!("**\n{}", head(set, fit, verdict, &origin, &comment));
+            if verdict.unusable.is_none() {
+                let compliances = set.bulk.compliances(fit.law.shear_modulus(), pascals);
+                text += &card(&name, fit.model.key, &scaled(fit, pascals), &compliances);
             }
-            for set in all {
-                for fit in set.fits.iter().filter(|fit| unusable(fit).is_none()) {
-                    let parameters = fit.parameters.iter();
-                    let scale = |unit: &str| if unit == "Pa" { pascals } else { 1.0 };
-                    let scaled: Vec<f64> = parameters.map(|of| of.value / scale(of.unit)).collect();
-                    let compliances = set.bulk.compliances(fit.law.shear_modulus(), pascals);
-                    let origin = match measured {
-                        true => format!("; K: {}", set.bulk.origin(fit.law.shear_modulus())),
-                        false => String::new(),
-                    };
-                    writeln!(file, "**\n** {} fitted to {}{origin}", fit.model.key, set.name)?;
-                    set.bulk.warnings().iter().try_for_each(|line| writeln!(file, "** {line}"))?;
-                    write!(file, "{}", card(fit.model.key, &scaled, &compliances))?;
-                }
-            }
-            Ok(())
-        })?;
+        }
+        atomic_write(directory.join(name), |file| file.write_all(text.as_bytes()))?;
     }
     Ok(())
 }
 
 /// Writes `materials_mm` and `materials_si` of each program, with a material of every fit; a law that a
-/// program does not have is named in a comment.
+/// program does not have, or that the data do not determine, is named in a comment.
 ///
 /// # Errors
 /// A file that cannot be written.
 pub fn write_hosts(directory: &Path, all: &[TableFits], hosts: &[CardProgram]) -> Result<(), Error> {
-    for (host, (name, units, pascals)) in hosts.iter().flat_map(|host| FILES.map(|file| (*host, file))) {
+    for (host, (file, units, pascals)) in hosts.iter().flat_map(|host| FILES.map(|file| (*host, file))) {
         let mut text = host.comment(&format!("units {units}"));
-        let usable = all.iter().flat_map(|set| set.fits.iter().map(move |fit| (set, fit)));
-        for (id, (set, fit)) in (1..).zip(usable.filter(|(_, fit)| unusable(fit).is_none())) {
+        let mut ids = 1..;
+        for FittedCard { name, set, fit, verdict } in cards(all) {
             let (key, shear) = (fit.model.key, fit.law.shear_modulus());
-            let scale = |unit: &str| if unit == "Pa" { pascals } else { 1.0 };
-            let scaled: Vec<f64> = fit.parameters.iter().map(|of| of.value / scale(of.unit)).collect();
-            text += &match host.card(id, key, &scaled, &set.bulk.compliances(shear, pascals)) {
-                Some(card) => {
-                    let origin = set.bulk.origin(shear);
-                    let head = host.comment(&format!("{key} fitted to {}; K: {origin}", set.name));
-                    let warnings =
-                        set.bulk.warnings().iter().map(|line| host.comment(line)).collect::<String>();
-                    head + &warnings + &card
-                }
+            let comment = |line: &str| host.comment(line);
+            let origin = format!("; K: {}", set.bulk.origin(shear));
+            let head = head(set, fit, verdict, &origin, &comment);
+            if verdict.unusable.is_some() {
+                text += &head;
+                continue;
+            }
+            let id = ids.next().unwrap_or_default();
+            let name = name.to_lowercase();
+            text += &match host.card(
+                id,
+                &name,
+                key,
+                &scaled(fit, pascals),
+                &set.bulk.compliances(shear, pascals),
+            ) {
+                Some(card) => head + &card,
                 None => host.comment(&format!("{} has no law `{key}`", host.name())),
             };
         }
-        let name = Path::new(name).with_extension(host.extension());
-        atomic_write(directory.join(name), |file| file.write_all(text.as_bytes()))?;
+        let path = directory.join(Path::new(file).with_extension(host.extension()));
+        atomic_write(path, |file| file.write_all(text.as_bytes()))?;
     }
     Ok(())
+}
+
+/// Fit with the name of its material.
+struct FittedCard<'a> {
+    name: String,
+    set: &'a TableFits<'a>,
+    fit: &'a Fit,
+    verdict: &'a FitVerdict,
+}
+
+/// Lists all fits, with names of which none is there twice.
+fn cards<'a>(all: &'a [TableFits<'a>]) -> Vec<FittedCard<'a>> {
+    let mut cards: Vec<FittedCard> = Vec::new();
+    for (set, (fit, verdict)) in all.iter().flat_map(|set| set.judged().map(move |own| (set, own))) {
+        let plain = material_name(fit.model.key, set.name);
+        let numbered = (2..).map(|number| format!("{plain}_{number}"));
+        let mut names = std::iter::once(plain.clone()).chain(numbered);
+        let is_new = |name: &String| cards.iter().all(|card| card.name != *name);
+        let name = names.find(is_new).unwrap_or_default();
+        cards.push(FittedCard { name, set, fit, verdict });
+    }
+    cards
+}
+
+/// Parameters in the host's unit of stress.
+fn scaled(fit: &Fit, pascals: f64) -> Vec<f64> {
+    let scale = |unit: &str| if unit == "Pa" { pascals } else { 1.0 };
+    fit.parameters.iter().map(|of| of.value / scale(of.unit)).collect()
+}
+
+/// Comments above a card, or in its place: origin and warnings, or the reason for which there is none.
+fn head(
+    set: &TableFits,
+    fit: &Fit,
+    verdict: &FitVerdict,
+    origin: &str,
+    comment: &dyn Fn(&str) -> String,
+) -> String {
+    let key = fit.model.key;
+    if let Some(why) = &verdict.unusable {
+        return comment(&format!("no card of {key} on {}: {why}", set.name));
+    }
+    let title = comment(&format!("{key} fitted to {}{origin}", set.name));
+    let warnings = [verdict.warnings(), set.bulk.warnings()].concat();
+    title + &warnings.iter().map(|line| comment(line)).collect::<String>()
 }
 
 #[cfg(test)]
@@ -119,7 +165,7 @@ mod tests {
                 "*USER MATERIAL, CONSTANTS=3\n4.000000000e1, 3.000000000e-1, 7.500000000e1\n",
             ),
         ] {
-            let found = card(key, parameters, &[0.05]);
+            let found = card("BAR", key, parameters, &[0.05]);
             assert!(found.ends_with(expected), "{found}");
         }
     }

@@ -8,7 +8,7 @@ use harness::output;
 use harness::report::{Phases, Report};
 use polycore::Error;
 use polycore::constitutive;
-use polycore::constitutive::hyperelastic::data::{Mode, TestData, TestState};
+use polycore::constitutive::hyperelastic::data::{TestData, TestState};
 use polycore::constitutive::hyperelastic::fit::{
     Agreement, Fit, FittedParameter, Identifiability, fit_until,
 };
@@ -20,6 +20,7 @@ use super::material::{DIGITS, digits};
 use super::quantities as q;
 use super::scene::FitCase;
 use super::table_fits::{TableFits, unit_of};
+use super::verdict::FitVerdict;
 use super::volumetric::VolumetricSet;
 use super::{card, draw, material, ranking, time_fits, trials};
 
@@ -41,6 +42,7 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
             table,
             read,
             fits: Vec::new(),
+            verdicts: Vec::new(),
             failed: Vec::new(),
             crossed: Vec::new(),
             outside: Vec::new(),
@@ -50,7 +52,10 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
         for model in &case.laws {
             run.show(done / total, &|| format!("fit {name}  {}", model.key));
             match fit_until(model, table, run.options.interrupted) {
-                Ok(fit) => set.fits.push(fit),
+                Ok(fit) => {
+                    set.verdicts.push(FitVerdict::new(&fit, table));
+                    set.fits.push(fit);
+                }
                 Err(constitutive::Error::Stopped) => stopped = true,
                 Err(error) => set.failed.push((model.key, error.to_string())),
             }
@@ -62,7 +67,7 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
         if !own.modes.is_empty() && !stopped {
             phases.start("ranking");
             run.show(done / total, &|| format!("rank the laws on {name}"));
-            match ranking::rank(own, &set.fits, run) {
+            match ranking::rank(own, set.judged(), run) {
                 Ok(laws) => set.ranked = laws,
                 Err(_) => stopped = true,
             }
@@ -75,8 +80,8 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
             let outside = stretches.iter().filter(|stretches| !coverage.contains(**stretches)).count();
             set.outside.push((&other.name, stretches.len(), outside));
         }
-        for fit in &set.fits {
-            record_fit(&mut report, name, table, fit)?;
+        for (fit, verdict) in set.fits.iter().zip(&set.verdicts) {
+            record_fit(&mut report, name, table, fit, verdict)?;
             for (other, (_, _, outside)) in case.others(own).zip(&set.outside) {
                 let key = format!("{name}.{}.{}", fit.model.key, other.name);
                 report.value(q::OUTSIDE.named(&[&key]), *outside as f64);
@@ -165,7 +170,10 @@ pub fn run(case: &FitCase, run: &mut Run) -> Result<Finished, Error> {
     let warnings = case.data.iter().flat_map(DataSet::warnings);
     let warnings = warnings.chain(case.volumetric.iter().flat_map(VolumetricSet::warnings));
     let warnings: String = warnings.map(|line| line + "\n").collect();
-    Ok(finished.with_notes(&(warnings + &remarks(case, &all))))
+    // the first line of each has K; the others are among the warnings
+    let moduli: String =
+        volumes.iter().filter_map(|text| text.lines().next()).map(|line| format!("{line}\n")).collect();
+    Ok(finished.with_notes(&(warnings + &moduli + &remarks(case, &all))))
 }
 
 /// Converts a value to the unit of the tables: stresses to MPa, numbers unchanged.
@@ -200,7 +208,13 @@ fn record_agreement(report: &mut Report, key: &str, found: &Agreement) {
     }
 }
 
-fn record_fit(report: &mut Report, data: &str, table: &TestData, fit: &Fit) -> Result<(), Error> {
+fn record_fit(
+    report: &mut Report,
+    data: &str,
+    table: &TestData,
+    fit: &Fit,
+    verdict: &FitVerdict,
+) -> Result<(), Error> {
     let key = format!("{data}.{}", fit.model.key);
     report.value(q::SHEAR_MODULUS.named(&[&key]), fit.law.shear_modulus() / MPA);
     for parameter in &fit.parameters {
@@ -215,19 +229,11 @@ fn record_fit(report: &mut Report, data: &str, table: &TestData, fit: &Fit) -> R
     if let Some(chi) = fit.chi {
         report.value(q::CHI.named(&[&key]), chi);
     }
-    report.value(q::STABLE.named(&[&key]), f64::from(u8::from(find_instability(fit, table).is_none())));
+    report.value(q::STABLE.named(&[&key]), f64::from(u8::from(verdict.instability.is_none())));
     report.work(&format!("{key}.evaluations"), fit.iterations as u64);
     report.work(&format!("{key}.starts"), fit.starts.0 as u64);
     report.work(&format!("{key}.starts_that_agree"), fit.starts.1 as u64);
     Ok(())
-}
-
-/// Finds the test and the stretch at which a law first becomes unstable, within the stretches of a table.
-pub fn find_instability(fit: &Fit, table: &TestData) -> Option<(Mode, f64)> {
-    let ends = stability::range(table);
-    let all = Mode::TESTS.into_iter().flat_map(|mode| ends.map(|end| (mode, end)));
-    all.filter(|(_, end)| *end != 1.0)
-        .find_map(|(mode, end)| stability::unstable_from(&fit.law, mode, end).map(|stretch| (mode, stretch)))
 }
 
 /// Writes `fits.csv`: one line for each number, with its standard error if the data determine it; stresses of
@@ -343,6 +349,7 @@ fn summary(case: &FitCase, all: &[TableFits], timed: &str, report: &Report) -> S
             let list: Vec<String> = fit.parameters.iter().map(format_parameter).collect();
             let _ = writeln!(text, "  {:<22}{}", fit.model.key, list.join(", "));
         }
+        text += &material::doubts(set);
         text += &material::best(set);
     }
     for trial in &report.trials {
@@ -391,6 +398,7 @@ fn remarks(case: &FitCase, all: &[TableFits]) -> String {
             let _ = writeln!(text, "failed  {law} on {}: {why}", set.name);
         }
         text += &transfer(set);
+        text += &material::doubts(set);
         text += &material::best(set);
     }
     text
@@ -432,7 +440,7 @@ fn verdicts(set: &TableFits) -> String {
     for (other, states, outside) in set.outside.iter().filter(|(_, _, outside)| *outside > 0) {
         let _ = writeln!(text, "  out of distribution: {outside} of {states} states of {other}");
     }
-    for fit in &set.fits {
+    for (fit, verdict) in set.judged() {
         let key = fit.model.key;
         let shown = |r2: Option<f64>| match r2 {
             Some(r2) if r2 > -100.0 => format!("{r2:.4}"),
@@ -454,17 +462,11 @@ fn verdicts(set: &TableFits) -> String {
         if let Some(chi) = fit.chi {
             let _ = write!(text, "; χ {}", digits(chi, 3));
         }
-        let lost = stability::count_states_without_ellipticity(&fit.law, set.table);
-        if lost > 0 {
-            let _ = write!(text, "; not elliptic at {lost} of {} states", set.table.states.len());
+        if let Some(lost) = verdict.without_ellipticity() {
+            let _ = write!(text, "; {lost}");
         }
-        match find_instability(fit, set.table) {
-            Some((mode, stretch)) => {
-                let _ =
-                    writeln!(text, "; unstable in {} tests from the stretch {stretch:.3} on", mode.name());
-            }
-            None => text += "; stable\n",
-        }
+        let unstable = verdict.without_stability();
+        let _ = writeln!(text, "; {}", unstable.as_deref().unwrap_or("stable"));
     }
     text
 }

@@ -200,7 +200,8 @@ impl FoamSet {
         })?;
         atomic_write(directory.join(format!("{}_foam.inp", self.name)), |file| {
             writeln!(file, "** units mm, N, MPa; fitted to {}", self.name)?;
-            laws.iter().try_for_each(|law| file.write_all(card(&law.key, &law.fit.law).as_bytes()))
+            laws.iter()
+                .try_for_each(|law| file.write_all(card(&self.name, &law.key, &law.fit.law).as_bytes()))
         })
     }
 
@@ -242,9 +243,9 @@ fn end_of(test: &FoamTest) -> f64 {
 }
 
 /// Formats the law as `*HYPERFOAM`, in MPa.
-fn card(key: &str, law: &Hyperfoam) -> String {
+fn card(foam: &str, key: &str, law: &Hyperfoam) -> String {
     let values = law.terms().iter().flat_map(|term| [term.modulus / MPA, term.exponent, term.beta]);
-    format!("**\n{}", deck::card(key, &values.collect::<Vec<_>>(), &[]))
+    format!("**\n{}", deck::card(&deck::material_name(key, foam), key, &values.collect::<Vec<_>>(), &[]))
 }
 
 #[cfg(test)]
@@ -259,6 +260,7 @@ mod tests {
         let law = Hyperfoam::new(&[term, FoamTerm { beta: 0.0, ..term }]).unwrap();
         let expected = "*HYPERFOAM, N=2\n2.000000000e-1, 7.000000000e0, 2.000000000e-1, \
                         7.000000000e0, 2.500000000e-1, 0.000000000e0\n";
-        assert!(card("hyperfoam-2", &law).ends_with(expected), "{}", card("hyperfoam-2", &law));
+        let text = card("pad", "hyperfoam-2", &law);
+        assert!(text.ends_with(expected) && text.contains("NAME=HYPERFOAM_2_PAD\n"), "{text}");
     }
 }

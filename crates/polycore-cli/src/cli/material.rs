@@ -5,12 +5,13 @@ use std::io::Write as _;
 use std::path::Path;
 
 use polycore::Error;
-use polycore::constitutive::hyperelastic::fit::{Fit, FittedParameter, Identifiability};
+use polycore::constitutive::hyperelastic::fit::{Fit, FittedParameter};
 use polycore::file::atomic_write;
 
 use super::MPA;
 use super::ranking;
 use super::table_fits::{TableFits, unit_of};
+use super::verdict::FitVerdict;
 use super::volumetric::Bulk;
 
 /// Laws whose block is printed in preference to others.
@@ -34,15 +35,17 @@ pub fn in_megapascals(value: f64, unit: &str) -> (f64, &'static str) {
 }
 
 /// Formats `[material.solid]` of `peri` for a fitted law, with its confidence intervals. For a law that the
-/// data do not determine it is a comment with advice.
-fn block(fit: &Fit, bulk: Bulk) -> String {
+/// data do not determine, or that is not elliptic there, it is a comment with advice.
+fn block(fit: &Fit, verdict: &FitVerdict, bulk: Bulk) -> String {
     let rms = stress(fit.rms, 5);
-    if let Some(why) = unusable(fit) {
+    let lost = || verdict.without_ellipticity().map(|lost| lost + ", where a simulation localises");
+    if let Some(why) = verdict.unusable.clone().or_else(lost) {
         return format!("# {}, rms {rms}: no block, {why}\n", fit.model.key);
     }
     let shear = fit.law.shear_modulus();
     let mut text = format!("[material.solid] # {}, rms {rms}\n", fit.model.key);
-    bulk.warnings().iter().for_each(|line| text += &format!("# {line}\n"));
+    let warnings = [verdict.warnings(), bulk.warnings()].concat();
+    warnings.iter().for_each(|line| text += &format!("# {line}\n"));
     let _ = writeln!(text, "law = \"correspondence\"");
     let _ = writeln!(text, "[material.solid.constitutive]\nmodel = \"{}\"", fit.model.key);
     let _ =
@@ -68,29 +71,11 @@ fn block(fit: &Fit, bulk: Bulk) -> String {
     text
 }
 
-/// Returns the reason for which a fitted law is no usable material, with advice.
-pub fn unusable(fit: &Fit) -> Option<String> {
-    let names = |verdict: Identifiability| -> Vec<&str> {
-        let those = fit.parameters.iter().filter(|parameter| parameter.identifiability == verdict);
-        those.map(|parameter| parameter.name).collect()
-    };
-    let (absent, open) = (names(Identifiability::Absent), names(Identifiability::Undetermined));
-    if !absent.is_empty() {
-        return Some(format!(
-            "without {} it is a law with fewer parameters: use that law",
-            absent.join(", ")
-        ));
-    }
-    (!open.is_empty()).then(|| {
-        format!("the data do not determine {}, which may be infinite: use `neo-hookean`", open.join(", "))
-    })
-}
-
 /// Formats the block of the law that a ranking puts first; without one, that of the eight-chain law with the
-/// least rms or, without such a law, of the best law. Laws whose parameters are all known to half of their
-/// size come first.
+/// least rms or, without such a law, of the best law. Laws that are stable and whose parameters are all known
+/// to half of their size come first; a law that the data do not determine, or that is not elliptic within
+/// them, is never taken.
 pub fn best(set: &TableFits) -> String {
-    let (data, fits) = (set.name, &set.fits);
     let ranked = ranking::best(&set.ranked).map(|law| law.key);
     let known = |fit: &Fit| {
         let sure = |parameter: &FittedParameter| {
@@ -98,17 +83,45 @@ pub fn best(set: &TableFits) -> String {
         };
         fit.parameters.iter().all(sure)
     };
-    let usable = || fits.iter().filter(|fit| unusable(fit).is_none());
-    let least = |a: &&Fit, b: &&Fit| a.rms.total_cmp(&b.rms);
-    let chains = |fit: &&Fit| fit.model.key.starts_with(EIGHT_CHAINS) && known(fit);
-    let best = usable().find(|fit| ranked == Some(fit.model.key));
-    let best = best.or_else(|| usable().filter(chains).min_by(least));
-    let best =
-        best.or_else(|| usable().filter(|fit| known(fit)).min_by(least)).or_else(|| usable().min_by(least));
-    // indented lines are printed as they are
-    let indented =
-        |fit: &Fit| block(fit, set.bulk).lines().map(|line| format!("  {line}\n")).collect::<String>();
-    best.map_or_else(String::new, |fit| format!("for a scene of peri, from {data}:\n{}", indented(fit)))
+    let usable = || set.judged().filter(|(_, verdict)| verdict.is_recommended());
+    let sure = || usable().filter(|(fit, verdict)| known(fit) && verdict.instability.is_none());
+    let least = |a: &(&Fit, &FitVerdict), b: &(&Fit, &FitVerdict)| a.0.rms.total_cmp(&b.0.rms);
+    let best = usable().find(|(fit, _)| ranked == Some(fit.model.key));
+    let best = best
+        .or_else(|| sure().filter(|(fit, _)| fit.model.key.starts_with(EIGHT_CHAINS)).min_by(least))
+        .or_else(|| sure().min_by(least))
+        .or_else(|| usable().filter(|(_, verdict)| verdict.instability.is_none()).min_by(least))
+        .or_else(|| usable().min_by(least));
+    let data = set.name;
+    match best {
+        Some((fit, verdict)) => {
+            // indented lines are printed as they are
+            let block = block(fit, verdict, set.bulk);
+            let indented: String = block.lines().map(|line| format!("  {line}\n")).collect();
+            format!("for a scene of peri, from {data}:\n{indented}")
+        }
+        None if set.fits.is_empty() => String::new(),
+        None => format!("{data}: no block for a scene of peri: no law is determined and elliptic there\n"),
+    }
+}
+
+/// Names the laws of a table that are no materials, or not elliptic there, in a line; empty without any.
+pub fn doubts(set: &TableFits) -> String {
+    let open = set
+        .judged()
+        .filter_map(|(fit, verdict)| Some(format!("{} ({})", fit.model.key, verdict.open.as_deref()?)));
+    let open: Vec<String> = open.collect();
+    let usable = set.judged().filter(|(_, verdict)| verdict.unusable.is_none());
+    let lost = usable.filter_map(|(fit, verdict)| {
+        let states = verdict.without_ellipticity()?;
+        Some(format!("{} is {states}", fit.model.key))
+    });
+    let open = (!open.is_empty()).then(|| format!("no block, no card of {}", open.join(", ")));
+    let parts: Vec<String> = open.into_iter().chain(lost).collect();
+    match parts.is_empty() {
+        true => String::new(),
+        false => format!("warning: {}: {}\n", set.name, parts.join("; ")),
+    }
 }
 
 /// Writes `materials.toml`: the block of every fit, under comments.
@@ -116,8 +129,8 @@ pub fn write(directory: &Path, all: &[TableFits]) -> Result<(), Error> {
     atomic_write(directory.join("materials.toml"), |file| {
         writeln!(file, "# Use one block; docs/guide/src/how-to/fit.md describes its limits.")?;
         for set in all {
-            for fit in &set.fits {
-                write!(file, "\n# fitted to {}\n{}", set.name, block(fit, set.bulk))?;
+            for (fit, verdict) in set.judged() {
+                write!(file, "\n# fitted to {}\n{}", set.name, block(fit, verdict, set.bulk))?;
             }
         }
         Ok(())

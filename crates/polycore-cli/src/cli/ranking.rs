@@ -6,16 +6,15 @@ use std::path::Path;
 
 use harness::case::Run;
 use harness::report::Report;
-use polycore::constitutive::hyperelastic::fit::{Fit, FittedParameter, Identifiability};
+use polycore::constitutive::hyperelastic::fit::Fit;
 use polycore::constitutive::hyperelastic::ranking::CrossValidation;
-use polycore::constitutive::hyperelastic::stability;
 use polycore::file::atomic_write;
 use polycore::{Error, constitutive};
 
 use super::data::DataSet;
-use super::fits::{find_instability, format_parameter};
 use super::material::digits;
 use super::quantities as q;
+use super::verdict::FitVerdict;
 
 /// Law with its errors in modes of deformation, relative to the largest stress of each.
 pub struct RankedLaw {
@@ -35,35 +34,24 @@ const SAFE_ERROR: f64 = 0.1;
 ///
 /// # Errors
 /// [`constitutive::Error::Stopped`].
-pub fn rank(set: &DataSet, fits: &[Fit], run: &Run) -> Result<Vec<RankedLaw>, constitutive::Error> {
+pub fn rank<'a>(
+    set: &DataSet,
+    fits: impl Iterator<Item = (&'a Fit, &'a FitVerdict)>,
+    run: &Run,
+) -> Result<Vec<RankedLaw>, constitutive::Error> {
     let mut laws = Vec::new();
-    for fit in fits.iter().filter(|_| !set.modes.is_empty()) {
+    for (fit, verdict) in fits.filter(|_| !set.modes.is_empty()) {
         laws.push(RankedLaw {
             key: fit.model.key,
             parameters: fit.parameters.len(),
             fitted: set.modes.iter().map(|mode| mode.error(&fit.law)).collect(),
             found: CrossValidation::new(fit.model, &set.modes, run.options.interrupted)?,
-            obstacle: obstacle(fit, set),
+            obstacle: verdict.obstacle(),
         });
     }
     let error = |law: &RankedLaw| law.found.worst().unwrap_or(f64::INFINITY);
     laws.sort_by(|a, b| error(a).total_cmp(&error(b)).then(a.parameters.cmp(&b.parameters)));
     Ok(laws)
-}
-
-/// Finds a term that is absent, a parameter that the data do not determine, or an instability.
-fn obstacle(fit: &Fit, set: &DataSet) -> Option<String> {
-    let open = |parameter: &&FittedParameter| parameter.identifiability != Identifiability::Determined;
-    if let Some(parameter) = fit.parameters.iter().find(open) {
-        return Some(format_parameter(parameter));
-    }
-    let (lost, states) =
-        (stability::count_states_without_ellipticity(&fit.law, &set.table), set.table.states.len());
-    if lost > 0 {
-        return Some(format!("not elliptic at {lost} of {states} states"));
-    }
-    let (mode, stretch) = find_instability(fit, &set.table)?;
-    Some(format!("unstable in {} tests from {stretch:.3} on", mode.name()))
 }
 
 /// Records the errors and the rank of each law.

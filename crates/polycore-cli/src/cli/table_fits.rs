@@ -4,6 +4,7 @@ use polycore::constitutive::hyperelastic::data::TestData;
 use polycore::constitutive::hyperelastic::fit::{Agreement, Fit};
 
 use super::ranking::RankedLaw;
+use super::verdict::FitVerdict;
 use super::volumetric::Bulk;
 
 /// Fits to one table.
@@ -13,6 +14,8 @@ pub struct TableFits<'a> {
     /// Layout of the file.
     pub read: &'a [String],
     pub fits: Vec<Fit>,
+    /// Verdicts on these fits, in their order.
+    pub verdicts: Vec<FitVerdict>,
     /// Laws that could not be fitted, and the reason.
     pub failed: Vec<(&'static str, String)>,
     /// Law, other table, agreement there; `None` if the law locks.
@@ -26,6 +29,11 @@ pub struct TableFits<'a> {
 }
 
 impl TableFits<'_> {
+    /// Iterates over fits with their verdicts.
+    pub fn judged(&self) -> impl Iterator<Item = (&Fit, &FitVerdict)> + Clone {
+        self.fits.iter().zip(&self.verdicts)
+    }
+
     /// Unit of the table's stresses and its value in Pa, chosen by the largest modulus.
     pub fn unit(&self) -> (&'static str, f64) {
         unit_of(self.fits.iter().map(|fit| fit.law.shear_modulus()).fold(0.0, f64::max))

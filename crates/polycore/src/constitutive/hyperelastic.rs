@@ -47,13 +47,18 @@ mod coverage;
 mod curves;
 pub mod data;
 pub mod deck;
+mod deck_keywords;
+pub mod deck_reader;
 pub mod fit;
 pub mod foam;
 #[cfg(feature = "tables")]
 mod foam_table;
 pub mod forecast;
+#[cfg(feature = "tables")]
+mod heading_test;
 pub mod homogeneous;
 pub mod host;
+mod host_reader;
 #[cfg(feature = "tables")]
 mod plausible;
 pub mod ranking;

@@ -4,7 +4,7 @@ use super::PartScene;
 use super::locate_error::located;
 use super::polymer::PolymerSpec;
 use crate::coupling::{STRAIN_STEP, StressSettings, loose_elements};
-use crate::mechanics::{SolidifyingMaxwell, is_supported, key};
+use crate::mechanics::{Roller, SolidifyingMaxwell, is_supported, key};
 use crate::mesh::Mesh;
 use crate::mesh::path::ToolPath;
 use harness::scene::{SceneError, Source};
@@ -15,6 +15,9 @@ use std::collections::HashSet;
 /// Matrix bytes per hexahedron, and per tetrahedron of 4 and 10 nodes.
 const HEXAHEDRON_BYTES: f64 = 26e3;
 const TETRAHEDRON_BYTES: [f64; 2] = [2e3, 10e3];
+
+/// Angle, rad, and share of a length, that are rounding.
+const SMALLEST_TURN: f64 = 1e-9;
 
 /// Stress and warpage, computed from the temperatures; deformation does not affect the heat.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
@@ -190,6 +193,7 @@ impl PartScene {
             }
             return Err(source.error("mechanics.bed", found, allowed));
         }
+        let rollers = self.rollers(source, mesh, bed)?;
         let places =
             |nodes: &[u32]| -> Vec<_> { nodes.iter().map(|&node| mesh.points[node as usize]).collect() };
         let shapes: HashSet<(usize, Vec<i64>)> =
@@ -207,9 +211,42 @@ impl PartScene {
             longest_step: spec.longest_step.map_or(f64::INFINITY, |time| time.si()),
             release: spec.release,
             release_at: spec.release_at.map(|time| time.si()),
+            rollers,
             ..settings
         };
         Ok(Some(Mechanics { settings, counts, matrices, compensation: spec.compensation, stiff }))
+    }
+
+    /// Rollers on the cuts of a `[mesh.tube]`, its planes of symmetry; none for other meshes.
+    ///
+    /// # Errors
+    /// Returns a [`SceneError`] for half a tube and more, whose cuts leave it free across the axis, and for a
+    /// bed that is no cross-section.
+    fn rollers(&self, source: &Source, mesh: &Mesh, bed: &[u32]) -> Result<Vec<Roller>, SceneError> {
+        let Some(tube) = &self.mesh.tube else { return Ok(Vec::new()) };
+        let angle = tube.angle.si();
+        if angle >= std::f64::consts::PI - SMALLEST_TURN {
+            let allowed = "below 180 deg with `[mechanics]`: the cuts are planes of symmetry, which hold the \
+                           part only if they meet at an angle";
+            return Err(source.error("mesh.tube.angle", format!("{} deg", angle.to_degrees()), allowed));
+        }
+        let height = |&node: &u32| mesh.points[node as usize][2];
+        let spread = bed
+            .iter()
+            .map(height)
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| [low.min(z), high.max(z)]);
+        if spread[1] - spread[0] > SMALLEST_TURN * tube.length.si() {
+            let allowed =
+                "`bottom` or `top` of a tube: its cuts are planes of symmetry and slide in themselves";
+            return Err(source.error("mechanics.bed", "a side that is no cross-section", allowed));
+        }
+        let (sine, cosine) = angle.sin_cos();
+        let cuts = [("start", [0.0, -1.0, 0.0]), ("end", [-sine, cosine, 0.0])];
+        let nodes = |name: &str| mesh.node_sets.get(name).into_iter().flatten().copied();
+        Ok(cuts
+            .iter()
+            .flat_map(|&(cut, normal)| nodes(cut).map(move |node| Roller { node, normal }))
+            .collect())
     }
 
     /// Refuses initial and deposition temperatures outside the range of the law.

@@ -55,8 +55,20 @@ pub(super) enum ColumnKind {
     Raw,
 }
 
-/// Words that mark a quantity derived from a strain or stress.
-const DERIVED: [&str; 14] = [
+/// Words that mark a quantity derived from a strain or stress, or another one than those of the test.
+const DERIVED: [&str; 26] = [
+    "lateral",
+    "transverse",
+    "thickness",
+    "volumetric",
+    "hydrostatic",
+    "green",
+    "almansi",
+    "plastic",
+    "permanent",
+    "residual",
+    "amplitude",
+    "2nd",
     "rate",
     "modulus",
     "energy",
@@ -115,16 +127,18 @@ impl Role {
         } else if has(&STRETCHES) {
             ColumnKind::Strain(Some(StrainMeasure::Stretch))
         } else if has(&STRAINS) || lengthened {
-            let measure = match (has(&TRUE), has(&NOMINAL) || lengthened) {
+            // Cauchy's strain is the engineering one
+            let measure = match (has(&TRUE) && !has(&["cauchy"]), has(&NOMINAL) || lengthened) {
                 (true, _) => Some(StrainMeasure::True),
                 (_, true) => Some(StrainMeasure::Engineering),
                 _ => None,
             };
             ColumnKind::Strain(measure)
         } else if has(&STRESSES) {
-            let measure = match (has(&TRUE), has(&NOMINAL)) {
-                (true, _) => Some(TestStressMeasure::True),
-                (_, true) => Some(TestStressMeasure::Nominal),
+            // J = 1: Kirchhoff's stress Jσ is the true one
+            let measure = match (has(&TRUE), has(&NOMINAL), has(&["kirchhoff"])) {
+                (true, ..) | (_, false, true) => Some(TestStressMeasure::True),
+                (_, true, _) => Some(TestStressMeasure::Nominal),
                 _ => None,
             };
             ColumnKind::Stress(measure)

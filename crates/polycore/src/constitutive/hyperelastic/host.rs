@@ -50,15 +50,22 @@ impl CardProgram {
         }
     }
 
-    /// Formats a law as material number `id`, stresses in the host's unit, with the Dᵢ of the volumetric
-    /// energy Σ (J − 1)²ⁱ/Dᵢ; `None` if the program has no such law. Terms that the card has no place for are
-    /// named in a comment.
-    pub fn card(self, id: usize, key: &str, parameters: &[f64], compliances: &[f64]) -> Option<String> {
+    /// Formats a law as material number `id` with a name, stresses in the host's unit, with the Dᵢ of the
+    /// volumetric energy Σ (J − 1)²ⁱ/Dᵢ; `None` if the program has no such law. Terms that the card has no
+    /// place for are named in a comment.
+    pub fn card(
+        self,
+        id: usize,
+        name: &str,
+        key: &str,
+        parameters: &[f64],
+        compliances: &[f64],
+    ) -> Option<String> {
         let bulk = compliances.first().map_or(f64::INFINITY, |d| 2.0 / d);
         let (card, held) = match self {
             Self::Ansys => ansys(id, key, parameters, compliances)?,
             Self::LsDyna => (ls_dyna(id, key, parameters, bulk)?, 1),
-            Self::Febio => (febio(id, key, parameters, bulk)?, 1),
+            Self::Febio => (febio(id, name, key, parameters, bulk)?, 1),
             Self::Moose => (moose(id, key, parameters, bulk)?, 1),
         };
         Some(left_out(compliances, held).map_or_else(String::new, |note| self.comment(&note)) + &card)
@@ -145,7 +152,7 @@ fn ls_dyna(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
 /// Σ cᵢ (I₁ − 3)ⁱ (`FEYeoh.cpp`), W₁ = ½ G Jm/(Jm − I₁ + 3) (`FEGentMaterial.cpp`), λ ∂W/∂λ = Σ cᵢ/mᵢ λ^mᵢ
 /// (`FEOgdenMaterial.cpp`), and ½k ln²J (`FEUncoupledMaterial.h`). Its Arruda–Boyce differs between versions,
 /// and none is written.
-fn febio(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
+fn febio(id: usize, name: &str, key: &str, p: &[f64], bulk: f64) -> Option<String> {
     let tags = |name: &str, values: &[f64]| -> Vec<(String, f64)> {
         (1..).zip(values).map(|(i, value)| (format!("{name}{i}"), *value)).collect()
     };
@@ -164,7 +171,7 @@ fn febio(id: usize, key: &str, p: &[f64], bulk: f64) -> Option<String> {
     constants.push(("k".to_owned(), bulk));
     let lines = constants.iter().map(|(tag, value)| format!("  <{tag}>{value:.9e}</{tag}>\n"));
     let lines: String = lines.collect();
-    Some(format!("<material id=\"{id}\" name=\"{key}\" type=\"{kind}\">\n{lines}</material>\n"))
+    Some(format!("<material id=\"{id}\" name=\"{name}\" type=\"{kind}\">\n{lines}</material>\n"))
 }
 
 /// S = (λ ln J − μ) C⁻¹ + μ 1, i.e. W = ½μ(I₁ − 3) − μ ln J + ½λ ln²J, with λ = K − ⅔μ
@@ -271,7 +278,7 @@ mod tests {
         ] {
             let mut count = 0;
             for model in MODELS {
-                let Some(card) = host.card(3, model.key, model.example, &[5e-8]) else { continue };
+                let Some(card) = host.card(3, model.key, model.key, model.example, &[5e-8]) else { continue };
                 let law = model.law(model.example).unwrap().energy_at(STRETCHES).unwrap();
                 worst = worst.max((energy(host, &card) / law - 1.0).abs());
                 count += 1;
@@ -284,7 +291,7 @@ mod tests {
     /// K = 40 MPa: d = 2/K; ν, λ = K − ⅔μ from K and μ = 0.4 MPa.
     #[test]
     fn bulk_moduli_in_the_form_of_each_program() {
-        let card = |host: CardProgram| host.card(1, "neo-hookean", &[0.4], &[0.05]).unwrap();
+        let card = |host: CardProgram| host.card(1, "bar", "neo-hookean", &[0.4], &[0.05]).unwrap();
         assert_eq!(card(CardProgram::Ansys), "TB,HYPER,1,1,1,NEO\nTBDATA,1,4.000000000e-1,5.000000000e-2\n");
         let poisson = numbers(card(CardProgram::LsDyna).lines().nth(1).unwrap())[1];
         assert!((poisson - (120.0 - 0.8) / 240.8).abs() < 1e-12, "{poisson}");
@@ -298,13 +305,13 @@ mod tests {
             (CardProgram::Ansys, "van-der-waals"),
         ] {
             let model = any_model(key).unwrap();
-            assert_eq!(host.card(1, key, model.example, &[2e-9]), None);
+            assert_eq!(host.card(1, key, key, model.example, &[2e-9]), None);
         }
         let all = [0.05, 2e-3];
-        let yeoh = CardProgram::Ansys.card(1, "yeoh", &[0.2, 2e-3, 5e-5], &all).unwrap();
+        let yeoh = CardProgram::Ansys.card(1, "bar", "yeoh", &[0.2, 2e-3, 5e-5], &all).unwrap();
         assert!(yeoh.ends_with("5.000000000e-5,5.000000000e-2,2.000000000e-3\n"), "{yeoh}");
         for host in [CardProgram::LsDyna, CardProgram::Febio] {
-            let card = host.card(1, "yeoh", &[0.2, 2e-3, 5e-5], &all).unwrap();
+            let card = host.card(1, "bar", "yeoh", &[0.2, 2e-3, 5e-5], &all).unwrap();
             let note = "left out: D2 = 2.000000000e-3; this material has D1 alone";
             assert!(card.starts_with(&host.comment(note)), "{card}");
         }

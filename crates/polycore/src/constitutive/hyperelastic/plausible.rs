@@ -138,8 +138,8 @@ fn remove_tails(rows: &mut Vec<TestRow>, notes: &mut Vec<String>, mode: Mode) {
     }
     if let (Some(first), count) = (lost.first(), lost.len()) {
         notes.push(format!(
-            "{count} rows after the largest stress are left out, from the stretch {:.4} on: the stress \
-             falls as in a broken specimen",
+            "warning: {count} rows after the largest stress are left out, from the stretch {:.4} on: the \
+             stress falls as in a broken specimen",
             rows[*first].stretches[0]
         ));
     }

@@ -8,6 +8,7 @@ use super::columns::{
 };
 use super::components::ComponentColumns;
 use super::data::{Mode, TestData, TestState};
+use super::heading_test::named_test;
 use super::plausible::{TestRow, plausible};
 use super::torsion_table::{TestCylinder, TorsionColumns};
 use super::weights::{Deviation, WeightSource};
@@ -122,6 +123,8 @@ fn located(error: table::Error) -> Error {
 /// Columns of a table with one stress or two in each row.
 struct TestColumns {
     mode: Option<usize>,
+    /// Test that the headings name, if neither a column nor the scene does.
+    named: Option<Mode>,
     strains: Vec<TestColumn<StrainMeasure>>,
     stresses: Vec<TestColumn<TestStressMeasure>>,
 }
@@ -202,7 +205,11 @@ impl TestColumns {
             (is_mode && (file.headings[i].plain == MODES[0] || says())).then_some(i)
         };
         let mode = if axes.len() == 1 { roles.iter().enumerate().find_map(named) } else { None };
-        Ok(Self { mode, strains, stresses })
+        let named = match (axes.len(), mode, format.mode) {
+            (1, None, None) => named_test(file, strains[0].column, stresses[0].column)?,
+            _ => None,
+        };
+        Ok(Self { mode, named, strains, stresses })
     }
 
     fn read(&self, file: &table::Table, format: &TestFormat) -> Result<ImportedTest, table::Error> {
@@ -352,7 +359,7 @@ impl TestColumns {
         format: &TestFormat,
     ) -> Result<(Mode, bool), table::Error> {
         let Some(column) = self.mode else {
-            let one = format.mode.unwrap_or(Mode::Uniaxial);
+            let one = format.mode.or(self.named).unwrap_or(Mode::Uniaxial);
             return Ok((if self.strains.len() == 2 { Mode::Biaxial } else { one }, false));
         };
         mode(file.text(row, column)).ok_or_else(|| {
@@ -410,10 +417,13 @@ impl TestColumns {
             table.states.iter().flat_map(|state| state.stretches.into_iter().take(self.strains.len()));
         let (low, high) =
             stretches.fold((f64::INFINITY, 0.0_f64), |(low, high), l| (low.min(l), high.max(l)));
-        format!(
-            "{}; {biaxial}{strain} and {stress}{assumed}; stretches {low:.4} to {high:.4}",
-            file.describe(&used)
-        )
+        let is_shear = table.states.iter().all(|state| state.mode == Mode::SimpleShear);
+        let measured = match is_shear {
+            true => "amount of shear and shear stress".to_owned(),
+            false => format!("{biaxial}{strain} and {stress}{assumed}"),
+        };
+        let named = self.named.map_or_else(String::new, |mode| format!("; {} by the headings", mode.name()));
+        format!("{}; {measured}{named}; stretches {low:.4} to {high:.4}", file.describe(&used))
     }
 }
 

@@ -67,7 +67,7 @@ impl Hysteresis {
     /// Formats it behind the `*HYPERELASTIC` card of `key` with `parameters` and D₁ in the host's unit of
     /// stress, which then states long-term moduli.
     pub fn card(&self, key: &str, parameters: &[f64], compliance: f64) -> String {
-        let elastic = deck::card(key, parameters, &[compliance]);
+        let elastic = deck::card(&deck::material_name(key, ""), key, parameters, &[compliance]);
         let long_term = |line: &str| match line.starts_with("*HYPERELASTIC") {
             true => format!("{line}, MODULI=LONG TERM\n"),
             false => format!("{line}\n"),
