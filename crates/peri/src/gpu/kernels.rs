@@ -324,8 +324,7 @@ pub fn half_kick_and_drift<F: Float>(
     let mut damped = F::new(0.0);
     let mut body_work = F::new(0.0);
     let mut greatest = F::new(0.0);
-    let mut index = ABSOLUTE_POS;
-    while index < particles.len() {
+    for index in range_stepped(ABSOLUTE_POS, particles.len(), threads) {
         let site = particles[index] as usize;
         #[unroll]
         for d in 0..dimension {
@@ -355,7 +354,6 @@ pub fn half_kick_and_drift<F: Float>(
             velocity[at] = speed;
             displacement[at] = there;
         }
-        index += threads;
     }
     partial[ABSOLUTE_POS] = held_work;
     partial[threads + ABSOLUTE_POS] = damped;
@@ -397,8 +395,7 @@ pub fn kick<F: Float>(
     let mut gained = F::new(0.0);
     let mut damped = F::new(0.0);
     let mut body_work = F::new(0.0);
-    let mut index = ABSOLUTE_POS;
-    while index < particles.len() {
+    for index in range_stepped(ABSOLUTE_POS, particles.len(), threads) {
         let site = particles[index] as usize;
         #[unroll]
         for d in 0..dimension {
@@ -425,7 +422,6 @@ pub fn kick<F: Float>(
             square = fma(speed, speed, square);
             velocity[at] = speed;
         }
-        index += threads;
     }
     let start = comptime!(LEAP_SUMS) * threads + ABSOLUTE_POS;
     partial[start] = square;
@@ -457,8 +453,7 @@ pub fn fold<F: Float>(
     #[unroll]
     for row in 0..rows {
         let mut sum = F::new(0.0);
-        let mut index = ABSOLUTE_POS;
-        while index < length {
+        for index in range_stepped(ABSOLUTE_POS, length, lanes) {
             let value = from[row * length + index];
             if comptime!(row < 32 && (greatest >> row) & 1 == 1) {
                 sum = F::max(sum, value);
@@ -467,7 +462,6 @@ pub fn fold<F: Float>(
             } else {
                 sum += value;
             }
-            index += lanes;
         }
         into[start + row * lanes + ABSOLUTE_POS] = sum;
     }

@@ -47,8 +47,7 @@ pub fn relaxation_sums<F: Float>(
     let mut free = F::new(0.0);
     let mut constrained = F::new(0.0);
     let mut moved = F::new(0.0);
-    let mut index = ABSOLUTE_POS;
-    while index < particles.len() {
+    for index in range_stepped(ABSOLUTE_POS, particles.len(), threads) {
         let site = particles[index] as usize;
         let own = mass[site];
         #[unroll]
@@ -68,7 +67,6 @@ pub fn relaxation_sums<F: Float>(
                 moved = fma(reach, reach, moved);
             }
         }
-        index += threads;
     }
     partial[ABSOLUTE_POS] = top;
     partial[threads + ABSOLUTE_POS] = bottom;
@@ -101,8 +99,7 @@ pub fn relax<F: Float>(
     let sites = displacement.len() / dimension;
     let keep = keep.get::<F>();
     let push = push.get::<F>();
-    let mut index = ABSOLUTE_POS;
-    while index < particles.len() {
+    for index in range_stepped(ABSOLUTE_POS, particles.len(), threads) {
         let site = particles[index] as usize;
         let own = mass[site];
         #[unroll]
@@ -115,7 +112,6 @@ pub fn relax<F: Float>(
             velocity[at] = speed;
             displacement[at] += speed;
         }
-        index += threads;
     }
 }
 
