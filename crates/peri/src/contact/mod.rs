@@ -34,6 +34,8 @@ mod friction;
 mod friction_pair;
 mod list;
 mod pushed_surfaces;
+#[cfg(feature = "gpu")]
+mod rows;
 mod stiffness;
 mod stops;
 mod surface;
@@ -54,6 +56,8 @@ pub use friction_pair::{ContactPair, Drag, FrictionPair};
 use list::ContactList;
 #[cfg(feature = "case")]
 pub(crate) use pushed_surfaces::BEHIND;
+#[cfg(feature = "gpu")]
+pub use rows::PlaneRows;
 use serde::{Deserialize, Serialize};
 pub use stiffness::Spring;
 pub use surface::{RigidSurface, SurfaceReaction, SurfaceShape};

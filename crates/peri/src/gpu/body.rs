@@ -1,6 +1,7 @@
 //! A lattice on a device: its buffers, and the launches of its kernels.
 
 use super::kernels::{CUBE, KernelForm, ROW, SUMS};
+use super::planes::DevicePlanes;
 use super::{Device, Precision};
 use crate::bonds::{BodyGeometry, BondDamage, LatticeBonds, Rational, not_finite};
 use crate::error::Error;
@@ -64,6 +65,7 @@ pub struct DeviceBody<const D: usize> {
     pub(super) count: Handle,
     pub(super) list: Handle,
     pub(super) elongations: Handle,
+    pub(super) planes: Option<DevicePlanes<D>>,
 }
 
 impl<const D: usize> DeviceBody<D> {
@@ -161,6 +163,7 @@ impl<const D: usize> DeviceBody<D> {
             count: whole(&[0]),
             list: client.empty(4 * 2 * LISTED),
             elongations: empty(LISTED),
+            planes: None,
             client,
         };
         body.set_law(law, f64::INFINITY)?;

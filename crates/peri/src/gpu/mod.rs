@@ -15,6 +15,8 @@ mod body;
 mod kernels;
 mod lbfgs;
 mod lbfgs_kernels;
+mod plane_kernels;
+mod planes;
 mod relaxation;
 mod relaxation_kernels;
 mod steps;

@@ -74,8 +74,8 @@ impl<const D: usize> DeviceBody<D> {
         }
     }
 
-    /// Forces of the present displacement with body forces at a load factor. Where it `looks`, [`Self::look`]
-    /// has what it saw.
+    /// Forces of the present displacement with body forces at a load factor, and of planes. Where it `looks`,
+    /// [`Self::stretch_range`] has what it saw.
     pub fn pull(&mut self, factor: f64, looks: bool) {
         if looks {
             self.count = self.client.create_from_slice(u32::as_bytes(&[0]));
@@ -83,9 +83,10 @@ impl<const D: usize> DeviceBody<D> {
         let [displacement, _, force] = &self.fields;
         let all = (&self.sites_of_particles, self.particles);
         self.launch_pull([displacement, force], all, factor, self.form, looks);
+        self.press(None);
     }
 
-    /// Forces of some sites.
+    /// Forces of some sites, without those of planes.
     pub fn pull_at(&self, sites: &[u32], factor: f64) {
         let [displacement, _, force] = &self.fields;
         let some = self.client.create_from_slice(u32::as_bytes(sites));
@@ -230,7 +231,7 @@ impl<const D: usize> DeviceBody<D> {
         let bytes = D * self.sites * self.precision.bytes() as usize;
         let kept = self.kept.take().unwrap_or_else(|| [(); 3].map(|()| self.client.empty(bytes)));
         for (from, into) in self.fields.iter().zip(&kept) {
-            self.copy(from, into);
+            self.copy(from, into, D * self.sites);
         }
         self.kept = Some(kept);
     }
@@ -239,20 +240,21 @@ impl<const D: usize> DeviceBody<D> {
     pub fn take_back(&mut self, time_step: f64) {
         let Some(kept) = &self.kept else { return };
         for (from, into) in kept.iter().zip(&self.fields) {
-            self.copy(from, into);
+            self.copy(from, into, D * self.sites);
         }
         self.time_step = time_step;
     }
 
-    fn copy(&self, from: &Handle, into: &Handle) {
-        // SAFETY: both are fields
+    /// Copies a list of `length` numbers.
+    pub(super) fn copy(&self, from: &Handle, into: &Handle, length: usize) {
+        // SAFETY: both have that length
         unsafe {
             copy::launch_unchecked(
                 &self.client,
-                self.cubes_of(D * self.sites),
+                self.cubes_of(length),
                 CubeDim::new_1d(CUBE as u32),
-                buffer(from, D * self.sites),
-                buffer(into, D * self.sites),
+                buffer(from, length),
+                buffer(into, length),
                 self.precision.element(),
             );
         }

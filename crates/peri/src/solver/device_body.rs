@@ -3,6 +3,7 @@
 use super::criterion::Criterion;
 use super::system::System;
 use crate::bonds::{LatticeBonds, Property};
+use crate::contact::{Contact, PlaneRows};
 use crate::error::Error;
 use crate::field::Field;
 use crate::gpu::DeviceLoads;
@@ -27,6 +28,12 @@ pub fn loads<'a, const D: usize>(system: &'a System<D>) -> DeviceLoads<'a, D> {
         displacement: loads.displacement.as_ref(),
         body_force: loads.body_force.as_ref(),
     }
+}
+
+/// Rows of the planes of a system, and their displacements along their normals, m, as they stand.
+pub fn planes<const D: usize>(system: &System<D>) -> (Option<PlaneRows<D>>, Vec<f64>) {
+    let contact = system.repulsion();
+    (contact.and_then(Contact::plane_rows), contact.map_or_else(Vec::new, Contact::plane_shifts))
 }
 
 /// Lattice of a system.
@@ -83,14 +90,14 @@ pub fn refuse<const D: usize>(system: &System<D>) -> Result<(), Error> {
             "a solid, or bonds with prestrains, of several laws, or that soften",
         ),
         (softens, "bonds that break by their energy"),
-        (system.contact.is_some(), "contact"),
         (!system.loads.turned.is_empty(), "a rotation"),
         (!system.loads.rigid.is_empty(), "a region that moves as a whole"),
         (system.loads.curved.is_some(), "a curve of time"),
         (!system.density_ratios.is_empty(), "parts of their own density"),
     ];
-    match what.iter().find(|(has, _)| *has) {
-        Some((_, what)) => Err(Error::Device(format!("unexpected {what}: only the processor does that"))),
+    let contact = system.repulsion().and_then(Contact::beyond_planes);
+    match what.iter().find(|(has, _)| *has).map(|(_, what)| *what).or(contact) {
+        Some(what) => Err(Error::Device(format!("unexpected {what}: only the processor does that"))),
         None => Ok(()),
     }
 }

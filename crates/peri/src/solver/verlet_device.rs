@@ -5,14 +5,16 @@
 //! back to that step. Otherwise a step is taken at a time, and the stretches that its forces meet are looked
 //! at.
 
-use super::device_body::{critical, lattice, lattice_with_law, limit, loads, refuse};
+use super::device_body::{critical, lattice, lattice_with_law, limit, loads, planes, refuse};
 use super::method::{StepCallback, Watch};
 use super::motion::StretchLook;
 use super::state::State;
 use super::system::System;
 use super::verlet::VelocityVerlet;
+use super::verlet_friction::work_of_pushes;
 use super::verlet_step::VerletSums;
 use crate::bonds::{LatticeBonds, Overstretched};
+use crate::contact::{Contact, RigidSurface};
 use crate::error::Error;
 use crate::gpu::{Device, DeviceBody, DeviceStep, MOST_STEPS, StepSums};
 
@@ -24,11 +26,13 @@ struct Run<const D: usize> {
     body: DeviceBody<D>,
     /// Greatest change of a stretch in the last step, at most; ∞ where it is not known.
     strain: f64,
+    /// True if planes move.
+    pushed: bool,
 }
 
 impl VelocityVerlet {
-    /// As [`Method::solve`](super::Method::solve), with steps on a device: of a lattice of a bond law,
-    /// without contact and turned regions. `watch` may keep the state after a row of history only.
+    /// As [`Method::solve`](super::Method::solve), with steps on a device: of a lattice of a bond law, in
+    /// contact with planes at most, without turned regions. `watch` may keep the state after a row of history only.
     ///
     /// # Errors
     /// As there; [`Error::Device`] for what the device cannot do, or where it fails.
@@ -42,7 +46,11 @@ impl VelocityVerlet {
     ) -> Result<(), Error> {
         refuse(system)?;
         self.open(system, state)?;
-        let mut run = Run { body: body_of(device, system, state)?, strain: f64::INFINITY };
+        let mut run = Run {
+            body: body_of(device, system, state)?,
+            strain: f64::INFINITY,
+            pushed: system.contact.iter().flat_map(Contact::surfaces).any(RigidSurface::moves),
+        };
         while state.step < self.records {
             let end = self.end_of_row(state);
             while state.motion.steps.taken < state.motion.steps.planned {
@@ -112,25 +120,25 @@ impl VelocityVerlet {
         let constants: Vec<DeviceStep> = steps.iter().map(|(step, _)| *step).collect();
         let before = run.body.time_step();
         run.body.keep_state();
-        for (slot, step) in constants.iter().enumerate() {
-            run.step(step);
-            run.body.keep_sums(slot);
+        for (slot, step) in steps.iter().enumerate() {
+            run.step(system, step);
+            run.keep_sums(slot);
         }
-        let sums = run.body.sums(&constants)?;
-        for (taken, (sums, (_, after))) in sums.iter().zip(&steps).enumerate() {
-            let strain = run.strain_of(state, sums);
+        let sums = run.sums(&constants)?;
+        for (taken, (sums, step)) in sums.iter().zip(&steps).enumerate() {
+            let strain = run.strain_of(state, &sums.0);
             let mut look = state.motion.look;
             look.slack += strain;
             if look.is_due(state.stretches.fitted, system.breaking_stretch()) {
                 run.body.take_back(before);
-                constants[..taken].iter().for_each(|step| run.step(step));
+                steps[..taken].iter().for_each(|step| run.step(system, step));
                 run.strain = f64::INFINITY;
                 return Ok(());
             }
             state.motion.look = look;
             run.strain = strain;
             system.count_evaluation(state);
-            self.count(state, *after, sums)?;
+            self.count(system, state, step, sums)?;
             watch(&self.status(state, false), state)?;
         }
         Ok(())
@@ -146,6 +154,7 @@ impl VelocityVerlet {
         let (step, after) = self.step_ahead(system, state, 0, end);
         let factor = step.factors[1];
         run.body.half_kick_and_drift(&step);
+        run.place(system, factor, after);
         run.body.pull(factor, true);
         let (observed, listed) = run.body.stretch_range()?;
         run.body.keep_sums(0);
@@ -165,9 +174,9 @@ impl VelocityVerlet {
             }
         }
         run.body.kick(&step);
-        run.body.keep_sums(0);
-        let sums = run.body.sums(&[step])?[0];
-        self.count(state, after, &sums)?;
+        run.keep_sums(0);
+        let sums = run.sums(&[step])?;
+        self.count(system, state, &(step, after), &sums[0])?;
         if look && system.is_overstretched(observed) {
             let list = run.overstretched(system, state, listed)?;
             let sites = system.sever_bonds(state, list, None);
@@ -182,8 +191,22 @@ impl VelocityVerlet {
         Ok(())
     }
 
-    fn count<const D: usize>(&self, state: &mut State<D>, after: f64, sums: &StepSums) -> Result<(), Error> {
-        state.motion.time = after;
+    /// Counts a step with its sums and the sizes of the forces of planes that move.
+    fn count<const D: usize>(
+        &self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        (step, after): &(DeviceStep, f64),
+        (sums, pushes): &(StepSums, Vec<f64>),
+    ) -> Result<(), Error> {
+        if system.contact.is_some() {
+            system.move_surfaces(step.factors[1], *after);
+        }
+        if let Some(contact) = system.repulsion().filter(|_| !pushes.is_empty()) {
+            let pushing = contact.plane_forces(pushes);
+            state.work += work_of_pushes(contact, state, pushing);
+        }
+        state.motion.time = *after;
         state.motion.steps.taken += 1;
         state.counts.iterate();
         let half =
@@ -194,10 +217,31 @@ impl VelocityVerlet {
 }
 
 impl<const D: usize> Run<D> {
-    fn step(&mut self, step: &DeviceStep) {
+    fn step(&mut self, system: &System<D>, (step, after): &(DeviceStep, f64)) {
         self.body.half_kick_and_drift(step);
+        self.place(system, step.factors[1], *after);
         self.body.pull(step.factors[1], false);
         self.body.kick(step);
+    }
+
+    /// Moves planes to a load factor and a time, s.
+    fn place(&mut self, system: &System<D>, factor: f64, time: f64) {
+        if let Some(contact) = system.repulsion().filter(|_| self.pushed) {
+            self.body.place_planes(&contact.plane_shifts_at(factor, time));
+        }
+    }
+
+    fn keep_sums(&self, slot: usize) {
+        self.body.keep_sums(slot);
+        if self.pushed {
+            self.body.keep_pushes(slot);
+        }
+    }
+
+    /// Sums of the steps kept, and the sizes of the forces of planes if any moves.
+    fn sums(&self, steps: &[DeviceStep]) -> Result<Vec<(StepSums, Vec<f64>)>, Error> {
+        let pushes = if self.pushed { self.body.pushes(steps.len())? } else { vec![Vec::new(); steps.len()] };
+        Ok(self.body.sums(steps)?.into_iter().zip(pushes).collect())
     }
 
     /// Greatest change of a stretch in a step, at most: two ends, √D components.
@@ -244,7 +288,30 @@ impl<const D: usize> Run<D> {
             // particles without bonds have lost theirs
             self.body.set_loads(&loads(system));
         }
-        self.body.pull_at(sites, factor);
+        if system.repulsion().is_some() {
+            self.press_severed(system, sites, factor);
+        } else {
+            self.body.pull_at(sites, factor);
+        }
+    }
+
+    /// Takes the faces and particles that planes touch now, and the forces of sites whose bonds have broken
+    /// and of those beside them, as the host renews them: by pieces.
+    fn press_severed(&mut self, system: &System<D>, sites: &[u32], factor: f64) {
+        let (rows, shifts) = planes(system);
+        self.body.set_planes(rows);
+        self.body.place_planes(&shifts);
+        let piece = system.piece();
+        let mut pieces: Vec<usize> = sites.iter().map(|&site| site as usize / piece).collect();
+        pieces.sort_unstable();
+        pieces.dedup();
+        let ranges: Vec<_> = pieces.iter().map(|k| k * piece..(k + 1) * piece).collect();
+        let particles = system.bonds.particles();
+        let at = |end: usize| particles.partition_point(|&site| (site as usize) < end);
+        let among: Vec<u32> =
+            ranges.iter().flat_map(|range| &particles[at(range.start)..at(range.end)]).copied().collect();
+        self.body.pull_at(&among, factor);
+        self.body.press(Some(&ranges));
     }
 }
 
@@ -257,6 +324,9 @@ fn body_of<const D: usize>(
     let mut body = DeviceBody::new(device, bonds, law, modulus)?;
     body.set_law(law, limit(system))?;
     body.set_loads(&loads(system));
+    let (rows, shifts) = planes(system);
+    body.set_planes(rows);
+    body.place_planes(&shifts);
     let time_step = Some(state.motion.steps.time_step).filter(|&step| step > 0.0);
     let fields = [&state.displacement, &state.velocity, &state.force];
     body.set_state(bonds, fields, time_step.unwrap_or(state.motion.limits.longest))?;

@@ -2,7 +2,7 @@
 
 use crate::bonds::Bonds;
 use crate::error::Error;
-use crate::program::scene::{BodyForceSpec, Boundary, DeviceChoice, ForcePrecision, Scene};
+use crate::program::scene::{BodyForceSpec, Boundary, ContactSpec, DeviceChoice, ForcePrecision, Scene};
 use crate::solver::{Equilibrium, Method, State, StepCallback, System, VelocityVerlet, Watch};
 use harness::scene::{SceneError, Source};
 
@@ -138,7 +138,6 @@ fn beyond_cards<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<(
         ("material.inclusions", !material.inclusions.is_empty(), "inclusions"),
         ("material.critical.convention", scene.softens(), "bonds that soften"),
         ("material.surface_correction", !uniform, "bonds with surface factors"),
-        ("contact", scene.contact.is_some(), "contact"),
         (rotation_key.as_str(), rotation.is_some(), "a rotation"),
         (rigid_key.as_str(), rigid.is_some(), "a region that moves as a whole"),
         (curve_key.as_str(), curve.is_some(), "a curve of time"),
@@ -147,7 +146,29 @@ fn beyond_cards<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<(
         (force_key.as_str(), force.is_some(), "a centrifugal force, or one that follows a curve"),
         ("dynamics.precision", scene.is_mixed(), "mixed precision"),
     ];
-    faults.iter().find(|(_, given, _)| *given).map(|(key, _, found)| ((*key).to_owned(), *found))
+    let first = faults.iter().find(|(_, given, _)| *given).map(|(key, _, found)| ((*key).to_owned(), *found));
+    first.or_else(|| scene.contact.as_ref().and_then(contact_beyond_cards))
+}
+
+/// Key and content of contact that a card cannot do: all but planes without friction.
+fn contact_beyond_cards(contact: &ContactSpec) -> Option<(String, &'static str)> {
+    if contact.has_pairs() {
+        let key = if contact.short_range.is_some() { "short_range" } else { "stiffness" };
+        return Some((format!("contact.{key}"), "contact of particles"));
+    }
+    if !contact.indenter.is_empty() {
+        return Some(("contact.indenter".to_owned(), "an indenter"));
+    }
+    contact.plane.iter().enumerate().find_map(|(index, plane)| {
+        let own = |key: &str| format!("contact.plane[{index}].{key}");
+        if plane.bonded {
+            return Some((own("bonded"), "a bonded plane"));
+        }
+        let rubs = plane.friction.unwrap_or(contact.friction) > 0.0;
+        let key = if plane.friction.is_some() { own("friction") } else { "contact.friction".to_owned() };
+        rubs.then_some((key, "friction"))
+            .or_else(|| plane.curve.as_ref().map(|_| (own("curve"), "a curve of time")))
+    })
 }
 
 #[cfg(feature = "gpu")]

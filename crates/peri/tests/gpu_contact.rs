@@ -1,0 +1,202 @@
+//! Scenes with contact on a graphics card, or on a program that stands for one, compared with the processor.
+
+use harness::case::{Case, Options, Run};
+use harness::scene::Source;
+use peri::Error;
+use peri::gpu::{Device, Precision};
+use peri::program::run::{FinishedScene, Peri};
+use peri::program::scene::Scene;
+use peri::solver::StepRecord;
+
+fn run(name: &str, text: &str) -> Result<FinishedScene, harness::scene::Failure<Error>> {
+    let folder = tempfile::tempdir().unwrap();
+    let source = Source::new(name, text);
+    let scene = source.parse::<Scene>()?;
+    let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(folder.path()));
+    peri::program::run::run(&source, &scene, &mut own)
+}
+
+/// Precisions of this machine's device; reports a skipped test without a device.
+#[track_caller]
+fn precisions() -> Vec<(Precision, &'static str)> {
+    let all = [(Precision::Single, "single"), (Precision::Double, "double")];
+    let has = |(precision, _): &(Precision, &str)| {
+        Device::portable().and_then(|device| device.with_precision(*precision)).is_ok()
+    };
+    let found: Vec<_> = all.into_iter().filter(has).collect();
+    if found.is_empty() {
+        evidence::skipped("a device behind Vulkan, Metal or DirectX 12");
+    }
+    found
+}
+
+fn on_card(text: &str, word: &str) -> FinishedScene {
+    let scene = text.replace("device = \"cpu\"", &format!("device = \"gpu\"\nprecision = \"{word}\""));
+    assert_ne!(scene, text);
+    let found = run("gpu.toml", &scene).unwrap();
+    let note = found.outcomes[0].warnings.join("\n");
+    assert!(note.contains(&format!("in {word} precision")), "{note}");
+    found
+}
+
+/// Numbers of a row of history that a device computes or that follow from its fields.
+fn numbers(row: &StepRecord) -> Vec<f64> {
+    let surfaces = row.resting.iter().flat_map(|resting| {
+        resting.force.into_iter().chain(resting.moved).chain([resting.area, resting.gap])
+    });
+    [row.work, row.stored, row.kinetic, row.damped, row.released, row.load].into_iter().chain(surfaces).collect()
+}
+
+/// Compares runs of a scene on the card with those of the processor: broken bonds, iterations within `apart`,
+/// and all numbers of the history to `allowed` of the greatest of their kind.
+fn compare(name: &str, text: &str, (apart, allowed, single): (u64, f64, f64)) -> FinishedScene {
+    let host = run("host.toml", text).unwrap();
+    for (precision, word) in precisions() {
+        let found = on_card(text, word);
+        let allowed = if precision == Precision::Double { allowed } else { single };
+        for (found, host) in found.outcomes.iter().zip(&host.outcomes) {
+            assert_eq!(found.history.len(), host.history.len(), "{name} in {word}");
+            let greatest = |column: usize| {
+                host.history.iter().map(|row| numbers(row)[column].abs()).fold(0.0, f64::max)
+            };
+            let energy = (0..3).map(greatest).fold(f64::MIN_POSITIVE, f64::max);
+            let mut worst = (0.0_f64, String::new());
+            for (found, host) in found.history.iter().zip(&host.history) {
+                if precision == Precision::Double {
+                    assert_eq!(found.broken, host.broken, "{name}");
+                    let iterations = found.iterations.abs_diff(host.iterations);
+                    assert!(iterations <= apart * host.rounds, "{name}: {found:?} {host:?}");
+                }
+                for (column, (a, b)) in numbers(found).into_iter().zip(numbers(host)).enumerate() {
+                    let size = if column < 5 { energy } else { greatest(column).max(1e-12 * energy) };
+                    // forces and gaps that vanish but for rounding
+                    let size = if size < 1e-9 { 1e-9 } else { size };
+                    let part = (a - b).abs() / size;
+                    if part > worst.0 {
+                        worst = (part, format!("number {column} at {}: {a:e} {b:e}", host.factor));
+                    }
+                }
+            }
+            eprintln!("{name} in {word}: {:.1e}, {}", worst.0, worst.1);
+            evidence::at_most(&format!("{name} in {word}"), worst.0, allowed);
+        }
+    }
+    host
+}
+
+/// A notched plate on a plane, hit by another plane that is inclined and moves, until bonds break beside it.
+const PRESSED: &str = r#"
+version = 1
+program = "peri"
+[body]
+space = "plane-stress"
+thickness = "1 mm"
+spacing = "1 mm"
+shapes = [{ add = "box", min = ["0 mm", "0 mm"], max = ["24 mm", "20 mm"] }]
+cracks = [{ from = ["12 mm", "12 mm"], to = ["12 mm", "21 mm"] }]
+[material]
+youngs_modulus = "191 GPa"
+law = "linear"
+critical = { stretch = 1.012 }
+[[boundary]]
+name = "held"
+min = ["0 mm", "0 mm"]
+max = ["1 mm", "20 mm"]
+displacement = ["0 mm", "free"]
+[contact]
+stiffness = 0
+[[contact.plane]]
+name = "floor"
+point = ["0 mm", "0 mm"]
+normal = [0.0, 1.0]
+stiffness = 2
+[[contact.plane]]
+name = "hammer"
+point = ["24 mm", "20.2 mm"]
+normal = [-0.3, -1.0]
+stiffness = 1.5
+velocity = ["0 m/s", "-60 m/s"]
+[solver]
+method = "verlet"
+[dynamics]
+density = "8000 kg/m^3"
+end_time = "20 us"
+damping = "1000 1/s"
+records = 8
+device = "cpu"
+[output]
+pictures = false
+fields = false
+"#;
+
+#[test]
+fn gpu_planes_press_as_on_the_host() {
+    let host = compare("hammer", PRESSED, (0, 1e-9, 0.05));
+    let last = host.outcomes[0].history.last().unwrap();
+    assert!(last.broken > 10, "{} bonds broke", last.broken);
+    assert!(last.resting.iter().all(|resting| resting.force[1].abs() > 1.0), "{:?}", last.resting);
+    assert!(last.work > 0.0);
+}
+
+/// The plates of a hammer that breaks nothing, whose steps are taken together.
+#[test]
+fn gpu_planes_in_steps_taken_together() {
+    let elastic = PRESSED.replace("critical = { stretch = 1.012 }\n", "");
+    let host = compare("elastic hammer", &elastic, (0, 1e-9, 1e-3));
+    assert!(host.outcomes[0].history.last().unwrap().work > 0.0);
+    let Some((_, word)) = precisions().pop() else { return };
+    let [one, two] = [(); 2].map(|()| on_card(&elastic, word));
+    let rows = |run: &FinishedScene| format!("{:?}", run.outcomes[0].history);
+    assert_eq!(rows(&one), rows(&two), "another run has other bits");
+}
+
+/// A block between planes in equilibrium, of which one moves.
+const SQUEEZED: &str = r#"
+version = 1
+program = "peri"
+[body]
+space = "solid"
+spacing = "1 mm"
+shapes = [{ add = "box", min = ["0 mm", "0 mm", "0 mm"], max = ["8 mm", "7 mm", "9 mm"] }]
+[material]
+youngs_modulus = "3 MPa"
+law = "linear"
+[[boundary]]
+name = "held"
+min = ["0 mm", "0 mm", "0 mm"]
+max = ["1 mm", "7 mm", "9 mm"]
+displacement = ["0 mm", "free", "free"]
+[[boundary]]
+name = "guided"
+min = ["0 mm", "0 mm", "0 mm"]
+max = ["8 mm", "1 mm", "9 mm"]
+displacement = ["free", "0 mm", "free"]
+[contact]
+stiffness = 0
+[[contact.plane]]
+name = "floor"
+point = ["0 mm", "0 mm", "0 mm"]
+normal = [0.0, 0.0, 1.0]
+[[contact.plane]]
+name = "press"
+point = ["8 mm", "0 mm", "9.1 mm"]
+normal = [-0.2, 0.0, -1.0]
+displacement = ["0 mm", "0 mm", "-0.6 mm"]
+[solver]
+method = "adr"
+steps = 3
+device = "cpu"
+[output]
+pictures = false
+fields = false
+"#;
+
+#[test]
+fn gpu_planes_in_equilibria() {
+    let host = compare("press by relaxation", SQUEEZED, (1, 1e-8, 5e-3));
+    let last = host.outcomes[0].history.last().unwrap();
+    assert!(last.resting.iter().all(|resting| resting.force[2].abs() > 0.01), "{:?}", last.resting);
+    let lbfgs = SQUEEZED.replace("method = \"adr\"", "method = \"lbfgs\"\ntolerance = 1e-6");
+    // without the coarse level it takes more iterations, and ends at another place within the tolerance
+    compare("press by L-BFGS", &lbfgs, (1000, 1e-4, 5e-3));
+}
