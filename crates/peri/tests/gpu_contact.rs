@@ -44,7 +44,10 @@ fn numbers(row: &StepRecord) -> Vec<f64> {
     let surfaces = row.resting.iter().flat_map(|resting| {
         resting.force.into_iter().chain(resting.moved).chain([resting.area, resting.gap])
     });
-    [row.work, row.stored, row.kinetic, row.damped, row.released, row.load].into_iter().chain(surfaces).collect()
+    [row.work, row.stored, row.kinetic, row.damped, row.released, row.load]
+        .into_iter()
+        .chain(surfaces)
+        .collect()
 }
 
 /// Compares runs of a scene on the card with those of the processor: broken bonds, iterations within `apart`,
@@ -56,9 +59,8 @@ fn compare(name: &str, text: &str, (apart, allowed, single): (u64, f64, f64)) ->
         let allowed = if precision == Precision::Double { allowed } else { single };
         for (found, host) in found.outcomes.iter().zip(&host.outcomes) {
             assert_eq!(found.history.len(), host.history.len(), "{name} in {word}");
-            let greatest = |column: usize| {
-                host.history.iter().map(|row| numbers(row)[column].abs()).fold(0.0, f64::max)
-            };
+            let greatest =
+                |column: usize| host.history.iter().map(|row| numbers(row)[column].abs()).fold(0.0, f64::max);
             let energy = (0..3).map(greatest).fold(f64::MIN_POSITIVE, f64::max);
             let mut worst = (0.0_f64, String::new());
             for (found, host) in found.history.iter().zip(&host.history) {
@@ -199,4 +201,80 @@ fn gpu_planes_in_equilibria() {
     let lbfgs = SQUEEZED.replace("method = \"adr\"", "method = \"lbfgs\"\ntolerance = 1e-6");
     // without the coarse level it takes more iterations, and ends at another place within the tolerance
     compare("press by L-BFGS", &lbfgs, (1000, 1e-4, 5e-3));
+}
+
+/// A plate turned at its upper end, pulled at its left side and pushed as a whole by curves of time, beside a
+/// plane that follows another.
+const CURVED: &str = r#"
+version = 1
+program = "peri"
+[body]
+space = "plane-stress"
+thickness = "1 mm"
+spacing = "1 mm"
+shapes = [{ add = "box", min = ["0 mm", "0 mm"], max = ["16 mm", "24 mm"] }]
+[material]
+youngs_modulus = "191 GPa"
+law = "linear"
+critical = { stretch = 1.01 }
+[[boundary]]
+name = "turned"
+min = ["0 mm", "22 mm"]
+max = ["16 mm", "24 mm"]
+rotation = { point = ["0 mm", "0 mm"], angle = "0.01 rad" }
+[[boundary]]
+name = "pulled"
+min = ["0 mm", "4 mm"]
+max = ["2 mm", "8 mm"]
+displacement = ["-0.1 mm", "free"]
+curve = "sin(pi*t/2e-5)"
+[[boundary]]
+name = "pushed"
+min = ["10 mm", "8 mm"]
+max = ["14 mm", "12 mm"]
+force = ["900 N", "0 N"]
+curve = "(t/1e-5)^2"
+[[body_force]]
+acceleration = ["0 m/s^2", "-1e6 m/s^2"]
+curve = "cos(pi*t/1e-5)"
+[contact]
+stiffness = 0
+[[contact.plane]]
+name = "press"
+point = ["0 mm", "-0.1 mm"]
+normal = [0.0, 1.0]
+displacement = ["0 mm", "0.3 mm"]
+curve = "t/2e-5"
+[solver]
+method = "verlet"
+[dynamics]
+density = "8000 kg/m^3"
+end_time = "20 us"
+records = 8
+device = "cpu"
+[output]
+pictures = false
+fields = false
+"#;
+
+#[test]
+fn gpu_curves_and_rotations_as_on_the_host() {
+    let host = compare("curves", CURVED, (0, 1e-9, 0.05));
+    let last = host.outcomes[0].history.last().unwrap();
+    assert!(last.broken > 10, "{} bonds broke", last.broken);
+    assert!(host.outcomes[0].history.iter().any(|row| row.resting[0].force[1] > 1.0));
+    let elastic = CURVED.replace("critical = { stretch = 1.01 }\n", "");
+    compare("elastic curves", &elastic, (0, 1e-9, 1e-3));
+    // equilibria at the times of a programme
+    let slow = CURVED.replace("method = \"verlet\"", "method = \"adr\"\ndevice = \"cpu\"");
+    let dynamics = &slow[slow.find("[dynamics]").unwrap()..slow.find("[output]").unwrap()];
+    let time = "[[time.step]]\nduration = \"20 us\"\nincrements = 4\n";
+    let slow = slow.replace(dynamics, time).replace("critical = { stretch = 1.01 }\n", "");
+    // a programme begins without load
+    let slow = slow.replace("-1e6 m/s^2\"]", "-1e6 m/s^2\"]\ndensity = \"8000 kg/m^3\"");
+    let slow = slow
+        .replace("cos(pi*t/1e-5)", "sin(pi*t/1e-5)")
+        .replace("0.01 rad\" }", "0.01 rad\" }\ncurve = \"t/2e-5\"");
+    let host = compare("equilibria of curves", &slow, (1, 1e-7, 0.02));
+    assert_eq!(host.outcomes[0].history.len(), 4);
 }

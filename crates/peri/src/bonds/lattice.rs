@@ -260,6 +260,18 @@ impl<const D: usize> LatticeBonds<D> {
         self.factors.is_none() && self.softening.bonds().is_empty()
     }
 
+    /// Returns true if bonds have softened.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn has_softened(&self) -> bool {
+        !self.softening.bonds().is_empty()
+    }
+
+    /// Factors of particles, over their interior value, and whether they are equal along all axes.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn factors(&self) -> Option<(&Field<D>, bool)> {
+        Some((self.factors.as_ref()?, self.even))
+    }
+
     /// The fitted law and kθ, N/m⁶, where they are set.
     #[cfg(feature = "gpu")]
     pub(crate) fn law(&self) -> Option<(&KernelFit, f64)> {

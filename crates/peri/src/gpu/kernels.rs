@@ -40,6 +40,8 @@ pub struct KernelForm {
     pub held: bool,
     /// Whether body forces act.
     pub loaded: bool,
+    /// Components of the factors of particles that bonds are weighted with: 0, 1, or as many as the body has.
+    pub factors: usize,
     /// Particles of a thread.
     pub tile: usize,
     /// Bonds of a particle that are taken together, a divisor of all its bonds: 1 or 2.
@@ -53,11 +55,40 @@ impl KernelForm {
     }
 }
 
+/// Weight of a bond from the factors g of its ends: (Σ_d (n_d/ḡ_d)²)^(−1/2), ḡ = ½(g_I + g_J); ḡ if they are
+/// equal along all axes. `row` is the place of the bond in `rows`.
+#[cube]
+pub fn weight<F: Float>(
+    factors: &[F],
+    rows: &[F],
+    row: usize,
+    site: usize,
+    there: usize,
+    #[comptime] form: KernelForm,
+) -> F {
+    let half = F::new(0.5);
+    if comptime!(form.factors == 1) {
+        half * (factors[site] + factors[there])
+    } else {
+        let dimension = comptime!(form.dimension);
+        let sites = factors.len() / dimension;
+        let mut sum = F::new(0.0);
+        #[unroll]
+        for d in 0..dimension {
+            let mean = half * (factors[d * sites + site] + factors[d * sites + there]);
+            let along = rows[row + d] / mean;
+            sum = fma(along, along, sum);
+        }
+        F::new(1.0) / F::sqrt(sum * rows[row + dimension])
+    }
+}
+
 /// Adds the force of bond `k` on the particle `p` of a thread, in `site`; its e.
 #[cube]
 #[allow(clippy::too_many_arguments)]
 fn add_bond<F: Float>(
     displacement: &[F],
+    factors: &[F],
     shifts: &[i32],
     rows: &[F],
     law: &Array<F>,
@@ -105,6 +136,9 @@ fn add_bond<F: Float>(
         q += law[ends];
     }
     q *= rows[row + dimension + 1];
+    if comptime!(form.factors > 0) {
+        q *= weight::<F>(factors, rows, row, site as usize, there, form);
+    }
     #[unroll]
     for d in 0..dimension {
         sum[p * dimension + d] = fma(q, zeta[d], sum[p * dimension + d]);
@@ -123,7 +157,7 @@ fn note<F: Float>(count: &[Atomic<u32>], list: &mut [u32], elongations: &mut [F]
     }
 }
 
-/// Force densities Σ_J c q(e) ζ of particles, with e = η·(2ξ + η)/|ξ|², plus `factor` times the body force.
+/// Force densities Σ_J c w q(e) ζ of particles, with the weights w of [`weight`] and e = η·(2ξ + η)/|ξ|², plus `factor` times the body force.
 /// Where it `looks`, each thread writes the least and greatest e of its bonds, and lists bonds beyond the
 /// law's last number.
 ///
@@ -132,6 +166,7 @@ fn note<F: Float>(count: &[Atomic<u32>], list: &mut [u32], elongations: &mut [F]
 #[allow(clippy::too_many_arguments, clippy::collapsible_if)]
 pub fn pull<F: Float>(
     displacement: &[F],
+    factors: &[F],
     particles: &[u32],
     shifts: &[i32],
     rows: &[F],
@@ -204,6 +239,7 @@ pub fn pull<F: Float>(
                         for p in 0..tile {
                             let e = add_bond::<F>(
                                 displacement,
+                                factors,
                                 shifts,
                                 rows,
                                 &coefficients,
@@ -246,6 +282,7 @@ pub fn pull<F: Float>(
                         if before[p] & bit != 0 {
                             let e = add_bond::<F>(
                                 displacement,
+                                factors,
                                 shifts,
                                 rows,
                                 &coefficients,
@@ -472,6 +509,27 @@ pub fn fold<F: Float>(
 pub fn scatter(places: &[u32], values: &[u32], into: &mut [u32]) {
     if ABSOLUTE_POS < places.len() {
         into[places[ABSOLUTE_POS] as usize] = values[ABSOLUTE_POS];
+    }
+}
+
+/// Replaces values of a field in some sites.
+#[cube(launch_unchecked)]
+pub fn put<F: Float>(
+    sites: &[u32],
+    values: &[F],
+    into: &mut [F],
+    #[comptime] form: KernelForm,
+    #[define(F)] _precision: ElemType,
+) {
+    let count = sites.len();
+    if ABSOLUTE_POS >= count {
+        terminate!();
+    }
+    let dimension = comptime!(form.dimension);
+    let all = into.len() / dimension;
+    #[unroll]
+    for d in 0..dimension {
+        into[d * all + sites[ABSOLUTE_POS] as usize] = values[d * count + ABSOLUTE_POS];
     }
 }
 

@@ -12,6 +12,7 @@
 //! step, and fetches fields for rows of the history only.
 
 mod body;
+mod driven;
 mod kernels;
 mod lbfgs;
 mod lbfgs_kernels;
@@ -22,6 +23,7 @@ mod relaxation_kernels;
 mod steps;
 
 pub use body::{DeviceBody, DeviceLoads, MOST_STEPS};
+pub use driven::DrivenSites;
 pub use lbfgs::{DeviceLineSums, DeviceSearch};
 pub use relaxation::{DeviceRelaxation, RelaxationSums};
 pub use steps::{DeviceStep, ListedBond, StepSums};

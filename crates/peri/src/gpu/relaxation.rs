@@ -131,6 +131,7 @@ impl<const D: usize> DeviceRelaxation<D> {
                 body.cubes_of(body.particles),
                 CubeDim::new_1d(CUBE as u32),
                 buffer(&body.fields[0], D * body.sites),
+                body.factors(),
                 buffer(&body.sites_of_particles, body.particles),
                 buffer(&body.shifts, bonds),
                 buffer(&body.rows, bonds * (D + super::kernels::ROW)),

@@ -19,8 +19,10 @@ pub struct DeviceStep {
     pub density: f64,
     /// Mass-proportional damping c, 1/s.
     pub damping: f64,
-    /// Load factor before and after.
+    /// Load factor before and after, of prescribed displacements.
     pub factors: [f64; 2],
+    /// Factor of body forces before and after.
+    pub loading: [f64; 2],
     /// Rate of the load factor after the step, 1/s.
     pub rate: f64,
 }
@@ -149,7 +151,7 @@ impl<const D: usize> DeviceBody<D> {
         let speed = self.spacing / step.time_step;
         let mass = 0.5 * step.density * self.volume;
         let damping = mass * step.damping * speed * self.spacing;
-        let [before, after] = step.factors;
+        let [before, after] = step.loading;
         let kick = LEAP_SUMS;
         StepSums {
             work: [
@@ -286,6 +288,7 @@ impl<const D: usize> DeviceBody<D> {
                 self.cubes_of(threads),
                 CubeDim::new_1d(CUBE as u32),
                 buffer(displacement, D * self.sites),
+                self.factors(),
                 buffer(sites, count),
                 buffer(&self.shifts, form.bonds),
                 buffer(&self.rows, form.bonds * (D + super::kernels::ROW)),

@@ -90,10 +90,8 @@ pub fn refuse<const D: usize>(system: &System<D>) -> Result<(), Error> {
             "a solid, or bonds with prestrains, of several laws, or that soften",
         ),
         (softens, "bonds that break by their energy"),
-        (!system.loads.turned.is_empty(), "a rotation"),
         (!system.loads.rigid.is_empty(), "a region that moves as a whole"),
-        (system.loads.curved.is_some(), "a curve of time"),
-        (!system.density_ratios.is_empty(), "parts of their own density"),
+        (system.loads.follows(), "a body force that follows the displacement"),
     ];
     let contact = system.repulsion().and_then(Contact::beyond_planes);
     match what.iter().find(|(has, _)| *has).map(|(_, what)| *what).or(contact) {

@@ -112,7 +112,8 @@ impl<const D: usize> SearchVectors<D> for CardVectors<'_, D> {
         if self.fitted != state.stretches.fitted {
             self.take_law(system, state)?;
         }
-        let (factor, pushed) = (system.factors[state.step], self.pushed);
+        let factor = system.loads.force_factor(system.factors[state.step]);
+        let pushed = self.pushed;
         let card = self.card()?;
         card.body.pull(factor, true);
         let found = card.line_sums(false)?;

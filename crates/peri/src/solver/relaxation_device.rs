@@ -90,7 +90,7 @@ impl<const D: usize> CardRelaxation<'_, D> {
     ) -> Result<bool, Error> {
         let (goal, iteration) = (self.settings.goal(), state.counts.iteration);
         let look = is_look_due(system, state);
-        let factor = system.factors[state.step];
+        let factor = system.loads.force_factor(system.factors[state.step]);
         let own = has_own_mass(system, state);
         if own && (iteration.is_multiple_of(REFRESH) || !self.stiffened) {
             let fitted = state.stretches.fitted;

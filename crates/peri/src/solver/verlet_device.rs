@@ -16,7 +16,8 @@ use super::verlet_step::VerletSums;
 use crate::bonds::{LatticeBonds, Overstretched};
 use crate::contact::{Contact, RigidSurface};
 use crate::error::Error;
-use crate::gpu::{Device, DeviceBody, DeviceStep, MOST_STEPS, StepSums};
+use crate::field::Field;
+use crate::gpu::{Device, DeviceBody, DeviceStep, DrivenSites, MOST_STEPS, StepSums};
 
 /// Strain of a step, over that of the last, that steps taken together allow for.
 const GROWTH: f64 = 1.5;
@@ -28,11 +29,13 @@ struct Run<const D: usize> {
     strain: f64,
     /// True if planes move.
     pushed: bool,
+    /// Sites of prescribed displacements and of body forces that are not proportional to the load factor.
+    driven: Option<[DrivenSites; 2]>,
 }
 
 impl VelocityVerlet {
     /// As [`Method::solve`](super::Method::solve), with steps on a device: of a lattice of a bond law, in
-    /// contact with planes at most, without turned regions. `watch` may keep the state after a row of history only.
+    /// contact with planes at most. `watch` may keep the state after a row of history only.
     ///
     /// # Errors
     /// As there; [`Error::Device`] for what the device cannot do, or where it fails.
@@ -45,12 +48,12 @@ impl VelocityVerlet {
         finished: &mut StepCallback<D>,
     ) -> Result<(), Error> {
         refuse(system)?;
+        refuse_in_steps(system)?;
         self.open(system, state)?;
-        let mut run = Run {
-            body: body_of(device, system, state)?,
-            strain: f64::INFINITY,
-            pushed: system.contact.iter().flat_map(Contact::surfaces).any(RigidSurface::moves),
-        };
+        let body = body_of(device, system, state)?;
+        let driven = driven_sites(system).map(|sites| sites.map(|sites| body.driven(sites)));
+        let pushed = system.contact.iter().flat_map(Contact::surfaces).any(RigidSurface::moves);
+        let mut run = Run { body, strain: f64::INFINITY, pushed, driven };
         while state.step < self.records {
             let end = self.end_of_row(state);
             while state.motion.steps.taken < state.motion.steps.planned {
@@ -103,8 +106,9 @@ impl VelocityVerlet {
         let after = steps.time_after(end);
         let (factor, rate) = self.factor(system, after);
         let factors = [self.factor(system, before).0, factor];
+        let loading = factors.map(|factor| system.loads.force_factor(factor));
         let (time_step, density, damping) = (steps.time_step, self.density, self.damping);
-        (DeviceStep { time_step, density, damping, factors, rate }, after)
+        (DeviceStep { time_step, density, damping, factors, loading, rate }, after)
     }
 
     fn advance_many<const D: usize>(
@@ -131,6 +135,7 @@ impl VelocityVerlet {
             look.slack += strain;
             if look.is_due(state.stretches.fitted, system.breaking_stretch()) {
                 run.body.take_back(before);
+                run.force(system, constants[0].factors[0]);
                 steps[..taken].iter().for_each(|step| run.step(system, step));
                 run.strain = f64::INFINITY;
                 return Ok(());
@@ -152,10 +157,9 @@ impl VelocityVerlet {
         end: f64,
     ) -> Result<(), Error> {
         let (step, after) = self.step_ahead(system, state, 0, end);
-        let factor = step.factors[1];
-        run.body.half_kick_and_drift(&step);
-        run.place(system, factor, after);
-        run.body.pull(factor, true);
+        run.leap(system, &(step, after));
+        let loading = step.loading[1];
+        run.body.pull(loading, true);
         let (observed, listed) = run.body.stretch_range()?;
         run.body.keep_sums(0);
         let sums = run.body.sums(&[step])?[0];
@@ -168,7 +172,7 @@ impl VelocityVerlet {
             state.motion.look = StretchLook::new(observed);
             if observed.high.is_finite() && system.widen(state)? {
                 run.take_law(system)?;
-                run.body.pull(factor, false);
+                run.body.pull(loading, false);
                 system.count_evaluation(state);
                 self.cover(system, state);
             }
@@ -180,7 +184,7 @@ impl VelocityVerlet {
         if look && system.is_overstretched(observed) {
             let list = run.overstretched(system, state, listed)?;
             let sites = system.sever_bonds(state, list, None);
-            run.take_severed(system, state, &sites, factor);
+            run.take_severed(system, state, &sites, loading);
         }
         let motion = &mut state.motion;
         if motion.limits.longest < (1.0 - 1e-9) * motion.steps.time_step
@@ -217,11 +221,35 @@ impl VelocityVerlet {
 }
 
 impl<const D: usize> Run<D> {
-    fn step(&mut self, system: &System<D>, (step, after): &(DeviceStep, f64)) {
+    fn step(&mut self, system: &mut System<D>, step: &(DeviceStep, f64)) {
+        self.leap(system, step);
+        self.body.pull(step.0.loading[1], false);
+        self.body.kick(&step.0);
+    }
+
+    /// The first half of a step, and loads and planes at its end.
+    fn leap(&mut self, system: &mut System<D>, (step, after): &(DeviceStep, f64)) {
+        let [before, factor] = step.factors;
+        if let Some([held, _]) = &self.driven {
+            system.set_ends(factor);
+            self.body.drive_held(held, &loads(system));
+        }
         self.body.half_kick_and_drift(step);
-        self.place(system, step.factors[1], *after);
-        self.body.pull(step.factors[1], false);
-        self.body.kick(step);
+        if let Some([held, _]) = &self.driven {
+            system.set_rates(before, factor);
+            self.body.drive_held(held, &loads(system));
+            self.force(system, factor);
+        }
+        self.place(system, factor, *after);
+    }
+
+    /// Takes the body forces at a load factor.
+    fn force(&self, system: &mut System<D>, factor: f64) {
+        if let Some([_, pushed]) = &self.driven {
+            // none depends on the displacement
+            system.set_forces(factor, &Field::zeros(0));
+            self.body.drive_pushed(pushed, &loads(system));
+        }
     }
 
     /// Moves planes to a load factor and a time, s.
@@ -276,8 +304,8 @@ impl<const D: usize> Run<D> {
         Ok(each.collect())
     }
 
-    /// Takes the bonds left to sites, and their forces.
-    fn take_severed(&mut self, system: &System<D>, state: &State<D>, sites: &[u32], factor: f64) {
+    /// Takes the bonds left to sites, and their forces with a factor of body forces.
+    fn take_severed(&mut self, system: &System<D>, state: &State<D>, sites: &[u32], loading: f64) {
         let Some(words) = state.fracture.intact.as_ref().filter(|_| !sites.is_empty()) else { return };
         let all = system.bonds.sites();
         let rows = words.len() / all;
@@ -289,15 +317,15 @@ impl<const D: usize> Run<D> {
             self.body.set_loads(&loads(system));
         }
         if system.repulsion().is_some() {
-            self.press_severed(system, sites, factor);
+            self.press_severed(system, sites, loading);
         } else {
-            self.body.pull_at(sites, factor);
+            self.body.pull_at(sites, loading);
         }
     }
 
     /// Takes the faces and particles that planes touch now, and the forces of sites whose bonds have broken
     /// and of those beside them, as the host renews them: by pieces.
-    fn press_severed(&mut self, system: &System<D>, sites: &[u32], factor: f64) {
+    fn press_severed(&mut self, system: &System<D>, sites: &[u32], loading: f64) {
         let (rows, shifts) = planes(system);
         self.body.set_planes(rows);
         self.body.place_planes(&shifts);
@@ -310,9 +338,38 @@ impl<const D: usize> Run<D> {
         let at = |end: usize| particles.partition_point(|&site| (site as usize) < end);
         let among: Vec<u32> =
             ranges.iter().flat_map(|range| &particles[at(range.start)..at(range.end)]).copied().collect();
-        self.body.pull_at(&among, factor);
+        self.body.pull_at(&among, loading);
         self.body.press(Some(&ranges));
     }
+}
+
+/// Refuses what only the host does in steps of time.
+fn refuse_in_steps<const D: usize>(system: &System<D>) -> Result<(), Error> {
+    let formulas = system.loads.curved.as_ref().is_some_and(|curved| !curved.fields.is_empty());
+    let what = [
+        (formulas, "formulas of place and time"),
+        (!system.density_ratios.is_empty(), "parts of their own density"),
+    ];
+    match what.iter().find(|(has, _)| *has) {
+        Some((_, what)) => Err(Error::Device(format!("unexpected {what}: only the processor does that"))),
+        None => Ok(()),
+    }
+}
+
+/// Sites of prescribed displacements, and of body forces, that are not proportional to the load factor;
+/// `None` if all are.
+fn driven_sites<const D: usize>(system: &System<D>) -> Option<[Vec<u32>; 2]> {
+    let loads = &system.loads;
+    let (turned, curved) = (&loads.turned, &loads.curved);
+    let of_curves = curved.iter().flat_map(|curved| &curved.held).flat_map(|region| &region.sites);
+    let held = turned.iter().flat_map(|region| &region.sites).chain(of_curves).copied();
+    let pushed = curved.iter().flat_map(|curved| &curved.pushed).flat_map(|region| &region.sites).copied();
+    let sorted = |mut sites: Vec<u32>| {
+        sites.sort_unstable();
+        sites.dedup();
+        sites
+    };
+    (!loads.is_proportional()).then(|| [sorted(held.collect()), sorted(pushed.collect())])
 }
 
 fn body_of<const D: usize>(
