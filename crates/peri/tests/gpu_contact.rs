@@ -1,12 +1,22 @@
 //! Scenes with contact on a graphics card, or on a program that stands for one, compared with the processor.
 
+#[path = "it/bodies.rs"]
+#[allow(dead_code)] // shared by all tests
+mod bodies;
+
+use bodies::{Body, MODULUS};
 use harness::case::{Case, Options, Run};
 use harness::scene::Source;
 use peri::Error;
+use peri::bonds::{BodyGeometry, LatticeBonds};
+use peri::contact::{Contact, RigidSurface};
 use peri::gpu::{Device, Precision};
+use peri::material::BondMaterial;
+use peri::potential::Law;
 use peri::program::run::{FinishedScene, Peri};
 use peri::program::scene::Scene;
-use peri::solver::StepRecord;
+use peri::solver::{Breaking, Loads, Method, Policy, State, Status, StepRecord, System, VelocityVerlet};
+use peri::surface::BodySurface;
 
 fn run(name: &str, text: &str) -> Result<FinishedScene, harness::scene::Failure<Error>> {
     let folder = tempfile::tempdir().unwrap();
@@ -277,4 +287,131 @@ fn gpu_curves_and_rotations_as_on_the_host() {
         .replace("0.01 rad\" }", "0.01 rad\" }\ncurve = \"t/2e-5\"");
     let host = compare("equilibria of curves", &slow, (1, 1e-7, 0.02));
     assert_eq!(host.outcomes[0].history.len(), 4);
+}
+
+/// A block that is driven against another one, which a plane stops.
+const BLOCKS: &str = r#"
+version = 1
+program = "peri"
+[body]
+space = "plane-stress"
+thickness = "1 mm"
+spacing = "1 mm"
+shapes = [
+  { add = "box", min = ["0 mm", "0 mm"], max = ["10 mm", "14 mm"] },
+  { add = "disk", centre = ["20 mm", "7 mm"], radius = "6 mm" },
+]
+[material]
+youngs_modulus = "191 GPa"
+law = "linear"
+[[boundary]]
+name = "driven"
+min = ["0 mm", "0 mm"]
+max = ["2 mm", "14 mm"]
+displacement = ["5 mm", "0 mm"]
+[contact]
+[[contact.plane]]
+name = "wall"
+point = ["25.9 mm", "0 mm"]
+normal = [-1.0, 0.1]
+[solver]
+method = "verlet"
+[dynamics]
+density = "8000 kg/m^3"
+end_time = "30 us"
+ramp = "30 us"
+records = 6
+device = "cpu"
+[output]
+pictures = false
+fields = false
+"#;
+
+#[test]
+fn gpu_pieces_touch_as_on_the_host() {
+    let host = compare("blocks", BLOCKS, (0, 1e-9, 0.05));
+    let last = host.outcomes[0].history.last().unwrap();
+    let touches = |row: &StepRecord| row.contact.is_some_and(|contact| contact.pairs > 2);
+    assert!(host.outcomes[0].history.iter().any(touches) && last.resting[0].force[0] < -1.0, "{last:?}");
+    // cracks whose flanks touch, and pieces of them
+    let touching = PRESSED.replace("stiffness = 0\n", "stiffness = 2\n");
+    let host = compare("hammer on pieces", &touching, (0, 1e-9, 0.05));
+    let last = host.outcomes[0].history.last().unwrap();
+    assert!(last.broken > 10 && last.contact.unwrap().pairs > 5, "{last:?}");
+    let broken = BLOCKS.replace("law = \"linear\"", "law = \"linear\"\ncritical = { stretch = 1.02 }");
+    let host = compare("blocks that break", &broken, (0, 1e-9, 0.05));
+    assert!(host.outcomes[0].history.last().unwrap().broken > 10);
+}
+
+const DENSITY: f64 = 2.3;
+
+/// A sheet with slits and a hole that a plane crushes, from a state; the state after row `stop`, or the last.
+fn crush(device: Option<&Device>, state: Option<State<2>>, stop: Option<usize>) -> State<2> {
+    let mut bonds = damaged();
+    let stiffness = bonds.particles().iter().map(|&site| {
+        let mut sum = 0.0;
+        bonds.neighbours(site as usize, &mut |bond| sum += 2.0 * MODULUS * bond.weight / bond.length);
+        sum
+    });
+    let stiffest = stiffness.fold(0.0, f64::max);
+    let step = (DENSITY / (2.0 * stiffest)).sqrt();
+    let solver = VelocityVerlet { records: 6, ..VelocityVerlet::new(DENSITY, 150.0 * step) };
+    let modulus = 0.2 * stiffest * bonds.spacing().powi(2);
+    let floor = RigidSurface::plane([0.0, 0.0], [0.1, 1.0]);
+    let mut hammer = RigidSurface::plane([0.0, 0.0301], [0.1, -1.0]);
+    hammer.velocity = [0.0, -0.0035 / (150.0 * step)];
+    let surfaces = vec![floor, hammer].into_iter().map(|plane| RigidSurface { stiffness: 2.0, ..plane });
+    let contact = Contact::new(&bonds, modulus, 2.0).unwrap();
+    let outside = BodySurface::of_lattice(&bonds);
+    let contact = contact.with_surfaces(&bonds, &outside, modulus, surfaces.collect()).unwrap();
+    let mut state = state.unwrap_or_else(|| State::new(bonds.sites()));
+    let law = Law::Linear.build(1.0, 1.0, false).unwrap();
+    let loads = Loads::default();
+    let mut system = System::new(&mut bonds, BondMaterial::new(&*law, MODULUS), &loads, &[]);
+    system.breaking = Some(Breaking { criterion: 1.03.into(), policy: Policy::default() });
+    system.contact = Some(contact);
+    let mut kept = None;
+    let mut watch = |status: &Status, state: &State<2>| {
+        if status.restartable && stop.is_some_and(|stop| state.step == stop) {
+            // through the checkpoint's own format
+            kept = Some(postcard::to_stdvec(state).unwrap());
+            return Err(Error::Device("stopped".to_owned()));
+        }
+        Ok(())
+    };
+    let finished = &mut |_: &dyn peri::bonds::Bonds<2>, _: &State<2>| Ok(());
+    let result = match device {
+        Some(device) => solver.solve_on(device, &mut system, &mut state, &mut watch, finished),
+        None => solver.solve(&mut system, &mut state, &mut watch, finished),
+    };
+    assert_eq!(result.is_err(), stop.is_some(), "{result:?}");
+    kept.map_or(state, |kept| postcard::from_bytes(&kept).unwrap())
+}
+
+fn damaged() -> LatticeBonds<2> {
+    Body { surface: None, ..Body::damaged([24, 30], 1e-3, 3.015) }.build().lattice
+}
+
+/// Bits repeat, and a run that is stopped and continued agrees to rounding.
+#[test]
+fn gpu_contact_repeats_and_continues() {
+    let host = crush(None, None, None);
+    let last = host.history.last().unwrap();
+    assert!(last.broken > 10 && last.contact.unwrap().pairs > 10, "{last:?}");
+    let Some((precision, _)) = precisions().pop() else { return };
+    let device = Device::portable().unwrap().with_precision(precision).unwrap();
+    let whole = crush(Some(&device), None, None);
+    assert!(whole == crush(Some(&device), None, None), "another run has other bits");
+    let resumed = crush(Some(&device), Some(crush(Some(&device), None, Some(3))), None);
+    for (name, other) in [("the host", &host), ("a continued run", &resumed)] {
+        let components = |state: &State<2>| state.displacement.components().concat();
+        let greatest = components(other).into_iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        let pairs = components(&whole).into_iter().zip(components(other));
+        let apart = pairs.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs())) / greatest;
+        eprintln!("crushed sheet against {name}: {apart:.1e} of the greatest");
+        if precision == Precision::Double {
+            assert_eq!(whole.fracture.events, other.fracture.events, "{name}");
+            evidence::at_most(&format!("crushed sheet against {name}"), apart, 1e-9);
+        }
+    }
 }

@@ -57,7 +57,7 @@ use list::ContactList;
 #[cfg(feature = "case")]
 pub(crate) use pushed_surfaces::BEHIND;
 #[cfg(feature = "gpu")]
-pub use rows::PlaneRows;
+pub use rows::{PairRows, PlaneRows, numbers_within};
 use serde::{Deserialize, Serialize};
 pub use stiffness::Spring;
 pub use surface::{RigidSurface, SurfaceReaction, SurfaceShape};

@@ -1,9 +1,12 @@
 //! Contact in compressed rows, as a graphics card takes it.
 
 use super::Contact;
+use super::list::difference;
 use super::stiffness::mixed;
 use super::surface::SurfaceShape;
 use super::surfaces::RigidSurfaces;
+use crate::bonds::BodyGeometry;
+use crate::field::Field;
 use std::ops::Range;
 
 /// Contact with planes: elements, which are faces and then bare particles, and the particles below them.
@@ -30,25 +33,40 @@ pub struct PlaneRows<const D: usize> {
     pub near: f64,
 }
 
+/// Pairs of particles without a bond that are near each other, each from both ends.
+pub struct PairRows<const D: usize> {
+    /// Sites of particles with others near them, ascending.
+    pub sites: Vec<u32>,
+    /// Ends of their entries, after a 0.
+    pub ends: Vec<u32>,
+    /// Site of the other particle.
+    pub others: Vec<u32>,
+    /// ξ, m.
+    pub bonds: Vec<[f64; D]>,
+    /// Contact distance d, m.
+    pub distances: Vec<f64>,
+    /// k V of the other particle, N/m⁴.
+    pub stiffness: Vec<f64>,
+}
+
 impl<const D: usize> PlaneRows<D> {
     /// Number of elements.
     pub fn elements(&self) -> usize {
         self.ends.len() - 1
     }
+}
 
-    /// Numbers of the particles whose sites lie in `sites`.
-    pub fn particles_in(&self, sites: Range<usize>) -> Range<usize> {
-        let at = |end: usize| self.sites.partition_point(|&site| (site as usize) < end);
-        at(sites.start)..at(sites.end)
-    }
+/// Numbers of those in an ascending list of sites that lie in ranges.
+pub fn numbers_within(list: &[u32], ranges: &[Range<usize>]) -> Vec<u32> {
+    let at = |end: usize| list.partition_point(|&site| (site as usize) < end) as u32;
+    ranges.iter().flat_map(|range| at(range.start)..at(range.end)).collect()
 }
 
 impl<const D: usize> Contact<D> {
-    /// First thing besides frictionless planes that move by themselves.
-    pub fn beyond_planes(&self) -> Option<&'static str> {
+    /// First thing besides contact of particles and planes that move by themselves, without friction.
+    pub fn beyond_rows(&self) -> Option<&'static str> {
         let any = |is: &dyn Fn(&super::RigidSurface<D>) -> bool| self.surfaces().any(is);
         [
-            (self.has_pairs(), "contact of particles"),
             (self.ties.is_some(), "tied grips"),
             (self.has_friction(), "friction"),
             (any(&|surface| surface.bonded), "a bonded plane"),
@@ -62,6 +80,41 @@ impl<const D: usize> Contact<D> {
     /// Rows of the present elements and planes; `None` without surfaces.
     pub fn plane_rows(&self) -> Option<PlaneRows<D>> {
         Some(self.surfaces.as_ref()?.rows(self.near))
+    }
+
+    /// Rows of the pairs that are listed; `None` if particles do not repel each other.
+    pub fn pair_rows(&self, bonds: &dyn BodyGeometry<D>) -> Option<PairRows<D>> {
+        let (mut sites, mut ends, mut others) = (Vec::new(), vec![0], Vec::new());
+        let (mut along, mut distances, mut stiffness) = (Vec::new(), Vec::new(), Vec::new());
+        for (own, candidates) in self.list.candidates().take_while(|_| self.has_pairs()) {
+            let home = bonds.position(own as usize);
+            for other in candidates {
+                let bond = difference(home, bonds.position(other as usize));
+                others.push(other);
+                along.push(bond);
+                distances.push(self.list.distance(own as usize, other as usize, bond));
+                stiffness.push(self.pair(own, other) * bonds.volume(other as usize));
+            }
+            sites.push(own);
+            ends.push(others.len() as u32);
+        }
+        let rows = PairRows { sites, ends, others, bonds: along, distances, stiffness };
+        self.has_pairs().then_some(rows)
+    }
+
+    /// Makes the list of pairs hold for a displacement; returns true if others are listed now.
+    pub fn renew_pairs(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> bool {
+        self.has_pairs() && self.list.renew(bonds, displacement)
+    }
+
+    /// Distance by which every particle may move after [`Self::renew_pairs`] until pairs must be renewed, m.
+    pub fn room_of_pairs(&self) -> f64 {
+        if self.has_pairs() { self.list.room() } else { f64::INFINITY }
+    }
+
+    /// [`Self::greatest_stiffness`] from that of pairs, N/m⁴.
+    pub fn stiffness_with_pairs(&self, pairs: f64) -> f64 {
+        pairs + self.half_surface_stiffness()
     }
 
     /// Displacements of the surfaces along their normals, m, as they stand.
@@ -102,7 +155,7 @@ impl<const D: usize> RigidSurfaces<D> {
             }
             ends.push(below.len() as u32);
         }
-        let rest = crate::field::Field::zeros(self.volumes.len());
+        let rest = Field::zeros(self.volumes.len());
         let (mut normals, mut heights, mut stiffness) = (Vec::new(), Vec::new(), Vec::new());
         for placed in &self.each {
             let SurfaceShape::Plane(normal) = placed.surface.shape else { continue };

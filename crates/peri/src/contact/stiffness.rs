@@ -29,7 +29,7 @@ impl<const D: usize> Contact<D> {
         pairs + self.half_surface_stiffness()
     }
 
-    fn half_surface_stiffness(&self) -> f64 {
+    pub(super) fn half_surface_stiffness(&self) -> f64 {
         let surfaces = self.surfaces.as_ref().map_or(0.0, RigidSurfaces::stiffness);
         0.5 * (surfaces + self.ties.as_ref().map_or(0.0, Ties::greatest))
     }

@@ -1,6 +1,7 @@
 //! A lattice on a device: its buffers, and the launches of its kernels.
 
 use super::kernels::{CUBE, KernelForm, ROW, SUMS};
+use super::pairs::DevicePairs;
 use super::planes::DevicePlanes;
 use super::{Device, Precision};
 use crate::bonds::{BodyGeometry, BondDamage, LatticeBonds, Rational, not_finite};
@@ -67,6 +68,7 @@ pub struct DeviceBody<const D: usize> {
     pub(super) list: Handle,
     pub(super) elongations: Handle,
     pub(super) planes: Option<DevicePlanes<D>>,
+    pub(super) pairs: Option<DevicePairs>,
 }
 
 impl<const D: usize> DeviceBody<D> {
@@ -172,6 +174,7 @@ impl<const D: usize> DeviceBody<D> {
             list: client.empty(4 * 2 * LISTED),
             elongations: empty(LISTED),
             planes: None,
+            pairs: None,
             client,
         };
         body.set_law(law, f64::INFINITY)?;

@@ -16,6 +16,8 @@ mod driven;
 mod kernels;
 mod lbfgs;
 mod lbfgs_kernels;
+mod pair_kernels;
+mod pairs;
 mod plane_kernels;
 mod planes;
 mod relaxation;

@@ -4,7 +4,7 @@ use super::body::{DeviceBody, LANES, MOST_STEPS, numbers};
 use super::kernels::CUBE;
 use super::plane_kernels::{PLANE, press, spread_pushes, stop, weigh};
 use super::steps::buffer;
-use crate::contact::PlaneRows;
+use crate::contact::{PlaneRows, numbers_within};
 use crate::error::Error;
 use cubecl::prelude::*;
 use cubecl::server::Handle;
@@ -97,9 +97,7 @@ impl<const D: usize> DeviceBody<D> {
         let Some(planes) = &self.planes else { return };
         self.launch_press(planes, false);
         let rows = &planes.rows;
-        let chosen: Option<Vec<u32>> = among.map(|ranges| {
-            ranges.iter().flat_map(|range| rows.particles_in(range.clone())).map(|row| row as u32).collect()
-        });
+        let chosen = among.map(|ranges| numbers_within(&rows.sites, ranges));
         let count = chosen.as_ref().map_or(rows.sites.len(), Vec::len);
         if count == 0 {
             return;

@@ -76,7 +76,7 @@ impl<const D: usize> DeviceBody<D> {
         }
     }
 
-    /// Forces of the present displacement with body forces at a load factor, and of planes. Where it `looks`,
+    /// Forces of the present displacement with body forces at a load factor, and of contact. Where it `looks`,
     /// [`Self::stretch_range`] has what it saw.
     pub fn pull(&mut self, factor: f64, looks: bool) {
         if looks {
@@ -86,9 +86,10 @@ impl<const D: usize> DeviceBody<D> {
         let all = (&self.sites_of_particles, self.particles);
         self.launch_pull([displacement, force], all, factor, self.form, looks);
         self.press(None);
+        self.part(None);
     }
 
-    /// Forces of some sites, without those of planes.
+    /// Forces of some sites, without those of contact.
     pub fn pull_at(&self, sites: &[u32], factor: f64) {
         let [displacement, _, force] = &self.fields;
         let some = self.client.create_from_slice(u32::as_bytes(sites));

@@ -3,7 +3,7 @@
 use super::criterion::Criterion;
 use super::system::System;
 use crate::bonds::{LatticeBonds, Property};
-use crate::contact::{Contact, PlaneRows};
+use crate::contact::{Contact, PairRows, PlaneRows};
 use crate::error::Error;
 use crate::field::Field;
 use crate::gpu::DeviceLoads;
@@ -34,6 +34,11 @@ pub fn loads<'a, const D: usize>(system: &'a System<D>) -> DeviceLoads<'a, D> {
 pub fn planes<const D: usize>(system: &System<D>) -> (Option<PlaneRows<D>>, Vec<f64>) {
     let contact = system.repulsion();
     (contact.and_then(Contact::plane_rows), contact.map_or_else(Vec::new, Contact::plane_shifts))
+}
+
+/// Rows of the pairs of particles that may touch in a system.
+pub fn pairs<const D: usize>(system: &System<D>) -> Option<PairRows<D>> {
+    system.repulsion().and_then(|contact| contact.pair_rows(&*system.bonds))
 }
 
 /// Lattice of a system.
@@ -76,6 +81,15 @@ pub fn held_as_before<const D: usize>(
     displacement
 }
 
+/// Refuses what only the host can do in searches for equilibrium.
+pub fn refuse_in_searches<const D: usize>(system: &System<D>) -> Result<(), Error> {
+    if system.repulsion().is_some_and(Contact::has_pairs) {
+        let what = "unexpected contact of particles in equilibria: only the processor does that";
+        return Err(Error::Device(what.to_owned()));
+    }
+    refuse(system)
+}
+
 /// Refuses what only the host can do.
 pub fn refuse<const D: usize>(system: &System<D>) -> Result<(), Error> {
     let softens = matches!(
@@ -93,7 +107,7 @@ pub fn refuse<const D: usize>(system: &System<D>) -> Result<(), Error> {
         (!system.loads.rigid.is_empty(), "a region that moves as a whole"),
         (system.loads.follows(), "a body force that follows the displacement"),
     ];
-    let contact = system.repulsion().and_then(Contact::beyond_planes);
+    let contact = system.repulsion().and_then(Contact::beyond_rows);
     match what.iter().find(|(has, _)| *has).map(|(_, what)| *what).or(contact) {
         Some(what) => Err(Error::Device(format!("unexpected {what}: only the processor does that"))),
         None => Ok(()),

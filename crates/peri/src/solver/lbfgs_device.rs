@@ -4,7 +4,7 @@
 //! Fields go to the card when a search begins and come back when it has ended, when bonds break on the way,
 //! and where the run may be saved.
 
-use super::device_body::{held_as_before, lattice_with_law, loads, planes, refuse, squares};
+use super::device_body::{held_as_before, lattice_with_law, loads, planes, refuse_in_searches, squares};
 use super::lbfgs::{Lbfgs, LbfgsSearch, LinePoint, SearchVectors};
 use super::lbfgs_host::{HUGE_SCALE, LARGEST_CHANGE};
 use super::pair_products::{Kept, PairProducts};
@@ -70,7 +70,7 @@ impl<'a, const D: usize> CardVectors<'a, D> {
 
 impl<const D: usize> SearchVectors<D> for CardVectors<'_, D> {
     fn build(&mut self, system: &mut System<D>, state: &State<D>, settings: &Lbfgs) -> Result<(), Error> {
-        refuse(system)?;
+        refuse_in_searches(system)?;
         SearchVectors::<D>::forget(self, true);
         self.preconditioner.build(system, state, settings.weight, None);
         Ok(())

@@ -4,7 +4,7 @@
 //! Fields go to the card when a search for equilibrium begins and come back when it has ended, when bonds
 //! break on the way, and where the run may be saved.
 
-use super::device_body::{held_as_before, lattice_with_law, loads, planes, refuse, squares};
+use super::device_body::{held_as_before, lattice_with_law, loads, planes, refuse_in_searches, squares};
 use super::dynamic_relaxation::{DynamicRelaxation, REFRESH, damping, is_look_due};
 use super::load_stepping::Equilibrium;
 use super::mass::{has_own_mass, update_unit_mass};
@@ -189,7 +189,7 @@ impl<const D: usize> Equilibrium<D> for CardRelaxation<'_, D> {
         state: &mut State<D>,
         watch: &mut Watch<D>,
     ) -> Result<Option<StretchRange>, Error> {
-        refuse(system)?;
+        refuse_in_searches(system)?;
         let status = state.status(system.factors.len(), self.settings.tolerance, 0.0, true);
         watch(&status, state)?;
         self.begin(system, state)?;

@@ -3,9 +3,11 @@
 //! As long as no stretch can leave the fitted law or reach the critical one, several steps are taken before
 //! their sums are read; where the sums show that stretches were to be looked at on the way, the card goes
 //! back to that step. Otherwise a step is taken at a time, and the stretches that its forces meet are looked
-//! at.
+//! at. Pairs of particles in contact are listed by the host, whenever particles have moved so far since that
+//! others may touch.
 
-use super::device_body::{critical, lattice, lattice_with_law, limit, loads, planes, refuse};
+use super::device_body::refuse;
+use super::device_run::{DeviceRun, GROWTH, TakenStep};
 use super::method::{StepCallback, Watch};
 use super::motion::StretchLook;
 use super::state::State;
@@ -13,29 +15,15 @@ use super::system::System;
 use super::verlet::VelocityVerlet;
 use super::verlet_friction::work_of_pushes;
 use super::verlet_step::VerletSums;
-use crate::bonds::{LatticeBonds, Overstretched};
-use crate::contact::{Contact, RigidSurface};
 use crate::error::Error;
-use crate::field::Field;
-use crate::gpu::{Device, DeviceBody, DeviceStep, DrivenSites, MOST_STEPS, StepSums};
+use crate::gpu::{Device, DeviceStep, MOST_STEPS};
 
-/// Strain of a step, over that of the last, that steps taken together allow for.
-const GROWTH: f64 = 1.5;
-
-/// A body on a card in a run.
-struct Run<const D: usize> {
-    body: DeviceBody<D>,
-    /// Greatest change of a stretch in the last step, at most; ∞ where it is not known.
-    strain: f64,
-    /// True if planes move.
-    pushed: bool,
-    /// Sites of prescribed displacements and of body forces that are not proportional to the load factor.
-    driven: Option<[DrivenSites; 2]>,
-}
+/// Steps for which the list of pairs has to hold.
+const FEW: f64 = 4.0;
 
 impl VelocityVerlet {
     /// As [`Method::solve`](super::Method::solve), with steps on a device: of a lattice of a bond law, in
-    /// contact with planes at most. `watch` may keep the state after a row of history only.
+    /// contact with itself and with planes at most, without friction. `watch` may keep the state after a row of history only.
     ///
     /// # Errors
     /// As there; [`Error::Device`] for what the device cannot do, or where it fails.
@@ -50,16 +38,14 @@ impl VelocityVerlet {
         refuse(system)?;
         refuse_in_steps(system)?;
         self.open(system, state)?;
-        let body = body_of(device, system, state)?;
-        let driven = driven_sites(system).map(|sites| sites.map(|sites| body.driven(sites)));
-        let pushed = system.contact.iter().flat_map(Contact::surfaces).any(RigidSurface::moves);
-        let mut run = Run { body, strain: f64::INFINITY, pushed, driven };
+        let mut run = DeviceRun::new(device, system, state)?;
         while state.step < self.records {
             let end = self.end_of_row(state);
             while state.motion.steps.taken < state.motion.steps.planned {
                 self.advance_on(&mut run, system, state, end, watch)?;
             }
             [state.displacement, state.velocity, state.force] = run.body.state()?;
+            run.renew_pairs(system, &state.displacement);
             self.close_row(system, state)?;
             finished(&*system.bonds, state)?;
             watch(&self.status(state, true), state)?;
@@ -70,7 +56,7 @@ impl VelocityVerlet {
     /// Some steps: many where no stretch has to be looked at, one otherwise.
     fn advance_on<const D: usize>(
         &self,
-        run: &mut Run<D>,
+        run: &mut DeviceRun<D>,
         system: &mut System<D>,
         state: &mut State<D>,
         end: f64,
@@ -79,8 +65,13 @@ impl VelocityVerlet {
         let motion = &state.motion;
         let room = motion.look.room(state.stretches.fitted, system.breaking_stretch());
         let left = motion.steps.planned - motion.steps.taken;
+        let most = (left as f64).min(MOST_STEPS as f64);
+        if run.steps_with_pairs() < most.min(FEW) {
+            let displacement = run.body.displacement()?;
+            run.renew_pairs(system, &displacement);
+        }
         // not a number, or none below 2: one
-        let many = (room / (GROWTH * run.strain)).min(left as f64).min(MOST_STEPS as f64);
+        let many = (room / (GROWTH * run.strain)).min(most).min(run.steps_with_pairs());
         if many >= 2.0 {
             self.advance_many(run, system, state, (end, many as usize), watch)
         } else {
@@ -113,7 +104,7 @@ impl VelocityVerlet {
 
     fn advance_many<const D: usize>(
         &self,
-        run: &mut Run<D>,
+        run: &mut DeviceRun<D>,
         system: &mut System<D>,
         state: &mut State<D>,
         (end, many): (f64, usize),
@@ -130,10 +121,13 @@ impl VelocityVerlet {
         }
         let sums = run.sums(&constants)?;
         for (taken, (sums, step)) in sums.iter().zip(&steps).enumerate() {
-            let strain = run.strain_of(state, &sums.0);
+            let strain = run.strain_of(state, &sums.sums);
             let mut look = state.motion.look;
             look.slack += strain;
-            if look.is_due(state.stretches.fitted, system.breaking_stretch()) {
+            if look.is_due(state.stretches.fitted, system.breaking_stretch())
+                || !run.keeps_pairs(&sums.sums)
+                || Self::is_stiffer(system, state, sums.stiffness)
+            {
                 run.body.take_back(before);
                 run.force(system, constants[0].factors[0]);
                 steps[..taken].iter().for_each(|step| run.step(system, step));
@@ -151,13 +145,20 @@ impl VelocityVerlet {
 
     fn advance_one<const D: usize>(
         &self,
-        run: &mut Run<D>,
+        run: &mut DeviceRun<D>,
         system: &mut System<D>,
         state: &mut State<D>,
         end: f64,
     ) -> Result<(), Error> {
         let (step, after) = self.step_ahead(system, state, 0, end);
         run.leap(system, &(step, after));
+        if run.lists_pairs() {
+            run.body.keep_sums(0);
+            if !run.keeps_pairs(&run.body.sums(&[step])?[0]) {
+                let displacement = run.body.displacement()?;
+                run.renew_pairs(system, &displacement);
+            }
+        }
         let loading = step.loading[1];
         run.body.pull(loading, true);
         let (observed, listed) = run.body.stretch_range()?;
@@ -180,11 +181,16 @@ impl VelocityVerlet {
         run.body.kick(&step);
         run.keep_sums(0);
         let sums = run.sums(&[step])?;
+        let mut stiffness = sums[0].stiffness;
         self.count(system, state, &(step, after), &sums[0])?;
         if look && system.is_overstretched(observed) {
             let list = run.overstretched(system, state, listed)?;
             let sites = system.sever_bonds(state, list, None);
             run.take_severed(system, state, &sites, loading);
+            stiffness = run.stiffness_of_pairs()?;
+        }
+        if let Some(contact) = system.repulsion() {
+            self.raise_contact(system, state, contact.stiffness_with_pairs(stiffness));
         }
         let motion = &mut state.motion;
         if motion.limits.longest < (1.0 - 1e-9) * motion.steps.time_step
@@ -195,13 +201,19 @@ impl VelocityVerlet {
         Ok(())
     }
 
-    /// Counts a step with its sums and the sizes of the forces of planes that move.
+    /// Returns true if contact is stiffer than the limits of time steps include.
+    fn is_stiffer<const D: usize>(system: &System<D>, state: &State<D>, pairs: f64) -> bool {
+        let greatest = system.repulsion().map_or(0.0, |contact| contact.stiffness_with_pairs(pairs));
+        greatest > state.motion.limits.contact
+    }
+
+    /// Counts a step with its sums.
     fn count<const D: usize>(
         &self,
         system: &mut System<D>,
         state: &mut State<D>,
         (step, after): &(DeviceStep, f64),
-        (sums, pushes): &(StepSums, Vec<f64>),
+        TakenStep { sums, pushes, .. }: &TakenStep,
     ) -> Result<(), Error> {
         if system.contact.is_some() {
             system.move_surfaces(step.factors[1], *after);
@@ -220,129 +232,6 @@ impl VelocityVerlet {
     }
 }
 
-impl<const D: usize> Run<D> {
-    fn step(&mut self, system: &mut System<D>, step: &(DeviceStep, f64)) {
-        self.leap(system, step);
-        self.body.pull(step.0.loading[1], false);
-        self.body.kick(&step.0);
-    }
-
-    /// The first half of a step, and loads and planes at its end.
-    fn leap(&mut self, system: &mut System<D>, (step, after): &(DeviceStep, f64)) {
-        let [before, factor] = step.factors;
-        if let Some([held, _]) = &self.driven {
-            system.set_ends(factor);
-            self.body.drive_held(held, &loads(system));
-        }
-        self.body.half_kick_and_drift(step);
-        if let Some([held, _]) = &self.driven {
-            system.set_rates(before, factor);
-            self.body.drive_held(held, &loads(system));
-            self.force(system, factor);
-        }
-        self.place(system, factor, *after);
-    }
-
-    /// Takes the body forces at a load factor.
-    fn force(&self, system: &mut System<D>, factor: f64) {
-        if let Some([_, pushed]) = &self.driven {
-            // none depends on the displacement
-            system.set_forces(factor, &Field::zeros(0));
-            self.body.drive_pushed(pushed, &loads(system));
-        }
-    }
-
-    /// Moves planes to a load factor and a time, s.
-    fn place(&mut self, system: &System<D>, factor: f64, time: f64) {
-        if let Some(contact) = system.repulsion().filter(|_| self.pushed) {
-            self.body.place_planes(&contact.plane_shifts_at(factor, time));
-        }
-    }
-
-    fn keep_sums(&self, slot: usize) {
-        self.body.keep_sums(slot);
-        if self.pushed {
-            self.body.keep_pushes(slot);
-        }
-    }
-
-    /// Sums of the steps kept, and the sizes of the forces of planes if any moves.
-    fn sums(&self, steps: &[DeviceStep]) -> Result<Vec<(StepSums, Vec<f64>)>, Error> {
-        let pushes = if self.pushed { self.body.pushes(steps.len())? } else { vec![Vec::new(); steps.len()] };
-        Ok(self.body.sums(steps)?.into_iter().zip(pushes).collect())
-    }
-
-    /// Greatest change of a stretch in a step, at most: two ends, √D components.
-    fn strain_of(&self, state: &State<D>, sums: &StepSums) -> f64 {
-        2.0 * (D as f64).sqrt() * sums.increment / state.motion.limits.bonds.shortest
-    }
-
-    fn take_law(&mut self, system: &System<D>) -> Result<(), Error> {
-        let Some((law, _)) = lattice(system).and_then(LatticeBonds::law) else { return Ok(()) };
-        self.body.set_law(law, limit(system))
-    }
-
-    /// Listed bonds that break, as the host finds them.
-    fn overstretched(
-        &self,
-        system: &System<D>,
-        state: &mut State<D>,
-        listed: usize,
-    ) -> Result<Vec<Overstretched>, Error> {
-        let Some(critical) = critical(system) else { return Ok(Vec::new()) };
-        let Some(listed) = self.body.listed(listed)? else {
-            [state.displacement, state.velocity, state.force] = self.body.state()?;
-            let scan = crate::bonds::StretchScan::default();
-            return Ok(crate::bonds::overstretched(&*system.bonds, &state.displacement, critical, &scan));
-        };
-        let each = listed.into_iter().filter_map(|(site, index, elongation)| {
-            let bond = system.bonds.bond(site as usize, index);
-            let least = critical.weaker(site as usize, bond.site).powi(2) - 1.0;
-            let (length, weight) = (bond.length, bond.weight);
-            (elongation > least).then_some(Overstretched { site, index, elongation, length, weight })
-        });
-        Ok(each.collect())
-    }
-
-    /// Takes the bonds left to sites, and their forces with a factor of body forces.
-    fn take_severed(&mut self, system: &System<D>, state: &State<D>, sites: &[u32], loading: f64) {
-        let Some(words) = state.fracture.intact.as_ref().filter(|_| !sites.is_empty()) else { return };
-        let all = system.bonds.sites();
-        let rows = words.len() / all;
-        let changed = sites.iter().flat_map(|&site| (0..rows).map(move |row| row * all + site as usize));
-        let changed: Vec<(usize, u64)> = changed.map(|at| (at, words[at])).collect();
-        self.body.replace(&changed);
-        if system.loads.body_force.is_some() {
-            // particles without bonds have lost theirs
-            self.body.set_loads(&loads(system));
-        }
-        if system.repulsion().is_some() {
-            self.press_severed(system, sites, loading);
-        } else {
-            self.body.pull_at(sites, loading);
-        }
-    }
-
-    /// Takes the faces and particles that planes touch now, and the forces of sites whose bonds have broken
-    /// and of those beside them, as the host renews them: by pieces.
-    fn press_severed(&mut self, system: &System<D>, sites: &[u32], loading: f64) {
-        let (rows, shifts) = planes(system);
-        self.body.set_planes(rows);
-        self.body.place_planes(&shifts);
-        let piece = system.piece();
-        let mut pieces: Vec<usize> = sites.iter().map(|&site| site as usize / piece).collect();
-        pieces.sort_unstable();
-        pieces.dedup();
-        let ranges: Vec<_> = pieces.iter().map(|k| k * piece..(k + 1) * piece).collect();
-        let particles = system.bonds.particles();
-        let at = |end: usize| particles.partition_point(|&site| (site as usize) < end);
-        let among: Vec<u32> =
-            ranges.iter().flat_map(|range| &particles[at(range.start)..at(range.end)]).copied().collect();
-        self.body.pull_at(&among, loading);
-        self.body.press(Some(&ranges));
-    }
-}
-
 /// Refuses what only the host does in steps of time.
 fn refuse_in_steps<const D: usize>(system: &System<D>) -> Result<(), Error> {
     let formulas = system.loads.curved.as_ref().is_some_and(|curved| !curved.fields.is_empty());
@@ -354,38 +243,4 @@ fn refuse_in_steps<const D: usize>(system: &System<D>) -> Result<(), Error> {
         Some((_, what)) => Err(Error::Device(format!("unexpected {what}: only the processor does that"))),
         None => Ok(()),
     }
-}
-
-/// Sites of prescribed displacements, and of body forces, that are not proportional to the load factor;
-/// `None` if all are.
-fn driven_sites<const D: usize>(system: &System<D>) -> Option<[Vec<u32>; 2]> {
-    let loads = &system.loads;
-    let (turned, curved) = (&loads.turned, &loads.curved);
-    let of_curves = curved.iter().flat_map(|curved| &curved.held).flat_map(|region| &region.sites);
-    let held = turned.iter().flat_map(|region| &region.sites).chain(of_curves).copied();
-    let pushed = curved.iter().flat_map(|curved| &curved.pushed).flat_map(|region| &region.sites).copied();
-    let sorted = |mut sites: Vec<u32>| {
-        sites.sort_unstable();
-        sites.dedup();
-        sites
-    };
-    (!loads.is_proportional()).then(|| [sorted(held.collect()), sorted(pushed.collect())])
-}
-
-fn body_of<const D: usize>(
-    device: &Device,
-    system: &System<D>,
-    state: &State<D>,
-) -> Result<DeviceBody<D>, Error> {
-    let (bonds, (law, modulus)) = lattice_with_law(system)?;
-    let mut body = DeviceBody::new(device, bonds, law, modulus)?;
-    body.set_law(law, limit(system))?;
-    body.set_loads(&loads(system));
-    let (rows, shifts) = planes(system);
-    body.set_planes(rows);
-    body.place_planes(&shifts);
-    let time_step = Some(state.motion.steps.time_step).filter(|&step| step > 0.0);
-    let fields = [&state.displacement, &state.velocity, &state.force];
-    body.set_state(bonds, fields, time_step.unwrap_or(state.motion.limits.longest))?;
-    Ok(body)
 }

@@ -46,7 +46,7 @@ pub fn choose<const D: usize>(
         let note = format!("`device = \"auto\"` takes the processor: {why}");
         Ok(Chosen { card: None, note: Some(note) })
     };
-    if let Some((key, found)) = beyond_cards(scene, bonds) {
+    if let Some((key, found)) = beyond_cards(scene) {
         let allowed = format!("none on a graphics card; `{block}.device = \"cpu\"` takes the processor");
         return if only {
             Err(source.error(&key, found, allowed))
@@ -111,7 +111,7 @@ pub fn equilibria<'a, const D: usize>(card: Option<&'a Card>, scene: &Scene) -> 
 }
 
 /// Key and content of what a card cannot do.
-fn beyond_cards<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<(String, &'static str)> {
+fn beyond_cards(scene: &Scene) -> Option<(String, &'static str)> {
     let material = &scene.material;
     let rigid = scene.boundary.iter().position(|boundary| boundary.rigid);
     let rigid_key = format!("boundary[{}].rigid", rigid.unwrap_or(0));
@@ -152,17 +152,21 @@ fn beyond_cards<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<(
         ("dynamics.precision", scene.is_mixed(), "mixed precision"),
     ];
     let first = faults.iter().find(|(_, given, _)| *given).map(|(key, _, found)| ((*key).to_owned(), *found));
-    first.or_else(|| scene.contact.as_ref().and_then(contact_beyond_cards))
+    first.or_else(|| contact_beyond_cards(scene.contact.as_ref()?, scene.has_dynamics()))
 }
 
-/// Key and content of contact that a card cannot do: all but planes without friction.
-fn contact_beyond_cards(contact: &ContactSpec) -> Option<(String, &'static str)> {
-    if contact.has_pairs() {
+/// Key and content of contact that a card cannot do: friction, other surfaces than planes, and particles that
+/// repel each other in equilibria.
+fn contact_beyond_cards(contact: &ContactSpec, dynamics: bool) -> Option<(String, &'static str)> {
+    if contact.has_pairs() && !dynamics {
         let key = if contact.short_range.is_some() { "short_range" } else { "stiffness" };
         return Some((format!("contact.{key}"), "contact of particles"));
     }
+    if contact.has_pairs() && contact.friction > 0.0 {
+        return Some(("contact.friction".to_owned(), "friction"));
+    }
     if !contact.indenter.is_empty() {
-        return Some(("contact.indenter".to_owned(), "an indenter"));
+        return Some(("contact.indenter[0]".to_owned(), "an indenter"));
     }
     contact.plane.iter().enumerate().find_map(|(index, plane)| {
         let own = |key: &str| format!("contact.plane[{index}].{key}");
