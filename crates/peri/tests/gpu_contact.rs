@@ -49,6 +49,9 @@ fn on_card(text: &str, word: &str) -> FinishedScene {
     found
 }
 
+/// Forces, N, and lengths, m, of which only rounding is left.
+const ROUNDING: f64 = 1e-9;
+
 /// Numbers of a row of history that a device computes or that follow from its fields.
 fn numbers(row: &StepRecord) -> Vec<f64> {
     let surfaces = row.resting.iter().flat_map(|resting| {
@@ -80,9 +83,7 @@ fn compare(name: &str, text: &str, (apart, allowed, single): (u64, f64, f64)) ->
                     assert!(iterations <= apart * host.rounds, "{name}: {found:?} {host:?}");
                 }
                 for (column, (a, b)) in numbers(found).into_iter().zip(numbers(host)).enumerate() {
-                    let size = if column < 5 { energy } else { greatest(column).max(1e-12 * energy) };
-                    // forces and gaps that vanish but for rounding
-                    let size = if size < 1e-9 { 1e-9 } else { size };
+                    let size = if column < 5 { energy } else { greatest(column).max(ROUNDING) };
                     let part = (a - b).abs() / size;
                     if part > worst.0 {
                         worst = (part, format!("number {column} at {}: {a:e} {b:e}", host.factor));

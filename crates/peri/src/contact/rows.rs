@@ -13,6 +13,8 @@ use std::ops::Range;
 pub struct PlaneRows<const D: usize> {
     /// Unit normal of each plane, towards the body.
     pub normals: Vec<[f64; D]>,
+    /// Displacement of each plane along its normal, m, as it stands.
+    pub shifts: Vec<f64>,
     /// 1 + max_{d≠e} |n_d n_e| of each normal.
     pub mixed: Vec<f64>,
     /// Ends of the entries of elements, after a 0; entries of site and weight.
@@ -117,12 +119,6 @@ impl<const D: usize> Contact<D> {
         pairs + self.half_surface_stiffness()
     }
 
-    /// Displacements of the surfaces along their normals, m, as they stand.
-    pub fn plane_shifts(&self) -> Vec<f64> {
-        let placed = self.surfaces.iter().flat_map(|surfaces| &surfaces.each);
-        placed.map(|placed| along(&placed.surface.shape, placed.now)).collect()
-    }
-
     /// Displacements of the surfaces along their normals, m, at a load factor and a time, s.
     pub fn plane_shifts_at(&self, factor: f64, time: f64) -> Vec<f64> {
         let shift = |surface: &super::RigidSurface<D>| along(&surface.shape, surface.place_at(factor, time));
@@ -156,10 +152,12 @@ impl<const D: usize> RigidSurfaces<D> {
             ends.push(below.len() as u32);
         }
         let rest = Field::zeros(self.volumes.len());
-        let (mut normals, mut heights, mut stiffness) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut normals, mut shifts) = (Vec::new(), Vec::new());
+        let (mut heights, mut stiffness) = (Vec::new(), Vec::new());
         for placed in &self.each {
             let SurfaceShape::Plane(normal) = placed.surface.shape else { continue };
             normals.push(normal);
+            shifts.push(along(&placed.surface.shape, placed.now));
             for element in 0..count {
                 let touch = self.beside(&placed.surface, &[0.0; D], &rest, element);
                 heights.push(-touch.overlap);
@@ -182,6 +180,18 @@ impl<const D: usize> RigidSurfaces<D> {
             particle_ends.push(above.len() as u32);
         }
         let mixed = normals.iter().map(|&normal| 1.0 + mixed(normal)).collect();
-        PlaneRows { normals, mixed, ends, below, heights, stiffness, sites, particle_ends, above, near }
+        PlaneRows {
+            normals,
+            shifts,
+            mixed,
+            ends,
+            below,
+            heights,
+            stiffness,
+            sites,
+            particle_ends,
+            above,
+            near,
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! Loads of some sites that change from step to step, on a device.
 
 use super::body::{DeviceBody, DeviceLoads, numbers};
-use super::kernels::{CUBE, put};
+use super::kernels::CUBE;
+use super::list_kernels::put;
 use super::steps::buffer;
 use crate::field::Field;
 use cubecl::prelude::*;
@@ -15,7 +16,7 @@ pub struct DrivenSites {
 
 impl<const D: usize> DeviceBody<D> {
     /// Puts a list of sites on the device.
-    pub fn driven(&self, sites: Vec<u32>) -> DrivenSites {
+    pub fn list_driven(&self, sites: Vec<u32>) -> DrivenSites {
         let places =
             self.client.create_from_slice(u32::as_bytes(if sites.is_empty() { &[0] } else { &sites }));
         DrivenSites { sites, places }
@@ -52,7 +53,7 @@ impl<const D: usize> DeviceBody<D> {
                 buffer(&driven.places, count),
                 buffer(&values, D * count),
                 buffer(into, D * self.sites),
-                self.form,
+                D,
                 self.precision.element(),
             );
         }

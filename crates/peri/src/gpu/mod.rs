@@ -16,6 +16,7 @@ mod driven;
 mod kernels;
 mod lbfgs;
 mod lbfgs_kernels;
+mod list_kernels;
 mod pair_kernels;
 mod pairs;
 mod plane_kernels;

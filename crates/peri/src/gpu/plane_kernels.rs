@@ -12,7 +12,7 @@ pub const PLANE: usize = 1;
 /// of their forces; `pushes` has the force on each element. Where it `weighs`, `stiff` has Σ_p k (1 + max
 /// |n_d n_e|) Σ|w| over planes nearer than `near`.
 #[cube(launch_unchecked)]
-#[allow(clippy::too_many_arguments)]
+#[allow(clippy::too_many_arguments, clippy::collapsible_if)]
 pub fn press<F: Float>(
     displacement: &[F],
     ends: &[u32],

@@ -68,7 +68,7 @@ impl<const D: usize> DeviceBody<D> {
             planes: numbers(client, precision, of_planes),
             heights: scaled(&rows.heights, 1.0 / self.spacing),
             stiffness: scaled(&rows.stiffness, self.spacing / (self.unit * self.volume)),
-            shifts: scaled(&vec![0.0; planes], 1.0),
+            shifts: scaled(&rows.shifts, 1.0 / self.spacing),
             sizes: scaled(&vec![0.0; planes * elements], 1.0),
             pushes: empty(D * elements),
             stiff: empty(elements),

@@ -88,10 +88,9 @@ impl<const D: usize> DeviceRelaxation<D> {
         Ok(())
     }
 
-    /// Takes planes, and places them by their displacements along their normals, m.
-    pub fn set_planes(&mut self, rows: Option<PlaneRows<D>>, shifts: &[f64]) {
+    /// Takes planes as they stand.
+    pub fn set_planes(&mut self, rows: Option<PlaneRows<D>>) {
         self.body.set_planes(rows);
-        self.body.place_planes(shifts);
         let bytes = self.body.sites * self.body.precision.bytes() as usize;
         self.weighed = self.body.planes.is_some().then(|| self.body.client.empty(bytes));
         self.settle_masses();

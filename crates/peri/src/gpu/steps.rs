@@ -1,9 +1,8 @@
 //! Steps of velocity Verlet on a device: launches of its kernels, and what the host reads of them.
 
 use super::body::{DeviceBody, FOLDED, LANES, LISTED, MOST_STEPS, cubes, failed};
-use super::kernels::{
-    CUBE, KernelForm, LEAP_SUMS, SUMS, copy, fold, half_kick_and_drift, kick, pull, scatter,
-};
+use super::kernels::{CUBE, KernelForm, LEAP_SUMS, SUMS, half_kick_and_drift, kick, pull};
+use super::list_kernels::{copy, fold, scatter};
 use crate::bonds::StretchRange;
 use crate::error::Error;
 use cubecl::ir::{ElemType, UIntKind};

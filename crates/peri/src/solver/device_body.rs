@@ -30,10 +30,9 @@ pub fn loads<'a, const D: usize>(system: &'a System<D>) -> DeviceLoads<'a, D> {
     }
 }
 
-/// Rows of the planes of a system, and their displacements along their normals, m, as they stand.
-pub fn planes<const D: usize>(system: &System<D>) -> (Option<PlaneRows<D>>, Vec<f64>) {
-    let contact = system.repulsion();
-    (contact.and_then(Contact::plane_rows), contact.map_or_else(Vec::new, Contact::plane_shifts))
+/// Rows of the planes of a system.
+pub fn planes<const D: usize>(system: &System<D>) -> Option<PlaneRows<D>> {
+    system.repulsion().and_then(Contact::plane_rows)
 }
 
 /// Rows of the pairs of particles that may touch in a system.

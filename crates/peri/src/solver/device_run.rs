@@ -44,7 +44,7 @@ impl<const D: usize> DeviceRun<D> {
     /// [`Error::Device`] for what the device cannot do, or where it fails.
     pub fn new(device: &Device, system: &mut System<D>, state: &State<D>) -> Result<Self, Error> {
         let body = body_of(device, system, state)?;
-        let driven = driven_sites(system).map(|sites| sites.map(|sites| body.driven(sites)));
+        let driven = driven_sites(system).map(|sites| sites.map(|sites| body.list_driven(sites)));
         let pushed = system.contact.iter().flat_map(Contact::surfaces).any(RigidSurface::moves);
         let (strain, way, room) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
         let mut run = Self { body, strain, way, room, pushed, driven };
@@ -113,7 +113,7 @@ impl<const D: usize> DeviceRun<D> {
     }
 
     /// Way that no particle exceeds in a step, m.
-    pub fn way_of(sums: &StepSums) -> f64 {
+    fn way_of(sums: &StepSums) -> f64 {
         (D as f64).sqrt() * sums.increment
     }
 
@@ -221,9 +221,7 @@ impl<const D: usize> DeviceRun<D> {
     /// Takes the faces and particles that planes touch now, pairs with those whose bonds have broken, and the
     /// forces of their sites and of those beside them, as the host renews them: by pieces.
     fn press_severed(&mut self, system: &System<D>, sites: &[u32], loading: f64) {
-        let (rows, shifts) = planes(system);
-        self.body.set_planes(rows);
-        self.body.place_planes(&shifts);
+        self.body.set_planes(planes(system));
         self.body.set_pairs(pairs(system));
         let piece = system.piece();
         let mut pieces: Vec<usize> = sites.iter().map(|&site| site as usize / piece).collect();
@@ -265,9 +263,7 @@ fn body_of<const D: usize>(
     let mut body = DeviceBody::new(device, bonds, law, modulus)?;
     body.set_law(law, limit(system))?;
     body.set_loads(&loads(system));
-    let (rows, shifts) = planes(system);
-    body.set_planes(rows);
-    body.place_planes(&shifts);
+    body.set_planes(planes(system));
     body.set_pairs(pairs(system));
     let time_step = Some(state.motion.steps.time_step).filter(|&step| step > 0.0);
     let fields = [&state.displacement, &state.velocity, &state.force];

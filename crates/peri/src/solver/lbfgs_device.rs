@@ -90,9 +90,7 @@ impl<const D: usize> SearchVectors<D> for CardVectors<'_, D> {
         self.pushed = squares(system);
         let (local, card) = (self.preconditioner.local().to_vec(), self.card()?);
         card.body.set_loads(&loads(system));
-        let (rows, shifts) = planes(system);
-        card.body.set_planes(rows);
-        card.body.place_planes(&shifts);
+        card.body.set_planes(planes(system));
         card.set_local(bonds, &local);
         // the direction is in the place of the velocity
         let rest = crate::field::Field::zeros(system.bonds.sites());
@@ -205,9 +203,7 @@ impl<const D: usize> SearchVectors<D> for CardVectors<'_, D> {
         if let (Some(card), Some(bonds)) = (&mut self.card, system.bonds.as_lattice()) {
             card.body.set_intact(bonds);
             card.body.set_loads(&loads(system));
-            let (rows, shifts) = planes(system);
-            card.body.set_planes(rows);
-            card.body.place_planes(&shifts);
+            card.body.set_planes(planes(system));
             card.set_local(bonds, self.preconditioner.local());
         }
     }

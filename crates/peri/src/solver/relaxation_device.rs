@@ -63,8 +63,7 @@ impl<const D: usize> CardRelaxation<'_, D> {
             update_unit_mass(bonds, system.bonds.particles(), &mut self.unit_mass);
         }
         card.set_masses(&self.unit_mass)?;
-        let (rows, shifts) = planes(system);
-        card.set_planes(rows, &shifts);
+        card.set_planes(planes(system));
         self.stiffened = false;
         self.pushed = squares(system);
         self.card = Some(card);
@@ -170,8 +169,7 @@ impl<const D: usize> CardRelaxation<'_, D> {
             let fields = [&state.displacement, &state.velocity, &state.force];
             card.body.set_state(lattice_with_law(system)?.0, fields, 1.0)?;
             card.body.set_loads(&loads(system));
-            let (rows, shifts) = planes(system);
-            card.set_planes(rows, &shifts);
+            card.set_planes(planes(system));
             self.pushed = squares(system);
             if !self.stiffened {
                 card.set_masses(&self.unit_mass)?;
