@@ -225,7 +225,8 @@ fn gpu_scene_of_equilibria_has_the_report_of_the_processor() {
     assert!(why.contains("directed bonds are too few"), "{why}");
     compare_equilibria(TORN, 1e-9);
     // a stiffer and tougher part, with a surface correction
-    let law = "law = \"linear\"\nsurface_correction = \"energy\"\ninclusions = [{ shape = { add = \"disk\", centre = \
-               [\"16 mm\", \"16 mm\"], radius = \"4 mm\" }, stiffness = 3 }]";
+    let law = r#"law = "linear"
+surface_correction = "energy"
+inclusions = [{ shape = { add = "disk", centre = ["16 mm", "16 mm"], radius = "4 mm" }, stiffness = 3 }]"#;
     compare_equilibria(&TORN.replace("law = \"linear\"", law), 1e-9);
 }

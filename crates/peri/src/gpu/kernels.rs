@@ -157,9 +157,9 @@ fn note<F: Float>(count: &[Atomic<u32>], list: &mut [u32], elongations: &mut [F]
     }
 }
 
-/// Force densities Σ_J c w q(e) ζ of particles, with the weights w of [`weight`] and e = η·(2ξ + η)/|ξ|², plus `factor` times the body force.
-/// Where it `looks`, each thread writes the least and greatest e of its bonds, and lists bonds beyond the
-/// law's last number.
+/// Force densities Σ_J c w q(e) ζ of particles, with the weights w of [`weight`] and e = η·(2ξ + η)/|ξ|²,
+/// plus `factor` times the body force. Where it `looks`, each thread writes the least and greatest e of its
+/// bonds, and lists bonds beyond the law's last number.
 ///
 /// The two ends of a bond find the same bits of e.
 #[cube(launch_unchecked)]

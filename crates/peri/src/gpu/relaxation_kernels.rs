@@ -115,8 +115,8 @@ pub fn relax<F: Float>(
     }
 }
 
-/// Bounds of the stiffness of particles, Σ_J c w·max(t, `least`)(1 + max_{d≠e} |n_d n_e|) with the directions n
-/// of the deformed bonds and t from a table of `pieces` in e, which begins at `low`; `rest` without bonds.
+/// Bounds of the stiffness of particles, Σ_J c w·max(t, `least`)(1 + max_{d≠e} |n_d n_e|) with the directions
+/// n of the deformed bonds and t from a table of `pieces` in e, which begins at `low`; `rest` without bonds.
 #[cube(launch_unchecked)]
 #[allow(clippy::too_many_arguments)]
 pub fn stiffen<F: Float>(

@@ -75,8 +75,8 @@ impl<const D: usize> DeviceBody<D> {
         }
     }
 
-    /// Forces of the present displacement with body forces at a load factor, and of contact. Where it `looks`,
-    /// [`Self::stretch_range`] has what it saw.
+    /// Forces of the present displacement with body forces at a load factor, and of contact. Where it
+    /// `looks`, [`Self::stretch_range`] has what it saw.
     pub fn pull(&mut self, factor: f64, looks: bool) {
         if looks {
             self.count = self.client.create_from_slice(u32::as_bytes(&[0]));

@@ -23,8 +23,8 @@ const FEW: f64 = 4.0;
 
 impl VelocityVerlet {
     /// As [`Method::solve`](super::Method::solve), with steps on a device: of a lattice of a bond law, in
-    /// contact with itself and with planes at most, without friction. `watch` may keep the state after a row of
-    /// history only.
+    /// contact with itself and with planes at most, without friction. `watch` may keep the state after a row
+    /// of history only.
     ///
     /// # Errors
     /// As there; [`Error::Device`] for what the device cannot do, or where it fails.
