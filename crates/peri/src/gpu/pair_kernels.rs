@@ -12,7 +12,7 @@ pub const PAIR: usize = 2;
 /// `stiff` has Σ_J c over them.
 #[cube(launch_unchecked)]
 #[allow(clippy::too_many_arguments)]
-pub fn part<F: Float>(
+pub fn push_apart<F: Float>(
     displacement: &[F],
     chosen: &[u32],
     particles: &[u32],

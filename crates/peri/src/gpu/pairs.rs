@@ -2,7 +2,7 @@
 
 use super::body::{DeviceBody, LANES, MOST_STEPS, numbers};
 use super::kernels::CUBE;
-use super::pair_kernels::{PAIR, part};
+use super::pair_kernels::{PAIR, push_apart};
 use super::steps::buffer;
 use crate::contact::{PairRows, numbers_within};
 use crate::error::Error;
@@ -52,14 +52,14 @@ impl<const D: usize> DeviceBody<D> {
     }
 
     /// Adds the forces of pairs to those of all particles, or of those whose sites lie in the ranges `among`.
-    pub fn part(&self, among: Option<&[Range<usize>]>) {
+    pub fn push_pairs(&self, among: Option<&[Range<usize>]>) {
         let Some(pairs) = &self.pairs else { return };
         match among.map(|ranges| numbers_within(&pairs.sites, ranges)) {
-            None => self.launch_part(pairs, (&pairs.all, pairs.sites.len()), true),
+            None => self.launch_pairs(pairs, (&pairs.all, pairs.sites.len()), true),
             Some(list) if list.is_empty() => {}
             Some(list) => {
                 let chosen = self.client.create_from_slice(u32::as_bytes(&list));
-                self.launch_part(pairs, (&chosen, list.len()), true);
+                self.launch_pairs(pairs, (&chosen, list.len()), true);
             }
         }
     }
@@ -67,15 +67,15 @@ impl<const D: usize> DeviceBody<D> {
     /// Measures the stiffness of all pairs, for [`Self::keep_stiffness`].
     pub fn measure_pairs(&self) {
         if let Some(pairs) = &self.pairs {
-            self.launch_part(pairs, (&pairs.all, pairs.sites.len()), false);
+            self.launch_pairs(pairs, (&pairs.all, pairs.sites.len()), false);
         }
     }
 
-    fn launch_part(&self, pairs: &DevicePairs, (chosen, count): (&Handle, usize), acts: bool) {
+    fn launch_pairs(&self, pairs: &DevicePairs, (chosen, count): (&Handle, usize), acts: bool) {
         let [displacement, _, force] = &self.fields;
         // SAFETY: every buffer has the length named here, and sites of pairs lie inside
         unsafe {
-            part::launch_unchecked(
+            push_apart::launch_unchecked(
                 &self.client,
                 self.cubes_of(count),
                 CubeDim::new_1d(CUBE as u32),

@@ -85,7 +85,7 @@ impl<const D: usize> DeviceBody<D> {
         let all = (&self.sites_of_particles, self.particles);
         self.launch_pull([displacement, force], all, factor, self.form, looks);
         self.press(None);
-        self.part(None);
+        self.push_pairs(None);
     }
 
     /// Forces of some sites, without those of contact.

@@ -54,13 +54,13 @@ impl<const D: usize> DeviceRun<D> {
 
     /// Takes a step; its constants and the time at its end.
     pub fn step(&mut self, system: &mut System<D>, step: &(DeviceStep, f64)) {
-        self.leap(system, step);
+        self.half_step(system, step);
         self.body.pull(step.0.loading[1], false);
         self.body.kick(&step.0);
     }
 
     /// The first half of a step, and loads and planes at its end.
-    pub fn leap(&mut self, system: &mut System<D>, (step, after): &(DeviceStep, f64)) {
+    pub fn half_step(&mut self, system: &mut System<D>, (step, after): &(DeviceStep, f64)) {
         let [before, factor] = step.factors;
         if let Some([held, _]) = &self.driven {
             system.set_ends(factor);
@@ -234,7 +234,7 @@ impl<const D: usize> DeviceRun<D> {
             ranges.iter().flat_map(|range| &particles[at(range.start)..at(range.end)]).copied().collect();
         self.body.pull_at(&among, loading);
         self.body.press(Some(&ranges));
-        self.body.part(Some(&ranges));
+        self.body.push_pairs(Some(&ranges));
     }
 }
 

@@ -152,7 +152,7 @@ impl VelocityVerlet {
         end: f64,
     ) -> Result<(), Error> {
         let (step, after) = self.step_ahead(system, state, 0, end);
-        run.leap(system, &(step, after));
+        run.half_step(system, &(step, after));
         if run.lists_pairs() {
             run.body.keep_sums(0);
             if !run.keeps_pairs(&run.body.sums(&[step])?[0]) {
