@@ -59,7 +59,14 @@ fn measure<const D: usize>(cells: u32, steps: u64) -> Result<(), Box<dyn std::er
         };
         // well below 2/ω_max
         let time_step = 0.1 * SPACING / (STIFFNESS / DENSITY).sqrt();
-        let step = DeviceStep { time_step, density: DENSITY, damping: 0.0, factors: [1.0; 2], rate: 0.0 };
+        let step = DeviceStep {
+            time_step,
+            density: DENSITY,
+            damping: 0.0,
+            factors: [1.0; 2],
+            loading: [1.0; 2],
+            rate: 0.0,
+        };
         let zero = Field::zeros(bonds.sites());
         let mut body = DeviceBody::new(&device, &bonds, &fit, modulus)?;
         let found = body.force(&bonds, &displacement)?;

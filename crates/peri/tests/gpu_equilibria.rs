@@ -201,6 +201,21 @@ fn gpu_relaxes_as_the_host() {
     }
 }
 
+/// Bonds that are weighted by factors of their ends.
+#[test]
+fn gpu_relaxes_bodies_with_surface_correction() {
+    for device in devices() {
+        let build = || Body::<2>::damaged([24, 30], 1e-3, 3.015).build().lattice;
+        let loads = pulled(&build(), 0.8, 0.0);
+        let case = Case { loads, law: Law::ChainOffset, steps: 3, breaking: None, refine: 1 };
+        let method = DynamicRelaxation { tolerance: 1e-4, ..DynamicRelaxation::default() };
+        let host = case.run(&mut build(), &mut method.solver());
+        let found = case.run(&mut build(), &mut method.device_solver(&device));
+        let allowed = if device.precision() == Precision::Double { 1e-10 } else { 2e-3 };
+        case.compare("surface correction", (&found, &host), &device, (1, allowed));
+    }
+}
+
 /// As on the device, no coarse level.
 const NO_COARSE: f64 = f64::INFINITY;
 

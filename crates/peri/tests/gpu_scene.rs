@@ -180,7 +180,7 @@ fn thesis(name: &str, lines: &[(&str, &str)]) -> String {
     text
 }
 
-/// Bars in tension, coarse and without a surface correction, by L-BFGS.
+/// Bars in tension, coarse, without and with a surface correction, by L-BFGS.
 #[test]
 fn gpu_scene_of_bars_in_tension() {
     let bar = thesis(
@@ -189,7 +189,7 @@ fn gpu_scene_of_bars_in_tension() {
             ("tolerance = 1e-6", "tolerance = 1e-6\ndevice = \"cpu\""),
             (
                 "spacing = [\"20 mm\", \"10 mm\"]\nsurface_correction = [\"none\", \"energy\"]",
-                "spacing = [\"20 mm\"]\nsurface_correction = [\"none\"]",
+                "spacing = [\"20 mm\"]\nsurface_correction = [\"none\", \"energy\"]",
             ),
         ],
     );
@@ -224,4 +224,9 @@ fn gpu_scene_of_equilibria_has_the_report_of_the_processor() {
     let why = auto.outcomes[0].warnings.join("\n");
     assert!(why.contains("directed bonds are too few"), "{why}");
     compare_equilibria(TORN, 1e-9);
+    // a stiffer and tougher part, with a surface correction
+    let law = r#"law = "linear"
+surface_correction = "energy"
+inclusions = [{ shape = { add = "disk", centre = ["16 mm", "16 mm"], radius = "4 mm" }, stiffness = 3 }]"#;
+    compare_equilibria(&TORN.replace("law = \"linear\"", law), 1e-9);
 }

@@ -2,6 +2,8 @@
 
 mod connect;
 mod damage;
+#[cfg(feature = "gpu")]
+mod device;
 mod laws;
 mod mixed;
 mod periodic;
@@ -258,12 +260,6 @@ impl<const D: usize> LatticeBonds<D> {
     /// Returns true if no bond has its own weight from integrity or surface factors.
     pub(crate) fn is_uniform(&self) -> bool {
         self.factors.is_none() && self.softening.bonds().is_empty()
-    }
-
-    /// The fitted law and kθ, N/m⁶, where they are set.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn law(&self) -> Option<(&KernelFit, f64)> {
-        self.law.as_ref().map(|(fit, modulus)| (fit, *modulus))
     }
 
     /// Input of lattice kernels for a displacement.

@@ -140,6 +140,32 @@ impl<const D: usize> ContactList<D> {
         }
     }
 
+    /// Makes the list hold for a displacement and as long as possible; returns true if it was rebuilt.
+    #[cfg(feature = "gpu")]
+    pub fn renew(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> bool {
+        let compares = |vicinity: &mut Vicinity<D>| vicinity.compare_at(bonds.particles(), displacement);
+        let holds = self.skin > 0.0 && self.vicinity.as_mut().is_some_and(compares);
+        if !holds {
+            self.rebuild(bonds, displacement);
+        }
+        !holds
+    }
+
+    /// Distance by which every particle may move since [`Self::renew`] until the list must be renewed, m.
+    #[cfg(feature = "gpu")]
+    pub fn room(&self) -> f64 {
+        self.vicinity.as_ref().map_or(0.0, Vicinity::room)
+    }
+
+    /// Iterates over the particles with candidates, and the sites of these, ascending.
+    #[cfg(feature = "gpu")]
+    pub fn candidates(&self) -> impl Iterator<Item = (u32, impl Iterator<Item = u32> + '_)> + '_ {
+        self.listed.iter().enumerate().map(|(k, own)| {
+            let start = k.checked_sub(1).map_or(0, |before| self.listed[before].end);
+            (own.site, self.candidates[start..own.end].iter().map(|candidate| candidate.site))
+        })
+    }
+
     /// Adds the pairs of sites whose bonds have just broken, each from both ends: the result equals a list
     /// made from the remaining bonds.
     pub fn add_broken_pairs(&mut self, bonds: &dyn BodyGeometry<D>, pairs: &[[u32; 2]]) {
@@ -263,6 +289,12 @@ impl<const D: usize> ContactList<D> {
         self.radii.get(site).copied().unwrap_or(self.largest)
     }
 
+    /// Contact distance d of two particles with the reference bond ξ, m.
+    pub fn distance(&self, own: usize, other: usize, bond: [f64; D]) -> f64 {
+        let radii = RADII_FACTOR * (self.radius(own) + self.radius(other));
+        (REFERENCE_FACTOR * length(bond)).min(radii)
+    }
+
     /// Returns the pair of two particles with the reference bond ξ if r < d + `gap`.
     fn near(
         &self,
@@ -272,8 +304,7 @@ impl<const D: usize> ContactList<D> {
         displacement: &Field<D>,
         gap: f64,
     ) -> Option<NearbyParticle<D>> {
-        let radii = RADII_FACTOR * (self.radius(own) + self.radius(other));
-        let distance = (REFERENCE_FACTOR * length(bond)).min(radii);
+        let distance = self.distance(own, other, bond);
         let (here, there) = (displacement.get(own), displacement.get(other));
         let zeta = std::array::from_fn(|d| bond[d] + (there[d] - here[d]));
         let r = length(zeta);
@@ -326,6 +357,6 @@ impl<const D: usize> ContactList<D> {
     }
 }
 
-fn difference<const D: usize>(from: [f64; D], to: [f64; D]) -> [f64; D] {
+pub fn difference<const D: usize>(from: [f64; D], to: [f64; D]) -> [f64; D] {
     std::array::from_fn(|d| to[d] - from[d])
 }

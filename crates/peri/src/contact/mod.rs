@@ -35,6 +35,8 @@ mod friction;
 mod friction_pair;
 mod list;
 mod pushed_surfaces;
+#[cfg(feature = "gpu")]
+mod rows;
 mod stiffness;
 mod stops;
 mod surface;
@@ -56,6 +58,8 @@ pub use friction_pair::{ContactPair, Drag, FrictionPair};
 use list::ContactList;
 #[cfg(feature = "case")]
 pub(crate) use pushed_surfaces::BEHIND;
+#[cfg(feature = "gpu")]
+pub use rows::{PairRows, PlaneRows, numbers_within};
 use serde::{Deserialize, Serialize};
 pub use stiffness::Spring;
 pub use surface::{RigidSurface, SurfaceReaction, SurfaceShape};

@@ -29,7 +29,7 @@ impl<const D: usize> Contact<D> {
         pairs + self.half_surface_stiffness()
     }
 
-    fn half_surface_stiffness(&self) -> f64 {
+    pub(super) fn half_surface_stiffness(&self) -> f64 {
         let surfaces = self.surfaces.as_ref().map_or(0.0, RigidSurfaces::stiffness);
         0.5 * (surfaces + self.ties.as_ref().map_or(0.0, Ties::greatest))
     }
@@ -145,14 +145,19 @@ impl<const D: usize> Contact<D> {
         self.near / (0.5 * farthest.sqrt()).max(closing.sqrt())
     }
 
+    /// Sites of particles without bonds, ascending.
+    pub fn detached(&self) -> &[u32] {
+        &self.list.alone
+    }
+
     /// Stops particles without bonds, so that they do not fly on in a search for equilibrium.
     pub fn stop_detached(&self, velocity: &mut Field<D>) {
-        self.list.alone.iter().for_each(|&site| velocity.set(site as usize, [0.0; D]));
+        self.detached().iter().for_each(|&site| velocity.set(site as usize, [0.0; D]));
     }
 }
 
 /// max_{d≠e} |n_d n_e|.
-fn mixed<const D: usize>(n: [f64; D]) -> f64 {
+pub(super) fn mixed<const D: usize>(n: [f64; D]) -> f64 {
     let pairs = (0..D).flat_map(|d| (0..d).map(move |e| (d, e)));
     pairs.map(|(d, e)| (n[d] * n[e]).abs()).fold(0.0, f64::max)
 }

@@ -156,6 +156,12 @@ impl<const D: usize> RigidSurface<D> {
         std::array::from_fn(|d| multiple(d) * self.displacement[d])
     }
 
+    /// Displacement at a load factor and a time, s, m, of a surface without a force.
+    pub(super) fn place_at(&self, factor: f64, time: f64) -> [f64; D] {
+        let displacement = self.displacement_at(factor);
+        std::array::from_fn(|d| displacement[d] + time * self.velocity[d])
+    }
+
     /// Multiple of the force at a load factor.
     pub(super) fn force_factor(&self, factor: f64) -> f64 {
         self.amplitudes.as_ref().map_or(factor, |each| each[0].multiple(factor))

@@ -162,11 +162,10 @@ impl<const D: usize> RigidSurfaces<D> {
     /// [`Self::balance`].
     pub fn move_to(&mut self, factor: f64, time: f64) {
         for placed in &mut self.each {
-            let (surface, velocity) = (&placed.surface, placed.surface.velocity);
+            let surface = &placed.surface;
             (placed.before, placed.factor) = (placed.now, surface.force_factor(factor));
             if surface.force.is_none() {
-                let displacement = surface.displacement_at(factor);
-                placed.now = std::array::from_fn(|d| displacement[d] + time * velocity[d]);
+                placed.now = surface.place_at(factor, time);
             }
         }
     }

@@ -54,9 +54,21 @@ impl<const D: usize> Vicinity<D> {
         if !(0..sites.div_ceil(CHUNK)).into_par_iter().any(moved) {
             return true;
         }
+        self.compare_at(particles, displacement)
+    }
+
+    /// Compares cells at a displacement; returns true if the list holds.
+    pub fn compare_at(&mut self, particles: &[u32], displacement: &Field<D>) -> bool {
         self.left = self.compare(particles, displacement);
         self.compared_at.clone_from(displacement);
         self.left > LEAST * self.skin
+    }
+
+    /// Distance by which every particle may move from where cells were last compared, m.
+    #[cfg(feature = "gpu")]
+    pub fn room(&self) -> f64 {
+        // as in `is_current`
+        if self.skin > 0.0 { 0.49 * self.left } else { 0.0 }
     }
 
     /// Computes the relative motion left to any two particles outside the list, m; negative if it was

@@ -1,6 +1,8 @@
 //! A lattice on a device: its buffers, and the launches of its kernels.
 
 use super::kernels::{CUBE, KernelForm, ROW, SUMS};
+use super::pairs::DevicePairs;
+use super::planes::DevicePlanes;
 use super::{Device, Precision};
 use crate::bonds::{BodyGeometry, BondDamage, LatticeBonds, Rational, not_finite};
 use crate::error::Error;
@@ -54,6 +56,7 @@ pub struct DeviceBody<const D: usize> {
     pub(super) held: Handle,
     pub(super) full: Handle,
     pub(super) body: Handle,
+    factors: Handle,
     pub(super) fields: [Handle; 3],
     pub(super) kept: Option<[Handle; 3]>,
     pub(super) partial: Handle,
@@ -64,6 +67,8 @@ pub struct DeviceBody<const D: usize> {
     pub(super) count: Handle,
     pub(super) list: Handle,
     pub(super) elongations: Handle,
+    pub(super) planes: Option<DevicePlanes<D>>,
+    pub(super) pairs: Option<DevicePairs>,
 }
 
 impl<const D: usize> DeviceBody<D> {
@@ -93,10 +98,13 @@ impl<const D: usize> DeviceBody<D> {
         law: &KernelFit,
         modulus: f64,
     ) -> Result<Self, Error> {
-        if !bonds.is_uniform() {
-            let what = "bonds with surface factors, of inclusions, or that soften";
-            return Err(Error::Device(format!("unexpected {what}: kernels take the stencil's own weights")));
+        if bonds.has_softened() {
+            return Err(Error::Device(
+                "unexpected bonds that soften: only the processor does that".to_owned(),
+            ));
         }
+        let (factors, even) = bonds.factors().unzip();
+        let components = factors.map_or(0, |_| if even == Some(true) { 1 } else { D });
         let precision = device.precision;
         let (sites, particles) = (bonds.sites(), bonds.particles().len());
         let stencil = bonds.stencil_bonds(modulus);
@@ -109,12 +117,15 @@ impl<const D: usize> DeviceBody<D> {
             stressed: false,
             held: false,
             loaded: false,
+            factors: components,
             tile: TILE,
             unroll: 2,
         };
         let field = (D * sites) as u64 * precision.bytes();
         let words = 4 * (sites * form.bonds.div_ceil(32)) as u64;
-        let fields = [("displacement", field), ("velocity", field), ("force", field)];
+        let factor_bytes = field / D as u64 * components as u64;
+        let fields =
+            [("displacement", field), ("velocity", field), ("force", field), ("bond factors", factor_bytes)];
         refuse_beyond_memory(device, &[&fields[..], &[("intact bonds", words)]].concat())?;
         let spacing = bonds.spacing();
         let unit = spacing * stencil.iter().map(|bond| bond.stiffness.abs()).fold(0.0, f64::max);
@@ -150,6 +161,7 @@ impl<const D: usize> DeviceBody<D> {
             held: whole(&[0]),
             full: empty(1),
             body: empty(1),
+            factors: factor_list(&client, precision, factors, components),
             fields: std::array::from_fn(|_| upload(&client, precision, &zeros, 1.0)),
             kept: None,
             partial: empty(SUMS * threads),
@@ -161,6 +173,8 @@ impl<const D: usize> DeviceBody<D> {
             count: whole(&[0]),
             list: client.empty(4 * 2 * LISTED),
             elongations: empty(LISTED),
+            planes: None,
+            pairs: None,
             client,
         };
         body.set_law(law, f64::INFINITY)?;
@@ -283,6 +297,11 @@ impl<const D: usize> DeviceBody<D> {
 }
 
 impl<const D: usize> DeviceBody<D> {
+    /// Factors of particles as kernels take them.
+    pub(super) fn factors(&self) -> BufferArg {
+        super::steps::buffer(&self.factors, (self.form.factors * self.sites).max(1))
+    }
+
     pub(super) fn download(&self, from: &Handle, scale: f64) -> Result<Field<D>, Error> {
         let values = self.values(from)?;
         let mut field = Field::zeros(self.sites);
@@ -313,6 +332,18 @@ fn halves(words: &[u64], sites: usize, bonds: usize) -> Vec<u32> {
         words[word / 2 * sites..][..sites].iter().map(move |bits| (bits >> (32 * (word % 2))) as u32)
     };
     (0..bonds.div_ceil(32)).flat_map(half).collect()
+}
+
+/// The first components of factors; one number without any.
+fn factor_list<const D: usize>(
+    client: &Client,
+    precision: Precision,
+    factors: Option<&Field<D>>,
+    components: usize,
+) -> Handle {
+    let Some(factors) = factors else { return numbers(client, precision, std::iter::once(1.0)) };
+    let list = factors.components().into_iter().take(components).flatten().copied();
+    numbers(client, precision, list)
 }
 
 fn upload<const D: usize>(client: &Client, precision: Precision, field: &Field<D>, scale: f64) -> Handle {

@@ -40,6 +40,8 @@ pub struct KernelForm {
     pub held: bool,
     /// Whether body forces act.
     pub loaded: bool,
+    /// Components of the factors of particles that bonds are weighted with: 0, 1, or as many as the body has.
+    pub factors: usize,
     /// Particles of a thread.
     pub tile: usize,
     /// Bonds of a particle that are taken together, a divisor of all its bonds: 1 or 2.
@@ -53,11 +55,40 @@ impl KernelForm {
     }
 }
 
+/// Weight of a bond from the factors g of its ends: (Σ_d (n_d/ḡ_d)²)^(−1/2), ḡ = ½(g_I + g_J); ḡ if they are
+/// equal along all axes. `row` is the place of the bond in `rows`.
+#[cube]
+pub fn weight<F: Float>(
+    factors: &[F],
+    rows: &[F],
+    row: usize,
+    site: usize,
+    there: usize,
+    #[comptime] form: KernelForm,
+) -> F {
+    let half = F::new(0.5);
+    if comptime!(form.factors == 1) {
+        half * (factors[site] + factors[there])
+    } else {
+        let dimension = comptime!(form.dimension);
+        let sites = factors.len() / dimension;
+        let mut sum = F::new(0.0);
+        #[unroll]
+        for d in 0..dimension {
+            let mean = half * (factors[d * sites + site] + factors[d * sites + there]);
+            let along = rows[row + d] / mean;
+            sum = fma(along, along, sum);
+        }
+        F::new(1.0) / F::sqrt(sum * rows[row + dimension])
+    }
+}
+
 /// Adds the force of bond `k` on the particle `p` of a thread, in `site`; its e.
 #[cube]
 #[allow(clippy::too_many_arguments)]
 fn add_bond<F: Float>(
     displacement: &[F],
+    factors: &[F],
     shifts: &[i32],
     rows: &[F],
     law: &Array<F>,
@@ -105,6 +136,9 @@ fn add_bond<F: Float>(
         q += law[ends];
     }
     q *= rows[row + dimension + 1];
+    if comptime!(form.factors > 0) {
+        q *= weight::<F>(factors, rows, row, site as usize, there, form);
+    }
     #[unroll]
     for d in 0..dimension {
         sum[p * dimension + d] = fma(q, zeta[d], sum[p * dimension + d]);
@@ -123,15 +157,16 @@ fn note<F: Float>(count: &[Atomic<u32>], list: &mut [u32], elongations: &mut [F]
     }
 }
 
-/// Force densities Σ_J c q(e) ζ of particles, with e = η·(2ξ + η)/|ξ|², plus `factor` times the body force.
-/// Where it `looks`, each thread writes the least and greatest e of its bonds, and lists bonds beyond the
-/// law's last number.
+/// Force densities Σ_J c w q(e) ζ of particles, with the weights w of [`weight`] and e = η·(2ξ + η)/|ξ|²,
+/// plus `factor` times the body force. Where it `looks`, each thread writes the least and greatest e of its
+/// bonds, and lists bonds beyond the law's last number.
 ///
 /// The two ends of a bond find the same bits of e.
 #[cube(launch_unchecked)]
 #[allow(clippy::too_many_arguments, clippy::collapsible_if)]
 pub fn pull<F: Float>(
     displacement: &[F],
+    factors: &[F],
     particles: &[u32],
     shifts: &[i32],
     rows: &[F],
@@ -204,6 +239,7 @@ pub fn pull<F: Float>(
                         for p in 0..tile {
                             let e = add_bond::<F>(
                                 displacement,
+                                factors,
                                 shifts,
                                 rows,
                                 &coefficients,
@@ -246,6 +282,7 @@ pub fn pull<F: Float>(
                         if before[p] & bit != 0 {
                             let e = add_bond::<F>(
                                 displacement,
+                                factors,
                                 shifts,
                                 rows,
                                 &coefficients,
@@ -324,8 +361,7 @@ pub fn half_kick_and_drift<F: Float>(
     let mut damped = F::new(0.0);
     let mut body_work = F::new(0.0);
     let mut greatest = F::new(0.0);
-    let mut index = ABSOLUTE_POS;
-    while index < particles.len() {
+    for index in range_stepped(ABSOLUTE_POS, particles.len(), threads) {
         let site = particles[index] as usize;
         #[unroll]
         for d in 0..dimension {
@@ -355,7 +391,6 @@ pub fn half_kick_and_drift<F: Float>(
             velocity[at] = speed;
             displacement[at] = there;
         }
-        index += threads;
     }
     partial[ABSOLUTE_POS] = held_work;
     partial[threads + ABSOLUTE_POS] = damped;
@@ -397,8 +432,7 @@ pub fn kick<F: Float>(
     let mut gained = F::new(0.0);
     let mut damped = F::new(0.0);
     let mut body_work = F::new(0.0);
-    let mut index = ABSOLUTE_POS;
-    while index < particles.len() {
+    for index in range_stepped(ABSOLUTE_POS, particles.len(), threads) {
         let site = particles[index] as usize;
         #[unroll]
         for d in 0..dimension {
@@ -425,7 +459,6 @@ pub fn kick<F: Float>(
             square = fma(speed, speed, square);
             velocity[at] = speed;
         }
-        index += threads;
     }
     let start = comptime!(LEAP_SUMS) * threads + ABSOLUTE_POS;
     partial[start] = square;
@@ -433,58 +466,4 @@ pub fn kick<F: Float>(
     partial[start + 2 * threads] = gained;
     partial[start + 3 * threads] = damped;
     partial[start + 4 * threads] = body_work;
-}
-
-/// Sums, or extremes, of `rows` lists: thread i of `lanes` takes every `lanes`th number from i on, in order.
-/// Bit r of `greatest` and `least`: list r, of the first 32, has its extreme taken.
-#[cube(launch_unchecked)]
-pub fn fold<F: Float>(
-    from: &[F],
-    into: &mut [F],
-    lanes: InputScalar,
-    start: InputScalar,
-    #[comptime] rows: usize,
-    #[comptime] greatest: u32,
-    #[comptime] least: u32,
-    #[define(F)] _precision: ElemType,
-) {
-    let lanes = lanes.get::<u32>() as usize;
-    let start = start.get::<u32>() as usize;
-    if ABSOLUTE_POS >= lanes {
-        terminate!();
-    }
-    let length = from.len() / rows;
-    #[unroll]
-    for row in 0..rows {
-        let mut sum = F::new(0.0);
-        let mut index = ABSOLUTE_POS;
-        while index < length {
-            let value = from[row * length + index];
-            if comptime!(row < 32 && (greatest >> row) & 1 == 1) {
-                sum = F::max(sum, value);
-            } else if comptime!(row < 32 && (least >> row) & 1 == 1) {
-                sum = F::min(sum, value);
-            } else {
-                sum += value;
-            }
-            index += lanes;
-        }
-        into[start + row * lanes + ABSOLUTE_POS] = sum;
-    }
-}
-
-/// Replaces words of a list.
-#[cube(launch_unchecked)]
-pub fn scatter(places: &[u32], values: &[u32], into: &mut [u32]) {
-    if ABSOLUTE_POS < places.len() {
-        into[places[ABSOLUTE_POS] as usize] = values[ABSOLUTE_POS];
-    }
-}
-
-/// Copies a list.
-#[cube(launch_unchecked)]
-pub fn copy<F: Float>(from: &[F], into: &mut [F], #[define(F)] _precision: ElemType) {
-    if ABSOLUTE_POS < from.len() {
-        into[ABSOLUTE_POS] = from[ABSOLUTE_POS];
-    }
 }

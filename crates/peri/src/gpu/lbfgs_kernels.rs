@@ -37,8 +37,7 @@ pub fn line_sums<F: Float>(
     let mut constrained = F::new(0.0);
     let mut slope = F::new(0.0);
     let mut moved = F::new(0.0);
-    let mut index = ABSOLUTE_POS;
-    while index < particles.len() {
+    for index in range_stepped(ABSOLUTE_POS, particles.len(), threads) {
         let site = particles[index] as usize;
         #[unroll]
         for d in 0..dimension {
@@ -55,7 +54,6 @@ pub fn line_sums<F: Float>(
                 moved = fma(reach, reach, moved);
             }
         }
-        index += threads;
     }
     partial[ABSOLUTE_POS] = free;
     partial[threads + ABSOLUTE_POS] = constrained;
@@ -111,8 +109,7 @@ pub fn record<F: Float>(
     let sites = force.len() / dimension;
     let start = slot.get::<u32>() as usize * force.len();
     let step = step.get::<F>();
-    let mut index = ABSOLUTE_POS;
-    while index < particles.len() {
+    for index in range_stepped(ABSOLUTE_POS, particles.len(), threads) {
         let site = particles[index] as usize;
         #[unroll]
         for d in 0..dimension {
@@ -124,7 +121,6 @@ pub fn record<F: Float>(
             steps[start + at] = f32::cast_from(step * direction[at]);
             images[start + at] = f32::cast_from(image);
         }
-        index += threads;
     }
 }
 
@@ -157,8 +153,7 @@ pub fn pair_products<F: Float>(
     let mut image_change = F::new(0.0);
     let mut step_slope = F::new(0.0);
     let mut image_slope = F::new(0.0);
-    let mut index = lane;
-    while index < particles.len() {
+    for index in range_stepped(lane, particles.len(), threads) {
         let site = particles[index] as usize;
         #[unroll]
         for d in 0..dimension {
@@ -174,7 +169,6 @@ pub fn pair_products<F: Float>(
                 image_slope = fma(image, gradient, image_slope);
             }
         }
-        index += threads;
     }
     let first = PAIR_SUMS * pair * threads + lane;
     partial[first] = step_change;
@@ -210,8 +204,7 @@ pub fn combine<F: Float>(
     let pairs = weights.len() / 2;
     let scale = scale.get::<F>();
     let mut slope = F::new(0.0);
-    let mut index = ABSOLUTE_POS;
-    while index < particles.len() {
+    for index in range_stepped(ABSOLUTE_POS, particles.len(), threads) {
         let site = particles[index] as usize;
         #[unroll]
         for d in 0..dimension {
@@ -232,7 +225,6 @@ pub fn combine<F: Float>(
             }
             direction[at] = sum;
         }
-        index += threads;
     }
     partial[ABSOLUTE_POS] = slope;
 }

@@ -12,14 +12,21 @@
 //! step, and fetches fields for rows of the history only.
 
 mod body;
+mod driven;
 mod kernels;
 mod lbfgs;
 mod lbfgs_kernels;
+mod list_kernels;
+mod pair_kernels;
+mod pairs;
+mod plane_kernels;
+mod planes;
 mod relaxation;
 mod relaxation_kernels;
 mod steps;
 
 pub use body::{DeviceBody, DeviceLoads, MOST_STEPS};
+pub use driven::DrivenSites;
 pub use lbfgs::{DeviceLineSums, DeviceSearch};
 pub use relaxation::{DeviceRelaxation, RelaxationSums};
 pub use steps::{DeviceStep, ListedBond, StepSums};

@@ -6,6 +6,7 @@ use super::kernels::CUBE;
 use super::relaxation_kernels::{RELAXATION_SUMS, relax, relaxation_sums, stiffen};
 use super::steps::buffer;
 use crate::bonds::LatticeBonds;
+use crate::contact::PlaneRows;
 use crate::error::Error;
 use crate::potential::{KernelFit, TangentTable};
 use cubecl::ir::{ElemType, UIntKind};
@@ -34,6 +35,8 @@ pub struct DeviceRelaxation<const D: usize> {
     /// Forces of the iteration before.
     before: Handle,
     mass: Handle,
+    /// Masses with the stiffness of planes.
+    weighed: Option<Handle>,
     springs: Handle,
     partial: Handle,
     sums: Handle,
@@ -63,6 +66,7 @@ impl<const D: usize> DeviceRelaxation<D> {
             // sites without a particle have no force
             before: numbers(&body.client, body.precision, (0..D * body.sites).map(|_| 0.0)),
             mass: empty(body.sites),
+            weighed: None,
             springs: numbers(&body.client, body.precision, springs.iter().map(|s| s / unit)),
             partial: empty(RELAXATION_SUMS * body.threads()),
             sums: empty(RELAXATION_SUMS * LANES),
@@ -80,7 +84,35 @@ impl<const D: usize> DeviceRelaxation<D> {
         let body = &self.body;
         body.refuse_other_sites("masses", masses)?;
         self.mass = numbers(&body.client, body.precision, masses.iter().map(|mass| mass / self.mass_unit));
+        self.settle_masses();
         Ok(())
+    }
+
+    /// Takes planes as they stand.
+    pub fn set_planes(&mut self, rows: Option<PlaneRows<D>>) {
+        self.body.set_planes(rows);
+        let bytes = self.body.sites * self.body.precision.bytes() as usize;
+        self.weighed = self.body.planes.is_some().then(|| self.body.client.empty(bytes));
+        self.settle_masses();
+    }
+
+    /// Adds the stiffness of planes at the present displacement to the masses, whose unit is a bond's
+    /// `tangent`, N/m⁶.
+    pub fn weigh(&self, tangent: f64) {
+        if let Some(weighed) = &self.weighed {
+            let factor = 0.5 * self.body.unit / (self.body.spacing * self.mass_unit * tangent);
+            self.body.weigh([&self.mass, weighed], factor);
+        }
+    }
+
+    fn settle_masses(&self) {
+        if let Some(weighed) = &self.weighed {
+            self.body.copy(&self.mass, weighed, self.body.sites);
+        }
+    }
+
+    fn masses(&self) -> &Handle {
+        self.weighed.as_ref().unwrap_or(&self.mass)
     }
 
     /// Takes the sums of stiffness of the present displacement, with each bond's own tangent from a table,
@@ -98,6 +130,7 @@ impl<const D: usize> DeviceRelaxation<D> {
                 body.cubes_of(body.particles),
                 CubeDim::new_1d(CUBE as u32),
                 buffer(&body.fields[0], D * body.sites),
+                body.factors(),
                 buffer(&body.sites_of_particles, body.particles),
                 buffer(&body.shifts, bonds),
                 buffer(&body.rows, bonds * (D + super::kernels::ROW)),
@@ -112,6 +145,7 @@ impl<const D: usize> DeviceRelaxation<D> {
                 body.precision.element(),
             );
         }
+        self.settle_masses();
     }
 
     /// Forces of the present displacement with body forces at a load factor; where it `looks`,
@@ -140,7 +174,7 @@ impl<const D: usize> DeviceRelaxation<D> {
                 buffer(displacement, D * body.sites),
                 buffer(&body.sites_of_particles, body.particles),
                 buffer(&body.held, body.held_words()),
-                buffer(&self.mass, body.sites),
+                buffer(self.masses(), body.sites),
                 buffer(&self.springs, body.sites),
                 buffer(&self.partial, RELAXATION_SUMS * threads),
                 body.form,
@@ -176,7 +210,7 @@ impl<const D: usize> DeviceRelaxation<D> {
                 buffer(force, D * body.sites),
                 buffer(&body.sites_of_particles, body.particles),
                 buffer(&body.held, body.held_words()),
-                buffer(&self.mass, body.sites),
+                buffer(self.masses(), body.sites),
                 buffer(velocity, D * body.sites),
                 buffer(displacement, D * body.sites),
                 InputScalar::new(threads as u32, ElemType::UInt(UIntKind::U32)),

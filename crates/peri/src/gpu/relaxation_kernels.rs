@@ -1,7 +1,7 @@
 //! Kernels of dynamic relaxation; see [`super::kernels`] for fields, lengths and indices. Masses are in units
 //! of [`super::DeviceRelaxation`].
 
-use super::kernels::{KernelForm, ROW};
+use super::kernels::{KernelForm, ROW, weight};
 use cubecl::ir::ElemType;
 use cubecl::prelude::*;
 
@@ -47,8 +47,7 @@ pub fn relaxation_sums<F: Float>(
     let mut free = F::new(0.0);
     let mut constrained = F::new(0.0);
     let mut moved = F::new(0.0);
-    let mut index = ABSOLUTE_POS;
-    while index < particles.len() {
+    for index in range_stepped(ABSOLUTE_POS, particles.len(), threads) {
         let site = particles[index] as usize;
         let own = mass[site];
         #[unroll]
@@ -68,7 +67,6 @@ pub fn relaxation_sums<F: Float>(
                 moved = fma(reach, reach, moved);
             }
         }
-        index += threads;
     }
     partial[ABSOLUTE_POS] = top;
     partial[threads + ABSOLUTE_POS] = bottom;
@@ -101,8 +99,7 @@ pub fn relax<F: Float>(
     let sites = displacement.len() / dimension;
     let keep = keep.get::<F>();
     let push = push.get::<F>();
-    let mut index = ABSOLUTE_POS;
-    while index < particles.len() {
+    for index in range_stepped(ABSOLUTE_POS, particles.len(), threads) {
         let site = particles[index] as usize;
         let own = mass[site];
         #[unroll]
@@ -115,16 +112,16 @@ pub fn relax<F: Float>(
             velocity[at] = speed;
             displacement[at] += speed;
         }
-        index += threads;
     }
 }
 
-/// Bounds of the stiffness of particles, Σ_J c·max(t, `least`)(1 + max_{d≠e} |n_d n_e|) with the directions n
-/// of the deformed bonds and t from a table of `pieces` in e, which begins at `low`; `rest` without bonds.
+/// Bounds of the stiffness of particles, Σ_J c w·max(t, `least`)(1 + max_{d≠e} |n_d n_e|) with the directions
+/// n of the deformed bonds and t from a table of `pieces` in e, which begins at `low`; `rest` without bonds.
 #[cube(launch_unchecked)]
 #[allow(clippy::too_many_arguments)]
 pub fn stiffen<F: Float>(
     displacement: &[F],
+    factors: &[F],
     particles: &[u32],
     shifts: &[i32],
     rows: &[F],
@@ -179,7 +176,11 @@ pub fn stiffen<F: Float>(
             if square > F::new(0.0) {
                 share = mixed / square;
             }
-            sum = fma(rows[row + dimension + 1] * tangent, F::new(1.0) + share, sum);
+            let mut stiffness = rows[row + dimension + 1];
+            if comptime!(form.factors > 0) {
+                stiffness *= weight::<F>(factors, rows, row, site, there, form);
+            }
+            sum = fma(stiffness * tangent, F::new(1.0) + share, sum);
         }
     }
     if sum > F::new(0.0) {

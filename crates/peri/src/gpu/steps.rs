@@ -1,9 +1,8 @@
 //! Steps of velocity Verlet on a device: launches of its kernels, and what the host reads of them.
 
 use super::body::{DeviceBody, FOLDED, LANES, LISTED, MOST_STEPS, cubes, failed};
-use super::kernels::{
-    CUBE, KernelForm, LEAP_SUMS, SUMS, copy, fold, half_kick_and_drift, kick, pull, scatter,
-};
+use super::kernels::{CUBE, KernelForm, LEAP_SUMS, SUMS, half_kick_and_drift, kick, pull};
+use super::list_kernels::{copy, fold, scatter};
 use crate::bonds::StretchRange;
 use crate::error::Error;
 use cubecl::ir::{ElemType, UIntKind};
@@ -19,8 +18,10 @@ pub struct DeviceStep {
     pub density: f64,
     /// Mass-proportional damping c, 1/s.
     pub damping: f64,
-    /// Load factor before and after.
+    /// Load factor before and after, of prescribed displacements.
     pub factors: [f64; 2],
+    /// Factor of body forces before and after.
+    pub loading: [f64; 2],
     /// Rate of the load factor after the step, 1/s.
     pub rate: f64,
 }
@@ -74,8 +75,8 @@ impl<const D: usize> DeviceBody<D> {
         }
     }
 
-    /// Forces of the present displacement with body forces at a load factor. Where it `looks`, [`Self::look`]
-    /// has what it saw.
+    /// Forces of the present displacement with body forces at a load factor, and of contact. Where it
+    /// `looks`, [`Self::stretch_range`] has what it saw.
     pub fn pull(&mut self, factor: f64, looks: bool) {
         if looks {
             self.count = self.client.create_from_slice(u32::as_bytes(&[0]));
@@ -83,9 +84,11 @@ impl<const D: usize> DeviceBody<D> {
         let [displacement, _, force] = &self.fields;
         let all = (&self.sites_of_particles, self.particles);
         self.launch_pull([displacement, force], all, factor, self.form, looks);
+        self.press(None);
+        self.push_pairs(None);
     }
 
-    /// Forces of some sites.
+    /// Forces of some sites, without those of contact.
     pub fn pull_at(&self, sites: &[u32], factor: f64) {
         let [displacement, _, force] = &self.fields;
         let some = self.client.create_from_slice(u32::as_bytes(sites));
@@ -148,7 +151,7 @@ impl<const D: usize> DeviceBody<D> {
         let speed = self.spacing / step.time_step;
         let mass = 0.5 * step.density * self.volume;
         let damping = mass * step.damping * speed * self.spacing;
-        let [before, after] = step.factors;
+        let [before, after] = step.loading;
         let kick = LEAP_SUMS;
         StepSums {
             work: [
@@ -230,7 +233,7 @@ impl<const D: usize> DeviceBody<D> {
         let bytes = D * self.sites * self.precision.bytes() as usize;
         let kept = self.kept.take().unwrap_or_else(|| [(); 3].map(|()| self.client.empty(bytes)));
         for (from, into) in self.fields.iter().zip(&kept) {
-            self.copy(from, into);
+            self.copy(from, into, D * self.sites);
         }
         self.kept = Some(kept);
     }
@@ -239,20 +242,21 @@ impl<const D: usize> DeviceBody<D> {
     pub fn take_back(&mut self, time_step: f64) {
         let Some(kept) = &self.kept else { return };
         for (from, into) in kept.iter().zip(&self.fields) {
-            self.copy(from, into);
+            self.copy(from, into, D * self.sites);
         }
         self.time_step = time_step;
     }
 
-    fn copy(&self, from: &Handle, into: &Handle) {
-        // SAFETY: both are fields
+    /// Copies a list of `length` numbers.
+    pub(super) fn copy(&self, from: &Handle, into: &Handle, length: usize) {
+        // SAFETY: both have that length
         unsafe {
             copy::launch_unchecked(
                 &self.client,
-                self.cubes_of(D * self.sites),
+                self.cubes_of(length),
                 CubeDim::new_1d(CUBE as u32),
-                buffer(from, D * self.sites),
-                buffer(into, D * self.sites),
+                buffer(from, length),
+                buffer(into, length),
                 self.precision.element(),
             );
         }
@@ -284,6 +288,7 @@ impl<const D: usize> DeviceBody<D> {
                 self.cubes_of(threads),
                 CubeDim::new_1d(CUBE as u32),
                 buffer(displacement, D * self.sites),
+                self.factors(),
                 buffer(sites, count),
                 buffer(&self.shifts, form.bonds),
                 buffer(&self.rows, form.bonds * (D + super::kernels::ROW)),

@@ -3,6 +3,7 @@
 use super::criterion::Criterion;
 use super::system::System;
 use crate::bonds::{LatticeBonds, Property};
+use crate::contact::{Contact, PairRows, PlaneRows};
 use crate::error::Error;
 use crate::field::Field;
 use crate::gpu::DeviceLoads;
@@ -27,6 +28,16 @@ pub fn loads<'a, const D: usize>(system: &'a System<D>) -> DeviceLoads<'a, D> {
         displacement: loads.displacement.as_ref(),
         body_force: loads.body_force.as_ref(),
     }
+}
+
+/// Rows of the planes of a system.
+pub fn planes<const D: usize>(system: &System<D>) -> Option<PlaneRows<D>> {
+    system.repulsion().and_then(Contact::plane_rows)
+}
+
+/// Rows of the pairs of particles that may touch in a system.
+pub fn pairs<const D: usize>(system: &System<D>) -> Option<PairRows<D>> {
+    system.repulsion().and_then(|contact| contact.pair_rows(&*system.bonds))
 }
 
 /// Lattice of a system.
@@ -69,6 +80,15 @@ pub fn held_as_before<const D: usize>(
     displacement
 }
 
+/// Refuses what only the host can do in searches for equilibrium.
+pub fn refuse_in_searches<const D: usize>(system: &System<D>) -> Result<(), Error> {
+    if system.repulsion().is_some_and(Contact::has_pairs) {
+        let what = "unexpected contact of particles in equilibria: only the processor does that";
+        return Err(Error::Device(what.to_owned()));
+    }
+    refuse(system)
+}
+
 /// Refuses what only the host can do.
 pub fn refuse<const D: usize>(system: &System<D>) -> Result<(), Error> {
     let softens = matches!(
@@ -83,14 +103,12 @@ pub fn refuse<const D: usize>(system: &System<D>) -> Result<(), Error> {
             "a solid, or bonds with prestrains, of several laws, or that soften",
         ),
         (softens, "bonds that break by their energy"),
-        (system.contact.is_some(), "contact"),
-        (!system.loads.turned.is_empty(), "a rotation"),
         (!system.loads.rigid.is_empty(), "a region that moves as a whole"),
-        (system.loads.curved.is_some(), "a curve of time"),
-        (!system.density_ratios.is_empty(), "parts of their own density"),
+        (system.loads.follows(), "a body force that follows the displacement"),
     ];
-    match what.iter().find(|(has, _)| *has) {
-        Some((_, what)) => Err(Error::Device(format!("unexpected {what}: only the processor does that"))),
+    let contact = system.repulsion().and_then(Contact::beyond_rows);
+    match what.iter().find(|(has, _)| *has).map(|(_, what)| *what).or(contact) {
+        Some(what) => Err(Error::Device(format!("unexpected {what}: only the processor does that"))),
         None => Ok(()),
     }
 }

@@ -95,6 +95,10 @@ pub trait SearchVectors<const D: usize> {
     fn give(&self, system: &mut System<D>, state: &mut State<D>) -> Result<(), Error>;
     /// Computes forces at the present displacement, those of the trial.
     fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<LinePoint, Error>;
+    /// Faces in contact with planes in the last forces, plane by plane.
+    fn in_touch(&self, system: &System<D>, state: &State<D>) -> Result<Vec<[u32; 2]>, Error> {
+        Ok(in_touch(system, state))
+    }
     /// ‖s u‖₂ with the springs s of the reference force, N/m³, and the precision of u.
     fn rounding(&mut self, system: &System<D>, state: &State<D>) -> Result<(f64, f64), Error>;
     /// u += step·d.
@@ -300,13 +304,16 @@ impl<V> LbfgsSearch<V> {
 
     /// Returns true if a tenth of the faces in contact with planes have changed since the preconditioner was
     /// built.
-    fn others_touch<const D: usize>(&self, system: &System<D>, state: &State<D>) -> bool {
+    fn others_touch<const D: usize>(&self, system: &System<D>, state: &State<D>) -> Result<bool, Error>
+    where
+        V: SearchVectors<D>,
+    {
         if system.repulsion().is_none_or(|contact| !contact.has_surfaces()) {
-            return false;
+            return Ok(false);
         }
-        let now = in_touch(system, state);
+        let now = self.vectors.in_touch(system, state)?;
         let kept = now.iter().filter(|face| self.in_touch.binary_search(face).is_ok()).count();
-        10 * (now.len() + self.in_touch.len() - 2 * kept) > now.len().max(1)
+        Ok(10 * (now.len() + self.in_touch.len() - 2 * kept) > now.len().max(1))
     }
 
     /// Computes forces and gradient of an iterate that no search produced.
@@ -373,7 +380,7 @@ impl<V> LbfgsSearch<V> {
             }
             watch(&self.status(system, state, false), state)?;
             let others_touch =
-                state.counts.iteration.is_multiple_of(TOUCHES) && self.others_touch(system, state);
+                state.counts.iteration.is_multiple_of(TOUCHES) && self.others_touch(system, state)?;
             if state.counts.iteration.is_multiple_of(ITERATIONS) || others_touch {
                 self.vectors.give(system, state)?;
                 self.begin(system, state, watch)?;

@@ -4,7 +4,7 @@
 //! Fields go to the card when a search begins and come back when it has ended, when bonds break on the way,
 //! and where the run may be saved.
 
-use super::device_body::{held_as_before, lattice_with_law, loads, refuse, squares};
+use super::device_body::{held_as_before, lattice_with_law, loads, planes, refuse_in_searches, squares};
 use super::lbfgs::{Lbfgs, LbfgsSearch, LinePoint, SearchVectors};
 use super::lbfgs_host::{HUGE_SCALE, LARGEST_CHANGE};
 use super::pair_products::{Kept, PairProducts};
@@ -17,7 +17,8 @@ use crate::gpu::{Device, DeviceSearch};
 use std::collections::VecDeque;
 
 impl Lbfgs {
-    /// Creates a solver whose iterations a device takes, of lattices of a bond law, without contact.
+    /// Creates a solver whose iterations a device takes, of lattices of a bond law, in contact with planes
+    /// at most.
     pub fn device_solver<'a, const D: usize>(&self, device: &'a Device) -> LbfgsSearch<CardVectors<'a, D>> {
         LbfgsSearch::with_vectors(*self, CardVectors::new(device, self.memory))
     }
@@ -69,7 +70,7 @@ impl<'a, const D: usize> CardVectors<'a, D> {
 
 impl<const D: usize> SearchVectors<D> for CardVectors<'_, D> {
     fn build(&mut self, system: &mut System<D>, state: &State<D>, settings: &Lbfgs) -> Result<(), Error> {
-        refuse(system)?;
+        refuse_in_searches(system)?;
         SearchVectors::<D>::forget(self, true);
         self.preconditioner.build(system, state, settings.weight, None);
         Ok(())
@@ -89,6 +90,7 @@ impl<const D: usize> SearchVectors<D> for CardVectors<'_, D> {
         self.pushed = squares(system);
         let (local, card) = (self.preconditioner.local().to_vec(), self.card()?);
         card.body.set_loads(&loads(system));
+        card.body.set_planes(planes(system));
         card.set_local(bonds, &local);
         // the direction is in the place of the velocity
         let rest = crate::field::Field::zeros(system.bonds.sites());
@@ -108,16 +110,22 @@ impl<const D: usize> SearchVectors<D> for CardVectors<'_, D> {
         if self.fitted != state.stretches.fitted {
             self.take_law(system, state)?;
         }
-        let (factor, pushed) = (system.factors[state.step], self.pushed);
+        let factor = system.loads.force_factor(system.factors[state.step]);
+        let pushed = self.pushed;
         let card = self.card()?;
         card.body.pull(factor, true);
         let found = card.line_sums(false)?;
         let (observed, _) = card.body.stretch_range()?;
         system.count_evaluation(state);
-        let (free, constrained) = (found.free, found.constrained);
+        // planes hold a body, too
+        let (free, constrained) = (found.free, found.constrained + card.body.plane_square()?);
         let external = factor * factor * pushed;
         let sums = ForceSums { free, constrained, external, ..ForceSums::default() };
         Ok(LinePoint { sums, observed, slope: found.slope })
+    }
+
+    fn in_touch(&self, _: &System<D>, _: &State<D>) -> Result<Vec<[u32; 2]>, Error> {
+        self.card.as_ref().map_or_else(|| Ok(Vec::new()), |card| card.body.plane_touches())
     }
 
     fn rounding(&mut self, _: &System<D>, _: &State<D>) -> Result<(f64, f64), Error> {
@@ -195,6 +203,7 @@ impl<const D: usize> SearchVectors<D> for CardVectors<'_, D> {
         if let (Some(card), Some(bonds)) = (&mut self.card, system.bonds.as_lattice()) {
             card.body.set_intact(bonds);
             card.body.set_loads(&loads(system));
+            card.body.set_planes(planes(system));
             card.set_local(bonds, self.preconditioner.local());
         }
     }

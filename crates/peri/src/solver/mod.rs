@@ -11,6 +11,8 @@ mod criterion;
 mod curves;
 #[cfg(feature = "gpu")]
 mod device_body;
+#[cfg(feature = "gpu")]
+mod device_run;
 mod dynamic_relaxation;
 mod fit_range;
 mod force_fields;

@@ -4,7 +4,7 @@
 //! Fields go to the card when a search for equilibrium begins and come back when it has ended, when bonds
 //! break on the way, and where the run may be saved.
 
-use super::device_body::{held_as_before, lattice_with_law, loads, refuse, squares};
+use super::device_body::{held_as_before, lattice_with_law, loads, planes, refuse_in_searches, squares};
 use super::dynamic_relaxation::{DynamicRelaxation, REFRESH, damping, is_look_due};
 use super::load_stepping::Equilibrium;
 use super::mass::{has_own_mass, update_unit_mass};
@@ -20,7 +20,8 @@ use crate::gpu::{Device, DeviceRelaxation};
 const KEPT: u64 = 500;
 
 impl DynamicRelaxation {
-    /// Creates a solver whose iterations a device takes, of lattices of a bond law, without contact.
+    /// Creates a solver whose iterations a device takes, of lattices of a bond law, in contact with planes
+    /// at most.
     pub fn device_solver<'a, const D: usize>(&self, device: &'a Device) -> CardRelaxation<'a, D> {
         CardRelaxation {
             settings: *self,
@@ -62,6 +63,7 @@ impl<const D: usize> CardRelaxation<'_, D> {
             update_unit_mass(bonds, system.bonds.particles(), &mut self.unit_mass);
         }
         card.set_masses(&self.unit_mass)?;
+        card.set_planes(planes(system));
         self.stiffened = false;
         self.pushed = squares(system);
         self.card = Some(card);
@@ -87,7 +89,7 @@ impl<const D: usize> CardRelaxation<'_, D> {
     ) -> Result<bool, Error> {
         let (goal, iteration) = (self.settings.goal(), state.counts.iteration);
         let look = is_look_due(system, state);
-        let factor = system.factors[state.step];
+        let factor = system.loads.force_factor(system.factors[state.step]);
         let own = has_own_mass(system, state);
         if own && (iteration.is_multiple_of(REFRESH) || !self.stiffened) {
             let fitted = state.stretches.fitted;
@@ -99,6 +101,7 @@ impl<const D: usize> CardRelaxation<'_, D> {
         }
         let tangent = if own { system.material.bond_law().1 } else { state.stretches.tangent };
         let mass = 0.5 * self.settings.mass_safety * tangent;
+        card.weigh(tangent);
         card.pull(factor, look);
         let measures = state.measures_rounding();
         let found = card.sums(measures)?;
@@ -106,7 +109,8 @@ impl<const D: usize> CardRelaxation<'_, D> {
             quotient_top: found.quotient_top,
             quotient_bottom: found.quotient_bottom * mass,
             free: found.free,
-            constrained: found.constrained,
+            // planes hold a body, too
+            constrained: found.constrained + card.body.plane_square()?,
             external: factor * factor * self.pushed,
         };
         system.count_evaluation(state);
@@ -133,6 +137,9 @@ impl<const D: usize> CardRelaxation<'_, D> {
         }
         let (keep, push) = move_factors(iteration, mass, damping);
         card.relax(keep, push);
+        if let Some(contact) = system.repulsion() {
+            card.body.stop(contact.detached());
+        }
         state.counts.iterate();
         let keeps = state.counts.iteration.is_multiple_of(KEPT);
         if keeps {
@@ -162,6 +169,7 @@ impl<const D: usize> CardRelaxation<'_, D> {
             let fields = [&state.displacement, &state.velocity, &state.force];
             card.body.set_state(lattice_with_law(system)?.0, fields, 1.0)?;
             card.body.set_loads(&loads(system));
+            card.set_planes(planes(system));
             self.pushed = squares(system);
             if !self.stiffened {
                 card.set_masses(&self.unit_mass)?;
@@ -179,7 +187,7 @@ impl<const D: usize> Equilibrium<D> for CardRelaxation<'_, D> {
         state: &mut State<D>,
         watch: &mut Watch<D>,
     ) -> Result<Option<StretchRange>, Error> {
-        refuse(system)?;
+        refuse_in_searches(system)?;
         let status = state.status(system.factors.len(), self.settings.tolerance, 0.0, true);
         watch(&status, state)?;
         self.begin(system, state)?;

@@ -300,7 +300,16 @@ impl VelocityVerlet {
     /// Raises the contact stiffness of the limits if more particles are in contact than so far.
     fn cover_contact<const D: usize>(&self, system: &System<D>, state: &mut State<D>) {
         let Some(contact) = system.repulsion() else { return };
-        let greatest = contact.greatest_stiffness(&*system.bonds, &state.displacement);
+        self.raise_contact(system, state, contact.greatest_stiffness(&*system.bonds, &state.displacement));
+    }
+
+    /// Raises the contact stiffness of the limits to that found, N/m⁴, if it is greater.
+    pub(super) fn raise_contact<const D: usize>(
+        &self,
+        system: &System<D>,
+        state: &mut State<D>,
+        greatest: f64,
+    ) {
         if greatest > state.motion.limits.contact {
             state.motion.limits.contact = GROWTH * greatest;
             self.cover(system, state);

@@ -3,32 +3,28 @@
 //! As long as no stretch can leave the fitted law or reach the critical one, several steps are taken before
 //! their sums are read; where the sums show that stretches were to be looked at on the way, the card goes
 //! back to that step. Otherwise a step is taken at a time, and the stretches that its forces meet are looked
-//! at.
+//! at. Pairs of particles in contact are listed by the host, whenever particles have moved so far since that
+//! others may touch.
 
-use super::device_body::{critical, lattice, lattice_with_law, limit, loads, refuse};
+use super::device_body::refuse;
+use super::device_run::{DeviceRun, GROWTH, TakenStep};
 use super::method::{StepCallback, Watch};
 use super::motion::StretchLook;
 use super::state::State;
 use super::system::System;
 use super::verlet::VelocityVerlet;
+use super::verlet_friction::work_of_pushes;
 use super::verlet_step::VerletSums;
-use crate::bonds::{LatticeBonds, Overstretched};
 use crate::error::Error;
-use crate::gpu::{Device, DeviceBody, DeviceStep, MOST_STEPS, StepSums};
+use crate::gpu::{Device, DeviceStep, MOST_STEPS};
 
-/// Strain of a step, over that of the last, that steps taken together allow for.
-const GROWTH: f64 = 1.5;
-
-/// A body on a card in a run.
-struct Run<const D: usize> {
-    body: DeviceBody<D>,
-    /// Greatest change of a stretch in the last step, at most; ∞ where it is not known.
-    strain: f64,
-}
+/// Steps for which the list of pairs has to hold.
+const FEW: f64 = 4.0;
 
 impl VelocityVerlet {
-    /// As [`Method::solve`](super::Method::solve), with steps on a device: of a lattice of a bond law,
-    /// without contact and turned regions. `watch` may keep the state after a row of history only.
+    /// As [`Method::solve`](super::Method::solve), with steps on a device: of a lattice of a bond law, in
+    /// contact with itself and with planes at most, without friction. `watch` may keep the state after a row
+    /// of history only.
     ///
     /// # Errors
     /// As there; [`Error::Device`] for what the device cannot do, or where it fails.
@@ -41,14 +37,16 @@ impl VelocityVerlet {
         finished: &mut StepCallback<D>,
     ) -> Result<(), Error> {
         refuse(system)?;
+        refuse_in_steps(system)?;
         self.open(system, state)?;
-        let mut run = Run { body: body_of(device, system, state)?, strain: f64::INFINITY };
+        let mut run = DeviceRun::new(device, system, state)?;
         while state.step < self.records {
             let end = self.end_of_row(state);
             while state.motion.steps.taken < state.motion.steps.planned {
                 self.advance_on(&mut run, system, state, end, watch)?;
             }
             [state.displacement, state.velocity, state.force] = run.body.state()?;
+            run.renew_pairs(system, &state.displacement);
             self.close_row(system, state)?;
             finished(&*system.bonds, state)?;
             watch(&self.status(state, true), state)?;
@@ -59,7 +57,7 @@ impl VelocityVerlet {
     /// Some steps: many where no stretch has to be looked at, one otherwise.
     fn advance_on<const D: usize>(
         &self,
-        run: &mut Run<D>,
+        run: &mut DeviceRun<D>,
         system: &mut System<D>,
         state: &mut State<D>,
         end: f64,
@@ -68,8 +66,13 @@ impl VelocityVerlet {
         let motion = &state.motion;
         let room = motion.look.room(state.stretches.fitted, system.breaking_stretch());
         let left = motion.steps.planned - motion.steps.taken;
+        let most = (left as f64).min(MOST_STEPS as f64);
+        if run.steps_with_pairs() < most.min(FEW) {
+            let displacement = run.body.displacement()?;
+            run.renew_pairs(system, &displacement);
+        }
         // not a number, or none below 2: one
-        let many = (room / (GROWTH * run.strain)).min(left as f64).min(MOST_STEPS as f64);
+        let many = (room / (GROWTH * run.strain)).min(most).min(run.steps_with_pairs());
         if many >= 2.0 {
             self.advance_many(run, system, state, (end, many as usize), watch)
         } else {
@@ -95,13 +98,14 @@ impl VelocityVerlet {
         let after = steps.time_after(end);
         let (factor, rate) = self.factor(system, after);
         let factors = [self.factor(system, before).0, factor];
+        let loading = factors.map(|factor| system.loads.force_factor(factor));
         let (time_step, density, damping) = (steps.time_step, self.density, self.damping);
-        (DeviceStep { time_step, density, damping, factors, rate }, after)
+        (DeviceStep { time_step, density, damping, factors, loading, rate }, after)
     }
 
     fn advance_many<const D: usize>(
         &self,
-        run: &mut Run<D>,
+        run: &mut DeviceRun<D>,
         system: &mut System<D>,
         state: &mut State<D>,
         (end, many): (f64, usize),
@@ -112,25 +116,29 @@ impl VelocityVerlet {
         let constants: Vec<DeviceStep> = steps.iter().map(|(step, _)| *step).collect();
         let before = run.body.time_step();
         run.body.keep_state();
-        for (slot, step) in constants.iter().enumerate() {
-            run.step(step);
-            run.body.keep_sums(slot);
+        for (slot, step) in steps.iter().enumerate() {
+            run.step(system, step);
+            run.keep_sums(slot);
         }
-        let sums = run.body.sums(&constants)?;
-        for (taken, (sums, (_, after))) in sums.iter().zip(&steps).enumerate() {
-            let strain = run.strain_of(state, sums);
+        let sums = run.sums(&constants)?;
+        for (taken, (sums, step)) in sums.iter().zip(&steps).enumerate() {
+            let strain = run.strain_of(state, &sums.sums);
             let mut look = state.motion.look;
             look.slack += strain;
-            if look.is_due(state.stretches.fitted, system.breaking_stretch()) {
+            if look.is_due(state.stretches.fitted, system.breaking_stretch())
+                || !run.keeps_pairs(&sums.sums)
+                || Self::is_stiffer(system, state, sums.stiffness)
+            {
                 run.body.take_back(before);
-                constants[..taken].iter().for_each(|step| run.step(step));
+                run.force(system, constants[0].factors[0]);
+                steps[..taken].iter().for_each(|step| run.step(system, step));
                 run.strain = f64::INFINITY;
                 return Ok(());
             }
             state.motion.look = look;
             run.strain = strain;
             system.count_evaluation(state);
-            self.count(state, *after, sums)?;
+            self.count(system, state, step, sums)?;
             watch(&self.status(state, false), state)?;
         }
         Ok(())
@@ -138,15 +146,22 @@ impl VelocityVerlet {
 
     fn advance_one<const D: usize>(
         &self,
-        run: &mut Run<D>,
+        run: &mut DeviceRun<D>,
         system: &mut System<D>,
         state: &mut State<D>,
         end: f64,
     ) -> Result<(), Error> {
         let (step, after) = self.step_ahead(system, state, 0, end);
-        let factor = step.factors[1];
-        run.body.half_kick_and_drift(&step);
-        run.body.pull(factor, true);
+        run.half_step(system, &(step, after));
+        if run.lists_pairs() {
+            run.body.keep_sums(0);
+            if !run.keeps_pairs(&run.body.sums(&[step])?[0]) {
+                let displacement = run.body.displacement()?;
+                run.renew_pairs(system, &displacement);
+            }
+        }
+        let loading = step.loading[1];
+        run.body.pull(loading, true);
         let (observed, listed) = run.body.stretch_range()?;
         run.body.keep_sums(0);
         let sums = run.body.sums(&[step])?[0];
@@ -159,19 +174,24 @@ impl VelocityVerlet {
             state.motion.look = StretchLook::new(observed);
             if observed.high.is_finite() && system.widen(state)? {
                 run.take_law(system)?;
-                run.body.pull(factor, false);
+                run.body.pull(loading, false);
                 system.count_evaluation(state);
                 self.cover(system, state);
             }
         }
         run.body.kick(&step);
-        run.body.keep_sums(0);
-        let sums = run.body.sums(&[step])?[0];
-        self.count(state, after, &sums)?;
+        run.keep_sums(0);
+        let sums = run.sums(&[step])?;
+        let mut stiffness = sums[0].stiffness;
+        self.count(system, state, &(step, after), &sums[0])?;
         if look && system.is_overstretched(observed) {
             let list = run.overstretched(system, state, listed)?;
             let sites = system.sever_bonds(state, list, None);
-            run.take_severed(system, state, &sites, factor);
+            run.take_severed(system, state, &sites, loading);
+            stiffness = run.stiffness_of_pairs()?;
+        }
+        if let Some(contact) = system.repulsion() {
+            self.raise_contact(system, state, contact.stiffness_with_pairs(stiffness));
         }
         let motion = &mut state.motion;
         if motion.limits.longest < (1.0 - 1e-9) * motion.steps.time_step
@@ -182,8 +202,28 @@ impl VelocityVerlet {
         Ok(())
     }
 
-    fn count<const D: usize>(&self, state: &mut State<D>, after: f64, sums: &StepSums) -> Result<(), Error> {
-        state.motion.time = after;
+    /// Returns true if contact is stiffer than the limits of time steps include.
+    fn is_stiffer<const D: usize>(system: &System<D>, state: &State<D>, pairs: f64) -> bool {
+        let greatest = system.repulsion().map_or(0.0, |contact| contact.stiffness_with_pairs(pairs));
+        greatest > state.motion.limits.contact
+    }
+
+    /// Counts a step with its sums.
+    fn count<const D: usize>(
+        &self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        (step, after): &(DeviceStep, f64),
+        TakenStep { sums, pushes, .. }: &TakenStep,
+    ) -> Result<(), Error> {
+        if system.contact.is_some() {
+            system.move_surfaces(step.factors[1], *after);
+        }
+        if let Some(contact) = system.repulsion().filter(|_| !pushes.is_empty()) {
+            let pushing = contact.plane_forces(pushes);
+            state.work += work_of_pushes(contact, state, pushing);
+        }
+        state.motion.time = *after;
         state.motion.steps.taken += 1;
         state.counts.iterate();
         let half =
@@ -193,72 +233,15 @@ impl VelocityVerlet {
     }
 }
 
-impl<const D: usize> Run<D> {
-    fn step(&mut self, step: &DeviceStep) {
-        self.body.half_kick_and_drift(step);
-        self.body.pull(step.factors[1], false);
-        self.body.kick(step);
+/// Refuses what only the host does in steps of time.
+fn refuse_in_steps<const D: usize>(system: &System<D>) -> Result<(), Error> {
+    let formulas = system.loads.curved.as_ref().is_some_and(|curved| !curved.fields.is_empty());
+    let what = [
+        (formulas, "formulas of place and time"),
+        (!system.density_ratios.is_empty(), "parts of their own density"),
+    ];
+    match what.iter().find(|(has, _)| *has) {
+        Some((_, what)) => Err(Error::Device(format!("unexpected {what}: only the processor does that"))),
+        None => Ok(()),
     }
-
-    /// Greatest change of a stretch in a step, at most: two ends, √D components.
-    fn strain_of(&self, state: &State<D>, sums: &StepSums) -> f64 {
-        2.0 * (D as f64).sqrt() * sums.increment / state.motion.limits.bonds.shortest
-    }
-
-    fn take_law(&mut self, system: &System<D>) -> Result<(), Error> {
-        let Some((law, _)) = lattice(system).and_then(LatticeBonds::law) else { return Ok(()) };
-        self.body.set_law(law, limit(system))
-    }
-
-    /// Listed bonds that break, as the host finds them.
-    fn overstretched(
-        &self,
-        system: &System<D>,
-        state: &mut State<D>,
-        listed: usize,
-    ) -> Result<Vec<Overstretched>, Error> {
-        let Some(critical) = critical(system) else { return Ok(Vec::new()) };
-        let Some(listed) = self.body.listed(listed)? else {
-            [state.displacement, state.velocity, state.force] = self.body.state()?;
-            let scan = crate::bonds::StretchScan::default();
-            return Ok(crate::bonds::overstretched(&*system.bonds, &state.displacement, critical, &scan));
-        };
-        let each = listed.into_iter().filter_map(|(site, index, elongation)| {
-            let bond = system.bonds.bond(site as usize, index);
-            let least = critical.weaker(site as usize, bond.site).powi(2) - 1.0;
-            let (length, weight) = (bond.length, bond.weight);
-            (elongation > least).then_some(Overstretched { site, index, elongation, length, weight })
-        });
-        Ok(each.collect())
-    }
-
-    /// Takes the bonds left to sites, and their forces.
-    fn take_severed(&mut self, system: &System<D>, state: &State<D>, sites: &[u32], factor: f64) {
-        let Some(words) = state.fracture.intact.as_ref().filter(|_| !sites.is_empty()) else { return };
-        let all = system.bonds.sites();
-        let rows = words.len() / all;
-        let changed = sites.iter().flat_map(|&site| (0..rows).map(move |row| row * all + site as usize));
-        let changed: Vec<(usize, u64)> = changed.map(|at| (at, words[at])).collect();
-        self.body.replace(&changed);
-        if system.loads.body_force.is_some() {
-            // particles without bonds have lost theirs
-            self.body.set_loads(&loads(system));
-        }
-        self.body.pull_at(sites, factor);
-    }
-}
-
-fn body_of<const D: usize>(
-    device: &Device,
-    system: &System<D>,
-    state: &State<D>,
-) -> Result<DeviceBody<D>, Error> {
-    let (bonds, (law, modulus)) = lattice_with_law(system)?;
-    let mut body = DeviceBody::new(device, bonds, law, modulus)?;
-    body.set_law(law, limit(system))?;
-    body.set_loads(&loads(system));
-    let time_step = Some(state.motion.steps.time_step).filter(|&step| step > 0.0);
-    let fields = [&state.displacement, &state.velocity, &state.force];
-    body.set_state(bonds, fields, time_step.unwrap_or(state.motion.limits.longest))?;
-    Ok(body)
 }

@@ -7,7 +7,7 @@
 use super::state::State;
 use super::system::System;
 use super::verlet_step::{FieldPair, VerletStep};
-use crate::contact::RigidSurface;
+use crate::contact::{Contact, RigidSurface};
 use crate::field::{Field, chunk_range};
 use crate::parallel;
 
@@ -73,9 +73,18 @@ pub fn surface_pass<const D: usize>(system: &System<D>, state: &mut State<D>, ru
     }
     let resting = contact.surface_reactions(&state.displacement);
     let pushing: Vec<[f64; 3]> = resting.iter().map(|resting| resting.force).collect();
-    state.work += work_of_surfaces(contact.moved(), &state.contact.surface_push, &pushing)
-        + work_of_surfaces(contact.moved(), rubbed, &state.contact.surface_friction);
-    state.contact.surface_push = pushing;
+    let rubbing = work_of_surfaces(contact.moved(), rubbed, &state.contact.surface_friction);
+    state.work += work_of_pushes(contact, state, pushing) + rubbing;
+}
+
+/// Work of surfaces that have moved, J, which push the body with these forces, N, from now on.
+pub fn work_of_pushes<const D: usize>(
+    contact: &Contact<D>,
+    state: &mut State<D>,
+    pushing: Vec<[f64; 3]>,
+) -> f64 {
+    let before = std::mem::replace(&mut state.contact.surface_push, pushing);
+    work_of_surfaces(contact.moved(), &before, &state.contact.surface_push)
 }
 
 /// Σ ½(force before + force after)·Δ; zero before the first step.

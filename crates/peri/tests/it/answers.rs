@@ -86,17 +86,14 @@ fn histories_of_curves_are_those_of_factors() {
         "traction = [\"20 kPa\", \"0 Pa\"]",
         "force = [\"0.05 N\", \"0.01 N\"]",
     ];
-    let times = |factors: [&str; 3]| {
-        let each =
-            factors.map(|factor| format!("[[time.step]]\nduration = \"1 s\"\nincrements = 2\n{factor}"));
-        format!("{}[solver]\ntolerance = 1e-9\n[output]\npictures = false\n", each.concat())
-    };
+    let rest = "tolerance = 1e-9\n[output]\npictures = false\n";
+    let factors = format!("[solver]\npath = [1, 0, -1]\nsteps = 6\n{rest}");
+    let times = format!("[[time.step]]\nduration = \"3 s\"\nincrements = 6\n[solver]\n{rest}");
     for end in ends {
         let grip = format!("[[boundary]]\nname = \"grip\"\nside = \"x+\"\n{end}\n");
         let curve = "curve = \"min(t, 2 - t)\"\n";
-        let factors = times(["factor = 1\n", "factor = 0\n", "factor = -1\n"]);
         let by_factor = history(&strip(RUBBER, &format!("{grip}{factors}")));
-        let by_curve = history(&strip(RUBBER, &format!("{grip}{curve}{}", times([""; 3]))));
+        let by_curve = history(&strip(RUBBER, &format!("{grip}{curve}{times}")));
         assert_eq!(by_curve.len(), 6);
         let [way, load] = [0, 1].map(|k| by_factor.iter().map(|row| row[k].abs()).fold(0.0, f64::max));
         for (found, expected) in by_curve.iter().zip(&by_factor) {

@@ -474,9 +474,9 @@ displacement = ["0 mm", "0 mm", "-0.06 mm"]
         let lines = peri::program::run::explanation(&source, &scene, false);
         lines.unwrap_or_else(|error| panic!("{error}")).join("\n")
     };
-    let [thin, thick] = [6, 8].map(told);
+    let [thin, thick] = [1, 2].map(told);
     for name in ["base", "punch"] {
-        let found = thin.contains(&format!("`{name}` meets a body 6 mm thick, less than 2.5 horizons"));
+        let found = thin.contains(&format!("`{name}` meets a body 1 mm thick, one layer of particles"));
         assert!(found, "{thin}");
     }
     assert!(!thick.contains("meets a body"), "{thick}");

@@ -2,7 +2,9 @@
 
 use crate::bonds::Bonds;
 use crate::error::Error;
-use crate::program::scene::{BodyForceSpec, Boundary, DeviceChoice, ForcePrecision, Scene};
+use crate::program::scene::{
+    BodyForceSpec, Boundary, ContactSpec, DeviceChoice, ForcePrecision, Scene, VaryingParameter,
+};
 use crate::solver::{Equilibrium, Method, State, StepCallback, System, VelocityVerlet, Watch};
 use harness::scene::{SceneError, Source};
 
@@ -44,7 +46,7 @@ pub fn choose<const D: usize>(
         let note = format!("`device = \"auto\"` takes the processor: {why}");
         Ok(Chosen { card: None, note: Some(note) })
     };
-    if let Some((key, found)) = beyond_cards(scene, bonds) {
+    if let Some((key, found)) = beyond_cards(scene) {
         let allowed = format!("none on a graphics card; `{block}.device = \"cpu\"` takes the processor");
         return if only {
             Err(source.error(&key, found, allowed))
@@ -109,45 +111,72 @@ pub fn equilibria<'a, const D: usize>(card: Option<&'a Card>, scene: &Scene) -> 
 }
 
 /// Key and content of what a card cannot do.
-fn beyond_cards<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<(String, &'static str)> {
+fn beyond_cards(scene: &Scene) -> Option<(String, &'static str)> {
     let material = &scene.material;
-    let rotation = scene.boundary.iter().position(|boundary| boundary.rotation.is_some());
-    let curve = scene.boundary.iter().position(Boundary::has_curve);
-    let curve_key = format!("boundary[{}].curve", curve.unwrap_or(0));
     let rigid = scene.boundary.iter().position(|boundary| boundary.rigid);
     let rigid_key = format!("boundary[{}].rigid", rigid.unwrap_or(0));
     let pressure = scene.boundary.iter().position(|boundary| boundary.pressure.is_some());
     let pressure_key = format!("boundary[{}].pressure", pressure.unwrap_or(0));
-    let formula = scene.boundary.iter().position(Boundary::depends_on_time);
+    // new on all of its particles in each step
+    let formula = scene.boundary.iter().position(Boundary::depends_on_time).filter(|_| scene.has_dynamics());
     let formula_key = format!("boundary[{}].traction_field", formula.unwrap_or(0));
-    let force = scene.body_force.iter().position(BodyForceSpec::is_curved);
-    let force_key = format!("body_force[{}]", force.unwrap_or(0));
-    let rotation_key = format!("boundary[{}].rotation", rotation.unwrap_or(0));
-    let uniform = bonds.as_lattice().is_none_or(crate::bonds::LatticeBonds::is_uniform);
+    let spin = scene.body_force.iter().position(|force| force.spin.is_some());
+    let spin_key = format!("body_force[{}].spin", spin.unwrap_or(0));
+    let force = scene.body_force.iter().position(BodyForceSpec::depends_on_time);
+    let force = force.filter(|_| scene.has_dynamics());
+    let force_key = format!("body_force[{}].formula", force.unwrap_or(0));
+    let followed = material.fields.iter().position(|field| field.of == VaryingParameter::Prestrain);
+    let part = material.inclusions.iter().position(|part| part.prestrain.is_some());
+    let prestrain_key = match followed {
+        Some(index) => format!("material.fields[{index}].of"),
+        None => format!("material.inclusions[{}].prestrain", part.unwrap_or(0)),
+    };
+    let dense = material.inclusions.iter().position(|part| part.density.is_some());
+    let dense = dense.filter(|_| scene.has_dynamics());
+    let dense_key = format!("material.inclusions[{}].density", dense.unwrap_or(0));
     let faults = [
         ("step", !scene.step.is_empty(), "steps"),
         ("periodic", scene.periodic.is_some(), "periodic sides"),
         ("body.points", scene.body.points.is_some(), "a body of points"),
         ("body.grid", scene.body.grid.is_some(), "a grid of cells"),
         ("material.solid", material.solid.is_some(), "a solid"),
-        (
-            "material.fields",
-            material.is_prestrained() || !material.fields.is_empty(),
-            "fields of the material",
-        ),
-        ("material.inclusions", !material.inclusions.is_empty(), "inclusions"),
+        (prestrain_key.as_str(), material.is_prestrained(), "bonds with prestrains"),
+        ("material.inclusions", material.has_laws_of_parts(), "inclusions of another law"),
+        (dense_key.as_str(), dense.is_some(), "a density of its own"),
         ("material.critical.convention", scene.softens(), "bonds that soften"),
-        ("material.surface_correction", !uniform, "bonds with surface factors"),
-        ("contact", scene.contact.is_some(), "contact"),
-        (rotation_key.as_str(), rotation.is_some(), "a rotation"),
         (rigid_key.as_str(), rigid.is_some(), "a region that moves as a whole"),
-        (curve_key.as_str(), curve.is_some(), "a curve of time"),
         (pressure_key.as_str(), pressure.is_some(), "a pressure"),
         (formula_key.as_str(), formula.is_some(), "a formula of `t`"),
-        (force_key.as_str(), force.is_some(), "a centrifugal force, or one that follows a curve"),
+        (force_key.as_str(), force.is_some(), "a formula of `t`"),
+        (spin_key.as_str(), spin.is_some(), "a centrifugal force"),
         ("dynamics.precision", scene.is_mixed(), "mixed precision"),
     ];
-    faults.iter().find(|(_, given, _)| *given).map(|(key, _, found)| ((*key).to_owned(), *found))
+    let first = faults.iter().find(|(_, given, _)| *given).map(|(key, _, found)| ((*key).to_owned(), *found));
+    first.or_else(|| contact_beyond_cards(scene.contact.as_ref()?, scene.has_dynamics()))
+}
+
+/// Key and content of contact that a card cannot do: friction, other surfaces than planes, and particles that
+/// repel each other in equilibria.
+fn contact_beyond_cards(contact: &ContactSpec, dynamics: bool) -> Option<(String, &'static str)> {
+    if contact.has_pairs() && !dynamics {
+        let key = if contact.short_range.is_some() { "short_range" } else { "stiffness" };
+        return Some((format!("contact.{key}"), "contact of particles"));
+    }
+    if contact.has_pairs() && contact.friction > 0.0 {
+        return Some(("contact.friction".to_owned(), "friction"));
+    }
+    if !contact.indenter.is_empty() {
+        return Some(("contact.indenter[0]".to_owned(), "an indenter"));
+    }
+    contact.plane.iter().enumerate().find_map(|(index, plane)| {
+        let own = |key: &str| format!("contact.plane[{index}].{key}");
+        if plane.bonded {
+            return Some((own("bonded"), "a bonded plane"));
+        }
+        let rubs = plane.friction.unwrap_or(contact.friction) > 0.0;
+        let key = if plane.friction.is_some() { own("friction") } else { "contact.friction".to_owned() };
+        rubs.then_some((key, "friction"))
+    })
 }
 
 #[cfg(feature = "gpu")]

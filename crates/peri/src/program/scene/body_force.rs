@@ -45,7 +45,7 @@ pub struct SpinSpec {
 
 impl BodyForceSpec {
     /// Returns true if the formulas depend on the time.
-    pub(super) fn depends_on_time(&self) -> bool {
+    pub fn depends_on_time(&self) -> bool {
         self.formula.iter().flatten().any(|formula| formula.find_variable_except("xyz").is_some())
     }
 

@@ -116,6 +116,11 @@ impl Material {
         })
     }
 
+    /// Returns true if inclusions have laws of their own.
+    pub fn has_laws_of_parts(&self) -> bool {
+        self.laws().len() > 1
+    }
+
     /// Lists the different laws, that of the rest first.
     fn laws(&self) -> Vec<LawChoice> {
         let mut laws = vec![self.law_of_rest()];
