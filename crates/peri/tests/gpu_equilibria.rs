@@ -51,7 +51,8 @@ struct Ran<const D: usize> {
     rows: Vec<(Vec<u64>, u64)>,
 }
 
-/// A body whose ends are moved apart by a strain and that is pushed aside.
+/// A body whose ends are moved apart by a strain and that is pushed aside, its held ends the most, which is no
+/// measure of the balance.
 fn pulled<const D: usize>(bonds: &LatticeBonds<D>, strain: f64, push: f64) -> Loads<D> {
     let positions = || bonds.particles().iter().map(|&site| bonds.position(site as usize)[1]);
     let length = positions().fold(0.0_f64, f64::max) + 0.5 * bonds.spacing();
@@ -66,7 +67,7 @@ fn pulled<const D: usize>(bonds: &LatticeBonds<D>, strain: f64, push: f64) -> Lo
         let mut body = Field::zeros(bonds.sites());
         for &site in bonds.particles() {
             let mut force = [0.0; D];
-            force[0] = push;
+            force[0] = if held(bonds.position(site as usize)) { 1e6 * push } else { push };
             body.set(site as usize, force);
         }
         loads.body_force = Some(body);

@@ -56,6 +56,8 @@ pub struct DeviceBody<const D: usize> {
     pub(super) held: Handle,
     pub(super) full: Handle,
     pub(super) body: Handle,
+    /// Factor of the body forces in the present forces.
+    pub(super) loading: f64,
     factors: Handle,
     pub(super) fields: [Handle; 3],
     pub(super) kept: Option<[Handle; 3]>,
@@ -161,6 +163,7 @@ impl<const D: usize> DeviceBody<D> {
             held: whole(&[0]),
             full: empty(1),
             body: empty(1),
+            loading: 0.0,
             factors: factor_list(&client, precision, factors, components),
             fields: std::array::from_fn(|_| upload(&client, precision, &zeros, 1.0)),
             kept: None,
@@ -298,6 +301,11 @@ impl<const D: usize> DeviceBody<D> {
 
 impl<const D: usize> DeviceBody<D> {
     /// Factors of particles as kernels take them.
+    /// Body forces.
+    pub(super) fn loads(&self) -> BufferArg {
+        super::steps::buffer(&self.body, if self.form.loaded { D * self.sites } else { 1 })
+    }
+
     pub(super) fn factors(&self) -> BufferArg {
         super::steps::buffer(&self.factors, (self.form.factors * self.sites).max(1))
     }

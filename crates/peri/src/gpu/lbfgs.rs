@@ -23,7 +23,7 @@ const PAIR_THREADS: usize = 1 << 14;
 pub struct DeviceLineSums {
     /// Σ F² where free, (N/m³)².
     pub free: f64,
-    /// Σ F² where held, (N/m³)².
+    /// Σ F² where held, without body forces, (N/m³)².
     pub constrained: f64,
     /// Slope of the energy along the direction, in the device's units.
     pub slope: f64,
@@ -142,7 +142,9 @@ impl<const D: usize> DeviceSearch<D> {
                 buffer(&body.sites_of_particles, body.particles),
                 buffer(&body.held, body.held_words()),
                 buffer(&self.springs, body.sites),
+                body.loads(),
                 buffer(&self.partial, LINE_SUMS * threads),
+                InputScalar::new(body.loading, body.precision.element()),
                 body.form,
                 measures,
                 body.precision.element(),

@@ -22,7 +22,9 @@ pub fn line_sums<F: Float>(
     particles: &[u32],
     held: &[u32],
     springs: &[F],
+    body: &[F],
     partial: &mut [F],
+    loading: InputScalar,
     #[comptime] form: KernelForm,
     #[comptime] measures: bool,
     #[define(F)] _precision: ElemType,
@@ -35,6 +37,7 @@ pub fn line_sums<F: Float>(
     let sites = displacement.len() / dimension;
     let mut free = F::new(0.0);
     let mut constrained = F::new(0.0);
+    let loading = loading.get::<F>();
     let mut slope = F::new(0.0);
     let mut moved = F::new(0.0);
     for index in range_stepped(ABSOLUTE_POS, particles.len(), threads) {
@@ -47,7 +50,12 @@ pub fn line_sums<F: Float>(
                 free = fma(pull, pull, free);
                 slope -= pull * direction[at];
             } else {
-                constrained = fma(pull, pull, constrained);
+                // without the body force on it
+                let mut inner = pull;
+                if comptime!(form.loaded) {
+                    inner = fma(-loading, body[at], pull);
+                }
+                constrained = fma(inner, inner, constrained);
             }
             if comptime!(measures) {
                 let reach = springs[site] * displacement[at];

@@ -22,7 +22,7 @@ pub struct RelaxationSums {
     pub quotient_bottom: f64,
     /// Σ F² where free.
     pub free: f64,
-    /// Σ F² where held.
+    /// Σ F² where held, without body forces.
     pub constrained: f64,
     /// √(Σ |s u|²) with the springs s, N/m³; 0 where it was not measured.
     pub moved: f64,
@@ -176,7 +176,9 @@ impl<const D: usize> DeviceRelaxation<D> {
                 buffer(&body.held, body.held_words()),
                 buffer(self.masses(), body.sites),
                 buffer(&self.springs, body.sites),
+                body.loads(),
                 buffer(&self.partial, RELAXATION_SUMS * threads),
+                InputScalar::new(body.loading, body.precision.element()),
                 body.form,
                 measures,
                 body.precision.element(),

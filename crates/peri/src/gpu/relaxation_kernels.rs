@@ -31,7 +31,9 @@ pub fn relaxation_sums<F: Float>(
     held: &[u32],
     mass: &[F],
     springs: &[F],
+    body: &[F],
     partial: &mut [F],
+    loading: InputScalar,
     #[comptime] form: KernelForm,
     #[comptime] measures: bool,
     #[define(F)] _precision: ElemType,
@@ -46,6 +48,7 @@ pub fn relaxation_sums<F: Float>(
     let mut bottom = F::new(0.0);
     let mut free = F::new(0.0);
     let mut constrained = F::new(0.0);
+    let loading = loading.get::<F>();
     let mut moved = F::new(0.0);
     for index in range_stepped(ABSOLUTE_POS, particles.len(), threads) {
         let site = particles[index] as usize;
@@ -60,7 +63,12 @@ pub fn relaxation_sums<F: Float>(
                 bottom = fma(speed * speed, own, bottom);
                 free = fma(pull, pull, free);
             } else {
-                constrained = fma(pull, pull, constrained);
+                // without the body force on it
+                let mut inner = pull;
+                if comptime!(form.loaded) {
+                    inner = fma(-loading, body[at], pull);
+                }
+                constrained = fma(inner, inner, constrained);
             }
             if comptime!(measures) {
                 let reach = springs[site] * displacement[at];

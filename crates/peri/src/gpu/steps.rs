@@ -61,7 +61,7 @@ impl<const D: usize> DeviceBody<D> {
                 buffer(&self.sites_of_particles, self.particles),
                 buffer(&self.held, self.held_words()),
                 buffer(&self.full, if self.form.held { D * self.sites } else { 1 }),
-                buffer(&self.body, if self.form.loaded { D * self.sites } else { 1 }),
+                self.loads(),
                 buffer(velocity, D * self.sites),
                 buffer(displacement, D * self.sites),
                 buffer(&self.partial, SUMS * self.threads()),
@@ -78,6 +78,7 @@ impl<const D: usize> DeviceBody<D> {
     /// Forces of the present displacement with body forces at a load factor, and of contact. Where it
     /// `looks`, [`Self::stretch_range`] has what it saw.
     pub fn pull(&mut self, factor: f64, looks: bool) {
+        self.loading = factor;
         if looks {
             self.count = self.client.create_from_slice(u32::as_bytes(&[0]));
         }
@@ -112,7 +113,7 @@ impl<const D: usize> DeviceBody<D> {
                 buffer(&self.sites_of_particles, self.particles),
                 buffer(&self.held, self.held_words()),
                 buffer(&self.full, if self.form.held { D * self.sites } else { 1 }),
-                buffer(&self.body, if self.form.loaded { D * self.sites } else { 1 }),
+                self.loads(),
                 buffer(velocity, D * self.sites),
                 buffer(&self.partial, SUMS * self.threads()),
                 number(1.0 / (1.0 + half)),

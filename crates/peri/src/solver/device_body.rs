@@ -59,10 +59,15 @@ pub fn limit<const D: usize>(system: &System<D>) -> f64 {
         .map_or(f64::INFINITY, |critical| (critical.least() * critical.least() - 1.0) * (1.0 - 1e-6) - 1e-12)
 }
 
-/// Σ b² of the body forces at load factor 1, (N/m³)².
+/// Σ b² of the body forces at load factor 1 on components that are not prescribed, (N/m³)².
 pub fn squares<const D: usize>(system: &System<D>) -> f64 {
-    let components = |body: &Field<D>| body.components().into_iter().flatten().map(|b| b * b).sum();
-    system.loads.body_force.as_ref().map_or(0.0, components)
+    let Some(body) = &system.loads.body_force else { return 0.0 };
+    let square = |(site, d, b): (usize, usize, f64)| {
+        if system.loads.constrained(site) >> d & 1 == 1 { 0.0 } else { b * b }
+    };
+    let components = body.components().into_iter().enumerate();
+    let all = components.flat_map(|(d, each)| each.iter().enumerate().map(move |(site, b)| (site, d, *b)));
+    all.map(square).sum()
 }
 
 /// Puts held components of a displacement from a device back to those before, which rounding may have
