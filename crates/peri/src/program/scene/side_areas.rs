@@ -26,7 +26,7 @@ pub(super) fn side_areas<const D: usize>(
     let bounds = [body.bounds.0[axis], body.bounds.1[axis]];
     let (extent, least) = (bounds[1] - bounds[0], LEAST_EXTENT * bonds.horizon());
     if surface.faces().is_empty() && extent < least {
-        let found = format!("a body {} mm thick", plain(extent * 1e3));
+        let found = format!("a body {} mm thick", plain((extent * 1e6).round() / 1e3));
         let allowed = format!(
             "at least {} mm, {LEAST_EXTENT} horizons, in a body without faces; or `layers`, in which the traction is \
              a body force",
