@@ -51,7 +51,7 @@ struct Ran<const D: usize> {
     rows: Vec<(Vec<u64>, u64)>,
 }
 
-/// A body whose ends are moved apart by a strain and that is pushed aside, its held ends the most, which is no
+/// A body whose ends are moved apart by a strain and that is pushed aside, its held ends the most: that is no
 /// measure of the balance.
 fn pulled<const D: usize>(bonds: &LatticeBonds<D>, strain: f64, push: f64) -> Loads<D> {
     let positions = || bonds.particles().iter().map(|&site| bonds.position(site as usize)[1]);

@@ -175,7 +175,7 @@ impl<const D: usize> Loads<D> {
         reach(regions.map(|region| (region.components, region.placed(part))), rigid)
     }
 
-    /// Relative prescribed displacement of regions at a multiple of 1, m, if all regions move by one multiple.
+    /// Relative prescribed displacement of regions at a multiple of 1, m, if all move by one multiple.
     fn common_reach(&self) -> Option<f64> {
         let curved = self.curved.as_ref()?;
         let moves = |region: &CurvedRegion<D>, d: usize| {
@@ -196,8 +196,8 @@ impl<const D: usize> Loads<D> {
         single.then(|| reach(full, &[])).filter(|reach| *reach > 0.0)
     }
 
-    /// Σ −F V·a and Σ u·a over the regions of prescribed displacement, with a the displacement at a multiple of
-    /// 1 and u that at τ.
+    /// Σ −F V·a and Σ u·a over the regions of prescribed displacement, with a the displacement at a multiple
+    /// of 1 and u that at τ.
     fn along_curves(&self, bonds: &dyn BodyGeometry<D>, part: f64, force: &Field<D>) -> [f64; 2] {
         let (mut pull, mut way) = (0.0, 0.0);
         for region in self.curved.iter().flat_map(|curved| &curved.held) {
@@ -296,9 +296,9 @@ impl<const D: usize> System<'_, D> {
 
     /// Load, N, and displacement, m, of a row of history with curves: the reaction of the regions of
     /// prescribed displacement and [`Loads::curved_reach`], both positive along the displacements at a
-    /// multiple of 1; where one curve moves all, its conjugate force. Where no region moves, the force and the way of the rigid surface that moves or is
-    /// pressed with the largest force; without one the applied force and the mean displacement of its points
-    /// along it.
+    /// multiple of 1; where one curve moves all, its conjugate force. Where no region moves, the force and
+    /// the way of the rigid surface that moves or is pressed with the largest force; without one the applied
+    /// force and the mean displacement of its points along it.
     pub(super) fn curved_response(&self, state: &State<D>, part: f64) -> (f64, f64) {
         let held = self.loads.curved.iter().flat_map(|curved| &curved.held);
         let regions_move =

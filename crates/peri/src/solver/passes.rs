@@ -162,8 +162,8 @@ pub fn gradient_pass<const D: usize>(
     (sums, observed, slope)
 }
 
-/// Adds body forces to forces; returns the sum of their squares over components that are not prescribed, whose
-/// bits are empty where there are none.
+/// Adds body forces to forces; returns the sum of their squares over components that are not prescribed;
+/// `prescribed` is empty where none is.
 fn add_body_force(force: &mut [f64], body: &[f64], factor: f64, (prescribed, bit): (&[u8], u8)) -> f64 {
     let mut square = 0.0;
     if prescribed.iter().all(|bits| bits & bit == 0) {

@@ -439,7 +439,8 @@ fn rough_plane_under_a_force() {
     assert!(message.contains("except of a plane pressed along its normal"), "{message}");
 }
 
-/// A block between two planes: of one layer of particles, which has no stiffness across it, a scene warns of both.
+/// A block between two planes: of one layer of particles, which has no stiffness across it, a scene warns of
+/// both.
 #[test]
 fn thin_bodies_are_warned_of() {
     let told = |height: u32| {

@@ -113,8 +113,8 @@ fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             let solver = &scene.solver;
             let unused = [("path", solver.path.is_some()), ("stop_below", solver.stop_below.is_some())];
             if let Some((key, _)) = unused.iter().find(|(_, given)| *given) {
-                let why = "has no effect with `method = \"verlet\"`: the time of `[dynamics]` has its own steps, its \
-                           `factor` is a formula of `t`";
+                let why = "has no effect with `method = \"verlet\"`: the time of `[dynamics]` has its own \
+                           steps, its `factor` is a formula of `t`";
                 return Err(source.unexpected(&format!("solver.{key}"), why));
             }
             let method = dynamics.method();

@@ -165,8 +165,8 @@ pub(super) fn free_to_pass(scene: &Scene) -> Option<String> {
     let open = scene.interface.iter().find(|one| one.unbonded).filter(|_| scene.contact.is_none())?;
     let [one, other] = &open.between;
     Some(format!(
-        "parts `{one}` and `{other}` are unbonded and may pass through each other: a `[contact]` block lets them \
-         touch"
+        "parts `{one}` and `{other}` are unbonded and may pass through each other: a `[contact]` block \
+         lets them touch"
     ))
 }
 

@@ -7,7 +7,8 @@ use super::{Boundary, Prescribed, PrescribedField, Scene};
 use crate::solver::{Amplitude, Rotation, Support};
 use harness::scene::{SceneError, Source};
 
-/// Number of parts of the time at which displacements with curves are compared, beside the ends of increments.
+/// Number of even parts of the time at which displacements with curves are compared, beside the ends of
+/// increments.
 const MOMENTS: u32 = 64;
 /// Largest number of increments whose ends are compared.
 const MOST_INCREMENTS: usize = 1024;
@@ -88,7 +89,8 @@ fn refuse_velocities<const D: usize>(
                 let [own, before] = [boundary, before].map(|one| one.velocity_at(place, d));
                 if (own - before).abs() > EQUAL * own.abs().max(before.abs()) {
                     let found = format!(
-                        "{} m/s along {} of the particle at ({}) mm, for which boundary[{other}] prescribes {} m/s",
+                        "{} m/s along {} of the particle at ({}) mm, for which boundary[{other}] prescribes \
+                         {} m/s",
                         plain(own),
                         ["x", "y", "z"][d],
                         millimetres(place),

@@ -28,8 +28,8 @@ pub(super) fn side_areas<const D: usize>(
     if surface.faces().is_empty() && extent < least {
         let found = format!("a body {} mm thick", plain((extent * 1e6).round() / 1e3));
         let allowed = format!(
-            "at least {} mm, {LEAST_EXTENT} horizons, in a body without faces; or `layers`, in which the traction is \
-             a body force",
+            "at least {} mm, {LEAST_EXTENT} horizons, in a body without faces; or `layers`, in which the \
+             traction is a body force",
             plain((least * 1e6).ceil() / 1e3)
         );
         return Err(source.error(key, found, allowed));
