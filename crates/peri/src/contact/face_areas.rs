@@ -2,8 +2,9 @@
 //!
 //! h_I of a particle below two opposite faces is that of both sides together: the nearer face takes it. Where
 //! these regions overlap, in thin walls, both sides gain the same area G_I at each particle, which leaves
-//! uniform stresses balanced, such that the first moment of a side lies on its face,
-//! Σ_I (ψ_f h_I·N_f + ψ_f G_I) d_I = 0 with the depths d_I, G_I being the mean of both sides' values.
+//! uniform stresses balanced where their normals are opposite, such that the first moment of a side lies on
+//! its face, Σ_I (ψ_f h_I·N_f + ψ_f G_I) d_I = 0 with the depths d_I, G_I being the mean of both sides'
+//! values. A bar has such areas along each axis across which it is thin.
 
 use crate::bonds::{BodyGeometry, Bonds, CellGrid};
 use crate::material::{BodyTensor, surface_load};
@@ -60,12 +61,8 @@ impl FaceAreas {
         let areas = sum(count, &below, own);
         join_small(surface, &areas, &mut below, typical, bonds.spacing());
         below.sort_by_key(|below| (below.face, below.site));
-        let common = common_areas(bonds.sites(), count, &below, own);
-        let share = |below: &FaceParticle| {
-            let common = if below.thin { below.hat * common[below.site as usize] } else { 0.0 };
-            own(below) + common
-        };
-        let shares = below.iter().map(share).collect();
+        let common = common_areas(surface, &below, own);
+        let shares = below.iter().zip(common).map(|(below, common)| own(below) + common).collect();
         Self { below, shares, typical }
     }
 }
@@ -103,25 +100,33 @@ fn sum(faces: usize, below: &[FaceParticle], value: impl Fn(&FaceParticle) -> f6
     sums
 }
 
-/// Computes G_I, m², by site; empty without thin walls.
-fn common_areas(
-    sites: usize,
-    faces: usize,
+/// Computes ψ_f G_I of each entry, m²: G_I for the faces of a wall, which are parallel.
+fn common_areas<const D: usize>(
+    surface: &BodySurface<D>,
     below: &[FaceParticle],
     own: impl Fn(&FaceParticle) -> f64,
 ) -> Vec<f64> {
-    if below.iter().all(|below| !below.thin) {
-        return Vec::new();
+    let (faces, mut common) = (surface.faces(), vec![0.0; below.len()]);
+    let moments = sum(faces.len(), below, |below| own(below) * below.depth);
+    let depths = sum(faces.len(), below, |below| if below.thin { below.hat * below.depth } else { 0.0 });
+    let mut thin: Vec<usize> = (0..below.len()).filter(|&entry| below[entry].thin).collect();
+    thin.sort_by_key(|&entry| below[entry].site);
+    for same in thin.chunk_by(|&a, &b| below[a].site == below[b].site) {
+        for &entry in same {
+            let normal = faces[below[entry].face as usize].normal;
+            let is_parallel = |&&other: &&usize| {
+                let there = faces[below[other].face as usize].normal;
+                (0..D).map(|d| normal[d] * there[d]).sum::<f64>().abs() > 0.5
+            };
+            let (mut area, mut hats) = (0.0, 0.0);
+            for &other in same.iter().filter(is_parallel) {
+                let FaceParticle { face, hat, .. } = below[other];
+                area -= hat * moments[face as usize] / depths[face as usize];
+                hats += hat;
+            }
+            common[entry] = below[entry].hat * area / hats;
+        }
     }
-    let moments = sum(faces, below, |below| own(below) * below.depth);
-    let depths = sum(faces, below, |below| if below.thin { below.hat * below.depth } else { 0.0 });
-    let (mut common, mut hats) = (vec![0.0; sites], vec![0.0; sites]);
-    for below in below.iter().filter(|below| below.thin) {
-        let (face, site) = (below.face as usize, below.site as usize);
-        common[site] -= below.hat * moments[face] / depths[face];
-        hats[site] += below.hat;
-    }
-    common.iter_mut().zip(hats).filter(|(_, hat)| *hat > 0.0).for_each(|(common, hat)| *common /= hat);
     common
 }
 

@@ -280,6 +280,32 @@ mod tests {
         }
     }
 
+    /// Sides of slender bars and of small blocks have their areas, along each axis.
+    #[test]
+    fn sides_of_slender_bars_have_their_areas() {
+        fn check<const D: usize>(size: [f64; D]) {
+            let bar = Body::lattice(Shape::Box { min: [0.0; D], max: size }, 1.0);
+            let bonds = bar.build().unwrap();
+            let faces = Faces::new(&bonds, &bar.surface(), false);
+            for axis in 0..D {
+                let sum = |sign: f64| {
+                    let own = (0..faces.len()).filter(|&face| faces.normals[face][axis] == sign);
+                    own.map(|face| faces.areas[face]).sum::<f64>()
+                };
+                let across: f64 = (0..D).filter(|&d| d != axis).map(|d| size[d]).product();
+                let found = [sum(1.0), sum(-1.0)];
+                assert!(
+                    found.iter().all(|x| (x / across - 1.0).abs() < 0.02),
+                    "{size:?}: {found:?} {across}"
+                );
+            }
+        }
+        let bars = [[4.0, 2.0], [6.0, 2.0], [8.0, 4.0], [10.0, 6.0], [12.0, 4.0], [30.0, 3.0], [16.0, 15.0]];
+        bars.into_iter().for_each(check::<2>);
+        let blocks = [[6.0, 2.0, 6.0], [12.0, 4.0, 12.0], [24.0, 2.0, 4.0], [5.0, 6.0, 7.0]];
+        blocks.into_iter().for_each(check::<3>);
+    }
+
     #[test]
     fn thin_walls_have_faces_of_full_area() {
         (2..16).for_each(|layers| check::<2>(layers, 24.0));

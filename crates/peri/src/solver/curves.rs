@@ -85,6 +85,13 @@ pub struct CurvedLoads<const D: usize> {
     pub fixed: Option<FixedForces<D>>,
 }
 
+impl<const D: usize> CurvedLoads<D> {
+    /// Returns true if regions begin where a step before has left them.
+    fn begins_moved(&self) -> bool {
+        self.held.iter().any(|region| !region.offsets.is_empty())
+    }
+}
+
 /// Body forces that do not depend on the displacement, N/m³.
 #[derive(Clone, Debug)]
 pub struct FixedForces<const D: usize> {
@@ -189,8 +196,7 @@ impl<const D: usize> Loads<D> {
             let first = all.next();
             all.all(|multiple| Some(multiple) == first)
         };
-        let begins_at_rest =
-            self.turned.is_empty() && curved.held.iter().all(|region| region.offsets.is_empty());
+        let begins_at_rest = self.turned.is_empty() && !curved.begins_moved();
         let single = begins_at_rest && (1..=PROBED).all(|k| is_common(f64::from(k) / f64::from(PROBED)));
         let full = curved.held.iter().map(|region| (region.components, region.scaled([1.0; D])));
         single.then(|| reach(full, &[])).filter(|reach| *reach > 0.0)
@@ -213,8 +219,8 @@ impl<const D: usize> Loads<D> {
     }
 
     /// Load, N, and displacement, m, of body forces: their sum, and the mean displacement of their points
-    /// along them, both positive along the forces at a multiple of 1, or along the present ones if these do
-    /// not follow multiples. `None` without forces.
+    /// along them, both positive along the forces at a multiple of 1. Along the present ones in later steps,
+    /// and where forces depend on the displacement or do not follow multiples. `None` without forces.
     fn pushed_response(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> Option<(f64, f64)> {
         let (present, curved) = (self.body_force.as_ref()?, self.curved.as_ref()?);
         let mut full = Field::zeros(bonds.sites());
@@ -222,7 +228,8 @@ impl<const D: usize> Loads<D> {
             let old: [f64; D] = full.get(site);
             full.set(site, std::array::from_fn(|d| old[d] + value[d]));
         }
-        let full = if curved.pushed.is_empty() { present } else { &full };
+        let follows = !curved.fields.is_empty() || curved.pushed.is_empty() || curved.begins_moved();
+        let full = if follows { present } else { &full };
         let (mut push, mut way) = (0.0, 0.0);
         for site in bonds.particles().iter().map(|&site| site as usize) {
             let (full, volume) = (full.get(site), bonds.volume(site));
@@ -233,8 +240,8 @@ impl<const D: usize> Loads<D> {
             push += product(present);
             way += product(displacement);
         }
-        let sum = length(one_sided(bonds, full));
-        (sum > 0.0).then(|| (along(length(one_sided(bonds, present)), push), way / sum))
+        let sum = |field| length(one_sided(bonds, &self.pushed_regions, field));
+        (sum(full) > 0.0).then(|| (along(sum(present), push), way / sum(full)))
     }
 
     /// Removes the body force of curves from a site.
@@ -318,7 +325,10 @@ impl<const D: usize> System<'_, D> {
         };
         let surfaces = self.contact.iter().flat_map(Contact::surfaces);
         let rigid: Vec<[f64; D]> = surfaces.map(|surface| surface.displacement_at(part)).collect();
-        let [pull, way] = self.loads.along_curves(&*self.bonds, part, &state.force);
+        // in later steps both are magnitudes
+        let moved = self.loads.curved.as_ref().is_some_and(|curved| curved.begins_moved());
+        let [pull, way] =
+            if moved { [0.0; 2] } else { self.loads.along_curves(&*self.bonds, part, &state.force) };
         let load = match self.loads.common_reach().filter(|_| rigid.iter().all(|u| *u == [0.0; D])) {
             Some(reach) => pull / reach,
             None => along(length(force), pull),

@@ -20,6 +20,8 @@ pub struct Support<const D: usize> {
 /// Loads of a body, site by site. Absent kinds of load are not stored.
 #[derive(Clone, Debug, Default)]
 pub struct Loads<const D: usize> {
+    /// Sites of tractions on sides, whose body forces have either sign.
+    pub pushed_regions: Vec<Vec<u32>>,
     /// Body force density at load factor 1, N/m³.
     pub body_force: Option<Field<D>>,
     /// Prescribed displacement at load factor 1, m, of constrained components; in rotating regions its rate
@@ -42,20 +44,39 @@ pub struct Loads<const D: usize> {
     pub curved: Option<Box<CurvedLoads<D>>>,
 }
 
-/// Larger one of both directions' sums along each axis.
-fn larger_sums<const D: usize>(sum: impl Fn(usize, f64) -> f64) -> [f64; D] {
-    std::array::from_fn(|d| sum(d, 1.0).max(sum(d, -1.0)))
-}
-
-/// Sum of a body force in one direction of an axis, N.
-fn directed<const D: usize>(bonds: &dyn BodyGeometry<D>, body: &Field<D>, d: usize, sign: f64) -> f64 {
-    let each = bonds.particles().iter().map(|&site| site as usize);
-    each.map(|site| (sign * body.get(site)[d]).max(0.0) * bonds.volume(site)).sum()
-}
-
-/// Force of a body force along each axis, N: the larger sum of both directions.
-pub(super) fn one_sided<const D: usize>(bonds: &dyn BodyGeometry<D>, body: &Field<D>) -> [f64; D] {
-    larger_sums(|d, sign| directed(bonds, body, d, sign))
+/// Force of a body force along each axis, N: the larger sum of both directions, of `regions` as wholes, in
+/// whose particles it may have either sign, and of other particles. A particle counts in the first region that
+/// contains it.
+pub(super) fn one_sided<const D: usize>(
+    bonds: &dyn BodyGeometry<D>,
+    regions: &[Vec<u32>],
+    body: &Field<D>,
+) -> [f64; D] {
+    let mut counted = vec![false; if regions.is_empty() { 0 } else { bonds.sites() }];
+    let mut sums = [[0.0; D]; 2];
+    let mut add = |force: [f64; D]| {
+        for d in 0..D {
+            sums[0][d] += force[d].max(0.0);
+            sums[1][d] += (-force[d]).max(0.0);
+        }
+    };
+    let force = |site: usize| body.get(site).map(|b| b * bonds.volume(site));
+    for region in regions {
+        let mut sum = [0.0; D];
+        for site in region.iter().map(|&site| site as usize) {
+            if !std::mem::replace(&mut counted[site], true) {
+                let own = force(site);
+                (0..D).for_each(|d| sum[d] += own[d]);
+            }
+        }
+        add(sum);
+    }
+    for site in bonds.particles().iter().map(|&site| site as usize) {
+        if !counted.get(site).copied().unwrap_or(false) {
+            add(force(site));
+        }
+    }
+    std::array::from_fn(|d| sums[0][d].max(sums[1][d]))
 }
 
 impl<const D: usize> Loads<D> {
@@ -156,10 +177,10 @@ impl<const D: usize> Loads<D> {
     /// Total force at factor 1 along each axis, N, of the body force and of `pushes` on rigid surfaces: the
     /// larger sum of both directions.
     pub fn applied(&self, bonds: &dyn BodyGeometry<D>, pushes: &[[f64; D]]) -> [f64; D] {
-        larger_sums(|d, sign| {
-            let pushed: f64 = pushes.iter().map(|push| (sign * push[d]).max(0.0)).sum();
-            pushed + self.body_force.as_ref().map_or(0.0, |body| directed(bonds, body, d, sign))
-        })
+        let body =
+            self.body_force.as_ref().map_or([0.0; D], |body| one_sided(bonds, &self.pushed_regions, body));
+        let pushed = |d: usize, sign: f64| pushes.iter().map(|push| (sign * push[d]).max(0.0)).sum::<f64>();
+        std::array::from_fn(|d| body[d] + pushed(d, 1.0).max(pushed(d, -1.0)))
     }
 
     /// Load, N, and its conjugate displacement, m, from [`Loads::conjugates`]: the force conjugate to the

@@ -48,7 +48,7 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
     let records = scene.dynamics.as_ref().map_or(scene.step_count(), |dynamics| dynamics.method().records);
     let peak = |get: fn(&StepRecord) -> f64| {
         move |m: &Moment<D>| {
-            let peak = m.state.history.iter().max_by(|a, b| a.load.total_cmp(&b.load));
+            let peak = m.state.history.iter().max_by(|a, b| a.load.abs().total_cmp(&b.load.abs()));
             peak.filter(|_| m.state.history.len() > 1).map(get)
         }
     };
@@ -67,7 +67,7 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
         to.add_if(secant, move |m| Some(both(m)?[0]));
         to.add_if(tangent, move |m| Some(both(m)?[1]));
     }
-    if scene.returns() || scene.has_curves() && !dynamic && scene.step.is_empty() {
+    if scene.returns() || scene.has_curves() && !dynamic && !scene.has_several_motions() {
         to.add_if(q::LOOP_ENERGY, |m| {
             let rows = m.state.history.iter().map(|row| [row.displacement, row.load]);
             if is_driven_by_force(&m.state.history) { driven_loop_energy(rows) } else { loop_energy(rows) }

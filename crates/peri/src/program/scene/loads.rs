@@ -56,6 +56,7 @@ pub fn loads_of<const D: usize>(
             add_traction(&areas, traction, sites, &mut alone, &mut loaded);
         }
         surfaces.extend(alone.body_force.map(|field| (index, field)));
+        loads.pushed_regions.push(areas.iter().map(|area| area.0).collect());
         add_traction(&areas, traction, sites, &mut loads, &mut loaded);
     }
     apply_formulas(source, scene, body, &regions, &mut loads)?;

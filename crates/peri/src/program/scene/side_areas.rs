@@ -7,8 +7,10 @@ use crate::material::{BodyTensor, surface_load};
 use harness::scene::{SceneError, Source};
 
 /// Least thickness of a body without faces over its horizon: area vectors of both sides overlap in thinner
-/// ones, by over 5 %.
-const LEAST_EXTENT: f64 = 2.5;
+/// ones, by 7 to 10 % of the force at 2.7.
+const LEAST_EXTENT: f64 = 3.0;
+/// Depth of area vectors below a flat side, in horizons.
+const REACH: f64 = 2.0;
 
 /// Returns the particles within two horizons of a side with the area of the side over their volume, 1/m: the
 /// component n·h_I/V_I of the area vectors ([`surface_load`]), in thin walls the share of the faces of this
@@ -35,7 +37,7 @@ pub(super) fn side_areas<const D: usize>(
         return Err(source.error(key, found, allowed));
     }
     let sign = if upper { 1.0 } else { -1.0 };
-    let mut reach = DEPTH * bonds.horizon();
+    let mut reach = REACH * bonds.horizon();
     let mut thin = Vec::new();
     if surface.faces().is_empty() {
         reach = reach.min(0.5 * extent);
@@ -46,9 +48,9 @@ pub(super) fn side_areas<const D: usize>(
     let area = |&site: &u32| {
         let at = site as usize;
         let below = sign * (bounds[usize::from(upper)] - bonds.position(at)[axis]);
-        let area = match thin.binary_search_by_key(&site, |own| own.0) {
-            Ok(own) => thin[own].1 / bonds.volume(at),
-            Err(_) => sign * areas.get(at)[axis],
+        let (area, reach) = match thin.binary_search_by_key(&site, |own| own.0) {
+            Ok(own) => (thin[own].1 / bonds.volume(at), DEPTH * bonds.horizon()),
+            Err(_) => (sign * areas.get(at)[axis], reach),
         };
         (below <= reach && area != 0.0).then_some((site, area))
     };

@@ -48,6 +48,7 @@ pub(super) fn add<const D: usize>(
         formula.check(source, &key, &places, (time.end, time.moments()))?;
         let end = time.end;
         points.iter().for_each(|point| loaded[point.0 as usize] = true);
+        loads.pushed_regions.push(points.iter().map(|point| point.0).collect());
         if boundary.depends_on_time() {
             let traction = move |place, part| formula.value(place, part * end);
             add_field(body, loads, PlacedForce::new(points, traction));
