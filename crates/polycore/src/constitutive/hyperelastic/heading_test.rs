@@ -213,6 +213,14 @@ mod tests {
     }
 
     #[test]
+    fn names_of_two_words() {
+        use super::super::columns::mode;
+        let named = |name: &str| mode(name).map(|found| found.0);
+        assert_eq!(named("planar biaxial"), Some(Mode::Equibiaxial));
+        assert_eq!(named("planar tension"), Some(Mode::PureShear));
+    }
+
+    #[test]
     fn unclear_headings_are_refused() {
         for (headings, part) in [
             ("strain,shear stress [MPa]", "`mode = \"simple-shear\"` (the strain is the amount"),
