@@ -116,6 +116,24 @@ fn as_many_measurements_as_parameters() {
     assert!(shown.contains("C1 = \"0.3000000000 MPa\"") && !shown.contains("warning"), "{shown}");
 }
 
+/// Strains of 1e-4 say nothing of the exponent of Ogden's law, which has no limit to be at.
+#[test]
+fn an_exponent_without_effect() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = "[[fit.data]]\nname = \"bar\"\nfile = \"t.csv\"\n";
+    let rows: String = (1..=6)
+        .map(|k| 1.0 + 1e-5 * f64::from(k))
+        .map(|l| format!("{l},{}\n", 0.4 * (l - l.powi(-2))))
+        .collect();
+    run(folder.path(), "laws = [\"ogden-1\"]", data, &format!("stretch,tensile stress [MPa]\n{rows}"));
+    let text = read(folder.path(), "materials_mm.inp");
+    assert!(
+        text.contains("the data do not determine alpha") && text.contains("use a law with fewer"),
+        "{text}"
+    );
+    assert!(!text.contains("infinite"), "{text}");
+}
+
 /// Rows after the break of a specimen are left out with a warning.
 #[test]
 fn rows_that_are_left_out() {

@@ -73,25 +73,35 @@ pub(super) fn named_test(
             let found = format!("words of {} and an abbreviation of {} tests", a.name(), b.name());
             refused(&found, "the `mode` of the test in the data's entry")
         }
-        (None, None) if [strain, stress].iter().any(|text| is_doubtful(text)) => refused(
-            "the abbreviation of a test in one heading alone",
+        (None, None) if is_doubtful(strain, stress) => refused(
+            "the abbreviation of a test in one heading alone, or without a `_`",
             "the `mode` of the test in the data's entry, or the abbreviation behind a `_` in both headings",
         ),
         (words, same) => Ok(words.or(same)),
     }
 }
 
+fn known_code(word: &str) -> Option<(&'static str, Mode)> {
+    CODES.into_iter().find(|(code, _)| *code == word.to_lowercase())
+}
+
 /// Abbreviation of a test behind a `_`.
 fn code(heading: &str) -> Option<(&'static str, Mode)> {
     let pieces = heading.split('_').skip(1);
     let words = pieces.map(|piece| piece.split(|c: char| !c.is_alphanumeric()).next().unwrap_or_default());
-    let known = |word: &str| CODES.into_iter().find(|(code, _)| *code == word);
-    words.filter_map(|word| known(&word.to_lowercase())).last()
+    words.filter_map(known_code).last()
 }
 
-/// Returns true for an abbreviation behind a `_` of another test than a uniaxial one.
-fn is_doubtful(heading: &str) -> bool {
-    code(heading).is_some_and(|(_, mode)| mode != Mode::Uniaxial)
+/// Returns true for abbreviations of another test than a uniaxial one, behind a `_` in a heading, or the same
+/// as words of both.
+fn is_doubtful(strain: &str, stress: &str) -> bool {
+    let other = |found: &(&str, Mode)| found.1 != Mode::Uniaxial;
+    let words = |text: &str| -> Vec<&'static str> {
+        let words = text.split(|c: char| !c.is_alphanumeric()).filter_map(known_code);
+        words.filter(other).map(|(code, _)| code).collect()
+    };
+    let both = words(strain).iter().any(|code| words(stress).contains(code));
+    both || [strain, stress].into_iter().filter_map(code).any(|found| other(&found))
 }
 
 /// Test of a heading in small letters without its unit, from stems in English, German and French; or what is
@@ -235,6 +245,7 @@ mod tests {
             ("strain_xy (DIC),stress_xy (DIC) [MPa]", "twice the component of a strain tensor"),
             ("gamma strain,tau stress [MPa]", "twice the component of a strain tensor"),
             ("stretch,nominal_ET [MPa]", "the abbreviation of a test in one heading alone"),
+            ("strain PS 1,stress PS 1 [MPa]", "or without a `_`"),
             ("shear stretch,shear stress [MPa]", "`mode = \"pure-shear\"` (the stretch of a wide strip)"),
             ("confined compression strain,stress [MPa]", "a block `[[volumetric]]`"),
             ("tensile strain at shear bands,stress [MPa]", "words of one test"),
