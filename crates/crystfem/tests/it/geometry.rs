@@ -347,7 +347,7 @@ fn the_order_of_elements_changes_no_stress() {
         let mesh = "[mesh]\nfile = \"m.inp\"\nunit = \"1 mm\"\n";
         let mechanics = "[mechanics]\nmaterial = \"PART\"\n[mechanics.law.elastic]\nmodulus = \"1 GPa\"\n\
                          poisson = 0.4\nexpansion = \"1e-4 1/K\"\n";
-        let rest = "[[boundary]]\nsurface = \"outer\"\ntemperature = \"0 degC\"\n[time]\nend = \"1e9 s\"\n\
+        let rest = "[[boundary]]\nsurface = \"bottom\"\ntemperature = \"0 degC\"\n[time]\nend = \"1e9 s\"\n\
                     scheme = \"backward-euler\"\nstep = \"1e9 s\"\n\
                     [output]\npictures = false\nfields = false\n";
         let materials = material("MOULD", 0) + &material("PART", 100);

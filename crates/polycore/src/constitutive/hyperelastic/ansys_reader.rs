@@ -16,7 +16,7 @@ impl AnsysCommand<'_> {
     }
 
     /// Returns true for a command with these first letters, of which four count.
-    fn is(&self, name: &str) -> bool {
+    fn has_name(&self, name: &str) -> bool {
         self.cell(0).chars().take(4).eq(name.chars().take(4))
     }
 
@@ -46,11 +46,11 @@ fn ansys_constants(commands: &[AnsysCommand]) -> Result<Vec<f64>, String> {
     let mut constants = Vec::new();
     for command in commands.iter().take_while(|command| command.cell(0) != "TB") {
         for other in ["TBTEMP", "TBMODIF", "TBDELE", "TBCOPY"] {
-            if command.is(other) {
+            if command.has_name(other) {
                 return Err(format!("constants of one temperature in TBDATA alone, without {other}"));
             }
         }
-        if !command.is("TBDATA") {
+        if !command.has_name("TBDATA") {
             continue;
         }
         let first = command.cell(1).parse::<usize>().ok().filter(|first| *first > 0);

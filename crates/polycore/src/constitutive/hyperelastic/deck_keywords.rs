@@ -36,7 +36,7 @@ pub(super) fn decoded(bytes: &[u8]) -> String {
 
 /// Notes on a card of a run from the comments above its material: the warnings, and the law that it was
 /// written for if the card is read as another one.
-pub(super) fn told(comments: &[&str], key: &str) -> Vec<String> {
+pub(super) fn card_notes(comments: &[&str], key: &str) -> Vec<String> {
     let title = comments.iter().rposition(|comment| comment.contains(" fitted to "));
     let own = &comments[title.unwrap_or(0)..];
     let fitted = title.and_then(|title| comments[title].split(' ').next()).filter(|fitted| *fitted != key);

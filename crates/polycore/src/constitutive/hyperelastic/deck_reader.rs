@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use super::deck::{DeckForm, FORMS};
-use super::deck_keywords::{DeckKeyword, KeywordClass, class, decoded, keywords, told};
+use super::deck_keywords::{DeckKeyword, KeywordClass, card_notes, class, decoded, keywords};
 use super::{COMPRESSIBLE_MODELS, Error, MODELS, ModelDescriptor, ModelKind, any_model};
 
 /// Material of a deck, stresses in the deck's unit.
@@ -177,7 +177,7 @@ fn material(name: &str, law: &DeckKeyword, group: &[DeckKeyword]) -> Result<Deck
     }
     model.law(&parameters).map_err(|error| refused(law, &error.to_string()))?;
     let head = group.first().filter(|head| head.name == "*MATERIAL").unwrap_or(law);
-    notes.extend(told(&head.comments, model.key));
+    notes.extend(card_notes(&head.comments, model.key));
     Ok(DeckMaterial { name: name.to_owned(), model, parameters, bulk, notes })
 }
 

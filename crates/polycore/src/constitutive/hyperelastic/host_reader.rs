@@ -6,7 +6,7 @@ use std::path::Path;
 use super::Error;
 use super::ansys_reader::ansys;
 use super::any_model;
-use super::deck_keywords::{cell_number, decoded, told};
+use super::deck_keywords::{card_notes, cell_number, decoded};
 use super::deck_reader::{DeckMaterial, MaterialDeck};
 use super::host::CardProgram;
 
@@ -70,7 +70,7 @@ impl CardProgram {
         for CardMaterial { line, name, written, comments, law } in found {
             match law.and_then(|law| material(&name, law)) {
                 Ok(mut material) => {
-                    material.notes.extend(told(&comments, material.model.key));
+                    material.notes.extend(card_notes(&comments, material.model.key));
                     deck.materials.push(material);
                 }
                 Err(allowed) => {
