@@ -14,7 +14,8 @@ use super::material::{DIGITS, digits, stress};
 #[derive(clap::Args)]
 pub struct Arguments {
     /// Abaqus or CalculiX deck with `*HYPERELASTIC`, `*HYPERFOAM` or user materials of crate `umat`; or
-    /// `.mac`, `.k` (`.key`, `.dyn`), `.feb`, `.i` with the materials that a fit writes for Ansys, LS-DYNA, FEBio, MOOSE.
+    /// `.mac`, `.k` (`.key`, `.dyn`), `.feb`, `.i` with the materials that a fit writes for Ansys, LS-DYNA,
+    /// FEBio, MOOSE.
     file: PathBuf,
     /// The deck's unit of stress: "1 MPa" with N and mm, "1 Pa" with N and m.
     #[arg(long, value_name = "QUANTITY", default_value = "1 MPa")]

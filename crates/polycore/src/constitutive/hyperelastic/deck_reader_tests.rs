@@ -100,8 +100,9 @@ fn keywords_of_a_material() {
                 0.2,0.2,2\n0.3,0.1,10\n";
     assert_eq!(parse("deck", foam).unwrap().materials.len(), 1);
     let tests = "*MATERIAL, NAME=B\n*HYPERELASTIC, NEO HOOKE\n0.15, 0.05\n\
-                 *VISCOELASTIC, TIME=RELAXATION TEST DATA\n*SHEAR TEST DATA\n0.9,1\n*VOLUMETRIC TEST DATA\n1,0.99\n*MULLINS EFFECT, TEST DATA \
-                 INPUT, BETA=0.1\n*UNIAXIAL TEST DATA\n1,0.5\n";
+                 *VISCOELASTIC, TIME=RELAXATION TEST DATA\n*SHEAR TEST DATA\n0.9,1\n\
+                 *VOLUMETRIC TEST DATA\n1,0.99\n*MULLINS EFFECT, TEST DATA INPUT, BETA=0.1\n\
+                 *UNIAXIAL TEST DATA\n1,0.5\n";
     let found = parse("deck", tests).unwrap();
     assert!(found.left_out.is_empty() && found.materials[0].notes.len() == 2, "{found:?}");
     // of the law itself
