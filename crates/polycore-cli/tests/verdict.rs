@@ -103,9 +103,8 @@ fn a_law_that_is_not_elliptic() {
 fn as_many_measurements_as_parameters() {
     let folder = tempfile::tempdir().unwrap();
     let data = "[[fit.data]]\nname = \"strip\"\nfile = \"t.csv\"\n";
-    let law = |l: f64| 0.6 * (l - l.powi(-3));
-    let table = format!("stretch,planar stress [MPa]\n1.5,{}\n2,{}\n", law(1.5), law(2.0));
-    let shown = plain(&run(folder.path(), "laws = [\"mooney-rivlin\"]", data, &table));
+    let table = "stretch,planar stress [MPa]\n1.5,0.7222\n2,1.126\n";
+    let shown = plain(&run(folder.path(), "laws = [\"mooney-rivlin\"]", data, table));
     assert!(shown.contains("strip: test: pure-shear, as the headings say"), "{shown}");
     assert!(shown.contains("warning: strip: no block, no card of mooney-rivlin"), "{shown}");
     let why = "the data do not determine C1, C2, other values fit as well";
