@@ -97,6 +97,42 @@ fn a_law_that_is_not_elliptic() {
     }
 }
 
+/// In pure shear I₁ = I₂: two measurements, as many as parameters, determine C₁ + C₂ alone. Two of a bar
+/// determine both.
+#[test]
+fn as_many_measurements_as_parameters() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = "[[fit.data]]\nname = \"strip\"\nfile = \"t.csv\"\n";
+    let table = "stretch,planar stress [MPa]\n1.5,0.7222\n2,1.126\n";
+    let shown = plain(&run(folder.path(), "laws = [\"mooney-rivlin\"]", data, table));
+    assert!(shown.contains("strip: test: pure-shear, as the headings say"), "{shown}");
+    assert!(shown.contains("warning: strip: no block, no card of mooney-rivlin"), "{shown}");
+    let why = "the data do not determine C1, C2, other values fit as well";
+    assert!(read(folder.path(), "materials_mm.inp").contains(why));
+    let law = |l: f64| 2.0 * (0.3 + 0.1 / l) * (l - l.powi(-2));
+    let table = format!("stretch,tensile stress [MPa]\n1.5,{}\n2,{}\n", law(1.5), law(2.0));
+    let shown = plain(&run(folder.path(), "laws = [\"mooney-rivlin\"]", data, &table));
+    assert!(shown.contains("C1 = \"0.3000000000 MPa\"") && !shown.contains("warning"), "{shown}");
+}
+
+/// Strains of 1e-4 say nothing of the exponent of Ogden's law, which has no limit to be at.
+#[test]
+fn an_exponent_without_effect() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = "[[fit.data]]\nname = \"bar\"\nfile = \"t.csv\"\n";
+    let rows: String = (1..=6)
+        .map(|k| 1.0 + 1e-5 * f64::from(k))
+        .map(|l| format!("{l},{}\n", 0.4 * (l - l.powi(-2))))
+        .collect();
+    run(folder.path(), "laws = [\"ogden-1\"]", data, &format!("stretch,tensile stress [MPa]\n{rows}"));
+    let text = read(folder.path(), "materials_mm.inp");
+    assert!(
+        text.contains("the data do not determine alpha") && text.contains("use a law with fewer"),
+        "{text}"
+    );
+    assert!(!text.contains("infinite"), "{text}");
+}
+
 /// Rows after the break of a specimen are left out with a warning.
 #[test]
 fn rows_that_are_left_out() {

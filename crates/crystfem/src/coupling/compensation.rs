@@ -12,8 +12,8 @@ use std::sync::Arc;
 pub struct LayerScale {
     /// Mean height of the nodes, m.
     pub height: f64,
-    /// Factors on x and y about the centre of the layer: 1/(1 + ε), ε the slope of the displacement by least
-    /// squares; 1 along an axis in which the layer has no extent.
+    /// Factors on x and y about the centre of the layer (of [`axial_scales`] about the z axis): 1/(1 + ε), ε
+    /// the slope of the displacement by least squares; 1 along an axis in which the layer has no extent.
     pub factors: [f64; 2],
     /// Shift of the layer in x and y, m: the opposite of its mean displacement.
     pub shift: [f64; 2],
@@ -41,6 +41,30 @@ pub fn layer_scales(mesh: &Mesh, layers: &[Vec<u32>], displacement: &[f64]) -> V
         (!nodes.is_empty()).then_some(LayerScale { height, factors: [x.0, y.0], shift: [x.1, y.1] })
     };
     layers.iter().filter_map(scale).collect()
+}
+
+/// Returns the scale of each layer of a sector whose cuts are planes of symmetry through the z axis: one
+/// factor about the axis, 1/(1 + ε) with u = ε r by least squares, and no shift. Other arguments are those of
+/// [`layer_scales`].
+pub fn axial_scales(mesh: &Mesh, layers: &[Vec<u32>], displacement: &[f64]) -> Vec<LayerScale> {
+    let mut scales = Vec::new();
+    for layer in layers {
+        // a layer alone, with the heights of its nodes
+        let Some(own) = layer_scales(mesh, std::slice::from_ref(layer), displacement).pop() else { continue };
+        let mut nodes: Vec<usize> =
+            layer.iter().flat_map(|&element| mesh.nodes(element)).map(|&node| node as usize).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes.retain(|node| displacement[3 * node].is_finite());
+        let sum = |of: &dyn Fn(usize, usize) -> f64| {
+            nodes.iter().map(|&node| of(node, 0) + of(node, 1)).sum::<f64>()
+        };
+        let square = sum(&|node, d| mesh.points[node][d].powi(2));
+        let slope = sum(&|node, d| mesh.points[node][d] * displacement[3 * node + d]);
+        let factor = if square > 0.0 { 1.0 / (1.0 + slope / square) } else { 1.0 };
+        scales.push(LayerScale { factors: [factor; 2], shift: [0.0; 2], ..own });
+    }
+    scales
 }
 
 /// Returns the mesh with each node moved by the opposite of its displacement, m, three a node; NaN moves
@@ -95,6 +119,26 @@ mod tests {
     use super::*;
     use crate::mesh::{Bar, abaqus};
     use evidence::near;
+
+    /// A quarter of a tube that shrinks by 2 % towards its axis: one factor about the axis, no shift.
+    #[test]
+    fn a_sector_is_scaled_about_its_axis() {
+        let mut mesh = Bar::new([20e-3, 5e-3], 2, 1e-3).mesh().unwrap();
+        // radius from x, angle from y
+        for point in &mut mesh.points {
+            let (radius, angle) = (0.01 + 0.1 * point[0], point[1] / 5e-3 * std::f64::consts::FRAC_PI_2);
+            (point[0], point[1]) = (radius * angle.cos(), radius * angle.sin());
+        }
+        let layers = vec![(0..mesh.element_count() as u32).collect::<Vec<u32>>()];
+        let moved: Vec<f64> = mesh.points.iter().flat_map(|p| [-0.02 * p[0], -0.02 * p[1], 1e-4]).collect();
+        let scales = axial_scales(&mesh, &layers, &moved);
+        for d in 0..2 {
+            near("compensation_axial_scale", scales[0].factors[d], 1.0 / 0.98, 1e-12);
+        }
+        assert_eq!((scales.len(), scales[0].shift), (1, [0.0; 2]));
+        // about its centre, the sector would be moved off the axis
+        assert!(layer_scales(&mesh, &layers, &moved)[0].shift[0] > 1e-5);
+    }
 
     /// Layers that shrink by 1 and 2 % along x and are moved get the factors 1/0.99 and 1/0.98; the mesh with
     /// the opposite displacement has the same elements and is read back from its file.

@@ -40,6 +40,9 @@ pub struct StressSettings {
     /// Rollers on planes of symmetry that contain the z axis, at an angle: a free part moves along z alone,
     /// and its bed side has a constant z. Default: none.
     pub rollers: Vec<Roller>,
+    /// Temperature of each element at which it is free of stress if it is there from the start, K. Default:
+    /// the initial temperatures of its nodes, of which one between two materials has a single one.
+    pub stress_free: Option<Vec<f64>>,
 }
 
 impl StressSettings {
@@ -64,6 +67,7 @@ impl StressSettings {
             release: true,
             release_at: None,
             rollers: Vec::new(),
+            stress_free: None,
         })
     }
 }
@@ -262,13 +266,17 @@ impl<'a> StressCoupling<'a> {
         Ok(())
     }
 
-    /// Replaces the temperatures of an element's nodes by the initial ones.
+    /// Replaces the temperatures of an element's nodes by those at which it is free of stress.
     fn initial(
         &self,
         simulation: &Simulation,
         element: usize,
         mut state: ElementThermalState,
     ) -> ElementThermalState {
+        if let Some(own) = self.settings.stress_free.as_ref().and_then(|all| all.get(element)) {
+            state.nodes[..state.count].fill(*own);
+            return state;
+        }
         let initial = &simulation.problem().initial;
         for (kelvin, &node) in state.nodes.iter_mut().zip(self.mesh.nodes(element as u32)) {
             *kelvin = initial.value_at(self.mesh.points[node as usize], 0.0);

@@ -302,3 +302,60 @@ fn tetrahedra_warp_as_hexahedra_do() {
         assert!(found.scalar("worst_stress_balance").unwrap() < 1e-10);
     }
 }
+
+/// A part at 100 °C on a mould at 0 °C cools to 0 °C as a whole: it shrinks by the same strain everywhere and
+/// stays flat, whichever elements a file has first, those of the part or of the mould.
+#[test]
+fn the_order_of_elements_changes_no_stress() {
+    const N: usize = 3;
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let node = |i: usize, j: usize, k: usize| 1 + i + (N + 1) * (j + (N + 1) * k);
+    let mut nodes = "*NODE\n".to_owned();
+    for (k, j, i) in (0..=N + 1).flat_map(|k| (0..=N).flat_map(move |j| (0..=N).map(move |i| (k, j, i)))) {
+        writeln!(nodes, "{}, {i}, {j}, {k}", node(i, j, k)).unwrap();
+    }
+    let layers = |range: std::ops::Range<usize>| -> Vec<String> {
+        let cells = range.flat_map(|k| (0..N).flat_map(move |j| (0..N).map(move |i| (i, j, k))));
+        let corners = |k: usize, i: usize, j: usize| {
+            [node(i, j, k), node(i + 1, j, k), node(i + 1, j + 1, k), node(i, j + 1, k)]
+                .map(|node| node.to_string())
+                .join(", ")
+        };
+        cells.map(|(i, j, k)| format!("{}, {}", corners(k, i, j), corners(k + 1, i, j))).collect()
+    };
+    for part_first in [false, true] {
+        let sets = [("MOULD", layers(0..2)), ("PART", layers(2..N + 1))];
+        let order = if part_first { [1, 0] } else { [0, 1] };
+        let mut text = nodes.clone();
+        let mut id = 0;
+        for (name, elements) in order.map(|set| &sets[set]) {
+            writeln!(text, "*ELEMENT, TYPE=C3D8, ELSET={name}").unwrap();
+            for element in elements {
+                id += 1;
+                writeln!(text, "{id}, {element}").unwrap();
+            }
+        }
+        fs::write(here.join("m.inp"), text).unwrap();
+        let material = |name: &str, degrees: u8| {
+            format!(
+                "[materials.{name}]\nlaw = \"conductor\"\ndensity = \"1000 kg/m^3\"\n\
+                 conductivity = \"1 W/(m K)\"\nspecific_heat = \"1000 J/(kg K)\"\n[[region]]\n\
+                 elements = \"{name}\"\nmaterial = \"{name}\"\ntemperature = \"{degrees} degC\"\n"
+            )
+        };
+        let mesh = "[mesh]\nfile = \"m.inp\"\nunit = \"1 mm\"\n";
+        let mechanics = "[mechanics]\nmaterial = \"PART\"\n[mechanics.law.elastic]\nmodulus = \"1 GPa\"\n\
+                         poisson = 0.4\nexpansion = \"1e-4 1/K\"\n";
+        let rest = "[[boundary]]\nsurface = \"bottom\"\ntemperature = \"0 degC\"\n[time]\nend = \"1e9 s\"\n\
+                    scheme = \"backward-euler\"\nstep = \"1e9 s\"\n\
+                    [output]\npictures = false\nfields = false\n";
+        let materials = material("MOULD", 0) + &material("PART", 100);
+        let text = format!("version = 1\nprogram = \"crystfem\"\n{mesh}{materials}{mechanics}{rest}");
+        fs::write(here.join("case.toml"), text).unwrap();
+        let source = Source::read(here.join("case.toml")).unwrap();
+        let found = run::<Crystfem>(&source, Options::new(&here.join("out"))).unwrap().report;
+        let warpage = found.scalar("warpage").unwrap();
+        assert!(warpage < 1e-10, "part first {part_first}: {warpage}");
+    }
+}

@@ -14,7 +14,8 @@ use super::material::{DIGITS, digits, stress};
 #[derive(clap::Args)]
 pub struct Arguments {
     /// Abaqus or CalculiX deck with `*HYPERELASTIC`, `*HYPERFOAM` or user materials of crate `umat`; or
-    /// `.mac`, `.k`, `.feb`, `.i` with the materials that a fit writes for Ansys, LS-DYNA, FEBio, MOOSE.
+    /// `.mac`, `.k` (`.key`, `.dyn`), `.feb`, `.i` with the materials that a fit writes for Ansys, LS-DYNA,
+    /// FEBio, MOOSE.
     file: PathBuf,
     /// The deck's unit of stress: "1 MPa" with N and mm, "1 Pa" with N and m.
     #[arg(long, value_name = "QUANTITY", default_value = "1 MPa")]
@@ -29,10 +30,7 @@ pub fn blocks(arguments: &Arguments) -> Result<String, Error> {
     let path = &arguments.file;
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
     let found = match CardProgram::find(&ending) {
-        Some(host) => {
-            let text = std::fs::read_to_string(path).map_err(Error::from_io("read", path))?;
-            host.parse(&path.display().to_string(), &text).map_err(Error::from)
-        }
+        Some(host) => host.read(path),
         None => deck_reader::read(path),
     };
     let MaterialDeck { materials, left_out } = found.map_err(|error| match error {

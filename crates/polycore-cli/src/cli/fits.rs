@@ -393,6 +393,8 @@ fn errors(case: &FitCase, all: &[TableFits]) -> String {
 fn remarks(case: &FitCase, all: &[TableFits]) -> String {
     let mut text = String::new();
     for (own, set) in case.data.iter().zip(all) {
+        let named = set.read.iter().filter(|line| line.starts_with("test: "));
+        named.for_each(|line| text += &format!("{}: {line}\n", set.name));
         text += &ranking::advice(own, &set.ranked);
         for (law, why) in &set.failed {
             let _ = writeln!(text, "failed  {law} on {}: {why}", set.name);

@@ -1,5 +1,6 @@
 //! Verdicts on fitted laws: those that are no usable materials, and where the others are not stable.
 
+use polycore::constitutive::hyperelastic::Domain;
 use polycore::constitutive::hyperelastic::data::{Mode, TestData};
 use polycore::constitutive::hyperelastic::fit::{Fit, FittedParameter, Identifiability};
 use polycore::constitutive::hyperelastic::stability;
@@ -74,8 +75,13 @@ fn unusable(fit: &Fit) -> Option<String> {
     };
     let absent = names(&|own| own.identifiability == Identifiability::Absent);
     let open = names(&|own| own.identifiability == Identifiability::Undetermined);
+    let is_open_above = |name: &&str| {
+        let own = fit.model.parameters.iter().find(|parameter| parameter.name == *name);
+        own.is_some_and(|parameter| matches!(parameter.domain, Domain::Above(_)))
+    };
     // with as many stresses as parameters there is no error to know
-    let free = names(&|own| own.standard_error.is_none() && fit.measurements > fit.parameters.len());
+    let judged = fit.collinear || fit.measurements > fit.parameters.len();
+    let free = names(&|own| own.standard_error.is_none() && judged);
     if !absent.is_empty() {
         return Some(format!(
             "without {} it is a law with fewer parameters: use that law",
@@ -83,10 +89,11 @@ fn unusable(fit: &Fit) -> Option<String> {
         ));
     }
     if !open.is_empty() {
-        return Some(format!(
-            "the data do not determine {}, which may be infinite: use `neo-hookean`",
-            open.join(", ")
-        ));
+        let advice = match open.iter().all(is_open_above) {
+            true => ", which may be infinite: use `neo-hookean`",
+            false => ": use a law with fewer parameters, or more kinds of tests",
+        };
+        return Some(format!("the data do not determine {}{advice}", open.join(", ")));
     }
     (!free.is_empty()).then(|| {
         format!(

@@ -20,6 +20,7 @@ use super::Error;
 use crate::tensor::deformation::check_stretches;
 use crate::tensor::{DeformationGradient, PrincipalFrame, Tensor, Voigt6x6, voigt};
 
+mod ansys_reader;
 mod arruda_boyce;
 mod chain;
 mod compressible;

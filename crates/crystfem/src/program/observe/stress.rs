@@ -2,7 +2,7 @@
 
 use super::warpage_picture;
 use crate::coupling::StressCoupling;
-use crate::coupling::compensation::{LayerScale, layer_scales, opposite, residual};
+use crate::coupling::compensation::{LayerScale, axial_scales, layer_scales, opposite, residual};
 use crate::error::Error;
 use crate::mesh::abaqus;
 use crate::program::quantities as q;
@@ -44,7 +44,11 @@ impl<'a> StressObserver<'a> {
         atomic_write(to.folder.join("compensated.inp"), |file| abaqus::write(&compensated, true, file))?;
         let whole = [(0..mesh.element_count() as u32).collect()];
         let layers = if self.task.layers.is_empty() { &whole[..] } else { &self.task.layers };
-        let scales = layer_scales(mesh, layers, displacement);
+        let scales = match self.mechanics.settings.rollers.is_empty() {
+            true => layer_scales(mesh, layers, displacement),
+            // the axis of a sector stays
+            false => axial_scales(mesh, layers, displacement),
+        };
         let column = |of: &dyn Fn(&LayerScale) -> f64| scales.iter().map(of).collect::<Vec<f64>>();
         let layer: Vec<f64> = (1..=scales.len()).map(|layer| layer as f64).collect();
         let (height, x, y) = (column(&|s| s.height), column(&|s| s.factors[0]), column(&|s| s.factors[1]));

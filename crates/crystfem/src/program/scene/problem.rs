@@ -93,10 +93,18 @@ impl PartScene {
             })?,
             None => PrintPlan::default(),
         };
-        let mechanics = {
+        let mut mechanics = {
             let path = filling.as_ref().and_then(|filling| filling.path.as_ref()).map(|(path, _)| path);
             self.mechanics(source, &mesh, &material_of, &absent, path)?
         };
+        if let Some(mechanics) = &mut mechanics {
+            if !mechanics.settings.rollers.is_empty() {
+                let note = "the cuts `start` and `end` of `[mesh.tube]` are planes of symmetry for \
+                            `[mechanics]`: warpage has the symmetry of the tube";
+                notes.push(note.to_owned());
+            }
+            mechanics.settings.stress_free = Some(temperature_of.clone());
+        }
         let interfaces = self.interfaces(source, &mesh, &material_of, &births)?;
         let end = self.time.end.map_or(default_end, |end| end.si());
         memory::refuse_times(source, self, end)?;

@@ -174,13 +174,15 @@ pub(super) fn mode(cell: &str) -> Option<(Mode, bool)> {
     let has = |list: &[&str]| words.iter().any(|word| list.contains(word));
     let compression = words.iter().any(|word| word.starts_with("compress")) || has(&["uc"]);
     let shear = has(&["shear", "ps"]);
-    if has(&["planar", "plane", "pt", "ps", "strip", "constrained"]) || (shear && has(&["pure"])) {
+    let biaxial = has(&["equibiaxial", "equi", "biaxial"]);
+    let planar = has(&["planar", "plane", "pt", "ps", "strip", "constrained"]) && !biaxial;
+    if planar || (shear && has(&["pure"])) {
         Some((Mode::PureShear, compression))
     } else if shear && has(&["simple"]) || has(&["ss"]) {
         Some((Mode::SimpleShear, false))
     } else if shear {
         None
-    } else if has(&["equibiaxial", "equi", "biaxial", "eb", "et", "ebt", "bt", "inflation", "bulge"]) {
+    } else if biaxial || has(&["eb", "et", "ebt", "bt", "inflation", "bulge"]) {
         Some((Mode::Equibiaxial, compression))
     } else if has(&["uniaxial", "ut", "uc", "tension", "tensile", "simple"]) || compression {
         Some((Mode::Uniaxial, compression))

@@ -10,8 +10,39 @@ pub(super) struct DeckKeyword<'a> {
     pub name: String,
     /// Options in capitals: `OGDEN`, `N=2`.
     pub options: Vec<String>,
+    /// Comments since the line before.
+    pub comments: Vec<&'a str>,
     /// Data lines with their numbers.
     data: Vec<(usize, &'a str)>,
+}
+
+/// Cells of a data line.
+const CELLS: usize = 8;
+
+/// Reads the number of a cell, of which the exponent may be a `D` as in Fortran; a blank is 0.
+pub(super) fn cell_number(cell: &str) -> Option<f64> {
+    let cell = cell.trim();
+    let number = if cell.is_empty() { Ok(0.0) } else { cell.replace(['d', 'D'], "E").parse::<f64>() };
+    number.ok().filter(|number| number.is_finite())
+}
+
+/// Decodes the bytes of a deck: UTF-8 with or without a byte-order mark, else Latin-1.
+pub(super) fn decoded(bytes: &[u8]) -> String {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => text.trim_start_matches('\u{feff}').to_owned(),
+        Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
+    }
+}
+
+/// Notes on a card of a run from the comments above its material: the warnings, and the law that it was
+/// written for if the card is read as another one.
+pub(super) fn card_notes(comments: &[&str], key: &str) -> Vec<String> {
+    let title = comments.iter().rposition(|comment| comment.contains(" fitted to "));
+    let own = &comments[title.unwrap_or(0)..];
+    let fitted = title.and_then(|title| comments[title].split(' ').next()).filter(|fitted| *fitted != key);
+    let other = fitted.map(|fitted| format!("written for `{fitted}`, read as `{key}`"));
+    let warnings = own.iter().filter(|comment| comment.starts_with("warning: "));
+    warnings.map(|warning| (*warning).to_owned()).chain(other).collect()
 }
 
 impl DeckKeyword<'_> {
@@ -23,30 +54,44 @@ impl DeckKeyword<'_> {
         })
     }
 
-    /// Numbers of each data line; a blank is 0, that after a comma at the end is none.
+    /// Numbers of each data line; a blank is 0, those after commas at the end are none.
     ///
     /// # Errors
     /// The line of a cell that is no finite number.
     pub fn rows(&self) -> Result<Vec<Vec<f64>>, String> {
         let row = |&(line, row): &(usize, &str)| {
-            let row = row.strip_suffix(',').unwrap_or(row);
+            let row = row.trim_end_matches(|c: char| c == ',' || c.is_whitespace());
             let number = |cell: &str| {
-                let cell = cell.trim();
-                let number = if cell.is_empty() { Ok(0.0) } else { cell.parse::<f64>() };
-                let finite = number.ok().filter(|number| number.is_finite());
-                finite.ok_or_else(|| format!("line {line}: found `{cell}`; allowed: a finite number"))
+                let finite = cell_number(cell);
+                finite
+                    .ok_or_else(|| format!("line {line}: found `{}`; allowed: a finite number", cell.trim()))
             };
             row.split(',').map(number).collect()
         };
         self.data.iter().map(row).collect()
     }
 
-    /// Numbers of all data lines.
+    /// Numbers of all data lines of eight cells; those left out at the end of a line are 0, those of the last
+    /// line missing.
     ///
     /// # Errors
-    /// As [`Self::rows`].
+    /// As [`Self::rows`]; a line of more cells.
     pub fn numbers(&self) -> Result<Vec<f64>, String> {
-        Ok(self.rows()?.concat())
+        let mut rows = self.rows()?;
+        if let Some(at) = rows.iter().position(|row| row.len() > CELLS) {
+            let (line, row) = self.data[at];
+            return Err(format!("line {line}: found `{row}`; allowed: {CELLS} numbers a line"));
+        }
+        if let Some((_, all)) = rows.split_last_mut() {
+            all.iter_mut().for_each(|row| row.resize(CELLS, 0.0));
+        }
+        Ok(rows.concat())
+    }
+
+    /// Returns true for test data in place of parameters, in the keywords that follow.
+    pub fn has_test_data(&self) -> bool {
+        let is_option = self.options.iter().any(|option| option == "TEST DATA INPUT");
+        is_option || self.value("TIME").is_some_and(|source| source.ends_with("TEST DATA"))
     }
 }
 
@@ -54,8 +99,13 @@ impl DeckKeyword<'_> {
 pub(super) fn keywords(text: &str) -> Vec<DeckKeyword<'_>> {
     let mut all: Vec<DeckKeyword> = Vec::new();
     let mut continues = false;
+    let mut comments = Vec::new();
     for (line, written) in (1..).zip(text.lines().map(str::trim)) {
-        if written.is_empty() || written.starts_with("**") {
+        if let Some(comment) = written.strip_prefix("**") {
+            comments.push(comment.trim());
+            continue;
+        }
+        if written.is_empty() {
             continue;
         }
         let parts = || {
@@ -65,9 +115,11 @@ pub(super) fn keywords(text: &str) -> Vec<DeckKeyword<'_>> {
         if written.starts_with('*') {
             let mut parts = parts();
             let name = parts.next().unwrap_or_default();
-            all.push(DeckKeyword { line, written, name, options: parts.collect(), data: Vec::new() });
+            let (comments, options) = (std::mem::take(&mut comments), parts.collect());
+            all.push(DeckKeyword { line, written, name, options, comments, data: Vec::new() });
             continues = written.ends_with(',');
         } else if let Some(last) = all.last_mut() {
+            comments.clear();
             match continues {
                 true => last.options.extend(parts()),
                 false => last.data.push((line, written)),
@@ -93,6 +145,8 @@ pub(super) enum KeywordClass {
     Apart,
     /// Is, or changes to, another law.
     Other,
+    /// Stands outside of materials.
+    Outside,
 }
 
 const LAWS: [&str; 3] = ["*HYPERELASTIC", "*HYPERFOAM", "*USER MATERIAL"];
@@ -174,7 +228,58 @@ const OTHERS: [&str; 43] = [
     "*VOLUMETRIC TEST DATA",
 ];
 
-/// Effect of a keyword with its `*`, in capitals; `None` if it belongs to no material.
+const OUTSIDE: [&str; 46] = [
+    "*AMPLITUDE",
+    "*ASSEMBLY",
+    "*BOUNDARY",
+    "*BUCKLE",
+    "*CHANGE FRICTION",
+    "*CLEARANCE",
+    "*CLOAD",
+    "*CONTROLS",
+    "*COUPLED TEMPERATURE-DISPLACEMENT",
+    "*COUPLING",
+    "*DISTRIBUTION",
+    "*DISTRIBUTION TABLE",
+    "*DLOAD",
+    "*DSLOAD",
+    "*DYNAMIC",
+    "*ELSET",
+    "*EQUATION",
+    "*FASTENER",
+    "*FREQUENCY",
+    "*FRICTION",
+    "*HEADING",
+    "*HEAT TRANSFER",
+    "*IMPORT",
+    "*INITIAL CONDITIONS",
+    "*INSTANCE",
+    "*KINEMATIC COUPLING",
+    "*MONITOR",
+    "*MPC",
+    "*NGEN",
+    "*NSET",
+    "*ORIENTATION",
+    "*OUTPUT",
+    "*PART",
+    "*PHYSICAL CONSTANTS",
+    "*PREPRINT",
+    "*RESTART",
+    "*RIGID BODY",
+    "*SECTION CONTROLS",
+    "*SPRING",
+    "*STATIC",
+    "*STEP",
+    "*TEMPERATURE",
+    "*TIE",
+    "*TIME POINTS",
+    "*TRANSFORM",
+    "*VISCO",
+];
+/// Beginnings of keywords outside of materials.
+const OUTSIDE_BEGINS: [&str; 6] = ["*CONTACT", "*ELEMENT", "*EL ", "*END ", "*NODE", "*SURFACE"];
+
+/// Effect of a keyword with its `*`, in capitals; `None` if it is not known.
 pub(super) fn class(name: &str) -> Option<KeywordClass> {
     let lists: [(&[&str], KeywordClass); 6] = [
         (&["*MATERIAL"], KeywordClass::Material),
@@ -184,5 +289,10 @@ pub(super) fn class(name: &str) -> Option<KeywordClass> {
         (&APART, KeywordClass::Apart),
         (&OTHERS, KeywordClass::Other),
     ];
-    lists.into_iter().find(|(names, _)| names.contains(&name)).map(|(_, class)| class)
+    let known = lists.into_iter().find(|(names, _)| names.contains(&name)).map(|(_, class)| class);
+    let outside = || {
+        let begins = || OUTSIDE_BEGINS.iter().any(|start| name.starts_with(start));
+        OUTSIDE.contains(&name) || name.ends_with(" SECTION") || begins()
+    };
+    known.or_else(|| outside().then_some(KeywordClass::Outside))
 }

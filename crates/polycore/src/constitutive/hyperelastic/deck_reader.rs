@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use super::deck::{DeckForm, FORMS};
-use super::deck_keywords::{DeckKeyword, KeywordClass, class, keywords};
+use super::deck_keywords::{DeckKeyword, KeywordClass, card_notes, class, decoded, keywords};
 use super::{COMPRESSIBLE_MODELS, Error, MODELS, ModelDescriptor, ModelKind, any_model};
 
 /// Material of a deck, stresses in the deck's unit.
@@ -51,7 +51,7 @@ impl MaterialDeck {
 /// [`crate::Error::Io`]; as [`parse`].
 pub fn read(path: impl AsRef<Path>) -> Result<MaterialDeck, crate::Error> {
     let path = path.as_ref();
-    let text = std::fs::read_to_string(path).map_err(crate::Error::from_io("read", path))?;
+    let text = decoded(&std::fs::read(path).map_err(crate::Error::from_io("read", path))?);
     Ok(parse(&path.display().to_string(), &text)?)
 }
 
@@ -59,7 +59,9 @@ pub fn read(path: impl AsRef<Path>) -> Result<MaterialDeck, crate::Error> {
 /// law is checked. `MODULI=INSTANTANEOUS` with the Prony series of a `*VISCOELASTIC` is converted to the law
 /// of long times; D₂ and more, rates, softening and what is no elasticity are noted.
 ///
-/// Left out are materials whose law is not in this crate or is changed by another keyword: a kind, an order
+/// A material ends at the next `*MATERIAL` or at a keyword that stands outside of materials. Left out are
+/// materials whose law is not in this crate or is changed by another keyword: an unknown keyword or an
+/// `*INCLUDE` inside the material, a kind, an order
 /// or an option that is unknown, test data in place of parameters, numbers that are missing, too many or of
 /// several temperatures, plasticity, creep, other branches; and parameters outside their domain.
 ///
@@ -68,17 +70,26 @@ pub fn read(path: impl AsRef<Path>) -> Result<MaterialDeck, crate::Error> {
 pub fn parse(name: &str, text: &str) -> Result<MaterialDeck, Error> {
     let mut deck = MaterialDeck::default();
     let mut group: Vec<DeckKeyword> = Vec::new();
+    // a keyword whose test data follow
+    let mut tested = false;
     for keyword in keywords(text) {
         let class = class(&keyword.name);
-        if class.is_none() || keyword.name == "*MATERIAL" {
+        if matches!(class, Some(KeywordClass::Material | KeywordClass::Outside)) {
             deck.add(&std::mem::take(&mut group));
         }
         if keyword.name == "*INCLUDE" {
             let (line, written) = (keyword.line, keyword.written);
             deck.left_out.push(format!("line {line}: `{written}`: give that file by itself"));
         }
-        if class.is_some() {
-            group.push(keyword);
+        if tested && keyword.name.ends_with(" TEST DATA") {
+            continue;
+        }
+        tested = !matches!(class, Some(KeywordClass::Law)) && keyword.has_test_data();
+        match class {
+            Some(KeywordClass::Outside) => {}
+            // outside of materials
+            None if group.is_empty() => {}
+            _ => group.push(keyword),
         }
     }
     deck.add(&group);
@@ -132,7 +143,7 @@ fn material(name: &str, law: &DeckKeyword, group: &[DeckKeyword]) -> Result<Deck
     let mut notes = Vec::new();
     let found = match law.name.as_str() {
         "*HYPERELASTIC" => rubber(law, order, &numbers, &mut notes),
-        "*HYPERFOAM" => foam(law, order, &numbers),
+        "*HYPERFOAM" => foam(law, order, &numbers, &mut notes),
         _ => user(name, law, &numbers),
     };
     let (model, mut parameters, mut bulk) = found.map_err(|allowed| refused(law, &allowed))?;
@@ -147,12 +158,17 @@ fn material(name: &str, law: &DeckKeyword, group: &[DeckKeyword]) -> Result<Deck
                 notes.push(format!("{own} left out: the law is that of the first loading"))
             }
             Some(KeywordClass::Apart) => notes.push(format!("{own} left out: no elasticity")),
+            None => {
+                let why = "known properties, as this one may change the law; what belongs to no material \
+                           stands before the first `*MATERIAL`";
+                return Err(refused(keyword, why));
+            }
             _ => {}
         }
     }
     let rate = group.iter().filter(|keyword| class(&keyword.name) == Some(KeywordClass::Rate));
     if let Some([shear, volume]) = relaxed(law, &rate.collect::<Vec<_>>(), &mut notes)? {
-        if model.kind == ModelKind::Compressible && shear != volume {
+        if model.kind == ModelKind::Compressible && (shear - volume).abs() > 1e-9 {
             return Err(refused(law, "the same Prony series for shear and volume of a foam, g = k"));
         }
         let stresses = parameters.iter_mut().zip(model.parameters).filter(|(_, own)| own.unit == "Pa");
@@ -160,6 +176,8 @@ fn material(name: &str, law: &DeckKeyword, group: &[DeckKeyword]) -> Result<Deck
         bulk = bulk.map(|bulk| bulk * volume);
     }
     model.law(&parameters).map_err(|error| refused(law, &error.to_string()))?;
+    let head = group.first().filter(|head| head.name == "*MATERIAL").unwrap_or(law);
+    notes.extend(card_notes(&head.comments, model.key));
     Ok(DeckMaterial { name: name.to_owned(), model, parameters, bulk, notes })
 }
 
@@ -219,10 +237,16 @@ fn relaxed(
 /// Model, parameters, and bulk modulus of data lines; or what is allowed.
 type DeckLaw = Result<(&'static ModelDescriptor, Vec<f64>, Option<f64>), String>;
 
-/// Checks the number of cells; missing ones at the end are 0, as in Abaqus.
-fn cells(numbers: &[f64], count: usize) -> Result<Vec<f64>, String> {
-    if numbers.is_empty() || numbers.len() > count {
-        return Err(format!("1 to {count} numbers, of one temperature; {} given", numbers.len()));
+/// Checks the number of cells; missing ones at the end are 0, as in Abaqus, and one more is the temperature.
+fn cells(numbers: &[f64], count: usize, notes: &mut Vec<String>) -> Result<Vec<f64>, String> {
+    if numbers.is_empty() || numbers.len() > count + 1 {
+        return Err(format!(
+            "1 to {count} numbers, eight a line, and a temperature; {} given with the blanks of full lines",
+            numbers.len()
+        ));
+    }
+    if let Some(temperature) = numbers.get(count) {
+        notes.push(format!("of the temperature {temperature} alone"));
     }
     Ok(numbers.iter().copied().chain(std::iter::repeat(0.0)).take(count).collect())
 }
@@ -257,7 +281,7 @@ fn rubber(law: &DeckKeyword, order: usize, numbers: &[f64], notes: &mut Vec<Stri
         };
         return Err(FORMS.iter().map(named).collect::<Vec<_>>().join("; "));
     };
-    let numbers = cells(numbers, form.coefficients + form.compliances())?;
+    let numbers = cells(numbers, form.coefficients + form.compliances(), notes)?;
     let (coefficients, compliances) = numbers.split_at(form.coefficients);
     let more: Vec<String> = (2..)
         .zip(&compliances[1..])
@@ -272,16 +296,19 @@ fn rubber(law: &DeckKeyword, order: usize, numbers: &[f64], notes: &mut Vec<Stri
     }
     let parameters = form.places.iter().map(|&place| coefficients[place] / form.factor).collect();
     let bulk = (compliances[0] > 0.0).then(|| 2.0 / compliances[0]);
+    if bulk.is_some_and(f64::is_infinite) {
+        return Err(format!("D1 of a finite K = 2/D1, or 0 for constant volume; {:e} given", compliances[0]));
+    }
     Ok((any_model(form.key).map_err(|error| error.to_string())?, parameters, bulk))
 }
 
-fn foam(law: &DeckKeyword, order: usize, numbers: &[f64]) -> DeckLaw {
+fn foam(law: &DeckKeyword, order: usize, numbers: &[f64], notes: &mut Vec<String>) -> DeckLaw {
     check_options(law, &["N", "MODULI"])?;
     let most = COMPRESSIBLE_MODELS.len();
     let Some(model) = order.checked_sub(1).and_then(|index| COMPRESSIBLE_MODELS.get(index)) else {
         return Err(format!("N=1 to N={most}"));
     };
-    let numbers = cells(numbers, 3 * order)?;
+    let numbers = cells(numbers, 3 * order, notes)?;
     let (moments, ratios) = numbers.split_at(2 * order);
     if let Some(ratio) = ratios.iter().find(|ratio| !(-1.0..0.5).contains(*ratio)) {
         return Err(format!("ν in (−1, ½); {ratio} given"));

@@ -33,8 +33,16 @@ fn bad_decks_name_the_line() {
         ("*HYPERELASTIC, YEOH, TEST DATA INPUT\n", "[[fit.data]]"),
         ("*MATERIAL, NAME=A\n*HYPERELASTIC, YEOH\n1, x\n", "line 3: found `x`; allowed: a finite number"),
         ("*HYPERELASTIC, NEO HOOKE\n1, nan\n", "line 2: found `nan`"),
-        ("*HYPERELASTIC, NEO HOOKE\n1.0,,20\n", "of one temperature; 3 given"),
-        ("*HYPERELASTIC, NEO HOOKE\n1, 0, 20\n2, 0, 40\n", "1 to 2 numbers, of one temperature; 6 given"),
+        ("*HYPERELASTIC, NEO HOOKE\n1, 0, 20\n2, 0, 40\n", "1 to 2 numbers, eight a line"),
+        ("*HYPERELASTIC, NEO HOOKE\n0.5\n0.4\n", "1 to 2 numbers, eight a line"),
+        ("*HYPERELASTIC, N=3\n1,0,0,1,0,0,0,0,1\n", "line 2: found `1,0,0,1,0,0,0,0,1`; allowed: 8 numbers"),
+        ("*MATERIAL, NAME=GENT\n*USER MATERIAL, CONSTANTS=3\n40, 0.3\n75\n", "3 constants; 9 given"),
+        ("*HYPERELASTIC, NEO HOOKE\n1, 1e-320\n", "D1 of a finite K = 2/D1"),
+        (
+            "*HYPERELASTIC, YEOH\n1\n*FOO\n1\n*PLASTIC\n1,0\n",
+            "line 3: found `*FOO`; allowed: known properties",
+        ),
+        ("*HYPERELASTIC, YEOH\n1\n*INCLUDE, INPUT=p.inp\n", "found `*INCLUDE, INPUT=p.inp`; allowed: known"),
         ("*HYPERELASTIC, NEO HOOKE\n", "0 given"),
         ("*HYPERELASTIC, NEO HOOKE\n-1, 0\n", "shear_modulus = -2 is outside"),
         ("*HYPERELASTIC, YEOH\n1,0,0,0,0.1,0\n", "D1 above 0, or all D of 0"),
@@ -57,7 +65,7 @@ fn bad_decks_name_the_line() {
             "*HYPERFOAM, MODULI=INSTANTANEOUS\n1, 2, 0.1\n*VISCOELASTIC, TIME=PRONY\n0.5, 0, 1\n",
             "the same Prony series for shear and volume of a foam",
         ),
-        ("*HYPERELASTIC, N=3\n1,0,0,1,0,0,0,0\n0,0,0,0,0\n", "1 to 12 numbers"),
+        ("*HYPERELASTIC, N=3\n1,0,0,1,0,0,0,0\n0,0,0,0,0,0\n", "1 to 12 numbers"),
         ("*HYPERELASTIC, REDUCED POLYNOMIAL, N=7\n1\n", "REDUCED POLYNOMIAL, N=6"),
         ("*HYPERFOAM, N=1\n1, 2, 0.5\n", "0.5 given"),
         ("*HYPERFOAM, N=9\n1, 2, 0.5\n", "N=1 to N=3"),
@@ -66,6 +74,62 @@ fn bad_decks_name_the_line() {
     ] {
         let error = parse("deck", deck).unwrap_err().to_string();
         assert!(error.contains(part), "{error}");
+    }
+}
+
+/// Data lines have eight cells, of which those at the end may be left out (Abaqus Keywords Guide).
+#[test]
+fn cells_left_out_at_the_end_of_a_line() {
+    let one = |deck: &str| parse("deck", deck).unwrap().materials[0].clone();
+    let found = one("*HYPERELASTIC, POLYNOMIAL, N=3\n0.3,0.05,0.001,0,0,1e-4\n,0.02\n");
+    assert_eq!((found.model.key, found.bulk), ("biderman", Some(100.0)));
+    let found = one("*HYPERFOAM, N=3\n0.2,7.,0.1,-2.,0.05,3.\n0.2\n");
+    // β = ν/(1 − 2ν)
+    assert_eq!(found.parameters, [0.2, 7.0, 0.0, 0.1, -2.0, 0.0, 0.05, 3.0, 0.2 / 0.6]);
+    // one temperature, an exponent of Fortran
+    let found = one("*HYPERELASTIC, NEO HOOKE\n1.5D-1, 2.d-2, 23.\n");
+    assert_eq!((&found.parameters[..], found.bulk), (&[0.3][..], Some(100.0)));
+    assert_eq!(found.notes, ["of the temperature 23 alone"]);
+}
+
+/// The sums of g and of k, 0.1 + 0.2 and 0.2 + 0.1 + 0, differ in the last digit; test data belong to the
+/// keyword before; an unknown keyword outside of a material changes none.
+#[test]
+fn keywords_of_a_material() {
+    let foam = "*HYPERFOAM, N=1, MODULI=INSTANTANEOUS\n0.2,7.,0.1\n*VISCOELASTIC, TIME=PRONY\n0.1,0.3,1\n\
+                0.2,0.2,2\n0.3,0.1,10\n";
+    assert_eq!(parse("deck", foam).unwrap().materials.len(), 1);
+    let tests = "*MATERIAL, NAME=B\n*HYPERELASTIC, NEO HOOKE\n0.15, 0.05\n\
+                 *VISCOELASTIC, TIME=RELAXATION TEST DATA\n*SHEAR TEST DATA\n0.9,1\n\
+                 *VOLUMETRIC TEST DATA\n1,0.99\n*MULLINS EFFECT, TEST DATA INPUT, BETA=0.1\n\
+                 *UNIAXIAL TEST DATA\n1,0.5\n";
+    let found = parse("deck", tests).unwrap();
+    assert!(found.left_out.is_empty() && found.materials[0].notes.len() == 2, "{found:?}");
+    // of the law itself
+    let own = "*HYPERELASTIC, NEO HOOKE\n0.15, 0.05\n*VOLUMETRIC TEST DATA\n1,0.99\n";
+    assert!(parse("deck", own).is_err());
+    let unknown = "*FOO\n1\n*MATERIAL, NAME=B\n*HYPERELASTIC, YEOH\n0.3\n*SHELL SECTION\n1\n*BAR\n1\n";
+    assert!(parse("deck", unknown).unwrap().left_out.is_empty());
+}
+
+/// Warnings and another law above a material come back; those of the material before do not.
+#[test]
+fn comments_of_a_card_are_notes() {
+    let deck = "** eight-chain fitted to a\n** warning: unstable\n*MATERIAL, NAME=A\n*HYPERELASTIC, \
+                ARRUDA-BOYCE\n0.3, 5.\n** yeoh fitted to b\n*MATERIAL, NAME=B\n*HYPERELASTIC, YEOH\n0.3\n";
+    let found = parse("deck", deck).unwrap().materials;
+    assert_eq!(found[0].notes, ["warning: unstable", "written for `eight-chain`, read as `arruda-boyce`"]);
+    assert!(found[1].notes.is_empty());
+}
+
+/// A byte-order mark, and Latin-1.
+#[test]
+fn encodings() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("d.inp");
+    for start in [&b"\xef\xbb\xbf"[..], b"** f\xfcr\n"] {
+        std::fs::write(&path, [start, b"*MATERIAL, NAME=B\n*HYPERELASTIC, YEOH\n0.15\n"].concat()).unwrap();
+        assert_eq!(read(&path).unwrap().materials[0].name, "B");
     }
 }
 

@@ -33,6 +33,9 @@ pub struct Fit {
     /// Draws of all parameters from their posterior ([`crate::posterior`]); those that the data do not
     /// determine keep their values. Empty if the data determine none.
     pub draws: Vec<Vec<f64>>,
+    /// True if other values of the parameters fit as well, to first order: the data determine combinations of
+    /// them alone.
+    pub collinear: bool,
     /// Number of measured stresses.
     pub measurements: usize,
     /// Number of evaluations of all residuals, over all starts (without those for derivatives).
@@ -163,7 +166,8 @@ pub fn fit_until(
             identifiability: found.identifiability[i],
         })
         .collect();
-    Ok(Fit { law, model, parameters, rms, chi, draws: found.draws, measurements, iterations, starts })
+    let (draws, collinear) = (found.draws, found.collinear);
+    Ok(Fit { law, model, parameters, rms, chi, draws, collinear, measurements, iterations, starts })
 }
 
 /// Best parameters of a model.

@@ -43,7 +43,12 @@ pub(super) struct FitUncertainty {
     pub identifiability: Vec<Identifiability>,
     /// Draws of all parameters.
     pub draws: Vec<Vec<f64>>,
+    /// As [`super::fit::Fit::collinear`].
+    pub collinear: bool,
 }
+
+/// Least eigenvalue of the normal matrix of unit columns that counts.
+const LEAST_EIGENVALUE: f64 = 1e-9;
 
 /// Axis, state and computed stresses of each measured stress, state by state.
 fn measured<'a>(
@@ -172,6 +177,7 @@ impl<'a> ParameterMap<'a> {
             errors: vec![None; q.len()],
             identifiability: vec![Identifiability::Determined; q.len()],
             draws: Vec::new(),
+            collinear: self.is_collinear(q, table),
         };
         let effects =
             self.jacobian(q, table).map(|jacobian| jacobian.column_iter().map(|c| c.norm()).collect());
@@ -211,6 +217,20 @@ impl<'a> ParameterMap<'a> {
         found
     }
 
+    /// Returns true if other values of the q with an effect on the residuals leave them as they are, to first
+    /// order: their Jacobian has a lower rank than their number.
+    fn is_collinear(&self, q: &DVector<f64>, table: &TestData) -> bool {
+        let Some(jacobian) = self.jacobian(q, table) else { return false };
+        let columns = jacobian.column_iter().map(|column| (column.norm(), column));
+        let live: Vec<_> =
+            columns.filter(|own| own.0 > LEAST_EFFECT).map(|(norm, column)| column / norm).collect();
+        if live.is_empty() {
+            return false;
+        }
+        let scaled = DMatrix::from_columns(&live);
+        scaled.tr_mul(&scaled).symmetric_eigenvalues().min() < LEAST_EIGENVALUE
+    }
+
     /// Returns the q that the residuals determine, their covariance s²(JᵀJ)⁻¹ and the degrees of freedom.
     fn covariance(&self, q: &DVector<f64>, table: &TestData) -> Option<(Vec<usize>, DMatrix<f64>, usize)> {
         let (residuals, jacobian) = (self.residuals(q, table)?, self.jacobian(q, table)?);
@@ -222,7 +242,7 @@ impl<'a> ParameterMap<'a> {
         }
         let scaled = DMatrix::from_columns(&columns);
         let normal = scaled.tr_mul(&scaled);
-        if normal.clone().symmetric_eigenvalues().min() < 1e-9 {
+        if normal.clone().symmetric_eigenvalues().min() < LEAST_EIGENVALUE {
             return None;
         }
         let degrees = residuals.len() - live.len();

@@ -1,16 +1,20 @@
 //! Materials of Ansys, LS-DYNA, FEBio and MOOSE as laws, in the forms in which [`CardProgram::card`] writes
 //! them; other materials are left out with the reason.
 
+use std::path::Path;
+
 use super::Error;
+use super::ansys_reader::ansys;
 use super::any_model;
+use super::deck_keywords::{card_notes, cell_number, decoded};
 use super::deck_reader::{DeckMaterial, MaterialDeck};
 use super::host::CardProgram;
 
 /// Key of a law with its parameters, and the Dᵢ or the bulk modulus; or what is allowed.
-type HostLaw = Result<(&'static str, Vec<f64>, Volume), String>;
+pub(super) type HostLaw = Result<(&'static str, Vec<f64>, Volume), String>;
 
 /// Volumetric constants of a material.
-enum Volume {
+pub(super) enum Volume {
     /// Dᵢ of Σ (J − 1)²ⁱ/Dᵢ; D₁ = 0 is constant volume.
     Compliances(Vec<f64>),
     Bulk(f64),
@@ -19,11 +23,13 @@ enum Volume {
 }
 
 /// Material as a text, before its law is known.
-struct CardMaterial<'a> {
-    line: usize,
-    name: String,
-    written: &'a str,
-    law: HostLaw,
+pub(super) struct CardMaterial<'a> {
+    pub line: usize,
+    pub name: String,
+    pub written: &'a str,
+    /// Comments since the material before.
+    pub comments: Vec<&'a str>,
+    pub law: HostLaw,
 }
 
 impl CardProgram {
@@ -31,11 +37,21 @@ impl CardProgram {
     pub fn find(extension: &str) -> Option<Self> {
         Some(match extension {
             "mac" => Self::Ansys,
-            "k" => Self::LsDyna,
+            "k" | "key" | "dyn" => Self::LsDyna,
             "feb" => Self::Febio,
             "i" => Self::Moose,
             _ => return None,
         })
+    }
+
+    /// Reads a file; see [`CardProgram::parse`].
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`]; as [`CardProgram::parse`].
+    pub fn read(self, path: impl AsRef<Path>) -> Result<MaterialDeck, crate::Error> {
+        let path = path.as_ref();
+        let text = decoded(&std::fs::read(path).map_err(crate::Error::from_io("read", path))?);
+        Ok(self.parse(&path.display().to_string(), &text)?)
     }
 
     /// Reads the materials that [`CardProgram::card`] writes. Left out are other kinds, materials with other
@@ -51,9 +67,12 @@ impl CardProgram {
             Self::Moose => moose(text),
         };
         let mut deck = MaterialDeck::default();
-        for CardMaterial { line, name, written, law } in found {
+        for CardMaterial { line, name, written, comments, law } in found {
             match law.and_then(|law| material(&name, law)) {
-                Ok(material) => deck.materials.push(material),
+                Ok(mut material) => {
+                    material.notes.extend(card_notes(&comments, material.model.key));
+                    deck.materials.push(material);
+                }
                 Err(allowed) => {
                     deck.left_out.push(format!("{name}: line {line}: found `{written}`; allowed: {allowed}"));
                 }
@@ -87,17 +106,15 @@ fn material(name: &str, law: (&'static str, Vec<f64>, Volume)) -> Result<DeckMat
     Ok(DeckMaterial { name: name.to_owned(), model, parameters, bulk, notes })
 }
 
-fn number(cell: &str) -> Result<f64, String> {
-    let cell = cell.trim();
-    let found = if cell.is_empty() { Ok(0.0) } else { cell.parse::<f64>() };
-    found.ok().filter(|found| found.is_finite()).ok_or_else(|| format!("a finite number, not `{cell}`"))
+pub(super) fn number(cell: &str) -> Result<f64, String> {
+    cell_number(cell).ok_or_else(|| format!("a finite number, not `{}`", cell.trim()))
 }
 
 /// Number of a material with the comment that names its law and table.
-fn named(id: &str, comment: &str) -> String {
-    match is_title(&comment) {
-        true => format!("material {id}, {}", comment.split(';').next().unwrap_or_default()),
-        false => format!("material {id}"),
+pub(super) fn named(id: &str, comments: &[&str]) -> String {
+    match comments.iter().rfind(|comment| is_title(comment)) {
+        Some(title) => format!("material {id}, {}", title.split(';').next().unwrap_or_default()),
+        None => format!("material {id}"),
     }
 }
 
@@ -128,7 +145,7 @@ fn polynomial(c: &[f64; 9]) -> (&'static str, Vec<f64>) {
 }
 
 /// Polynomial of so many powers of I₁ − 3.
-fn series(c: &[f64]) -> Result<(&'static str, Vec<f64>), String> {
+pub(super) fn series(c: &[f64]) -> Result<(&'static str, Vec<f64>), String> {
     let key = match c {
         [modulus] => return Ok(("neo-hookean", vec![2.0 * modulus])),
         [_, _] => "reduced-polynomial-2",
@@ -142,7 +159,7 @@ fn series(c: &[f64]) -> Result<(&'static str, Vec<f64>), String> {
 }
 
 /// Ogden's law of terms (μ, α) of Σ 2μ/α² (Σ λ^α − 3).
-fn ogden(terms: &[[f64; 2]]) -> Result<(&'static str, Vec<f64>), String> {
+pub(super) fn ogden(terms: &[[f64; 2]]) -> Result<(&'static str, Vec<f64>), String> {
     let key = match terms.len() {
         1 => "ogden-1",
         2 => "ogden-2",
@@ -152,108 +169,13 @@ fn ogden(terms: &[[f64; 2]]) -> Result<(&'static str, Vec<f64>), String> {
     Ok((key, terms.concat()))
 }
 
-/// `TB,HYPER` with its `TBDATA`; another `TB` of the same material than a density or thermal one leaves it
-/// out, as moduli may then be instantaneous.
-fn ansys(text: &str) -> Vec<CardMaterial<'_>> {
-    const APART: [&str; 6] = ["CTE", "DENS", "EFLX", "SDAMP", "SPHT", "THERM"];
-    let cells = |line: &str| -> Vec<String> {
-        let line = line.split('!').next().unwrap_or_default();
-        line.split(',').map(|cell| cell.trim().to_uppercase()).collect()
-    };
-    let lines: Vec<(usize, &str)> = (1..).zip(text.lines().map(str::trim)).collect();
-    let mut found = Vec::new();
-    let mut comment = "";
-    for (at, &(line, written)) in lines.iter().enumerate() {
-        comment = written.strip_prefix('!').map(str::trim).filter(is_title).unwrap_or(comment);
-        let head = cells(written);
-        let cell = |i: usize| head.get(i).map_or("", String::as_str);
-        if cell(0) != "TB" || cell(1) != "HYPER" {
-            continue;
-        }
-        let id = cell(2);
-        let other = lines.iter().map(|(_, line)| cells(line)).find(|cells| {
-            let one = |i: usize| cells.get(i).map_or("", String::as_str);
-            one(0) == "TB" && one(1) != "HYPER" && one(2) == id && !APART.contains(&one(1))
-        });
-        let data = || -> Result<Vec<f64>, String> {
-            let mut constants = Vec::new();
-            for &(_, row) in &lines[at + 1..] {
-                let row = cells(row);
-                match row[0].as_str() {
-                    "TBDATA" => {}
-                    "" if row.len() == 1 => continue,
-                    "TBTEMP" => return Err("constants of one temperature, without TBTEMP".to_owned()),
-                    _ => break,
-                }
-                let first = row.get(1).and_then(|cell| cell.parse::<usize>().ok()).filter(|first| *first > 0);
-                let first = first.ok_or("TBDATA with the place of its first constant, from 1 on")?;
-                constants.resize(constants.len().max(first - 1).min(1000), 0.0);
-                for (i, cell) in row[2..].iter().enumerate() {
-                    let value = number(cell)?;
-                    if first + i > constants.len() {
-                        constants.push(value);
-                    } else {
-                        constants[first + i - 1] = value;
-                    }
-                }
-            }
-            Ok(constants)
-        };
-        let law = match other {
-            Some(other) => Err(format!("a material without TB,{}", other[1])),
-            None => data().and_then(|constants| ansys_law(cell(5), cell(4), &constants)),
-        };
-        found.push(CardMaterial { line, name: named(id, comment), written, law });
-        comment = "";
-    }
-    found
-}
-
-fn ansys_law(option: &str, points: &str, constants: &[f64]) -> HostLaw {
-    let points: usize = points.parse().unwrap_or(1);
-    let count = match option {
-        "NEO" => 1,
-        "BOYCE" | "GENT" => 2,
-        "ETUBE" => 4,
-        "YEOH" | "MOONEY" => points,
-        "OGDEN" => 2 * points,
-        _ => return Err("the options NEO, MOONEY, YEOH, OGDEN, BOYCE, GENT, ETUBE".to_owned()),
-    };
-    let held = if ["YEOH", "OGDEN"].contains(&option) { points } else { 1 };
-    if constants.len() > count.saturating_add(held) {
-        return Err(format!("{count} constants and {held} d; {} given", constants.len()));
-    }
-    let at = |i: usize| constants.get(i).copied().unwrap_or(0.0);
-    let c: Vec<f64> = (0..count).map(at).collect();
-    let (key, parameters) = match (option, &c[..]) {
-        ("NEO", _) => ("neo-hookean", c),
-        ("BOYCE", _) => ("arruda-boyce", c),
-        ("GENT", _) => ("gent", c),
-        ("ETUBE", _) => ("extended-tube", c),
-        ("YEOH", c) => series(c)?,
-        ("OGDEN", c) => {
-            let term = |term: &[f64]| [0.5 * term[0] * term[1], term[1]];
-            ogden(&c.chunks_exact(2).map(term).collect::<Vec<_>>())?
-        }
-        (_, &[a, b]) => ("mooney-rivlin", vec![a, b]),
-        (_, &[a, b, d]) => ("polynomial-2", vec![a, b, 0.0, d, 0.0]),
-        (_, [_, _, _, _, _]) => ("polynomial-2", c),
-        (_, &[a, b, d, e, f, g, h, i, j]) => match [e, f, h, i, j] == [0.0; 5] {
-            true => ("biderman", vec![a, b, d, g]),
-            false => ("polynomial-3", c),
-        },
-        _ => return Err("MOONEY of 2, 3, 5 or 9 constants".to_owned()),
-    };
-    Ok((key, parameters, Volume::Compliances((count..count + held).map(at).collect())))
-}
-
 /// `*MAT_077_H+` and `*MAT_077_O+` with constants (N = 0) and without relaxation.
 fn ls_dyna(text: &str) -> Vec<CardMaterial<'_>> {
     let lines: Vec<(usize, &str)> = (1..).zip(text.lines()).collect();
     let mut found = Vec::new();
-    let mut comment = "";
+    let mut comments = Vec::new();
     for (at, &(line, written)) in lines.iter().enumerate() {
-        comment = written.strip_prefix('$').map(str::trim).filter(is_title).unwrap_or(comment);
+        comments.extend(written.strip_prefix('$').map(str::trim));
         let keyword = written.trim().to_uppercase();
         if !keyword.starts_with("*MAT_") {
             continue;
@@ -263,8 +185,8 @@ fn ls_dyna(text: &str) -> Vec<CardMaterial<'_>> {
             own.filter(|(_, row)| !row.starts_with('$')).map(|(_, row)| fields(row)).collect();
         let id = rows.first().and_then(|row| row.first()).map_or("", |cell| cell.trim());
         let law = ls_dyna_law(&keyword, &rows);
-        found.push(CardMaterial { line, name: named(id, comment), written: written.trim(), law });
-        comment = "";
+        let comments = std::mem::take(&mut comments);
+        found.push(CardMaterial { line, name: named(id, &comments), written: written.trim(), comments, law });
     }
     found
 }
@@ -309,20 +231,62 @@ fn ls_dyna_law(keyword: &str, rows: &[Vec<&str>]) -> HostLaw {
 
 /// `<material>` of the types `Mooney-Rivlin`, `Yeoh`, `Gent`, `Ogden` with constants alone.
 fn febio(text: &str) -> Vec<CardMaterial<'_>> {
+    const START: &str = "<material";
+    let (plain, remarks) = without_comments(text);
     let mut found = Vec::new();
-    for (at, _) in text.match_indices("<material ") {
-        let Some(end) = text[at..].find('>') else { continue };
-        let head = &text[at..=at + end];
-        let attribute = |key: &str| head.split(&format!(" {key}=\"")).nth(1)?.split('"').next();
-        let law = match text[at..].find("</material>") {
-            Some(close) => febio_law(attribute("type").unwrap_or_default(), &text[at + end + 1..at + close]),
-            None => Err("an end `</material>`".to_owned()),
+    let mut before = 0;
+    for (at, _) in plain.match_indices(START) {
+        if !plain[at + START.len()..].starts_with(char::is_whitespace) {
+            continue;
+        }
+        let Some(end) = plain[at..].find('>').map(|end| at + end) else { continue };
+        let head = &plain[at + START.len()..end];
+        let law = match plain[end..].find("</material>") {
+            Some(close) if !head.ends_with('/') => {
+                let kind = attribute(head, "type").unwrap_or_default();
+                febio_law(kind, &plain[end + 1..end + close])
+            }
+            _ => Err("an end `</material>`".to_owned()),
         };
         let line = 1 + text[..at].matches('\n').count();
-        let name = attribute("name").or(attribute("id")).unwrap_or_default();
-        found.push(CardMaterial { line, name: format!("material {name}"), written: head, law });
+        let name = attribute(head, "name").or(attribute(head, "id")).unwrap_or_default();
+        let own = remarks.iter().filter(|(place, _)| (before..at).contains(place));
+        let comments: Vec<&str> = own.map(|(_, remark)| *remark).collect();
+        before = at;
+        let name = format!("material {name}");
+        found.push(CardMaterial { line, name, written: &text[at..=end], comments, law });
     }
     found
+}
+
+/// Replaces the comments of an XML text by blanks, and lists them with their places.
+fn without_comments(text: &str) -> (String, Vec<(usize, &str)>) {
+    let (mut plain, mut remarks) = (String::with_capacity(text.len()), Vec::new());
+    let mut rest = text;
+    while let Some(start) = rest.find("<!--") {
+        let end = rest[start..].find("-->").map_or(rest.len(), |end| start + end + 3);
+        let comment = &rest[start..end];
+        plain += &rest[..start];
+        remarks.push((plain.len(), comment.trim_start_matches("<!--").trim_end_matches("-->").trim()));
+        plain.extend(comment.bytes().map(|byte| if byte == b'\n' { '\n' } else { ' ' }));
+        rest = &rest[end..];
+    }
+    (plain + rest, remarks)
+}
+
+/// Value of an attribute in single or double quotes.
+fn attribute<'a>(head: &'a str, key: &str) -> Option<&'a str> {
+    let mut rest = head;
+    loop {
+        let (name, after) = rest.split_once('=')?;
+        let after = after.trim_start();
+        let quote = after.chars().next().filter(|quote| ['"', '\''].contains(quote))?;
+        let (value, after) = after[1..].split_once(quote)?;
+        if name.trim() == key {
+            return Some(value);
+        }
+        rest = after;
+    }
 }
 
 fn febio_law(kind: &str, body: &str) -> HostLaw {
@@ -333,10 +297,6 @@ fn febio_law(kind: &str, body: &str) -> HostLaw {
     let mut constants: Vec<(&str, f64)> = Vec::new();
     let mut rest = body.trim();
     while !rest.is_empty() {
-        if let Some((_, after)) = rest.strip_prefix("<!--").and_then(|rest| rest.split_once("-->")) {
-            rest = after.trim_start();
-            continue;
-        }
         let tag = rest.strip_prefix('<').and_then(|rest| rest.split_once('>'));
         let (tag, after) = tag.ok_or("constants in tags")?;
         let value = after.split_once(&format!("</{tag}>"));
@@ -368,38 +328,48 @@ fn febio_law(kind: &str, body: &str) -> HostLaw {
     Ok((key, parameters, Volume::Bulk(bulk)))
 }
 
-/// Blocks with `type = ComputeNeoHookeanStress`, K = λ + ⅔μ.
+/// Blocks with `type = ComputeNeoHookeanStress` of large strains, K = λ + ⅔μ.
 fn moose(text: &str) -> Vec<CardMaterial<'_>> {
+    const KINEMATICS: &str = "large_kinematics";
     let mut found: Vec<CardMaterial> = Vec::new();
-    let (mut comment, mut block) = ("", Vec::new());
+    let (mut comments, mut block, mut title, mut global) = (Vec::new(), Vec::new(), "", None);
     for (line, written) in (1..).zip(text.lines().map(str::trim)) {
-        comment = written.strip_prefix('#').map(str::trim).filter(is_title).unwrap_or(comment);
+        comments.extend(written.strip_prefix('#').map(str::trim));
         if !written.starts_with('[') {
-            block.push((line, written));
+            let plain = written.split('#').next().unwrap_or_default();
+            let pair = plain.split_once('=');
+            block.extend(pair.map(|(key, value)| (line, written, key.trim(), unquoted(value))));
             continue;
         }
-        let value = |key: &str| {
-            let pairs = block.iter().filter_map(|(_, row): &(usize, &str)| row.split_once('='));
-            let mut same = pairs.filter(|(found, _)| found.trim() == key);
-            same.next().map(|(_, value)| value.split('#').next().unwrap_or_default().trim().to_owned())
-        };
-        let is_law = |(_, row): &&(usize, &str)| {
-            row.split_once('=')
-                .is_some_and(|(key, value)| key.trim() == "type" && value.trim() == "ComputeNeoHookeanStress")
-        };
-        if let Some(&(line, written)) = block.iter().find(is_law) {
-            let constant = |key: &str| number(&value(key).ok_or_else(|| format!("a constant `{key}`"))?);
-            let law =
-                constant("lambda").and_then(|lame| Ok([lame, constant("mu")?])).map(|[lame, modulus]| {
-                    ("neo-hookean", vec![modulus], Volume::Bulk(lame + 2.0 / 3.0 * modulus))
-                });
-            let id = (found.len() + 1).to_string();
-            found.push(CardMaterial { line, name: named(&id, comment), written, law });
-            comment = "";
+        let value = |key: &str| block.iter().find(|own| own.2 == key).map(|own| own.3);
+        if title == "[GlobalParams]" {
+            global = value(KINEMATICS);
+        }
+        if let Some(&(line, written, ..)) = block.iter().find(|own| own.2 == "type" && own.3 == MOOSE_LAW) {
+            let constant = |key: &str| number(value(key).ok_or_else(|| format!("a constant `{key}`"))?);
+            let law = match value(KINEMATICS).or(global) {
+                Some(large) if !large.eq_ignore_ascii_case("true") => {
+                    Err(format!("`{KINEMATICS} = true`, not `{large}`: without it the law is linear"))
+                }
+                _ => constant("lambda").and_then(|lame| {
+                    let modulus = constant("mu")?;
+                    Ok(("neo-hookean", vec![modulus], Volume::Bulk(lame + 2.0 / 3.0 * modulus)))
+                }),
+            };
+            let (id, comments) = ((found.len() + 1).to_string(), std::mem::take(&mut comments));
+            found.push(CardMaterial { line, name: named(&id, &comments), written, comments, law });
         }
         block.clear();
+        title = written;
     }
     found
+}
+
+const MOOSE_LAW: &str = "ComputeNeoHookeanStress";
+
+/// Value without blanks and quotes around it.
+fn unquoted(value: &str) -> &str {
+    value.trim().trim_matches(['"', '\'']).trim()
 }
 
 #[cfg(test)]

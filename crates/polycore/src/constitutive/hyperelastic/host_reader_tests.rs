@@ -50,6 +50,46 @@ fn terms_without_a_place_are_noted() {
     assert_eq!((&found.parameters[..], found.bulk), (&[0.2, 0.05, 0.0, 0.01, 0.0][..], None));
 }
 
+/// Commands between, blanks and quotes of others, comments with a material, single quotes, line breaks.
+#[test]
+fn texts_as_others_write_them() {
+    let read = |host: CardProgram, text: &str| host.parse("m", text).unwrap();
+    let between = "TB,HYPER,1,1,3,YEOH\nTBDATA,1,0.2\n/COM, next\nMP,EX,1,3\nTBDATA,2,2e-3,5e-5,0.05\n\
+                   TB,MOONEY,2\nTBDATA,1,0.2,0.1\nTB,BISO,3\n/EOF\nTB,HYPER,1,1,1,NEO\n";
+    let found = read(CardProgram::Ansys, between);
+    assert_eq!(
+        (&found.materials[0].parameters[..], found.materials[0].bulk),
+        (&[0.2, 2e-3, 5e-5][..], Some(40.0))
+    );
+    assert_eq!(found.left_out[0], "material 2: line 6: found `TB,MOONEY,2`; allowed: TB,HYPER alone");
+    assert!(found.left_out.len() == 2 && found.left_out[1].contains("TB,BISO,3"), "{found:?}");
+    let one_line = "TB,HYPER,1,1,1,NEO $ TBDATA,1,0.4,0.05 ! rubber $ TBDATA,1,7\n";
+    assert_eq!(read(CardProgram::Ansys, one_line).materials[0].parameters, [0.4]);
+    let hidden = "<!-- µ <material id=\"1\" name=\"x\" type=\"Yeoh\">\n<c1>1</c1><k>1</k></material> -->\n\
+                  <material\n id=\"2\" name='y' type = \"Yeoh\">\n<c1>2</c1><!-- a --><k>10</k></material>";
+    let found = read(CardProgram::Febio, hidden);
+    assert_eq!((found.materials.len(), found.materials[0].name.as_str()), (1, "material y"));
+    assert_eq!((found.materials[0].parameters[0], found.materials[0].bulk), (4.0, Some(10.0)));
+    let block = "[a]\ntype = \"ComputeNeoHookeanStress\" # law\nlambda = '10' # λ\nmu = 3\n";
+    let found = read(CardProgram::Moose, &format!("{block}[]\n{block}large_kinematics = false\n[]\n"));
+    assert_eq!((&found.materials[0].parameters[..], found.materials[0].bulk), (&[3.0][..], Some(12.0)));
+    assert!(found.materials.len() == 1 && found.left_out[0].contains("large_kinematics = true"), "{found:?}");
+    assert_eq!(["key", "dyn"].map(CardProgram::find), [Some(CardProgram::LsDyna); 2]);
+}
+
+/// Warnings of a card come back as notes, in all programs.
+#[test]
+fn comments_of_a_card_are_notes() {
+    for host in ALL {
+        let card = |id| host.card(id, "a", "neo-hookean", &[0.4], &[0.05]).unwrap();
+        let title = host.comment("neo-hookean fitted to bar");
+        let first = format!("{title}{}{}", host.comment("warning: unstable"), card(1));
+        let found = host.parse("m", &format!("{first}{title}{}", card(2))).unwrap().materials;
+        assert_eq!(found[0].notes, ["warning: unstable"], "{host:?}");
+        assert!(found.len() == 2 && found[1].notes.is_empty(), "{host:?}");
+    }
+}
+
 #[test]
 fn materials_of_other_forms_are_named() {
     let wide = |cells: &[&str]| cells.iter().map(|cell| format!("{cell:>20}")).collect::<String>();
@@ -63,6 +103,17 @@ fn materials_of_other_forms_are_named() {
             CardProgram::Ansys,
             "TB,HYPER,1,1,1,NEO\nTBDATA,1,1,2,3\n".to_owned(),
             "1 constants and 1 d; 3 given",
+        ),
+        (CardProgram::Ansys, "TB,HYPER,1,1,1000000000000,YEOH\nTBDATA,1,1\n".to_owned(), "1 to 9 points"),
+        (
+            CardProgram::Ansys,
+            "TB,HYPER,1,1,1,NEO\nTBDATA,1,1\nTBLIST\nTBMODIF,1,1,2\n".to_owned(),
+            "without TBMODIF",
+        ),
+        (
+            CardProgram::Ansys,
+            "TB,HYPER,1,1,1,NEO\nTBDATA,1,1\nTB,EXPE\n".to_owned(),
+            "a material without TB,EXPE",
         ),
         (CardProgram::Ansys, "TB,HYPER,1,2,1,NEO\nTBTEMP,20\nTBDATA,1,1\n".to_owned(), "without TBTEMP"),
         (

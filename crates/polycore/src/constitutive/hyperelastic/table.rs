@@ -188,6 +188,20 @@ impl TestColumns {
                 },
             )?);
         }
+        let named = |(i, role): (usize, &Option<Role>)| {
+            let is_mode = role.as_ref().is_some_and(|role| role.what == ColumnKind::Mode);
+            let says = || (0..file.rows()).any(|row| mode(file.text(row, i)).is_some());
+            (is_mode && (file.headings[i].plain == MODES[0] || says())).then_some(i)
+        };
+        let mode = if axes.len() == 1 { roles.iter().enumerate().find_map(named) } else { None };
+        let named = match (axes.len(), mode, format.mode) {
+            (1, None, None) => named_test(file, &strains[0], stresses[0].column)?,
+            _ => None,
+        };
+        // of the amount of shear there is one measure, and its stress is both
+        if mode.is_none() && format.mode.or(named) == Some(Mode::SimpleShear) {
+            return Ok(Self { mode, named, strains, stresses });
+        }
         let (first, other) = (&strains[0], &stresses[0]);
         if first.assumed && other.measure == TestStressMeasure::True && !other.assumed {
             let allowed = "`strain = \"engineering\"` or `strain = \"true\"` in the data's entry: the \
@@ -199,16 +213,6 @@ impl TestColumns {
                 "`stress = \"nominal\"` or `stress = \"true\"` in the data's entry: the strain is a true one";
             return Err(file.refuse_headings(allowed));
         }
-        let named = |(i, role): (usize, &Option<Role>)| {
-            let is_mode = role.as_ref().is_some_and(|role| role.what == ColumnKind::Mode);
-            let says = || (0..file.rows()).any(|row| mode(file.text(row, i)).is_some());
-            (is_mode && (file.headings[i].plain == MODES[0] || says())).then_some(i)
-        };
-        let mode = if axes.len() == 1 { roles.iter().enumerate().find_map(named) } else { None };
-        let named = match (axes.len(), mode, format.mode) {
-            (1, None, None) => named_test(file, strains[0].column, stresses[0].column)?,
-            _ => None,
-        };
         Ok(Self { mode, named, strains, stresses })
     }
 
@@ -342,6 +346,9 @@ impl TestColumns {
             roots: row.roots,
             ..TestState::new(row.mode, row.stretches, row.nominal)
         };
+        if let Some(mode) = self.named {
+            notes.push(format!("test: {}, as the headings say", mode.name()));
+        }
         let source = file.remark("# source:").unwrap_or_default().to_owned();
         let table = TestData::weighted(source, rows.iter().map(state).collect(), absolute);
         if table.measurements() == 0 {
@@ -422,8 +429,7 @@ impl TestColumns {
             true => "amount of shear and shear stress".to_owned(),
             false => format!("{biaxial}{strain} and {stress}{assumed}"),
         };
-        let named = self.named.map_or_else(String::new, |mode| format!("; {} by the headings", mode.name()));
-        format!("{}; {measured}{named}; stretches {low:.4} to {high:.4}", file.describe(&used))
+        format!("{}; {measured}; stretches {low:.4} to {high:.4}", file.describe(&used))
     }
 }
 
