@@ -45,8 +45,8 @@ pub struct Loads<const D: usize> {
 }
 
 /// Force of a body force along each axis, N: the larger sum of both directions, of `regions` as wholes, in
-/// whose particles it may have either sign, and of other particles. A particle counts in the first region that
-/// contains it.
+/// whose particles it may have either sign, and of other particles. A particle counts in the first region
+/// that contains it.
 pub(super) fn one_sided<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     regions: &[Vec<u32>],
