@@ -54,7 +54,7 @@ impl Scene {
             CurveList::All(own) => vec![format!("{own:?}")],
             CurveList::Each(each) => each.iter().map(|own| format!("{own:?}")).collect(),
         });
-        !self.step.is_empty() || texts.collect::<std::collections::BTreeSet<_>>().len() > 1
+        self.later || !self.step.is_empty() || texts.collect::<std::collections::BTreeSet<_>>().len() > 1
     }
 
     /// Returns true if forces depend on the displacement.
