@@ -140,11 +140,11 @@ fn rows_that_are_left_out() {
     let table = "stretch,nominal_MPa\n1.5,0.4\n2,0.6\n2.5,0.8\n2.6,0.1\n";
     let data = "[[fit.data]]\nname = \"bar\"\nfile = \"t.csv\"\n";
     let shown = plain(&run(folder.path(), "laws = [\"neo-hookean\"]", data, table));
-    assert!(shown.contains("warning: bar: 1 rows after the largest stress are left out"), "{shown}");
+    assert!(shown.contains("warning: bar: 1 row after the largest stress left out"), "{shown}");
 }
 
-/// One law on two tables: names tell cards, and the blocks that return from them, apart; so they do from each
-/// program's cards. Exact data: μ = 0.5 and 0.3 MPa.
+/// Names of a law on two tables tell the cards of each program apart, and the blocks that return from them.
+/// Exact data: μ = 0.5 and 0.3 MPa.
 #[test]
 fn materials_have_names_of_their_own() {
     let folder = tempfile::tempdir().unwrap();

@@ -6,8 +6,8 @@
 //! its face, Σ_I (ψ_f h_I·N_f + ψ_f G_I) d_I = 0 with the depths d_I, G_I being the mean of both sides'
 //! values. A bar has such areas along each axis across which it is thin.
 
-use crate::bonds::{BodyGeometry, Bonds, CellGrid};
-use crate::material::{BodyTensor, surface_load};
+use crate::bonds::{BodyGeometry, CellGrid};
+use crate::field::Field;
 use crate::parallel;
 use crate::surface::BodySurface;
 
@@ -44,10 +44,14 @@ pub(super) struct FaceAreas {
 }
 
 impl FaceAreas {
-    /// Shares out the areas; small faces join larger ones.
-    pub fn new<const D: usize>(bonds: &dyn Bonds<D>, surface: &BodySurface<D>) -> Self {
+    /// Shares out the areas; small faces join larger ones. `load` is h_I/V_I
+    /// ([`crate::material::surface_load`] of the stress 1).
+    pub fn new<const D: usize>(
+        bonds: &dyn BodyGeometry<D>,
+        surface: &BodySurface<D>,
+        load: &Field<D>,
+    ) -> Self {
         let typical = typical_area(bonds);
-        let load = surface_load(bonds, BodyTensor::<D>::identity());
         let mut below = below(bonds, surface);
         let own = |below: &FaceParticle| {
             if !below.own {
@@ -68,14 +72,14 @@ impl FaceAreas {
 }
 
 /// Lists the particles in walls that are thin along an axis, ascending, with the area of the faces above them
-/// that point along it (`sign` 1) or against it (−1), projected on it, m².
+/// that point along it (`sign` 1) or against it (−1), projected on it, m²; `load` as in [`FaceAreas::new`].
 pub fn thin_wall_areas<const D: usize>(
-    bonds: &dyn Bonds<D>,
+    bonds: &dyn BodyGeometry<D>,
     surface: &BodySurface<D>,
-    axis: usize,
-    sign: f64,
+    load: &Field<D>,
+    (axis, sign): (usize, f64),
 ) -> Vec<(u32, f64)> {
-    let FaceAreas { below, shares, .. } = FaceAreas::new(bonds, surface);
+    let FaceAreas { below, shares, .. } = FaceAreas::new(bonds, surface, load);
     let along = |below: &FaceParticle| sign * surface.faces()[below.face as usize].normal[axis];
     let mut areas: Vec<(u32, f64, bool)> = Vec::with_capacity(below.len());
     for (below, share) in below.iter().zip(shares) {

@@ -13,6 +13,7 @@
 use super::face_areas::{FaceAreas, FaceParticle, SMALL};
 use crate::bonds::{BodyGeometry, Bonds};
 use crate::field::Field;
+use crate::material::{BodyTensor, surface_load};
 use crate::parallel;
 use crate::surface::{BodySurface, SurfaceFace};
 use nalgebra::{SMatrix, SVector};
@@ -49,7 +50,8 @@ impl<const D: usize> Faces<D> {
     /// `tied` faces have r_f = 0: the weights gain a term along the normal as well, so that faces rotate with
     /// the body.
     pub fn new(bonds: &dyn Bonds<D>, surface: &BodySurface<D>, tied: bool) -> Self {
-        let FaceAreas { below, shares, typical } = FaceAreas::new(bonds, surface);
+        let load = surface_load(bonds, BodyTensor::<D>::identity());
+        let FaceAreas { below, shares, typical } = FaceAreas::new(bonds, surface, &load);
         let mut faces = Self {
             places: Vec::new(),
             sources: Vec::new(),
@@ -246,7 +248,6 @@ fn centre<const D: usize>(
 mod tests {
     use super::*;
     use crate::geometry::Shape;
-    use crate::material::{BodyTensor, surface_load};
     use crate::model::Body;
 
     /// Two horizons from the rim of a plate of `layers` particles: areas and depths of the faces of its broad

@@ -185,19 +185,22 @@ impl<const D: usize> Loads<D> {
     /// Relative prescribed displacement of regions at a multiple of 1, m, if all move by one multiple.
     fn common_reach(&self) -> Option<f64> {
         let curved = self.curved.as_ref()?;
-        let moves = |region: &CurvedRegion<D>, d: usize| {
-            region.components >> d & 1 == 1 && region.values.iter().any(|value| value[d] != 0.0)
+        if !self.turned.is_empty() || curved.begins_moved() {
+            return None;
+        }
+        let moving = |region: &'_ CurvedRegion<D>| -> Vec<Amplitude> {
+            let moves = |&d: &usize| {
+                region.components >> d & 1 == 1 && region.values.iter().any(|value| value[d] != 0.0)
+            };
+            (0..D).filter(moves).map(|d| region.amplitudes[d].clone()).collect()
         };
+        let moving: Vec<Amplitude> = curved.held.iter().flat_map(moving).collect();
         let is_common = |part: f64| {
-            let mut all = curved.held.iter().flat_map(|region| {
-                let multiples = region.multiples(part);
-                (0..D).filter(|&d| moves(region, d)).map(move |d| multiples[d])
-            });
-            let first = all.next();
-            all.all(|multiple| Some(multiple) == first)
+            let mut multiples = moving.iter().map(|amplitude| amplitude.multiple(part));
+            let first = multiples.next();
+            multiples.all(|multiple| Some(multiple) == first)
         };
-        let begins_at_rest = self.turned.is_empty() && !curved.begins_moved();
-        let single = begins_at_rest && (1..=PROBED).all(|k| is_common(f64::from(k) / f64::from(PROBED)));
+        let single = (1..=PROBED).all(|k| is_common(f64::from(k) / f64::from(PROBED)));
         let full = curved.held.iter().map(|region| (region.components, region.scaled([1.0; D])));
         single.then(|| reach(full, &[])).filter(|reach| *reach > 0.0)
     }
@@ -240,7 +243,7 @@ impl<const D: usize> Loads<D> {
             push += product(present);
             way += product(displacement);
         }
-        let sum = |field| length(one_sided(bonds, &self.pushed_regions, field));
+        let sum = |field| length(one_sided(bonds, &self.pushed_regions, Some(field), &[]));
         (sum(full) > 0.0).then(|| (along(sum(present), push), way / sum(full)))
     }
 

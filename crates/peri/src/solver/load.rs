@@ -44,15 +44,15 @@ pub struct Loads<const D: usize> {
     pub curved: Option<Box<CurvedLoads<D>>>,
 }
 
-/// Force of a body force along each axis, N: the larger sum of both directions, of `regions` as wholes, in
-/// whose particles it may have either sign, and of other particles. A particle counts in the first region
-/// that contains it.
+/// Force of a body force and of `pushes` along each axis, N: the larger sum of both directions, of `regions`
+/// as wholes, in whose particles it may have either sign, and of other particles. A particle counts in the
+/// first region that contains it.
 pub(super) fn one_sided<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     regions: &[Vec<u32>],
-    body: &Field<D>,
+    body: Option<&Field<D>>,
+    pushes: &[[f64; D]],
 ) -> [f64; D] {
-    let mut counted = vec![false; if regions.is_empty() { 0 } else { bonds.sites() }];
     let mut sums = [[0.0; D]; 2];
     let mut add = |force: [f64; D]| {
         for d in 0..D {
@@ -60,6 +60,9 @@ pub(super) fn one_sided<const D: usize>(
             sums[1][d] += (-force[d]).max(0.0);
         }
     };
+    pushes.iter().for_each(|&push| add(push));
+    let Some(body) = body else { return larger(sums) };
+    let mut counted = vec![false; if regions.is_empty() { 0 } else { bonds.sites() }];
     let force = |site: usize| body.get(site).map(|b| b * bonds.volume(site));
     for region in regions {
         let mut sum = [0.0; D];
@@ -76,7 +79,11 @@ pub(super) fn one_sided<const D: usize>(
             add(force(site));
         }
     }
-    std::array::from_fn(|d| sums[0][d].max(sums[1][d]))
+    larger(sums)
+}
+
+fn larger<const D: usize>([up, down]: [[f64; D]; 2]) -> [f64; D] {
+    std::array::from_fn(|d| f64::max(up[d], down[d]))
 }
 
 impl<const D: usize> Loads<D> {
@@ -177,10 +184,7 @@ impl<const D: usize> Loads<D> {
     /// Total force at factor 1 along each axis, N, of the body force and of `pushes` on rigid surfaces: the
     /// larger sum of both directions.
     pub fn applied(&self, bonds: &dyn BodyGeometry<D>, pushes: &[[f64; D]]) -> [f64; D] {
-        let body =
-            self.body_force.as_ref().map_or([0.0; D], |body| one_sided(bonds, &self.pushed_regions, body));
-        let pushed = |d: usize, sign: f64| pushes.iter().map(|push| (sign * push[d]).max(0.0)).sum::<f64>();
-        std::array::from_fn(|d| body[d] + pushed(d, 1.0).max(pushed(d, -1.0)))
+        one_sided(bonds, &self.pushed_regions, self.body_force.as_ref(), pushes)
     }
 
     /// Load, N, and its conjugate displacement, m, from [`Loads::conjugates`]: the force conjugate to the

@@ -23,7 +23,7 @@ struct SiteRun {
 /// A particle with constrained or shared components.
 pub struct HeldParticle {
     pub particle: usize,
-    /// Its site, in its work item.
+    /// Number of the site in its work item.
     pub site: usize,
     /// Bits of these components.
     pub components: u8,

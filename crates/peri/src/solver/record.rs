@@ -60,6 +60,11 @@ pub struct StepRecord {
 type RecordScalar = (&'static str, &'static str, fn(&StepRecord) -> f64);
 
 impl StepRecord {
+    /// Number of the row with the greatest load, of either sign.
+    pub fn peak(history: &[Self]) -> Option<usize> {
+        (0..history.len()).max_by(|&a, &b| history[a].load.abs().total_cmp(&history[b].load.abs()))
+    }
+
     /// Scalars of every step.
     pub const SCALARS: [RecordScalar; 12] = [
         ("displacement", "m", |record| record.displacement),

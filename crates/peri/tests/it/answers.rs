@@ -1,10 +1,14 @@
 //! Answers of scenes in closed form: energies of particles, loads on held particles, signs of histories.
 
+use crate::bodies::Body;
 use harness::case::{Case, Options, Run};
 use harness::output::vtkhdf;
 use harness::scene::Source;
+use peri::bonds::BodyGeometry;
+use peri::field::Field;
 use peri::program::run::{FinishedScene, Peri, run};
 use peri::program::scene::Scene;
+use peri::solver::Loads;
 use std::path::Path;
 
 const BONDS: &str = "[material]\nyoungs_modulus = \"1 MPa\"\nlaw = \"linear\"\n";
@@ -78,7 +82,28 @@ fn loads_on_held_particles_do_not_end_the_search() {
     }
 }
 
-/// One curve of all loads gives the history of the same load factors; forces alone move their points.
+/// A weight of 3 N against a push of 2 N is a load of 3 N; a region whose particles are pushed both ways
+/// counts with its resultant.
+#[test]
+fn applied_forces_count_in_one_direction() {
+    let bonds = Body::<2>::solid([6, 5], 1.0, 3.015).build().lattice;
+    let volume: f64 = bonds.particles().iter().map(|&site| bonds.volume(site as usize)).sum();
+    let mut body = Field::zeros(bonds.sites());
+    bonds.particles().iter().for_each(|&site| body.set(site as usize, [0.0, -3.0 / volume]));
+    let mut loads = Loads { body_force: Some(body), ..Loads::default() };
+    let applied = loads.applied(&bonds, &[[0.0, 2.0]]);
+    assert!(applied[0] == 0.0 && (applied[1] - 3.0).abs() < 1e-12, "{applied:?}");
+    let (first, second) = (bonds.particles()[0], bonds.particles()[1]);
+    let body = loads.body_force.as_mut().unwrap();
+    bonds.particles().iter().for_each(|&site| body.set(site as usize, [0.0; 2]));
+    body.set(first as usize, [0.0, 5.0 / bonds.volume(first as usize)]);
+    body.set(second as usize, [0.0, -1.0 / bonds.volume(second as usize)]);
+    assert!((loads.applied(&bonds, &[])[1] - 5.0).abs() < 1e-12);
+    loads.pushed_regions = vec![vec![first, second]];
+    assert!((loads.applied(&bonds, &[])[1] - 4.0).abs() < 1e-12);
+}
+
+/// A curve of all loads gives the history of the same load factors; forces alone move their points.
 #[test]
 fn histories_of_curves_are_those_of_factors() {
     let ends = [

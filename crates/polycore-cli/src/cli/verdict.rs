@@ -60,11 +60,7 @@ impl FitVerdict {
 
     /// Finds a term that is absent, a parameter that the data do not determine, or an instability.
     pub fn obstacle(&self) -> Option<String> {
-        let unstable = || {
-            let (mode, stretch) = self.instability?;
-            Some(format!("unstable in {} tests from {stretch:.3} on", mode.name()))
-        };
-        self.open.clone().or_else(|| self.without_ellipticity()).or_else(unstable)
+        self.open.clone().or_else(|| self.without_ellipticity()).or_else(|| self.without_stability())
     }
 }
 

@@ -48,8 +48,8 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
     let records = scene.dynamics.as_ref().map_or(scene.step_count(), |dynamics| dynamics.method().records);
     let peak = |get: fn(&StepRecord) -> f64| {
         move |m: &Moment<D>| {
-            let peak = m.state.history.iter().max_by(|a, b| a.load.abs().total_cmp(&b.load.abs()));
-            peak.filter(|_| m.state.history.len() > 1).map(get)
+            let peak = StepRecord::peak(&m.state.history).filter(|_| m.state.history.len() > 1)?;
+            Some(get(&m.state.history[peak]))
         }
     };
     if records > 1 || scene.solver.refine > 1 {

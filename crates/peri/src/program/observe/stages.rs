@@ -4,6 +4,7 @@ use super::moment::Moment;
 use super::scale::{bridge_length, moment_title};
 use super::solid::{self, BodyView, shown_stress};
 use crate::error::Error;
+use crate::solver::StepRecord;
 use harness::output::picture::{FieldMap, Panel};
 use harness::output::vtkhdf;
 use std::borrow::Cow;
@@ -21,8 +22,8 @@ pub fn draw_stages<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), E
         .map(|k| Ok(new_damage(frames.data(k, "damage")?.iter().sum(), cracks)))
         .collect::<Result<_, Error>>()?;
     // frame of the peak load, which the damage does not determine
-    let peak = history.iter().enumerate().max_by(|a, b| a.1.load.abs().total_cmp(&b.1.load.abs()));
-    let peak = peak.and_then(|(k, _)| frames.times().iter().position(|&time| time == (k + 1) as f64));
+    let peak = StepRecord::peak(history);
+    let peak = peak.and_then(|k| frames.times().iter().position(|&time| time == (k + 1) as f64));
     let chosen = choose_frames(&damages, peak, m.scene.output.stages);
     let Some(spec) = &m.scene.stress else { return Ok(()) };
     let measure = format!("cauchy_{}", spec.measures[0].name());

@@ -111,8 +111,7 @@ impl VariantOutcome {
 /// Returns a line per variant with its peak load and the resolution by load steps.
 pub fn peak_lines(outcomes: &[VariantOutcome]) -> String {
     let line = |outcome: &VariantOutcome| {
-        let peak = (0..outcome.history.len())
-            .max_by(|&a, &b| outcome.history[a].load.abs().total_cmp(&outcome.history[b].load.abs()))?;
+        let peak = StepRecord::peak(&outcome.history)?;
         let (at, name) = (outcome.history[peak].displacement, &outcome.name);
         let load = outcome.history[peak].load;
         let near = [peak.checked_sub(1), Some(peak + 1)];

@@ -37,14 +37,14 @@ pub(super) fn side_areas<const D: usize>(
         return Err(source.error(key, found, allowed));
     }
     let sign = if upper { 1.0 } else { -1.0 };
+    let areas = surface_load(bonds, BodyTensor::<D>::identity());
     let mut reach = REACH * bonds.horizon();
     let mut thin = Vec::new();
     if surface.faces().is_empty() {
         reach = reach.min(0.5 * extent);
     } else {
-        thin = thin_wall_areas(bonds, &surface, axis, sign);
+        thin = thin_wall_areas(bonds, &surface, &areas, (axis, sign));
     }
-    let areas = surface_load(bonds, BodyTensor::<D>::identity());
     let area = |&site: &u32| {
         let at = site as usize;
         let below = sign * (bounds[usize::from(upper)] - bonds.position(at)[axis]);

@@ -1,6 +1,6 @@
 //! Keywords of a deck: lines, options and data, and what each does to the law of its material.
 
-/// DeckKeyword with its data lines.
+/// Keyword of a deck with its data lines.
 #[derive(Debug)]
 pub(super) struct DeckKeyword<'a> {
     pub line: usize,

@@ -138,8 +138,9 @@ fn remove_tails(rows: &mut Vec<TestRow>, notes: &mut Vec<String>, mode: Mode) {
     }
     if let (Some(first), count) = (lost.first(), lost.len()) {
         notes.push(format!(
-            "warning: {count} rows after the largest stress are left out, from the stretch {:.4} on: the \
-             stress falls as in a broken specimen",
+            "warning: {count} row{} after the largest stress left out, from the stretch {:.4} on: the stress \
+             falls as in a broken specimen",
+            if count == 1 { "" } else { "s" },
             rows[*first].stretches[0]
         ));
     }

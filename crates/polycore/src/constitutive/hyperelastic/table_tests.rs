@@ -168,7 +168,7 @@ fn what_follows_the_break_is_left_out() {
     assert_eq!(reading.table.states.len(), 3);
     assert!(
         reading.notes[0]
-            .starts_with("warning: 2 rows after the largest stress are left out, from the stretch 2.5200")
+            .starts_with("warning: 2 rows after the largest stress left out, from the stretch 2.5200")
     );
     for whole in [
         "stretch,nominal_MPa\n1.5,0.3\n2,0.6\n2.5,1\n2.2,0.5\n1.8,0.2\n",
