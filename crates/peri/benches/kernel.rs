@@ -75,9 +75,9 @@ pub fn solids<const D: usize>(bonds: &dyn Bonds<D>) -> Result<[Named<D>; 3], Err
     let kind = Kind::polyconvex_energy(Symmetry::Isotropic);
     let learnt = Surrogate::random(Header::new(kind, &[(16, Softplus), (8, Softplus)], 1), 1);
     let learnt = learnt.map_err(|error| Error::geometry(error.to_string()))?;
-    let chains = NonlocalSolid(EightChainSolid::new(space, 1.0, 25.0, 100.0)?).respond(bonds);
-    let neo_hookean = NonlocalSolid(Correspondence::new(law, space)?).respond(bonds);
-    let learnt = NonlocalSolid(Correspondence::new(learnt, space)?).respond(bonds);
+    let chains = NonlocalSolid::new(EightChainSolid::new(space, 1.0, 25.0, 100.0)?).respond(bonds);
+    let neo_hookean = NonlocalSolid::new(Correspondence::new(law, space)?).respond(bonds);
+    let learnt = NonlocalSolid::new(Correspondence::new(learnt, space)?).respond(bonds);
     Ok([
         ("eight-chain", chains),
         ("correspondence neo-hookean", neo_hookean),

@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let body = Body::lattice(Shape::rectangle([0.0, 0.0], [30e-3, 16e-3]), 1e-3).plane_stress(1e-3);
     let ramp = (1..=10).map(|k| [0.01 * f64::from(k), 0.1 * f64::from(k)]);
     let hold = (1..=10).map(|k| [0.1 + 0.3 * f64::from(k), 1.0]);
-    let model = Model::new(body, NonlocalSolid(Arc::new(solid)))
+    let model = Model::new(body, NonlocalSolid::new(Arc::new(solid)))
         .clamp(|[x, _]| x < 6e-3)
         .displace(|[x, _]| x > 24e-3, [9e-3, 0.0])
         .programme(ramp.chain(hold));

@@ -1,8 +1,9 @@
 //! The two passes of a solid on a cloud, by the kernels of [`crate::bonds`].
 
 use super::family::Bond;
+use super::nonlocal_solid::NonlocalSolid;
 use super::point::SolidPoint;
-use super::point_law::{NonlocalSolid, PointLaw};
+use super::point_law::PointLaw;
 use super::pointwise::Passes;
 use super::solid_passes::Families;
 use super::tensor::BodyTensor;
@@ -54,7 +55,7 @@ impl<L: PointLaw<D>, const D: usize> Passes<NonlocalSolid<L>, D> for CloudPasses
         let springs = parallel::map_items(items, |chunk, ((terms, bonded), points)| {
             let (mut springs, first) = (false, chunk * CHUNK);
             let soft = softening.among(chunk_range(chunk, cloud.sites()));
-            changes.reshape(&solid.0, (bonds, displacement), (first, soft), bonded, points);
+            changes.reshape(solid, (bonds, displacement), (first, soft), bonded, points);
             cloud.moments(places, chunk, &mut |site, moments| {
                 let (at, point) = (site - first, &mut points[site - first]);
                 if point.has_gradient() {
@@ -69,9 +70,9 @@ impl<L: PointLaw<D>, const D: usize> Passes<NonlocalSolid<L>, D> for CloudPasses
                         shifted += BodyTensor::from_fn(|a, b| lack * bond.change[a] * bond.relief[b]);
                     }
                     point.deform(moment, shifted, square);
-                    point.answer(&solid.0);
+                    point.answer(solid.law_of(point));
                 } else {
-                    point.spring(&solid.0);
+                    point.spring(solid.law_of(point));
                     springs |= bonded[at] > 0;
                 }
                 let terms = &mut terms[stride * at..stride * (at + 1)];

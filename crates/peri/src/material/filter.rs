@@ -1,6 +1,7 @@
 //! Average of pressures over nearest neighbours: at a bulk modulus of a thousand shear moduli the pressures
 //! of single particles are rough at corners of grips.
 
+use super::nonlocal_solid::NonlocalSolid;
 use super::point::SolidPoint;
 use super::point_law::PointLaw;
 use super::pointwise::copy_to_images;
@@ -9,7 +10,7 @@ use crate::parallel;
 use rayon::prelude::*;
 
 /// The symmetric average b = 1 + (A − D)/(2·dimension + 1) of the particles of a lattice, with A = 1 between
-/// nearest neighbours whose bond is intact and D its sums over rows: rows of b sum to 1, and no entry is
+/// nearest neighbours of one law whose bond is intact and D its sums over rows: rows of b sum to 1, and no entry is
 /// negative.
 #[derive(Default)]
 pub(super) struct Filter {
@@ -35,6 +36,7 @@ impl Filter {
                 bonds.neighbours(site, &mut |bond| {
                     if bond.length < 1.1 * spacing
                         && points[bond.site].has_gradient()
+                        && points[bond.site].law == points[site].law
                         && let Some(place) = places.next()
                     {
                         *place = bond.site as u32;
@@ -50,19 +52,19 @@ impl Filter {
     /// U′(J_I), forces are its exact variation.
     pub(super) fn apply<L: PointLaw<D>, const D: usize>(
         &mut self,
-        law: &L,
+        solid: &NonlocalSolid<L>,
         bonds: &dyn BodyGeometry<D>,
         points: &mut [SolidPoint<D>],
     ) {
         let change = |point: &SolidPoint<D>| point.deformation().map_or(0.0, |found| found.volume_change());
         self.values = parallel::map_each(points, change);
         self.average(bonds);
-        let own = |change: f64| law.filtered(change).unwrap_or_default();
         let parts = points.par_iter_mut().zip(&self.means).zip(&self.values);
         let slopes = parts.map(|((point, &mean), &change)| {
             if !point.has_gradient() {
                 return 0.0;
             }
+            let own = |change: f64| solid.law_of(point).filtered(change).unwrap_or_default();
             let ([before, slope], [after, smooth]) = (own(change), own(mean));
             point.filtered = [after - before, -slope];
             point.integrity() * smooth

@@ -12,6 +12,7 @@
 //! greatest of Σ_j ω(1 − cos k·ξ) over Σ_j ω, both measured. Shape tensors enter by R_i: a family of few
 //! bonds is stiff, and its neighbours share that stiffness.
 
+use super::nonlocal_solid::NonlocalSolid;
 use super::point::{FrequencyTerms, SolidPoint};
 use super::point_law::PointLaw;
 use super::{DeformedBody, Family};
@@ -96,7 +97,7 @@ fn of_particle<const D: usize>(family: &Family<D>, points: &[SolidPoint<D>]) -> 
 
 /// Computes max m_j, or returns `enough` if that is larger.
 pub fn bound<const D: usize>(
-    law: &(impl PointLaw<D> + ?Sized),
+    solid: &NonlocalSolid<impl PointLaw<D>>,
     (bonds, displacement): DeformedBody<D>,
     points: &mut [SolidPoint<D>],
     enough: f64,
@@ -109,7 +110,8 @@ pub fn bound<const D: usize>(
         let mut beyond = Vec::new();
         for &site in &particles[from..to] {
             let family = Family::new(bonds, displacement, site as usize);
-            if points[site as usize - range.start].stiffen_waves(law, &family) > enough {
+            let point = &mut points[site as usize - range.start];
+            if point.stiffen_waves(solid.law_of(point), &family) > enough {
                 beyond.push(site);
             }
         }

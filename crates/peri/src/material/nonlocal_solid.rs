@@ -5,13 +5,99 @@ use super::cloud_passes::CloudPasses;
 use super::compression::CRUSH_LIMIT;
 use super::past::Past;
 use super::point::{GRADIENT, ReliefTerms, SolidPoint};
-use super::point_law::{Deformation, NonlocalSolid, PointLaw};
+use super::point_law::{Deformation, PointLaw};
 use super::solid_passes::SolidPasses;
 use super::tensor::BodyTensor;
 use super::{Bond, DeformedBody, Family, Material, Passes};
 use crate::bonds::{BodyGeometry, BondKind, Bonds};
 use crate::calibrate::modulus_in;
+use crate::error::Error;
 use nalgebra::SVector;
+use std::sync::Arc;
+
+/// Material of a [`PointLaw`]: W_I = I W(F, residual), an exact variation for any law, whose bonds carry
+/// T_IJ = ω (A ζ + Q ξ) with A = D G, Q = P M⁻¹ − D G F and G = [`PointStress::stabilisation`]. A homogeneous
+/// deformation gives its exact P in every particle, at edges too; bonds are not parallel to their forces.
+///
+/// If too few bonds are left (D λ_min(M) ≤ 0.1) a particle has springs of the same shear modulus instead,
+/// W_I = ½D(D + 2)μ Σ_J ω(|ζ| − |ξ|)². See the guide (*Solids with any Poisson ratio*); the stabilisation is
+/// that of Silling 2017, doi:10.1016/j.cma.2017.03.043.
+///
+/// On an irregular cloud with [`super::relief`] F has one more term, Σ_J ω ζ⊗z(θ)/I with z(θ) = θ_J − θ_I − G
+/// ξ, G = Σ_J ω (θ_J − θ_I)⊗ξ M⁻¹/I, and T_IJ gains ω P z(θ): uniform stress is in equilibrium.
+///
+/// Parts of the body may have laws of their own: each family has that of its particle, and a bond across the
+/// border carries the force states of both.
+#[derive(Clone, Debug)]
+pub struct NonlocalSolid<L> {
+    /// The law, and those of parts.
+    laws: Vec<L>,
+    /// Number of the law of each site; empty for one law.
+    numbers: Arc<[u16]>,
+}
+
+impl<L> NonlocalSolid<L> {
+    /// Creates a solid of one law.
+    pub fn new(law: L) -> Self {
+        Self { laws: vec![law], numbers: Arc::default() }
+    }
+
+    /// Gives parts of a body laws of their own: `numbers` are those of the laws by site, 0 for that of
+    /// [`Self::new`], from 1 on for `laws`.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a number without a law.
+    pub fn with_parts(mut self, laws: Vec<L>, numbers: Vec<u16>) -> Result<Self, Error> {
+        self.laws.truncate(1);
+        self.laws.extend(laws);
+        if let Some(most) = numbers.iter().copied().max().filter(|&most| usize::from(most) >= self.laws.len())
+        {
+            let (name, allowed) = ("number of the law of a site", format!("below {}", self.laws.len()));
+            return Err(Error::Parameter { name, found: f64::from(most), allowed });
+        }
+        self.numbers = numbers.into();
+        Ok(self)
+    }
+
+    /// Applies a function to every law.
+    pub fn map<M>(self, of: impl FnMut(L) -> M) -> NonlocalSolid<M> {
+        NonlocalSolid { laws: self.laws.into_iter().map(of).collect(), numbers: self.numbers }
+    }
+
+    /// The laws, that of the rest first.
+    pub fn laws(&self) -> &[L] {
+        &self.laws
+    }
+
+    /// The law, that of the rest of a body with parts.
+    pub fn law(&self) -> &L {
+        &self.laws[0]
+    }
+
+    /// Law of the particle in a site.
+    pub fn law_at(&self, site: usize) -> &L {
+        &self.laws[usize::from(self.number(site))]
+    }
+
+    /// Law of the particle in a state.
+    pub fn law_of<const D: usize>(&self, point: &SolidPoint<D>) -> &L {
+        &self.laws[usize::from(point.law)]
+    }
+
+    fn number(&self, site: usize) -> u16 {
+        self.numbers.get(site).copied().unwrap_or(0)
+    }
+}
+
+/// ∂P₁₁/∂F₁₁ at rest, Pa, by a central difference: truncation and rounding are about 1e-10 of it.
+fn longitudinal<const D: usize>(law: &impl PointLaw<D>) -> f64 {
+    let at = |strain: f64| {
+        let mut gradient = BodyTensor::<D>::zeros();
+        gradient[(0, 0)] = strain;
+        law.respond(&Deformation::homogeneous(gradient)).piola[(0, 0)]
+    };
+    (at(1e-5) - at(-1e-5)) / 2e-5
+}
 
 impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
     type Point = SolidPoint<D>;
@@ -20,8 +106,9 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         let zero = BodyTensor::zeros();
         let relief = || Box::new(ReliefTerms { gradient: zero, part: zero, piola: zero });
         let relief = family.is_relieved().then(relief);
-        let mut point = SolidPoint { whole: family.sum(|bond| bond.volume), relief, ..SolidPoint::default() };
-        point.deformation.past = self.0.past().map(Box::new);
+        let (whole, law) = (family.sum(|bond| bond.volume), self.number(family.site()));
+        let mut point = SolidPoint { whole, law, relief, ..SolidPoint::default() };
+        point.deformation.past = self.law_of(&point).past().map(Box::new);
         point
     }
 
@@ -47,9 +134,9 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         }
         if point.has_gradient() {
             point.deform(moment, shifted, square);
-            point.answer(&self.0);
+            point.answer(self.law_of(point));
         } else {
-            point.spring(&self.0);
+            point.spring(self.law_of(point));
         }
     }
 
@@ -61,7 +148,7 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
             // Σ_J ω 2(1 − cos kξ) is at most 2.6 (2D) or 2.4 (3D) Σ_J ω in all lattices
             let springs = if D == 2 { 2.6 } else { 2.4 } * point.steepest() * squares;
             let shear = point.slope * point.whole / D as f64;
-            let gradient = self.0.stiffness(&point.deformation) - shear;
+            let gradient = self.law_of(point).stiffness(&point.deformation) - shear;
             // λ_max(M⁻¹)/D = 1/(D λ_min(M))
             let reach = GRADIENT.sqrt() / (family.horizon() * point.shape);
             springs + if gradient < 0.0 { 0.0 } else { point.integrity() * gradient * reach * reach }
@@ -114,7 +201,7 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
 
     fn energy(&self, family: &Family<D>, point: &SolidPoint<D>) -> f64 {
         match point.deformation() {
-            Some(_) => point.integrity() * point.energy(&self.0).unwrap_or(0.0),
+            Some(_) => point.integrity() * point.energy(self.law_of(point)).unwrap_or(0.0),
             None => 0.5 * point.spring * family.sum(|bond| bond.volume * bond.strain().powi(2)),
         }
     }
@@ -133,7 +220,7 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         points: &mut [SolidPoint<D>],
         enough: f64,
     ) -> Option<f64> {
-        Some(super::frequency::bound(&self.0, body, points, enough))
+        Some(super::frequency::bound(self, body, points, enough))
     }
 
     fn past<'p>(&self, point: &'p mut SolidPoint<D>) -> Option<&'p mut Past> {
@@ -142,7 +229,7 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
 
     fn stabilise(&self, point: &mut SolidPoint<D>, duration: f64) {
         if point.has_gradient() {
-            self.0.stabilise(&mut point.deformation, duration);
+            self.law_of(point).stabilise(&mut point.deformation, duration);
         }
     }
 
@@ -150,7 +237,7 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         if !point.has_gradient() {
             return 0.0;
         }
-        point.integrity() * self.0.advance(&mut point.deformation)
+        point.integrity() * self.law_of(point).advance(&mut point.deformation)
     }
 
     fn is_crushed(&self, point: &SolidPoint<D>) -> bool {
@@ -160,21 +247,19 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
 
     /// Micromodulus for Young's modulus E ≈ 3μ.
     fn micromodulus(&self, bonds: &dyn BodyGeometry<D>) -> f64 {
-        modulus_in(bonds, 3.0 * self.0.shear_modulus())
+        modulus_in(bonds, 3.0 * self.law().shear_modulus())
     }
 
-    /// ∂P₁₁/∂F₁₁ at rest, by a central difference: truncation and rounding are about 1e-10 of it.
     fn longitudinal_modulus(&self, _bonds: &dyn BodyGeometry<D>) -> f64 {
-        let at = |strain: f64| {
-            let mut gradient = BodyTensor::<D>::zeros();
-            gradient[(0, 0)] = strain;
-            self.0.respond(&Deformation::homogeneous(gradient)).piola[(0, 0)]
-        };
-        (at(1e-5) - at(-1e-5)) / 2e-5
+        longitudinal(self.law())
+    }
+
+    fn relative_stiffness(&self, site: usize) -> f64 {
+        if self.number(site) == 0 { 1.0 } else { longitudinal(self.law_at(site)) / longitudinal(self.law()) }
     }
 
     /// Bonds of E = 3μ have λ = 1.2μ and K = 2μ in space and in plane strain.
     fn volumetric(&self) -> f64 {
-        (self.0.bulk_modulus() - 2.0 * self.0.shear_modulus()).max(0.0)
+        (self.law().bulk_modulus() - 2.0 * self.law().shear_modulus()).max(0.0)
     }
 }

@@ -24,6 +24,8 @@ pub struct SolidPoint<const D: usize> {
     /// D λ_min(M).
     pub(super) shape: f64,
     pub(super) deformation: Deformation<D>,
+    /// Number of the particle's law.
+    pub(super) law: u16,
     /// Contributions of [`super::filter`] to W and ∂W/∂J; 0 without.
     pub(super) filtered: [f64; 2],
     /// A and Q + A 1, both over Σ_J V_J, and the stiffness of the springs over Σ_J V_J, Pa/m³.
@@ -58,6 +60,7 @@ impl<const D: usize> Default for SolidPoint<D> {
             inverse: zero,
             shape: 0.0,
             deformation: Deformation::homogeneous(zero),
+            law: 0,
             filtered: [0.0; 2],
             slope: 0.0,
             stress: zero,

@@ -54,7 +54,8 @@ pub struct PointStress<const D: usize> {
     pub stabilisation: f64,
 }
 
-/// A solid whose energy follows from the mean deformation of a family. [`NonlocalSolid`] makes it a material.
+/// A solid whose energy follows from the mean deformation of a family. [`super::NonlocalSolid`] makes it a
+/// material.
 pub trait PointLaw<const D: usize>: Send + Sync {
     /// Energy density W, J/m³, 0 at rest.
     fn energy(&self, deformation: &Deformation<D>) -> f64;
@@ -155,16 +156,3 @@ impl<L: PointLaw<D> + ?Sized, const D: usize> PointLaw<D> for Arc<L> {
         (**self).advance(deformation)
     }
 }
-
-/// Material of a [`PointLaw`]: W_I = I W(F, residual), an exact variation for any law, whose bonds carry
-/// T_IJ = ω (A ζ + Q ξ) with A = D G, Q = P M⁻¹ − D G F and G = [`PointStress::stabilisation`]. A homogeneous
-/// deformation gives its exact P in every particle, at edges too; bonds are not parallel to their forces.
-///
-/// If too few bonds are left (D λ_min(M) ≤ 0.1) a particle has springs of the same shear modulus instead,
-/// W_I = ½D(D + 2)μ Σ_J ω(|ζ| − |ξ|)². See the guide (*Solids with any Poisson ratio*); the stabilisation is
-/// that of Silling 2017, doi:10.1016/j.cma.2017.03.043.
-///
-/// On an irregular cloud with [`super::relief`] F has one more term, Σ_J ω ζ⊗z(θ)/I with z(θ) = θ_J − θ_I − G
-/// ξ, G = Σ_J ω (θ_J − θ_I)⊗ξ M⁻¹/I, and T_IJ gains ω P z(θ): uniform stress is in equilibrium.
-#[derive(Clone, Debug)]
-pub struct NonlocalSolid<L>(pub L);

@@ -40,6 +40,8 @@ pub struct Pointwise<M: Material<D>, const D: usize> {
     material: M,
     /// States, site by site.
     points: Vec<M::Point>,
+    /// True if particles have histories.
+    remembers: bool,
     passes: Option<Box<dyn Passes<M, D>>>,
     /// kθ of linear bonds of similar stiffness.
     modulus: f64,
@@ -57,10 +59,11 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
         for (&site, point) in bonds.particles().iter().zip(begun) {
             points[site as usize] = point;
         }
+        let remembers = points.iter_mut().any(|point| material.past(point).is_some());
         copy_to_images(bonds, &mut points);
         let modulus = material.micromodulus(bonds);
         let passes = material.passes(bonds);
-        Self { material, points, passes, modulus, tangent: 0.0 }
+        Self { material, points, remembers, passes, modulus, tangent: 0.0 }
     }
 
     /// Updates the states of all particles.
@@ -99,9 +102,10 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
 
     /// Visits the histories of the particles in their order, if there are any.
     fn pasts(&mut self, bonds: &dyn Bonds<D>, visit: &mut dyn FnMut(&mut Past)) {
-        for &site in bonds.particles() {
-            let Some(past) = self.material.past(&mut self.points[site as usize]) else { return };
-            visit(past);
+        if self.remembers {
+            for &site in bonds.particles() {
+                self.material.past(&mut self.points[site as usize]).into_iter().for_each(&mut *visit);
+            }
         }
     }
 

@@ -3,8 +3,9 @@
 use super::DeformedBody;
 use super::family::Family;
 use super::filter::Filter;
+use super::nonlocal_solid::NonlocalSolid;
 use super::point::SolidPoint;
-use super::point_law::{NonlocalSolid, PointLaw};
+use super::point_law::PointLaw;
 use super::pointwise::{Passes, copy_to_images};
 use super::tensor::BodyTensor;
 use crate::bonds::{BodyGeometry, BondDamage, Bonds, LinearRow, Softened, StretchRange, among};
@@ -97,7 +98,7 @@ impl FamilyChanges {
     /// bonds.
     pub(super) fn reshape<const D: usize>(
         self,
-        law: &impl PointLaw<D>,
+        solid: &NonlocalSolid<impl PointLaw<D>>,
         (bonds, displacement): DeformedBody<D>,
         (first, soft): (usize, &[Softened]),
         bonded: &mut [u32],
@@ -112,7 +113,7 @@ impl FamilyChanges {
                 *bonded = now;
                 point.reshape(&Family::new(bonds, displacement, site));
                 if now == 0 {
-                    point.spring(law);
+                    point.spring(solid.law_of(point));
                 }
             }
         }
@@ -153,14 +154,14 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
         let softening = lattice.softening();
         let changes = self.families.changes(bonds);
         let rows = &self.rows;
-        let filters = solid.0.filtered(0.0).is_some();
+        let filters = solid.laws().iter().any(|law| law.filtered(0.0).is_some());
         let items = self.terms.chunks_mut().into_iter().zip(self.families.bonded.chunks_mut(CHUNK));
         let items = items.zip(points.chunks_mut(CHUNK)).collect();
         let springs = parallel::map_items(items, |chunk, ((mut terms, bonded), points)| {
             let mut springs = false;
             let first = chunk * CHUNK;
             let soft = softening.among(chunk_range(chunk, lattice.sites()));
-            changes.reshape(&solid.0, (bonds, displacement), (first, soft), bonded, points);
+            changes.reshape(solid, (bonds, displacement), (first, soft), bonded, points);
             lattice.moments::<N>(rows, displacement, chunk, &mut |base, moments| {
                 for lane in 0..moments[0].len() {
                     let at = base + lane - first;
@@ -178,9 +179,9 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
                         if filters {
                             continue;
                         }
-                        point.answer(&solid.0);
+                        point.answer(solid.law_of(point));
                     } else if bonded[at] > 0 {
-                        point.spring(&solid.0);
+                        point.spring(solid.law_of(point));
                         springs = true;
                     }
                     for (n, value) in point.terms().enumerate() {
@@ -196,11 +197,11 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
             if changes.any {
                 self.filter.link(bonds, points, lattice.spacing());
             }
-            self.filter.apply(&solid.0, bonds, points);
+            self.filter.apply(solid, bonds, points);
             let items = self.terms.chunks_mut().into_iter().zip(points.chunks_mut(CHUNK)).collect();
             parallel::for_items(items, |_, (mut terms, points): (_, &mut [SolidPoint<D>])| {
                 for (at, point) in points.iter_mut().enumerate().filter(|(_, point)| point.has_gradient()) {
-                    point.answer(&solid.0);
+                    point.answer(solid.law_of(point));
                     point.terms().enumerate().for_each(|(n, value)| terms[n][at] = value);
                 }
             });

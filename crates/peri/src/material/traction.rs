@@ -1,6 +1,7 @@
 //! Tractions on the surfaces as seen by the families of a solid.
 
-use super::point_law::{Deformation, NonlocalSolid, PointLaw, PointStress};
+use super::nonlocal_solid::NonlocalSolid;
+use super::point_law::{Deformation, PointLaw, PointStress};
 use super::tensor::BodyTensor;
 use super::{Pointwise, SolverMaterial};
 use crate::bonds::Bonds;
@@ -32,7 +33,7 @@ impl<const D: usize> PointLaw<D> for Uniform<D> {
 /// of I and its neighbours. Σ h = 0; inside a lattice h = 0, and a flat face has a normal h within two
 /// horizons below it.
 pub fn surface_load<const D: usize>(bonds: &dyn Bonds<D>, piola: BodyTensor<D>) -> Field<D> {
-    let mut solid = Pointwise::new(NonlocalSolid(Uniform(piola)), bonds);
+    let mut solid = Pointwise::new(NonlocalSolid::new(Uniform(piola)), bonds);
     let rest = Field::zeros(bonds.sites());
     solid.prepare(bonds, &rest);
     let mut force = Field::zeros(bonds.sites());

@@ -19,7 +19,7 @@ fn wrap<const D: usize, L>(law: L, space: Space, body: &Body<D>) -> Result<Solid
         let own = body.space;
         return Err(Error::geometry(format!("law: found {space:?}; allowed: {own:?}, that of the body")));
     }
-    Ok((NonlocalSolid(law), None))
+    Ok((NonlocalSolid::new(law), None))
 }
 
 impl<const D: usize, L: Law + Clone + 'static> IntoMaterial<D> for Correspondence<L, D> {
@@ -44,7 +44,8 @@ impl<const D: usize, L: PointLaw<D> + Clone + 'static> Simulation<D, NonlocalSol
     /// Creates an evaluator of forces, stresses and energy-momentum, see [`crate::probe`]; create it before
     /// bonds break.
     pub fn evaluator(&self) -> StressEvaluator<D> {
-        StressEvaluator::for_solid(Arc::new(self.material.0.clone()), false, &self.bonds)
+        let solid = self.material.clone().map(|law| Arc::new(law) as Arc<dyn PointLaw<D>>);
+        StressEvaluator::for_solid(solid, false, &self.bonds)
     }
 
     /// First Piola–Kirchhoff stress P of every particle, Pa, in the order of [`Self::displacements`].

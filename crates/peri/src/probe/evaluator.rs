@@ -31,7 +31,7 @@ enum EvaluatorKind<const D: usize> {
     Nothing,
     /// A solid, with states of its particles.
     Solid {
-        law: Arc<dyn PointLaw<D>>,
+        solid: AnySolid<D>,
         learnt: bool,
         states: Mutex<Pointwise<AnySolid<D>, D>>,
     },
@@ -52,9 +52,9 @@ impl<const D: usize> StressEvaluator<D> {
 
     /// Creates an evaluator of a solid; `bonds` are those of the reference state. A law `learnt` from data
     /// has flags.
-    pub fn for_solid(law: Arc<dyn PointLaw<D>>, learnt: bool, bonds: &dyn Bonds<D>) -> Self {
-        let states = Mutex::new(Pointwise::new(NonlocalSolid(law.clone()), bonds));
-        Self(EvaluatorKind::Solid { law, learnt, states })
+    pub fn for_solid(solid: AnySolid<D>, learnt: bool, bonds: &dyn Bonds<D>) -> Self {
+        let states = Mutex::new(Pointwise::new(solid.clone(), bonds));
+        Self(EvaluatorKind::Solid { solid, learnt, states })
     }
 
     /// Bond law, if the material is one.
@@ -170,13 +170,13 @@ impl<const D: usize> StressEvaluator<D> {
 
     /// First Piola–Kirchhoff and Cauchy stress of a solid's law in every particle, Pa; `None` for bond laws.
     pub fn stress(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<[Vec<StressTensor<D>>; 2]> {
-        let EvaluatorKind::Solid { law, states, .. } = &self.0 else { return None };
+        let EvaluatorKind::Solid { solid, states, .. } = &self.0 else { return None };
         let states = prepared(states, bonds, state);
         let both = bonds.particles().iter().map(|&site| {
             let point = &states.points()[site as usize];
             let Some(deformation) = point.deformation() else { return ([[0.0; D]; D], [[0.0; D]; D]) };
-            let gradient = deformation.gradient();
-            let piola = point.respond(&**law).piola * point.integrity();
+            let (gradient, law) = (deformation.gradient(), solid.law_of(point));
+            let piola = point.respond(law).piola * point.integrity();
             let volume = (1.0 + deformation.volume_change()) * law.thickness_stretch(deformation);
             let cauchy = piola * gradient.transpose() / volume;
             let rows = |t: &BodyTensor<D>| std::array::from_fn(|a| std::array::from_fn(|b| t[(a, b)]));
@@ -195,14 +195,15 @@ impl<const D: usize> StressEvaluator<D> {
         sites: &[u32],
         visit: &mut dyn FnMut(usize, StressTensor<D>),
     ) {
-        let EvaluatorKind::Solid { law, states, .. } = &self.0 else { return };
+        let EvaluatorKind::Solid { solid, states, .. } = &self.0 else { return };
         let states = prepared(states, bonds, state);
         for (at, &site) in sites.iter().enumerate() {
             let point = &states.points()[site as usize];
             let Some(deformation) = point.deformation() else { continue };
-            let piola = point.respond(&**law).piola;
+            let law = solid.law_of(point);
+            let piola = point.respond(law).piola;
             let tensor = (deformation.displacement_gradient.transpose() * piola
-                - BodyTensor::<D>::identity() * point.energy(&**law).unwrap_or(0.0))
+                - BodyTensor::<D>::identity() * point.energy(law).unwrap_or(0.0))
                 * point.integrity();
             visit(at, std::array::from_fn(|a| std::array::from_fn(|b| tensor[(a, b)])));
         }
@@ -217,8 +218,8 @@ impl<const D: usize> StressEvaluator<D> {
                 let of = |&site: &u32| Material::<D>::energy(&**material, &family(site), &());
                 Some(parallel::map_each(bonds.particles(), of))
             }
-            EvaluatorKind::Solid { law, states, .. } => {
-                let (states, solid) = (prepared(states, bonds, state), NonlocalSolid(law.clone()));
+            EvaluatorKind::Solid { solid, states, .. } => {
+                let states = prepared(states, bonds, state);
                 let of = |&site: &u32| solid.energy(&family(site), &states.points()[site as usize]);
                 Some(parallel::map_each(bonds.particles(), of))
             }
@@ -228,10 +229,11 @@ impl<const D: usize> StressEvaluator<D> {
     /// Uncertainties of a learnt law, particle by particle; none for particles without it; `None` for laws in
     /// closed form.
     pub fn flags(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<Vec<Flags>> {
-        let EvaluatorKind::Solid { law, learnt: true, states } = &self.0 else { return None };
+        let EvaluatorKind::Solid { solid, learnt: true, states } = &self.0 else { return None };
         let states = prepared(states, bonds, state);
         let of = |&site: &u32| {
-            states.points()[site as usize].deformation().map_or(Flags::default(), |found| law.flags(found))
+            let point = &states.points()[site as usize];
+            point.deformation().map_or(Flags::default(), |found| solid.law_of(point).flags(found))
         };
         Some(parallel::map_each(bonds.particles(), of))
     }

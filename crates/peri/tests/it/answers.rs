@@ -35,7 +35,7 @@ displacement = ["0 mm", "0 mm"]
     )
 }
 
-fn solve(text: &str, output: &Path) -> FinishedScene {
+pub fn solve(text: &str, output: &Path) -> FinishedScene {
     let source = Source::new("scene.toml", text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
     let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(output));

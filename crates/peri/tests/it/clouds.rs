@@ -456,7 +456,7 @@ fn ring_error(n: usize, relieved: bool) -> f64 {
         let x = bonds.position(site);
         let radius = x[0].hypot(x[1]);
         if radius > 1.5 && radius < outer {
-            let piola = solid.0.respond(material.points()[site].deformation().unwrap()).piola / size;
+            let piola = solid.law().respond(material.points()[site].deformation().unwrap()).piola / size;
             let truth = kirsch(x).1;
             let found = [piola[(0, 0)], piola[(1, 1)], piola[(0, 1)]];
             sum += (0..3).map(|k| (found[k] - truth[k]).powi(2)).sum::<f64>();

@@ -61,7 +61,7 @@ fn rise(from: f64, to: f64) -> Amplitude {
 fn load(moving: bool, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> State<2> {
     let mut built = Body::<2>::solid([12, 12], 0.1, 3.015).build();
     let bonds = &mut built.lattice;
-    let solid = NonlocalSolid(EightChainSolid::new(Space::PlaneStrain, 1.0, 1e6, 5.0).unwrap());
+    let solid = NonlocalSolid::new(EightChainSolid::new(Space::PlaneStrain, 1.0, 1e6, 5.0).unwrap());
     let rest = || Amplitude::new(|_| (0.0, 0.0));
     let held = vec![
         region(&*bonds, |[_, y]| y < 0.3, [0.0; 2], 3, [rest(), rest()]),

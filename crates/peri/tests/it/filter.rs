@@ -13,7 +13,7 @@ use peri::solver::{Lbfgs, Loads, Method, State, System};
 
 fn rubber<const D: usize>(space: Space, bulk: f64, filter: bool) -> NonlocalSolid<EightChainSolid<D>> {
     let network = EightChainSolid::new(space, 1.0, 25.0, bulk).unwrap();
-    NonlocalSolid(if filter { network.filtered().unwrap() } else { network })
+    NonlocalSolid::new(if filter { network.filtered().unwrap() } else { network })
 }
 
 #[test]
@@ -95,7 +95,7 @@ fn roughness(rows: usize, filter: bool) -> f64 {
     let pressure = |site: usize| {
         let point = &points.points()[site];
         let f: Matrix2<f64> = point.deformation().unwrap().gradient();
-        let found = point.respond(&solid.0);
+        let found = point.respond(solid.law());
         let cofactor = Matrix2::new(f.m22, -f.m21, -f.m12, f.m11);
         (found.piola - f * found.stabilisation).dot(&cofactor) / cofactor.norm_squared()
     };

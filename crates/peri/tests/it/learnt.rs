@@ -37,7 +37,7 @@ fn orthotropic(tilt: f64) -> Surrogate {
 }
 
 fn solid<const D: usize>(law: &Surrogate, space: Space) -> NonlocalSolid<Correspondence<Surrogate, D>> {
-    NonlocalSolid(Correspondence::new(law.clone(), space).unwrap())
+    NonlocalSolid::new(Correspondence::new(law.clone(), space).unwrap())
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn distance<const D: usize>(
         let mut material = Pointwise::new(solid.clone(), bonds);
         material.prepare(bonds, &scatter(bonds.sites(), sites, &moved));
         for &site in sites {
-            let found = solid.0.respond(material.points()[site].deformation().unwrap()).piola;
+            let found = solid.law().respond(material.points()[site].deformation().unwrap()).piola;
             off[0] = off[0].max((found - expected).norm() / expected.norm());
         }
         let rest = Field::zeros(bonds.sites());
@@ -108,7 +108,7 @@ fn distance<const D: usize>(
             material.force(bonds, &rest, chunk, &mut part, None);
         }
         let most = force.components().iter().flat_map(|c| c.iter()).fold(0.0_f64, |m, x| m.max(x.abs()));
-        off[1] = off[1].max(most * 0.1 / solid.0.shear_modulus());
+        off[1] = off[1].max(most * 0.1 / solid.law().shear_modulus());
     }
     off
 }
@@ -136,7 +136,7 @@ fn what_leaves_the_box_is_flagged() {
     fn outside<const D: usize>(space: Space, stretches: [f64; D]) -> [bool; 3] {
         let mut displacement_gradient = BodyTensor::<D>::zeros();
         (0..D).for_each(|d| displacement_gradient[(d, d)] = stretches[d] - 1.0);
-        let flags = solid(&trained(), space).0.flags(&Deformation::homogeneous(displacement_gradient));
+        let flags = solid(&trained(), space).law().flags(&Deformation::homogeneous(displacement_gradient));
         std::array::from_fn(|d| flags.outside[d])
     }
     // the box ends at stretches of 0.81 to 0.82 and 1.49

@@ -36,7 +36,7 @@ fn spin(solver: Solver, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> 
     let surface = BodySurface::of_shapes(&body.operations, body.spacing);
     let mut built = body.build();
     let bonds = &mut built.lattice;
-    let solid = NonlocalSolid(EightChainSolid::new(Space::PlaneStrain, 1.0, 1e6, 5.0).unwrap());
+    let solid = NonlocalSolid::new(EightChainSolid::new(Space::PlaneStrain, 1.0, 1e6, 5.0).unwrap());
     let all = bonds.particles().to_vec();
     let within = |inside: &dyn Fn([f64; 2]) -> bool| {
         all.iter().copied().filter(|&site| inside(bonds.position(site as usize))).collect::<Vec<u32>>()

@@ -36,6 +36,7 @@ mod looks;
 mod materials;
 mod model;
 mod pace;
+mod part_solids;
 mod parts;
 mod periodic;
 mod pressed;

@@ -16,11 +16,11 @@ fn neo_hooke<const D: usize>(
 ) -> NonlocalSolid<Correspondence<Compressible<NeoHookean>, D>> {
     let volumetric = Volumetric::Ciarlet { lame: bulk - 2.0 / 3.0 };
     let law = Compressible::new(NeoHookean::new(1.0).unwrap(), volumetric).unwrap();
-    NonlocalSolid(Correspondence::new(law, space).unwrap())
+    NonlocalSolid::new(Correspondence::new(law, space).unwrap())
 }
 
 fn rubber<const D: usize>(space: Space, bulk: f64) -> NonlocalSolid<EightChainSolid<D>> {
-    NonlocalSolid(EightChainSolid::new(space, 1.0, 25.0, bulk).unwrap())
+    NonlocalSolid::new(EightChainSolid::new(space, 1.0, 25.0, bulk).unwrap())
 }
 
 fn block<const D: usize>(cells: [usize; D]) -> LatticeBonds<D> {

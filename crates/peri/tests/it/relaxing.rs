@@ -27,7 +27,7 @@ fn solid<const D: usize>(space: Space, lame: f64, driving: Driving, softening: O
     if let Some(softening) = softening {
         law = law.with_softening(softening).unwrap();
     }
-    NonlocalSolid(Arc::new(ViscousCorrespondence::new::<D>(law, space, 1.0, driving).unwrap()))
+    NonlocalSolid::new(Arc::new(ViscousCorrespondence::new::<D>(law, space, 1.0, driving).unwrap()))
 }
 
 /// With a state that does not change in the step the forces are those of an energy, within the bound of the
@@ -182,7 +182,7 @@ fn a_glassy_sheet_softens_as_its_material_point() {
     };
     let (steps, most, duration, temperature) = (20, 0.2, 1.0, 338.15);
     let solid = ViscousCorrespondence::new::<2>(law(), Space::PlaneStress, 1.0, Driving::Equilibrium);
-    let solid: Solid = NonlocalSolid(Arc::new(solid.unwrap().at_temperature(temperature)));
+    let solid: Solid = NonlocalSolid::new(Arc::new(solid.unwrap().at_temperature(temperature)));
     let mut built = Body::<2>::solid([14, 14], 0.1, 3.015).build();
     let bonds = &mut built.lattice;
     // a free particle two horizons from the surface, where a homogeneous deformation is an equilibrium
@@ -241,7 +241,7 @@ fn glassy_law(pressure: f64) -> Viscoelastic {
 /// the position that grow in 20 steps of a second.
 fn deform<const D: usize>(space: Space, most: [f64; D], pressure: f64) -> [f64; 2] {
     let solid = ViscousCorrespondence::new::<D>(glassy_law(pressure), space, 1.0, Driving::Equilibrium);
-    let solid: Solid = NonlocalSolid(Arc::new(solid.unwrap()));
+    let solid: Solid = NonlocalSolid::new(Arc::new(solid.unwrap()));
     let mut built = Body::<D>::solid([14; D], 0.1, 3.015).build();
     let bonds = &mut built.lattice;
     // a free particle two horizons from the surface, where a homogeneous deformation is an equilibrium

@@ -131,9 +131,9 @@ fn energies_at_a_strength() {
     let (bulk, small) = (5.0 / 3.0, 1e-4);
     let youngs = 9.0 * bulk / (3.0 * bulk + 1.0);
     let poisson = 0.5 * youngs - 1.0;
-    let solid = energy_at_strength(&neo_hooke::<3>(Space::Solid, bulk).0, small).unwrap();
+    let solid = energy_at_strength(neo_hooke::<3>(Space::Solid, bulk).law(), small).unwrap();
     near("energy_at_strength_3d", solid * 2.0 * youngs / (small * small), 1.0, 2e-4);
-    let plane = energy_at_strength(&neo_hooke::<2>(Space::PlaneStrain, bulk).0, small).unwrap();
+    let plane = energy_at_strength(neo_hooke::<2>(Space::PlaneStrain, bulk).law(), small).unwrap();
     let exact = 0.5 * (1.0 - poisson * poisson) * small * small / youngs;
     near("energy_at_strength_plane_strain", plane / exact, 1.0, 2e-4);
     let long = EightChainSolid::<2>::new(Space::PlaneStress, 1.0, 1e9, f64::INFINITY).unwrap();
@@ -151,7 +151,7 @@ fn strip(rows: usize, ductility: f64, weak: f64) -> f64 {
     let mut built = body.build();
     let bonds = &mut built.lattice;
     let (solid, strength) = (neo_hooke::<2>(Space::PlaneStrain, 5.0 / 3.0), 1e-3);
-    let onset = energy_at_strength(&solid.0, strength).unwrap();
+    let onset = energy_at_strength(solid.law(), strength).unwrap();
     let law = Bilinear { onset, limit: ductility * onset };
     let grip = 6.0 * spacing;
     // the uniform state has (1 − ν²)σ/E = 3.75e-4 at the strength
@@ -212,7 +212,7 @@ fn tear(moving: bool, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> St
     let mut built = body.build();
     let bonds = &mut built.lattice;
     let solid: NonlocalSolid<EightChainSolid<2>> = rubber(Space::PlaneStrain, 5.0);
-    let onset = energy_at_strength(&solid.0, 1.0).unwrap();
+    let onset = energy_at_strength(solid.law(), 1.0).unwrap();
     let law = bilinear(bonds, 0.1, onset).unwrap();
     assert!(law.ductility() > 1.5 && law.ductility() < 5.0, "{law:?}");
     let loads = hold(bonds, |[_, y]| match y {

@@ -21,11 +21,11 @@ pub fn neo_hooke<const D: usize>(
 ) -> NonlocalSolid<Correspondence<Compressible<NeoHookean>, D>> {
     let volumetric = Volumetric::Ciarlet { lame: bulk - 2.0 / 3.0 };
     let law = Compressible::new(NeoHookean::new(1.0).unwrap(), volumetric).unwrap();
-    NonlocalSolid(Correspondence::new(law, space).unwrap())
+    NonlocalSolid::new(Correspondence::new(law, space).unwrap())
 }
 
 pub fn rubber<const D: usize>(space: Space, bulk: f64) -> NonlocalSolid<EightChainSolid<D>> {
-    NonlocalSolid(EightChainSolid::new(space, 1.0, 25.0, bulk).unwrap())
+    NonlocalSolid::new(EightChainSolid::new(space, 1.0, 25.0, bulk).unwrap())
 }
 
 #[test]
@@ -200,7 +200,7 @@ fn long_chains_are_neo_hookean() {
         }
         force
     };
-    let chains = NonlocalSolid(EightChainSolid::new(Space::PlaneStrain, 1.0, 1e9, 10.0).unwrap());
+    let chains = NonlocalSolid::new(EightChainSolid::new(Space::PlaneStrain, 1.0, 1e9, 10.0).unwrap());
     let a = forces(&mut Pointwise::new(chains, &built.lattice));
     let b = forces(&mut Pointwise::new(neo_hooke(Space::PlaneStrain, 10.0), &built.lattice));
     let largest =
@@ -406,7 +406,7 @@ fn iterations_at_large_bulk_moduli() {
         let strip = Shape::rectangle([0.0, -3e-3], [32e-3, 11e-3]);
         let body = peri::model::Body::lattice(strip, 0.5e-3).plane_strain(1e-3);
         let rubber =
-            NonlocalSolid(EightChainSolid::new(Space::PlaneStrain, 0.4e6, 25.0, bulk * 0.4e6).unwrap());
+            NonlocalSolid::new(EightChainSolid::new(Space::PlaneStrain, 0.4e6, 25.0, bulk * 0.4e6).unwrap());
         let model = peri::model::Model::new(body, rubber)
             .clamp(|[_, y]| y < 0.0)
             .displace(|[_, y]| y > 8e-3, [0.0, -0.08e-3]);

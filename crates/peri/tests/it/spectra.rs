@@ -46,7 +46,7 @@ pub fn forces<const D: usize>(
 /// Returns the eigenvalues of −∂f/∂u at rest of a free block, ascending.
 fn modes<const D: usize>(cells: [usize; D], space: Space, bulk: f64, stabilisation: f64) -> Vec<f64> {
     let bonds = block(cells, 1.0);
-    let mut material = Pointwise::new(NonlocalSolid(neo_hooke::<D>(space, bulk, stabilisation)), &bonds);
+    let mut material = Pointwise::new(NonlocalSolid::new(neo_hooke::<D>(space, bulk, stabilisation)), &bonds);
     let sites: Vec<usize> = bonds.particles().iter().map(|&site| site as usize).collect();
     let step = 1e-5;
     let mut matrix = nalgebra::DMatrix::zeros(D * sites.len(), D * sites.len());
@@ -105,7 +105,7 @@ fn symbol<const D: usize>(number: [f64; D], along: usize, bulk: f64, stabilisati
     // two horizons on either side
     let bonds = block([13; D], 1.0);
     let space = if D == 2 { Space::PlaneStrain } else { Space::Solid };
-    let mut material = Pointwise::new(NonlocalSolid(neo_hooke::<D>(space, bulk, stabilisation)), &bonds);
+    let mut material = Pointwise::new(NonlocalSolid::new(neo_hooke::<D>(space, bulk, stabilisation)), &bonds);
     let middle = bonds.particles().iter().map(|&site| site as usize);
     let middle = middle.into_iter().find(|&site| bonds.position(site) == [6.5; D]).unwrap();
     let size = 1e-4;
@@ -230,8 +230,8 @@ pub fn errors(bonds: &mut dyn Bonds<2>, n: usize, bulk: f64, volume: f64) -> [f6
         bonds.particles().iter().copied().filter(|&site| loads.constrained[site as usize] == 3).collect(),
     );
     (loads.displacement, loads.body_force) = (Some(exact.clone()), Some(body));
-    let mut points = Pointwise::new(NonlocalSolid(law.clone()), bonds);
-    let mut system = System::new(bonds, NonlocalSolid(law), &loads, &[1.0]);
+    let mut points = Pointwise::new(NonlocalSolid::new(law.clone()), bonds);
+    let mut system = System::new(bonds, NonlocalSolid::new(law), &loads, &[1.0]);
     let mut state = State::new(sites);
     state.displacement.clone_from(&exact);
     let method = Lbfgs { tolerance: 1e-8, max_iterations: 5000, ..Default::default() };

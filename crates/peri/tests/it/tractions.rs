@@ -15,7 +15,7 @@ use peri::material::{
 fn judge<L: PointLaw<D>, const D: usize>(name: &str, bonds: &dyn Bonds<D>, solid: NonlocalSolid<L>) {
     let gradient =
         BodyTensor::<D>::from_fn(|a, b| [[0.3, -0.1, 0.05], [0.2, -0.2, 0.1], [0.0, 0.15, 0.1]][a][b]);
-    let stress = solid.0.respond(&Deformation::homogeneous(gradient)).piola;
+    let stress = solid.law().respond(&Deformation::homogeneous(gradient)).piola;
     let load = surface_load(bonds, stress);
     let mut displacement = Field::zeros(bonds.sites());
     for &site in bonds.particles() {

@@ -3,7 +3,7 @@
 use super::moment::Moment;
 use crate::probe::{driven_loop_energy, load_at, loop_energy, stiffness_at};
 use crate::program::quantities as q;
-use crate::program::scene::{Scene, SolidLaw, plain};
+use crate::program::scene::{Scene, plain};
 use crate::solver::{Balance, StepRecord};
 use harness::observe::Scalars;
 use harness::report::Quantity;
@@ -87,7 +87,7 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
     if breaks {
         add_last(to, q::RELEASED_ENERGY, |row| row.released);
     }
-    if scene.material.solid.as_ref().is_some_and(SolidLaw::has_state) {
+    if scene.remembers() {
         add_last(to, q::DISSIPATED_ENERGY, |row| row.dissipated);
     }
     add_last(

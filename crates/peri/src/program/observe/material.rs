@@ -9,7 +9,7 @@ use crate::correction::{bond_factors, surface_factors};
 use crate::critical::{Context, CrackArea, Critical, Crossing, Toughness};
 use crate::error::Error;
 use crate::exact::Plate;
-use crate::material::{BondMaterial, Material, NonlocalSolid, Prestrained, SolverMaterial, relief};
+use crate::material::{BondMaterial, Material, Prestrained, SolverMaterial, relief};
 use crate::potential::{BondPotential, BondSoftening};
 use crate::probe::{AnySolid, LineSampler, StressEvaluator};
 use crate::program::scene::{
@@ -53,7 +53,8 @@ impl<const D: usize> SceneMaterial<D> {
     pub fn relative_stiffness(&self, site: usize) -> f64 {
         match self {
             Self::Bonds(bonded) => Material::<D>::relative_stiffness(bonded, site),
-            Self::Prestrained(_) | Self::Solid(_) => 1.0,
+            Self::Solid(solid) => solid.relative_stiffness(site),
+            Self::Prestrained(_) => 1.0,
         }
     }
 
@@ -107,22 +108,28 @@ impl<const D: usize> BodyWithMaterial<D> {
             }
             other => source.error("material.critical", other, "a critical stretch"),
         };
-        if let Some(solid) = &spec.solid {
-            let law = solid.build::<D>(source, space, scene.is_beside_surfaces(), scene.driving())?;
-            let limit = |critical: Critical| critical.solid_criterion(&*law, &*body.bonds);
-            let across = |rest: Property| {
-                let least = |critical, _| limit(critical).map(|own| own.least());
-                scene::limits_of_bonds(source, scene, body, rest, &1.0.into(), &least)
+        if spec.solid.is_some() {
+            let (solid, inclusions) = scene::solid_of_parts(source, scene, body)?;
+            let limit = |critical: Critical| critical.solid_criterion(&**solid.law(), &*body.bonds);
+            let least = |critical, _| limit(critical).map(|own| own.least());
+            let each = |rest: Property| {
+                let rest = if spec.critical.is_some() { rest.least() } else { f64::INFINITY };
+                let limits = inclusions.limits(source, &*body.bonds, rest, &least)?;
+                scene::limits_of_bonds(source, scene, body, limits, &1.0.into(), &least)
             };
-            let rest = |limits| if spec.critical.is_some() { limits } else { f64::INFINITY.into() };
             let criterion = match scene.limits().next().map(limit).transpose().map_err(fault)? {
-                Some(Criterion::Stretch(limits)) => Some(Criterion::Stretch(across(rest(limits))?)),
-                Some(Criterion::Energy(limits)) => Some(Criterion::Energy(across(rest(limits))?)),
+                Some(Criterion::Stretch(rest)) => Some(Criterion::Stretch(each(rest)?)),
+                Some(Criterion::Energy(rest)) => Some(Criterion::Energy(each(rest)?)),
                 other => other,
             };
+            // of force scale and preconditioner: forces of solids have no factors
+            let moduli = scene::relative_moduli(&solid, &*body.bonds);
+            if let Some(factors) = bond_factors(&*body.bonds, None, &moduli) {
+                body.bonds.set_factors(factors);
+            }
             return Ok(Self {
                 criterion,
-                material: SceneMaterial::Solid(NonlocalSolid(law)),
+                material: SceneMaterial::Solid(solid),
                 toughness: None,
                 followed: Vec::new(),
                 stiffness: 1.0.into(),
@@ -162,7 +169,7 @@ impl<const D: usize> BodyWithMaterial<D> {
                 toughness = Some(Toughness::new(critical, &rest, stretch));
             }
             let own = |critical: Critical, stiffness| critical.resolve(&context(stiffness, crossing));
-            let limits = inclusions.critical_stretch(source, &*body.bonds, stretch, &own)?;
+            let limits = inclusions.limits(source, &*body.bonds, stretch, &own)?;
             let stiffness = &inclusions.micromodulus;
             criterion = Some(scene::limits_of_bonds(source, scene, body, limits, stiffness, &own)?.into());
         }
@@ -296,7 +303,7 @@ impl<const D: usize> Physics<D> {
                 StressEvaluator::for_bonds(material.clone(), scene.fit_bound(), breaks)
             }
             SceneMaterial::Solid(solid) if scene.observes_forces() => {
-                StressEvaluator::for_solid(solid.0.clone(), scene.is_learnt(), bonds)
+                StressEvaluator::for_solid(solid.clone(), scene.is_learnt(), bonds)
             }
             _ => StressEvaluator::none(),
         };

@@ -262,8 +262,9 @@ fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
 
 fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let material = &scene.material;
-    if let Some(solid) = &material.solid {
-        return super::solid::check(source, scene, solid);
+    if material.solid.is_some() {
+        super::solid::check(source, scene)?;
+        return inclusions(source, scene);
     }
     let Some(youngs_modulus) = material.youngs_modulus else {
         let why = "needed for a bond law; a [material.network] gives it, a [material.solid] takes its place";
@@ -318,7 +319,19 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             }
         }
     }
+    inclusions(source, scene)
+}
+
+/// Checks numbers of inclusions of any material.
+fn inclusions(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    let material = &scene.material;
     for (index, inclusion) in material.inclusions.iter().enumerate() {
+        if inclusion.solid.is_some() && material.solid.is_none() {
+            let key = format!("material.inclusions[{index}].solid");
+            let why =
+                "needs `material.solid`, that of the rest of the body; a part of a bond law has a `law`";
+            return Err(source.unexpected(&key, why));
+        }
         let key = format!("material.inclusions[{index}].stiffness");
         positive(source, &key, inclusion.stiffness, "")?;
         if let Some(density) = inclusion.density {

@@ -42,10 +42,10 @@ pub fn explain<const D: usize>(
     if let Some(solid) = &scene.material.solid {
         let states = (bonds.sites() * size_of::<SolidPoint<D>>()) as f64 / 1e6;
         builds(format!("a solid, `{}`: states of particles {states:.1} MB", solid.law.name()));
-        let remembered = solid.memory_of_a_particle();
-        if remembered > 0 {
+        super::part_solid::explain(scene).into_iter().for_each(&mut builds);
+        for own in scene.solids().map(|(_, own)| own).filter(|own| own.has_state()) {
+            let (remembered, branches) = (own.memory_of_a_particle(), own.branch.len());
             let megabytes = (8 * remembered * bonds.particles().len()) as f64 / 1e6;
-            let branches = solid.branch.len();
             builds(format!("{branches} branches: {remembered} numbers a particle, {megabytes:.1} MB"));
         }
     }

@@ -2,7 +2,7 @@
 
 use super::inclusion_region::Region;
 use super::values::DiscreteBody;
-use super::{Material, ParameterField, Scene, ShapeSpec, VaryingParameter, plain};
+use super::{Material, ParameterField, Scene, ShapeSpec, SolidLaw, VaryingParameter, plain};
 use crate::bonds::{Bonds, Property};
 use crate::calibrate::{Space, poisson_ratio};
 use crate::critical::Critical;
@@ -14,8 +14,8 @@ use serde::Deserialize;
 use std::array;
 use std::collections::HashMap;
 
-/// A part of the body whose bonds are stiffer or softer, or have a law of their own; a bond across its border
-/// has the mean of both.
+/// A part of the body whose bonds are stiffer or softer, or which has a law of its own; a bond across its
+/// border has the mean of both.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Inclusion {
@@ -36,6 +36,8 @@ pub struct Inclusion {
     /// Scales kθ of the part so that the small-strain modulus is exact; default: that of the
     /// material if `law` is the same, otherwise by `law`.
     pub rescale: Option<bool>,
+    /// Solid of the part, in place of `material.solid`; of overlapping parts the last counts.
+    pub solid: Option<SolidLaw>,
     /// Replaces `material.critical`. A bond that ends in inclusions or passes through them takes the lowest
     /// value on its way, so that a layer may be thinner than the spacing.
     pub critical: Option<Critical>,
@@ -173,7 +175,7 @@ impl<'a, const D: usize> Inclusions<'a, D> {
             // a layer between particles may still be a weak one
             let acts =
                 inclusion.stiffness != 1.0 || inclusion.prestrain.is_some() || inclusion.critical.is_none();
-            let acts = acts || inclusion.has_law();
+            let acts = acts || inclusion.has_law() || inclusion.solid.is_some();
             if members.is_empty() && acts {
                 let key = inclusion.key(index);
                 return Err(source.error(&key, "a shape without particles", "a shape with at least one"));
@@ -207,13 +209,13 @@ impl<'a, const D: usize> Inclusions<'a, D> {
         self.each.iter().map(|(inclusion, _, members)| (*inclusion, &members[..]))
     }
 
-    /// Returns the critical stretch of each particle: `rest`, replaced by the stretch of a fracture energy
-    /// that follows a field, or of the last inclusion with `critical`. `resolve` computes it from the
-    /// criterion and the relative micromodulus.
+    /// Returns the limit of each particle, of a bond law the critical stretch: `rest`, replaced by that of a
+    /// fracture energy that follows a field, or of the last inclusion with `critical`. `resolve` computes it
+    /// from the criterion and the relative micromodulus.
     ///
     /// # Errors
-    /// A critical stretch out of its domain.
-    pub fn critical_stretch(
+    /// A limit out of its domain.
+    pub fn limits(
         &self,
         source: &Source,
         bonds: &dyn Bonds<D>,
@@ -236,7 +238,7 @@ impl<'a, const D: usize> Inclusions<'a, D> {
             let key = format!("material.inclusions[{index}].critical");
             let fault = |error| match error {
                 Error::Parameter { found, allowed, .. } => source.error(&key, plain(found), allowed),
-                other => source.error(&key, other, "a critical stretch"),
+                other => source.error(&key, other, "a limit that bonds can have"),
             };
             // neighbours of equal stiffness share one bisection
             let mut last = None;
@@ -265,8 +267,7 @@ impl<'a, const D: usize> Inclusions<'a, D> {
         Ok(property.weakened(weak.into_iter().map(|(_, bond, value)| (bond, value)).collect()))
     }
 
-    /// Finds bonds that pass through inclusions with a critical stretch, and the lowest critical stretch
-    /// between their ends.
+    /// Finds bonds that pass through inclusions with a limit, and the lowest limit between their ends.
     fn weakened_bonds(
         &self,
         source: &Source,
@@ -312,7 +313,7 @@ impl<'a, const D: usize> Inclusions<'a, D> {
                             source.error(
                                 &format!("material.inclusions[{index}].critical"),
                                 error,
-                                "a critical stretch",
+                                "a limit that bonds can have",
                             )
                         })?,
                     };
@@ -332,7 +333,7 @@ impl<'a, const D: usize> Inclusions<'a, D> {
 /// Fraction of a bond's length below which a crossed part is rounding, where faces meet.
 const THIN: f64 = 1e-6;
 
-/// Inclusions that a bond passes through, its sites, and the lowest critical stretch in them.
+/// Inclusions that a bond passes through, its sites, and the lowest limit in them.
 type Passing = (Vec<usize>, [u32; 2], f64);
 
 impl Material {

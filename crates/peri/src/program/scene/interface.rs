@@ -98,7 +98,16 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     Ok(())
 }
 
-fn check_limit(source: &Source, scene: &Scene, key: &str, critical: &Critical) -> Result<(), SceneError> {
+/// Checks the limit of bonds of an interface or a part.
+///
+/// # Errors
+/// A limit that the material does not take.
+pub(super) fn check_limit(
+    source: &Source,
+    scene: &Scene,
+    key: &str,
+    critical: &Critical,
+) -> Result<(), SceneError> {
     if scene.material.solid.is_none() {
         let given = critical.alternatives();
         return match given.len() {
@@ -111,7 +120,7 @@ fn check_limit(source: &Source, scene: &Scene, key: &str, critical: &Critical) -
         .iter()
         .find_map(|(name, given)| given.then_some(name))
     {
-        let why = "an interface of a `solid` takes `stretch` or `fracture_energy` alone";
+        let why = "interfaces and parts of a `solid` take `stretch` or `fracture_energy` alone";
         return Err(source.unexpected(&format!("{key}.{name}"), why));
     }
     if scene.material.critical.is_some_and(|own| own.strength.is_some()) {

@@ -71,9 +71,9 @@ fn bytes_of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> 
         each += if contact.has_friction() { 3.0 * vector } else { 0.0 };
     }
     each += super::part_law::memory_of_a_site(scene, masks);
-    if let Some(solid) = &scene.material.solid {
+    if scene.material.solid.is_some() {
         // histories in points, in the state, in a checkpoint; a heap block each
-        let remembered = solid.memory_of_a_particle() as f64;
+        let remembered = scene.solids().map(|(_, own)| own.memory_of_a_particle()).max().unwrap_or(0) as f64;
         each += if remembered > 0.0 {
             4.0 * 8.0 * remembered + 2.0 * (size_of::<Past>() as f64 + 32.0)
         } else {

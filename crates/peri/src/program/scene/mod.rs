@@ -33,6 +33,7 @@ mod method;
 mod network;
 mod overlap;
 mod part_law;
+mod part_solid;
 mod parts;
 mod periodic;
 mod placement;
@@ -76,6 +77,7 @@ pub use memory::needed as memory_needed;
 pub use method::{Dynamics, SolverMethod, SolverSpec};
 pub use network::{ChemistrySpec, explain_network, resolve_network};
 pub use part_law::laws_of_parts;
+pub use part_solid::{relative_moduli, solid_of_parts};
 pub use periodic::PeriodicSpec;
 pub use placement::{check_placement, check_surfaces, exact_plate};
 pub use probe::{HistoryProbe, Track};
@@ -445,11 +447,6 @@ impl Scene {
         let j_integral = self.probe.iter().any(|probe| probe.track == Track::JIntegral);
         let traced = self.stress.is_some() || !self.output.section.is_empty() || self.periodic.is_some();
         traced || j_integral || self.output.energy || self.is_learnt()
-    }
-
-    /// Returns true for a law learnt from data.
-    pub fn is_learnt(&self) -> bool {
-        self.material.solid.as_ref().is_some_and(SolidLaw::is_learnt)
     }
 
     /// Returns the energy that drives breaking.

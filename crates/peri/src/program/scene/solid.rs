@@ -74,8 +74,8 @@ const FILTERED_RATIO: f64 = 50.0;
 /// Temperature of a body whose viscosities have no shift, K.
 const ROOM: f64 = 293.15;
 
-/// Key of the block.
-const KEY: &str = "material.solid";
+/// Key of the block of the rest of the body.
+pub(super) const KEY: &str = "material.solid";
 
 impl SolidLaw {
     /// Returns true for a law learnt from data.
@@ -103,14 +103,15 @@ impl SolidLaw {
     fn with_state<const D: usize>(
         &self,
         source: &Source,
+        block: &str,
         space: Space,
         law: impl Law + 'static,
         driving: Driving,
     ) -> Result<Arc<dyn PointLaw<D>>, SceneError> {
         let branches = self.branch.iter().enumerate();
-        let branches = branches.map(|(k, own)| own.branch(source, &format!("{KEY}.branch[{k}]")));
+        let branches = branches.map(|(k, own)| own.branch(source, &format!("{block}.branch[{k}]")));
         let branches = branches.collect::<Result<Vec<_>, _>>()?;
-        let key = format!("{KEY}.temperature");
+        let key = format!("{block}.temperature");
         let shifted = self.branch.iter().any(|own| own.shift.is_some());
         let temperature = match self.temperature {
             Some(_) if !shifted => return Err(source.unexpected(&key, "no branch has a `shift`")),
@@ -122,28 +123,30 @@ impl SolidLaw {
             let found = format!("{temperature:.2} K, where WLF exceeds 12 decades");
             return Err(source.error(&key, found, format!("{least:.2} K and above")));
         }
-        let wrong = |error: polycore::constitutive::Error| source.error(KEY, error, "a law with time");
+        let wrong = |error: polycore::constitutive::Error| source.error(block, error, "a law with time");
         let mut law = Viscoelastic::new(Box::new(law), branches).map_err(wrong)?;
         if let Some(mullins) = &self.mullins {
-            law = law.with_softening(mullins.softening(source, &format!("{KEY}.mullins"))?).map_err(wrong)?;
+            law =
+                law.with_softening(mullins.softening(source, &format!("{block}.mullins"))?).map_err(wrong)?;
         }
         let solid = ViscousCorrespondence::new::<D>(law, space, self.stabilisation.unwrap_or(1.0), driving);
         let solid = solid.map(|solid| solid.at_temperature(temperature));
         Ok(Arc::new(solid.map_err(|error| match error {
             Error::Parameter { name: "stabilisation", found, allowed } => {
-                source.error(&format!("{KEY}.stabilisation"), plain(found), allowed)
+                source.error(&format!("{block}.stabilisation"), plain(found), allowed)
             }
-            other => source.error(&format!("{KEY}.constitutive"), other, "a law with an energy"),
+            other => source.error(&format!("{block}.constitutive"), other, "a law with an energy"),
         })?))
     }
 
-    /// Builds the law; `planes` is true on a lattice beside rigid planes.
+    /// Builds the law of the block with the key `block`; `planes` is true on a lattice beside rigid planes.
     ///
     /// # Errors
     /// A missing or unexpected key, or a value out of its domain.
     pub fn build<const D: usize>(
         &self,
         source: &Source,
+        block: &str,
         space: Space,
         planes: bool,
         driving: Driving,
@@ -163,18 +166,18 @@ impl SolidLaw {
         ] {
             if given && of_chains != chains {
                 let why = format!("`{}` does not use it, `{other}` does", self.law.name());
-                return Err(source.unexpected(&format!("{KEY}.{key}"), why));
+                return Err(source.unexpected(&format!("{block}.{key}"), why));
             }
         }
-        let missing = |key: &str, why: &str| source.missing(&format!("{KEY}.{key}"), why);
+        let missing = |key: &str, why: &str| source.missing(&format!("{block}.{key}"), why);
         let wrong = |error: Error| match error {
             Error::Parameter { name, found, allowed } if chains || name == "stabilisation" => {
-                source.error(&format!("{KEY}.{}", name.replace(' ', "_")), plain(found), allowed)
+                source.error(&format!("{block}.{}", name.replace(' ', "_")), plain(found), allowed)
             }
             Error::Parameter { name, found, allowed } => {
-                source.error(&format!("{KEY}.constitutive"), format!("{name}: {}", plain(found)), allowed)
+                source.error(&format!("{block}.constitutive"), format!("{name}: {}", plain(found)), allowed)
             }
-            other => source.error(KEY, other, "a law with an energy, and without stress at rest"),
+            other => source.error(block, other, "a law with an energy, and without stress at rest"),
         };
         if chains {
             let shear = self
@@ -198,7 +201,7 @@ impl SolidLaw {
             }
             if space == Space::PlaneStress {
                 let allowed = "false: in plane stress the thickness is free to change";
-                return Err(source.error(&format!("{KEY}.pressure_filter"), "true", allowed));
+                return Err(source.error(&format!("{block}.pressure_filter"), "true", allowed));
             }
             return Ok(Arc::new(network.filtered().map_err(wrong)?));
         }
@@ -206,11 +209,11 @@ impl SolidLaw {
             let why = "needed for `correspondence`: `model`, `parameters` and `bulk_modulus`, or `learnt`";
             missing("constitutive", why)
         })?;
-        let (key, stabilisation) = (format!("{KEY}.constitutive"), self.stabilisation.unwrap_or(1.0));
+        let (key, stabilisation) = (format!("{block}.constitutive"), self.stabilisation.unwrap_or(1.0));
         let Some(learnt) = spec.learnt(source, &key)? else {
             let law = spec.law(source, &key)?;
             if self.has_state() {
-                return self.with_state(source, space, law, driving);
+                return self.with_state(source, block, space, law, driving);
             }
             return Ok(Arc::new(Correspondence::stabilised(law, space, stabilisation).map_err(wrong)?));
         };
@@ -223,7 +226,7 @@ impl SolidLaw {
             return Err(source.error(&format!("{key}.learnt"), "a law with `softening`", allowed));
         }
         if self.has_state() {
-            return self.with_state(source, space, learnt, driving);
+            return self.with_state(source, block, space, learnt, driving);
         }
         Ok(Arc::new(Correspondence::stabilised(learnt, space, stabilisation).map_err(wrong)?))
     }
@@ -233,7 +236,7 @@ impl SolidLaw {
 ///
 /// # Errors
 /// A key of bond laws, or a block that the law does not take.
-pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<(), SceneError> {
+pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let material = &scene.material;
     for (key, given) in [
         ("youngs_modulus", material.youngs_modulus.is_some()),
@@ -244,7 +247,6 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         ("calibration", material.calibration != Calibration::default()),
         ("volume_correction", material.volume_correction != VolumeCorrection::default()),
         ("surface_correction", material.surface_correction != SurfaceCorrection::default()),
-        ("inclusions", !material.inclusions.is_empty()),
         ("fields", !material.fields.is_empty()),
     ] {
         if given {
@@ -253,7 +255,8 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         }
     }
     if let Some(critical) = &material.critical {
-        if critical.driving.is_some() && (solid.branch.is_empty() || critical.fracture_energy.is_none()) {
+        let relaxes = scene.solids().any(|(_, own)| !own.branch.is_empty());
+        if critical.driving.is_some() && !(relaxes && critical.fracture_energy.is_some()) {
             let why = "needs `fracture_energy` beside it, and a solid with `branch`";
             return Err(source.unexpected("material.critical.driving", why));
         }
@@ -266,10 +269,8 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         }
         check_limit(source, "material.critical", critical)?;
     }
-    let planes = scene.is_beside_surfaces();
-    if solid.pressure_filter == Some(true) && scene.body.points.is_some() {
-        let allowed = "false: points of a cloud have no nearest neighbours";
-        return Err(source.error(&format!("{KEY}.pressure_filter"), "true", allowed));
+    if scene.body.space != Space::Solid {
+        positive(source, "body.thickness", scene.body.thickness.map_or(1.0, |t| t.si()), "m")?;
     }
     let other = scene
         .stress
@@ -280,14 +281,18 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         let allowed = "`constitutive`, the stress of the law itself";
         return Err(source.error(&format!("stress.measures[{index}]"), "a measure of bond forces", allowed));
     }
-    let driving = scene.driving();
-    match scene.body.space {
-        Space::Solid => solid.build::<3>(source, Space::Solid, planes, driving).map(|_| ()),
-        plane => {
-            positive(source, "body.thickness", scene.body.thickness.map_or(1.0, |t| t.si()), "m")?;
-            solid.build::<2>(source, plane, planes, driving).map(|_| ())
+    let (space, planes, driving) = (scene.body.space, scene.is_beside_surfaces(), scene.driving());
+    for (key, own) in scene.solids() {
+        if own.pressure_filter == Some(true) && scene.body.points.is_some() {
+            let allowed = "false: points of a cloud have no nearest neighbours";
+            return Err(source.error(&format!("{key}.pressure_filter"), "true", allowed));
+        }
+        match space {
+            Space::Solid => own.build::<3>(source, &key, space, planes, driving).map(|_| ())?,
+            _ => own.build::<2>(source, &key, space, planes, driving).map(|_| ())?,
         }
     }
+    super::part_solid::check(source, scene)
 }
 
 /// Checks a limit of bonds of a solid.

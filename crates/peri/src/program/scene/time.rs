@@ -106,7 +106,7 @@ impl Scene {
 /// # Errors
 /// A [`SceneError`] that names the key, the value found and what is allowed.
 pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
-    let remembers = scene.material.solid.as_ref().is_some_and(|solid| solid.has_state());
+    let remembers = scene.remembers();
     let Some(time) = &scene.time else {
         if remembers && scene.dynamics.is_none() {
             let why =
