@@ -10,8 +10,8 @@ use crate::parallel;
 use rayon::prelude::*;
 
 /// The symmetric average b = 1 + (A − D)/(2·dimension + 1) of the particles of a lattice, with A = 1 between
-/// nearest neighbours of one law whose bond is intact and D its sums over rows: rows of b sum to 1, and no entry is
-/// negative.
+/// nearest neighbours of one law whose bond is intact and D its sums over rows: rows of b sum to 1, and no
+/// entry is negative.
 #[derive(Default)]
 pub(super) struct Filter {
     /// Neighbours of each site; `u32::MAX`: none.

@@ -19,8 +19,8 @@ fn mixed<const D: usize>(laws: [AnyLaw<D>; 3], bonds: &dyn Bonds<D>) -> Nonlocal
     NonlocalSolid::new(rest).with_parts(vec![one, other], (0..bonds.sites()).map(number).collect()).unwrap()
 }
 
-/// Forces are derivatives of the energy, and the stiffness has its bound, with three laws in every family, one
-/// of them with filtered pressures.
+/// Forces are derivatives of the energy, and the stiffness has its bound, with three laws in every family,
+/// one of them with filtered pressures.
 #[test]
 fn solids_of_parts_pass_the_battery() {
     fn laws<const D: usize>(space: Space) -> [AnyLaw<D>; 3] {
@@ -81,12 +81,12 @@ fields = false
 fn block(shear: f64, branch: bool) -> String {
     let bulk = 5.0 * shear;
     let own = format!(
-        "law = \"correspondence\", constitutive = {{ model = \"neo-hookean\", parameters = {{ shear_modulus = \
-         \"{shear} MPa\" }}, bulk_modulus = \"{bulk} MPa\" }}"
+        "law = \"correspondence\", constitutive = {{ model = \"neo-hookean\", parameters = {{ \
+         shear_modulus = \"{shear} MPa\" }}, bulk_modulus = \"{bulk} MPa\" }}"
     );
     let relaxing = format!(
-        ", branch = [{{ spring = \"neo-hookean\", viscosity = \"constant\", parameters = {{ nu = \"{shear} MPa\", \
-         eta = \"{shear} MPa s\" }} }}]"
+        ", branch = [{{ spring = \"neo-hookean\", viscosity = \"constant\", parameters = {{ \
+         nu = \"{shear} MPa\", eta = \"{shear} MPa s\" }} }}]"
     );
     format!("{{ {own}{} }}", if branch { &relaxing } else { "" })
 }
@@ -116,7 +116,7 @@ fn a_part_with_branches_relaxes_to_its_equilibrium() {
     let elastic = stored(&halves(&block(0.4, false), &block(4.0, false), ""));
     for (name, soft, stiff) in [("soft", true, false), ("stiff", false, true)] {
         let relaxed = stored(&halves(&block(0.4, soft), &block(4.0, stiff), hold));
-        // a tenth of the branch's stabilisation lasts, on the part of the deformation that no gradient describes
+        // a tenth of the branch's stabilisation lasts, on what no gradient describes
         at_most(&format!("relaxed_{name}_part"), (relaxed / elastic - 1.0).abs(), 1e-3);
     }
 }
