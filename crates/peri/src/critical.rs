@@ -206,7 +206,7 @@ impl Critical {
                          energy break at {limit:.4e} J/m³"
                     ))
                 })?;
-                Ok(Criterion::Softening(softening))
+                Ok(softening.into())
             }
         }
     }
@@ -245,6 +245,18 @@ impl Critical {
             ratio = next;
         }
         Err(fault("a lower strength: no softening was found that has it".to_owned()))
+    }
+
+    /// λ₀ and the critical bond stretch λ_f; with a strength it sets the softening of the context.
+    ///
+    /// # Errors
+    /// As [`Self::softening`] and [`Self::resolve`].
+    pub fn softened(&self, context: &mut Context) -> Result<[f64; 2], Error> {
+        if self.strength.is_some() {
+            context.softening = self.softening(context)?;
+        }
+        let end = self.resolve(context)?;
+        Ok([context.softening.onset(end), end])
     }
 
     /// Computes the critical bond stretch.

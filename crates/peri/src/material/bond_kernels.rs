@@ -111,8 +111,8 @@ impl<const D: usize> SolverMaterial<D> for BondKernels<'_> {
     }
 
     fn prepare(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
-        if let Some(((softening, end), fit)) = self.material.soft.as_ref().zip(self.laws[0].fit.as_ref()) {
-            self.lacking = SofteningLoss::new(&self.material, (*softening, end), fit, bonds, displacement);
+        if let Some((soft, fit)) = self.material.soft.as_ref().zip(self.laws[0].fit.as_ref()) {
+            self.lacking = SofteningLoss::new(&self.material, soft, fit, bonds, displacement);
         }
     }
 
@@ -156,9 +156,11 @@ impl<const D: usize> SolverMaterial<D> for BondKernels<'_> {
         self.laws.iter_mut().for_each(|law| law.sample_energies(observed));
         let modulus = self.material.modulus();
         let Some(table) = self.laws[0].energies() else { return 0.0 };
-        let lacking = self.material.soft.as_ref().map(|(softening, end)| {
-            modulus * lacking_energy(&self.material, (*softening, end), table, bonds, displacement)
-        });
+        let lacking = self
+            .material
+            .soft
+            .as_ref()
+            .map(|soft| modulus * lacking_energy(&self.material, soft, table, bonds, displacement));
         if self.laws.len() == 1
             && let Some(sum) = bonds.energy_sum(displacement, table)
         {
@@ -202,8 +204,9 @@ impl<const D: usize> SolverMaterial<D> for BondKernels<'_> {
         let energy = |bond: &Overstretched| {
             let stretch = (1.0 + bond.elongation).sqrt();
             let (site, other) = (bond.site as usize, || bonds.bond(bond.site as usize, bond.index).site);
-            if let Some((softening, end)) = &material.soft {
-                let energy = softening.energy(material.law(), stretch, end.weaker(site, other()));
+            if let Some(soft) = &material.soft {
+                let (softening, end) = soft.of_bond(site, other());
+                let energy = softening.energy(material.law(), stretch, end);
                 return bonds.volume(site) * bond.weight * bond.length * energy;
             }
             let of = |law: &dyn BondPotential| {

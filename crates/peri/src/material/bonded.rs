@@ -1,6 +1,7 @@
 //! Bond laws as materials without a state of a particle: one law, or one for each part of a body.
 
 use super::bond_kernels::BondKernels;
+use super::softened::BodySoftening;
 use super::{Bond, Family, Material, SolverMaterial};
 use crate::bonds::{BodyGeometry, Bonds, LawShares, Property};
 use crate::error::Error;
@@ -12,8 +13,8 @@ use std::sync::Arc;
 pub struct BondMaterial<'a> {
     law: Arc<dyn BondPotential + 'a>,
     modulus: f64,
-    /// Bonds that soften before they break, and their λ_f.
-    pub(super) soft: Option<(BondSoftening, Property)>,
+    /// Bonds that soften before they break.
+    pub(super) soft: Option<BodySoftening>,
     /// Laws of parts of the body, and the particles of all laws.
     parts: Option<(Vec<PartLaw<'a>>, Arc<LawShares>)>,
 }
@@ -33,12 +34,18 @@ impl<'a> BondMaterial<'a> {
         Self { law: Arc::new(law), modulus, soft: None, parts: None }
     }
 
-    /// Makes bonds soften to zero load at a stretch λ_f, that of the weaker of their ends.
+    /// Makes bonds soften to zero load at a stretch λ_f, that of the weaker of their ends; `onset` is the λ₀
+    /// of each if they soften by several e_f.
     ///
     /// # Errors
     /// [`Error::Geometry`] for several laws.
-    pub fn softening(self, softening: BondSoftening, end: Property) -> Result<Self, Error> {
-        Self { soft: Some((softening, end)), ..self }.checked()
+    pub fn softening(
+        self,
+        law: BondSoftening,
+        end: Property,
+        onset: Option<Property>,
+    ) -> Result<Self, Error> {
+        Self { soft: Some(BodySoftening { law, end, onset }), ..self }.checked()
     }
 
     /// Refuses bonds that soften beside laws of parts.
@@ -131,8 +138,9 @@ impl<const D: usize> Material<D> for BondMaterial<'_> {
         let strain = bond.strain();
         let tension = self.mean(bond.from, bond.to, |law| law.tension_at_strain(strain));
         let mut size = self.scale(bond) * tension;
-        if let Some((softening, end)) = &self.soft {
-            size *= softening.integrity(bond.stretch(), end.weaker(bond.from, bond.to));
+        if let Some(soft) = &self.soft {
+            let (softening, end) = soft.of_bond(bond.from, bond.to);
+            size *= softening.integrity(bond.stretch(), end);
         }
         bond.direction().map(|x| size * x)
     }
@@ -141,8 +149,9 @@ impl<const D: usize> Material<D> for BondMaterial<'_> {
     fn energy(&self, family: &Family<D>, (): &()) -> f64 {
         let energy = |bond: &Bond<D>| match &self.soft {
             None => self.mean(bond.from, bond.to, |law| law.energy(bond.stretch())),
-            Some((softening, end)) => {
-                softening.energy(&*self.law, bond.stretch(), end.weaker(bond.from, bond.to))
+            Some(soft) => {
+                let (softening, end) = soft.of_bond(bond.from, bond.to);
+                softening.energy(&*self.law, bond.stretch(), end)
             }
         };
         self.modulus * family.sum(|bond| bond.weight * bond.length * energy(&bond))

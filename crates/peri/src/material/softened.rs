@@ -7,25 +7,49 @@ use crate::field::{CHUNK, Field, chunk_range};
 use crate::parallel;
 use crate::potential::{BondSoftening, EnergyTable, KernelFit};
 
+/// Softening of the bonds of a body.
+#[derive(Clone)]
+pub(super) struct BodySoftening {
+    pub law: BondSoftening,
+    /// λ_f.
+    pub end: Property,
+    /// λ₀ of bonds that soften by another e_f than that of `law`; `None`: there are none.
+    pub onset: Option<Property>,
+}
+
+impl BodySoftening {
+    /// Softening of a bond, by its sites, with its λ_f.
+    pub fn of_bond(&self, from: usize, to: usize) -> (BondSoftening, f64) {
+        let end = self.end.weaker(from, to);
+        let Some(onset) = self.onset.as_ref().filter(|_| end.is_finite()) else { return (self.law, end) };
+        let ductility = (end - 1.0) / (onset.weaker(from, to) - 1.0);
+        (BondSoftening { ductility, ..self.law }, end)
+    }
+
+    fn least_onset(&self) -> f64 {
+        self.onset.as_ref().map_or_else(|| self.law.onset(self.end.least()), Property::least)
+    }
+}
+
 /// Softened bonds of a displacement, by work items: site, and the force density lost by its bonds, N/m³ (to
 /// be added).
 #[derive(Default)]
 pub(super) struct SofteningLoss(Vec<Vec<(u32, [f64; 3])>>);
 
-/// Visits the bonds beyond the onset that a work item finds, with their stretch and λ_f; all items together
+/// Visits the bonds beyond the onset that a work item finds, with their softening and λ_f; all items together
 /// find each bond from both ends.
 fn each<const D: usize>(
-    (softening, end): (BondSoftening, &Property),
+    softening: &BodySoftening,
     bonds: &dyn BondForces<D>,
     displacement: &Field<D>,
     chunk: usize,
-    visit: &mut dyn FnMut(&Bond<D>, f64),
+    visit: &mut dyn FnMut(&Bond<D>, (BondSoftening, f64)),
 ) {
-    let least = softening.onset(end.least()).powi(2) - 1.0;
+    let least = softening.least_onset().powi(2) - 1.0;
     let sites = chunk_range(chunk, bonds.sites());
     for [site, index] in bonds.suspects(displacement, sites, least * (1.0 - 1e-9) - 1e-12) {
         let bond = Bond::new(site as usize, &bonds.bond(site as usize, index), displacement);
-        visit(&bond, end.weaker(bond.from, bond.to));
+        visit(&bond, softening.of_bond(bond.from, bond.to));
     }
 }
 
@@ -33,15 +57,15 @@ impl SofteningLoss {
     /// Collects the losses of a displacement, with the fit of the kernels.
     pub fn new<const D: usize>(
         material: &BondMaterial,
-        soft: (BondSoftening, &Property),
+        soft: &BodySoftening,
         fit: &KernelFit,
         bonds: &dyn BondForces<D>,
         displacement: &Field<D>,
     ) -> Self {
-        let (law, modulus, softening) = (material.law(), material.modulus(), soft.0);
+        let (law, modulus) = (material.law(), material.modulus());
         let of = |chunk: usize| {
             let mut found: Vec<(u32, [f64; 3])> = Vec::new();
-            each(soft, bonds, displacement, chunk, &mut |bond, end| {
+            each(soft, bonds, displacement, chunk, &mut |bond, (softening, end)| {
                 let stretch = bond.stretch();
                 let borne = softening.integrity(stretch, end);
                 if borne < 1.0 {
@@ -77,15 +101,15 @@ impl SofteningLoss {
 /// Energy lost by softened bonds relative to `table`, over kθ.
 pub(super) fn lacking_energy<const D: usize>(
     material: &BondMaterial,
-    soft: (BondSoftening, &Property),
+    soft: &BodySoftening,
     table: &EnergyTable,
     bonds: &dyn BondForces<D>,
     displacement: &Field<D>,
 ) -> f64 {
-    let (law, softening) = (material.law(), soft.0);
+    let law = material.law();
     let of = |chunk: usize| {
         let mut sum = 0.0;
-        each(soft, bonds, displacement, chunk, &mut |bond, end| {
+        each(soft, bonds, displacement, chunk, &mut |bond, (softening, end)| {
             let stretch = bond.stretch();
             if softening.integrity(stretch, end) < 1.0 {
                 let more = softening.energy(law, stretch, end) - table.value(bond.elongation());

@@ -125,7 +125,7 @@ impl<const D: usize> IntoMaterial<D> for Rubber {
         let material = BondMaterial::new(law, modulus);
         let soft = self.critical.and_then(|own| own.convention) == Some(Convention::Softening);
         match critical.filter(|_| soft) {
-            Some(end) => Ok((material.softening(softening, end.into())?, critical)),
+            Some(end) => Ok((material.softening(softening, end.into(), None)?, critical)),
             None => Ok((material, critical)),
         }
     }

@@ -15,9 +15,10 @@ use crate::potential::StretchRange;
 const SOFTENING_LAG: f64 = 0.01;
 
 /// Applies softening to bonds beyond the onset, each given with the energy that its breaking would release:
-/// returns those that break, and all softened bonds; `None` if no integrity falls by more than `lag`.
+/// returns those that break, and all softened bonds; `None` if no integrity falls by more than `lag`. `law`
+/// is that of a bond.
 fn soften(
-    law: Bilinear,
+    law: impl Fn(&Overstretched) -> Bilinear,
     soft: &[Softened],
     found: Vec<(Overstretched, f64)>,
     lag: f64,
@@ -29,7 +30,7 @@ fn soften(
         if known.is_some_and(|at| energy <= soft[at].greatest) {
             continue;
         }
-        let integrity = law.integrity(energy);
+        let integrity = law(&bond).integrity(energy);
         fall = fall.max(before - integrity);
         if integrity <= 0.0 {
             list.push(bond);
@@ -67,11 +68,16 @@ impl<const D: usize> System<'_, D> {
     pub fn break_bonds(&mut self, state: &mut State<D>) -> Vec<u32> {
         let mut softened = None;
         let list = match self.breaking.as_ref().map(|breaking| &breaking.criterion) {
-            Some(&Criterion::Softening(law)) => {
+            Some(Criterion::Softening { onset, limit }) => {
                 let bound = self.loads.bound();
                 let free = |site: usize| bound.get(site).is_none_or(|bits| *bits == 0);
-                let (bonds, onset) = (&*self.bonds, law.onset.into());
-                let found = self.material.overloaded(bonds, &state.displacement, &onset, &free);
+                let bonds = &*self.bonds;
+                let found = self.material.overloaded(bonds, &state.displacement, onset, &free);
+                let law = |bond: &Overstretched| {
+                    let site = bond.site as usize;
+                    let other = bonds.bond(site, bond.index).site;
+                    Bilinear { onset: onset.weaker(site, other), limit: limit.weaker(site, other) }
+                };
                 // in dynamics forces follow at once
                 let lag = if state.motion.begun { 0.0 } else { SOFTENING_LAG };
                 let changed = soften(law, &state.fracture.softened, found, lag);

@@ -23,8 +23,13 @@ pub enum Criterion {
     /// [`crate::material::Material::released_energy`]. Bonds of constrained particles do not break: grips do
     /// not tear.
     Energy(Property),
-    /// The same for bonds with a strength: they soften before they break.
-    Softening(Bilinear),
+    /// The same for bonds with a strength: they soften before they break, by the [`Bilinear`] law of these.
+    Softening {
+        /// Y₀, at which bonds begin to soften, J/m³.
+        onset: Property,
+        /// Y_c, J/m³.
+        limit: Property,
+    },
 }
 
 /// Softening of a bond, with energies over its share of the family, J/m³: with the greatest energy κ that its
@@ -58,6 +63,12 @@ impl Bilinear {
     }
 }
 
+impl From<Bilinear> for Criterion {
+    fn from(law: Bilinear) -> Self {
+        Self::Softening { onset: law.onset.into(), limit: law.limit.into() }
+    }
+}
+
 impl From<Property> for Criterion {
     fn from(stretch: Property) -> Self {
         Self::Stretch(stretch)
@@ -74,8 +85,15 @@ impl Criterion {
     /// Least limit of any bond: a stretch, or an energy, J/m³.
     pub fn least(&self) -> f64 {
         match self {
-            Self::Stretch(limits) | Self::Energy(limits) => limits.least(),
-            Self::Softening(law) => law.limit,
+            Self::Stretch(limit) | Self::Energy(limit) | Self::Softening { limit, .. } => limit.least(),
+        }
+    }
+
+    /// Least energy at which any bond begins to soften, J/m³; without softening the least limit.
+    pub fn onset(&self) -> f64 {
+        match self {
+            Self::Softening { onset, .. } => onset.least(),
+            _ => self.least(),
         }
     }
 
@@ -83,7 +101,7 @@ impl Criterion {
     pub fn least_stretch(&self) -> f64 {
         match self {
             Self::Stretch(stretch) => stretch.least(),
-            Self::Energy(_) | Self::Softening(_) => 1.0,
+            Self::Energy(_) | Self::Softening { .. } => 1.0,
         }
     }
 
@@ -91,7 +109,7 @@ impl Criterion {
     pub fn greatest_stretch(&self) -> f64 {
         match self {
             Self::Stretch(stretch) => stretch.greatest(),
-            Self::Energy(_) | Self::Softening(_) => f64::INFINITY,
+            Self::Energy(_) | Self::Softening { .. } => f64::INFINITY,
         }
     }
 

@@ -98,7 +98,7 @@ pub fn refuse_in_searches<const D: usize>(system: &System<D>) -> Result<(), Erro
 pub fn refuse<const D: usize>(system: &System<D>) -> Result<(), Error> {
     let softens = matches!(
         system.breaking.as_ref().map(|breaking| &breaking.criterion),
-        Some(Criterion::Energy(_) | Criterion::Softening(_))
+        Some(Criterion::Energy(_) | Criterion::Softening { .. })
     );
     let what = [
         (system.bonds.as_lattice().is_none(), "a body of points"),

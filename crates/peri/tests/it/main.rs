@@ -8,6 +8,7 @@ mod assembly;
 mod balance;
 mod bodies;
 mod clouds;
+mod cohesive;
 mod composites;
 mod contact;
 mod cracks;

@@ -176,7 +176,7 @@ fn strip(rows: usize, ductility: f64, weak: f64) -> f64 {
     }
     let factors: Vec<f64> = (0..60).map(|k| 0.7 + 0.005 * f64::from(k)).collect();
     let mut system = System::new(bonds, solid, &loads, &factors);
-    system.breaking = Some(Breaking { criterion: Criterion::Softening(law), policy: Policy::AtEquilibrium });
+    system.breaking = Some(Breaking { criterion: law.into(), policy: Policy::AtEquilibrium });
     system.stop_below = 0.7;
     let method = Lbfgs { tolerance: 1e-5, ..Default::default() };
     method.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
@@ -223,7 +223,7 @@ fn tear(moving: bool, start: Option<&State<2>>, saved: &mut Vec<State<2>>) -> St
     let mut state = start.cloned().unwrap_or_else(|| State::new(bonds.sites()));
     let factors: Vec<f64> = (1..=20).map(|k| 0.05 * f64::from(k)).collect();
     let mut system = System::new(bonds, solid, &loads, &factors);
-    system.breaking = Some(Breaking { criterion: Criterion::Softening(law), policy: Policy::AtEquilibrium });
+    system.breaking = Some(Breaking { criterion: law.into(), policy: Policy::AtEquilibrium });
     system.stop_below = 0.1;
     let mut seen = 0;
     let mut watch = |status: &Status, state: &State<2>| {

@@ -209,7 +209,8 @@ fn forces_of_soft_bonds_are_slopes() {
         CloudBonds::new(&points, &vec![0.5; points.len()], 0.5, 3.015, VolumeCorrection::None, &[]).unwrap();
     for mut bonds in [Box::new(lattice) as Box<dyn Bonds<2>>, Box::new(cloud)] {
         let law = Law::Linear.build(0.0, 0.0, false).unwrap();
-        let material = BondMaterial::new(law, 2.0).softening(BondSoftening::default(), 1.06.into()).unwrap();
+        let material =
+            BondMaterial::new(law, 2.0).softening(BondSoftening::default(), 1.06.into(), None).unwrap();
         let mut response = material.respond(&*bonds);
         let mut displacement = Field::<2>::zeros(bonds.sites());
         let sites: Vec<usize> = bonds.particles().iter().map(|&site| site as usize).collect();

@@ -112,15 +112,20 @@ impl<const D: usize> BodyWithMaterial<D> {
             let (solid, inclusions) = scene::solid_of_parts(source, scene, body)?;
             let limit = |critical: Critical| critical.solid_criterion(&**solid.law(), &*body.bonds);
             let least = |critical, _| limit(critical).map(|own| own.least());
-            let each = |rest: Property| {
+            let first = |critical, _| limit(critical).map(|own| own.onset());
+            let each = |rest: Property, own: &dyn Fn(Critical, f64) -> Result<f64, Error>| {
                 let rest = if spec.critical.is_some() { rest.least() } else { f64::INFINITY };
-                let limits = inclusions.limits(source, &*body.bonds, rest, &least)?;
-                scene::limits_of_bonds(source, scene, body, limits, &1.0.into(), &least)
+                let limits = inclusions.limits(source, &*body.bonds, rest, own)?;
+                scene::limits_of_bonds(source, scene, body, limits, &1.0.into(), own)
             };
             let criterion = match scene.limits().next().map(limit).transpose().map_err(fault)? {
-                Some(Criterion::Stretch(rest)) => Some(Criterion::Stretch(each(rest)?)),
-                Some(Criterion::Energy(rest)) => Some(Criterion::Energy(each(rest)?)),
-                other => other,
+                Some(Criterion::Stretch(rest)) => Some(Criterion::Stretch(each(rest, &least)?)),
+                Some(Criterion::Energy(rest)) => Some(Criterion::Energy(each(rest, &least)?)),
+                Some(Criterion::Softening { onset, limit }) => {
+                    let onset = each(onset, &first)?;
+                    Some(Criterion::Softening { onset, limit: each(limit, &least)? })
+                }
+                None => None,
             };
             // of force scale and preconditioner: forces of solids have no factors
             let moduli = scene::relative_moduli(&solid, &*body.bonds);
@@ -158,7 +163,7 @@ impl<const D: usize> BodyWithMaterial<D> {
             Context { law: &*law, links, space, modulus, horizon, thickness, crossing, convention, softening }
         };
         let (mut criterion, mut toughness): (Option<Criterion>, _) = (None, None);
-        let mut softening = BondSoftening::default();
+        let (mut softening, mut onset) = (BondSoftening::default(), None);
         if let Some(crossing) = crossing {
             let mut stretch = f64::INFINITY;
             if let Some(critical) = &spec.critical {
@@ -168,16 +173,30 @@ impl<const D: usize> BodyWithMaterial<D> {
                 softening = rest.softening;
                 toughness = Some(Toughness::new(critical, &rest, stretch));
             }
-            let own = |critical: Critical, stiffness| critical.resolve(&context(stiffness, crossing));
-            let limits = inclusions.limits(source, &*body.bonds, stretch, &own)?;
+            let kink = spec.critical.and_then(|critical| critical.kink);
+            let own = |critical: Critical, stiffness| {
+                let mut context = context(stiffness, crossing);
+                context.softening.kink = kink;
+                Critical { kink, ..critical }.softened(&mut context)
+            };
+            let end = |critical: Critical, stiffness| own(critical, stiffness).map(|[_, end]| end);
+            let limits = inclusions.limits(source, &*body.bonds, stretch, &end)?;
             let stiffness = &inclusions.micromodulus;
-            criterion = Some(scene::limits_of_bonds(source, scene, body, limits, stiffness, &own)?.into());
+            let ends = scene::limits_of_bonds(source, scene, body, limits, stiffness, &end)?;
+            let strong = scene.limits().any(|limit| limit.strength.is_some());
+            if strong && scene.interface.iter().any(|one| one.critical.is_some()) {
+                let rest = if stretch.is_finite() { softening.onset(stretch) } else { stretch };
+                let start = |critical: Critical, stiffness| own(critical, stiffness).map(|[start, _]| start);
+                let starts = scene::limits_of_bonds(source, scene, body, rest.into(), stiffness, &start)?;
+                onset = Some(starts);
+            }
+            criterion = Some(ends.into());
         }
         let mut bonded = BondMaterial::new(law, modulus);
         if scene.softens()
             && let Some(Criterion::Stretch(end)) = &criterion
         {
-            bonded = bonded.softening(softening, end.clone())?;
+            bonded = bonded.softening(softening, end.clone(), onset)?;
         }
         if let Some((laws, shares)) = scene::laws_of_parts(scene, &*body.bonds, &inclusions)? {
             bonded = bonded.with_parts(laws, shares)?;

@@ -5,7 +5,7 @@ use super::variant::SceneVariant;
 use super::{Boundary, DiscreteBody, Scene, SolverMethod, SurfaceCorrection};
 use crate::bonds::VolumeCorrection;
 use crate::material::SolidPoint;
-use crate::solver::Criterion;
+use crate::solver::{Bilinear, Criterion};
 use harness::report::Named;
 use harness::scene::{SceneError, Source};
 
@@ -69,12 +69,15 @@ pub fn explain<const D: usize>(
         let limit = match criterion {
             Criterion::Stretch(stretch) => format!("at a stretch of {:.6}", stretch.least()),
             Criterion::Energy(limit) => format!("when they release more than {:.4e} J/m³", limit.least()),
-            Criterion::Softening(law) => format!(
-                "when they have taken {:.4e} J/m³, and soften from {:.4e} J/m³ on (e_f = {:.3})",
-                law.limit,
-                law.onset,
-                law.ductility()
-            ),
+            Criterion::Softening { onset, limit } => {
+                let law = Bilinear { onset: onset.least(), limit: limit.least() };
+                format!(
+                    "when they have taken {:.4e} J/m³, and soften from {:.4e} J/m³ on (e_f = {:.3})",
+                    law.limit,
+                    law.onset,
+                    law.ductility()
+                )
+            }
         };
         builds(format!("bonds that break {limit}; damage of each particle"));
     }

@@ -1,7 +1,7 @@
 //! Interfaces between parts of a body, and particles whose bonds never break.
 
 use super::shapes::operations;
-use super::values::{DiscreteBody, ONE_OF_THEM, plain};
+use super::values::{DiscreteBody, ONE_OF_THEM, plain, positive};
 use super::{Scene, tearing};
 use crate::bonds::{Property, sever_pairs};
 use crate::critical::{Convention, Critical, ONE_OF};
@@ -60,14 +60,6 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         if !scene.breaks() {
             return Err(source.unexpected(key, "needs `material.critical`, or no bond breaks at all"));
         }
-        let strength = scene.material.critical.and_then(|critical| critical.strength);
-        if strength.is_some() && scene.material.solid.is_some() {
-            return Err(source.conflict(
-                key,
-                "material.critical.strength",
-                "bonds of one solid soften alike",
-            ));
-        }
     }
     for (index, interface) in scene.interface.iter().enumerate() {
         let key = format!("interface[{index}]");
@@ -116,20 +108,29 @@ pub(super) fn check_limit(
         };
     }
     super::solid::check_limit(source, key, critical)?;
-    if let Some(name) = [("strength", critical.strength.is_some()), ("driving", critical.driving.is_some())]
-        .iter()
-        .find_map(|(name, given)| given.then_some(name))
-    {
-        let why = "interfaces and parts of a `solid` take `stretch` or `fracture_energy` alone";
-        return Err(source.unexpected(&format!("{key}.{name}"), why));
+    if critical.driving.is_some() {
+        let why = "all bonds have that of `material.critical`";
+        return Err(source.unexpected(&format!("{key}.driving"), why));
     }
-    if scene.material.critical.is_some_and(|own| own.strength.is_some()) {
-        return Err(source.conflict(key, "material.critical.strength", "bonds of one solid soften alike"));
+    if let Some(strength) = critical.strength {
+        let key = format!("{key}.strength");
+        positive(source, &key, strength.si(), "Pa")?;
+        if critical.fracture_energy.is_none() {
+            return Err(source.unexpected(&key, "needs `fracture_energy` beside it"));
+        }
+        if scene.material.inclusions.iter().any(|part| part.solid.is_some()) {
+            let why = "the energy at a strength is that of one solid";
+            return Err(source.conflict(&key, "material.inclusions.solid", why));
+        }
     }
-    let energy = |critical: &Critical| critical.fracture_energy.is_some();
-    if scene.limits().any(|other| energy(&other) != energy(critical)) {
-        let found = if energy(critical) { "`fracture_energy`" } else { "`stretch`" };
-        return Err(source.error(key, found, "the same kind of limit as all other bonds of a `solid`"));
+    let kind = |critical: &Critical| match (critical.stretch, critical.strength) {
+        (Some(_), _) => "`stretch`",
+        (None, None) => "`fracture_energy`",
+        (None, Some(_)) => "`fracture_energy` with `strength`",
+    };
+    if scene.limits().any(|other| kind(&other) != kind(critical)) {
+        let allowed = "the same kind of limit as all other bonds of a `solid`";
+        return Err(source.error(key, kind(critical), allowed));
     }
     Ok(())
 }
@@ -290,7 +291,13 @@ pub(super) fn explain<const D: usize>(
             Some(Criterion::Energy(limits)) => {
                 format!("that break when they release more than {:.4e} J/m³", least(limits))
             }
-            _ => "that never break".to_owned(),
+            Some(Criterion::Softening { onset, limit }) => {
+                let (onset, limit) = (least(onset), least(limit));
+                format!(
+                    "that soften from {onset:.4e} J/m³ on and break when they have taken {limit:.4e} J/m³"
+                )
+            }
+            None => "that never break".to_owned(),
         };
         format!("an interface, {}: {} bonds {limit}", interface.name(), bonds.len())
     };

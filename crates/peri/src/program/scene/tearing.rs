@@ -117,12 +117,13 @@ fn strength(source: &Source, scene: &Scene, key: &str, critical: &Critical) -> R
     if material.law != Some(Law::Linear) {
         return Err(source.unexpected(&key, "only for `law = \"linear\"` or [material.solid]"));
     }
-    let has_limits = scene.interface.iter().any(|one| one.critical.is_some());
-    for (other, given) in [
-        ("fields", !material.fields.is_empty()),
-        ("inclusions", !material.inclusions.is_empty()),
-        ("interface", has_limits),
-    ] {
+    if critical.kink.is_some() && key.starts_with("interface") {
+        let key = key.replace(".strength", ".kink");
+        return Err(source.unexpected(&key, "bonds of one body have the kink of `material.critical`"));
+    }
+    for (other, given) in
+        [("fields", !material.fields.is_empty()), ("inclusions", !material.inclusions.is_empty())]
+    {
         if given {
             return Err(source.conflict(&key, other, "bonds of one body soften alike"));
         }
