@@ -56,5 +56,6 @@ mod surface;
 mod tearing;
 mod time_step;
 mod tractions;
+mod turning_steps;
 mod waves;
 mod work;

@@ -5,7 +5,9 @@ use super::{
     BodyForceSpec, Boundary, ContactSpec, CrackSpec, DeviceChoice, Dynamics, Prescribed, Scene, SolverMethod,
     SolverSpec,
 };
-use super::{TimeProgramSpec, common_amplitude, crack, loads::own_region_names};
+use super::loads::{name_of, own_region_names};
+use super::{TimeProgramSpec, common_amplitude, crack};
+use crate::solver::Rotation;
 use crate::bonds::Bonds;
 use crate::geometry::Cut;
 use harness::scene::{SceneError, Source};
@@ -136,6 +138,7 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     if let Some(contact) = &scene.contact {
         refuse_in_contact(source, contact)?;
     }
+    refuse_other_axes(source, scene)?;
     for index in 0..=scene.step.len() {
         let (source, scene) = (scene.source_of(source, index), scene.stage(index));
         if scene.solver.refine > 1 || scene.solver.snap_back {
@@ -184,14 +187,41 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                            end with it";
             return Err(source.error(&key, found, allowed));
         }
-        if let Some(at) = scene.boundary.iter().position(|boundary| boundary.rotation.is_some()) {
-            let why = "a rotation starts from the undeformed body: write it in the first step";
-            return Err(source.unexpected(&format!("boundary[{at}].rotation"), why));
-        }
         if scene.dynamics.as_ref().is_some_and(|dynamics| dynamics.device != DeviceChoice::Cpu) {
             return Err(source.error("dynamics.device", "a graphics card in a later step", "`cpu`"));
         }
         check_variant(&source, &scene)?;
+    }
+    Ok(())
+}
+
+/// Refuses a rotation of a region about another axis than that about which the step before has turned it.
+fn refuse_other_axes(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    let near = 1e-9 * scene.body.spacing.map_or(1e-3, |spacing| spacing.si());
+    let mut turned: Vec<(String, Rotation<3>)> = Vec::new();
+    for index in 0..=scene.step.len() {
+        let (source, scene) = (scene.source_of(source, index), scene.stage(index));
+        let mut now = Vec::new();
+        for (at, boundary) in scene.boundary.iter().enumerate() {
+            let name = name_of(at, boundary);
+            let before = turned.iter().find(|(own, _)| *own == name).map(|(_, rotation)| *rotation);
+            let Some(rotation) = &boundary.rotation else {
+                now.extend(before.filter(|_| boundary.held_in_place() != 0).map(|own| (name, own)));
+                continue;
+            };
+            let rotation = rotation.in_space();
+            let differs = |before: &Rotation<3>| !rotation.shares_axis(before, near);
+            if let Some(before) = before.filter(differs) {
+                let [point, axis] = [before.centre.map(|x| x * 1e3), before.axis].map(|x| format!("{x:?}"));
+                let found = format!("another axis than that of the step before, through {point} mm along {axis}");
+                let allowed = "the axis of the step before; another one once the region is turned back to 0°";
+                return Err(source.error(&format!("boundary[{at}].rotation"), found, allowed));
+            }
+            if rotation.angle != 0.0 {
+                now.push((name, rotation));
+            }
+        }
+        turned = now;
     }
     Ok(())
 }
