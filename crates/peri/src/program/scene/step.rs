@@ -38,8 +38,9 @@ pub struct StepSpec {
 /// Steps before a later one.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct EarlierSteps {
-    /// Their time, s.
+    /// Their time, s, and that of explicit dynamics among them.
     pub(super) time: f64,
+    pub(super) moving: f64,
     /// Load factor at the end of the first step, at which rigid surfaces without a curve stay.
     pub(super) factor: f64,
     /// True if any step of the scene is explicit dynamics.
@@ -78,10 +79,12 @@ impl Scene {
         scene.solver = solver.unwrap_or_default();
         scene.solver.method = scene.solver.method.or(explicit);
         (scene.body.cracks, scene.step, scene.later) = (cracks, Vec::new(), true);
-        let later = self.step[..index - 1].iter().map(|own| (&own.time, &own.dynamics));
-        let all = std::iter::once((&self.time, &self.dynamics)).chain(later);
-        let time = all.map(|(time, dynamics)| duration(time.as_ref(), dynamics.as_ref())).sum();
-        scene.earlier = EarlierSteps { time, factor: self.last_factor(), explicit: self.has_dynamics() };
+        let later = || self.step[..index - 1].iter().map(|own| (&own.time, &own.dynamics));
+        let all = || std::iter::once((&self.time, &self.dynamics)).chain(later());
+        let time = all().map(|(time, dynamics)| duration(time.as_ref(), dynamics.as_ref())).sum();
+        let moving = all().map(|(_, dynamics)| duration(None, dynamics.as_ref())).sum();
+        let (factor, explicit) = (self.last_factor(), self.has_dynamics());
+        scene.earlier = EarlierSteps { time, moving, factor, explicit };
         Cow::Owned(scene)
     }
 
@@ -136,7 +139,7 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         return Ok(());
     }
     if let Some(contact) = &scene.contact {
-        refuse_in_contact(source, contact)?;
+        refuse_in_contact(source, scene, contact)?;
     }
     refuse_other_axes(source, scene)?;
     for index in 0..=scene.step.len() {
@@ -227,22 +230,11 @@ fn refuse_other_axes(source: &Source, scene: &Scene) -> Result<(), SceneError> {
 }
 
 /// Refuses what rigid surfaces do not carry over to the next step.
-fn refuse_in_contact(source: &Source, contact: &ContactSpec) -> Result<(), SceneError> {
-    let planes = contact.plane.iter().enumerate();
-    let planes =
-        planes.map(|(index, own)| (format!("contact.plane[{index}]"), own.velocity.is_some(), false));
-    let indenters = contact.indenter.iter().enumerate().map(|(index, own)| {
-        (format!("contact.indenter[{index}]"), own.velocity.is_some(), own.force.is_some())
-    });
-    for (key, velocity, force) in planes.chain(indenters) {
-        if velocity {
-            let why = "with [[step]] a `displacement` and its `curve` over the time of all steps move it";
-            return Err(source.conflict(&format!("{key}.velocity"), "step", why));
-        }
-        if force {
-            let why = "with [[step]] a rigid surface moves by a `displacement`";
-            return Err(source.conflict(&format!("{key}.force"), "step", why));
-        }
+fn refuse_in_contact(source: &Source, scene: &Scene, contact: &ContactSpec) -> Result<(), SceneError> {
+    let pushed = contact.indenter.iter().position(|own| own.force.is_some());
+    if let Some(index) = pushed.filter(|_| scene.has_dynamics()) {
+        let why = "a step is explicit dynamics, in which an indenter has no mass: move it by `displacement`";
+        return Err(source.unexpected(&format!("contact.indenter[{index}].force"), why));
     }
     if contact.tied_grips == Some(true) {
         return Err(source.conflict("contact.tied_grips", "step", "each step holds regions of its own"));
