@@ -334,7 +334,8 @@ impl<const D: usize> System<'_, D> {
         let surfaces = self.contact.iter().flat_map(Contact::surfaces);
         let rigid: Vec<[f64; D]> = surfaces.map(|surface| surface.displacement_at(part)).collect();
         // in later steps both are magnitudes
-        let moved = self.loads.curved.as_ref().is_some_and(|curved| curved.begins_moved());
+        let moved = self.loads.curved.as_ref().is_some_and(|curved| curved.begins_moved())
+            || self.loads.turned.iter().any(|turned| turned.start.is_some());
         let [pull, way] =
             if moved { [0.0; 2] } else { self.loads.along_curves(&*self.bonds, part, &state.force) };
         let straight = self.loads.curved_reach(part, &rigid);

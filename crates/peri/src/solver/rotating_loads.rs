@@ -32,8 +32,7 @@ impl<const D: usize> Loads<D> {
                 let rate = if before == after {
                     turned.rate(number, place, [before, after], after)
                 } else {
-                    let [old, new] =
-                        [before, after].map(|factor| turned.displacement(number, place, factor));
+                    let [old, new] = [before, after].map(|factor| turned.displacement(number, place, factor));
                     std::array::from_fn(|d| (new[d] - old[d]) / (after - before))
                 };
                 turned.set(field, site, rate);
@@ -96,11 +95,7 @@ impl<const D: usize> Loads<D> {
 
     /// Longest arc of rotating particles against the others, m, by the angle of each region, rad; for regions
     /// rotating both ways, the sum of both.
-    pub(super) fn arc(
-        &self,
-        bonds: &dyn BodyGeometry<D>,
-        angle: impl Fn(&RotatingRegion<D>) -> f64,
-    ) -> f64 {
+    pub(super) fn arc(&self, bonds: &dyn BodyGeometry<D>, angle: impl Fn(&RotatingRegion<D>) -> f64) -> f64 {
         let span = |d: usize| {
             let angles = self.turned.iter().map(|turned| angle(turned) * turned.rotation.axis[d]);
             let (low, high) = angles.fold((0.0_f64, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
@@ -195,8 +190,7 @@ impl<const D: usize> Loads<D> {
                 let mut moves = shift.map(|x| increment * x);
                 if let Some(region) = turned {
                     let [(old_angle, old), (angle, new)] = [before, after].map(|at| region.turn_at(at));
-                    let from =
-                        std::array::from_fn(|d| place[d] + u[d] - region.rotation.centre[d] - old[d]);
+                    let from = std::array::from_fn(|d| place[d] + u[d] - region.rotation.centre[d] - old[d]);
                     let turn = region.rotation.turn(part * (angle - old_angle), from);
                     (0..D).for_each(|d| u[d] += turn[d]);
                     moves = std::array::from_fn(|d| new[d] - old[d]);

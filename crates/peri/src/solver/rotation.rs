@@ -17,7 +17,7 @@ pub struct Rotation<const D: usize> {
 
 impl<const D: usize> Rotation<D> {
     /// Part of a vector across the axis, and n × this part.
-    fn across(&self, from: [f64; D]) -> [[f64; D]; 2] {
+    pub(super) fn across(&self, from: [f64; D]) -> [[f64; D]; 2] {
         let n = self.axis;
         let r: [f64; 3] = std::array::from_fn(|d| from.get(d).copied().unwrap_or(0.0));
         let along: f64 = (0..3).map(|d| n[d] * r[d]).sum();

@@ -44,13 +44,7 @@ pub struct StepEnd<const D: usize> {
 impl<const D: usize> State<D> {
     /// Begins the next step, after one with this `end`, and severs the bonds across some cuts. Velocities stay
     /// if both steps are explicit dynamics (`moving`).
-    pub fn begin_stage(
-        &mut self,
-        bonds: &dyn Bonds<D>,
-        cuts: &[Cut<D>],
-        end: StepEnd<D>,
-        moving: bool,
-    ) {
+    pub fn begin_stage(&mut self, bonds: &dyn Bonds<D>, cuts: &[Cut<D>], end: StepEnd<D>, moving: bool) {
         self.stage = StepOrigin {
             finished: self.stage.finished + 1,
             time: self.history.last().map_or(0.0, |row| row.time),
@@ -141,7 +135,7 @@ impl<const D: usize> System<'_, D> {
         let turned = self.loads.turned_at_end(&*self.bonds, &state.stage, &state.displacement, factor);
         let factor = self.loads.force_factor(factor);
         let mut body_force = self.loads.body_force.clone();
-        for force in &mut body_force {
+        if let Some(force) = &mut body_force {
             for &site in self.bonds.particles() {
                 force.set(site as usize, force.get(site as usize).map(|x| factor * x));
             }

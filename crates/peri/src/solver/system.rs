@@ -137,7 +137,9 @@ impl<'a, const D: usize> System<'a, D> {
         match &state.contact.start {
             Some(start) => contact.balance(start),
             // a step of a programme begins with surfaces that earlier ones have pressed on the body
-            None if state.stage.finished > 0 && !state.control.predicted => contact.balance(&state.displacement),
+            None if state.stage.finished > 0 && !state.control.predicted => {
+                contact.balance(&state.displacement)
+            }
             None => {}
         }
     }

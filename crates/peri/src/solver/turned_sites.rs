@@ -42,7 +42,9 @@ impl<const D: usize> Rotation<D> {
         let [own, there] = [self.centre, other.centre].map(space);
         let across = |b: [f64; 3]| {
             let n = self.axis;
-            length::<3>(std::array::from_fn(|d| n[(d + 1) % 3] * b[(d + 2) % 3] - n[(d + 2) % 3] * b[(d + 1) % 3]))
+            length::<3>(std::array::from_fn(|d| {
+                n[(d + 1) % 3] * b[(d + 2) % 3] - n[(d + 2) % 3] * b[(d + 1) % 3]
+            }))
         };
         let apart = across(std::array::from_fn(|d| there[d] - own[d]));
         apart <= near && across(other.axis) <= ONE_AXIS
@@ -63,7 +65,10 @@ impl TurnedSites {
     fn title(&self) -> String {
         let point = self.centre.map(|x| format!("{:.4}", x * 1e3)).join(", ");
         let axis = self.axis.map(|x| format!("{x:.4}")).join(", ");
-        format!("turned by {:.4}° about the axis through ({point}) mm along ({axis})", self.angle.to_degrees())
+        format!(
+            "turned by {:.4}° about the axis through ({point}) mm along ({axis})",
+            self.angle.to_degrees()
+        )
     }
 }
 
@@ -167,10 +172,7 @@ enum Turned<const D: usize> {
 ///
 /// # Errors
 /// What is found and allowed, for motions that would distort the region.
-fn goes_on<const D: usize>(
-    region: &CurvedRegion<D>,
-    turned: &[TurnedSites],
-) -> Result<Turned<D>, String> {
+fn goes_on<const D: usize>(region: &CurvedRegion<D>, turned: &[TurnedSites]) -> Result<Turned<D>, String> {
     let shares = |own: &&TurnedSites| region.sites.iter().any(|site| own.sites.binary_search(site).is_ok());
     let Some(own) = turned.iter().find(shares) else { return Ok(Turned::Straight) };
     let has = |mask: u8, d: usize| mask >> d & 1 == 1;
@@ -181,7 +183,11 @@ fn goes_on<const D: usize>(
     let every = across().count();
     let whole = region.sites.iter().all(|site| own.sites.binary_search(site).is_ok());
     if set == 0 {
-        return Ok(if whole && held == every { Turned::Arc(own.rotation(own.angle)) } else { Turned::Straight });
+        return Ok(if whole && held == every {
+            Turned::Arc(own.rotation(own.angle))
+        } else {
+            Turned::Straight
+        });
     }
     let first = region.values.first().copied().unwrap_or([0.0; D]);
     let same = |value: &[f64; D]| (0..D).all(|d| !has(region.components, d) || value[d] == first[d]);
@@ -263,7 +269,11 @@ impl<const D: usize> Loads<D> {
                         .map(|d| (region.amplitudes[d].clone(), region.amplitudes.clone())),
                     components: region.components,
                     kept: region.kept,
-                    region: self.held_regions.iter().position(|own| *own == region.sites).unwrap_or(usize::MAX),
+                    region: self
+                        .held_regions
+                        .iter()
+                        .position(|own| *own == region.sites)
+                        .unwrap_or(usize::MAX),
                     sites: region.sites,
                     start: None,
                 }),
@@ -288,8 +298,8 @@ impl<const D: usize> Loads<D> {
                 };
                 angle = Some(about);
             }
-            let angle =
-                angle.unwrap_or_else(|| angle_of(bonds, displacement, (&region.sites, &region.rotation), 0.0));
+            let angle = angle
+                .unwrap_or_else(|| angle_of(bonds, displacement, (&region.sites, &region.rotation), 0.0));
             let begun = region.begin(bonds, displacement, angle, common);
             begun.map_err(|found| refused(&region.sites, found))?;
         }
@@ -300,7 +310,11 @@ impl<const D: usize> Loads<D> {
     ///
     /// # Errors
     /// [`Error::Geometry`] with the particle and the jump.
-    pub(super) fn refuse_jumps(&self, bonds: &dyn BodyGeometry<D>, origin: &StepOrigin<D>) -> Result<(), Error> {
+    pub(super) fn refuse_jumps(
+        &self,
+        bonds: &dyn BodyGeometry<D>,
+        origin: &StepOrigin<D>,
+    ) -> Result<(), Error> {
         let Some(before) = &origin.displacement else { return Ok(()) };
         let mut begun = before.clone();
         self.place_turned(bonds, 0.0, &mut begun);

@@ -1,15 +1,15 @@
 //! Steps of a programme in sequence: the scene's own blocks are the first, each `[[step]]` is a later one.
 
 use super::check::check_variant;
+use super::loads::{name_of, own_region_names};
 use super::{
     BodyForceSpec, Boundary, ContactSpec, CrackSpec, DeviceChoice, Dynamics, Prescribed, Scene, SolverMethod,
     SolverSpec,
 };
-use super::loads::{name_of, own_region_names};
 use super::{TimeProgramSpec, common_amplitude, crack};
-use crate::solver::Rotation;
 use crate::bonds::Bonds;
 use crate::geometry::Cut;
+use crate::solver::Rotation;
 use harness::scene::{SceneError, Source};
 use serde::Deserialize;
 use std::borrow::Cow;
@@ -216,7 +216,8 @@ fn refuse_other_axes(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             let differs = |before: &Rotation<3>| !rotation.shares_axis(before, near);
             if let Some(before) = before.filter(differs) {
                 let [point, axis] = [before.centre.map(|x| x * 1e3), before.axis].map(|x| format!("{x:?}"));
-                let found = format!("another axis than that of the step before, through {point} mm along {axis}");
+                let found =
+                    format!("another axis than that of the step before, through {point} mm along {axis}");
                 let allowed = "the axis of the step before; another one once the region is turned back to 0°";
                 return Err(source.error(&format!("boundary[{at}].rotation"), found, allowed));
             }
