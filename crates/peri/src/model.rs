@@ -188,7 +188,16 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
             let (shift, components, sites) = ([0.0; D], (1 << D) - 1, regions[number].0.clone());
             loads.turn(
                 &bonds,
-                RotatingRegion { rotation, shift, amplitudes: None, components, region, sites },
+                RotatingRegion {
+                    rotation,
+                    shift,
+                    amplitudes: None,
+                    components,
+                    kept: 0,
+                    region,
+                    sites,
+                    start: None,
+                },
             );
         }
         let contact = match (self.contact, self.surfaces.is_empty()) {

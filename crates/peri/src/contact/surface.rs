@@ -50,6 +50,8 @@ pub struct RigidSurface<const D: usize> {
     pub displacement: [f64; D],
     /// Velocity in explicit dynamics, m/s, in addition to the displacement.
     pub velocity: [f64; D],
+    /// Displacement by its velocity in earlier steps, m.
+    pub drift: [f64; D],
     /// Force on the rigid body at load factor 1, N, in equilibria: it moves along the force, from where it
     /// first touches the undeformed body, to where contact balances the force. `None`: moves by
     /// `displacement` and `velocity`.
@@ -73,6 +75,7 @@ impl<const D: usize> RigidSurface<D> {
             bonded: false,
             displacement: [0.0; D],
             velocity: [0.0; D],
+            drift: [0.0; D],
             force: None,
             amplitudes: None,
         }
@@ -157,9 +160,9 @@ impl<const D: usize> RigidSurface<D> {
     }
 
     /// Displacement at a load factor and a time, s, m, of a surface without a force.
-    pub(super) fn place_at(&self, factor: f64, time: f64) -> [f64; D] {
+    pub fn place_at(&self, factor: f64, time: f64) -> [f64; D] {
         let displacement = self.displacement_at(factor);
-        std::array::from_fn(|d| displacement[d] + time * self.velocity[d])
+        std::array::from_fn(|d| displacement[d] + time * self.velocity[d] + self.drift[d])
     }
 
     /// Multiple of the force at a load factor.

@@ -179,7 +179,8 @@ impl<const D: usize> Loads<D> {
     /// from the body at rest.
     pub(super) fn curved_reach(&self, part: f64, rigid: &[[f64; D]]) -> f64 {
         let regions = self.curved.iter().flat_map(|curved| &curved.held);
-        reach(regions.map(|region| (region.components, region.placed(part))), rigid)
+        let shifts = self.turned.iter().map(|turned| (turned.components, turned.turn_at(part).1));
+        reach(regions.map(|region| (region.components, region.placed(part))), shifts, rigid)
     }
 
     /// Relative prescribed displacement of regions at a multiple of 1, m, if all move by one multiple.
@@ -202,7 +203,7 @@ impl<const D: usize> Loads<D> {
         };
         let single = (1..=PROBED).all(|k| is_common(f64::from(k) / f64::from(PROBED)));
         let full = curved.held.iter().map(|region| (region.components, region.scaled([1.0; D])));
-        single.then(|| reach(full, &[])).filter(|reach| *reach > 0.0)
+        single.then(|| reach(full, std::iter::empty(), &[])).filter(|reach| *reach > 0.0)
     }
 
     /// Σ −F V·a and Σ u·a over the regions of prescribed displacement, with a the displacement at a multiple
@@ -269,12 +270,14 @@ impl<const D: usize> System<'_, D> {
         }
         self.set_rates(before, after);
         if !state.control.predicted {
+            self.set_arc_rates([before, after], before);
             if self.loads.follows() && state.control.pushed.is_none() {
                 self.set_forces(before, &state.displacement);
                 self.keep_forces(state);
             }
             self.set_mean_forces([before, after], &state.displacement);
             let (pull, push) = self.curved_conjugates(state);
+            self.set_rates(before, after);
             state.control.balanced = [before, pull, push];
             if self.refine > 1 && state.control.cuts == 0 {
                 state.control.start_force = Some(Box::new(state.force.clone()));
@@ -293,6 +296,7 @@ impl<const D: usize> System<'_, D> {
     pub(super) fn work_of_curves(&mut self, state: &mut State<D>, [before, after]: [f64; 2]) -> f64 {
         let [old_factor, old_pull, old_push] = state.control.balanced;
         let first = state.control.round == 0;
+        self.set_arc_rates([before, after], after);
         self.set_mean_forces(if first { [before, after] } else { [after; 2] }, &state.displacement);
         let (pull, push) = self.curved_conjugates(state);
         self.set_forces(after, &state.displacement);
@@ -306,9 +310,10 @@ impl<const D: usize> System<'_, D> {
 
     /// Load, N, and displacement, m, of a row of history with curves: the reaction of the regions of
     /// prescribed displacement and [`Loads::curved_reach`], both positive along the displacements at a
-    /// multiple of 1; where one curve moves all, its conjugate force. Where no region moves, the force and
-    /// the way of the rigid surface that moves or is pressed with the largest force; without one the applied
-    /// force and the mean displacement of its points along it.
+    /// multiple of 1; where one curve moves all, its conjugate force. Of regions that only rotate, the moment
+    /// over the largest radius, and the arc there; of regions that do both, the root of both squares. Where
+    /// no region moves, the force and the way of the rigid surface that moves or is pressed with the largest
+    /// force; without one the applied force and the mean displacement of its points along it.
     pub(super) fn curved_response(&self, state: &State<D>, part: f64) -> (f64, f64) {
         let held = self.loads.curved.iter().flat_map(|curved| &curved.held);
         let regions_move =
@@ -329,21 +334,34 @@ impl<const D: usize> System<'_, D> {
         let surfaces = self.contact.iter().flat_map(Contact::surfaces);
         let rigid: Vec<[f64; D]> = surfaces.map(|surface| surface.displacement_at(part)).collect();
         // in later steps both are magnitudes
-        let moved = self.loads.curved.as_ref().is_some_and(|curved| curved.begins_moved());
+        let moved = self.loads.curved.as_ref().is_some_and(|curved| curved.begins_moved())
+            || self.loads.turned.iter().any(|turned| turned.start.is_some());
         let [pull, way] =
             if moved { [0.0; 2] } else { self.loads.along_curves(&*self.bonds, part, &state.force) };
+        let straight = self.loads.curved_reach(part, &rigid);
+        if !self.loads.turned.is_empty() {
+            let bonds = &*self.bonds;
+            let arc = self.loads.arc(bonds, |turned| turned.turn_at(part).0);
+            let (turning, signs) = self.loads.turning_force(bonds, part, &state.force);
+            let [pull, way] = if moved { [0.0; 2] } else { [pull + signs[0], way + signs[1]] };
+            let moves = [0.0, 1.0].map(|at| self.loads.curved_reach(at, &rigid));
+            let pushed = moves.into_iter().any(|reach| reach > 0.0) || straight > 0.0;
+            let load = if pushed { length(force).hypot(turning) } else { turning };
+            return (along(load, pull), along(straight.hypot(arc), way));
+        }
         let load = match self.loads.common_reach().filter(|_| rigid.iter().all(|u| *u == [0.0; D])) {
             Some(reach) => pull / reach,
             None => along(length(force), pull),
         };
-        (load, along(self.loads.curved_reach(part, &rigid), way))
+        (load, along(straight, way))
     }
 }
 
-/// Relative displacement, m, of regions with the bits of their prescribed components and of rigid surfaces:
-/// √Σ_d (max − min)², counted from the body at rest.
+/// Relative displacement, m, of regions with the bits of their prescribed components, of the shifts of
+/// rotating ones, and of rigid surfaces: √Σ_d (max − min)², counted from the body at rest.
 fn reach<const D: usize>(
     regions: impl Iterator<Item = (u8, impl Iterator<Item = (usize, [f64; D])>)>,
+    shifts: impl Iterator<Item = (u8, [f64; D])>,
     rigid: &[[f64; D]],
 ) -> f64 {
     let mut span = [[0.0_f64; 2]; D];
@@ -351,13 +369,15 @@ fn reach<const D: usize>(
         let moved = rigid.iter().map(|displacement| displacement[d]);
         *span = moved.fold(*span, |[low, high], u| [low.min(u), high.max(u)]);
     }
-    for (components, values) in regions {
-        for (_, value) in values {
-            for d in (0..D).filter(|d| components >> d & 1 == 1) {
-                span[d] = [span[d][0].min(value[d]), span[d][1].max(value[d])];
-            }
+    let mut widen = |components: u8, value: [f64; D]| {
+        for d in (0..D).filter(|d| components >> d & 1 == 1) {
+            span[d] = [span[d][0].min(value[d]), span[d][1].max(value[d])];
         }
+    };
+    for (components, values) in regions {
+        values.for_each(|(_, value)| widen(components, value));
     }
+    shifts.for_each(|(components, shift)| widen(components, shift));
     span.iter().map(|[low, high]| (high - low).powi(2)).sum::<f64>().sqrt()
 }
 

@@ -178,7 +178,11 @@ impl<const D: usize> Loads<D> {
             high - low
         };
         let straight = (0..D).map(|d| span(d).powi(2)).sum::<f64>().sqrt();
-        if self.turned.is_empty() { straight } else { straight.hypot(self.arc(bonds)) }
+        if self.turned.is_empty() {
+            straight
+        } else {
+            straight.hypot(self.arc(bonds, |turned| turned.rotation.angle))
+        }
     }
 
     /// Total force at factor 1 along each axis, N, of the body force and of `pushes` on rigid surfaces: the

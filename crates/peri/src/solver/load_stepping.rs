@@ -205,10 +205,10 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
     let of_curves = system.loads.curved.as_ref().map(|_| system.loads.curved_predictor(&*system.bonds));
     let predictor = of_curves.as_ref().unwrap_or(predictor);
     let past = &state.control.past[state.control.past.len() - weights.len()..];
-    if !system.loads.turned.is_empty() {
+    let carried = system.loads.turns_between([at(1), factor]);
+    if carried {
         system.loads.carry(&*system.bonds, [at(1), factor], &mut state.displacement);
     }
-    let carried = !system.loads.turned.is_empty();
     let before = (!system.loads.rigid.is_empty()).then(|| state.displacement.clone());
     for &site in system.bonds.particles() {
         let site = site as usize;

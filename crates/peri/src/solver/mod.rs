@@ -49,6 +49,7 @@ mod stiffness_control;
 mod system;
 mod time_program;
 mod time_step;
+mod turned_sites;
 mod unsupported;
 mod verlet;
 #[cfg(feature = "gpu")]
@@ -77,10 +78,11 @@ pub use record::{Status, StepRecord};
 #[cfg(feature = "gpu")]
 pub use relaxation_device::CardRelaxation;
 pub use rigid::RigidRegion;
-pub use rotation::{RotatingRegion, Rotation};
-pub use stage::StepOrigin;
+pub use rotation::{RotatingRegion, Rotation, TurnStart};
+pub use stage::{StepEnd, StepOrigin};
 pub use state::{BodyStretches, Counts, ForceResiduals, State};
 pub use step_control::StepControl;
 pub use system::{LoadCurve, StateObserver, System};
+pub use turned_sites::TurnedSites;
 pub use unsupported::{ContactStops, Unsupported, find_unsupported};
 pub use verlet::{VelocityVerlet, ramped};

@@ -7,7 +7,9 @@ use super::motion::{DynamicEnergies, Motion};
 use super::state::State;
 use super::step_control::StepControl;
 use super::system::System;
-use crate::bonds::Bonds;
+use super::turned_sites::TurnedSites;
+use crate::bonds::{BodyGeometry, Bonds};
+use crate::error::Error;
 use crate::field::Field;
 use crate::geometry::Cut;
 use serde::{Deserialize, Serialize};
@@ -26,24 +28,30 @@ pub struct StepOrigin<const D: usize> {
     pub displacement: Option<Field<D>>,
     /// Body force density at the start, N/m³, if there was any.
     pub body_force: Option<Field<D>>,
+    /// Sites turned about an axis so far.
+    pub turned: Vec<TurnedSites>,
+}
+
+/// What a step leaves to the next one, beside the state.
+#[derive(Clone, Debug, Default)]
+pub struct StepEnd<const D: usize> {
+    /// Body force density, N/m³, if there is any.
+    pub body_force: Option<Field<D>>,
+    /// Sites turned about an axis so far.
+    pub turned: Vec<TurnedSites>,
 }
 
 impl<const D: usize> State<D> {
-    /// Begins the next step, after one that ended with `body_force`, N/m³, and severs the bonds across some
-    /// cuts. Velocities stay if both steps are explicit dynamics (`moving`).
-    pub fn begin_stage(
-        &mut self,
-        bonds: &dyn Bonds<D>,
-        cuts: &[Cut<D>],
-        body_force: Option<Field<D>>,
-        moving: bool,
-    ) {
+    /// Begins the next step, after one with this `end`, and severs the bonds across some cuts. Velocities stay
+    /// if both steps are explicit dynamics (`moving`).
+    pub fn begin_stage(&mut self, bonds: &dyn Bonds<D>, cuts: &[Cut<D>], end: StepEnd<D>, moving: bool) {
         self.stage = StepOrigin {
             finished: self.stage.finished + 1,
             time: self.history.last().map_or(0.0, |row| row.time),
             rows: self.history.len(),
             displacement: Some(self.displacement.clone()),
-            body_force,
+            body_force: end.body_force,
+            turned: end.turned,
         };
         (self.step, self.counts.iteration, self.counts.step_iterations) = (0, 0, 0);
         // the heat of friction adds up until explicit dynamics begins a ledger of its own
@@ -81,10 +89,20 @@ impl Fracture {
 }
 
 impl<const D: usize> Loads<D> {
-    /// Lets loads that follow curves begin at the start of a step: displacements go from there to their
-    /// values, former body forces fade as the load factor `common` grows.
-    pub fn continue_from(&mut self, stage: &StepOrigin<D>, common: &super::Amplitude) {
-        let Some(curved) = &mut self.curved else { return };
+    /// Lets loads that follow curves begin at the start of a step: displacements and rotations go from there
+    /// to their values, former body forces fade as the load factor `common` grows.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] for rotations that do not go on from the present place of their region, and for
+    /// motions that begin with a jump.
+    pub fn continue_from(
+        &mut self,
+        bonds: &dyn BodyGeometry<D>,
+        stage: &StepOrigin<D>,
+        common: &super::Amplitude,
+    ) -> Result<(), Error> {
+        self.continue_turned(bonds, stage, common)?;
+        let Some(curved) = &mut self.curved else { return Ok(()) };
         let start =
             |site: u32| stage.displacement.as_ref().map_or([0.0; D], |field| field.get(site as usize));
         for region in &mut curved.held {
@@ -104,19 +122,24 @@ impl<const D: usize> Loads<D> {
             self.body_force.get_or_insert_with(|| Field::zeros(force.sites()));
         }
         self.set_peaks();
+        self.set_turned_peaks(bonds);
+        self.refuse_jumps(bonds, stage)
     }
 }
 
 impl<const D: usize> System<'_, D> {
-    /// Body force density in a state at the end of a step, N/m³.
-    pub fn body_force_at_end(&mut self, state: &State<D>) -> Option<Field<D>> {
+    /// Returns what a step leaves to the next one in the state at its end.
+    pub fn end_of_step(&mut self, state: &State<D>) -> StepEnd<D> {
         let factor = state.history.last().map_or(0.0, |row| row.factor);
         self.set_forces(factor, &state.displacement);
+        let turned = self.loads.turned_at_end(&*self.bonds, &state.stage, &state.displacement, factor);
         let factor = self.loads.force_factor(factor);
-        let mut force = self.loads.body_force.clone()?;
-        for &site in self.bonds.particles() {
-            force.set(site as usize, force.get(site as usize).map(|x| factor * x));
+        let mut body_force = self.loads.body_force.clone();
+        if let Some(force) = &mut body_force {
+            for &site in self.bonds.particles() {
+                force.set(site as usize, force.get(site as usize).map(|x| factor * x));
+            }
         }
-        Some(force)
+        StepEnd { body_force, turned }
     }
 }

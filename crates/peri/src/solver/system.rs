@@ -133,8 +133,14 @@ impl<'a, const D: usize> System<'a, D> {
     /// Moves rigid surfaces to the load factor at the start of a step, those with a force to their balance.
     pub(super) fn place_surfaces_at_start(&mut self, state: &State<D>, before: f64) {
         self.move_surfaces(before, 0.0);
-        if let (Some(contact), Some(start)) = (&mut self.contact, &state.contact.start) {
-            contact.balance(start);
+        let Some(contact) = &mut self.contact else { return };
+        match &state.contact.start {
+            Some(start) => contact.balance(start),
+            // a step of a programme begins with surfaces that earlier ones have pressed on the body
+            None if state.stage.finished > 0 && !state.control.predicted => {
+                contact.balance(&state.displacement)
+            }
+            None => {}
         }
     }
 

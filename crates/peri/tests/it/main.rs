@@ -58,5 +58,6 @@ mod surface;
 mod tearing;
 mod time_step;
 mod tractions;
+mod turning_steps;
 mod waves;
 mod work;

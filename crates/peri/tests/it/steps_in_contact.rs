@@ -1,6 +1,7 @@
 //! Contact across the steps of a programme: surfaces keep their places, sticking friction its slip.
 
 use crate::curves::solve;
+use crate::turning_steps::interrupted;
 use evidence::{at_most, near};
 use peri::solver::StepRecord;
 
@@ -131,4 +132,125 @@ fn a_press_that_leaves_leaves_nothing() {
     near("held_force", force(3) / force(1), 1.0, 1e-6);
     at_most("left_force", force(5) / force(1), 1e-6);
     at_most("left_energy", rows[5].stored / rows[1].stored, 1e-6);
+}
+
+/// A held block under a round indenter with a force of 2 N/mm; `time` are keys of the first step.
+fn pressed(curve: &str, time: &str, steps: &str) -> String {
+    format!(
+        r#"version = 1
+program = "peri"
+boundary = [{{ name = "base", side = "y-", displacement = ["0 mm", "0 mm"] }}]
+{time}
+[body]
+space = "plane-strain"
+thickness = "1 mm"
+spacing = "0.5 mm"
+shapes = [{{ add = "box", min = ["0 mm", "0 mm"], max = ["16 mm", "8 mm"] }}]
+[material.solid]
+law = "correspondence"
+constitutive = {{ model = "neo-hookean", parameters = {{ shear_modulus = "1 MPa" }}, bulk_modulus = "2 MPa" }}
+[contact]
+stiffness = 0
+tied_grips = false
+[[contact.indenter]]
+point = ["8 mm", "12 mm"]
+radius = "4 mm"
+force = ["0 N", "-2 N"]
+{curve}
+[output]
+pictures = false
+fields = false
+{steps}"#
+    )
+}
+
+const BASE: &str = "{ name = \"base\", side = \"y-\", displacement = [\"0 mm\", \"0 mm\"] }";
+
+/// An indenter keeps its force of 2 N while the next step loads the block from the side: contact and base
+/// balance both forces, and the indenter, which moves along its force, sinks further. Work and stored energy
+/// go on.
+#[test]
+fn a_force_stays_in_the_next_step() {
+    let solver = "solver = { steps = 2, tolerance = 1e-8 }";
+    let side = "{ name = \"side\", side = \"x+\", force = [\"1 N\", \"0 N\"] }";
+    let later = format!("[[step]]\nboundary = [{BASE}, {side}]\n{solver}\n");
+    let rows = history(&pressed("", solver, &later));
+    assert_eq!(rows.len(), 4);
+    for (row, [pull, push]) in rows.iter().zip([[0.0, 1.0], [0.0, 2.0], [0.5, 2.0], [1.0, 2.0]]) {
+        // the balance of a force is found to 1e-13
+        near("force_of_an_indenter", row.resting[0].force[1], -push, 1e-9);
+        // sum of the residuals of all particles; the indenter cannot give way to the side
+        near("base_beside_a_side_load", row.reactions[0][0] + row.resting[0].force[0], -pull, 1e-5);
+        near("base_below_an_indenter", row.reactions[0][1], push, 1e-5);
+    }
+    assert!(rows[3].resting[0].moved[1] != rows[1].resting[0].moved[1]);
+    // the trapezoidal rule of two steps of F ∝ δ, and of a load that is nearly linear
+    near("work_under_a_force", (rows[3].work - rows[1].work) / (rows[3].stored - rows[1].stored), 1.0, 0.05);
+}
+
+/// A force on a curve over the time of all steps: two steps of one increment each are one step of two, in
+/// forces, places, energies and work, forth and back.
+#[test]
+fn a_force_goes_on_along_its_curve() {
+    let curve = "curve = \"min(t, 4 - t)\"";
+    let time = |seconds: u32| {
+        let step = format!("[{{ duration = \"{seconds} s\", increments = {seconds}, factor = 1 }}]");
+        format!("time = {{ step = {step} }}\nsolver = {{ tolerance = 1e-9 }}")
+    };
+    let one = history(&pressed(curve, &time(4), ""));
+    let later = format!("[[step]]\nboundary = [{BASE}]\n{}\n", time(1)).repeat(3);
+    let steps = history(&pressed(curve, &time(1), &later));
+    assert_eq!((one.len(), steps.len()), (4, 4));
+    let peak = &one[1];
+    for (a, b) in one.iter().zip(&steps) {
+        near("time_of_a_force", b.time, a.time, 1e-12);
+        near("force_of_steps", b.resting[0].force[1], a.resting[0].force[1], 1e-9);
+        let way = (b.resting[0].moved[1] - a.resting[0].moved[1]).abs() / peak.resting[0].moved[1].abs();
+        at_most("way_of_steps", way, 1e-6);
+        at_most("energy_of_a_force", (b.stored - a.stored).abs() / peak.stored, 1e-6);
+        at_most("work_of_a_force", (b.work - a.work).abs() / peak.work, 1e-6);
+    }
+    near("work_of_the_peak", peak.work / peak.stored, 1.0, 0.1);
+}
+
+/// A run resumed within either step has the same bits.
+#[test]
+fn resumed_below_an_indenter() {
+    let solver = "solver = { steps = 2, tolerance = 1e-8 }";
+    let side = "{ name = \"side\", side = \"x+\", force = [\"1 N\", \"0 N\"] }";
+    let text = pressed("", solver, &format!("[[step]]\nboundary = [{BASE}, {side}]\n{solver}\n"));
+    let whole = history(&text);
+    let iterations: usize = whole.iter().map(|row| row.iterations as usize).sum();
+    for part in [0.3, 0.6, 0.9] {
+        let calls = (part * iterations as f64) as usize;
+        assert_eq!(interrupted(&text, calls), whole, "after {calls} of {iterations} iterations");
+    }
+}
+
+/// A floor with a velocity moves in explicit steps and stays in equilibria between them: as one with a
+/// displacement on the curve of this motion.
+#[test]
+fn a_velocity_goes_on_in_explicit_steps() {
+    let grip = "boundary = [{ side = \"x+\", displacement = [\"free\", \"0 mm\"] }]";
+    let dynamics = "dynamics = { density = \"1000 kg/m^3\", end_time = \"0.2 ms\" }";
+    let time = "time = { step = [{ duration = \"1 s\", increments = 1, factor = 1 }] }\nsolver = { tolerance = 1e-9 }";
+    let scene = |floor: &str| {
+        let steps = format!("[[step]]\n{grip}\n{time}\n[[step]]\n{grip}\n{dynamics}\n");
+        let text = block(floor, "", &steps).replace("friction = 0.3", "friction = 0");
+        let (head, rest) = text.split_once("[body]").unwrap();
+        history(&format!("{head}{grip}\n{dynamics}\nsolver = {{ method = \"verlet\" }}\n[body]{rest}"))
+    };
+    let by_velocity = scene("velocity = [\"0 m/s\", \"0.5 m/s\"]");
+    let curve = "curve = \"min(t, 2e-4) + max(t - 1.0002, 0)\"";
+    let by_curve = scene(&format!("displacement = [\"0 mm\", \"500 mm\"]\n{curve}"));
+    assert_eq!(by_velocity.len(), by_curve.len());
+    let force = by_velocity.iter().map(|row| row.resting[0].force[1]).fold(0.0, f64::max);
+    let (between, last) = (&by_velocity[by_velocity.len() / 2], by_velocity.last().unwrap());
+    near("drift_between", between.resting[0].moved[1], 1e-4, 1e-12);
+    near("drift_at_the_end", last.resting[0].moved[1], 2e-4, 1e-12);
+    for (a, b) in by_velocity.iter().zip(&by_curve) {
+        // 1 s of the curve leaves rounding of its time: 1e-16 s over 0.4 ms
+        at_most("place_of_a_velocity", (a.resting[0].moved[1] - b.resting[0].moved[1]).abs(), 1e-12);
+        at_most("force_of_a_velocity", (a.resting[0].force[1] - b.resting[0].force[1]).abs() / force, 1e-5);
+    }
 }

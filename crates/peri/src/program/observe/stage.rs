@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::field::Field;
 use crate::geometry::Cut;
 use crate::program::scene::{self, DiscreteBody, Scene};
-use crate::solver::{Loads, State};
+use crate::solver::{Loads, State, StepEnd};
 use harness::scene::{Failure, Source};
 
 /// Later step of a scene in its body.
@@ -49,16 +49,16 @@ impl<const D: usize> SceneStage<D> {
         (1..=scene.step.len()).map(of).collect()
     }
 
-    /// Begins the step in the state at the end of the one before; `body_force` as [`State::begin_stage`].
+    /// Begins the step in the state at the end of the one before, with its `end`.
     pub fn begin(
         &self,
         [before, own]: [&Scene; 2],
         body: &DiscreteBody<D>,
-        body_force: Option<Field<D>>,
+        end: StepEnd<D>,
         state: &mut State<D>,
     ) {
         let moving = before.dynamics.is_some() && own.dynamics.is_some();
-        state.begin_stage(&*body.bonds, &self.cuts, body_force, moving);
+        state.begin_stage(&*body.bonds, &self.cuts, end, moving);
         for site in 0..self.velocity.as_ref().map_or(0, Field::sites) {
             let prescribed = self.velocity.as_ref().map_or([0.0; D], |field| field.get(site));
             if prescribed != [0.0; D] {
@@ -68,9 +68,12 @@ impl<const D: usize> SceneStage<D> {
     }
 
     /// Loads of the step, which continue those of a state that has begun it.
-    pub fn loads(&self, own: &Scene, state: &State<D>) -> Loads<D> {
+    ///
+    /// # Errors
+    /// As [`Loads::continue_from`].
+    pub fn loads(&self, own: &Scene, body: &DiscreteBody<D>, state: &State<D>) -> Result<Loads<D>, Error> {
         let mut loads = self.loads.clone();
-        loads.continue_from(&state.stage, &scene::common_amplitude(own));
-        loads
+        loads.continue_from(&*body.bonds, &state.stage, &scene::common_amplitude(own))?;
+        Ok(loads)
     }
 }

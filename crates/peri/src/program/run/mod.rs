@@ -17,11 +17,10 @@ use variants::VariantRun;
 use crate::bonds::{Bonds, Property};
 use crate::calibrate::Space;
 use crate::error::Error;
-use crate::field::Field;
 use crate::program::observe::{self, FieldFrames, Moment, Physics, SceneObservers, in_space};
 use crate::program::quantities as q;
 use crate::program::scene::{self, ContactSpec, NAMING, Scene, SceneVariant};
-use crate::solver::{Breaking, State, Status, StepRecord, System, load_stepping};
+use crate::solver::{Breaking, State, Status, StepEnd, StepRecord, System, load_stepping};
 use harness::case::{Fault, Run, Step, StepField};
 use harness::observe::{Outputs, Scalars};
 use harness::report::{Phases, Report, SceneUnits};
@@ -184,7 +183,7 @@ fn run_variant<const D: usize>(
     let last = scene.at_end();
     let mut observers = observe::observers::<D>(&last);
     let mut frames = FieldFrames::new(scene, &state, &output.join(physics.field_file()))?;
-    let mut solved = Ok(None);
+    let mut solved = Ok(StepEnd::default());
     for index in state.stage.finished..=scene.step.len() {
         let (own_source, own_scene) = (scene.source_of(source, index), scene.stage(index));
         if let Some(before) = index.checked_sub(1) {
@@ -192,10 +191,10 @@ fn run_variant<const D: usize>(
             body = Physics::<D>::new(source, scene, variant)?.0;
             let stage = &physics.stages[before];
             if state.stage.finished < index {
-                let force = solved.unwrap_or_default();
-                stage.begin([&scene.stage(before), &own_scene], &body, force, &mut state);
+                let end = solved.unwrap_or_default();
+                stage.begin([&scene.stage(before), &own_scene], &body, end, &mut state);
             }
-            physics.loads = stage.loads(&own_scene, &state);
+            physics.loads = stage.loads(&own_scene, &body, &state).map_err(PeriFailure::Run)?;
             physics.surfaces.clone_from(&stage.surfaces);
         }
         let watched = (&mut observers, &mut frames);
@@ -270,7 +269,7 @@ fn initial_state<const D: usize>(
     Ok(state)
 }
 
-/// Solves a step; returns the body forces at its end if another one follows.
+/// Solves a step; returns what it leaves to the next one, if there is any.
 fn solve<const D: usize>(
     (source, scene, card): (&Source, &Scene, Option<&device::Card>),
     physics: &Physics<D>,
@@ -279,7 +278,7 @@ fn solve<const D: usize>(
     state: &mut State<D>,
     phases: &RefCell<Phases>,
     (observers, frames): (&mut SceneObservers<D>, &mut FieldFrames),
-) -> Result<Option<Field<D>>, PeriFailure> {
+) -> Result<StepEnd<D>, PeriFailure> {
     let (material, loads) = (&physics.body.material, &physics.loads);
     let (factors, times) = scene.load_steps();
     let mut watch = |status: &Status, state: &State<D>| variant_run.watch(status, state);
@@ -334,7 +333,7 @@ fn solve<const D: usize>(
     phases.borrow_mut().stop();
     solved?;
     let later = state.stage.finished < physics.stages.len();
-    Ok(if later { system.body_force_at_end(state) } else { None })
+    Ok(if later { system.end_of_step(state) } else { StepEnd::default() })
 }
 
 /// Returns the data of a finished step for a callback: positions and displacements in three components.

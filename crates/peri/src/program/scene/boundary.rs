@@ -3,6 +3,7 @@
 use super::ShapeSpec;
 use super::curve_spec::{CurveList, CurveSpec};
 use super::formula::Formula;
+use crate::solver::Rotation;
 use polycore::units::{Angle, Force, Length, Speed, Stress};
 use serde::Deserialize;
 
@@ -62,6 +63,12 @@ impl Boundary {
         self.displacement.is_some() || self.displacement_field.is_some() || self.rotation.is_some()
     }
 
+    /// Returns the components that keep their displacement of the start of a step, a bit each.
+    pub fn held_in_place(&self) -> u8 {
+        let components = self.displacement.iter().flatten().enumerate();
+        components.map(|(d, held)| u8::from(*held == Prescribed::Hold) << d).sum()
+    }
+
     /// Returns true if the boundary prescribes forces.
     pub fn prescribes_force(&self) -> bool {
         let surface = self.traction.is_some() || self.traction_field.is_some() || self.pressure.is_some();
@@ -114,10 +121,22 @@ pub struct RotationSpec {
     pub point: Vec<Length>,
     /// Direction of the axis, of any length, in a solid.
     pub axis: Option<Vec<f64>>,
-    /// Angle at the end of the last step, right-handed about the axis; in the plane from x to y.
+    /// Angle at the end of the last load step, from the undeformed region, right-handed about the axis; in the
+    /// plane from x to y.
     pub angle: Angle,
     /// Curve of time that multiplies the angle; default: that of the boundary.
     pub curve: Option<CurveSpec>,
+}
+
+impl RotationSpec {
+    /// Returns the rotation in space; a plane body turns about z.
+    pub(super) fn in_space(&self) -> Rotation<3> {
+        let centre = std::array::from_fn(|d| self.point.get(d).map_or(0.0, |x| x.si()));
+        let axis = self.axis.as_deref().unwrap_or(&[0.0, 0.0, 1.0]);
+        let size = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let axis = std::array::from_fn(|d| axis.get(d).map_or(0.0, |x| x / size));
+        Rotation { centre, axis, angle: self.angle.si() }
+    }
 }
 
 /// Sides of the bounding box.

@@ -68,7 +68,7 @@ pub struct PlaneSpec {
     /// Displacement at the end of the last step; the plane follows the load factor, and stays there in a
     /// later `[[step]]`.
     pub displacement: Option<Vec<Length>>,
-    /// Velocity, in explicit dynamics; added to the displacement.
+    /// Velocity, in explicit dynamics, with `[[step]]` in explicit steps; added to the displacement.
     pub velocity: Option<Vec<Speed>>,
     /// Curve of time that multiplies `displacement`, or one for each component, instead of the load factor.
     pub curve: Option<CurveList>,
@@ -204,7 +204,12 @@ impl ContactSpec {
         let names = self.surface_names().into_iter();
         let amplitudes = surface_amplitudes(source, scene, self)?;
         let all = planes.chain(indenters).zip(names.zip(amplitudes));
-        all.map(|(surface, (name, amplitudes))| Ok(RigidSurface { name, amplitudes, ..surface? })).collect()
+        let moving = scene.earlier.moving;
+        all.map(|(surface, (name, amplitudes))| {
+            let surface: RigidSurface<D> = surface?;
+            Ok(RigidSurface { name, amplitudes, drift: surface.velocity.map(|v| moving * v), ..surface })
+        })
+        .collect()
     }
 
     /// Builds the contact of a body with bond modulus kθ = `micromodulus` and longitudinal modulus `modulus`.
@@ -335,7 +340,7 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     }
     for (index, plane) in contact.plane.iter().enumerate() {
         let key = |name: &str| format!("contact.plane[{index}].{name}");
-        if plane.velocity.is_some() && !explicit {
+        if plane.velocity.is_some() && !scene.has_dynamics() {
             let why = format!(
                 "needs `solver.method = \"verlet\"`; with `{}` write `displacement`",
                 scene.method().name()

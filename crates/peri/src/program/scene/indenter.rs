@@ -39,10 +39,10 @@ pub struct IndenterSpec {
     pub friction: Option<f64>,
     /// Displacement at the end of the last step; it follows the load factor.
     pub displacement: Option<Vec<Length>>,
-    /// Velocity, in explicit dynamics; added to the displacement.
+    /// Velocity, in explicit dynamics, with `[[step]]` in explicit steps; added to the displacement.
     pub velocity: Option<Vec<Speed>>,
     /// Force on the indenter at the end of the last step instead of a displacement, in equilibrium: it moves
-    /// along the force only, from where it first touches the body at rest.
+    /// along the force only, from where it first touches the body at rest. It stays in a later `[[step]]`.
     pub force: Option<Vec<Force>>,
     /// Curve of time that multiplies `displacement` or `force` instead of the load factor; of a displacement
     /// also one for each component.
@@ -226,7 +226,7 @@ pub(super) fn check(source: &Source, scene: &Scene, contact: &ContactSpec) -> Re
     let explicit = scene.method() == SolverMethod::Verlet;
     for (index, indenter) in contact.indenter.iter().enumerate() {
         let key = |name: &str| format!("contact.indenter[{index}].{name}");
-        if indenter.velocity.is_some() && !explicit {
+        if indenter.velocity.is_some() && !scene.has_dynamics() {
             let why = format!(
                 "needs `solver.method = \"verlet\"`; with `{}` write `displacement`",
                 scene.method().name()
@@ -243,7 +243,8 @@ pub(super) fn check(source: &Source, scene: &Scene, contact: &ContactSpec) -> Re
         if contact.stiffness_of(indenter.stiffness, explicit) == 0.0 {
             return Err(source.error(&key("stiffness"), 0, "above 0 of an indenter with a `force`"));
         }
-        let factors = if indenter.curve.is_some() { Vec::new() } else { scene.programme().0 };
+        let follows = indenter.curve.is_none() && !scene.later;
+        let factors = if follows { scene.programme().0 } else { Vec::new() };
         if let Some(factor) = factors.into_iter().find(|factor| *factor < 0.0) {
             let found = format!("a load factor of {}", plain(factor));
             let allowed = "factors of 0 and above: an indenter pushes and never pulls";

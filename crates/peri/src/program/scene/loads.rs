@@ -39,7 +39,8 @@ pub fn loads_of<const D: usize>(
             loaded[site as usize] = true;
         }
         let by_area = scene.material.solid.is_some() && boundary.layers.is_none() && boundary.depth.is_none();
-        let support = support(source, &key, boundary, body, &members, depth.filter(|_| !by_area))?;
+        let depth = depth.filter(|_| !by_area);
+        let support = support(source, &key, boundary, body, &members, depth, scene.later)?;
         if let (Some(side), Some(traction), true) = (boundary.side, &boundary.traction, by_area) {
             tractions.push((index, side, std::array::from_fn(|d| traction[d].si())));
         }
@@ -63,10 +64,7 @@ pub fn loads_of<const D: usize>(
     super::rotation::turn(source, scene, body, &regions, &amplitudes, &mut loads)?;
     if scene.has_curves() {
         let rotates = |index: usize| scene.boundary[index].rotation.is_some();
-        let kept = |index: usize| {
-            let components = scene.boundary[index].displacement.iter().flatten().enumerate();
-            components.map(|(d, held)| u8::from(*held == Prescribed::Hold) << d).sum()
-        };
+        let kept = |index: usize| scene.boundary[index].held_in_place();
         super::curve::follow(&regions, rotates, kept, &surfaces, &amplitudes, &mut loads);
     }
     super::pressure::add(source, scene, body, &amplitudes, &mut loads)?;
@@ -316,6 +314,10 @@ pub fn order_regions<const D: usize>(boundaries: &[Boundary], names: &[String], 
     let old = std::mem::take(&mut loads.held_regions);
     let each = names.iter().map(|name| find(name).and_then(|at| old.get(at).cloned()).unwrap_or_default());
     loads.held_regions = each.collect();
+    for turned in &mut loads.turned {
+        let place = own.get(turned.region).and_then(|own| names.iter().position(|name| name == own));
+        turned.region = place.unwrap_or(turned.region);
+    }
 }
 
 /// Returns lines for `peri check`: the particles of each boundary, and the free length between two grips.
@@ -377,7 +379,7 @@ fn mm(length: f64) -> f64 {
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Returns the name of a boundary: its own, its side, or its number.
-fn name_of(index: usize, boundary: &Boundary) -> String {
+pub(super) fn name_of(index: usize, boundary: &Boundary) -> String {
     match (&boundary.name, boundary.side) {
         (Some(name), _) => name.clone(),
         (None, Some(side)) => side.to_string(),
@@ -394,6 +396,7 @@ fn support<const D: usize>(
     body: &DiscreteBody<D>,
     members: &[u32],
     depth: Option<f64>,
+    later: bool,
 ) -> Result<Support<D>, SceneError> {
     let count = |name: &str, found: usize| {
         if found == D {
@@ -443,7 +446,7 @@ fn support<const D: usize>(
             Prescribed::Hold => Some(0.0),
         });
     }
-    if super::rotation::rotation_of::<D>(source, key, boundary)?.is_some() {
+    if super::rotation::rotation_of::<D>(source, key, boundary, later)?.is_some() {
         for (d, component) in support.displacement.iter_mut().enumerate() {
             let free = boundary.displacement.as_ref().is_some_and(|given| given[d] == Prescribed::Free);
             *component = if free { None } else { Some(component.unwrap_or(0.0)) };

@@ -34,7 +34,7 @@ pub(super) fn refuse<const D: usize>(
     }
     let moments = moments(scene, !amplitudes.is_empty());
     let motion = |(index, boundary)| -> Result<BoundaryMotion<D>, SceneError> {
-        let rotation = rotation_of::<D>(source, &format!("boundary[{index}]"), boundary)?;
+        let rotation = rotation_of::<D>(source, &format!("boundary[{index}]"), boundary, scene.later)?;
         Ok(BoundaryMotion { boundary, rotation, amplitudes: amplitudes.get(index) })
     };
     let motions: Vec<BoundaryMotion<D>> =
@@ -127,12 +127,11 @@ impl<const D: usize> BoundaryMotion<'_, D> {
         moments: &[f64],
     ) -> Option<(String, &'static str)> {
         for &part in moments {
-            let [own, before] = [self, before].map(|motion| motion.displacement(place, part)[d]);
-            if own.is_nan() != before.is_nan() {
+            if self.holds(d) != before.holds(d) {
                 let found = format!("`hold` or a displacement of particles that boundary[{other}] moves");
                 return Some((found, "`hold` in both where regions overlap, or `free` in one of them"));
             }
-            // what is held in place is unknown before the run
+            let [own, before] = [self, before].map(|motion| motion.displacement(place, part)[d]);
             if (own - before).abs() > EQUAL * own.abs().max(before.abs()) {
                 let when = self.amplitudes.map_or(String::new(), |_| format!(" at {part} of the time"));
                 let found = format!(
@@ -149,14 +148,18 @@ impl<const D: usize> BoundaryMotion<'_, D> {
         None
     }
 
-    /// Displacement of a particle at a part of the time, m; NaN where it is not known.
+    /// Returns true if the component keeps its value of the start of a step, which is unknown before the run.
+    fn holds(&self, d: usize) -> bool {
+        self.boundary.held_in_place() >> d & 1 == 1
+    }
+
+    /// Displacement of a particle at a part of the time, m; of components that are held, by a rotation alone.
     fn displacement(&self, place: [f64; D], part: f64) -> [f64; D] {
         let value = |d: usize| {
             let held = self.boundary.displacement.as_ref().and_then(|held| held.get(d));
             let field = self.boundary.displacement_field.as_ref().and_then(|field| field.get(d));
             match (held, field) {
                 (Some(Prescribed::At(value)), _) => *value,
-                (Some(Prescribed::Hold), _) => f64::NAN,
                 (_, Some(PrescribedField::By(formula))) => formula.value_at(place),
                 _ => 0.0,
             }

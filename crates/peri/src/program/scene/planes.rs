@@ -33,9 +33,8 @@ struct PlanePosition<const D: usize> {
 impl<const D: usize> PlanePosition<D> {
     /// Returns the displacement of the plane along its normal, m, at a load factor and a time, s.
     fn displacement(&self, factor: f64, time: f64) -> f64 {
-        let (displacement, velocity) = (self.plane.displacement_at(factor), self.plane.velocity);
-        let normal = self.normal;
-        (0..D).map(|d| normal[d] * (displacement[d] + time * velocity[d])).sum()
+        let place = self.plane.place_at(factor, time);
+        (0..D).map(|d| self.normal[d] * place[d]).sum()
     }
 }
 

@@ -15,7 +15,7 @@ const LARGE_ROTATION: f64 = 10.0;
 /// Largest strain of a field that rotates its region as a rigid body.
 const RIGID_STRAIN: f64 = 0.02;
 
-/// Converts the rotation of a boundary.
+/// Converts the rotation of a boundary, of a `later` step or of the first one.
 ///
 /// # Errors
 /// An invalid point, axis or angle; a free component that the rotation needs; a `displacement_field` beside
@@ -24,12 +24,13 @@ pub(super) fn rotation_of<const D: usize>(
     source: &Source,
     key: &str,
     boundary: &Boundary,
+    later: bool,
 ) -> Result<Option<Rotation<D>>, SceneError> {
     let Some(RotationSpec { point, axis, angle, .. }) = &boundary.rotation else { return Ok(None) };
     let key = format!("{key}.rotation");
     let centre = vector::<D>(source, &format!("{key}.point"), point)?;
     let axis = direction::<D>(source, &format!("{key}.axis"), axis.as_deref())?;
-    if angle.si() == 0.0 {
+    if angle.si() == 0.0 && !later {
         return Err(source.error(&format!("{key}.angle"), "0", "an angle other than 0"));
     }
     if boundary.displacement_field.is_some() {
@@ -87,7 +88,8 @@ pub(super) fn turn<const D: usize>(
     let mut number = 0;
     for (index, (boundary, (members, support))) in scene.boundary.iter().zip(regions).enumerate() {
         let held = support.displacement.iter().any(Option::is_some);
-        if let Some(rotation) = rotation_of::<D>(source, &format!("boundary[{index}]"), boundary)? {
+        let key = format!("boundary[{index}]");
+        if let Some(rotation) = rotation_of::<D>(source, &key, boundary, scene.later)? {
             let mut later = vec![false; body.bonds.sites()];
             for (others, support) in &regions[index + 1..] {
                 if support.displacement.iter().any(Option::is_some) {
@@ -100,8 +102,10 @@ pub(super) fn turn<const D: usize>(
                 shift: support.displacement.map(|component| component.unwrap_or(0.0)),
                 amplitudes: amplitudes.get(index).cloned(),
                 components: (0..D).map(bit).sum(),
+                kept: boundary.held_in_place(),
                 region: number,
                 sites: members.iter().copied().filter(|&site| !later[site as usize]).collect(),
+                start: None,
             };
             loads.turn(&*body.bonds, turned);
         }

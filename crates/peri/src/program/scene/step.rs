@@ -1,13 +1,15 @@
 //! Steps of a programme in sequence: the scene's own blocks are the first, each `[[step]]` is a later one.
 
 use super::check::check_variant;
+use super::loads::{name_of, own_region_names};
 use super::{
     BodyForceSpec, Boundary, ContactSpec, CrackSpec, DeviceChoice, Dynamics, Prescribed, Scene, SolverMethod,
     SolverSpec,
 };
-use super::{TimeProgramSpec, common_amplitude, crack, loads::own_region_names};
+use super::{TimeProgramSpec, common_amplitude, crack};
 use crate::bonds::Bonds;
 use crate::geometry::Cut;
+use crate::solver::Rotation;
 use harness::scene::{SceneError, Source};
 use serde::Deserialize;
 use std::borrow::Cow;
@@ -36,8 +38,9 @@ pub struct StepSpec {
 /// Steps before a later one.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct EarlierSteps {
-    /// Their time, s.
+    /// Their time, s, and that of explicit dynamics among them.
     pub(super) time: f64,
+    pub(super) moving: f64,
     /// Load factor at the end of the first step, at which rigid surfaces without a curve stay.
     pub(super) factor: f64,
     /// True if any step of the scene is explicit dynamics.
@@ -76,10 +79,12 @@ impl Scene {
         scene.solver = solver.unwrap_or_default();
         scene.solver.method = scene.solver.method.or(explicit);
         (scene.body.cracks, scene.step, scene.later) = (cracks, Vec::new(), true);
-        let later = self.step[..index - 1].iter().map(|own| (&own.time, &own.dynamics));
-        let all = std::iter::once((&self.time, &self.dynamics)).chain(later);
-        let time = all.map(|(time, dynamics)| duration(time.as_ref(), dynamics.as_ref())).sum();
-        scene.earlier = EarlierSteps { time, factor: self.last_factor(), explicit: self.has_dynamics() };
+        let later = || self.step[..index - 1].iter().map(|own| (&own.time, &own.dynamics));
+        let all = || std::iter::once((&self.time, &self.dynamics)).chain(later());
+        let time = all().map(|(time, dynamics)| duration(time.as_ref(), dynamics.as_ref())).sum();
+        let moving = all().map(|(_, dynamics)| duration(None, dynamics.as_ref())).sum();
+        let (factor, explicit) = (self.last_factor(), self.has_dynamics());
+        scene.earlier = EarlierSteps { time, moving, factor, explicit };
         Cow::Owned(scene)
     }
 
@@ -134,8 +139,9 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         return Ok(());
     }
     if let Some(contact) = &scene.contact {
-        refuse_in_contact(source, contact)?;
+        refuse_in_contact(source, scene, contact)?;
     }
+    refuse_other_axes(source, scene)?;
     for index in 0..=scene.step.len() {
         let (source, scene) = (scene.source_of(source, index), scene.stage(index));
         if scene.solver.refine > 1 || scene.solver.snap_back {
@@ -184,10 +190,6 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                            end with it";
             return Err(source.error(&key, found, allowed));
         }
-        if let Some(at) = scene.boundary.iter().position(|boundary| boundary.rotation.is_some()) {
-            let why = "a rotation starts from the undeformed body: write it in the first step";
-            return Err(source.unexpected(&format!("boundary[{at}].rotation"), why));
-        }
         if scene.dynamics.as_ref().is_some_and(|dynamics| dynamics.device != DeviceChoice::Cpu) {
             return Err(source.error("dynamics.device", "a graphics card in a later step", "`cpu`"));
         }
@@ -196,23 +198,44 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     Ok(())
 }
 
+/// Refuses a rotation of a region about another axis than that about which the step before has turned it.
+fn refuse_other_axes(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    let near = 1e-9 * scene.body.spacing.map_or(1e-3, |spacing| spacing.si());
+    let mut turned: Vec<(String, Rotation<3>)> = Vec::new();
+    for index in 0..=scene.step.len() {
+        let (source, scene) = (scene.source_of(source, index), scene.stage(index));
+        let mut now = Vec::new();
+        for (at, boundary) in scene.boundary.iter().enumerate() {
+            let name = name_of(at, boundary);
+            let before = turned.iter().find(|(own, _)| *own == name).map(|(_, rotation)| *rotation);
+            let Some(rotation) = &boundary.rotation else {
+                now.extend(before.filter(|_| boundary.held_in_place() != 0).map(|own| (name, own)));
+                continue;
+            };
+            let rotation = rotation.in_space();
+            let differs = |before: &Rotation<3>| !rotation.shares_axis(before, near);
+            if let Some(before) = before.filter(differs) {
+                let [point, axis] = [before.centre.map(|x| x * 1e3), before.axis].map(|x| format!("{x:?}"));
+                let found =
+                    format!("another axis than that of the step before, through {point} mm along {axis}");
+                let allowed = "the axis of the step before; another one once the region is turned back to 0°";
+                return Err(source.error(&format!("boundary[{at}].rotation"), found, allowed));
+            }
+            if rotation.angle != 0.0 {
+                now.push((name, rotation));
+            }
+        }
+        turned = now;
+    }
+    Ok(())
+}
+
 /// Refuses what rigid surfaces do not carry over to the next step.
-fn refuse_in_contact(source: &Source, contact: &ContactSpec) -> Result<(), SceneError> {
-    let planes = contact.plane.iter().enumerate();
-    let planes =
-        planes.map(|(index, own)| (format!("contact.plane[{index}]"), own.velocity.is_some(), false));
-    let indenters = contact.indenter.iter().enumerate().map(|(index, own)| {
-        (format!("contact.indenter[{index}]"), own.velocity.is_some(), own.force.is_some())
-    });
-    for (key, velocity, force) in planes.chain(indenters) {
-        if velocity {
-            let why = "with [[step]] a `displacement` and its `curve` over the time of all steps move it";
-            return Err(source.conflict(&format!("{key}.velocity"), "step", why));
-        }
-        if force {
-            let why = "with [[step]] a rigid surface moves by a `displacement`";
-            return Err(source.conflict(&format!("{key}.force"), "step", why));
-        }
+fn refuse_in_contact(source: &Source, scene: &Scene, contact: &ContactSpec) -> Result<(), SceneError> {
+    let pushed = contact.indenter.iter().position(|own| own.force.is_some());
+    if let Some(index) = pushed.filter(|_| scene.has_dynamics()) {
+        let why = "a step is explicit dynamics, in which an indenter has no mass: move it by `displacement`";
+        return Err(source.unexpected(&format!("contact.indenter[{index}].force"), why));
     }
     if contact.tied_grips == Some(true) {
         return Err(source.conflict("contact.tied_grips", "step", "each step holds regions of its own"));
