@@ -39,6 +39,7 @@ mod pace;
 mod parts;
 mod periodic;
 mod pressed;
+mod pressures;
 mod prestrain;
 mod relaxation;
 mod relaxing;

@@ -19,6 +19,7 @@ mod sections;
 mod solid;
 mod stage;
 mod stages;
+mod tractions;
 mod values;
 
 pub use expect::{check, quantities_of};

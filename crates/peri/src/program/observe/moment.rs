@@ -2,6 +2,7 @@
 
 use super::material::Physics;
 use crate::bonds::{Bonds, Fragment, covered_stretches, fragments};
+use crate::contact::SurfaceTraction;
 use crate::error::Error;
 use crate::program::scene::Scene;
 use crate::solver::{State, StepRecord};
@@ -39,6 +40,7 @@ pub struct Moment<'a, const D: usize> {
     phases: &'a RefCell<Phases>,
     stresses: OnceCell<Stresses<D>>,
     fragments: OnceCell<Vec<Fragment>>,
+    tractions: OnceCell<Vec<SurfaceTraction<D>>>,
 }
 
 impl<'a, const D: usize> Moment<'a, D> {
@@ -49,8 +51,8 @@ impl<'a, const D: usize> Moment<'a, D> {
         state: &'a State<D>,
         phases: &'a RefCell<Phases>,
     ) -> Self {
-        let (stresses, fragments) = (OnceCell::new(), OnceCell::new());
-        Self { scene, physics, bonds, state, phases, stresses, fragments }
+        let (stresses, fragments, tractions) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
+        Self { scene, physics, bonds, state, phases, stresses, fragments, tractions }
     }
 
     /// Iterates over a number of every row of the history.
@@ -67,6 +69,11 @@ impl<'a, const D: usize> Moment<'a, D> {
     pub fn fragments(&self) -> &[Fragment] {
         let breaks = self.physics.body.criterion.is_some();
         self.fragments.get_or_init(|| if breaks { fragments(self.bonds) } else { Vec::new() })
+    }
+
+    /// Returns the tractions of rigid surfaces on the body; none without `output.contact`.
+    pub fn tractions(&self) -> &[SurfaceTraction<D>] {
+        self.tractions.get_or_init(|| self.physics.tractions(self.scene, self.bonds, self.state))
     }
 
     /// Returns the damage of each particle: broken bonds over the bonds of the body without cracks, so that

@@ -14,7 +14,7 @@ pub use program::Peri;
 
 use variants::VariantRun;
 
-use crate::bonds::{Bonds, Property};
+use crate::bonds::Bonds;
 use crate::calibrate::Space;
 use crate::error::Error;
 use crate::field::Field;
@@ -198,6 +198,7 @@ fn run_variant<const D: usize>(
             physics.loads = stage.loads(&own_scene, &state);
             physics.surfaces.clone_from(&stage.surfaces);
         }
+        physics.face(&own_scene, &body)?;
         let watched = (&mut observers, &mut frames);
         let own = (&*own_source, &*own_scene, device.card.as_ref().filter(|_| index == 0));
         solved = solve(own, &physics, variant_run, &mut body, &mut state, &phases, watched);
@@ -283,18 +284,7 @@ fn solve<const D: usize>(
     let (material, loads) = (&physics.body.material, &physics.loads);
     let (factors, times) = scene.load_steps();
     let mut watch = |status: &Status, state: &State<D>| variant_run.watch(status, state);
-    let contact = match &scene.contact {
-        Some(contact) => {
-            let surfaces = physics.surfaces.clone();
-            let whole = material.longitudinal_modulus(&*body.bonds);
-            let stiffness = |site| physics.body.stiffness.value_at(site) * material.relative_stiffness(site);
-            let modulus = Property::new(&*body.bonds, |site, _| whole * stiffness(site));
-            let held = physics.held.as_deref();
-            let tied = held.map(|held| (held, contact.tie_stiffness(scene.dynamics.is_some())));
-            Some(contact.contact(surfaces, body, material.micromodulus(&*body.bonds), &modulus, tied)?)
-        }
-        None => None,
-    };
+    let contact = physics.contact(scene, body)?;
     let density_ratios = scene::density_ratios(source, scene, body)?;
     let amplitude = scene.amplitude();
     let row = |bonds: &dyn Bonds<D>, state: &State<D>| physics.row(bonds, state);

@@ -20,7 +20,7 @@ impl Case for Peri {
   peri sweep SCENE --vary material.critical.fracture_energy=50J/m^2,100J/m^2
   peri exact law --law chain-affine --links 720 --dissociation 1200
   peri schema > peri.schema.json                    for editors",
-        magic: b"peri-c17",
+        magic: b"peri-c18",
         columns: &[
             "peak_load*",
             "displacement_at_peak*",

@@ -198,6 +198,11 @@ fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     if scene.output.energy && scene.material.is_prestrained() {
         return Err(source.unexpected("output.energy", "prestrained bodies have no energy densities"));
     }
+    let surfaces = scene.contact.as_ref().is_some_and(super::ContactSpec::has_surfaces);
+    if scene.output.contact && !surfaces && scene.study.is_empty() {
+        let why = "only a [[contact.plane]] or a [[contact.indenter]] presses on the surface of the body";
+        return Err(source.unexpected("output.contact", why));
+    }
     if !(1..=12).contains(&scene.output.stages) {
         return Err(source.error("output.stages", scene.output.stages, "1 to 12"));
     }

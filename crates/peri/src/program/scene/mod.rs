@@ -388,6 +388,8 @@ pub struct OutputFiles {
     pub flags: bool,
     /// Writes the energy density of particles, as a field and in pictures.
     pub energy: bool,
+    /// Writes pressure and shear of rigid planes and indenters on the body, as fields, tables and pictures.
+    pub contact: bool,
     /// Displacements at which the report has the load, as `load_at_20mm`.
     pub load_at: Vec<Length>,
     /// Displacements at which the report has the stiffness, as `secant_stiffness_at_2mm`.
@@ -412,6 +414,7 @@ impl Default for OutputFiles {
             solid: None,
             flags: false,
             energy: false,
+            contact: false,
             load_at: Vec::new(),
             stiffness_at: Vec::new(),
             integrals: false,
