@@ -9,7 +9,7 @@ use super::surface::SurfaceReaction;
 use super::surfaces::{MovingSurface, RigidSurfaces, SurfaceContact};
 use crate::bonds::BodyGeometry;
 use crate::field::Field;
-use crate::geometry::length;
+use crate::geometry::{determinant, length};
 use crate::stress::deformation_gradient;
 use nalgebra::{SMatrix, SVector};
 
@@ -101,11 +101,11 @@ impl<const D: usize> RigidSurfaces<D> {
         let Some(&normal) = self.faces.normals.get(touch.element) else { return touch.area };
         let Some(site) = self.nearest(bonds, touch.element) else { return touch.area };
         let gradient = deformation_gradient(bonds, displacement, site);
-        let gradient = SMatrix::<f64, D, D>::from_fn(|a, b| gradient[a][b]);
+        let matrix = SMatrix::<f64, D, D>::from_fn(|a, b| gradient[a][b]);
         // cof F = J F⁻ᵀ
-        let ratio = gradient.try_inverse().map(|inverse| {
-            let turned = inverse.transpose() * SVector::from(normal);
-            length(turned.into()) / inverse.determinant().abs()
+        let ratio = matrix.try_inverse().map(|inverse| {
+            let turned: SVector<f64, D> = inverse.transpose() * SVector::from(normal);
+            determinant(&gradient).abs() * length(turned.into())
         });
         touch.area * ratio.filter(|ratio| ratio.is_normal()).unwrap_or(1.0)
     }

@@ -38,6 +38,7 @@ mod model;
 mod pace;
 mod parts;
 mod periodic;
+mod pictures;
 mod pressed;
 mod pressures;
 mod prestrain;

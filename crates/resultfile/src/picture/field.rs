@@ -12,6 +12,7 @@ use super::axis::{labels, ticks};
 use super::bar::{ColorBar, LABEL, LINE, TICK, TICK_LENGTH};
 use super::blocks::ParticleBlocks;
 use super::canvas::{BLACK, Canvas, LabelAnchor, Text};
+use super::film::{FilmPace, film};
 use super::color::{ColorMap, MISSING, RIGID};
 use super::particles::{PixelWindow, Raster};
 use super::picture_error;
@@ -20,6 +21,8 @@ use polycore::file::atomic_write;
 
 const TITLE: u32 = 28;
 const MARGIN: usize = 26;
+/// The last picture of an animation is shown so many times as long.
+const REST: u16 = 20;
 /// Width of the rim around particles beside rigid bodies, over the longer side of the field.
 const RIM: f64 = 0.06;
 /// More pixels than this are a mistake.
@@ -45,6 +48,7 @@ pub struct FieldMap<'a> {
     size: usize,
     lengths: Option<(String, f64)>,
     names: [&'a str; 2],
+    least_width: usize,
 }
 
 /// A field: positions of the particles (deformed or not) and their values.
@@ -60,6 +64,7 @@ pub struct Panel<'a> {
     colors: ColorMap,
     range: Option<(f64, f64)>,
     rigid: Option<RigidOutline<'a>>,
+    within: Option<[[f64; 2]; 2]>,
 }
 
 /// Height above rigid bodies at a place, negative within them.
@@ -87,6 +92,7 @@ impl<'a> Panel<'a> {
             colors: ColorMap::Viridis,
             range: None,
             rigid: None,
+            within: None,
         }
     }
 
@@ -121,6 +127,12 @@ impl<'a> Panel<'a> {
     /// negative.
     pub fn rigid(mut self, height: &'a (dyn Fn([f64; 2]) -> f64 + Sync)) -> Self {
         self.rigid = Some(RigidOutline(height));
+        self
+    }
+
+    /// Shows the plane around particles at two corners instead of that around all particles.
+    pub fn within(mut self, corners: [[f64; 2]; 2]) -> Self {
+        self.within = Some(corners);
         self
     }
 
@@ -204,7 +216,7 @@ impl Default for FieldMap<'_> {
 impl<'a> FieldMap<'a> {
     /// No panel yet.
     pub fn new() -> Self {
-        Self { panels: Vec::new(), columns: None, size: 720, lengths: None, names: ["x", "y"] }
+        Self { panels: Vec::new(), columns: None, size: 720, lengths: None, names: ["x", "y"], least_width: 0 }
     }
 
     /// Adds a field.
@@ -238,6 +250,36 @@ impl<'a> FieldMap<'a> {
         self
     }
 
+    /// Leaves room for a title of so many characters, for pictures of one width.
+    pub fn room_for(mut self, characters: usize) -> Self {
+        self.least_width = characters * TITLE as usize * 2 / 3 + 2 * MARGIN;
+        self
+    }
+
+    /// Writes maps of one window, given to the second argument of `frame`, one after another into an animated
+    /// `.png`, a `.gif`, or, by `ffmpeg`, an `.mp4`, each for some `seconds`. It rests on the last, and repeats
+    /// without end but as MP4.
+    ///
+    /// # Errors
+    /// Those of `frame`; as [`Self::write`]; for MP4 no `ffmpeg` on the PATH, or its message.
+    pub fn animate(
+        path: impl AsRef<Path>,
+        frames: usize,
+        seconds: f64,
+        mut frame: impl FnMut(usize, &mut dyn FnMut(&FieldMap<'_>)) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let path = path.as_ref();
+        let mut size = None;
+        let bytes = film(path, frames, FilmPace { seconds, rest: REST }, |index| {
+            let mut drawn = Err("there is no map".to_owned());
+            frame(index, &mut |map| drawn = map.canvas())?;
+            let canvas = drawn.map_err(|reason| picture_error(path, reason))?;
+            let size = *size.get_or_insert([canvas.width, canvas.height]);
+            Ok(if size == [canvas.width, canvas.height] { canvas } else { canvas.on_sheet(size) })
+        })?;
+        atomic_write(path, |file| file.write_all(&bytes))
+    }
+
     /// Writes a `.png`, whole or not at all.
     ///
     /// # Errors
@@ -264,7 +306,8 @@ impl<'a> FieldMap<'a> {
             let mut outlined = Vec::with_capacity(panels.len());
             for panel in panels {
                 panel.check()?;
-                let window = PixelWindow::around(panel.positions, panel.spacing, self.size as f64)
+                let around = panel.within.as_ref().map_or(panel.positions, |corners| &corners[..]);
+                let window = PixelWindow::around(around, panel.spacing, self.size as f64)
                     .ok_or_else(|| {
                         format!("panel `{}`: positions are not finite or too far apart", panel.title)
                     })?;
@@ -315,7 +358,7 @@ impl<'a> FieldMap<'a> {
         let left = MARGIN + axes.as_ref().map_or(0, |axes| axes.left);
         let bottom = MARGIN + axes.as_ref().map_or(0, |axes| axes.bottom);
         let body = raster.width + 2 * MARGIN + bar.width;
-        let width = (left + body).max(title.width + 2 * MARGIN);
+        let width = (left + body).max(title.width + 2 * MARGIN).max(self.least_width);
         let mut canvas = sheet(width, head + bar.height.max(raster.height) + bottom)?;
         let (x, y) = (left as isize, head as isize);
         for (at, value) in raster.values.iter().enumerate() {

@@ -1,5 +1,6 @@
 //! Observers of a run: each defines its scalars, fields and files, and computes them from a state.
 
+mod animation;
 mod contact;
 mod cracks;
 mod exact;
@@ -22,6 +23,7 @@ mod stages;
 mod tractions;
 mod values;
 
+pub use animation::animate;
 pub use expect::{check, quantities_of};
 pub use frames::FieldFrames;
 pub(crate) use frames::in_space;

@@ -37,6 +37,7 @@ pub struct Moment<'a, const D: usize> {
     pub bonds: &'a dyn Bonds<D>,
     /// Displacement and history.
     pub state: &'a State<D>,
+    label: Option<&'a str>,
     phases: &'a RefCell<Phases>,
     stresses: OnceCell<Stresses<D>>,
     fragments: OnceCell<Vec<Fragment>>,
@@ -52,7 +53,23 @@ impl<'a, const D: usize> Moment<'a, D> {
         phases: &'a RefCell<Phases>,
     ) -> Self {
         let (stresses, fragments, tractions) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
-        Self { scene, physics, bonds, state, phases, stresses, fragments, tractions }
+        Self { scene, physics, bonds, state, label: None, phases, stresses, fragments, tractions }
+    }
+
+    /// Gives the moment the name of a state.
+    pub fn named(self, name: &'a str) -> Self {
+        Self { label: Some(name), ..self }
+    }
+
+    /// Returns the end of the names of its pictures: the variant, and the state if it has a name.
+    pub fn file_name(&self) -> String {
+        let name = &self.physics.name;
+        self.label.map_or_else(|| name.clone(), |label| format!("{name}_{label}"))
+    }
+
+    /// Returns a title, with the name of the state.
+    pub fn titled(&self, title: &str) -> String {
+        self.label.map_or_else(|| title.to_owned(), |label| format!("{title}, {label}"))
     }
 
     /// Iterates over a number of every row of the history.

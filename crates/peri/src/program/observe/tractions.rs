@@ -171,7 +171,7 @@ fn draw_curves<const D: usize>(
 ) -> Result<(), Error> {
     let all = contacts.iter().flat_map(|contact| &contact.each);
     let (scale, unit) = stress_unit(all.map(|one| one.pressure.abs()).fold(0.0, f64::max));
-    let mut plot = LinePlot::new(if m.scene.title.is_empty() { "Contact" } else { &m.scene.title })
+    let mut plot = LinePlot::new(&m.titled(if m.scene.title.is_empty() { "Contact" } else { &m.scene.title }))
         .size(900.0, 560.0)
         .axes("distance from the centre of pressure (mm)", &format!("pressure ({unit})"))
         .legend(LegendPlace::Outside);
@@ -185,7 +185,7 @@ fn draw_curves<const D: usize>(
             plot = plot.series(Series::line(&format!("{}, shear", contact.name), &along, &shears));
         }
     }
-    Ok(plot.write(output.join(format!("contact_{}.png", m.physics.name)))?)
+    Ok(plot.write(output.join(format!("contact_{}.png", m.file_name())))?)
 }
 
 /// Draws the pressure of a surface on a solid, seen from its side.
@@ -206,7 +206,7 @@ fn draw_solid<const D: usize>(m: &Moment<D>, contact: &Contact<D>, output: &Path
     let label = format!("pressure of `{}` ({unit})", contact.name);
     let strip = Strip { label, range: (low * scale, high * scale), colors: ColorMap::Viridis };
     let solids = Solids {
-        title: m.scene.title.clone(),
+        title: m.titled(&m.scene.title),
         bounds,
         unit: ("mm".into(), 1e-3),
         view: contact.view(),
@@ -216,6 +216,6 @@ fn draw_solid<const D: usize>(m: &Moment<D>, contact: &Contact<D>, output: &Path
     let drawn = Particles { reference: &rest, positions: &places, spacing, bridge };
     let skin = drawn.skin(None, |k| [values[k] * scale, f64::NAN]);
     let title = moment_title(&m.state.history, m.state.history.len() as f64);
-    let path = output.join(format!("contact_{}_{}.png", contact.name, m.physics.name));
+    let path = output.join(format!("contact_{}_{}.png", contact.name, m.file_name()));
     Ok(solids.write(path, 1, |_| Ok((title.clone(), skin.clone())))?)
 }

@@ -20,7 +20,7 @@ use crate::error::Error;
 use crate::field::Field;
 use crate::program::observe::{self, FieldFrames, Moment, Physics, SceneObservers, in_space};
 use crate::program::quantities as q;
-use crate::program::scene::{self, ContactSpec, NAMING, Scene, SceneVariant};
+use crate::program::scene::{self, ContactSpec, NAMING, NamedState, Scene, SceneVariant};
 use crate::solver::{Breaking, State, Status, StepRecord, System, load_stepping};
 use harness::case::{Fault, Run, Step, StepField};
 use harness::observe::{Outputs, Scalars};
@@ -184,6 +184,8 @@ fn run_variant<const D: usize>(
     let last = scene.at_end();
     let mut observers = observe::observers::<D>(&last);
     let mut frames = FieldFrames::new(scene, &state, &output.join(physics.field_file()))?;
+    let outputs = Outputs { folder: output, pictures: scene.output.pictures };
+    let (whole, states) = (scene, scene.named_states());
     let mut solved = Ok(None);
     for index in state.stage.finished..=scene.step.len() {
         let (own_source, own_scene) = (scene.source_of(source, index), scene.stage(index));
@@ -199,11 +201,18 @@ fn run_variant<const D: usize>(
             physics.surfaces.clone_from(&stage.surfaces);
         }
         physics.face(&own_scene, &body)?;
-        let watched = (&mut observers, &mut frames);
+        let watched = Watched { observers: &mut observers, frames: &mut frames, states: &states, outputs };
         let own = (&*own_source, &*own_scene, device.card.as_ref().filter(|_| index == 0));
         solved = solve(own, &physics, variant_run, &mut body, &mut state, &phases, watched);
         if solved.is_err() {
             break;
+        }
+        if own_scene.dynamics.is_some() {
+            body.bonds.prepare(&state.displacement);
+        }
+        for named in states.iter().filter(|named| named.is_now(&state, true)) {
+            let moment = Moment::new((&own_scene, &physics), &*body.bonds, &state, &phases).named(named.name);
+            observers.iter().try_for_each(|observer| observer.draw(&moment, &outputs))?;
         }
     }
     outcome.regions = scene::region_names(scene);
@@ -220,6 +229,7 @@ fn run_variant<const D: usize>(
         state.fracture.restore(&mut *body.bonds)?;
         outcome.error = Some(error.to_string());
     }
+    outcome.warnings.extend(whole.unreached(&state, ended.is_some()));
     if scene.dynamics.is_some() {
         body.bonds.prepare(&state.displacement);
     }
@@ -243,8 +253,8 @@ fn run_variant<const D: usize>(
     outcome.probes = observe::columns(scene);
     outcome.record_seconds(&phases.borrow());
     frames.finish(&observers, &moment)?;
-    let outputs = Outputs { folder: output, pictures: scene.output.pictures };
     observers.iter().try_for_each(|observer| observer.write(&moment, &outputs))?;
+    outcome.warnings.extend(observe::animate(&moment, output));
     Ok((outcome, ended))
 }
 
@@ -271,6 +281,14 @@ fn initial_state<const D: usize>(
     Ok(state)
 }
 
+/// What sees the finished steps of a run: observers, field file, and the pictures of named states.
+struct Watched<'a, 's, const D: usize> {
+    observers: &'a mut SceneObservers<'s, D>,
+    frames: &'a mut FieldFrames,
+    states: &'a [NamedState<'s>],
+    outputs: Outputs<'a>,
+}
+
 /// Solves a step; returns the body forces at its end if another one follows.
 fn solve<const D: usize>(
     (source, scene, card): (&Source, &Scene, Option<&device::Card>),
@@ -279,7 +297,7 @@ fn solve<const D: usize>(
     body: &mut scene::DiscreteBody<D>,
     state: &mut State<D>,
     phases: &RefCell<Phases>,
-    (observers, frames): (&mut SceneObservers<D>, &mut FieldFrames),
+    Watched { observers, frames, states, outputs }: Watched<'_, '_, D>,
 ) -> Result<Option<Field<D>>, PeriFailure> {
     let (material, loads) = (&physics.body.material, &physics.loads);
     let (factors, times) = scene.load_steps();
@@ -303,9 +321,13 @@ fn solve<const D: usize>(
     phases.borrow_mut().start("solve");
     let mut finished = |bonds: &dyn Bonds<D>, state: &State<D>| {
         phases.borrow_mut().stop();
-        let moment = Moment::new((scene, physics), bonds, state, phases);
+        let mut moment = Moment::new((scene, physics), bonds, state, phases);
         observers.iter_mut().try_for_each(|observer| observer.see(&moment))?;
         frames.step(observers, &moment)?;
+        for named in states.iter().filter(|named| state.control.round == 0 && named.is_now(state, false)) {
+            moment = moment.named(named.name);
+            observers.iter().try_for_each(|observer| observer.draw(&moment, &outputs))?;
+        }
         if state.control.round == 0 {
             variant_run.step(|| step_data(bonds, state));
         }
