@@ -23,8 +23,9 @@ pub struct SurfaceTraction<const D: usize> {
     pub surface: usize,
     /// Sites of the particles on the surface of the body below the face.
     pub sites: Vec<u32>,
-    /// Present position, m, and normal of the rigid surface, towards the body.
+    /// Present position, m.
     pub place: [f64; D],
+    /// Normal of the rigid surface there, towards the body.
     pub normal: [f64; D],
     /// Present area, m².
     pub area: f64,

@@ -76,8 +76,7 @@ fn pictures_of_states_are_those_of_shorter_runs() {
         assert!(finished.outcomes[0].warnings.iter().all(|warning| !warning.contains("output.state")));
     }
     for kind in ["stress", "energy"] {
-        let all: Vec<Vec<u8>> =
-            folders.iter().map(|folder| picture(folder.path(), kind, "_half")).collect();
+        let all: Vec<Vec<u8>> = folders.iter().map(|folder| picture(folder.path(), kind, "_half")).collect();
         assert!(all[1..].iter().all(|other| *other == all[0]), "{kind}");
         assert_ne!(all[0], picture(folders[0].path(), kind, ""), "{kind}");
     }

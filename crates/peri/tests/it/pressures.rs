@@ -14,8 +14,8 @@ use std::path::Path;
 const SOFT: &str = "[material.solid]\nlaw = \"correspondence\"\nconstitutive = { model = \"neo-hookean\", \
                     parameters = { shear_modulus = \"1 MPa\" }, bulk_modulus = \"1.6666667 MPa\" }\n";
 const MODULUS: f64 = 8e6 / 3.0;
-/// The middle of a block stays there.
-const HELD: &str = "[[boundary]]\nmin = [\"-1.1 mm\", \"-1 mm\"]\nmax = [\"1.1 mm\", \"13 mm\"]\n\
+/// The middle column of a block stays there.
+const HELD: &str = "[[boundary]]\nmin = [\"-0.6 mm\", \"-1 mm\"]\nmax = [\"0.6 mm\", \"13 mm\"]\n\
                     displacement = [\"0 mm\", \"free\"]\n";
 
 fn solve(text: &str, output: &Path) -> FinishedScene {
@@ -88,7 +88,7 @@ contact = true
 fn pressures_below_a_cylinder_are_those_of_hertz() {
     let a = (4.0 * 400.0 * 0.08 / (PI * MODULUS)).sqrt();
     let most = 2.0 * 400.0 / (PI * a);
-    for (spacing, peak, error) in [("1 mm", 0.06, 0.08), ("0.5 mm", 0.04, 0.05)] {
+    for (spacing, peak, error) in [("1 mm", 0.04, 0.08), ("0.5 mm", 0.02, 0.05)] {
         let directory = tempfile::tempdir().unwrap();
         let [along, pressures] = below_a_roller(spacing, directory.path());
         let greatest = pressures.iter().copied().fold(0.0, f64::max);
@@ -101,7 +101,7 @@ fn pressures_below_a_cylinder_are_those_of_hertz() {
     }
 }
 
-/// A block of 24 × 12 particles between planes, with keys of the planes and of the upper one.
+/// A block of 25 × 12 particles between planes, with keys of the planes and of the upper one.
 fn squeezed(planes: &str, upper: &str) -> String {
     format!(
         r#"
@@ -109,7 +109,7 @@ fn squeezed(planes: &str, upper: &str) -> String {
 space = "plane-strain"
 thickness = "2 mm"
 spacing = "1 mm"
-shapes = [{{ add = "box", min = ["-12 mm", "0 mm"], max = ["12 mm", "12 mm"] }}]
+shapes = [{{ add = "box", min = ["-12.5 mm", "0 mm"], max = ["12.5 mm", "12 mm"] }}]
 {SOFT}
 [contact]
 stiffness = 0
@@ -144,16 +144,17 @@ fn pressures_of_a_squeezed_block_are_those_of_its_present_width() {
     let finished = solve(&(squeezed("", upper) + HELD), directory.path());
     let rows = table(&directory.path().join("contact_upper_dx-1mm_m-3.015.csv"));
     let force = -finished.report.scalar("upper_force_y").unwrap();
-    let width = rows["x"].iter().copied().fold(0.0, f64::max) - rows["x"].iter().copied().fold(0.0, f64::min);
-    let width = width * 24.0 / 23.0;
-    assert_eq!(rows["x"].len(), 24);
-    let area: f64 = rows["area"].iter().sum();
-    near("squeezed_area", area / (width * 2e-3), 1.0, 2e-3);
-    for pressure in &rows["pressure"] {
-        near("squeezed_pressure", pressure * width * 2e-3 / force, 1.0, 1e-2);
-    }
+    assert_eq!(rows["x"].len(), 25);
+    let ends = [f64::min, f64::max].map(|pick| rows["x"].iter().copied().fold(0.0, pick));
+    let width = (ends[1] - ends[0]) * 25.0 / 24.0;
     // 30 % of squeeze widen it by more than a tenth
-    assert!(width > 0.027, "{width}");
+    assert!(width > 0.0275, "{width}");
+    // areas of faces are exact to 2e-4, the strain near the free sides is uniform to the tolerance
+    let area: f64 = rows["area"].iter().sum();
+    near("squeezed_area", area / (width * 2e-3), 1.0, 5e-4);
+    for pressure in &rows["pressure"] {
+        near("squeezed_pressure", pressure * width * 2e-3 / force, 1.0, 5e-4);
+    }
 }
 
 /// Pressures and shears add up to the force of the plane, whether it slides, sticks or is bonded; shears stay
@@ -170,10 +171,11 @@ fn tractions_add_up_to_the_force_of_the_plane() {
             let sum = |column: &str| rows[column].iter().zip(&rows["area"]).map(|(t, a)| t * a).sum::<f64>();
             let force = |axis: &str| finished.report.scalar(&format!("{plane}_force_{axis}")).unwrap();
             let size = force("y").abs();
-            // sums of 24 numbers in another order
+            // sums of 25 numbers in another order
             assert!((up * sum("pressure") + sum("shear_y") - force("y")).abs() < 1e-12 * size);
             assert!((sum("shear_x") - force("x")).abs() < 1e-12 * size, "{} {}", sum("shear_x"), force("x"));
-            assert!(force("x").abs() > 0.02 * size, "{plane}: no shear");
+            let rubs = rows["shear_x"].iter().zip(&rows["area"]).map(|(t, a)| (t * a).abs()).sum::<f64>();
+            assert!(rubs > 0.05 * size, "{plane}: no shear");
             for (shear, pressure) in rows["shear_x"].iter().zip(&rows["pressure"]) {
                 assert!(friction.is_none_or(|mu| shear.abs() <= mu * pressure * (1.0 + 1e-6)));
             }

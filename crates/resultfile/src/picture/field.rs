@@ -12,8 +12,8 @@ use super::axis::{labels, ticks};
 use super::bar::{ColorBar, LABEL, LINE, TICK, TICK_LENGTH};
 use super::blocks::ParticleBlocks;
 use super::canvas::{BLACK, Canvas, LabelAnchor, Text};
-use super::film::{FilmPace, film};
 use super::color::{ColorMap, MISSING, RIGID};
+use super::film::{FilmPace, film};
 use super::particles::{PixelWindow, Raster};
 use super::picture_error;
 use polycore::Error;
@@ -216,7 +216,14 @@ impl Default for FieldMap<'_> {
 impl<'a> FieldMap<'a> {
     /// No panel yet.
     pub fn new() -> Self {
-        Self { panels: Vec::new(), columns: None, size: 720, lengths: None, names: ["x", "y"], least_width: 0 }
+        Self {
+            panels: Vec::new(),
+            columns: None,
+            size: 720,
+            lengths: None,
+            names: ["x", "y"],
+            least_width: 0,
+        }
     }
 
     /// Adds a field.
@@ -307,8 +314,8 @@ impl<'a> FieldMap<'a> {
             for panel in panels {
                 panel.check()?;
                 let around = panel.within.as_ref().map_or(panel.positions, |corners| &corners[..]);
-                let window = PixelWindow::around(around, panel.spacing, self.size as f64)
-                    .ok_or_else(|| {
+                let window =
+                    PixelWindow::around(around, panel.spacing, self.size as f64).ok_or_else(|| {
                         format!("panel `{}`: positions are not finite or too far apart", panel.title)
                     })?;
                 let window = if panel.rigid.is_some() { window.widened(RIM) } else { window };

@@ -12,7 +12,7 @@ use polycore::Error;
 /// Program that writes MP4.
 const FFMPEG: &str = "ffmpeg";
 /// Speed with which colours of a GIF are chosen: 1 is the best, 30 the fastest.
-const SPEED: i32 = 10;
+const SPEED: i32 = 3;
 /// Characters of a message of `ffmpeg` at most.
 const MESSAGE: usize = 400;
 
@@ -172,7 +172,11 @@ mod tests {
             for (at, pixel) in image.buffer.chunks(4).enumerate() {
                 let (x, y) = (at % usize::from(image.width), at / usize::from(image.width));
                 let color: Color = [pixel[0], pixel[1], pixel[2]];
-                shown.set((x + usize::from(image.left)) as isize, (y + usize::from(image.top)) as isize, color);
+                shown.set(
+                    (x + usize::from(image.left)) as isize,
+                    (y + usize::from(image.top)) as isize,
+                    color,
+                );
             }
             assert!(shown.encode() == frame(index).encode(), "frame {index}");
         }

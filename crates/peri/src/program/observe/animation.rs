@@ -1,5 +1,6 @@
 //! Draws all frames of the field file one after another.
 
+use super::maps::rigid_height;
 use super::moment::Moment;
 use super::scale::{bridge_length, moment_title, stress_unit};
 use super::solid::{ColouredField, EMPTY_BOX, extend_box, field, shown_stress, stress_range, stress_strip};
@@ -39,9 +40,9 @@ pub fn animate<const D: usize>(m: &Moment<D>, output: &Path) -> Vec<String> {
     let drawn = Frames::new(m, output).and_then(|frames| {
         let first = frames.draw(&path(kind));
         match first {
-            Err(why) if kind == Animation::Mp4 => frames.draw(&path(Animation::Gif)).map(|_| {
-                Some(format!("`output.animation`: a GIF in place of the MP4, as {why}"))
-            }),
+            Err(why) if kind == Animation::Mp4 => frames
+                .draw(&path(Animation::Gif))
+                .map(|_| Some(format!("`output.animation`: a GIF in place of the MP4, as {why}"))),
             other => other.map(|()| None),
         }
     });
@@ -88,7 +89,9 @@ impl<'a, const D: usize> Frames<'a, D> {
         match (&self.shown, &self.m.scene.stress) {
             (Shown::Stress(_), Some(spec)) => stress_strip(spec, range),
             (Shown::Scalar("damage"), _) => super::solid::damage_field(),
-            (Shown::Scalar("contact_pressure"), _) => field(format!("contact pressure ({unit})"), scale, range),
+            (Shown::Scalar("contact_pressure"), _) => {
+                field(format!("contact pressure ({unit})"), scale, range)
+            }
             (Shown::Scalar(_), _) => super::solid::energy_field(&[range.1]),
             _ => field("|u| (mm)".to_owned(), 1e3, range),
         }
@@ -127,8 +130,12 @@ impl<'a, const D: usize> Frames<'a, D> {
                 let strip = &field.strip;
                 let panel = Panel::new(&title(frame), &strip.label, &places, &values, spacing);
                 let panel = panel.range(strip.range.0, strip.range.1).reference(&rest).bridge(bridge);
-                let map = FieldMap::new().lengths("mm", 1e-3).size(SIZE).room_for(longest);
-                take(&map.panel(panel.within(corners)));
+                // of an equilibrium within a step, where they were before it
+                let row = self.series.times()[frame] as usize;
+                let height = rigid_height(m, row.checked_sub(1).and_then(|row| m.state.history.get(row)));
+                let panel = panel.within(corners);
+                let panel = if m.physics.placed.is_empty() { panel } else { panel.rigid(&height) };
+                take(&FieldMap::new().lengths("mm", 1e-3).size(SIZE).room_for(longest).panel(panel));
                 Ok(())
             })?);
         }

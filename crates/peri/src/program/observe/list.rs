@@ -1,7 +1,9 @@
 //! List of all observers.
 
 use super::moment::{Moment, SceneObservers, StatelessObserver};
-use super::{contact, cracks, exact, flags, frames, history, lines, maps, probes, sections, tractions, values};
+use super::{
+    contact, cracks, exact, flags, frames, history, lines, maps, probes, sections, tractions, values,
+};
 use crate::calibrate::Space;
 use crate::error::Error;
 use crate::program::scene::Scene;

@@ -6,6 +6,7 @@ use super::{solid, stages};
 use crate::contact::{RigidSurface, SurfaceReaction};
 use crate::error::Error;
 use crate::program::scene::Scene;
+use crate::solver::StepRecord;
 use harness::observe::{Observer, Outputs};
 use harness::output::picture::{FieldMap, Panel};
 use std::path::Path;
@@ -75,14 +76,7 @@ fn maps<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error> {
     if wide > 1.8 * high {
         map = map.columns(1).size(1200);
     }
-    let (surfaces, record) = (&m.physics.surfaces, m.state.history.last());
-    let moved = record.map_or(&[][..], |record| &record.resting);
-    let height = |place: [f64; 2]| {
-        let above = |(surface, at): (&RigidSurface<D>, &SurfaceReaction)| {
-            surface.height(std::array::from_fn(|d| place[d] - at.moved[d]))
-        };
-        surfaces.iter().zip(moved).map(above).fold(f64::INFINITY, f64::min)
-    };
+    let height = rigid_height(m, m.state.history.last());
     for (name, values) in &components {
         let label = format!("{name}{unit}");
         // in a torn body these are residual stresses of its pieces
@@ -93,9 +87,23 @@ fn maps<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error> {
         let title = m.titled(&format!("{label}, {}{moment}", measure.name()));
         let panel = Panel::new(&title, &label, &places, values, m.bonds.spacing()).reference(&rest);
         let panel = panel.bridge(bridge_length(m));
-        map = map.panel(if surfaces.is_empty() { panel } else { panel.rigid(&height) });
+        map = map.panel(if m.physics.placed.is_empty() { panel } else { panel.rigid(&height) });
     }
     Ok(map.write(output.join(format!("stress_{}.png", m.file_name())))?)
+}
+
+/// Returns the height above rigid planes and indenters in a row of the history, m.
+pub(super) fn rigid_height<const D: usize>(
+    m: &Moment<D>,
+    row: Option<&StepRecord>,
+) -> impl Fn([f64; 2]) -> f64 + Sync {
+    let (surfaces, moved) = (&m.physics.placed, row.map_or(&[][..], |row| &row.resting));
+    move |place| {
+        let above = |(surface, at): (&RigidSurface<D>, &SurfaceReaction)| {
+            surface.height(std::array::from_fn(|d| place[d] - at.moved[d]))
+        };
+        surfaces.iter().zip(moved).map(above).fold(f64::INFINITY, f64::min)
+    }
 }
 
 /// Draws the particles of a plane body at which a learnt law is uncertain.
@@ -104,8 +112,13 @@ fn maps<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error> {
 /// A file that cannot be written.
 fn flagged<const D: usize>(m: &Moment<D>, values: &[f64], output: &Path) -> Result<(), Error> {
     let [rest, places] = plane_positions(m);
-    let panel =
-        Panel::new(&m.titled("where the learnt law is uncertain"), "flagged", &places, values, m.bonds.spacing());
+    let panel = Panel::new(
+        &m.titled("where the learnt law is uncertain"),
+        "flagged",
+        &places,
+        values,
+        m.bonds.spacing(),
+    );
     let map = FieldMap::new()
         .lengths("mm", 1e-3)
         .panel(panel.range(0.0, 1.0).reference(&rest).bridge(bridge_length(m)));

@@ -206,8 +206,11 @@ pub struct Physics<const D: usize> {
     pub loaded: Vec<bool>,
     /// Grips that are tied at their surface, by site.
     pub held: Option<Vec<bool>>,
-    /// Planes and indenters of `[contact]`, and with `output.contact` the faces on which they act.
+    /// Planes and indenters of `[contact]`.
     pub surfaces: Vec<RigidSurface<D>>,
+    /// The same where they begin: with a force at first touch.
+    pub placed: Vec<RigidSurface<D>>,
+    /// With `output.contact`, the same with the faces on which they act.
     faced: Option<RigidSurfaces<D>>,
     rows: Vec<RowPart<D>>,
     /// Evaluator of forces and stresses; this and the following fields are set by [`Self::begin`].
@@ -267,6 +270,7 @@ impl<const D: usize> Physics<D> {
             loaded,
             held,
             surfaces: surfaces.unwrap_or_default(),
+            placed: Vec::new(),
             faced: None,
             rows,
             evaluator: StressEvaluator::none(),
@@ -330,18 +334,24 @@ impl<const D: usize> Physics<D> {
         let modulus = Property::new(bonds, |site, _| whole * stiffness(site));
         let held = self.held.as_deref();
         let tied = held.map(|held| (held, spec.tie_stiffness(scene.dynamics.is_some())));
-        let contact = spec.contact(self.surfaces.clone(), body, material.micromodulus(bonds), &modulus, tied)?;
+        let contact =
+            spec.contact(self.surfaces.clone(), body, material.micromodulus(bonds), &modulus, tied)?;
         Ok(Some(contact))
     }
 
-    /// Keeps the faces of a whole body on which rigid surfaces act in a step, if the scene asks for their
-    /// tractions.
+    /// Places rigid surfaces beside a whole body for the outputs of a step.
     ///
     /// # Errors
     /// As [`Self::contact`].
-    pub fn face(&mut self, scene: &Scene, body: &DiscreteBody<D>) -> Result<(), Error> {
-        let contact = if scene.output.contact { self.contact(scene, body)? } else { None };
-        self.faced = contact.and_then(Contact::into_surfaces);
+    pub fn place(&mut self, scene: &Scene, body: &DiscreteBody<D>) -> Result<(), Error> {
+        self.placed.clone_from(&self.surfaces);
+        let pushed = self.surfaces.iter().any(|surface| surface.force.is_some());
+        let output = &scene.output;
+        if output.contact || pushed && (output.pictures || output.animation.is_some()) {
+            let contact = self.contact(scene, body)?;
+            self.placed = contact.iter().flat_map(Contact::surfaces).cloned().collect();
+            self.faced = contact.filter(|_| output.contact).and_then(Contact::into_surfaces);
+        }
         Ok(())
     }
 

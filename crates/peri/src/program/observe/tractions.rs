@@ -77,7 +77,8 @@ impl<'a, const D: usize> Contact<'a, D> {
 
     /// Writes places, present areas, pressures and shears.
     fn write(&self, shear: bool, path: &Path) -> Result<(), Error> {
-        let column = |get: &dyn Fn(&SurfaceTraction<D>) -> f64| self.each.iter().map(|one| get(one)).collect();
+        let column =
+            |get: &dyn Fn(&SurfaceTraction<D>) -> f64| self.each.iter().map(|one| get(one)).collect();
         let axes = ["x", "y", "z"].into_iter().take(D).enumerate();
         let mut columns: Vec<(String, &str, Vec<f64>)> = Vec::new();
         if D == 2 {
@@ -171,10 +172,11 @@ fn draw_curves<const D: usize>(
 ) -> Result<(), Error> {
     let all = contacts.iter().flat_map(|contact| &contact.each);
     let (scale, unit) = stress_unit(all.map(|one| one.pressure.abs()).fold(0.0, f64::max));
-    let mut plot = LinePlot::new(&m.titled(if m.scene.title.is_empty() { "Contact" } else { &m.scene.title }))
-        .size(900.0, 560.0)
-        .axes("distance from the centre of pressure (mm)", &format!("pressure ({unit})"))
-        .legend(LegendPlace::Outside);
+    let mut plot =
+        LinePlot::new(&m.titled(if m.scene.title.is_empty() { "Contact" } else { &m.scene.title }))
+            .size(900.0, 560.0)
+            .axes("distance from the centre of pressure (mm)", &format!("pressure ({unit})"))
+            .legend(LegendPlace::Outside);
     for contact in contacts {
         let along: Vec<f64> = contact.along.iter().map(|x| x * 1e3).collect();
         let pressures: Vec<f64> = contact.each.iter().map(|one| one.pressure * scale).collect();
@@ -195,8 +197,7 @@ fn draw_solid<const D: usize>(m: &Moment<D>, contact: &Contact<D>, output: &Path
     let (scale, unit) = stress_unit(high.max(-low));
     let rest: Vec<[f64; 3]> = m.sites().map(|site| super::in_space(m.bonds.position(site))).collect();
     let moved = m.sites().map(|site| super::in_space(m.state.displacement.get(site)));
-    let places: Vec<[f64; 3]> =
-        rest.iter().zip(moved).map(|(x, u)| [0, 1, 2].map(|d| x[d] + u[d])).collect();
+    let places: Vec<[f64; 3]> = rest.iter().zip(moved).map(|(x, u)| [0, 1, 2].map(|d| x[d] + u[d])).collect();
     let (mut bounds, spacing) = (EMPTY_BOX, m.bonds.spacing());
     extend_box(&mut bounds, &places);
     for d in 0..3 {

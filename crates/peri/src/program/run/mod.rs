@@ -200,7 +200,7 @@ fn run_variant<const D: usize>(
             physics.loads = stage.loads(&own_scene, &state);
             physics.surfaces.clone_from(&stage.surfaces);
         }
-        physics.face(&own_scene, &body)?;
+        physics.place(&own_scene, &body)?;
         let watched = Watched { observers: &mut observers, frames: &mut frames, states: &states, outputs };
         let own = (&*own_source, &*own_scene, device.card.as_ref().filter(|_| index == 0));
         solved = solve(own, &physics, variant_run, &mut body, &mut state, &phases, watched);

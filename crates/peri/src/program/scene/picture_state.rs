@@ -62,7 +62,8 @@ impl NamedState<'_> {
 
     /// Returns the first row that is the state, from 0; of an end the last row of a step that is over.
     fn row<const D: usize>(&self, state: &State<D>, is_over: bool) -> Option<usize> {
-        let start = self.step.checked_sub(1).map_or(Some(0), |before| state.stage.starts.get(before).copied())?;
+        let start =
+            self.step.checked_sub(1).map_or(Some(0), |before| state.stage.starts.get(before).copied())?;
         let next = state.stage.starts.get(self.step).copied();
         let rows = start..next.unwrap_or(state.history.len());
         match self.place {
@@ -108,7 +109,10 @@ impl Scene {
             format!(" at load factor {}{time}", plain(row.factor))
         });
         let warning = |named: NamedState| {
-            format!("`output.state`: the run ended{end}, before the state `{}`: it has no pictures", named.name)
+            format!(
+                "`output.state`: the run ended{end}, before the state `{}`: it has no pictures",
+                named.name
+            )
         };
         self.named_states().into_iter().filter(missed).map(warning).collect()
     }
@@ -148,7 +152,11 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                 return Err(source.unexpected(&key("factor"), why));
             }
             if !factors.iter().any(|&own| same(own, factor)) {
-                return Err(source.error(&key("factor"), plain(factor), around(factor, &factors, "load factor", "")));
+                return Err(source.error(
+                    &key("factor"),
+                    plain(factor),
+                    around(factor, &factors, "load factor", ""),
+                ));
             }
         }
         if let Some(time) = spec.time.map(Time::si) {
@@ -193,7 +201,11 @@ fn checked_steps(source: &Source, scene: &Scene) -> Result<Vec<usize>, SceneErro
                 return Err(source.unexpected(&key("step"), "only a scene with [[step]] has several"));
             }
             Some(step) if !(1..=count).contains(&step) => {
-                return Err(source.error(&key("step"), step, format!("1 to {count}, the first is that of the scene")));
+                return Err(source.error(
+                    &key("step"),
+                    step,
+                    format!("1 to {count}, the first is that of the scene"),
+                ));
             }
             None if count > 1 && spec.factor.is_some() => {
                 return Err(source.missing(&key("step"), "needed beside `factor` in a scene with [[step]]"));
