@@ -13,7 +13,6 @@ use super::bar::{ColorBar, LABEL, LINE, TICK, TICK_LENGTH};
 use super::blocks::ParticleBlocks;
 use super::canvas::{BLACK, Canvas, LabelAnchor, Text};
 use super::color::{ColorMap, MISSING, RIGID};
-use super::film::{FilmPace, film};
 use super::particles::{PixelWindow, Raster};
 use super::picture_error;
 use polycore::Error;
@@ -21,8 +20,6 @@ use polycore::file::atomic_write;
 
 const TITLE: u32 = 28;
 const MARGIN: usize = 26;
-/// The last picture of an animation is shown so many times as long.
-const REST: u16 = 20;
 /// Width of the rim around particles beside rigid bodies, over the longer side of the field.
 const RIM: f64 = 0.06;
 /// More pixels than this are a mistake.
@@ -261,30 +258,6 @@ impl<'a> FieldMap<'a> {
     pub fn room_for(mut self, characters: usize) -> Self {
         self.least_width = characters * TITLE as usize * 2 / 3 + 2 * MARGIN;
         self
-    }
-
-    /// Writes maps of one window, given to the second argument of `frame`, one after another into an animated
-    /// `.png`, a `.gif`, or, by `ffmpeg`, an `.mp4`, each for some `seconds`. It rests on the last, and repeats
-    /// without end but as MP4.
-    ///
-    /// # Errors
-    /// Those of `frame`; as [`Self::write`]; for MP4 no `ffmpeg` on the PATH, or its message.
-    pub fn animate(
-        path: impl AsRef<Path>,
-        frames: usize,
-        seconds: f64,
-        mut frame: impl FnMut(usize, &mut dyn FnMut(&FieldMap<'_>)) -> Result<(), Error>,
-    ) -> Result<(), Error> {
-        let path = path.as_ref();
-        let mut size = None;
-        let bytes = film(path, frames, FilmPace { seconds, rest: REST }, |index| {
-            let mut drawn = Err("there is no map".to_owned());
-            frame(index, &mut |map| drawn = map.canvas())?;
-            let canvas = drawn.map_err(|reason| picture_error(path, reason))?;
-            let size = *size.get_or_insert([canvas.width, canvas.height]);
-            Ok(if size == [canvas.width, canvas.height] { canvas } else { canvas.on_sheet(size) })
-        })?;
-        atomic_write(path, |file| file.write_all(&bytes))
     }
 
     /// Writes a `.png`, whole or not at all.

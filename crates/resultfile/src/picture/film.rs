@@ -6,8 +6,10 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use super::canvas::{Canvas, animated_png};
+use super::field::FieldMap;
 use super::picture_error;
 use polycore::Error;
+use polycore::file::atomic_write;
 
 /// Program that writes MP4.
 const FFMPEG: &str = "ffmpeg";
@@ -16,6 +18,9 @@ const SPEED: i32 = 3;
 /// Characters of a message of `ffmpeg` at most.
 const MESSAGE: usize = 400;
 
+/// The last map of an animation is shown so many times as long.
+const REST: u16 = 20;
+
 /// Time of frames.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FilmPace {
@@ -23,6 +28,32 @@ pub(super) struct FilmPace {
     pub seconds: f64,
     /// The last is shown so many times as long.
     pub rest: u16,
+}
+
+impl FieldMap<'_> {
+    /// Writes maps of one window, given to the second argument of `frame`, one after another into an animated
+    /// `.png`, a `.gif`, or, by `ffmpeg`, an `.mp4`, each for some `seconds`. It rests on the last, and repeats
+    /// without end but as MP4.
+    ///
+    /// # Errors
+    /// Those of `frame`; as [`Self::write`]; for MP4 no `ffmpeg` on the PATH, or its message.
+    pub fn animate(
+        path: impl AsRef<Path>,
+        frames: usize,
+        seconds: f64,
+        mut frame: impl FnMut(usize, &mut dyn FnMut(&FieldMap<'_>)) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let path = path.as_ref();
+        let mut size = None;
+        let bytes = film(path, frames, FilmPace { seconds, rest: REST }, |index| {
+            let mut drawn = Err("there is no map".to_owned());
+            frame(index, &mut |map| drawn = map.canvas())?;
+            let canvas = drawn.map_err(|reason| picture_error(path, reason))?;
+            let size = *size.get_or_insert([canvas.width, canvas.height]);
+            Ok(if size == [canvas.width, canvas.height] { canvas } else { canvas.on_sheet(size) })
+        })?;
+        atomic_write(path, |file| file.write_all(&bytes))
+    }
 }
 
 /// Returns images of one size as an animation of the kind of `path`: GIF (`.gif`), MP4 (`.mp4`), else an
