@@ -19,17 +19,17 @@ const EACH: [f64; 2] = [0.04, 0.3];
 const SIZE: usize = 560;
 
 /// Field that is shown: stress, else energy density, contact pressure, damage, else the displacement.
-enum Shown {
+enum FilmField {
     Stress(String),
     Scalar(&'static str),
     Displacement,
 }
 
 /// Frames of a field file and how they are drawn.
-struct Frames<'a, const D: usize> {
+struct FilmFrames<'a, const D: usize> {
     m: &'a Moment<'a, D>,
     series: Series,
-    shown: Shown,
+    shown: FilmField,
     chosen: Vec<usize>,
 }
 
@@ -37,7 +37,7 @@ struct Frames<'a, const D: usize> {
 pub fn animate<const D: usize>(m: &Moment<D>, output: &Path) -> Vec<String> {
     let Some(kind) = m.scene.output.animation else { return Vec::new() };
     let path = |kind: Animation| output.join(format!("animation_{}.{}", m.physics.name, kind.name()));
-    let drawn = Frames::new(m, output).and_then(|frames| {
+    let drawn = FilmFrames::new(m, output).and_then(|frames| {
         let first = frames.draw(&path(kind));
         match first {
             Err(why) if kind == Animation::Mp4 => frames
@@ -52,16 +52,16 @@ pub fn animate<const D: usize>(m: &Moment<D>, output: &Path) -> Vec<String> {
     }
 }
 
-impl<'a, const D: usize> Frames<'a, D> {
+impl<'a, const D: usize> FilmFrames<'a, D> {
     fn new(m: &'a Moment<'a, D>, output: &Path) -> Result<Self, Error> {
         let series = vtkhdf::read(output.join(m.physics.field_file()))?;
         let spec = &m.scene.output;
         let shown = match &m.scene.stress {
-            Some(stress) => Shown::Stress(format!("cauchy_{}", stress.measures[0].name())),
-            None if spec.energy => Shown::Scalar("energy_density"),
-            None if spec.contact => Shown::Scalar("contact_pressure"),
-            None if m.physics.whole.is_some() => Shown::Scalar("damage"),
-            None => Shown::Displacement,
+            Some(stress) => FilmField::Stress(format!("cauchy_{}", stress.measures[0].name())),
+            None if spec.energy => FilmField::Scalar("energy_density"),
+            None if spec.contact => FilmField::Scalar("contact_pressure"),
+            None if m.physics.whole.is_some() => FilmField::Scalar("damage"),
+            None => FilmField::Displacement,
         };
         let (count, kept) = (series.len(), series.len().min(MOST));
         let chosen = (1..=kept).map(|k| k * count / kept - 1).collect();
@@ -71,11 +71,11 @@ impl<'a, const D: usize> Frames<'a, D> {
     /// Values of the field in a frame.
     fn values(&self, frame: usize) -> Result<Vec<f64>, polycore::Error> {
         Ok(match (&self.shown, &self.m.scene.stress) {
-            (Shown::Stress(name), Some(spec)) => {
+            (FilmField::Stress(name), Some(spec)) => {
                 let tensors = self.series.data(frame, name)?;
                 tensors.chunks(9).map(|t| shown_stress(spec, D == 2, t)).collect()
             }
-            (Shown::Scalar(name), _) => self.series.data(frame, name)?,
+            (FilmField::Scalar(name), _) => self.series.data(frame, name)?,
             _ => {
                 let moved = self.series.data(frame, "displacement")?;
                 moved.chunks(3).map(|u| u.iter().map(|u| u * u).sum::<f64>().sqrt()).collect()
@@ -87,12 +87,12 @@ impl<'a, const D: usize> Frames<'a, D> {
     fn field(&self, range: (f64, f64)) -> ColouredField {
         let (scale, unit) = stress_unit(range.1.max(-range.0));
         match (&self.shown, &self.m.scene.stress) {
-            (Shown::Stress(_), Some(spec)) => stress_strip(spec, range),
-            (Shown::Scalar("damage"), _) => super::solid::damage_field(),
-            (Shown::Scalar("contact_pressure"), _) => {
+            (FilmField::Stress(_), Some(spec)) => stress_strip(spec, range),
+            (FilmField::Scalar("damage"), _) => super::solid::damage_field(),
+            (FilmField::Scalar("contact_pressure"), _) => {
                 field(format!("contact pressure ({unit})"), scale, range)
             }
-            (Shown::Scalar(_), _) => super::solid::energy_field(&[range.1]),
+            (FilmField::Scalar(_), _) => super::solid::energy_field(&[range.1]),
             _ => field("|u| (mm)".to_owned(), 1e3, range),
         }
     }
@@ -104,7 +104,7 @@ impl<'a, const D: usize> Frames<'a, D> {
             extend_box(&mut bounds, &self.series.points(frame)?);
             let values = self.values(frame)?;
             let (low, high) = match self.shown {
-                Shown::Stress(_) => stress_range(values),
+                FilmField::Stress(_) => stress_range(values),
                 _ => values.iter().fold((0.0_f64, 0.0_f64), |(low, high), x| (low.min(*x), high.max(*x))),
             };
             range = (range.0.min(low), range.1.max(high));

@@ -22,7 +22,7 @@ pub(super) struct Tractions<'s>(pub &'s Scene);
 
 /// Contact with one surface: its tractions, its mean normal, and their distances along it from the centre of
 /// pressure, m.
-struct Contact<'a, const D: usize> {
+struct PressedSurface<'a, const D: usize> {
     name: String,
     each: Vec<&'a SurfaceTraction<D>>,
     normal: [f64; D],
@@ -45,7 +45,7 @@ fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-impl<'a, const D: usize> Contact<'a, D> {
+impl<'a, const D: usize> PressedSurface<'a, D> {
     /// Returns the contacts of surfaces that touch the body; in a plane body in order along them.
     fn all(scene: &Scene, tractions: &'a [SurfaceTraction<D>]) -> Vec<Self> {
         let names = scene.contact.as_ref().map_or_else(Vec::new, ContactSpec::surface_names);
@@ -122,7 +122,7 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Tractions<'_> {
     /// Writes `contact_SURFACE_VARIANT.csv` for each surface that touches the body.
     fn write(&self, m: &Moment<'m, D>, to: &Outputs) -> Result<(), Error> {
         let Some(spec) = self.0.contact.as_ref().filter(|_| self.0.output.contact) else { return Ok(()) };
-        for contact in Contact::all(self.0, m.tractions()) {
+        for contact in PressedSurface::all(self.0, m.tractions()) {
             let path = to.folder.join(format!("contact_{}_{}.csv", contact.name, m.physics.name));
             contact.write(has_shear(spec), &path)?;
         }
@@ -132,7 +132,7 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Tractions<'_> {
     /// Draws the pressure along all contacts of a plane body, and that of each surface on a solid.
     fn draw(&self, m: &Moment<'m, D>, to: &Outputs) -> Result<(), Error> {
         let Some(spec) = self.0.contact.as_ref().filter(|_| self.0.output.contact) else { return Ok(()) };
-        let contacts = Contact::all(self.0, m.tractions());
+        let contacts = PressedSurface::all(self.0, m.tractions());
         if contacts.is_empty() {
             return Ok(());
         }
@@ -166,7 +166,7 @@ fn means<'a, const D: usize, const N: usize>(
 /// Draws pressure and shear along the contacts of a plane body.
 fn draw_curves<const D: usize>(
     m: &Moment<D>,
-    contacts: &[Contact<D>],
+    contacts: &[PressedSurface<D>],
     shear: bool,
     output: &Path,
 ) -> Result<(), Error> {
@@ -191,7 +191,11 @@ fn draw_curves<const D: usize>(
 }
 
 /// Draws the pressure of a surface on a solid, seen from its side.
-fn draw_solid<const D: usize>(m: &Moment<D>, contact: &Contact<D>, output: &Path) -> Result<(), Error> {
+fn draw_solid<const D: usize>(
+    m: &Moment<D>,
+    contact: &PressedSurface<D>,
+    output: &Path,
+) -> Result<(), Error> {
     let values = means(m, contact.each.iter().copied(), |one| [one.pressure]).into_flattened();
     let [low, high] = [f64::min, f64::max].map(|pick| values.iter().copied().fold(0.0, pick));
     let (scale, unit) = stress_unit(high.max(-low));

@@ -207,10 +207,8 @@ fn run_variant<const D: usize>(
         if solved.is_err() {
             break;
         }
-        if own_scene.dynamics.is_some() {
-            body.bonds.prepare(&state.displacement);
-        }
         for named in states.iter().filter(|named| named.is_now(&state, true)) {
+            body.bonds.prepare(&state.displacement);
             let moment = Moment::new((&own_scene, &physics), &*body.bonds, &state, &phases).named(named.name);
             observers.iter().try_for_each(|observer| observer.draw(&moment, &outputs))?;
         }
