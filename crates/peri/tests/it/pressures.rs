@@ -164,8 +164,12 @@ fn tractions_add_up_to_the_force_of_the_plane() {
     let upper = "displacement = [\"1.5 mm\", \"-1 mm\"]";
     for (planes, friction) in [("friction = 0.3", Some(0.3)), ("bonded = true", None)] {
         let directory = tempfile::tempdir().unwrap();
-        let held = if friction.is_some() { HELD } else { "" };
-        let finished = solve(&(squeezed(planes, upper) + held), directory.path());
+        let pulled = "[[boundary]]\nside = \"x+\"\ntraction = [\"1 kPa\", \"0 Pa\"]\n";
+        let held = if friction.is_some() { HELD } else { pulled };
+        // sums hold at any residual
+        let text =
+            squeezed(planes, upper).replace("steps = 8\ntolerance = 1e-6", "steps = 2\ntolerance = 1e-3");
+        let finished = solve(&(text + held), directory.path());
         for (plane, up) in [("lower", 1.0), ("upper", -1.0)] {
             let rows = table(&directory.path().join(format!("contact_{plane}_dx-1mm_m-3.015.csv")));
             let sum = |column: &str| rows[column].iter().zip(&rows["area"]).map(|(t, a)| t * a).sum::<f64>();
@@ -177,7 +181,8 @@ fn tractions_add_up_to_the_force_of_the_plane() {
             let rubs = rows["shear_x"].iter().zip(&rows["area"]).map(|(t, a)| (t * a).abs()).sum::<f64>();
             assert!(rubs > 0.05 * size, "{plane}: no shear");
             for (shear, pressure) in rows["shear_x"].iter().zip(&rows["pressure"]) {
-                assert!(friction.is_none_or(|mu| shear.abs() <= mu * pressure * (1.0 + 1e-6)));
+                // friction follows normal forces to 1e-3 of their sum over 25 faces
+                assert!(friction.is_none_or(|mu| shear.abs() <= mu * pressure * (1.0 + 0.025)));
             }
         }
     }
