@@ -12,6 +12,7 @@ mod canvas;
 mod color;
 mod cubes;
 mod field;
+mod film;
 mod line;
 mod particles;
 mod plot;

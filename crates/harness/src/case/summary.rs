@@ -282,12 +282,14 @@ fn files(output: &Path, style: &TerminalStyle) -> String {
         many => format!(", {many} {one}s"),
     };
     let [pictures, tables, fields] = [".png", ".csv", ".vtkhdf"].map(ending);
+    let films = [".gif", ".mp4"].map(ending).concat();
     let mut text = format!(
-        "results in {}: {FILE_NAME}{}{}{}\n",
+        "results in {}: {FILE_NAME}{}{}{}{}\n",
         output.display(),
         count(tables.len(), "table"),
         count(fields.len(), "field file"),
         count(pictures.len(), "picture"),
+        count(films.len(), "animation"),
     );
     for pair in pictures.chunks(2).take(3) {
         let paths = pair.iter().map(|name| output.join(name).display().to_string()).collect::<Vec<_>>();

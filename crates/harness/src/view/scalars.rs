@@ -40,7 +40,7 @@ impl ArrayScalar {
 /// Returns the scalars of an array, those of bodies in a plane without the third direction.
 pub fn scalars(array: &str, components: usize, plane: bool) -> Vec<ArrayScalar> {
     let (stem, unit) = match array {
-        _ if array.starts_with("cauchy") || array.starts_with("piola") => (array, "Pa"),
+        _ if ["cauchy", "piola", "contact"].iter().any(|kind| array.starts_with(kind)) => (array, "Pa"),
         _ => [("_Pa", "Pa"), ("_degC", "°C"), ("_m", "m")]
             .into_iter()
             .find_map(|(end, unit)| Some((array.strip_suffix(end)?, unit)))

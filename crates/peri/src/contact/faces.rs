@@ -22,6 +22,7 @@ use nalgebra::{SMatrix, SVector};
 /// term.
 const FLAT: f64 = 1e-3;
 /// Faces with their weights, face by face and particle by particle.
+#[derive(Clone)]
 pub struct Faces<const D: usize> {
     /// X_f, m.
     pub places: Vec<[f64; D]>,

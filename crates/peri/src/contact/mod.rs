@@ -44,6 +44,7 @@ mod surface_friction;
 mod surface_reactions;
 mod surfaces;
 mod ties;
+mod tractions;
 mod vicinity;
 
 use crate::bonds::{BodyGeometry, Bonds, LatticeBonds, Property};
@@ -63,9 +64,10 @@ pub use rows::{PairRows, PlaneRows, numbers_within};
 use serde::{Deserialize, Serialize};
 pub use stiffness::Spring;
 pub use surface::{RigidSurface, SurfaceReaction, SurfaceShape};
-use surfaces::RigidSurfaces;
+pub use surfaces::RigidSurfaces;
 use ties::Ties;
 pub use ties::{GripInterface, across, grips};
+pub use tractions::SurfaceTraction;
 
 /// κ of Macek & Silling (2007).
 pub const SHORT_RANGE: f64 = 15.0;
@@ -339,6 +341,16 @@ impl<const D: usize> Contact<D> {
     /// Force, area and width of the contact with each rigid surface, without friction.
     pub fn surface_reactions(&self, displacement: &Field<D>) -> Vec<SurfaceReaction> {
         self.surfaces.as_ref().map_or_else(Vec::new, |surfaces| surfaces.reactions(displacement))
+    }
+
+    /// Greatest pressure of each rigid surface on the body, Pa; 0 where nothing is pressed.
+    pub fn greatest_pressures(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> Vec<f64> {
+        self.surfaces.as_ref().map_or_else(Vec::new, |own| own.greatest_pressures(bonds, displacement))
+    }
+
+    /// Returns the rigid surfaces with the faces on which they act.
+    pub fn into_surfaces(self) -> Option<RigidSurfaces<D>> {
+        self.surfaces
     }
 
     /// Sum of the squares of the surfaces' force densities at the last update, (N/m³)².

@@ -56,7 +56,7 @@ impl<const D: usize> RigidSurfaces<D> {
     }
 
     /// Moves surfaces with a force to where contact balances it.
-    pub(super) fn balance(&mut self, field: &Field<D>) {
+    pub fn balance(&mut self, field: &Field<D>) {
         for number in 0..self.each.len() {
             let surface = &self.each[number].surface;
             let Some((size, along)) = surface.pushed() else { continue };

@@ -275,6 +275,8 @@ pub struct SurfaceReaction {
     /// Largest extent of the faces in contact across the normal, or across the force of a round surface, m:
     /// in a plane body the width of the contact.
     pub width: f64,
+    /// Greatest pressure, Pa, see [`SurfaceTraction`](super::SurfaceTraction); 0 where nothing is pressed.
+    pub pressure: f64,
     /// Displacement of the surface, m.
     pub moved: [f64; 3],
 }

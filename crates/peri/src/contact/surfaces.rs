@@ -15,6 +15,7 @@ const TIED: f64 = 0.5;
 const BATCH: usize = 1024;
 
 /// A rigid surface in motion.
+#[derive(Clone)]
 pub(super) struct MovingSurface<const D: usize> {
     pub(super) surface: RigidSurface<D>,
     /// Displacement of the surface now and at the last placement, m.
@@ -65,6 +66,7 @@ impl<const D: usize> SurfaceContact<D> {
 
 /// All rigid surfaces of a scene with the elements they act on: faces of the body, and particles that have
 /// lost bonds.
+#[derive(Clone)]
 pub struct RigidSurfaces<const D: usize> {
     pub(super) each: Vec<MovingSurface<D>>,
     pub(super) faces: Faces<D>,

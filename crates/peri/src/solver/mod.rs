@@ -49,6 +49,7 @@ mod stiffness_control;
 mod system;
 mod time_program;
 mod time_step;
+mod tractions;
 mod turned_sites;
 mod unsupported;
 mod verlet;

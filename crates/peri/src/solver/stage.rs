@@ -24,6 +24,8 @@ pub struct StepOrigin<const D: usize> {
     pub time: f64,
     /// Rows of the history at the start.
     pub rows: usize,
+    /// Rows of the history at the start of each later step so far.
+    pub starts: Vec<usize>,
     /// Displacement at the start, m; none in the first step.
     pub displacement: Option<Field<D>>,
     /// Body force density at the start, N/m³, if there was any.
@@ -45,7 +47,10 @@ impl<const D: usize> State<D> {
     /// Begins the next step, after one with this `end`, and severs the bonds across some cuts. Velocities stay
     /// if both steps are explicit dynamics (`moving`).
     pub fn begin_stage(&mut self, bonds: &dyn Bonds<D>, cuts: &[Cut<D>], end: StepEnd<D>, moving: bool) {
+        let mut starts = std::mem::take(&mut self.stage.starts);
+        starts.push(self.history.len());
         self.stage = StepOrigin {
+            starts,
             finished: self.stage.finished + 1,
             time: self.history.last().map_or(0.0, |row| row.time),
             rows: self.history.len(),

@@ -356,6 +356,11 @@ impl<'a, const D: usize> System<'a, D> {
         stored: f64,
     ) -> StepRecord {
         let (load, displacement) = self.response(state, factor, (pull, push));
+        let mut resting = self.surface_reactions(state);
+        if let Some(contact) = self.repulsion() {
+            let pressures = contact.greatest_pressures(&*self.bonds, &state.displacement);
+            resting.iter_mut().zip(pressures).for_each(|(own, pressure)| own.pressure = pressure);
+        }
         StepRecord {
             factor,
             load,
@@ -378,7 +383,7 @@ impl<'a, const D: usize> System<'a, D> {
             kinetic: state.motion.energies.kinetic,
             damped: state.motion.energies.damped,
             rubbed: state.motion.energies.rubbed,
-            resting: self.surface_reactions(state),
+            resting,
             seen: self.seen(state),
         }
     }

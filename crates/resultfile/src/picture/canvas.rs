@@ -147,6 +147,33 @@ impl Canvas {
         [left, top, right + 1 - left, bottom + 1 - top]
     }
 
+    /// Returns what differs from the frame before, as [`Self::difference`].
+    ///
+    /// # Errors
+    /// A frame of another size.
+    pub(super) fn changes(&self, last: &Self, path: &Path, index: usize) -> Result<[usize; 4], Error> {
+        if [self.width, self.height] == [last.width, last.height] {
+            return Ok(self.difference(last));
+        }
+        Err(picture_error(path, format!("frame {index} has another size")))
+    }
+
+    /// Returns the bytes of a rectangle (left, top, width, height), row by row.
+    pub(super) fn part(&self, [x, y, width, height]: [usize; 4]) -> Vec<u8> {
+        let rows = self.pixels.chunks(self.width).skip(y).take(height);
+        rows.flat_map(|row| row[x..x + width].as_flattened()).copied().collect()
+    }
+
+    /// Returns the image on a white sheet of another size; what is beyond it is cut off.
+    pub(super) fn on_sheet(&self, [width, height]: [usize; 2]) -> Self {
+        let mut sheet = Self::new(width, height);
+        for (row, line) in self.pixels.chunks(self.width.max(1)).take(height).enumerate() {
+            let count = line.len().min(width);
+            sheet.pixels[row * width..row * width + count].copy_from_slice(&line[..count]);
+        }
+        sheet
+    }
+
     /// Copies another image to a place where it fits.
     pub(super) fn paste(&mut self, other: &Self, x: usize, y: usize) {
         for (row, line) in other.pixels.chunks(other.width.max(1)).enumerate() {
@@ -186,17 +213,14 @@ impl Canvas {
 /// times as long.
 ///
 /// # Errors
-/// Those of `frame`; no frame; what cannot be encoded.
-pub(super) fn film(
+/// Those of `frame`; what cannot be encoded.
+pub(super) fn animated_png(
     path: &Path,
     frames: usize,
     seconds: f64,
     rest: u16,
     mut frame: impl FnMut(usize) -> Result<Canvas, Error>,
 ) -> Result<Vec<u8>, Error> {
-    if frames == 0 {
-        return Err(picture_error(path, "there is no frame"));
-    }
     let text = |error: png::EncodingError| picture_error(path, error);
     let mut last = frame(0)?;
     let mut bytes = Vec::new();
@@ -214,20 +238,15 @@ pub(super) fn film(
     writer.write_image_data(last.pixels.as_flattened()).map_err(text)?;
     for index in 1..frames {
         let next = frame(index)?;
-        if [next.width, next.height] != [last.width, last.height] {
-            return Err(picture_error(path, format!("frame {index} has another size")));
-        }
         // what changes only
-        let [x, y, width, height] = next.difference(&last);
+        let part @ [x, y, width, height] = next.changes(&last, path, index)?;
         writer.reset_frame_position().map_err(text)?;
         writer.set_frame_dimension(width as u32, height as u32).map_err(text)?;
         writer.set_frame_position(x as u32, y as u32).map_err(text)?;
         if index + 1 == frames {
             writer.set_frame_delay(delay.saturating_mul(rest), 1000).map_err(text)?;
         }
-        let rows = next.pixels.chunks(next.width).skip(y).take(height);
-        let part: Vec<u8> = rows.flat_map(|row| row[x..x + width].as_flattened()).copied().collect();
-        writer.write_image_data(&part).map_err(text)?;
+        writer.write_image_data(&next.part(part)).map_err(text)?;
         last = next;
     }
     writer.finish().map_err(text)?;

@@ -45,6 +45,7 @@ pub struct FieldMap<'a> {
     size: usize,
     lengths: Option<(String, f64)>,
     names: [&'a str; 2],
+    least_width: usize,
 }
 
 /// A field: positions of the particles (deformed or not) and their values.
@@ -60,6 +61,7 @@ pub struct Panel<'a> {
     colors: ColorMap,
     range: Option<(f64, f64)>,
     rigid: Option<RigidOutline<'a>>,
+    within: Option<[[f64; 2]; 2]>,
 }
 
 /// Height above rigid bodies at a place, negative within them.
@@ -87,6 +89,7 @@ impl<'a> Panel<'a> {
             colors: ColorMap::Viridis,
             range: None,
             rigid: None,
+            within: None,
         }
     }
 
@@ -121,6 +124,12 @@ impl<'a> Panel<'a> {
     /// negative.
     pub fn rigid(mut self, height: &'a (dyn Fn([f64; 2]) -> f64 + Sync)) -> Self {
         self.rigid = Some(RigidOutline(height));
+        self
+    }
+
+    /// Shows the plane around particles at two corners instead of that around all particles.
+    pub fn within(mut self, corners: [[f64; 2]; 2]) -> Self {
+        self.within = Some(corners);
         self
     }
 
@@ -204,7 +213,14 @@ impl Default for FieldMap<'_> {
 impl<'a> FieldMap<'a> {
     /// No panel yet.
     pub fn new() -> Self {
-        Self { panels: Vec::new(), columns: None, size: 720, lengths: None, names: ["x", "y"] }
+        Self {
+            panels: Vec::new(),
+            columns: None,
+            size: 720,
+            lengths: None,
+            names: ["x", "y"],
+            least_width: 0,
+        }
     }
 
     /// Adds a field.
@@ -238,6 +254,12 @@ impl<'a> FieldMap<'a> {
         self
     }
 
+    /// Leaves room for a title of so many characters, for pictures of one width.
+    pub fn room_for(mut self, characters: usize) -> Self {
+        self.least_width = characters * TITLE as usize * 2 / 3 + 2 * MARGIN;
+        self
+    }
+
     /// Writes a `.png`, whole or not at all.
     ///
     /// # Errors
@@ -264,8 +286,9 @@ impl<'a> FieldMap<'a> {
             let mut outlined = Vec::with_capacity(panels.len());
             for panel in panels {
                 panel.check()?;
-                let window = PixelWindow::around(panel.positions, panel.spacing, self.size as f64)
-                    .ok_or_else(|| {
+                let around = panel.within.as_ref().map_or(panel.positions, |corners| &corners[..]);
+                let window =
+                    PixelWindow::around(around, panel.spacing, self.size as f64).ok_or_else(|| {
                         format!("panel `{}`: positions are not finite or too far apart", panel.title)
                     })?;
                 let window = if panel.rigid.is_some() { window.widened(RIM) } else { window };
@@ -315,7 +338,7 @@ impl<'a> FieldMap<'a> {
         let left = MARGIN + axes.as_ref().map_or(0, |axes| axes.left);
         let bottom = MARGIN + axes.as_ref().map_or(0, |axes| axes.bottom);
         let body = raster.width + 2 * MARGIN + bar.width;
-        let width = (left + body).max(title.width + 2 * MARGIN);
+        let width = (left + body).max(title.width + 2 * MARGIN).max(self.least_width);
         let mut canvas = sheet(width, head + bar.height.max(raster.height) + bottom)?;
         let (x, y) = (left as isize, head as isize);
         for (at, value) in raster.values.iter().enumerate() {

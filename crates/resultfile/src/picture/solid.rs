@@ -7,7 +7,8 @@ use std::path::Path;
 
 use super::axis::labels;
 use super::bar::{ColorBar, TICK};
-use super::canvas::{Canvas, Color, LabelAnchor, Text, film};
+use super::canvas::{Canvas, Color, LabelAnchor, Text};
+use super::film::{FilmPace, film};
 use super::picture_error;
 use super::shade::{Camera, Sight};
 use super::skin::{Skin, View};
@@ -122,11 +123,11 @@ impl Solids {
         atomic_write(path, |file| file.write_all(&bytes))
     }
 
-    /// Writes frames one after another into an animated `.png`. It repeats without end and rests on the last
-    /// frame; viewers that know no animation show the first.
+    /// Writes frames one after another into an animated `.png`, a `.gif`, or, by `ffmpeg`, an `.mp4`. It rests on
+    /// the last frame, and repeats without end but as MP4; viewers that know no animation show the first.
     ///
     /// # Errors
-    /// As [`Self::write`].
+    /// As [`Self::write`]; for MP4 no `ffmpeg` on the PATH, or its message.
     pub fn animate(
         &self,
         path: impl AsRef<Path>,
@@ -165,7 +166,7 @@ impl Solids {
         let layout = self.layout(views.len().min(1), views, 520.0).map_err(fail)?;
         let mut empty = Canvas::new(layout.size[0], layout.size[1]);
         self.surround(&layout, &mut empty);
-        let bytes = film(path, views.len(), seconds, rest, |index| {
+        let bytes = film(path, views.len(), FilmPace { seconds, rest }, |index| {
             let mut canvas = empty.clone();
             self.paint(&layout, views[index], 0, &*stage(index)?, &mut canvas).map_err(fail)?;
             Ok(canvas)

@@ -56,8 +56,10 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
         for (d, axis) in axes(scene).iter().enumerate().filter(|_| index >= contact.plane.len()) {
             to.add_if(q::INDENTER_DISPLACEMENT.named(&[&name, axis]), |m| Some(resting(m)?.moved[d]));
         }
-        let sizes: [fn(SurfaceReaction) -> f64; 3] = [|one| one.area, |one| one.spread, |one| one.width];
-        for (quantity, get) in [q::PLANE_AREA, q::PLANE_SPREAD, q::PLANE_WIDTH].iter().zip(sizes) {
+        let sizes: [fn(SurfaceReaction) -> f64; 4] =
+            [|one| one.area, |one| one.spread, |one| one.width, |one| one.pressure];
+        let quantities = [q::PLANE_AREA, q::PLANE_SPREAD, q::PLANE_WIDTH, q::PLANE_PRESSURE];
+        for (quantity, get) in quantities.iter().zip(sizes) {
             to.add_if(quantity.named(&[&name]), |m| resting(m).map(get));
         }
     }

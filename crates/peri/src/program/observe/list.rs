@@ -1,7 +1,9 @@
 //! List of all observers.
 
 use super::moment::{Moment, SceneObservers, StatelessObserver};
-use super::{contact, cracks, exact, flags, frames, history, lines, maps, probes, sections, values};
+use super::{
+    contact, cracks, exact, flags, frames, history, lines, maps, probes, sections, tractions, values,
+};
 use crate::calibrate::Space;
 use crate::error::Error;
 use crate::program::scene::Scene;
@@ -38,6 +40,7 @@ pub fn observers<const D: usize>(scene: &Scene) -> SceneObservers<'_, D> {
         stateless(StatelessObserver { fields: flags::flag_field, ..none }),
         stateless(StatelessObserver { fields: frames::energy_field, ..none }),
         stateless(StatelessObserver { fields: frames::stress_fields, ..none }),
+        Box::new(tractions::Tractions(scene)),
         Box::new(maps::Pictures(scene)),
     ]
 }

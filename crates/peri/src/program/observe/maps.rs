@@ -6,6 +6,7 @@ use super::{solid, stages};
 use crate::contact::{RigidSurface, SurfaceReaction};
 use crate::error::Error;
 use crate::program::scene::Scene;
+use crate::solver::StepRecord;
 use harness::observe::{Observer, Outputs};
 use harness::output::picture::{FieldMap, Panel};
 use std::path::Path;
@@ -15,27 +16,37 @@ pub(super) struct Pictures<'s>(pub &'s Scene);
 
 impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Pictures<'_> {
     fn write(&self, m: &Moment<'m, D>, to: &Outputs) -> Result<(), Error> {
-        if !to.pictures {
-            return Ok(());
-        }
+        let spec = &self.0.output;
+        let breaks = m.physics.body.criterion.is_some();
+        let has_stages = spec.fields && spec.every.is_some() && self.0.stress.is_some() && breaks;
+        if to.pictures { self.draw_all(m, has_stages, to.folder) } else { Ok(()) }
+    }
+
+    fn draw(&self, m: &Moment<'m, D>, to: &Outputs) -> Result<(), Error> {
+        self.draw_all(m, false, to.folder)
+    }
+}
+
+impl Pictures<'_> {
+    /// Draws fields of a plane body, and a solid; with stages those of breaking in place of the moment.
+    fn draw_all<const D: usize>(&self, m: &Moment<D>, stages: bool, folder: &Path) -> Result<(), Error> {
         let spec = &self.0.output;
         let flags = if spec.flags { m.physics.evaluator.flags(m.bonds, m.state) } else { None };
         let flags: Option<Vec<f64>> =
             flags.map(|flags| flags.iter().map(|flags| f64::from(u8::from(flags.any()))).collect());
         let energies = if spec.energy { m.physics.evaluator.energies(m.bonds, m.state) } else { None };
         if D == 2 {
-            maps(m, to.folder)?;
-            flags.iter().try_for_each(|values| flagged(m, values, to.folder))?;
-            energies.iter().try_for_each(|values| energy_map(m, values, to.folder))?;
+            maps(m, folder)?;
+            flags.iter().try_for_each(|values| flagged(m, values, folder))?;
+            energies.iter().try_for_each(|values| energy_map(m, values, folder))?;
         }
-        let breaks = m.physics.body.criterion.is_some();
-        if spec.fields && spec.every.is_some() && self.0.stress.is_some() && breaks {
-            stages::draw_stages(m, to.folder)?;
+        if stages {
+            stages::draw_stages(m, folder)?;
         } else if D == 3 {
             let flags = flags.map(|flags| (solid::flagged_field(), flags));
             let energies = energies.map(|values| (solid::energy_field(&values), values));
             let second = flags.or(energies).or_else(|| Some((solid::damage_field(), m.damage()?)));
-            solid::draw_end(m, second, to.folder)?;
+            solid::draw_end(m, second, folder)?;
         }
         Ok(())
     }
@@ -65,14 +76,7 @@ fn maps<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error> {
     if wide > 1.8 * high {
         map = map.columns(1).size(1200);
     }
-    let (surfaces, record) = (&m.physics.surfaces, m.state.history.last());
-    let moved = record.map_or(&[][..], |record| &record.resting);
-    let height = |place: [f64; 2]| {
-        let above = |(surface, at): (&RigidSurface<D>, &SurfaceReaction)| {
-            surface.height(std::array::from_fn(|d| place[d] - at.moved[d]))
-        };
-        surfaces.iter().zip(moved).map(above).fold(f64::INFINITY, f64::min)
-    };
+    let height = rigid_height(m, m.state.history.last());
     for (name, values) in &components {
         let label = format!("{name}{unit}");
         // in a torn body these are residual stresses of its pieces
@@ -80,12 +84,26 @@ fn maps<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error> {
         let moment = last.map_or(String::new(), |r| {
             format!(", U = {} mm, F = {} N", short(r.displacement * 1e3), short(r.load))
         });
-        let title = format!("{label}, {}{moment}", measure.name());
+        let title = m.titled(&format!("{label}, {}{moment}", measure.name()));
         let panel = Panel::new(&title, &label, &places, values, m.bonds.spacing()).reference(&rest);
         let panel = panel.bridge(bridge_length(m));
-        map = map.panel(if surfaces.is_empty() { panel } else { panel.rigid(&height) });
+        map = map.panel(if m.physics.placed.is_empty() { panel } else { panel.rigid(&height) });
     }
-    Ok(map.write(output.join(format!("stress_{}.png", m.physics.name)))?)
+    Ok(map.write(output.join(format!("stress_{}.png", m.file_name())))?)
+}
+
+/// Returns the height above rigid planes and indenters in a row of the history, m.
+pub(super) fn rigid_height<const D: usize>(
+    m: &Moment<D>,
+    row: Option<&StepRecord>,
+) -> impl Fn([f64; 2]) -> f64 + Sync {
+    let (surfaces, moved) = (&m.physics.placed, row.map_or(&[][..], |row| &row.resting));
+    move |place| {
+        let above = |(surface, at): (&RigidSurface<D>, &SurfaceReaction)| {
+            surface.height(std::array::from_fn(|d| place[d] - at.moved[d]))
+        };
+        surfaces.iter().zip(moved).map(above).fold(f64::INFINITY, f64::min)
+    }
 }
 
 /// Draws the particles of a plane body at which a learnt law is uncertain.
@@ -94,12 +112,17 @@ fn maps<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error> {
 /// A file that cannot be written.
 fn flagged<const D: usize>(m: &Moment<D>, values: &[f64], output: &Path) -> Result<(), Error> {
     let [rest, places] = plane_positions(m);
-    let panel =
-        Panel::new("where the learnt law is uncertain", "flagged", &places, values, m.bonds.spacing());
+    let panel = Panel::new(
+        &m.titled("where the learnt law is uncertain"),
+        "flagged",
+        &places,
+        values,
+        m.bonds.spacing(),
+    );
     let map = FieldMap::new()
         .lengths("mm", 1e-3)
         .panel(panel.range(0.0, 1.0).reference(&rest).bridge(bridge_length(m)));
-    Ok(map.write(output.join(format!("flags_{}.png", m.physics.name)))?)
+    Ok(map.write(output.join(format!("flags_{}.png", m.file_name())))?)
 }
 
 /// Draws the energy density of a plane body.
@@ -111,9 +134,9 @@ fn energy_map<const D: usize>(m: &Moment<D>, values: &[f64], output: &Path) -> R
     let field = solid::energy_field(values);
     let values: Vec<f64> = values.iter().map(|w| w * field.scale).collect();
     let label = &field.strip.label;
-    let panel = Panel::new(label, label, &places, &values, m.bonds.spacing()).reference(&rest);
+    let panel = Panel::new(&m.titled(label), label, &places, &values, m.bonds.spacing()).reference(&rest);
     let map = FieldMap::new().lengths("mm", 1e-3).panel(panel.bridge(bridge_length(m)));
-    Ok(map.write(output.join(format!("energy_{}.png", m.physics.name)))?)
+    Ok(map.write(output.join(format!("energy_{}.png", m.file_name())))?)
 }
 
 /// Returns the reference and current positions of the particles of a plane body.

@@ -4,7 +4,7 @@ use super::rows::{RowPart, rows};
 use super::stage::SceneStage;
 use crate::bonds::{Bonds, Property};
 use crate::calibrate;
-use crate::contact::RigidSurface;
+use crate::contact::{Contact, RigidSurface, RigidSurfaces, SurfaceTraction};
 use crate::correction::{bond_factors, surface_factors};
 use crate::critical::{Context, CrackArea, Critical, Crossing, Toughness};
 use crate::error::Error;
@@ -234,6 +234,10 @@ pub struct Physics<const D: usize> {
     pub held: Option<Vec<bool>>,
     /// Planes and indenters of `[contact]`.
     pub surfaces: Vec<RigidSurface<D>>,
+    /// The same where they begin: with a force at first touch.
+    pub placed: Vec<RigidSurface<D>>,
+    /// With `output.contact`, the same with the faces on which they act.
+    faced: Option<RigidSurfaces<D>>,
     rows: Vec<RowPart<D>>,
     /// Evaluator of forces and stresses; this and the following fields are set by [`Self::begin`].
     pub evaluator: StressEvaluator<D>,
@@ -292,6 +296,8 @@ impl<const D: usize> Physics<D> {
             loaded,
             held,
             surfaces: surfaces.unwrap_or_default(),
+            placed: Vec::new(),
+            faced: None,
             rows,
             evaluator: StressEvaluator::none(),
             whole: None,
@@ -340,6 +346,50 @@ impl<const D: usize> Physics<D> {
         let corrected = variant.surface == SurfaceCorrection::Energy;
         self.by_window = self.loaded.iter().map(|&loaded| loaded || corrected).collect();
         Ok(())
+    }
+
+    /// Builds the contact of a body that is whole.
+    ///
+    /// # Errors
+    /// As [`Contact::with_surfaces`].
+    pub fn contact(&self, scene: &Scene, body: &DiscreteBody<D>) -> Result<Option<Contact<D>>, Error> {
+        let Some(spec) = &scene.contact else { return Ok(None) };
+        let (material, bonds) = (&self.body.material, &*body.bonds);
+        let whole = material.longitudinal_modulus(bonds);
+        let stiffness = |site| self.body.stiffness.value_at(site) * material.relative_stiffness(site);
+        let modulus = Property::new(bonds, |site, _| whole * stiffness(site));
+        let held = self.held.as_deref();
+        let tied = held.map(|held| (held, spec.tie_stiffness(scene.dynamics.is_some())));
+        let contact =
+            spec.contact(self.surfaces.clone(), body, material.micromodulus(bonds), &modulus, tied)?;
+        Ok(Some(contact))
+    }
+
+    /// Places rigid surfaces beside a whole body for the outputs of a step.
+    ///
+    /// # Errors
+    /// As [`Self::contact`].
+    pub fn place(&mut self, scene: &Scene, body: &DiscreteBody<D>) -> Result<(), Error> {
+        self.placed.clone_from(&self.surfaces);
+        let pushed = self.surfaces.iter().any(|surface| surface.force.is_some());
+        let output = &scene.output;
+        if output.contact || pushed && (output.pictures || output.animation.is_some()) {
+            let contact = self.contact(scene, body)?;
+            self.placed = contact.iter().flat_map(Contact::surfaces).cloned().collect();
+            self.faced = contact.filter(|_| output.contact).and_then(Contact::into_surfaces);
+        }
+        Ok(())
+    }
+
+    /// Returns the tractions of rigid surfaces in a state; none without `output.contact`.
+    pub fn tractions(
+        &self,
+        scene: &Scene,
+        bonds: &dyn Bonds<D>,
+        state: &State<D>,
+    ) -> Vec<SurfaceTraction<D>> {
+        let faced = self.faced.as_ref();
+        faced.map_or_else(Vec::new, |faced| state.tractions(faced, bonds, &scene.load_steps().0))
     }
 
     /// Returns the numbers of a row of the history: probes, flags of a learnt law, sections.

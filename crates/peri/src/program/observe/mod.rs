@@ -1,5 +1,6 @@
 //! Observers of a run: each defines its scalars, fields and files, and computes them from a state.
 
+mod animation;
 mod contact;
 mod cracks;
 mod exact;
@@ -19,8 +20,10 @@ mod sections;
 mod solid;
 mod stage;
 mod stages;
+mod tractions;
 mod values;
 
+pub use animation::animate;
 pub use expect::{check, quantities_of};
 pub use frames::FieldFrames;
 pub(crate) use frames::in_space;

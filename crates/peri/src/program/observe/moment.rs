@@ -2,6 +2,7 @@
 
 use super::material::Physics;
 use crate::bonds::{Bonds, Fragment, covered_stretches, fragments};
+use crate::contact::SurfaceTraction;
 use crate::error::Error;
 use crate::program::scene::Scene;
 use crate::solver::{State, StepRecord};
@@ -36,9 +37,11 @@ pub struct Moment<'a, const D: usize> {
     pub bonds: &'a dyn Bonds<D>,
     /// Displacement and history.
     pub state: &'a State<D>,
+    label: Option<&'a str>,
     phases: &'a RefCell<Phases>,
     stresses: OnceCell<Stresses<D>>,
     fragments: OnceCell<Vec<Fragment>>,
+    tractions: OnceCell<Vec<SurfaceTraction<D>>>,
 }
 
 impl<'a, const D: usize> Moment<'a, D> {
@@ -49,8 +52,24 @@ impl<'a, const D: usize> Moment<'a, D> {
         state: &'a State<D>,
         phases: &'a RefCell<Phases>,
     ) -> Self {
-        let (stresses, fragments) = (OnceCell::new(), OnceCell::new());
-        Self { scene, physics, bonds, state, phases, stresses, fragments }
+        let (stresses, fragments, tractions) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
+        Self { scene, physics, bonds, state, label: None, phases, stresses, fragments, tractions }
+    }
+
+    /// Gives the moment the name of a state.
+    pub fn named(self, name: &'a str) -> Self {
+        Self { label: Some(name), ..self }
+    }
+
+    /// Returns the end of the names of its pictures: the variant, and the state if it has a name.
+    pub fn file_name(&self) -> String {
+        let name = &self.physics.name;
+        self.label.map_or_else(|| name.clone(), |label| format!("{name}_{label}"))
+    }
+
+    /// Returns a title, with the name of the state.
+    pub fn titled(&self, title: &str) -> String {
+        self.label.map_or_else(|| title.to_owned(), |label| format!("{title}, {label}"))
     }
 
     /// Iterates over a number of every row of the history.
@@ -67,6 +86,11 @@ impl<'a, const D: usize> Moment<'a, D> {
     pub fn fragments(&self) -> &[Fragment] {
         let breaks = self.physics.body.criterion.is_some();
         self.fragments.get_or_init(|| if breaks { fragments(self.bonds) } else { Vec::new() })
+    }
+
+    /// Returns the tractions of rigid surfaces on the body; none without `output.contact`.
+    pub fn tractions(&self) -> &[SurfaceTraction<D>] {
+        self.tractions.get_or_init(|| self.physics.tractions(self.scene, self.bonds, self.state))
     }
 
     /// Returns the damage of each particle: broken bonds over the bonds of the body without cracks, so that

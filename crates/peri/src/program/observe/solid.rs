@@ -69,12 +69,21 @@ pub fn shown_stress(spec: &StressSpec, flat: bool, t: &[f64]) -> f64 {
 
 /// Returns the field of stresses, with a range that leaves out extremes: the Cauchy stress of a crushed
 /// particle would use all colours.
-pub fn stress_field(spec: &StressSpec, mut values: Vec<f64>) -> ColouredField {
+pub fn stress_field(spec: &StressSpec, values: Vec<f64>) -> ColouredField {
+    stress_strip(spec, stress_range(values))
+}
+
+/// Returns the range of values, with 0 and without extremes.
+pub fn stress_range(mut values: Vec<f64>) -> (f64, f64) {
     values.retain(|value| !value.is_nan());
     values.sort_by(f64::total_cmp);
     let part =
         |share: f64| values.get((share * (values.len().max(1) - 1) as f64) as usize).copied().unwrap_or(0.0);
-    let (low, high) = (part(0.002).min(0.0), part(0.998).max(0.0));
+    (part(0.002).min(0.0), part(0.998).max(0.0))
+}
+
+/// Returns the field of stresses with a range, Pa.
+pub fn stress_strip(spec: &StressSpec, (low, high): (f64, f64)) -> ColouredField {
     let (scale, unit) = stress_unit(high.max(-low));
     let index: String = match (&spec.component, spec.component()) {
         (Some(name), Some(_)) => {
@@ -102,7 +111,8 @@ pub fn energy_field(values: &[f64]) -> ColouredField {
     field(format!("energy density ({})", unit.replace("Pa", "J/m³")), scale, (0.0, most))
 }
 
-fn field(label: String, scale: f64, (low, high): (f64, f64)) -> ColouredField {
+/// Returns a field with a factor of its values and a range before it.
+pub fn field(label: String, scale: f64, (low, high): (f64, f64)) -> ColouredField {
     let range = (low * scale, high * scale);
     let range = if range.0 < range.1 && (range.1 - range.0).is_finite() { range } else { (0.0, 1.0) };
     ColouredField { scale, strip: Strip { label, range, colors: ColorMap::Viridis } }
@@ -166,7 +176,7 @@ impl<const D: usize> BodyPictures<'_, D> {
             bounds[1][d] += 0.5 * spacing;
         }
         let solids = Solids {
-            title: m.scene.title.clone(),
+            title: m.titled(&m.scene.title),
             bounds,
             unit: ("mm".into(), 1e-3),
             view: spec.view(),
@@ -185,7 +195,7 @@ impl<const D: usize> BodyPictures<'_, D> {
             };
             Ok((title.clone(), particles.skin(spec.plane(at_rest), |k| [value(0, k), value(1, k)])))
         };
-        let name = &m.physics.name;
+        let name = &m.file_name();
         solids.write(output.join(format!("solid_{name}.png")), stages, |index| {
             let drawn = stage(index)?;
             last = spec.turntable.then(|| drawn.clone());

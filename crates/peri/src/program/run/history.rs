@@ -73,6 +73,7 @@ impl VariantOutcome {
                 }
             }
             columns.push((format!("area {surface}"), "m²".to_owned(), each(&|r| resting(r).area)));
+            columns.push((format!("pressure {surface}"), "Pa".to_owned(), each(&|r| resting(r).pressure)));
             columns.push((format!("spread {surface}"), "m".to_owned(), each(&|r| resting(r).spread)));
             columns.push((format!("width {surface}"), "m".to_owned(), each(&|r| resting(r).width)));
         }

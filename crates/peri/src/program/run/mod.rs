@@ -14,12 +14,12 @@ pub use program::Peri;
 
 use variants::VariantRun;
 
-use crate::bonds::{Bonds, Property};
+use crate::bonds::Bonds;
 use crate::calibrate::Space;
 use crate::error::Error;
 use crate::program::observe::{self, FieldFrames, Moment, Physics, SceneObservers, in_space};
 use crate::program::quantities as q;
-use crate::program::scene::{self, ContactSpec, NAMING, Scene, SceneVariant};
+use crate::program::scene::{self, ContactSpec, NAMING, NamedState, Scene, SceneVariant};
 use crate::solver::{Breaking, State, Status, StepEnd, StepRecord, System, load_stepping};
 use harness::case::{Fault, Run, Step, StepField};
 use harness::observe::{Outputs, Scalars};
@@ -183,6 +183,8 @@ fn run_variant<const D: usize>(
     let last = scene.at_end();
     let mut observers = observe::observers::<D>(&last);
     let mut frames = FieldFrames::new(scene, &state, &output.join(physics.field_file()))?;
+    let outputs = Outputs { folder: output, pictures: scene.output.pictures };
+    let (whole, states) = (scene, scene.named_states());
     let mut solved = Ok(StepEnd::default());
     for index in state.stage.finished..=scene.step.len() {
         let (own_source, own_scene) = (scene.source_of(source, index), scene.stage(index));
@@ -197,11 +199,17 @@ fn run_variant<const D: usize>(
             physics.loads = stage.loads(&own_scene, &body, &state).map_err(PeriFailure::Run)?;
             physics.surfaces.clone_from(&stage.surfaces);
         }
-        let watched = (&mut observers, &mut frames);
+        physics.place(&own_scene, &body)?;
+        let watched = Watched { observers: &mut observers, frames: &mut frames, states: &states, outputs };
         let own = (&*own_source, &*own_scene, device.card.as_ref().filter(|_| index == 0));
         solved = solve(own, &physics, variant_run, &mut body, &mut state, &phases, watched);
         if solved.is_err() {
             break;
+        }
+        for named in states.iter().filter(|named| named.is_now(&state, true)) {
+            body.bonds.prepare(&state.displacement);
+            let moment = Moment::new((&own_scene, &physics), &*body.bonds, &state, &phases).named(named.name);
+            observers.iter().try_for_each(|observer| observer.draw(&moment, &outputs))?;
         }
     }
     outcome.regions = scene::region_names(scene);
@@ -218,6 +226,7 @@ fn run_variant<const D: usize>(
         state.fracture.restore(&mut *body.bonds)?;
         outcome.error = Some(error.to_string());
     }
+    outcome.warnings.extend(whole.unreached(&state, ended.is_some()));
     if scene.dynamics.is_some() {
         body.bonds.prepare(&state.displacement);
     }
@@ -241,8 +250,8 @@ fn run_variant<const D: usize>(
     outcome.probes = observe::columns(scene);
     outcome.record_seconds(&phases.borrow());
     frames.finish(&observers, &moment)?;
-    let outputs = Outputs { folder: output, pictures: scene.output.pictures };
     observers.iter().try_for_each(|observer| observer.write(&moment, &outputs))?;
+    outcome.warnings.extend(observe::animate(&moment, output));
     Ok((outcome, ended))
 }
 
@@ -269,6 +278,14 @@ fn initial_state<const D: usize>(
     Ok(state)
 }
 
+/// What sees the finished steps of a run: observers, field file, and the pictures of named states.
+struct Watched<'a, 's, const D: usize> {
+    observers: &'a mut SceneObservers<'s, D>,
+    frames: &'a mut FieldFrames,
+    states: &'a [NamedState<'s>],
+    outputs: Outputs<'a>,
+}
+
 /// Solves a step; returns what it leaves to the next one, if there is any.
 fn solve<const D: usize>(
     (source, scene, card): (&Source, &Scene, Option<&device::Card>),
@@ -277,23 +294,12 @@ fn solve<const D: usize>(
     body: &mut scene::DiscreteBody<D>,
     state: &mut State<D>,
     phases: &RefCell<Phases>,
-    (observers, frames): (&mut SceneObservers<D>, &mut FieldFrames),
+    Watched { observers, frames, states, outputs }: Watched<'_, '_, D>,
 ) -> Result<StepEnd<D>, PeriFailure> {
     let (material, loads) = (&physics.body.material, &physics.loads);
     let (factors, times) = scene.load_steps();
     let mut watch = |status: &Status, state: &State<D>| variant_run.watch(status, state);
-    let contact = match &scene.contact {
-        Some(contact) => {
-            let surfaces = physics.surfaces.clone();
-            let whole = material.longitudinal_modulus(&*body.bonds);
-            let stiffness = |site| physics.body.stiffness.value_at(site) * material.relative_stiffness(site);
-            let modulus = Property::new(&*body.bonds, |site, _| whole * stiffness(site));
-            let held = physics.held.as_deref();
-            let tied = held.map(|held| (held, contact.tie_stiffness(scene.dynamics.is_some())));
-            Some(contact.contact(surfaces, body, material.micromodulus(&*body.bonds), &modulus, tied)?)
-        }
-        None => None,
-    };
+    let contact = physics.contact(scene, body)?;
     let density_ratios = scene::density_ratios(source, scene, body)?;
     let amplitude = scene.amplitude();
     let row = |bonds: &dyn Bonds<D>, state: &State<D>| physics.row(bonds, state);
@@ -312,9 +318,13 @@ fn solve<const D: usize>(
     phases.borrow_mut().start("solve");
     let mut finished = |bonds: &dyn Bonds<D>, state: &State<D>| {
         phases.borrow_mut().stop();
-        let moment = Moment::new((scene, physics), bonds, state, phases);
+        let mut moment = Moment::new((scene, physics), bonds, state, phases);
         observers.iter_mut().try_for_each(|observer| observer.see(&moment))?;
         frames.step(observers, &moment)?;
+        for named in states.iter().filter(|named| state.control.round == 0 && named.is_now(state, false)) {
+            moment = moment.named(named.name);
+            observers.iter().try_for_each(|observer| observer.draw(&moment, &outputs))?;
+        }
         if state.control.round == 0 {
             variant_run.step(|| step_data(bonds, state));
         }

@@ -198,6 +198,21 @@ fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     if scene.output.energy && scene.material.is_prestrained() {
         return Err(source.unexpected("output.energy", "prestrained bodies have no energy densities"));
     }
+    let surfaces = scene.contact.as_ref().is_some_and(super::ContactSpec::has_surfaces);
+    if scene.output.contact && !surfaces && scene.study.is_empty() {
+        let why = "only a [[contact.plane]] or a [[contact.indenter]] presses on the surface of the body";
+        return Err(source.unexpected("output.contact", why));
+    }
+    super::picture_state::check(source, scene)?;
+    if scene.output.animation.is_some() && !(scene.output.fields && scene.output.every.is_some()) {
+        let key = if scene.output.fields { "every" } else { "fields" };
+        let why = "`every` and `fields = true` write the frames of an `animation`";
+        return Err(if key == "every" {
+            source.missing("output.every", why)
+        } else {
+            source.conflict("output.animation", "fields = false", why)
+        });
+    }
     if !(1..=12).contains(&scene.output.stages) {
         return Err(source.error("output.stages", scene.output.stages, "1 to 12"));
     }

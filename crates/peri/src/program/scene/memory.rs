@@ -110,6 +110,9 @@ fn bytes_of_results<const D: usize>(scene: &Scene, particles: f64) -> f64 {
     if scene.output.energy {
         each += 16.0;
     }
+    if scene.output.contact {
+        each += 8.0 * (1 + D) as f64;
+    }
     if scene.output.pictures {
         each += if D == 2 { DRAWN } else { DRAWN_IN_SPACE };
     }

@@ -36,6 +36,7 @@ mod part_law;
 mod part_solid;
 mod parts;
 mod periodic;
+mod picture_state;
 mod placement;
 mod planes;
 mod pressure;
@@ -79,6 +80,7 @@ pub use network::{ChemistrySpec, explain_network, resolve_network};
 pub use part_law::laws_of_parts;
 pub use part_solid::{relative_moduli, solid_of_parts};
 pub use periodic::PeriodicSpec;
+pub use picture_state::{NamedState, StateSpec};
 pub use placement::{check_placement, check_surfaces, exact_plate};
 pub use probe::{HistoryProbe, Track};
 pub use shapes::{AxisName, ShapeKind, ShapeSpec};
@@ -371,6 +373,26 @@ impl ExactSpec {
     }
 }
 
+/// Kind of an animation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Animation {
+    /// GIF.
+    Gif,
+    /// MP4, by `ffmpeg`; a GIF where there is none.
+    Mp4,
+}
+
+impl Animation {
+    /// Returns the extension of its file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gif => "gif",
+            Self::Mp4 => "mp4",
+        }
+    }
+}
+
 /// Files to write beside the report.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -382,6 +404,8 @@ pub struct OutputFiles {
     /// Interval of steps at which fields are written, also in every step in which bonds break; default: only
     /// the end.
     pub every: Option<usize>,
+    /// Animation of the fields of all written steps; needs `fields` and `every`.
+    pub animation: Option<Animation>,
     /// Number of stages in pictures, from the last intact state to the end; needs `every`.
     pub stages: usize,
     /// View of a solid in pictures.
@@ -390,6 +414,8 @@ pub struct OutputFiles {
     pub flags: bool,
     /// Writes the energy density of particles, as a field and in pictures.
     pub energy: bool,
+    /// Writes pressure and shear of rigid planes and indenters on the body, as fields, tables and pictures.
+    pub contact: bool,
     /// Displacements at which the report has the load, as `load_at_20mm`.
     pub load_at: Vec<Length>,
     /// Displacements at which the report has the stiffness, as `secant_stiffness_at_2mm`.
@@ -402,6 +428,8 @@ pub struct OutputFiles {
     pub line: Vec<LineSpec>,
     /// Planes whose transmitted force is written in every row of the history.
     pub section: Vec<SectionSpec>,
+    /// States at which the pictures of the end are drawn as well.
+    pub state: Vec<StateSpec>,
 }
 
 impl Default for OutputFiles {
@@ -410,16 +438,19 @@ impl Default for OutputFiles {
             pictures: true,
             fields: true,
             every: None,
+            animation: None,
             stages: 5,
             solid: None,
             flags: false,
             energy: false,
+            contact: false,
             load_at: Vec::new(),
             stiffness_at: Vec::new(),
             integrals: false,
             compare: None,
             line: Vec::new(),
             section: Vec::new(),
+            state: Vec::new(),
         }
     }
 }

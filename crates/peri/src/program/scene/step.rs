@@ -106,7 +106,7 @@ impl Scene {
 }
 
 /// Returns the time of a step, s; 0 without times.
-fn duration(time: Option<&TimeProgramSpec>, dynamics: Option<&Dynamics>) -> f64 {
+pub(super) fn duration(time: Option<&TimeProgramSpec>, dynamics: Option<&Dynamics>) -> f64 {
     let ramps = time.iter().flat_map(|time| &time.step).map(|own| own.duration.si()).sum();
     dynamics.map_or(ramps, |dynamics| dynamics.end_time.si())
 }

@@ -1,0 +1,189 @@
+//! Pressures of rigid surfaces on bodies: Hertz's profiles, a squeezed block, resultants, friction.
+
+use evidence::{at_most, near};
+use harness::case::{Case, Options, Run};
+use harness::output::{csv, vtkhdf};
+use harness::scene::Source;
+use peri::program::run::{FinishedScene, Peri, run};
+use peri::program::scene::Scene;
+use std::collections::HashMap;
+use std::f64::consts::PI;
+use std::path::Path;
+
+/// K/μ = 5/3, so ν = 1/4 and E/(1 − ν²) = 8μ/3.
+const SOFT: &str = "[material.solid]\nlaw = \"correspondence\"\nconstitutive = { model = \"neo-hookean\", \
+                    parameters = { shear_modulus = \"1 MPa\" }, bulk_modulus = \"1.6666667 MPa\" }\n";
+const MODULUS: f64 = 8e6 / 3.0;
+/// The middle column of a block stays there.
+const HELD: &str = "[[boundary]]\nmin = [\"-0.6 mm\", \"-1 mm\"]\nmax = [\"0.6 mm\", \"13 mm\"]\n\
+                    displacement = [\"0 mm\", \"free\"]\n";
+
+fn solve(text: &str, output: &Path) -> FinishedScene {
+    let source = Source::new("scene.toml", format!("version = 1\nprogram = \"peri\"\n{text}"));
+    let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
+    let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(output));
+    run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Columns of a table by name, without units.
+fn table(path: &Path) -> HashMap<String, Vec<f64>> {
+    let columns = csv::read(path).unwrap().into_iter();
+    columns.map(|(name, values)| (name.split(' ').next().unwrap().to_owned(), values)).collect()
+}
+
+/// Distances from the middle and pressures below a cylinder of R = 80 mm that 400 N/m press on a half-space.
+fn below_a_roller(spacing: &str, output: &Path) -> [Vec<f64>; 2] {
+    let text = format!(
+        r#"
+[body]
+space = "plane-strain"
+thickness = "1 mm"
+spacing = "{spacing}"
+shapes = [{{ add = "box", min = ["-30 mm", "0 mm"], max = ["30 mm", "30 mm"] }}]
+{SOFT}
+[[boundary]]
+min = ["-1.1 mm", "0 mm"]
+max = ["1.1 mm", "1.2 mm"]
+displacement = ["0 mm", "free"]
+[contact]
+stiffness = 0
+[[contact.plane]]
+name = "base"
+point = ["0 mm", "0 mm"]
+normal = [0, 1]
+stiffness = 10
+[[contact.indenter]]
+name = "roller"
+point = ["0 mm", "111 mm"]
+radius = "80 mm"
+force = ["0 N", "-0.4 N"]
+[solver]
+steps = 2
+tolerance = 1e-4
+[output]
+contact = true
+"#
+    );
+    let finished = solve(&text, output);
+    let variant = format!("dx-{}_m-3.015", spacing.replace(' ', ""));
+    let rows = table(&output.join(format!("contact_roller_{variant}.csv")));
+    let sum: f64 = rows["pressure"].iter().zip(&rows["area"]).map(|(p, a)| p * a).sum();
+    // the normals of the cylinder turn by a/R
+    near(&format!("roller_resultant_{variant}"), sum, 0.4, 0.4 * 0.5 * (4.5f64 / 80.0).powi(2));
+    let greatest = rows["pressure"].iter().copied().fold(0.0, f64::max);
+    assert_eq!(finished.report.scalar("roller_pressure"), Some(greatest));
+    assert!(output.join(format!("contact_{variant}.png")).is_file());
+    // the field of the particles below: of one face each
+    let frames = vtkhdf::read(output.join(format!("{variant}.vtkhdf"))).unwrap();
+    let field = frames.data(frames.len() - 1, "contact_pressure").unwrap();
+    let of_roller = field.iter().zip(frames.points(frames.len() - 1).unwrap()).filter(|(_, x)| x[1] > 0.015);
+    let of_roller = of_roller.map(|(p, _)| *p).fold(0.0, f64::max);
+    assert!((of_roller / greatest - 1.0).abs() < 1e-6, "{of_roller} {greatest}");
+    [rows["along"].clone(), rows["pressure"].clone()]
+}
+
+/// Hertz's line contact (Johnson, Contact Mechanics (1985), §4.2): p = p₀√(1 − x²/a²), a² = 4FR/(πE*),
+/// p₀ = 2F/(πa). The block adds (a/h)² = 2 %.
+#[test]
+fn pressures_below_a_cylinder_are_those_of_hertz() {
+    let a = (4.0 * 400.0 * 0.08 / (PI * MODULUS)).sqrt();
+    let most = 2.0 * 400.0 / (PI * a);
+    for (spacing, peak, error) in [("1 mm", 0.04, 0.08), ("0.5 mm", 0.02, 0.05)] {
+        let directory = tempfile::tempdir().unwrap();
+        let [along, pressures] = below_a_roller(spacing, directory.path());
+        let greatest = pressures.iter().copied().fold(0.0, f64::max);
+        let name = |what: &str| format!("hertz_{what}_{}", spacing.replace(' ', ""));
+        near(&name("peak"), greatest / most, 1.0, peak);
+        let hertz = |x: f64| (1.0 - (x / a).powi(2)).max(0.0).sqrt();
+        let off = |(x, p): (&f64, &f64)| (p / most - hertz(*x)).powi(2);
+        let square = along.iter().zip(&pressures).map(off).sum::<f64>() / along.len() as f64;
+        at_most(&name("rms"), square.sqrt(), error);
+    }
+}
+
+/// A block of 25 × 12 particles between planes, with keys of the planes and of the upper one.
+fn squeezed(planes: &str, upper: &str) -> String {
+    format!(
+        r#"
+[body]
+space = "plane-strain"
+thickness = "2 mm"
+spacing = "1 mm"
+shapes = [{{ add = "box", min = ["-12.5 mm", "0 mm"], max = ["12.5 mm", "12 mm"] }}]
+{SOFT}
+[contact]
+stiffness = 0
+[[contact.plane]]
+name = "lower"
+point = ["0 mm", "0 mm"]
+normal = [0, 1]
+stiffness = 100
+{planes}
+[[contact.plane]]
+name = "upper"
+point = ["0 mm", "12 mm"]
+normal = [0, -1]
+stiffness = 100
+{planes}
+{upper}
+[solver]
+method = "lbfgs"
+steps = 8
+tolerance = 1e-6
+[output]
+contact = true
+"#
+    )
+}
+
+/// Between smooth planes a block bears the same pressure everywhere: its force over its present width.
+#[test]
+fn pressures_of_a_squeezed_block_are_those_of_its_present_width() {
+    let directory = tempfile::tempdir().unwrap();
+    let upper = "displacement = [\"0 mm\", \"-3.6 mm\"]";
+    let finished = solve(&(squeezed("", upper) + HELD), directory.path());
+    let rows = table(&directory.path().join("contact_upper_dx-1mm_m-3.015.csv"));
+    let force = -finished.report.scalar("upper_force_y").unwrap();
+    assert_eq!(rows["x"].len(), 25);
+    let ends = [f64::min, f64::max].map(|pick| rows["x"].iter().copied().fold(0.0, pick));
+    let width = (ends[1] - ends[0]) * 25.0 / 24.0;
+    // 30 % of squeeze widen it by a tenth
+    assert!(width > 0.027, "{width}");
+    // forces balance to 1e-6
+    let area: f64 = rows["area"].iter().sum();
+    near("squeezed_area", area / (width * 2e-3), 1.0, 1e-5);
+    for pressure in &rows["pressure"] {
+        near("squeezed_pressure", pressure * width * 2e-3 / force, 1.0, 1e-5);
+    }
+}
+
+/// Pressures and shears add up to the force of the plane, whether it slides, sticks or is bonded; shears stay
+/// within friction.
+#[test]
+fn tractions_add_up_to_the_force_of_the_plane() {
+    let upper = "displacement = [\"1.5 mm\", \"-1 mm\"]";
+    for (planes, friction) in [("friction = 0.3", Some(0.3)), ("bonded = true", None)] {
+        let directory = tempfile::tempdir().unwrap();
+        let pulled = "[[boundary]]\nside = \"x+\"\ntraction = [\"1 kPa\", \"0 Pa\"]\n";
+        let held = if friction.is_some() { HELD } else { pulled };
+        // sums hold at any residual
+        let text =
+            squeezed(planes, upper).replace("steps = 8\ntolerance = 1e-6", "steps = 2\ntolerance = 1e-3");
+        let finished = solve(&(text + held), directory.path());
+        for (plane, up) in [("lower", 1.0), ("upper", -1.0)] {
+            let rows = table(&directory.path().join(format!("contact_{plane}_dx-1mm_m-3.015.csv")));
+            let sum = |column: &str| rows[column].iter().zip(&rows["area"]).map(|(t, a)| t * a).sum::<f64>();
+            let force = |axis: &str| finished.report.scalar(&format!("{plane}_force_{axis}")).unwrap();
+            let size = force("y").abs();
+            // sums of 25 numbers in another order
+            assert!((up * sum("pressure") + sum("shear_y") - force("y")).abs() < 1e-12 * size);
+            assert!((sum("shear_x") - force("x")).abs() < 1e-12 * size, "{} {}", sum("shear_x"), force("x"));
+            let rubs = rows["shear_x"].iter().zip(&rows["area"]).map(|(t, a)| (t * a).abs()).sum::<f64>();
+            assert!(rubs > 0.05 * size, "{plane}: no shear");
+            for (shear, pressure) in rows["shear_x"].iter().zip(&rows["pressure"]) {
+                // friction follows normal forces to 1e-3 of their sum over 25 faces
+                assert!(friction.is_none_or(|mu| shear.abs() <= mu * pressure * (1.0 + 0.025)));
+            }
+        }
+    }
+}
