@@ -10,9 +10,7 @@ use peri::calibrate::Space;
 use peri::critical::bilinear;
 use peri::field::Field;
 use peri::material::{EightChainSolid, Material, NonlocalSolid, SolverMaterial, energy_at_strength};
-use peri::solver::{
-    Bilinear, Breaking, Criterion, Lbfgs, Method, Policy, State, Status, System, VelocityVerlet,
-};
+use peri::solver::{Bilinear, Breaking, Lbfgs, Method, Policy, State, Status, System, VelocityVerlet};
 
 /// Opening a bond completely takes Y_c at any strength: ∫Y(−dd) by the trapezoidal rule over κ.
 #[test]
