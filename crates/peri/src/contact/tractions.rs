@@ -37,7 +37,7 @@ pub struct SurfaceTraction<const D: usize> {
 
 impl<const D: usize> RigidSurfaces<D> {
     /// Places surfaces where they were in a row of the history, beside the bonds that are intact.
-    pub fn place(&mut self, bonds: &dyn BodyGeometry<D>, resting: &[SurfaceReaction]) {
+    pub fn place_surfaces(&mut self, bonds: &dyn BodyGeometry<D>, resting: &[SurfaceReaction]) {
         self.expose(bonds, bonds.particles().iter().map(|&site| site as usize));
         for (placed, at) in self.each.iter_mut().zip(resting) {
             placed.now = std::array::from_fn(|d| at.moved[d]);

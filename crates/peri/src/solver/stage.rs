@@ -36,7 +36,7 @@ pub struct StepOrigin<const D: usize> {
 
 /// What a step leaves to the next one, beside the state.
 #[derive(Clone, Debug, Default)]
-pub struct StepEnd<const D: usize> {
+pub struct StageEnd<const D: usize> {
     /// Body force density, N/m³, if there is any.
     pub body_force: Option<Field<D>>,
     /// Sites turned about an axis so far.
@@ -44,9 +44,9 @@ pub struct StepEnd<const D: usize> {
 }
 
 impl<const D: usize> State<D> {
-    /// Begins the next step, after one with this `end`, and severs the bonds across some cuts. Velocities stay
-    /// if both steps are explicit dynamics (`moving`).
-    pub fn begin_stage(&mut self, bonds: &dyn Bonds<D>, cuts: &[Cut<D>], end: StepEnd<D>, moving: bool) {
+    /// Begins the next step, after one with this `end`, and severs the bonds across some cuts. Velocities
+    /// stay if both steps are explicit dynamics (`moving`).
+    pub fn begin_stage(&mut self, bonds: &dyn Bonds<D>, cuts: &[Cut<D>], end: StageEnd<D>, moving: bool) {
         let mut starts = std::mem::take(&mut self.stage.starts);
         starts.push(self.history.len());
         self.stage = StepOrigin {
@@ -134,7 +134,7 @@ impl<const D: usize> Loads<D> {
 
 impl<const D: usize> System<'_, D> {
     /// Returns what a step leaves to the next one in the state at its end.
-    pub fn end_of_step(&mut self, state: &State<D>) -> StepEnd<D> {
+    pub fn end_of_step(&mut self, state: &State<D>) -> StageEnd<D> {
         let factor = state.history.last().map_or(0.0, |row| row.factor);
         self.set_forces(factor, &state.displacement);
         let turned = self.loads.turned_at_end(&*self.bonds, &state.stage, &state.displacement, factor);
@@ -145,6 +145,6 @@ impl<const D: usize> System<'_, D> {
                 force.set(site as usize, force.get(site as usize).map(|x| factor * x));
             }
         }
-        StepEnd { body_force, turned }
+        StageEnd { body_force, turned }
     }
 }

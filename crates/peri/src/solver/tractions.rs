@@ -5,8 +5,8 @@ use crate::bonds::BodyGeometry;
 use crate::contact::{ContactPair, RigidSurfaces, SurfaceTraction};
 
 impl<const D: usize> State<D> {
-    /// Returns the tractions of rigid surfaces, given beside the undeformed body, at the end of the last row of
-    /// the history, or at an equilibrium within a step of a run with the load factors `factors`.
+    /// Returns the tractions of rigid surfaces, given beside the undeformed body, at the end of the last row
+    /// of the history, or at an equilibrium within a step of a run with the load factors `factors`.
     pub fn tractions(
         &self,
         surfaces: &RigidSurfaces<D>,
@@ -15,7 +15,7 @@ impl<const D: usize> State<D> {
     ) -> Vec<SurfaceTraction<D>> {
         let (own, moved) = (&self.contact, &self.displacement);
         let mut surfaces = surfaces.clone();
-        surfaces.place(bonds, self.history.last().map_or(&[], |row| &row.resting));
+        surfaces.place_surfaces(bonds, self.history.last().map_or(&[], |row| &row.resting));
         if self.control.round == 0 {
             let drags = own.grips.iter().map(|grip| (grip.pair, grip.slip.map(|x| -grip.stiffness * x)));
             return surfaces.tractions(bonds, moved, drags);

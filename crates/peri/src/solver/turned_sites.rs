@@ -144,8 +144,9 @@ impl<const D: usize> RotatingRegion<D> {
         if across().any(|d| warped[d]) && across().any(held) && !across().all(held) {
             let most = across().map(largest).fold(0.0, f64::max);
             return Err(format!(
-                "its particles, up to {:.4} mm from the places of a rigid region, and `hold` beside a length; \
-                 allowed: `hold` in all components across the axis, which turns the region as it is, or in none",
+                "its particles, up to {:.4} mm from the places of a rigid region, and `hold` beside a \
+                 length; allowed: `hold` in all components across the axis, which turns the region as it \
+                 is, or in none",
                 most * 1e3
             ));
         }
@@ -329,8 +330,9 @@ impl<const D: usize> Loads<D> {
         }
         let place = bonds.position(site).map(|x| format!("{:.4}", x * 1e3)).join(", ");
         Err(Error::geometry(format!(
-            "step {}: found a prescribed motion that begins {:.4} mm from where the step before has left the \
-             particle at ({place}) mm; allowed: a curve that is 0 at the start, in explicit dynamics also a ramp",
+            "step {}: found a prescribed motion that begins {:.4} mm from where the step before has left \
+             the particle at ({place}) mm; allowed: a curve that is 0 at the start, in explicit dynamics \
+             also a ramp",
             origin.finished + 1,
             most * 1e3
         )))

@@ -42,17 +42,22 @@ fn torn(text: &str) -> [f64; 2] {
     ["peak_load", "released_energy"].map(|wanted| values.iter().find(|(name, ..)| name == wanted).unwrap().1)
 }
 
-/// The interface bears its strength, 0.3 or 0.6 N over 10 mm², and takes its fracture energy, 0.2 mJ. It bears
-/// up to 1/(1 − ν²) = 9/8 of the strength of a free body, as the blocks hold it along its plane, less half a
-/// step, 2.5 %. Bonds that the free ends lack are as many times fewer as the spacing is finer.
+/// The interface bears its strength, 0.3 or 0.6 N over 10 mm², and takes its fracture energy, 0.2 mJ. It
+/// bears up to 1/(1 − ν²) = 9/8 of the strength of a free body, as the blocks hold it along its plane, less
+/// half a step, 2.5 %. Bonds that the free ends lack are as many times fewer as the spacing is finer.
 #[test]
 fn cohesive_interfaces_bear_their_strength_and_take_their_energy() {
     for strength in [30.0, 60.0] {
         let found = [1.0, 0.5].map(|spacing| {
             let rest = format!(
-                "[material]\nyoungs_modulus = \"2 MPa\"\nlaw = \"linear\"\n[[interface]]\nbetween = [\"left\", \
-                 \"right\"]\ncritical = {{ fracture_energy = \"20 J/m^2\", convention = \"softening\", strength = \
-                 \"{strength} kPa\" }}"
+                r#"
+[material]
+youngs_modulus = "2 MPa"
+law = "linear"
+[[interface]]
+between = ["left", "right"]
+critical = {{ fracture_energy = "20 J/m^2", convention = "softening", strength = "{strength} kPa" }}
+"#
             );
             torn(&blocks(&rest, spacing))
         });
@@ -68,9 +73,17 @@ fn cohesive_interfaces_bear_their_strength_and_take_their_energy() {
 /// A solid bears the strength; a whole plane that opens at once takes more than a crack that runs along it.
 #[test]
 fn cohesive_interfaces_of_solids_bear_their_strength() {
-    let rest = "[material.solid]\nlaw = \"correspondence\"\nconstitutive = { model = \"neo-hookean\", parameters \
-                = { shear_modulus = \"0.75 MPa\" }, bulk_modulus = \"2 MPa\" }\n[[interface]]\nbetween = \
-                [\"left\", \"right\"]\ncritical = { fracture_energy = \"20 J/m^2\", strength = \"60 kPa\" }";
+    let rest = r#"
+[material.solid]
+law = "correspondence"
+[material.solid.constitutive]
+model = "neo-hookean"
+parameters = { shear_modulus = "0.75 MPa" }
+bulk_modulus = "2 MPa"
+[[interface]]
+between = ["left", "right"]
+critical = { fracture_energy = "20 J/m^2", strength = "60 kPa" }
+"#;
     let [load, energy] = torn(&blocks(rest, 1.0));
     assert!((load / 0.6 - 1.0).abs() < 0.025, "{load}");
     assert!(energy > 2e-4, "{energy}");

@@ -50,8 +50,8 @@ fn picture(output: &Path, kind: &str, state: &str) -> Vec<u8> {
     fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The picture of a state is that of a run which ends there, whatever follows: of a load factor, and of the end
-/// of a step.
+/// The picture of a state is that of a run which ends there, whatever follows: of a load factor, and of the
+/// end of a step.
 #[test]
 fn pictures_of_states_are_those_of_shorter_runs() {
     let output = "[output]\nenergy = true\n[[output.state]]\nname = \"half\"\n";
@@ -85,9 +85,17 @@ fn pictures_of_states_are_those_of_shorter_runs() {
 /// In explicit dynamics a state is the first row from its time on.
 #[test]
 fn states_in_time() {
-    let rest = "[solver]\nmethod = \"verlet\"\n[dynamics]\ndensity = \"1000 kg/m^3\"\nend_time = \"4 ms\"\nrecords = 8\n[output]\nenergy = true\n\
-                [[output.state]]\nname = \"early\"\ntime = \"0.9 ms\"\n[[output.state]]\nname = \"last\"\ntime = \
-                \"4 ms\"\n";
+    let rest = r#"
+[solver]
+method = "verlet"
+[dynamics]
+density = "1000 kg/m^3"
+end_time = "4 ms"
+records = 8
+[output]
+energy = true
+state = [{ name = "early", time = "0.9 ms" }, { name = "last", time = "4 ms" }]
+"#;
     let directory = tempfile::tempdir().unwrap();
     let moving = strip(RUBBER, rest);
     let finished = solve(&moving, directory.path());
@@ -102,8 +110,14 @@ fn states_in_time() {
 /// A run that ends before a state says so.
 #[test]
 fn states_that_are_not_reached() {
-    let rest = "[solver]\nsteps = 20\nstop_below = 0.1\n[output]\nenergy = true\n[[output.state]]\nname = \"whole\"\nfactor = \
-                0.25\n[[output.state]]\nname = \"end\"\nfactor = 1\n";
+    let rest = r#"
+[solver]
+steps = 20
+stop_below = 0.1
+[output]
+energy = true
+state = [{ name = "whole", factor = 0.25 }, { name = "end", factor = 1 }]
+"#;
     let directory = tempfile::tempdir().unwrap();
     let text = strip(BRITTLE, rest).replace("[\"2 mm\", \"1 mm\"]", "[\"2 mm\", \"0 mm\"]");
     let finished = solve(&text, directory.path());

@@ -233,7 +233,8 @@ fn resumed_below_an_indenter() {
 fn a_velocity_goes_on_in_explicit_steps() {
     let grip = "boundary = [{ side = \"x+\", displacement = [\"free\", \"0 mm\"] }]";
     let dynamics = "dynamics = { density = \"1000 kg/m^3\", end_time = \"0.2 ms\" }";
-    let time = "time = { step = [{ duration = \"1 s\", increments = 1, factor = 1 }] }\nsolver = { tolerance = 1e-9 }";
+    let time = "time = { step = [{ duration = \"1 s\", increments = 1, factor = 1 }] }\n\
+                solver = { tolerance = 1e-9 }";
     let scene = |floor: &str| {
         let steps = format!("[[step]]\n{grip}\n{time}\n[[step]]\n{grip}\n{dynamics}\n");
         let text = block(floor, "", &steps).replace("friction = 0.3", "friction = 0");

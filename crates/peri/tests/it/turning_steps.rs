@@ -58,7 +58,8 @@ fn turn(degrees: f64) -> String {
 fn step(grip: &str, solver: &str) -> String {
     let low = "{ side = \"z-\", depth = \"7.5 mm\", displacement = [\"0 mm\", \"0 mm\", \"0 mm\"] }";
     format!(
-        "[[step]]\nboundary = [{low}, {{ side = \"z+\", depth = \"7.5 mm\", {grip} }}]\nsolver = {{ {solver} }}\n"
+        "[[step]]\nboundary = [{low}, {{ side = \"z+\", depth = \"7.5 mm\", {grip} }}]\n\
+         solver = {{ {solver} }}\n"
     )
 }
 
@@ -71,8 +72,8 @@ fn value(finished: &FinishedScene, name: &str) -> f64 {
 }
 
 /// A bar twisted by 120° in one step, and by 60° in each of two: the same moment, force, energy and work at
-/// every angle. Held there, and named with its lengths it returns along the arc, through the same energies, to
-/// none. The solver's tolerance is 1e-5 of the forces.
+/// every angle. Held there, and named with its lengths it returns along the arc, through the same energies,
+/// to none. The solver's tolerance is 1e-5 of the forces.
 #[test]
 fn twisted_further_and_back() {
     let solver = |steps: u32| format!("steps = {steps}, tolerance = 1e-5");
@@ -103,10 +104,10 @@ fn twisted_further_and_back() {
     at_most("untwisted_work", rows[4].work.abs() / rows[1].work, 1e-3);
 }
 
-/// A bar compressed by 5 % and then twisted by 60°, in one step of the scene and in two, against Rivlin (1949), doi:10.1098/rsta.1949.0009: M = ½πμψa⁴/λ with the twist ψ per undeformed length and the
-/// stretch λ in the middle: to 1 % against the bar that is twisted only, and to 5 % in itself on a lattice of an
-/// eighth of the diameter. Both steps at once, or in the
-/// opposite order, lead to the same state.
+/// A bar compressed by 5 % and then twisted by 60°, in one step of the scene and in two, against Rivlin
+/// (1949), doi:10.1098/rsta.1949.0009: M = ½πμψa⁴/λ with the twist ψ per undeformed length and the stretch λ
+/// in the middle: to 1 % against the bar that is twisted only, and to 5 % in itself on a lattice of an eighth
+/// of the diameter. Both steps at once, or in the opposite order, lead to the same state.
 #[test]
 fn compressed_then_twisted() {
     let slice = |name: &str, track: &str, z: f64| {
@@ -174,7 +175,10 @@ youngs_modulus = "1 MPa"
 law = "linear"
 [[boundary]]
 name = "rim"
-shapes = [{{ add = "disk", centre = ["0 mm", "0 mm"], radius = "16 mm" }}, {{ cut = "disk", centre = ["0 mm", "0 mm"], radius = "13 mm" }}]
+shapes = [
+  {{ add = "disk", centre = ["0 mm", "0 mm"], radius = "16 mm" }},
+  {{ cut = "disk", centre = ["0 mm", "0 mm"], radius = "13 mm" }},
+]
 displacement = ["0 mm", "0 mm"]
 [[boundary]]
 name = "sleeve"
@@ -190,15 +194,14 @@ pictures = false
     )
 }
 
-const RIM: &str = "{ name = \"rim\", shapes = [{ add = \"disk\", centre = [\"0 mm\", \"0 mm\"], radius = \"16 mm\" }, \
+const RIM: &str = "{ name = \"rim\", shapes = [\
+                   { add = \"disk\", centre = [\"0 mm\", \"0 mm\"], radius = \"16 mm\" }, \
                    { cut = \"disk\", centre = [\"0 mm\", \"0 mm\"], radius = \"13 mm\" }], \
                    displacement = [\"0 mm\", \"0 mm\"] }";
 
 fn sleeve(motion: &str) -> String {
-    format!(
-        "{{ name = \"sleeve\", shapes = [{{ add = \"disk\", centre = [\"0 mm\", \"0 mm\"], radius = \"7 mm\" }}], \
-         {motion} }}"
-    )
+    let disk = "{ add = \"disk\", centre = [\"0 mm\", \"0 mm\"], radius = \"7 mm\" }";
+    format!("{{ name = \"sleeve\", shapes = [{disk}], {motion} }}")
 }
 
 fn about(degrees: f64) -> String {
@@ -224,7 +227,8 @@ fn work_of_a_rotation() {
     near("work_given_back", rows[4].work / rows[2].work, 1.0, 1e-6);
     near("moment_given_back", rows[4].load / rows[2].load, 1.0, 1e-6);
     // a curve that overshoots and comes back to the angle
-    let time = "time = { step = [{ duration = \"1 s\", increments = 4, factor = 1 }] }\nsolver = { tolerance = 1e-8 }";
+    let time = "time = { step = [{ duration = \"1 s\", increments = 4, factor = 1 }] }\n\
+                solver = { tolerance = 1e-8 }";
     let curve = format!("{}, curve = \"2.5 * t - 1.5 * t * t\"", about(40.0));
     let run = solve(&ring(&about(20.0), &later(&curve, time)));
     let last = history(&run).last().unwrap();

@@ -32,8 +32,8 @@ pub(super) struct FilmPace {
 
 impl FieldMap<'_> {
     /// Writes maps of one window, given to the second argument of `frame`, one after another into an animated
-    /// `.png`, a `.gif`, or, by `ffmpeg`, an `.mp4`, each for some `seconds`. It rests on the last, and repeats
-    /// without end but as MP4.
+    /// `.png`, a `.gif`, or, by `ffmpeg`, an `.mp4`, each for some `seconds`. It rests on the last, and
+    /// repeats without end but as MP4.
     ///
     /// # Errors
     /// Those of `frame`; as [`Self::write`]; for MP4 no `ffmpeg` on the PATH, or its message.
@@ -102,7 +102,7 @@ fn gif(
         }
         // the sides of a picture whose sides fit do so as well
         let [left, top, width, height] = part.map(|size| u16::try_from(size).unwrap_or(u16::MAX));
-        let pixels = last.part(part);
+        let pixels = last.rectangle(part);
         let rest = if index + 1 == frames { rest } else { 1 };
         let image = gif::Frame {
             left,
@@ -150,7 +150,7 @@ fn mp4(
             match next.and_then(|next| next.changes(&first, path, index).map(|_| next)) {
                 Ok(next) => {
                     let times = if index + 1 == frames { rest } else { 1 };
-                    let pixels = next.part([0, 0, next.width, next.height]);
+                    let pixels = next.rectangle([0, 0, next.width, next.height]);
                     // a program that has ended says why
                     if (0..times).any(|_| input.write_all(&pixels).is_err()) {
                         break;

@@ -123,8 +123,9 @@ impl Solids {
         atomic_write(path, |file| file.write_all(&bytes))
     }
 
-    /// Writes frames one after another into an animated `.png`, a `.gif`, or, by `ffmpeg`, an `.mp4`. It rests on
-    /// the last frame, and repeats without end but as MP4; viewers that know no animation show the first.
+    /// Writes frames one after another into an animated `.png`, a `.gif`, or, by `ffmpeg`, an `.mp4`. It
+    /// rests on the last frame, and repeats without end but as MP4; viewers that know no animation show the
+    /// first.
     ///
     /// # Errors
     /// As [`Self::write`]; for MP4 no `ffmpeg` on the PATH, or its message.

@@ -369,7 +369,7 @@ impl<const D: usize> Physics<D> {
     ///
     /// # Errors
     /// As [`Self::contact`].
-    pub fn place(&mut self, scene: &Scene, body: &DiscreteBody<D>) -> Result<(), Error> {
+    pub fn place_surfaces(&mut self, scene: &Scene, body: &DiscreteBody<D>) -> Result<(), Error> {
         self.placed.clone_from(&self.surfaces);
         let pushed = self.surfaces.iter().any(|surface| surface.force.is_some());
         let output = &scene.output;

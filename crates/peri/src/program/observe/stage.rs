@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::field::Field;
 use crate::geometry::Cut;
 use crate::program::scene::{self, DiscreteBody, Scene};
-use crate::solver::{Loads, State, StepEnd};
+use crate::solver::{Loads, StageEnd, State};
 use harness::scene::{Failure, Source};
 
 /// Later step of a scene in its body.
@@ -54,7 +54,7 @@ impl<const D: usize> SceneStage<D> {
         &self,
         [before, own]: [&Scene; 2],
         body: &DiscreteBody<D>,
-        end: StepEnd<D>,
+        end: StageEnd<D>,
         state: &mut State<D>,
     ) {
         let moving = before.dynamics.is_some() && own.dynamics.is_some();

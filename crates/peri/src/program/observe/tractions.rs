@@ -105,8 +105,8 @@ impl<'a, const D: usize> PressedSurface<'a, D> {
 }
 
 impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Tractions<'_> {
-    /// Adds pressures and shears of particles on the surface: the mean over the faces above them that touch; 0
-    /// elsewhere.
+    /// Adds pressures and shears of particles on the surface: the mean over the faces above them that touch;
+    /// 0 elsewhere.
     fn fields(&self, to: &mut Fields<Moment<'m, D>>) {
         let Some(contact) = self.0.contact.as_ref().filter(|_| self.0.output.contact) else { return };
         to.add("contact_pressure", 1, Place::Points, |m| {

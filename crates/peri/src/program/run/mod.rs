@@ -20,7 +20,7 @@ use crate::error::Error;
 use crate::program::observe::{self, FieldFrames, Moment, Physics, SceneObservers, in_space};
 use crate::program::quantities as q;
 use crate::program::scene::{self, ContactSpec, NAMING, NamedState, Scene, SceneVariant};
-use crate::solver::{Breaking, State, Status, StepEnd, StepRecord, System, load_stepping};
+use crate::solver::{Breaking, StageEnd, State, Status, StepRecord, System, load_stepping};
 use harness::case::{Fault, Run, Step, StepField};
 use harness::observe::{Outputs, Scalars};
 use harness::report::{Phases, Report, SceneUnits};
@@ -185,7 +185,7 @@ fn run_variant<const D: usize>(
     let mut frames = FieldFrames::new(scene, &state, &output.join(physics.field_file()))?;
     let outputs = Outputs { folder: output, pictures: scene.output.pictures };
     let (whole, states) = (scene, scene.named_states());
-    let mut solved = Ok(StepEnd::default());
+    let mut solved = Ok(StageEnd::default());
     for index in state.stage.finished..=scene.step.len() {
         let (own_source, own_scene) = (scene.source_of(source, index), scene.stage(index));
         if let Some(before) = index.checked_sub(1) {
@@ -199,7 +199,7 @@ fn run_variant<const D: usize>(
             physics.loads = stage.loads(&own_scene, &body, &state).map_err(PeriFailure::Run)?;
             physics.surfaces.clone_from(&stage.surfaces);
         }
-        physics.place(&own_scene, &body)?;
+        physics.place_surfaces(&own_scene, &body)?;
         let watched = Watched { observers: &mut observers, frames: &mut frames, states: &states, outputs };
         let own = (&*own_source, &*own_scene, device.card.as_ref().filter(|_| index == 0));
         solved = solve(own, &physics, variant_run, &mut body, &mut state, &phases, watched);
@@ -295,7 +295,7 @@ fn solve<const D: usize>(
     state: &mut State<D>,
     phases: &RefCell<Phases>,
     Watched { observers, frames, states, outputs }: Watched<'_, '_, D>,
-) -> Result<StepEnd<D>, PeriFailure> {
+) -> Result<StageEnd<D>, PeriFailure> {
     let (material, loads) = (&physics.body.material, &physics.loads);
     let (factors, times) = scene.load_steps();
     let mut watch = |status: &Status, state: &State<D>| variant_run.watch(status, state);
@@ -343,7 +343,7 @@ fn solve<const D: usize>(
     phases.borrow_mut().stop();
     solved?;
     let later = state.stage.finished < physics.stages.len();
-    Ok(if later { system.end_of_step(state) } else { StepEnd::default() })
+    Ok(if later { system.end_of_step(state) } else { StageEnd::default() })
 }
 
 /// Returns the data of a finished step for a callback: positions and displacements in three components.

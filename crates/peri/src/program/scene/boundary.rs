@@ -121,8 +121,8 @@ pub struct RotationSpec {
     pub point: Vec<Length>,
     /// Direction of the axis, of any length, in a solid.
     pub axis: Option<Vec<f64>>,
-    /// Angle at the end of the last load step, from the undeformed region, right-handed about the axis; in the
-    /// plane from x to y.
+    /// Angle at the end of the last load step, from the undeformed region, right-handed about the axis; in
+    /// the plane from x to y.
     pub angle: Angle,
     /// Curve of time that multiplies the angle; default: that of the boundary.
     pub curve: Option<CurveSpec>,

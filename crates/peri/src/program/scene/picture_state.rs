@@ -19,8 +19,8 @@ pub struct StateSpec {
     pub name: String,
     /// Load factor, that of a load step.
     pub factor: Option<f64>,
-    /// Time from the start of the run: that of a load step; with `[dynamics]` the first row of the history from
-    /// then on.
+    /// Time from the start of the run: that of a load step; with `[dynamics]` the first row of the history
+    /// from then on.
     pub time: Option<Time>,
     /// Step of a scene with `[[step]]`, the first is 1: of the `factor`, else the state is its end.
     pub step: Option<usize>,
