@@ -14,7 +14,7 @@ use polycore::units::{
 };
 
 /// Branch of a law with time: a spring in series with a dashpot.
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BranchSpec {
     /// The spring: `nu`; `nu_1`, `beta_1` …; `chain_modulus`, `links`.
@@ -60,7 +60,7 @@ impl ShiftSpec {
 }
 
 /// Spring of a branch.
-#[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SpringKind {
     /// Neo-Hookean.
@@ -92,7 +92,7 @@ pub enum ViscosityKind {
 }
 
 /// Constant of a branch: a number, or a quantity such as "3 MPa s".
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, schemars::JsonSchema)]
 #[serde(untagged)]
 pub enum BranchConstant {
     /// A number.
@@ -102,7 +102,7 @@ pub enum BranchConstant {
 }
 
 /// Softening of the equilibrium law by the largest strain so far (Ogden and Roxburgh 1999, Abaqus' form).
-#[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MullinsSpec {
     /// r, above 1.

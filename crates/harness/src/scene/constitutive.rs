@@ -17,7 +17,7 @@ use polycore::units::Stress;
 
 /// A hyperelastic law with a volumetric energy ¼λ(J² − 1 − 2 ln J) that gives it a bulk modulus, or a law
 /// learnt from data.
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ConstitutiveSpec {
     /// Name of the law.

@@ -128,3 +128,33 @@ fn histories_of_curves_are_those_of_factors() {
         assert!(by_curve[5][0] < 0.0 && by_curve[5][1] < 0.0);
     }
 }
+
+/// A region that is free in every component has no reaction, and leaves those of others their names.
+#[test]
+fn free_regions_leave_reactions_their_names() {
+    let rest = |free: &str| {
+        format!(
+            r#"[[boundary]]
+name = "middle"
+min = ["8 mm", "0 mm"]
+max = ["12 mm", "6 mm"]
+{free}
+force = ["0.1 N", "0 N"]
+[[boundary]]
+name = "right"
+side = "x+"
+displacement = ["0.5 mm", "0 mm"]
+[output]
+pictures = false
+"#
+        )
+    };
+    let reactions = |free: &str| {
+        let directory = tempfile::tempdir().unwrap();
+        let outcome = solve(&strip(RUBBER, &rest(free)), directory.path()).outcomes.remove(0);
+        (outcome.regions.clone(), outcome.history[0].reactions.clone())
+    };
+    let plain = reactions("");
+    assert_eq!(plain.0, ["foot", "right"]);
+    assert_eq!(reactions("displacement = [\"free\", \"free\"]\n"), plain);
+}

@@ -159,7 +159,7 @@ impl Canvas {
     }
 
     /// Returns the bytes of a rectangle (left, top, width, height), row by row.
-    pub(super) fn rectangle(&self, [x, y, width, height]: [usize; 4]) -> Vec<u8> {
+    pub(super) fn bytes_within(&self, [x, y, width, height]: [usize; 4]) -> Vec<u8> {
         let rows = self.pixels.chunks(self.width).skip(y).take(height);
         rows.flat_map(|row| row[x..x + width].as_flattened()).copied().collect()
     }
@@ -246,7 +246,7 @@ pub(super) fn animated_png(
         if index + 1 == frames {
             writer.set_frame_delay(delay.saturating_mul(rest), 1000).map_err(text)?;
         }
-        writer.write_image_data(&next.rectangle(part)).map_err(text)?;
+        writer.write_image_data(&next.bytes_within(part)).map_err(text)?;
         last = next;
     }
     writer.finish().map_err(text)?;

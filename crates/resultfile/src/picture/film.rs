@@ -102,7 +102,7 @@ fn gif(
         }
         // the sides of a picture whose sides fit do so as well
         let [left, top, width, height] = part.map(|size| u16::try_from(size).unwrap_or(u16::MAX));
-        let pixels = last.rectangle(part);
+        let pixels = last.bytes_within(part);
         let rest = if index + 1 == frames { rest } else { 1 };
         let image = gif::Frame {
             left,
@@ -150,7 +150,7 @@ fn mp4(
             match next.and_then(|next| next.changes(&first, path, index).map(|_| next)) {
                 Ok(next) => {
                     let times = if index + 1 == frames { rest } else { 1 };
-                    let pixels = next.rectangle([0, 0, next.width, next.height]);
+                    let pixels = next.bytes_within([0, 0, next.width, next.height]);
                     // a program that has ended says why
                     if (0..times).any(|_| input.write_all(&pixels).is_err()) {
                         break;

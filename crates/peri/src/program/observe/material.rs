@@ -337,7 +337,9 @@ impl<const D: usize> Physics<D> {
             let left = bonds.particles().iter().map(|&site| bonds.bonded(site as usize));
             [left.zip(&cracked).map(|(left, cracked)| left + cracked).collect(), cracked]
         });
-        let given = scene.material.critical.and_then(|critical| critical.fracture_energy);
+        // parts of a solid with limits of their own have no common energy
+        let common = scene.material.inclusions.iter().all(|part| part.critical.is_none());
+        let given = scene.material.critical.filter(|_| common).and_then(|critical| critical.fracture_energy);
         let toughness = own.toughness.as_ref();
         self.tearing = toughness.map(|own| own.tearing).or(given.map(|energy| energy.si()));
         self.cracks = breaks.then(|| {

@@ -63,6 +63,13 @@ impl Boundary {
         self.displacement.is_some() || self.displacement_field.is_some() || self.rotation.is_some()
     }
 
+    /// Returns true if the boundary prescribes a component of the displacement.
+    pub fn constrains(&self) -> bool {
+        let held = self.displacement.iter().flatten().any(|u| *u != Prescribed::Free);
+        let fields = self.displacement_field.iter().flatten();
+        held || fields.into_iter().any(|u| !matches!(u, PrescribedField::Free)) || self.rotation.is_some()
+    }
+
     /// Returns the components that keep their displacement of the start of a step, a bit each.
     pub fn held_in_place(&self) -> u8 {
         let components = self.displacement.iter().flatten().enumerate();

@@ -316,6 +316,13 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         let why = "`stiffness` follows the material, `short_range` is the κ of the literature";
         return Err(source.conflict("contact.short_range", "stiffness", why));
     }
+    let own = |part: &super::Inclusion| part.stiffness != 1.0 || part.has_law() || part.solid.is_some();
+    if let Some(index) =
+        scene.material.inclusions.iter().position(own).filter(|_| contact.short_range.is_some())
+    {
+        let why = "κ refers to the modulus of one material; `stiffness` follows that of each part";
+        return Err(source.conflict("contact.short_range", &format!("material.inclusions[{index}]"), why));
+    }
     rough("contact.friction", contact.friction)?;
     let names = contact.surface_names();
     for (number, name) in names.iter().enumerate() {

@@ -302,7 +302,7 @@ pub fn region_names(scene: &Scene) -> Vec<String> {
 
 /// Returns the names of the regions of prescribed displacement among the boundaries of a step.
 pub(super) fn own_region_names(boundaries: &[Boundary]) -> Vec<String> {
-    let constrained = boundaries.iter().enumerate().filter(|(_, b)| b.prescribes_displacement());
+    let constrained = boundaries.iter().enumerate().filter(|(_, b)| b.constrains());
     constrained.map(|(index, boundary)| name_of(index, boundary)).collect()
 }
 

@@ -35,7 +35,7 @@ pub(super) fn refuse<const D: usize>(
     let moments = moments(scene, !amplitudes.is_empty());
     let motion = |(index, boundary)| -> Result<BoundaryMotion<D>, SceneError> {
         let rotation = rotation_of::<D>(source, &format!("boundary[{index}]"), boundary, scene.later)?;
-        Ok(BoundaryMotion { boundary, rotation, amplitudes: amplitudes.get(index) })
+        Ok(BoundaryMotion { boundary, rotation, amplitudes: amplitudes.get(index), later: scene.later })
     };
     let motions: Vec<BoundaryMotion<D>> =
         scene.boundary.iter().enumerate().map(motion).collect::<Result<_, _>>()?;
@@ -115,6 +115,8 @@ struct BoundaryMotion<'a, const D: usize> {
     boundary: &'a Boundary,
     rotation: Option<Rotation<D>>,
     amplitudes: Option<&'a (Amplitude, [Amplitude; D])>,
+    /// True in a later step, whose motions begin where the one before has left the particles.
+    later: bool,
 }
 
 impl<const D: usize> BoundaryMotion<'_, D> {
@@ -126,7 +128,16 @@ impl<const D: usize> BoundaryMotion<'_, D> {
         (place, d): ([f64; D], usize),
         moments: &[f64],
     ) -> Option<(String, &'static str)> {
+        if self.later && self.rotation.is_some() != before.rotation.is_some() {
+            let found = format!("particles that boundary[{other}] moves, one of them by a `rotation`");
+            return Some((found, "a `rotation` in both where regions overlap, or `free` in one of them"));
+        }
         for &part in moments {
+            let moves = !self.holds(d) || self.rotation.is_some();
+            if self.later && moves && self.multiples(part, d) != before.multiples(part, d) {
+                let found = format!("particles that boundary[{other}] moves by another curve");
+                return Some((found, "one curve where regions overlap in a later step"));
+            }
             if self.holds(d) != before.holds(d) {
                 let found = format!("`hold` or a displacement of particles that boundary[{other}] moves");
                 return Some((found, "`hold` in both where regions overlap, or `free` in one of them"));
@@ -146,6 +157,13 @@ impl<const D: usize> BoundaryMotion<'_, D> {
             }
         }
         None
+    }
+
+    /// Returns the multiples of the angle and of a component at a part of the time.
+    fn multiples(&self, part: f64, d: usize) -> [f64; 2] {
+        let both = self.amplitudes.map(|(angle, each)| [angle, &each[d]].map(|one| one.multiple(part)));
+        let [angle, own] = both.unwrap_or([1.0; 2]);
+        [if self.rotation.is_some() { angle } else { 0.0 }, own]
     }
 
     /// Returns true if the component keeps its value of the start of a step, which is unknown before the run.

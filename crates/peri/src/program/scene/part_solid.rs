@@ -87,22 +87,30 @@ pub fn solid_of_parts<'a, const D: usize>(
     body: &DiscreteBody<D>,
 ) -> Result<(AnySolid<D>, Inclusions<'a, D>), SceneError> {
     let (space, planes, driving) = (scene.body.space, scene.is_beside_surfaces(), scene.driving());
-    let built = scene.solids().map(|(key, own)| own.build(source, &key, space, planes, driving));
+    // equal solids have one number: pressures are averaged over their neighbours
+    let mut different: Vec<(String, &SolidLaw)> = Vec::new();
+    for (key, own) in scene.solids() {
+        if different.iter().all(|(_, other)| *other != own) {
+            different.push((key, own));
+        }
+    }
+    let built = different.iter().map(|(key, own)| own.build(source, key, space, planes, driving));
     let mut laws: Vec<Arc<dyn PointLaw<D>>> = built.collect::<Result<_, _>>()?;
     let inclusions = Inclusions::new(source, scene, body, &[])?;
     let parts = laws.split_off(1);
-    for ((key, _), law) in scene.solids().skip(1).zip(&parts) {
+    for ((key, _), law) in different[1..].iter().zip(&parts) {
         let [own, rest] = [law, &laws[0]].map(|law| law.shear_modulus());
         if own.max(rest) > GREATEST_RATIO * own.min(rest) {
             let found = format!("a shear modulus of {} Pa beside {} Pa of the rest", plain(own), plain(rest));
-            return Err(source.error(&key, found, format!("at most {GREATEST_RATIO:.0e} apart")));
+            return Err(source.error(key, found, format!("at most {GREATEST_RATIO:.0e} apart")));
         }
     }
     let mut solid = NonlocalSolid::new(laws.remove(0));
     if !parts.is_empty() {
         let mut numbers = vec![0; body.bonds.sites()];
-        let own = inclusions.members().filter(|(part, _)| part.solid.is_some());
-        for ((_, members), number) in own.zip(1..) {
+        for (part, members) in inclusions.members() {
+            let Some(own) = &part.solid else { continue };
+            let number = different.iter().position(|(_, other)| *other == own).unwrap_or(0) as u16;
             members.iter().for_each(|&site| numbers[site as usize] = number);
         }
         let wrong = |error| source.error("material.inclusions", error, "fewer parts");

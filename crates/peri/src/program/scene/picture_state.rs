@@ -147,7 +147,7 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         let own = scene.stage(named);
         let (factors, times) = own.load_steps();
         if let Some(factor) = spec.factor {
-            if own.dynamics.is_some() || own.has_curves() {
+            if scene.end_of(named) > 0.0 && (own.dynamics.is_some() || own.has_curves()) {
                 let why = "with [dynamics] and with curves of time states have a `time`";
                 return Err(source.unexpected(&key("factor"), why));
             }
@@ -174,6 +174,31 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             if own.dynamics.is_none() && !times.iter().any(|&own| same(own, time)) {
                 return Err(source.error(&key("time"), found, around(time, &times, "time", " s")));
             }
+        }
+    }
+    Ok(())
+}
+
+/// Refuses states whose pictures have the names of others, of the variants with these names.
+///
+/// # Errors
+/// A [`SceneError`] that names the state.
+pub(super) fn refuse_shared_names(
+    source: &Source,
+    scene: &Scene,
+    variants: &[String],
+) -> Result<(), SceneError> {
+    let mut known: Vec<String> = variants.to_vec();
+    for (index, state) in scene.output.state.iter().enumerate() {
+        for variant in variants {
+            let name = format!("{variant}_{}", state.name);
+            if known.contains(&name) {
+                let found =
+                    format!("`{}`, with which pictures of `{variant}` are named `{name}`", state.name);
+                let allowed = "a name that makes no name of other pictures";
+                return Err(source.error(&format!("output.state[{index}].name"), found, allowed));
+            }
+            known.push(name);
         }
     }
     Ok(())

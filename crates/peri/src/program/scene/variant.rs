@@ -101,5 +101,9 @@ fn name(source: &Source, study: Option<&str>) -> Result<String, SceneError> {
 /// Returns the variants: the scene's own discretisation, or all combinations that its studies list.
 pub fn variants(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<SceneVariant>, SceneError> {
     let studies: Vec<study::Study> = scene.study.iter().map(Study::study).collect();
-    study::variants(source, &studies, quick, NAMING, name)?.into_iter().map(SceneVariant::new).collect()
+    let each = study::variants(source, &studies, quick, NAMING, name)?.into_iter().map(SceneVariant::new);
+    let each = each.collect::<Result<Vec<_>, _>>()?;
+    let names: Vec<String> = each.iter().map(SceneVariant::name).collect();
+    super::picture_state::refuse_shared_names(source, scene, &names)?;
+    Ok(each)
 }
