@@ -23,9 +23,9 @@ displacement = ["0 mm", "free"]
 [[boundary]]
 side = "x+"
 depth = "3 mm"
-displacement = ["2 mm", "free"]
+displacement = ["2.5 mm", "free"]
 [solver]
-steps = 40
+steps = 50
 tolerance = 1e-5
 [output]
 pictures = false

@@ -188,17 +188,17 @@ pub(super) fn refuse_shared_names(
     scene: &Scene,
     variants: &[String],
 ) -> Result<(), SceneError> {
-    let mut known: Vec<String> = variants.to_vec();
+    let mut known: Vec<(String, &str)> = variants.iter().map(|name| (name.clone(), "")).collect();
     for (index, state) in scene.output.state.iter().enumerate() {
         for variant in variants {
             let name = format!("{variant}_{}", state.name);
-            if known.contains(&name) {
+            if known.iter().any(|(other, own)| *other == name && *own != state.name) {
                 let found =
                     format!("`{}`, with which pictures of `{variant}` are named `{name}`", state.name);
                 let allowed = "a name that makes no name of other pictures";
                 return Err(source.error(&format!("output.state[{index}].name"), found, allowed));
             }
-            known.push(name);
+            known.push((name, &state.name));
         }
     }
     Ok(())
