@@ -349,8 +349,8 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Returns the rigid surfaces with the faces on which they act.
-    pub fn into_surfaces(self) -> Option<RigidSurfaces<D>> {
-        self.surfaces
+    pub fn rigid_surfaces(&self) -> Option<&RigidSurfaces<D>> {
+        self.surfaces.as_ref()
     }
 
     /// Sum of the squares of the surfaces' force densities at the last update, (N/m³)².

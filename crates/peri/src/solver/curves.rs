@@ -189,7 +189,7 @@ impl<const D: usize> Loads<D> {
         if !self.turned.is_empty() || curved.begins_moved() {
             return None;
         }
-        let moving = |region: &'_ CurvedRegion<D>| -> Vec<Amplitude> {
+        let moving = |region: &CurvedRegion<D>| -> Vec<Amplitude> {
             let moves = |&d: &usize| {
                 region.components >> d & 1 == 1 && region.values.iter().any(|value| value[d] != 0.0)
             };
@@ -277,7 +277,9 @@ impl<const D: usize> System<'_, D> {
             }
             self.set_mean_forces([before, after], &state.displacement);
             let (pull, push) = self.curved_conjugates(state);
-            self.set_rates(before, after);
+            if !self.loads.turned.is_empty() {
+                self.set_rates(before, after);
+            }
             state.control.balanced = [before, pull, push];
             if self.refine > 1 && state.control.cuts == 0 {
                 state.control.start_force = Some(Box::new(state.force.clone()));

@@ -34,16 +34,16 @@ impl<const D: usize> Rotation<D> {
 
     /// Displacement of a position X at a load factor, m.
     pub fn displacement(&self, place: [f64; D], factor: f64) -> [f64; D] {
-        self.turn(factor * self.angle, self.from(place))
+        self.turn(factor * self.angle, self.offset(place))
     }
 
     /// Distance of a position from the axis, m.
     pub(super) fn radius(&self, place: [f64; D]) -> f64 {
-        length(self.across(self.from(place))[0])
+        length(self.across(self.offset(place))[0])
     }
 
     /// Vector from the centre to a position, m.
-    pub(super) fn from(&self, place: [f64; D]) -> [f64; D] {
+    pub(super) fn offset(&self, place: [f64; D]) -> [f64; D] {
         std::array::from_fn(|d| place[d] - self.centre[d])
     }
 
@@ -139,7 +139,7 @@ impl<const D: usize> RotatingRegion<D> {
     pub(super) fn displacement(&self, number: usize, place: [f64; D], factor: f64) -> [f64; D] {
         let (angle, shift) = self.turn_at(factor);
         let warp = self.warp(number, |fading| fading.multiple(factor));
-        let from = self.rotation.from(place);
+        let from = self.rotation.offset(place);
         let turned = self.rotation.turn(angle, std::array::from_fn(|d| from[d] + warp[d]));
         std::array::from_fn(|d| turned[d] + shift[d] + warp[d])
     }
@@ -147,7 +147,7 @@ impl<const D: usize> RotatingRegion<D> {
     /// Arm n × R(θ)(X − c + w), m, of the moment of the site of a number at a load factor.
     pub(super) fn arm(&self, number: usize, place: [f64; D], factor: f64) -> [f64; D] {
         let warp = self.warp(number, |fading| fading.multiple(factor));
-        let from = self.rotation.from(place);
+        let from = self.rotation.offset(place);
         self.rotation.arm(self.turn_at(factor).0, std::array::from_fn(|d| from[d] + warp[d]))
     }
 

@@ -34,7 +34,7 @@ pub struct StepOrigin<const D: usize> {
     pub turned: Vec<TurnedSites>,
 }
 
-/// What a step leaves to the next one, beside the state.
+/// End of a step, beside the state, from which the next one continues.
 #[derive(Clone, Debug, Default)]
 pub struct StageEnd<const D: usize> {
     /// Body force density, N/m³, if there is any.
@@ -133,7 +133,7 @@ impl<const D: usize> Loads<D> {
 }
 
 impl<const D: usize> System<'_, D> {
-    /// Returns what a step leaves to the next one in the state at its end.
+    /// Returns the end of a step in the state there.
     pub fn end_of_step(&mut self, state: &State<D>) -> StageEnd<D> {
         let factor = state.history.last().map_or(0.0, |row| row.factor);
         self.set_forces(factor, &state.displacement);

@@ -1,5 +1,5 @@
-//! Rotating regions across the steps of a programme: each goes on from the angle, the shift and the warp that
-//! the step before has left.
+//! Rotating regions across the steps of a programme: each begins a step with the angle, the shift and the warp
+//! at the end of the step before.
 
 use super::curves::CurvedRegion;
 use super::load::Loads;
@@ -111,8 +111,8 @@ impl<const D: usize> RotatingRegion<D> {
     /// Begins a step at the place of its particles, at an angle, rad; `common` is the load factor.
     ///
     /// # Errors
-    /// What is found and allowed, for a deformed region of which some components across the axis are held,
-    /// others not.
+    /// A deformed region of which some components across the axis are held, others not; the text says what is
+    /// found and allowed.
     fn begin(
         &mut self,
         bonds: &dyn BodyGeometry<D>,
@@ -123,7 +123,7 @@ impl<const D: usize> RotatingRegion<D> {
         let rounding = ROUNDING * bonds.spacing();
         let offset = |&site: &u32| -> [f64; D] {
             let u = displacement.get(site as usize);
-            let turned = self.rotation.turn(angle, self.rotation.from(bonds.position(site as usize)));
+            let turned = self.rotation.turn(angle, self.rotation.offset(bonds.position(site as usize)));
             std::array::from_fn(|d| if self.prescribes(d) { u[d] - turned[d] } else { 0.0 })
         };
         let offsets: Vec<[f64; D]> = self.sites.iter().map(offset).collect();
@@ -161,21 +161,25 @@ impl<const D: usize> RotatingRegion<D> {
     }
 }
 
-/// How a region with the sites of rotations goes on.
-enum Turned<const D: usize> {
+/// Motion of a region without a `rotation` of its own in the next step.
+enum NextMotion<const D: usize> {
     /// Straight, from where it is.
     Straight,
     /// Along the arc, to the angle of this rotation.
     Arc(Rotation<D>),
 }
 
-/// Rotation that a region without a `rotation` of its own goes on with: held at its angle, or back to 0.
+/// Finds the motion of a region without a `rotation` of its own: a region that has been turned stays at its
+/// angle, or returns to 0.
 ///
 /// # Errors
-/// What is found and allowed, for motions that would distort the region.
-fn goes_on<const D: usize>(region: &CurvedRegion<D>, turned: &[TurnedSites]) -> Result<Turned<D>, String> {
+/// A motion that would distort the region; the text says what is found and allowed.
+fn next_motion<const D: usize>(
+    region: &CurvedRegion<D>,
+    turned: &[TurnedSites],
+) -> Result<NextMotion<D>, String> {
     let shares = |own: &&TurnedSites| region.sites.iter().any(|site| own.sites.binary_search(site).is_ok());
-    let Some(own) = turned.iter().find(shares) else { return Ok(Turned::Straight) };
+    let Some(own) = turned.iter().find(shares) else { return Ok(NextMotion::Straight) };
     let has = |mask: u8, d: usize| mask >> d & 1 == 1;
     let along = own.rotation::<D>(0.0).along();
     let across = || (0..D).filter(|&d| along != Some(d));
@@ -185,9 +189,9 @@ fn goes_on<const D: usize>(region: &CurvedRegion<D>, turned: &[TurnedSites]) -> 
     let whole = region.sites.iter().all(|site| own.sites.binary_search(site).is_ok());
     if set == 0 {
         return Ok(if whole && held == every {
-            Turned::Arc(own.rotation(own.angle))
+            NextMotion::Arc(own.rotation(own.angle))
         } else {
-            Turned::Straight
+            NextMotion::Straight
         });
     }
     let first = region.values.first().copied().unwrap_or([0.0; D]);
@@ -196,7 +200,7 @@ fn goes_on<const D: usize>(region: &CurvedRegion<D>, turned: &[TurnedSites]) -> 
     let mut amplitudes = across().map(|d| &region.amplitudes[d]);
     let one = amplitudes.next();
     if whole && set == every && uniform && amplitudes.all(|amplitude| Some(amplitude) == one) {
-        return Ok(Turned::Arc(own.rotation(0.0)));
+        return Ok(NextMotion::Arc(own.rotation(0.0)));
     }
     Err(format!(
         "displacements of particles {}; allowed: a `rotation`, `hold`, or lengths with one curve in all \
@@ -260,9 +264,9 @@ impl<const D: usize> Loads<D> {
             Error::geometry(format!("{text}: found {found}"))
         };
         for region in std::mem::take(&mut curved.held) {
-            match goes_on(&region, &origin.turned).map_err(|found| refused(&region.sites, found))? {
-                Turned::Straight => curved.held.push(region),
-                Turned::Arc(rotation) => self.turned.push(RotatingRegion {
+            match next_motion(&region, &origin.turned).map_err(|found| refused(&region.sites, found))? {
+                NextMotion::Straight => curved.held.push(region),
+                NextMotion::Arc(rotation) => self.turned.push(RotatingRegion {
                     rotation,
                     shift: region.values.first().copied().unwrap_or([0.0; D]),
                     amplitudes: (0..D)

@@ -12,11 +12,11 @@ use peri::solver::Loads;
 use std::path::Path;
 
 const BONDS: &str = "[material]\nyoungs_modulus = \"1 MPa\"\nlaw = \"linear\"\n";
-const RUBBER: &str = "[material.solid]\nlaw = \"correspondence\"\nconstitutive = { model = \"neo-hookean\", \
+pub const RUBBER: &str = "[material.solid]\nlaw = \"correspondence\"\nconstitutive = { model = \"neo-hookean\", \
                       parameters = { shear_modulus = \"0.4 MPa\" }, bulk_modulus = \"4 MPa\" }\n";
 
 /// A strip of 20 × 6 particles, held at its left end.
-fn strip(material: &str, rest: &str) -> String {
+pub fn strip(material: &str, rest: &str) -> String {
     format!(
         r#"version = 1
 program = "peri"

@@ -1,48 +1,17 @@
 //! Pictures of named states, and animations.
 
-use harness::case::{Case, Options, Run};
-use harness::scene::Source;
-use peri::program::run::{FinishedScene, Peri, run};
-use peri::program::scene::Scene;
+use crate::answers::{self, RUBBER, solve};
 use std::fs;
 use std::path::Path;
 
-const RUBBER: &str = "[material.solid]\nlaw = \"correspondence\"\nconstitutive = { model = \"neo-hookean\", \
-                      parameters = { shear_modulus = \"0.4 MPa\" }, bulk_modulus = \"4 MPa\" }\n";
 const BRITTLE: &str =
     "[material]\nyoungs_modulus = \"1 MPa\"\nlaw = \"linear\"\ncritical = { stretch = 1.04 }\n";
 const STRESS: &str = "[stress]\nmeasures = [\"constitutive\"]\n";
 
 /// A strip of 20 × 6 particles, pulled at its right end.
 fn strip(material: &str, rest: &str) -> String {
-    format!(
-        r#"version = 1
-program = "peri"
-title = "A strip"
-[body]
-space = "plane-strain"
-thickness = "1 mm"
-spacing = "1 mm"
-shapes = [{{ add = "box", min = ["0 mm", "0 mm"], max = ["20 mm", "6 mm"] }}]
-{material}
-[[boundary]]
-name = "foot"
-side = "x-"
-displacement = ["0 mm", "0 mm"]
-[[boundary]]
-name = "head"
-side = "x+"
-displacement = ["2 mm", "1 mm"]
-{rest}
-"#
-    )
-}
-
-fn solve(text: &str, output: &Path) -> FinishedScene {
-    let source = Source::new("scene.toml", text);
-    let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
-    let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(output));
-    run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
+    let head = "[[boundary]]\nname = \"head\"\nside = \"x+\"\ndisplacement = [\"2 mm\", \"1 mm\"]\n";
+    answers::strip(material, &format!("{head}{rest}"))
 }
 
 fn picture(output: &Path, kind: &str, state: &str) -> Vec<u8> {

@@ -1,11 +1,8 @@
 //! Pressures of rigid surfaces on bodies: Hertz's profiles, a squeezed block, resultants, friction.
 
 use evidence::{at_most, near};
-use harness::case::{Case, Options, Run};
 use harness::output::{csv, vtkhdf};
-use harness::scene::Source;
-use peri::program::run::{FinishedScene, Peri, run};
-use peri::program::scene::Scene;
+use peri::program::run::FinishedScene;
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::path::Path;
@@ -19,10 +16,7 @@ const HELD: &str = "[[boundary]]\nmin = [\"-0.6 mm\", \"-1 mm\"]\nmax = [\"0.6 m
                     displacement = [\"0 mm\", \"free\"]\n";
 
 fn solve(text: &str, output: &Path) -> FinishedScene {
-    let source = Source::new("scene.toml", format!("version = 1\nprogram = \"peri\"\n{text}"));
-    let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
-    let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(output));
-    run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
+    crate::answers::solve(&format!("version = 1\nprogram = \"peri\"\n{text}"), output)
 }
 
 /// Columns of a table by name, without units.
@@ -83,7 +77,8 @@ contact = true
 }
 
 /// Hertz's line contact (Johnson, Contact Mechanics (1985), §4.2): p = p₀√(1 − x²/a²), a² = 4FR/(πE*),
-/// p₀ = 2F/(πa). The block adds (a/h)² = 2 %.
+/// p₀ = 2F/(πa). The block adds (a/h)² = 2 %, to the greatest pressure at 8 spacings in a; with half as many
+/// the bar is twice that. At the rim the two outer faces may be off by half their pressure, √(Δx/a)/2.
 #[test]
 fn pressures_below_a_cylinder_are_those_of_hertz() {
     let a = (4.0 * 400.0 * 0.08 / (PI * MODULUS)).sqrt();

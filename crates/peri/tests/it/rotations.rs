@@ -20,7 +20,7 @@ fn solve(text: &str) -> FinishedScene {
     run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn value(finished: &FinishedScene, name: &str) -> f64 {
+pub fn value(finished: &FinishedScene, name: &str) -> f64 {
     finished.report.scalar(name).unwrap_or_else(|| panic!("no {name} in\n{}", finished.report.table()))
 }
 

@@ -2,6 +2,7 @@
 //! the step before has left it.
 
 use crate::curves::solve;
+use crate::rotations::value;
 use evidence::{at_most, near};
 use harness::case::{Case, Fault, Options, Run};
 use harness::scene::{Failure, Source};
@@ -67,10 +68,6 @@ fn history(run: &FinishedScene) -> &[StepRecord] {
     &run.outcomes[0].history
 }
 
-fn value(finished: &FinishedScene, name: &str) -> f64 {
-    finished.report.scalar(name).unwrap_or_else(|| panic!("no {name} in\n{}", finished.report.table()))
-}
-
 /// A bar twisted by 120° in one step, and by 60° in each of two: the same moment, force, energy and work at
 /// every angle. Held there, and named with its lengths it returns along the arc, through the same energies,
 /// to none. The solver's tolerance is 1e-5 of the forces.
@@ -106,8 +103,8 @@ fn twisted_further_and_back() {
 
 /// A bar compressed by 5 % and then twisted by 60°, in one step of the scene and in two, against Rivlin
 /// (1949), doi:10.1098/rsta.1949.0009: M = ½πμψa⁴/λ with the twist ψ per undeformed length and the stretch λ
-/// in the middle: to 1 % against the bar that is twisted only, and to 5 % in itself on a lattice of an eighth
-/// of the diameter. Both steps at once, or in the opposite order, lead to the same state.
+/// in the middle: to 1 % against the bar that is twisted only, and to 5 % in itself, as the polar moment of the
+/// cells, an eighth of the diameter wide, is 8 % above that of the circle. Both steps at once, or in the opposite order, lead to the same state.
 #[test]
 fn compressed_then_twisted() {
     let slice = |name: &str, track: &str, z: f64| {
@@ -347,7 +344,7 @@ fn resumed_while_it_turns() {
     near("shift_after_a_turn", whole.last().unwrap().stored / history(&shifted)[2].stored, 1.0, 1e-6);
 }
 
-/// What a run refuses as it begins a step.
+/// Message of a run that refuses to begin a step.
 fn refused(text: &str) -> String {
     let directory = tempfile::tempdir().unwrap();
     let source = Source::new("scene.toml", text);

@@ -133,7 +133,7 @@ impl Canvas {
 
     /// Returns the least rectangle (left, top, width, height) outside of which nothing differs from an image
     /// of the same size; one pixel where nothing does.
-    fn difference(&self, other: &Self) -> [usize; 4] {
+    pub(super) fn difference(&self, other: &Self) -> [usize; 4] {
         let differs =
             |x: usize, y: usize| self.pixels[y * self.width + x] != other.pixels[y * self.width + x];
         let in_row = |y: &usize| {
@@ -147,13 +147,13 @@ impl Canvas {
         [left, top, right + 1 - left, bottom + 1 - top]
     }
 
-    /// Returns what differs from the frame before, as [`Self::difference`].
+    /// Returns the frame `index` of a film if it has the size of another one.
     ///
     /// # Errors
     /// A frame of another size.
-    pub(super) fn changes(&self, last: &Self, path: &Path, index: usize) -> Result<[usize; 4], Error> {
-        if [self.width, self.height] == [last.width, last.height] {
-            return Ok(self.difference(last));
+    pub(super) fn sized_as(self, other: &Self, path: &Path, index: usize) -> Result<Self, Error> {
+        if [self.width, self.height] == [other.width, other.height] {
+            return Ok(self);
         }
         Err(picture_error(path, format!("frame {index} has another size")))
     }
@@ -213,7 +213,7 @@ impl Canvas {
 /// times as long.
 ///
 /// # Errors
-/// Those of `frame`; what cannot be encoded.
+/// Errors of `frame`, and images that cannot be encoded.
 pub(super) fn animated_png(
     path: &Path,
     frames: usize,
@@ -237,9 +237,9 @@ pub(super) fn animated_png(
     let mut writer = encoder.write_header().map_err(text)?;
     writer.write_image_data(last.pixels.as_flattened()).map_err(text)?;
     for index in 1..frames {
-        let next = frame(index)?;
+        let next = frame(index)?.sized_as(&last, path, index)?;
         // what changes only
-        let part @ [x, y, width, height] = next.changes(&last, path, index)?;
+        let part @ [x, y, width, height] = next.difference(&last);
         writer.reset_frame_position().map_err(text)?;
         writer.set_frame_dimension(width as u32, height as u32).map_err(text)?;
         writer.set_frame_position(x as u32, y as u32).map_err(text)?;

@@ -36,7 +36,7 @@ impl FieldMap<'_> {
     /// repeats without end but as MP4.
     ///
     /// # Errors
-    /// Those of `frame`; as [`Self::write`]; for MP4 no `ffmpeg` on the PATH, or its message.
+    /// Errors of `frame`; as [`Self::write`]; for MP4 no `ffmpeg` on the PATH, or its message.
     pub fn animate(
         path: impl AsRef<Path>,
         frames: usize,
@@ -60,7 +60,7 @@ impl FieldMap<'_> {
 /// animated PNG. Those but MP4 repeat without end.
 ///
 /// # Errors
-/// Those of `frame`; no frame; what cannot be encoded; for MP4 no `ffmpeg` on the PATH, or its message.
+/// Errors of `frame`; no frame; images that cannot be encoded; for MP4 no `ffmpeg` on the PATH, or its message.
 pub(super) fn film(
     path: &Path,
     frames: usize,
@@ -95,9 +95,9 @@ fn gif(
     let mut part = [0, 0, last.width, last.height];
     for index in 0..frames {
         if index > 0 {
-            let next = frame(index)?;
+            let next = frame(index)?.sized_as(&last, path, index)?;
             // what changes only
-            part = next.changes(&last, path, index)?;
+            part = next.difference(&last);
             last = next;
         }
         // the sides of a picture whose sides fit do so as well
@@ -147,7 +147,7 @@ fn mp4(
     if let Some(mut input) = input {
         for index in 0..frames {
             let next = if index == 0 { Ok(first.clone()) } else { frame(index) };
-            match next.and_then(|next| next.changes(&first, path, index).map(|_| next)) {
+            match next.and_then(|next| next.sized_as(&first, path, index)) {
                 Ok(next) => {
                     let times = if index + 1 == frames { rest } else { 1 };
                     let pixels = next.bytes_within([0, 0, next.width, next.height]);

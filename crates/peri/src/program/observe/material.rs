@@ -367,20 +367,11 @@ impl<const D: usize> Physics<D> {
         Ok(Some(contact))
     }
 
-    /// Places rigid surfaces beside a whole body for the outputs of a step.
-    ///
-    /// # Errors
-    /// As [`Self::contact`].
-    pub fn place_surfaces(&mut self, scene: &Scene, body: &DiscreteBody<D>) -> Result<(), Error> {
-        self.placed.clone_from(&self.surfaces);
-        let pushed = self.surfaces.iter().any(|surface| surface.force.is_some());
-        let output = &scene.output;
-        if output.contact || pushed && (output.pictures || output.animation.is_some()) {
-            let contact = self.contact(scene, body)?;
-            self.placed = contact.iter().flat_map(Contact::surfaces).cloned().collect();
-            self.faced = contact.filter(|_| output.contact).and_then(Contact::into_surfaces);
-        }
-        Ok(())
+    /// Places the rigid surfaces of a contact beside a whole body for the outputs of a step.
+    pub fn place_surfaces(&mut self, scene: &Scene, contact: Option<&Contact<D>>) {
+        self.placed = contact.into_iter().flat_map(Contact::surfaces).cloned().collect();
+        let faced = contact.filter(|_| scene.output.contact).and_then(Contact::rigid_surfaces);
+        self.faced = faced.cloned();
     }
 
     /// Returns the tractions of rigid surfaces in a state; none without `output.contact`.

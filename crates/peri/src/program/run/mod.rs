@@ -16,6 +16,7 @@ use variants::VariantRun;
 
 use crate::bonds::Bonds;
 use crate::calibrate::Space;
+use crate::contact::Contact;
 use crate::error::Error;
 use crate::program::observe::{self, FieldFrames, Moment, Physics, SceneObservers, in_space};
 use crate::program::quantities as q;
@@ -199,10 +200,11 @@ fn run_variant<const D: usize>(
             physics.loads = stage.loads(&own_scene, &body, &state).map_err(PeriFailure::Run)?;
             physics.surfaces.clone_from(&stage.surfaces);
         }
-        physics.place_surfaces(&own_scene, &body)?;
+        let contact = physics.contact(&own_scene, &body)?;
+        physics.place_surfaces(&own_scene, contact.as_ref());
         let watched = Watched { observers: &mut observers, frames: &mut frames, states: &states, outputs };
         let own = (&*own_source, &*own_scene, device.card.as_ref().filter(|_| index == 0));
-        solved = solve(own, &physics, variant_run, &mut body, &mut state, &phases, watched);
+        solved = solve(own, (&physics, contact), variant_run, &mut body, &mut state, &phases, watched);
         if solved.is_err() {
             break;
         }
@@ -278,7 +280,7 @@ fn initial_state<const D: usize>(
     Ok(state)
 }
 
-/// What sees the finished steps of a run: observers, field file, and the pictures of named states.
+/// Receivers of the finished steps of a run: observers, field file, and the pictures of named states.
 struct Watched<'a, 's, const D: usize> {
     observers: &'a mut SceneObservers<'s, D>,
     frames: &'a mut FieldFrames,
@@ -286,10 +288,10 @@ struct Watched<'a, 's, const D: usize> {
     outputs: Outputs<'a>,
 }
 
-/// Solves a step; returns what it leaves to the next one, if there is any.
+/// Solves a step; returns its end if another one follows.
 fn solve<const D: usize>(
     (source, scene, card): (&Source, &Scene, Option<&device::Card>),
-    physics: &Physics<D>,
+    (physics, contact): (&Physics<D>, Option<Contact<D>>),
     variant_run: &VariantRun,
     body: &mut scene::DiscreteBody<D>,
     state: &mut State<D>,
@@ -299,7 +301,6 @@ fn solve<const D: usize>(
     let (material, loads) = (&physics.body.material, &physics.loads);
     let (factors, times) = scene.load_steps();
     let mut watch = |status: &Status, state: &State<D>| variant_run.watch(status, state);
-    let contact = physics.contact(scene, body)?;
     let density_ratios = scene::density_ratios(source, scene, body)?;
     let amplitude = scene.amplitude();
     let row = |bonds: &dyn Bonds<D>, state: &State<D>| physics.row(bonds, state);

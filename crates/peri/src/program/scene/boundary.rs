@@ -66,8 +66,8 @@ impl Boundary {
     /// Returns true if the boundary prescribes a component of the displacement.
     pub fn constrains(&self) -> bool {
         let held = self.displacement.iter().flatten().any(|u| *u != Prescribed::Free);
-        let fields = self.displacement_field.iter().flatten();
-        held || fields.into_iter().any(|u| !matches!(u, PrescribedField::Free)) || self.rotation.is_some()
+        let placed = self.displacement_field.iter().flatten().any(|u| !matches!(u, PrescribedField::Free));
+        held || placed || self.rotation.is_some()
     }
 
     /// Returns the components that keep their displacement of the start of a step, a bit each.

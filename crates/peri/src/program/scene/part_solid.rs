@@ -110,10 +110,14 @@ pub fn solid_of_parts<'a, const D: usize>(
         let mut numbers = vec![0; body.bonds.sites()];
         for (part, members) in inclusions.members() {
             let Some(own) = &part.solid else { continue };
-            let number = different.iter().position(|(_, other)| *other == own).unwrap_or(0) as u16;
+            let number = different.iter().position(|(_, other)| *other == own).unwrap_or(0);
+            let number = u16::try_from(number).map_err(|_| {
+                let found = format!("{} different solids", different.len());
+                source.error("material.inclusions", found, format!("at most {}", u16::MAX))
+            })?;
             members.iter().for_each(|&site| numbers[site as usize] = number);
         }
-        let wrong = |error| source.error("material.inclusions", error, "fewer parts");
+        let wrong = |error| source.error("material.inclusions", error, "a law for every part");
         solid = solid.with_parts(parts, numbers).map_err(wrong)?;
     }
     Ok((solid, inclusions))

@@ -59,7 +59,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<MaterialDeck, crate::Error> {
 /// law is checked. `MODULI=INSTANTANEOUS` with the Prony series of a `*VISCOELASTIC` is converted to the law
 /// of long times; D₂ and more, rates, softening and what is no elasticity are noted.
 ///
-/// A material ends at the next `*MATERIAL` or at a keyword that belongs to none. Left out are materials whose
+/// A material ends at the next `*MATERIAL` or where another block begins. Left out are materials whose
 /// law is not in this crate or is changed by another keyword: an unknown keyword or an `*INCLUDE` inside the
 /// material, a kind, an order or an option that is unknown, test data in place of parameters, numbers that
 /// are missing, too many or of several temperatures, plasticity, creep, other branches; and parameters
