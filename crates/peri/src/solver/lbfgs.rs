@@ -345,7 +345,8 @@ impl<V> LbfgsSearch<V> {
         V: SearchVectors<D>,
     {
         let goal = self.settings.goal();
-        let before = state.counts.total_iterations;
+        // since the preconditioner was built, where a run may begin
+        let mut before = state.counts.total_iterations;
         let mut point = self.arrive(system, state)?;
         let mut broken = false;
         loop {
@@ -385,6 +386,7 @@ impl<V> LbfgsSearch<V> {
                 self.vectors.give(system, state)?;
                 self.begin(system, state, watch)?;
                 self.vectors.take(system, state)?;
+                before = state.counts.total_iterations;
                 point = self.arrive(system, state)?;
             }
         }

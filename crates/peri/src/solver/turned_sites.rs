@@ -1,5 +1,5 @@
-//! Rotating regions across the steps of a programme: each begins a step with the angle, the shift and the warp
-//! at the end of the step before.
+//! Rotating regions across the steps of a programme: each begins a step with the angle, the shift and the
+//! warp at the end of the step before.
 
 use super::curves::CurvedRegion;
 use super::load::Loads;

@@ -12,8 +12,9 @@ use peri::solver::Loads;
 use std::path::Path;
 
 const BONDS: &str = "[material]\nyoungs_modulus = \"1 MPa\"\nlaw = \"linear\"\n";
-pub const RUBBER: &str = "[material.solid]\nlaw = \"correspondence\"\nconstitutive = { model = \"neo-hookean\", \
-                      parameters = { shear_modulus = \"0.4 MPa\" }, bulk_modulus = \"4 MPa\" }\n";
+pub const RUBBER: &str = "[material.solid]\nlaw = \"correspondence\"\n\
+                          constitutive = { model = \"neo-hookean\", \
+                          parameters = { shear_modulus = \"0.4 MPa\" }, bulk_modulus = \"4 MPa\" }\n";
 
 /// A strip of 20 × 6 particles, held at its left end.
 pub fn strip(material: &str, rest: &str) -> String {

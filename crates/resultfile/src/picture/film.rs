@@ -60,7 +60,8 @@ impl FieldMap<'_> {
 /// animated PNG. Those but MP4 repeat without end.
 ///
 /// # Errors
-/// Errors of `frame`; no frame; images that cannot be encoded; for MP4 no `ffmpeg` on the PATH, or its message.
+/// Errors of `frame`; no frame; images that cannot be encoded; for MP4 no `ffmpeg` on the PATH, or its
+/// message.
 pub(super) fn film(
     path: &Path,
     frames: usize,
