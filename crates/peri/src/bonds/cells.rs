@@ -8,6 +8,7 @@ use rayon::prelude::*;
 const FARTHEST: i64 = 1 << 40;
 
 /// Points in cells of equal edge. Empty cells are not stored: a point far from all others costs nothing.
+#[derive(Clone)]
 pub struct CellGrid<const D: usize> {
     low: [f64; D],
     edge: f64,

@@ -1,6 +1,6 @@
 //! Properties as fields over particles.
 
-use super::BodyGeometry;
+use super::{BodyGeometry, Bonds};
 
 /// A property of the particles: one value for all, which costs nothing, or a value for each site. Numbers
 /// convert: `3.0.into()`. Single bonds may have a value of their own.
@@ -97,6 +97,10 @@ impl Property {
         if !self.guarded.is_empty() && (self.guarded[site] || self.guarded[other]) {
             return f64::INFINITY;
         }
+        self.unguarded(site, other)
+    }
+
+    fn unguarded(&self, site: usize, other: usize) -> f64 {
         let ends =
             if self.values.is_empty() { self.rest } else { self.value_at(site).min(self.value_at(other)) };
         if self.bonds.is_empty() {
@@ -104,6 +108,30 @@ impl Property {
         }
         let found = self.bonds.binary_search_by_key(&[site as u32, other as u32], |bond| bond.0);
         found.map_or(ends, |at| self.bonds[at].1)
+    }
+
+    /// Replaces the value of every particle and bond by `of` that value, whether or not `of` keeps their
+    /// order; guarded particles stay.
+    #[must_use]
+    pub fn replaced<const D: usize>(&self, bonds: &dyn Bonds<D>, of: impl Fn(f64) -> f64) -> Self {
+        if let Some(value) = self.uniform() {
+            return of(value).into();
+        }
+        let mut new = Self::new(bonds, |site, _| of(self.value_at(site)));
+        let mut own = Vec::new();
+        for &site in bonds.particles() {
+            bonds.neighbours(site as usize, &mut |bond| {
+                let value = of(self.unguarded(site as usize, bond.site));
+                if site < bond.site as u32 && value != new.unguarded(site as usize, bond.site) {
+                    own.push(([site, bond.site as u32], value));
+                }
+            });
+        }
+        new = new.with_bonds(own);
+        if !self.guarded.is_empty() {
+            (new.guarded, new.greatest) = (self.guarded.clone(), f64::INFINITY);
+        }
+        new
     }
 
     /// The single value of all particles and bonds; `None` for a field.

@@ -92,7 +92,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Motion of the first side of a pair against the second since friction began to act, m.
-    fn slipped(&self, pair: ContactPair, displacement: &Field<D>) -> [f64; 3] {
+    pub fn slipped(&self, pair: ContactPair, displacement: &Field<D>) -> [f64; 3] {
         let Some(start) = &self.start else { return [0.0; 3] };
         let ContactPair::Particles(own, other) = pair else {
             return self

@@ -18,6 +18,7 @@ const ROUNDED: f64 = 1e-6;
 const FARTHEST_CELLS: f64 = (1_u64 << 38) as f64;
 
 /// Pairs of particles without a bond that are nearer than their contact distance, a gap and a skin.
+#[derive(Clone)]
 pub struct ContactList<const D: usize> {
     /// Particles' radii, m; empty where all are `largest`.
     radii: Vec<f64>,

@@ -34,6 +34,7 @@ mod forces;
 mod friction;
 mod friction_pair;
 mod list;
+mod pair_tractions;
 mod pushed_surfaces;
 #[cfg(feature = "gpu")]
 mod rows;
@@ -80,6 +81,7 @@ pub const PAIR_STIFFNESS: f64 = 2.0;
 const NEAR: f64 = 0.25;
 
 /// Contact of a body.
+#[derive(Clone)]
 pub struct Contact<const D: usize> {
     /// Force density on a particle per volume of the other and per overlap, N/m⁷, for the greatest M.
     stiffness: f64,
@@ -346,11 +348,6 @@ impl<const D: usize> Contact<D> {
     /// Greatest pressure of each rigid surface on the body, Pa; 0 where nothing is pressed.
     pub fn greatest_pressures(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> Vec<f64> {
         self.surfaces.as_ref().map_or_else(Vec::new, |own| own.greatest_pressures(bonds, displacement))
-    }
-
-    /// Returns the rigid surfaces with the faces on which they act.
-    pub fn rigid_surfaces(&self) -> Option<&RigidSurfaces<D>> {
-        self.surfaces.as_ref()
     }
 
     /// Sum of the squares of the surfaces' force densities at the last update, (N/m³)².

@@ -54,6 +54,7 @@ pub fn grips<const D: usize>(bonds: &LatticeBonds<D>, constrained: &[u8]) -> Vec
 }
 
 /// Faces of free particles tied to held ones.
+#[derive(Clone)]
 pub struct Ties<const D: usize> {
     /// Faces, with the held particles among their entries.
     faces: Faces<D>,

@@ -1,9 +1,10 @@
-//! Tractions of rigid surfaces on a body: forces of contact over the present areas on which they act.
+//! Tractions on a body: forces of contact over the areas on which they act.
 //!
 //! A face of the undeformed area A and normal N has the present area A|cof F N| (Nanson), F the deformation
 //! gradient of the particle nearest to it; a plane body keeps its thickness. A particle that has lost bonds
 //! has its undeformed area.
 
+use super::Contact;
 use super::friction_pair::{ContactPair, across};
 use super::surface::SurfaceReaction;
 use super::surfaces::{MovingSurface, RigidSurfaces, SurfaceContact};
@@ -16,16 +17,16 @@ use nalgebra::{SMatrix, SVector};
 /// Distance from a face, in spacings, up to which particles lie on the surface below it.
 const BELOW: f64 = 1.0;
 
-/// Traction of a rigid surface on a face of a body, or on a particle that touches it itself.
+/// Traction of a rigid surface on a face of a body or on a particle without one, or of particles on another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceTraction<const D: usize> {
-    /// Number of the surface.
+    /// Number of the surface; of particles the number of surfaces.
     pub surface: usize,
     /// Sites of the particles on the surface of the body below the face.
     pub sites: Vec<u32>,
     /// Present position, m.
     pub place: [f64; D],
-    /// Normal of the rigid surface there, towards the body.
+    /// Normal of the surface there, towards the body.
     pub normal: [f64; D],
     /// Present area, m².
     pub area: f64,
@@ -35,24 +36,47 @@ pub struct SurfaceTraction<const D: usize> {
     pub shear: [f64; D],
 }
 
-impl<const D: usize> RigidSurfaces<D> {
-    /// Places surfaces where they were in a row of the history, beside the bonds that are intact.
-    pub fn place_surfaces(&mut self, bonds: &dyn BodyGeometry<D>, resting: &[SurfaceReaction]) {
-        self.expose(bonds, bonds.particles().iter().map(|&site| site as usize));
-        for (placed, at) in self.each.iter_mut().zip(resting) {
-            placed.now = std::array::from_fn(|d| at.moved[d]);
-        }
+impl<const D: usize> Contact<D> {
+    /// Finds the contacts of a displacement and places surfaces where they were in a row of the history,
+    /// beside the bonds that are intact.
+    pub fn place(
+        &mut self,
+        bonds: &dyn BodyGeometry<D>,
+        displacement: &Field<D>,
+        resting: &[SurfaceReaction],
+    ) {
+        self.rebuild(bonds, displacement);
+        let placed = self.surfaces.iter_mut().flat_map(|surfaces| &mut surfaces.each);
+        placed.zip(resting).for_each(|(placed, at)| placed.now = std::array::from_fn(|d| at.moved[d]));
     }
 
-    /// Returns the tractions of all surfaces at a displacement, with forces of friction, N, by pair.
+    /// Returns the tractions of all surfaces, then those of particles on each other, at a displacement, with
+    /// forces of friction, N, by pair.
     pub fn tractions(
         &self,
         bonds: &dyn BodyGeometry<D>,
         displacement: &Field<D>,
-        drags: impl Iterator<Item = (ContactPair, [f64; 3])>,
+        drags: &[(ContactPair, [f64; 3])],
+    ) -> Vec<SurfaceTraction<D>> {
+        let surfaces = self.surfaces.as_ref();
+        let mut found =
+            surfaces.map_or_else(Vec::new, |surfaces| surfaces.tractions(bonds, displacement, drags));
+        found.append(&mut self.pair_tractions(bonds, displacement, drags));
+        found
+    }
+}
+
+impl<const D: usize> RigidSurfaces<D> {
+    /// Returns the tractions of all surfaces at a displacement, with forces of friction, N, by pair.
+    fn tractions(
+        &self,
+        bonds: &dyn BodyGeometry<D>,
+        displacement: &Field<D>,
+        drags: &[(ContactPair, [f64; 3])],
     ) -> Vec<SurfaceTraction<D>> {
         let mut rubs: Vec<(usize, usize, [f64; 3])> = drags
-            .filter_map(|(pair, force)| {
+            .iter()
+            .filter_map(|&(pair, force)| {
                 let (surface, element) = self.element(pair)?;
                 Some((surface, element, force))
             })

@@ -12,6 +12,7 @@ const RINGS: i64 = 3;
 const LEAST: f64 = 0.2;
 
 /// The particles of a list in cells, and their relative motion.
+#[derive(Clone)]
 pub struct Vicinity<const D: usize> {
     grid: CellGrid<D>,
     edge: f64,

@@ -99,6 +99,8 @@ harness::quantities! {
         0.632 of the radius of a Hertzian circle";
     PLANE_PRESSURE = "{plane}_pressure", "Pa", "greatest pressure of a rigid plane or an indenter on a face \
         at the end: force along the normal over the present area; 0 where nothing is pressed";
+    PAIR_PRESSURE = "contact_pressure", "Pa", "greatest pressure of particles on another that they touch, at \
+        the end, over its share of the undeformed surface";
     INDENTER_DISPLACEMENT = "{indenter}_displacement_{axis}", "m", "displacement of an indenter at the end; \
         with a force from where it first touches the body at rest";
     CRITICAL_TIME_STEP = "critical_time_step", "s", "critical time step 2/ω of the body at the start";

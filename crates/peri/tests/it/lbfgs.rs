@@ -234,15 +234,29 @@ fn bits_do_not_depend_on_threads() {
 #[ignore = "takes 6 to 35 s; .ci/run runs it"]
 fn restarts_take_the_same_bits() {
     for (refine, snap_back) in [(1, false), (16, false), (16, true)] {
-        restarts(refine, snap_back);
+        let settings = Lbfgs { tolerance: 1e-5, ..Default::default() };
+        restarts([40, 30], settings, (refine, snap_back), &|_| true);
     }
 }
 
-fn restarts(refine: usize, snap_back: bool) {
+/// So has one that begins within a search longer than a preconditioner is kept.
+#[test]
+fn restarts_within_a_long_search() {
+    let settings = Lbfgs { tolerance: 1e-9, memory: 2, coarsening: f64::INFINITY, ..Default::default() };
+    restarts([24, 18], settings, (1, false), &|state| state.counts.iteration > 0);
+}
+
+/// Tears a sheet, and again from restartable states of a kind.
+fn restarts(
+    counts: [usize; 2],
+    settings: Lbfgs,
+    (refine, snap_back): (usize, bool),
+    kind: &dyn Fn(&State<2>) -> bool,
+) {
     // some steps go on from equilibria without a broken bond, and one begins with a new preconditioner
     let factors: Vec<f64> = (1..=12).map(|k| f64::from(k) / 12.0).collect();
     let build = || {
-        let (built, end) = damaged([40, 30]);
+        let (built, end) = damaged(counts);
         let loads =
             hold(&built.lattice, |x| (x[0] < 0.375 || x[0] > end).then(|| (3, [0.6 * x[0], 0.1 * x[0]])));
         (built, loads)
@@ -254,9 +268,8 @@ fn restarts(refine: usize, snap_back: bool) {
         let mut system = System::new(&mut built.lattice, BondMaterial::new(&*law, MODULUS), &loads, &factors);
         system.breaking.clone_from(&breaking);
         (system.refine, system.snap_back) = (refine, snap_back);
-        let settings = Lbfgs { tolerance: 1e-5, ..Default::default() };
         let mut watch = |status: &peri::solver::Status, state: &State<2>| {
-            if status.restartable {
+            if status.restartable && kind(state) {
                 saved.push(state.clone());
             }
             Ok(())

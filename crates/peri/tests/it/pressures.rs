@@ -182,3 +182,67 @@ fn tractions_add_up_to_the_force_of_the_plane() {
         }
     }
 }
+
+/// Two blocks, the upper one `width` mm wide, that are 20 mm high and pressed on each other by 0.2 mm.
+fn blocks_in_contact(width: f64, rest: &str) -> String {
+    let half = 0.5 * width;
+    format!(
+        r#"
+[body]
+space = "plane-strain"
+thickness = "1 mm"
+spacing = "0.5 mm"
+shapes = [
+  {{ add = "box", min = ["-10 mm", "-10 mm"], max = ["10 mm", "0 mm"], part = "lower" }},
+  {{ add = "box", min = ["-{half} mm", "0 mm"], max = ["{half} mm", "10 mm"], part = "upper" }},
+]
+{SOFT}
+[[interface]]
+between = ["lower", "upper"]
+unbonded = true
+{rest}
+[solver]
+steps = 1
+tolerance = 1e-5
+[output]
+contact = true
+"#
+    )
+}
+
+/// Blocks between smooth planes have the pressure of the load but for a horizon at their corners; those with
+/// rough faces between held ends have its sum on both sides, and at most μp of shear.
+#[test]
+fn pressures_between_blocks_are_those_of_the_load() {
+    let pressed = |width: f64, rest: &str| {
+        let directory = tempfile::tempdir().unwrap();
+        let finished = solve(&blocks_in_contact(width, rest), directory.path());
+        let rows = table(&directory.path().join("contact_particles_dx-0.5mm_m-3.015.csv"));
+        let greatest = rows["pressure"].iter().copied().fold(0.0, f64::max);
+        assert_eq!(finished.report.scalar("contact_pressure"), Some(greatest));
+        assert!(directory.path().join("contact_dx-0.5mm_m-3.015.png").is_file());
+        (finished.outcomes[0].history.last().unwrap().load.abs(), rows)
+    };
+    let smooth = "[[boundary]]\nside = \"y-\"\ndisplacement = [\"free\", \"0 mm\"]\n\
+                  [[boundary]]\nside = \"y+\"\ndisplacement = [\"free\", \"-0.2 mm\"]\n\
+                  [[boundary]]\nmin = [\"-0.6 mm\", \"-10 mm\"]\nmax = [\"0.6 mm\", \"10 mm\"]\n\
+                  displacement = [\"0 mm\", \"free\"]\n[contact]\n";
+    let (load, rows) = pressed(20.0, smooth);
+    for (pressure, x) in rows["pressure"].iter().zip(&rows["x"]) {
+        let error = if x.abs() < 8e-3 { 0.02 } else { 0.25 };
+        near("even_pressure", pressure * 2e-5 / load, 1.0, error);
+    }
+    let rough = "[[boundary]]\nside = \"y-\"\ndisplacement = [\"0 mm\", \"0 mm\"]\n\
+                 [[boundary]]\nside = \"y+\"\ndisplacement = [\"0 mm\", \"-0.2 mm\"]\n\
+                 [contact]\nfriction = 0.3\n";
+    let (load, rows) = pressed(10.0, rough);
+    let middle = rows["y"].iter().sum::<f64>() / rows["y"].len() as f64;
+    for upper in [false, true] {
+        let each = rows["pressure"].iter().zip(&rows["area"]).zip(&rows["y"]);
+        let side = each.filter(|(_, y)| (**y > middle) == upper);
+        near("resultant", side.map(|((p, a), _)| p * a).sum::<f64>() / load, 1.0, 1e-3);
+    }
+    let shear = rows["shear_x"].iter().zip(&rows["pressure"]).map(|(s, p)| s.abs() / p).fold(0.0, f64::max);
+    assert!(shear > 0.01, "{shear}");
+    at_most("coulomb", shear, 0.3 + 1e-6);
+}

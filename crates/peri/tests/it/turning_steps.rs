@@ -103,9 +103,9 @@ fn twisted_further_and_back() {
 
 /// A bar compressed by 5 % and then twisted by 60°, in one step of the scene and in two, against Rivlin
 /// (1949), doi:10.1098/rsta.1949.0009: M = ½πμψa⁴/λ with the twist ψ per undeformed length and the stretch λ
-/// in the middle: to 1 % against the bar that is twisted only, and to 5 % in itself, as the polar moment of the
-/// cells, an eighth of the diameter wide, is 8 % above that of the circle. Both steps at once, or in the opposite
-/// order, lead to the same state.
+/// in the middle: to 1 % against the bar that is twisted only, and to 5 % in itself, as the polar moment of
+/// the cells, an eighth of the diameter wide, is 8 % above that of the circle. Both steps at once, or in the
+/// opposite order, lead to the same state.
 #[test]
 fn compressed_then_twisted() {
     let slice = |name: &str, track: &str, z: f64| {

@@ -4,7 +4,7 @@ use super::moment::Moment;
 use super::values::axes;
 use crate::contact::SurfaceReaction;
 use crate::program::quantities as q;
-use crate::program::scene::{ContactSpec, PlaneSpec, Scene};
+use crate::program::scene::{ContactSpec, PlaneSpec, Scene, ShapeKind, ShapeSpec};
 use harness::observe::Scalars;
 
 /// Energy of contact over the stored energy above which a run warns.
@@ -45,6 +45,12 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
     to.add_if(q::CONTACTS, |m| Some(touching(m)?.pairs as f64));
     to.add_if(q::DEEPEST_OVERLAP, |m| touching(m).map(|_| deepest_overlap(m)));
     to.add_if(q::CONTACT_SHARE, contact_share);
+    if scene.output.contact && contact.has_pairs() {
+        to.add_if(q::PAIR_PRESSURE, |m| {
+            let own = m.tractions().iter().filter(|one| one.surface == contact.surface_names().len());
+            m.state.history.last().map(|_| own.map(|one| one.pressure).fold(0.0, f64::max))
+        });
+    }
     if contact.has_friction() {
         to.add_if(q::FRICTION_WORK, |m| m.state.history.last().map(|last| last.rubbed));
     }
@@ -88,6 +94,18 @@ pub(super) fn warnings<const D: usize>(m: &Moment<D>) -> Vec<String> {
                  the spacing"
             ));
         }
+    }
+    let steps = |shape: &ShapeSpec| shape.add.or(shape.cut) != Some(ShapeKind::Box);
+    let surfaces = contact.surface_names().len();
+    if m.scene.output.contact
+        && m.scene.body.shapes().iter().any(steps)
+        && m.tractions().iter().any(|one| one.surface == surfaces)
+    {
+        warnings.push(
+            "pressures of particles on each other: where curved or inclined faces of a lattice touch, on \
+             steps, they rise at the ends of these; press with an indenter, or use their sums"
+                .to_owned(),
+        );
     }
     let rests = |plane: &PlaneSpec| {
         let wanted = plane.displacement.is_some() || plane.friction.is_some_and(|mu| mu > 0.0);

@@ -4,7 +4,7 @@ use super::rows::{RowPart, rows};
 use super::stage::SceneStage;
 use crate::bonds::{Bonds, Property};
 use crate::calibrate;
-use crate::contact::{Contact, RigidSurface, RigidSurfaces, SurfaceTraction};
+use crate::contact::{Contact, RigidSurface, SurfaceTraction};
 use crate::correction::{bond_factors, surface_factors};
 use crate::critical::{Context, CrackArea, Critical, Crossing, Toughness};
 use crate::error::Error;
@@ -13,7 +13,8 @@ use crate::material::{BondMaterial, Material, Prestrained, SolverMaterial, relie
 use crate::potential::{BondPotential, BondSoftening};
 use crate::probe::{AnySolid, LineSampler, StressEvaluator};
 use crate::program::scene::{
-    self, DiscreteBody, Inclusions, ParameterField, Scene, SceneVariant, SurfaceCorrection,
+    self, BondEnds, DiscreteBody, Inclusions, LimitOf, LimitRule, ParameterField, Scene, SceneVariant,
+    SurfaceCorrection,
 };
 use crate::solver::{Criterion, Loads, State};
 use harness::scene::{Failure, SceneError, Source};
@@ -97,33 +98,28 @@ impl<const D: usize> BodyWithMaterial<D> {
     ) -> Result<Self, Failure<Error>> {
         let (space, spec) = (scene.body.space, &scene.material);
         let (horizon, thickness) = (body.bonds.horizon(), body.thickness);
-        let fault = |error| match error {
-            Error::Parameter { name, found, allowed } => {
-                let unit = match name {
-                    "critical.fracture_energy" => " J/m²",
-                    "critical.strength" if spec.solid.is_some() => " Pa",
-                    _ => "",
-                };
-                source.error(&format!("material.{name}"), scene::plain(found) + unit, allowed)
-            }
-            other => source.error("material.critical", other, "a critical stretch"),
-        };
+        let fault = |error| scene::limit_error(source, "material.critical", error);
         if spec.solid.is_some() {
             let (solid, inclusions) = scene::solid_of_parts(source, scene, body)?;
-            let limit = |critical: Critical| critical.solid_criterion(&**solid.law(), &*body.bonds);
-            let least = |critical, _| limit(critical).map(|own| own.least());
-            let first = |critical, _| limit(critical).map(|own| own.onset());
-            let each = |rest: Property, own: &dyn Fn(Critical, f64) -> Result<f64, Error>| {
-                let rest = if spec.critical.is_some() { rest.least() } else { f64::INFINITY };
-                let limits = inclusions.limits(source, &*body.bonds, rest, own)?;
-                scene::limits_of_bonds(source, scene, body, limits, &1.0.into(), own)
+            let both = |critical: Critical, ends: BondEnds| {
+                let laws = ends.laws.map(|number| &*solid.laws()[usize::from(number)] as _);
+                critical.solid_criterion(laws, &*body.bonds).map(|own| [own.onset(), own.least()])
             };
-            let criterion = match scene.limits().next().map(limit).transpose().map_err(fault)? {
-                Some(Criterion::Stretch(rest)) => Some(Criterion::Stretch(each(rest, &least)?)),
-                Some(Criterion::Energy(rest)) => Some(Criterion::Energy(each(rest, &least)?)),
-                Some(Criterion::Softening { onset, limit }) => {
-                    let onset = each(onset, &first)?;
-                    Some(Criterion::Softening { onset, limit: each(limit, &least)? })
+            let law = |site: u32| solid.number_at(site as usize);
+            let limits = |rest: f64, limit: LimitOf<f64>| {
+                let rule = LimitRule { law: &law, limit };
+                let limits = inclusions.limits(source, &*body.bonds, rest, rule)?;
+                scene::limits_of_bonds(source, scene, body, limits, &1.0.into(), rule)
+            };
+            let rest = spec.critical.map_or(Ok([f64::INFINITY; 2]), |own| both(own, BondEnds::REST));
+            let rest = rest.map_err(fault)?;
+            let limit = || limits(rest[1], &|critical, ends| Ok(both(critical, ends)?[1]));
+            let criterion = match scene.limits().next() {
+                Some(Critical { stretch: Some(_), .. }) => Some(Criterion::Stretch(limit()?)),
+                Some(Critical { strength: None, .. }) => Some(Criterion::Energy(limit()?)),
+                Some(_) => {
+                    let [onset, limit] = scene::softening_limits(&*body.bonds, rest, &both, &limits)?;
+                    Some(Criterion::Softening { onset, limit })
                 }
                 None => None,
             };
@@ -174,23 +170,25 @@ impl<const D: usize> BodyWithMaterial<D> {
                 toughness = Some(Toughness::new(critical, &rest, stretch));
             }
             let kink = spec.critical.and_then(|critical| critical.kink);
-            let own = |critical: Critical, stiffness| {
-                let mut context = context(stiffness, crossing);
+            let both = |critical: Critical, ends: BondEnds| {
+                let mut context = context(ends.stiffness, crossing);
                 context.softening.kink = kink;
                 Critical { kink, ..critical }.softened(&mut context)
             };
-            let end = |critical: Critical, stiffness| own(critical, stiffness).map(|[_, end]| end);
-            let limits = inclusions.limits(source, &*body.bonds, stretch, &end)?;
-            let stiffness = &inclusions.micromodulus;
-            let ends = scene::limits_of_bonds(source, scene, body, limits, stiffness, &end)?;
-            let strong = scene.limits().any(|limit| limit.strength.is_some());
-            if strong && scene.interface.iter().any(|one| one.critical.is_some()) {
-                let rest = if stretch.is_finite() { softening.onset(stretch) } else { stretch };
-                let start = |critical: Critical, stiffness| own(critical, stiffness).map(|[start, _]| start);
-                let starts = scene::limits_of_bonds(source, scene, body, rest.into(), stiffness, &start)?;
-                onset = Some(starts);
-            }
-            criterion = Some(ends.into());
+            let limits = |rest: f64, limit: LimitOf<f64>| {
+                let rule = LimitRule { law: &|_| 0, limit };
+                let limits = inclusions.limits(source, &*body.bonds, rest, rule)?;
+                scene::limits_of_bonds(source, scene, body, limits, &inclusions.micromodulus, rule)
+            };
+            criterion = Some(if scene.has_strength() {
+                let first = if stretch.is_finite() { softening.onset(stretch) } else { stretch };
+                let [starts, ends] = scene::softening_limits(&*body.bonds, [first, stretch], &both, &limits)?;
+                onset =
+                    Some(starts).filter(|starts| [starts, &ends].iter().any(|own| own.uniform().is_none()));
+                ends.into()
+            } else {
+                limits(stretch, &|critical, ends| Ok(both(critical, ends)?[1]))?.into()
+            });
         }
         let mut bonded = BondMaterial::new(law, modulus);
         if scene.softens()
@@ -236,8 +234,8 @@ pub struct Physics<const D: usize> {
     pub surfaces: Vec<RigidSurface<D>>,
     /// The same where they begin: with a force at first touch.
     pub placed: Vec<RigidSurface<D>>,
-    /// With `output.contact`, the same with the faces on which they act.
-    faced: Option<RigidSurfaces<D>>,
+    /// With `output.contact`, the contact of the present step beside the undeformed body.
+    touching: Option<Contact<D>>,
     rows: Vec<RowPart<D>>,
     /// Evaluator of forces and stresses; this and the following fields are set by [`Self::begin`].
     pub evaluator: StressEvaluator<D>,
@@ -297,7 +295,7 @@ impl<const D: usize> Physics<D> {
             held,
             surfaces: surfaces.unwrap_or_default(),
             placed: Vec::new(),
-            faced: None,
+            touching: None,
             rows,
             evaluator: StressEvaluator::none(),
             whole: None,
@@ -370,19 +368,18 @@ impl<const D: usize> Physics<D> {
     /// Places the rigid surfaces of a contact beside a whole body for the outputs of a step.
     pub fn place_surfaces(&mut self, scene: &Scene, contact: Option<&Contact<D>>) {
         self.placed = contact.into_iter().flat_map(Contact::surfaces).cloned().collect();
-        let faced = contact.filter(|_| scene.output.contact).and_then(Contact::rigid_surfaces);
-        self.faced = faced.cloned();
+        self.touching = contact.filter(|_| scene.output.contact).cloned();
     }
 
-    /// Returns the tractions of rigid surfaces in a state; none without `output.contact`.
+    /// Returns the tractions of contact in a state; none without `output.contact`.
     pub fn tractions(
         &self,
         scene: &Scene,
         bonds: &dyn Bonds<D>,
         state: &State<D>,
     ) -> Vec<SurfaceTraction<D>> {
-        let faced = self.faced.as_ref();
-        faced.map_or_else(Vec::new, |faced| state.tractions(faced, bonds, &scene.load_steps().0))
+        let touching = self.touching.as_ref();
+        touching.map_or_else(Vec::new, |contact| state.tractions(contact, bonds, &scene.load_steps().0))
     }
 
     /// Returns the numbers of a row of the history: probes, flags of a learnt law, sections.

@@ -88,7 +88,7 @@ impl<'a, const D: usize> Moment<'a, D> {
         self.fragments.get_or_init(|| if breaks { fragments(self.bonds) } else { Vec::new() })
     }
 
-    /// Returns the tractions of rigid surfaces on the body; none without `output.contact`.
+    /// Returns the tractions of contact; none without `output.contact`.
     pub fn tractions(&self) -> &[SurfaceTraction<D>] {
         self.tractions.get_or_init(|| self.physics.tractions(self.scene, self.bonds, self.state))
     }

@@ -1,11 +1,11 @@
-//! Pressure and shear of rigid planes and indenters on a body: fields, tables, pictures.
+//! Pressure and shear of rigid planes, indenters and other parts on a body: fields, tables, pictures.
 
 use super::moment::Moment;
 use super::scale::{bridge_length, moment_title, stress_unit};
 use super::solid::{EMPTY_BOX, extend_box};
 use crate::contact::SurfaceTraction;
 use crate::error::Error;
-use crate::program::scene::{ContactSpec, PlaneSpec, Scene};
+use crate::program::scene::{ContactSpec, PARTICLES, PlaneSpec, Scene};
 use harness::observe::{Fields, Observer, Outputs, Place};
 use harness::output::csv;
 use harness::output::picture::{ColorMap, LegendPlace, LinePlot, Particles, Series, Solids, Strip, View};
@@ -20,10 +20,12 @@ const HORIZONTAL: f64 = 0.7;
 /// Observer of pressures and shears.
 pub(super) struct Tractions<'s>(pub &'s Scene);
 
-/// Contact with one surface: its tractions, its mean normal, and their distances along it from the centre of
-/// pressure, m.
+/// Contact with one surface, or of particles: its tractions, its mean normal, and their distances along it
+/// from the centre of pressure, m; of particles, of the side that has the greatest pressure.
 struct PressedSurface<'a, const D: usize> {
     name: String,
+    /// True for particles.
+    mutual: bool,
     each: Vec<&'a SurfaceTraction<D>>,
     normal: [f64; D],
     along: Vec<f64>,
@@ -46,13 +48,21 @@ fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
 }
 
 impl<'a, const D: usize> PressedSurface<'a, D> {
-    /// Returns the contacts of surfaces that touch the body; in a plane body in order along them.
+    /// Returns the contacts of surfaces that touch the body, then that of particles; in a plane body in order
+    /// along them.
     fn all(scene: &Scene, tractions: &'a [SurfaceTraction<D>]) -> Vec<Self> {
-        let names = scene.contact.as_ref().map_or_else(Vec::new, ContactSpec::surface_names);
+        let mut names = scene.contact.as_ref().map_or_else(Vec::new, ContactSpec::surface_names);
+        let surfaces = names.len();
+        names.push(PARTICLES.to_owned());
         let of = |(number, name): (usize, String)| {
+            let mutual = number == surfaces;
             let mut each: Vec<&SurfaceTraction<D>> =
                 tractions.iter().filter(|one| one.surface == number).collect();
-            let weights: Vec<f64> = each.iter().map(|one| one.pressure.abs() * one.area).collect();
+            let greatest = each.iter().max_by(|a, b| a.pressure.total_cmp(&b.pressure))?.normal;
+            let shown = |one: &SurfaceTraction<D>| !mutual || dot(&one.normal, &greatest) > 0.0;
+            let weight =
+                |one: &&SurfaceTraction<D>| f64::from(u8::from(shown(one))) * one.pressure.abs() * one.area;
+            let weights: Vec<f64> = each.iter().map(weight).collect();
             let total: f64 = weights.iter().sum();
             if total == 0.0 {
                 return None;
@@ -70,7 +80,7 @@ impl<'a, const D: usize> PressedSurface<'a, D> {
                 each.sort_by(|a, b| along(a).total_cmp(&along(b)));
             }
             let along = each.iter().map(|one| along(one)).collect();
-            Some(Self { name, each, normal, along })
+            Some(Self { name, mutual, each, normal, along })
         };
         names.into_iter().enumerate().filter_map(of).collect()
     }
@@ -139,7 +149,8 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Tractions<'_> {
         if D == 2 {
             return draw_curves(m, &contacts, has_shear(spec), to.folder);
         }
-        contacts.iter().try_for_each(|contact| draw_solid(m, contact, to.folder))
+        // parts that touch hide their contact
+        contacts.iter().filter(|own| !own.mutual).try_for_each(|own| draw_solid(m, own, to.folder))
     }
 }
 
@@ -178,12 +189,14 @@ fn draw_curves<const D: usize>(
             .axes("distance from the centre of pressure (mm)", &format!("pressure ({unit})"))
             .legend(LegendPlace::Outside);
     for contact in contacts {
-        let along: Vec<f64> = contact.along.iter().map(|x| x * 1e3).collect();
-        let pressures: Vec<f64> = contact.each.iter().map(|one| one.pressure * scale).collect();
+        let shown = |one: &SurfaceTraction<D>| !contact.mutual || dot(&one.normal, &contact.normal) > 0.0;
+        let each = contact.each.iter().zip(&contact.along).filter(|(one, _)| shown(one));
+        let along: Vec<f64> = each.clone().map(|(_, x)| x * 1e3).collect();
+        let pressures: Vec<f64> = each.clone().map(|(one, _)| one.pressure * scale).collect();
         plot = plot.series(Series::marked_line(&contact.name, &along, &pressures));
         if shear {
             let tangent = tangent(&contact.normal);
-            let shears: Vec<f64> = contact.each.iter().map(|one| dot(&one.shear, &tangent) * scale).collect();
+            let shears: Vec<f64> = each.map(|(one, _)| dot(&one.shear, &tangent) * scale).collect();
             plot = plot.series(Series::line(&format!("{}, shear", contact.name), &along, &shears));
         }
     }

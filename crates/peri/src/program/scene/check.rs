@@ -2,7 +2,10 @@
 
 use super::values::{ONE_OF_THEM, plain, positive, ratio, required};
 use super::variant::{SceneVariant, variants};
-use super::{BodyForceSpec, HORIZON_RATIO, HistoryProbe, Scene, SolverMethod, Track, VaryingParameter};
+use super::{
+    BodyForceSpec, ContactSpec, HORIZON_RATIO, HistoryProbe, PARTICLES, Scene, SolverMethod, Track,
+    VaryingParameter,
+};
 use crate::calibrate::{Calibration, Space};
 use crate::solver::Policy;
 use crate::stress::StressMethod;
@@ -198,10 +201,20 @@ fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     if scene.output.energy && scene.material.is_prestrained() {
         return Err(source.unexpected("output.energy", "prestrained bodies have no energy densities"));
     }
-    let surfaces = scene.contact.as_ref().is_some_and(super::ContactSpec::has_surfaces);
-    if scene.output.contact && !surfaces && scene.study.is_empty() {
-        let why = "only a [[contact.plane]] or a [[contact.indenter]] presses on the surface of the body";
+    let touches = |contact: &ContactSpec| contact.has_surfaces() || contact.has_pairs();
+    if scene.output.contact && !scene.contact.as_ref().is_some_and(touches) && scene.study.is_empty() {
+        let why = "needs [contact] of particles, a [[contact.plane]] or a [[contact.indenter]]";
         return Err(source.unexpected("output.contact", why));
+    }
+    let named = |name: &String| name == PARTICLES;
+    let names = scene.contact.as_ref().map_or_else(Vec::new, ContactSpec::surface_names);
+    if scene.output.contact && names.iter().any(named) {
+        let found = format!("a plane or an indenter named `{PARTICLES}`");
+        return Err(source.error(
+            "output.contact",
+            found,
+            "another name: particles that touch have this one",
+        ));
     }
     super::picture_state::check(source, scene)?;
     if scene.output.animation.is_some() && !(scene.output.fields && scene.output.every.is_some()) {
@@ -405,8 +418,8 @@ fn solver(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         (!scene.breaks(), "bonds that never break"),
         (scene.method() == SolverMethod::Verlet, "explicit dynamics"),
         (solver.breaking == Policy::EachIteration, "`breaking = \"each-iteration\"`"),
-        (scene.material.critical.is_some_and(|critical| critical.strength.is_some()), "bonds that soften"),
-        (scene.contact.as_ref().is_some_and(super::ContactSpec::has_friction), "friction"),
+        (scene.has_strength(), "bonds that soften"),
+        (scene.contact.as_ref().is_some_and(ContactSpec::has_friction), "friction"),
     ];
     if let Some((_, what)) = refuses.into_iter().find(|(refused, _)| *refused && solver.refine > 1) {
         let allowed =

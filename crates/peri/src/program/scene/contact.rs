@@ -19,6 +19,8 @@ use serde::Deserialize;
 const STIFFEST: f64 = 1e4;
 /// Largest coefficient of friction.
 const ROUGHEST: f64 = 100.0;
+/// Name of the contact of particles in files and pictures.
+pub const PARTICLES: &str = "particles";
 
 /// Contact between particles that no intact bond joins, and with planes.
 #[derive(Clone, Debug, Default, Deserialize, schemars::JsonSchema)]

@@ -3,7 +3,7 @@
 use super::values::plain;
 use super::variant::SceneVariant;
 use super::{Boundary, DiscreteBody, Scene, SolverMethod, SurfaceCorrection};
-use crate::bonds::VolumeCorrection;
+use crate::bonds::{Property, VolumeCorrection};
 use crate::material::SolidPoint;
 use crate::solver::{Bilinear, Criterion};
 use harness::report::Named;
@@ -71,11 +71,13 @@ pub fn explain<const D: usize>(
             Criterion::Energy(limit) => format!("when they release more than {:.4e} J/m³", limit.least()),
             Criterion::Softening { onset, limit } => {
                 let law = Bilinear { onset: onset.least(), limit: limit.least() };
+                let ductility = match [onset, limit].map(Property::uniform) {
+                    [Some(_), Some(_)] => format!("e_f = {:.3}", law.ductility()),
+                    _ => "the least of all".to_owned(),
+                };
                 format!(
-                    "when they have taken {:.4e} J/m³, and soften from {:.4e} J/m³ on (e_f = {:.3})",
-                    law.limit,
-                    law.onset,
-                    law.ductility()
+                    "when they have taken {:.4e} J/m³, and soften from {:.4e} J/m³ on ({ductility})",
+                    law.limit, law.onset
                 )
             }
         };

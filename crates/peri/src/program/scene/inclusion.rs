@@ -3,16 +3,14 @@
 use super::inclusion_region::Region;
 use super::values::DiscreteBody;
 use super::{Material, ParameterField, Scene, ShapeSpec, SolidLaw, VaryingParameter, plain};
-use crate::bonds::{Bonds, Property};
+use crate::bonds::Property;
 use crate::calibrate::{Space, poisson_ratio};
 use crate::critical::Critical;
-use crate::error::Error;
 use crate::potential::Law;
 use harness::scene::{SceneError, Source};
-use polycore::units::{Density, EnergyPerArea, Ratio};
+use polycore::units::{Density, Ratio};
 use serde::Deserialize;
 use std::array;
-use std::collections::HashMap;
 
 /// A part of the body whose bonds are stiffer or softer, or which has a law of its own; a bond across its
 /// border has the mean of both.
@@ -53,7 +51,7 @@ fn default_stiffness() -> f64 {
 
 impl Inclusion {
     /// Returns the key of its region.
-    fn key(&self, index: usize) -> String {
+    pub(super) fn key(&self, index: usize) -> String {
         format!("material.inclusions[{index}].{}", if self.part.is_some() { "part" } else { "shape" })
     }
 }
@@ -129,11 +127,13 @@ pub struct Inclusions<'a, const D: usize> {
     /// Micromodulus over that of the scene's Young's modulus, the product of all inclusions of a particle.
     pub micromodulus: Property,
     /// Fracture energy, J/m², if it follows a field.
-    fracture_energy: Option<Property>,
+    pub(super) fracture_energy: Option<Property>,
     /// Prestrain ε* by site, if there is any.
     pub prestrain: Option<Vec<[[f64; D]; D]>>,
     /// Inclusions with their regions and the sites of their particles.
-    each: Vec<(&'a Inclusion, Region<D>, Vec<u32>)>,
+    pub(super) each: Vec<(&'a Inclusion, Region<D>, Vec<u32>)>,
+    /// Criterion of the rest.
+    pub(super) critical: Option<Critical>,
 }
 
 impl<'a, const D: usize> Inclusions<'a, D> {
@@ -201,140 +201,15 @@ impl<'a, const D: usize> Inclusions<'a, D> {
         if let Some(found) = along.reduce(f64::min).filter(|&least| least <= -1.0) {
             return Err(source.error("material", format!("a prestrain of {}", plain(found)), "above -1"));
         }
-        Ok(Self { micromodulus: Property::new(bonds, factor), fracture_energy, prestrain, each })
+        let critical = scene.material.critical;
+        Ok(Self { micromodulus: Property::new(bonds, factor), fracture_energy, prestrain, each, critical })
     }
 
     /// Lists the inclusions with the sites of their particles.
     pub(super) fn members(&self) -> impl Iterator<Item = (&Inclusion, &[u32])> {
         self.each.iter().map(|(inclusion, _, members)| (*inclusion, &members[..]))
     }
-
-    /// Returns the limit of each particle, of a bond law the critical stretch: `rest`, replaced by that of a
-    /// fracture energy that follows a field, or of the last inclusion with `critical`. `resolve` computes it
-    /// from the criterion and the relative micromodulus.
-    ///
-    /// # Errors
-    /// A limit out of its domain.
-    pub fn limits(
-        &self,
-        source: &Source,
-        bonds: &dyn Bonds<D>,
-        rest: f64,
-        resolve: &dyn Fn(Critical, f64) -> Result<f64, Error>,
-    ) -> Result<Property, SceneError> {
-        let varies = self.fracture_energy.is_some() || !self.each.is_empty();
-        let mut stretch = vec![rest; if varies { bonds.sites() } else { 0 }];
-        if let Some(energies) = &self.fracture_energy {
-            for site in bonds.particles().iter().map(|&site| site as usize) {
-                let energy = Some(EnergyPerArea::from_si(energies.value_at(site)));
-                let critical = Critical { fracture_energy: energy, ..Critical::default() };
-                stretch[site] = resolve(critical, self.micromodulus.value_at(site)).map_err(|error| {
-                    source.error("material.fields", error, "a fracture energy that bonds can have")
-                })?;
-            }
-        }
-        for (index, (inclusion, _, members)) in self.each.iter().enumerate() {
-            let Some(critical) = inclusion.critical else { continue };
-            let key = format!("material.inclusions[{index}].critical");
-            let fault = |error| match error {
-                Error::Parameter { found, allowed, .. } => source.error(&key, plain(found), allowed),
-                other => source.error(&key, other, "a limit that bonds can have"),
-            };
-            // neighbours of equal stiffness share one bisection
-            let mut last = None;
-            for &site in members {
-                let stiffness = self.micromodulus.value_at(site as usize);
-                let own = match last {
-                    Some((before, own)) if before == stiffness => own,
-                    _ => resolve(critical, stiffness).map_err(fault)?,
-                };
-                stretch[site as usize] = own;
-                last = Some((stiffness, own));
-            }
-        }
-        let property = Property::new(bonds, |site, _| stretch.get(site).copied().unwrap_or(rest));
-        if self.each.iter().all(|(inclusion, ..)| inclusion.critical.is_none()) {
-            return Ok(property);
-        }
-        let weak = self.weakened_bonds(source, bonds, resolve)?;
-        for (index, (_, _, members)) in self.each.iter().enumerate() {
-            if members.is_empty() && !weak.iter().any(|one| one.0.contains(&index)) {
-                let key = self.each[index].0.key(index);
-                let found = "a shape without particles, and without bonds that pass through it";
-                return Err(source.error(&key, found, "a shape with at least one"));
-            }
-        }
-        Ok(property.weakened(weak.into_iter().map(|(_, bond, value)| (bond, value)).collect()))
-    }
-
-    /// Finds bonds that pass through inclusions with a limit, and the lowest limit between their ends.
-    fn weakened_bonds(
-        &self,
-        source: &Source,
-        bonds: &dyn Bonds<D>,
-        resolve: &dyn Fn(Critical, f64) -> Result<f64, Error>,
-    ) -> Result<Vec<Passing>, SceneError> {
-        let reach = bonds.horizon() * (1.0 + 1e-9);
-        let mut known: HashMap<(usize, u64), f64> = HashMap::new();
-        let mut found = Vec::new();
-        for &site in bonds.particles() {
-            let here = bonds.position(site as usize);
-            let near = |&index: &usize| self.each[index].1.is_near(here, reach);
-            let near: Vec<usize> = (0..self.each.len()).filter(near).collect();
-            if near.iter().all(|&index| self.each[index].0.critical.is_none()) {
-                continue;
-            }
-            // relative micromodulus of the rest at this end
-            let inside = |place| near.iter().filter(move |&&index| self.each[index].1.contains(place));
-            let stiffness = |place| inside(place).map(|&index| self.each[index].0.stiffness).product::<f64>();
-            let rest = self.micromodulus.value_at(site as usize) / stiffness(here);
-            let mut others = Vec::new();
-            bonds.neighbours(site as usize, &mut |bond| {
-                if site < bond.site as u32 {
-                    others.push(bond.site as u32);
-                }
-            });
-            for other in others {
-                let there = bonds.position(other as usize);
-                let mut ends: Vec<f64> =
-                    near.iter().flat_map(|&index| self.each[index].1.passages(here, there)).collect();
-                ends.sort_by(f64::total_cmp);
-                let mut passing = (Vec::new(), [site, other], f64::INFINITY);
-                for pair in ends.windows(2).filter(|pair| pair[1] - pair[0] > THIN) {
-                    let part = 0.5 * (pair[0] + pair[1]);
-                    let place: [f64; D] = array::from_fn(|d| here[d] + part * (there[d] - here[d]));
-                    let last =
-                        inside(place).rev().find_map(|&index| Some((index, self.each[index].0.critical?)));
-                    let Some((index, critical)) = last else { continue };
-                    let stiffness = rest * stiffness(place);
-                    let value = match known.get(&(index, stiffness.to_bits())) {
-                        Some(&value) => value,
-                        None => resolve(critical, stiffness).map_err(|error| {
-                            source.error(
-                                &format!("material.inclusions[{index}].critical"),
-                                error,
-                                "a limit that bonds can have",
-                            )
-                        })?,
-                    };
-                    known.insert((index, stiffness.to_bits()), value);
-                    passing.0.push(index);
-                    passing.2 = passing.2.min(value);
-                }
-                if !passing.0.is_empty() {
-                    found.push(passing);
-                }
-            }
-        }
-        Ok(found)
-    }
 }
-
-/// Fraction of a bond's length below which a crossed part is rounding, where faces meet.
-const THIN: f64 = 1e-6;
-
-/// Inclusions that a bond passes through, its sites, and the lowest limit in them.
-type Passing = (Vec<usize>, [u32; 2], f64);
 
 impl Material {
     /// Returns true if some bonds are at rest at a stretch other than 1.

@@ -1,11 +1,11 @@
 //! Interfaces between parts of a body, and particles whose bonds never break.
 
+use super::limits::{BondEnds, LimitRule};
 use super::shapes::operations;
 use super::values::{DiscreteBody, ONE_OF_THEM, plain, positive};
 use super::{Scene, tearing};
 use crate::bonds::{Property, sever_pairs};
 use crate::critical::{Convention, Critical, ONE_OF};
-use crate::error::Error;
 use crate::geometry::{Parts, inside};
 use crate::solver::Criterion;
 use harness::scene::{SceneError, Source};
@@ -36,6 +36,12 @@ impl Scene {
     /// Lists the limits of bonds: that of the material, then those of interfaces.
     pub fn limits(&self) -> impl Iterator<Item = Critical> {
         self.material.critical.into_iter().chain(self.interface.iter().filter_map(|one| one.critical))
+    }
+
+    /// Returns true if some bonds have a strength.
+    pub fn has_strength(&self) -> bool {
+        let parts = self.material.inclusions.iter().filter_map(|part| part.critical);
+        self.limits().chain(parts).any(|limit| limit.strength.is_some())
     }
 
     /// Returns the convention of the first limit, which the others follow unless they have their own.
@@ -117,10 +123,6 @@ pub(super) fn check_limit(
         positive(source, &key, strength.si(), "Pa")?;
         if critical.fracture_energy.is_none() {
             return Err(source.unexpected(&key, "needs `fracture_energy` beside it"));
-        }
-        if scene.material.inclusions.iter().any(|part| part.solid.is_some()) {
-            let why = "the energy at a strength is that of one solid";
-            return Err(source.conflict(&key, "material.inclusions.solid", why));
         }
     }
     let kind = |critical: &Critical| match (critical.stretch, critical.strength) {
@@ -222,8 +224,8 @@ pub(super) fn cross_interfaces<const D: usize>(
     Ok(())
 }
 
-/// Gives bonds across interfaces their own limits in place of `rest`, bonds of unbreakable particles none.
-/// `own` computes a limit from the criterion and the mean `stiffness` at the ends of a bond.
+/// Gives bonds across interfaces their own limits in place of `rest`, bonds of unbreakable particles none;
+/// `stiffness` is that of the particles.
 ///
 /// # Errors
 /// A limit out of its domain, and unbreakable shapes without particles.
@@ -233,26 +235,23 @@ pub fn limits_of_bonds<const D: usize>(
     body: &DiscreteBody<D>,
     rest: Property,
     stiffness: &Property,
-    own: &dyn Fn(Critical, f64) -> Result<f64, Error>,
+    rule: LimitRule,
 ) -> Result<Property, SceneError> {
     let mut limits = Vec::new();
     for (index, (interface, bonds)) in scene.interface.iter().zip(&body.interfaces).enumerate() {
         let Some(critical) = interface.critical else { continue };
         let key = format!("interface[{index}].critical");
-        let fault = |error| match error {
-            Error::Parameter { found, allowed, .. } => source.error(&key, plain(found), allowed),
-            other => source.error(&key, other, "a limit that bonds can have"),
-        };
-        // neighbours of equal stiffness share one bisection
+        // neighbours of equal material share one bisection
         let mut last = None;
         for &[a, b] in bonds {
             let mean = 0.5 * (stiffness.value_at(a as usize) + stiffness.value_at(b as usize));
+            let ends = BondEnds { stiffness: mean, laws: [a, b].map(rule.law) };
             let limit = match last {
-                Some((before, limit)) if before == mean => limit,
-                _ => own(critical, mean).map_err(fault)?,
+                Some((before, limit)) if before == ends => limit,
+                _ => rule.of_block((source, &key), critical, ends)?,
             };
             limits.push(([a, b], limit));
-            last = Some((mean, limit));
+            last = Some((ends, limit));
         }
     }
     let guarded = unbreakable(source, scene, body)?;

@@ -62,16 +62,7 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             return Err(source.missing(&key("solid"), why));
         }
         if let Some(critical) = &part.critical {
-            if critical.strength.is_some() {
-                let why = "parts of a `solid` take `stretch` or `fracture_energy` alone";
-                return Err(source.unexpected(&key("critical.strength"), why));
-            }
             check_limit(source, scene, &key("critical"), critical)?;
-        }
-        if scene.material.critical.is_some_and(|critical| critical.strength.is_some()) && part.solid.is_some()
-        {
-            let why = "bonds of one solid soften alike";
-            return Err(source.conflict(&key("solid"), "material.critical.strength", why));
         }
     }
     Ok(())

@@ -121,11 +121,13 @@ fn strength(source: &Source, scene: &Scene, key: &str, critical: &Critical) -> R
         let key = key.replace(".strength", ".kink");
         return Err(source.unexpected(&key, "bonds of one body have the kink of `material.critical`"));
     }
-    for (other, given) in
-        [("fields", !material.fields.is_empty()), ("inclusions", !material.inclusions.is_empty())]
-    {
-        if given {
-            return Err(source.conflict(&key, other, "bonds of one body soften alike"));
+    if !material.fields.is_empty() {
+        return Err(source.conflict(&key, "fields", "parameters of a body whose bonds have a strength"));
+    }
+    for (index, part) in material.inclusions.iter().enumerate() {
+        if part.critical.is_none() && part.stiffness != 1.0 {
+            let why = "a stiffer or softer part beside bonds with a strength needs one of its own";
+            return Err(source.missing(&format!("material.inclusions[{index}].critical"), why));
         }
     }
     Ok(())
