@@ -180,15 +180,15 @@ impl Critical {
         all.into_iter().filter(|(_, given)| *given).map(|(name, _)| name).collect()
     }
 
-    /// Criterion for breaking bonds of a solid, between particles of two laws: a stretch, an energy, or an
-    /// energy of softening beyond a strength, the mean of both laws in uniaxial tension.
+    /// Criterion for breaking bonds of a solid: a stretch, an energy, or an energy of softening beyond a
+    /// strength.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a strength that the law does not reach or that is too large for the fracture
     /// energy.
     pub fn solid_criterion<const D: usize>(
         &self,
-        laws: [&dyn PointLaw<D>; 2],
+        law: &dyn PointLaw<D>,
         bonds: &dyn BodyGeometry<D>,
     ) -> Result<Criterion, Error> {
         let energy = self.fracture_energy.map_or(f64::NAN, |energy| energy.si());
@@ -198,10 +198,7 @@ impl Critical {
             (None, Some(strength)) => {
                 let fault =
                     |allowed| Error::Parameter { name: "critical.strength", found: strength, allowed };
-                let [one, other] = laws.map(|law| energy_at_strength(law, strength));
-                let onset = one
-                    .zip(other)
-                    .map(|(one, other)| 0.5 * (one + other))
+                let onset = energy_at_strength(law, strength)
                     .ok_or_else(|| fault("a stress that the law reaches in uniaxial tension".to_owned()))?;
                 let softening = bilinear(bonds, energy, onset).map_err(|limit| {
                     fault(format!(

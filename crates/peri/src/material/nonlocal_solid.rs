@@ -76,17 +76,16 @@ impl<L> NonlocalSolid<L> {
 
     /// Law of the particle in a site.
     pub fn law_at(&self, site: usize) -> &L {
-        &self.laws[usize::from(self.number_at(site))]
-    }
-
-    /// Number of that law.
-    pub fn number_at(&self, site: usize) -> u16 {
-        self.numbers.get(site).copied().unwrap_or(0)
+        &self.laws[usize::from(self.number(site))]
     }
 
     /// Law of the particle in a state.
     pub fn law_of<const D: usize>(&self, point: &SolidPoint<D>) -> &L {
         &self.laws[usize::from(point.law)]
+    }
+
+    fn number(&self, site: usize) -> u16 {
+        self.numbers.get(site).copied().unwrap_or(0)
     }
 }
 
@@ -107,7 +106,7 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         let zero = BodyTensor::zeros();
         let relief = || Box::new(ReliefTerms { gradient: zero, part: zero, piola: zero });
         let relief = family.is_relieved().then(relief);
-        let (whole, law) = (family.sum(|bond| bond.volume), self.number_at(family.site()));
+        let (whole, law) = (family.sum(|bond| bond.volume), self.number(family.site()));
         let mut point = SolidPoint { whole, law, relief, ..SolidPoint::default() };
         point.deformation.past = self.law_of(&point).past().map(Box::new);
         point
@@ -256,11 +255,7 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
     }
 
     fn relative_stiffness(&self, site: usize) -> f64 {
-        if self.number_at(site) == 0 {
-            1.0
-        } else {
-            longitudinal(self.law_at(site)) / longitudinal(self.law())
-        }
+        if self.number(site) == 0 { 1.0 } else { longitudinal(self.law_at(site)) / longitudinal(self.law()) }
     }
 
     /// Bonds of E = 3μ have λ = 1.2μ and K = 2μ in space and in plane strain.

@@ -240,7 +240,8 @@ fn pressures_between_blocks_are_those_of_the_load() {
     for upper in [false, true] {
         let each = rows["pressure"].iter().zip(&rows["area"]).zip(&rows["y"]);
         let side = each.filter(|(_, y)| (**y > middle) == upper);
-        near("resultant", side.map(|((p, a), _)| p * a).sum::<f64>() / load, 1.0, 1e-3);
+        // normals tilt, and friction has a part along them
+        near("resultant", side.map(|((p, a), _)| p * a).sum::<f64>() / load, 1.0, 5e-3);
     }
     let shear = rows["shear_x"].iter().zip(&rows["pressure"]).map(|(s, p)| s.abs() / p).fold(0.0, f64::max);
     assert!(shear > 0.01, "{shear}");

@@ -13,8 +13,7 @@ use crate::material::{BondMaterial, Material, Prestrained, SolverMaterial, relie
 use crate::potential::{BondPotential, BondSoftening};
 use crate::probe::{AnySolid, LineSampler, StressEvaluator};
 use crate::program::scene::{
-    self, BondEnds, DiscreteBody, Inclusions, LimitOf, LimitRule, ParameterField, Scene, SceneVariant,
-    SurfaceCorrection,
+    self, DiscreteBody, Inclusions, LimitOf, ParameterField, Scene, SceneVariant, SurfaceCorrection,
 };
 use crate::solver::{Criterion, Loads, State};
 use harness::scene::{Failure, SceneError, Source};
@@ -101,19 +100,16 @@ impl<const D: usize> BodyWithMaterial<D> {
         let fault = |error| scene::limit_error(source, "material.critical", error);
         if spec.solid.is_some() {
             let (solid, inclusions) = scene::solid_of_parts(source, scene, body)?;
-            let both = |critical: Critical, ends: BondEnds| {
-                let laws = ends.laws.map(|number| &*solid.laws()[usize::from(number)] as _);
-                critical.solid_criterion(laws, &*body.bonds).map(|own| [own.onset(), own.least()])
+            let both = |critical: Critical, _| {
+                critical.solid_criterion(&**solid.law(), &*body.bonds).map(|own| [own.onset(), own.least()])
             };
-            let law = |site: u32| solid.number_at(site as usize);
             let limits = |rest: f64, limit: LimitOf<f64>| {
-                let rule = LimitRule { law: &law, limit };
-                let limits = inclusions.limits(source, &*body.bonds, rest, rule)?;
-                scene::limits_of_bonds(source, scene, body, limits, &1.0.into(), rule)
+                let limits = inclusions.limits(source, &*body.bonds, rest, limit)?;
+                scene::limits_of_bonds(source, scene, body, limits, &1.0.into(), limit)
             };
-            let rest = spec.critical.map_or(Ok([f64::INFINITY; 2]), |own| both(own, BondEnds::REST));
+            let rest = spec.critical.map_or(Ok([f64::INFINITY; 2]), |own| both(own, 1.0));
             let rest = rest.map_err(fault)?;
-            let limit = || limits(rest[1], &|critical, ends| Ok(both(critical, ends)?[1]));
+            let limit = || limits(rest[1], &|critical, stiffness| Ok(both(critical, stiffness)?[1]));
             let criterion = match scene.limits().next() {
                 Some(Critical { stretch: Some(_), .. }) => Some(Criterion::Stretch(limit()?)),
                 Some(Critical { strength: None, .. }) => Some(Criterion::Energy(limit()?)),
@@ -170,15 +166,14 @@ impl<const D: usize> BodyWithMaterial<D> {
                 toughness = Some(Toughness::new(critical, &rest, stretch));
             }
             let kink = spec.critical.and_then(|critical| critical.kink);
-            let both = |critical: Critical, ends: BondEnds| {
-                let mut context = context(ends.stiffness, crossing);
+            let both = |critical: Critical, stiffness| {
+                let mut context = context(stiffness, crossing);
                 context.softening.kink = kink;
                 Critical { kink, ..critical }.softened(&mut context)
             };
             let limits = |rest: f64, limit: LimitOf<f64>| {
-                let rule = LimitRule { law: &|_| 0, limit };
-                let limits = inclusions.limits(source, &*body.bonds, rest, rule)?;
-                scene::limits_of_bonds(source, scene, body, limits, &inclusions.micromodulus, rule)
+                let limits = inclusions.limits(source, &*body.bonds, rest, limit)?;
+                scene::limits_of_bonds(source, scene, body, limits, &inclusions.micromodulus, limit)
             };
             criterion = Some(if scene.has_strength() {
                 let first = if stretch.is_finite() { softening.onset(stretch) } else { stretch };
@@ -187,7 +182,7 @@ impl<const D: usize> BodyWithMaterial<D> {
                     Some(starts).filter(|starts| [starts, &ends].iter().any(|own| own.uniform().is_none()));
                 ends.into()
             } else {
-                limits(stretch, &|critical, ends| Ok(both(critical, ends)?[1]))?.into()
+                limits(stretch, &|critical, stiffness| Ok(both(critical, stiffness)?[1]))?.into()
             });
         }
         let mut bonded = BondMaterial::new(law, modulus);

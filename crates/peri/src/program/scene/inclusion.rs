@@ -132,8 +132,6 @@ pub struct Inclusions<'a, const D: usize> {
     pub prestrain: Option<Vec<[[f64; D]; D]>>,
     /// Inclusions with their regions and the sites of their particles.
     pub(super) each: Vec<(&'a Inclusion, Region<D>, Vec<u32>)>,
-    /// Criterion of the rest.
-    pub(super) critical: Option<Critical>,
 }
 
 impl<'a, const D: usize> Inclusions<'a, D> {
@@ -201,8 +199,7 @@ impl<'a, const D: usize> Inclusions<'a, D> {
         if let Some(found) = along.reduce(f64::min).filter(|&least| least <= -1.0) {
             return Err(source.error("material", format!("a prestrain of {}", plain(found)), "above -1"));
         }
-        let critical = scene.material.critical;
-        Ok(Self { micromodulus: Property::new(bonds, factor), fracture_energy, prestrain, each, critical })
+        Ok(Self { micromodulus: Property::new(bonds, factor), fracture_energy, prestrain, each })
     }
 
     /// Lists the inclusions with the sites of their particles.

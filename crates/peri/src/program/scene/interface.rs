@@ -1,6 +1,6 @@
 //! Interfaces between parts of a body, and particles whose bonds never break.
 
-use super::limits::{BondEnds, LimitRule};
+use super::limits::{LimitOf, limit_error};
 use super::shapes::operations;
 use super::values::{DiscreteBody, ONE_OF_THEM, plain, positive};
 use super::{Scene, tearing};
@@ -124,6 +124,10 @@ pub(super) fn check_limit(
         if critical.fracture_energy.is_none() {
             return Err(source.unexpected(&key, "needs `fracture_energy` beside it"));
         }
+        if scene.material.inclusions.iter().any(|part| part.solid.is_some()) {
+            let why = "the energy at a strength is that of one solid";
+            return Err(source.conflict(&key, "material.inclusions.solid", why));
+        }
     }
     let kind = |critical: &Critical| match (critical.stretch, critical.strength) {
         (Some(_), _) => "`stretch`",
@@ -224,7 +228,7 @@ pub(super) fn cross_interfaces<const D: usize>(
     Ok(())
 }
 
-/// Gives bonds across interfaces their own limits in place of `rest`, bonds of unbreakable particles none;
+/// Gives bonds across interfaces their own limits in place of `rest`, bonds of unbreakable particles none.
 /// `stiffness` is that of the particles.
 ///
 /// # Errors
@@ -235,23 +239,22 @@ pub fn limits_of_bonds<const D: usize>(
     body: &DiscreteBody<D>,
     rest: Property,
     stiffness: &Property,
-    rule: LimitRule,
+    limit: LimitOf<f64>,
 ) -> Result<Property, SceneError> {
     let mut limits = Vec::new();
     for (index, (interface, bonds)) in scene.interface.iter().zip(&body.interfaces).enumerate() {
         let Some(critical) = interface.critical else { continue };
         let key = format!("interface[{index}].critical");
-        // neighbours of equal material share one bisection
+        // neighbours of equal stiffness share one bisection
         let mut last = None;
         for &[a, b] in bonds {
             let mean = 0.5 * (stiffness.value_at(a as usize) + stiffness.value_at(b as usize));
-            let ends = BondEnds { stiffness: mean, laws: [a, b].map(rule.law) };
-            let limit = match last {
-                Some((before, limit)) if before == ends => limit,
-                _ => rule.of_block((source, &key), critical, ends)?,
+            let own = match last {
+                Some((before, own)) if before == mean => own,
+                _ => limit(critical, mean).map_err(|error| limit_error(source, &key, error))?,
             };
-            limits.push(([a, b], limit));
-            last = Some((ends, limit));
+            limits.push(([a, b], own));
+            last = Some((mean, own));
         }
     }
     let guarded = unbreakable(source, scene, body)?;

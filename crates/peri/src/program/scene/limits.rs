@@ -1,4 +1,4 @@
-//! Limits of bonds from the materials at their ends.
+//! Limits of bonds: of parts, and of bonds that soften.
 
 use super::{Inclusions, plain};
 use crate::bonds::{Bonds, Property};
@@ -10,46 +10,9 @@ use std::array;
 use std::cell::RefCell;
 use std::collections::HashMap;
 
-/// Materials at the ends of a bond, on which its limit depends.
-#[derive(Clone, Copy, PartialEq)]
-pub struct BondEnds {
-    /// Mean micromodulus over that of the scene's Young's modulus.
-    pub stiffness: f64,
-    /// Numbers of the laws of a solid.
-    pub laws: [u16; 2],
-}
-
-impl BondEnds {
-    /// The material of the rest of a body.
-    pub const REST: Self = Self { stiffness: 1.0, laws: [0; 2] };
-}
-
-/// Computes a limit of a bond, from the criterion given for it.
-pub type LimitOf<'a, T> = &'a dyn Fn(Critical, BondEnds) -> Result<T, Error>;
-
-/// Rule for the limits of the bonds of a body.
-#[derive(Clone, Copy)]
-pub struct LimitRule<'a> {
-    /// Number of the law of a solid in a site.
-    pub law: &'a dyn Fn(u32) -> u16,
-    /// The limit.
-    pub limit: LimitOf<'a, f64>,
-}
-
-impl LimitRule<'_> {
-    /// Returns the limit by the criterion of the block `key`.
-    ///
-    /// # Errors
-    /// A limit out of its domain.
-    pub(super) fn of_block(
-        &self,
-        (source, key): (&Source, &str),
-        critical: Critical,
-        ends: BondEnds,
-    ) -> Result<f64, SceneError> {
-        (self.limit)(critical, ends).map_err(|error| limit_error(source, key, error))
-    }
-}
+/// Computes a limit of a bond from the criterion given for it, and the micromodulus over that of the scene's
+/// Young's modulus.
+pub type LimitOf<'a, T> = &'a dyn Fn(Critical, f64) -> Result<T, Error>;
 
 /// Builds the error of a criterion in the block `key`.
 pub fn limit_error(source: &Source, key: &str, error: Error) -> SceneError {
@@ -80,8 +43,8 @@ pub fn softening_limits<const D: usize>(
     limits: &dyn Fn(f64, LimitOf<f64>) -> Result<Property, SceneError>,
 ) -> Result<[Property; 2], SceneError> {
     let found = RefCell::new(vec![rest]);
-    limits(rest[1], &|critical, ends| {
-        let own = both(critical, ends)?;
+    limits(rest[1], &|critical, stiffness| {
+        let own = both(critical, stiffness)?;
         found.borrow_mut().push(own);
         Ok(own[1])
     })?;
@@ -89,7 +52,7 @@ pub fn softening_limits<const D: usize>(
     found.sort_by(|one, other| one[0].total_cmp(&other[0]).then(one[1].total_cmp(&other[1])));
     found.dedup();
     let rank = |own: [f64; 2]| found.iter().position(|other| *other == own).unwrap_or_default() as f64;
-    let ranks = limits(rank(rest), &|critical, ends| Ok(rank(both(critical, ends)?)))?;
+    let ranks = limits(rank(rest), &|critical, stiffness| Ok(rank(both(critical, stiffness)?)))?;
     Ok([0, 1].map(|part| ranks.replaced(bonds, |rank| found[rank as usize][part])))
 }
 
@@ -104,7 +67,7 @@ impl<const D: usize> Inclusions<'_, D> {
         source: &Source,
         bonds: &dyn Bonds<D>,
         rest: f64,
-        rule: LimitRule,
+        limit: LimitOf<f64>,
     ) -> Result<Property, SceneError> {
         let varies = self.fracture_energy.is_some() || !self.each.is_empty();
         let mut stretch = vec![rest; if varies { bonds.sites() } else { 0 }];
@@ -112,8 +75,7 @@ impl<const D: usize> Inclusions<'_, D> {
             for site in bonds.particles().iter().map(|&site| site as usize) {
                 let energy = Some(EnergyPerArea::from_si(energies.value_at(site)));
                 let critical = Critical { fracture_energy: energy, ..Critical::default() };
-                let ends = BondEnds { stiffness: self.micromodulus.value_at(site), ..BondEnds::REST };
-                stretch[site] = (rule.limit)(critical, ends).map_err(|error| {
+                stretch[site] = limit(critical, self.micromodulus.value_at(site)).map_err(|error| {
                     source.error("material.fields", error, "a fracture energy that bonds can have")
                 })?;
             }
@@ -121,27 +83,23 @@ impl<const D: usize> Inclusions<'_, D> {
         for (index, (inclusion, _, members)) in self.each.iter().enumerate() {
             let Some(critical) = inclusion.critical else { continue };
             let key = format!("material.inclusions[{index}].critical");
-            // neighbours of equal material share one bisection
+            // neighbours of equal stiffness share one bisection
             let mut last = None;
             for &site in members {
                 let stiffness = self.micromodulus.value_at(site as usize);
-                let ends = BondEnds { stiffness, laws: [(rule.law)(site); 2] };
                 let own = match last {
-                    Some((before, own)) if before == ends => own,
-                    _ => rule.of_block((source, &key), critical, ends)?,
+                    Some((before, own)) if before == stiffness => own,
+                    _ => limit(critical, stiffness).map_err(|error| limit_error(source, &key, error))?,
                 };
                 stretch[site as usize] = own;
-                last = Some((ends, own));
+                last = Some((stiffness, own));
             }
         }
         let property = Property::new(bonds, |site, _| stretch.get(site).copied().unwrap_or(rest));
-        let mixed = self.bonds_of_two_laws(source, bonds, rule)?.into_iter();
-        let mixed = mixed.filter(|&([a, b], own)| own != property.weaker(a as usize, b as usize)).collect();
-        let property = property.with_bonds(mixed);
         if self.each.iter().all(|(inclusion, ..)| inclusion.critical.is_none()) {
             return Ok(property);
         }
-        let weak = self.weakened_bonds(source, bonds, rule)?;
+        let weak = self.weakened_bonds(source, bonds, limit)?;
         for (index, (_, _, members)) in self.each.iter().enumerate() {
             if members.is_empty() && !weak.iter().any(|one| one.0.contains(&index)) {
                 let key = self.each[index].0.key(index);
@@ -152,70 +110,15 @@ impl<const D: usize> Inclusions<'_, D> {
         Ok(property.weakened(weak.into_iter().map(|(_, bond, value)| (bond, value)).collect()))
     }
 
-    /// Finds bonds between particles of different laws, and the lower limit of both ends for these laws.
-    fn bonds_of_two_laws(
-        &self,
-        source: &Source,
-        bonds: &dyn Bonds<D>,
-        rule: LimitRule,
-    ) -> Result<Vec<([u32; 2], f64)>, SceneError> {
-        let laws: Vec<u16> = bonds.particles().iter().map(|&site| (rule.law)(site)).collect();
-        if laws.iter().all(|law| *law == laws[0]) {
-            return Ok(Vec::new());
-        }
-        // number of the inclusion whose criterion a particle has, from 1 on; 0: the rest
-        let mut owners = vec![0; bonds.sites()];
-        for (index, (inclusion, _, members)) in self.each.iter().enumerate() {
-            if inclusion.critical.is_some() {
-                members.iter().for_each(|&site| owners[site as usize] = index + 1);
-            }
-        }
-        let (mut known, mut found) = (HashMap::new(), Vec::new());
-        for &site in bonds.particles() {
-            let mut others = Vec::new();
-            bonds.neighbours(site as usize, &mut |bond| {
-                let other = bond.site as u32;
-                if site < other && (rule.law)(site) != (rule.law)(other) {
-                    others.push(other);
-                }
-            });
-            for other in others {
-                let ends = BondEnds { laws: [site, other].map(rule.law), ..BondEnds::REST };
-                let mut least = f64::INFINITY;
-                for owner in [site, other].map(|end| owners[end as usize]) {
-                    let own = match owner.checked_sub(1) {
-                        Some(index) => self.each[index].0.critical,
-                        None => self.critical,
-                    };
-                    let Some(critical) = own else { continue };
-                    let value = match known.get(&(owner, ends.laws)) {
-                        Some(&value) => value,
-                        None => {
-                            let key = match owner.checked_sub(1) {
-                                Some(index) => format!("material.inclusions[{index}].critical"),
-                                None => "material.critical".to_owned(),
-                            };
-                            rule.of_block((source, &key), critical, ends)?
-                        }
-                    };
-                    known.insert((owner, ends.laws), value);
-                    least = least.min(value);
-                }
-                found.push(([site, other], least));
-            }
-        }
-        Ok(found)
-    }
-
     /// Finds bonds that pass through inclusions with a limit, and the lowest limit between their ends.
     fn weakened_bonds(
         &self,
         source: &Source,
         bonds: &dyn Bonds<D>,
-        rule: LimitRule,
+        limit: LimitOf<f64>,
     ) -> Result<Vec<Passing>, SceneError> {
         let reach = bonds.horizon() * (1.0 + 1e-9);
-        let mut known: HashMap<(usize, u64, [u16; 2]), f64> = HashMap::new();
+        let mut known: HashMap<(usize, u64), f64> = HashMap::new();
         let mut found = Vec::new();
         for &site in bonds.particles() {
             let here = bonds.position(site as usize);
@@ -246,17 +149,14 @@ impl<const D: usize> Inclusions<'_, D> {
                     let last =
                         inside(place).rev().find_map(|&index| Some((index, self.each[index].0.critical?)));
                     let Some((index, critical)) = last else { continue };
-                    let ends =
-                        BondEnds { stiffness: rest * stiffness(place), laws: [site, other].map(rule.law) };
-                    let material = (index, ends.stiffness.to_bits(), ends.laws);
-                    let value = match known.get(&material) {
+                    let stiffness = rest * stiffness(place);
+                    let value = match known.get(&(index, stiffness.to_bits())) {
                         Some(&value) => value,
-                        None => {
-                            let key = format!("material.inclusions[{index}].critical");
-                            rule.of_block((source, &key), critical, ends)?
-                        }
+                        None => limit(critical, stiffness).map_err(|error| {
+                            limit_error(source, &format!("material.inclusions[{index}].critical"), error)
+                        })?,
                     };
-                    known.insert(material, value);
+                    known.insert((index, stiffness.to_bits()), value);
                     passing.0.push(index);
                     passing.2 = passing.2.min(value);
                 }

@@ -64,6 +64,11 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         if let Some(critical) = &part.critical {
             check_limit(source, scene, &key("critical"), critical)?;
         }
+        if scene.material.critical.is_some_and(|critical| critical.strength.is_some()) && part.solid.is_some()
+        {
+            let why = "at the border of two solids bonds soften below their strength";
+            return Err(source.conflict(&key("solid"), "material.critical.strength", why));
+        }
     }
     Ok(())
 }

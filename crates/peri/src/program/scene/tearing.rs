@@ -1,6 +1,6 @@
 //! Fracture energies of a bond law: their conventions, and warnings where cracks run at a different energy.
 
-use super::{DiscreteBody, Scene, plain};
+use super::{DiscreteBody, Inclusion, Scene, plain};
 use crate::bonds::Bonds;
 use crate::calibrate::Space;
 use crate::critical::{Convention, Critical, Toughness};
@@ -122,13 +122,12 @@ fn strength(source: &Source, scene: &Scene, key: &str, critical: &Critical) -> R
         return Err(source.unexpected(&key, "bonds of one body have the kink of `material.critical`"));
     }
     if !material.fields.is_empty() {
-        return Err(source.conflict(&key, "fields", "parameters of a body whose bonds have a strength"));
+        return Err(source.conflict(&key, "fields", "bonds of one body have one stiffness and toughness"));
     }
-    for (index, part) in material.inclusions.iter().enumerate() {
-        if part.critical.is_none() && part.stiffness != 1.0 {
-            let why = "a stiffer or softer part beside bonds with a strength needs one of its own";
-            return Err(source.missing(&format!("material.inclusions[{index}].critical"), why));
-        }
+    let stiff = |part: &Inclusion| part.stiffness != 1.0;
+    if let Some(index) = material.inclusions.iter().position(stiff) {
+        let why = "at the border of parts of other stiffness bonds soften below their strength";
+        return Err(source.conflict(&key, &format!("material.inclusions[{index}].stiffness"), why));
     }
     Ok(())
 }
