@@ -344,6 +344,60 @@ fn gpu_pieces_touch_as_on_the_host() {
     assert!(host.outcomes[0].history.last().unwrap().broken > 10);
 }
 
+/// A plate that is torn in two and closed again.
+const TORN: &str = r#"
+version = 1
+program = "peri"
+[body]
+space = "plane-stress"
+thickness = "1 mm"
+spacing = "1 mm"
+shapes = [{ add = "box", min = ["0 mm", "0 mm"], max = ["16 mm", "22 mm"] }]
+cracks = [{ from = ["-1 mm", "11 mm"], to = ["7.6 mm", "11 mm"] }]
+[material]
+youngs_modulus = "191 GPa"
+law = "linear"
+critical = { stretch = 1.03 }
+[[boundary]]
+name = "pulled"
+min = ["0 mm", "19 mm"]
+max = ["16 mm", "22 mm"]
+displacement = ["0.1 mm", "0.4 mm"]
+[[boundary]]
+name = "fixed"
+min = ["0 mm", "0 mm"]
+max = ["16 mm", "3 mm"]
+displacement = ["0 mm", "0 mm"]
+[contact]
+short_range = 15
+[solver]
+method = "adr"
+path = [1.0, -1.5]
+steps = 4
+device = "cpu"
+[output]
+pictures = false
+fields = false
+"#;
+
+/// Equilibria of pieces that a plane stops, and of a plate that was torn.
+#[test]
+fn gpu_pieces_touch_in_equilibria() {
+    let dynamics = &BLOCKS[BLOCKS.find("[dynamics]").unwrap()..BLOCKS.find("device").unwrap()];
+    let guide = "\n[[boundary]]\nname = \"guided\"\nmin = [\"19 mm\", \"6 mm\"]\nmax = [\"21 mm\", \"8 mm\"]\n\
+                 displacement = [\"free\", \"0 mm\"]\n[contact]";
+    let slow = BLOCKS.replace(dynamics, "steps = 4\n").replace("verlet", "adr").replace("\n[contact]", guide);
+    let slow = slow.replace("[-1.0, 0.1]", "[-1.0, 0.0]");
+    for (name, text, broken) in [("blocks", slow.as_str(), 0), ("torn plate", TORN, 100)] {
+        let host = compare(&format!("{name} by relaxation"), text, (1, 1e-9, 0.05));
+        let rows = &host.outcomes[0].history;
+        let last = rows.last().unwrap();
+        assert!(last.contact.unwrap().pairs > 5 && last.broken >= broken, "{last:?}");
+        let lbfgs = text.replace("method = \"adr\"", "method = \"lbfgs\"\ntolerance = 1e-6");
+        compare(&format!("{name} by L-BFGS"), &lbfgs, (1000, 1e-4, 0.05));
+    }
+}
+
 const DENSITY: f64 = 2.3;
 
 /// A sheet with slits and a hole that a plane crushes, from a state; the state after row `stop`, or the last.
