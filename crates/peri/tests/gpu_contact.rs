@@ -384,10 +384,15 @@ fields = false
 #[test]
 fn gpu_pieces_touch_in_equilibria() {
     let dynamics = &BLOCKS[BLOCKS.find("[dynamics]").unwrap()..BLOCKS.find("device").unwrap()];
-    let guide = "\n[[boundary]]\nname = \"guided\"\nmin = [\"19 mm\", \"6 mm\"]\nmax = [\"21 mm\", \"8 mm\"]\n\
+    let guide = "\n[[boundary]]\nname = \"guided\"\nmin = [\"17 mm\", \"6 mm\"]\nmax = [\"19 mm\", \"8 mm\"]\n\
                  displacement = [\"free\", \"0 mm\"]\n[contact]";
-    let slow = BLOCKS.replace(dynamics, "steps = 4\n").replace("verlet", "adr").replace("\n[contact]", guide);
-    let slow = slow.replace("[-1.0, 0.1]", "[-1.0, 0.0]");
+    let mut slow = BLOCKS.replace(dynamics, "steps = 8\n").replace("\n[contact]", guide);
+    // in small steps, as the law of the first trials must not become a table
+    let others =
+        [("20 mm", "18 mm"), ("25.9", "23.9"), ("5 mm", "2.4 mm"), ("0, 0.1]", "0, 0.0]"), ("verlet", "adr")];
+    for (old, new) in others {
+        slow = slow.replacen(old, new, 1);
+    }
     for (name, text, broken) in [("blocks", slow.as_str(), 0), ("torn plate", TORN, 100)] {
         let host = compare(&format!("{name} by relaxation"), text, (1, 1e-9, 0.05));
         let rows = &host.outcomes[0].history;

@@ -373,13 +373,13 @@ fn gpu_equilibria_break_the_same_bonds() {
             (between, cells, 1, false),
             (between, [14, 18], 8, false),
             (on_the_way, cells, 1, false),
-            (between, cells, 1, true),
-            (on_the_way, cells, 1, true),
+            (between, [14, 18], 1, true),
+            (on_the_way, [14, 18], 1, true),
         ] {
             let sheet = damaged(cells);
             let breaking = Some((1.03.into(), policy));
             let steps = if refine > 1 { 2 } else { 8 };
-            let strain = if touches { -0.1 } else { 0.02 };
+            let strain = if touches { -0.08 } else { 0.02 };
             let loads = pulled(&sheet, strain, 0.0);
             let case = Case { loads, law: Law::Linear, steps, breaking, refine, touches };
             let host = case.run(&mut damaged(cells), &mut DynamicRelaxation::default().solver());
@@ -393,7 +393,7 @@ fn gpu_equilibria_break_the_same_bonds() {
                 );
                 continue;
             }
-            let allowed = if device.precision() == Precision::Double { 1e-9 } else { 1e-4 };
+            let allowed = if device.precision() == Precision::Double { 1e-9 } else { 1e-3 };
             case.compare(
                 &format!("{policy:?}, {refine} parts of a step"),
                 (&found, &host),
@@ -409,7 +409,7 @@ fn gpu_equilibria_break_the_same_bonds() {
 fn gpu_equilibria_continue_with_the_same_bits() {
     let Some(device) = devices().pop() else { return };
     continue_with_the_same_bits(&device, 0.01, false);
-    continue_with_the_same_bits(&device, -0.05, true);
+    continue_with_the_same_bits(&device, -0.01, true);
 }
 
 fn continue_with_the_same_bits(device: &Device, strain: f64, touches: bool) {

@@ -109,7 +109,7 @@ impl<const D: usize> CardRelaxation<'_, D> {
         let contact = system.repulsion().map(|_| tangent);
         let measures = state.measures_rounding();
         card.keep_forces();
-        let mut forces = |card: &mut DeviceRelaxation<D>| {
+        let forces = |card: &mut DeviceRelaxation<D>| {
             card.weigh(contact);
             card.body.pull(factor, look);
             card.sums(measures)
@@ -117,7 +117,8 @@ impl<const D: usize> CardRelaxation<'_, D> {
         let mut found = forces(card)?;
         if !self.pairs.hold_after((D as f64).sqrt() * found.way) && found.free.is_finite() {
             // others than those listed may touch
-            self.pairs.renew(&mut card.body, system, &card.body.displacement()?);
+            let displacement = card.body.displacement()?;
+            self.pairs.renew(&mut card.body, system, &displacement);
             found = forces(card)?;
         }
         let sums = ForceSums {
