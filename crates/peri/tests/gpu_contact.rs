@@ -380,16 +380,15 @@ pictures = false
 fields = false
 "#;
 
-/// Equilibria of pieces that a plane stops, and of a plate that was torn.
+/// Equilibria of a piece between another one and a plane, and of a plate that was torn.
 #[test]
 fn gpu_pieces_touch_in_equilibria() {
     let dynamics = &BLOCKS[BLOCKS.find("[dynamics]").unwrap()..BLOCKS.find("device").unwrap()];
-    let guide = "\n[[boundary]]\nname = \"guided\"\nmin = [\"17 mm\", \"6 mm\"]\nmax = [\"19 mm\", \"8 mm\"]\n\
-                 displacement = [\"free\", \"0 mm\"]\n[contact]";
-    let mut slow = BLOCKS.replace(dynamics, "steps = 8\n").replace("\n[contact]", guide);
+    let fixed = "\n[[boundary]]\nname = \"fixed\"\nmin = [\"17 mm\", \"6 mm\"]\nmax = [\"19 mm\", \"8 mm\"]\n\
+                 displacement = [\"0 mm\", \"0 mm\"]\n[contact]";
+    let mut slow = BLOCKS.replace(dynamics, "steps = 8\n").replace("\n[contact]", fixed);
     // in small steps, as the law of the first trials must not become a table
-    let others =
-        [("20 mm", "18 mm"), ("25.9", "23.9"), ("5 mm", "2.4 mm"), ("0, 0.1]", "0, 0.0]"), ("verlet", "adr")];
+    let others = [("20 mm", "18 mm"), ("25.9", "23.6"), ("5 mm", "2.4 mm"), ("verlet", "adr")];
     for (old, new) in others {
         slow = slow.replacen(old, new, 1);
     }
@@ -397,7 +396,8 @@ fn gpu_pieces_touch_in_equilibria() {
         let host = compare(&format!("{name} by relaxation"), text, (1, 1e-9, 0.05));
         let rows = &host.outcomes[0].history;
         let last = rows.last().unwrap();
-        assert!(last.contact.unwrap().pairs > 5 && last.broken >= broken, "{last:?}");
+        assert!(last.contact.unwrap().pairs > 3 && last.broken >= broken, "{last:?}");
+        assert!(last.resting.iter().all(|resting| resting.force[0] < -1.0), "{last:?}");
         let lbfgs = text.replace("method = \"adr\"", "method = \"lbfgs\"\ntolerance = 1e-6");
         compare(&format!("{name} by L-BFGS"), &lbfgs, (1000, 1e-4, 0.05));
     }
