@@ -100,8 +100,8 @@ pub fn push_apart<F: Float>(
     stiff[particle] = all;
 }
 
-/// Adds the stiffness of others nearer than d + `near` to the masses of particles, `factor`·Σ_J c (1 + max_{d≠e}
-/// |n_d n_e|) along n = ζ/r; without bonds, a particle has twice that instead.
+/// Adds the stiffness of others nearer than d + `near` to the masses of particles, `factor`·Σ_J c (1 +
+/// max_{d≠e} |n_d n_e|) along n = ζ/r; without bonds, a particle has twice that instead.
 #[cube(launch_unchecked)]
 #[allow(clippy::too_many_arguments)]
 pub fn weigh_pairs<F: Float>(
