@@ -27,8 +27,8 @@ impl ListedPairs {
         self.room != f64::INFINITY
     }
 
-    /// Counts a way, m, that no particle exceeds in a move; returns false if pairs may have come near that are
-    /// not listed.
+    /// Counts a way, m, that no particle exceeds in a move; returns false if pairs may have come near that
+    /// are not listed.
     pub fn hold_after(&mut self, way: f64) -> bool {
         self.way = way;
         self.room -= way;

@@ -19,8 +19,8 @@ use crate::gpu::{Device, DeviceSearch};
 use std::collections::VecDeque;
 
 impl Lbfgs {
-    /// Creates a solver whose iterations a device takes, of lattices of a bond law, in contact with themselves
-    /// and with planes at most, without friction.
+    /// Creates a solver whose iterations a device takes, of lattices of a bond law, in contact with
+    /// themselves and with planes at most, without friction.
     pub fn device_solver<'a, const D: usize>(&self, device: &'a Device) -> LbfgsSearch<CardVectors<'a, D>> {
         LbfgsSearch::with_vectors(*self, CardVectors::new(device, self.memory))
     }

@@ -21,8 +21,8 @@ use crate::gpu::{Device, DeviceRelaxation};
 const KEPT: u64 = 500;
 
 impl DynamicRelaxation {
-    /// Creates a solver whose iterations a device takes, of lattices of a bond law, in contact with themselves
-    /// and with planes at most, without friction.
+    /// Creates a solver whose iterations a device takes, of lattices of a bond law, in contact with
+    /// themselves and with planes at most, without friction.
     pub fn device_solver<'a, const D: usize>(&self, device: &'a Device) -> CardRelaxation<'a, D> {
         CardRelaxation {
             settings: *self,
