@@ -344,6 +344,65 @@ fn gpu_pieces_touch_as_on_the_host() {
     assert!(host.outcomes[0].history.last().unwrap().broken > 10);
 }
 
+/// A plate that is torn in two and closed again.
+const TORN: &str = r#"
+version = 1
+program = "peri"
+[body]
+space = "plane-stress"
+thickness = "1 mm"
+spacing = "1 mm"
+shapes = [{ add = "box", min = ["0 mm", "0 mm"], max = ["16 mm", "22 mm"] }]
+cracks = [{ from = ["-1 mm", "11 mm"], to = ["7.6 mm", "11 mm"] }]
+[material]
+youngs_modulus = "191 GPa"
+law = "linear"
+critical = { stretch = 1.03 }
+[[boundary]]
+name = "pulled"
+min = ["0 mm", "19 mm"]
+max = ["16 mm", "22 mm"]
+displacement = ["0.1 mm", "0.4 mm"]
+[[boundary]]
+name = "fixed"
+min = ["0 mm", "0 mm"]
+max = ["16 mm", "3 mm"]
+displacement = ["0 mm", "0 mm"]
+[contact]
+short_range = 15
+[solver]
+method = "adr"
+path = [1.0, -1.5]
+steps = 4
+device = "cpu"
+[output]
+pictures = false
+fields = false
+"#;
+
+/// Equilibria of a piece between another one and a plane, and of a plate that was torn.
+#[test]
+fn gpu_pieces_touch_in_equilibria() {
+    let dynamics = &BLOCKS[BLOCKS.find("[dynamics]").unwrap()..BLOCKS.find("device").unwrap()];
+    let fixed = "\n[[boundary]]\nname = \"fixed\"\nmin = [\"17 mm\", \"6 mm\"]\nmax = [\"19 mm\", \"8 mm\"]\n\
+                 displacement = [\"0 mm\", \"0 mm\"]\n[contact]";
+    let mut slow = BLOCKS.replace(dynamics, "steps = 8\n").replace("\n[contact]", fixed);
+    // in small steps, as the law of the first trials must not become a table
+    let others = [("20 mm", "18 mm"), ("25.9", "23.1"), ("5 mm", "2.4 mm"), ("verlet", "adr")];
+    for (old, new) in others {
+        slow = slow.replacen(old, new, 1);
+    }
+    for (name, text, broken) in [("torn plate", TORN, 100), ("blocks", slow.as_str(), 0)] {
+        let host = compare(&format!("{name} by relaxation"), text, (1, 1e-9, 0.05));
+        let rows = &host.outcomes[0].history;
+        let last = rows.last().unwrap();
+        assert!(last.contact.unwrap().pairs > 3 && last.broken >= broken, "{last:?}");
+        assert!(last.resting.iter().all(|resting| resting.force[0] < -1.0), "{last:?}");
+        let lbfgs = text.replace("method = \"adr\"", "method = \"lbfgs\"\ntolerance = 1e-6");
+        compare(&format!("{name} by L-BFGS"), &lbfgs, (1000, 1e-4, 0.05));
+    }
+}
+
 const DENSITY: f64 = 2.3;
 
 /// A sheet with slits and a hole that a plane crushes, from a state; the state after row `stop`, or the last.

@@ -141,15 +141,14 @@ impl<const D: usize> ContactList<D> {
         }
     }
 
-    /// Makes the list hold for a displacement and as long as possible; returns true if it was rebuilt.
+    /// Makes the list hold for a displacement and as long as possible.
     #[cfg(feature = "gpu")]
-    pub fn renew(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> bool {
+    pub fn renew(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
         let compares = |vicinity: &mut Vicinity<D>| vicinity.compare_at(bonds.particles(), displacement);
         let holds = self.skin > 0.0 && self.vicinity.as_mut().is_some_and(compares);
         if !holds {
             self.rebuild(bonds, displacement);
         }
-        !holds
     }
 
     /// Distance by which every particle may move since [`Self::renew`] until the list must be renewed, m.

@@ -41,6 +41,8 @@ pub struct PairRows<const D: usize> {
     pub sites: Vec<u32>,
     /// Ends of their entries, after a 0.
     pub ends: Vec<u32>,
+    /// True for particles without bonds.
+    pub alone: Vec<bool>,
     /// Site of the other particle.
     pub others: Vec<u32>,
     /// ξ, m.
@@ -49,6 +51,8 @@ pub struct PairRows<const D: usize> {
     pub distances: Vec<f64>,
     /// k V of the other particle, N/m⁴.
     pub stiffness: Vec<f64>,
+    /// Largest gap of particles about to touch, m.
+    pub near: f64,
 }
 
 impl<const D: usize> PlaneRows<D> {
@@ -86,7 +90,7 @@ impl<const D: usize> Contact<D> {
 
     /// Rows of the pairs that are listed; `None` if particles do not repel each other.
     pub fn pair_rows(&self, bonds: &dyn BodyGeometry<D>) -> Option<PairRows<D>> {
-        let (mut sites, mut ends, mut others) = (Vec::new(), vec![0], Vec::new());
+        let (mut sites, mut ends, mut alone, mut others) = (Vec::new(), vec![0], Vec::new(), Vec::new());
         let (mut along, mut distances, mut stiffness) = (Vec::new(), Vec::new(), Vec::new());
         for (own, candidates) in self.list.candidates().take_while(|_| self.has_pairs()) {
             let home = bonds.position(own as usize);
@@ -98,15 +102,19 @@ impl<const D: usize> Contact<D> {
                 stiffness.push(self.pair(own, other) * bonds.volume(other as usize));
             }
             sites.push(own);
+            alone.push(bonds.is_alone(own as usize));
             ends.push(others.len() as u32);
         }
-        let rows = PairRows { sites, ends, others, bonds: along, distances, stiffness };
+        let rows =
+            PairRows { sites, ends, alone, others, bonds: along, distances, stiffness, near: self.near };
         self.has_pairs().then_some(rows)
     }
 
-    /// Makes the list of pairs hold for a displacement; returns true if others are listed now.
-    pub fn renew_pairs(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> bool {
-        self.has_pairs() && self.list.renew(bonds, displacement)
+    /// Makes the list of pairs hold for a displacement, and as long as possible.
+    pub fn renew_pairs(&mut self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) {
+        if self.has_pairs() {
+            self.list.renew(bonds, displacement);
+        }
     }
 
     /// Distance by which every particle may move after [`Self::renew_pairs`] until pairs must be renewed, m.

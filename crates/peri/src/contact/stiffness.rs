@@ -142,7 +142,13 @@ impl<const D: usize> Contact<D> {
         let parts = parallel::map(sites.div_ceil(CHUNK), of).into_iter();
         let [farthest, closing] =
             parts.fold([0.0; 2], |a: [f64; 2], b: [f64; 2]| [a[0].max(b[0]), a[1].max(b[1])]);
-        self.near / (0.5 * farthest.sqrt()).max(closing.sqrt())
+        self.step_of([farthest.sqrt(), closing.sqrt()])
+    }
+
+    /// [`Self::longest_step`] along a direction whose greatest length is the first number, and its greatest
+    /// difference between particles in contact or about to touch the second.
+    pub fn step_of(&self, [farthest, closing]: [f64; 2]) -> f64 {
+        self.near / (0.5 * farthest).max(closing)
     }
 
     /// Sites of particles without bonds, ascending.

@@ -3,7 +3,7 @@
 use super::body::{DeviceBody, LANES, numbers, refuse_beyond_memory};
 use super::kernels::{CUBE, KernelForm};
 use super::lbfgs_kernels::{
-    LINE_SUMS, PAIR_SUMS, advance, combine, line_sums, pair_products, record, spread,
+    LINE_SUMS, PAIR_SUMS, advance, combine, line_sums, pair_products, reach, record, spread,
 };
 use super::steps::buffer;
 use super::{Device, Precision};
@@ -269,6 +269,30 @@ impl<const D: usize> DeviceSearch<D> {
         }
         body.fold([&self.slopes, &self.slope], threads, LANES, (0, 1), (1, 0, 0));
         Ok(sums_of(&body.values(&self.slope)?)[0])
+    }
+
+    /// Greatest length of the direction, m, and its greatest difference between particles in contact or about
+    /// to touch.
+    ///
+    /// # Errors
+    /// [`Error::Device`] where the device fails.
+    pub fn moves(&self) -> Result<[f64; 2], Error> {
+        let (body, threads) = (&self.body, self.body.threads());
+        // SAFETY: as in `line_sums`
+        unsafe {
+            reach::launch_unchecked(
+                &body.client,
+                body.cubes_of(threads),
+                CubeDim::new_1d(CUBE as u32),
+                buffer(&body.fields[1], D * body.sites),
+                buffer(&body.sites_of_particles, body.particles),
+                buffer(&self.slopes, threads),
+                D,
+                body.precision.element(),
+            );
+        }
+        body.fold([&self.slopes, &self.slope], threads, LANES, (0, 1), (1, 1, 0));
+        Ok([body.longest(&self.slope)?, body.closing()?])
     }
 
     /// Extremes of e of bonds in the direction, times `factor`, as a displacement.

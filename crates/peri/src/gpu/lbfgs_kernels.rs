@@ -83,6 +83,34 @@ pub fn advance<F: Float>(
     }
 }
 
+/// Greatest square of the length of a direction, each thread's.
+#[cube(launch_unchecked)]
+pub fn reach<F: Float>(
+    direction: &[F],
+    particles: &[u32],
+    partial: &mut [F],
+    #[comptime] dimension: usize,
+    #[define(F)] _precision: ElemType,
+) {
+    let threads = partial.len();
+    if ABSOLUTE_POS >= threads {
+        terminate!();
+    }
+    let sites = direction.len() / dimension;
+    let mut greatest = F::new(0.0);
+    for index in range_stepped(ABSOLUTE_POS, particles.len(), threads) {
+        let site = particles[index] as usize;
+        let mut square = F::new(0.0);
+        #[unroll]
+        for d in 0..dimension {
+            let along = direction[d * sites + site];
+            square = fma(along, along, square);
+        }
+        greatest = F::max(greatest, square);
+    }
+    partial[ABSOLUTE_POS] = greatest;
+}
+
 /// Writes a field, scaled.
 #[cube(launch_unchecked)]
 pub fn spread<F: Float>(from: &[F], into: &mut [F], factor: InputScalar, #[define(F)] _precision: ElemType) {

@@ -1,8 +1,8 @@
-//! Contact between particles on a device: its buffers, and the launches of its kernel.
+//! Contact between particles on a device: its buffers, and the launches of its kernels.
 
 use super::body::{DeviceBody, LANES, MOST_STEPS, numbers};
 use super::kernels::CUBE;
-use super::pair_kernels::{PAIR, push_apart};
+use super::pair_kernels::{PAIR, close_in, push_apart, weigh_pairs};
 use super::steps::buffer;
 use crate::contact::{PairRows, numbers_within};
 use crate::error::Error;
@@ -14,13 +14,16 @@ use std::ops::Range;
 pub(super) struct DevicePairs {
     sites: Vec<u32>,
     entries: usize,
+    near: f64,
     all: Handle,
     particles: Handle,
     ends: Handle,
+    alone: Handle,
     others: Handle,
     pairs: Handle,
     stiff: Handle,
     greatest: Handle,
+    square: Handle,
 }
 
 impl<const D: usize> DeviceBody<D> {
@@ -40,13 +43,16 @@ impl<const D: usize> DeviceBody<D> {
         });
         DevicePairs {
             entries: rows.others.len(),
+            near: rows.near / self.spacing,
             all: whole(&(0..rows.sites.len() as u32).collect::<Vec<_>>()),
             particles: whole(&rows.sites),
             ends: whole(&rows.ends),
+            alone: whole(&rows.alone.iter().map(|&alone| alone.into()).collect::<Vec<_>>()),
             others: whole(&rows.others),
             pairs: numbers(client, precision, each),
             stiff: empty(rows.sites.len()),
             greatest: empty(MOST_STEPS * LANES),
+            square: empty(LANES),
             sites: rows.sites,
         }
     }
@@ -111,6 +117,68 @@ impl<const D: usize> DeviceBody<D> {
         let values = self.values(&pairs.greatest)?;
         let greatest = |slot: &[f64]| self.unit / self.spacing * slot.iter().copied().fold(0.0, f64::max);
         Ok(values.chunks(LANES).take(slots).map(greatest).collect())
+    }
+
+    /// Adds the stiffness of pairs, present or about to touch, to the masses of a relaxation, times `factor`.
+    pub(super) fn weigh_pairs(&self, mass: &Handle, factor: f64) {
+        let Some(pairs) = &self.pairs else { return };
+        let (count, element) = (pairs.sites.len(), self.precision.element());
+        // SAFETY: as in `launch_pairs`
+        unsafe {
+            weigh_pairs::launch_unchecked(
+                &self.client,
+                self.cubes_of(count),
+                CubeDim::new_1d(CUBE as u32),
+                buffer(&self.fields[0], D * self.sites),
+                buffer(&pairs.particles, count),
+                buffer(&pairs.ends, count + 1),
+                buffer(&pairs.alone, count),
+                buffer(&pairs.others, pairs.entries),
+                buffer(&pairs.pairs, (D + PAIR) * pairs.entries),
+                buffer(mass, self.sites),
+                InputScalar::new(pairs.near, element),
+                InputScalar::new(factor, element),
+                self.form,
+                element,
+            );
+        }
+    }
+
+    /// Greatest difference, m, of the direction in the place of the velocity between particles in contact or
+    /// about to touch.
+    ///
+    /// # Errors
+    /// [`Error::Device`] where the device fails.
+    pub(super) fn closing(&self) -> Result<f64, Error> {
+        let Some(pairs) = &self.pairs else { return Ok(0.0) };
+        let (count, element) = (pairs.sites.len(), self.precision.element());
+        let [displacement, direction, _] = &self.fields;
+        // SAFETY: as in `launch_pairs`
+        unsafe {
+            close_in::launch_unchecked(
+                &self.client,
+                self.cubes_of(count),
+                CubeDim::new_1d(CUBE as u32),
+                buffer(displacement, D * self.sites),
+                buffer(direction, D * self.sites),
+                buffer(&pairs.particles, count),
+                buffer(&pairs.ends, count + 1),
+                buffer(&pairs.others, pairs.entries),
+                buffer(&pairs.pairs, (D + PAIR) * pairs.entries),
+                buffer(&pairs.stiff, count),
+                InputScalar::new(pairs.near, element),
+                self.form,
+                element,
+            );
+        }
+        self.fold([&pairs.stiff, &pairs.square], count, LANES, (0, 1), (1, 1, 0));
+        self.longest(&pairs.square)
+    }
+
+    /// Root of the greatest of squares of lengths, m.
+    pub(super) fn longest(&self, squares: &Handle) -> Result<f64, Error> {
+        let greatest = self.values(squares)?.into_iter().fold(0.0, f64::max);
+        Ok(self.spacing * greatest.sqrt())
     }
 
     /// Displacement, m.

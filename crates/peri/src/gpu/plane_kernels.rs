@@ -147,7 +147,6 @@ pub fn weigh<F: Float>(
     above: &[u32],
     shares: &[F],
     stiff: &[F],
-    base: &[F],
     mass: &mut [F],
     factor: InputScalar,
     #[define(F)] _precision: ElemType,
@@ -161,7 +160,7 @@ pub fn weigh<F: Float>(
         let share = shares[entry as usize];
         sum = fma(F::max(share, F::new(0.0) - share), stiff[above[entry as usize] as usize], sum);
     }
-    mass[site] = fma(factor.get::<F>(), sum, base[site]);
+    mass[site] = fma(factor.get::<F>(), sum, mass[site]);
 }
 
 /// Stops particles.

@@ -195,9 +195,8 @@ impl<const D: usize> DeviceBody<D> {
         Ok(touching.map(|(at, _)| [(at / elements) as u32, (at % elements) as u32]).collect())
     }
 
-    /// Adds the stiffness of planes present or about to touch to the masses `base` of a relaxation, times
-    /// `factor`.
-    pub(super) fn weigh(&self, [base, mass]: [&Handle; 2], factor: f64) {
+    /// Adds the stiffness of planes present or about to touch to the masses of a relaxation, times `factor`.
+    pub(super) fn weigh(&self, mass: &Handle, factor: f64) {
         let Some(planes) = &self.planes else { return };
         self.launch_press(planes, true);
         let rows = &planes.rows;
@@ -212,7 +211,6 @@ impl<const D: usize> DeviceBody<D> {
                 buffer(&planes.above, rows.above.len()),
                 buffer(&planes.shares, rows.above.len()),
                 buffer(&planes.stiff, rows.elements()),
-                buffer(base, self.sites),
                 buffer(mass, self.sites),
                 InputScalar::new(factor, self.precision.element()),
                 self.precision.element(),

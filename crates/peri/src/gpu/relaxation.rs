@@ -3,10 +3,9 @@
 use super::Device;
 use super::body::{DeviceBody, LANES, numbers};
 use super::kernels::CUBE;
-use super::relaxation_kernels::{RELAXATION_SUMS, relax, relaxation_sums, stiffen};
+use super::relaxation_kernels::{RELAXATION_SUMS, WAY, relax, relaxation_sums, stiffen};
 use super::steps::buffer;
 use crate::bonds::LatticeBonds;
-use crate::contact::PlaneRows;
 use crate::error::Error;
 use crate::potential::{KernelFit, TangentTable};
 use cubecl::ir::{ElemType, UIntKind};
@@ -26,6 +25,8 @@ pub struct RelaxationSums {
     pub constrained: f64,
     /// √(Σ |s u|²) with the springs s, N/m³; 0 where it was not measured.
     pub moved: f64,
+    /// Greatest component of the last move, m.
+    pub way: f64,
 }
 
 /// A lattice in relaxation on a device: velocities are in metres an iteration.
@@ -35,7 +36,7 @@ pub struct DeviceRelaxation<const D: usize> {
     /// Forces of the iteration before.
     before: Handle,
     mass: Handle,
-    /// Masses with the stiffness of planes.
+    /// Masses with the stiffness of contact.
     weighed: Option<Handle>,
     springs: Handle,
     partial: Handle,
@@ -68,7 +69,11 @@ impl<const D: usize> DeviceRelaxation<D> {
             mass: empty(body.sites),
             weighed: None,
             springs: numbers(&body.client, body.precision, springs.iter().map(|s| s / unit)),
-            partial: empty(RELAXATION_SUMS * body.threads()),
+            partial: numbers(
+                &body.client,
+                body.precision,
+                (0..RELAXATION_SUMS * body.threads()).map(|_| 0.0),
+            ),
             sums: empty(RELAXATION_SUMS * LANES),
             mass_unit: body.unit / (body.spacing * modulus),
             spring_unit: unit,
@@ -84,31 +89,23 @@ impl<const D: usize> DeviceRelaxation<D> {
         let body = &self.body;
         body.refuse_other_sites("masses", masses)?;
         self.mass = numbers(&body.client, body.precision, masses.iter().map(|mass| mass / self.mass_unit));
-        self.settle_masses();
         Ok(())
     }
 
-    /// Takes planes as they stand.
-    pub fn set_planes(&mut self, rows: Option<PlaneRows<D>>) {
-        self.body.set_planes(rows);
-        let bytes = self.body.sites * self.body.precision.bytes() as usize;
-        self.weighed = self.body.planes.is_some().then(|| self.body.client.empty(bytes));
-        self.settle_masses();
-    }
-
-    /// Adds the stiffness of planes at the present displacement to the masses, whose unit is a bond's
-    /// `tangent`, N/m⁶.
-    pub fn weigh(&self, tangent: f64) {
-        if let Some(weighed) = &self.weighed {
-            let factor = 0.5 * self.body.unit / (self.body.spacing * self.mass_unit * tangent);
-            self.body.weigh([&self.mass, weighed], factor);
-        }
-    }
-
-    fn settle_masses(&self) {
-        if let Some(weighed) = &self.weighed {
-            self.body.copy(&self.mass, weighed, self.body.sites);
-        }
+    /// Adds the stiffness of contact at the present displacement to the masses, whose unit is a bond's
+    /// `tangent`, N/m⁶; `None` without contact.
+    pub fn weigh(&mut self, tangent: Option<f64>) {
+        let Some(tangent) = tangent else {
+            self.weighed = None;
+            return;
+        };
+        let body = &self.body;
+        let bytes = body.sites * body.precision.bytes() as usize;
+        let weighed = self.weighed.get_or_insert_with(|| body.client.empty(bytes));
+        body.copy(&self.mass, weighed, body.sites);
+        let factor = body.unit / (body.spacing * self.mass_unit * tangent);
+        body.weigh_pairs(weighed, factor);
+        body.weigh(weighed, 0.5 * factor);
     }
 
     fn masses(&self) -> &Handle {
@@ -145,14 +142,11 @@ impl<const D: usize> DeviceRelaxation<D> {
                 body.precision.element(),
             );
         }
-        self.settle_masses();
     }
 
-    /// Forces of the present displacement with body forces at a load factor; where it `looks`,
-    /// [`DeviceBody::stretch_range`] has what it saw. The forces until now are kept as those before.
-    pub fn pull(&mut self, factor: f64, looks: bool) {
+    /// Keeps the forces until now as those before.
+    pub fn keep_forces(&mut self) {
         std::mem::swap(&mut self.body.fields[2], &mut self.before);
-        self.body.pull(factor, looks);
     }
 
     /// Sums of the present forces; also of what has `moved` where it `measures`.
@@ -184,7 +178,7 @@ impl<const D: usize> DeviceRelaxation<D> {
                 body.precision.element(),
             );
         }
-        body.fold([&self.partial, &self.sums], threads, LANES, (0, 1), (RELAXATION_SUMS, 0, 0));
+        body.fold([&self.partial, &self.sums], threads, LANES, (0, 1), (RELAXATION_SUMS, 1 << WAY, 0));
         let values = body.values(&self.sums)?;
         let lists: Vec<&[f64]> = values.chunks(LANES).collect();
         let sum = |row: usize| lists[row].iter().sum::<f64>();
@@ -195,6 +189,7 @@ impl<const D: usize> DeviceRelaxation<D> {
             free: force * force * sum(2),
             constrained: force * force * sum(3),
             moved: self.spring_unit * length * sum(4).sqrt(),
+            way: length * lists[WAY].iter().copied().fold(0.0, f64::max),
         })
     }
 
@@ -215,6 +210,7 @@ impl<const D: usize> DeviceRelaxation<D> {
                 buffer(self.masses(), body.sites),
                 buffer(velocity, D * body.sites),
                 buffer(displacement, D * body.sites),
+                buffer(&self.partial, RELAXATION_SUMS * threads),
                 InputScalar::new(threads as u32, ElemType::UInt(UIntKind::U32)),
                 number(keep),
                 number(push * body.unit / (body.spacing * self.mass_unit)),

@@ -15,8 +15,11 @@ pub fn is_free(held: &[u32], site: usize, d: usize, #[comptime] form: KernelForm
     free
 }
 
-/// Sums of an iteration: velocity times change of force, mass times v², F² where free, F² where held, |s u|².
-pub const RELAXATION_SUMS: usize = 5;
+/// Sums of an iteration: velocity times change of force, mass times v², F² where free, F² where held, |s u|²;
+/// the greatest component of the last move.
+pub const RELAXATION_SUMS: usize = 6;
+/// Place of the last of them, which [`relax`] writes.
+pub const WAY: usize = RELAXATION_SUMS - 1;
 
 /// Sums of the present force over particles, each thread its [`RELAXATION_SUMS`]; |s u|² with springs s only
 /// where it `measures`.
@@ -93,6 +96,7 @@ pub fn relax<F: Float>(
     mass: &[F],
     velocity: &mut [F],
     displacement: &mut [F],
+    partial: &mut [F],
     threads: InputScalar,
     keep: InputScalar,
     push: InputScalar,
@@ -107,6 +111,7 @@ pub fn relax<F: Float>(
     let sites = displacement.len() / dimension;
     let keep = keep.get::<F>();
     let push = push.get::<F>();
+    let mut way = F::new(0.0);
     for index in range_stepped(ABSOLUTE_POS, particles.len(), threads) {
         let site = particles[index] as usize;
         let own = mass[site];
@@ -119,8 +124,10 @@ pub fn relax<F: Float>(
             }
             velocity[at] = speed;
             displacement[at] += speed;
+            way = F::max(way, F::max(speed, F::new(0.0) - speed));
         }
     }
+    partial[comptime!(WAY) * threads + ABSOLUTE_POS] = way;
 }
 
 /// Bounds of the stiffness of particles, Σ_J c w·max(t, `least`)(1 + max_{d≠e} |n_d n_e|) with the directions

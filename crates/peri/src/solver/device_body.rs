@@ -85,15 +85,6 @@ pub fn held_as_before<const D: usize>(
     displacement
 }
 
-/// Refuses what only the host can do in searches for equilibrium.
-pub fn refuse_in_searches<const D: usize>(system: &System<D>) -> Result<(), Error> {
-    if system.repulsion().is_some_and(Contact::has_pairs) {
-        let what = "unexpected contact of particles in equilibria: only the processor does that";
-        return Err(Error::Device(what.to_owned()));
-    }
-    refuse(system)
-}
-
 /// Refuses what only the host can do.
 pub fn refuse<const D: usize>(system: &System<D>) -> Result<(), Error> {
     let softens = matches!(

@@ -1,6 +1,7 @@
 //! A body on a graphics card in explicit dynamics: steps, and what the host reads of them.
 
 use super::device_body::{critical, lattice, lattice_with_law, limit, loads, pairs, planes};
+use super::device_pairs::ListedPairs;
 use super::state::State;
 use super::system::System;
 use crate::bonds::{LatticeBonds, Overstretched};
@@ -18,9 +19,8 @@ pub struct DeviceRun<const D: usize> {
     pub body: DeviceBody<D>,
     /// Greatest change of a stretch in the last step, at most; ∞ where it is not known.
     pub strain: f64,
-    /// Way of no less than any particle in the last step, m, and that until pairs must be renewed.
-    way: f64,
-    room: f64,
+    /// Pairs of particles that may touch.
+    pub pairs: ListedPairs,
     /// True if planes move.
     pushed: bool,
     /// Sites of prescribed displacements and of body forces that are not proportional to the load factor.
@@ -46,8 +46,8 @@ impl<const D: usize> DeviceRun<D> {
         let body = body_of(device, system, state)?;
         let driven = driven_sites(system).map(|sites| sites.map(|sites| body.list_driven(sites)));
         let pushed = system.contact.iter().flat_map(Contact::surfaces).any(RigidSurface::moves);
-        let (strain, way, room) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
-        let mut run = Self { body, strain, way, room, pushed, driven };
+        let (strain, pairs) = (f64::INFINITY, ListedPairs::new());
+        let mut run = Self { body, strain, pairs, pushed, driven };
         run.renew_pairs(system, &state.displacement);
         Ok(run)
     }
@@ -112,39 +112,14 @@ impl<const D: usize> DeviceRun<D> {
         Ok(all.map(|(sums, (pushes, stiffness))| TakenStep { sums, pushes, stiffness }).collect())
     }
 
-    /// Way that no particle exceeds in a step, m.
-    fn way_of(sums: &StepSums) -> f64 {
-        (D as f64).sqrt() * sums.increment
-    }
-
-    /// Returns true if pairs are listed.
-    pub fn lists_pairs(&self) -> bool {
-        self.room != f64::INFINITY
-    }
-
     /// Counts the way of a step; returns false if pairs may have come near that are not listed.
     pub fn keeps_pairs(&mut self, sums: &StepSums) -> bool {
-        self.way = Self::way_of(sums);
-        self.room -= self.way;
-        // false for what is not a number
-        self.room >= 0.0
-    }
-
-    /// Number of steps like the last that the list of pairs holds for, at least.
-    pub fn steps_with_pairs(&self) -> f64 {
-        if self.lists_pairs() { self.room / (GROWTH * self.way) } else { f64::INFINITY }
+        self.pairs.hold_after((D as f64).sqrt() * sums.increment)
     }
 
     /// Makes the list of pairs hold at a displacement, m, and as long as possible.
     pub fn renew_pairs(&mut self, system: &mut System<D>, displacement: &Field<D>) {
-        let Some(contact) = &mut system.contact else { return };
-        if !contact.has_pairs() {
-            return;
-        }
-        if contact.renew_pairs(&*system.bonds, displacement) {
-            self.body.set_pairs(contact.pair_rows(&*system.bonds));
-        }
-        self.room = contact.room_of_pairs();
+        self.pairs.renew(&mut self.body, system, displacement);
     }
 
     /// Greatest stiffness of contact on a particle after bonds have broken, N/m⁴.
@@ -152,7 +127,7 @@ impl<const D: usize> DeviceRun<D> {
     /// # Errors
     /// [`Error::Device`] where the device fails.
     pub fn stiffness_of_pairs(&self) -> Result<f64, Error> {
-        if !self.lists_pairs() {
+        if !self.pairs.are_listed() {
             return Ok(0.0);
         }
         self.body.measure_pairs();
@@ -264,7 +239,6 @@ fn body_of<const D: usize>(
     body.set_law(law, limit(system))?;
     body.set_loads(&loads(system));
     body.set_planes(planes(system));
-    body.set_pairs(pairs(system));
     let time_step = Some(state.motion.steps.time_step).filter(|&step| step > 0.0);
     let fields = [&state.displacement, &state.velocity, &state.force];
     body.set_state(bonds, fields, time_step.unwrap_or(state.motion.limits.longest))?;

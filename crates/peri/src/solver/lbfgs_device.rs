@@ -4,7 +4,8 @@
 //! Fields go to the card when a search begins and come back when it has ended, when bonds break on the way,
 //! and where the run may be saved.
 
-use super::device_body::{held_as_before, lattice_with_law, loads, planes, refuse_in_searches, squares};
+use super::device_body::{held_as_before, lattice_with_law, loads, planes, refuse, squares};
+use super::device_pairs::ListedPairs;
 use super::lbfgs::{Lbfgs, LbfgsSearch, LinePoint, SearchVectors};
 use super::lbfgs_host::{HUGE_SCALE, LARGEST_CHANGE};
 use super::pair_products::{Kept, PairProducts};
@@ -13,12 +14,13 @@ use super::preconditioner::Preconditioner;
 use super::state::State;
 use super::system::System;
 use crate::error::Error;
+use crate::field::Field;
 use crate::gpu::{Device, DeviceSearch};
 use std::collections::VecDeque;
 
 impl Lbfgs {
-    /// Creates a solver whose iterations a device takes, of lattices of a bond law, in contact with planes
-    /// at most.
+    /// Creates a solver whose iterations a device takes, of lattices of a bond law, in contact with
+    /// themselves and with planes at most, without friction.
     pub fn device_solver<'a, const D: usize>(&self, device: &'a Device) -> LbfgsSearch<CardVectors<'a, D>> {
         LbfgsSearch::with_vectors(*self, CardVectors::new(device, self.memory))
     }
@@ -28,6 +30,9 @@ impl Lbfgs {
 pub struct CardVectors<'a, const D: usize> {
     device: &'a Device,
     card: Option<DeviceSearch<D>>,
+    pairs: ListedPairs,
+    /// Greatest length of the direction, m, where particles repel each other.
+    reach: f64,
     preconditioner: Preconditioner<D>,
     most: usize,
     products: PairProducts,
@@ -40,11 +45,17 @@ pub struct CardVectors<'a, const D: usize> {
     pushed: f64,
 }
 
+fn no_search() -> Error {
+    Error::Device("expected a search on the device".to_owned())
+}
+
 impl<'a, const D: usize> CardVectors<'a, D> {
     fn new(device: &'a Device, most: usize) -> Self {
         Self {
             device,
             card: None,
+            pairs: ListedPairs::new(),
+            reach: 0.0,
             preconditioner: Preconditioner::new(),
             most,
             products: PairProducts::new(most),
@@ -57,7 +68,13 @@ impl<'a, const D: usize> CardVectors<'a, D> {
     }
 
     fn card(&mut self) -> Result<&mut DeviceSearch<D>, Error> {
-        self.card.as_mut().ok_or_else(|| Error::Device("expected a search on the device".to_owned()))
+        self.card.as_mut().ok_or_else(no_search)
+    }
+
+    fn renew_pairs(&mut self, system: &mut System<D>, displacement: &Field<D>) -> Result<(), Error> {
+        let card = self.card.as_mut().ok_or_else(no_search)?;
+        self.pairs.renew(&mut card.body, system, displacement);
+        Ok(())
     }
 
     fn take_law(&mut self, system: &System<D>, state: &State<D>) -> Result<(), Error> {
@@ -70,7 +87,7 @@ impl<'a, const D: usize> CardVectors<'a, D> {
 
 impl<const D: usize> SearchVectors<D> for CardVectors<'_, D> {
     fn build(&mut self, system: &mut System<D>, state: &State<D>, settings: &Lbfgs) -> Result<(), Error> {
-        refuse_in_searches(system)?;
+        refuse(system)?;
         SearchVectors::<D>::forget(self, true);
         self.preconditioner.build(system, state, settings.weight, None);
         Ok(())
@@ -93,8 +110,10 @@ impl<const D: usize> SearchVectors<D> for CardVectors<'_, D> {
         card.body.set_planes(planes(system));
         card.set_local(bonds, &local);
         // the direction is in the place of the velocity
-        let rest = crate::field::Field::zeros(system.bonds.sites());
-        card.body.set_state(bonds, [&state.displacement, &rest, &state.force], 1.0)
+        let rest = Field::zeros(system.bonds.sites());
+        card.body.set_state(bonds, [&state.displacement, &rest, &state.force], 1.0)?;
+        self.pairs.expire();
+        self.renew_pairs(system, &state.displacement)
     }
 
     fn give(&self, system: &mut System<D>, state: &mut State<D>) -> Result<(), Error> {
@@ -109,6 +128,10 @@ impl<const D: usize> SearchVectors<D> for CardVectors<'_, D> {
     fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<LinePoint, Error> {
         if self.fitted != state.stretches.fitted {
             self.take_law(system, state)?;
+        }
+        if !self.pairs.hold() {
+            let displacement = self.card()?.body.displacement()?;
+            self.renew_pairs(system, &displacement)?;
         }
         let factor = system.loads.force_factor(system.factors[state.step]);
         let pushed = self.pushed;
@@ -136,16 +159,23 @@ impl<const D: usize> SearchVectors<D> for CardVectors<'_, D> {
     fn step(&mut self, _: &mut State<D>, step: f64) {
         if let Some(card) = &self.card {
             card.advance(step);
+            self.pairs.hold_after(step.abs() * self.reach);
         }
     }
 
-    /// Limited if bonds soften: the energy is not convex there.
+    /// Limited as on the host.
     fn longest_step(&mut self, system: &System<D>, _: &State<D>, most: f64) -> Result<f64, Error> {
+        let mut longest = f64::INFINITY;
+        if let Some(contact) = system.repulsion().filter(|contact| contact.has_pairs()) {
+            let moves = self.card()?.moves()?;
+            self.reach = moves[0];
+            longest = contact.step_of(moves);
+        }
         if !system.material.softens_at((1.0 + most).sqrt()) {
-            return Ok(f64::INFINITY);
+            return Ok(longest);
         }
         let range = self.card()?.range_along(HUGE_SCALE)?;
-        Ok(LARGEST_CHANGE * HUGE_SCALE / (1.0 + range.high).sqrt())
+        Ok((LARGEST_CHANGE * HUGE_SCALE / (1.0 + range.high).sqrt()).min(longest))
     }
 
     fn direct(&mut self) -> Result<f64, Error> {
@@ -199,6 +229,7 @@ impl<const D: usize> SearchVectors<D> for CardVectors<'_, D> {
 
     fn bonds_broke(&mut self, system: &System<D>, sites: &[u32]) {
         self.preconditioner.bonds_broke(&*system.bonds, sites);
+        self.pairs.expire();
         self.pushed = squares(system);
         if let (Some(card), Some(bonds)) = (&mut self.card, system.bonds.as_lattice()) {
             card.body.set_intact(bonds);

@@ -12,6 +12,8 @@ mod curves;
 #[cfg(feature = "gpu")]
 mod device_body;
 #[cfg(feature = "gpu")]
+mod device_pairs;
+#[cfg(feature = "gpu")]
 mod device_run;
 mod dynamic_relaxation;
 mod fit_range;

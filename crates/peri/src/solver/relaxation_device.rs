@@ -4,7 +4,8 @@
 //! Fields go to the card when a search for equilibrium begins and come back when it has ended, when bonds
 //! break on the way, and where the run may be saved.
 
-use super::device_body::{held_as_before, lattice_with_law, loads, planes, refuse_in_searches, squares};
+use super::device_body::{held_as_before, lattice_with_law, loads, planes, refuse, squares};
+use super::device_pairs::ListedPairs;
 use super::dynamic_relaxation::{DynamicRelaxation, REFRESH, damping, is_look_due};
 use super::load_stepping::Equilibrium;
 use super::mass::{has_own_mass, update_unit_mass};
@@ -20,13 +21,14 @@ use crate::gpu::{Device, DeviceRelaxation};
 const KEPT: u64 = 500;
 
 impl DynamicRelaxation {
-    /// Creates a solver whose iterations a device takes, of lattices of a bond law, in contact with planes
-    /// at most.
+    /// Creates a solver whose iterations a device takes, of lattices of a bond law, in contact with
+    /// themselves and with planes at most, without friction.
     pub fn device_solver<'a, const D: usize>(&self, device: &'a Device) -> CardRelaxation<'a, D> {
         CardRelaxation {
             settings: *self,
             device,
             card: None,
+            pairs: ListedPairs::new(),
             unit_mass: Vec::new(),
             stiffened: false,
             pushed: 0.0,
@@ -39,6 +41,7 @@ pub struct CardRelaxation<'a, const D: usize> {
     settings: DynamicRelaxation,
     device: &'a Device,
     card: Option<DeviceRelaxation<D>>,
+    pairs: ListedPairs,
     /// Gershgorin sums of the undeformed body for a unit bond tangent.
     unit_mass: Vec<f64>,
     /// True if the card has those of the deformed body with each bond's own tangent.
@@ -49,7 +52,7 @@ pub struct CardRelaxation<'a, const D: usize> {
 
 impl<const D: usize> CardRelaxation<'_, D> {
     /// Puts the state on the card.
-    fn begin(&mut self, system: &System<D>, state: &State<D>) -> Result<(), Error> {
+    fn begin(&mut self, system: &mut System<D>, state: &State<D>) -> Result<(), Error> {
         let (bonds, (law, modulus)) = lattice_with_law(system)?;
         let mut card = match self.card.take() {
             Some(card) => card,
@@ -63,9 +66,11 @@ impl<const D: usize> CardRelaxation<'_, D> {
             update_unit_mass(bonds, system.bonds.particles(), &mut self.unit_mass);
         }
         card.set_masses(&self.unit_mass)?;
-        card.set_planes(planes(system));
+        card.body.set_planes(planes(system));
         self.stiffened = false;
         self.pushed = squares(system);
+        self.pairs.expire();
+        self.pairs.renew(&mut card.body, system, &state.displacement);
         self.card = Some(card);
         Ok(())
     }
@@ -101,10 +106,21 @@ impl<const D: usize> CardRelaxation<'_, D> {
         }
         let tangent = if own { system.material.bond_law().1 } else { state.stretches.tangent };
         let mass = 0.5 * self.settings.mass_safety * tangent;
-        card.weigh(tangent);
-        card.pull(factor, look);
+        let contact = system.repulsion().map(|_| tangent);
         let measures = state.measures_rounding();
-        let found = card.sums(measures)?;
+        card.keep_forces();
+        let forces = |card: &mut DeviceRelaxation<D>| {
+            card.weigh(contact);
+            card.body.pull(factor, look);
+            card.sums(measures)
+        };
+        let mut found = forces(card)?;
+        if !self.pairs.hold_after((D as f64).sqrt() * found.way) && found.free.is_finite() {
+            // others than those listed may touch
+            let displacement = card.body.displacement()?;
+            self.pairs.renew(&mut card.body, system, &displacement);
+            found = forces(card)?;
+        }
         let sums = ForceSums {
             quotient_top: found.quotient_top,
             quotient_bottom: found.quotient_bottom * mass,
@@ -169,7 +185,9 @@ impl<const D: usize> CardRelaxation<'_, D> {
             let fields = [&state.displacement, &state.velocity, &state.force];
             card.body.set_state(lattice_with_law(system)?.0, fields, 1.0)?;
             card.body.set_loads(&loads(system));
-            card.set_planes(planes(system));
+            card.body.set_planes(planes(system));
+            self.pairs.expire();
+            self.pairs.renew(&mut card.body, system, &state.displacement);
             self.pushed = squares(system);
             if !self.stiffened {
                 card.set_masses(&self.unit_mass)?;
@@ -187,7 +205,7 @@ impl<const D: usize> Equilibrium<D> for CardRelaxation<'_, D> {
         state: &mut State<D>,
         watch: &mut Watch<D>,
     ) -> Result<Option<StretchRange>, Error> {
-        refuse_in_searches(system)?;
+        refuse(system)?;
         let status = state.status(system.factors.len(), self.settings.tolerance, 0.0, true);
         watch(&status, state)?;
         self.begin(system, state)?;

@@ -67,12 +67,12 @@ impl VelocityVerlet {
         let room = motion.look.room(state.stretches.fitted, system.breaking_stretch());
         let left = motion.steps.planned - motion.steps.taken;
         let most = (left as f64).min(MOST_STEPS as f64);
-        if run.steps_with_pairs() < most.min(FEW) {
+        if run.pairs.moves_left() < most.min(FEW) {
             let displacement = run.body.displacement()?;
             run.renew_pairs(system, &displacement);
         }
         // not a number, or none below 2: one
-        let many = (room / (GROWTH * run.strain)).min(most).min(run.steps_with_pairs());
+        let many = (room / (GROWTH * run.strain)).min(most).min(run.pairs.moves_left());
         if many >= 2.0 {
             self.advance_many(run, system, state, (end, many as usize), watch)
         } else {
@@ -153,7 +153,7 @@ impl VelocityVerlet {
     ) -> Result<(), Error> {
         let (step, after) = self.step_ahead(system, state, 0, end);
         run.half_step(system, &(step, after));
-        if run.lists_pairs() {
+        if run.pairs.are_listed() {
             run.body.keep_sums(0);
             if !run.keeps_pairs(&run.body.sums(&[step])?[0]) {
                 let displacement = run.body.displacement()?;

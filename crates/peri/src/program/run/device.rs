@@ -152,16 +152,11 @@ fn beyond_cards(scene: &Scene) -> Option<(String, &'static str)> {
         ("dynamics.precision", scene.is_mixed(), "mixed precision"),
     ];
     let first = faults.iter().find(|(_, given, _)| *given).map(|(key, _, found)| ((*key).to_owned(), *found));
-    first.or_else(|| contact_beyond_cards(scene.contact.as_ref()?, scene.has_dynamics()))
+    first.or_else(|| contact_beyond_cards(scene.contact.as_ref()?))
 }
 
-/// Key and content of contact that a card cannot do: friction, other surfaces than planes, and particles that
-/// repel each other in equilibria.
-fn contact_beyond_cards(contact: &ContactSpec, dynamics: bool) -> Option<(String, &'static str)> {
-    if contact.has_pairs() && !dynamics {
-        let key = if contact.short_range.is_some() { "short_range" } else { "stiffness" };
-        return Some((format!("contact.{key}"), "contact of particles"));
-    }
+/// Key and content of contact that a card cannot do: friction, and other surfaces than planes.
+fn contact_beyond_cards(contact: &ContactSpec) -> Option<(String, &'static str)> {
     if contact.has_pairs() && contact.friction > 0.0 {
         return Some(("contact.friction".to_owned(), "friction"));
     }

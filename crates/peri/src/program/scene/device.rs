@@ -12,8 +12,7 @@ pub enum DeviceChoice {
     /// The processor.
     #[default]
     Cpu,
-    /// A graphics card: a lattice of one bond law, without friction and prestrains; in equilibria without
-    /// contact of particles.
+    /// A graphics card: a lattice of one bond law, without friction and prestrains.
     Gpu,
     /// A graphics card where there is one that can do it and the body is large enough to gain by it, the
     /// processor otherwise.
