@@ -413,7 +413,7 @@ fn gpu_equilibria_break_the_same_bonds() {
 fn gpu_equilibria_continue_with_the_same_bits() {
     let Some(device) = devices().pop() else { return };
     continue_with_the_same_bits(&device, [8, 60], 0.01, false);
-    continue_with_the_same_bits(&device, [8, 24], -0.01, true);
+    continue_with_the_same_bits(&device, [8, 40], -0.01, true);
 }
 
 fn continue_with_the_same_bits(device: &Device, cells: [usize; 2], strain: f64, touches: bool) {
