@@ -1,7 +1,7 @@
 //! Tractions of particles on others that they touch.
 //!
-//! Particles of the undeformed volume V push on one along n. Of a column of the lattice along the axis nearest
-//! to n, one particle lies on the surface: it has the area V/(Δx max|n_d|).
+//! Others push on a particle of the undeformed volume V along n. Of a column of the lattice along the axis
+//! nearest to n, one particle lies on the surface: it has the area V/(Δx max|n_d|).
 
 use super::Contact;
 use super::friction_pair::{ContactPair, across};

@@ -39,7 +39,7 @@ pub struct SurfaceTraction<const D: usize> {
 impl<const D: usize> Contact<D> {
     /// Finds the contacts of a displacement and places surfaces where they were in a row of the history,
     /// beside the bonds that are intact.
-    pub fn place(
+    pub fn prepare_tractions(
         &mut self,
         bonds: &dyn BodyGeometry<D>,
         displacement: &Field<D>,

@@ -32,11 +32,11 @@ impl ListedPairs {
     pub fn hold_after(&mut self, way: f64) -> bool {
         self.way = way;
         self.room -= way;
-        self.hold()
+        self.are_complete()
     }
 
     /// Returns true if all pairs that may touch are listed.
-    pub fn hold(&self) -> bool {
+    pub fn are_complete(&self) -> bool {
         // false for what is not a number
         self.room >= 0.0
     }

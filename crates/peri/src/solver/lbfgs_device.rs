@@ -129,7 +129,7 @@ impl<const D: usize> SearchVectors<D> for CardVectors<'_, D> {
         if self.fitted != state.stretches.fitted {
             self.take_law(system, state)?;
         }
-        if !self.pairs.hold() {
+        if !self.pairs.are_complete() {
             let displacement = self.card()?.body.displacement()?;
             self.renew_pairs(system, &displacement)?;
         }

@@ -5,8 +5,8 @@ use crate::bonds::BodyGeometry;
 use crate::contact::{Contact, ContactPair, SurfaceTraction};
 
 impl<const D: usize> State<D> {
-    /// Returns the tractions of a contact, given beside the undeformed body, at the end of the last row of the
-    /// history, or at an equilibrium within a step of a run with the load factors `factors`.
+    /// Returns the tractions of a contact, given beside the undeformed body, at the end of the last row of
+    /// the history, or at an equilibrium within a step of a run with the load factors `factors`.
     pub fn tractions(
         &self,
         contact: &Contact<D>,
@@ -15,7 +15,7 @@ impl<const D: usize> State<D> {
     ) -> Vec<SurfaceTraction<D>> {
         let (own, moved) = (&self.contact, &self.displacement);
         let mut contact = contact.clone();
-        contact.place(bonds, moved, self.history.last().map_or(&[], |row| &row.resting));
+        contact.prepare_tractions(bonds, moved, self.history.last().map_or(&[], |row| &row.resting));
         let drags: Vec<(ContactPair, [f64; 3])> = if self.control.round == 0 {
             own.grips.iter().map(|grip| (grip.pair, grip.slip.map(|x| -grip.stiffness * x))).collect()
         } else {
