@@ -16,8 +16,9 @@ use nalgebra::SVector;
 use std::sync::Arc;
 
 /// Material of a [`PointLaw`]: W_I = I W(F, residual), an exact variation for any law, whose bonds carry
-/// T_IJ = ω (A ζ + Q ξ) with A = D G, Q = P M⁻¹ − D G F and G = [`PointStress::stabilisation`]. A homogeneous
-/// deformation gives its exact P in every particle, at edges too; bonds are not parallel to their forces.
+/// T_IJ = ω (A ζ + Q ξ) with A = D G, Q = P M⁻¹ − D G F and G = [`super::PointStress::stabilisation`]. A
+/// homogeneous deformation gives its exact P in every particle, at edges too; bonds are not parallel to their
+/// forces.
 ///
 /// If too few bonds are left (D λ_min(M) ≤ 0.1) a particle has springs of the same shear modulus instead,
 /// W_I = ½D(D + 2)μ Σ_J ω(|ζ| − |ξ|)². See the guide (*Solids with any Poisson ratio*); the stabilisation is
