@@ -46,8 +46,9 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
     to.add_if(q::DEEPEST_OVERLAP, |m| touching(m).map(|_| deepest_overlap(m)));
     to.add_if(q::CONTACT_SHARE, contact_share);
     if scene.output.contact && contact.has_pairs() {
-        to.add_if(q::PAIR_PRESSURE, |m| {
-            let own = m.tractions().iter().filter(|one| one.surface == contact.surface_names().len());
+        let surfaces = contact.surface_names().len();
+        to.add_if(q::PAIR_PRESSURE, move |m| {
+            let own = m.tractions().iter().filter(|one| one.surface == surfaces);
             m.state.history.last().map(|_| own.map(|one| one.pressure).fold(0.0, f64::max))
         });
     }
