@@ -8,10 +8,11 @@
 //! A face touches a plane as a sphere of the radius r_f about Σ_I w_fI x_I, with r_f = N_f·(X_f − Σ_I w_fI
 //! X_I); on a flat face of a lattice r_f = 0. On a staircase, where Σ_I w_fI X_I lies beside X_f as well, the
 //! weights gain a term, linear across N_f, that shifts it below X_f. No position depends on a rotation, so
-//! forces have an energy and conserve momentum and angular momentum.
+//! forces have an energy and conserve momentum and angular momentum. Beside the edge of a curved side the
+//! sphere would reach beyond the other side there: weights that are linear along N_f as well raise its centre.
 
 use super::face_areas::{FaceAreas, FaceParticle, SMALL};
-use crate::bonds::{BodyGeometry, Bonds};
+use crate::bonds::{BodyGeometry, Bonds, CellGrid};
 use crate::field::Field;
 use crate::material::{BodyTensor, surface_load};
 use crate::parallel;
@@ -21,6 +22,11 @@ use nalgebra::{SMatrix, SVector};
 /// Least variance of the particles along a direction, in squared spacings, for which weights gain a linear
 /// term.
 const FLAT: f64 = 1e-3;
+/// Least radius of a sphere that may reach beyond another side, and distance of that side's faces from its centre,
+/// in spacings.
+const ROUND: f64 = 1e-3;
+const BESIDE: f64 = 2.0;
+
 /// Faces with their weights, face by face and particle by particle.
 #[derive(Clone)]
 pub struct Faces<const D: usize> {
@@ -66,6 +72,8 @@ impl<const D: usize> Faces<D> {
             ends: Vec::new(),
             shares: Vec::new(),
         };
+        let places: Vec<[f64; D]> = surface.faces().iter().map(|face| face.place).collect();
+        let (grid, spacing) = (CellGrid::new(&places, BESIDE * bonds.spacing()), bonds.spacing());
         let mut start = 0;
         for group in below.chunk_by(|a, b| a.face == b.face) {
             let shares = &shares[start..start + group.len()];
@@ -77,7 +85,15 @@ impl<const D: usize> Faces<D> {
             }
             let face = group[0].face as usize;
             let mut weights: Vec<f64> = shares.iter().map(|share| share / area).collect();
-            faces.radii.push(centre(bonds, &surface.faces()[face], group, &mut weights, tied));
+            let own = &surface.faces()[face];
+            let mut radius = centre(bonds, own, group, &mut weights, tied.then_some(0.0));
+            if radius > ROUND * spacing {
+                let room = room(surface, &grid, own, radius, spacing);
+                if room < radius {
+                    radius = centre(bonds, own, group, &mut weights, Some(room));
+                }
+            }
+            faces.radii.push(radius);
             faces.sources.push(face as u32);
             faces.places.push(surface.faces()[face].place);
             faces.normals.push(surface.faces()[face].normal);
@@ -202,14 +218,36 @@ impl<const D: usize> Faces<D> {
     }
 }
 
-/// Adds the term, linear across the normal of the face, that brings Σ w X below the face; returns its depth,
-/// m.
+/// Returns the depth of the lowest centre, m, from which a sphere up to a face reaches beyond no other side of the
+/// body; `radius` if that does.
+fn room<const D: usize>(
+    surface: &BodySurface<D>,
+    grid: &CellGrid<D>,
+    face: &SurfaceFace<D>,
+    radius: f64,
+    spacing: f64,
+) -> f64 {
+    let centre = std::array::from_fn(|d| face.place[d] - radius * face.normal[d]);
+    let mut room = radius;
+    grid.near(centre, BESIDE * spacing, |other| {
+        let other = &surface.faces()[other];
+        let (aside, down) = surface.reach(other, centre);
+        let is_other_side = (0..D).map(|d| other.normal[d] * face.normal[d]).sum::<f64>() < 0.5;
+        if is_other_side && aside < spacing && down > 0.0 {
+            room = room.min(down);
+        }
+    });
+    room
+}
+
+/// Adds the term, linear across the normal of the face, that brings Σ w X below the face; with `depth`, m, linear
+/// along it as well, such that it lies there. Returns its depth, m.
 fn centre<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     face: &SurfaceFace<D>,
     group: &[FaceParticle],
     weights: &mut [f64],
-    tied: bool,
+    depth: Option<f64>,
 ) -> f64 {
     let (spacing, normal) = (bonds.spacing(), SVector::<f64, D>::from(face.normal));
     // mostly near the surface
@@ -221,9 +259,9 @@ fn centre<const D: usize>(
     };
     let aside = |below: &FaceParticle| {
         let from = from(below);
-        if tied { from } else { from - normal * normal.dot(&from) }
+        if depth.is_some() { from } else { from - normal * normal.dot(&from) }
     };
-    let (mut off, mut middle) = (SVector::<f64, D>::zeros(), SVector::<f64, D>::zeros());
+    let (mut off, mut middle) = (normal * (-depth.unwrap_or(0.0) / spacing), SVector::<f64, D>::zeros());
     for ((below, weight), measure) in group.iter().zip(&*weights).zip(&measure) {
         off -= aside(below) * *weight;
         middle += aside(below) * (measure / total);
@@ -312,5 +350,33 @@ mod tests {
     fn thin_walls_have_faces_of_full_area() {
         (2..16).for_each(|layers| check::<2>(layers, 24.0));
         [2, 3, 5, 8].into_iter().for_each(|layers| check::<3>(layers, 17.0));
+    }
+
+    /// Spheres of faces reach beyond no side: a plane at the end of a cylinder touches no face of its round side.
+    #[test]
+    fn spheres_stay_inside_the_body() {
+        for (radius, length) in [(7.5, 12.0), (7.0, 8.0), (11.3, 9.0), (15.0, 30.0)] {
+            let centre = [0.0, 0.0, 0.5 * length];
+            let body = Body::lattice(Shape::Cylinder { centre, axis: 2, length, radius }, 1.0);
+            let bonds = body.build().unwrap();
+            let faces = Faces::new(&bonds, &body.surface(), false);
+            let mut round = 0;
+            for face in 0..faces.len() {
+                let mut below = [0.0; 3];
+                for (site, weight) in faces.below(face) {
+                    let here = bonds.position(site);
+                    (0..3).for_each(|d| below[d] += weight * here[d]);
+                }
+                let (place, normal, size) = (faces.places[face], faces.normals[face], faces.radii[face]);
+                let depth: f64 = (0..3).map(|d| (place[d] - below[d]) * normal[d]).sum();
+                assert!((depth - size).abs() < 1e-9, "{place:?}: centre {depth} below it, radius {size}");
+                if normal[2] == 0.0 {
+                    round += usize::from(size > 0.4);
+                    let room = below[2].min(length - below[2]);
+                    assert!(size <= room + 1e-9, "{place:?}: radius {size}, {room} from an end");
+                }
+            }
+            assert!(round > 16, "{round} spheres");
+        }
     }
 }

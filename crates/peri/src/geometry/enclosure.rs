@@ -78,8 +78,7 @@ impl<const D: usize> Enclosure<D> {
         (0..corners.len()).any(|one| {
             let [low, high] = polycore::numerics::bounds(corners[one].iter().copied());
             let normal = self.facets.normal(one);
-            let mut found = false;
-            self.facets.near(low.map(|x| x - width), high.map(|x| x + width), |other| {
+            self.facets.any_near(low.map(|x| x - width), high.map(|x| x + width), |other| {
                 let back = self.facets.normal(other);
                 let opposed = dot(normal, back) < FACING;
                 let before = |from: usize, to: usize, normal: [f64; D]| {
@@ -88,9 +87,8 @@ impl<const D: usize> Enclosure<D> {
                     };
                     corners[to].iter().any(|corner| offset(corner) > self.near)
                 };
-                found = found || opposed && before(one, other, normal) && before(other, one, back);
-            });
-            found
+                opposed && before(one, other, normal) && before(other, one, back)
+            })
         })
     }
 

@@ -45,35 +45,28 @@ impl<const D: usize> FacetSet<D> {
     pub fn covers(&self, point: [f64; D], reach: f64, walls: &Facets<D>) -> bool {
         let slack = UPRIGHT * reach;
         let (low, high) = (point.map(|x| x - reach), point.map(|x| x + reach));
-        let mut found = false;
-        self.facets.near(low, high, |facet| {
-            if found {
-                return;
-            }
+        self.facets.any_near(low, high, |facet| {
             let corners = &self.facets.corners()[facet];
             let foot = nearest(point, corners);
             let offset: [f64; D] = std::array::from_fn(|d| point[d] - foot[d]);
             let depth = length(offset);
             if depth > reach {
-                return;
+                return false;
             }
             let is_upright = length(along(corners, offset)) <= slack;
             let is_below =
                 is_upright || !self.rim.is_within(foot, slack) && self.is_least(point, foot, depth);
-            found = is_below && !parts(walls, point, foot);
-        });
-        found
+            is_below && !parts(walls, point, foot)
+        })
     }
 
     /// Returns true if no facet at a point `foot` is nearer to a point than `depth`, m.
     fn is_least(&self, point: [f64; D], foot: [f64; D], depth: f64) -> bool {
         let slack = UPRIGHT * depth;
-        let mut least = true;
-        self.facets.near(foot.map(|x| x - slack), foot.map(|x| x + slack), |facet| {
+        !self.facets.any_near(foot.map(|x| x - slack), foot.map(|x| x + slack), |facet| {
             let corners = &self.facets.corners()[facet];
-            least = least && (distance(foot, corners) > slack || distance(point, corners) >= depth - slack);
-        });
-        least
+            distance(foot, corners) <= slack && distance(point, corners) < depth - slack
+        })
     }
 }
 

@@ -36,17 +36,17 @@ impl<const D: usize> Facets<D> {
         facets.bins[..D - 1].fill(along);
         let mut counts = vec![0_u32; facets.bins.iter().product::<usize>() + 1];
         let spans: Vec<[[usize; 2]; D]> = (0..facets.corners.len()).map(|k| facets.span_of(k)).collect();
-        spans.iter().for_each(|span| facets.visit(span, |bin, _| counts[bin + 1] += 1));
+        spans.iter().flat_map(|&span| facets.bins_of(span)).for_each(|(bin, _)| counts[bin + 1] += 1);
         for bin in 1..counts.len() {
             counts[bin] += counts[bin - 1];
         }
         facets.firsts = counts.clone();
         let mut members = vec![0; counts.last().copied().unwrap_or(0) as usize];
-        for (facet, span) in (0_u32..).zip(&spans) {
-            facets.visit(span, |bin, _| {
+        for (facet, &span) in (0_u32..).zip(&spans) {
+            for (bin, _) in facets.bins_of(span) {
                 members[counts[bin] as usize] = facet;
                 counts[bin] += 1;
-            });
+            }
         }
         facets.members = members;
         facets
@@ -70,9 +70,7 @@ impl<const D: usize> Facets<D> {
     /// Returns true if a facet lies within `reach`, m, of a point.
     pub fn is_within(&self, point: [f64; D], reach: f64) -> bool {
         let (low, high) = (point.map(|x| x - reach), point.map(|x| x + reach));
-        let mut found = false;
-        self.near(low, high, |facet| found = found || distance(point, &self.corners[facet]) <= reach);
-        found
+        self.any_near(low, high, |facet| distance(point, &self.corners[facet]) <= reach)
     }
 
     /// Counts how often a ray from a point along the last axis leaves a body within these facets, less how
@@ -118,21 +116,33 @@ impl<const D: usize> Facets<D> {
 
     /// Visits the facets whose boxes meet a box, each once.
     pub(super) fn near(&self, low: [f64; D], high: [f64; D], mut visit: impl FnMut(usize)) {
+        self.any_near(low, high, |facet| {
+            visit(facet);
+            false
+        });
+    }
+
+    /// Returns true if a condition holds for a facet whose box meets a box; asks no other after that.
+    pub(super) fn any_near(
+        &self,
+        low: [f64; D],
+        high: [f64; D],
+        mut holds: impl FnMut(usize) -> bool,
+    ) -> bool {
         let apart = (0..D).any(|d| high[d] < self.low[d] || self.high[d] < low[d]);
         if self.corners.is_empty() || apart {
-            return;
+            return false;
         }
         let range = self.range(low, high);
-        self.visit(&range, |bin, at| {
-            for &facet in &self.members[self.firsts[bin] as usize..self.firsts[bin + 1] as usize] {
+        self.bins_of(range).any(|(bin, at)| {
+            self.members[self.firsts[bin] as usize..self.firsts[bin + 1] as usize].iter().any(|&facet| {
                 let [least, most] = &self.boxes[facet as usize];
                 let meets = (0..D).all(|d| least[d] <= high[d] && low[d] <= most[d]);
                 // in the first of their common bins
-                if meets && (0..D - 1).all(|d| at[d] == self.bin(d, least[d]).max(range[d][0])) {
-                    visit(facet as usize);
-                }
-            }
-        });
+                let first = || (0..D - 1).all(|d| at[d] == self.bin(d, least[d]).max(range[d][0]));
+                meets && first() && holds(facet as usize)
+            })
+        })
     }
 
     /// Bins of a facet along each axis: the first and the last.
@@ -151,14 +161,14 @@ impl<const D: usize> Facets<D> {
         (part.clamp(0.0, 1.0) * self.bins[d] as f64).min(self.bins[d] as f64 - 1.0).max(0.0) as usize
     }
 
-    /// Visits the bins of a range, with their numbers and places.
-    fn visit(&self, range: &[[usize; 2]; D], mut visit: impl FnMut(usize, [usize; D])) {
-        let counts = range.map(|[first, last]| last + 1 - first);
-        for index in 0..counts.iter().product() {
+    /// Bins of a range, with their numbers and places.
+    fn bins_of(&self, range: [[usize; 2]; D]) -> impl Iterator<Item = (usize, [usize; D])> {
+        let (bins, counts) = (self.bins, range.map(|[first, last]| last + 1 - first));
+        (0..counts.iter().product()).map(move |index| {
             let step = super::cell(index, counts);
             let at: [usize; D] = std::array::from_fn(|d| range[d][0] + step[d]);
-            visit((0..D).rev().fold(0, |bin, d| bin * self.bins[d] + at[d]), at);
-        }
+            ((0..D).rev().fold(0, |bin, d| bin * bins[d] + at[d]), at)
+        })
     }
 }
 

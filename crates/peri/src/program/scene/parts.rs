@@ -2,50 +2,35 @@
 
 use super::{DiscreteBody, Scene};
 use crate::bonds::components;
-use crate::geometry::{NearbyGaps, Operation};
-use std::collections::BTreeMap;
+use crate::geometry::Operation;
+use std::collections::{BTreeMap, HashSet};
 
 /// Largest number of parts that `peri check` lists.
 const LISTED: usize = 12;
 
-/// Particles whose bonds may meet a gap, by site.
-struct GapSites(Vec<bool>);
-
-impl GapSites {
-    fn new<const D: usize>(body: &DiscreteBody<D>) -> Self {
-        let mut near = vec![false; body.bonds.sites()];
-        for &site in body.bonds.particles() {
-            near[site as usize] = within(body, site as usize).is_some();
-        }
-        Self(near)
+/// Finds the bonds that cross a gap, as pairs of sites, the lower one first.
+fn crossing<const D: usize>(body: &DiscreteBody<D>) -> HashSet<[usize; 2]> {
+    let (bonds, mut found) = (&*body.bonds, HashSet::new());
+    let reach = bonds.horizon() * (1.0 + 1e-9);
+    for site in bonds.particles().iter().map(|&site| site as usize) {
+        let here = bonds.position(site);
+        let Some(near) = body.gaps.as_ref().and_then(|gaps| gaps.within(here, reach)) else { continue };
+        bonds.neighbours(site, &mut |bond| {
+            if site < bond.site && near.severs(here, bonds.position(bond.site)) {
+                found.insert([site, bond.site]);
+            }
+        });
     }
-
-    /// Returns true if the bond of two sites crosses a gap.
-    fn crosses<const D: usize>(&self, body: &DiscreteBody<D>, site: usize, other: usize) -> bool {
-        let place = |site: usize| body.bonds.position(site);
-        self.0[site] && within(body, site).is_some_and(|near| near.severs(place(site), place(other)))
-    }
-}
-
-/// Selects the gaps within a horizon of a site.
-fn within<const D: usize>(body: &DiscreteBody<D>, site: usize) -> Option<NearbyGaps<'_, D>> {
-    let reach = body.bonds.horizon() * (1.0 + 1e-9);
-    body.gaps.as_ref().and_then(|gaps| gaps.within(body.bonds.position(site), reach))
+    found
 }
 
 /// Warns of bonds between separate parts of a cloud without `bond_gaps`.
 pub(super) fn bonded_parts<const D: usize>(scene: &Scene, body: &DiscreteBody<D>) -> Option<String> {
-    if body.gaps.is_none() || scene.body.bond_gaps.is_some() {
+    // between shapes such bonds are kept only by `bond_gaps`
+    if scene.body.bond_gaps.is_some() || !body.operations.is_empty() {
         return None;
     }
-    let bonds = &*body.bonds;
-    let near = GapSites::new(body);
-    let mut across = 0_u64;
-    for &site in bonds.particles() {
-        bonds.neighbours(site as usize, &mut |bond| {
-            across += u64::from((site as usize) < bond.site && near.crosses(body, site as usize, bond.site));
-        });
-    }
+    let across = crossing(body).len();
     (across > 0).then(|| {
         format!(
             "the points form parts more than 1.5 edges of their cubes apart, joined by {across} bonds: \
@@ -61,8 +46,9 @@ pub(super) fn explain<const D: usize>(body: &DiscreteBody<D>) -> Vec<String> {
         return Vec::new();
     }
     let bonds = &*body.bonds;
-    let near = GapSites::new(body);
-    let roots = components(bonds, |site, other| !near.crosses(body, site, other));
+    let crossing = crossing(body);
+    let crosses = |site: usize, other: usize| crossing.contains(&[site.min(other), site.max(other)]);
+    let roots = components(bonds, |site, other| !crosses(site, other));
     let mut parts: BTreeMap<u32, (usize, Vec<bool>)> = BTreeMap::new();
     let mut bridges: BTreeMap<[u32; 2], u64> = BTreeMap::new();
     for &site in bonds.particles() {
@@ -73,7 +59,7 @@ pub(super) fn explain<const D: usize>(body: &DiscreteBody<D>) -> Vec<String> {
             *of |= matches!(operation, Operation::Add(shape) if shape.contains(here));
         }
         bonds.neighbours(site as usize, &mut |bond| {
-            if (site as usize) < bond.site && near.crosses(body, site as usize, bond.site) {
+            if (site as usize) < bond.site && crosses(site as usize, bond.site) {
                 let other = roots[bond.site];
                 *bridges.entry([root.min(other), root.max(other)]).or_default() += 1;
             }
