@@ -15,6 +15,20 @@ use crate::stamp::{SourceStamp, sources};
 use crate::table::print;
 use crate::workspace::Repository;
 
+/// Arguments that choose targets.
+const TARGETS: [&str; 10] = [
+    "--lib",
+    "--bin",
+    "--bins",
+    "--test",
+    "--tests",
+    "--doc",
+    "--example",
+    "--examples",
+    "--bench",
+    "--all-targets",
+];
+
 /// Environment variable that crate `evidence` reads.
 const FOLDER: &str = "EVIDENCE_FOLDER";
 
@@ -93,8 +107,20 @@ pub fn run(workspace: &Repository, arguments: &[String]) -> Result<bool> {
     let folder = workspace.results("evidence")?;
     fs::remove_dir_all(&folder).into_diagnostic()?;
     fs::create_dir_all(&folder).into_diagnostic()?;
-    let command = ["test", "--release", "--workspace"];
-    let passed = workspace.cargo(&command, arguments, &[(FOLDER, &folder)])?;
+    let chosen = arguments.iter().take_while(|argument| *argument != "--").any(|argument| {
+        let name = argument.split('=').next().unwrap_or_default();
+        TARGETS.contains(&name)
+    });
+    // without the examples, which tests include: each would compile the solvers again
+    let mut runs: &[&[&str]] = if chosen { &[&[]] } else { &[&["--lib", "--bins", "--tests"], &["--doc"]] };
+    if arguments.iter().any(|argument| argument == "--no-run") {
+        runs = &runs[..1];
+    }
+    let mut passed = true;
+    for targets in runs {
+        let command = [&["test", "--release", "--workspace"], *targets].concat();
+        passed &= workspace.cargo(&command, arguments, &[(FOLDER, &folder)])?;
+    }
     let (new, skips) = collect(&folder)?;
     // a selection of tests keeps the numbers of the others
     let before = if arguments.is_empty() { Records::new() } else { read(workspace) };

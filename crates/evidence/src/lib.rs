@@ -15,6 +15,31 @@ use std::path::Path;
 
 use serde_json::{Map, Value, json};
 
+/// Runs the examples of a package as tests, one each, where it includes them as modules: compiled together they
+/// take as long as one of them. The last test finds those that are missing; `except` names those that read
+/// arguments.
+#[macro_export]
+macro_rules! run_examples {
+    ($($name:ident)*; except $($other:ident)*) => {
+        $(
+            #[test]
+            fn $name() -> impl std::process::Termination {
+                $name::main()
+            }
+        )*
+
+        #[test]
+        fn every_example_runs() {
+            let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/examples");
+            let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+            let mut found: Vec<String> =
+                files.map(|file| file.file_stem().unwrap().to_str().unwrap().to_owned()).collect();
+            found.sort();
+            assert_eq!(found, { let mut all = vec![$(stringify!($name),)* $(stringify!($other),)*]; all.sort(); all });
+        }
+    };
+}
+
 /// Environment variable with the folder of the records.
 pub const FOLDER: &str = "EVIDENCE_FOLDER";
 

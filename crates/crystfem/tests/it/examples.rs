@@ -1,13 +1,30 @@
-//! Results of the examples.
+//! Example programs: each runs to its end, and some results.
 
+#[path = "../../examples/cooling.rs"]
+mod cooling;
+#[path = "../../examples/cooling_block.rs"]
+mod cooling_block;
 #[path = "../../examples/fit_kinetics.rs"]
 mod fit_kinetics;
 #[path = "../../examples/healing.rs"]
 mod healing;
 #[path = "../../examples/print_gcode.rs"]
 mod print_gcode;
+#[path = "../../examples/printed_bar.rs"]
+mod printed_bar;
 #[path = "../../examples/stress_and_warpage.rs"]
 mod stress_and_warpage;
+
+evidence::run_examples!(
+    cooling
+    cooling_block
+    fit_kinetics
+    healing
+    print_gcode
+    printed_bar
+    stress_and_warpage
+    ; except
+);
 
 /// The true constants are recovered.
 #[test]

@@ -71,24 +71,52 @@ impl FaceAreas {
     }
 }
 
-/// Lists the particles in walls that are thin along an axis, ascending, with the area of the faces above them
-/// that point along it (`sign` 1) or against it (−1), projected on it, m²; `load` as in [`FaceAreas::new`].
-pub fn thin_wall_areas<const D: usize>(
+/// Depth below a side from which a face parallel to it is no part of the side, in spacings.
+const STEP: f64 = 0.5;
+
+/// Areas of a side, m²: of the particles whose area vector is not that of the side alone, ascending; and of the
+/// whole side where slots and steps lie below it.
+pub struct SideAreas {
+    pub shared: Vec<(u32, f64)>,
+    pub whole: Option<f64>,
+}
+
+/// Computes the areas of the side that points along an axis (`sign` 1) or against it (−1). In walls that are thin
+/// along it particles have the share of the faces above them, slanted and curved ones by their projection. The
+/// floors of slots and steps, flat faces below the outermost flat one, are no part of a side, unless faces are
+/// those of cells (`smooth` false): these are steps everywhere. `load` as in [`FaceAreas::new`].
+pub fn side_areas<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     surface: &BodySurface<D>,
     load: &Field<D>,
     (axis, sign): (usize, f64),
-) -> Vec<(u32, f64)> {
-    let FaceAreas { below, shares, .. } = FaceAreas::new(bonds, surface, load);
-    let along = |below: &FaceParticle| sign * surface.faces()[below.face as usize].normal[axis];
-    let mut areas: Vec<(u32, f64, bool)> = Vec::with_capacity(below.len());
-    for (below, share) in below.iter().zip(shares) {
-        let along = along(below);
-        areas.push((below.site, share * along.max(0.0), below.thin && along.abs() > 0.5));
+    smooth: bool,
+) -> SideAreas {
+    let FaceAreas { below, shares, typical } = FaceAreas::new(bonds, surface, load);
+    let along = |face: u32| sign * surface.faces()[face as usize].normal[axis];
+    let height = |face: u32| sign * surface.faces()[face as usize].place[axis];
+    let upwards = || (0..surface.faces().len() as u32).filter(|&face| along(face) > 0.5);
+    let flat = || upwards().filter(|&face| along(face) > 0.999);
+    let top = flat().map(height).fold(f64::NEG_INFINITY, f64::max);
+    let is_floor = |face: u32| smooth && along(face) > 0.999 && height(face) < top - STEP * bonds.spacing();
+    let mut entries: Vec<(&FaceParticle, f64)> = below.iter().zip(shares).collect();
+    entries.sort_by_key(|(below, _)| below.site);
+    let mut shared = Vec::new();
+    for same in entries.chunk_by(|a, b| a.0.site == b.0.site) {
+        let above = same.iter().filter(|(below, _)| along(below.face) > 0.5);
+        let nearest = above.min_by(|a, b| a.0.depth.total_cmp(&b.0.depth));
+        if nearest.is_some_and(|(below, _)| is_floor(below.face)) {
+            shared.push((same[0].0.site, 0.0));
+        } else if same.iter().any(|(below, _)| below.thin && along(below.face).abs() > 0.5) {
+            let own = same.iter().filter(|(below, _)| !is_floor(below.face));
+            let area = own.map(|(below, share)| share * along(below.face).max(0.0)).sum();
+            shared.push((same[0].0.site, area));
+        }
     }
-    areas.sort_by_key(|area| area.0);
-    let sites = areas.chunk_by(|a, b| a.0 == b.0).filter(|same| same.iter().any(|area| area.2));
-    sites.map(|same| (same[0].0, same.iter().map(|area| area.1).sum())).collect()
+    // one flat face above each column of the lattice
+    let count = flat().filter(|&face| !is_floor(face)).count();
+    let has_floors = flat().any(is_floor) && upwards().count() == flat().count();
+    SideAreas { shared, whole: has_floors.then_some(count as f64 * typical) }
 }
 
 /// Computes the side area of a particle, m²: its volume over the spacing.

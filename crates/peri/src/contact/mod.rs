@@ -53,7 +53,7 @@ use crate::error::Error;
 use crate::field::{CHUNK, Field};
 use crate::parallel;
 use crate::surface::BodySurface;
-pub(crate) use face_areas::{DEPTH, thin_wall_areas};
+pub(crate) use face_areas::{DEPTH, SideAreas, side_areas};
 pub(crate) use faces::Faces;
 pub use friction::SlidingFriction;
 pub use friction_pair::{ContactPair, Drag, FrictionPair};

@@ -159,3 +159,22 @@ pictures = false
     assert_eq!(plain.0, ["foot", "right"]);
     assert_eq!(reactions("displacement = [\"free\", \"free\"]\n"), plain);
 }
+
+/// A plane that stands inside the body at the start brings energy that its motion does not account for.
+#[test]
+fn energy_without_work_is_reported() {
+    let press = |depth: &str| {
+        format!(
+            "[[boundary]]\nname = \"guide\"\nside = \"y-\"\ndisplacement = [\"free\", \"0 mm\"]\n\
+             [contact]\nstiffness = 0\n[[contact.plane]]\nname = \"press\"\npoint = [\"{depth}\", \"0 mm\"]\n\
+             normal = [-1, 0]\ndisplacement = [\"-0.1 mm\", \"0 mm\"]\n\
+             [solver]\nmethod = \"lbfgs\"\nsteps = 2\n[output]\npictures = false\nfields = false\n"
+        )
+    };
+    for (depth, warns) in [("20 mm", false), ("19.7 mm", true)] {
+        let directory = tempfile::tempdir().unwrap();
+        let finished = solve(&strip(RUBBER, &press(depth)), directory.path());
+        let warnings = finished.outcomes[0].warnings.join("\n");
+        assert_eq!(warnings.contains("step 1: the body stores"), warns, "{warnings}");
+    }
+}

@@ -16,6 +16,7 @@ mod curves;
 mod dynamics;
 mod enclosures;
 mod equilibria;
+mod examples;
 mod fields;
 mod filter;
 mod forces;

@@ -127,7 +127,28 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
 /// Largest share of the dissipated energy by which stored and dissipated energy may miss the work.
 const LARGEST_MISS: f64 = 0.1;
 
-/// Warns of increments too long for the energies of branches, and of a stiffness asked for across a fall.
+/// Part of the greatest work by which the stored energy of equilibria may exceed the work of the loads: a third in
+/// the first step where the load grows as the root of the displacement.
+const LARGEST_EXCESS: f64 = 0.5;
+
+/// Returns the first row of equilibria whose stored energy exceeds the work of the loads, and the excess, J.
+fn excess<const D: usize>(m: &Moment<D>) -> Option<(usize, f64)> {
+    if m.scene.dynamics.is_some() || m.scene.material.is_prestrained() {
+        return None;
+    }
+    let mut greatest = 0.0_f64;
+    m.state.history.iter().enumerate().find_map(|(step, row)| {
+        greatest = greatest.max(row.work.abs());
+        let excess = row.stored - row.work;
+        // a rigid motion stores what rounding leaves
+        let is_deformed = (row.largest_stretch - 1.0).abs() > 1e-9;
+        let exceeds = row.dissipated == 0.0 && is_deformed && excess > LARGEST_EXCESS * greatest;
+        exceeds.then_some((step + 1, excess))
+    })
+}
+
+/// Warns of increments too long for the energies of branches, of a stiffness asked for across a fall, and of
+/// energy that no load has brought.
 pub(super) fn warnings<const D: usize>(m: &Moment<D>) -> Vec<String> {
     let reached = |at: &f64| m.state.history.iter().any(|row| row.displacement >= *at * (1.0 - 1e-12));
     let asked = m.scene.output.stiffness_at.iter().map(|at| at.si()).filter(reached);
@@ -153,6 +174,13 @@ pub(super) fn warnings<const D: usize>(m: &Moment<D>) -> Vec<String> {
             damped_energy(row, false).abs()
         )
     };
+    let unbrought = excess(m).map(|(step, excess)| {
+        format!(
+            "step {step}: the body stores {excess:.2e} J more than the work of the loads: it was under stress \
+             at the start, or has left its path for another equilibrium; look at its picture, take more `steps`"
+        )
+    });
+    let fallen = fallen.chain(unbrought);
     fallen.chain(several).chain(off.filter(|row| row.dissipated > 0.0).map(warning)).collect()
 }
 

@@ -206,15 +206,13 @@ fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         let why = "needs [contact] of particles, a [[contact.plane]] or a [[contact.indenter]]";
         return Err(source.unexpected("output.contact", why));
     }
-    let named = |name: &String| name == PARTICLES;
     let names = scene.contact.as_ref().map_or_else(Vec::new, ContactSpec::surface_names);
-    if scene.output.contact && names.iter().any(named) {
-        let found = format!("a plane or an indenter named `{PARTICLES}`");
-        return Err(source.error(
-            "output.contact",
-            found,
-            "another name: particles that touch have this one",
-        ));
+    // names of files and of the scalar `contact_pressure` of particles that touch
+    let taken = names.iter().find(|name| [PARTICLES, "contact"].contains(&name.as_str()));
+    if let Some(name) = taken.filter(|_| scene.output.contact) {
+        let found = format!("a plane or an indenter named `{name}`");
+        let allowed = "another name: particles that touch have this one";
+        return Err(source.error("output.contact", found, allowed));
     }
     super::picture_state::check(source, scene)?;
     if scene.output.animation.is_some() && !(scene.output.fields && scene.output.every.is_some()) {

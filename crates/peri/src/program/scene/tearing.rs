@@ -117,7 +117,7 @@ fn strength(source: &Source, scene: &Scene, key: &str, critical: &Critical) -> R
     if material.law != Some(Law::Linear) {
         return Err(source.unexpected(&key, "only for `law = \"linear\"` or [material.solid]"));
     }
-    if critical.kink.is_some() && key.starts_with("interface") {
+    if critical.kink.is_some() && !key.starts_with("material.critical") {
         let key = key.replace(".strength", ".kink");
         return Err(source.unexpected(&key, "bonds of one body have the kink of `material.critical`"));
     }

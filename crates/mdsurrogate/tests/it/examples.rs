@@ -1,0 +1,6 @@
+//! Example programs: each runs to its end.
+
+#[path = "../../examples/train.rs"]
+mod train;
+
+evidence::run_examples!(train; except predict);
