@@ -226,8 +226,8 @@ fn rust_examples_are_doctests_or_programs() {
         let marker = before.trim_end().lines().next_back().and_then(|line| line.strip_prefix("<!-- file: "));
         if let Some(file) = marker.and_then(|rest| rest.strip_suffix(" -->")) {
             let text = fs::read_to_string(workspace().join(file)).unwrap();
-            // public for the tests that include it
-            let text = text.replace("\npub fn main", "\nfn main");
+            // visible to the tests that include it
+            let text = text.replace("\npub(crate) fn main", "\nfn main");
             assert!(file.contains("/examples/") && text.trim_end() == fence, "{file}");
             programs += 1;
             continue;

@@ -3,7 +3,7 @@
 use crystfem::kinetics::{KineticConstants, Kinetics, cooling_curve};
 use crystfem::melting::Melting;
 
-pub fn main() -> Result<(), crystfem::Error> {
+pub(crate) fn main() -> Result<(), crystfem::Error> {
     let kinetics = Kinetics::new(KineticConstants::TABLE_4_1_COLUMN_1)?;
     for rate in [1.0, 2.0, 10.0] {
         let curve = cooling_curve(&kinetics, rate / 60.0, 473.15, 373.15, 0.0, 2);

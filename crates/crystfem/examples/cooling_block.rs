@@ -7,7 +7,7 @@ use crystfem::problem::Problem;
 use crystfem::simulation::{Settings, Simulation};
 use std::sync::Arc;
 
-pub fn main() -> Result<(), crystfem::Error> {
+pub(crate) fn main() -> Result<(), crystfem::Error> {
     let (density, conductivity, specific_heat) = (1010.0, 0.25, 2200.0);
     let material = Conductor::new(
         density,

@@ -23,7 +23,7 @@ pub fn fitted() -> Result<KineticFit, crystfem::Error> {
 }
 
 #[allow(dead_code, reason = "the tests include this file and call what it shows")]
-pub fn main() -> Result<(), crystfem::Error> {
+pub(crate) fn main() -> Result<(), crystfem::Error> {
     let fit = fitted()?;
     for constant in &fit.estimates {
         println!("{:16} {:.6e} {}", constant.name, constant.value, constant.unit);

@@ -28,7 +28,7 @@ pub fn healed(interval: f64) -> Result<Option<[f64; 2]>, crystfem::Error> {
 }
 
 #[allow(dead_code, reason = "the tests include this file and call what it shows")]
-pub fn main() -> Result<(), crystfem::Error> {
+pub(crate) fn main() -> Result<(), crystfem::Error> {
     for interval in [2.0, 10.0, 50.0] {
         println!("a layer every {interval:2} s: least and mean degree of healing {:.3?}", healed(interval)?);
     }

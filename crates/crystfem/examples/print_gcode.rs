@@ -30,7 +30,7 @@ pub fn printed(later: f64) -> Result<Simulation, crystfem::Error> {
 }
 
 #[allow(dead_code, reason = "the tests include this file and call what it shows")]
-pub fn main() -> Result<(), crystfem::Error> {
+pub(crate) fn main() -> Result<(), crystfem::Error> {
     for later in [1.0, 10.0, 100.0] {
         let (simulation, top) = (printed(later)?, [5e-3, 3e-3, 0.9e-3]);
         let (kelvin, alpha) = (simulation.temperature_at(top), simulation.field_at("alpha", top));

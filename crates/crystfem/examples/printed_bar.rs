@@ -6,7 +6,7 @@ use crystfem::mesh::{Bar, Substrate};
 use crystfem::printed::PrintedPart;
 use crystfem::simulation::Settings;
 
-pub fn main() -> Result<(), crystfem::Error> {
+pub(crate) fn main() -> Result<(), crystfem::Error> {
     let (plate, air) = (353.15, 353.15);
     let glass = Conductor::new(2500.0, ThermalProperty::Constant(1.0), ThermalProperty::Constant(800.0))?;
     let substrate = Substrate { size: [30e-3, 20e-3], thickness: 4e-3, growth: 1.6 };

@@ -26,7 +26,7 @@ pub fn bar() -> Result<[f64; 3], crystfem::Error> {
 }
 
 #[allow(dead_code, reason = "the tests include this file and call what it shows")]
-pub fn main() -> Result<(), crystfem::Error> {
+pub(crate) fn main() -> Result<(), crystfem::Error> {
     let [on_bed, released, warpage] = bar()?;
     println!("largest Mises stress {:.2} MPa on the bed, {:.2} MPa released", on_bed / 1e6, released / 1e6);
     println!("warpage of the bed side {:.1} µm", warpage * 1e6);

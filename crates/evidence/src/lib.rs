@@ -15,9 +15,9 @@ use std::path::Path;
 
 use serde_json::{Map, Value, json};
 
-/// Runs the examples of a package as tests, one each, where it includes them as modules: compiled together they
-/// take as long as one of them. The last test finds those that are missing; `except` names those that read
-/// arguments.
+/// Runs the examples of a package as tests, one each, where it includes them as modules: compiled together
+/// they take as long as one of them. The last test finds those that are missing; `except` names those that
+/// read arguments.
 #[macro_export]
 macro_rules! run_examples {
     ($($name:ident)*; except $($other:ident)*) => {
@@ -35,7 +35,9 @@ macro_rules! run_examples {
             let mut found: Vec<String> =
                 files.map(|file| file.file_stem().unwrap().to_str().unwrap().to_owned()).collect();
             found.sort();
-            assert_eq!(found, { let mut all = vec![$(stringify!($name),)* $(stringify!($other),)*]; all.sort(); all });
+            let mut all = vec![$(stringify!($name),)* $(stringify!($other),)*];
+            all.sort();
+            assert_eq!(found, all);
         }
     };
 }

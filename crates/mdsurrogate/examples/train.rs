@@ -11,7 +11,7 @@ use polycore::constitutive::surrogate::{Kind, Symmetry};
 use polycore::constitutive::verify::{Deviations, deformations};
 use polycore::tensor::{DeformationGradient, Tensor, voigt};
 
-pub fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     // deformations with strains of some per cent, and the Cauchy stress of a neo-Hookean solid
     let truth = Compressible::new(NeoHookean::new(1e6)?, Volumetric::Logarithmic { lame: 2e6 })?;
     let mut random = SplitMix64::new(1);

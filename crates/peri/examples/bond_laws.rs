@@ -2,7 +2,7 @@
 
 use peri::potential::{Chain, Law};
 
-pub fn main() -> Result<(), peri::Error> {
+pub(crate) fn main() -> Result<(), peri::Error> {
     let (links, dissociation) = (720.0, 1200.0);
     println!("{:<14} {:>8} {:>9} {:>9} {:>9}", "law", "t′(1)", "t(1.2)", "t(2)", "t(2.94)");
     for law in Law::ALL {

@@ -6,7 +6,7 @@ use peri::model::{Body, Model, Rubber};
 use peri::potential::Law;
 use peri::solver::{DynamicRelaxation, Support};
 
-pub fn main() -> Result<(), peri::Error> {
+pub(crate) fn main() -> Result<(), peri::Error> {
     // 20 mm across, 1 mm thick; the upper plane comes down by 2 mm in four steps
     let body = Body::lattice(Shape::Ball { centre: [0.0; 2], radius: 10e-3 }, 0.5e-3).plane_strain(1e-3);
     let lower = RigidSurface::plane([0.0, -10e-3], [0.0, 1.0]);

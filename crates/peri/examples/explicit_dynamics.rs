@@ -8,7 +8,7 @@ use peri::potential::Law;
 use peri::probe::{WaveFront, crossing};
 use peri::solver::{Support, VelocityVerlet};
 
-pub fn main() -> Result<(), peri::Error> {
+pub(crate) fn main() -> Result<(), peri::Error> {
     // 200 mm × 12 mm; the left end is pulled by 0.1 mm in 2 ms
     let (density, youngs_modulus, spacing) = (1100.0, 1e6, 2e-3);
     let body = Body::lattice(Shape::rectangle([0.0, 0.0], [200e-3, 12e-3]), spacing).plane_stress(1e-3);

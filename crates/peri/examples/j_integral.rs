@@ -8,7 +8,7 @@ use peri::model::{Body, Model};
 use peri::probe::JIntegral;
 use peri::solver::Lbfgs;
 
-pub fn main() -> Result<(), peri::Error> {
+pub(crate) fn main() -> Result<(), peri::Error> {
     let (height, shear, stretch) = (40e-3, 0.4e6, 1.5_f64);
     let strip = Shape::rectangle([-80e-3, -26e-3], [80e-3, 26e-3]);
     let crack = Cut::segment([-81e-3, 0.0], [0.0, 0.0]);

@@ -131,7 +131,7 @@ pub fn poisson_ratio(solid: LinearSolid) -> Result<f64, peri::Error> {
 }
 
 #[allow(dead_code, reason = "the tests include this file and call what it shows")]
-pub fn main() -> Result<(), peri::Error> {
+pub(crate) fn main() -> Result<(), peri::Error> {
     for bulk in [2.0, 4.0, 19.0] {
         let exact = (bulk - 1.0) / (bulk + 1.0);
         let found = poisson_ratio(LinearSolid { bulk: bulk.into(), shear: 1.0.into() })?;

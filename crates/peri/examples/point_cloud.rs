@@ -6,7 +6,7 @@ use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{Lbfgs, Loads, Method, State, Support, System};
 
-pub fn main() -> Result<(), peri::Error> {
+pub(crate) fn main() -> Result<(), peri::Error> {
     // 40 × 12 points 1 mm apart, each shifted by up to 0.2 mm; 1 mm thick
     let (thickness, horizon, youngs_modulus) = (1e-3, 3.015e-3, 1e6);
     let shift = |k: usize, step: f64| 0.4e-3 * ((k as f64 * step).fract() - 0.5);

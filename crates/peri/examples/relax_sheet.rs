@@ -9,7 +9,7 @@ use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric}
 use polycore::constitutive::viscoelastic::{Branch, Spring, Viscoelastic, Viscosity};
 use std::sync::Arc;
 
-pub fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     // 0.4 MPa in equilibrium, a branch of 0.8 MPa that relaxes in 1 s
     let rubber = Compressible::new(NeoHookean::new(4e5)?, Volumetric::Ciarlet { lame: 4e7 })?;
     let branch = Branch::new(Spring::NeoHookean(NeoHookean::new(8e5)?), Viscosity::Constant(8e5))?;

@@ -26,7 +26,7 @@ pub fn apparent_modulus(width: f64, height: f64, spacing: f64, bulk: f64) -> Res
 }
 
 #[allow(dead_code, reason = "the tests include this file and call what it shows")]
-pub fn main() -> Result<(), peri::Error> {
+pub(crate) fn main() -> Result<(), peri::Error> {
     let (height, shear) = (8e-3, 0.4e6);
     println!("width/height   apparent modulus   4μ(1 + S²) in series with K");
     for ratio in [1.0, 2.0, 4.0] {

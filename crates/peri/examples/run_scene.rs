@@ -26,7 +26,7 @@ pictures = false
 fields = false
 "#;
 
-pub fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let directory = std::env::temp_dir().join(format!("run-scene-{}", std::process::id()));
     let source = Source::new("strip.toml", SCENE);
     let finished = case::run::<Peri>(&source, Options::new(&directory))?;

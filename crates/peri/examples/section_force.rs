@@ -6,7 +6,7 @@ use peri::potential::Law;
 use peri::probe::Section;
 use peri::solver::Lbfgs;
 
-pub fn main() -> Result<(), peri::Error> {
+pub(crate) fn main() -> Result<(), peri::Error> {
     // 40 mm × 8 mm × 1 mm, particles 1 mm apart; the left end is clamped, the right end moves down by 2 mm
     let body = Body::lattice(Shape::rectangle([0.0, 0.0], [40e-3, 8e-3]), 1e-3).plane_stress(1e-3);
     let model = Model::new(body, Rubber::new(Law::ChainOffset, 1e6))

@@ -5,7 +5,7 @@ use peri::model::{Body, Model, Rubber};
 use peri::potential::Law;
 use peri::solver::Lbfgs;
 
-pub fn main() -> Result<(), peri::Error> {
+pub(crate) fn main() -> Result<(), peri::Error> {
     // 60 mm × 40 mm × 1 mm, particles 2 mm apart; a slot of 20 mm from the left edge, as wide as the horizon
     let sheet = Shape::rectangle([0.0, 0.0], [60e-3, 40e-3]);
     let slot = Shape::rectangle([0.0, 16e-3], [20e-3, 24e-3]);

@@ -3,7 +3,7 @@
 use harness::output::vtkhdf::ParticleSeries;
 use peri::prelude::*;
 
-pub fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     // a block of 20 mm × 10 mm × 10 mm, K/μ = 25, pulled to 1.5 times its length in 5 steps
     let body = Body::lattice(Shape::cuboid([0.0; 3], [20e-3, 10e-3, 10e-3]), 1e-3);
     let model = Model::new(body, EightChainSolid::new(Space::Solid, 0.4e6, 25.0, 10e6)?)

@@ -74,17 +74,18 @@ impl FaceAreas {
 /// Depth below a side from which a face parallel to it is no part of the side, in spacings.
 const STEP: f64 = 0.5;
 
-/// Areas of a side, m²: of the particles whose area vector is not that of the side alone, ascending; and of the
-/// whole side where slots and steps lie below it.
+/// Areas of a side, m²: of the particles whose area vector is not that of the side alone, ascending; and of
+/// the whole side where slots and steps lie below it.
 pub struct SideAreas {
     pub shared: Vec<(u32, f64)>,
     pub whole: Option<f64>,
 }
 
-/// Computes the areas of the side that points along an axis (`sign` 1) or against it (−1). In walls that are thin
-/// along it particles have the share of the faces above them, slanted and curved ones by their projection. The
-/// floors of slots and steps, flat faces below the outermost flat one, are no part of a side, unless faces are
-/// those of cells (`smooth` false): these are steps everywhere. `load` as in [`FaceAreas::new`].
+/// Computes the areas of the side that points along an axis (`sign` 1) or against it (−1). In walls that are
+/// thin along it particles have the share of the faces above them, slanted and curved ones by their
+/// projection. The floors of slots and steps, flat faces below the outermost flat one, are no part of a side,
+/// unless faces are those of cells (`smooth` false): these are steps everywhere. `load` as in
+/// [`FaceAreas::new`].
 pub fn side_areas<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     surface: &BodySurface<D>,

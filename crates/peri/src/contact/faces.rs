@@ -9,7 +9,8 @@
 //! X_I); on a flat face of a lattice r_f = 0. On a staircase, where Σ_I w_fI X_I lies beside X_f as well, the
 //! weights gain a term, linear across N_f, that shifts it below X_f. No position depends on a rotation, so
 //! forces have an energy and conserve momentum and angular momentum. Beside the edge of a curved side the
-//! sphere would reach beyond the other side there: weights that are linear along N_f as well raise its centre.
+//! sphere would reach beyond the other side there: weights that are linear along N_f as well raise its
+//! centre.
 
 use super::face_areas::{FaceAreas, FaceParticle, SMALL};
 use crate::bonds::{BodyGeometry, Bonds, CellGrid};
@@ -22,8 +23,8 @@ use nalgebra::{SMatrix, SVector};
 /// Least variance of the particles along a direction, in squared spacings, for which weights gain a linear
 /// term.
 const FLAT: f64 = 1e-3;
-/// Least radius of a sphere that may reach beyond another side, and distance of that side's faces from its centre,
-/// in spacings.
+/// Least radius of a sphere that may reach beyond another side, and distance of that side's faces from its
+/// centre, in spacings.
 const ROUND: f64 = 1e-3;
 const BESIDE: f64 = 2.0;
 /// Height over the spacing, and 1 − cosine, of two sides that meet in an edge or are one.
@@ -220,9 +221,9 @@ impl<const D: usize> Faces<D> {
     }
 }
 
-/// Returns the depth of the lowest centre, m, from which a sphere up to a face reaches beyond no other side of the
-/// body; `radius` if that does. Below a side whose normal has the cosine c with that of the face, and h above the
-/// place of the face, a sphere of the radius d fits for d ≤ h/(1 − c).
+/// Returns the depth of the lowest centre, m, from which a sphere up to a face reaches beyond no other side
+/// of the body; `radius` if that does. Below a side whose normal has the cosine c with that of the face, and
+/// h above the place of the face, a sphere of the radius d fits for d ≤ h/(1 − c).
 fn room<const D: usize>(
     surface: &BodySurface<D>,
     grid: &CellGrid<D>,
@@ -303,8 +304,8 @@ fn centre<const D: usize>(
     -bonds.spacing() * below
 }
 
-/// Raises Σ w X from one depth below the face to another, m, by a term linear along the normal; returns its depth:
-/// the old one where all particles lie at one.
+/// Raises Σ w X from one depth below the face to another, m, by a term linear along the normal; returns its
+/// depth: the old one where all particles lie at one.
 fn raise<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     face: &SurfaceFace<D>,
@@ -396,8 +397,8 @@ mod tests {
         [2, 3, 5, 8].into_iter().for_each(|layers| check::<3>(layers, 17.0));
     }
 
-    /// Spheres of faces reach beyond no other side: a plane along one side touches no face of another, at edges of
-    /// any angle.
+    /// Spheres of faces reach beyond no other side: a plane along one side touches no face of another, at
+    /// edges of any angle.
     #[test]
     fn spheres_stay_inside_the_body() {
         fn check<const D: usize>(name: &str, body: &Body<D>) {

@@ -60,8 +60,8 @@ pub struct StepRecord {
 type RecordScalar = (&'static str, &'static str, fn(&StepRecord) -> f64);
 
 impl StepRecord {
-    /// Number of the row with the greatest load of either sign; the positive one of a cycle whose peaks are equal to
-    /// 0.1 %.
+    /// Number of the row with the greatest load of either sign; the positive one of a cycle whose peaks are
+    /// equal to 0.1 %.
     pub fn peak(history: &[Self]) -> Option<usize> {
         let by_load = |&a: &usize, &b: &usize| history[a].load.total_cmp(&history[b].load);
         let (least, greatest) = ((0..history.len()).min_by(by_load)?, (0..history.len()).max_by(by_load)?);

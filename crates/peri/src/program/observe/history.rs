@@ -127,8 +127,8 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
 /// Largest share of the dissipated energy by which stored and dissipated energy may miss the work.
 const LARGEST_MISS: f64 = 0.1;
 
-/// Part of the greatest work by which the stored energy of equilibria may exceed the work of the loads: a third in
-/// the first step where the load grows as the root of the displacement.
+/// Part of the greatest work by which the stored energy of equilibria may exceed the work of the loads: a
+/// third in the first step where the load grows as the root of the displacement.
 const LARGEST_EXCESS: f64 = 0.5;
 
 /// Returns the first row of equilibria whose stored energy exceeds the work of the loads, and the excess, J.
@@ -176,8 +176,9 @@ pub(super) fn warnings<const D: usize>(m: &Moment<D>) -> Vec<String> {
     };
     let unbrought = excess(m).map(|(step, excess)| {
         format!(
-            "step {step}: the body stores {excess:.2e} J more than the work of the loads: it was under stress \
-             at the start, or has left its path for another equilibrium; look at its picture, take more `steps`"
+            "step {step}: the body stores {excess:.2e} J more than the work of the loads: it was under \
+             stress at the start, or has left its path for another equilibrium; look at its picture, take \
+             more `steps`"
         )
     });
     let fallen = fallen.chain(unbrought);

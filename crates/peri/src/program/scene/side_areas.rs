@@ -15,8 +15,8 @@ const REACH: f64 = 2.0;
 
 /// Returns the particles within two horizons of a side with the area of the side over their volume, 1/m: the
 /// component n·h_I/V_I of the area vectors ([`surface_load`]), in thin walls the share of the faces of this
-/// side. Floors of slots and steps have none; beside their walls, area vectors are too large: there all are scaled
-/// to the area of the side.
+/// side. Floors of slots and steps have none; beside their walls, area vectors are too large: there all are
+/// scaled to the area of the side.
 ///
 /// # Errors
 /// A thin cloud, which has no faces; a side without area.
