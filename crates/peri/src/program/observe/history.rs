@@ -131,6 +131,9 @@ const LARGEST_MISS: f64 = 0.1;
 /// third in the first step where the load grows as the root of the displacement.
 const LARGEST_EXCESS: f64 = 0.5;
 
+/// Largest stretch less 1 up to which a body moves as a whole.
+const DEFORMED: f64 = 1e-4;
+
 /// Returns the first row of equilibria whose stored energy exceeds the work of the loads, and the excess, J.
 fn excess<const D: usize>(m: &Moment<D>) -> Option<(usize, f64)> {
     if m.scene.dynamics.is_some() || m.scene.material.is_prestrained() {
@@ -140,8 +143,8 @@ fn excess<const D: usize>(m: &Moment<D>) -> Option<(usize, f64)> {
     m.state.history.iter().enumerate().find_map(|(step, row)| {
         greatest = greatest.max(row.work.abs());
         let excess = row.stored - row.work;
-        // a rigid motion stores what rounding leaves
-        let is_deformed = (row.largest_stretch - 1.0).abs() > 1e-9;
+        // a rigid motion stores what the tolerance leaves
+        let is_deformed = (row.largest_stretch - 1.0).abs() > DEFORMED;
         let exceeds = row.dissipated == 0.0 && is_deformed && excess > LARGEST_EXCESS * greatest;
         exceeds.then_some((step + 1, excess))
     })
