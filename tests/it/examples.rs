@@ -1,4 +1,5 @@
-//! Example programs that read arguments: each runs to its end. Tests of the packages run the others.
+//! Example programs of `polycore`, and those that read arguments: each runs to its end. Tests of the other
+//! packages run theirs.
 
 use crate::program::{EXAMPLES, command, finish, workspace};
 

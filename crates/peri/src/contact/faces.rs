@@ -401,7 +401,7 @@ mod tests {
     /// edges of any angle.
     #[test]
     fn spheres_stay_inside_the_body() {
-        fn check<const D: usize>(name: &str, body: &Body<D>) {
+        fn check<const D: usize>(name: &str, body: &Body<D>, allowed: f64) {
             let bonds = body.build().unwrap();
             let (surface, faces) = (body.surface(), Faces::new(&bonds, &body.surface(), false));
             let (mut round, mut worst) = (0, 0.0_f64);
@@ -429,27 +429,34 @@ mod tests {
                 }
             }
             eprintln!("{name}: {round} spheres, {worst:.1e} beyond a side");
-            assert!(round > 1 && worst < 0.02, "{name}: {round} spheres, {worst} beyond a side");
+            assert!(round > 1 && worst < allowed, "{name}: {round} spheres, {worst} beyond a side");
         }
+        // exactly below flat sides; below curved ones by tangents at their faces, 8.3e-3 found
+        let (flat, curved) = (1e-9, 0.02);
         for (radius, length) in [(2.5, 6.0), (3.4, 6.0), (4.45, 6.0), (7.5, 12.0), (8.7, 9.3), (11.3, 9.0)] {
             let centre = [0.0, 0.0, 0.5 * length];
             let cylinder = Shape::Cylinder { centre, axis: 2, length, radius };
-            check(&format!("cylinder {radius}"), &Body::lattice(cylinder.clone(), 1.0));
+            check(&format!("cylinder {radius}"), &Body::lattice(cylinder.clone(), 1.0), flat);
             let upper = Shape::Box { min: [0.5 * radius, -20.0, -20.0], max: [20.0; 3] };
-            check(&format!("cylinder {radius} with a flat"), &Body::lattice(cylinder, 1.0).cut(upper));
+            check(&format!("cylinder {radius} with a flat"), &Body::lattice(cylinder, 1.0).cut(upper), flat);
         }
         for cut in [0.3, 0.5, 0.6, 0.9] {
             let above = Shape::Box { min: [-30.0, 20.0 * cut], max: [30.0, 30.0] };
-            check(&format!("disk cut at {cut}"), &Body::lattice(Shape::disk([0.0; 2], 20.0), 1.0).cut(above));
+            check(
+                &format!("disk cut at {cut}"),
+                &Body::lattice(Shape::disk([0.0; 2], 20.0), 1.0).cut(above),
+                flat,
+            );
             let above = Shape::Box { min: [-30.0, -30.0, 7.0 * cut], max: [30.0; 3] };
             let ball = Shape::Ball { centre: [0.0; 3], radius: 7.0 };
-            check(&format!("ball cut at {cut}"), &Body::lattice(ball, 1.0).cut(above));
+            check(&format!("ball cut at {cut}"), &Body::lattice(ball, 1.0).cut(above), flat);
         }
         for depth in [-2.0, 0.0, 3.0] {
             let notch = Shape::disk([12.0, 20.0 - depth], 6.0);
             check(
                 &format!("notch {depth}"),
                 &Body::lattice(Shape::rectangle([0.0; 2], [24.0, 20.0]), 1.0).cut(notch),
+                curved,
             );
         }
     }
