@@ -16,6 +16,7 @@ mod device_pairs;
 #[cfg(feature = "gpu")]
 mod device_run;
 mod dynamic_relaxation;
+mod face_springs;
 mod fit_range;
 mod force_fields;
 mod force_scale;

@@ -1,7 +1,8 @@
 //! Approximate inverse of the body's stiffness, for gradients of its energy: B g = ω g/(V M) + P A_c⁻¹ Pᵀ g,
 //! with the Gershgorin mass M of dynamic relaxation and a coarse level.
 
-use super::coarse::{BondCounts, CoarseBody, CoarseLevel, PlaneAnchor};
+use super::coarse::{BondCounts, CoarseBody, CoarseLevel};
+use super::face_springs::{FaceSprings, HeldFace};
 use super::mass::{has_own_mass, own_mass, update_unit_mass};
 use super::particle_map::{ParticleMap, in_order};
 use super::state::State;
@@ -25,13 +26,15 @@ pub struct Preconditioner<const D: usize> {
     unit_mass: Vec<f64>,
     /// The smallest of `local`, used for unsupported particles.
     least: f64,
+    /// Faces in contact; `None`: in `local`.
+    faces: Option<FaceSprings<D>>,
     coarse: Option<CoarseLevel<D>>,
 }
 
 impl<const D: usize> Preconditioner<D> {
     /// Creates an empty preconditioner.
     pub fn new() -> Self {
-        Self { local: Vec::new(), volumes: Vec::new(), unit_mass: Vec::new(), least: 0.0, coarse: None }
+        Self { local: Vec::new(), volumes: Vec::new(), unit_mass: Vec::new(), least: 0.0, faces: None, coarse: None }
     }
 
     /// Returns true if it is built.
@@ -65,17 +68,40 @@ impl<const D: usize> Preconditioner<D> {
             contact.add_pairs(&*system.bonds, &state.displacement, tangent, &mut springs);
         }
         springs.iter_mut().for_each(|m| *m *= 0.5 * tangent);
-        let mut anchors = Vec::new();
+        let mut faces = Vec::new();
         if let Some(contact) = system.repulsion() {
             contact.springs(&state.displacement, &mut |below, normal, stiffness| {
-                let mut head = (0, 0.0);
-                for &(site, weight) in below {
-                    springs[site] += stiffness * weight * weight / bonds.volume(site);
-                    head = if weight > head.1 { (site, weight) } else { head };
-                }
-                anchors.push(PlaneAnchor { site: head.0 as u32, normal, stiffness });
+                faces.push(HeldFace { below: below.to_vec(), normal, stiffness });
             });
         }
+        self.set_local(bonds, &springs, weight);
+        self.faces =
+            coarsening.and_then(|_| FaceSprings::new(&faces, bonds.particles(), &system.loads, &self.local));
+        if self.faces.is_none() && !faces.is_empty() {
+            for face in &faces {
+                for &(site, weight) in &face.below {
+                    springs[site] += face.stiffness * weight * weight / bonds.volume(site);
+                }
+            }
+            self.set_local(bonds, &springs, weight);
+        }
+        let body = CoarseBody {
+            bonds,
+            loads: &system.loads,
+            displacement: &state.displacement,
+            law: (law, [modulus, system.material.volumetric()], state.stretches.fitted),
+            springs: &springs,
+            survey: &survey,
+            faces: &faces,
+        };
+        let old = self.coarse.take();
+        let Some(coarsening) = coarsening else { return };
+        let most = (self.volumes.len() / SHARE[D - 2]).clamp(LEAST[D - 2], MOST[D - 2]);
+        self.coarse = CoarseLevel::new(&body, coarsening * bonds.spacing(), most, old);
+    }
+
+    /// Computes the local part from the springs of sites, N/m⁵.
+    fn set_local(&mut self, bonds: &dyn BodyGeometry<D>, springs: &[f64], weight: f64) {
         let local = |(&site, volume): (&u32, &f64)| {
             let spring = springs[site as usize];
             if spring > 0.0 { weight / (volume * spring) } else { f64::INFINITY }
@@ -86,19 +112,6 @@ impl<const D: usize> Preconditioner<D> {
             self.least = 1.0;
         }
         self.local.iter_mut().filter(|local| local.is_infinite()).for_each(|local| *local = self.least);
-        let body = CoarseBody {
-            bonds,
-            loads: &system.loads,
-            displacement: &state.displacement,
-            law: (law, [modulus, system.material.volumetric()], state.stretches.fitted),
-            springs: &springs,
-            survey: &survey,
-            anchors: &anchors,
-        };
-        let old = self.coarse.take();
-        let Some(coarsening) = coarsening else { return };
-        let most = (self.volumes.len() / SHARE[D - 2]).clamp(LEAST[D - 2], MOST[D - 2]);
-        self.coarse = CoarseLevel::new(&body, coarsening * bonds.spacing(), most, old);
     }
 
     /// Updates the local part where bonds broke; the coarse part stays.
@@ -109,6 +122,9 @@ impl<const D: usize> Preconditioner<D> {
             let Ok(particle) = bonds.particles().binary_search(&site) else { continue };
             let local = &mut self.local[particle];
             let alone = bonds.is_alone(site as usize);
+            if alone && let Some(faces) = &mut self.faces {
+                faces.release(particle);
+            }
             *local = if alone { self.least } else { *local * before / self.unit_mass[site as usize] };
         }
     }
@@ -150,6 +166,10 @@ impl<const D: usize> Preconditioner<D> {
                 }
             }
         });
+        if let Some(faces) = &mut self.faces {
+            faces.correct(gradient, result);
+        }
+        let (coarse, local) = (self.coarse.as_ref().filter(|_| !local_only), &self.local);
         for (components, particles) in places.shared() {
             let of = |particle: usize| {
                 let (g, value) = (gradient.get(particle), coarse.map_or([0.0; D], |own| own.value(particle)));

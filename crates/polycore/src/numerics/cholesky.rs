@@ -47,11 +47,19 @@ pub struct Cholesky {
 impl Cholesky {
     /// Analyses a pattern, in the order of elimination of its rows; `None` if memory does not suffice.
     pub fn analyse(pattern: Pattern) -> Option<Self> {
+        Self::analyse_in_order(pattern, SymmetricOrdering::Identity)
+    }
+
+    /// Analyses a pattern, in an order of elimination by approximate minimum degree.
+    pub fn analyse_reordered(pattern: Pattern) -> Option<Self> {
+        Self::analyse_in_order(pattern, SymmetricOrdering::Amd)
+    }
+
+    fn analyse_in_order(pattern: Pattern, order: SymmetricOrdering<usize>) -> Option<Self> {
         let parameters = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
         };
-        let order = SymmetricOrdering::Identity;
         let symbolic =
             factorize_symbolic_cholesky(pattern.symbolic(), Side::Upper, order, parameters).ok()?;
         let scratch = MemBuffer::try_new(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq)).ok()?;

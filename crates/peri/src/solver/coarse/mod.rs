@@ -1,6 +1,7 @@
 //! Coarse level of a two-level preconditioner: P A_c⁻¹ Pᵀ with P the hat functions of [`space`], A_c their
 //! stiffness of [`stiffness`], factored by [`factor`].
 
+mod faces;
 mod factor;
 mod space;
 mod stiffness;
@@ -14,6 +15,8 @@ use crate::parallel;
 use crate::potential::BondPotential;
 use crate::solver::load::Loads;
 use crate::solver::particle_map::in_order;
+use crate::solver::face_springs::HeldFace;
+use faces::{FaceFunctions, add_faces};
 use factor::{Factor, Pattern};
 use polycore::numerics::bounds;
 use pulp::Arch;
@@ -43,18 +46,8 @@ pub struct CoarseBody<'a, const D: usize> {
     pub springs: &'a [f64],
     /// Counts of the bonds.
     pub survey: &'a BondCounts,
-    /// Faces held by rigid planes.
-    pub anchors: &'a [PlaneAnchor<D>],
-}
-
-/// A face held by a rigid plane.
-pub struct PlaneAnchor<const D: usize> {
-    /// Particle at the face: functions hardly change over the particles below it.
-    pub site: u32,
-    /// Direction in which it is held; `None`: all directions.
-    pub normal: Option<[f64; D]>,
-    /// Stiffness, N/m.
-    pub stiffness: f64,
+    /// Faces held by rigid surfaces and grips.
+    pub faces: &'a [HeldFace<D>],
 }
 
 /// A factored coarse level.
@@ -78,15 +71,17 @@ impl<const D: usize> CoarseLevel<D> {
         // a lattice's particle with every bond has neighbours on all sides; a cloud's may still be at a gap
         let whole = if body.bonds.whole_family().is_some() { body.survey.most } else { u32::MAX };
         let mut space = CoarseSpace::new(body.bonds, &body.survey.bonded, whole, edge, most / D)?;
-        let CoarseBody { bonds, loads, displacement, law, springs, survey, anchors } = *body;
+        let CoarseBody { bonds, loads, displacement, law, springs, survey, faces } = *body;
         let assembly = Assembly::new(bonds, loads, displacement, survey, law, springs, space.edge);
-        let mut matrices: Vec<(ElementMatrix, [f64; CORNERS])> =
+        let matrices: Vec<(ElementMatrix, [f64; CORNERS])> =
             parallel::map_each(&space.elements, |element| assembly.element(&space, element));
-        add_anchors(&space, anchors, &mut matrices);
+        let faces: Vec<FaceFunctions<D>> =
+            faces.iter().map(|face| FaceFunctions::new(&space, loads, face)).collect();
         let extent = extent(body.bonds);
         let shift = SHIFT * assembly.stiffness() * (std::f64::consts::PI / extent).powi(2);
-        let (pattern, blocks) = pattern::<D>(&space);
-        let entries = assemble::<D>(&space, &pattern, &blocks, &matrices, shift);
+        let (pattern, blocks) = pattern::<D>(&space, &faces);
+        let mut entries = assemble::<D>(&space, &pattern, &blocks, &matrices, shift);
+        add_faces(&faces, &pattern, &blocks, &mut entries);
         drop(matrices);
         let factor = Factor::new(pattern, &entries, old.map(|old| old.factor))?;
         let places = space.renumber(bonds.particles());
@@ -161,37 +156,6 @@ impl<const D: usize> CoarseLevel<D> {
     }
 }
 
-/// Adds k φ_a φ_b n⊗n of anchors to the matrices of their elements.
-fn add_anchors<const D: usize>(
-    space: &CoarseSpace<D>,
-    anchors: &[PlaneAnchor<D>],
-    matrices: &mut [(ElementMatrix, [f64; CORNERS])],
-) {
-    for anchor in anchors {
-        let element = space.element_of[anchor.site as usize];
-        if element == NONE {
-            continue;
-        }
-        let local = space.local.get(anchor.site as usize);
-        let hat = |corner: usize| {
-            (0..D).map(|d| if corner >> d & 1 == 1 { local[d] } else { 1.0 - local[d] }).product::<f64>()
-        };
-        let mut pair = 0;
-        for a in 0..1 << D {
-            for b in a..1 << D {
-                let value = anchor.stiffness * hat(a) * hat(b);
-                for i in 0..D {
-                    for j in 0..D {
-                        let part = anchor.normal.map_or(f64::from(u8::from(i == j)), |n| n[i] * n[j]);
-                        matrices[element as usize].0[pair][i * D + j] += value * part;
-                    }
-                }
-                pair += 1;
-            }
-        }
-    }
-}
-
 /// Diagonal of the bounding box, m.
 fn extent<const D: usize>(bonds: &dyn BodyGeometry<D>) -> f64 {
     let [low, high] = bounds(bonds.particles().iter().map(|&site| bonds.position(site as usize)));
@@ -204,7 +168,17 @@ struct FunctionBlocks {
     others: Vec<u32>,
 }
 
-fn pattern<const D: usize>(space: &CoarseSpace<D>) -> (Pattern, FunctionBlocks) {
+impl FunctionBlocks {
+    /// Place of a pair of functions, row ≤ column, in its column. Every pair of one element or face has one.
+    fn place(&self, row: u32, column: usize) -> usize {
+        self.others[self.starts[column]..self.starts[column + 1]].partition_point(|&other| other < row)
+    }
+}
+
+fn pattern<const D: usize>(
+    space: &CoarseSpace<D>,
+    faces: &[FaceFunctions<D>],
+) -> (Pattern, FunctionBlocks) {
     let mut pairs: Vec<u64> = Vec::with_capacity(space.elements.len() * (1 << (2 * D)));
     for element in &space.elements {
         for &column in &element.functions[..1 << D] {
@@ -212,6 +186,16 @@ fn pattern<const D: usize>(space: &CoarseSpace<D>) -> (Pattern, FunctionBlocks) 
                 pairs.push(u64::from(column) << 32 | u64::from(row));
             }
         }
+    }
+    let mut last: &[u32] = &[];
+    for functions in faces.iter().map(|face| &*face.functions) {
+        // neighbours have the same
+        if functions != last {
+            for (k, &column) in functions.iter().enumerate() {
+                pairs.extend(functions[..=k].iter().map(|&row| u64::from(column) << 32 | u64::from(row)));
+            }
+        }
+        last = functions;
     }
     pairs.sort_unstable();
     pairs.dedup();
@@ -251,9 +235,7 @@ fn assemble<const D: usize>(
             for b in a..1 << D {
                 let (f, g) = (element.functions[a], element.functions[b]);
                 let (row, column) = (f.min(g), f.max(g) as usize);
-                let others = &blocks.others[blocks.starts[column]..blocks.starts[column + 1]];
-                // every pair of an element's functions is in the pattern
-                let place = others.partition_point(|&other| other < row);
+                let place = blocks.place(row, column);
                 for i in 0..D {
                     for j in 0..D {
                         // only the upper triangle is kept

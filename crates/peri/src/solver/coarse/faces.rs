@@ -1,0 +1,72 @@
+//! Stiffness of held faces in the space of the coarse functions: k Pᵀw wᵀP, exactly. One that is too small, as
+//! with the functions at one particle in place of wᵀP, makes steps of the coarse level too long in proportion
+//! to k.
+
+use super::space::{CORNERS, CoarseSpace, NONE};
+use super::{FunctionBlocks, Pattern};
+use crate::solver::face_springs::HeldFace;
+use crate::solver::load::Loads;
+
+/// wᵀP of a face.
+pub struct FaceFunctions<const D: usize> {
+    /// Functions, ascending.
+    pub functions: Vec<u32>,
+    /// Value of each, for the free components of the particles below.
+    values: Vec<[f64; D]>,
+    normal: Option<[f64; D]>,
+    stiffness: f64,
+}
+
+impl<const D: usize> FaceFunctions<D> {
+    /// Sums the functions at the particles below a face.
+    pub fn new(space: &CoarseSpace<D>, loads: &Loads<D>, face: &HeldFace<D>) -> Self {
+        let mut all: Vec<(u32, [f64; D])> = Vec::with_capacity(face.below.len() * CORNERS);
+        for &(site, weight) in &face.below {
+            let element = space.element_of[site];
+            if element == NONE {
+                continue;
+            }
+            let (local, bits) = (space.local.get(site), loads.constrained(site));
+            let functions = space.elements[element as usize].functions;
+            for (corner, &function) in functions[..1 << D].iter().enumerate() {
+                let along = |d: usize| if corner >> d & 1 == 1 { local[d] } else { 1.0 - local[d] };
+                let hat: f64 = weight * (0..D).map(along).product::<f64>();
+                let free = |d: usize| if bits >> d & 1 == 1 { 0.0 } else { hat };
+                all.push((function, std::array::from_fn(free)));
+            }
+        }
+        all.sort_by_key(|entry| entry.0);
+        let (mut functions, mut values) = (Vec::new(), Vec::new());
+        for group in all.chunk_by(|a, b| a.0 == b.0) {
+            let sum = |d: usize| group.iter().map(|entry| entry.1[d]).sum::<f64>();
+            functions.push(group[0].0);
+            values.push(std::array::from_fn(sum));
+        }
+        Self { functions, values, normal: face.normal, stiffness: face.stiffness }
+    }
+}
+
+/// Adds the stiffness of faces to the upper triangle of the matrix.
+pub fn add_faces<const D: usize>(
+    faces: &[FaceFunctions<D>],
+    pattern: &Pattern,
+    blocks: &FunctionBlocks,
+    entries: &mut [f64],
+) {
+    for face in faces {
+        for (k, &column) in face.functions.iter().enumerate() {
+            let (column, other) = (column as usize, face.values[k]);
+            for (&row, own) in face.functions[..=k].iter().zip(&face.values) {
+                let place = blocks.place(row, column);
+                for j in 0..D {
+                    let last = if row as usize == column { j } else { D - 1 };
+                    for i in 0..=last {
+                        let part = face.normal.map_or(f64::from(u8::from(i == j)), |n| n[i] * n[j]);
+                        entries[pattern.starts[column * D + j] + place * D + i] +=
+                            face.stiffness * own[i] * other[j] * part;
+                    }
+                }
+            }
+        }
+    }
+}
