@@ -33,6 +33,7 @@ mod faceted;
 mod forces;
 mod friction;
 mod friction_pair;
+mod holds;
 mod list;
 mod pair_tractions;
 mod pushed_surfaces;

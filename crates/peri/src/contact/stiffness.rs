@@ -53,7 +53,7 @@ impl<const D: usize> Contact<D> {
         masses: &mut [f64],
     ) {
         self.add_pairs(bonds, displacement, tangent, masses);
-        self.near_springs(displacement, self.near, &mut |below, normal, stiffness| {
+        self.near_springs(displacement, Some(self.near), &mut |below, normal, stiffness| {
             let sum: f64 = below.iter().map(|(_, weight)| weight.abs()).sum();
             let mixed = 1.0 + normal.map_or(0.0, mixed);
             for &(site, weight) in below {
@@ -93,10 +93,10 @@ impl<const D: usize> Contact<D> {
     /// Visits faces in contact with surfaces or tied: particles below with weights, the normal of one
     /// without friction, the stiffness, N/m.
     pub fn springs(&self, displacement: &Field<D>, visit: &mut Spring<D>) {
-        self.near_springs(displacement, 0.0, visit);
+        self.near_springs(displacement, None, visit);
     }
 
-    fn near_springs(&self, displacement: &Field<D>, gap: f64, visit: &mut Spring<D>) {
+    fn near_springs(&self, displacement: &Field<D>, gap: Option<f64>, visit: &mut Spring<D>) {
         if let Some(surfaces) = &self.surfaces {
             surfaces.springs(displacement, gap, visit);
         }

@@ -54,10 +54,7 @@ impl<const D: usize> RigidSurfaces<D> {
             }
             for touch in self.near(placed, field, 0.0) {
                 let bound = surface.friction * touch.stiffness * touch.overlap;
-                let pair = match touch.element.checked_sub(self.faces.len()) {
-                    None => ContactPair::Face(number as u32, touch.element as u32),
-                    Some(bare) => ContactPair::Particle(number as u32, self.bare[bare]),
-                };
+                let pair = self.pair(number, touch.element);
                 let stiffness = surface.elastic_slip.map_or(touch.stiffness, |slip| bound / slip);
                 let normal = std::array::from_fn(|d| touch.normal.get(d).copied().unwrap_or(0.0));
                 let known = old.binary_search_by_key(&pair, |grip| grip.pair).ok().map(|at| &old[at]);

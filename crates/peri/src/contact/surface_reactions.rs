@@ -127,14 +127,16 @@ impl<const D: usize> RigidSurfaces<D> {
         matrix.symmetric_eigenvalues().max() * self.penalty.greatest() * self.greatest
     }
 
-    /// Visits elements in contact or nearer than `gap`, m: the particles below with their weights, the
+    /// Visits elements in contact, or those nearer than `gap`, m: the particles below with their weights, the
     /// directions in which the surface holds them, and the stiffness, N/m.
-    pub fn springs(&self, field: &Field<D>, gap: f64, visit: &mut super::Spring<D>) {
+    pub fn springs(&self, field: &Field<D>, gap: Option<f64>, visit: &mut super::Spring<D>) {
         let mut below = Vec::new();
         for placed in &self.each {
             let surface = &placed.surface;
-            let touches =
-                if surface.bonded { self.touches(placed, field) } else { self.near(placed, field, gap) };
+            let touches = match gap {
+                Some(gap) if !surface.bonded => self.near(placed, field, gap),
+                _ => self.touches(placed, field),
+            };
             for touch in touches {
                 below.clear();
                 match touch.element.checked_sub(self.faces.len()) {

@@ -29,6 +29,8 @@ pub(super) struct MovingSurface<const D: usize> {
     pub(super) weight: f64,
     /// Faces tied to the surface.
     tied: Vec<u32>,
+    /// Elements held in a search for equilibrium, faces first, ascending.
+    pub(super) held: Vec<usize>,
 }
 
 /// A face, or a particle exposed to rigid surfaces, beside one.
@@ -130,7 +132,7 @@ impl<const D: usize> RigidSurfaces<D> {
                 )));
             }
             let (rate, now, before) = (surface.displacement, [0.0; D], [0.0; D]);
-            each.push(MovingSurface { surface, now, before, factor: 0.0, rate, weight: 1.0, tied });
+            each.push(MovingSurface { surface, now, before, factor: 0.0, rate, weight: 1.0, tied, held: Vec::new() });
         }
         let mut all = Self {
             each,
@@ -297,7 +299,7 @@ impl<const D: usize> RigidSurfaces<D> {
         }
     }
 
-    /// Elements that a surface acts on, in order: its tied faces, or those behind it.
+    /// Elements that a surface acts on, in order: its tied faces, or those behind it and those it holds.
     pub(super) fn touches(&self, placed: &MovingSurface<D>, field: &Field<D>) -> Vec<SurfaceContact<D>> {
         if placed.surface.bonded {
             let tied = |&face: &u32| {
@@ -313,7 +315,14 @@ impl<const D: usize> RigidSurfaces<D> {
             };
             return placed.tied.iter().filter_map(tied).collect();
         }
-        self.near(placed, field, 0.0)
+        let mut touches = self.near(placed, field, 0.0);
+        let free = |element: &&usize| touches.binary_search_by_key(*element, |touch| touch.element).is_err();
+        let pulled: Vec<usize> = placed.held.iter().filter(free).copied().collect();
+        touches.extend(pulled.iter().map(|&element| self.beside(&placed.surface, &placed.now, field, element)));
+        if !pulled.is_empty() {
+            touches.sort_unstable_by_key(|touch| touch.element);
+        }
+        touches
     }
 
     /// Elements nearer to a surface than `gap`, m, in order.
@@ -375,6 +384,14 @@ impl<const D: usize> RigidSurfaces<D> {
             }
         }
         self.pushes = pushes;
+    }
+
+    /// Pair of a surface and an element.
+    pub(super) fn pair(&self, surface: usize, element: usize) -> ContactPair {
+        match element.checked_sub(self.faces.len()) {
+            None => ContactPair::Face(surface as u32, element as u32),
+            Some(bare) => ContactPair::Particle(surface as u32, self.bare[bare]),
+        }
     }
 
     /// Surface and element of a pair; `None` for two particles.

@@ -82,6 +82,8 @@ impl<const D: usize> QuasiStatic<D> for Lbfgs {
 
 /// Vectors of a search for equilibrium, on the host or on a device.
 pub trait SearchVectors<const D: usize> {
+    /// True if contacts may be held in a search.
+    const HOLDS: bool;
     /// Builds the preconditioner for the present state.
     ///
     /// # Errors
@@ -186,14 +188,30 @@ impl<V> LbfgsSearch<V> {
         V: SearchVectors<D>,
     {
         watch(&self.status(system, state, true), state)?;
+        if self.holds(system) {
+            system.hold_touching(state);
+        }
         system.prepare(&mut state.displacement);
         (self.searches, self.first, self.worn) = (0, 0, false);
-        self.in_touch = in_touch(system, state);
+        let now = in_touch(system, state);
+        if std::env::var("PERI_DEBUG").is_ok() {
+            let kept = now.iter().filter(|face| self.in_touch.binary_search(face).is_ok()).count();
+            eprintln!("BEGIN step {} it {} ren {} touch {} old {} kept {}", state.step, state.counts.iteration, state.contact.renewals, now.len(), self.in_touch.len(), kept);
+        }
+        self.in_touch = now;
         self.vectors.build(system, state, &self.settings)
     }
 
     fn status<const D: usize>(&self, system: &System<D>, state: &State<D>, restartable: bool) -> Status {
         state.status(system.factors.len(), self.settings.tolerance, 0.0, restartable)
+    }
+
+    /// Returns true if contacts are held in a search: where bonds may break in it they must not be pulled.
+    fn holds<const D: usize>(&self, system: &System<D>) -> bool
+    where
+        V: SearchVectors<D>,
+    {
+        V::HOLDS && !system.breaks_on_the_way()
     }
 
     /// Evaluates, and again if the fitted law had to be widened.
@@ -295,6 +313,9 @@ impl<V> LbfgsSearch<V> {
         }
         match self.search(system, state, point, slope)? {
             LineSearch::Found(step, point) => {
+                if std::env::var("PERI_DEBUG").is_ok() {
+                    eprintln!("  it {} step {:.3} slope {:.2e} -> {:.2e} res {:.3e}", state.counts.iteration, step, slope, point.slope, point.sums.residual(state.convergence.floor));
+                }
                 self.vectors.accept(step, CURVATURE * step * slope.abs())?;
                 Ok(Some(point))
             }
@@ -353,6 +374,19 @@ impl<V> LbfgsSearch<V> {
             let measured = state.measures_rounding().then(|| self.vectors.rounding(system, state));
             let (moved, epsilon) = measured.transpose()?.unzip();
             state.record_measured(system, &point.sums, &goal, (epsilon.unwrap_or(0.0), moved));
+            let spent = state.counts.iteration >= goal.max_iterations;
+            if system.release_contacts(state, goal.tolerance, spent) {
+                self.vectors.forget(false);
+                if self.others_touch(system, state)? {
+                    self.begin(system, state, watch)?;
+                    before = state.counts.total_iterations;
+                }
+                if std::env::var("PERI_DEBUG").is_ok() {
+                    eprintln!("RELEASE {}", state.contact.releases);
+                }
+                point = self.arrive(system, state)?;
+                continue;
+            }
             if state.is_balanced(&goal, broken)? {
                 let took = state.counts.total_iterations - before;
                 self.first = if self.searches == 0 { took } else { self.first };
@@ -413,7 +447,13 @@ impl<const D: usize, V: SearchVectors<D>> Equilibrium<D> for LbfgsSearch<V> {
             self.begin(system, state, watch)?;
         }
         self.vectors.take(system, state)?;
+        if self.holds(system) {
+            system.hold_contacts(state);
+        }
         let found = self.find_balance(system, state, watch);
+        if let Some(contact) = &mut system.contact {
+            contact.hold(&[]);
+        }
         if matches!(found, Ok(_) | Err(Error::NotConverged { .. })) {
             self.vectors.give(system, state)?;
         }

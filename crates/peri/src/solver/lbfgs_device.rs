@@ -86,6 +86,8 @@ impl<'a, const D: usize> CardVectors<'a, D> {
 }
 
 impl<const D: usize> SearchVectors<D> for CardVectors<'_, D> {
+    const HOLDS: bool = false;
+
     fn build(&mut self, system: &mut System<D>, state: &State<D>, settings: &Lbfgs) -> Result<(), Error> {
         refuse(system)?;
         SearchVectors::<D>::forget(self, true);

@@ -62,6 +62,8 @@ impl<const D: usize> HostVectors<D> {
 }
 
 impl<const D: usize> SearchVectors<D> for HostVectors<D> {
+    const HOLDS: bool = true;
+
     fn build(&mut self, system: &mut System<D>, state: &State<D>, settings: &Lbfgs) -> Result<(), Error> {
         let particles = system.bonds.particles().len();
         let fields = [

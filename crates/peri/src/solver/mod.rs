@@ -21,6 +21,7 @@ mod fit_range;
 mod force_fields;
 mod force_scale;
 mod fracture;
+mod held_contacts;
 mod inverted;
 mod lbfgs;
 #[cfg(feature = "gpu")]

@@ -5,7 +5,7 @@ use super::motion::Motion;
 use super::record::{Status, StepRecord};
 use super::stage::StepOrigin;
 use super::step_control::{Accepted, StepControl};
-use crate::contact::FrictionPair;
+use crate::contact::{ContactPair, FrictionPair};
 use crate::field::Field;
 use crate::material::Memory;
 use crate::potential::StretchRange;
@@ -153,13 +153,18 @@ pub(super) struct ContactState<const D: usize> {
     /// Active friction in the search for the current equilibrium, and its number of renewals in this step.
     pub active: Vec<FrictionPair>,
     pub renewals: u32,
+    /// Pairs held by rigid surfaces in the search for the current equilibrium, the residual at which those that
+    /// pull are released (0: not set), and the number of releases in this search.
+    pub held: Vec<ContactPair>,
+    pub release_at: f64,
+    pub releases: u32,
 }
 
 impl<const D: usize> ContactState<D> {
     /// Begins the next step of a programme: elastic slips stay.
     pub fn begin_stage(&mut self) {
         (self.friction, self.start, self.renewals) = (None, None, 0);
-        (self.active, self.surface_push) = (Vec::new(), Vec::new());
+        (self.active, self.surface_push, self.held) = (Vec::new(), Vec::new(), Vec::new());
     }
 }
 
