@@ -36,6 +36,18 @@ pub struct FrictionPair {
     pub share: f64,
 }
 
+/// Derivative of the friction after a slip.
+#[derive(Clone, Copy, Debug)]
+pub struct TangentStiffness {
+    /// True beyond the elastic slip.
+    pub slips: bool,
+    /// Unit vector of the elastic slip, or any across the normal if it is 0.
+    pub direction: [f64; 3],
+    /// Stiffness along it, and across it and the normal, N/m.
+    pub along: f64,
+    pub across: f64,
+}
+
 /// Friction after a slip.
 #[derive(Clone, Copy, Debug)]
 pub struct Drag {
@@ -69,6 +81,18 @@ impl FrictionPair {
         }
     }
 
+    /// Computes the stiffness after the first side has moved by `moved`, m, against the second: k_t, beyond the
+    /// elastic slip b/|e*| across it only.
+    pub fn tangent_stiffness(&self, moved: [f64; 3]) -> TangentStiffness {
+        let moved = across(&self.normal, moved);
+        let trial: [f64; 3] = std::array::from_fn(|d| self.slip[d] + self.share * moved[d]);
+        let (size, most) = (length(trial), self.bound / self.stiffness);
+        let slips = size > most;
+        let [along, across_it] = if slips { [0.0, self.bound / size] } else { [self.stiffness; 2] };
+        let direction = if size > 0.0 { trial.map(|x| x / size) } else { tangent(&self.normal) };
+        TangentStiffness { slips, direction, along: self.share * along, across: self.share * across_it }
+    }
+
     /// Rotates the slip into the plane across a new normal, keeping its length, and shortens it to the bound.
     pub fn project(&mut self) {
         let old = length(self.slip);
@@ -76,6 +100,15 @@ impl FrictionPair {
         let size = length(turned);
         let wanted = old.min(self.bound / self.stiffness);
         self.slip = if size > 0.0 { turned.map(|x| x * wanted / size) } else { [0.0; 3] };
+    }
+}
+
+/// A unit vector across a unit normal, in the plane of the first two axes if the normal is.
+fn tangent(normal: &[f64; 3]) -> [f64; 3] {
+    let flat = normal[0].hypot(normal[1]);
+    if flat > 0.5 { [-normal[1] / flat, normal[0] / flat, 0.0] } else {
+        let size = normal[1].hypot(normal[2]);
+        [0.0, -normal[2] / size, normal[1] / size]
     }
 }
 

@@ -11,12 +11,12 @@ use super::surfaces::RigidSurfaces;
 use crate::field::Field;
 
 impl<const D: usize> RigidSurfaces<D> {
-    /// Pairs in contact with surfaces that are neither bonded nor moved by a force, ascending.
-    fn touching(&self, field: &Field<D>) -> Vec<ContactPair> {
+    /// Pairs nearer than `gap`, m, to surfaces that are neither bonded nor moved by a force, ascending.
+    fn touching(&self, field: &Field<D>, gap: f64) -> Vec<ContactPair> {
         let mut pairs = Vec::new();
         for (number, placed) in self.each.iter().enumerate() {
             if !placed.surface.bonded && placed.surface.force.is_none() {
-                let touches = self.near(placed, field, 0.0);
+                let touches = self.near(placed, field, gap);
                 pairs.extend(touches.iter().map(|touch| self.pair(number, touch.element)));
             }
         }
@@ -36,9 +36,9 @@ impl<const D: usize> RigidSurfaces<D> {
 }
 
 impl<const D: usize> Contact<D> {
-    /// Pairs in contact with rigid surfaces that may be held, ascending.
-    pub fn touching(&self, displacement: &Field<D>) -> Vec<ContactPair> {
-        self.surfaces.as_ref().map_or_else(Vec::new, |surfaces| surfaces.touching(displacement))
+    /// Pairs in contact with rigid surfaces, or nearer than `gap`, m, that may be held, ascending.
+    pub fn touching(&self, displacement: &Field<D>, gap: f64) -> Vec<ContactPair> {
+        self.surfaces.as_ref().map_or_else(Vec::new, |surfaces| surfaces.touching(displacement, gap))
     }
 
     /// Holds pairs in contact, ascending, whether they push or pull; releases all others.

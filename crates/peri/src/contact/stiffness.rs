@@ -8,9 +8,15 @@ use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::parallel;
 
-/// Visitor of a face: particles below with weights, the direction in which it is held (`None`: all), the
-/// stiffness, N/m.
-pub type Spring<'a, const D: usize> = dyn FnMut(&[(usize, f64)], Option<[f64; D]>, f64) + 'a;
+/// Visitor of a held face: sites of the particles below with their weights; directions in which it is held,
+/// at right angles to each other, with the stiffness along each, N/m.
+pub type Spring<'a, const D: usize> = dyn FnMut(&[(usize, f64)], &[([f64; D], f64)]) + 'a;
+
+/// All axes with one stiffness.
+pub(super) fn all_axes<const D: usize>(stiffness: f64) -> Vec<([f64; D], f64)> {
+    let axis = |axis: usize| std::array::from_fn(|d| f64::from(u8::from(d == axis)));
+    (0..D).map(|d| (axis(d), stiffness)).collect()
+}
 
 impl<const D: usize> Contact<D> {
     /// Computes max_I Σ_J k V_J over all contacts plus half the stiffness of surfaces, N/m⁴: twice that over
@@ -53,9 +59,10 @@ impl<const D: usize> Contact<D> {
         masses: &mut [f64],
     ) {
         self.add_pairs(bonds, displacement, tangent, masses);
-        self.near_springs(displacement, Some(self.near), &mut |below, normal, stiffness| {
+        self.near_springs(displacement, Some(self.near), &mut |below, directions| {
             let sum: f64 = below.iter().map(|(_, weight)| weight.abs()).sum();
-            let mixed = 1.0 + normal.map_or(0.0, mixed);
+            let [(normal, stiffness), ..] = *directions else { return };
+            let mixed = 1.0 + if directions.len() == 1 { mixed(normal) } else { 0.0 };
             for &(site, weight) in below {
                 let row = stiffness * weight.abs() * sum / bonds.volume(site);
                 masses[site] += 0.5 * row * mixed / tangent;
@@ -90,24 +97,25 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Visits faces in contact with surfaces or tied: particles below with weights, the normal of one
-    /// without friction, the stiffness, N/m.
+    /// Visits faces in contact with surfaces or tied.
     pub fn springs(&self, displacement: &Field<D>, visit: &mut Spring<D>) {
         self.near_springs(displacement, None, visit);
     }
 
     fn near_springs(&self, displacement: &Field<D>, gap: Option<f64>, visit: &mut Spring<D>) {
         if let Some(surfaces) = &self.surfaces {
-            surfaces.springs(displacement, gap, visit);
+            let friction = self.start.as_ref().map(|start| (&*self.held, start));
+            surfaces.springs(displacement, gap, friction, visit);
         }
         if let Some(ties) = &self.ties {
             ties.springs(visit);
         }
     }
 
-    /// Numbers of the faces in contact with surfaces, surface by surface.
-    pub fn in_touch(&self, displacement: &Field<D>) -> Vec<[u32; 2]> {
-        self.surfaces.as_ref().map_or_else(Vec::new, |surfaces| surfaces.in_touch(displacement))
+    /// Surface and number of the faces in contact, ascending, and 1 where they slip.
+    pub fn in_touch(&self, displacement: &Field<D>) -> Vec<[u32; 3]> {
+        let friction = self.start.as_ref().map(|start| (&*self.held, start));
+        self.surfaces.as_ref().map_or_else(Vec::new, |surfaces| surfaces.in_touch(displacement, friction))
     }
 
     /// Longest step along a direction in which no particle jumps past another: a relative motion of a quarter

@@ -1,8 +1,10 @@
 //! Friction of faces and particles on rigid surfaces.
 
-use super::friction_pair::{ContactPair, FrictionPair};
-use super::surfaces::RigidSurfaces;
+use super::friction_pair::{ContactPair, FrictionPair, TangentStiffness};
+use super::stiffness::all_axes;
+use super::surfaces::{RigidSurfaces, SurfaceContact};
 use crate::field::Field;
+use nalgebra::Vector3;
 
 impl<const D: usize> RigidSurfaces<D> {
     /// Motion of a face or particle against a surface since `start`, m.
@@ -12,6 +14,45 @@ impl<const D: usize> RigidSurfaces<D> {
         let placed = &self.each[number];
         let moved = |d: usize| now[d] - then[d] - (placed.now[d] - placed.before[d]);
         std::array::from_fn(|d| if d < D { moved(d) } else { 0.0 })
+    }
+
+    /// Computes the stiffness of the active friction of an element, for its motion since the second of
+    /// `friction`; `None` without any.
+    pub(super) fn active(
+        &self,
+        surface: usize,
+        element: usize,
+        field: &Field<D>,
+        friction: Option<(&[FrictionPair], &Field<D>)>,
+    ) -> Option<TangentStiffness> {
+        let (held, start) = friction?;
+        let pair = self.pair(surface, element);
+        let grip = &held[held.binary_search_by_key(&pair, |grip| grip.pair).ok()?];
+        Some(grip.tangent_stiffness(self.slipped(pair, field, start)))
+    }
+
+    /// Directions in which a surface holds an element in contact, with the stiffness along each, N/m.
+    pub(super) fn directions(
+        &self,
+        surface: usize,
+        touch: &SurfaceContact<D>,
+        field: &Field<D>,
+        friction: Option<(&[FrictionPair], &Field<D>)>,
+    ) -> Vec<([f64; D], f64)> {
+        let mut directions = vec![(touch.normal, touch.stiffness)];
+        let Some(grip) = self.active(surface, touch.element, field, friction) else { return directions };
+        if grip.along == touch.stiffness && grip.across == touch.stiffness {
+            return all_axes(touch.stiffness);
+        }
+        let normal = Vector3::from_fn(|d, _| touch.normal.get(d).copied().unwrap_or(0.0));
+        let across: [f64; 3] = normal.cross(&Vector3::from(grip.direction)).into();
+        for (direction, stiffness) in [(grip.direction, grip.along), (across, grip.across)] {
+            // in the plane, one of them is the axis across it
+            if stiffness > 0.0 && direction[..D].iter().any(|x| *x != 0.0) {
+                directions.push((std::array::from_fn(|d| direction[d]), stiffness));
+            }
+        }
+        directions
     }
 
     /// Motion of a face or particle against a surface in a step, s, with a velocity, m/s, m.

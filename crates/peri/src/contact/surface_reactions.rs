@@ -1,5 +1,7 @@
 //! Results of the contact with rigid surfaces: forces, energies, stiffness.
 
+use super::friction_pair::FrictionPair;
+use super::stiffness::all_axes;
 use super::surface::{SurfaceReaction, SurfaceShape};
 use super::surfaces::{MovingSurface, RigidSurfaces};
 use crate::field::Field;
@@ -127,11 +129,17 @@ impl<const D: usize> RigidSurfaces<D> {
         matrix.symmetric_eigenvalues().max() * self.penalty.greatest() * self.greatest
     }
 
-    /// Visits elements in contact, or those nearer than `gap`, m: the particles below with their weights, the
-    /// directions in which the surface holds them, and the stiffness, N/m.
-    pub fn springs(&self, field: &Field<D>, gap: Option<f64>, visit: &mut super::Spring<D>) {
+    /// Visits elements in contact, with the stiffness of the present `friction`; or those nearer than `gap`, m,
+    /// held in all directions where there is friction.
+    pub fn springs(
+        &self,
+        field: &Field<D>,
+        gap: Option<f64>,
+        friction: Option<(&[FrictionPair], &Field<D>)>,
+        visit: &mut super::Spring<D>,
+    ) {
         let mut below = Vec::new();
-        for placed in &self.each {
+        for (number, placed) in self.each.iter().enumerate() {
             let surface = &placed.surface;
             let touches = match gap {
                 Some(gap) if !surface.bonded => self.near(placed, field, gap),
@@ -143,18 +151,29 @@ impl<const D: usize> RigidSurfaces<D> {
                     None => below.extend(self.faces.below(touch.element)),
                     Some(bare) => below.push((self.bare[bare] as usize, 1.0)),
                 }
-                let normal = (!surface.bonded && surface.friction == 0.0).then_some(touch.normal);
-                visit(&below, normal, touch.stiffness);
+                let directions = if surface.bonded || (gap.is_some() && surface.friction > 0.0) {
+                    all_axes(touch.stiffness)
+                } else {
+                    self.directions(number, &touch, field, friction)
+                };
+                visit(&below, &directions);
             }
         }
     }
 
-    /// Surface and element of all contacts, ascending.
-    pub fn in_touch(&self, field: &Field<D>) -> Vec<[u32; 2]> {
-        let each = self.each.iter().enumerate();
-        each.flat_map(|(number, placed)| {
-            self.touches(placed, field).into_iter().map(move |touch| [number as u32, touch.element as u32])
-        })
-        .collect()
+    /// Surface and element of all contacts, ascending, and 1 for those that slip.
+    pub fn in_touch(
+        &self,
+        field: &Field<D>,
+        friction: Option<(&[FrictionPair], &Field<D>)>,
+    ) -> Vec<[u32; 3]> {
+        let mut all = Vec::new();
+        for (number, placed) in self.each.iter().enumerate() {
+            for touch in self.touches(placed, field) {
+                let slips = self.active(number, touch.element, field, friction).is_some_and(|grip| grip.slips);
+                all.push([number as u32, touch.element as u32, u32::from(slips)]);
+            }
+        }
+        all
     }
 }

@@ -167,7 +167,7 @@ impl<const D: usize> Ties<D> {
     pub fn springs(&self, visit: &mut super::Spring<D>) {
         for face in 0..self.faces.len() {
             let free: Vec<(usize, f64)> = self.faces.below(face).take(self.free[face]).collect();
-            visit(&free, None, self.stiffness(face));
+            visit(&free, &super::stiffness::all_axes(self.stiffness(face)));
         }
     }
 }

@@ -183,16 +183,16 @@ impl<const D: usize> DeviceBody<D> {
         Ok(self.unit * self.unit * self.values(&planes.square)?.iter().sum::<f64>())
     }
 
-    /// Planes and elements that touched in the last forces, in order.
+    /// Planes and elements that touched in the last forces, in order, and 0 as none slips.
     ///
     /// # Errors
     /// [`Error::Device`] where the device fails.
-    pub fn plane_touches(&self) -> Result<Vec<[u32; 2]>, Error> {
+    pub fn plane_touches(&self) -> Result<Vec<[u32; 3]>, Error> {
         let Some(planes) = &self.planes else { return Ok(Vec::new()) };
         let elements = planes.rows.elements();
         let sizes = self.values(&planes.sizes)?;
         let touching = sizes.iter().enumerate().filter(|(_, size)| **size > 0.0);
-        Ok(touching.map(|(at, _)| [(at / elements) as u32, (at % elements) as u32]).collect())
+        Ok(touching.map(|(at, _)| [(at / elements) as u32, (at % elements) as u32, 0]).collect())
     }
 
     /// Adds the stiffness of planes present or about to touch to the masses of a relaxation, times `factor`.

@@ -89,7 +89,7 @@ impl<const D: usize> State<D> {
     /// # Errors
     /// [`Error::NotConverged`] if all iterations are used.
     pub(super) fn is_balanced(&mut self, goal: &SearchLimits, broken: bool) -> Result<bool, Error> {
-        let balanced = self.convergence.residual <= goal.tolerance;
+        let balanced = self.convergence.residual <= goal.tolerance.max(self.contact.loose);
         let spent = self.counts.iteration >= goal.max_iterations;
         if !broken && (balanced || (spent && self.convergence.residual <= goal.accept)) {
             self.counts.unconverged += u64::from(!balanced);

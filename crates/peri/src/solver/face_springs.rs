@@ -13,10 +13,8 @@ use polycore::numerics::cholesky::{Cholesky, Pattern};
 pub struct HeldFace<const D: usize> {
     /// Sites of the particles below with their weights.
     pub below: Vec<(usize, f64)>,
-    /// Direction in which it is held; `None`: all directions.
-    pub normal: Option<[f64; D]>,
-    /// Stiffness, N/m.
-    pub stiffness: f64,
+    /// Directions in which it is held, at right angles to each other, with the stiffness along each, N/m.
+    pub directions: Vec<([f64; D], f64)>,
 }
 
 /// Springs of faces.
@@ -36,9 +34,7 @@ impl<const D: usize> FaceSprings<D> {
     pub fn new(faces: &[HeldFace<D>], particles: &[u32], loads: &Loads<D>, local: &[f64]) -> Option<Self> {
         let (mut starts, mut entries, mut stiffness) = (vec![0], Vec::new(), Vec::new());
         for face in faces {
-            let axes = (0..D).map(|axis| std::array::from_fn(|d| f64::from(u8::from(d == axis))));
-            let directions: Vec<[f64; D]> = face.normal.map_or_else(|| axes.collect(), |normal| vec![normal]);
-            for direction in directions {
+            for &(direction, spring) in &face.directions {
                 for &(site, weight) in &face.below {
                     let Ok(particle) = particles.binary_search(&(site as u32)) else { continue };
                     let bits = loads.bound().get(site).copied().unwrap_or(0);
@@ -46,7 +42,7 @@ impl<const D: usize> FaceSprings<D> {
                     entries.push((particle as u32, std::array::from_fn(free)));
                 }
                 starts.push(entries.len());
-                stiffness.push(face.stiffness);
+                stiffness.push(spring);
             }
         }
         let (pattern, values) = matrix(&starts, &entries, &stiffness, local);
@@ -145,21 +141,23 @@ mod tests {
         let diagonal = [2.0, 3.0, 0.5, 4.0, 1.5];
         let local = diagonal.map(|d: f64| 1.0 / d);
         for stiffness in [0.1, 30.0, 1e6] {
-            let slanted = Some([0.6, 0.8]);
+            let slanted = vec![([0.6, 0.8], stiffness)];
+            let both = vec![([1.0, 0.0], 3.0 * stiffness), ([0.0, 1.0], 0.5 * stiffness)];
+            let along = vec![([1.0, 0.0], stiffness)];
             let faces = [
-                HeldFace { below: vec![(0, 1.1), (1, 0.2), (2, -0.3)], normal: slanted, stiffness },
-                HeldFace { below: vec![(2, 0.9), (3, 0.1)], normal: None, stiffness: 3.0 * stiffness },
-                HeldFace { below: vec![(4, 1.0)], normal: Some([1.0, 0.0]), stiffness },
+                HeldFace { below: vec![(0, 1.1), (1, 0.2), (2, -0.3)], directions: slanted },
+                HeldFace { below: vec![(2, 0.9), (3, 0.1)], directions: both },
+                HeldFace { below: vec![(4, 1.0)], directions: along },
             ];
-            let held = |particle: usize| u8::from(particle == 1);
-            let mut springs = FaceSprings::new(&faces, &local, held).unwrap();
+            let loads = Loads::<2> { constrained: vec![0, 1, 0, 0, 0], ..Loads::default() };
+            let mut springs = FaceSprings::new(&faces, &[0, 1, 2, 3, 4], &loads, &local).unwrap();
             let mut whole = DMatrix::from_fn(10, 10, |a, b| if a == b { diagonal[a / 2] } else { 0.0 });
             for face in &faces {
                 for (part_a, a) in face.below.iter().flat_map(|&(p, w)| [(w, 2 * p), (w, 2 * p + 1)]) {
                     for (part_b, b) in face.below.iter().flat_map(|&(p, w)| [(w, 2 * p), (w, 2 * p + 1)]) {
-                        let same = f64::from(u8::from(a % 2 == b % 2));
-                        let direction = face.normal.map_or(same, |n| n[a % 2] * n[b % 2]);
-                        whole[(a, b)] += face.stiffness * part_a * part_b * direction;
+                        for (direction, spring) in &face.directions {
+                            whole[(a, b)] += spring * part_a * part_b * direction[a % 2] * direction[b % 2];
+                        }
                     }
                 }
             }

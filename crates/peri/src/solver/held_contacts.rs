@@ -5,6 +5,8 @@ use super::system::System;
 
 /// Releases in one search, after which no contact is held.
 const RELEASES: u32 = 20;
+/// Gap below which contacts are held from the start of a search, in spacings.
+const NEAR: f64 = 0.05;
 /// Residual at which contacts that pull are released, over that after the last release.
 const DECADE: f64 = 0.1;
 
@@ -19,11 +21,13 @@ impl<const D: usize> System<'_, D> {
     /// Adds those that touch now, at the start of a search all anew.
     pub(super) fn hold_touching(&mut self, state: &mut State<D>) {
         let Some(contact) = self.contact.as_mut().filter(|contact| contact.has_surfaces()) else { return };
+        let mut gap = 0.0;
         if state.counts.iteration == 0 && state.contact.renewals == 0 {
+            gap = NEAR * self.bonds.spacing();
             (state.contact.release_at, state.contact.releases) = (0.0, 0);
         }
         if state.contact.releases < RELEASES {
-            state.contact.held.extend(contact.touching(&state.displacement));
+            state.contact.held.extend(contact.touching(&state.displacement, gap));
             state.contact.held.sort_unstable();
             state.contact.held.dedup();
         }
@@ -44,7 +48,7 @@ impl<const D: usize> System<'_, D> {
             return false;
         }
         state.contact.release_at = 0.0;
-        let touching = contact.touching(&state.displacement);
+        let touching = contact.touching(&state.displacement, 0.0);
         let pull = state.contact.held.iter().any(|pair| touching.binary_search(pair).is_err());
         if pull {
             state.contact.releases += 1;

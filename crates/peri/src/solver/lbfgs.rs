@@ -98,7 +98,7 @@ pub trait SearchVectors<const D: usize> {
     /// Computes forces at the present displacement, those of the trial.
     fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<LinePoint, Error>;
     /// Faces in contact with planes in the last forces, plane by plane.
-    fn in_touch(&self, system: &System<D>, state: &State<D>) -> Result<Vec<[u32; 2]>, Error> {
+    fn in_touch(&self, system: &System<D>, state: &State<D>) -> Result<Vec<[u32; 3]>, Error> {
         Ok(in_touch(system, state))
     }
     /// ‖s u‖₂ with the springs s of the reference force, N/m³, and the precision of u.
@@ -136,7 +136,7 @@ pub struct LbfgsSearch<V> {
     first: u64,
     worn: bool,
     /// Faces in contact with planes when the preconditioner was built.
-    in_touch: Vec<[u32; 2]>,
+    in_touch: Vec<[u32; 3]>,
 }
 
 /// A point along a search direction.
@@ -375,7 +375,7 @@ impl<V> LbfgsSearch<V> {
             let (moved, epsilon) = measured.transpose()?.unzip();
             state.record_measured(system, &point.sums, &goal, (epsilon.unwrap_or(0.0), moved));
             let spent = state.counts.iteration >= goal.max_iterations;
-            if system.release_contacts(state, goal.tolerance, spent) {
+            if system.release_contacts(state, goal.tolerance.max(state.contact.loose), spent) {
                 self.vectors.forget(false);
                 if self.others_touch(system, state)? {
                     self.begin(system, state, watch)?;
@@ -471,7 +471,7 @@ impl<const D: usize, V: SearchVectors<D>> Equilibrium<D> for LbfgsSearch<V> {
 }
 
 /// Faces in contact with planes.
-fn in_touch<const D: usize>(system: &System<D>, state: &State<D>) -> Vec<[u32; 2]> {
+fn in_touch<const D: usize>(system: &System<D>, state: &State<D>) -> Vec<[u32; 3]> {
     system.repulsion().map_or_else(Vec::new, |contact| contact.in_touch(&state.displacement))
 }
 

@@ -149,7 +149,7 @@ impl<const D: usize> SearchVectors<D> for CardVectors<'_, D> {
         Ok(LinePoint { sums, observed, slope: found.slope })
     }
 
-    fn in_touch(&self, _: &System<D>, _: &State<D>) -> Result<Vec<[u32; 2]>, Error> {
+    fn in_touch(&self, _: &System<D>, _: &State<D>) -> Result<Vec<[u32; 3]>, Error> {
         self.card.as_ref().map_or_else(|| Ok(Vec::new()), |card| card.body.plane_touches())
     }
 

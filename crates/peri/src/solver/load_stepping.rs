@@ -4,7 +4,7 @@ use super::force_scale::{Balance, ForceScale};
 use super::method::{Method, StepCallback, Watch};
 use super::record::StepRecord;
 use super::state::State;
-use super::system::System;
+use super::system::{FIRST_RESIDUAL, System};
 
 use crate::bonds::StretchRange;
 use crate::error::Error;
@@ -95,7 +95,7 @@ fn step_by_step<const D: usize>(
             state.contact.start = Some(state.displacement.clone());
             state.contact.active.clone_from(&state.contact.grips);
             state.contact.active.iter_mut().for_each(|grip| grip.share = 1.0);
-            state.contact.renewals = 0;
+            (state.contact.renewals, state.contact.loose) = (0, FIRST_RESIDUAL);
         }
         system.begin_step(state);
         if !state.control.predicted && system.cut_at_touch(state) {

@@ -70,8 +70,8 @@ impl<const D: usize> Preconditioner<D> {
         springs.iter_mut().for_each(|m| *m *= 0.5 * tangent);
         let mut faces = Vec::new();
         if let Some(contact) = system.repulsion() {
-            contact.springs(&state.displacement, &mut |below, normal, stiffness| {
-                faces.push(HeldFace { below: below.to_vec(), normal, stiffness });
+            contact.springs(&state.displacement, &mut |below, directions| {
+                faces.push(HeldFace { below: below.to_vec(), directions: directions.to_vec() });
             });
         }
         self.set_local(bonds, &springs, weight);
@@ -79,8 +79,9 @@ impl<const D: usize> Preconditioner<D> {
             coarsening.and_then(|_| FaceSprings::new(&faces, bonds.particles(), &system.loads, &self.local));
         if self.faces.is_none() && !faces.is_empty() {
             for face in &faces {
+                let stiffness = face.directions.iter().map(|held| held.1).fold(0.0, f64::max);
                 for &(site, weight) in &face.below {
-                    springs[site] += face.stiffness * weight * weight / bonds.volume(site);
+                    springs[site] += stiffness * weight * weight / bonds.volume(site);
                 }
             }
             self.set_local(bonds, &springs, weight);

@@ -16,6 +16,10 @@ use std::borrow::Cow;
 /// Renewals of the normal forces of friction in a load step, and the number after which they are averaged:
 /// large coefficients may alternate.
 const RENEWALS: u32 = 40;
+/// Residual of the search after a renewal over the relative change of the normal forces in it.
+const LOOSE: f64 = 0.1;
+/// Residual of the first search of a step with friction.
+pub(super) const FIRST_RESIDUAL: f64 = 0.05;
 const ALTERNATING: u32 = 8;
 
 /// The equations of a body under its loads.
@@ -173,6 +177,7 @@ impl<'a, const D: usize> System<'a, D> {
             return false;
         };
         let Some(start) = &state.contact.start else { return false };
+        let rough = std::mem::take(&mut state.contact.loose) > 0.0 && state.convergence.residual > tolerance;
         let mut new = contact.grips(&*self.bonds, &state.displacement, start, &state.contact.grips);
         let bound = |grips: &[FrictionPair], pair| {
             grips
@@ -184,12 +189,16 @@ impl<'a, const D: usize> System<'a, D> {
         let changed = new.iter().map(|grip| (grip.bound - bound(&state.contact.active, grip.pair)).abs());
         let change: f64 = lost.chain(changed).sum();
         let total: f64 = new.iter().map(|grip| grip.bound).sum();
-        if change <= tolerance * total {
+        let settled = change <= tolerance * total;
+        if !rough && settled {
             return false;
         }
         if state.contact.renewals >= RENEWALS {
-            state.counts.unconverged += 1;
-            return false;
+            state.counts.unconverged += u64::from(!rough);
+            return rough;
+        }
+        if !settled && total > 0.0 {
+            state.contact.loose = LOOSE * (change / total).min(1.0);
         }
         if state.contact.renewals >= ALTERNATING {
             new.iter_mut()

@@ -13,8 +13,8 @@ pub struct FaceFunctions<const D: usize> {
     pub functions: Vec<u32>,
     /// Value of each, for the free components of the particles below.
     values: Vec<[f64; D]>,
-    normal: Option<[f64; D]>,
-    stiffness: f64,
+    /// Σ k n⊗n over the directions n in which the face is held, N/m.
+    stiffness: [[f64; D]; D],
 }
 
 impl<const D: usize> FaceFunctions<D> {
@@ -42,7 +42,9 @@ impl<const D: usize> FaceFunctions<D> {
             functions.push(group[0].0);
             values.push(std::array::from_fn(sum));
         }
-        Self { functions, values, normal: face.normal, stiffness: face.stiffness }
+        let part = |i: usize, j: usize| face.directions.iter().map(|(n, k)| k * n[i] * n[j]).sum::<f64>();
+        let stiffness = std::array::from_fn(|i| std::array::from_fn(|j| part(i, j)));
+        Self { functions, values, stiffness }
     }
 }
 
@@ -61,9 +63,8 @@ pub fn add_faces<const D: usize>(
                 for j in 0..D {
                     let last = if row as usize == column { j } else { D - 1 };
                     for i in 0..=last {
-                        let part = face.normal.map_or(f64::from(u8::from(i == j)), |n| n[i] * n[j]);
                         entries[pattern.starts[column * D + j] + place * D + i] +=
-                            face.stiffness * own[i] * other[j] * part;
+                            face.stiffness[i][j] * own[i] * other[j];
                     }
                 }
             }
