@@ -71,7 +71,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Adds the sums of pairs only, as [`Self::add_stiffness`].
-    pub fn add_pairs(
+    fn add_pairs(
         &self,
         bonds: &dyn BodyGeometry<D>,
         displacement: &Field<D>,
@@ -94,6 +94,47 @@ impl<const D: usize> Contact<D> {
         for (own, sum) in sums.into_iter().flatten() {
             let mass = &mut masses[own.site as usize];
             *mass = if own.alone { 2.0 * sum } else { *mass + sum };
+        }
+    }
+
+    /// Adds contacts to the diagonal of the stiffness over volumes, N/m⁵: pairs present or imminent as in
+    /// [`Self::add_stiffness`], faces in contact by k w²/V.
+    pub fn add_to_diagonal(
+        &self,
+        bonds: &dyn BodyGeometry<D>,
+        displacement: &Field<D>,
+        springs: &mut [f64],
+    ) {
+        let mut pairs = vec![0.0; springs.len()];
+        self.add_pairs(bonds, displacement, 1.0, &mut pairs);
+        springs.iter_mut().zip(&pairs).for_each(|(spring, pair)| *spring += 0.5 * pair);
+        self.springs(displacement, &mut |below, directions| {
+            let stiffness = directions.iter().map(|held| held.1).fold(0.0, f64::max);
+            for &(site, weight) in below {
+                springs[site] += stiffness * weight * weight / bonds.volume(site);
+            }
+        });
+    }
+
+    /// Visits pairs of particles in contact or about to touch, each once: the first with the weight 1, the
+    /// second with −1.
+    pub fn pair_springs(
+        &self,
+        bonds: &dyn BodyGeometry<D>,
+        displacement: &Field<D>,
+        visit: &mut Spring<D>,
+    ) {
+        for (own, near) in self.pairs(bonds, displacement, 0..displacement.sites(), self.near) {
+            for other in near.filter(|other| own.site < other.site) {
+                let [a, b] = [own.site, other.site].map(|site| site as usize);
+                let stiffness = self.pair(own.site, other.site) * bonds.volume(a) * bonds.volume(b);
+                let below = [(a, 1.0), (b, -1.0)];
+                if self.friction > 0.0 {
+                    visit(&below, &all_axes(stiffness));
+                } else {
+                    visit(&below, &[(other.direction(), stiffness)]);
+                }
+            }
         }
     }
 

@@ -8,6 +8,7 @@ use super::particle_map::{ParticleMap, in_order};
 use super::state::State;
 use super::system::System;
 use crate::bonds::BodyGeometry;
+use crate::contact::Spring;
 use crate::field::{CHUNK, Field, chunk_range};
 
 /// Limits of the coarse level's degrees of freedom, in two and three dimensions: at least, particles per
@@ -64,26 +65,23 @@ impl<const D: usize> Preconditioner<D> {
         }
         let particles = bonds.particles().iter().map(|&site| site as usize);
         particles.filter(|&site| survey.bonded[site] == 0).for_each(|site| springs[site] = 0.0);
-        if let Some(contact) = system.repulsion() {
-            contact.add_pairs(&*system.bonds, &state.displacement, tangent, &mut springs);
-        }
         springs.iter_mut().for_each(|m| *m *= 0.5 * tangent);
         let mut faces = Vec::new();
-        if let Some(contact) = system.repulsion() {
-            contact.springs(&state.displacement, &mut |below, directions| {
+        if let Some(contact) = system.repulsion().filter(|_| coarsening.is_some()) {
+            let visit: &mut Spring<D> = &mut |below, directions| {
                 faces.push(HeldFace { below: below.to_vec(), directions: directions.to_vec() });
-            });
+            };
+            contact.springs(&state.displacement, visit);
+            contact.pair_springs(bonds, &state.displacement, visit);
         }
         self.set_local(bonds, &springs, weight);
-        self.faces =
-            coarsening.and_then(|_| FaceSprings::new(&faces, bonds.particles(), &system.loads, &self.local));
-        if self.faces.is_none() && !faces.is_empty() {
-            for face in &faces {
-                let stiffness = face.directions.iter().map(|held| held.1).fold(0.0, f64::max);
-                for &(site, weight) in &face.below {
-                    springs[site] += stiffness * weight * weight / bonds.volume(site);
-                }
-            }
+        let few = faces.len() <= bonds.particles().len();
+        let exact = || FaceSprings::new(&faces, bonds.particles(), &system.loads, &self.local);
+        self.faces = few.then(exact).flatten();
+        if self.faces.is_none()
+            && let Some(contact) = system.repulsion()
+        {
+            contact.add_to_diagonal(bonds, &state.displacement, &mut springs);
             self.set_local(bonds, &springs, weight);
         }
         let body = CoarseBody {
