@@ -106,7 +106,9 @@ impl FrictionPair {
 /// A unit vector across a unit normal, in the plane of the first two axes if the normal is.
 fn tangent(normal: &[f64; 3]) -> [f64; 3] {
     let flat = normal[0].hypot(normal[1]);
-    if flat > 0.5 { [-normal[1] / flat, normal[0] / flat, 0.0] } else {
+    if flat > 0.5 {
+        [-normal[1] / flat, normal[0] / flat, 0.0]
+    } else {
         let size = normal[1].hypot(normal[2]);
         [0.0, -normal[2] / size, normal[1] / size]
     }

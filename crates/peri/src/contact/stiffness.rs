@@ -99,12 +99,7 @@ impl<const D: usize> Contact<D> {
 
     /// Adds contacts to the diagonal of the stiffness over volumes, N/m⁵: pairs present or imminent as in
     /// [`Self::add_stiffness`], faces in contact by k w²/V.
-    pub fn add_to_diagonal(
-        &self,
-        bonds: &dyn BodyGeometry<D>,
-        displacement: &Field<D>,
-        springs: &mut [f64],
-    ) {
+    pub fn add_to_diagonal(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>, springs: &mut [f64]) {
         let mut pairs = vec![0.0; springs.len()];
         self.add_pairs(bonds, displacement, 1.0, &mut pairs);
         springs.iter_mut().zip(&pairs).for_each(|(spring, pair)| *spring += 0.5 * pair);
@@ -118,12 +113,7 @@ impl<const D: usize> Contact<D> {
 
     /// Visits pairs of particles in contact or about to touch, each once: the first with the weight 1, the
     /// second with −1.
-    pub fn pair_springs(
-        &self,
-        bonds: &dyn BodyGeometry<D>,
-        displacement: &Field<D>,
-        visit: &mut Spring<D>,
-    ) {
+    pub fn pair_springs(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>, visit: &mut Spring<D>) {
         for (own, near) in self.pairs(bonds, displacement, 0..displacement.sites(), self.near) {
             for other in near.filter(|other| own.site < other.site) {
                 let [a, b] = [own.site, other.site].map(|site| site as usize);

@@ -170,7 +170,8 @@ impl<const D: usize> RigidSurfaces<D> {
         let mut all = Vec::new();
         for (number, placed) in self.each.iter().enumerate() {
             for touch in self.touches(placed, field) {
-                let slips = self.active(number, touch.element, field, friction).is_some_and(|grip| grip.slips);
+                let slips =
+                    self.active(number, touch.element, field, friction).is_some_and(|grip| grip.slips);
                 all.push([number as u32, touch.element as u32, u32::from(slips)]);
             }
         }

@@ -132,7 +132,16 @@ impl<const D: usize> RigidSurfaces<D> {
                 )));
             }
             let (rate, now, before) = (surface.displacement, [0.0; D], [0.0; D]);
-            each.push(MovingSurface { surface, now, before, factor: 0.0, rate, weight: 1.0, tied, held: Vec::new() });
+            each.push(MovingSurface {
+                surface,
+                now,
+                before,
+                factor: 0.0,
+                rate,
+                weight: 1.0,
+                tied,
+                held: Vec::new(),
+            });
         }
         let mut all = Self {
             each,
@@ -318,7 +327,8 @@ impl<const D: usize> RigidSurfaces<D> {
         let mut touches = self.near(placed, field, 0.0);
         let free = |element: &&usize| touches.binary_search_by_key(*element, |touch| touch.element).is_err();
         let pulled: Vec<usize> = placed.held.iter().filter(free).copied().collect();
-        touches.extend(pulled.iter().map(|&element| self.beside(&placed.surface, &placed.now, field, element)));
+        touches
+            .extend(pulled.iter().map(|&element| self.beside(&placed.surface, &placed.now, field, element)));
         if !pulled.is_empty() {
             touches.sort_unstable_by_key(|touch| touch.element);
         }

@@ -1,12 +1,15 @@
-//! Active set of rigid surfaces in a search for equilibrium, see [`crate::contact`]'s `holds`.
+//! Contacts that rigid surfaces hold in a search for equilibrium, see `contact::holds`: when they are added and
+//! released.
 
 use super::state::State;
 use super::system::System;
 
 /// Releases in one search, after which no contact is held.
 const RELEASES: u32 = 20;
-/// Gap below which contacts are held from the start of a search, in spacings.
-const NEAR: f64 = 0.05;
+/// Gap below which faces rest on a surface before the first load step, in spacings.
+const RESTING: f64 = 0.05;
+/// Gap above which contacts of the last load step are not held in the next, in spacings.
+const NEAR: f64 = 0.25;
 /// Residual at which contacts that pull are released, over that after the last release.
 const DECADE: f64 = 0.1;
 
@@ -18,18 +21,25 @@ impl<const D: usize> System<'_, D> {
         }
     }
 
-    /// Adds those that touch now, at the start of a search all anew.
+    /// Adds those that touch now. At the start of a load step those of the last one stay only near a surface: one
+    /// that withdraws must not drag the body along.
     pub(super) fn hold_touching(&mut self, state: &mut State<D>) {
         let Some(contact) = self.contact.as_mut().filter(|contact| contact.has_surfaces()) else { return };
-        let mut gap = 0.0;
-        if state.counts.iteration == 0 && state.contact.renewals == 0 {
-            gap = NEAR * self.bonds.spacing();
-            (state.contact.release_at, state.contact.releases) = (0.0, 0);
+        let own = &mut state.contact;
+        if state.counts.iteration == 0 && own.renewals == 0 {
+            (own.release_at, own.releases) = (0.0, 0);
+            let near = |gap: f64| contact.touching(&state.displacement, gap * self.bonds.spacing());
+            if own.held.is_empty() {
+                own.held = near(RESTING);
+            } else {
+                let near = near(NEAR);
+                own.held.retain(|pair| near.binary_search(pair).is_ok());
+            }
         }
-        if state.contact.releases < RELEASES {
-            state.contact.held.extend(contact.touching(&state.displacement, gap));
-            state.contact.held.sort_unstable();
-            state.contact.held.dedup();
+        if own.releases < RELEASES {
+            own.held.extend(contact.touching(&state.displacement, 0.0));
+            own.held.sort_unstable();
+            own.held.dedup();
         }
         contact.hold(&state.contact.held);
     }

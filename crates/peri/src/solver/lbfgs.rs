@@ -97,7 +97,7 @@ pub trait SearchVectors<const D: usize> {
     fn give(&self, system: &mut System<D>, state: &mut State<D>) -> Result<(), Error>;
     /// Computes forces at the present displacement, those of the trial.
     fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<LinePoint, Error>;
-    /// Faces in contact with planes in the last forces, plane by plane.
+    /// Faces in contact with rigid surfaces in the last forces, surface by surface, and 1 where they slip.
     fn in_touch(&self, system: &System<D>, state: &State<D>) -> Result<Vec<[u32; 3]>, Error> {
         Ok(in_touch(system, state))
     }
@@ -135,7 +135,7 @@ pub struct LbfgsSearch<V> {
     searches: u64,
     first: u64,
     worn: bool,
-    /// Faces in contact with planes when the preconditioner was built.
+    /// Faces in contact with rigid surfaces when the preconditioner was built, and which of them slip.
     in_touch: Vec<[u32; 3]>,
 }
 
@@ -193,12 +193,7 @@ impl<V> LbfgsSearch<V> {
         }
         system.prepare(&mut state.displacement);
         (self.searches, self.first, self.worn) = (0, 0, false);
-        let now = in_touch(system, state);
-        if std::env::var("PERI_DEBUG").is_ok() {
-            let kept = now.iter().filter(|face| self.in_touch.binary_search(face).is_ok()).count();
-            eprintln!("BEGIN step {} it {} ren {} touch {} old {} kept {}", state.step, state.counts.iteration, state.contact.renewals, now.len(), self.in_touch.len(), kept);
-        }
-        self.in_touch = now;
+        self.in_touch = in_touch(system, state);
         self.vectors.build(system, state, &self.settings)
     }
 
@@ -313,9 +308,6 @@ impl<V> LbfgsSearch<V> {
         }
         match self.search(system, state, point, slope)? {
             LineSearch::Found(step, point) => {
-                if std::env::var("PERI_DEBUG").is_ok() {
-                    eprintln!("  it {} step {:.3} slope {:.2e} -> {:.2e} res {:.3e}", state.counts.iteration, step, slope, point.slope, point.sums.residual(state.convergence.floor));
-                }
                 self.vectors.accept(step, CURVATURE * step * slope.abs())?;
                 Ok(Some(point))
             }
@@ -323,8 +315,8 @@ impl<V> LbfgsSearch<V> {
         }
     }
 
-    /// Returns true if a tenth of the faces in contact with planes have changed since the preconditioner was
-    /// built.
+    /// Returns true if a tenth of the faces in contact with rigid surfaces, or of their slips, have changed
+    /// since the preconditioner was built.
     fn others_touch<const D: usize>(&self, system: &System<D>, state: &State<D>) -> Result<bool, Error>
     where
         V: SearchVectors<D>,
@@ -380,9 +372,6 @@ impl<V> LbfgsSearch<V> {
                 if self.others_touch(system, state)? {
                     self.begin(system, state, watch)?;
                     before = state.counts.total_iterations;
-                }
-                if std::env::var("PERI_DEBUG").is_ok() {
-                    eprintln!("RELEASE {}", state.contact.releases);
                 }
                 point = self.arrive(system, state)?;
                 continue;
@@ -470,7 +459,7 @@ impl<const D: usize, V: SearchVectors<D>> Equilibrium<D> for LbfgsSearch<V> {
     }
 }
 
-/// Faces in contact with planes.
+/// Faces in contact with rigid surfaces, and which of them slip.
 fn in_touch<const D: usize>(system: &System<D>, state: &State<D>) -> Vec<[u32; 3]> {
     system.repulsion().map_or_else(Vec::new, |contact| contact.in_touch(&state.displacement))
 }

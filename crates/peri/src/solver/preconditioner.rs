@@ -35,7 +35,14 @@ pub struct Preconditioner<const D: usize> {
 impl<const D: usize> Preconditioner<D> {
     /// Creates an empty preconditioner.
     pub fn new() -> Self {
-        Self { local: Vec::new(), volumes: Vec::new(), unit_mass: Vec::new(), least: 0.0, faces: None, coarse: None }
+        Self {
+            local: Vec::new(),
+            volumes: Vec::new(),
+            unit_mass: Vec::new(),
+            least: 0.0,
+            faces: None,
+            coarse: None,
+        }
     }
 
     /// Returns true if it is built.

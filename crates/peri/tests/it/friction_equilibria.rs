@@ -9,6 +9,7 @@ use peri::contact::{Contact, RigidSurface, SHORT_RANGE};
 use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{DynamicRelaxation, Lbfgs, Loads, Method, State, System};
+use peri::surface::BodySurface;
 
 /// Solves all steps by a method; returns the final state and the first restartable state of step 2.
 fn equilibria(
@@ -230,5 +231,39 @@ fn dragged_over_a_plane() {
             assert!(now.balance.external < 1e-6 * now.balance.size);
         }
         assert!(run(method, 2, None).0 == one && run(method, 2, saved).0 == one, "method {method}");
+    }
+}
+
+/// A block pressed by a twentieth between planes: L-BFGS takes as many iterations at any stiffness of the
+/// planes, with friction and without, and finds the forces of relaxation.
+#[test]
+fn stiff_planes_take_no_more_iterations() {
+    let run = |method: usize, friction: f64, times: f64| {
+        let mut built = Body::<2>::solid([16, 12], 1.0, 3.015).build();
+        let bonds = &mut built.lattice;
+        let loads = hold(bonds, |x| ((x[0] - 7.5).abs() + (x[1] - 5.5).abs() < 0.1).then_some((1, [0.0; 2])));
+        let plane = |point, normal| RigidSurface {
+            friction,
+            stiffness: times * MODULUS,
+            ..RigidSurface::plane(point, normal)
+        };
+        let upper = RigidSurface { displacement: [0.0, -0.6], ..plane([0.0, 12.0], [0.0, -1.0]) };
+        let surfaces = vec![plane([0.0, 0.0], [0.0, 1.0]), upper];
+        let contact = Contact::short_range(bonds, MODULUS, 0.0).unwrap();
+        let contact = contact.with_surfaces(bonds, &BodySurface::of_lattice(bonds), 1.0, surfaces).unwrap();
+        let (state, _) = equilibria(method, bonds, &loads, contact, &[0.5, 1.0], None).unwrap();
+        let forces = state.history.last().unwrap().resting.iter().map(|resting| resting.force[1]).collect();
+        (state.counts.total_iterations, forces)
+    };
+    for friction in [0.0, 0.3] {
+        let stiff = [100.0, 1e3, 1e5];
+        let found: [(u64, Vec<f64>); 3] = stiff.map(|times| run(1, friction, times));
+        let counts = found.each_ref().map(|found| found.0);
+        let (relaxed, forces) = run(0, friction, stiff[0]);
+        eprintln!("planes, μ = {friction}: {counts:?} iterations, relaxation {relaxed}; {:?}", found[0].1);
+        assert!(counts[1].max(counts[2]) < 2 * counts[0], "μ = {friction}: {counts:?}");
+        for (a, b) in found[0].1.iter().zip(&forces) {
+            assert!((a / b - 1.0).abs() < 1e-6, "{a} {b}");
+        }
     }
 }

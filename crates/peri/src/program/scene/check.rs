@@ -44,8 +44,10 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     super::interface::check(source, scene)?;
     solver(source, scene)?;
     let strained = scene.periodic.as_ref().is_some_and(|periodic| periodic.gradient.is_some());
-    if scene.boundary.is_empty() && scene.body_force.is_empty() && !strained {
-        return Err(source.missing("boundary", "needed for loads and supports: at least one [[boundary]]"));
+    let bonded = scene.contact.iter().flat_map(|contact| &contact.plane).any(|plane| plane.bonded);
+    if scene.boundary.is_empty() && scene.body_force.is_empty() && !strained && !bonded {
+        let needed = "needed for loads and supports: at least one [[boundary]], or a `bonded` plane";
+        return Err(source.missing("boundary", needed));
     }
     let named = |at: usize| scene.boundary[at].name.as_ref();
     let twice = |&at: &usize| named(at).is_some() && (0..at).any(|before| named(before) == named(at));

@@ -116,10 +116,11 @@ impl Scene {
         self.dynamics.as_ref().is_some_and(|dynamics| dynamics.precision == ForcePrecision::Mixed)
     }
 
-    /// Returns the method; default: L-BFGS, with contact dynamic relaxation, because the coarse level of
-    /// L-BFGS does not include contact.
+    /// Returns the method; default: L-BFGS; with contact dynamic relaxation where bonds break, and on a card,
+    /// which has the diagonal of contact only.
     pub fn method(&self) -> SolverMethod {
-        self.solver.method.unwrap_or(if self.contact.is_some() {
+        let hard = self.breaks() || self.device().0 != DeviceChoice::Cpu;
+        self.solver.method.unwrap_or(if self.contact.is_some() && hard {
             SolverMethod::Adr
         } else {
             SolverMethod::Lbfgs

@@ -13,9 +13,9 @@ use crate::bonds::BodyGeometry;
 use crate::field::Field;
 use crate::parallel;
 use crate::potential::BondPotential;
+use crate::solver::face_springs::HeldFace;
 use crate::solver::load::Loads;
 use crate::solver::particle_map::in_order;
-use crate::solver::face_springs::HeldFace;
 use faces::{FaceFunctions, add_faces};
 use factor::{Factor, Pattern};
 use polycore::numerics::bounds;
@@ -175,10 +175,7 @@ impl FunctionBlocks {
     }
 }
 
-fn pattern<const D: usize>(
-    space: &CoarseSpace<D>,
-    faces: &[FaceFunctions<D>],
-) -> (Pattern, FunctionBlocks) {
+fn pattern<const D: usize>(space: &CoarseSpace<D>, faces: &[FaceFunctions<D>]) -> (Pattern, FunctionBlocks) {
     let mut pairs: Vec<u64> = Vec::with_capacity(space.elements.len() * (1 << (2 * D)));
     for element in &space.elements {
         for &column in &element.functions[..1 << D] {
