@@ -81,8 +81,8 @@ impl FrictionPair {
         }
     }
 
-    /// Computes the stiffness after the first side has moved by `moved`, m, against the second: k_t, beyond the
-    /// elastic slip b/|e*| across it only.
+    /// Computes the stiffness after the first side has moved by `moved`, m, against the second: k_t, beyond
+    /// the elastic slip b/|e*| across it only.
     pub fn tangent_stiffness(&self, moved: [f64; 3]) -> TangentStiffness {
         let moved = across(&self.normal, moved);
         let trial: [f64; 3] = std::array::from_fn(|d| self.slip[d] + self.share * moved[d]);

@@ -1,9 +1,10 @@
 //! Elements that rigid surfaces hold in a search for equilibrium.
 //!
-//! The energy of an element in contact is ½k⟨o⟩², whose curvature jumps where the overlap o changes its sign: a
-//! search in which many elements touch and lift off again and again hardly advances. Between two decades of
-//! the residual, elements that have touched are held with ½ko² instead; those that then pull are released (the
-//! primal-dual active set of Hintermüller, Ito & Kunisch 2002, doi:10.1137/S1052623401383558).
+//! The energy of an element in contact is ½k⟨o⟩², whose curvature jumps where the overlap o changes its
+//! sign: a search in which many elements touch and lift off again and again hardly advances. Between two
+//! decades of the residual, elements that have touched are held with ½ko² instead; those that then pull are
+//! released (the primal-dual active set of Hintermüller, Ito & Kunisch 2002,
+//! doi:10.1137/S1052623401383558).
 
 use super::Contact;
 use super::friction_pair::ContactPair;
@@ -24,7 +25,7 @@ impl<const D: usize> RigidSurfaces<D> {
         pairs
     }
 
-    fn hold(&mut self, pairs: &[ContactPair]) {
+    fn set_held(&mut self, pairs: &[ContactPair]) {
         self.each.iter_mut().for_each(|placed| placed.held.clear());
         for &pair in pairs {
             let element = self.element(pair).filter(|&(_, element)| self.is_live(element));
@@ -42,9 +43,9 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Holds pairs in contact, ascending, whether they push or pull; releases all others.
-    pub fn hold(&mut self, pairs: &[ContactPair]) {
+    pub fn set_held(&mut self, pairs: &[ContactPair]) {
         if let Some(surfaces) = &mut self.surfaces {
-            surfaces.hold(pairs);
+            surfaces.set_held(pairs);
         }
     }
 }

@@ -129,8 +129,8 @@ impl<const D: usize> RigidSurfaces<D> {
         matrix.symmetric_eigenvalues().max() * self.penalty.greatest() * self.greatest
     }
 
-    /// Visits elements in contact, with the stiffness of the present `friction`; or those nearer than `gap`, m,
-    /// held in all directions where there is friction.
+    /// Visits elements in contact, with the stiffness of the present `friction`; or those nearer than
+    /// `gap`, m, held in all directions where there is friction.
     pub fn springs(
         &self,
         field: &Field<D>,

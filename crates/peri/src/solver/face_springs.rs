@@ -1,9 +1,10 @@
 //! Springs of faces in the local part of the preconditioner.
 //!
-//! A face in contact with a rigid surface, or tied to a grip, adds k w wᵀ to the stiffness. With the diagonal of
-//! this matrix alone, the particles below would be as stiff against each other as against the surface, and
-//! iterations grow in proportion to k. With D the diagonal of the body and W the weights w of all faces,
-//! (D + W K Wᵀ)⁻¹ = D⁻¹ − D⁻¹W S⁻¹WᵀD⁻¹ and S = K⁻¹ + WᵀD⁻¹W (Woodbury), with sparse factors of S.
+//! A face in contact with a rigid surface, or tied to a grip, adds k w wᵀ to the stiffness. With the
+//! diagonal of this matrix alone, the particles below would be as stiff against each other as against the
+//! surface, and iterations grow in proportion to k. With D the diagonal of the body and W the weights w of
+//! all faces, (D + W K Wᵀ)⁻¹ = D⁻¹ − D⁻¹W S⁻¹WᵀD⁻¹ and S = K⁻¹ + WᵀD⁻¹W (Woodbury), with sparse factors of
+//! S.
 
 use super::load::Loads;
 use crate::field::Field;
@@ -29,8 +30,8 @@ pub struct FaceSprings<const D: usize> {
 }
 
 impl<const D: usize> FaceSprings<D> {
-    /// Computes the factors with D⁻¹ of each of the `particles`. `None` without faces, or if the factors exceed
-    /// the memory.
+    /// Computes the factors with D⁻¹ of each of the `particles`. `None` without faces, or if the factors
+    /// exceed the memory.
     pub fn new(faces: &[HeldFace<D>], particles: &[u32], loads: &Loads<D>, local: &[f64]) -> Option<Self> {
         let (mut starts, mut entries, mut stiffness) = (vec![0], Vec::new(), Vec::new());
         for face in faces {
@@ -77,7 +78,7 @@ impl<const D: usize> FaceSprings<D> {
     }
 
     /// Releases a particle that has lost all its bonds, so that the sum of both parts stays positive.
-    pub fn release(&mut self, particle: usize) {
+    pub fn release_particle(&mut self, particle: usize) {
         let own = self.entries.iter_mut().filter(|(other, _)| *other as usize == particle);
         own.for_each(|(_, weight)| *weight = [0.0; D]);
     }

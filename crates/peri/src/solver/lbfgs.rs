@@ -441,7 +441,7 @@ impl<const D: usize, V: SearchVectors<D>> Equilibrium<D> for LbfgsSearch<V> {
         }
         let found = self.find_balance(system, state, watch);
         if let Some(contact) = &mut system.contact {
-            contact.hold(&[]);
+            contact.set_held(&[]);
         }
         if matches!(found, Ok(_) | Err(Error::NotConverged { .. })) {
             self.vectors.give(system, state)?;

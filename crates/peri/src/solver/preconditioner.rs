@@ -129,7 +129,7 @@ impl<const D: usize> Preconditioner<D> {
             let local = &mut self.local[particle];
             let alone = bonds.is_alone(site as usize);
             if alone && let Some(faces) = &mut self.faces {
-                faces.release(particle);
+                faces.release_particle(particle);
             }
             *local = if alone { self.least } else { *local * before / self.unit_mass[site as usize] };
         }

@@ -155,8 +155,8 @@ pub(super) struct ContactState<const D: usize> {
     pub renewals: u32,
     /// Residual at which a search ends whose friction is not final.
     pub loose: f64,
-    /// Pairs held by rigid surfaces in the search for the current equilibrium, the residual at which those that
-    /// pull are released (0: not set), and the number of releases in this search.
+    /// Pairs held by rigid surfaces in the search for the current equilibrium, the residual at which those
+    /// that pull are released (0: not set), and the number of releases in this search.
     pub held: Vec<ContactPair>,
     pub release_at: f64,
     pub releases: u32,

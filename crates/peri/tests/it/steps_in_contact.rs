@@ -216,14 +216,18 @@ fn a_force_goes_on_along_its_curve() {
 /// A run resumed within either step has the same bits.
 #[test]
 fn resumed_below_an_indenter() {
-    let solver = "solver = { steps = 2, tolerance = 1e-8 }";
-    let side = "{ name = \"side\", side = \"x+\", force = [\"1 N\", \"0 N\"] }";
-    let text = pressed("", solver, &format!("[[step]]\nboundary = [{BASE}, {side}]\n{solver}\n"));
-    let whole = history(&text);
-    let iterations: usize = whole.iter().map(|row| row.iterations as usize).sum();
-    for part in [0.3, 0.6, 0.9] {
-        let calls = (part * iterations as f64) as usize;
-        assert_eq!(interrupted(&text, calls), whole, "after {calls} of {iterations} iterations");
+    // L-BFGS continues from the start of a search only
+    for (method, parts) in [("adr", [0.3, 0.6, 0.9]), ("lbfgs", [0.2, 0.4, 0.6])] {
+        let solver = &format!("solver = {{ method = \"{method}\", steps = 2, tolerance = 1e-8 }}");
+        let side = "{ name = \"side\", side = \"x+\", force = [\"1 N\", \"0 N\"] }";
+        let text = pressed("", solver, &format!("[[step]]\nboundary = [{BASE}, {side}]\n{solver}\n"));
+        let whole = history(&text);
+        let iterations: usize = whole.iter().map(|row| row.iterations as usize).sum();
+        for part in parts {
+            let calls = (part * iterations as f64) as usize;
+            let resumed = interrupted(&text, calls);
+            assert_eq!(resumed, whole, "{method}, after {calls} of {iterations} iterations");
+        }
     }
 }
 

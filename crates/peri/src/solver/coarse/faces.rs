@@ -1,6 +1,6 @@
-//! Stiffness of held faces in the space of the coarse functions: k Pᵀw wᵀP, exactly. One that is too small, as
-//! with the functions at one particle in place of wᵀP, makes steps of the coarse level too long in proportion
-//! to k.
+//! Stiffness of held faces in the space of the coarse functions: k Pᵀw wᵀP, exactly. One that is too small,
+//! as with the functions at one particle in place of wᵀP, makes steps of the coarse level too long in
+//! proportion to k.
 
 use super::space::{CORNERS, CoarseSpace, NONE};
 use super::{FunctionBlocks, Pattern};
@@ -59,7 +59,7 @@ pub fn add_faces<const D: usize>(
         for (k, &column) in face.functions.iter().enumerate() {
             let (column, other) = (column as usize, face.values[k]);
             for (&row, own) in face.functions[..=k].iter().zip(&face.values) {
-                let place = blocks.place(row, column);
+                let place = blocks.index_in_column(row, column);
                 for j in 0..D {
                     let last = if row as usize == column { j } else { D - 1 };
                     for i in 0..=last {

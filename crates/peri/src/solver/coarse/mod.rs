@@ -169,8 +169,8 @@ struct FunctionBlocks {
 }
 
 impl FunctionBlocks {
-    /// Place of a pair of functions, row ≤ column, in its column. Every pair of one element or face has one.
-    fn place(&self, row: u32, column: usize) -> usize {
+    /// Index of a pair of functions, row ≤ column, in its column. Every pair of one element or face has one.
+    fn index_in_column(&self, row: u32, column: usize) -> usize {
         self.others[self.starts[column]..self.starts[column + 1]].partition_point(|&other| other < row)
     }
 }
@@ -232,7 +232,7 @@ fn assemble<const D: usize>(
             for b in a..1 << D {
                 let (f, g) = (element.functions[a], element.functions[b]);
                 let (row, column) = (f.min(g), f.max(g) as usize);
-                let place = blocks.place(row, column);
+                let place = blocks.index_in_column(row, column);
                 for i in 0..D {
                     for j in 0..D {
                         // only the upper triangle is kept
