@@ -67,9 +67,7 @@ impl FrictionPair {
 
     /// Computes the friction after the first side has moved by `moved`, m, against the second.
     pub fn drag(&self, moved: [f64; 3]) -> Drag {
-        let moved = across(&self.normal, moved);
-        let trial: [f64; 3] = std::array::from_fn(|d| self.slip[d] + self.share * moved[d]);
-        let (size, most) = (length(trial), self.bound / self.stiffness);
+        let (trial, size, most) = self.trial_slip(moved);
         if size <= most {
             return Drag { force: trial.map(|x| -self.stiffness * x), slip: trial, dissipated: 0.0 };
         }
@@ -81,12 +79,17 @@ impl FrictionPair {
         }
     }
 
+    /// e* after a motion, m, its length, and b/k_t.
+    fn trial_slip(&self, moved: [f64; 3]) -> ([f64; 3], f64, f64) {
+        let moved = across(&self.normal, moved);
+        let trial = std::array::from_fn(|d| self.slip[d] + self.share * moved[d]);
+        (trial, length(trial), self.bound / self.stiffness)
+    }
+
     /// Computes the stiffness after the first side has moved by `moved`, m, against the second: k_t, beyond
     /// the elastic slip b/|e*| across it only.
     pub fn tangent_stiffness(&self, moved: [f64; 3]) -> TangentStiffness {
-        let moved = across(&self.normal, moved);
-        let trial: [f64; 3] = std::array::from_fn(|d| self.slip[d] + self.share * moved[d]);
-        let (size, most) = (length(trial), self.bound / self.stiffness);
+        let (trial, size, most) = self.trial_slip(moved);
         let slips = size > most;
         let [along, across_it] = if slips { [0.0, self.bound / size] } else { [self.stiffness; 2] };
         let direction = if size > 0.0 { trial.map(|x| x / size) } else { tangent(&self.normal) };

@@ -2,6 +2,7 @@
 
 use super::Contact;
 use super::list::{ListedParticle, NearbyParticle};
+use super::surface_friction::ActiveFriction;
 use super::surfaces::RigidSurfaces;
 use super::ties::Ties;
 use crate::bonds::BodyGeometry;
@@ -135,8 +136,7 @@ impl<const D: usize> Contact<D> {
 
     fn near_springs(&self, displacement: &Field<D>, gap: Option<f64>, visit: &mut Spring<D>) {
         if let Some(surfaces) = &self.surfaces {
-            let friction = self.start.as_ref().map(|start| (&*self.held, start));
-            surfaces.springs(displacement, gap, friction, visit);
+            surfaces.springs(displacement, gap, self.active_friction(), visit);
         }
         if let Some(ties) = &self.ties {
             ties.springs(visit);
@@ -145,8 +145,12 @@ impl<const D: usize> Contact<D> {
 
     /// Surface and number of the faces in contact, ascending, and 1 where they slip.
     pub fn in_touch(&self, displacement: &Field<D>) -> Vec<[u32; 3]> {
-        let friction = self.start.as_ref().map(|start| (&*self.held, start));
-        self.surfaces.as_ref().map_or_else(Vec::new, |surfaces| surfaces.in_touch(displacement, friction))
+        let in_touch = |surfaces: &RigidSurfaces<D>| surfaces.in_touch(displacement, self.active_friction());
+        self.surfaces.as_ref().map_or_else(Vec::new, in_touch)
+    }
+
+    fn active_friction(&self) -> ActiveFriction<'_, D> {
+        self.start.as_ref().map(|start| (&*self.held, start))
     }
 
     /// Longest step along a direction in which no particle jumps past another: a relative motion of a quarter

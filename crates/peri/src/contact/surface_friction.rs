@@ -6,6 +6,9 @@ use super::surfaces::{RigidSurfaces, SurfaceContact};
 use crate::field::Field;
 use nalgebra::Vector3;
 
+/// Friction between equilibria, sorted by pair, and the displacement from which on it acts; or none.
+pub(super) type ActiveFriction<'a, const D: usize> = Option<(&'a [FrictionPair], &'a Field<D>)>;
+
 impl<const D: usize> RigidSurfaces<D> {
     /// Motion of a face or particle against a surface since `start`, m.
     pub fn slipped(&self, pair: ContactPair, field: &Field<D>, start: &Field<D>) -> [f64; 3] {
@@ -16,14 +19,13 @@ impl<const D: usize> RigidSurfaces<D> {
         std::array::from_fn(|d| if d < D { moved(d) } else { 0.0 })
     }
 
-    /// Computes the stiffness of the active friction of an element, for its motion since the second of
-    /// `friction`; `None` without any.
+    /// Computes the stiffness of the friction of an element; `None` without any.
     pub(super) fn active(
         &self,
         surface: usize,
         element: usize,
         field: &Field<D>,
-        friction: Option<(&[FrictionPair], &Field<D>)>,
+        friction: ActiveFriction<D>,
     ) -> Option<TangentStiffness> {
         let (held, start) = friction?;
         let pair = self.pair(surface, element);
@@ -37,7 +39,7 @@ impl<const D: usize> RigidSurfaces<D> {
         surface: usize,
         touch: &SurfaceContact<D>,
         field: &Field<D>,
-        friction: Option<(&[FrictionPair], &Field<D>)>,
+        friction: ActiveFriction<D>,
     ) -> Vec<([f64; D], f64)> {
         let mut directions = vec![(touch.normal, touch.stiffness)];
         let Some(grip) = self.active(surface, touch.element, field, friction) else { return directions };

@@ -1,8 +1,8 @@
 //! Results of the contact with rigid surfaces: forces, energies, stiffness.
 
-use super::friction_pair::FrictionPair;
 use super::stiffness::all_axes;
 use super::surface::{SurfaceReaction, SurfaceShape};
+use super::surface_friction::ActiveFriction;
 use super::surfaces::{MovingSurface, RigidSurfaces};
 use crate::field::Field;
 use crate::geometry::length;
@@ -135,7 +135,7 @@ impl<const D: usize> RigidSurfaces<D> {
         &self,
         field: &Field<D>,
         gap: Option<f64>,
-        friction: Option<(&[FrictionPair], &Field<D>)>,
+        friction: ActiveFriction<D>,
         visit: &mut super::Spring<D>,
     ) {
         let mut below = Vec::new();
@@ -162,11 +162,7 @@ impl<const D: usize> RigidSurfaces<D> {
     }
 
     /// Surface and element of all contacts, ascending, and 1 for those that slip.
-    pub fn in_touch(
-        &self,
-        field: &Field<D>,
-        friction: Option<(&[FrictionPair], &Field<D>)>,
-    ) -> Vec<[u32; 3]> {
+    pub fn in_touch(&self, field: &Field<D>, friction: ActiveFriction<D>) -> Vec<[u32; 3]> {
         let mut all = Vec::new();
         for (number, placed) in self.each.iter().enumerate() {
             for touch in self.touches(placed, field) {

@@ -326,12 +326,10 @@ impl<const D: usize> RigidSurfaces<D> {
         }
         let mut touches = self.near(placed, field, 0.0);
         let free = |element: &&usize| touches.binary_search_by_key(*element, |touch| touch.element).is_err();
-        let pulled: Vec<usize> = placed.held.iter().filter(free).copied().collect();
-        touches
-            .extend(pulled.iter().map(|&element| self.beside(&placed.surface, &placed.now, field, element)));
-        if !pulled.is_empty() {
-            touches.sort_unstable_by_key(|touch| touch.element);
-        }
+        let beside = |&element: &usize| self.beside(&placed.surface, &placed.now, field, element);
+        let pulled: Vec<SurfaceContact<D>> = placed.held.iter().filter(free).map(beside).collect();
+        touches.extend(pulled);
+        touches.sort_unstable_by_key(|touch| touch.element);
         touches
     }
 

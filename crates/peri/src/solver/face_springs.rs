@@ -33,6 +33,9 @@ impl<const D: usize> FaceSprings<D> {
     /// Computes the factors with D⁻¹ of each of the `particles`. `None` without faces, or if the factors
     /// exceed the memory.
     pub fn new(faces: &[HeldFace<D>], particles: &[u32], loads: &Loads<D>, local: &[f64]) -> Option<Self> {
+        if faces.is_empty() {
+            return None;
+        }
         let (mut starts, mut entries, mut stiffness) = (vec![0], Vec::new(), Vec::new());
         for face in faces {
             for &(direction, spring) in &face.directions {
@@ -47,7 +50,7 @@ impl<const D: usize> FaceSprings<D> {
             }
         }
         let (pattern, values) = matrix(&starts, &entries, &stiffness, local);
-        let cholesky = Cholesky::analyse_reordered(pattern).filter(|_| !faces.is_empty())?;
+        let cholesky = Cholesky::analyse_reordered(pattern)?;
         let mut factors = Vec::new();
         if !cholesky.factor(&values, &mut factors) {
             return None;

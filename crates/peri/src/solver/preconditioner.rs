@@ -147,9 +147,9 @@ impl<const D: usize> Preconditioner<D> {
         if let Some(coarse) = self.coarse.as_mut().filter(|_| !local_only) {
             coarse.solve(gradient);
         }
-        let particles = gradient.sites();
-        let coarse = self.coarse.as_ref().filter(|_| !local_only);
-        let (g, local) = (gradient.components(), &self.local);
+        let Self { local, faces, coarse, .. } = self;
+        let coarse = coarse.as_ref().filter(|_| !local_only);
+        let (g, particles) = (gradient.components(), gradient.sites());
         in_order(result.chunks_mut(), |chunk, z| {
             let range = chunk_range(chunk, particles);
             let (start, local) = (chunk * CHUNK, &local[range.clone()]);
@@ -172,10 +172,9 @@ impl<const D: usize> Preconditioner<D> {
                 }
             }
         });
-        if let Some(faces) = &mut self.faces {
+        if let Some(faces) = faces {
             faces.correct(gradient, result);
         }
-        let (coarse, local) = (self.coarse.as_ref().filter(|_| !local_only), &self.local);
         for (components, particles) in places.shared() {
             let of = |particle: usize| {
                 let (g, value) = (gradient.get(particle), coarse.map_or([0.0; D], |own| own.value(particle)));

@@ -16,11 +16,11 @@ use std::borrow::Cow;
 /// Renewals of the normal forces of friction in a load step, and the number after which they are averaged:
 /// large coefficients may alternate.
 const RENEWALS: u32 = 40;
+const ALTERNATING: u32 = 8;
 /// Residual of the search after a renewal over the relative change of the normal forces in it.
 const LOOSE: f64 = 0.1;
 /// Residual of the first search of a step with friction.
 pub(super) const FIRST_RESIDUAL: f64 = 0.05;
-const ALTERNATING: u32 = 8;
 
 /// The equations of a body under its loads.
 pub struct System<'a, const D: usize> {

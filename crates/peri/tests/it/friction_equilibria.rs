@@ -235,7 +235,7 @@ fn dragged_over_a_plane() {
 }
 
 /// A block pressed by a twentieth between planes: L-BFGS takes as many iterations at any stiffness of the
-/// planes, with friction at ten times it, and finds the forces of relaxation.
+/// planes, with friction at ten times the least, and finds the forces of relaxation.
 #[test]
 fn stiff_planes_take_no_more_iterations() {
     let run = |method: usize, friction: f64, times: f64| {
@@ -261,9 +261,10 @@ fn stiff_planes_take_no_more_iterations() {
         let counts = found.each_ref().map(|found| found.0);
         let (relaxed, forces) = run(0, friction, stiff[0]);
         eprintln!("planes, μ = {friction}: {counts:?} iterations, relaxation {relaxed}; {:?}", found[0].1);
-        // with the stiffest, an elastic slip of 1e-5 spacings, faces that stick and slip take turns
-        let most = if friction > 0.0 { counts[1] } else { counts[1].max(counts[2]) };
-        assert!(most < 2 * counts[0], "μ = {friction}: {counts:?}");
+        // with the stiffest, an elastic slip of 1e-5 spacings, faces alternate between stick and slip: four
+        // times as many iterations, for a thousand times the stiffness
+        let most = if friction > 0.0 { 10 } else { 2 };
+        assert!(counts[1] < 2 * counts[0] && counts[2] < most * counts[0], "μ = {friction}: {counts:?}");
         for (a, b) in found[0].1.iter().zip(&forces) {
             assert!((a / b - 1.0).abs() < 1e-6, "{a} {b}");
         }

@@ -3,6 +3,7 @@
 //! proportion to k.
 
 use super::space::{CORNERS, CoarseSpace, NONE};
+use super::stiffness::hats;
 use super::{FunctionBlocks, Pattern};
 use crate::solver::face_springs::HeldFace;
 use crate::solver::load::Loads;
@@ -26,12 +27,10 @@ impl<const D: usize> FaceFunctions<D> {
             if element == NONE {
                 continue;
             }
-            let (local, bits) = (space.local.get(site), loads.constrained(site));
-            let functions = space.elements[element as usize].functions;
-            for (corner, &function) in functions[..1 << D].iter().enumerate() {
-                let along = |d: usize| if corner >> d & 1 == 1 { local[d] } else { 1.0 - local[d] };
-                let hat: f64 = weight * (0..D).map(along).product::<f64>();
-                let free = |d: usize| if bits >> d & 1 == 1 { 0.0 } else { hat };
+            let (values, _) = hats::<D>(space.local.get(site), space.edge);
+            let (bits, functions) = (loads.constrained(site), space.elements[element as usize].functions);
+            for (&function, value) in functions[..1 << D].iter().zip(values) {
+                let free = |d: usize| if bits >> d & 1 == 1 { 0.0 } else { weight * value };
                 all.push((function, std::array::from_fn(free)));
             }
         }
@@ -59,14 +58,9 @@ pub fn add_faces<const D: usize>(
         for (k, &column) in face.functions.iter().enumerate() {
             let (column, other) = (column as usize, face.values[k]);
             for (&row, own) in face.functions[..=k].iter().zip(&face.values) {
-                let place = blocks.index_in_column(row, column);
-                for j in 0..D {
-                    let last = if row as usize == column { j } else { D - 1 };
-                    for i in 0..=last {
-                        entries[pattern.starts[column * D + j] + place * D + i] +=
-                            face.stiffness[i][j] * own[i] * other[j];
-                    }
-                }
+                blocks.add::<D>(pattern, entries, [row as usize, column], |i, j| {
+                    face.stiffness[i][j] * own[i] * other[j]
+                });
             }
         }
     }

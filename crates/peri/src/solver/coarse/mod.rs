@@ -169,9 +169,23 @@ struct FunctionBlocks {
 }
 
 impl FunctionBlocks {
-    /// Index of a pair of functions, row ≤ column, in its column. Every pair of one element or face has one.
-    fn index_in_column(&self, row: u32, column: usize) -> usize {
-        self.others[self.starts[column]..self.starts[column + 1]].partition_point(|&other| other < row)
+    /// Adds a matrix of components (i of the row, j of the column) of a pair of functions, row ≤ column, of
+    /// one element or face to the entries of the upper triangle.
+    fn add<const D: usize>(
+        &self,
+        pattern: &Pattern,
+        entries: &mut [f64],
+        [row, column]: [usize; 2],
+        value: impl Fn(usize, usize) -> f64,
+    ) {
+        let others = &self.others[self.starts[column]..self.starts[column + 1]];
+        let place = others.partition_point(|&other| (other as usize) < row);
+        for j in 0..D {
+            let last = if row == column { j } else { D - 1 };
+            for i in 0..=last {
+                entries[pattern.starts[column * D + j] + place * D + i] += value(i, j);
+            }
+        }
     }
 }
 
@@ -231,21 +245,11 @@ fn assemble<const D: usize>(
         for a in 0..1 << D {
             for b in a..1 << D {
                 let (f, g) = (element.functions[a], element.functions[b]);
-                let (row, column) = (f.min(g), f.max(g) as usize);
-                let place = blocks.index_in_column(row, column);
-                for i in 0..D {
-                    for j in 0..D {
-                        // only the upper triangle is kept
-                        if row as usize == column && i > j {
-                            continue;
-                        }
-                        let mut value = if f <= g { matrix[at][i * D + j] } else { matrix[at][j * D + i] };
-                        if a == b && i == j {
-                            value += shift * measure[a];
-                        }
-                        entries[pattern.starts[column * D + j] + place * D + i] += value;
-                    }
-                }
+                let pair = [f.min(g), f.max(g)].map(|function| function as usize);
+                blocks.add::<D>(pattern, &mut entries, pair, |i, j| {
+                    let value = if f <= g { matrix[at][i * D + j] } else { matrix[at][j * D + i] };
+                    if a == b && i == j { value + shift * measure[a] } else { value }
+                });
                 at += 1;
             }
         }

@@ -369,7 +369,7 @@ fn add_products<const D: usize>(products: &mut GradientProducts, volume: f64, sl
 }
 
 /// The hats of a cell's corners and their derivatives.
-fn hats<const D: usize>(local: [f64; D], edge: [f64; D]) -> ([f64; CORNERS], [[f64; D]; CORNERS]) {
+pub fn hats<const D: usize>(local: [f64; D], edge: [f64; D]) -> ([f64; CORNERS], [[f64; D]; CORNERS]) {
     let mut values = [0.0; CORNERS];
     let mut slopes = [[0.0; D]; CORNERS];
     for corner in 0..1 << D {
