@@ -12,11 +12,11 @@ use super::surfaces::RigidSurfaces;
 use crate::field::Field;
 
 impl<const D: usize> RigidSurfaces<D> {
-    /// Pairs nearer than `gap`, m, to surfaces that are neither bonded nor moved by a force, ascending.
+    /// Pairs nearer than `gap`, m, to surfaces that no force moves, and not tied to them, ascending.
     fn touching(&self, field: &Field<D>, gap: f64) -> Vec<ContactPair> {
         let mut pairs = Vec::new();
         for (number, placed) in self.each.iter().enumerate() {
-            if !placed.surface.bonded && placed.surface.force.is_none() {
+            if placed.surface.force.is_none() {
                 let touches = self.near(placed, field, gap);
                 pairs.extend(touches.iter().map(|touch| self.pair(number, touch.element)));
             }

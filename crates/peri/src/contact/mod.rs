@@ -28,6 +28,7 @@
 //! angular momentum.
 
 mod face_areas;
+mod face_centres;
 mod faces;
 mod faceted;
 mod forces;

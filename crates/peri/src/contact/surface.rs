@@ -44,7 +44,8 @@ pub struct RigidSurface<const D: usize> {
     /// Elastic slip γ at which friction reaches Coulomb's limit, m; `None`: tangential and normal stiffness
     /// are equal.
     pub elastic_slip: Option<f64>,
-    /// Ties the faces that touch it in the reference state: no gap, no slip. Planes only.
+    /// Ties the faces that touch it in the reference state: no gap, no slip; others touch it without
+    /// friction. Planes only.
     pub bonded: bool,
     /// Displacement at load factor 1, m, in proportion to the factor.
     pub displacement: [f64; D],

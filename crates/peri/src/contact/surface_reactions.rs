@@ -141,17 +141,14 @@ impl<const D: usize> RigidSurfaces<D> {
         let mut below = Vec::new();
         for (number, placed) in self.each.iter().enumerate() {
             let surface = &placed.surface;
-            let touches = match gap {
-                Some(gap) if !surface.bonded => self.near(placed, field, gap),
-                _ => self.touches(placed, field),
-            };
-            for touch in touches {
+            for touch in self.touches_within(placed, field, gap.unwrap_or(0.0)) {
                 below.clear();
                 match touch.element.checked_sub(self.faces.len()) {
                     None => below.extend(self.faces.below(touch.element)),
                     Some(bare) => below.push((self.bare[bare] as usize, 1.0)),
                 }
-                let directions = if surface.bonded || (gap.is_some() && surface.friction > 0.0) {
+                let rubs = surface.friction > 0.0 && !surface.bonded;
+                let directions = if touch.offset.is_some() || (gap.is_some() && rubs) {
                     all_axes(touch.stiffness)
                 } else {
                     self.directions(number, &touch, field, friction)

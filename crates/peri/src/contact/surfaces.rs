@@ -308,39 +308,60 @@ impl<const D: usize> RigidSurfaces<D> {
         }
     }
 
-    /// Elements that a surface acts on, in order: its tied faces, or those behind it and those it holds.
+    /// Elements that a surface acts on, in order: those tied to it, those behind it and those it holds.
     pub(super) fn touches(&self, placed: &MovingSurface<D>, field: &Field<D>) -> Vec<SurfaceContact<D>> {
-        if placed.surface.bonded {
-            let tied = |&face: &u32| {
-                let mut element = face as usize;
-                if !self.sound[element] {
-                    let head = self.faces.head(element) as u32;
-                    element = self.faces.len() + self.bare.binary_search(&head).ok()?;
-                }
-                let mut touch = self.beside(&placed.surface, &placed.now, field, element);
-                let moved = self.displacement(field, element);
-                touch.offset = Some(std::array::from_fn(|d| moved[d] - placed.now[d]));
-                Some(touch)
-            };
-            return placed.tied.iter().filter_map(tied).collect();
-        }
-        let mut touches = self.near(placed, field, 0.0);
+        self.touches_within(placed, field, 0.0)
+    }
+
+    /// Likewise, with those nearer than `gap`, m.
+    pub(super) fn touches_within(
+        &self,
+        placed: &MovingSurface<D>,
+        field: &Field<D>,
+        gap: f64,
+    ) -> Vec<SurfaceContact<D>> {
+        let beside = |element: usize| self.beside(&placed.surface, &placed.now, field, element);
+        let mut touches = self.near(placed, field, gap);
         let free = |element: &&usize| touches.binary_search_by_key(*element, |touch| touch.element).is_err();
-        let beside = |&element: &usize| self.beside(&placed.surface, &placed.now, field, element);
-        let pulled: Vec<SurfaceContact<D>> = placed.held.iter().filter(free).map(beside).collect();
+        let pulled: Vec<SurfaceContact<D>> =
+            placed.held.iter().filter(free).map(|&element| beside(element)).collect();
         touches.extend(pulled);
+        touches.extend(self.tied(placed).into_iter().map(|element| {
+            let moved = self.displacement(field, element);
+            let offset = std::array::from_fn(|d| moved[d] - placed.now[d]);
+            SurfaceContact { offset: Some(offset), ..beside(element) }
+        }));
         touches.sort_unstable_by_key(|touch| touch.element);
         touches
     }
 
-    /// Elements nearer to a surface than `gap`, m, in order.
+    /// Elements tied to a surface, ascending: faces, or the particles below those that have lost bonds.
+    fn tied(&self, placed: &MovingSurface<D>) -> Vec<usize> {
+        let element = |&face: &u32| {
+            if self.sound[face as usize] {
+                return Some(face as usize);
+            }
+            let head = self.faces.head(face as usize) as u32;
+            Some(self.faces.len() + self.bare.binary_search(&head).ok()?)
+        };
+        let mut tied: Vec<usize> = placed.tied.iter().filter_map(element).collect();
+        tied.sort_unstable();
+        tied
+    }
+
+    /// Elements nearer to a surface than `gap`, m, and not tied to it, in order.
     pub(super) fn near(
         &self,
         placed: &MovingSurface<D>,
         field: &Field<D>,
         gap: f64,
     ) -> Vec<SurfaceContact<D>> {
-        self.near_at(&placed.surface, &placed.now, field, gap)
+        let mut near = self.near_at(&placed.surface, &placed.now, field, gap);
+        if !placed.tied.is_empty() {
+            let tied = self.tied(placed);
+            near.retain(|touch| tied.binary_search(&touch.element).is_err());
+        }
+        near
     }
 
     /// Elements nearer to a surface moved by `shift`, m, than `gap`, m, in order.

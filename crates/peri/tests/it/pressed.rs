@@ -3,8 +3,11 @@
 
 use crate::bodies::{Body, Built, MODULUS, Slit, distance, hold, rms};
 use peri::bonds::{BodyGeometry, Bonds};
-use peri::contact::{Contact, ContactSummary, SHORT_RANGE};
-use peri::material::BondMaterial;
+use peri::calibrate::Space;
+use peri::contact::{Contact, ContactSummary, RigidSurface, SHORT_RANGE};
+use peri::geometry::Shape;
+use peri::material::{BondMaterial, EightChainSolid};
+use peri::model::Model;
 use peri::potential::Law;
 use peri::solver::{
     Breaking, DynamicRelaxation, Equilibrium, Lbfgs, LbfgsSolver, Loads, RelaxationSolver, State, System,
@@ -307,4 +310,30 @@ fn contact_without_touch_changes_no_bit() {
     assert!(
         System::new(&mut built.lattice, BondMaterial::new(&*law, MODULUS), &loads, &[]).contact.is_none()
     );
+}
+
+/// A block of 20 × 12 (plane strain, μ = 0.4, K/μ = 20), bonded to two plates and squeezed by 40 %: its sides
+/// fold onto the plates, and it carries what finite elements do (FElupe 11, 48 over the half height, whose
+/// sides touch the plates: 12.066 and 37.221 at 2.4 and 4.8; elements that pass through them carry 34.05).
+#[test]
+fn sides_fold_onto_bonded_plates() {
+    let body = peri::model::Body::lattice(Shape::rectangle([0.0; 2], [20.0, 12.0]), 0.5).plane_strain(1.0);
+    let rubber = EightChainSolid::new(Space::PlaneStrain, 0.4, 25.0, 8.0).unwrap();
+    let plate =
+        |point, normal| RigidSurface { bonded: true, stiffness: 10.0, ..RigidSurface::plane(point, normal) };
+    let upper = RigidSurface { displacement: [0.0, -4.8], ..plate([0.0, 12.0], [0.0, -1.0]) };
+    let model = Model::new(body, rubber).contact(0.0).rigid_surface(plate([0.0; 2], [0.0, 1.0]));
+    let mut simulation = model.rigid_surface(upper).steps(8).build().unwrap();
+    simulation.solve(Lbfgs { tolerance: 1e-4, ..Lbfgs::default() }).unwrap();
+    let rows = simulation.history();
+    for (row, reference) in [(&rows[3], 12.066), (&rows[7], 37.221)] {
+        let (off, touching) = (row.load / reference - 1.0, row.contact.unwrap().pairs);
+        eprintln!("squeezed by {:.1}: {:.3}, {off:.4}; {touching} contacts", row.displacement, row.load);
+        assert!(off.abs() < 0.04, "{} at {}", row.load, row.displacement);
+    }
+    let [first, last] = [&rows[0], &rows[7]].map(|row| row.contact.unwrap().pairs);
+    assert!(last >= first + 8, "{first} contacts at first, {last} at last");
+    assert!((rows[7].stored / rows[7].work - 1.0).abs() < 0.01);
+    let lowest = simulation.displacements().map(|(x, u)| x[1] + u[1]).fold(f64::INFINITY, f64::min);
+    assert!(lowest > -0.1 * 0.5, "a particle at {lowest}");
 }

@@ -64,7 +64,8 @@ pub struct PlaneSpec {
     pub stiffness: Option<f64>,
     /// Coefficient of friction; default: `contact.friction`.
     pub friction: Option<f64>,
-    /// Ties the faces of the body that lie on the plane at the start, in all directions; default: false.
+    /// Ties the faces of the body that lie on the plane at the start, in all directions; others touch it
+    /// without friction; default: false.
     #[serde(default)]
     pub bonded: bool,
     /// Displacement at the end of the last step; the plane follows the load factor, and stays there in a
