@@ -200,20 +200,23 @@ impl<'a, const D: usize> FaceCentres<'a, D> {
     /// Lists faces within a horizon of an edge whose centres lie above the surface.
     fn above_edges(&self) -> Vec<usize> {
         let (above, reach) = (-ABOVE * self.bonds.spacing(), self.bonds.horizon());
+        let mut high: Vec<usize> =
+            (0..self.faces.len()).filter(|&number| self.faces[number].radius < above).collect();
+        if high.is_empty() {
+            return high;
+        }
         let all = self.surface.faces();
         let grid = CellGrid::new(&all.iter().map(|face| face.place).collect::<Vec<_>>(), reach);
-        let is_high = |&number: &usize| {
+        high.retain(|&number| {
             let (own, mut found) = (self.own(number), false);
-            if self.faces[number].radius < above {
-                grid.near(own.place, reach, |other| {
-                    let other = &all[other];
-                    let meets = other.patch != own.patch && cosine(other.normal, own.normal) > OPPOSITE;
-                    found |= meets && distance(other.place, own.place) < reach;
-                });
-            }
+            grid.near(own.place, reach, |other| {
+                let other = &all[other];
+                let meets = other.patch != own.patch && cosine(other.normal, own.normal) > OPPOSITE;
+                found |= meets && distance(other.place, own.place) < reach;
+            });
             found
-        };
-        (0..self.faces.len()).filter(is_high).collect()
+        });
+        high
     }
 
     /// Lists the faces within a horizon of each of `high`, on the same side, whose centres lie below it.

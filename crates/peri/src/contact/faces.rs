@@ -317,7 +317,7 @@ mod tests {
     /// edges of any angle.
     #[test]
     fn spheres_stay_inside_the_body() {
-        fn check<const D: usize>(name: &str, body: &Body<D>, allowed: f64) {
+        fn check<const D: usize>(name: &str, body: &Body<D>, [allowed, least]: [f64; 2]) {
             let bonds = body.build().unwrap();
             let (surface, faces) = (body.surface(), Faces::new(&bonds, &body.surface(), false));
             let (mut round, mut worst) = (0, 0.0_f64);
@@ -334,7 +334,7 @@ mod tests {
                     (depth - size).abs() < 1e-9,
                     "{name}, {own:?}: centre {depth} below it, radius {size}"
                 );
-                round += usize::from(size > 0.02);
+                round += usize::from(size > least);
                 let centre = std::array::from_fn(|d| own.place[d] - size * own.normal[d]);
                 for other in surface.faces().iter().filter(|other| other.patch != own.patch && size > 0.0) {
                     let (aside, down) = surface.reach(other, centre);
@@ -347,8 +347,9 @@ mod tests {
             eprintln!("{name}: {round} spheres, {worst:.1e} beyond a side");
             assert!(round > 1 && worst < allowed, "{name}: {round} spheres, {worst} beyond a side");
         }
-        // exactly below flat sides; below curved ones by tangents at their faces, 8.3e-3 found
-        let (flat, curved) = (1e-9, 0.02);
+        // exactly below flat sides; below curved ones by tangents at their faces, 8.3e-3 found. Spheres of
+        // shallow notches, 0.2 spacings at most, have lent their depth to the faces at the edges
+        let (flat, curved) = ([1e-9, 0.3], 0.02);
         for (radius, length) in [(2.5, 6.0), (3.4, 6.0), (4.45, 6.0), (7.5, 12.0), (8.7, 9.3), (11.3, 9.0)] {
             let centre = [0.0, 0.0, 0.5 * length];
             let cylinder = Shape::Cylinder { centre, axis: 2, length, radius };
@@ -367,12 +368,12 @@ mod tests {
             let ball = Shape::Ball { centre: [0.0; 3], radius: 7.0 };
             check(&format!("ball cut at {cut}"), &Body::lattice(ball, 1.0).cut(above), flat);
         }
-        for depth in [-2.0, 0.0, 3.0] {
+        for (depth, least) in [(-2.0, 0.15), (0.0, 0.15), (3.0, 0.3)] {
             let notch = Shape::disk([12.0, 20.0 - depth], 6.0);
             check(
                 &format!("notch {depth}"),
                 &Body::lattice(Shape::rectangle([0.0; 2], [24.0, 20.0]), 1.0).cut(notch),
-                curved,
+                [curved, least],
             );
         }
     }

@@ -313,8 +313,9 @@ fn contact_without_touch_changes_no_bit() {
 }
 
 /// A block of 20 × 12 (plane strain, μ = 0.4, K/μ = 20), bonded to two plates and squeezed by 40 %: its sides
-/// fold onto the plates, and it carries what finite elements do (FElupe 11, 48 over the half height, whose
-/// sides touch the plates: 12.066 and 37.221 at 2.4 and 4.8; elements that pass through them carry 34.05).
+/// fold onto the plates, and it carries what finite elements do (FElupe 11, whose sides touch the plates:
+/// 12.066 and 37.221 at 2.4 and 4.8 with 48 over the half height; with 12, 37.118 at 4.8, and 34.052 where
+/// sides pass through the plates).
 #[test]
 fn sides_fold_onto_bonded_plates() {
     let body = peri::model::Body::lattice(Shape::rectangle([0.0; 2], [20.0, 12.0]), 0.5).plane_strain(1.0);
