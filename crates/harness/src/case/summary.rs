@@ -134,6 +134,24 @@ impl<'a> Names<'a> {
         found
     }
 
+    /// Scalars of the first quantities that expectations name, of the variants that the first of them has.
+    fn of_expectations(&self, expected: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+        let mut quantities: Vec<&str> = Vec::new();
+        for quantity in expected.map(|name| self.split(name).0) {
+            if !quantities.contains(&quantity) && quantities.len() < COLUMNS {
+                quantities.push(quantity);
+            }
+        }
+        let mut found = self.fitting(quantities.into_iter());
+        let variants = |quantity: &str| -> BTreeSet<&str> {
+            let own = found.iter().map(|name| self.split(name)).filter(|own| own.0 == quantity);
+            own.map(|own| own.1).collect()
+        };
+        let first = found.first().map(|name| variants(self.split(name).0)).unwrap_or_default();
+        found.retain(|name| first.contains(self.split(name).1) || self.split(name).1.is_empty());
+        found
+    }
+
     fn is_like(&self, pattern: &str, name: &str) -> bool {
         matches_pattern(pattern, name) || matches_pattern(pattern, self.split(name).0)
     }
@@ -144,30 +162,19 @@ impl<'a> Names<'a> {
 }
 
 /// Returns names of the values that matter: those that `[report]` lists, otherwise those of the first
-/// expectations, otherwise the main values of the program, otherwise the first.
+/// expectations, otherwise the main values of the program, otherwise the first. Expectations that are bounds
+/// only, such as those that a program adds, come after the main values.
 pub(crate) fn main_names(report: &Report, listed: &[String], columns: &[&str]) -> Vec<String> {
     let names = Names::new(report);
     let mut found = names.fitting(listed.iter().map(String::as_str));
     if found.is_empty() {
-        let expected = report.expect.iter().filter(|one| one.expect.kind != Kind::Regression);
-        let mut quantities: Vec<&str> = Vec::new();
-        for name in expected.flat_map(|one| one.expect.names()) {
-            let quantity = names.split(name).0;
-            if !quantities.contains(&quantity) && quantities.len() < COLUMNS {
-                quantities.push(quantity);
-            }
+        let expected = || report.expect.iter().filter(|one| one.expect.kind != Kind::Regression);
+        found = names.of_expectations(expected().flat_map(|one| one.expect.names()));
+        if expected().all(|one| one.expect.kind == Kind::Bound) {
+            let own = std::mem::replace(&mut found, names.fitting(columns.iter().copied()));
+            let new: Vec<_> = own.into_iter().filter(|name| !found.contains(name)).collect();
+            found.extend(new);
         }
-        found = names.fitting(quantities.into_iter());
-        // of the variants that the first of them has
-        let variants = |quantity: &str| -> BTreeSet<&str> {
-            let own = found.iter().map(|name| names.split(name)).filter(|own| own.0 == quantity);
-            own.map(|own| own.1).collect()
-        };
-        let first = found.first().map(|name| variants(names.split(name).0)).unwrap_or_default();
-        found.retain(|name| first.contains(names.split(name).1) || names.split(name).1.is_empty());
-    }
-    if found.is_empty() {
-        found = names.fitting(columns.iter().copied());
     }
     if found.is_empty() {
         found = names.scalars().take(SINGLE[0]).collect();
@@ -346,6 +353,9 @@ mod tests {
         assert_eq!(rows[0], "variant  peak [N]", "{table}");
         assert_eq!([rows[1], rows[2], rows[3]], ["dx=10mm  2", "dx=5mm   2.5", "dx=1mm   2.9"]);
         assert!(rows[4].starts_with("balance  1"), "{table}");
+        let main = main_names(&report, &[], &["error*"]);
+        assert_eq!(main[..3], ["error[dx=1mm]", "error[dx=5mm]", "error[dx=10mm]"], "{main:?}");
+        assert!(main[3..].contains(&"balance".to_owned()), "{main:?}");
         let listed = main_values(&report, &["error".to_owned()], &[], 100);
         assert!(listed.starts_with("variant  error\n") && !listed.contains("balance"), "{listed}");
         assert!(verdict(&report, &TerminalStyle::plain()).starts_with("3 of 3 expectations met (3 bound)"));

@@ -1,7 +1,7 @@
 //! Friction of all contacts: between equilibria and in explicit dynamics.
 
 use super::Contact;
-use super::friction_pair::{ContactPair, FrictionPair};
+use super::friction_pair::{ContactPair, FrictionPair, known_in};
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::parallel;
@@ -45,7 +45,7 @@ impl<const D: usize> Contact<D> {
             {
                 for touch in touching {
                     let pair = ContactPair::Particles(own.site, touch.site);
-                    let known = old.binary_search_by_key(&pair, |grip| grip.pair).ok().map(|at| &old[at]);
+                    let known = known_in(old, pair);
                     let volumes = [own.site, touch.site].map(|site| bonds.volume(site as usize));
                     let push = self.pair(own.site, touch.site) * volumes[0] * volumes[1];
                     let bound = self.friction * push * touch.overlap();
@@ -55,7 +55,7 @@ impl<const D: usize> Contact<D> {
                     let then = touch.overlap_at(start, own.site as usize);
                     let share = if then >= 0.0 { 1.0 } else { touch.overlap() / (touch.overlap() - then) };
                     let slip = known.map_or([0.0; 3], |grip| grip.slip);
-                    let mut grip = FrictionPair { pair, slip, bound, stiffness, normal, share };
+                    let mut grip = FrictionPair { pair, slip, bound, stiffness, normal, share, growth: 0.0 };
                     grip.project();
                     if bound > 0.0 {
                         grips.push(grip);
@@ -71,14 +71,19 @@ impl<const D: usize> Contact<D> {
         grips
     }
 
-    /// Returns the friction after a load step, sorted by pair, for the next one; the energy dissipated in the
-    /// step, J; and the friction force of each rigid surface, N.
-    pub fn slide(&self, displacement: &Field<D>) -> (Vec<FrictionPair>, f64, Vec<[f64; 3]>) {
+    /// Returns the friction after a load step, sorted by pair, for the next one, with its growth since `old`;
+    /// the energy dissipated in the step, J; and the friction force of each rigid surface, N.
+    pub fn slide(
+        &self,
+        displacement: &Field<D>,
+        old: &[FrictionPair],
+    ) -> (Vec<FrictionPair>, f64, Vec<[f64; 3]>) {
         let mut forces = vec![[0.0; 3]; self.surfaces().count()];
         let (mut dissipated, mut grips) = (0.0, self.held.clone());
         for grip in &mut grips {
             let drag = grip.drag(self.slipped(grip.pair, displacement));
             grip.slip = drag.slip;
+            grip.growth = grip.bound - known_in(old, grip.pair).map_or(0.0, |known| known.bound);
             match grip.pair {
                 // the other half is counted from the other side
                 ContactPair::Particles(..) => dissipated += 0.5 * drag.dissipated,

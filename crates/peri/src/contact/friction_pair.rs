@@ -34,6 +34,8 @@ pub struct FrictionPair {
     pub normal: [f64; 3],
     /// Fraction of the load step since the sides have touched.
     pub share: f64,
+    /// Growth of b over the last load step, N.
+    pub growth: f64,
 }
 
 /// Derivative of the friction after a slip.
@@ -96,6 +98,12 @@ impl FrictionPair {
         TangentStiffness { slips, direction, along: self.share * along, across: self.share * across_it }
     }
 
+    /// Extrapolates b over a load step of `ratio` times the length of the last one, to between half and twice
+    /// its value.
+    pub fn extrapolate(&mut self, ratio: f64) {
+        self.bound = (self.bound + ratio * self.growth).clamp(0.5 * self.bound, 2.0 * self.bound);
+    }
+
     /// Rotates the slip into the plane across a new normal, keeping its length, and shortens it to the bound.
     pub fn project(&mut self) {
         let old = length(self.slip);
@@ -104,6 +112,11 @@ impl FrictionPair {
         let wanted = old.min(self.bound / self.stiffness);
         self.slip = if size > 0.0 { turned.map(|x| x * wanted / size) } else { [0.0; 3] };
     }
+}
+
+/// Returns the friction of a pair in a list that is sorted by pair.
+pub fn known_in(sorted: &[FrictionPair], pair: ContactPair) -> Option<&FrictionPair> {
+    sorted.binary_search_by_key(&pair, |grip| grip.pair).ok().map(|at| &sorted[at])
 }
 
 /// A unit vector across a unit normal, in the plane of the first two axes if the normal is.

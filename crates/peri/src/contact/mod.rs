@@ -58,7 +58,7 @@ use crate::surface::BodySurface;
 pub(crate) use face_areas::{DEPTH, SideAreas, side_areas};
 pub(crate) use faces::Faces;
 pub use friction::SlidingFriction;
-pub use friction_pair::{ContactPair, Drag, FrictionPair};
+pub use friction_pair::{ContactPair, Drag, FrictionPair, known_in};
 use list::ContactList;
 #[cfg(feature = "case")]
 pub(crate) use pushed_surfaces::BEHIND;

@@ -1,6 +1,6 @@
 //! Friction of faces and particles on rigid surfaces.
 
-use super::friction_pair::{ContactPair, FrictionPair, TangentStiffness};
+use super::friction_pair::{ContactPair, FrictionPair, TangentStiffness, known_in};
 use super::stiffness::all_axes;
 use super::surfaces::{RigidSurfaces, SurfaceContact};
 use crate::field::Field;
@@ -29,7 +29,7 @@ impl<const D: usize> RigidSurfaces<D> {
     ) -> Option<TangentStiffness> {
         let (held, start) = friction?;
         let pair = self.pair(surface, element);
-        let grip = &held[held.binary_search_by_key(&pair, |grip| grip.pair).ok()?];
+        let grip = known_in(held, pair)?;
         Some(grip.tangent_stiffness(self.slipped(pair, field, start)))
     }
 
@@ -100,11 +100,11 @@ impl<const D: usize> RigidSurfaces<D> {
                 let pair = self.pair(number, touch.element);
                 let stiffness = surface.elastic_slip.map_or(touch.stiffness, |slip| bound / slip);
                 let normal = std::array::from_fn(|d| touch.normal.get(d).copied().unwrap_or(0.0));
-                let known = old.binary_search_by_key(&pair, |grip| grip.pair).ok().map(|at| &old[at]);
+                let known = known_in(old, pair);
                 let then = self.earlier_overlap(placed, start, touch.element);
                 let share = if then >= 0.0 { 1.0 } else { touch.overlap / (touch.overlap - then) };
                 let slip = known.map_or([0.0; 3], |grip| grip.slip);
-                let mut grip = FrictionPair { pair, slip, bound, stiffness, normal, share };
+                let mut grip = FrictionPair { pair, slip, bound, stiffness, normal, share, growth: 0.0 };
                 grip.project();
                 if bound > 0.0 {
                     grips.push(grip);

@@ -94,7 +94,11 @@ fn step_by_step<const D: usize>(
         if !state.control.predicted && system.friction().is_some() {
             state.contact.start = Some(state.displacement.clone());
             state.contact.active.clone_from(&state.contact.grips);
-            state.contact.active.iter_mut().for_each(|grip| grip.share = 1.0);
+            let ratio = step_ratio(&system.factors, state.step);
+            for grip in &mut state.contact.active {
+                grip.share = 1.0;
+                grip.extrapolate(ratio);
+            }
             (state.contact.renewals, state.contact.loose) = (0, FIRST_RESIDUAL);
         }
         system.begin_step(state);
@@ -169,6 +173,14 @@ fn step_by_step<const D: usize>(
     Ok(())
 }
 
+/// Returns the length of a load step over that of the one before, 0 in the first.
+fn step_ratio(factors: &[f64], step: usize) -> f64 {
+    let at = |step: Option<usize>| step.map_or(0.0, |step| factors[step]);
+    let Some(last) = step.checked_sub(1) else { return 0.0 };
+    let before = at(Some(last)) - at(last.checked_sub(1));
+    if before == 0.0 { 0.0 } else { (factors[step] - factors[last]) / before }
+}
+
 /// Moves the body with its grips and lets it start from rest. If bonds may break, which takes many small
 /// steps, extrapolates the last equilibria u, u′, u″ by 3u − 3u′ + u″ if they are equally spaced and no bond
 /// broke since, by 2u − u′ if there are two; affinely otherwise. If grips rotate, moves with the nearest of
@@ -241,7 +253,7 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
 fn work_of_loads<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     let factor = system.factors[state.step];
     if let Some(contact) = system.friction() {
-        state.contact.surface_friction = contact.slide(&state.displacement).2;
+        state.contact.surface_friction = contact.slide(&state.displacement, &[]).2;
     }
     if system.loads.curved.is_some() {
         let before = state.step.checked_sub(1).map_or(0.0, |before| system.factors[before]);
@@ -269,7 +281,7 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
         contact.update(&*system.bonds, &state.displacement);
     }
     if let Some(contact) = system.friction() {
-        let (grips, dissipated, _) = contact.slide(&state.displacement);
+        let (grips, dissipated, _) = contact.slide(&state.displacement, &state.contact.grips);
         state.contact.grips = grips;
         state.motion.energies.rubbed += dissipated;
     }

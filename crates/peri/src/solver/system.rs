@@ -6,7 +6,7 @@ use super::load::Loads;
 use super::record::StepRecord;
 use super::state::State;
 use crate::bonds::{Bonds, StretchScan, not_finite};
-use crate::contact::{Contact, ContactSummary, FrictionPair, SurfaceReaction};
+use crate::contact::{Contact, ContactSummary, FrictionPair, SurfaceReaction, known_in};
 use crate::error::Error;
 use crate::field::Field;
 use crate::material::{Material, SolverMaterial};
@@ -179,11 +179,7 @@ impl<'a, const D: usize> System<'a, D> {
         let Some(start) = &state.contact.start else { return false };
         let rough = std::mem::take(&mut state.contact.loose) > 0.0 && state.convergence.residual > tolerance;
         let mut new = contact.grips(&*self.bonds, &state.displacement, start, &state.contact.grips);
-        let bound = |grips: &[FrictionPair], pair| {
-            grips
-                .binary_search_by_key(&pair, |grip: &FrictionPair| grip.pair)
-                .map_or(0.0, |at| grips[at].bound)
-        };
+        let bound = |grips: &[FrictionPair], pair| known_in(grips, pair).map_or(0.0, |grip| grip.bound);
         let lost =
             state.contact.active.iter().filter(|grip| bound(&new, grip.pair) == 0.0).map(|grip| grip.bound);
         let changed = new.iter().map(|grip| (grip.bound - bound(&state.contact.active, grip.pair)).abs());

@@ -20,9 +20,11 @@ impl Case for Peri {
   peri sweep SCENE --vary material.critical.fracture_energy=50J/m^2,100J/m^2
   peri exact law --law chain-affine --links 720 --dissociation 1200
   peri schema > peri.schema.json                    for editors",
-        magic: b"peri-c18",
+        magic: b"peri-c19",
         columns: &[
             "peak_load*",
+            "load_at_*",
+            "stiffness_at_*",
             "displacement_at_peak*",
             "first_break*",
             "stored_energy*",
