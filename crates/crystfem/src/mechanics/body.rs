@@ -72,6 +72,25 @@ pub struct Roller {
     pub normal: [f64; 3],
 }
 
+impl Roller {
+    /// Rollers of a sector of a body of revolution that starts at y = 0 and has an angle, rad, above 0 and
+    /// below π: on its cuts, node sets `start` and `end`, and in both directions across z on its `axis`.
+    pub fn on_cuts(mesh: &Mesh, angle: f64) -> Vec<Self> {
+        let nodes = |name: &str| mesh.node_sets.get(name).map_or(&[][..], Vec::as_slice);
+        let axis = nodes("axis");
+        let (sine, cosine) = angle.sin_cos();
+        let cuts = [("start", [0.0, -1.0, 0.0]), ("end", [-sine, cosine, 0.0])];
+        let cuts = cuts.into_iter().flat_map(|(cut, normal)| {
+            let off_axis = nodes(cut).iter().filter(|node| axis.binary_search(node).is_err());
+            off_axis.map(move |&node| Self { node, normal })
+        });
+        // normals of one node are orthogonal
+        let across = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let held = across.into_iter().flat_map(|normal| axis.iter().map(move |&node| Self { node, normal }));
+        cuts.chain(held).collect()
+    }
+}
+
 impl<'a> Body<'a> {
     /// Returns a body without active elements.
     ///

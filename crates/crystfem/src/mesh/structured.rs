@@ -338,7 +338,7 @@ pub(crate) fn count(length: f64, first: f64, growth: f64) -> Result<f64, Error> 
 }
 
 /// Sorts coordinates; those closer than [`COORDINATE_TOLERANCE`] of the extent become one.
-fn unique(mut values: Vec<f64>) -> Vec<f64> {
+pub(crate) fn unique(mut values: Vec<f64>) -> Vec<f64> {
     values.sort_unstable_by(f64::total_cmp);
     let extent = values.last().zip(values.first()).map_or(0.0, |(last, first)| last - first);
     values.dedup_by(|next, kept| *next - *kept <= COORDINATE_TOLERANCE * extent);

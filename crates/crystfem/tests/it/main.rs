@@ -16,6 +16,7 @@ mod point;
 #[cfg(feature = "case")]
 mod printed;
 mod readers;
+mod revolved;
 mod same_bits;
 mod schedules;
 mod solvers;

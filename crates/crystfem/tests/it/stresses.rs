@@ -228,10 +228,7 @@ fn a_sector_of_a_tube_between_its_planes_of_symmetry() {
         body.tolerance = 1e-10;
         body.activate(0..mesh.element_count(), 1);
         let cuts = [("start", [0.0, 1.0, 0.0]), ("end", [-angle.sin(), angle.cos(), 0.0])];
-        let rollers = |(name, normal): (&str, [f64; 3])| {
-            mesh.node_sets[name].iter().map(move |&node| Roller { node, normal }).collect::<Vec<_>>()
-        };
-        body.rollers = cuts.into_iter().flat_map(rollers).collect();
+        body.rollers = Roller::on_cuts(&mesh, angle);
         let supports: Vec<FixedComponent> = (0..mesh.points.len() as u32).map(|node| (node, 2)).collect();
         let law = SolidifyingMaxwell::elastic(1.0, POISSON, 0.0, f64::INFINITY);
         let hold = |_| law.increment([300.0, 0.0], [300.0, 0.0], 0.0);

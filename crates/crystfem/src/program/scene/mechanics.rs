@@ -164,7 +164,7 @@ impl PartScene {
         if others > 0 {
             let found = format!("a mesh with {others} wedges or second-order hexahedra");
             let allowed = "8-node hexahedra, 4- or 10-node tetrahedra (meshers produce tetrahedra for any \
-                shape; so does `cells` of a bar or brick)";
+                shape; so does `cells` of a bar, brick or revolved section)";
             return Err(source.error("mechanics", found, allowed));
         }
         let share = |given: Option<Ratio>| given.map_or(0.0, |ratio| ratio.si());
@@ -217,36 +217,30 @@ impl PartScene {
         Ok(Some(Mechanics { settings, counts, matrices, compensation: spec.compensation, stiff }))
     }
 
-    /// Rollers on the cuts of a `[mesh.tube]`, its planes of symmetry; none for other meshes.
+    /// Rollers on the cuts of a body of revolution, its planes of symmetry, and on its axis; none for other
+    /// meshes.
     ///
     /// # Errors
-    /// Returns a [`SceneError`] for half a tube and more, whose cuts leave it free across the axis, and for a
+    /// Returns a [`SceneError`] for half a body and more, whose cuts leave it free across the axis, and for a
     /// bed that is no cross-section.
     fn rollers(&self, source: &Source, mesh: &Mesh, bed: &[u32]) -> Result<Vec<Roller>, SceneError> {
-        let Some(tube) = &self.mesh.tube else { return Ok(Vec::new()) };
-        let angle = tube.angle.si();
+        let Some((kind, angle)) = self.mesh.sector() else { return Ok(Vec::new()) };
         if angle >= std::f64::consts::PI - SMALLEST_TURN {
             let allowed = "below 180 deg with `[mechanics]`: the cuts are planes of symmetry, which hold the \
                            part only if they meet at an angle";
-            return Err(source.error("mesh.tube.angle", format!("{} deg", angle.to_degrees()), allowed));
+            let key = format!("mesh.{kind}.angle");
+            return Err(source.error(&key, format!("{} deg", angle.to_degrees()), allowed));
         }
-        let height = |&node: &u32| mesh.points[node as usize][2];
-        let spread = bed
-            .iter()
-            .map(height)
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| [low.min(z), high.max(z)]);
-        if spread[1] - spread[0] > SMALLEST_TURN * tube.length.si() {
-            let allowed =
-                "`bottom` or `top` of a tube: its cuts are planes of symmetry and slide in themselves";
+        let heights = bed.iter().map(|&node| mesh.points[node as usize][2]);
+        let spread =
+            heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| [low.min(z), high.max(z)]);
+        let [low, high] = mesh.bounds().unwrap_or_default();
+        if spread[1] - spread[0] > SMALLEST_TURN * (high[2] - low[2]) {
+            let flat = if kind == "tube" { "`bottom` or `top` of a tube" } else { "a side at one height z" };
+            let allowed = format!("{flat}: its cuts are planes of symmetry and slide in themselves");
             return Err(source.error("mechanics.bed", "a side that is no cross-section", allowed));
         }
-        let (sine, cosine) = angle.sin_cos();
-        let cuts = [("start", [0.0, -1.0, 0.0]), ("end", [-sine, cosine, 0.0])];
-        let nodes = |name: &str| mesh.node_sets.get(name).into_iter().flatten().copied();
-        Ok(cuts
-            .iter()
-            .flat_map(|&(cut, normal)| nodes(cut).map(move |node| Roller { node, normal }))
-            .collect())
+        Ok(Roller::on_cuts(mesh, angle))
     }
 
     /// Refuses initial and deposition temperatures outside the range of the law.

@@ -2,6 +2,7 @@
 
 use super::locate_error::{located, located_in};
 use super::memory;
+use super::revolved::RevolvedSpec;
 use super::voxels::{BuiltMesh, PRINTED_SIZES, PathSpec, StlSpec, box_of};
 use crate::error::Error;
 use crate::mesh::{Bar, Block, CellSplit, Grid, Mesh, Substrate, Tube, quality, read};
@@ -36,8 +37,8 @@ const TUBE_KEYS: [(&str, &str); 6] = [
     ("elements along an axis", "elements"),
 ];
 
-/// A mesh: one of a printed bar, a brick, a sector of a tube, a G-code file, the inside of an STL surface,
-/// and a mesh file.
+/// A mesh: one of a printed bar, a brick, a sector of a tube or of another body of revolution, a G-code file,
+/// the inside of an STL surface, and a mesh file.
 ///
 /// ```toml
 /// [mesh.bar]
@@ -57,6 +58,8 @@ pub struct MeshSpec {
     pub brick: Option<BrickSpec>,
     /// Sector of a hollow cylinder.
     pub tube: Option<TubeSpec>,
+    /// Sector of a body of revolution, from a plane section.
+    pub revolved: Option<RevolvedSpec>,
     /// Cells that the beads of a G-code file fill, printed along its path.
     pub path: Option<PathSpec>,
     /// Cells inside an STL surface.
@@ -141,7 +144,11 @@ impl MeshSpec {
             None | Some(1) => {}
             Some(2) if built.filling.is_none() => built.mesh = built.mesh.second_order(),
             Some(order) => {
-                return Err(source.error("mesh.order", order, "1, or 2 for a bar, brick, tube or file"));
+                return Err(source.error(
+                    "mesh.order",
+                    order,
+                    "1, or 2 for a bar, brick, tube, revolved section or file",
+                ));
             }
         }
         Ok(built)
@@ -149,11 +156,12 @@ impl MeshSpec {
 
     fn first_order(&self, source: &Source) -> Result<BuiltMesh, SceneError> {
         let structured = [self.bar.is_some(), self.brick.is_some(), self.tube.is_some()];
-        let from_files = [self.file.is_some(), self.path.is_some(), self.stl.is_some()];
+        let from_files =
+            [self.revolved.is_some(), self.file.is_some(), self.path.is_some(), self.stl.is_some()];
         let kinds = structured.into_iter().chain(from_files);
         let given = kinds.filter(|&x| x).count();
         if given != 1 {
-            let one = "one of `bar`, `brick`, `tube`, `path`, `stl`, `file`";
+            let one = "one of `bar`, `brick`, `tube`, `revolved`, `path`, `stl`, `file`";
             return Err(match given {
                 0 => source.missing("mesh", format!("the scene needs {one}")),
                 _ => source.error("mesh", format!("{given} kinds of mesh"), one),
@@ -161,6 +169,9 @@ impl MeshSpec {
         }
         if self.unit.is_some() && self.file.is_none() {
             return Err(source.unexpected("mesh.unit", "only `mesh.file` has a unit here; remove it"));
+        }
+        if let Some(revolved) = &self.revolved {
+            return revolved.build(source, |mesh| self.without_unit(source, mesh));
         }
         if let Some(path) = &self.path {
             return path.build(source);
@@ -209,14 +220,24 @@ impl MeshSpec {
 }
 
 impl MeshSpec {
+    /// Block and angle, rad, of a sector of a body of revolution, whose cuts are planes of symmetry.
+    pub(super) fn sector(&self) -> Option<(&'static str, f64)> {
+        let tube = self.tube.as_ref().map(|tube| ("tube", tube.angle.si()));
+        tube.or(self.revolved.as_ref().map(|revolved| ("revolved", revolved.angle())))
+    }
+
     /// Returns an error for a mesh file without `unit` whose part is metres large.
     pub(super) fn without_unit(&self, source: &Source, mesh: &Mesh) -> Option<SceneError> {
-        let [low, high] = mesh.bounds().filter(|_| self.file.is_some() && self.unit.is_none())?;
+        let key = match &self.revolved {
+            Some(own) => (own.file.is_some() && own.unit.is_none()).then_some("mesh.revolved.unit"),
+            None => (self.file.is_some() && self.unit.is_none()).then_some("mesh.unit"),
+        }?;
+        let [low, high] = mesh.bounds()?;
         let [x, y, z] = [0, 1, 2].map(|d| ((high[d] - low[d]) * 1e6).round() / 1e6);
         let why = format!(
             "in metres the part is {x} × {y} × {z} m; write e.g. \"1 mm\", or \"1 m\" if it is so large"
         );
-        (x.max(y).max(z) > SUSPICIOUS_SIZE).then(|| source.missing("mesh.unit", why))
+        (x.max(y).max(z) > SUSPICIOUS_SIZE).then(|| source.missing(key, why))
     }
 
     /// Returns the number of cells along each axis of a bar, brick or tube before allocation; zeros for a

@@ -98,10 +98,11 @@ impl PartScene {
             self.mechanics(source, &mesh, &material_of, &absent, path)?
         };
         if let Some(mechanics) = &mut mechanics {
-            if !mechanics.settings.rollers.is_empty() {
-                let note = "the cuts `start` and `end` of `[mesh.tube]` are planes of symmetry for \
-                            `[mechanics]`: warpage has the symmetry of the tube";
-                notes.push(note.to_owned());
+            if let Some((kind, _)) = self.mesh.sector() {
+                notes.push(format!(
+                    "the cuts `start` and `end` of `[mesh.{kind}]` are planes of symmetry for `[mechanics]`: \
+                     warpage has the symmetry of the body"
+                ));
             }
             mechanics.settings.stress_free = Some(temperature_of.clone());
         }
@@ -297,6 +298,10 @@ impl PartScene {
             let mut except = Vec::new();
             for name in &spec.except {
                 except.extend(faces(&format!("{key}.except"), name)?);
+            }
+            // cuts are not outside
+            if spec.surface == "outer" && self.mesh.sector().is_some() {
+                except.extend(["start", "end"].iter().filter_map(|cut| mesh.surfaces.get(*cut)).flatten());
             }
             // a node set has no faces
             if let (Some(temperature), Some(nodes)) = (&spec.temperature, spec.node_set(mesh)) {
