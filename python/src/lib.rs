@@ -2,14 +2,15 @@
 //!
 //! Users see the package `polymech` in `python/package`: shapes of arrays, names, pictures and docstrings
 //! are there. This module contains the parts that need Rust: runs of scenes ([`scenes`]), fields of VTKHDF
-//! files ([`fields`]), laws at many points ([`laws`], [`surrogates`], by [`predict`]), models of `peri`
-//! ([`model`], [`bond`]), polymer networks ([`network`]), laws with time ([`time`]) and the material of
-//! `crystfem` at a point ([`point`]). Work releases the interpreter's lock; [`watch`] handles signals and
-//! calls Python's functions.
+//! files ([`fields`]), laws at many points ([`laws`], [`surrogates`], by [`predict`]) and in decks
+//! ([`decks`]), models of `peri` ([`model`], [`bond`]), polymer networks ([`network`]), laws with time
+//! ([`time`]) and the material of `crystfem` at a point ([`point`]). Work releases the interpreter's lock;
+//! [`watch`] handles signals and calls Python's functions.
 
 use pyo3::prelude::*;
 
 mod bond;
+mod decks;
 mod error;
 mod fields;
 mod laws;
@@ -30,6 +31,7 @@ mod _polymech {
     #[pymodule_export]
     use super::{
         bond::BondLaw,
+        decks::{card, read_deck},
         error::{Interrupted, RunError, SceneError},
         fields::{field, layout},
         laws::{Law, fit_law, fit_volumetric, langevin, langevin_methods, models},

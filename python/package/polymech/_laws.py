@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -139,12 +140,20 @@ def predicted(evaluate: Callable[[Array, float], dict[str, Any]], c: ArrayLike) 
     return Prediction(**shaped)
 
 
+def bulk_at_rest(law: _polymech.Law) -> float:
+    """Bulk modulus of a law of the module at rest, Pa."""
+    tangent = law.predict(np.array([[1.0, 1.0, 1.0, 0.0, 0.0, 0.0]]), True, 1e-12)["tangent"]
+    return float(tangent.reshape(6, 6)[:3, :3].mean())
+
+
 class Law:
     """A hyperelastic law of rubber: ``Law("eight-chain", modulus=0.27e6, links=25)``, parameters in SI, by name or in order.
 
-    Laws are incompressible unless `volumetric` names an energy U(J) and its Lamé constant λ in Pa: ``("ciarlet", 10e6)``,
-    ``"quadratic"``, ``"logarithmic"``; foams (``"hyperfoam-1"`` to ``"hyperfoam-3"``) have their own. `Law.models()` lists the
-    laws and their parameters.
+    Laws are incompressible unless they have a `bulk_modulus` K, Pa, by the energy ¼λ(J² − 1 − 2 ln J) of
+    scenes, or `volumetric` names an energy U(J) and its Lamé constant λ in Pa: ``("ciarlet", 10e6)`` (that of
+    scenes), ``"quadratic"``, ``"logarithmic"``. Foams (``"hyperfoam-1"`` to ``"hyperfoam-3"``) have their
+    own. `Law.models()` lists the laws and their parameters. The `repr` of a law is Python that makes it
+    again.
     """
 
     def __init__(
@@ -152,6 +161,7 @@ class Law:
         model: str,
         *values: float,
         volumetric: tuple[str, float] | None = None,
+        bulk_modulus: float | None = None,
         as_published: bool = False,
         **parameters: float,
     ) -> None:
@@ -162,7 +172,16 @@ class Law:
                 allowed = "one of " + ", ".join(Law.models()) if known is None else ", ".join(known)
                 raise ValueError(f"{model}: found {', '.join(found)}; allowed: {allowed}")
             values = tuple(parameters[name] for name in known)
-        self._law = _polymech.Law(model, [float(value) for value in values], volumetric, as_published)
+        numbers = [float(value) for value in values]
+        if bulk_modulus is not None:
+            if volumetric is not None:
+                raise ValueError("bulk_modulus conflicts with volumetric: give one of them")
+            least = bulk_at_rest(_polymech.Law(model, numbers, ("ciarlet", 0.0), as_published))
+            if not bulk_modulus >= least:
+                raise ValueError(f"bulk_modulus: found {bulk_modulus} Pa; allowed: at least {least:.7g} Pa")
+            volumetric = ("ciarlet", bulk_modulus - least)
+        self._law = _polymech.Law(model, numbers, volumetric, as_published)
+        self._bulk = bulk_modulus
         self.model = model
 
     @staticmethod
@@ -181,7 +200,68 @@ class Law:
         return self._law.shear_modulus()
 
     def __repr__(self) -> str:
-        return f"Law({self.model!r}, " + ", ".join(f"{name}={value:g}" for name, value in self.parameters.items()) + ")"
+        _, values, volumetric, published = self._law.__getnewargs__()
+        given = [f"{name}={value!r}" for name, value in zip(Law.models()[self.model], values, strict=True)]
+        if self._bulk is not None:
+            given.append(f"bulk_modulus={self._bulk!r}")
+        elif volumetric is not None:
+            given.append(f"volumetric={volumetric!r}")
+        return f"Law({', '.join([repr(self.model), *given, *['as_published=True'][: int(published)]])})"
+
+    @property
+    def bulk_modulus(self) -> float | None:
+        """K at rest, Pa; `None` of an incompressible law."""
+        incompressible = self._law.__getnewargs__()[2] is None and not self.model.startswith("hyperfoam")
+        return self._bulk if self._bulk is not None or incompressible else bulk_at_rest(self._law)
+
+    def block(self) -> dict[str, Any]:
+        """Returns the law as `constitutive` of a scene, with its units.
+
+        Scenes have laws with a `bulk_modulus`, whose energy is ``"ciarlet"``, and foams.
+        """
+        _, values, volumetric, published = self._law.__getnewargs__()
+        foam = self.model.startswith("hyperfoam")
+        if published or not (foam or (volumetric is not None and volumetric[0] == "ciarlet")):
+            raise ValueError(f"{self!r}: scenes have laws with a bulk_modulus")
+        units = Law.models()[self.model].items()
+        pairs = zip(units, values, strict=True)
+        parameters = {name: f"{x!r} Pa" if unit.unit == "Pa" else x for (name, unit), x in pairs}
+        bulk = {} if foam else {"bulk_modulus": f"{self.bulk_modulus!r} Pa"}
+        return {"model": self.model, "parameters": parameters, **bulk}
+
+    @staticmethod
+    def read(path: str | os.PathLike[str], stress: float = 1e6) -> dict[str, Law]:
+        """Reads the laws of a deck by the names of its materials, with their bulk moduli.
+
+        Decks of Abaqus and CalculiX (`*HYPERELASTIC`, `*HYPERFOAM`, user materials of this project), and
+        the materials that a fit writes for Ansys (``.mac``), LS-DYNA (``.k``), FEBio (``.feb``) and MOOSE
+        (``.i``). `stress` is the deck's unit of stress, Pa: 1e6 with N and mm, 1 with N and m. Warnings name
+        what a law does not take over, and materials left out.
+        """
+        materials, left_out = _polymech.read_deck(os.fspath(path))
+        laws = {}
+        for name, model, values, bulk, notes in materials:
+            known = Law.models()[model].values()
+            numbers = (x * stress if v.unit == "Pa" else x for v, x in zip(known, values, strict=True))
+            laws[name] = Law(model, *numbers, bulk_modulus=None if bulk is None else bulk * stress)
+            for note in notes:
+                warnings.warn(f"{name}: {note}", stacklevel=2)
+        for reason in left_out:
+            warnings.warn(f"left out: {reason}", stacklevel=2)
+        return laws
+
+    def card(self, program: str = "abaqus", name: str = "RUBBER", stress: float = 1e6) -> str:
+        """Formats the law as a material of a finite-element program.
+
+        Programs are ``"abaqus"`` (and CalculiX), ``"ansys"``, ``"ls-dyna"``, ``"febio"`` and ``"moose"``.
+        `stress` is the unit of stress, Pa: 1e6 with N and mm, 1 with N and m. K of an incompressible law is
+        100 times the shear modulus, as in the cards of fits.
+        """
+        _, values, _, _ = self._law.__getnewargs__()
+        known = Law.models()[self.model].values()
+        numbers = [x / stress if v.unit == "Pa" else x for v, x in zip(known, values, strict=True)]
+        bulk = self.bulk_modulus or 100 * self.shear_modulus
+        return _polymech.card(program, name, self.model, numbers, [2 * stress / bulk])
 
     def biaxial(self, first: ArrayLike, second: ArrayLike) -> Array:
         """Nominal stresses (…, 2), Pa, of an incompressible sheet stretched to λ₁ and λ₂."""

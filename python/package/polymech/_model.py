@@ -2,161 +2,62 @@
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+import os
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _polymech
-from ._result import Table, Value
-from ._run import OnStep, stepper
-
-if TYPE_CHECKING:
-    import pyvista
-    from matplotlib.figure import Figure
+from ._body import Body, cut, numbers
+from ._laws import Law
+from ._result import Result
+from ._run import Program
+from ._scene import schema
+from ._simulation import BondLaw, Simulation
 
 Array = NDArray[np.float64]
-Region: TypeAlias = "Callable[..., Any] | tuple[Sequence[float], Sequence[float]]"
+Box: TypeAlias = "tuple[Sequence[float], Sequence[float]]"
+Region: TypeAlias = "str | tuple[str, float] | Box | Body | Callable[..., Any]"
+Curve: TypeAlias = "str | tuple[ArrayLike, ArrayLike] | Callable[[Array], ArrayLike]"
+Curves: TypeAlias = "Curve | list[Curve]"
 
-
-def _numbers(values: Sequence[float], length: int, what: str) -> list[float]:
-    found = [float(value) for value in values]
-    if len(found) != length:
-        raise ValueError(f"{what}: found {len(found)} components; allowed: {length}")
-    return found
-
-
-class Body:
-    """Shapes filled with particles on a regular lattice; lengths in m. Methods return a new body and do not change this one.
-
-    Bodies of two dimensions are sheets in plane stress, unless `space` is ``"plane-strain"``.
-    """
-
-    def __init__(
-        self,
-        dimension: int,
-        shape: tuple[str, list[float]],
-        spacing: float,
-        horizon: float = 3.015,
-        thickness: float = 1.0,
-        space: str | None = None,
-        partial_volumes: bool = False,
-    ) -> None:
-        default = "solid" if dimension == 3 else "plane-stress"
-        self.dimension = dimension
-        self._spec: dict[str, Any] = {
-            "shapes": [("add", *shape)],
-            "cracks": [],
-            "spacing": float(spacing),
-            "horizon": float(horizon),
-            "thickness": float(thickness),
-            "space": space or default,
-            "partial_volumes": bool(partial_volumes),
-        }
-
-    @classmethod
-    def rectangle(cls, low: Sequence[float], high: Sequence[float], spacing: float, **options: Any) -> Body:
-        """Creates a sheet between two corners. Options: `horizon` δ in spacings, `thickness` in m, `space`, `partial_volumes`."""
-        return cls(2, ("box", _numbers(low, 2, "corner") + _numbers(high, 2, "corner")), spacing, **options)
-
-    @classmethod
-    def disk(cls, centre: Sequence[float], radius: float, spacing: float, **options: Any) -> Body:
-        """Creates a round sheet."""
-        return cls(2, ("ball", [*_numbers(centre, 2, "centre"), float(radius)]), spacing, **options)
-
-    @classmethod
-    def box(cls, low: Sequence[float], high: Sequence[float], spacing: float, **options: Any) -> Body:
-        """Creates a cuboid between two corners. Options: `horizon` δ in spacings, `partial_volumes`."""
-        return cls(3, ("box", _numbers(low, 3, "corner") + _numbers(high, 3, "corner")), spacing, **options)
-
-    @classmethod
-    def ball(cls, centre: Sequence[float], radius: float, spacing: float, **options: Any) -> Body:
-        """Creates a sphere."""
-        return cls(3, ("ball", [*_numbers(centre, 3, "centre"), float(radius)]), spacing, **options)
-
-    @classmethod
-    def cylinder(
-        cls, centre: Sequence[float], radius: float, length: float, axis: int, spacing: float, **options: Any
-    ) -> Body:
-        """Creates a cylinder along the axis 0, 1 or 2."""
-        numbers = [*_numbers(centre, 3, "centre"), float(radius), float(length), float(axis)]
-        return cls(3, ("cylinder", numbers), spacing, **options)
-
-    def _with(self, **lists: Any) -> Body:
-        body = copy.copy(self)
-        body._spec = {**self._spec, **{name: self._spec[name] + [item] for name, item in lists.items()}}
-        return body
-
-    def join(self, other: Body) -> Body:
-        """Adds the shape of another body."""
-        return self._with(shapes=("add", *other._spec["shapes"][0][1:]))
-
-    def cut(self, low: Sequence[float], high: Sequence[float]) -> Body:
-        """Removes a box."""
-        d = self.dimension
-        return self._with(shapes=("cut", "box", _numbers(low, d, "corner") + _numbers(high, d, "corner")))
-
-    def cut_ball(self, centre: Sequence[float], radius: float) -> Body:
-        """Removes a disk or sphere."""
-        return self._with(shapes=("cut", "ball", [*_numbers(centre, self.dimension, "centre"), float(radius)]))
-
-    def crack(self, start: Sequence[float], *edges: Sequence[float]) -> Body:
-        """Adds a crack of zero width: in a plane between two points, in space from a corner along two edges."""
-        d = self.dimension
-        if len(edges) != d - 1:
-            raise ValueError(f"crack: found {len(edges)} further points; allowed: {d - 1} in {d} dimensions")
-        return self._with(cracks=sum((_numbers(p, d, "crack") for p in (start, *edges)), []))
-
-
-class BondLaw:
-    """A bond law of your own: the tension t of a bond over its stretch l = |ζ|/|ξ|, a function of an array of stretches.
-
-    The function is sampled once, on construction, between two stretches; beyond them it continues along its tangent. Between the
-    samples it is a polynomial of degree 10 on 256 panels, accurate to about 1e-12 for a smooth function. The scale of t is arbitrary:
-    it is chosen so that the small-strain modulus is that of the model.
-    """
-
-    def __init__(self, tension: Callable[[Array], ArrayLike], stretches: tuple[float, float] = (0.05, 6.0)) -> None:
-        low, high = map(float, stretches)
-        sampled = np.asarray(tension(_polymech.BondLaw.stretches(low, high)), dtype=np.float64)
-        self._law = _polymech.BondLaw(low, high, np.ascontiguousarray(sampled))
-
-    def tension(self, stretch: ArrayLike) -> Array:
-        """t(l), to which the kernels are fitted."""
-        return self._evaluate(stretch, 0)
-
-    def derivative(self, stretch: ArrayLike) -> Array:
-        """dt/dl."""
-        return self._evaluate(stretch, 1)
-
-    def energy(self, stretch: ArrayLike) -> Array:
-        """Integral of t over l from rest."""
-        return self._evaluate(stretch, 2)
-
-    def _evaluate(self, stretch: ArrayLike, what: int) -> Array:
-        array = np.asarray(stretch, dtype=np.float64)
-        return self._law.evaluate(np.ascontiguousarray(array).reshape(-1))[what].reshape(array.shape)
+SIDES = ("x-", "x+", "y-", "y+", "z-", "z+")
+# blocks that every step has of its own
+OF_STEPS = ("boundary", "body_force", "solver", "time", "dynamics")
 
 
 class Model:
-    """A body, its material and its loads, not yet built. Methods change the model and return it.
+    """Body, material and loads, not yet built. Methods change the model and return it.
 
-    `law` is the name of a bond law (``chain-offset``, ``chain-shifted``, ``chain-affine``, ``linear``, ``as-published``), a
-    `BondLaw`, or a function of stretches. `youngs_modulus` in Pa. Chains have `links` of a `dissociation` energy, in kθ. Bonds break at
-    a `critical_stretch`, or at the one that follows from a `fracture_energy` in J/m². The `convention` says which energy it is:
-    ``tearing``, at which a crack runs; ``bonds``, of the bonds across it; ``softening``, of tearing with bonds that soften before they break.
+    `law` is the name of a bond law (``chain-offset``, ``chain-shifted``, ``chain-affine``, ``linear``,
+    ``as-published``), a `BondLaw`, or a function of stretches. `youngs_modulus` in Pa. Chains have `links` of
+    a `dissociation` energy, in kθ. Bonds break at a `critical_stretch`, or at the one that follows from a
+    `fracture_energy` in J/m². The `convention` says which energy it is: ``tearing``, at which a crack runs;
+    ``bonds``, of the bonds across it; ``softening``, of tearing with bonds that soften before they break. A
+    `polymech.Law` with a bulk modulus is a solid with any Poisson ratio, in place of `youngs_modulus`.
 
-    A region is a function of coordinate arrays in m, such as ``lambda x, y: y < 6e-3``, or two corners of a box.
+    A region is a side, ``"x-"`` to ``"z+"``, as deep as the horizon, or with a depth in m, ``("x-", 3e-3)``;
+    two corners of a box; a function of coordinate arrays in m, such as ``lambda x, y: y < 6e-3``; a `Body`;
+    or the name of a set of the mesh file of the body.
+
+    `run` computes all of it as a scene and returns a `Result`. `build` and `solve` keep the state in memory:
+    for bodies of boxes, balls and cylinders, regions that are sides, boxes or functions, `displace`,
+    `body_force`, `contact` and `crack`.
+
+    A `curve` multiplies a load at the time t, s, in place of the load factor: a formula of t, ``"min(t,
+    1)"``, times and values, ``(t, value)``, between which it is linear, or a function of an array of times,
+    which is sampled 1000 times in every interval of `time`, at all increments among others. A list has one
+    curve for each component. Curves need `time` or `dynamics`.
     """
 
     def __init__(
         self,
         body: Body,
-        law: str | BondLaw | Callable[[Array], ArrayLike] = "chain-offset",
+        law: str | BondLaw | Law | Callable[[Array], ArrayLike] = "chain-offset",
         *,
-        youngs_modulus: float,
+        youngs_modulus: float | None = None,
         links: float = 720.0,
         dissociation: float = 1200.0,
         critical_stretch: float | None = None,
@@ -170,174 +71,419 @@ class Model:
             raise ValueError("critical_stretch conflicts with fracture_energy: give one of them")
         if convention not in ("tearing", "bonds", "softening"):
             raise ValueError(f"convention: found {convention!r}; allowed: tearing, bonds, softening")
-        if not isinstance(law, (str, BondLaw)):
+        if isinstance(law, Law) != (youngs_modulus is None):
+            raise ValueError("youngs_modulus: needed by a bond law, refused beside a Law")
+        if not isinstance(law, (str, BondLaw, Law)):
             law = BondLaw(law)
         self.body = body
-        self._spec: dict[str, Any] = {
-            **body._spec,
-            "law": law if isinstance(law, str) else law._law,
-            "youngs_modulus": float(youngs_modulus),
+        self._law = law
+        self._material = {
+            "youngs_modulus": None if youngs_modulus is None else float(youngs_modulus),
             "links": float(links),
             "dissociation": float(dissociation),
             "critical_stretch": critical_stretch,
             "fracture_energy": fracture_energy,
             "convention": convention,
             "lattice_calibration": calibration == "lattice",
-            "regions": [],
-            "steps": 1,
-            "contact": None,
         }
+        self._tables: dict[str, Any] = {}
+        self._steps: list[dict[str, Any]] = [{}]
+
+    def add(self, block: str, **keys: Any) -> Model:
+        """Adds a block of a scene by its keys, numbers in SI, such as ``"probe"`` or ``"output.section"``.
+
+        Blocks of a list are appended; of others (``"solver"``, ``"stress"``, ``"material"``) keys are set.
+        `boundary`, `solver`, `time`, `dynamics` and `body_force` are of the present `step`.
+        """
+        *path, last = block.split(".")
+        table = self._steps[-1] if block.partition(".")[0] in OF_STEPS else self._tables
+        for name in path:
+            table = table.setdefault(name, {})
+        keys = {name: value for name, value in keys.items() if value is not None}
+        if schema("peri").is_list(block):
+            table.setdefault(last, []).append(keys)
+        else:
+            table.setdefault(last, {}).update(keys)
+        return self
 
     def clamp(self, region: Region) -> Model:
         """Fixes a region."""
         return self.displace(region, [0.0] * self.body.dimension)
 
-    def displace(self, region: Region, displacement: Sequence[float | None]) -> Model:
-        """Displaces a region, m, at the end of the steps; components that are `None` stay free. Later calls replace earlier ones."""
-        moved = [None if u is None else float(u) for u in displacement]
-        return self._load(region, moved, [0.0] * self.body.dimension)
+    def hold(self, region: Region, name: str | None = None) -> Model:
+        """Holds a region where the step before has left it."""
+        return self.displace(region, ["hold"] * self.body.dimension, name=name)
+
+    def displace(
+        self,
+        region: Region,
+        displacement: Sequence[float | str | None],
+        *,
+        curve: Curves | None = None,
+        name: str | None = None,
+    ) -> Model:
+        """Displaces a region, m, at the end of the steps; components that are `None` stay free.
+
+        Components may be formulas of the position in m, ``"0.3*y"``, or, in a later `step`, ``"hold"``. In
+        memory later calls replace earlier ones.
+        """
+        return self.add("boundary", region=region, displacement=list(displacement), curve=curve, name=name)
+
+    def rotate(
+        self,
+        region: Region,
+        angle: float,
+        through: Sequence[float] | None = None,
+        axis: Sequence[float] | None = None,
+        *,
+        displacement: Sequence[float | str | None] | None = None,
+        curve: Curves | None = None,
+        name: str | None = None,
+    ) -> Model:
+        """Turns a region by an angle, rad, along the arc, about an axis through a point, m.
+
+        A plane body turns about the point, by default the origin. The angle is right-handed, and in a later
+        `step` that from the undeformed region. `displacement`, m, is added; `None` frees its component along
+        the axis.
+        """
+        point = [0.0] * self.body.dimension if through is None else through
+        turn = {"point": point, "angle": float(angle), "axis": axis}
+        shift = None if displacement is None else list(displacement)
+        return self.add("boundary", region=region, rotation=turn, displacement=shift, curve=curve, name=name)
+
+    def force(
+        self,
+        region: Region,
+        force: Sequence[float],
+        *,
+        rigid: bool = False,
+        curve: Curves | None = None,
+        name: str | None = None,
+    ) -> Model:
+        """Loads a region by a total force, N; a `rigid` one moves as a whole, without rotation."""
+        return self.add("boundary", region=region, force=force, rigid=rigid or None, curve=curve, name=name)
+
+    def traction(
+        self, side: Region, traction: Sequence[float], *, curve: Curves | None = None, name: str | None = None
+    ) -> Model:
+        """Loads a side by a traction, Pa, of fixed direction."""
+        return self.add("boundary", region=side, traction=traction, curve=curve, name=name)
+
+    def pressure(
+        self, region: Region, pressure: float, *, curve: Curve | None = None, name: str | None = None
+    ) -> Model:
+        """Presses on the faces of a region by a pressure, Pa, that follows the deformed surface."""
+        return self.add("boundary", region=region, pressure=float(pressure), curve=curve, name=name)
 
     def body_force(self, region: Region, force: Sequence[float]) -> Model:
-        """Loads a region by a body force, N/m³, at the end of the steps. Forces add up."""
-        return self._load(region, [None] * self.body.dimension, [float(f) for f in force])
+        """Loads a region by a body force, N/m³, at the end of the steps, in memory. Forces add up."""
+        return self.add("boundary", region=region, body_force=[float(f) for f in force])
 
-    def _load(self, region: Region, displacement: list[float | None], force: list[float]) -> Model:
-        if callable(region):
-            function = region
+    def contact(self, stiffness: float | None = None, friction: float | None = None) -> Model:
+        """Makes particles without a bond repel each other.
 
-            def inside(points: Array) -> NDArray[np.bool_]:
-                return np.ascontiguousarray(np.broadcast_to(np.asarray(function(*points.T), dtype=bool), len(points)))
+        A contact is as compliant as 2/`stiffness` layers of confined material; 2 is usual. `friction` is the
+        coefficient μ, also of rigid surfaces.
+        """
+        layers = 2.0 if stiffness is None else float(stiffness)
+        return self.add("contact", stiffness=layers, friction=friction)
+
+    def plane(
+        self,
+        point: Sequence[float],
+        normal: Sequence[float],
+        displacement: Sequence[float] | None = None,
+        *,
+        force: Sequence[float] | None = None,
+        bonded: bool = False,
+        friction: float | None = None,
+        curve: Curves | None = None,
+        **keys: Any,
+    ) -> Model:
+        """Adds a rigid plane through a point, m, with a normal towards the body.
+
+        It moves by a displacement, m, or by a force, N, and may be `bonded` to the faces of the body on it,
+        or have a coefficient of `friction`. Without `contact` only rigid surfaces touch the body. `keys` of
+        all rigid surfaces: `name`, `stiffness`, `velocity` (m/s).
+        """
+        keys |= {"displacement": displacement, "friction": friction, "curve": curve}
+        if force is None:
+            return self.add("contact.plane", point=point, normal=normal, bonded=bonded or None, **keys)
+        return self.add("contact.indenter", point=point, normal=normal, force=force, **keys)
+
+    def sphere(
+        self,
+        centre: Sequence[float],
+        radius: float,
+        displacement: Sequence[float] | None = None,
+        *,
+        force: Sequence[float] | None = None,
+        friction: float | None = None,
+        curve: Curves | None = None,
+        **keys: Any,
+    ) -> Model:
+        """Adds a rigid sphere, in a plane body a circle, m.
+
+        It moves by a displacement, m, or by a force, N; see `plane`.
+        """
+        keys |= {"displacement": displacement, "force": force, "friction": friction, "curve": curve}
+        return self.add("contact.indenter", point=centre, radius=float(radius), **keys)
+
+    def cylinder(
+        self,
+        point: Sequence[float],
+        axis: Sequence[float],
+        radius: float,
+        displacement: Sequence[float] | None = None,
+        **keys: Any,
+    ) -> Model:
+        """Adds a rigid cylinder without ends, of a radius, m, about an axis through a point, m.
+
+        Further keys as of `sphere`.
+        """
+        return self.sphere(point, radius, displacement, axis=axis, **keys)
+
+    def indenter(
+        self,
+        path: str | os.PathLike[str],
+        unit: float,
+        point: Sequence[float] = (0.0, 0.0, 0.0),
+        displacement: Sequence[float] | None = None,
+        **keys: Any,
+    ) -> Model:
+        """Adds a rigid closed surface, an STL file.
+
+        `unit` is the length of a unit of the file, m, and its origin lies at `point`, m. Further keys as of
+        `sphere`.
+        """
+        keys |= {"file": os.path.abspath(path), "unit": float(unit), "displacement": displacement}
+        return self.add("contact.indenter", point=point, **keys)
+
+    def interface(
+        self,
+        first: str,
+        second: str,
+        *,
+        critical_stretch: float | None = None,
+        fracture_energy: float | None = None,
+        strength: float | None = None,
+        convention: str | None = None,
+        slides: bool = False,
+    ) -> Model:
+        """Gives the bonds between two parts a limit of their own; without a limit the parts are not bonded.
+
+        The limit is a stretch, or an energy, J/m², and perhaps a strength, Pa; `convention` is that of
+        `Model`. The compressed bonds of one that `slides` break, too.
+        """
+        limits = {"stretch": critical_stretch, "fracture_energy": fracture_energy, "strength": strength}
+        given = {**limits, "convention": convention}
+        critical = {name: limit for name, limit in given.items() if limit is not None}
+        bonds = {"critical": critical, "slides": slides or None} if critical else {"unbonded": True}
+        return self.add("interface", between=[first, second], **bonds)
+
+    def crack(self, start: Sequence[float], *edges: Sequence[float]) -> Model:
+        """Adds a crack at the start of the present step, m, as `Body.crack` does."""
+        if len(self._steps) == 1:
+            self.body = self.body.crack(start, *edges)
         else:
-            low, high = (np.asarray(_numbers(corner, self.body.dimension, "corner")) for corner in region)
-
-            def inside(points: Array) -> NDArray[np.bool_]:
-                inner: NDArray[np.bool_] = np.all((low <= points) & (points <= high), axis=1)
-                return inner
-
-        self._spec["regions"].append((inside, displacement, force))
+            self._steps[-1].setdefault("cracks", []).append(cut(self.body.dimension, start, edges))
         return self
 
     def steps(self, steps: int) -> Model:
         """Applies the loads in equal steps."""
-        self._spec["steps"] = int(steps)
+        return self.add("solver", steps=int(steps))
+
+    def time(self, duration: float, increments: int, factor: float = 1.0) -> Model:
+        """Adds an interval of time, s, of so many equilibria.
+
+        Loads without a curve grow linearly to `factor` of their values; a second interval with the same
+        factor is a hold.
+        """
+        interval = {"duration": float(duration), "increments": int(increments)}
+        return self.add("time.step", **interval, factor=float(factor))
+
+    def dynamics(self, density: float, end_time: float, **keys: Any) -> Model:
+        """Computes explicit dynamics, with a density in kg/m³ until a time in s.
+
+        `keys` are those of `[dynamics]`: `ramp` (s), `damping` (1/s), `records`, …
+        """
+        return self.add("dynamics", density=float(density), end_time=float(end_time), **keys)
+
+    def step(self) -> Model:
+        """Begins a later step, from the state at the end of the one before; calls that follow describe it.
+
+        Regions that it does not name are free; a displacement is counted from the undeformed body and reached
+        from where the region is. Rigid surfaces stay.
+        """
+        self._steps.append({})
         return self
 
-    def contact(self, stiffness: float) -> Model:
-        """Makes particles without a bond repel each other: a contact is as compliant as 2/`stiffness` layers of confined material; 2 is usual."""
-        self._spec["contact"] = float(stiffness)
-        return self
+    def scene(self) -> dict[str, Any]:
+        """Returns the model as a dictionary for `peri.run`, `peri.check` and `peri.sweep`, numbers in SI."""
+        first, *later = steps = [self._step(step) for step in self._steps]
+        # a region has the same name in all steps
+        names: dict[str, str] = {}
+        for load in (load for step in steps for load in step.get("boundary", []) if later):
+            place = repr({name: load[name] for name in ("min", "max", "shapes") if name in load})
+            if "name" not in load and not {"side", "set"} & load.keys():
+                load["name"] = names.setdefault(place, f"region {len(names) + 1}")
+        tables = dict(self._tables)
+        material = {**self._bonds(), **tables.pop("material", {})}
+        output = {"pictures": False, **tables.pop("output", {})}
+        body = {**self.body._scene(), **tables.pop("body", {})}
+        if "contact" in tables:
+            tables["contact"] = _resolved({"stiffness": 0.0, **tables["contact"]}, self._steps)
+        scene = {"body": body, "material": material, **tables, **first, "output": output}
+        return {**scene, "step": later} if later else scene
+
+    def run(self, output: str | os.PathLike[str] | None = None, **options: Any) -> Result:
+        """Runs the model as a scene, with the options of `peri.run`: ``run("out/bar", progress=True)``.
+
+        Keys are replaced as there: ``solver__tolerance=1e-6``. There are no pictures, unless
+        ``add("output", pictures=True)``.
+        """
+        return Program("peri").run(self.scene(), output, **options)
+
+    def check(self, **overrides: Any) -> list[str]:
+        """Describes in lines what `run` builds; raises `SceneError` if the model is invalid."""
+        return Program("peri").check(self.scene(), **overrides)
 
     def build(self) -> Simulation:
-        """Builds particles, bonds and loads. Raises `ValueError` for an invalid model, and any exception of a region."""
-        return Simulation(_polymech.Simulation(self._spec))
+        """Builds particles, bonds and loads in memory.
+
+        Raises `ValueError` for an invalid model, and any exception of a region.
+        """
+        return Simulation(_polymech.Simulation(self._plain()))
 
     def solve(self, method: str = "lbfgs", **settings: Any) -> Simulation:
         """Builds and solves: see `Simulation.solve`."""
         return self.build().solve(method, **settings)
 
+    def _bonds(self) -> dict[str, Any]:
+        """Block `[material]`."""
+        own = self._material
+        limits = {"stretch": own["critical_stretch"], "fracture_energy": own["fracture_energy"]}
+        law: dict[str, Any]
+        if isinstance(self._law, Law):
+            law = {"solid": {"law": "correspondence", "constitutive": self._law.block()}}
+        elif isinstance(self._law, str):
+            chains = {} if self._law == "linear" else {name: own[name] for name in ("links", "dissociation")}
+            law = {"law": self._law, "youngs_modulus": own["youngs_modulus"], **chains}
+            law |= {"calibration": "lattice"} if own["lattice_calibration"] else {}
+            law |= {"volume_correction": "linear"} if self.body.partial_volumes else {}
+            limits |= {"convention": own["convention"] if own["fracture_energy"] else None}
+        else:
+            raise ValueError("law: found a function; allowed in `run`: the name of a bond law, or a Law")
+        critical = {name: limit for name, limit in limits.items() if limit is not None}
+        return {**law, "critical": critical} if critical else law
 
-class Simulation:
-    """A built model and its state. Arrays are in the order of `positions`."""
+    def _step(self, step: Mapping[str, Any]) -> dict[str, Any]:
+        """Blocks of a step."""
+        found: dict[str, Any] = _resolved(step, [step])
+        for load in found.get("boundary", []):
+            if "body_force" in load:
+                raise ValueError("body_force: `solve` only; `run` takes `force`, N")
+            if "region" in load:
+                load |= self._at(load.pop("region"))
+            shift = load.get("displacement")
+            if shift is not None:
+                formulas = any(isinstance(u, str) and u not in ("free", "hold") for u in shift)
+                shift = ["free" if u is None else u for u in shift]
+                if formulas:
+                    del load["displacement"]
+                    load["displacement_field"] = [u if isinstance(u, str) else repr(float(u)) for u in shift]
+                else:
+                    load["displacement"] = shift
+        if "dynamics" in found:
+            found["solver"] = {"method": "verlet", **found.get("solver", {})}
+        return found
 
-    def __init__(self, simulation: _polymech.Simulation) -> None:
-        self._simulation = simulation
-        self.finished = False
-        """True if the last `solve` completed."""
+    def _at(self, region: Any) -> dict[str, Any]:
+        """Keys of a region."""
+        if isinstance(region, Body):
+            return {"shapes": region._shapes}
+        if isinstance(region, str):
+            return {"side" if region in SIDES else "set": region}
+        if callable(region):
+            allowed = "a side, two corners, a Body, a set of a mesh"
+            raise ValueError(f"region: found a function; allowed in `run`: {allowed}")
+        if isinstance(region[0], str):
+            return {**self._at(region[0]), "depth": float(region[1])}
+        low, high = (numbers(corner, self.body.dimension, "corner") for corner in region)
+        return {"min": low, "max": high}
 
-    def solve(
-        self,
-        method: str = "lbfgs",
-        *,
-        threads: int | None = None,
-        on_step: OnStep | None = None,
-        **settings: float,
-    ) -> Simulation:
-        """Solves the remaining load steps by ``lbfgs``, dynamic ``relaxation``, or explicit dynamics, ``verlet``.
+    def _plain(self) -> dict[str, Any]:
+        """Numbers of the model for the compiled module."""
+        first, contact = self._steps[0], self._tables.get("contact", {})
+        loads, solver = first.get("boundary", []), first.get("solver", {})
+        beyond = {"Law"} if isinstance(self._law, Law) else set()
+        beyond |= {"step"} if len(self._steps) > 1 else set()
+        beyond |= self._tables.keys() - {"contact"} | contact.keys() - {"stiffness"}
+        beyond |= first.keys() - {"boundary", "solver"} | solver.keys() - {"steps"}
+        beyond |= {key for load in loads for key in load} - {"region", "displacement", "body_force"}
+        if beyond:
+            raise ValueError(f"{', '.join(sorted(beyond))}: not in `build` and `solve`; use `run`")
+        zero, free = [0.0] * self.body.dimension, [None] * self.body.dimension
+        return {
+            **self.body._plain(),
+            **self._material,
+            "law": self._law._law if isinstance(self._law, BondLaw) else self._law,
+            "regions": [
+                (self._inside(load["region"]), load.get("displacement", free), load.get("body_force", zero))
+                for load in loads
+            ],
+            "steps": solver.get("steps", 1),
+            "contact": contact.get("stiffness"),
+        }
 
-        Settings: `tolerance`, `max_iterations`, `accept`; for ``verlet`` `density` (kg/m³), `end_time`, `ramp`, `time_step` (s), `damping`
-        (1/s), `records`. `on_step` is called after every step. If it returns `False`, or after Ctrl-C, the state is kept, and another
-        call continues. Raises `RunError` if no equilibrium is found.
-        """
-        numbers = {name: float(value) for name, value in settings.items()}
-        self.finished = self._simulation.solve(method, numbers, threads, stepper(on_step))
-        return self
+    def _inside(self, region: Any) -> Callable[[Array], NDArray[np.bool_]]:
+        """Function that selects points of a region."""
+        if callable(region):
 
-    def extend(self, factors: Sequence[float]) -> Simulation:
-        """Adds load steps, by their load factors."""
-        self._simulation.extend([float(factor) for factor in factors])
-        return self
+            def inside(points: Array) -> NDArray[np.bool_]:
+                found = np.asarray(region(*points.T), dtype=bool)
+                return np.ascontiguousarray(np.broadcast_to(found, len(points)))
 
-    def set_velocity(self, velocity: ArrayLike) -> Simulation:
-        """Sets the initial velocity of explicit dynamics, (N, D), m/s."""
-        self._simulation.set_velocity(np.ascontiguousarray(velocity, dtype=np.float64).reshape(-1))
-        return self
+            return inside
+        at = self._at(region)
+        if "side" in at:
+            axis, sign = "xyz".index(at["side"][0]), 1.0 if at["side"][1] == "-" else -1.0
+            depth = at.get("depth", int(self.body.horizon) * self.body.spacing) - 0.499 * self.body.spacing
+            return lambda points: sign * points[:, axis] <= (sign * points[:, axis]).min() + depth
+        if "min" not in at:
+            allowed = "a side, two corners, a function"
+            raise ValueError(f"region: found a Body or a set; allowed in `build` and `solve`: {allowed}")
+        return lambda points: np.all((at["min"] <= points) & (points <= at["max"]), axis=1)
 
-    @property
-    def positions(self) -> Array:
-        """Reference positions X, (N, D), m."""
-        return self._simulation.positions()
 
-    @property
-    def displacements(self) -> Array:
-        """Displacements u, (N, D), m."""
-        return self._simulation.displacements()
+def _times(steps: Sequence[Mapping[str, Any]]) -> Array:
+    """Instants of steps, s, at which functions are sampled."""
+    times = [0.0]
+    for step in steps:
+        whole = [{"duration": step.get("dynamics", {}).get("end_time", 0.0), "increments": 1}]
+        for interval in step.get("time", {}).get("step", whole):
+            count = interval["increments"] * max(1, 1000 // interval["increments"])
+            times += np.linspace(times[-1], times[-1] + interval["duration"], count + 1)[1:].tolist()
+    return np.unique(times)
 
-    @property
-    def history(self) -> Table:
-        """Table with a row for each finished load step, or each record of a dynamic history."""
-        columns = self._simulation.history()
-        return Table({n: data for n, (_, data) in columns.items()}, {n: unit for n, (unit, _) in columns.items()}, "history")
 
-    @property
-    def load(self) -> Value:
-        """Load of the last step, N."""
-        loads = self.history["load"]
-        return Value(loads[-1] if len(loads) else 0.0, "N")
+def _resolved(value: Any, steps: Sequence[Mapping[str, Any]]) -> Any:
+    """Copies blocks of a scene; curves of arrays and functions become tables."""
+    if isinstance(value, Mapping):
+        return {n: (_curve if n == "curve" else _resolved)(item, steps) for n, item in value.items()}
+    return [_resolved(item, steps) for item in value] if isinstance(value, list) else value
 
-    def cauchy(self, measure: str = "hardy") -> Array:
-        """Cauchy stress σ, (N, D, D), Pa."""
-        return self._simulation.tensors("cauchy", measure)
 
-    def piola(self, measure: str = "hardy") -> Array:
-        """First Piola–Kirchhoff stress P, (N, D, D), Pa."""
-        return self._simulation.tensors("piola", measure)
-
-    def deformation_gradients(self) -> Array:
-        """F of each particle's family, (N, D, D)."""
-        return self._simulation.tensors("deformation", "hardy")
-
-    @property
-    def damage(self) -> Array:
-        """Share of its bonds that each particle has lost, (N,)."""
-        return self._simulation.damage()
-
-    @property
-    def fragments(self) -> int:
-        """Number of pieces of the body."""
-        return self._simulation.fragments()
-
-    def mesh(self) -> pyvista.PolyData:
-        """Particles at their deformed positions, for PyVista."""
-        import pyvista as pv
-
-        u, x = self.displacements, self.positions
-        pad = ((0, 0), (0, 3 - x.shape[1]))
-        points = pv.PolyData(np.pad(x + u, pad))
-        points.point_data["displacement"] = np.pad(u, pad)
-        points.point_data["damage"] = self.damage
-        return points
-
-    def plot(self, values: ArrayLike | None = None, label: str = "") -> Figure:
-        """Plots the deformed body, coloured by `values`, (N,), or by its displacement, beside the history."""
-        import matplotlib.pyplot as plt
-
-        from . import _plot
-
-        u = self.displacements
-        if values is None:
-            damage = self.damage
-            values, label = (damage, "damage") if damage.any() else (np.linalg.norm(u, axis=1), "|displacement| [m]")
-        figure, axes = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
-        _plot.draw(axes[0], self.positions + u, np.asarray(values, dtype=float), label)
-        _plot.history(axes[1], {"": self.history})
-        return figure
+def _curve(curve: Any, steps: Sequence[Mapping[str, Any]]) -> Any:
+    """Curve of a scene."""
+    if isinstance(curve, list):
+        return [_curve(one, steps) for one in curve]
+    if callable(curve):
+        times = _times(steps)
+        if len(times) == 1:
+            raise ValueError("curve: a function needs `time` or `dynamics`, between whose ends it is sampled")
+        curve = times, np.broadcast_to(np.asarray(curve(times), dtype=float), times.shape)
+    if isinstance(curve, tuple):
+        instants, values = curve
+        return {"file": {"time [s]": instants, "value": values}, "time": "time", "value": "value"}
+    return curve

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from . import _polymech
 from ._result import Result, Table, Value
-from ._scene import Scene, literal, read
+from ._scene import Schema, Scene, literal, read, schema
 
 
 @dataclass(frozen=True)
@@ -105,6 +105,13 @@ class Program:
     def __init__(self, name: str) -> None:
         self._name = name
 
+    @property
+    def _schema(self) -> Schema:
+        return schema(self._name)
+
+    def _read(self, scene: Scene, overrides: Mapping[str, Any], folder: str) -> tuple[str, str]:
+        return read(scene, self._name, overrides, self._schema, Path(folder))
+
     def run(
         self,
         scene: Scene,
@@ -120,19 +127,25 @@ class Program:
     ) -> Result:
         """Runs a scene to its end.
 
-        `scene` is the path of a TOML file, its text, or a dictionary; `overrides` replace its keys, with ``__`` for a dot:
-        ``material__youngs_modulus="2 MPa"``, or ``**{"a.b[0].c": 1}``.
+        `scene` is the path of a TOML file, its text, or a dictionary. In a dictionary numbers without a unit
+        are SI (m, Pa, K, rad, …), keys that are `None` are left out, and a table, `file`, may be a dictionary
+        of columns by their headings, such as ``{"time [s]": t, "pull": pull}``. `overrides` replace keys,
+        with ``__`` for a dot: ``material__youngs_modulus=2e6``, or ``**{"a.b[0].c": 1}``.
 
-        `output` is the folder of the results; the default is a temporary folder that is deleted with the `Result`. `threads` may be
-        any number: results have the same bits. `progress=True` shows a bar, a function is called as ``progress(part, line)``.
-        `on_step` is called with every finished step (`Step`: values, fields); if it returns `False` the run stops with `Interrupted`.
-        Ctrl-C raises `KeyboardInterrupt`. In both cases the checkpoint is kept, and `resume` continues to the same bits.
+        `output` is the folder of the results; the default is a temporary folder that is deleted with the
+        `Result`. `threads` may be any number: results have the same bits. `progress=True` shows a bar, a
+        function is called as ``progress(part, line)``. `on_step` is called with every finished step (`Step`:
+        values, fields); if it returns `False` the run stops with `Interrupted`. Ctrl-C raises
+        `KeyboardInterrupt`. In both cases the checkpoint is kept, and `resume` continues to the same bits.
 
         Raises `SceneError` (a `ValueError`) for an invalid scene, `RunError` for a failed run.
         """
-        text, path = read(scene, self._name, overrides)
         how, ours = _how(output, quick, threads, checkpoint_every, inputs, progress, on_step)
-        return _done(how, ours, _begin(how, ours, lambda: _polymech.run(self._name, text, path, how)))
+
+        def call() -> tuple[str, str]:
+            return _polymech.run(self._name, *self._read(scene, overrides, how["output"]), how)
+
+        return _done(how, ours, _begin(how, ours, call))
 
     def resume(
         self,
@@ -149,9 +162,9 @@ class Program:
 
     def check(self, scene: Scene, *, quick: bool = False, **overrides: Any) -> list[str]:
         """Describes in lines what a scene builds and what it omits; raises `SceneError` if it is invalid."""
-        text, path = read(scene, self._name, overrides)
         how, _ = _how(Path("out") / "check", quick=quick)
-        return _polymech.check(self._name, text, path, how)
+        with tempfile.TemporaryDirectory(prefix="polymech-") as folder:
+            return _polymech.check(self._name, *self._read(scene, overrides, folder), how)
 
     def sweep(
         self,
@@ -167,16 +180,23 @@ class Program:
     ) -> Table:
         """Runs a scene for every combination of values, in parallel: ``{"print.layer_time": ["10 s", "20 s"]}``.
 
-        Returns a row for each run with its settings and values of its report; `columns` adds values (``*`` matches any text).
-        The same call with the same folder continues and extends a sweep.
+        Returns a row for each run with its settings and values of its report; `columns` adds values (``*``
+        matches any text). The same call with the same folder continues and extends a sweep.
         """
-        text, path = read(scene, self._name, {})
         how, ours = _how(output, quick=quick, threads=threads, progress=progress)
         # overrides are keys with one value
-        common = {name.replace("__", "."): [value] for name, value in overrides.items()}
-        each = {**common, **vary}.items()
-        values = [(name, [value if isinstance(value, str) else literal(value) for value in column]) for name, column in each]
-        told = _begin(how, ours, lambda: _polymech.sweep(self._name, text, path, values, list(columns), how))
+        each = {**{name.replace("__", "."): [value] for name, value in overrides.items()}, **vary}
+        values = []
+        for name, column in each.items():
+            known = self._schema.at(name)
+            si = [self._schema.si(value, known, None) for value in column]
+            values.append((name, [value if isinstance(value, str) else literal(value) for value in si]))
+
+        def call() -> tuple[str, str]:
+            text, path = self._read(scene, {}, how["output"])
+            return _polymech.sweep(self._name, text, path, values, list(columns), how)
+
+        told = _begin(how, ours, call)
         result = _done(how, ours, told)
         table = Table.read(Path(how["output"]) / "sweep.csv")
         table.result = result

@@ -10,8 +10,10 @@
 
 from __future__ import annotations
 
-from ._model import Body, BondLaw, Model, Simulation
+from ._body import Body
+from ._model import Model
 from ._run import Program
+from ._simulation import BondLaw, Simulation
 
 __all__ = ["Body", "BondLaw", "Model", "Simulation", "check", "resume", "run", "schema", "sweep"]
 
