@@ -166,6 +166,46 @@ fn compare_equilibria(text: &str, allowed: f64) {
     }
 }
 
+/// Expectations are judged alike, and pictures, tables and fields are the same files, pictures to the bit.
+#[test]
+fn gpu_scene_draws_and_judges_as_the_processor() {
+    if Device::portable().and_then(|device| device.with_precision(Precision::Double)).is_err() {
+        return evidence::skipped("a device behind Vulkan, Metal or DirectX 12 in double precision");
+    }
+    let expect = |quantity: &str, bound: &str| {
+        format!("[[expect]]\nquantity = \"{quantity}\"\n{bound}\nkind = \"bound\"\nsource = \"test\"\n")
+    };
+    let scene = SCENE.replace("pictures = false\nfields = false", "every = 4")
+        + &expect("broken_bonds", "at_least = 10")
+        + &expect("energy_error", "at_most = 0.01")
+        + &expect("crack_speed", "at_least = 1e6");
+    let drawn = |device: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let source = Source::new("case.toml", scene.replace("\"cpu\"", device));
+        let scene = source.parse::<Scene>().unwrap();
+        let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(folder.path()));
+        let finished = peri::program::run::run(&source, &scene, &mut own).unwrap();
+        let judged: Vec<bool> = finished.report.expect.iter().map(|one| one.pass).collect();
+        let files = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path());
+        let mut files: Vec<_> = files.collect();
+        files.sort();
+        let named = |path: std::path::PathBuf| {
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            let picture = if name.ends_with(".png") { std::fs::read(&path).unwrap() } else { Vec::new() };
+            (name, picture)
+        };
+        (judged, files.into_iter().map(named).collect::<Vec<_>>())
+    };
+    let (host, card) = (drawn("\"cpu\""), drawn("\"gpu\""));
+    assert_eq!((&host.0[..], &card.0[..]), (&[true, true, false][..], &[true, true, false][..]));
+    let names = |files: &[(String, Vec<u8>)]| files.iter().map(|file| file.0.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&host.1), names(&card.1));
+    assert!(names(&host.1).iter().filter(|name| name.ends_with(".png")).count() >= 2, "{:?}", names(&host.1));
+    for ((name, host), (_, card)) in host.1.iter().zip(&card.1) {
+        assert!(host == card, "{name} differs");
+    }
+}
+
 /// A scene of the thesis with lines replaced.
 fn thesis(name: &str, lines: &[(&str, &str)]) -> String {
     let path = format!("{}/../../cases/ch2/{name}/case.toml", env!("CARGO_MANIFEST_DIR"));

@@ -72,6 +72,22 @@ impl<const D: usize> Enclosure<D> {
         if count > 0 && !self.facets.is_within(point, self.near) { count } else { 0 }
     }
 
+    /// Finds a point that lies by more than `margin`, m, inside this body at one of its facets, and inside
+    /// `other`, or inside another piece of this body if `other` is this one.
+    pub fn shared_point(&self, other: &Self, margin: f64) -> Option<[f64; D]> {
+        let own = i32::from(std::ptr::eq(self, other));
+        let inside = (0..self.facets.corners().len()).map(|facet| {
+            let (corners, normal) = (&self.facets.corners()[facet], self.facets.normal(facet));
+            let middle = |d: usize| corners.iter().map(|corner| corner[d]).sum::<f64>() / D as f64;
+            std::array::from_fn(|d| middle(d) - margin * normal[d])
+        });
+        inside
+            .filter(|&point| !self.facets.is_within(point, 0.5 * margin))
+            .filter(|&point| !other.facets.is_within(point, 0.5 * margin))
+            .filter(|&point| self.facets.windings(point) > 0)
+            .find(|&point| other.facets.windings(point) > own)
+    }
+
     /// Returns true if facets face each other across a gap narrower than `width`, m.
     pub(super) fn has_slots(&self, width: f64) -> bool {
         let corners = self.facets.corners();

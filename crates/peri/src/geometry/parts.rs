@@ -31,6 +31,13 @@ impl<const D: usize> Parts<D> {
         super::bounds(&own.map(|(operation, _)| operation.clone()).collect::<Vec<_>>())
     }
 
+    /// Distance of the bounding boxes of two parts, m; 0 where they meet.
+    pub fn gap(&self, pair: [u32; 2]) -> f64 {
+        let [Some((low, high)), Some((from, to))] = pair.map(|part| self.bounds(part)) else { return 0.0 };
+        let along = |d: usize| (low[d] - to[d]).max(from[d] - high[d]).max(0.0);
+        (0..D).map(|d| along(d).powi(2)).sum::<f64>().sqrt()
+    }
+
     /// Fractions of the segment from `a` to `b` at which it enters or leaves a shape.
     pub fn passages(&self, a: [f64; D], b: [f64; D]) -> Vec<f64> {
         let mut ends = Vec::new();

@@ -300,12 +300,12 @@ impl<const D: usize> DeviceBody<D> {
 }
 
 impl<const D: usize> DeviceBody<D> {
-    /// Factors of particles as kernels take them.
     /// Body forces.
     pub(super) fn loads(&self) -> BufferArg {
         super::steps::buffer(&self.body, if self.form.loaded { D * self.sites } else { 1 })
     }
 
+    /// Factors of particles as kernels take them.
     pub(super) fn factors(&self) -> BufferArg {
         super::steps::buffer(&self.factors, (self.form.factors * self.sites).max(1))
     }

@@ -13,6 +13,7 @@ pub use evaluator::{AnySolid, StressEvaluator};
 pub use line::LineSampler;
 pub use motion::{WaveFront, mark_distances, mean_displacement, rotation};
 pub use path::{
-    crossing, driven_loop_energy, envelope, first_swing, load_at, loop_energy, stiffness_at, unwrapped,
+    crossing, driven_loop_energy, envelope, first_swing, load_at, loop_energy, resistance, stiffness_at,
+    unwrapped,
 };
 pub use section::Section;

@@ -43,6 +43,25 @@ pub fn load_at(path: impl IntoIterator<Item = [f64; 2]>, displacement: f64) -> O
     None
 }
 
+/// Energy per length that a crack takes: from rows of its tip, m, and of the energy spent, J, the middle of
+/// each advance by at least `least`, m, the energy spent in it over its length, J/m, and its length, m.
+pub fn resistance(rows: impl IntoIterator<Item = [f64; 2]>, least: f64) -> Vec<[f64; 3]> {
+    let mut rows = rows.into_iter().filter(|row| row.iter().all(|x| x.is_finite()));
+    let Some(mut before) = rows.next() else { return Vec::new() };
+    let mut found = Vec::new();
+    for here in rows {
+        let [advance, spent] = [here[0] - before[0], here[1] - before[1]];
+        if advance.abs() >= least {
+            found.push([0.5 * (before[0] + here[0]), spent / advance.abs(), advance.abs()]);
+            before = here;
+        } else if found.is_empty() && advance == 0.0 {
+            // until the crack starts
+            before = here;
+        }
+    }
+    found
+}
+
 /// Secant and tangent stiffness, N/m, at a displacement where a path of displacements and loads first comes
 /// to it: load over displacement, and the slope there of the parabola through the two points beside and the
 /// next one, of second order in their distances.
@@ -160,6 +179,15 @@ mod tests {
         assert_eq!(smooth(&path, 2.1), None);
         assert_eq!(smooth(&[[1.0, 4.0]], 1.0), Some([4.0, 4.0]));
         assert_eq!(smooth(&[], 1.0), None);
+    }
+
+    #[test]
+    fn resistance_of_a_crack_that_waits_and_jumps() {
+        // 2 J/m, in advances of 1, 3 and 1 m; losses before it starts do not count
+        let rows =
+            [[f64::NAN, 0.0], [5.0, 0.0], [5.0, 0.5], [6.0, 2.5], [6.2, 2.9], [9.0, 8.5], [10.0, 10.5]];
+        assert_eq!(resistance(rows, 0.9), [[5.5, 2.0, 1.0], [7.5, 2.0, 3.0], [9.5, 2.0, 1.0]]);
+        assert_eq!(resistance([[1.0, 0.0]], 0.9), [[0.0; 3]; 0]);
     }
 
     #[test]

@@ -51,7 +51,13 @@ impl<const D: usize> System<'_, D> {
         match self.breaking.as_ref().map(|breaking| &breaking.criterion) {
             Some(Criterion::Stretch(stretch)) => {
                 let seen = std::mem::take(&mut self.seen_stretches);
-                self.material.overstretched(&*self.bonds, &state.displacement, stretch, &seen)
+                let mut list = self.material.overstretched(&*self.bonds, &state.displacement, stretch, &seen);
+                let slid = self.slid(state);
+                if !slid.is_empty() {
+                    list.extend(slid);
+                    list.sort_unstable_by_key(|bond| (bond.site, bond.index));
+                }
+                list
             }
             Some(Criterion::Energy(limit)) => {
                 let bound = self.loads.bound();
@@ -233,6 +239,11 @@ impl<const D: usize> System<'_, D> {
     /// Returns true if stretches reach the critical one.
     pub(super) fn is_overstretched(&self, observed: StretchRange) -> bool {
         self.breaking_stretch().is_some_and(|least| observed.high > least * least - 1.0)
+    }
+
+    /// Returns true if bonds may break in a state with these stretches.
+    pub(super) fn may_break(&self, observed: StretchRange) -> bool {
+        self.is_overstretched(observed) || !self.sliding.is_empty()
     }
 
     /// Stretch below which no bond breaks; `None` if bonds do not break.

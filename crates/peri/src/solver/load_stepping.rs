@@ -136,7 +136,7 @@ fn step_by_step<const D: usize>(
             if system.lower(state, shortest) {
                 continue;
             }
-            let sites = if system.is_overstretched(state.stretches.balanced) {
+            let sites = if system.may_break(state.stretches.balanced) {
                 system.break_bonds(state)
             } else {
                 Vec::new()

@@ -44,6 +44,7 @@ mod relaxation_device;
 mod rigid;
 mod rotating_loads;
 mod rotation;
+mod sliding;
 mod snap_back;
 mod stage;
 mod state;

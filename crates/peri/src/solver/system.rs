@@ -42,6 +42,9 @@ pub struct System<'a, const D: usize> {
     pub snap_back: bool,
     /// Criterion of breaking; `None` if bonds do not break.
     pub breaking: Option<Breaking>,
+    /// Bonds across sliding interfaces, by their sites: they break under compression, too, see
+    /// [`crate::solver`].
+    pub sliding: Vec<[u32; 2]>,
     /// Stops after the step whose load is below this fraction of the largest, once bonds broke; 0: never.
     pub stop_below: f64,
     /// Largest relative error of the fitted bond law.
@@ -96,6 +99,7 @@ impl<'a, const D: usize> System<'a, D> {
             refine: 1,
             snap_back: false,
             breaking: None,
+            sliding: Vec::new(),
             stop_below: 0.0,
             fit_bound: 1e-9,
             contact: None,

@@ -361,7 +361,8 @@ impl VelocityVerlet {
             state.contact.surface_friction.clone(),
             system.friction().is_some(),
         );
-        let look = state.motion.look.is_due(state.stretches.fitted, system.breaking_stretch());
+        let due = state.motion.look.is_due(state.stretches.fitted, system.breaking_stretch());
+        let look = due || !system.sliding.is_empty();
         // forces that are not final yet
         let late = look || rubs || !system.loads.rigid.is_empty();
         let (mut second, observed) = force_pass(system, state, masses, &leap, look, !late);
@@ -444,7 +445,7 @@ impl VelocityVerlet {
         observed: StretchRange,
         factor: f64,
     ) -> bool {
-        if !system.is_overstretched(observed) {
+        if !system.may_break(observed) {
             return false;
         }
         let sites = system.break_bonds(state);

@@ -51,6 +51,7 @@ mod rigid;
 mod rotations;
 #[path = "../../examples/rubber_bearing.rs"]
 mod rubber_bearing;
+mod sliding;
 mod softening;
 mod solid_kernels;
 mod solids;

@@ -10,7 +10,7 @@ use harness::report::Report;
 use harness::scene::{SceneError, Source};
 use polycore::Error;
 use polycore::constitutive::hyperelastic::foam::{FoamFit, FoamTest, fit};
-use polycore::constitutive::hyperelastic::{Hyperelastic, Hyperfoam, deck};
+use polycore::constitutive::hyperelastic::{CardProgram, Hyperelastic, Hyperfoam, deck};
 use polycore::file::atomic_write;
 use serde::Deserialize;
 
@@ -177,7 +177,8 @@ impl FoamSet {
         Ok(text)
     }
 
-    /// Writes `NAME_foam.csv`, states measured and computed, and `NAME_foam.inp`, the laws as `*HYPERFOAM`.
+    /// Writes `NAME_foam.csv`, states measured and computed, and the laws as `*HYPERFOAM` in `NAME_foam.inp`
+    /// and as `TB,HYPER,,,,FOAM` in `NAME_foam.mac`.
     fn write(&self, directory: &Path, laws: &[FoamLaw]) -> Result<(), Error> {
         let mut text = "test,strain,measured_MPa,measured_lateral".to_owned();
         laws.iter().for_each(|law| {
@@ -202,6 +203,16 @@ impl FoamSet {
             writeln!(file, "** units mm, N, MPa; fitted to {}", self.name)?;
             laws.iter()
                 .try_for_each(|law| file.write_all(card(&self.name, &law.key, &law.fit.law).as_bytes()))
+        })?;
+        atomic_write(directory.join(format!("{}_foam.mac", self.name)), |file| {
+            writeln!(file, "! units mm, N, MPa")?;
+            for (id, law) in (1..).zip(laws) {
+                writeln!(file, "! {} fitted to {}", law.key, self.name)?;
+                let values = values(&law.fit.law);
+                let card = CardProgram::Ansys.card(id, &self.name, &law.key, &values, &[]);
+                file.write_all(card.unwrap_or_default().as_bytes())?;
+            }
+            Ok(())
         })
     }
 
@@ -242,10 +253,14 @@ fn end_of(test: &FoamTest) -> f64 {
     by_stress.map_or(0.0, |state| state.strain)
 }
 
+/// μ in MPa, α and β of each term.
+fn values(law: &Hyperfoam) -> Vec<f64> {
+    law.terms().iter().flat_map(|term| [term.modulus / MPA, term.exponent, term.beta]).collect()
+}
+
 /// Formats the law as `*HYPERFOAM`, in MPa.
 fn card(foam: &str, key: &str, law: &Hyperfoam) -> String {
-    let values = law.terms().iter().flat_map(|term| [term.modulus / MPA, term.exponent, term.beta]);
-    format!("**\n{}", deck::card(&deck::material_name(key, foam), key, &values.collect::<Vec<_>>(), &[]))
+    format!("**\n{}", deck::card(&deck::material_name(key, foam), key, &values(law), &[]))
 }
 
 #[cfg(test)]

@@ -251,7 +251,7 @@ impl FitCase {
             files += "<volumetric>_volumetric.csv, ";
         }
         if !self.foams.is_empty() {
-            files += "<foam>_foam.csv, <foam>_foam.inp, ";
+            files += "<foam>_foam.csv, <foam>_foam.inp, <foam>_foam.mac, ";
         }
         if !self.forecasts.is_empty() {
             files += "<forecast>_forecast.csv, ";

@@ -2,7 +2,8 @@
 
 use super::moment::{Moment, SceneObservers, StatelessObserver};
 use super::{
-    contact, cracks, exact, flags, frames, history, lines, maps, probes, sections, tractions, values,
+    contact, cracks, exact, flags, frames, history, lines, maps, probes, resistance, sections, tractions,
+    values,
 };
 use crate::calibrate::Space;
 use crate::error::Error;
@@ -31,6 +32,7 @@ pub fn observers<const D: usize>(scene: &Scene) -> SceneObservers<'_, D> {
         stateless(StatelessObserver { scalars: contact::scalars, warnings: contact::warnings, ..none }),
         stateless(StatelessObserver { scalars: probes::scalars, ..none }),
         stateless(StatelessObserver { scalars: probes::mean_stresses, ..none }),
+        Box::new(resistance::Resistance(scene)),
         stateless(StatelessObserver { scalars: flags::scalars, warnings: flags::warnings, ..none }),
         Box::new(exact::HoleErrors::new(scene)),
         Box::new(sections::Sections(scene)),

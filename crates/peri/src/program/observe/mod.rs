@@ -14,6 +14,7 @@ mod maps;
 mod material;
 mod moment;
 mod probes;
+mod resistance;
 mod rows;
 mod scale;
 mod sections;

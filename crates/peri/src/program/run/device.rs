@@ -134,6 +134,8 @@ fn beyond_cards(scene: &Scene) -> Option<(String, &'static str)> {
     let dense = material.inclusions.iter().position(|part| part.density.is_some());
     let dense = dense.filter(|_| scene.has_dynamics());
     let dense_key = format!("material.inclusions[{}].density", dense.unwrap_or(0));
+    let slides = scene.interface.iter().position(|interface| interface.slides);
+    let slides_key = format!("interface[{}].slides", slides.unwrap_or(0));
     let faults = [
         ("step", !scene.step.is_empty(), "steps"),
         ("periodic", scene.periodic.is_some(), "periodic sides"),
@@ -143,6 +145,7 @@ fn beyond_cards(scene: &Scene) -> Option<(String, &'static str)> {
         (prestrain_key.as_str(), material.is_prestrained(), "bonds with prestrains"),
         ("material.inclusions", material.has_laws_of_parts(), "inclusions of another law"),
         (dense_key.as_str(), dense.is_some(), "a density of its own"),
+        (slides_key.as_str(), slides.is_some(), "an interface that slides"),
         ("material.critical.convention", scene.softens(), "bonds that soften"),
         (rigid_key.as_str(), rigid.is_some(), "a region that moves as a whole"),
         (pressure_key.as_str(), pressure.is_some(), "a pressure"),

@@ -313,6 +313,7 @@ fn solve<const D: usize>(
     system.fit_bound = scene.fit_bound();
     let criterion = physics.body.criterion.clone();
     system.breaking = criterion.map(|criterion| Breaking { criterion, policy: scene.solver.breaking });
+    system.sliding = scene::sliding_bonds(scene, &physics.body.interfaces);
     system.contact = contact;
     (system.refine, system.snap_back) = (scene.solver.refine, scene.solver.snap_back);
     system.stop_below = scene.solver.stop_below.map_or(0.0, |part| part.si());

@@ -23,6 +23,9 @@ pub struct InterfaceSpec {
     /// True: no bond crosses the interface.
     #[serde(default)]
     pub unbonded: bool,
+    /// True: its compressed bonds break, too, where the parts slide along each other.
+    #[serde(default)]
+    pub slides: bool,
 }
 
 impl InterfaceSpec {
@@ -92,6 +95,34 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             (Some(critical), false) => check_limit(source, scene, &format!("{key}.critical"), critical)?,
             (None, true) => {}
         }
+        if interface.slides {
+            check_sliding(source, scene, index)?;
+        }
+    }
+    Ok(())
+}
+
+/// Checks an interface whose compressed bonds break where its parts slide.
+///
+/// # Errors
+/// No limit, bonds that soften or break by their energy, and prestrains.
+fn check_sliding(source: &Source, scene: &Scene, index: usize) -> Result<(), SceneError> {
+    let [key, limit] = ["slides", "critical"].map(|name| format!("interface[{index}].{name}"));
+    let Some(critical) = scene.interface[index].critical else {
+        return Err(source.unexpected(&key, "needs `critical`, the limit of its bonds"));
+    };
+    if scene.softens() || critical.convention == Some(Convention::Softening) || critical.strength.is_some() {
+        return Err(source.conflict(&key, &limit, "bonds that break at once, by the `tearing` convention"));
+    }
+    if scene.material.solid.is_some() && critical.stretch.is_none() {
+        return Err(source.conflict(
+            &key,
+            &limit,
+            "bonds of a law, or of a `solid` that break by a `stretch`",
+        ));
+    }
+    if scene.material.is_prestrained() {
+        return Err(source.unexpected(&key, "bonds with prestrains have no common length at rest"));
     }
     Ok(())
 }
@@ -203,7 +234,8 @@ pub(super) fn cross_interfaces<const D: usize>(
         let number = |name| part_number(source, scene, &format!("interface[{index}].between"), name);
         pairs.push([number(one)?, number(other)?]);
     }
-    let mut across = parts_of(scene, body).bonds_across(&*body.bonds, &pairs);
+    let parts = parts_of(scene, body);
+    let mut across = parts.bonds_across(&*body.bonds, &pairs);
     for (interface, bonds) in scene.interface.iter().zip(&across) {
         if interface.unbonded {
             sever_pairs(&mut *body.bonds, bonds);
@@ -217,8 +249,10 @@ pub(super) fn cross_interfaces<const D: usize>(
         if bonds.is_empty() {
             let [one, other] = &interface.between;
             let spacing = plain((body.bonds.spacing() * 1e9).round() / 1e6);
+            let gap = plain((parts.gap(pairs[index]) * 1e9).round() / 1e6);
+            let apart = if gap == "0" { String::new() } else { format!(", {gap} mm from each other") };
             let found = format!(
-                "`{one}` and `{other}`, between which no bond of particles {spacing} mm apart passes"
+                "`{one}` and `{other}`{apart}, between which no bond of particles {spacing} mm apart passes"
             );
             let allowed = "parts that touch and are not separated by cracks";
             return Err(source.error(&format!("interface[{index}].between"), found, allowed));
@@ -226,6 +260,12 @@ pub(super) fn cross_interfaces<const D: usize>(
     }
     body.interfaces = across;
     Ok(())
+}
+
+/// Returns the bonds across interfaces that slide, by their sites.
+pub fn sliding_bonds(scene: &Scene, interfaces: &[Vec<[u32; 2]>]) -> Vec<[u32; 2]> {
+    let each = scene.interface.iter().zip(interfaces).filter(|(interface, _)| interface.slides);
+    each.flat_map(|(_, bonds)| bonds).copied().collect()
 }
 
 /// Gives bonds across interfaces their own limits in place of `rest`, bonds of unbreakable particles none.

@@ -10,6 +10,8 @@ use std::sync::Arc;
 
 /// Difference of the volume of cells and that inside their surface, over it, that rounding explains.
 const EQUAL: f64 = 1e-9;
+/// Depth of an overlap of cells that is refused, in spacings.
+const LEAST_OVERLAP: f64 = 0.05;
 
 /// Builds the shape of a mesh file.
 ///
@@ -164,10 +166,10 @@ fn shape_numbers<const D: usize>(operations: &[Operation<D>]) -> Parts<D> {
     Parts::new(operations, &(0..operations.len() as u32).collect::<Vec<u32>>())
 }
 
-/// Checks that blocks of one mesh file do not overlap at a particle, and that each has particles.
+/// Checks that blocks of one mesh file do not overlap, and that each has particles.
 ///
 /// # Errors
-/// A particle in several cells, a block without particles.
+/// A particle in several cells, cells that overlap by more than [`LEAST_OVERLAP`], a block without particles.
 pub(super) fn check_filling<const D: usize>(
     source: &Source,
     scene: &Scene,
@@ -183,6 +185,17 @@ pub(super) fn check_filling<const D: usize>(
         return Ok(());
     }
     let shapes = scene.body.shapes();
+    let same_file =
+        |one: usize, other: usize| shapes[one].file.is_some() && shapes[one].file == shapes[other].file;
+    let overlapping = |what: &str, place: [f64; D], index: usize, other: Option<usize>| {
+        let at: Vec<String> = place.iter().map(|x| plain((x * 1e9).round() / 1e6)).collect();
+        let others = other.map_or("cells overlap".to_owned(), |other| {
+            format!("a cell of body.shapes[{other}] and one of this shape overlap")
+        });
+        let found = format!("a {what} at ({}) mm where {others}", at.join(", "));
+        let allowed = "cells that share faces only; of nested blocks name one";
+        source.error(&format!("body.shapes[{index}]"), found, allowed)
+    };
     let parts = shape_numbers(operations);
     let mut filled = vec![0_u64; operations.len()];
     for index in (0..lattice.occupied.len()).filter(|&index| lattice.occupied[index]) {
@@ -194,18 +207,21 @@ pub(super) fn check_filling<const D: usize>(
         let mut owner: Option<usize> = None;
         for &(index, body) in &bodies {
             let depth = body.depth(place);
-            let same = owner
-                .filter(|&other| shapes[other].file.is_some() && shapes[other].file == shapes[index].file);
+            let same = owner.filter(|&other| same_file(index, other));
             if depth > 1 || depth > 0 && same.is_some() {
-                let at: Vec<String> = place.iter().map(|x| plain((x * 1e9).round() / 1e6)).collect();
-                let others = same.map_or("cells overlap".to_owned(), |other| {
-                    format!("a cell of body.shapes[{other}] and one of this shape overlap")
-                });
-                let found = format!("a particle at ({}) mm where {others}", at.join(", "));
-                let allowed = "cells that share faces only; of nested blocks name one";
-                return Err(source.error(&format!("body.shapes[{index}]"), found, allowed));
+                return Err(overlapping("particle", place, index, same));
             }
             owner = owner.or((depth > 0).then_some(index));
+        }
+    }
+    let margin = LEAST_OVERLAP * lattice.spacing;
+    let pairs = bodies.iter().flat_map(|one| bodies.iter().map(move |two| (*one, *two)));
+    for ((index, body), (other, beside)) in pairs {
+        if index != other && !same_file(index, other) {
+            continue;
+        }
+        if let Some(place) = body.shared_point(beside, margin) {
+            return Err(overlapping("point", place, index, (other != index).then_some(other)));
         }
     }
     for &(index, body) in &bodies {

@@ -72,7 +72,7 @@ pub use formula::Formula;
 pub use grips::free_lengths;
 pub use inclusion::{Inclusion, Inclusions, density_ratios};
 pub use indenter::IndenterSpec;
-pub use interface::{InterfaceSpec, limits_of_bonds};
+pub use interface::{InterfaceSpec, limits_of_bonds, sliding_bonds};
 pub use limits::{LimitOf, limit_error, softening_limits};
 pub use line::{LineField, SectionSpec, line_fields};
 pub use loads::{loads_of, order_regions, region_names, velocities_of};

@@ -111,9 +111,14 @@ fn ansys_law(option: &str, points: &str, constants: &[f64]) -> HostLaw {
         "ETUBE" => 4,
         "YEOH" | "MOONEY" => points,
         "OGDEN" => 2 * points,
-        _ => return Err("the options NEO, MOONEY, YEOH, OGDEN, BOYCE, GENT, ETUBE".to_owned()),
+        "FOAM" => 3 * points,
+        _ => return Err("the options NEO, MOONEY, YEOH, OGDEN, BOYCE, GENT, ETUBE, FOAM".to_owned()),
     };
-    let held = if ["YEOH", "OGDEN"].contains(&option) { points } else { 1 };
+    let held = match option {
+        "YEOH" | "OGDEN" => points,
+        "FOAM" => 0,
+        _ => 1,
+    };
     if constants.len() > count.saturating_add(held) {
         return Err(format!("{count} constants and {held} d; {} given", constants.len()));
     }
@@ -124,6 +129,12 @@ fn ansys_law(option: &str, points: &str, constants: &[f64]) -> HostLaw {
         ("BOYCE", _) => ("arruda-boyce", c),
         ("GENT", _) => ("gent", c),
         ("ETUBE", _) => ("extended-tube", c),
+        ("FOAM", c) => {
+            let keys = ["hyperfoam-1", "hyperfoam-2", "hyperfoam-3"];
+            let key = keys.get(points - 1).ok_or("1 to 3 terms of FOAM")?;
+            let pairs = c.chunks_exact(2).zip(&c[2 * points..]);
+            (*key, pairs.flat_map(|(pair, beta)| [0.5 * pair[0] * pair[1], pair[1], *beta]).collect())
+        }
         ("YEOH", c) => series(c)?,
         ("OGDEN", c) => {
             let term = |term: &[f64]| [0.5 * term[0] * term[1], term[1]];

@@ -100,7 +100,8 @@ fn is_series(key: &str) -> bool {
 /// elsewhere: NEO (μ = 2C₁₀, d), YEOH (all c, then all d) and the nine terms of the polynomial in Ansys' own
 /// converter of Abaqus decks (`src/ansys/meshing/prime/internals/utils.py` of ansys/pyprimemesh), the five of
 /// MOONEY in Ansys' example `techdemo-15` (ansys/pymapdl-examples), OGDEN (μ₁, α₁, μ₂, α₂, d₁) in the Guide's
-/// listing; BOYCE, GENT and ETUBE in the Reference alone.
+/// listing; BOYCE, GENT and ETUBE in the Reference alone. FOAM, Σ μᵢ/αᵢ (Σ λ^αᵢ − 3 + (J^(−αᵢβᵢ) − 1)/βᵢ),
+/// has all μᵢ, αᵢ, then all βᵢ (8.4.1.2.9), and no d.
 fn ansys(id: usize, key: &str, p: &[f64], compliances: &[f64]) -> Option<(String, usize)> {
     let (terms, option, mut constants) = match (key, p) {
         ("neo-hookean", _) => (1, "NEO", p.to_vec()),
@@ -112,13 +113,21 @@ fn ansys(id: usize, key: &str, p: &[f64], compliances: &[f64]) -> Option<(String
         ("polynomial-2", _) => (5, "MOONEY", p.to_vec()),
         ("polynomial-3", _) => (9, "MOONEY", p.to_vec()),
         ("biderman", &[a, b, c, d]) => (9, "MOONEY", vec![a, b, c, 0.0, 0.0, d, 0.0, 0.0, 0.0]),
+        (key, _) if key.starts_with("hyperfoam-") => {
+            let pairs = p.chunks_exact(3).flat_map(|term| [2.0 * term[0] / term[1], term[1]]);
+            (p.len() / 3, "FOAM", pairs.chain(p.iter().skip(2).step_by(3).copied()).collect())
+        }
         _ => {
             let own = ogden(key, p)?;
             (own.len(), "OGDEN", own.iter().flat_map(|[mu, alpha]| [2.0 * mu / alpha, *alpha]).collect())
         }
     };
     // d₁ to d_N stand after the constants
-    let held = if ["YEOH", "OGDEN"].contains(&option) { terms } else { 1 };
+    let held = match option {
+        "YEOH" | "OGDEN" => terms,
+        "FOAM" => 0,
+        _ => 1,
+    };
     let zero_if_soft = |d: &f64| if d.is_finite() { *d } else { 0.0 };
     constants.extend(compliances.iter().take(held).map(zero_if_soft));
     let rows = constants.chunks(6).enumerate().map(|(i, row)| {
@@ -286,6 +295,21 @@ mod tests {
             assert_eq!(count, expected, "{}", host.name());
         }
         evidence::at_most("energies of cards by their programs' formulas, relative", worst, 5e-6);
+    }
+
+    /// Two terms: μ₁, α₁, μ₂, α₂, β₁, β₂, with twice the moduli over the exponents of Abaqus.
+    #[test]
+    fn foam_of_ansys() {
+        let parameters = [4.1625, 4.5, 0.92, 20.7, -4.5, 0.5];
+        let card = CardProgram::Ansys.card(1, "pad", "hyperfoam-2", &parameters, &[]).unwrap();
+        let expected = "TB,HYPER,1,1,2,FOAM\nTBDATA,1,1.850000000e0,4.500000000e0,-9.200000000e0,\
+                        -4.500000000e0,9.200000000e-1,5.000000000e-1\n";
+        assert_eq!(card, expected);
+        let found = CardProgram::Ansys.parse("m.mac", &card).unwrap().materials.remove(0);
+        assert_eq!((found.model.key, found.bulk), ("hyperfoam-2", None));
+        let off = found.parameters.iter().zip(parameters).map(|(a, b)| (a / b - 1.0).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-9, "{:?}", found.parameters);
+        assert_eq!(CardProgram::LsDyna.card(1, "pad", "hyperfoam-2", &parameters, &[]), None);
     }
 
     /// K = 40 MPa: d = 2/K; ν, λ = K − ⅔μ from K and μ = 0.4 MPa.
