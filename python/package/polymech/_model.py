@@ -278,6 +278,8 @@ class Model:
         limits = {"stretch": critical_stretch, "fracture_energy": fracture_energy, "strength": strength}
         given = {**limits, "convention": convention}
         critical = {name: limit for name, limit in given.items() if limit is not None}
+        if (slides or critical) and not any(limit is not None for limit in limits.values()):
+            raise ValueError("interface: needs `critical_stretch` or `fracture_energy` beside the other keys")
         bonds = {"critical": critical, "slides": slides or None} if critical else {"unbonded": True}
         return self.add("interface", between=[first, second], **bonds)
 

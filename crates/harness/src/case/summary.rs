@@ -162,15 +162,15 @@ impl<'a> Names<'a> {
 }
 
 /// Returns names of the values that matter: those that `[report]` lists, otherwise those of the first
-/// expectations, otherwise the main values of the program, otherwise the first. Expectations that are bounds
-/// only, such as those that a program adds, come after the main values.
+/// expectations, otherwise the main values of the program, otherwise the first. Bounds that the program adds
+/// to a scene without expectations come after the main values.
 pub(crate) fn main_names(report: &Report, listed: &[String], columns: &[&str]) -> Vec<String> {
     let names = Names::new(report);
     let mut found = names.fitting(listed.iter().map(String::as_str));
     if found.is_empty() {
         let expected = || report.expect.iter().filter(|one| one.expect.kind != Kind::Regression);
         found = names.of_expectations(expected().flat_map(|one| one.expect.names()));
-        if expected().all(|one| one.expect.kind == Kind::Bound) {
+        if !report.provenance.scene.contains("[[expect]]") {
             let own = std::mem::replace(&mut found, names.fitting(columns.iter().copied()));
             let new: Vec<_> = own.into_iter().filter(|name| !found.contains(name)).collect();
             found.extend(new);

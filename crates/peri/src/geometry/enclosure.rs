@@ -76,10 +76,22 @@ impl<const D: usize> Enclosure<D> {
     /// `other`, or inside another piece of this body if `other` is this one.
     pub fn shared_point(&self, other: &Self, margin: f64) -> Option<[f64; D]> {
         let own = i32::from(std::ptr::eq(self, other));
-        let inside = (0..self.facets.corners().len()).map(|facet| {
-            let (corners, normal) = (&self.facets.corners()[facet], self.facets.normal(facet));
-            let middle = |d: usize| corners.iter().map(|corner| corner[d]).sum::<f64>() / D as f64;
-            std::array::from_fn(|d| middle(d) - margin * normal[d])
+        let ((low, high), (from, to)) = (self.facets.bounds(), other.facets.bounds());
+        if (0..D).any(|d| high[d] < from[d] || to[d] < low[d]) {
+            return None;
+        }
+        // the middle of a facet, and beside its corners
+        let inside = (0..self.facets.corners().len()).flat_map(|facet| {
+            let (corners, normal) = (self.facets.corners()[facet], self.facets.normal(facet));
+            let middle: [f64; D] =
+                std::array::from_fn(|d| corners.iter().map(|corner| corner[d]).sum::<f64>() / D as f64);
+            let beside = corners.into_iter().map(move |corner| {
+                let inwards: [f64; D] = std::array::from_fn(|d| middle[d] - corner[d]);
+                let part = (3.0 * margin / dot(inwards, inwards).sqrt()).min(0.5);
+                std::array::from_fn(|d| corner[d] + part * inwards[d])
+            });
+            let points = std::iter::once(middle).chain(beside);
+            points.map(move |point| std::array::from_fn(|d| point[d] - margin * normal[d]))
         });
         inside
             .filter(|&point| !self.facets.is_within(point, 0.5 * margin))

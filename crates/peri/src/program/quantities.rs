@@ -143,9 +143,9 @@ harness::quantities! {
         gauges";
     PROBE_ACROSS = "{probe}_across", "m", "of a crack: largest distance of its tip from 0 across its axis, \
         between the gauges if there are any";
-    PROBE_TEARING_ENERGY = "{probe}_tearing_energy", "J/m²", "of a crack in the plane: work less stored, \
-        kinetic, friction, `dissipated_energy` and damping since it starts, over its advance times the \
-        thickness";
+    PROBE_TEARING_ENERGY = "{probe}_tearing_energy", "J/m²", "of a crack with one tip in the plane: work \
+        less stored, kinetic, dissipated, damped and friction energy since it starts, over its advance times \
+        the thickness";
     PROBE_LOAD_AT = "{probe}_load_at_{opening}mm", "N", "of an opening: load at this value, if the run \
         reaches it";
     MEAN_STRESS = "mean_stress_{component}", "Pa", "with `[periodic]`: mean first Piola–Kirchhoff stress of \

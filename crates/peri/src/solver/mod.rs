@@ -85,6 +85,7 @@ pub use record::{Status, StepRecord};
 pub use relaxation_device::CardRelaxation;
 pub use rigid::RigidRegion;
 pub use rotation::{RotatingRegion, Rotation, TurnStart};
+pub use sliding::SlidingBonds;
 pub use stage::{StageEnd, StepOrigin};
 pub use state::{BodyStretches, Counts, ForceResiduals, State};
 pub use step_control::StepControl;

@@ -4,6 +4,7 @@ use super::criterion::Breaking;
 use super::force_scale::{Balance, ForceScale};
 use super::load::Loads;
 use super::record::StepRecord;
+use super::sliding::SlidingBonds;
 use super::state::State;
 use crate::bonds::{Bonds, StretchScan, not_finite};
 use crate::contact::{Contact, ContactSummary, FrictionPair, SurfaceReaction, known_in};
@@ -42,9 +43,8 @@ pub struct System<'a, const D: usize> {
     pub snap_back: bool,
     /// Criterion of breaking; `None` if bonds do not break.
     pub breaking: Option<Breaking>,
-    /// Bonds across sliding interfaces, by their sites: they break under compression, too, see
-    /// [`crate::solver`].
-    pub sliding: Vec<[u32; 2]>,
+    /// Bonds across interfaces that slide, which slip breaks under compression, too.
+    pub sliding: SlidingBonds,
     /// Stops after the step whose load is below this fraction of the largest, once bonds broke; 0: never.
     pub stop_below: f64,
     /// Largest relative error of the fitted bond law.
@@ -99,7 +99,7 @@ impl<'a, const D: usize> System<'a, D> {
             refine: 1,
             snap_back: false,
             breaking: None,
-            sliding: Vec::new(),
+            sliding: SlidingBonds::default(),
             stop_below: 0.0,
             fit_bound: 1e-9,
             contact: None,

@@ -21,7 +21,7 @@ use crate::error::Error;
 use crate::program::observe::{self, FieldFrames, Moment, Physics, SceneObservers, in_space};
 use crate::program::quantities as q;
 use crate::program::scene::{self, ContactSpec, NAMING, NamedState, Scene, SceneVariant};
-use crate::solver::{Breaking, StageEnd, State, Status, StepRecord, System, load_stepping};
+use crate::solver::{Breaking, SlidingBonds, StageEnd, State, Status, StepRecord, System, load_stepping};
 use harness::case::{Fault, Run, Step, StepField};
 use harness::observe::{Outputs, Scalars};
 use harness::report::{Phases, Report, SceneUnits};
@@ -313,7 +313,7 @@ fn solve<const D: usize>(
     system.fit_bound = scene.fit_bound();
     let criterion = physics.body.criterion.clone();
     system.breaking = criterion.map(|criterion| Breaking { criterion, policy: scene.solver.breaking });
-    system.sliding = scene::sliding_bonds(scene, &physics.body.interfaces);
+    system.sliding = SlidingBonds::new(scene::sliding_bonds(scene, &physics.body.interfaces));
     system.contact = contact;
     (system.refine, system.snap_back) = (scene.solver.refine, scene.solver.snap_back);
     system.stop_below = scene.solver.stop_below.map_or(0.0, |part| part.si());

@@ -23,8 +23,8 @@ impl Case for Peri {
         magic: b"peri-c19",
         columns: &[
             "peak_load*",
-            "load_at_*",
-            "stiffness_at_*",
+            "load_at_*mm",
+            "*_stiffness_at_*mm",
             "displacement_at_peak*",
             "first_break*",
             "stored_energy*",

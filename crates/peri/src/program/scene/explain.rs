@@ -137,8 +137,11 @@ pub fn explain<const D: usize>(
         (variant.surface == SurfaceCorrection::Energy, "surface correction"),
         (variant.volume == VolumeCorrection::Linear, "volume correction"),
         (scene.stress.is_some(), "stress"),
-        (scene.dynamics.is_some(), "inertia"),
-        (!scene.body.cracks.is_empty(), "pre-cut cracks"),
+        (scene.has_dynamics(), "inertia"),
+        (
+            !scene.body.cracks.is_empty() || scene.step.iter().any(|step| !step.cracks.is_empty()),
+            "pre-cut cracks",
+        ),
         (scene.contact.is_some(), "contact (needs [contact])"),
         (
             criterion.is_some(),

@@ -122,7 +122,16 @@ fn check_sliding(source: &Source, scene: &Scene, index: usize) -> Result<(), Sce
         ));
     }
     if scene.material.is_prestrained() {
-        return Err(source.unexpected(&key, "bonds with prestrains have no common length at rest"));
+        return Err(
+            source.unexpected(&key, "bonds with prestrains break in tension only; remove one of both")
+        );
+    }
+    if scene.solver.refine > 1 || scene.step.iter().any(|step| step.refines()) {
+        return Err(source.conflict(
+            &key,
+            "solver.refine",
+            "slip is looked at at the ends of steps; take more",
+        ));
     }
     Ok(())
 }
@@ -209,11 +218,12 @@ pub(super) fn parts_of<const D: usize>(scene: &Scene, body: &DiscreteBody<D>) ->
 
 /// Warns of unbonded parts that would pass through each other.
 pub(super) fn free_to_pass(scene: &Scene) -> Option<String> {
-    let open = scene.interface.iter().find(|one| one.unbonded).filter(|_| scene.contact.is_none())?;
+    let opens = |one: &&InterfaceSpec| one.unbonded || one.slides;
+    let open = scene.interface.iter().find(opens).filter(|_| scene.contact.is_none())?;
     let [one, other] = &open.between;
+    let how = if open.unbonded { "are unbonded and" } else { "slide, and once unbonded they" };
     Some(format!(
-        "parts `{one}` and `{other}` are unbonded and may pass through each other: a `[contact]` block \
-         lets them touch"
+        "parts `{one}` and `{other}` {how} may pass through each other: a `[contact]` block lets them touch"
     ))
 }
 

@@ -193,7 +193,7 @@ pub(super) fn check_filling<const D: usize>(
             format!("a cell of body.shapes[{other}] and one of this shape overlap")
         });
         let found = format!("a {what} at ({}) mm where {others}", at.join(", "));
-        let allowed = "cells that share faces only; of nested blocks name one";
+        let allowed = "cells that share faces only; name only one of two nested blocks";
         source.error(&format!("body.shapes[{index}]"), found, allowed)
     };
     let parts = shape_numbers(operations);
