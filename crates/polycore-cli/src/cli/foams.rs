@@ -10,7 +10,8 @@ use harness::report::Report;
 use harness::scene::{SceneError, Source};
 use polycore::Error;
 use polycore::constitutive::hyperelastic::foam::{FoamFit, FoamTest, fit};
-use polycore::constitutive::hyperelastic::{CardProgram, Hyperelastic, Hyperfoam, deck};
+use polycore::constitutive::hyperelastic::host::CardProgram;
+use polycore::constitutive::hyperelastic::{Hyperelastic, Hyperfoam, deck};
 use polycore::file::atomic_write;
 use serde::Deserialize;
 
