@@ -192,7 +192,7 @@ fn sections_of_files_keep_their_names() {
             "second order",
         ),
     ] {
-        let error = read(&TWO_BLOCKS.replace(found, written).split("*SURFACE").next().unwrap().to_owned());
+        let error = read(TWO_BLOCKS.replace(found, written).split("*SURFACE").next().unwrap());
         let error = error.unwrap_err().to_string();
         assert!(error.contains(words), "{error}");
     }
