@@ -1,6 +1,7 @@
 //! The program `peri`: scenes in TOML, runs, the command line. The library does not depend on it.
 
 pub mod bridge;
+mod card;
 pub mod command;
 pub mod observe;
 pub mod quantities;

@@ -87,18 +87,60 @@ fn gpu_scene_has_the_report_of_the_processor() {
             }
             continue;
         }
-        for (name, expected, _) in &host.outcomes[0].values {
-            let value = found.outcomes[0].get(name).unwrap();
-            // errors are what rounding leaves
-            let bound = if name.ends_with("_error") { 1e-9 } else { 1e-9 * expected.abs().max(1e-12) };
-            assert!((value - expected).abs() <= bound, "{name}: {value:e} {expected:e}");
-        }
-        // rows without a crack have no number
-        let crack = |finished: &FinishedScene| {
-            let rows = finished.outcomes[0].history.iter();
-            format!("{:?}", rows.map(|row| (row.broken, row.seen.clone())).collect::<Vec<_>>())
-        };
-        assert_eq!(crack(&found), crack(&host));
+        compare_reports(&found, &host);
+    }
+}
+
+/// Compares values, and broken bonds and cracks of each row.
+fn compare_reports(found: &FinishedScene, host: &FinishedScene) {
+    for (name, expected, _) in &host.outcomes[0].values {
+        let value = found.outcomes[0].get(name).unwrap();
+        // errors are what rounding leaves
+        let bound = if name.ends_with("_error") { 1e-9 } else { 1e-9 * expected.abs().max(1e-12) };
+        assert!((value - expected).abs() <= bound, "{name}: {value:e} {expected:e}");
+    }
+    // rows without a crack have no number
+    let crack = |finished: &FinishedScene| {
+        let rows = finished.outcomes[0].history.iter();
+        format!("{:?}", rows.map(|row| (row.broken, row.seen.clone())).collect::<Vec<_>>())
+    };
+    assert_eq!(crack(found), crack(host));
+}
+
+/// The plate of Kalthoff and Winkler, coarse, with stresses along a line: the card computes them, too.
+#[test]
+fn gpu_scene_of_kalthoff_and_winkler() {
+    if Device::portable().and_then(|device| device.with_precision(Precision::Double)).is_err() {
+        return evidence::skipped("a device behind Vulkan, Metal or DirectX 12 in double precision");
+    }
+    let line = "[stress]\nmeasures = [\"hardy\"]\n[[output.line]]\nname = \"ligament\"\n\
+                from = [\"2 mm\", \"0 mm\", \"4 mm\"]\nto = [\"45 mm\", \"0 mm\", \"4 mm\"]\npoints = 30\n";
+    let plate = case(
+        "external/kalthoff-winkler",
+        &[("\ndevice = \"auto\"", "\ndevice = \"cpu\""), ("spacing = \"1.5 mm\"", "spacing = \"4.5 mm\"")],
+    );
+    let studies = plate.find("\n[[study]]").unwrap();
+    let plate = format!("{}\n{line}", &plate[..studies]);
+    let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+    let [host, found] = std::array::from_fn(|k| {
+        let text = plate.replace("\"cpu\"", ["\"cpu\"", "\"gpu\""][k]);
+        let source = Source::new("case.toml", text);
+        let scene = source.parse::<Scene>().unwrap();
+        let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(folders[k].path()));
+        peri::program::run::run(&source, &scene, &mut own).unwrap()
+    });
+    assert!(host.outcomes[0].get("broken_bonds").unwrap() > 1000.0);
+    compare_reports(&found, &host);
+    let [host, found] = folders.map(|folder| {
+        let files = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path());
+        let file = files.into_iter().find(|path| path.to_string_lossy().contains("line_")).unwrap();
+        let text = std::fs::read_to_string(file).unwrap();
+        text.lines().skip(1).flat_map(|row| row.split(',')).map(|x| x.parse().unwrap()).collect::<Vec<f64>>()
+    });
+    let most = host.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    assert!(most > 1e7 && host.len() == found.len(), "{most:e}");
+    for (found, host) in found.iter().zip(&host) {
+        assert!((found - host).abs() <= 1e-9 * most, "{found:e} {host:e}");
     }
 }
 
@@ -206,9 +248,9 @@ fn gpu_scene_draws_and_judges_as_the_processor() {
     }
 }
 
-/// A scene of the thesis with lines replaced.
-fn thesis(name: &str, lines: &[(&str, &str)]) -> String {
-    let path = format!("{}/../../cases/ch2/{name}/case.toml", env!("CARGO_MANIFEST_DIR"));
+/// The scene of a case with lines replaced, without expectations.
+fn case(name: &str, lines: &[(&str, &str)]) -> String {
+    let path = format!("{}/../../cases/{name}/case.toml", env!("CARGO_MANIFEST_DIR"));
     let mut text = std::fs::read_to_string(path).unwrap();
     for (old, new) in lines {
         assert!(text.contains(old), "{old}");
@@ -223,8 +265,8 @@ fn thesis(name: &str, lines: &[(&str, &str)]) -> String {
 /// Bars in tension, coarse, without and with a surface correction, by L-BFGS.
 #[test]
 fn gpu_scene_of_bars_in_tension() {
-    let bar = thesis(
-        "bar-in-tension",
+    let bar = case(
+        "ch2/bar-in-tension",
         &[
             ("tolerance = 1e-6", "tolerance = 1e-6\ndevice = \"cpu\""),
             (
@@ -243,8 +285,8 @@ fn gpu_scene_of_bars_in_tension() {
 fn gpu_scene_of_mode_one() {
     for (method, allowed) in [("adr", 1e-9), ("lbfgs", 1e-4)] {
         let solver = format!("method = \"{method}\"\ndevice = \"cpu\"\nsteps = 2");
-        let sheet = thesis(
-            "mode-1",
+        let sheet = case(
+            "ch2/mode-1",
             &[
                 ("steps = 100 ", &solver),
                 ("\"-100 mm\"", "\"-20 mm\""),

@@ -168,13 +168,14 @@ pub(crate) fn main_names(report: &Report, listed: &[String], columns: &[&str]) -
     let names = Names::new(report);
     let mut found = names.fitting(listed.iter().map(String::as_str));
     if found.is_empty() {
-        let expected = || report.expect.iter().filter(|one| one.expect.kind != Kind::Regression);
-        found = names.of_expectations(expected().flat_map(|one| one.expect.names()));
-        if !report.provenance.scene.contains("[[expect]]") {
-            let own = std::mem::replace(&mut found, names.fitting(columns.iter().copied()));
-            let new: Vec<_> = own.into_iter().filter(|name| !found.contains(name)).collect();
-            found.extend(new);
+        let expected = report.expect.iter().filter(|one| one.expect.kind != Kind::Regression);
+        let expected = names.of_expectations(expected.flat_map(|one| one.expect.names()));
+        let is_expecting = Source::new("scene", report.provenance.scene.as_str()).has_expectations();
+        if expected.is_empty() || !is_expecting {
+            found = names.fitting(columns.iter().copied());
         }
+        let new: Vec<&str> = expected.into_iter().filter(|name| !found.contains(name)).collect();
+        found.extend(new);
     }
     if found.is_empty() {
         found = names.scalars().take(SINGLE[0]).collect();
@@ -328,7 +329,7 @@ mod tests {
             #[serde(default)]
             expect: Vec<crate::report::Expect>,
         }
-        let mut report = Report::new("test", "1", "");
+        let mut report = Report::new("test", "1", expectations);
         for (variant, value) in [("dx=10mm", 2.0), ("dx=5mm", 2.5), ("dx=1mm", 2.9)] {
             report.value(crate::report::Named::new(format!("peak[{variant}]"), "N"), value);
             report.value(crate::report::Named::new(format!("error[{variant}]"), ""), 3.0 - value);
@@ -353,12 +354,22 @@ mod tests {
         assert_eq!(rows[0], "variant  peak [N]", "{table}");
         assert_eq!([rows[1], rows[2], rows[3]], ["dx=10mm  2", "dx=5mm   2.5", "dx=1mm   2.9"]);
         assert!(rows[4].starts_with("balance  1"), "{table}");
-        let main = main_names(&report, &[], &["error*"]);
-        assert_eq!(main[..3], ["error[dx=1mm]", "error[dx=5mm]", "error[dx=10mm]"], "{main:?}");
-        assert!(main[3..].contains(&"balance".to_owned()), "{main:?}");
         let listed = main_values(&report, &["error".to_owned()], &[], 100);
         assert!(listed.starts_with("variant  error\n") && !listed.contains("balance"), "{listed}");
         assert!(verdict(&report, &TerminalStyle::plain()).starts_with("3 of 3 expectations met (3 bound)"));
+    }
+
+    /// Expectations of the scene come first, those that the program adds after its own values; regressions
+    /// show nothing.
+    #[test]
+    fn values_of_the_program_beside_expectations() {
+        let errors = ["error[dx=1mm]", "error[dx=5mm]", "error[dx=10mm]"];
+        let mut own = report(&expect("balance", "at_most = 9"));
+        assert_eq!(main_names(&own, &[], &["error*"]), ["balance"]);
+        own.provenance.scene = "# [[expect]] of the program\n".to_owned();
+        assert_eq!(main_names(&own, &[], &["error*"]), [&errors[..], &["balance"]].concat());
+        let earlier = report(&expect("balance", "at_most = 9").replace("\"bound\"", "\"regression\""));
+        assert_eq!(main_names(&earlier, &[], &["error*"]), errors);
     }
 
     #[test]

@@ -175,6 +175,11 @@ impl Source {
         (!title.is_empty()).then(|| title.to_owned())
     }
 
+    /// Returns true for a scene with `[[expect]]`.
+    pub(crate) fn has_expectations(&self) -> bool {
+        DeTable::parse(&self.text).is_ok_and(|root| root.get_ref().contains_key("expect"))
+    }
+
     /// Returns the names and patterns of `[report] values`.
     pub fn report_values(&self) -> Vec<String> {
         let values = || {

@@ -52,6 +52,7 @@ pub struct DeviceBody<const D: usize> {
     pub(super) shifts: Handle,
     pub(super) rows: Handle,
     pub(super) law: Handle,
+    pub(super) law_numbers: usize,
     pub(super) intact: Handle,
     pub(super) held: Handle,
     pub(super) full: Handle,
@@ -113,6 +114,7 @@ impl<const D: usize> DeviceBody<D> {
         let form = KernelForm {
             dimension: D,
             bonds: stencil.len(),
+            tabulated: false,
             numerator: 1,
             denominator: 0,
             clamped: false,
@@ -123,12 +125,7 @@ impl<const D: usize> DeviceBody<D> {
             tile: TILE,
             unroll: 2,
         };
-        let field = (D * sites) as u64 * precision.bytes();
-        let words = 4 * (sites * form.bonds.div_ceil(32)) as u64;
-        let factor_bytes = field / D as u64 * components as u64;
-        let fields =
-            [("displacement", field), ("velocity", field), ("force", field), ("bond factors", factor_bytes)];
-        refuse_beyond_memory(device, &[&fields[..], &[("intact bonds", words)]].concat())?;
+        device.refuse_large(bonds, 0)?;
         let spacing = bonds.spacing();
         let unit = spacing * stencil.iter().map(|bond| bond.stiffness.abs()).fold(0.0, f64::max);
         let mut rows = Vec::with_capacity(form.bonds * (D + ROW));
@@ -159,6 +156,7 @@ impl<const D: usize> DeviceBody<D> {
             shifts: client.create_from_slice(i32::as_bytes(&shifts)),
             rows: numbers(&client, precision, rows.into_iter()),
             law: empty(1),
+            law_numbers: 1,
             intact: whole(&halves(&bonds.intact(), sites, form.bonds)),
             held: whole(&[0]),
             full: empty(1),
@@ -187,27 +185,30 @@ impl<const D: usize> DeviceBody<D> {
     /// Takes another law for the same modulus; bonds with e above `limit` are listed.
     ///
     /// # Errors
-    /// [`Error::Device`] for a law that only a table represents.
+    /// [`Error::Device`] for forces that are 0 or not finite.
     pub fn set_law(&mut self, fit: &KernelFit, limit: f64) -> Result<(), Error> {
-        let law = Rational::new(fit).filter(|_| self.unit > 0.0 && self.unit.is_finite());
-        let Some(law) = law else {
-            return Err(Error::Device(format!(
-                "law of the bonds: unexpected {} with a force of {} N/m³; kernels take polynomials and \
-                 rationals above 0",
-                fit.kind(),
-                self.unit
-            )));
+        if !(self.unit > 0.0 && self.unit.is_finite()) {
+            let found = format!("law of the bonds: found a force of {} N/m³; allowed: above 0", self.unit);
+            return Err(Error::Device(found));
+        }
+        let ratio = Rational::new(fit);
+        let (numerator, denominator, constant) = match &ratio {
+            Some(ratio) => (&ratio.numerator[..], &ratio.denominator[..], ratio.constant),
+            None => (&[][..], &[][..], 0.0),
         };
         self.form = KernelForm {
-            numerator: law.numerator.len(),
-            denominator: law.denominator.len(),
-            clamped: law.clamp.iter().any(|end| end.is_finite()),
-            stressed: law.constant != 0.0,
+            tabulated: ratio.is_none(),
+            numerator: numerator.len(),
+            denominator: denominator.len(),
+            clamped: fit.clamp.iter().any(|end| end.is_finite()),
+            stressed: constant != 0.0,
             ..self.form
         };
-        let ends = [law.constant, law.clamp[0], law.clamp[1], limit];
-        let numbers_of_law = law.numerator.iter().chain(&law.denominator).chain(&ends).copied();
-        self.law = numbers(&self.client, self.precision, numbers_of_law);
+        let ends = [constant, fit.clamp[0], fit.clamp[1], limit];
+        let coefficients = numerator.iter().chain(denominator).chain(&ends);
+        let law: Vec<f64> = coefficients.chain(fit.nodes().iter().flatten()).copied().collect();
+        self.law_numbers = law.len();
+        self.law = numbers(&self.client, self.precision, law.into_iter());
         Ok(())
     }
 
@@ -375,16 +376,39 @@ pub(super) fn failed(error: &ServerError) -> Error {
     Error::Device(text.split("\nBacktrace").next().unwrap_or_default().to_owned())
 }
 
-/// Refuses buffers, bytes each by name, that a device does not hold.
-pub(super) fn refuse_beyond_memory(device: &Device, buffers: &[(&str, u64)]) -> Result<(), Error> {
-    let (name, one) = (device.name(), device.largest_buffer());
-    if let Some((what, bytes)) = buffers.iter().find(|(_, bytes)| *bytes > one) {
-        let found = format!("{what}: found {bytes} bytes; allowed: {one} in a buffer of {name}");
-        return Err(Error::Device(found));
+impl Device {
+    /// Refuses a lattice whose buffers this device does not hold; L-BFGS keeps `pairs` steps, other methods 0.
+    ///
+    /// # Errors
+    /// [`Error::Device`] with the buffer, its bytes and those of the device.
+    pub fn refuse_large<const D: usize>(&self, bonds: &LatticeBonds<D>, pairs: usize) -> Result<(), Error> {
+        let list = (D * bonds.sites()) as u64;
+        let field = list * self.precision.bytes();
+        let words = 4 * (bonds.sites() * bonds.stencil().offsets.len().div_ceil(32)) as u64;
+        let buffers = [
+            ("displacement", field),
+            ("velocity", field),
+            ("force", field),
+            ("factors of bonds", bonds.factors().map_or(0, |_| field)),
+            ("intact bonds", words),
+            // differences of displacements and of forces
+            ("steps of L-BFGS", 4 * pairs as u64 * list),
+            ("steps of L-BFGS", 4 * pairs as u64 * list),
+        ];
+        self.refuse_buffers(&buffers)
     }
-    let total = buffers.iter().map(|(_, bytes)| bytes).sum::<u64>();
-    match device.client.properties().memory.max_memory().filter(|all| total > *all) {
-        Some(all) => Err(Error::Device(format!("memory: found {total} bytes; allowed: {all} on {name}"))),
-        None => Ok(()),
+
+    /// Refuses buffers, bytes each by name, that this device does not hold.
+    pub(super) fn refuse_buffers(&self, buffers: &[(&str, u64)]) -> Result<(), Error> {
+        let (name, one) = (self.name(), self.largest_buffer());
+        if let Some((what, bytes)) = buffers.iter().find(|(_, bytes)| *bytes > one) {
+            let found = format!("{what}: found {bytes} bytes; allowed: {one} in a buffer of {name}");
+            return Err(Error::Device(found));
+        }
+        let total = buffers.iter().map(|(_, bytes)| bytes).sum::<u64>();
+        match self.client.properties().memory.max_memory().filter(|all| total > *all) {
+            Some(all) => Err(Error::Device(format!("memory: found {total} bytes; allowed: {all} on {name}"))),
+            None => Ok(()),
+        }
     }
 }

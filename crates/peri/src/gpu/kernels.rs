@@ -20,6 +20,8 @@ pub const ROW: usize = 2;
 /// Numbers of a law beyond its coefficients: value at e = 0, least and greatest e, the e from which bonds are
 /// listed.
 pub const ENDS: usize = 4;
+/// Numbers of a node of a law that is a table: strain l − 1, tension, its derivative.
+pub const NODE: usize = 3;
 
 /// Constants that kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -28,6 +30,8 @@ pub struct KernelForm {
     pub dimension: usize,
     /// Bonds of the stencil.
     pub bonds: usize,
+    /// Whether the law is a table instead of a ratio of polynomials.
+    pub tabulated: bool,
     /// Coefficients of the law's numerator.
     pub numerator: usize,
     /// Coefficients of its denominator beyond the leading 1.
@@ -49,8 +53,8 @@ pub struct KernelForm {
 }
 
 impl KernelForm {
-    /// Numbers of the law.
-    pub fn law(&self) -> usize {
+    /// Numbers of the law that each thread keeps: all but the nodes of a table.
+    pub fn coefficients(&self) -> usize {
         self.numerator + self.denominator + ENDS
     }
 }
@@ -83,14 +87,75 @@ pub fn weight<F: Float>(
     }
 }
 
+/// Value at e of a law that is a ratio of polynomials.
+#[cube]
+fn ratio<F: Float>(law: &Array<F>, e: F, #[comptime] form: KernelForm) -> F {
+    let mut q = law[comptime!(form.numerator - 1)];
+    #[unroll]
+    for j in 1..comptime!(form.numerator) {
+        q = fma(q, e, law[comptime!(form.numerator - 1 - j)]);
+    }
+    if comptime!(form.denominator > 0) {
+        let mut below = law[comptime!(form.numerator + form.denominator - 1)];
+        #[unroll]
+        for j in 1..comptime!(form.denominator) {
+            below = fma(below, e, law[comptime!(form.numerator + form.denominator - 1 - j)]);
+        }
+        q /= fma(below, e, F::new(1.0));
+    }
+    q *= e;
+    if comptime!(form.stressed) {
+        q += law[comptime!(form.numerator + form.denominator)];
+    }
+    q
+}
+
+/// Value at e of a law that is a table: the cubic of its piece, the tangent beyond its ends.
+#[cube]
+fn tabulated<F: Float>(law: &[F], e: F, #[comptime] form: KernelForm) -> F {
+    let one = F::new(1.0);
+    let start = comptime!(form.coefficients());
+    let stretch = F::sqrt(F::max(one + e, F::new(0.0)));
+    let strain = e / (one + stretch);
+    let mut left = 0usize;
+    let mut right = (law.len() - start) / comptime!(NODE) - 1;
+    while right - left > 1 {
+        let middle = (left + right) / 2;
+        if law[start + comptime!(NODE) * middle] <= strain {
+            left = middle;
+        } else {
+            right = middle;
+        }
+    }
+    let from = start + comptime!(NODE) * left;
+    let to = start + comptime!(NODE) * right;
+    let width = law[to] - law[from];
+    let s = (strain - law[from]) / width;
+    let r = (law[to] - strain) / width;
+    let rise = F::new(2.0) * s;
+    let fall = F::new(2.0) * r;
+    let mut tension = (one + rise) * r * r * law[from + 1]
+        + s * r * r * width * law[from + 2]
+        + s * s * (one + fall) * law[to + 1]
+        - s * s * r * width * law[to + 2];
+    if strain < law[from] {
+        tension = fma(law[from + 2], strain - law[from], law[from + 1]);
+    }
+    if strain > law[to] {
+        tension = fma(law[to + 2], strain - law[to], law[to + 1]);
+    }
+    tension / F::max(stretch, F::new(1e-30))
+}
+
 /// Adds the force of bond `k` on the particle `p` of a thread, in `site`; its e.
 #[cube]
 #[allow(clippy::too_many_arguments)]
-fn add_bond<F: Float>(
+pub fn add_bond<F: Float>(
     displacement: &[F],
     factors: &[F],
     shifts: &[i32],
     rows: &[F],
+    table: &[F],
     law: &Array<F>,
     own: &Array<F>,
     sum: &mut Array<F>,
@@ -118,23 +183,8 @@ fn add_bond<F: Float>(
     if comptime!(form.clamped) {
         at = F::max(law[ends + 1], F::min(e, law[ends + 2]));
     }
-    let mut q = law[comptime!(form.numerator - 1)];
-    #[unroll]
-    for j in 1..comptime!(form.numerator) {
-        q = fma(q, at, law[comptime!(form.numerator - 1 - j)]);
-    }
-    if comptime!(form.denominator > 0) {
-        let mut below = law[comptime!(form.numerator + form.denominator - 1)];
-        #[unroll]
-        for j in 1..comptime!(form.denominator) {
-            below = fma(below, at, law[comptime!(form.numerator + form.denominator - 1 - j)]);
-        }
-        q /= fma(below, at, F::new(1.0));
-    }
-    q *= at;
-    if comptime!(form.stressed) {
-        q += law[ends];
-    }
+    let mut q =
+        if comptime!(form.tabulated) { tabulated::<F>(table, at, form) } else { ratio::<F>(law, at, form) };
     q *= rows[row + dimension + 1];
     if comptime!(form.factors > 0) {
         q *= weight::<F>(factors, rows, row, site as usize, there, form);
@@ -195,9 +245,9 @@ pub fn pull<F: Float>(
     let mut before = Array::<u32>::new(tile);
     let mut own = Array::<F>::new(comptime!(form.tile * form.dimension));
     let mut sum = Array::<F>::new(comptime!(form.tile * form.dimension));
-    let mut coefficients = Array::<F>::new(comptime!(form.law()));
+    let mut coefficients = Array::<F>::new(comptime!(form.coefficients()));
     #[unroll]
-    for j in 0..comptime!(form.law()) {
+    for j in 0..comptime!(form.coefficients()) {
         coefficients[j] = law[j];
     }
     #[unroll]
@@ -242,6 +292,7 @@ pub fn pull<F: Float>(
                                 factors,
                                 shifts,
                                 rows,
+                                law,
                                 &coefficients,
                                 &own,
                                 &mut sum,
@@ -285,6 +336,7 @@ pub fn pull<F: Float>(
                                 factors,
                                 shifts,
                                 rows,
+                                law,
                                 &coefficients,
                                 &own,
                                 &mut sum,

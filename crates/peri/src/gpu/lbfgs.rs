@@ -1,6 +1,6 @@
 //! Vectors of L-BFGS on a device: launches of its kernels, and the sums that the host reads.
 
-use super::body::{DeviceBody, LANES, numbers, refuse_beyond_memory};
+use super::body::{DeviceBody, LANES, numbers};
 use super::kernels::{CUBE, KernelForm};
 use super::lbfgs_kernels::{
     LINE_SUMS, PAIR_SUMS, advance, combine, line_sums, pair_products, reach, record, spread,
@@ -74,7 +74,7 @@ impl<const D: usize> DeviceSearch<D> {
         let body = DeviceBody::new(device, bonds, law, modulus)?;
         body.refuse_other_sites("springs", springs)?;
         let (bytes, list) = (body.precision.bytes() as usize, D * body.sites);
-        refuse_beyond_memory(device, &[("steps of L-BFGS", (4 * pairs * list) as u64); 2])?;
+        device.refuse_large(bonds, pairs)?;
         let zeros = || numbers(&body.client, body.precision, (0..list).map(|_| 0.0));
         let singles = || numbers(&body.client, Precision::Single, (0..pairs * list).map(|_| 0.0));
         let empty = |length: usize| body.client.empty(length * bytes);

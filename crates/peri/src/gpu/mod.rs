@@ -24,12 +24,15 @@ mod planes;
 mod relaxation;
 mod relaxation_kernels;
 mod steps;
+mod stress;
+mod stress_kernels;
 
 pub use body::{DeviceBody, DeviceLoads, MOST_STEPS};
 pub use driven::DrivenSites;
 pub use lbfgs::{DeviceLineSums, DeviceSearch};
 pub use relaxation::{DeviceRelaxation, RelaxationSums};
 pub use steps::{DeviceStep, ListedBond, StepSums};
+pub use stress::piolas;
 
 use crate::error::Error;
 use cubecl::client::Client;

@@ -293,7 +293,7 @@ impl<const D: usize> DeviceBody<D> {
                 buffer(sites, count),
                 buffer(&self.shifts, form.bonds),
                 buffer(&self.rows, form.bonds * (D + super::kernels::ROW)),
-                buffer(&self.law, form.law()),
+                buffer(&self.law, self.law_numbers),
                 buffer(&self.intact, form.bonds.div_ceil(32) * self.sites),
                 buffer(&self.body, if form.loaded { D * self.sites } else { 1 }),
                 buffer(force, D * self.sites),

@@ -173,6 +173,11 @@ impl KernelFit {
         q
     }
 
+    /// Strain l − 1, tension and its derivative at the nodes of a table; none for a ratio of polynomials.
+    pub fn nodes(&self) -> &[[f64; 3]] {
+        &self.table
+    }
+
     /// Form of the fit: `polynomial of degree 6`, `rational 3/2`, `table of 2000 nodes`.
     pub fn kind(&self) -> String {
         if !self.table.is_empty() {

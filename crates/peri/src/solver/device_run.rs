@@ -143,7 +143,7 @@ impl<const D: usize> DeviceRun<D> {
     /// Takes the fitted law.
     ///
     /// # Errors
-    /// [`Error::Device`] for a law that only a table represents.
+    /// [`Error::Device`] for forces that are 0 or not finite.
     pub fn take_law(&mut self, system: &System<D>) -> Result<(), Error> {
         let Some((law, _)) = lattice(system).and_then(LatticeBonds::law) else { return Ok(()) };
         self.body.set_law(law, limit(system))

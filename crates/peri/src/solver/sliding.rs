@@ -5,59 +5,60 @@ use super::state::State;
 use super::system::System;
 use crate::bonds::{Bonds, Overstretched};
 use crate::field::Field;
+use crate::material::Bond;
 use nalgebra::{SMatrix, SVector};
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
-/// Bonds across interfaces that slide, by their sites.
+/// Bonds across interfaces that slide: for each site those to which it has one.
 #[derive(Clone, Debug, Default)]
-pub struct SlidingBonds {
-    pairs: Vec<[u32; 2]>,
-    /// Sites that each site has a bond across to.
-    across: HashMap<u32, Vec<u32>>,
-}
+pub struct SlidingBonds(BTreeMap<u32, Vec<u32>>);
 
 impl SlidingBonds {
-    /// Lists bonds, each once.
-    pub fn new(pairs: Vec<[u32; 2]>) -> Self {
-        let mut across: HashMap<u32, Vec<u32>> = HashMap::new();
-        for &[a, b] in &pairs {
+    /// Lists bonds by their sites, each once.
+    pub fn new(pairs: impl IntoIterator<Item = [u32; 2]>) -> Self {
+        let mut across: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for [a, b] in pairs {
             across.entry(a).or_default().push(b);
             across.entry(b).or_default().push(a);
         }
-        Self { pairs, across }
+        Self(across)
     }
 
     /// Returns true if no interface slides.
     pub fn is_empty(&self) -> bool {
-        self.pairs.is_empty()
+        self.0.is_empty()
     }
 
-    /// Slip of two particles over their distance at rest, along their bond: negative where it shortens it.
+    /// Slip of the ends of a bond across over their distance at rest, along the bond: negative where it
+    /// shortens it; the same bits from either end.
     ///
     /// y = F(ξ + j), where F is the deformation gradient of the bonds of both within their parts; of the jump
     /// j the slip is what lies normal to n, the mean of the bonds across. `None` without an F that can be
     /// inverted.
-    fn slip<const D: usize>(&self, bonds: &dyn Bonds<D>, u: &Field<D>, [a, b]: [u32; 2]) -> Option<f64> {
-        let place = |site: u32| SVector::from(bonds.position(site as usize));
-        let moved = |site: u32| SVector::from(u.get(site as usize));
-        let bond = |from: u32, to: u32| place(to) - place(from);
+    fn slip<const D: usize>(&self, bonds: &dyn Bonds<D>, u: &Field<D>, bond: &Bond<D>) -> Option<f64> {
         let mut shape = SMatrix::<f64, D, D>::zeros();
         let mut deformed = shape;
         let mut normal = SVector::<f64, D>::zeros();
-        for (end, sign) in [(a, 1.0), (b, -1.0)] {
-            let across = &self.across[&end];
-            normal += sign * across.iter().map(|&other| bond(end, other)).sum::<SVector<f64, D>>();
-            bonds.neighbours(end as usize, &mut |own| {
-                let other = own.site as u32;
-                if !across.contains(&other) {
-                    let at_rest = bond(end, other);
+        let [low, high] = [bond.from.min(bond.to), bond.from.max(bond.to)];
+        for (end, sign) in [(low, 1.0), (high, -1.0)] {
+            let across = self.0.get(&(end as u32))?;
+            let place = |site: usize| SVector::from(bonds.position(site));
+            normal += across
+                .iter()
+                .map(|&other| sign * (place(other as usize) - place(end)))
+                .sum::<SVector<f64, D>>();
+            bonds.neighbours(end, &mut |own| {
+                if !across.contains(&(own.site as u32)) {
+                    let own = Bond::new(end, &own, u);
+                    let at_rest = SVector::from(own.reference);
                     shape += own.weight * at_rest * at_rest.transpose();
-                    deformed += own.weight * (at_rest + moved(other) - moved(end)) * at_rest.transpose();
+                    deformed += own.weight * (at_rest + SVector::from(own.change)) * at_rest.transpose();
                 }
             });
         }
-        let at_rest = bond(a, b);
-        let jump = shape * deformed.try_inverse()? * (at_rest + moved(b) - moved(a)) - at_rest;
+        let sign = if bond.from == low { 1.0 } else { -1.0 };
+        let at_rest = sign * SVector::from(bond.reference);
+        let jump = shape * deformed.try_inverse()? * (at_rest + sign * SVector::from(bond.change)) - at_rest;
         let normal = normal.try_normalize(0.0)?;
         let slip = jump - normal * normal.dot(&jump);
         Some(slip.dot(&at_rest) / at_rest.norm_squared()).filter(|slip| slip.is_finite())
@@ -73,33 +74,21 @@ impl<const D: usize> System<'_, D> {
             return Vec::new();
         };
         let (bonds, u) = (&*self.bonds, &state.displacement);
-        let square = |[a, b]: [u32; 2]| {
-            let (here, there) = (bonds.position(a as usize), bonds.position(b as usize));
-            let (from, to) = (u.get(a as usize), u.get(b as usize));
-            let [mut now, mut rest] = [0.0; 2];
-            for d in 0..D {
-                now += (there[d] - here[d] + to[d] - from[d]).powi(2);
-                rest += (there[d] - here[d]).powi(2);
-            }
-            now / rest
-        };
         let mut found = Vec::new();
-        for &[a, b] in &self.sliding.pairs {
-            let shortest = 1.0 / critical.weaker(a as usize, b as usize);
-            let is_short = square([a, b]) < shortest * shortest;
-            let slides = || self.sliding.slip(bonds, u, [a, b]).is_some_and(|slip| slip < shortest - 1.0);
-            if !(is_short && bonds.is_bonded(a as usize, b as usize) && slides()) {
-                continue;
-            }
-            let elongation = square([a, b]) - 1.0;
-            for [site, other] in [[a, b], [b, a]] {
-                bonds.neighbours(site as usize, &mut |bond| {
-                    if bond.site == other as usize {
-                        let (index, length, weight) = (bond.index, bond.length, bond.weight);
-                        found.push(Overstretched { site, index, elongation, length, weight });
-                    }
-                });
-            }
+        for (&site, others) in &self.sliding.0 {
+            bonds.neighbours(site as usize, &mut |neighbour| {
+                if !others.contains(&(neighbour.site as u32)) {
+                    return;
+                }
+                let bond = Bond::new(site as usize, &neighbour, u);
+                let shortest = 1.0 / critical.weaker(bond.from, bond.to);
+                let slips = || self.sliding.slip(bonds, u, &bond).is_some_and(|slip| slip < shortest - 1.0);
+                let elongation = bond.elongation();
+                if elongation < shortest * shortest - 1.0 && slips() {
+                    let (index, length, weight) = (neighbour.index, bond.length, bond.weight);
+                    found.push(Overstretched { site, index, elongation, length, weight });
+                }
+            });
         }
         found.sort_unstable_by_key(|bond| (bond.site, bond.index));
         found

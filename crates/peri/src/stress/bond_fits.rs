@@ -30,6 +30,12 @@ impl<'a> BondFits<'a> {
         Ok(Self { fits, shares })
     }
 
+    /// Returns the law of all bonds; `None` where there are several.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn single(&self) -> Option<&'a KernelFit> {
+        self.fits.first().filter(|_| self.shares.is_none())
+    }
+
     /// q(e) of a bond.
     #[inline]
     pub fn value(&self, from: usize, to: usize, e: f64) -> f64 {

@@ -13,12 +13,37 @@ use crate::parallel;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-/// Sums of a measure, and their run time.
-struct StressSums<const D: usize> {
+/// Weights of a measure on a lattice.
+pub struct StressPlan<const D: usize> {
     measure: StressMethod,
     window: Option<AveragedWindow<D>>,
     /// Taps of each bond of half the stencil.
-    taps: Vec<Vec<Tap>>,
+    pub taps: Vec<Vec<Tap>>,
+    /// Sites whose averages are divided by the weights of the bonds whose two particles exist.
+    pub rim: Vec<u32>,
+}
+
+impl<const D: usize> StressPlan<D> {
+    /// Computes the weights of a measure.
+    pub fn new(bonds: &LatticeBonds<D>, state: &StressInput<D>, measure: StressMethod) -> Self {
+        let window = measure
+            .is_partition()
+            .then(|| AveragedWindow::<D>::new(StressWindow::for_measure(measure), bonds.ratio()));
+        let mut alike = BTreeMap::new();
+        let half = half(bonds).iter();
+        let taps = half.map(|&offset| taps(bonds, offset, measure, window.as_ref(), &mut alike)).collect();
+        Self { measure, window, taps, rim: rim(bonds, state, measure) }
+    }
+
+    /// Returns the divisor of the sum over bonds, particle by particle.
+    pub fn volumes(&self, bonds: &LatticeBonds<D>, state: &StressInput<D>, ball: BallVolume) -> Vec<f64> {
+        volumes(bonds, state, self.measure, ball, self.window.as_ref())
+    }
+}
+
+/// Sums of a measure, and their run time.
+struct StressSums<const D: usize> {
+    plan: StressPlan<D>,
     shares: ShareSums<D>,
     seconds: f64,
 }
@@ -26,20 +51,15 @@ struct StressSums<const D: usize> {
 impl<const D: usize> StressSums<D> {
     fn new(bonds: &LatticeBonds<D>, state: &StressInput<D>, measure: StressMethod) -> Self {
         let started = Instant::now();
-        let window = measure
-            .is_partition()
-            .then(|| AveragedWindow::<D>::new(StressWindow::for_measure(measure), bonds.ratio()));
-        let mut alike = BTreeMap::new();
-        let half = half(bonds).iter();
-        let taps = half.map(|&offset| taps(bonds, offset, measure, window.as_ref(), &mut alike)).collect();
-        let shares = ShareSums::new(bonds.sites(), &rim(bonds, state, measure));
-        Self { measure, window, taps, shares, seconds: started.elapsed().as_secs_f64() }
+        let plan = StressPlan::new(bonds, state, measure);
+        let shares = ShareSums::new(bonds.sites(), &plan.rim);
+        Self { plan, shares, seconds: started.elapsed().as_secs_f64() }
     }
 
     /// Divides the sums by the volumes.
     fn finish(self, bonds: &LatticeBonds<D>, state: &StressInput<D>, ball: BallVolume) -> MeasuredStress<D> {
         let started = Instant::now();
-        let volumes = volumes(bonds, state, self.measure, ball, self.window.as_ref());
+        let volumes = self.plan.volumes(bonds, state, ball);
         let one = |particle: usize| {
             let share = self.shares.get(bonds.particles()[particle] as usize);
             share.map(|row| row.map(|sum| sum / volumes[particle]))
@@ -69,7 +89,8 @@ pub fn piolas<const D: usize>(
     let mut all: Vec<StressSums<D>> =
         measures.iter().map(|&measure| StressSums::new(bonds, state, measure)).collect();
     let started = Instant::now();
-    let reach = all.iter().flat_map(|sums| sums.taps.iter().flatten()).map(|tap| tap.shift.unsigned_abs());
+    let reach =
+        all.iter().flat_map(|sums| sums.plan.taps.iter().flatten()).map(|tap| tap.shift.unsigned_abs());
     let longest = half(bonds).iter().map(|&offset| bonds.shift(offset).unsigned_abs());
     let (reach, longest) = (reach.max().unwrap_or(0), longest.max().unwrap_or(0));
     let filled = tiles(bonds.sites(), bonds.particles());
@@ -82,7 +103,7 @@ pub fn piolas<const D: usize>(
         let edge = offset.map(|o| f64::from(o) * bonds.lattice().spacing);
         for sums in &mut all {
             let started = Instant::now();
-            shared.add(&sums.taps[k], edge, &mut sums.shares);
+            shared.add(&sums.plan.taps[k], edge, &mut sums.shares);
             sums.seconds += started.elapsed().as_secs_f64();
         }
     }

@@ -16,6 +16,8 @@ mod window;
 
 pub use ball::{ball_volume, cell_fractions, segment_fraction};
 pub use bond_fits::BondFits;
+#[cfg(feature = "gpu")]
+pub(crate) use lattice::StressPlan;
 
 use crate::bonds::{
     BodyGeometry, BondForces, BondKind, Bonds, CloudBonds, GradientSums, LatticeBonds, Neighbour,

@@ -56,13 +56,12 @@ const STEPS: &str = "[solver]\nsteps = 20";
 #[test]
 fn parts_that_slide_lose_their_compressed_bonds() {
     let shear = r#"["0 mm", "4 mm"]"#;
-    assert_eq!(blocks(true, shear, STEPS)[..1], [1.0]);
-    assert_eq!(blocks(true, shear, STEPS)[2], 2.0);
+    let [broken, _, fragments] = blocks(true, shear, STEPS);
+    assert!(broken == 1.0 && fragments == 2.0, "{broken} {fragments}");
     let [held, _, fragments] = blocks(false, shear, STEPS);
     assert!((0.3..0.9).contains(&held) && fragments == 1.0, "{held} {fragments}");
     let time = "[solver]\nmethod = \"verlet\"\n[dynamics]\ndensity = \"1000 kg/m^3\"\n\
-                ramp = \"5 ms\"\n\
-                end_time = \"5 ms\"\nrecords = 10";
+                ramp = \"5 ms\"\nend_time = \"5 ms\"\nrecords = 10";
     let [broken, _, fragments] = blocks(true, shear, time);
     assert!(broken == 1.0 && fragments == 2.0, "{broken} {fragments}");
 }

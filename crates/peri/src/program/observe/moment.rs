@@ -4,6 +4,7 @@ use super::material::Physics;
 use crate::bonds::{Bonds, Fragment, covered_stretches, fragments};
 use crate::contact::SurfaceTraction;
 use crate::error::Error;
+use crate::program::card::{self, Card};
 use crate::program::scene::Scene;
 use crate::solver::{State, StepRecord};
 use crate::stress::{
@@ -37,6 +38,7 @@ pub struct Moment<'a, const D: usize> {
     pub bonds: &'a dyn Bonds<D>,
     /// Displacement and history.
     pub state: &'a State<D>,
+    card: Option<&'a Card>,
     label: Option<&'a str>,
     phases: &'a RefCell<Phases>,
     stresses: OnceCell<Stresses<D>>,
@@ -53,7 +55,12 @@ impl<'a, const D: usize> Moment<'a, D> {
         phases: &'a RefCell<Phases>,
     ) -> Self {
         let (stresses, fragments, tractions) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
-        Self { scene, physics, bonds, state, label: None, phases, stresses, fragments, tractions }
+        Self { scene, physics, bonds, state, card: None, label: None, phases, stresses, fragments, tractions }
+    }
+
+    /// Computes stresses on a graphics card, if there is one.
+    pub fn on(self, card: Option<&'a Card>) -> Self {
+        Self { card, ..self }
     }
 
     /// Gives the moment the name of a state.
@@ -148,7 +155,8 @@ impl<'a, const D: usize> Moment<'a, D> {
         let (modulus, missing) = (material.modulus(), SurfaceCompensation::WindowAt(&self.physics.by_window));
         let fit = BondFits::new(&fits, material.shares(), bonds.sites())?;
         let loaded = StressInput { displacement: &state.displacement, fit, modulus, missing };
-        let measured = stress::piolas(bonds, &loaded, &spec.measures, spec.ball);
+        let on_card = self.card.and_then(|card| card::piolas(card, bonds, &loaded, spec));
+        let measured = on_card.unwrap_or_else(|| stress::piolas(bonds, &loaded, &spec.measures, spec.ball));
         for (&measure, MeasuredStress { piola, seconds }) in spec.measures.iter().zip(measured) {
             let started = Instant::now();
             stresses.cauchy.push((measure, cauchy(&piola, &gradients)));

@@ -1,22 +1,14 @@
 //! Choice of the device that takes the steps or iterations of a variant.
 
 use crate::bonds::Bonds;
-use crate::error::Error;
+use crate::program::card::{self, Card};
 use crate::program::scene::{
     BodyForceSpec, Boundary, ContactSpec, DeviceChoice, ForcePrecision, Scene, VaryingParameter,
 };
-use crate::solver::{Equilibrium, Method, State, StepCallback, System, VelocityVerlet, Watch};
 use harness::scene::{SceneError, Source};
 
 /// Directed bonds below which launching kernels takes longer than the processor's forces.
 const FEWEST_BONDS: u64 = 5_000_000;
-
-/// A graphics card.
-#[cfg(feature = "gpu")]
-pub type Card = crate::gpu::Device;
-/// No graphics card in this build.
-#[cfg(not(feature = "gpu"))]
-pub enum Card {}
 
 /// Device of a variant.
 #[derive(Default)]
@@ -58,8 +50,9 @@ pub fn choose<const D: usize>(
     if !only && directed < FEWEST_BONDS {
         return on_processor(format!("{directed} directed bonds are too few to gain by a card"));
     }
-    match open(precision == ForcePrecision::Single, block) {
-        Ok((card, _)) if !only && !is_card(&card) => {
+    let open = card::open(precision == ForcePrecision::Single, block);
+    match open.and_then(|(card, name)| card::room(&card, scene, bonds).map(|()| (card, name))) {
+        Ok((card, _)) if !only && !card::is_card(&card) => {
             on_processor("this machine has no graphics card".to_owned())
         }
         Ok((card, name)) => Ok(Chosen { card: Some(card), note: Some(name) }),
@@ -72,41 +65,6 @@ pub fn choose<const D: usize>(
             ))
         }
         Err(why) => on_processor(why),
-    }
-}
-
-/// Explicit dynamics on a card, or on the processor where there is none.
-///
-/// # Errors
-/// Those of the method.
-pub fn solve<const D: usize>(
-    card: Option<&Card>,
-    method: &VelocityVerlet,
-    system: &mut System<D>,
-    state: &mut State<D>,
-    watch: &mut Watch<D>,
-    finished: &mut StepCallback<D>,
-) -> Result<(), Error> {
-    match card {
-        #[cfg(feature = "gpu")]
-        Some(card) => method.solve_on(card, system, state, watch, finished),
-        #[cfg(not(feature = "gpu"))]
-        Some(card) => match *card {},
-        None => method.solve(system, state, watch, finished),
-    }
-}
-
-/// Method of equilibria on a card, or on the processor where there is none.
-pub fn equilibria<'a, const D: usize>(card: Option<&'a Card>, scene: &Scene) -> Box<dyn Equilibrium<D> + 'a> {
-    match card {
-        #[cfg(feature = "gpu")]
-        Some(card) => match scene.method() {
-            crate::program::scene::SolverMethod::Lbfgs => Box::new(scene.lbfgs().device_solver(card)),
-            _ => Box::new(scene.relaxation().device_solver(card)),
-        },
-        #[cfg(not(feature = "gpu"))]
-        Some(card) => match *card {},
-        None => scene.equilibria(),
     }
 }
 
@@ -175,34 +133,4 @@ fn contact_beyond_cards(contact: &ContactSpec) -> Option<(String, &'static str)>
         let key = if plane.friction.is_some() { own("friction") } else { "contact.friction".to_owned() };
         rubs.then_some((key, "friction"))
     })
-}
-
-#[cfg(feature = "gpu")]
-fn open(single: bool, block: &str) -> Result<(Card, String), String> {
-    let precision = if single { crate::gpu::Precision::Single } else { crate::gpu::Precision::Double };
-    let none = |error: crate::Error| format!("this machine has no graphics card that can be used ({error})");
-    let card = Card::portable().map_err(none)?;
-    let name = card.name().to_owned();
-    let card = card.with_precision(precision).map_err(|_| {
-        format!("{name} does not compute in double precision; take `{block}.precision = \"single\"`")
-    })?;
-    let digits = if single { "single" } else { "double" };
-    let what = if block == "solver" { "equilibria" } else { "steps" };
-    Ok((card, format!("{what} on {name} in {digits} precision")))
-}
-
-#[cfg(not(feature = "gpu"))]
-fn open(_: bool, _: &str) -> Result<(Card, String), String> {
-    Err("this program was built without graphics cards: `cargo build --release -p peri --features gpu`"
-        .to_owned())
-}
-
-#[cfg(feature = "gpu")]
-fn is_card(card: &Card) -> bool {
-    card.is_card()
-}
-
-#[cfg(not(feature = "gpu"))]
-fn is_card(card: &Card) -> bool {
-    match *card {}
 }

@@ -18,10 +18,11 @@ use crate::bonds::Bonds;
 use crate::calibrate::Space;
 use crate::contact::Contact;
 use crate::error::Error;
+use crate::program::card::{self, Card};
 use crate::program::observe::{self, FieldFrames, Moment, Physics, SceneObservers, in_space};
 use crate::program::quantities as q;
 use crate::program::scene::{self, ContactSpec, NAMING, NamedState, Scene, SceneVariant};
-use crate::solver::{Breaking, SlidingBonds, StageEnd, State, Status, StepRecord, System, load_stepping};
+use crate::solver::{Breaking, Method, StageEnd, State, Status, StepRecord, System, load_stepping};
 use harness::case::{Fault, Run, Step, StepField};
 use harness::observe::{Outputs, Scalars};
 use harness::report::{Phases, Report, SceneUnits};
@@ -210,7 +211,8 @@ fn run_variant<const D: usize>(
         }
         for named in states.iter().filter(|named| named.is_now(&state, true)) {
             body.bonds.prepare(&state.displacement);
-            let moment = Moment::new((&own_scene, &physics), &*body.bonds, &state, &phases).named(named.name);
+            let moment = Moment::new((&own_scene, &physics), &*body.bonds, &state, &phases);
+            let moment = moment.on(device.card.as_ref()).named(named.name);
             observers.iter().try_for_each(|observer| observer.draw(&moment, &outputs))?;
         }
     }
@@ -232,7 +234,7 @@ fn run_variant<const D: usize>(
     if scene.dynamics.is_some() {
         body.bonds.prepare(&state.displacement);
     }
-    let moment = Moment::new((scene, &physics), &*body.bonds, &state, &phases);
+    let moment = Moment::new((scene, &physics), &*body.bonds, &state, &phases).on(device.card.as_ref());
     moment.stresses()?;
     phases.borrow_mut().start("compare");
     observers.iter_mut().try_for_each(|observer| observer.end(&moment))?;
@@ -290,7 +292,7 @@ struct Watched<'a, 's, const D: usize> {
 
 /// Solves a step; returns its end if another one follows.
 fn solve<const D: usize>(
-    (source, scene, card): (&Source, &Scene, Option<&device::Card>),
+    (source, scene, card): (&Source, &Scene, Option<&Card>),
     (physics, contact): (&Physics<D>, Option<Contact<D>>),
     variant_run: &VariantRun,
     body: &mut scene::DiscreteBody<D>,
@@ -313,14 +315,14 @@ fn solve<const D: usize>(
     system.fit_bound = scene.fit_bound();
     let criterion = physics.body.criterion.clone();
     system.breaking = criterion.map(|criterion| Breaking { criterion, policy: scene.solver.breaking });
-    system.sliding = SlidingBonds::new(scene::sliding_bonds(scene, &physics.body.interfaces));
+    system.sliding = scene::sliding_bonds(scene, &physics.body.interfaces);
     system.contact = contact;
     (system.refine, system.snap_back) = (scene.solver.refine, scene.solver.snap_back);
     system.stop_below = scene.solver.stop_below.map_or(0.0, |part| part.si());
     phases.borrow_mut().start("solve");
     let mut finished = |bonds: &dyn Bonds<D>, state: &State<D>| {
         phases.borrow_mut().stop();
-        let mut moment = Moment::new((scene, physics), bonds, state, phases);
+        let mut moment = Moment::new((scene, physics), bonds, state, phases).on(card);
         observers.iter_mut().try_for_each(|observer| observer.see(&moment))?;
         frames.step(observers, &moment)?;
         for named in states.iter().filter(|named| state.control.round == 0 && named.is_now(state, false)) {
@@ -335,10 +337,15 @@ fn solve<const D: usize>(
     };
     let solved = match &scene.dynamics {
         Some(dynamics) => {
-            device::solve(card, &dynamics.method(), &mut system, state, &mut watch, &mut finished)
+            let method = dynamics.method();
+            match card {
+                Some(card) => card::solve(card, &method, &mut system, state, &mut watch, &mut finished),
+                None => method.solve(&mut system, state, &mut watch, &mut finished),
+            }
         }
         None => {
-            let mut method = device::equilibria(card, scene);
+            let on_card = card.map(|card| card::equilibria(card, scene));
+            let mut method = on_card.unwrap_or_else(|| scene.equilibria());
             load_stepping(&mut *method, &mut system, state, &mut watch, &mut finished)
         }
     };

@@ -7,7 +7,7 @@ use super::{Scene, tearing};
 use crate::bonds::{Property, sever_pairs};
 use crate::critical::{Convention, Critical, ONE_OF};
 use crate::geometry::{Parts, inside};
-use crate::solver::Criterion;
+use crate::solver::{Criterion, SlidingBonds};
 use harness::scene::{SceneError, Source};
 use serde::Deserialize;
 
@@ -126,7 +126,7 @@ fn check_sliding(source: &Source, scene: &Scene, index: usize) -> Result<(), Sce
             source.unexpected(&key, "bonds with prestrains break in tension only; remove one of both")
         );
     }
-    if scene.solver.refine > 1 || scene.step.iter().any(|step| step.refines()) {
+    if scene.solver.refine > 1 {
         return Err(source.conflict(
             &key,
             "solver.refine",
@@ -273,9 +273,9 @@ pub(super) fn cross_interfaces<const D: usize>(
 }
 
 /// Returns the bonds across interfaces that slide, by their sites.
-pub fn sliding_bonds(scene: &Scene, interfaces: &[Vec<[u32; 2]>]) -> Vec<[u32; 2]> {
+pub fn sliding_bonds(scene: &Scene, interfaces: &[Vec<[u32; 2]>]) -> SlidingBonds {
     let each = scene.interface.iter().zip(interfaces).filter(|(interface, _)| interface.slides);
-    each.flat_map(|(_, bonds)| bonds).copied().collect()
+    SlidingBonds::new(each.flat_map(|(_, bonds)| bonds).copied())
 }
 
 /// Gives bonds across interfaces their own limits in place of `rest`, bonds of unbreakable particles none.

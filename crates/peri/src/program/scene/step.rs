@@ -35,13 +35,6 @@ pub struct StepSpec {
     pub cracks: Vec<CrackSpec>,
 }
 
-impl StepSpec {
-    /// Returns true if the step finds the load at which bonds break to fractions of its load steps.
-    pub(super) fn refines(&self) -> bool {
-        self.solver.as_ref().is_some_and(|solver| solver.refine > 1)
-    }
-}
-
 /// Steps before a later one.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct EarlierSteps {
