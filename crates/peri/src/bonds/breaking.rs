@@ -1,12 +1,12 @@
 //! Finds bonds beyond their critical stretch, and the fragments that broken bonds leave.
 
-use super::{BodyGeometry, BondForces, Bonds, Property};
+use super::{BodyGeometry, BondForces, Bonds, Neighbour, Property};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::parallel;
 use crate::potential::StretchRange;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 /// A bond to be severed, seen from one of its ends.
@@ -68,6 +68,8 @@ pub fn overstretched<const D: usize, B: BondForces<D> + ?Sized>(
     // vectorised loops find the bonds to examine; their last bits may differ from those below
     let least = (critical.least() * critical.least() - 1.0) * (1.0 - 1e-9) - 1e-12;
     let beyond = |[site, index]: [u32; 2]| {
+        // the other end of a bond to an image is listed there
+        let site = bonds.origin(site as usize) as u32;
         let bond = bonds.bond(site as usize, index);
         let (own, other) = (displacement.get(site as usize), displacement.get(bond.site));
         let mut e = 0.0;
@@ -95,6 +97,45 @@ pub fn overstretched<const D: usize, B: BondForces<D> + ?Sized>(
     let mut found = found.concat();
     found.par_sort_unstable_by_key(|bond| (bond.site, bond.index));
     found
+}
+
+/// Finds the other particle of a bond of a site, and its bond back: also across a periodic side, where the bond
+/// leads to an image.
+pub fn counterpart<const D: usize, B: BodyGeometry<D> + ?Sized>(
+    bonds: &B,
+    site: usize,
+    bond: &Neighbour<D>,
+) -> Option<(usize, Neighbour<D>)> {
+    let (there, mut found) = (bonds.origin(bond.site), None);
+    bonds.neighbours(there, &mut |back| {
+        if back.bond == bond.bond.map(|x| -x) && bonds.origin(back.site) == site {
+            found = Some((there, back));
+        }
+    });
+    found
+}
+
+/// Adds the other ends of bonds across periodic sides, whose stretch rounding may keep below the limit there:
+/// the mean deformation of a cell has other last bits from either end.
+pub fn add_counterparts<const D: usize>(bonds: &dyn Bonds<D>, list: &mut Vec<Overstretched>) {
+    if bonds.images().is_empty() {
+        return;
+    }
+    let known: BTreeSet<(u32, u32)> = list.iter().map(|bond| (bond.site, bond.index)).collect();
+    let other = |one: &Overstretched| {
+        let bond = bonds.bond(one.site as usize, one.index);
+        let (there, back) = counterpart(bonds, one.site as usize, &bond)?;
+        let (site, index) = (there as u32, back.index);
+        (!known.contains(&(site, index))).then_some(Overstretched {
+            site,
+            index,
+            weight: back.weight,
+            ..*one
+        })
+    };
+    let missing: Vec<Overstretched> = list.iter().filter_map(other).collect();
+    list.extend(missing);
+    list.sort_unstable_by_key(|bond| (bond.site, bond.index));
 }
 
 /// Severs the intact bonds among pairs of sites.

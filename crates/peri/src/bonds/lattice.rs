@@ -25,6 +25,7 @@ use crate::potential::{EnergyTable, KernelFit, StretchRange, TangentTable};
 use laws::LawPass;
 use mixed::Mixed;
 pub use periodic::PeriodicImage;
+use periodic::repeated;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -92,7 +93,7 @@ impl<const D: usize> LatticeBonds<D> {
     }
 
     /// Builds bonds as [`Self::with_gaps`] does, and across the sides of the box along `periodic` axes: there
-    /// bonds of particles near one side reach those near the opposite one. Cuts end at such sides.
+    /// bonds of particles near one side reach those near the opposite one. Cuts repeat themselves, too.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -163,7 +164,7 @@ impl<const D: usize> LatticeBonds<D> {
             return Err(Error::geometry("the body contains no particle".to_owned()));
         }
         bonds.images = bonds.images_in(&copies);
-        bonds.connect(cuts, gaps);
+        bonds.connect(&repeated(cuts, period, bonds.horizon()), gaps);
         bonds.classify();
         refuse_one_sided(&bonds)?;
         Ok(bonds)

@@ -25,7 +25,8 @@ mod traits;
 pub use crate::geometry::Lattice;
 pub use crate::potential::StretchRange;
 pub use breaking::{
-    Fragment, Overstretched, StretchScan, components, fingerprint, fragments, overstretched, sever_pairs,
+    Fragment, Overstretched, StretchScan, add_counterparts, components, counterpart, fingerprint, fragments,
+    overstretched, sever_pairs,
 };
 pub use cells::CellGrid;
 pub use cloud::CloudBonds;

@@ -377,7 +377,8 @@ pub(super) fn failed(error: &ServerError) -> Error {
 }
 
 impl Device {
-    /// Refuses a lattice whose buffers this device does not hold; L-BFGS keeps `pairs` steps, other methods 0.
+    /// Refuses a lattice whose buffers this device does not hold; L-BFGS keeps `pairs` steps, other methods
+    /// none.
     ///
     /// # Errors
     /// [`Error::Device`] with the buffer, its bytes and those of the device.

@@ -12,6 +12,7 @@
 //! step, and fetches fields for rows of the history only.
 
 mod body;
+mod bond_kernels;
 mod driven;
 mod kernels;
 mod lbfgs;

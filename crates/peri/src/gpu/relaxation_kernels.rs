@@ -1,7 +1,8 @@
 //! Kernels of dynamic relaxation; see [`super::kernels`] for fields, lengths and indices. Masses are in units
 //! of [`super::DeviceRelaxation`].
 
-use super::kernels::{KernelForm, ROW, weight};
+use super::bond_kernels::weight;
+use super::kernels::{KernelForm, ROW};
 use cubecl::ir::ElemType;
 use cubecl::prelude::*;
 

@@ -1,7 +1,8 @@
 //! Kernels of the stress: forces of the bonds of one offset, and their distribution over the particles whose
 //! windows they cross.
 
-use super::kernels::{KernelForm, ROW, add_bond};
+use super::bond_kernels::add_bond;
+use super::kernels::{KernelForm, ROW};
 use cubecl::ir::ElemType;
 use cubecl::prelude::*;
 
@@ -67,8 +68,8 @@ pub fn offset_forces<F: Float>(
     }
 }
 
-/// Adds Σ w f ⊗ ξ of bond `bond` to the sums of each particle, over the `count` taps from `first` on: bonds that
-/// begin at a shift from the particle, and their weights w there.
+/// Adds Σ w f ⊗ ξ of bond `bond` to the sums of each particle, over the `count` taps from `first` on: bonds
+/// that begin at a shift from the particle, and their weights w there.
 #[cube(launch_unchecked)]
 #[allow(clippy::too_many_arguments)]
 pub fn distribute<F: Float>(

@@ -1,4 +1,5 @@
-//! Work of a graphics card, in builds with the feature `gpu`; without it there is no card, and no code for one.
+//! Work of a graphics card, in builds with the feature `gpu`; without it there is neither a card nor code for
+//! one.
 
 #[cfg(feature = "gpu")]
 pub use with::{Card, equilibria, is_card, open, piolas, room, solve};

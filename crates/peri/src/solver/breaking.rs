@@ -4,7 +4,7 @@ use super::criterion::{Bilinear, Criterion, Policy, most};
 use super::fracture::BreakingEvent;
 use super::state::State;
 use super::system::System;
-use crate::bonds::{Neighbour, Overstretched, Softened, fingerprint};
+use crate::bonds::{Neighbour, Overstretched, Softened, add_counterparts, counterpart, fingerprint};
 use crate::contact::Contact;
 use crate::field::Field;
 use crate::material::EnergyPart;
@@ -48,7 +48,7 @@ fn soften(
 impl<const D: usize> System<'_, D> {
     /// Lists bonds beyond their limit, for a criterion without softening.
     pub(super) fn beyond(&mut self, state: &State<D>) -> Vec<Overstretched> {
-        match self.breaking.as_ref().map(|breaking| &breaking.criterion) {
+        let mut list = match self.breaking.as_ref().map(|breaking| &breaking.criterion) {
             Some(Criterion::Stretch(stretch)) => {
                 let seen = std::mem::take(&mut self.seen_stretches);
                 let mut list = self.material.overstretched(&*self.bonds, &state.displacement, stretch, &seen);
@@ -61,12 +61,14 @@ impl<const D: usize> System<'_, D> {
             }
             Some(Criterion::Energy(limit)) => {
                 let bound = self.loads.bound();
-                let free = |site: usize| bound.get(site).is_none_or(|bits| *bits == 0);
+                let free = |site: usize| bound.get(self.bonds.origin(site)).is_none_or(|bits| *bits == 0);
                 let found = self.material.overloaded(&*self.bonds, &state.displacement, limit, &free);
                 found.into_iter().map(|(bond, _)| bond).collect()
             }
             _ => Vec::new(),
-        }
+        };
+        add_counterparts(&*self.bonds, &mut list);
+        list
     }
 
     /// Severs all bonds beyond their limit, and softens those beyond the onset; returns the sites of their
@@ -76,7 +78,7 @@ impl<const D: usize> System<'_, D> {
         let list = match self.breaking.as_ref().map(|breaking| &breaking.criterion) {
             Some(Criterion::Softening { onset, limit }) => {
                 let bound = self.loads.bound();
-                let free = |site: usize| bound.get(site).is_none_or(|bits| *bits == 0);
+                let free = |site: usize| bound.get(self.bonds.origin(site)).is_none_or(|bits| *bits == 0);
                 let bonds = &*self.bonds;
                 let found = self.material.overloaded(bonds, &state.displacement, onset, &free);
                 let law = |bond: &Overstretched| {
@@ -194,13 +196,8 @@ impl<const D: usize> System<'_, D> {
                 weight: bond.weight,
             };
             let mut found: Vec<Overstretched> = more.iter().map(|(site, bond)| of(*site, bond)).collect();
-            for (site, there) in &more {
-                self.bonds.neighbours(there.site, &mut |bond| {
-                    if bond.site == *site as usize {
-                        found.push(of(there.site as u32, &bond));
-                    }
-                });
-            }
+            let back = |(site, bond): &(u32, Neighbour<D>)| counterpart(&*self.bonds, *site as usize, bond);
+            found.extend(more.iter().filter_map(back).map(|(site, bond)| of(site as u32, &bond)));
             found.sort_unstable_by_key(|bond| (bond.site, bond.index));
             found.dedup_by_key(|bond| (bond.site, bond.index));
             for bond in &found {

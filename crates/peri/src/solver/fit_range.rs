@@ -1,6 +1,6 @@
 //! Range of stretches of a fitted law, and its extension to observed stretches.
 
-use super::criterion::{least, most};
+use super::criterion::{Criterion, least, most};
 use super::state::State;
 use super::system::System;
 use crate::bonds::stretch_range;
@@ -37,9 +37,12 @@ impl<const D: usize> System<'_, D> {
     fn refuse_beside_images(&self) -> Result<(), Error> {
         let loads = &self.loads;
         let refused = [
-            (self.breaking.is_some(), "bonds that break"),
+            (self.softens(), "bonds that soften"),
             (self.contact.is_some(), "contact"),
-            (loads.curved.is_some(), "curves of time"),
+            (
+                loads.curved.is_some() && loads.mean_gradient.is_some(),
+                "curves of time beside a mean gradient",
+            ),
             (!loads.turned.is_empty(), "rotations"),
             (!loads.rigid.is_empty(), "regions that move as a whole"),
             // their forces would do work beside the mean stress
@@ -49,6 +52,12 @@ impl<const D: usize> System<'_, D> {
             Some((_, what)) => Err(Error::geometry(format!("periodic sides: found {what}; allowed: none"))),
             None => Ok(()),
         }
+    }
+
+    fn softens(&self) -> bool {
+        self.breaking
+            .as_ref()
+            .is_some_and(|breaking| matches!(breaking.criterion, Criterion::Softening { .. }))
     }
 
     /// Returns true if a particle is held or loaded in a component whose row of the mean gradient is not 0.

@@ -1,23 +1,27 @@
 //! Cells with periodic sides: homogeneous states without surface, of any size; waves of the lattice.
 
-use crate::bodies::MODULUS;
+use crate::bodies::{MODULUS, hold};
 use crate::dynamics::{DENSITY, once, run};
-use peri::bonds::{BodyGeometry, BondForces, LatticeBonds, Stencil, VolumeCorrection, force};
+use peri::bonds::{BodyGeometry, BondDamage, BondForces, LatticeBonds, Stencil, VolumeCorrection, force};
 use peri::field::Field;
-use peri::geometry::{Operation, Shape, lattice};
+use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::{BondMaterial, virial};
 use peri::potential::{BondPotential, Law};
-use peri::solver::{Lbfgs, Loads, Method, State, System};
+use peri::solver::{Breaking, Lbfgs, Loads, Method, Policy, State, System};
 use peri::stress::{BallVolume, StressInput, StressMethod, SurfaceCompensation, piola_on_lattice};
 use std::f64::consts::PI;
 
 const SPACING: f64 = 0.1;
 
 fn cell<const D: usize>(cells: [usize; D], periodic: [bool; D]) -> LatticeBonds<D> {
+    cut_cell(cells, periodic, &[])
+}
+
+fn cut_cell<const D: usize>(cells: [usize; D], periodic: [bool; D], cuts: &[Cut<D>]) -> LatticeBonds<D> {
     let max = cells.map(|count| count as f64 * SPACING);
     let body = [Operation::Add(Shape::Box { min: [0.0; D], max })];
     let lattice = lattice(&body, SPACING, 1.0).unwrap();
-    LatticeBonds::with_periodic_sides(lattice, 3.015, VolumeCorrection::None, (&[], None), periodic).unwrap()
+    LatticeBonds::with_periodic_sides(lattice, 3.015, VolumeCorrection::None, (cuts, None), periodic).unwrap()
 }
 
 /// Energy density Σ kθ|ξ|φ V and stress Σ kθ V t m ⊗ ξ of a homogeneous lattice.
@@ -93,7 +97,6 @@ fn a_cell_relaxes_to_the_homogeneous_state() {
     solver.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
     let volume = 40.0 * 24.0 * SPACING * SPACING;
     assert!((state.history[0].stored / volume / energy - 1.0).abs() < 1e-8);
-    eprintln!("a cell from a random start: {} iterations", state.counts.total_iterations);
     assert!((1..200).contains(&state.counts.total_iterations), "{}", state.counts.total_iterations);
 }
 
@@ -184,5 +187,81 @@ fn a_standing_wave_has_the_frequency_of_the_lattice() {
         let row = state.history.last().unwrap();
         let error = ((row.kinetic + row.stored) / row.work - 1.0).abs();
         assert!(error < (frequency * step).powi(2), "{waves} waves: energy off by {error}");
+    }
+}
+
+/// Tears a cell that is held at the ends of y: broken bonds, detached particles, stored energy and load.
+fn tear<const D: usize>(mut bonds: LatticeBonds<D>) -> [f64; 4] {
+    let law = Law::Linear.build(1.0, 1.0, false).unwrap();
+    let height = bonds.lattice().cells[1] as f64 * SPACING;
+    let end = |y: f64| if y < 0.15 { -1.0 } else { f64::from(u8::from(y > height - 0.15)) };
+    let pulled = |place: [f64; D]| {
+        let side = end(place[1]);
+        let moved = std::array::from_fn(|d| if d == 1 { 0.014 * side } else { 0.0 });
+        (side != 0.0).then_some(((1 << D) - 1, moved))
+    };
+    let loads = hold(&bonds, pulled);
+    let mut state = State::new(bonds.sites());
+    let factors = [0.5, 0.75, 1.0];
+    let mut system = System::new(&mut bonds, BondMaterial::new(&*law, MODULUS), &loads, &factors);
+    system.breaking = Some(Breaking { criterion: 1.03.into(), policy: Policy::default() });
+    let solver = Lbfgs { tolerance: 1e-9, ..Lbfgs::default() };
+    solver.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
+    assert_eq!(system.bonds.one_sided(), None);
+    let row = state.history.last().unwrap();
+    [state.fracture.broken as f64, state.fracture.detached as f64, row.stored, row.load]
+}
+
+fn assert_near(found: [f64; 4], expected: [f64; 4], what: &str) {
+    for (found, expected) in found.into_iter().zip(expected) {
+        assert!((found - expected).abs() <= 1e-6 * expected.abs(), "{what}: {found} {expected}");
+    }
+}
+
+/// A plate that repeats itself through its thickness tears alike with a layer and with five.
+#[test]
+fn layers_of_a_periodic_thickness_tear_alike() {
+    let plate = |layers: usize| {
+        let crack = Cut { corner: [-0.1, 0.7, -1.0], edges: [[0.6, 0.0, 0.0], [0.0, 0.0, 9.0], [0.0; 3]] };
+        tear(cut_cell([16, 14, layers], [false, false, true], &[crack]))
+    };
+    let one = plate(1);
+    assert!(one[0] > 30.0, "{one:?}");
+    assert_near(plate(5), one.map(|value| 5.0 * value), "five layers");
+}
+
+/// A crack tears a cell alike wherever it lies, also across the side, without a place where it is missing.
+#[test]
+fn a_crack_across_a_periodic_side() {
+    let sheet = |from: f64| {
+        let cut = Cut::segment([from, 0.7], [from + 0.8, 0.7]);
+        let bonds = cut_cell([20, 14], [true, false], &[cut]);
+        (bonds.directed_bonds(), tear(bonds))
+    };
+    let (bonds, middle) = sheet(0.63);
+    assert!(middle[0] > 20.0, "{middle:?}");
+    for from in [1.63, -0.37, 0.03, 1.23] {
+        let (found, torn) = sheet(from);
+        assert_eq!(found, bonds);
+        assert_near(torn, middle, &format!("a crack from {from}"));
+    }
+}
+
+/// Bonds at their limit by the mean deformation alone break at both of their ends.
+#[test]
+fn a_strained_cell_breaks_from_both_ends() {
+    let law = Law::Linear.build(1.0, 1.0, false).unwrap();
+    for strain in [0.1, 0.123456, 1.0 / 3.0] {
+        let mut bonds = cell([7, 5], [true, true]);
+        let loads = Loads { mean_gradient: Some([[strain, 0.0], [0.0, 0.0]]), ..Loads::default() };
+        let (material, factors) = (BondMaterial::new(&*law, MODULUS), [1.0]);
+        let mut system = System::new(&mut bonds, material, &loads, &factors);
+        // bonds along x, to the last bits
+        system.breaking = Some(Breaking { criterion: (1.0 + strain).into(), policy: Policy::default() });
+        let mut state = State::new(system.bonds.sites());
+        let solver = Lbfgs { tolerance: 1e-6, ..Lbfgs::default() };
+        let ended = solver.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()));
+        assert!(ended.is_ok(), "{ended:?}");
+        assert_eq!(system.bonds.one_sided(), None, "{strain}");
     }
 }

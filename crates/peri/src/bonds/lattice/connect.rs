@@ -48,9 +48,29 @@ impl<const D: usize> LatticeBonds<D> {
                 }
             }
         });
-        let count = |bits: &Vec<u64>| bits.iter().map(|bits| u64::from(bits.count_ones())).sum::<u64>();
-        self.directed_bonds = parallel::map_each(&intact, count).iter().sum();
         self.intact = intact;
+        self.sever_across_sides();
+        let count = |bits: &Vec<u64>| bits.iter().map(|bits| u64::from(bits.count_ones())).sum::<u64>();
+        self.directed_bonds = parallel::map_each(&self.intact, count).iter().sum();
+    }
+
+    /// Severs bonds across periodic sides that a cut parts, by rounding, as seen from one of their ends only.
+    fn sever_across_sides(&mut self) {
+        let opposite = self.stencil.offsets.len() - 1;
+        for image in &self.images {
+            // bonds that lead to the image, from their particles
+            for k in 0..=opposite {
+                let from = (image.site as usize).wrapping_add_signed(-self.spans[k].shift);
+                if from >= self.sites {
+                    continue;
+                }
+                let back = image.origin as usize;
+                let [here, there] = [self.is_intact(from, k), self.is_intact(back, opposite - k)];
+                if here && !there {
+                    self.intact[k / 64][from] &= !(1 << (k % 64));
+                }
+            }
+        }
     }
 
     /// Classifies the tiles by the checks that the kernel must make.

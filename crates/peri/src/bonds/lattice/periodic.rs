@@ -6,7 +6,7 @@
 //! twice, and kernels see an image as any other neighbour.
 
 use super::LatticeBonds;
-use crate::geometry::cell;
+use crate::geometry::{Cut, cell};
 
 /// Image of a particle beyond a periodic side.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,6 +17,22 @@ pub struct PeriodicImage<const D: usize> {
     pub origin: u32,
     /// Reference position of the image less that of the particle, m: whole periods.
     pub shift: [f64; D],
+}
+
+/// Returns cuts with their copies beyond periodic sides, as far as bonds reach.
+pub fn repeated<const D: usize>(cuts: &[Cut<D>], period: [f64; D], horizon: f64) -> Vec<Cut<D>> {
+    let mut all = cuts.to_vec();
+    for d in (0..D).filter(|&d| period[d] > 0.0) {
+        let most = (horizon / period[d]).ceil() as i32;
+        let moved = |cut: &Cut<D>, periods: i32| {
+            let mut copy = *cut;
+            copy.corner[d] += f64::from(periods) * period[d];
+            copy
+        };
+        let copies = |cut| (-most..=most).map(move |periods| moved(cut, periods));
+        all = all.iter().flat_map(copies).collect();
+    }
+    all
 }
 
 impl<const D: usize> LatticeBonds<D> {

@@ -59,7 +59,7 @@ impl<'a, const D: usize> Moment<'a, D> {
     }
 
     /// Computes stresses on a graphics card, if there is one.
-    pub fn on(self, card: Option<&'a Card>) -> Self {
+    pub fn with_card(self, card: Option<&'a Card>) -> Self {
         Self { card, ..self }
     }
 

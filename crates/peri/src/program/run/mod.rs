@@ -212,7 +212,7 @@ fn run_variant<const D: usize>(
         for named in states.iter().filter(|named| named.is_now(&state, true)) {
             body.bonds.prepare(&state.displacement);
             let moment = Moment::new((&own_scene, &physics), &*body.bonds, &state, &phases);
-            let moment = moment.on(device.card.as_ref()).named(named.name);
+            let moment = moment.with_card(device.card.as_ref()).named(named.name);
             observers.iter().try_for_each(|observer| observer.draw(&moment, &outputs))?;
         }
     }
@@ -234,7 +234,8 @@ fn run_variant<const D: usize>(
     if scene.dynamics.is_some() {
         body.bonds.prepare(&state.displacement);
     }
-    let moment = Moment::new((scene, &physics), &*body.bonds, &state, &phases).on(device.card.as_ref());
+    let moment =
+        Moment::new((scene, &physics), &*body.bonds, &state, &phases).with_card(device.card.as_ref());
     moment.stresses()?;
     phases.borrow_mut().start("compare");
     observers.iter_mut().try_for_each(|observer| observer.end(&moment))?;
@@ -322,7 +323,7 @@ fn solve<const D: usize>(
     phases.borrow_mut().start("solve");
     let mut finished = |bonds: &dyn Bonds<D>, state: &State<D>| {
         phases.borrow_mut().stop();
-        let mut moment = Moment::new((scene, physics), bonds, state, phases).on(card);
+        let mut moment = Moment::new((scene, physics), bonds, state, phases).with_card(card);
         observers.iter_mut().try_for_each(|observer| observer.see(&moment))?;
         frames.step(observers, &moment)?;
         for named in states.iter().filter(|named| state.control.round == 0 && named.is_now(state, false)) {

@@ -73,39 +73,50 @@ fn refuse_blocks(source: &Source, scene: &Scene, periodic: &PeriodicSpec) -> Res
     let solid = scene.material.solid.is_some();
     let own = if solid { StressMethod::Constitutive } else { StressMethod::OnePoint };
     let measures = || scene.stress.iter().flat_map(|stress| &stress.measures);
-    let tracked = |probe: &super::HistoryProbe| {
-        !matches!(probe.track, Track::Displacement | Track::Strain | Track::Opening)
+    let along = |axis: AxisName| scene.periodic_axes::<3>()[axis.index()];
+    let tracked = |probe: &super::HistoryProbe| match probe.track {
+        Track::Displacement | Track::Strain | Track::Opening => false,
+        Track::Crack | Track::Front => probe.axis.is_none_or(along),
+        _ => true,
     };
+    let spin = scene.body_force.iter().position(|force| force.spin.is_some());
+    let spin_key = format!("body_force[{}].spin", spin.unwrap_or(0));
     let (device, _, block) = scene.device();
     let device_key = format!("{block}.device");
     let refused = [
         ("body.points", scene.body.points.is_some()),
         ("body.grid", scene.body.grid.is_some()),
-        ("body.cracks", !scene.body.cracks.is_empty()),
         ("contact", scene.contact.is_some()),
-        ("step", !scene.step.is_empty()),
         ("interface", !scene.interface.is_empty()),
-        ("body_force", !scene.body_force.is_empty()),
-        ("time", scene.time.is_some()),
+        (spin_key.as_str(), spin.is_some()),
         ("exact", scene.exact.is_some()),
         ("output.section", !scene.output.section.is_empty()),
         ("output.line", !scene.output.line.is_empty()),
-        ("material.critical", scene.breaks()),
+        ("material.critical.convention", scene.softens()),
         ("material.inclusions", scene.material.is_prestrained()),
         (device_key.as_str(), device == super::DeviceChoice::Gpu),
-        ("dynamics", scene.dynamics.is_some() && solid),
     ];
     if let Some((key, _)) = refused.into_iter().find(|(_, given)| *given) {
         let why = match key {
             "material.inclusions" => "prestrained parts are not available with periodic sides",
-            "dynamics" => "solids have none in explicit dynamics; a bond law has",
+            "material.critical.convention" => "bonds that soften are not available with periodic sides",
             _ => "not available with periodic sides",
         };
         return Err(source.conflict(key, "periodic", why));
     }
-    if periodic.gradient.is_some() && scene.dynamics.is_some() {
-        let why = "only equilibria have a mean deformation";
-        return Err(source.conflict("periodic.gradient", "dynamics", why));
+    let strained = [
+        ("dynamics", scene.dynamics.is_some(), "only equilibria have a mean deformation"),
+        (
+            "body_force",
+            !scene.body_force.is_empty(),
+            "forces of the body would do work beside the mean stress",
+        ),
+        ("step", !scene.step.is_empty(), "a mean deformation has one step"),
+        ("time", scene.time.is_some(), "a mean deformation has no time"),
+    ];
+    let conflict = strained.into_iter().find(|(_, given, _)| *given && periodic.gradient.is_some());
+    if let Some((key, _, why)) = conflict {
+        return Err(source.conflict(key, "periodic.gradient", why));
     }
     if let Some(index) = measures().position(|&measure| measure != own) {
         let key = format!("stress.measures[{index}]");
@@ -114,8 +125,12 @@ fn refuse_blocks(source: &Source, scene: &Scene, periodic: &PeriodicSpec) -> Res
     }
     if let Some(index) = scene.probe.iter().position(tracked) {
         let key = format!("probe[{index}].track");
-        let found = "a probe that follows cracks, waves or rotations";
-        return Err(source.error(&key, found, "with periodic sides: displacement, strain or opening"));
+        let found = "a probe of rotations or J, or of a crack or wave along a periodic axis";
+        return Err(source.error(
+            &key,
+            found,
+            "with periodic sides: displacement, strain, opening; a crack or front along another axis",
+        ));
     }
     Ok(())
 }
@@ -128,7 +143,7 @@ fn refuse_boundaries(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             ("pressure", boundary.pressure.is_some()),
             ("rotation", boundary.rotation.is_some()),
             ("rigid", boundary.rigid),
-            ("curve", boundary.has_curve()),
+            ("curve", boundary.has_curve() && scene.mean_gradient::<3>().is_some()),
         ];
         if let Some((name, _)) = refused.into_iter().find(|(_, given)| *given) {
             let why = if name == "side" {
