@@ -97,9 +97,10 @@ impl<const D: usize> SignedDistance<D> {
             }
             let FacetBox { first, count, .. } = self.boxes[at];
             if count == 0 {
-                let mut both = [first, first + 1].map(|child| (child, self.boxes[child].square(&point)));
-                both.sort_by(|a, b| b.1.total_cmp(&a.1));
-                open.extend(both);
+                let left = (first, self.boxes[first].square(&point));
+                let right = (first + 1, self.boxes[first + 1].square(&point));
+                // the nearer one is taken next
+                open.extend(if left.1 >= right.1 { [left, right] } else { [right, left] });
             }
             for &facet in &self.order[first..first + count] {
                 let place = closest(point, &corners[facet]);
@@ -146,7 +147,7 @@ impl<const D: usize> SignedDistance<D> {
 
 /// Point of a facet nearest to a point: Ericson, Real-Time Collision Detection (2005), section 5.1.5.
 fn closest<const D: usize>(point: [f64; D], corners: &Facet<D>) -> [f64; D] {
-    let [a, b, c] = [0, 1, 2].map(|k: usize| corners[k.min(D - 1)]);
+    let [a, b, c] = [corners[0], corners[1.min(D - 1)], corners[2.min(D - 1)]];
     let from = |p: [f64; D], q: [f64; D]| -> [f64; D] { std::array::from_fn(|d| q[d] - p[d]) };
     let on =
         |p: [f64; D], e: [f64; D], part: f64| -> [f64; D] { std::array::from_fn(|d| p[d] + part * e[d]) };
@@ -158,8 +159,9 @@ fn closest<const D: usize>(point: [f64; D], corners: &Facet<D>) -> [f64; D] {
     if D == 2 {
         return on(a, ab, part(ab, a));
     }
-    let [(d1, d2), (d3, d4), (d5, d6)] =
-        [a, b, c].map(|p| (dot(ab, from(p, point)), dot(ac, from(p, point))));
+    // a map over the corners would not be inlined
+    let sides = |p: [f64; D]| (dot(ab, from(p, point)), dot(ac, from(p, point)));
+    let ((d1, d2), (d3, d4), (d5, d6)) = (sides(a), sides(b), sides(c));
     let (va, vb, vc) = (d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2);
     if d1 <= 0.0 && d2 <= 0.0 {
         a

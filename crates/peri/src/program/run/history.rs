@@ -25,6 +25,10 @@ impl VariantOutcome {
             ("displacement".to_owned(), "m".to_owned(), each(&|r| r.displacement)),
             ("load".to_owned(), "N".to_owned(), each(&|r| r.load)),
         ]);
+        if !self.starts.is_empty() {
+            let step = |row: usize| 1.0 + self.starts.iter().filter(|&&start| start <= row).count() as f64;
+            columns.push(("step".to_owned(), "".to_owned(), (0..self.history.len()).map(step).collect()));
+        }
         if has_times(&self.history) {
             columns.push(("time".to_owned(), "s".to_owned(), each(&|r| r.time)));
         }

@@ -249,6 +249,7 @@ fn run_variant<const D: usize>(
     outcome.record_work(&*body.bonds, &state);
     outcome.history.clone_from(&state.history);
     outcome.events.clone_from(&state.fracture.events);
+    outcome.starts.clone_from(&state.stage.starts);
     outcome.fragments = moment.fragments().to_vec();
     outcome.planes = scene.contact.as_ref().map_or(0, |contact| contact.plane.len());
     outcome.surfaces = scene.contact.as_ref().map_or_else(Vec::new, ContactSpec::surface_names);

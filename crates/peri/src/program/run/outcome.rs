@@ -35,6 +35,8 @@ pub struct VariantOutcome {
     pub snaps_back: bool,
     /// Names of the regions of prescribed displacement.
     pub regions: Vec<String>,
+    /// Rows of the history at the start of each later step of a programme.
+    pub starts: Vec<usize>,
     /// Names of rigid surfaces: planes, then indenters.
     pub surfaces: Vec<String>,
     /// Number of planes.
@@ -91,6 +93,7 @@ impl VariantOutcome {
             snaps_back: false,
             regions: Vec::new(),
             surfaces: Vec::new(),
+            starts: Vec::new(),
             planes: 0,
             probes: Vec::new(),
             warnings: Vec::new(),
