@@ -99,8 +99,8 @@ pub fn overstretched<const D: usize, B: BondForces<D> + ?Sized>(
     found
 }
 
-/// Finds the other particle of a bond of a site, and its bond back: also across a periodic side, where the bond
-/// leads to an image.
+/// Finds the other particle of a bond of a site, and its bond back: also across a periodic side, where the
+/// bond leads to an image.
 pub fn counterpart<const D: usize, B: BodyGeometry<D> + ?Sized>(
     bonds: &B,
     site: usize,
