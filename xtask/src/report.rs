@@ -24,6 +24,7 @@ mod others;
 mod pages;
 mod pictures;
 mod points;
+mod references;
 mod stability;
 mod thesis;
 mod timing;
@@ -88,6 +89,7 @@ struct Page {
     measurements: Vec<others::ExternalFigure>,
     others: Vec<others::ExternalFigure>,
     timing: Vec<timing::TimingSubject>,
+    references: Vec<references::ReferenceSeries>,
     stability: Vec<stability::StabilityTrial>,
     errata: Vec<errata::ErratumVerdict>,
     cross: Vec<cross::CrossCheck>,
@@ -137,6 +139,7 @@ struct Json<'a> {
     measurements: Vec<others::ExternalFigure>,
     others: Vec<others::ExternalFigure>,
     timing: Vec<timing::TimingSubject>,
+    references: Vec<references::ReferenceSeries>,
     stability: Vec<stability::StabilityTrial>,
     errata: Vec<errata::ErratumVerdict>,
     cross_checks: Vec<cross::CrossCheck>,
@@ -251,6 +254,7 @@ fn page(
         measurements: others::measurements(outcomes),
         others: others::figures(outcomes),
         timing: timing::measured(workspace, folder, outcomes)?,
+        references: references::series(outcomes),
         stability: stability::trials(outcomes),
         errata: errata::judge(&sources.errata, &sources.map.erratum, &found),
         cross: cross::checked(workspace)?,
@@ -301,6 +305,7 @@ fn json(page: Page, outcomes: &[CaseOutcome]) -> Json<'_> {
         thesis: page.thesis.into_iter().map(thesis::RowVerdict::without_pictures).collect(),
         links: page.links.into_iter().map(thesis::RowVerdict::without_pictures).collect(),
         timing: page.timing.into_iter().map(timing::TimingSubject::without_picture).collect(),
+        references: page.references,
         stability: page.stability,
         errata: page.errata,
         cross_checks: page.cross,

@@ -74,6 +74,13 @@ pub fn text(page: &Page, outcomes: &[CaseOutcome]) -> String {
     for [title, command] in absent {
         text += &format!("\n{title}: not measured, run `{command}`.\n");
     }
+    if !page.references.is_empty() {
+        text += "\n## References over the spacing\n\nErrors of values that a closed form, a measurement, a \
+                 publication or another program gives, at each spacing of a case, and the observed order.\n\n";
+        let mut table = TextTable::new(["case", "value", "errors", "order"]);
+        page.references.iter().for_each(|series| table.push(series.cells()));
+        text += &table.markdown();
+    }
     text += "\n## Cross-checks\n\n";
     let mut table = TextTable::new(["engine", "largest difference", "expected", "verdict", "measured"]);
     page.cross.iter().for_each(|crossed| table.push(crossed.cells()));

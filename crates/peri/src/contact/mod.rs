@@ -62,6 +62,7 @@ pub use friction_pair::{ContactPair, Drag, FrictionPair, known_in};
 use list::ContactList;
 #[cfg(feature = "case")]
 pub(crate) use pushed_surfaces::BEHIND;
+use pushed_surfaces::PushFriction;
 #[cfg(feature = "gpu")]
 pub use rows::{PairRows, PlaneRows, numbers_within};
 use serde::{Deserialize, Serialize};
@@ -312,17 +313,19 @@ impl<const D: usize> Contact<D> {
         self.surfaces().any(|surface| surface.force.is_some())
     }
 
-    /// Moves rigid surfaces with a force to where contact balances it at a displacement.
-    pub fn balance(&mut self, displacement: &Field<D>) {
-        if let Some(surfaces) = &mut self.surfaces {
-            surfaces.balance(displacement);
-        }
+    /// Moves rigid surfaces with a force to where contact balances it at a displacement, with the active
+    /// friction, or with that at the end of a step, `resting`.
+    pub fn balance(&mut self, displacement: &Field<D>, resting: Option<&[FrictionPair]>) {
+        let Some(surfaces) = &mut self.surfaces else { return };
+        let active = push_friction(&self.held, self.start.as_ref());
+        surfaces.balance(displacement, resting.map_or(active, PushFriction::Resting));
     }
 
     /// Finds a rigid surface whose force contact does not balance: its title, the balanced part and the
     /// force, N.
     pub fn unbalanced(&self, displacement: &Field<D>) -> Option<(String, f64, f64)> {
-        self.surfaces.as_ref()?.unbalanced(displacement)
+        let active = push_friction(&self.held, self.start.as_ref());
+        self.surfaces.as_ref()?.unbalanced(displacement, active)
     }
 
     /// Sums P·t of the forces on rigid surfaces at load factor 1, of those with amplitudes at their mean
@@ -403,6 +406,14 @@ impl<const D: usize> Contact<D> {
             surfaces.expose(bonds, bonds.particles().iter().map(|&site| site as usize));
         }
     }
+}
+
+/// Active friction of surfaces with a force: none without a displacement at the start of the step.
+fn push_friction<'a, const D: usize>(
+    held: &'a [FrictionPair],
+    start: Option<&'a Field<D>>,
+) -> PushFriction<'a, D> {
+    start.map_or(PushFriction::Resting(&[]), |start| PushFriction::Sliding(held, start))
 }
 
 /// Checks that a quantity is positive and finite.

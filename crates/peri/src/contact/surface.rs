@@ -208,8 +208,7 @@ impl<const D: usize> RigidSurface<D> {
     /// Checks the surface and normalises its vectors.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a vector without direction, for values that are negative or not finite, and
-    /// for a force together with friction, except of a plane pressed along its normal.
+    /// [`Error::Parameter`] for a vector without direction, and for values that are negative or not finite.
     pub(super) fn checked(mut self) -> Result<Self, Error> {
         non_negative("stiffness of a rigid surface", self.stiffness)?;
         non_negative("friction of a rigid surface", self.friction)?;
@@ -241,12 +240,6 @@ impl<const D: usize> RigidSurface<D> {
         }
         if let Some(force) = self.force {
             unit("force on a rigid surface", force)?;
-            // elsewhere friction has a part along the force, which the balance of contact does not know
-            if self.friction > 0.0 && !self.is_pushed_along_normal() {
-                let allowed = "0 with a force, except of a plane pressed along its normal".to_owned();
-                let (name, found) = ("friction of a rigid surface", self.friction);
-                return Err(Error::Parameter { name, found, allowed });
-            }
         }
         Ok(self)
     }

@@ -391,7 +391,7 @@ impl<const D: usize> RigidSurfaces<D> {
 
     /// Computes the forces of all surfaces at a displacement, with friction for the motion since `start`.
     pub fn update(&mut self, field: &Field<D>, held: &[FrictionPair], start: Option<&Field<D>>) {
-        self.balance(field);
+        self.balance(field, super::push_friction(held, start));
         let mut pushes = std::mem::take(&mut self.pushes);
         pushes.clear();
         let mut add = |surfaces: &Self, element: usize, force: [f64; D]| {

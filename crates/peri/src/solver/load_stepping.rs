@@ -252,6 +252,9 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
 /// Adds the work of the loads since the last equilibrium, by the trapezoidal rule.
 fn work_of_loads<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     let factor = system.factors[state.step];
+    if let Some(contact) = system.contact.as_mut().filter(|contact| contact.has_pushed()) {
+        contact.balance(&state.displacement, None);
+    }
     if let Some(contact) = system.friction() {
         state.contact.surface_friction = contact.slide(&state.displacement, &[]).2;
     }
@@ -259,9 +262,6 @@ fn work_of_loads<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
         let before = state.step.checked_sub(1).map_or(0.0, |before| system.factors[before]);
         state.work += system.work_of_curves(state, [before, factor]);
         return;
-    }
-    if let Some(contact) = system.contact.as_mut().filter(|contact| contact.has_pushed()) {
-        contact.balance(&state.displacement);
     }
     let (pull, push) = system.conjugates(state);
     let [old_factor, old_pull, old_push] = state.control.balanced;

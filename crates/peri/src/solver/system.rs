@@ -142,11 +142,12 @@ impl<'a, const D: usize> System<'a, D> {
     pub(super) fn place_surfaces_at_start(&mut self, state: &State<D>, before: f64) {
         self.move_surfaces(before, 0.0);
         let Some(contact) = &mut self.contact else { return };
+        let resting = Some(&*state.contact.grips);
         match &state.contact.start {
-            Some(start) => contact.balance(start),
+            Some(start) => contact.balance(start, resting),
             // a step of a programme begins with surfaces that earlier ones have pressed on the body
             None if state.stage.finished > 0 && !state.control.predicted => {
-                contact.balance(&state.displacement)
+                contact.balance(&state.displacement, resting)
             }
             None => {}
         }

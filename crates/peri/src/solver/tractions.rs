@@ -24,10 +24,10 @@ impl<const D: usize> State<D> {
             // as a step begins
             contact.move_surfaces(self.step.checked_sub(1).map_or(0.0, at), 0.0);
             let start = own.start.as_ref().unwrap_or(moved);
-            contact.balance(start);
+            contact.balance(start, Some(&own.grips));
             contact.move_surfaces(at(self.step), 0.0);
-            contact.balance(moved);
             contact.begin_friction(start, own.active.clone());
+            contact.balance(moved, None);
             let drag = |pair: ContactPair| contact.slipped(pair, moved);
             own.active.iter().map(|grip| (grip.pair, grip.drag(drag(grip.pair)).force)).collect()
         };

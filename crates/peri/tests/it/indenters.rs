@@ -147,7 +147,7 @@ fn contact_balances_a_force() {
         ("no face of the body ahead", RigidSurface { point: [30.0, 3.0, 50.0], ..sphere.clone() }),
         ("radius of a rigid surface: found -1", RigidSurface::sphere([0.0; 3], -1.0)),
         ("axis of a cylinder: found 0", RigidSurface::cylinder([0.0; 3], [0.0; 3], 1.0)),
-        ("friction of a rigid surface: found 0.5", RigidSurface { friction: 0.5, ..sphere.clone() }),
+        ("friction of a rigid surface: found -0.5", RigidSurface { friction: -0.5, ..sphere.clone() }),
         ("force on a rigid surface: found 0", RigidSurface { force: Some([0.0; 3]), ..sphere.clone() }),
     ] {
         let message = beside(bonds, vec![wrong]).map(|_| ()).unwrap_err().to_string();
@@ -434,9 +434,41 @@ fn rough_plane_under_a_force() {
     assert!(row.rubbed > 0.0 && row.resting[0].moved[2] > smooth.history[3].resting[0].moved[2], "{row:?}");
     assert!((row.work - row.stored - row.rubbed).abs() < 0.02 * row.work, "{row:?}");
     assert!(run(2, None).0 == one && run(2, saved).0 == one);
-    let aside = RigidSurface { force: Some([0.0, 1.0, -4.0]), ..rough };
-    let message = beside(&block().lattice, vec![aside]).map(|_| ()).unwrap_err().to_string();
-    assert!(message.contains("except of a plane pressed along its normal"), "{message}");
+}
+
+/// Friction helps to carry the force of a sphere, and of a plane pressed aside: normal forces and friction along
+/// the force balance it, it leads to where a displacement has needed it, the energies balance, and a resumed
+/// run has the same bits.
+#[test]
+fn friction_along_a_force() {
+    let plane = RigidSurface::plane([3.0, 3.0, 50.0], [0.0, 0.0, -1.0]);
+    for (smooth, along, depth, friction, eased) in [
+        (RigidSurface::sphere([3.0, 3.0, 50.0], 4.0), [0.0, 0.0, -1.0], 0.4, 0.1, 1.01),
+        (plane, [0.0, 0.6, -0.8], 0.1, 0.3, 1.1),
+    ] {
+        let smooth = RigidSurface { stiffness: 50.0, ..smooth };
+        let rough = RigidSurface { friction, point: touching(smooth.clone()), ..smooth };
+        let moved = RigidSurface { displacement: along.map(|e| depth * e), ..rough.clone() };
+        let by_depth = equilibria(moved, 1, None).0.history[3].resting[0];
+        let force: f64 = (0..3).map(|d| along[d] * by_depth.force[d]).sum();
+        let pushed = RigidSurface { force: Some(along.map(|e| force * e)), ..rough };
+        let run = |threads: usize, from: Option<State<3>>| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| equilibria(pushed.clone(), 1, from))
+        };
+        let (one, saved) = run(1, None);
+        let row = &one.history[3];
+        let travel = |row: &StepRecord| (0..3).map(|d| along[d] * row.resting[0].moved[d]).sum::<f64>();
+        let carried: f64 = (0..3).map(|d| along[d] * row.resting[0].force[d]).sum();
+        let easy = equilibria(RigidSurface { friction: 0.0, ..pushed.clone() }, 1, None).0;
+        eprintln!("{force} {carried}: {} {}", travel(row), travel(&easy.history[3]));
+        assert!((carried - force).abs() < 1e-6 * force, "{carried} {force}");
+        assert!((travel(row) - depth).abs() < 0.01 * depth, "{} {depth}", travel(row));
+        assert!(travel(&easy.history[3]) > eased * depth, "{}", travel(&easy.history[3]));
+        let off = row.work - row.stored - row.rubbed;
+        assert!(row.rubbed > 0.0 && off.abs() < 0.03 * row.work, "{off} {row:?}");
+        assert!(run(2, None).0 == one && run(2, saved).0 == one);
+    }
 }
 
 /// A block between two planes: of one layer of particles, which has no stiffness across it, a scene warns of

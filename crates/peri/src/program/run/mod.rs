@@ -6,6 +6,7 @@ mod draw;
 mod history;
 mod outcome;
 mod program;
+mod references;
 mod studies;
 mod variants;
 
@@ -138,8 +139,11 @@ fn run_in<const D: usize>(
     history::write(scene, &finished, output)?;
     compare::write(&finished, output)?;
     compare::suite(&mut report, &finished, output)?;
+    let errors = references::reference_errors(&scene.expect, &finished);
+    references::add(&mut report, &errors);
     if scene.output.pictures {
         draw::draw_curves(scene, &finished, output)?;
+        references::draw(&errors, output)?;
         let units = SceneUnits::from_scene(&source.text);
         studies::draw_studies(&scene.expect, &finished, &units, output)?;
     }

@@ -177,11 +177,6 @@ pub(super) fn check<const D: usize>(
             return Err(source.error(&key("point"), found, allowed));
         }
         let Some(force) = surface.force else { continue };
-        if surface.friction > 0.0 && !surface.is_pushed_along_normal() {
-            let allowed =
-                "`friction = 0` of an indenter with a `force`, unless a plane is pressed along its normal";
-            return Err(source.error(&key("friction"), plain(surface.friction), allowed));
-        }
         let size = length(force);
         let ahead = |&site: &u32| {
             let place = body.bonds.position(site as usize);
