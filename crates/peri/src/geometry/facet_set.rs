@@ -60,6 +60,19 @@ impl<const D: usize> FacetSet<D> {
         })
     }
 
+    /// Returns true if one of the facets is as near to a point as any of `all`, and nearer than `reach`, m.
+    pub fn is_nearest(&self, point: [f64; D], reach: f64, all: &Facets<D>) -> bool {
+        let least = |facets: &Facets<D>| {
+            let mut least = f64::INFINITY;
+            facets.near(point.map(|x| x - reach), point.map(|x| x + reach), |facet| {
+                least = least.min(distance(point, &facets.corners()[facet]));
+            });
+            least
+        };
+        let own = least(&self.facets);
+        own < reach && own <= least(all) + UPRIGHT * reach
+    }
+
     /// Returns true if no facet at a point `foot` is nearer to a point than `depth`, m.
     fn is_least(&self, point: [f64; D], foot: [f64; D], depth: f64) -> bool {
         let slack = UPRIGHT * depth;

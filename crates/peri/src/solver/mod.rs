@@ -79,7 +79,7 @@ pub use load::{Loads, Support};
 pub use load_stepping::{Equilibrium, QuasiStatic, load_stepping};
 pub use method::{Method, StepCallback, Watch};
 pub use motion::{DynamicEnergies, EqualSteps, Motion, StepLimits};
-pub use pressure::FollowingPressure;
+pub use pressure::{FollowingPressure, ThicknessStretch};
 pub use record::{Status, StepRecord};
 #[cfg(feature = "gpu")]
 pub use relaxation_device::CardRelaxation;

@@ -1,5 +1,5 @@
 //! Pressure that follows the surface: −p cof(F) N per reference area (Nanson's formula), in faces of the
-//! body.
+//! body; in plane stress −p λ₃ cof(F) N with the stretch λ₃ of the thickness.
 
 use super::force_fields::ForceField;
 use crate::amplitude::Amplitude;
@@ -7,7 +7,7 @@ use crate::bonds::{BodyGeometry, Bonds};
 use crate::contact::Faces;
 use crate::field::Field;
 use crate::material::{BodyTensor, cofactor};
-use crate::stress::{StressTensor, deformation_gradient};
+use crate::stress::deformation_gradient;
 use crate::surface::{BodySurface, SurfaceFace};
 use rayon::prelude::*;
 use std::fmt;
@@ -15,7 +15,10 @@ use std::fmt;
 /// Faces of a work item.
 const BATCH: usize = 256;
 
-/// Pressure on some faces of a body in plane strain or in space.
+/// Stretch λ₃ of the thickness in plane stress of the particle of a site, from its displacement gradient.
+pub type ThicknessStretch<const D: usize> = Box<dyn Fn(usize, BodyTensor<D>) -> f64 + Send + Sync>;
+
+/// Pressure on some faces of a body.
 pub struct FollowingPressure<const D: usize> {
     faces: Faces<D>,
     /// Particles below the pressed faces, ascending.
@@ -27,6 +30,8 @@ pub struct FollowingPressure<const D: usize> {
     /// Pressure at a multiple of 1, Pa.
     pressure: f64,
     amplitude: Amplitude,
+    /// In plane stress.
+    thickness: Option<ThicknessStretch<D>>,
 }
 
 impl<const D: usize> FollowingPressure<D> {
@@ -54,7 +59,12 @@ impl<const D: usize> FollowingPressure<D> {
         let below = each.iter().map(|own| own.iter().map(number).collect()).collect();
         let mut volumes = vec![0.0; bonds.sites()];
         bonds.particles().iter().for_each(|&site| volumes[site as usize] = bonds.volume(site as usize));
-        Some(Self { faces, sites, below, volumes, pressure, amplitude })
+        Some(Self { faces, sites, below, volumes, pressure, amplitude, thickness: None })
+    }
+
+    /// Lets the area change with the thickness, in plane stress.
+    pub fn with_thickness(self, thickness: Option<ThicknessStretch<D>>) -> Self {
+        Self { thickness, ..self }
     }
 }
 
@@ -65,8 +75,8 @@ impl<const D: usize> fmt::Debug for FollowingPressure<D> {
 }
 
 impl<const D: usize> ForceField<D> for FollowingPressure<D> {
-    /// F of a face is the mean over the particles below it, each over its intact bonds: a gap of a crack is
-    /// no pressed area.
+    /// F and λ₃ of a face are the means over the particles below it, each over its intact bonds: a gap of a
+    /// crack is no pressed area.
     fn add(
         &self,
         bonds: &dyn BodyGeometry<D>,
@@ -76,21 +86,27 @@ impl<const D: usize> ForceField<D> for FollowingPressure<D> {
         force: &mut Field<D>,
     ) {
         let pressure = share * self.pressure * self.amplitude.multiple(part);
-        let of = |&site: &u32| deformation_gradient(bonds, displacement, site as usize);
-        let gradients: Vec<StressTensor<D>> = self.sites.par_iter().with_min_len(BATCH).map(of).collect();
+        let change = |&site: &u32| {
+            let gradient = deformation_gradient(bonds, displacement, site as usize);
+            let own = BodyTensor::from_fn(|a, b| gradient[a][b] - f64::from(u8::from(a == b)));
+            (own, self.thickness.as_ref().map_or(1.0, |stretch| stretch(site as usize, own)))
+        };
+        let changes: Vec<(BodyTensor<D>, f64)> =
+            self.sites.par_iter().with_min_len(BATCH).map(change).collect();
         let push = |(face, below): (usize, &Vec<(u32, f64)>)| {
             if below.is_empty() {
                 return [0.0; D];
             }
-            let mut mean = BodyTensor::<D>::identity();
+            let (mut mean, mut thickness) = (BodyTensor::<D>::identity(), 1.0);
             for (number, weight) in below {
-                let own = gradients[*number as usize];
-                mean += BodyTensor::from_fn(|a, b| weight * (own[a][b] - f64::from(u8::from(a == b))));
+                let (own, stretch) = changes[*number as usize];
+                mean += own * *weight;
+                thickness += weight * (stretch - 1.0);
             }
             let (area, normal) = (cofactor(&mean), self.faces.normals[face]);
             std::array::from_fn(|a| {
                 let along: f64 = (0..D).map(|b| area[(a, b)] * normal[b]).sum();
-                -pressure * self.faces.areas[face] * along
+                -pressure * thickness * self.faces.areas[face] * along
             })
         };
         let each = self.below.par_iter().enumerate().with_min_len(BATCH);

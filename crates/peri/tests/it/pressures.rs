@@ -247,3 +247,61 @@ fn pressures_between_blocks_are_those_of_the_load() {
     assert!(shear > 0.01, "{shear}");
     at_most("coulomb", shear, 0.3 + 1e-6);
 }
+
+/// Reactions of a square of 20 mm of a mesh, turned by an angle in degrees, whose side `right` is held and on whose side `left`
+/// a pressure of 1 kPa acts, in a thickness of 1 mm.
+fn reaction_of_a_turned_square(angle: f64, spacing: &str, output: &Path) -> [f64; 2] {
+    let (sine, cosine) = angle.to_radians().sin_cos();
+    let corner = |[x, y]: [f64; 2]| format!("{} {} 0", cosine * x - sine * y, sine * x + cosine * y);
+    let corners = [[0.0, 0.0], [20.0, 0.0], [20.0, 20.0], [0.0, 20.0]].map(corner);
+    let nodes: String = corners.iter().zip(1..).map(|(corner, k)| format!("{k} {corner}\n")).collect();
+    let mesh = format!(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n3\n1 1 \"left\"\n1 2 \"right\"\n2 3 \"all\"\n\
+         $EndPhysicalNames\n$Nodes\n4\n{nodes}$EndNodes\n$Elements\n3\n1 3 2 3 3 1 2 3 4\n2 1 2 1 1 4 1\n\
+         3 1 2 2 2 2 3\n$EndElements\n"
+    );
+    let file = output.join("turned.msh");
+    std::fs::create_dir_all(output).unwrap();
+    std::fs::write(&file, mesh).unwrap();
+    let text = format!(
+        r#"
+[body]
+space = "plane-strain"
+thickness = "1 mm"
+spacing = "{spacing}"
+shapes = [{{ add = "mesh", file = '{}', unit = "1 mm" }}]
+{SOFT}
+[[boundary]]
+name = "right"
+set = "right"
+displacement = ["0 mm", "0 mm"]
+[[boundary]]
+set = "left"
+pressure = "1 kPa"
+[output]
+pictures = false
+fields = false
+"#,
+        file.display()
+    );
+    let report = solve(&text, &output.join("run")).report;
+    ["reaction_x", "reaction_y"].map(|name| report.scalar(name).unwrap())
+}
+
+/// A pressure on a set of a mesh acts on the faces of the particles behind it: its resultant is that of the
+/// side; along a staircase but for faces at its two ends, of up to a spacing each.
+#[test]
+fn pressure_on_a_set_of_a_mesh() {
+    let folder = tempfile::tempdir().unwrap();
+    for (angle, spacing, name, share) in [
+        (0.0, "1 mm", "upright", 1e-4),
+        (20.0, "1 mm", "turned_1mm", 0.1),
+        (20.0, "0.5 mm", "turned_0.5mm", 0.05),
+    ] {
+        let (sine, cosine) = f64::to_radians(angle).sin_cos();
+        let [x, y] = reaction_of_a_turned_square(angle, spacing, &folder.path().join(name));
+        let (along, across) = (cosine * x + sine * y, cosine * y - sine * x);
+        near(&format!("pressure_on_a_set_{name}"), along, 0.02, share * 0.02);
+        near(&format!("pressure_along_a_set_{name}"), across, 0.0, share * 0.02);
+    }
+}

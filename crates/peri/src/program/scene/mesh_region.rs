@@ -6,6 +6,7 @@ use super::values::{ONE_OF_THEM, required};
 use super::{Boundary, Scene, ShapeSpec};
 use crate::bonds::Bonds;
 use crate::geometry::{Enclosure, Facet, FacetSet};
+use crate::surface::SurfaceFace;
 use harness::scene::{SceneError, Source};
 use polycore::numerics::DisjointSets;
 use polycore::units::Length;
@@ -57,6 +58,17 @@ impl<const D: usize> SetRegion<D> {
                 // a set of one body takes no particles of another across a gap
                 (!is_filled || pieces.contains(place)) && faces.covers(place, *reach, pieces.facets())
             }
+        }
+    }
+
+    /// Returns true for a face of particles of this spacing, m, that stands for a facet of the set: from half a
+    /// spacing in front of it, no other facet of the mesh is nearer. Faces of cells lie beside the facets of the
+    /// mesh by up to a spacing.
+    pub fn has_face(&self, face: &SurfaceFace<D>, spacing: f64) -> bool {
+        let before = std::array::from_fn(|d| face.place[d] + 0.5 * spacing * face.normal[d]);
+        match self {
+            Self::Cells(_) => false,
+            Self::Below(layer) => layer.faces.is_nearest(before, 2.0 * spacing, layer.pieces.facets()),
         }
     }
 }

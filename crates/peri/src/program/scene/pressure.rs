@@ -3,11 +3,13 @@
 use super::Scene;
 use super::body_force::add_field;
 use super::curve_spec::CurveList;
+use super::part_solid::solid_of_parts;
 use super::region::extent;
 use super::values::{DiscreteBody, plain};
 use crate::calibrate::Space;
 use crate::geometry::inside as within;
-use crate::solver::{Amplitude, FollowingPressure, Loads};
+use crate::material::{Deformation, PointLaw};
+use crate::solver::{Amplitude, FollowingPressure, Loads, ThicknessStretch};
 use crate::surface::SurfaceFace;
 use harness::scene::{SceneError, Source};
 
@@ -17,8 +19,8 @@ pub(super) const LEAST_WALL: f64 = 1.75;
 /// Adds the pressures of boundaries to loads that follow curves.
 ///
 /// # Errors
-/// A pressure in plane stress, with a curve for each component, on a region without faces, or on a wall that
-/// is too thin for its horizon.
+/// A pressure in plane stress without a thickness, with a curve for each component, on a region without faces,
+/// or on a wall that is too thin for its horizon.
 pub(super) fn add<const D: usize>(
     source: &Source,
     scene: &Scene,
@@ -29,13 +31,9 @@ pub(super) fn add<const D: usize>(
     for (index, boundary) in scene.boundary.iter().enumerate() {
         let Some(pressure) = boundary.pressure else { continue };
         let key = format!("boundary[{index}].pressure");
-        if scene.body.space == Space::PlaneStress {
-            let allowed = "`plane-strain` or `solid`: in plane stress the area changes with the thickness";
-            return Err(source.error(&key, "a pressure in `plane-stress`", allowed));
-        }
-        if boundary.set.is_some() {
-            let why = "a pressure acts on a `side`, or on the faces in `shapes` or a box";
-            return Err(source.conflict(&key, "set", why));
+        if let Some(depth) = boundary.depth_key().filter(|_| boundary.set.is_some()) {
+            let why = "a pressure acts on the faces of a set, whatever lies below them";
+            return Err(source.conflict(&format!("boundary[{index}].{depth}"), "pressure", why));
         }
         if matches!(boundary.curve, Some(CurveList::Each(_))) {
             let why = "a pressure has one curve, not one for each component";
@@ -48,7 +46,7 @@ pub(super) fn add<const D: usize>(
         });
         let inside = |face: &SurfaceFace<D>| {
             let faces = outward.is_none_or(|(axis, sign)| sign * face.normal[axis] > 0.5);
-            faces && extent.contains(face.place)
+            faces && extent.has_face(face, body.bonds.spacing())
         };
         let Some(amplitude) = amplitudes.get(index).map(|(_, each)| &each[0]) else { continue };
         let surface = body.surface();
@@ -67,12 +65,39 @@ pub(super) fn add<const D: usize>(
         let pressed =
             FollowingPressure::new(&*body.bonds, &surface, inside, pressure.si(), amplitude.clone());
         let Some(pressed) = pressed else {
-            let allowed = "a region with a part of the surface of a body of `shapes`, or of a lattice";
+            let allowed = "a region with a part of the surface of a body of `shapes`, or of a lattice; of a \
+                           mesh a set of faces";
             return Err(source.error(&key, "a region without faces", allowed));
         };
-        add_field(body, loads, pressed);
+        add_field(body, loads, pressed.with_thickness(thickness(source, scene, &key, body)?));
     }
     Ok(())
+}
+
+/// Builds the stretch of the thickness of a body in plane stress; `None` of others.
+///
+/// # Errors
+/// Bond laws and laws with a state, whose thickness no deformation gradient gives.
+fn thickness<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    key: &str,
+    body: &DiscreteBody<D>,
+) -> Result<Option<ThicknessStretch<D>>, SceneError> {
+    if scene.body.space != Space::PlaneStress {
+        return Ok(None);
+    }
+    if scene.material.solid.is_none() || scene.remembers() {
+        let found = if scene.remembers() { "a solid with a state" } else { "a bond law" };
+        let allowed = "a `solid` without `branch` and `mullins`, which gives the thickness; or `plane-strain` \
+                       or `solid`: in plane stress the area changes with the thickness";
+        return Err(source.error(key, format!("a pressure in `plane-stress` on {found}"), allowed));
+    }
+    let (solid, _) = solid_of_parts(source, scene, body)?;
+    Ok(Some(Box::new(move |site, displacement_gradient| {
+        let deformation = Deformation { displacement_gradient, residual: 0.0, past: None };
+        solid.law_at(site).thickness_stretch(&deformation)
+    })))
 }
 
 /// Median thickness of the wall below some faces, m, up to [`LEAST_WALL`] spacings and in steps of a quarter;

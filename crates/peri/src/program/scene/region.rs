@@ -6,6 +6,7 @@ use super::shapes::operations;
 use super::values::{DiscreteBody, ONE_OF_THEM, check_order, vector};
 use crate::bonds::Bonds;
 use crate::geometry::{Operation, inside};
+use crate::surface::SurfaceFace;
 use harness::scene::{SceneError, Source};
 
 /// Returns the number of layers of particles that a boundary takes at a side.
@@ -114,6 +115,15 @@ impl<const D: usize> BoundaryExtent<D> {
         let boxed = (0..D).all(|d| self.low[d] <= place[d] && place[d] <= self.high[d]);
         let shaped = boxed && (self.shapes.is_empty() || inside(&self.shapes, place));
         shaped && self.set.as_ref().is_none_or(|set| set.contains(place))
+    }
+
+    /// Returns true if the region contains a face of a body of this spacing, m; of a set of faces, if they are
+    /// the nearest of the mesh to it.
+    pub(super) fn has_face(&self, face: &SurfaceFace<D>, spacing: f64) -> bool {
+        match &self.set {
+            Some(set) => set.has_face(face, spacing),
+            None => self.contains(face.place),
+        }
     }
 }
 
