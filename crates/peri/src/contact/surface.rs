@@ -1,5 +1,6 @@
 //! Rigid surfaces that a body cannot pass, or to which it is tied: planes, spheres, cylinders, facets.
 
+use super::Inertia;
 use super::friction_pair::across;
 use super::non_negative;
 use crate::amplitude::Amplitude;
@@ -57,6 +58,9 @@ pub struct RigidSurface<const D: usize> {
     /// first touches the undeformed body, to where contact balances the force. `None`: moves by
     /// `displacement` and `velocity`.
     pub force: Option<[f64; D]>,
+    /// Mass in explicit dynamics, with a force: `velocity` is then that at the start, and there is no
+    /// `displacement`. `None`: moves as prescribed.
+    pub inertia: Option<Inertia<D>>,
     /// Multiples of the components of `displacement` over the load factor, of which `force` follows the
     /// first; `None`: the factor itself. A system with amplitudes has
     /// [`Loads::curved`](crate::solver::Loads::curved) loads, which count the work.
@@ -78,6 +82,7 @@ impl<const D: usize> RigidSurface<D> {
             velocity: [0.0; D],
             drift: [0.0; D],
             force: None,
+            inertia: None,
             amplitudes: None,
         }
     }
@@ -202,7 +207,7 @@ impl<const D: usize> RigidSurface<D> {
 
     /// Returns true if it moves by itself.
     pub fn moves(&self) -> bool {
-        self.displacement != [0.0; D] || self.velocity != [0.0; D]
+        self.displacement != [0.0; D] || self.velocity != [0.0; D] || self.inertia.is_some()
     }
 
     /// Checks the surface and normalises its vectors.
@@ -237,6 +242,9 @@ impl<const D: usize> RigidSurface<D> {
         if self.bonded && (self.force.is_some() || !matches!(self.shape, SurfaceShape::Plane(_))) {
             let allowed = "a plane without a force".to_owned();
             return Err(Error::Parameter { name: "bonded rigid surface", found: 1.0, allowed });
+        }
+        if let Some(inertia) = &self.inertia {
+            inertia.check()?;
         }
         if let Some(force) = self.force {
             unit("force on a rigid surface", force)?;
@@ -273,4 +281,6 @@ pub struct SurfaceReaction {
     pub pressure: f64,
     /// Displacement of the surface, m.
     pub moved: [f64; 3],
+    /// Velocity of a surface with a mass, m/s.
+    pub velocity: [f64; 3],
 }

@@ -21,6 +21,8 @@ pub(super) struct MovingSurface<const D: usize> {
     /// Displacement of the surface now and at the last placement, m.
     pub(super) now: [f64; D],
     pub(super) before: [f64; D],
+    /// Displacement of a surface with a mass after its flight, m.
+    pub(super) flown: [f64; D],
     /// Load factor of its force.
     pub(super) factor: f64,
     /// Mean rate of its displacement over the load factor in the present step, m, and mean of the multiples
@@ -136,6 +138,7 @@ impl<const D: usize> RigidSurfaces<D> {
                 surface,
                 now,
                 before,
+                flown: [0.0; D],
                 factor: 0.0,
                 rate,
                 weight: 1.0,
@@ -177,7 +180,9 @@ impl<const D: usize> RigidSurfaces<D> {
         for placed in &mut self.each {
             let surface = &placed.surface;
             (placed.before, placed.factor) = (placed.now, surface.force_factor(factor));
-            if surface.force.is_none() {
+            if surface.inertia.is_some() {
+                placed.now = placed.flown;
+            } else if surface.force.is_none() {
                 placed.now = surface.place_at(factor, time);
             }
         }

@@ -103,6 +103,7 @@ harness::quantities! {
         the end, over its share of the undeformed surface";
     INDENTER_DISPLACEMENT = "{indenter}_displacement_{axis}", "m", "displacement of an indenter at the end; \
         with a force from where it first touches the body at rest";
+    INDENTER_VELOCITY = "{indenter}_velocity_{axis}", "m/s", "velocity of an indenter with a mass at the end";
     CRITICAL_TIME_STEP = "critical_time_step", "s", "critical time step 2/ω of the body at the start";
     TIME_STEP = "time_step", "s", "time step at the end";
     KINETIC_ENERGY = "kinetic_energy", "J", "kinetic energy at the end";

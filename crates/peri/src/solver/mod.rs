@@ -18,6 +18,7 @@ mod device_run;
 mod dynamic_relaxation;
 mod face_springs;
 mod fit_range;
+mod flights;
 mod force_fields;
 mod force_scale;
 mod fracture;

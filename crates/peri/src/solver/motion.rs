@@ -53,6 +53,8 @@ pub struct StepLimits {
     pub(super) longest: f64,
     /// Greatest sum of contact stiffness on a particle included in the limits, N/m⁴.
     pub(super) contact: f64,
+    /// Stiffness of the contact of a rigid surface over its mass included in the limits, 1/s².
+    pub(super) striking: f64,
     /// ω_max² at the start over the law's tangent there.
     pub(super) frequency: f64,
     /// Sums over the bonds of the unbroken body.

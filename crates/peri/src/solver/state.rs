@@ -5,7 +5,7 @@ use super::motion::Motion;
 use super::record::{Status, StepRecord};
 use super::stage::StepOrigin;
 use super::step_control::{Accepted, StepControl};
-use crate::contact::{ContactPair, FrictionPair};
+use crate::contact::{ContactPair, Flight, FrictionPair};
 use crate::field::Field;
 use crate::material::Memory;
 use crate::potential::StretchRange;
@@ -146,6 +146,8 @@ pub(super) struct ContactState<const D: usize> {
     pub surface_friction: Vec<[f64; 3]>,
     /// Force of each rigid surface, N, if any moves.
     pub surface_push: Vec<[f64; 3]>,
+    /// Motion of rigid surfaces with a mass, in the order of all; empty without any.
+    pub flights: Vec<Flight>,
     /// Displacement at the start of the load step, with friction between equilibria.
     pub start: Option<Field<D>>,
     /// Friction after the last step.

@@ -264,6 +264,10 @@ impl<'a, const D: usize> System<'a, D> {
             (0..3).for_each(|d| resting.force[d] += rub[d]);
         }
         resting
+            .iter_mut()
+            .zip(&state.contact.flights)
+            .for_each(|(own, flight)| own.velocity = flight.velocity);
+        resting
     }
 
     /// Refuses a state with particles behind a rigid surface, or halfway through each other.

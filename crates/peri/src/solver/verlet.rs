@@ -147,6 +147,7 @@ impl VelocityVerlet {
         system.contact.iter_mut().for_each(Contact::end_friction);
         if state.motion.begun {
             let factor = self.factor(system, state.motion.time).0;
+            system.place_flights(state);
             system.move_surfaces(factor, state.motion.time);
             system.restore(state)?;
             system.set_forces(factor, &state.displacement);
@@ -257,6 +258,7 @@ impl VelocityVerlet {
         let rest = VerletStep { step: 0.0, density: self.density, damping: 0.0, factors: [factor; 2], rate };
         friction_pass(system, state, &masses.volumes, &rest, None);
         surface_pass(system, state, &[]);
+        system.begin_flights(state, factor);
         self.break_overstretched(system, state, observed, factor);
         Ok(())
     }
@@ -277,15 +279,16 @@ impl VelocityVerlet {
         // blocks of the tangent's rows: ω² ≤ ‖A_II‖ + Σ‖A_IJ‖ with ‖t′nn + t/λ(1 − nn)‖ ≤ max(|t′|, |t|/λ);
         // Feingold & Varga (1962), doi:10.2140/pjm.1962.12.1241
         let lightest = self.density * system.lightest_ratio();
-        let contact = 2.0 * motion.limits.contact / lightest;
+        let (contact, striking) = (2.0 * motion.limits.contact / lightest, motion.limits.striking);
         // the greatest frequency of a sum is no greater than the sum of both (Weyl)
         let [bound, estimate] = if system.material.has_points() {
-            motion.pace.squares(lightest).map(|square| square + contact)
+            motion.pace.squares(lightest).map(|square| square + contact + striking)
         } else {
             [
                 2.0 * (motion.limits.bonds.stiffness * state.stretches.tangent + motion.limits.contact)
-                    / lightest,
-                motion.limits.frequency * law.mean_tangent + contact,
+                    / lightest
+                    + striking,
+                motion.limits.frequency * law.mean_tangent + contact + striking,
             ]
         };
         motion.limits.gershgorin_step = critical(bound);
@@ -300,6 +303,11 @@ impl VelocityVerlet {
     /// Raises the contact stiffness of the limits if more particles are in contact than so far.
     fn cover_contact<const D: usize>(&self, system: &System<D>, state: &mut State<D>) {
         let Some(contact) = system.repulsion() else { return };
+        let striking = contact.striking(&state.displacement);
+        if striking > state.motion.limits.striking {
+            state.motion.limits.striking = GROWTH * striking;
+            self.cover(system, state);
+        }
         self.raise_contact(system, state, contact.greatest_stiffness(&*system.bonds, &state.displacement));
     }
 
@@ -327,6 +335,7 @@ impl VelocityVerlet {
         let before = self.factor(system, state.motion.time).0;
         let (density, damping) = (self.density, self.damping);
         let start = self.follows(system).then(|| (state.displacement.clone(), state.velocity.clone()));
+        let flights = state.contact.flights.clone();
         let (mut cuts, slack) = (0, state.motion.look.slack);
         let (after, leap, first) = loop {
             let after = state.motion.steps.time_after(end);
@@ -340,6 +349,7 @@ impl VelocityVerlet {
             // two ends, √D components
             let strain = 2.0 * (D as f64).sqrt() * first.increment / state.motion.limits.bonds.shortest;
             state.motion.look.slack = slack + strain;
+            system.leap_flights(state, &flights, step);
             system.move_surfaces(factor, after);
             system.set_duration(state, step)?;
             system.prepare(&mut state.displacement);
@@ -351,6 +361,8 @@ impl VelocityVerlet {
             // a step whose end requires a shorter one is undone
             state.displacement.clone_from(displacement);
             state.velocity.clone_from(velocity);
+            state.contact.flights.clone_from(&flights);
+            system.place_flights(state);
             system.move_surfaces(before, state.motion.time);
             state.motion.plan(end);
         };
@@ -382,6 +394,7 @@ impl VelocityVerlet {
             second = kick_pass(&system.loads, state, masses, &leap);
         }
         surface_pass(system, state, &rubbing);
+        system.kick_flights(state, factor, leap.step);
         let motion = &mut state.motion;
         motion.time = after;
         motion.steps.taken += 1;

@@ -6,7 +6,7 @@ use crate::dynamics::DENSITY;
 use harness::scene::Source;
 use peri::Error;
 use peri::bonds::{BodyGeometry, Bonds, LatticeBonds};
-use peri::contact::{Contact, RigidSurface};
+use peri::contact::{Contact, Inertia, RigidSurface};
 use peri::field::Field;
 use peri::geometry::{Enclosure, SignedDistance};
 use peri::material::BondMaterial;
@@ -333,6 +333,69 @@ fn disc_in_motion() {
     let off = last.work - last.stored - last.kinetic;
     assert!(last.work > 0.0 && off.abs() < 0.01 * last.work, "{off} {last:?}");
     assert!((last.resting[0].moved[1] + 0.4).abs() < 1e-12 && last.resting[0].force[1] < 0.0);
+}
+
+/// A rough disc with a mass strikes a free block obliquely, pushed on by a force: momentum and energy of both
+/// balance, and a resumed run has the same bits on any number of threads. Before it touches, it falls by ½at².
+#[test]
+fn struck_by_a_mass() {
+    let (mass, force) = (20.0 * DENSITY, [0.0, -0.02 * DENSITY]);
+    let disc = RigidSurface {
+        stiffness: 5.0,
+        friction: 0.3,
+        velocity: [0.06, -0.1],
+        inertia: Some(Inertia { mass, force }),
+        ..RigidSurface::sphere([8.0, 8.0 + 6.5], 6.0)
+    };
+    let run = |threads: usize, from: Option<State<2>>| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut built = Body::<2>::solid([20, 8], 1.0, 3.015).build();
+            let contact = beside(&built.lattice, vec![disc.clone()]).unwrap();
+            let bonds = &mut built.lattice;
+            let loads = hold(bonds, |_| None);
+            let law = Law::Linear.build(1.0, 1.0, false).unwrap();
+            let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), &loads, &[]);
+            system.contact = Some(contact);
+            let mut state = from.unwrap_or_else(|| State::new(system.bonds.sites()));
+            let mut saved = None;
+            let watch = &mut |status: &peri::solver::Status, state: &State<2>| {
+                if status.restartable && status.step == 12 && saved.is_none() {
+                    saved = Some(state.clone());
+                }
+                Ok(())
+            };
+            let solver = VelocityVerlet { records: 20, ..VelocityVerlet::new(DENSITY, 12.0) };
+            solver.solve(&mut system, &mut state, watch, &mut |_, _| Ok(())).unwrap();
+            let particles = system.bonds.particles().iter().map(|&site| site as usize);
+            let momentum: Vec<[f64; 2]> = particles
+                .map(|site| state.velocity.get(site).map(|v| DENSITY * system.bonds.volume(site) * v))
+                .collect();
+            (state, saved, [0, 1].map(|d| momentum.iter().map(|p| p[d]).sum::<f64>()))
+        })
+    };
+    let (one, saved, body) = run(1, None);
+    let first = &one.history[0];
+    let fallen = disc.velocity[1] * first.time + 0.5 * force[1] / mass * first.time.powi(2);
+    assert!((first.resting[0].moved[1] - fallen).abs() < 1e-12 && first.stored == 0.0, "{first:?}");
+    let last = one.history.last().unwrap();
+    let resting = last.resting[0];
+    for d in 0..2 {
+        let given = mass * disc.velocity[d] + force[d] * last.time;
+        let off = body[d] + mass * resting.velocity[d] - given;
+        assert!(off.abs() < 1e-9 * given.abs(), "{off} {given}");
+    }
+    let square = |v: [f64; 3]| 0.5 * mass * v.iter().map(|v| v * v).sum::<f64>();
+    let fed = (0..2).map(|d| force[d] * resting.moved[d]).sum::<f64>();
+    let given = square([disc.velocity[0], disc.velocity[1], 0.0]) + fed;
+    let off = given - square(resting.velocity) - last.kinetic - last.stored - last.rubbed;
+    eprintln!("{given} {off} {body:?} {last:?}");
+    assert!(body[1] < 0.0 && last.rubbed > 0.0 && off.abs() < 0.01 * given, "{off} {given}");
+    assert!(run(2, None).0 == one && run(2, saved).0 == one);
+    let heavy = RigidSurface { inertia: Some(Inertia { mass: 0.0, force }), ..disc.clone() };
+    let bonds = Body::<2>::solid([20, 8], 1.0, 3.015).build().lattice;
+    let message = beside(&bonds, vec![heavy]).map(|_| ()).unwrap_err().to_string();
+    assert!(message.contains("mass of a rigid surface: found 0"), "{message}");
 }
 
 /// The lower side of a box of facets acts as a plane, to rounding.

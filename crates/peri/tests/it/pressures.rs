@@ -294,7 +294,7 @@ fields = false
 fn pressure_on_a_set_of_a_mesh() {
     let folder = tempfile::tempdir().unwrap();
     for (angle, spacing, name, share) in [
-        (0.0, "1 mm", "upright", 1e-4),
+        (0.0, "1 mm", "upright", 5e-4),
         (20.0, "1 mm", "turned_1mm", 0.1),
         (20.0, "0.5 mm", "turned_0.5mm", 0.05),
     ] {

@@ -63,6 +63,11 @@ pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>
         for (d, axis) in axes(scene).iter().enumerate().filter(|_| index >= contact.plane.len()) {
             to.add_if(q::INDENTER_DISPLACEMENT.named(&[&name, axis]), |m| Some(resting(m)?.moved[d]));
         }
+        let own = index.checked_sub(contact.plane.len()).and_then(|own| contact.indenter.get(own));
+        for (d, axis) in axes(scene).iter().enumerate().filter(|_| own.is_some_and(|own| own.mass.is_some()))
+        {
+            to.add_if(q::INDENTER_VELOCITY.named(&[&name, axis]), |m| Some(resting(m)?.velocity[d]));
+        }
         let sizes: [fn(SurfaceReaction) -> f64; 4] =
             [|one| one.area, |one| one.spread, |one| one.width, |one| one.pressure];
         let quantities = [q::PLANE_AREA, q::PLANE_SPREAD, q::PLANE_WIDTH, q::PLANE_PRESSURE];

@@ -76,6 +76,12 @@ impl VariantOutcome {
                     columns.push((format!("displacement_{axis} {surface}"), "m".to_owned(), values));
                 }
             }
+            for (d, axis) in ["x", "y", "z"].iter().enumerate() {
+                let values = each(&|r| resting(r).velocity[d]);
+                if values.iter().any(|&v| v != 0.0) {
+                    columns.push((format!("velocity_{axis} {surface}"), "m/s".to_owned(), values));
+                }
+            }
             columns.push((format!("area {surface}"), "m²".to_owned(), each(&|r| resting(r).area)));
             columns.push((format!("pressure {surface}"), "Pa".to_owned(), each(&|r| resting(r).pressure)));
             columns.push((format!("spread {surface}"), "m".to_owned(), each(&|r| resting(r).spread)));

@@ -45,7 +45,10 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     solver(source, scene)?;
     let strained = scene.periodic.as_ref().is_some_and(|periodic| periodic.gradient.is_some());
     let bonded = scene.contact.iter().flat_map(|contact| &contact.plane).any(|plane| plane.bonded);
-    if scene.boundary.is_empty() && scene.body_force.is_empty() && !strained && !bonded {
+    // in motion, rigid surfaces suffice
+    let indenters = scene.contact.iter().flat_map(|contact| &contact.indenter);
+    let struck = scene.has_dynamics() && indenters.count() > 0;
+    if scene.boundary.is_empty() && scene.body_force.is_empty() && !strained && !bonded && !struck {
         let needed = "needed for loads and supports: at least one [[boundary]], or a `bonded` plane";
         return Err(source.missing("boundary", needed));
     }

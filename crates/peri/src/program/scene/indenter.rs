@@ -6,10 +6,10 @@ use super::curve_spec::CurveList;
 use super::line::plane_of;
 use super::values::{plain, required, vector};
 use super::{ContactSpec, Scene, SolverMethod};
-use crate::contact::RigidSurface;
+use crate::contact::{Inertia, RigidSurface};
 use crate::geometry::{Enclosure, SignedDistance, length};
 use harness::scene::{SceneError, Source};
-use polycore::units::{Force, Length, Speed};
+use polycore::units::{Force, Length, Mass, Speed};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -39,10 +39,15 @@ pub struct IndenterSpec {
     pub friction: Option<f64>,
     /// Displacement at the end of the last step; it follows the load factor.
     pub displacement: Option<Vec<Length>>,
-    /// Velocity, in explicit dynamics, with `[[step]]` in explicit steps; added to the displacement.
+    /// Velocity, in explicit dynamics, with `[[step]]` in explicit steps; added to the displacement. With
+    /// `mass` that at the start.
     pub velocity: Option<Vec<Speed>>,
+    /// Mass, in explicit dynamics: contact and `force` accelerate the indenter, which does not turn; in a
+    /// plane body that of its thickness.
+    pub mass: Option<Mass>,
     /// Force on the indenter at the end of the last step instead of a displacement, in equilibrium: it moves
-    /// along the force only, from where it first touches the body at rest. It stays in a later `[[step]]`.
+    /// along the force only, from where it first touches the body at rest. It stays in a later `[[step]]`. In
+    /// explicit dynamics on an indenter with a `mass`.
     pub force: Option<Vec<Force>>,
     /// Curve of time that multiplies `displacement` or `force` instead of the load factor; of a displacement
     /// also one for each component.
@@ -81,13 +86,15 @@ impl IndenterSpec {
             None => None,
             Some(force) => Some(self.force(source, key, force)?),
         };
+        let inertia = self.mass.map(|mass| Inertia { mass: mass.si(), force: force.unwrap_or([0.0; D]) });
         Ok(RigidSurface {
             stiffness: contact.stiffness_of(self.stiffness, explicit),
             friction: contact.friction_of(self.friction),
             elastic_slip: contact.elastic_slip.map(|slip| slip.si()),
             displacement,
             velocity,
-            force,
+            force: force.filter(|_| inertia.is_none()),
+            inertia,
             ..surface
         })
     }
@@ -233,15 +240,37 @@ pub(super) fn check(source: &Source, scene: &Scene, contact: &ContactSpec) -> Re
             );
             return Err(source.unexpected(&key("velocity"), why));
         }
-        if indenter.force.is_none() {
+        if let Some(mass) = indenter.mass {
+            super::values::positive(source, &key("mass"), mass.si(), "kg")?;
+            let others = [
+                ("displacement", indenter.displacement.is_some(), "contact and a `force` move a mass"),
+                ("step", scene.later || !scene.step.is_empty(), "a mass flies in a scene of one step"),
+            ];
+            if let Some((other, _, why)) = others.into_iter().find(|(_, given, _)| *given) {
+                return Err(source.conflict(&key("mass"), other, why));
+            }
+            if !explicit {
+                let why = "only explicit dynamics has masses; in equilibrium write `displacement` or `force`";
+                return Err(source.unexpected(&key("mass"), why));
+            }
+        }
+        if indenter.force.is_none() && indenter.mass.is_none() {
             continue;
         }
-        if explicit {
-            let why = "an indenter has no mass: explicit dynamics moves it by `displacement` or `velocity`";
-            return Err(source.unexpected(&key("force"), why));
+        if explicit && indenter.mass.is_none() {
+            let why = "its inertia: explicit dynamics moves an indenter without one by `displacement` or \
+                       `velocity`";
+            return Err(source.missing(&key("mass"), why));
         }
         if contact.stiffness_of(indenter.stiffness, explicit) == 0.0 {
-            return Err(source.error(&key("stiffness"), 0, "above 0 of an indenter with a `force`"));
+            return Err(source.error(
+                &key("stiffness"),
+                0,
+                "above 0 of an indenter with a `force` or a `mass`",
+            ));
+        }
+        if indenter.force.is_none() || explicit {
+            continue;
         }
         let follows = indenter.curve.is_none() && !scene.later;
         let factors = if follows { scene.programme().0 } else { Vec::new() };

@@ -234,7 +234,7 @@ fn refuse_other_axes(source: &Source, scene: &Scene) -> Result<(), SceneError> {
 fn refuse_in_contact(source: &Source, scene: &Scene, contact: &ContactSpec) -> Result<(), SceneError> {
     let pushed = contact.indenter.iter().position(|own| own.force.is_some());
     if let Some(index) = pushed.filter(|_| scene.has_dynamics()) {
-        let why = "a step is explicit dynamics, in which an indenter has no mass: move it by `displacement`";
+        let why = "a step is explicit dynamics: move the indenter by `displacement`";
         return Err(source.unexpected(&format!("contact.indenter[{index}].force"), why));
     }
     if contact.tied_grips == Some(true) {
