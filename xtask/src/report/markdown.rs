@@ -76,7 +76,8 @@ pub fn text(page: &Page, outcomes: &[CaseOutcome]) -> String {
     }
     if !page.references.is_empty() {
         text += "\n## References over the spacing\n\nErrors of values that a closed form, a measurement, a \
-                 publication or another program gives, at each spacing of a case, and the observed order.\n\n";
+                 publication or another program gives, at each spacing of a case, and the observed \
+                 order.\n\n";
         let mut table = TextTable::new(["case", "value", "errors", "order"]);
         page.references.iter().for_each(|series| table.push(series.cells()));
         text += &table.markdown();

@@ -1,5 +1,5 @@
-//! Rigid surfaces with a mass, in explicit dynamics: contact and a force of their own accelerate them; they do
-//! not turn.
+//! Rigid surfaces with a mass, in explicit dynamics: contact and a force of their own accelerate them; they
+//! do not turn.
 
 use super::surfaces::{MovingSurface, RigidSurfaces};
 use super::{Contact, positive};
@@ -47,7 +47,7 @@ pub struct Flight {
 
 impl Flight {
     /// First half of a kick and the drift of a step, s, of velocity Verlet.
-    pub fn leap(&self, step: f64) -> Self {
+    pub fn drift_on(&self, step: f64) -> Self {
         let Self { moved, velocity, acceleration } = *self;
         let velocity = std::array::from_fn(|d| velocity[d] + 0.5 * step * acceleration[d]);
         Self { moved: std::array::from_fn(|d| moved[d] + step * velocity[d]), velocity, acceleration }
@@ -69,7 +69,8 @@ impl<const D: usize> Contact<D> {
         });
     }
 
-    /// Accelerations, m/s², of surfaces with a mass that push the body with these forces, N, at a load factor.
+    /// Accelerations, m/s², of surfaces with a mass that push the body with these forces, N, at a load
+    /// factor.
     pub fn accelerations(&self, pushing: &[[f64; 3]], factor: f64) -> Vec<[f64; 3]> {
         let accelerate = |(surface, push): (&super::RigidSurface<D>, &[f64; 3])| {
             let Some(Inertia { mass, force }) = surface.inertia else { return [0.0; 3] };

@@ -6,9 +6,9 @@
 //! a body need not know of t. The sum grows with t as long as faces lie ahead; it is found by Newton's method
 //! within a bracket, from the geometry alone, so that no earlier state changes a bit.
 //!
-//! Friction along e, of all surfaces but planes pressed along their normal, adds its potential to E: for given
-//! normal forces it is convex in u − t, so that the sum still grows with t. Between steps its forces are those
-//! at the end of the last one.
+//! Friction along e, of all surfaces but planes pressed along their normal, adds its potential to E: for
+//! given normal forces it is convex in u − t, so that the sum still grows with t. Between steps its forces
+//! are those at the end of the last one.
 
 use super::friction_pair::FrictionPair;
 use super::surface::{RigidSurface, SurfaceShape};
@@ -110,8 +110,8 @@ impl<const D: usize> RigidSurfaces<D> {
         friction.pairs().iter().filter_map(own).collect()
     }
 
-    /// Force of the contact of a surface along its own force less the wanted one, N, and its derivative, N/m, at
-    /// a travel, m.
+    /// Force of the contact of a surface along its own force less the wanted one, N, and its derivative, N/m,
+    /// at a travel, m.
     fn excess(
         &self,
         number: usize,

@@ -5,7 +5,8 @@ use super::system::System;
 use crate::contact::Flight;
 
 impl<const D: usize> System<'_, D> {
-    /// Starts surfaces with a mass at their velocities, with the contact of the start; without any does nothing.
+    /// Starts surfaces with a mass at their velocities, with the contact of the start; without any does
+    /// nothing.
     pub(super) fn begin_flights(&mut self, state: &mut State<D>, factor: f64) {
         let surfaces = || self.contact.iter().flat_map(|contact| contact.surfaces());
         state.contact.flights.clear();
@@ -21,7 +22,7 @@ impl<const D: usize> System<'_, D> {
     /// Moves surfaces with a mass by a step, s, from their motion `before`.
     pub(super) fn leap_flights(&mut self, state: &mut State<D>, before: &[Flight], step: f64) {
         state.contact.flights.clear();
-        state.contact.flights.extend(before.iter().map(|flight| flight.leap(step)));
+        state.contact.flights.extend(before.iter().map(|flight| flight.drift_on(step)));
         self.place_flights(state);
     }
 

@@ -336,7 +336,8 @@ fn disc_in_motion() {
 }
 
 /// A rough disc with a mass strikes a free block obliquely, pushed on by a force: momentum and energy of both
-/// balance, and a resumed run has the same bits on any number of threads. Before it touches, it falls by ½at².
+/// balance, and a resumed run has the same bits on any number of threads. Before it touches, it falls by
+/// ½at².
 #[test]
 fn struck_by_a_mass() {
     let (mass, force) = (20.0 * DENSITY, [0.0, -0.02 * DENSITY]);
@@ -499,9 +500,9 @@ fn rough_plane_under_a_force() {
     assert!(run(2, None).0 == one && run(2, saved).0 == one);
 }
 
-/// Friction helps to carry the force of a sphere, and of a plane pressed aside: normal forces and friction along
-/// the force balance it, it leads to where a displacement has needed it, the energies balance, and a resumed
-/// run has the same bits.
+/// Friction helps to carry the force of a sphere, and of a plane pressed aside: normal forces and friction
+/// along the force balance it, it leads to where a displacement has needed it, the energies balance, and a
+/// resumed run has the same bits.
 #[test]
 fn friction_along_a_force() {
     let plane = RigidSurface::plane([3.0, 3.0, 50.0], [0.0, 0.0, -1.0]);

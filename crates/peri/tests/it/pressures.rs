@@ -248,8 +248,8 @@ fn pressures_between_blocks_are_those_of_the_load() {
     at_most("coulomb", shear, 0.3 + 1e-6);
 }
 
-/// Reactions of a square of 20 mm of a mesh, turned by an angle in degrees, whose side `right` is held and on whose side `left`
-/// a pressure of 1 kPa acts, in a thickness of 1 mm.
+/// Reactions of a square of 20 mm of a mesh, turned by an angle in degrees, whose side `right` is held and on
+/// whose side `left` a pressure of 1 kPa acts, in a thickness of 1 mm.
 fn reaction_of_a_turned_square(angle: f64, spacing: &str, output: &Path) -> [f64; 2] {
     let (sine, cosine) = angle.to_radians().sin_cos();
     let corner = |[x, y]: [f64; 2]| format!("{} {} 0", cosine * x - sine * y, sine * x + cosine * y);

@@ -18,9 +18,9 @@ pub struct ReferenceErrors {
     pub error: Vec<f64>,
 }
 
-/// Collects the quantities that an expectation of independent evidence compares with a `reference`: their errors
-/// at all spacings of the study, those without an expectation too. Leaves out references of 0, and families with
-/// fewer than two values.
+/// Collects the quantities that an expectation of independent evidence compares with a `reference`: their
+/// errors at all spacings of the study, those without an expectation too. Leaves out references of 0, and
+/// families with fewer than two values.
 pub fn reference_errors(expect: &[Expect], outcomes: &[VariantOutcome]) -> Vec<ReferenceErrors> {
     let mut found = Vec::new();
     for (family, members) in families(outcomes) {

@@ -61,9 +61,9 @@ impl<const D: usize> SetRegion<D> {
         }
     }
 
-    /// Returns true for a face of particles of this spacing, m, that stands for a facet of the set: from half a
-    /// spacing in front of it, no other facet of the mesh is nearer. Faces of cells lie beside the facets of the
-    /// mesh by up to a spacing.
+    /// Returns true for a face of particles of this spacing, m, that stands for a facet of the set: from half
+    /// a spacing in front of it, no other facet of the mesh is nearer. Faces of cells lie beside the facets
+    /// of the mesh by up to a spacing.
     pub fn has_face(&self, face: &SurfaceFace<D>, spacing: f64) -> bool {
         let before = std::array::from_fn(|d| face.place[d] + 0.5 * spacing * face.normal[d]);
         match self {

@@ -19,8 +19,8 @@ pub(super) const LEAST_WALL: f64 = 1.75;
 /// Adds the pressures of boundaries to loads that follow curves.
 ///
 /// # Errors
-/// A pressure in plane stress without a thickness, with a curve for each component, on a region without faces,
-/// or on a wall that is too thin for its horizon.
+/// A pressure in plane stress without a thickness, with a curve for each component, on a region without
+/// faces, or on a wall that is too thin for its horizon.
 pub(super) fn add<const D: usize>(
     source: &Source,
     scene: &Scene,
@@ -89,8 +89,8 @@ fn thickness<const D: usize>(
     }
     if scene.material.solid.is_none() || scene.remembers() {
         let found = if scene.remembers() { "a solid with a state" } else { "a bond law" };
-        let allowed = "a `solid` without `branch` and `mullins`, which gives the thickness; or `plane-strain` \
-                       or `solid`: in plane stress the area changes with the thickness";
+        let allowed = "a `solid` without `branch` and `mullins`, which gives the thickness; or \
+                       `plane-strain` or `solid`: in plane stress the area changes with the thickness";
         return Err(source.error(key, format!("a pressure in `plane-stress` on {found}"), allowed));
     }
     let (solid, _) = solid_of_parts(source, scene, body)?;

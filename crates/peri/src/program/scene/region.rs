@@ -117,8 +117,8 @@ impl<const D: usize> BoundaryExtent<D> {
         shaped && self.set.as_ref().is_none_or(|set| set.contains(place))
     }
 
-    /// Returns true if the region contains a face of a body of this spacing, m; of a set of faces, if they are
-    /// the nearest of the mesh to it.
+    /// Returns true if the region contains a face of a body of this spacing, m; of a set of faces, if they
+    /// are the nearest of the mesh to it.
     pub(super) fn has_face(&self, face: &SurfaceFace<D>, spacing: f64) -> bool {
         match &self.set {
             Some(set) => set.has_face(face, spacing),
