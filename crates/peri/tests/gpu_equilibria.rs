@@ -170,7 +170,8 @@ impl<const D: usize> Case<D> {
                 assert!((a - b).abs() <= 10.0 * bound, "{name}, {what} at {}: {a:e} {b:e}", host.factor);
             }
         }
-        if counts[0].total_iterations == counts[1].total_iterations {
+        // of L-BFGS the iterates are others, and so are the evaluations of its line searches
+        if apart == 1 && counts[0].total_iterations == counts[1].total_iterations {
             assert_eq!(counts[0], counts[1], "{name}: work");
         }
     }
