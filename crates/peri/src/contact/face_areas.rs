@@ -72,10 +72,12 @@ impl FaceAreas {
 }
 
 /// Depth below a side from which a face parallel to it is no part of the side, in spacings.
+#[cfg(feature = "case")]
 const STEP: f64 = 0.5;
 
 /// Areas of a side, m²: of the particles whose area vector is not that of the side alone, ascending; and of
 /// the whole side where slots and steps lie below it.
+#[cfg(feature = "case")]
 pub struct SideAreas {
     pub shared: Vec<(u32, f64)>,
     pub whole: Option<f64>,
@@ -86,6 +88,7 @@ pub struct SideAreas {
 /// projection. The floors of slots and steps, flat faces below the outermost flat one, are no part of a side,
 /// unless faces are those of cells (`smooth` false): these are steps everywhere. `load` as in
 /// [`FaceAreas::new`].
+#[cfg(feature = "case")]
 pub fn side_areas<const D: usize>(
     bonds: &dyn BodyGeometry<D>,
     surface: &BodySurface<D>,

@@ -56,6 +56,7 @@ use crate::error::Error;
 use crate::field::{CHUNK, Field};
 use crate::parallel;
 use crate::surface::BodySurface;
+#[cfg(feature = "case")]
 pub(crate) use face_areas::{DEPTH, SideAreas, side_areas};
 pub(crate) use faces::Faces;
 pub use flight::{Flight, Inertia};
