@@ -1,6 +1,6 @@
 //! Readers of mesh files: [`gmsh`] (MSH 2 and 4, text and binary), [`abaqus`] (input files of Abaqus and
-//! CalculiX), [`stl`] (closed surfaces); with the feature `results` also `vtu` (VTK's unstructured grids) and
-//! `exodus` (Exodus II).
+//! CalculiX), [`stl`] (closed surfaces); with the feature `results` also `vtu` (VTK's unstructured grids),
+//! `exodus` (Exodus II) and `dxf` (outlines of drawings).
 //!
 //! A file becomes a [`MeshFile`]: nodes, elements, named sets, with the line of each for messages. What they
 //! mean is up to the reader of the file: `crystfem` makes a finite element mesh of it, `peri` fills it with
@@ -8,6 +8,8 @@
 
 pub mod abaqus;
 mod content;
+#[cfg(feature = "results")]
+pub mod dxf;
 mod error;
 #[cfg(feature = "results")]
 pub mod exodus;

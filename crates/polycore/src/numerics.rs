@@ -13,7 +13,7 @@ pub mod nonnegative;
 pub mod sets;
 
 pub use bisection::{bisect, bisected};
-pub use bounds::{bounds, range};
+pub use bounds::{bounds, range, segments_meet};
 #[cfg(feature = "solvers")]
 pub use conjugate_gradients::conjugate_gradients;
 pub use groups::Groups;

@@ -14,6 +14,16 @@ pub fn bounds<const D: usize>(points: impl IntoIterator<Item = [f64; D]>) -> [[f
     [low, high]
 }
 
+/// Returns true if two segments in the plane of the first two axes meet.
+pub fn segments_meet<const D: usize>([a, b]: [[f64; D]; 2], [p, q]: [[f64; D]; 2]) -> bool {
+    let side = |p: [f64; D], q: [f64; D], at: [f64; D]| {
+        let cross = (q[0] - p[0]) * (at[1] - p[1]) - (q[1] - p[1]) * (at[0] - p[0]);
+        if cross == 0.0 { 0.0 } else { cross.signum() }
+    };
+    let within = |d: usize| a[d].min(b[d]) <= p[d].max(q[d]) && p[d].min(q[d]) <= a[d].max(b[d]);
+    side(a, b, p) * side(a, b, q) <= 0.0 && side(p, q, a) * side(p, q, b) <= 0.0 && within(0) && within(1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,10 +1,11 @@
-//! Shapes inside closed facets: cells of mesh files, STL surfaces, polygons.
+//! Shapes inside closed facets: cells of mesh files, STL surfaces, drawings, polygons.
 
 use super::mesh_cells::CellMesh;
 use super::values::{DiscreteBody, plain, positive, required, vector};
 use super::{Scene, ShapeSpec};
-use crate::geometry::{Enclosure, Lattice, Operation, Parts, Shape, cell};
+use crate::geometry::{Enclosure, Facet, Lattice, Operation, Parts, Shape, cell};
 use harness::scene::{SceneError, Source};
+use polycore::numerics::segments_meet;
 use polycore::units::Length;
 use std::sync::Arc;
 
@@ -27,6 +28,12 @@ pub(super) fn mesh_shape<const D: usize>(
     let unit = required(source, &unit_key, spec.unit, "the file has none")?;
     let ending = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     let at = |error: String| source.refused(&file_key, format!("{}: {error}", file.display()));
+    if spec.layer.is_some() && ending != "dxf" {
+        return Err(source.unexpected(&format!("{key}.layer"), "only drawings (`.dxf`) have layers"));
+    }
+    if ending == "dxf" {
+        return outline(source, key, spec, unit.si());
+    }
     if ending == "stl" {
         if D == 2 {
             let allowed = "a mesh of triangles and quadrangles";
@@ -44,7 +51,7 @@ pub(super) fn mesh_shape<const D: usize>(
         return Ok(enclosed(Enclosure::new(facets).map_err(|error| at(error.to_string()))?));
     }
     if !meshfile::is_mesh(file) {
-        let allowed = format!("{} or `.stl`", meshfile::FORMATS);
+        let allowed = format!("{}, `.stl` or, in a plane body, `.dxf`", meshfile::FORMATS);
         return Err(source.error(&file_key, format!("`{}`", file.display()), allowed));
     }
     let mesh = CellMesh::<D>::read(source, &file_key, &unit_key, file, unit)?;
@@ -76,6 +83,53 @@ pub(super) fn mesh_shape<const D: usize>(
         return Err(source.error(&file_key, found, "each cell once, and none inside of another"));
     }
     Ok(enclosed(body))
+}
+
+/// Builds the shape of the outline of a drawing.
+///
+/// # Errors
+/// In 3D, with a block, and as [`meshfile::dxf::read`].
+fn outline<const D: usize>(
+    source: &Source,
+    key: &str,
+    spec: &ShapeSpec,
+    unit: f64,
+) -> Result<Shape<D>, SceneError> {
+    let [file_key, unit_key] = ["file", "unit"].map(|name| format!("{key}.{name}"));
+    let file = spec.file.as_deref().unwrap_or_else(|| "".as_ref());
+    if D != 2 {
+        return Err(source.error(&file_key, "a drawing in a solid", "a mesh, or an STL surface"));
+    }
+    if spec.block.is_some() {
+        return Err(source.unexpected(&format!("{key}.block"), "a drawing has a `layer`"));
+    }
+    positive(source, &unit_key, unit, "m")?;
+    let outline = meshfile::dxf::read(&source.file(file), unit, spec.layer.as_deref())
+        .map_err(|error| source.refused(&file_key, error.to_string()))?;
+    let corner = |point: [f64; 2]| -> [f64; D] { std::array::from_fn(|d| point[d.min(1)]) };
+    let sides = |points: &Vec<[f64; 2]>| -> Vec<Facet<D>> {
+        let ends = |k: usize| std::array::from_fn(|end| corner(points[(k + end) % points.len()]));
+        (0..points.len()).map(ends).collect()
+    };
+    let body = Enclosure::new(outline.loops.iter().flat_map(sides).collect())
+        .map_err(|error| source.refused(&file_key, format!("{}: {error}", file.display())))?;
+    Ok(enclosed(body))
+}
+
+/// Notes of the readers of drawings and closed surfaces.
+pub(super) fn notes(source: &Source, scene: &Scene) -> Vec<String> {
+    let read = |shape: &ShapeSpec| {
+        let (file, unit) = shape.file.as_ref().zip(shape.unit)?;
+        let path = source.file(file);
+        let ending = file.extension()?.to_string_lossy().to_lowercase();
+        let notes = match ending.as_str() {
+            "dxf" => meshfile::dxf::read(&path, unit.si(), shape.layer.as_deref()).ok()?.notes,
+            "stl" => meshfile::stl::read(&path, unit.si()).ok()?.notes,
+            _ => return None,
+        };
+        Some(notes.into_iter().map(|note| format!("{}: {note}", file.display())).collect::<Vec<_>>())
+    };
+    scene.body.shapes().iter().filter_map(read).flatten().collect()
 }
 
 fn enclosed<const D: usize>(body: Enclosure<D>) -> Shape<D> {
@@ -115,8 +169,8 @@ pub(super) fn polygon<const D: usize>(
         .sum();
     for (one, other) in (0..count).flat_map(|one| (one + 1..count).map(move |other| (one, other))) {
         let neighbours = other == next(one) || one == next(other);
-        if !neighbours && crosses([corners[one], corners[next(one)]], [corners[other], corners[next(other)]])
-        {
+        let edge = |k: usize| [corners[k], corners[next(k)]];
+        if !neighbours && segments_meet(edge(one), edge(other)) {
             let found = format!("edges from corners {one} and {other} that meet");
             return Err(source.error(&key, found, "a polygon whose edges do not cross"));
         }
@@ -127,16 +181,6 @@ pub(super) fn polygon<const D: usize>(
     let facets = (0..count).map(|k| std::array::from_fn(|end| corners[(k + end) % count])).collect();
     let body = Enclosure::new(facets).map_err(|error| source.error(&key, error, "corners around an area"))?;
     Ok(enclosed(body))
-}
-
-/// Returns true if two segments in a plane meet.
-fn crosses<const D: usize>([a, b]: [[f64; D]; 2], [p, q]: [[f64; D]; 2]) -> bool {
-    let side = |p: [f64; D], q: [f64; D], at: [f64; D]| {
-        let cross = (q[0] - p[0]) * (at[1] - p[1]) - (q[1] - p[1]) * (at[0] - p[0]);
-        if cross == 0.0 { 0.0 } else { cross.signum() }
-    };
-    let within = |d: usize| a[d].min(b[d]) <= p[d].max(q[d]) && p[d].min(q[d]) <= a[d].max(b[d]);
-    side(a, b, p) * side(a, b, q) <= 0.0 && side(p, q, a) * side(p, q, b) <= 0.0 && within(0) && within(1)
 }
 
 /// Returns lines for `peri check`: the volume of each shape of a file or polygon, and that of its particles.

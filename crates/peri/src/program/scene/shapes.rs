@@ -30,14 +30,16 @@ pub struct ShapeSpec {
     pub axis: Option<AxisName>,
     /// Corners of a polygon, in order.
     pub points: Option<Vec<Vec<Length>>>,
-    /// File of a mesh: Gmsh `.msh`, Abaqus or CalculiX `.inp`, VTK `.vtu`, Exodus II `.e`, or a closed
-    /// surface, `.stl`.
+    /// File of a mesh: Gmsh `.msh`, Abaqus or CalculiX `.inp`, VTK `.vtu`, Exodus II `.e`; or a closed
+    /// surface, `.stl`, or in a plane body the outline of a drawing, `.dxf`.
     pub file: Option<PathBuf>,
     /// Length of one unit of the file.
     pub unit: Option<Length>,
     /// Cells of the file that form the shape: a physical group of Gmsh, an element set of Abaqus, a block of
     /// Exodus II, the value of an array of VTK (`MaterialIds-2`); default: all.
     pub block: Option<String>,
+    /// Layer of a drawing that has the outline; default: all.
+    pub layer: Option<String>,
     /// Name of the part to which a shape of the body belongs, default: its `block`; of shapes that overlap,
     /// the last one counts.
     pub part: Option<String>,
@@ -147,6 +149,9 @@ pub(super) fn shape<const D: usize>(
     }
     if spec.block.is_some() && kind != ShapeKind::Mesh {
         return Err(source.unexpected(&format!("{key}.block"), format!("a {} has no block", kind.name())));
+    }
+    if spec.layer.is_some() && kind != ShapeKind::Mesh {
+        return Err(source.unexpected(&format!("{key}.layer"), format!("a {} has no layer", kind.name())));
     }
     if spec.part.is_some() && (spec.cut.is_some() || !key.starts_with("body.shapes")) {
         return Err(

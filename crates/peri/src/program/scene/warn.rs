@@ -39,6 +39,7 @@ pub fn warnings<const D: usize>(source: &Source, scene: &Scene, body: &DiscreteB
         .chain(cracks)
         .chain(super::bridges::bridges(body))
         .chain(turns)
+        .chain(super::mesh_shape::notes(source, scene))
         .chain(super::planes::warnings(source, scene, body))
         .chain(super::indenter_place::warnings(source, scene, body))
         .chain(voids)
