@@ -53,7 +53,7 @@ pub fn loops(chains: Vec<Chain>) -> Result<Vec<Vec<[f64; 2]>>, String> {
 fn partners(open: &[Chain], near: f64) -> Result<Vec<usize>, String> {
     let end = |number: usize| {
         let points = &open[number / 2].points;
-        points[if number % 2 == 0 { 0 } else { points.len() - 1 }]
+        points[if number.is_multiple_of(2) { 0 } else { points.len() - 1 }]
     };
     let mut order: Vec<usize> = (0..2 * open.len()).collect();
     order.sort_by(|&a, &b| end(a)[0].total_cmp(&end(b)[0]));

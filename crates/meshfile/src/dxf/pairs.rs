@@ -39,11 +39,11 @@ pub fn count(path: &Path, bytes: &[u8]) -> Result<usize, Error> {
         match code {
             0 if pair[1] == "EOF" => return Ok(count),
             0 => count += usize::from(section == "ENTITIES" && DRAWN.contains(&pair[1])),
-            10..=59 | 210..=239 if section == "ENTITIES" => {
-                if !pair[1].parse::<f64>().is_ok_and(f64::is_finite) {
-                    let what = format!("value of code {code}");
-                    return Err(line_error(path, line + 1, what, pair[1], "a finite number"));
-                }
+            10..=59 | 210..=239
+                if section == "ENTITIES" && !pair[1].parse::<f64>().is_ok_and(f64::is_finite) =>
+            {
+                let what = format!("value of code {code}");
+                return Err(line_error(path, line + 1, what, pair[1], "a finite number"));
             }
             _ => {}
         }
