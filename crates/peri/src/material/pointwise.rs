@@ -353,6 +353,7 @@ impl<M: Material<D>, const D: usize> SolverMaterial<D> for Pointwise<M, D> {
         let mut energies = vec![0.0; bonds.sites()];
         let each: Vec<f64> = parallel::map_each(bonds.particles(), energy);
         bonds.particles().iter().zip(each).for_each(|(&site, energy)| energies[site as usize] = energy);
+        copy_to_images(bonds, &mut energies);
         let released = |bond: &Bond<D>, site: usize| {
             self.material.released_energy(bond, &self.points[site], energies[site]).unwrap_or(0.0)
         };
